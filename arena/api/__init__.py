@@ -1,0 +1,1 @@
+"""The wire: REST, one resource a file."""

@@ -1,0 +1,12 @@
+"""The Django app of arena."""
+
+from __future__ import annotations
+
+from django.apps import AppConfig
+
+
+class ArenaConfig(AppConfig):
+    """From two pictures to a rated table."""
+
+    name = "arena"
+    default_auto_field = "django.db.models.BigAutoField"

@@ -1,0 +1,112 @@
+"""Typed readers of the environment; a wrong value stops the start with a sentence."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable
+from pathlib import Path
+from typing import TypeVar
+from urllib.parse import urlsplit
+
+import dj_database_url
+from django.core.exceptions import ImproperlyConfigured
+
+T = TypeVar("T")
+
+_TRUE, _FALSE = {"1", "true", "yes", "on"}, {"0", "false", "no", "off", ""}
+
+
+def read(name: str, default: T, parse: Callable[[str], T], allowed: str) -> T:
+    """The value of an environment variable, or the default where it is not set.
+
+    Raises:
+        ImproperlyConfigured: The value can't be parsed; the sentence names variable and choices.
+    """
+    raw = os.environ.get(name)
+    if raw is None:
+        return default
+    try:
+        return parse(raw.strip())
+    except (ValueError, KeyError) as error:
+        raise ImproperlyConfigured(f"{name}={raw!r} can't be used: {allowed}.") from error
+
+
+def boolean(name: str, *, default: bool) -> bool:
+    """A switch: 1/true/yes/on or 0/false/no/off."""
+
+    def parse(raw: str) -> bool:
+        word = raw.lower()
+        if word not in _TRUE | _FALSE:
+            raise ValueError(word)
+        return word in _TRUE
+
+    return read(name, default, parse, "use 1 or 0 (true, yes, on; false, no, off)")
+
+
+def integer(name: str, *, default: int, low: int, high: int) -> int:
+    """A whole number from low to high."""
+
+    def parse(raw: str) -> int:
+        number = int(raw)
+        if not low <= number <= high:
+            raise ValueError(raw)
+        return number
+
+    return read(name, default, parse, f"a whole number from {low} to {high} is needed")
+
+
+def names(name: str, *, default: tuple[str, ...]) -> list[str]:
+    """A list, separated by commas."""
+    return list(
+        read(
+            name,
+            default,
+            lambda raw: tuple(part.strip() for part in raw.split(",") if part.strip()),
+            "names separated by commas are needed",
+        )
+    )
+
+
+def choice(name: str, *, default: str, allowed: tuple[str, ...]) -> str:
+    """One word of a closed set."""
+    table = {word: word for word in allowed}
+    return read(
+        name, default, lambda raw: table[raw.lower()], f"one of {', '.join(allowed)} is needed"
+    )
+
+
+def folder(name: str, *, default: Path) -> Path:
+    """An absolute folder; it need not exist yet, but nothing else may stand there."""
+
+    def parse(raw: str) -> Path:
+        path = Path(raw).expanduser().resolve()
+        if path.exists() and not path.is_dir():
+            raise ValueError(raw)
+        return path
+
+    return read(name, default, parse, "a folder is needed, and this is a file")
+
+
+def database(name: str, *, default: str) -> dict[str, object]:
+    """A database by its URL: sqlite:///PATH or postgresql://USER:PASSWORD@HOST:PORT/NAME."""
+
+    def parse(raw: str) -> dict[str, object]:
+        if urlsplit(raw).scheme not in {"sqlite", "postgres", "postgresql"}:
+            raise ValueError(raw)
+        return dict(dj_database_url.parse(raw))
+
+    allowed = "use sqlite:///PATH or postgresql://USER:PASSWORD@HOST:PORT/NAME"
+    return read(name, parse(default), parse, allowed)
+
+
+def redis(name: str, *, default: str) -> str:
+    """The URL of a Redis: redis://HOST:PORT/N, rediss:// or unix (redis+socket:///PATH)."""
+
+    def parse(raw: str) -> str:
+        if urlsplit(raw).scheme not in {"redis", "rediss", "redis+socket"}:
+            raise ValueError(raw)
+        return raw
+
+    return read(
+        name, default, parse, "use redis://HOST:PORT/N, rediss://... or redis+socket:///PATH"
+    )

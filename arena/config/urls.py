@@ -1,0 +1,12 @@
+"""Every address of the product."""
+
+from __future__ import annotations
+
+from django.contrib import admin
+from django.urls import include, path
+
+urlpatterns = [
+    path("admin/", admin.site.urls),
+    path("api/v1/", include("arena.api.urls")),
+    path("", include("arena.web.urls")),
+]

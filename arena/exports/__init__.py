@@ -1,0 +1,1 @@
+"""Snapshots and jobs as tables, files and charts."""

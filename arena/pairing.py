@@ -1,0 +1,1 @@
+"""The planner of matchups: a pure function of seed and rules."""

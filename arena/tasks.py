@@ -1,0 +1,1 @@
+"""Celery tasks of arena: doors that carry one id."""

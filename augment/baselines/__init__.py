@@ -1,0 +1,1 @@
+"""Contestants without a language model."""

@@ -1,0 +1,1 @@
+"""Geometric findings about a modification, as values with numbers."""

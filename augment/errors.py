@@ -1,0 +1,106 @@
+"""Every error of augment says what its reader should do; it carries data and knows no HTTP."""
+
+from __future__ import annotations
+
+
+class AugmentError(Exception):
+    """The root of augment's own errors: its text is a sentence for the person who caused it."""
+
+
+class InvalidDocument(AugmentError):
+    """A file or document breaks its format. Mend the input; nothing of it was kept.
+
+    Args:
+        what: The kind of document, such as "scene" or "Argoverse 2 log".
+        problems: One entry a fault: the path inside the document and what is allowed there.
+    """
+
+    def __init__(self, what: str, problems: list[tuple[str, str]]) -> None:
+        self.what = what
+        self.problems = problems
+        shown = "; ".join(f"{path or '(document)'}: {text}" for path, text in problems[:8])
+        more = f" (and {len(problems) - 8} more)" if len(problems) > 8 else ""
+        super().__init__(f"This {what} can't be read: {shown}{more}")
+
+
+class InvalidModification(AugmentError):
+    """A modification does not fit its scene (unknown id, id taken twice). Ask again or mend it."""
+
+
+class UnknownName(AugmentError):
+    """A name that nobody registered; the sentence lists what is allowed.
+
+    Args:
+        kind: What was looked up ("contestant", "scenario", "variant").
+        name: The value that was given.
+        allowed: The names that would have been understood.
+    """
+
+    def __init__(self, kind: str, name: str, allowed: list[str]) -> None:
+        self.kind = kind
+        self.name = name
+        self.allowed = allowed
+        known = ", ".join(allowed) if allowed else "none yet"
+        super().__init__(f"Unknown {kind} {name!r}. Known: {known}.")
+
+
+class Conflict(AugmentError):
+    """The request contradicts what is stored already (a taken slug, a finished job)."""
+
+
+class InstructionNotUnderstood(AugmentError):
+    """The rule-based contestants refuse rather than guess. An outcome, never retried.
+
+    Args:
+        reason: What was not understood.
+        understood: The parts of the sentence that were read.
+        ignored: The parts that were not.
+    """
+
+    def __init__(
+        self, reason: str, *, understood: tuple[str, ...] = (), ignored: tuple[str, ...] = ()
+    ) -> None:
+        self.reason = reason
+        self.understood = understood
+        self.ignored = ignored
+        super().__init__(reason)
+
+
+class ReplyUnreadable(AugmentError):
+    """A model's answer could not be read. Ask once more with the problems, then give up.
+
+    Args:
+        problems: What was wrong, each a sentence that can go back to the model.
+    """
+
+    def __init__(self, problems: list[str]) -> None:
+        self.problems = problems
+        super().__init__("The answer can't be read: " + "; ".join(problems))
+
+
+class ModelFault(AugmentError):
+    """The wire or the endpoint broke before there was an answer.
+
+    Args:
+        message: What happened, free of keys.
+        retryable: Whether the same request may succeed later.
+        status: The HTTP status, if there was one.
+        retry_after_s: How long the endpoint asked to be left alone.
+    """
+
+    def __init__(
+        self,
+        message: str,
+        *,
+        retryable: bool,
+        status: int | None = None,
+        retry_after_s: float | None = None,
+    ) -> None:
+        self.retryable = retryable
+        self.status = status
+        self.retry_after_s = retry_after_s
+        super().__init__(message)
+
+
+class ModelRefused(AugmentError):
+    """The model answered that it will not do this. An outcome, never retried."""

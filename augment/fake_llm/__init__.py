@@ -1,0 +1,1 @@
+"""The stand-in language-model server: it works from the request alone."""

@@ -1,0 +1,1 @@
+"""One file a format: readers give a Scene, writers take a Modification."""

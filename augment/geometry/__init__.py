@@ -1,0 +1,1 @@
+"""Plane geometry on plain numbers: metres, radians, counter-clockwise from +x."""

@@ -1,0 +1,132 @@
+"""A directed line through points, read by its arc length.
+
+The four verbs of a lane: `position(s, d)`, `project(point)`, `heading_at(s)` and (on the lane)
+`width_at(s)`. s runs along the line from its first point, d to the left of it, both in metres.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from augment.geometry.frames import Pose
+
+FloatArray = NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Projection:
+    """Where a point lies beside a line: along it, left of it (right is negative), and how far."""
+
+    s_m: float
+    d_m: float
+    distance_m: float
+
+
+@dataclass(frozen=True, eq=False)
+class Polyline:
+    """At least two distinct points (P, 2) in metres, in order of travel; repeats are dropped.
+
+    Raises:
+        ValueError: The points are not (P, 2), not finite, or fewer than two remain.
+    """
+
+    points_m: FloatArray
+
+    def __init__(self, points_m: ArrayLike) -> None:
+        points = np.array(points_m, dtype=np.float64)
+        if points.ndim != 2 or points.shape[1] != 2:
+            raise ValueError(f"a line needs points of shape (P, 2), not {points.shape}")
+        if not np.isfinite(points).all():
+            raise ValueError("a line needs finite coordinates")
+        keep = np.ones(len(points), dtype=bool)
+        keep[1:] = np.hypot(*np.diff(points, axis=0).T) > 1e-6
+        points = points[keep]
+        if len(points) < 2:
+            raise ValueError("a line needs at least two distinct points")
+        points.flags.writeable = False
+        object.__setattr__(self, "points_m", points)
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, Polyline) and np.array_equal(self.points_m, other.points_m)
+
+    def __hash__(self) -> int:
+        return hash(self.points_m.tobytes())
+
+    @cached_property
+    def stations_m(self) -> FloatArray:
+        """Arc length at each point, (P,)."""
+        steps = np.hypot(*np.diff(self.points_m, axis=0).T)
+        return np.concatenate([[0.0], np.cumsum(steps)])
+
+    @property
+    def length_m(self) -> float:
+        """The arc length from the first point to the last."""
+        return float(self.stations_m[-1])
+
+    def position(self, s_m: float, d_m: float = 0.0) -> tuple[float, float]:
+        """The point s along the line and d to its left; the ends are extended straight."""
+        index = self._segment(s_m)
+        start, direction = self.points_m[index], self._directions[index]
+        along = s_m - self.stations_m[index]
+        x, y = start + along * direction + d_m * np.array([-direction[1], direction[0]])
+        return float(x), float(y)
+
+    def heading_at(self, s_m: float) -> float:
+        """The direction of travel at s, in (-pi, pi]."""
+        dx, dy = self._directions[self._segment(s_m)]
+        return math.atan2(dy, dx)
+
+    def pose_at(self, s_m: float, d_m: float = 0.0) -> Pose:
+        """Position and direction of travel at s, d to the left."""
+        x_m, y_m = self.position(s_m, d_m)
+        return Pose(x_m=x_m, y_m=y_m, heading_rad=self.heading_at(s_m))
+
+    def project(self, x_m: float, y_m: float) -> Projection:
+        """The nearest place on the line; of equally near ones the first."""
+        starts = self.points_m[:-1]
+        lengths = np.diff(self.stations_m)
+        offset = np.array([x_m, y_m]) - starts
+        along = np.clip((offset * self._directions).sum(axis=1), 0.0, lengths)
+        gap = offset - along[:, None] * self._directions
+        distances = np.hypot(gap[:, 0], gap[:, 1])
+        index = int(np.argmin(distances))
+        direction = self._directions[index]
+        left = direction[0] * offset[index, 1] - direction[1] * offset[index, 0]
+        distance = float(distances[index])
+        return Projection(
+            s_m=float(self.stations_m[index] + along[index]),
+            d_m=math.copysign(distance, left),
+            distance_m=distance,
+        )
+
+    def resampled(self, spacing_m: float) -> Polyline:
+        """Points every `spacing_m` from the start; the last point is kept whatever is left."""
+        stations = np.arange(0.0, self.length_m, spacing_m)
+        if self.length_m - stations[-1] < 1e-6:
+            stations = stations[:-1]
+        return self._at(np.concatenate([stations, [self.length_m]]))
+
+    def between(self, start_m: float, end_m: float) -> Polyline:
+        """The part from arc length `start_m` to `end_m` (clipped to the line)."""
+        low, high = max(0.0, start_m), min(self.length_m, end_m)
+        inner = self.stations_m[(self.stations_m > low) & (self.stations_m < high)]
+        return self._at(np.concatenate([[low], inner, [high]]))
+
+    def _at(self, stations_m: FloatArray) -> Polyline:
+        x = np.interp(stations_m, self.stations_m, self.points_m[:, 0])
+        y = np.interp(stations_m, self.stations_m, self.points_m[:, 1])
+        return Polyline(np.column_stack([x, y]))
+
+    @cached_property
+    def _directions(self) -> FloatArray:
+        steps = np.diff(self.points_m, axis=0)
+        return np.asarray(steps / np.hypot(steps[:, 0], steps[:, 1])[:, None], dtype=np.float64)
+
+    def _segment(self, s_m: float) -> int:
+        index = int(np.searchsorted(self.stations_m, s_m, side="right")) - 1
+        return min(max(index, 0), len(self.points_m) - 2)

@@ -1,0 +1,1 @@
+"""What a sentence asks for: grammar -> typed Intent, with what was understood and what not."""

@@ -1,0 +1,1 @@
+"""Prompts and answers: Scene -> text, text -> Modification, or an error that says where."""

@@ -1,0 +1,180 @@
+"""The entities of a scene: every attribute of the paper's table "Input vectors".
+
+Frame: ego frame. Angles counter-clockwise from +x. Values are frozen; change by `replace`.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from enum import StrEnum
+
+from augment.geometry.frames import Pose
+from augment.geometry.polyline import Polyline
+
+Point = tuple[float, float]
+
+
+class AgentType(StrEnum):
+    """What a traffic agent is: nuPlan's classes, and the bus that interPlan adds to them."""
+
+    EGO_VEHICLE = "EGO_VEHICLE"
+    VEHICLE = "VEHICLE"
+    BUS = "BUS"
+    BICYCLE = "BICYCLE"
+    PEDESTRIAN = "PEDESTRIAN"
+    TRAFFIC_CONE = "TRAFFIC_CONE"
+    BARRIER = "BARRIER"
+    CONSTRUCTION_SIGN = "CONSTRUCTION_SIGN"
+    GENERIC_OBJECT = "GENERIC_OBJECT"
+
+
+class TrafficLight(StrEnum):
+    """The state of a connector's light; `none` means that there is no light."""
+
+    GREEN = "green"
+    YELLOW = "yellow"
+    RED = "red"
+    UNKNOWN = "unknown"
+    NONE = "none"
+
+
+class TurnType(StrEnum):
+    """How a connector leads through its intersection."""
+
+    STRAIGHT = "straight"
+    LEFT = "left"
+    RIGHT = "right"
+    U_TURN = "u_turn"
+
+
+class AreaKind(StrEnum):
+    """What an area is; the union of lanes, connectors and `drivable` areas can be driven on."""
+
+    DRIVABLE = "drivable"
+    WALKWAY = "walkway"
+    CROSSWALK = "crosswalk"
+    INTERSECTION = "intersection"
+    CARPARK = "carpark"
+
+
+class TrafficSide(StrEnum):
+    """On which side of the road people drive; it comes from the map, never from a guess."""
+
+    LEFT = "left"
+    RIGHT = "right"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class TrafficAgent:
+    """A road user or an object: a box with a heading, a speed and the lane that it is on.
+
+    Attributes:
+        id: Short and stable within its scene ("Agent1" is the ego).
+        x_m, y_m: The centre of the box.
+        length_m: Along the heading; width_m: across it.
+        speed_mps: Along the heading, 0 for what stands.
+        lane_id: The lane or connector under the centre, None off every lane.
+        walk_to_m: Where a pedestrian's walk ends (interPlan's end point), None without a walk.
+    """
+
+    id: str
+    type: AgentType
+    x_m: float
+    y_m: float
+    heading_rad: float
+    width_m: float
+    length_m: float
+    speed_mps: float = 0.0
+    lane_id: str | None = None
+    walk_to_m: Point | None = None
+
+    @property
+    def pose(self) -> Pose:
+        """Centre and heading."""
+        return Pose(x_m=self.x_m, y_m=self.y_m, heading_rad=self.heading_rad)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Lane:
+    """A lane between intersections.
+
+    Attributes:
+        centerline: In the direction of travel.
+        width_m: Mean distance between the boundaries.
+        speed_limit_mps: None where the map does not say.
+        left_boundary, right_boundary: In the direction of travel, None where the map has none.
+        left_neighbor, right_neighbor: Ids of adjacent lanes of the same direction, if any.
+    """
+
+    id: str
+    centerline: Polyline
+    width_m: float
+    speed_limit_mps: float | None = None
+    left_boundary: Polyline | None = None
+    right_boundary: Polyline | None = None
+    left_neighbor: str | None = None
+    right_neighbor: str | None = None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class LaneConnector:
+    """The way through an intersection, or the joint between two pieces of one lane.
+
+    Attributes:
+        from_lane, to_lane: Ids of lanes or connectors; None where the map ends.
+    """
+
+    id: str
+    from_lane: str | None
+    to_lane: str | None
+    centerline: Polyline
+    width_m: float
+    traffic_light: TrafficLight = TrafficLight.NONE
+    turn_type: TurnType = TurnType.STRAIGHT
+    speed_limit_mps: float | None = None
+    left_boundary: Polyline | None = None
+    right_boundary: Polyline | None = None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Area:
+    """A polygon given by its boundary points (P >= 3), not closed."""
+
+    id: str
+    kind: AreaKind
+    boundary_m: tuple[Point, ...]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Origin:
+    """Where the ego frame lies in the source's own world frame."""
+
+    frame: str
+    pose: Pose
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Scene:
+    """Ego, traffic, lanes, connectors and areas at one moment, t0.
+
+    Attributes:
+        name: The slug of the scene.
+        ego: Always at (0, 0), heading 0, type EGO_VEHICLE, id "Agent1".
+        agents: All others, nearest to the ego first.
+        provenance: Where it comes from and under which licence, in a sentence.
+    """
+
+    name: str
+    ego: TrafficAgent
+    traffic_side: TrafficSide
+    origin: Origin
+    provenance: str
+    agents: tuple[TrafficAgent, ...] = ()
+    lanes: tuple[Lane, ...] = ()
+    connectors: tuple[LaneConnector, ...] = ()
+    areas: tuple[Area, ...] = field(default=())
+
+    @property
+    def everyone(self) -> tuple[TrafficAgent, ...]:
+        """The ego first, then the others."""
+        return (self.ego, *self.agents)

@@ -1,0 +1,42 @@
+"""What was recorded after t0: the tracks of the others and the ego's own motion.
+
+Frame: the ego frame of t0 (the Scene's frame). T steps.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Track:
+    """One agent over time; row t is NaN where it was not seen.
+
+    Attributes:
+        agent_id: The agent's id in the Scene, or a fresh one for who appears after t0.
+        states: (T, 4): x_m, y_m, heading_rad, speed_mps of the box centre.
+    """
+
+    agent_id: str
+    type: str
+    length_m: float
+    width_m: float
+    states: NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Recording:
+    """The log from t0 on.
+
+    Attributes:
+        times_s: (T,) seconds since t0, the first is 0.
+        ego: (T, 4): x_m, y_m, heading_rad, speed_mps of the ego's geometric centre.
+        tracks: One entry an agent.
+    """
+
+    times_s: NDArray[np.float64]
+    ego: NDArray[np.float64]
+    tracks: tuple[Track, ...]

@@ -1,0 +1,1 @@
+"""Celery tasks of augment: doors that carry one id."""

@@ -1,0 +1,26 @@
+"""What every test shares: recorded data by its variable, and no key of anybody's."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+import pytest
+
+
+@pytest.fixture(scope="session")
+def realdata() -> Path:
+    """The recorded scenes; without REALDATA_DIR a named skip, which CI does not allow."""
+    folder = os.environ.get("REALDATA_DIR")
+    if not folder:
+        pytest.skip("REALDATA_DIR is not set: recorded scenes are not here")
+    path = Path(folder)
+    assert path.is_dir(), f"REALDATA_DIR={folder} is not a folder"
+    return path
+
+
+@pytest.fixture(autouse=True)
+def _no_keys(monkeypatch: pytest.MonkeyPatch) -> None:
+    """No test can spend anybody's money."""
+    for name in ("OPENAI_API_KEY", "OPENAI_ORG_ID", "OPENAI_PROJECT_ID", "OPENAI_BASE_URL"):
+        monkeypatch.delenv(name, raising=False)

@@ -1,0 +1,161 @@
+"""Small hand-made scenes whose right answers can be seen by eye."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+
+from augment.geometry.frames import Pose
+from augment.geometry.polyline import Polyline
+from augment.scene.entities import (
+    AgentType,
+    Area,
+    AreaKind,
+    Lane,
+    LaneConnector,
+    Origin,
+    Scene,
+    TrafficAgent,
+    TrafficLight,
+    TrafficSide,
+    TurnType,
+)
+
+EGO = TrafficAgent(
+    id="Agent1",
+    type=AgentType.EGO_VEHICLE,
+    x_m=0.0,
+    y_m=0.0,
+    heading_rad=0.0,
+    width_m=2.297,
+    length_m=5.176,
+    speed_mps=8.0,
+    lane_id="Lane1",
+)
+
+
+def vehicle(name: str, x_m: float, y_m: float, heading_rad: float = 0.0) -> TrafficAgent:
+    return TrafficAgent(
+        id=name,
+        type=AgentType.VEHICLE,
+        x_m=x_m,
+        y_m=y_m,
+        heading_rad=heading_rad,
+        width_m=2.0,
+        length_m=4.8,
+    )
+
+
+def cone(name: str, x_m: float, y_m: float) -> TrafficAgent:
+    return replace(vehicle(name, x_m, y_m), type=AgentType.TRAFFIC_CONE, width_m=0.5, length_m=0.5)
+
+
+def pedestrian(
+    name: str, x_m: float, y_m: float, walk_to_m: tuple[float, float] | None = None
+) -> TrafficAgent:
+    heading = 0.0 if walk_to_m is None else math.atan2(walk_to_m[1] - y_m, walk_to_m[0] - x_m)
+    return replace(
+        vehicle(name, x_m, y_m, heading),
+        type=AgentType.PEDESTRIAN,
+        width_m=0.791,
+        length_m=0.9,
+        walk_to_m=walk_to_m,
+    )
+
+
+def scene(**changes: object) -> Scene:
+    """A straight two-way street, right-hand traffic: Lane1 is the ego's, Lane2 comes towards it.
+
+    Both lanes are 3.5 m wide and run from x = -50 m to x = 100 m; a walkway on either side.
+    """
+    made = Scene(
+        name="street",
+        ego=EGO,
+        traffic_side=TrafficSide.RIGHT,
+        origin=Origin(frame="test", pose=Pose(x_m=0.0, y_m=0.0, heading_rad=0.0)),
+        provenance="made for a test",
+        lanes=(
+            Lane(
+                id="Lane1",
+                centerline=Polyline([(-50.0, 0.0), (100.0, 0.0)]),
+                width_m=3.5,
+                speed_limit_mps=13.9,
+            ),
+            Lane(
+                id="Lane2",
+                centerline=Polyline([(100.0, 3.5), (-50.0, 3.5)]),
+                width_m=3.5,
+                speed_limit_mps=13.9,
+            ),
+        ),
+        areas=(
+            Area(
+                id="Area1",
+                kind=AreaKind.DRIVABLE,
+                boundary_m=((-50.0, -1.75), (100.0, -1.75), (100.0, 5.25), (-50.0, 5.25)),
+            ),
+            Area(
+                id="Area2",
+                kind=AreaKind.WALKWAY,
+                boundary_m=((-50.0, -4.25), (100.0, -4.25), (100.0, -1.75), (-50.0, -1.75)),
+            ),
+            Area(
+                id="Area3",
+                kind=AreaKind.WALKWAY,
+                boundary_m=((-50.0, 5.25), (100.0, 5.25), (100.0, 7.75), (-50.0, 7.75)),
+            ),
+        ),
+    )
+    return replace(made, **changes)  # type: ignore[arg-type]
+
+
+def curve(radius_m: float = 40.0) -> Scene:
+    """One lane that bends left on a circle of that radius around (0, radius), after 10 m straight.
+
+    Where the bend has turned by an angle a, the lane is at x = 10 + r sin a, y = r (1 - cos a).
+    """
+    angles = np.linspace(0.0, math.pi / 2.0, 91)
+    bend = np.column_stack([10.0 + radius_m * np.sin(angles), radius_m * (1.0 - np.cos(angles))])
+    line = Polyline(np.vstack([[[-50.0, 0.0], [0.0, 0.0]], bend]))
+    return scene(
+        name="curve",
+        lanes=(Lane(id="Lane1", centerline=line, width_m=3.5, speed_limit_mps=8.3),),
+        areas=(),
+    )
+
+
+def junction() -> Scene:
+    """Lane1 ends at x = 20 m; connectors lead straight on (Lane2) and to the left (Lane3)."""
+    left = [
+        (20.0 + 8.0 * math.sin(a), 8.0 - 8.0 * math.cos(a)) for a in np.linspace(0, 1.5708, 19)
+    ]
+    return scene(
+        name="junction",
+        lanes=(
+            Lane(id="Lane1", centerline=Polyline([(-50, 0), (20, 0)]), width_m=3.5),
+            Lane(id="Lane2", centerline=Polyline([(36, 0), (100, 0)]), width_m=3.5),
+            Lane(id="Lane3", centerline=Polyline([(28, 8), (28, 60)]), width_m=3.5),
+        ),
+        connectors=(
+            LaneConnector(
+                id="Connector1",
+                from_lane="Lane1",
+                to_lane="Lane2",
+                centerline=Polyline([(20, 0), (36, 0)]),
+                width_m=3.5,
+                traffic_light=TrafficLight.GREEN,
+            ),
+            LaneConnector(
+                id="Connector2",
+                from_lane="Lane1",
+                to_lane="Lane3",
+                centerline=Polyline(left),
+                width_m=3.5,
+                traffic_light=TrafficLight.RED,
+                turn_type=TurnType.LEFT,
+            ),
+        ),
+        areas=(),
+    )
