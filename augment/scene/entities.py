@@ -104,6 +104,7 @@ class Lane:
         speed_limit_mps: None where the map does not say.
         left_boundary, right_boundary: In the direction of travel, None where the map has none.
         left_neighbor, right_neighbor: Ids of adjacent lanes of the same direction, if any.
+        successors: Ids of the lanes that follow at its end with no intersection between.
     """
 
     id: str
@@ -114,11 +115,12 @@ class Lane:
     right_boundary: Polyline | None = None
     left_neighbor: str | None = None
     right_neighbor: str | None = None
+    successors: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class LaneConnector:
-    """The way through an intersection, or the joint between two pieces of one lane.
+    """One way through an intersection, from one lane to one other.
 
     Attributes:
         from_lane, to_lane: Ids of lanes or connectors; None where the map ends.

@@ -40,6 +40,9 @@ class LaneGraph:
         self.ways: dict[str, Way] = {way.id: way for way in ways}
         self._next: dict[str, list[str]] = {way_id: [] for way_id in self.ways}
         self._previous: dict[str, list[str]] = {way_id: [] for way_id in self.ways}
+        for lane in scene.lanes:
+            for following in lane.successors:
+                self._join(lane.id, following)
         for connector in scene.connectors:
             self._join(connector.from_lane, connector.id)
             self._join(connector.id, connector.to_lane)

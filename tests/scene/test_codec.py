@@ -1,0 +1,249 @@
+from __future__ import annotations
+
+import json
+import math
+from copy import deepcopy
+from typing import Any
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from augment.errors import InvalidDocument
+from augment.geometry.frames import Pose
+from augment.geometry.polyline import Polyline
+from augment.scene.codec import (
+    modification_from_document,
+    modification_to_document,
+    scene_from_document,
+    scene_to_document,
+)
+from augment.scene.entities import (
+    AgentType,
+    Area,
+    AreaKind,
+    Lane,
+    LaneConnector,
+    Origin,
+    Scene,
+    TrafficAgent,
+    TrafficLight,
+    TrafficSide,
+    TurnType,
+)
+from augment.scene.modification import Modification
+from tests.scenes import EGO, cone, curve, junction, pedestrian, scene, vehicle
+
+metres = st.floats(-1000.0, 1000.0)
+points = st.tuples(metres, metres)
+sizes = st.floats(0.1, 50.0)
+limits = st.none() | st.floats(0.5, 60.0)
+
+
+@st.composite
+def lines(draw: st.DrawFn) -> Polyline:
+    steps = draw(st.lists(st.floats(0.01, 9.0), min_size=2, max_size=5))
+    across = draw(st.lists(metres, min_size=len(steps), max_size=len(steps)))
+    x = draw(metres)
+    xs = [x := x + step for step in steps]
+    return Polyline(list(zip(xs, across, strict=True)))
+
+
+def agents(name: str, lane_ids: list[str]) -> st.SearchStrategy[TrafficAgent]:
+    return st.builds(
+        TrafficAgent,
+        id=st.just(name),
+        type=st.sampled_from([kind for kind in AgentType if kind is not AgentType.EGO_VEHICLE]),
+        x_m=metres,
+        y_m=metres,
+        heading_rad=st.floats(-math.pi, math.pi),
+        width_m=sizes,
+        length_m=sizes,
+        speed_mps=st.floats(0.0, 50.0),
+        lane_id=st.none() | st.sampled_from(lane_ids),
+        walk_to_m=st.none() | points,
+    )
+
+
+@st.composite
+def scenes(draw: st.DrawFn) -> Scene:
+    names = [f"Lane{number}" for number in range(1, draw(st.integers(1, 3)) + 1)]
+    some_lane = st.none() | st.sampled_from(names)
+    some_line = st.none() | lines()
+    lanes = tuple(
+        draw(
+            st.builds(
+                Lane,
+                id=st.just(name),
+                centerline=lines(),
+                width_m=sizes,
+                speed_limit_mps=limits,
+                left_boundary=some_line,
+                right_boundary=some_line,
+                left_neighbor=some_lane,
+                right_neighbor=some_lane,
+                successors=st.lists(st.sampled_from(names), unique=True).map(tuple),
+            )
+        )
+        for name in names
+    )
+    connector = st.builds(
+        LaneConnector,
+        id=st.just("Connector1"),
+        from_lane=some_lane,
+        to_lane=some_lane,
+        centerline=lines(),
+        width_m=sizes,
+        traffic_light=st.sampled_from(TrafficLight),
+        turn_type=st.sampled_from(TurnType),
+        speed_limit_mps=limits,
+        left_boundary=some_line,
+        right_boundary=some_line,
+    )
+    area = st.builds(
+        Area,
+        id=st.just("Area1"),
+        kind=st.sampled_from(AreaKind),
+        boundary_m=st.lists(points, min_size=3, max_size=6, unique=True).map(tuple),
+    )
+    pose = st.builds(Pose, x_m=metres, y_m=metres, heading_rad=st.floats(-math.pi, math.pi))
+    return Scene(
+        name=draw(st.text(min_size=1, max_size=20)),
+        ego=EGO,
+        traffic_side=draw(st.sampled_from(TrafficSide)),
+        origin=Origin(frame="somewhere", pose=draw(pose)),
+        provenance="made for a test",
+        agents=tuple(draw(agents(f"Agent{n}", names)) for n in range(2, draw(st.integers(2, 5)))),
+        lanes=lanes,
+        connectors=(draw(connector),),
+        areas=(draw(area),),
+    )
+
+
+@given(scenes())
+def test_a_scene_survives_the_way_through_json_exactly(given_scene: Scene) -> None:
+    text = json.dumps(scene_to_document(given_scene), allow_nan=False)
+    assert scene_from_document(json.loads(text)) == given_scene
+
+
+@given(agents("Agent2", ["Lane1"]), agents("Agent3", ["Lane1"]))
+def test_a_modification_survives_the_way_through_json_exactly(
+    first: TrafficAgent, second: TrafficAgent
+) -> None:
+    change = Modification(added=(first,), moved=(second,), removed=("Agent4",))
+    text = json.dumps(modification_to_document(change), allow_nan=False)
+    assert modification_from_document(json.loads(text)) == change
+
+
+@pytest.mark.parametrize("hand_made", [scene(), curve(), junction()])
+def test_the_scenes_of_the_tests_are_documents(hand_made: Scene) -> None:
+    assert scene_from_document(scene_to_document(hand_made)) == hand_made
+
+
+def document() -> dict[str, Any]:
+    busy = scene(agents=(vehicle("Agent2", 20.0, 0.0), cone("Agent3", 5.0, 1.0)))
+    made = scene_to_document(busy)
+    made["connectors"] = scene_to_document(junction())["connectors"][:1]
+    return deepcopy(made)
+
+
+def put(made: dict[str, Any], place: list[Any], value: object) -> dict[str, Any]:
+    inner: Any = made
+    for step in place[:-1]:
+        inner = inner[step]
+    inner[place[-1]] = value
+    return made
+
+
+BROKEN = [
+    (["version"], 2, "version: version 2 is not known; this program reads version 1"),
+    (["version"], True, "version: version True"),
+    (["format"], "geojson", "format: expected 'scenario-arena/scene', got 'geojson'"),
+    (["lanes", 1, "centerline_m", 0, 1], "3.5", "lanes[1].centerline_m[0][1]: "),
+    (["lanes", 1, "centerline_m", 0, 1], math.nan, "lanes[1].centerline_m[0][1]: "),
+    (["lanes", 1, "centerline_m", 0, 1], 10**400, "lanes[1].centerline_m[0][1]: "),
+    (["lanes", 1, "centerline_m", 0], [1.0, 2.0, 3.0], "lanes[1].centerline_m[0]: "),
+    (["lanes", 1, "centerline_m"], [[0, 0], [0, 0]], "lanes[1].centerline_m: a line needs"),
+    (["lanes", 1, "id"], "Lane1", "lanes[1].id: 'Lane1' is taken already by lanes[0].id"),
+    (["lanes", 1, "left_neighbor"], "Lane9", "lanes[1].left_neighbor: 'Lane9' is not a lane"),
+    (["lanes", 1, "successors"], ["Lane9"], "lanes[1].successors[0]: 'Lane9' is not a lane"),
+    (["lanes", 1, "width_m"], 0, "lanes[1].width_m: "),
+    (["lanes", 1, "colour"], "red", "lanes[1].colour: is not a field of this format"),
+    (["connectors", 0, "to_lane"], "Lane9", "connectors[0].to_lane: 'Lane9' is not a lane"),
+    (["connectors", 0, "traffic_light"], "blue", "connectors[0].traffic_light: "),
+    (["areas", 0, "boundary_m"], [[0, 0], [1, 0]], "areas[0].boundary_m: "),
+    (["areas", 0, "boundary_m"], [[0, 0], [1, 0], [0, 0]], "areas[0].boundary_m: an area needs"),
+    (["agents", 1, "type"], "UNICORN", "agents[1].type: "),
+    (["agents", 1, "type"], "EGO_VEHICLE", "agents[1].type: there is one ego"),
+    (["agents", 1, "lane_id"], "Lane9", "agents[1].lane_id: 'Lane9' is not a lane"),
+    (["agents", 1, "length_m"], math.inf, "agents[1].length_m: "),
+    (["agents", 1, "speed_mps"], True, "agents[1].speed_mps: "),
+    (["ego", "x_m"], 0.5, "ego.x_m: the ego is the origin"),
+    (["ego", "type"], "VEHICLE", "ego.type: the ego is EGO_VEHICLE"),
+    (["agents"], None, "agents: "),
+]
+
+
+@pytest.mark.parametrize(("place", "value", "sentence"), BROKEN)
+def test_every_fault_is_named_with_its_place(
+    place: list[Any], value: object, sentence: str
+) -> None:
+    with pytest.raises(InvalidDocument) as caught:
+        scene_from_document(put(document(), place, value))
+    assert sentence in str(caught.value)
+
+
+def test_a_missing_field_is_named() -> None:
+    made = document()
+    del made["lanes"][0]["width_m"]
+    with pytest.raises(InvalidDocument) as caught:
+        scene_from_document(made)
+    assert caught.value.problems == [("lanes[0].width_m", "is missing")]
+
+
+@pytest.mark.parametrize("thing", [None, 3, "scene", [], [{}]])
+def test_what_is_no_object_is_no_scene(thing: object) -> None:
+    with pytest.raises(InvalidDocument, match="expected an object"):
+        scene_from_document(thing)
+
+
+def test_all_faults_are_named_at_once() -> None:
+    made = put(put(document(), ["ego", "width_m"], -1), ["agents", 0, "x_m"], None)
+    with pytest.raises(InvalidDocument) as caught:
+        scene_from_document(made)
+    assert [place for place, _ in caught.value.problems] == ["ego.width_m", "agents[0].x_m"]
+
+
+def test_what_could_not_be_read_is_not_written() -> None:
+    with pytest.raises(InvalidDocument, match=r"agents\[0\]\.x_m"):
+        scene_to_document(scene(agents=(vehicle("Agent2", math.nan, 0.0),)))
+
+
+def test_a_modification_names_each_agent_once() -> None:
+    change = Modification(added=(cone("Agent2", 1.0, 0.0),), removed=("Agent2",))
+    with pytest.raises(InvalidDocument, match=r"remove\[0\]: 'Agent2' is taken already by add"):
+        modification_to_document(change)
+
+
+def test_nobody_adds_a_second_ego() -> None:
+    change = modification_to_document(Modification(added=(cone("Agent2", 1.0, 0.0),)))
+    change["add"][0]["type"] = "EGO_VEHICLE"
+    with pytest.raises(InvalidDocument, match=r"add\[0\]\.type"):
+        modification_from_document(change)
+
+
+def test_documents_say_their_units() -> None:
+    change = Modification(added=(pedestrian("Agent2", 12.0, -4.0, (12.0, 4.0)),))
+    assert modification_to_document(change)["add"] == [
+        {
+            "id": "Agent2",
+            "type": "PEDESTRIAN",
+            "x_m": 12.0,
+            "y_m": -4.0,
+            "heading_rad": math.pi / 2,
+            "width_m": 0.791,
+            "length_m": 0.9,
+            "speed_mps": 0.0,
+            "walk_to_m": [12.0, 4.0],
+        }
+    ]
