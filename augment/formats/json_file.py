@@ -1,0 +1,44 @@
+"""JSON files from outside, read once and without surprises."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+from augment.errors import InvalidDocument
+
+MAX_BYTES = 64 * 1024 * 1024
+
+
+def read_json(file: Path, *, what: str) -> object:
+    """What the JSON file holds.
+
+    Args:
+        file: A file in UTF-8 of at most `MAX_BYTES`.
+        what: The kind of document, for the sentence.
+
+    Raises:
+        InvalidDocument: No such file, too large, no JSON, or a name twice in one object.
+    """
+    try:
+        size = file.stat().st_size
+        if size > MAX_BYTES:
+            text = f"{size} bytes; at most {MAX_BYTES} are read"
+            raise InvalidDocument(what, [(file.name, text)])
+        return json.loads(file.read_text(encoding="utf-8"), object_pairs_hook=_object)
+    except OSError as fault:
+        raise InvalidDocument(what, [(str(file), fault.strerror or "can't be read")]) from None
+    except RecursionError:
+        raise InvalidDocument(what, [(file.name, "is nested too deeply")]) from None
+    except ValueError as fault:  # not JSON, not UTF-8, or a number of thousands of digits
+        raise InvalidDocument(what, [(file.name, f"is not JSON: {fault}")]) from None
+
+
+def _object(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
+    made = dict(pairs)
+    if len(made) < len(pairs):
+        names = [name for name, _ in pairs]
+        doubled = sorted({name for name in names if names.count(name) > 1})
+        raise ValueError(f"named twice in one object: {', '.join(doubled)}")
+    return made

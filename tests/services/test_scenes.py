@@ -1,0 +1,118 @@
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+from django.contrib.auth.models import User
+
+from augment.errors import Conflict, InvalidDocument, InvalidModification, UnknownName
+from augment.models import BaseScene, Event, Scenario
+from augment.scene.codec import modification_to_document, scene_to_document
+from augment.scene.modification import Modification
+from augment.services.scenes import add_scenario, import_scene, reference_of, scene_of
+from tests.scenes import cone, scene, vehicle
+
+pytestmark = pytest.mark.django_db
+
+BUSY = scene(agents=(vehicle("Agent2", 20.0, 0.0),))
+
+
+@pytest.fixture
+def file(tmp_path: Path) -> Path:
+    file = tmp_path / "busy.json"
+    file.write_text(json.dumps(scene_to_document(BUSY)))
+    return file
+
+
+@pytest.fixture
+def street(file: Path) -> BaseScene:
+    return import_scene(source="json", path=file, frame=0, slug="street")
+
+
+def scenario(**changes: object) -> Scenario:
+    asked = {
+        "scene": "street",
+        "type": "jaywalking_pedestrian",
+        "instruction": "add a pedestrian",
+    }
+    return add_scenario(**(asked | changes))  # type: ignore[arg-type]
+
+
+def test_an_imported_scene_carries_its_slug_and_leaves_a_line_in_the_log(file: Path) -> None:
+    ada = User.objects.create_user("ada")
+    row = import_scene(source="json", path=file, frame=0, slug="main-street", actor=ada)
+    assert row.document["name"] == "main-street"
+    assert row.recording is None
+    event = Event.objects.get()
+    assert (event.actor, event.verb, event.object_code) == (ada, "import", str(row.code))
+
+
+def test_a_taken_slug_is_a_conflict(street: BaseScene, file: Path) -> None:
+    with pytest.raises(Conflict, match="a scene called 'street' already"):
+        import_scene(source="json", path=file, frame=0, slug="street")
+
+
+@pytest.mark.parametrize("slug", ["", "Main Street", "a--b", "-a", "a/b", "ä", "x" * 81])
+def test_a_slug_keeps_to_its_letters(file: Path, slug: str) -> None:
+    with pytest.raises(InvalidDocument, match="slug"):
+        import_scene(source="json", path=file, frame=0, slug=slug)
+
+
+def test_an_unknown_source_names_the_known_ones(file: Path) -> None:
+    with pytest.raises(UnknownName, match="json"):
+        import_scene(source="osm", path=file, frame=0, slug="street")
+
+
+def test_a_broken_scene_leaves_nothing_behind(file: Path) -> None:
+    file.write_text(file.read_text().replace('"width_m": 3.5', '"width_m": NaN', 1))
+    with pytest.raises(InvalidDocument, match=r"lanes\[0\]\.width_m"):
+        import_scene(source="json", path=file, frame=0, slug="street")
+    assert not BaseScene.objects.exists()
+    assert not Event.objects.exists()
+
+
+@pytest.mark.usefixtures("street")
+def test_a_scenario_without_a_slug_gets_the_next_free_one() -> None:
+    assert [scenario().slug, scenario().slug] == ["street-jaywalker-1", "street-jaywalker-2"]
+    assert scenario(type="avoid_crashed_cars").slug == "street-accident-site-1"
+
+
+@pytest.mark.usefixtures("street")
+def test_traffic_goes_unless_it_is_kept() -> None:
+    assert scene_of(scenario()).agents == ()
+    assert scene_of(scenario(keep_traffic=True)).agents == BUSY.agents
+
+
+@pytest.mark.usefixtures("street")
+def test_a_reference_comes_back_as_it_went_in() -> None:
+    change = Modification(added=(cone("Agent2", 9.0, 0.5),))
+    row = scenario(reference=modification_to_document(change))
+    row.refresh_from_db()
+    assert reference_of(row) == change
+    assert reference_of(scenario()) is None
+
+
+@pytest.mark.usefixtures("street")
+def test_a_reference_has_to_fit_the_scene() -> None:
+    change = modification_to_document(Modification(added=(cone("Agent2", 9.0, 0.5),)))
+    with pytest.raises(InvalidModification, match="Agent2 is in the scene already"):
+        scenario(reference=change, keep_traffic=True)
+    change["add"][0]["lane_id"] = "Lane9"
+    with pytest.raises(InvalidDocument, match="'Lane9' is not a lane"):
+        scenario(reference=change)
+    assert not Scenario.objects.exists()
+
+
+@pytest.mark.usefixtures("street")
+def test_unknown_names_are_refused_with_the_known_ones() -> None:
+    with pytest.raises(UnknownName, match=r"scene 'road'\. Known: street"):
+        scenario(scene="road")
+    with pytest.raises(UnknownName, match="jaywalking_pedestrian"):
+        scenario(type="jaywalker")
+    with pytest.raises(InvalidDocument, match="instruction"):
+        scenario(instruction="  ")
+    scenario(slug="mine")
+    with pytest.raises(Conflict, match="'mine'"):
+        scenario(slug="mine")
+    assert Event.objects.filter(object_kind="scenario").count() == 1
