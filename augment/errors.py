@@ -104,3 +104,39 @@ class ModelFault(AugmentError):
 
 class ModelRefused(AugmentError):
     """The model answered that it will not do this. An outcome, never retried."""
+
+
+class QueueUnreachable(AugmentError):
+    """No broker takes messages. The rows wait and are sent by the next worker that starts.
+
+    Args:
+        address: Where a broker was looked for, free of passwords.
+    """
+
+    def __init__(self, address: str) -> None:
+        self.address = address
+        super().__init__(
+            f"No Redis at {address}: start `manage.py serve` or set REDIS_URL. "
+            "What was queued is kept and runs as soon as a worker starts."
+        )
+
+
+class ClaimLost(AugmentError):
+    """Somebody else works on this row now. Drop the result; the new holder brings its own."""
+
+
+class KeyMissing(AugmentError):
+    """The environment variable that should hold an endpoint's key is not set. Set and retry.
+
+    Args:
+        variable: The name of the variable; its value is never part of any text.
+        endpoint: The label of the endpoint that needs it.
+    """
+
+    def __init__(self, variable: str, endpoint: str) -> None:
+        self.variable = variable
+        self.endpoint = endpoint
+        super().__init__(
+            f"The environment variable {variable}, which holds the key of endpoint "
+            f"{endpoint!r}, is not set where the worker runs."
+        )

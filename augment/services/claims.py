@@ -1,0 +1,218 @@
+"""Who works on which augmentation: one conditional UPDATE decides, never a message.
+
+A message may come twice or never. A row is claimed by exactly one worker, which keeps the claim
+alive by a heartbeat; a claim without one is taken back and the row waits again.
+"""
+
+from __future__ import annotations
+
+import logging
+import uuid
+from collections.abc import Iterable
+from dataclasses import dataclass
+from datetime import datetime, timedelta
+from enum import StrEnum
+from typing import Any
+
+from django.db import transaction
+from django.db.models import Max, Q, QuerySet
+
+from augment.models import Attempt, Augmentation, GenerationJob
+
+logger = logging.getLogger(__name__)
+
+LOST_LIMIT = 5
+"""So many workers in a row may die at one row; then it is the row's fault and it fails."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Claim:
+    """The right to write the outcome of one augmentation, as long as the row carries the token."""
+
+    token: uuid.UUID
+    augmentation_pk: int
+    attempt_pk: int
+    attempt_number: int
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Settlement:
+    """How a try ended.
+
+    Attributes:
+        state: An outcome: done, unreadable, refused or failed.
+        reason: Why there is no modification, as a sentence; empty when done.
+        image: Name of the picture in the media storage, empty when failed.
+    """
+
+    state: Augmentation.State
+    reason: str = ""
+    modification: dict[str, Any] | None = None
+    notes: str = ""
+    image: str = ""
+
+
+class TryEnd(StrEnum):
+    """How an attempt can end beside the outcomes of its augmentation."""
+
+    LOST = "lost"
+    RELEASED = "released"
+
+
+@transaction.atomic
+def claim(*, augmentation_pk: int, now: datetime, worker: str = "") -> Claim | None:
+    """Take a waiting row and open its next attempt.
+
+    Returns:
+        The claim, or None when the row does not wait (any more): somebody else has it, it is
+        done, it was cancelled. A second delivery of a message therefore does nothing.
+    """
+    token = uuid.uuid4()
+    waiting = Augmentation.objects.filter(pk=augmentation_pk, state=Augmentation.State.QUEUED)
+    taken = waiting.update(
+        state=Augmentation.State.RUNNING, claim=token, heartbeat_at=now, finished_at=None
+    )
+    if not taken:
+        return None
+    tries = Attempt.objects.filter(augmentation_id=augmentation_pk)
+    number = (tries.aggregate(last=Max("number"))["last"] or 0) + 1
+    attempt = Attempt.objects.create(
+        augmentation_id=augmentation_pk, number=number, worker=worker, started_at=now
+    )
+    return Claim(
+        token=token,
+        augmentation_pk=augmentation_pk,
+        attempt_pk=attempt.pk,
+        attempt_number=number,
+    )
+
+
+def beat(*, held: Claim, now: datetime) -> bool:
+    """Say that the holder is alive; False when the claim is lost."""
+    return bool(_row_of(held).update(heartbeat_at=now))
+
+
+def is_held(*, held: Claim) -> bool:
+    """Whether the row still carries the claim."""
+    return _row_of(held).exists()
+
+
+def keep_modification(*, held: Claim, modification: dict[str, Any], notes: str) -> bool:
+    """Store what was understood before it is drawn, so that a second try only has to draw.
+
+    Returns:
+        False when the claim is lost; nothing was written then.
+    """
+    return bool(_row_of(held).update(modification=modification, notes=notes))
+
+
+@transaction.atomic
+def settle(*, held: Claim, settlement: Settlement, now: datetime) -> bool:
+    """Write the outcome and close the attempt.
+
+    Returns:
+        False when the claim is lost: the result is dropped, because the row is somebody else's.
+    """
+    changes: dict[str, Any] = {
+        "state": settlement.state,
+        "reason": settlement.reason,
+        "image": settlement.image,
+        "finished_at": now,
+        "claim": None,
+        "heartbeat_at": None,
+    }
+    if settlement.modification is not None:
+        changes |= {"modification": settlement.modification}
+    if settlement.notes:
+        changes |= {"notes": settlement.notes}
+    if not _row_of(held).update(**changes):
+        logger.warning(
+            "Dropped the result of attempt %d at augmentation %d: its claim was taken back.",
+            held.attempt_number,
+            held.augmentation_pk,
+        )
+        return False
+    Attempt.objects.filter(pk=held.attempt_pk).update(
+        finished_at=now, outcome=settlement.state, reason=settlement.reason
+    )
+    return True
+
+
+@transaction.atomic
+def release(*, held: Claim, now: datetime) -> bool:
+    """Give an unfinished row back to the queue; False when the claim is lost already."""
+    if not _row_of(held).update(
+        state=Augmentation.State.QUEUED, claim=None, heartbeat_at=None, sent_at=None
+    ):
+        return False
+    Attempt.objects.filter(pk=held.attempt_pk).update(finished_at=now, outcome=TryEnd.RELEASED)
+    return True
+
+
+def requeue_stale(*, now: datetime, older_than: timedelta) -> list[int]:
+    """Take back every claim whose last heartbeat is older than that.
+
+    Rows of a cancelled job become cancelled. A row that has lost LOST_LIMIT workers in a row
+    fails, so that one that kills its workers can't keep them all busy.
+
+    Returns:
+        Primary keys of the rows that wait again and need a message.
+    """
+    stale = Augmentation.objects.filter(
+        state=Augmentation.State.RUNNING, heartbeat_at__lt=now - older_than
+    )
+    return [row.pk for row in stale.select_related("job") if _take_back(row, now=now)]
+
+
+def unsent(*, now: datetime, older_than: timedelta) -> list[int]:
+    """Waiting rows that have no message, or one so old that it may be lost."""
+    waiting = Augmentation.objects.filter(state=Augmentation.State.QUEUED)
+    lost = Q(sent_at=None) | Q(sent_at__lt=now - older_than)
+    return list(waiting.filter(lost).order_by("pk").values_list("pk", flat=True))
+
+
+def mark_sent(*, ids: Iterable[int], now: datetime) -> None:
+    """Remember when the messages of these rows were sent."""
+    Augmentation.objects.filter(pk__in=list(ids)).update(sent_at=now)
+
+
+# --- Private -----------------------------------------------------------------------------------
+
+
+def _row_of(held: Claim) -> QuerySet[Augmentation]:
+    """The row, if it is still the holder's."""
+    return Augmentation.objects.filter(
+        pk=held.augmentation_pk, state=Augmentation.State.RUNNING, claim=held.token
+    )
+
+
+@transaction.atomic
+def _take_back(seen: Augmentation, *, now: datetime) -> bool:
+    """End a stale claim, unless its holder was heard since; True when the row waits again."""
+    lost = _lost_in_a_row(seen.pk) + 1
+    changes: dict[str, Any] = {"state": Augmentation.State.QUEUED, "sent_at": None}
+    if seen.job.state == GenerationJob.State.CANCELLED:
+        changes = {"state": Augmentation.State.CANCELLED, "finished_at": now}
+    elif lost >= LOST_LIMIT:
+        reason = f"Lost {lost} workers in a row at this one; look for the cause, then retry."
+        changes = {"state": Augmentation.State.FAILED, "finished_at": now, "reason": reason}
+    row = Augmentation.objects.filter(pk=seen.pk, claim=seen.claim, heartbeat_at=seen.heartbeat_at)
+    if not row.update(claim=None, heartbeat_at=None, **changes):
+        return False
+    # The attempt stays without an end: nobody saw it.
+    Attempt.objects.filter(augmentation_id=seen.pk, finished_at=None, outcome="").update(
+        outcome=TryEnd.LOST, reason="The worker stopped without a word."
+    )
+    logger.warning("Took back augmentation %d: silent since %s.", seen.pk, seen.heartbeat_at)
+    return bool(changes["state"] == Augmentation.State.QUEUED)
+
+
+def _lost_in_a_row(pk: int) -> int:
+    """How many of the last attempts before the current one were lost."""
+    ended = Attempt.objects.filter(augmentation_id=pk).exclude(outcome="")
+    count = 0
+    for outcome in ended.order_by("-number").values_list("outcome", flat=True)[:LOST_LIMIT]:
+        if outcome != TryEnd.LOST:
+            break
+        count += 1
+    return count

@@ -1,0 +1,208 @@
+"""Generation jobs: contestants x scenarios, one row a cell, until nothing is under way."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from datetime import datetime
+
+from django.contrib.auth.models import User
+from django.db import transaction
+from django.db.models import Count, Exists, OuterRef, Q
+from django.utils import timezone
+
+from augment.errors import Conflict, UnknownName
+from augment.models import Augmentation, Contestant, GenerationJob, Scenario
+from augment.services.events import log_event
+
+Kind = Contestant.Kind
+State = Augmentation.State
+
+RUNNABLE = (Kind.REFERENCE, Kind.RULE, Kind.LLM, Kind.SIMULATED)
+"""Kinds that a job can run; what humans and outside baselines made is imported."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class JobProgress:
+    """How many rows of a job are in which state."""
+
+    total: int
+    queued: int
+    running: int
+    done: int
+    unreadable: int
+    refused: int
+    failed: int
+    cancelled: int
+
+    @property
+    def under_way(self) -> int:
+        """Rows without an outcome yet."""
+        return self.queued + self.running
+
+    @property
+    def ended(self) -> int:
+        """Rows with an outcome."""
+        return self.total - self.under_way
+
+
+@transaction.atomic
+def launch(
+    *,
+    name: str,
+    contestants: Sequence[str],
+    scenarios: Sequence[str],
+    actor: User | None = None,
+) -> GenerationJob:
+    """Write a job and one waiting row per contestant and scenario; the door sends the messages.
+
+    Args:
+        name: What people call it.
+        contestants: Slugs; a slug given twice counts once.
+        scenarios: Slugs; a slug given twice counts once.
+        actor: Who launches it, None for the machine.
+
+    Raises:
+        UnknownName: A slug that nobody registered.
+        Conflict: Nothing is chosen, a contestant can't be run, or the reference is to run on
+            scenarios that have none.
+    """
+    who = _contestants(contestants)
+    where = _scenarios(scenarios)
+    _refuse_impossible(who, where)
+    job = GenerationJob.objects.create(name=name, launched_by_id=actor.pk if actor else None)
+    job.contestants.set(who)
+    job.scenarios.set(where)
+    Augmentation.objects.bulk_create(
+        Augmentation(job=job, scenario=scenario, contestant=contestant)
+        for scenario in where
+        for contestant in who
+    )
+    after = {
+        "name": name,
+        "contestants": [contestant.slug for contestant in who],
+        "scenarios": [scenario.slug for scenario in where],
+    }
+    log_event(
+        actor=actor, verb="launch", object_kind="job", object_code=str(job.code), after=after
+    )
+    return job
+
+
+def progress(job: GenerationJob) -> JobProgress:
+    """The counts of a job, by one query."""
+    counts = {state.value: Count("pk", filter=Q(state=state)) for state in State}
+    return JobProgress(**job.augmentations.aggregate(total=Count("pk"), **counts))
+
+
+@transaction.atomic
+def cancel(job: GenerationJob, actor: User | None = None) -> GenerationJob:
+    """Cancel what waits; what runs may end and keeps its result.
+
+    Raises:
+        Conflict: The job is over already.
+    """
+    running = GenerationJob.objects.filter(pk=job.pk, state=GenerationJob.State.RUNNING)
+    now = timezone.now()
+    if not running.update(state=GenerationJob.State.CANCELLED, finished_at=now):
+        job.refresh_from_db()
+        raise Conflict(f"Job {job.name!r} is {job.get_state_display().lower()} already.")
+    waiting = Augmentation.objects.filter(job=job, state=State.QUEUED)
+    stopped = waiting.update(state=State.CANCELLED, finished_at=now)
+    log_event(
+        actor=actor,
+        verb="cancel",
+        object_kind="job",
+        object_code=str(job.code),
+        before={"state": GenerationJob.State.RUNNING.value},
+        after={"state": GenerationJob.State.CANCELLED.value, "cancelled": stopped},
+    )
+    job.refresh_from_db()
+    return job
+
+
+@transaction.atomic
+def retry_failed(job: GenerationJob, actor: User | None = None) -> GenerationJob:
+    """Let every failed row wait again; outcomes of the contestants themselves stay.
+
+    Raises:
+        Conflict: The job was cancelled, or nothing in it failed.
+    """
+    open_again = GenerationJob.objects.filter(pk=job.pk).exclude(
+        state=GenerationJob.State.CANCELLED
+    )
+    if not open_again.update(state=GenerationJob.State.RUNNING, finished_at=None):
+        raise Conflict(f"Job {job.name!r} was cancelled; launch a new one instead.")
+    failed = Augmentation.objects.filter(job=job, state=State.FAILED)
+    again = failed.update(state=State.QUEUED, reason="", finished_at=None, sent_at=None)
+    if not again:
+        raise Conflict(f"Nothing in job {job.name!r} failed; there is nothing to try again.")
+    log_event(
+        actor=actor,
+        verb="retry",
+        object_kind="job",
+        object_code=str(job.code),
+        after={"queued": again},
+    )
+    job.refresh_from_db()
+    return job
+
+
+def finish_if_over(*, now: datetime, job_pk: int | None = None) -> int:
+    """Finish the job, or every running job, in which nothing is under way.
+
+    To be called after an outcome is committed, never in its transaction: two workers that end
+    the last two rows at once would each still see the other's row under way.
+
+    Returns:
+        How many jobs were finished by this call.
+    """
+    under_way = Augmentation.objects.filter(job=OuterRef("pk"), state__in=Augmentation.UNDER_WAY)
+    over = GenerationJob.objects.filter(~Exists(under_way), state=GenerationJob.State.RUNNING)
+    if job_pk is not None:
+        over = over.filter(pk=job_pk)
+    return over.update(state=GenerationJob.State.FINISHED, finished_at=now)
+
+
+# --- Private -----------------------------------------------------------------------------------
+
+
+def _contestants(slugs: Sequence[str]) -> list[Contestant]:
+    """The rows in the given order."""
+    found = {row.slug: row for row in Contestant.objects.filter(slug__in=slugs)}
+    for slug in slugs:
+        if slug not in found:
+            known = Contestant.objects.values_list("slug", flat=True)
+            raise UnknownName("contestant", slug, list(known))
+    return [found[slug] for slug in dict.fromkeys(slugs)]
+
+
+def _scenarios(slugs: Sequence[str]) -> list[Scenario]:
+    """The rows in the given order, without their scenes."""
+    found = {row.slug: row for row in Scenario.objects.filter(slug__in=slugs)}
+    for slug in slugs:
+        if slug not in found:
+            known = Scenario.objects.values_list("slug", flat=True)
+            raise UnknownName("scenario", slug, list(known))
+    return [found[slug] for slug in dict.fromkeys(slugs)]
+
+
+def _refuse_impossible(who: list[Contestant], where: list[Scenario]) -> None:
+    """Raise Conflict for a job that could not run to its end."""
+    if not who:
+        raise Conflict("Choose at least one contestant.")
+    if not where:
+        raise Conflict("Choose at least one scenario.")
+    strangers = [row.slug for row in who if row.kind not in RUNNABLE]
+    if strangers:
+        raise Conflict(
+            f"A job can't run {', '.join(strangers)}: what humans or outside programs made is "
+            "imported."
+        )
+    references = [row.slug for row in who if row.kind == Kind.REFERENCE]
+    without = [row.slug for row in where if row.reference is None]
+    if references and without:
+        raise Conflict(
+            f"{references[0]} can't run on scenarios without a reference modification: "
+            f"{', '.join(without)}."
+        )

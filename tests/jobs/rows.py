@@ -1,0 +1,77 @@
+"""Rows for the tests of jobs: a street, a scenario, contestants and a launched job."""
+
+from __future__ import annotations
+
+from datetime import UTC, datetime, timedelta
+from typing import Any
+
+from augment.models import Augmentation, BaseScene, Contestant, Endpoint, GenerationJob, Scenario
+from augment.scene.codec import modification_to_document, scene_to_document
+from augment.scene.entities import Scene
+from augment.scene.modification import Modification
+from augment.services import claims, jobs
+from tests.scenes import cone
+from tests.scenes import scene as street
+
+NOON = datetime(2026, 11, 20, 12, 0, tzinfo=UTC)
+STALE = timedelta(seconds=20)
+INSTRUCTION = "Place a traffic cone on the ego's lane 20 m in front of the ego."
+TWO_CONES = Modification(added=(cone("Agent2", 20.0, 0.5), cone("Agent3", 25.0, -0.5)))
+
+
+def add_scenario(slug: str, *, scene: Scene | None = None, **columns: Any) -> Scenario:
+    base = BaseScene.objects.create(
+        slug=f"{slug}-scene",
+        document=scene_to_document(scene or street(name=f"{slug}-scene")),
+        source="authored",
+        provenance="made for a test",
+    )
+    columns = {
+        "type": Scenario.Type.CONSTRUCTION_ZONE,
+        "instruction": INSTRUCTION,
+        "reference": modification_to_document(TWO_CONES),
+    } | columns
+    return Scenario.objects.create(slug=slug, base_scene=base, **columns)
+
+
+def add_kind(slug: str, kind: str = Contestant.Kind.REFERENCE) -> Contestant:
+    return Contestant.objects.create(slug=slug, name=slug, kind=kind)
+
+
+def add_model(slug: str, *, endpoint: Endpoint, model: str) -> Contestant:
+    kind = Contestant.Kind.SIMULATED if endpoint.is_simulated else Contestant.Kind.LLM
+    return Contestant.objects.create(
+        slug=slug, name=slug, kind=kind, variant="otm", endpoint=endpoint, model=model
+    )
+
+
+def launch(*, scenarios: int = 1, contestants: tuple[str, ...] = ("reference",)) -> GenerationJob:
+    for slug in contestants:
+        if not Contestant.objects.filter(slug=slug).exists():
+            add_kind(slug)
+    places = [add_scenario(f"street-{number}") for number in range(1, scenarios + 1)]
+    return jobs.launch(
+        name="Round 1", contestants=list(contestants), scenarios=[row.slug for row in places]
+    )
+
+
+def only_row(job: GenerationJob) -> Augmentation:
+    return job.augmentations.get()
+
+
+def claimed(row: Augmentation, now: datetime = NOON) -> claims.Claim:
+    held = claims.claim(augmentation_pk=row.pk, now=now, worker="here")
+    assert held is not None
+    return held
+
+
+def failed(reason: str = "the wire broke") -> claims.Settlement:
+    return claims.Settlement(state=Augmentation.State.FAILED, reason=reason)
+
+
+def done() -> claims.Settlement:
+    return claims.Settlement(
+        state=Augmentation.State.DONE,
+        modification=modification_to_document(TWO_CONES),
+        image="bev/x.png",
+    )

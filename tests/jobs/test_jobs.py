@@ -1,0 +1,168 @@
+from __future__ import annotations
+
+import pytest
+from django.contrib.auth.models import User
+from pytest_django import DjangoAssertNumQueries
+
+from augment.errors import Conflict, UnknownName
+from augment.models import Augmentation, Contestant, Event, GenerationJob
+from augment.services import claims, jobs
+from tests.jobs.rows import NOON, add_kind, add_scenario, claimed, done, failed, launch
+
+pytestmark = pytest.mark.django_db
+State = Augmentation.State
+
+
+def test_a_job_gets_one_waiting_row_per_cell() -> None:
+    add_kind("rule-placer", Contestant.Kind.RULE)
+    job = launch(scenarios=3, contestants=("reference", "rule-placer"))
+    assert job.state == GenerationJob.State.RUNNING
+    assert jobs.progress(job) == jobs.JobProgress(
+        total=6, queued=6, running=0, done=0, unreadable=0, refused=0, failed=0, cancelled=0
+    )
+    assert set(job.augmentations.values_list("sent_at", flat=True)) == {None}
+
+
+def test_a_launch_is_logged_with_who_and_what() -> None:
+    add_kind("reference")
+    add_scenario("street")
+    admin = User.objects.create_user("admin")
+    job = jobs.launch(name="R", contestants=["reference"], scenarios=["street"], actor=admin)
+    event = Event.objects.get()
+    assert job.launched_by == admin
+    assert (event.actor, event.verb, event.object_code) == (admin, "launch", str(job.code))
+    assert event.after == {"name": "R", "contestants": ["reference"], "scenarios": ["street"]}
+
+
+def test_a_slug_given_twice_counts_once() -> None:
+    add_kind("reference")
+    add_scenario("street")
+    job = jobs.launch(name="R", contestants=["reference"] * 2, scenarios=["street", "street"])
+    assert job.augmentations.count() == 1
+
+
+def test_an_unknown_contestant_stops_the_launch_and_names_the_known() -> None:
+    add_kind("reference")
+    with pytest.raises(UnknownName, match=r"Unknown contestant 'gpt'\. Known: reference"):
+        jobs.launch(name="R", contestants=["gpt"], scenarios=["nowhere"])
+    assert not GenerationJob.objects.exists()
+
+
+def test_an_unknown_scenario_stops_the_launch_and_names_the_known() -> None:
+    add_kind("reference")
+    add_scenario("street")
+    with pytest.raises(UnknownName, match=r"Unknown scenario 'road'\. Known: street"):
+        jobs.launch(name="R", contestants=["reference"], scenarios=["street", "road"])
+
+
+def test_the_reference_can_not_run_where_there_is_none() -> None:
+    add_kind("reference")
+    add_kind("rule-placer", Contestant.Kind.RULE)
+    add_scenario("bare", reference=None)
+    add_scenario("full")
+    with pytest.raises(Conflict, match="without a reference modification: bare"):
+        jobs.launch(name="R", contestants=["reference"], scenarios=["full", "bare"])
+    jobs.launch(name="R", contestants=["rule-placer"], scenarios=["bare"])
+
+
+@pytest.mark.parametrize("empty", ["contestants", "scenarios"])
+def test_a_job_of_nothing_is_refused(empty: str) -> None:
+    add_kind("reference")
+    add_scenario("street")
+    chosen = {"contestants": ["reference"], "scenarios": ["street"]} | {empty: []}
+    with pytest.raises(Conflict, match=f"at least one {empty[:-1]}"):
+        jobs.launch(name="R", contestants=chosen["contestants"], scenarios=chosen["scenarios"])
+
+
+def test_what_a_human_made_can_not_be_run() -> None:
+    add_kind("kevin", Contestant.Kind.HUMAN)
+    add_scenario("street")
+    with pytest.raises(Conflict, match="can't run kevin"):
+        jobs.launch(name="R", contestants=["kevin"], scenarios=["street"])
+
+
+def test_progress_counts_states_by_one_query(
+    django_assert_num_queries: DjangoAssertNumQueries,
+) -> None:
+    job = launch(scenarios=4)
+    first, second, third, _ = job.augmentations.order_by("pk")
+    claims.settle(held=claimed(first), settlement=done(), now=NOON)
+    claims.settle(held=claimed(second), settlement=failed(), now=NOON)
+    claimed(third)
+    with django_assert_num_queries(1):
+        counts = jobs.progress(job)
+    assert (counts.total, counts.queued, counts.running) == (4, 1, 1)
+    assert (counts.done, counts.failed) == (1, 1)
+    assert (counts.under_way, counts.ended) == (2, 2)
+
+
+def test_a_job_is_finished_when_nothing_is_under_way() -> None:
+    job = launch(scenarios=2)
+    first, second = job.augmentations.order_by("pk")
+    claims.settle(held=claimed(first), settlement=done(), now=NOON)
+    assert jobs.finish_if_over(job_pk=job.pk, now=NOON) == 0
+    held = claimed(second)
+    assert jobs.finish_if_over(job_pk=job.pk, now=NOON) == 0
+    claims.settle(held=held, settlement=failed(), now=NOON)
+    assert jobs.finish_if_over(job_pk=job.pk, now=NOON) == 1
+    assert jobs.finish_if_over(job_pk=job.pk, now=NOON) == 0
+    job.refresh_from_db()
+    assert (job.state, job.finished_at) == (GenerationJob.State.FINISHED, NOON)
+
+
+def test_cancel_stops_what_waits_and_keeps_what_is_done_or_runs() -> None:
+    job = launch(scenarios=3)
+    first, second, third = job.augmentations.order_by("pk")
+    claims.settle(held=claimed(first), settlement=done(), now=NOON)
+    held = claimed(second)
+    jobs.cancel(job)
+    assert job.state == GenerationJob.State.CANCELLED
+    third.refresh_from_db()
+    assert third.state == State.CANCELLED
+    assert claims.claim(augmentation_pk=third.pk, now=NOON) is None
+    assert claims.settle(held=held, settlement=done(), now=NOON)
+    assert jobs.finish_if_over(job_pk=job.pk, now=NOON) == 0
+    counts = jobs.progress(job)
+    assert (counts.done, counts.cancelled) == (2, 1)
+    event = Event.objects.filter(verb="cancel").get()
+    assert event.after == {"state": "cancelled", "cancelled": 1}
+
+
+def test_a_job_is_cancelled_once() -> None:
+    job = launch()
+    jobs.cancel(job)
+    with pytest.raises(Conflict, match="is cancelled already"):
+        jobs.cancel(job)
+
+
+def test_retry_queues_failed_rows_alone_and_opens_the_job_again() -> None:
+    job = launch(scenarios=2)
+    first, second = job.augmentations.order_by("pk")
+    claims.settle(held=claimed(first), settlement=failed(), now=NOON)
+    claims.settle(held=claimed(second), settlement=done(), now=NOON)
+    jobs.finish_if_over(now=NOON)
+    jobs.retry_failed(job)
+    assert (job.state, job.finished_at) == (GenerationJob.State.RUNNING, None)
+    first.refresh_from_db()
+    second.refresh_from_db()
+    assert (first.state, first.reason, first.sent_at) == (State.QUEUED, "", None)
+    assert second.state == State.DONE
+    assert claimed(first).attempt_number == 2
+
+
+def test_there_is_nothing_to_retry_where_nothing_failed() -> None:
+    job = launch()
+    row = job.augmentations.get()
+    claims.settle(held=claimed(row), settlement=done(), now=NOON)
+    jobs.finish_if_over(now=NOON)
+    with pytest.raises(Conflict, match="Nothing in job 'Round 1' failed"):
+        jobs.retry_failed(job)
+    job.refresh_from_db()
+    assert job.state == GenerationJob.State.FINISHED
+
+
+def test_a_cancelled_job_is_not_retried() -> None:
+    job = launch()
+    jobs.cancel(job)
+    with pytest.raises(Conflict, match="was cancelled"):
+        jobs.retry_failed(job)
