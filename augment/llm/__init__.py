@@ -1,1 +1,1 @@
-"""Language models over the OpenAI wire: messages, clients, the only door to the network."""
+"""Language models from outside: messages, a client protocol, and the one door to the network."""

@@ -1,0 +1,100 @@
+"""What is sent to a language model and what comes back, in no vendor's words.
+
+Everything that is stored, replayed or shown goes through these values.
+"""
+
+from __future__ import annotations
+
+import base64
+from dataclasses import dataclass
+from enum import StrEnum
+
+DEFAULT_MAX_TOKENS = 8192
+
+
+class Speaker(StrEnum):
+    """Who says a message of a conversation."""
+
+    SYSTEM = "system"
+    USER = "user"
+    ASSISTANT = "assistant"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Message:
+    """One turn of a conversation.
+
+    Attributes:
+        images: PNG files that go with the text, in order; only a user shows images.
+    """
+
+    speaker: Speaker
+    text: str
+    images: tuple[bytes, ...] = ()
+
+    def to_document(self) -> dict[str, object]:
+        """The message in the form of the OpenAI-compatible wire."""
+        if not self.images:
+            return {"role": self.speaker.value, "content": self.text}
+        parts: list[dict[str, object]] = [{"type": "text", "text": self.text}]
+        parts += [{"type": "image_url", "image_url": {"url": _data_url(i)}} for i in self.images]
+        return {"role": self.speaker.value, "content": parts}
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Request:
+    """One question to one model; it knows neither address nor key.
+
+    Attributes:
+        max_tokens: The most that the answer may have, reasoning included.
+        temperature, seed: Left out of the request where None.
+    """
+
+    model: str
+    messages: tuple[Message, ...]
+    max_tokens: int = DEFAULT_MAX_TOKENS
+    temperature: float | None = None
+    seed: int | None = None
+
+    def to_document(self) -> dict[str, object]:
+        """The body of the request on the OpenAI-compatible wire, ready for JSON."""
+        document: dict[str, object] = {
+            "model": self.model,
+            "messages": [message.to_document() for message in self.messages],
+            "max_completion_tokens": self.max_tokens,
+        }
+        if self.temperature is not None:
+            document["temperature"] = self.temperature
+        if self.seed is not None:
+            document["seed"] = self.seed
+        return document
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Reply:
+    """One answer as it came, before anybody reads it. Unknown is None, never zero.
+
+    Attributes:
+        text: The answer, empty where the model said nothing.
+        model: The model id that the server named, empty where it named none.
+        finish_reason: Why the model stopped ("stop", "length", ...), empty where unknown.
+        refusal: What the model said when it declined, None where it did not.
+        latency_s: From sending the request to the whole answer.
+    """
+
+    text: str
+    model: str = ""
+    finish_reason: str = ""
+    refusal: str | None = None
+    prompt_tokens: int | None = None
+    completion_tokens: int | None = None
+    latency_s: float | None = None
+
+    @property
+    def is_cut_off(self) -> bool:
+        """Whether the answer stopped at its length limit."""
+        return self.finish_reason == "length"
+
+
+def _data_url(png: bytes) -> str:
+    return "data:image/png;base64," + base64.b64encode(png).decode("ascii")

@@ -1,0 +1,130 @@
+"""The only door to the network: one OpenAI-compatible endpoint, spoken to with `openai`.
+
+What that package and the many servers make of a fault ends here: the rest of the house sees a
+Reply or a ModelFault. Retries are made above, where every attempt is recorded.
+"""
+
+from __future__ import annotations
+
+import os
+import time
+from types import TracebackType
+from typing import TYPE_CHECKING, Self
+from urllib.parse import urlsplit
+
+from augment.errors import ModelFault
+from augment.llm.messages import Reply, Request
+from augment.llm.wire_faults import Secret, fault_of_status, retry_after_s
+from augment.llm.wire_reply import reply_of
+
+if TYPE_CHECKING:
+    import openai
+
+DEFAULT_TIMEOUT_S = 180.0
+CONNECT_TIMEOUT_S = 10.0
+
+_OPENAI_HOSTS = (".openai.com", ".openai.azure.com")
+_KEYLESS = "no-key"
+"""Sent where an endpoint needs no key: without one the package would look for OPENAI_API_KEY."""
+
+
+class OpenAIWire:
+    """A ChatClient that makes one real HTTP call for each request.
+
+    Args:
+        base_url: Of the endpoint, up to and including "/v1" or its like.
+        api_key: None where the endpoint needs none. It is sent to this endpoint and to nobody
+            else; no fault and no reply ever contains it.
+        timeout_s: The longest silence while waiting for the answer.
+
+    Raises:
+        ModelFault: The key can't be sent, or OPENAI_CUSTOM_HEADERS is set: the package would add
+            those headers to requests to whatever host, and who set them meant OpenAI's.
+    """
+
+    def __init__(
+        self, *, base_url: str, api_key: str | None, timeout_s: float = DEFAULT_TIMEOUT_S
+    ) -> None:
+        if os.environ.get("OPENAI_CUSTOM_HEADERS"):
+            raise ModelFault(
+                "OPENAI_CUSTOM_HEADERS is set and would be sent to every endpoint; unset it",
+                retryable=False,
+            )
+        key = (api_key or "").strip()
+        if not (key.isascii() and key.isprintable() and " " not in key):
+            raise ModelFault("the key has characters that no key may have", retryable=False)
+        self._secret = Secret(key)
+        self._client = _client(base_url, key or _KEYLESS, timeout_s)
+
+    def complete(self, request: Request) -> Reply:
+        """The endpoint's answer to one request.
+
+        Raises:
+            ModelFault: There was none; whether it may come later is said by `retryable`.
+        """
+        import openai
+
+        started = time.monotonic()
+        try:
+            # Typed loosely on purpose: our document is what the wire takes, and is tested so.
+            answer: object = self._client.chat.completions.create(**request.to_document())  # type: ignore[call-overload]
+        except openai.APITimeoutError:
+            fault = ModelFault("the endpoint took too long to answer", retryable=True)
+        except openai.APIConnectionError as error:
+            fault = ModelFault(f"the connection failed: {_cause(error)}", retryable=True)
+        except openai.APIStatusError as error:
+            fault = fault_of_status(
+                error.status_code, error.body, retry_after_s(dict(error.response.headers))
+            )
+        except openai.OpenAIError as error:
+            fault = ModelFault(f"the request failed: {type(error).__name__}", retryable=False)
+        except ValueError:
+            # A body that is no JSON comes through as a bare JSONDecodeError.
+            fault = ModelFault("the endpoint's answer is not valid JSON", retryable=True)
+        else:
+            return reply_of(answer, latency_s=time.monotonic() - started, secret=self._secret)
+        # Outside the handlers, so that nothing of the package's errors (which hold the request
+        # with its headers) hangs on ours.
+        raise self._secret.cleared(fault)
+
+    def close(self) -> None:
+        """Close the connections."""
+        self._client.close()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        self.close()
+
+
+def _client(base_url: str, key: str, timeout_s: float) -> openai.OpenAI:
+    import openai
+
+    host = (urlsplit(base_url).hostname or "").lower()
+    foreign = not f".{host}".endswith(_OPENAI_HOSTS)
+    headers = dict.fromkeys(("OpenAI-Organization", "OpenAI-Project"), openai.omit)
+    return openai.OpenAI(
+        api_key=key,
+        base_url=base_url,
+        max_retries=0,
+        timeout=openai.Timeout(timeout_s, connect=min(CONNECT_TIMEOUT_S, timeout_s)),
+        default_headers=headers if foreign else None,  # type: ignore[arg-type]
+        # A redirect would carry the scene to a host that nobody entered.
+        http_client=openai.DefaultHttpxClient(follow_redirects=False),
+    )
+
+
+def _cause(error: BaseException) -> str:
+    """The kind of the innermost fault; its text may hold parts of the request."""
+    inner = error
+    while inner.__cause__ is not None:
+        inner = inner.__cause__
+    if isinstance(inner, OSError) and inner.strerror:
+        return inner.strerror
+    return type(inner).__name__
