@@ -1,1 +1,1 @@
-"""Prompts and answers: Scene -> text, text -> Modification, or an error that says where."""
+"""From a scene to the text that a model reads, and from its answer to a Modification."""

@@ -1,0 +1,122 @@
+"""The JSON block that counts in a model's answer: found, read strictly, mended very little.
+
+Whatever the text, nothing but ReplyUnreadable comes out of here, and nothing is evaluated.
+"""
+
+from __future__ import annotations
+
+import json
+import re
+
+from augment.errors import ReplyUnreadable
+
+LONGEST_ANSWER = 200_000
+"""Characters; a longer answer is not looked at."""
+
+_FENCE = re.compile(r"^[ \t]*```[^\n`]*\n(.*?)(?:^[ \t]*```|\Z)", re.DOTALL | re.MULTILINE)
+
+
+def last_object(answer: str, keys: frozenset[str]) -> tuple[dict[str, object], bool]:
+    """The last JSON object of the answer that has one of the keys, and whether it was mended.
+
+    A block that names a key but can't be read is not passed over in favour of an earlier draft:
+    the draft may differ from what the model settled on.
+
+    Raises:
+        ReplyUnreadable: There is no such block, or it breaks JSON.
+    """
+    if len(answer) > LONGEST_ANSWER:
+        raise ReplyUnreadable([f"the answer is longer than {LONGEST_ANSWER} characters"])
+    named = re.compile("|".join(rf'"{re.escape(key)}"\s*:' for key in sorted(keys)))
+    for block in _candidates(_without_thoughts(answer)):
+        if not named.search(block):
+            continue
+        found, mended = _loaded(block)
+        if isinstance(found, dict) and keys & found.keys():
+            return found, mended
+    wanted = ", ".join(f'"{key}"' for key in sorted(keys))
+    raise ReplyUnreadable([f"there is no fenced JSON block with the keys {wanted}"])
+
+
+def _without_thoughts(answer: str) -> str:
+    """What follows the last reasoning tag of models that think aloud."""
+    return answer.rpartition("</think>")[2]
+
+
+def _candidates(answer: str) -> list[str]:
+    """Fenced blocks (the last may lack its end), last first; without any, bare objects."""
+    fenced = [match.group(1) for match in _FENCE.finditer(answer)]
+    return (fenced or _bare_objects(answer))[::-1]
+
+
+def _bare_objects(answer: str) -> list[str]:
+    """Outermost {...}, braces in strings not counted; one that never closes runs to the end."""
+    found, depth, start, in_string, escaped = [], 0, 0, False, False
+    for index, character in enumerate(answer):
+        if in_string:
+            in_string = escaped or character != '"'
+            escaped = not escaped and character == "\\"
+        elif character == '"' and depth:
+            in_string = True
+        elif character == "{":
+            start = start if depth else index
+            depth += 1
+        elif character == "}" and depth:
+            depth -= 1
+            if not depth:
+                found.append(answer[start : index + 1])
+    return [*found, answer[start:]] if depth else found
+
+
+def _loaded(block: str) -> tuple[object, bool]:
+    try:
+        return _strict(block), False
+    except _Broken as broken:
+        mended = _mended(block)
+        if mended == block:
+            raise ReplyUnreadable([str(broken)]) from None
+    try:
+        return _strict(mended), True
+    except _Broken as broken:
+        raise ReplyUnreadable([str(broken)]) from None
+
+
+class _Broken(Exception):
+    """The block is not strict JSON; the text says where."""
+
+
+def _strict(block: str) -> object:
+    try:
+        return json.loads(block, parse_constant=_refuse, object_pairs_hook=_once)
+    except json.JSONDecodeError as error:
+        place = f"line {error.lineno}, column {error.colno}"
+        raise _Broken(f"the JSON block breaks at {place}: {error.msg}") from None
+    except RecursionError:
+        raise _Broken("the JSON block is nested too deeply") from None
+    except ValueError:
+        raise _Broken("the JSON block has a number with too many digits") from None
+
+
+def _refuse(constant: str) -> object:
+    raise _Broken(f"{constant} is not a number that a block may hold")
+
+
+def _once(pairs: list[tuple[str, object]]) -> dict[str, object]:
+    found = dict(pairs)
+    if len(found) < len(pairs):
+        doubled = next(key for key, _ in pairs if [k for k, _ in pairs].count(key) > 1)
+        raise _Broken(f"the key {doubled[:40]!a} stands twice in one object")
+    return found
+
+
+_STRING_OR_NOISE = re.compile(
+    r'("(?:[^"\\\n]|\\.)*")'  # a string stays as it is, whatever is in it
+    r"|//[^\n]*|/\*.*?\*/"  # comments go
+    r"|,(?=(?:\s|//[^\n]*(?:\n|$)|/\*.*?\*/)*[}\]])",  # so do commas before a closing bracket
+    re.DOTALL,
+)
+
+
+def _mended(block: str) -> str:
+    """Without comments and trailing commas: what models add and what cannot shift a number."""
+    return _STRING_OR_NOISE.sub(lambda match: match.group(1) or "", block)

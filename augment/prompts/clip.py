@@ -1,0 +1,74 @@
+"""Cutting a map down to what lies around the ego.
+
+Frame: ego frame. P points of a line or boundary.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from augment.geometry.polyline import Polyline
+
+FloatArray = NDArray[np.float64]
+
+_LOOK_EVERY_M = 0.5
+
+
+def line_within(line: Polyline, radius_m: float) -> Polyline | None:
+    """The line from where it first comes within the radius of the origin to where it last does.
+
+    None where it never does, or for less than half a metre.
+    """
+    fine = line.resampled(_LOOK_EVERY_M)
+    inside = np.flatnonzero(np.hypot(*fine.points_m.T) <= radius_m)
+    if len(inside) < 2:
+        return None
+    return line.between(float(fine.stations_m[inside[0]]), float(fine.stations_m[inside[-1]]))
+
+
+def boundary_within(boundary_m: FloatArray, radius_m: float) -> FloatArray:
+    """A boundary (P, 2) cut to the square |x|, |y| <= radius; empty where they do not meet."""
+    points = np.asarray(boundary_m, dtype=np.float64)
+    for axis in (0, 1):
+        for sign in (1.0, -1.0):
+            points = _cut(points, sign * points[:, axis] - radius_m)
+            if len(points) < 3:
+                return np.empty((0, 2))
+    return points
+
+
+def simplified(boundary_m: FloatArray, tolerance_m: float) -> FloatArray:
+    """The boundary (P, 2) without points that lie on the line between their neighbours.
+
+    A point goes where it is within the tolerance of the line from the last kept point to the
+    next one; what is left is at least a triangle.
+    """
+    kept = [boundary_m[0]]
+    for index in range(1, len(boundary_m)):
+        following = boundary_m[(index + 1) % len(boundary_m)]
+        if _off_line(boundary_m[index], kept[-1], following) > tolerance_m:
+            kept.append(boundary_m[index])
+    return np.array(kept) if len(kept) >= 3 else boundary_m
+
+
+def _cut(points: FloatArray, outside_m: FloatArray) -> FloatArray:
+    """The part of a closed boundary where `outside_m`, given at each point, is not positive."""
+    kept: list[FloatArray] = []
+    for index in range(len(points)):
+        before, here = outside_m[index - 1], outside_m[index]
+        if (before > 0.0) != (here > 0.0):
+            share = before / (before - here)
+            kept.append(points[index - 1] + share * (points[index] - points[index - 1]))
+        if here <= 0.0:
+            kept.append(points[index])
+    return np.array(kept).reshape(-1, 2)
+
+
+def _off_line(point: FloatArray, start: FloatArray, end: FloatArray) -> float:
+    along = end - start
+    length = float(np.hypot(*along))
+    offset = point - start
+    if length < 1e-9:
+        return float(np.hypot(*offset))
+    return abs(float(along[0] * offset[1] - along[1] * offset[0])) / length

@@ -1,0 +1,150 @@
+"""A scene as the paper's table of input vectors: separate lists for each kind of entity.
+
+Frame: ego frame, metres to two decimals, radians to three. Lanes are centrelines sampled every
+5 m. Only what lies within a radius of the ego is written down.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Mapping
+
+import numpy as np
+
+from augment.geometry.polyline import Polyline
+from augment.prompts.clip import boundary_within, line_within, simplified
+from augment.prompts.names import ShortNames, number_of, short_names
+from augment.scene.entities import Area, Lane, LaneConnector, Scene, TrafficAgent
+
+SPACING_M = 5.0
+DEFAULT_RADIUS_M = 80.0
+
+Vector = list[object]
+
+_COMPASS = ("East", "Northeast", "North", "Northwest", "West", "Southwest", "South", "Southeast")
+_BOUNDARY_TOLERANCE_M = 0.1
+
+
+def scene_text(scene: Scene, *, radius_m: float = DEFAULT_RADIUS_M) -> str:
+    """The four lists under their headings, one entity a line, and what the lists can't say."""
+    names = short_names(scene)
+    lists = {
+        "Agents": agent_vectors(scene, names, radius_m),
+        "Lanes": lane_vectors(scene, names, radius_m),
+        "Lane connectors": connector_vectors(scene, names, radius_m),
+        "Areas": area_vectors(scene, names, radius_m),
+    }
+    parts = [f"{title}:\n{_listed(vectors)}" for title, vectors in lists.items()]
+    parts.append(f"Traffic drives on the {scene.traffic_side.value}-hand side of the road.")
+    parts.append(f"The first new agent is {names.next_agent}.")
+    return "\n\n".join(parts)
+
+
+def agent_vectors(scene: Scene, names: ShortNames, radius_m: float) -> dict[str, Vector]:
+    """Type, centre x and y, heading, width, length, velocity, lane id, by agent id."""
+    return {
+        names.agents[agent.id]: agent_vector(agent, names)
+        for agent in scene.everyone
+        if math.hypot(agent.x_m, agent.y_m) <= radius_m
+    }
+
+
+def agent_vector(agent: TrafficAgent, names: ShortNames) -> Vector:
+    """One agent as its list of attributes."""
+    return [
+        agent.type.value,
+        _metres(agent.x_m),
+        _metres(agent.y_m),
+        round(agent.heading_rad, 3) + 0.0,
+        _metres(agent.width_m),
+        _metres(agent.length_m),
+        _metres(agent.speed_mps),
+        None if agent.lane_id is None else names.ways.get(agent.lane_id),
+    ]
+
+
+def lane_vectors(scene: Scene, names: ShortNames, radius_m: float) -> dict[str, Vector]:
+    """Lane number, travel direction, direction relative to the ego, width, limit, coordinates."""
+    shown = ((lane, line_within(lane.centerline, radius_m)) for lane in scene.lanes)
+    return {
+        names.ways[lane.id]: _lane_vector(lane, line, names)
+        for lane, line in shown
+        if line is not None
+    }
+
+
+def connector_vectors(scene: Scene, names: ShortNames, radius_m: float) -> dict[str, Vector]:
+    """From lane, to lane, light, turn, speed limit, coordinates, by connector id."""
+    shown = ((way, line_within(way.centerline, radius_m)) for way in scene.connectors)
+    return {
+        names.ways[way.id]: _connector_vector(way, line, names)
+        for way, line in shown
+        if line is not None
+    }
+
+
+def area_vectors(scene: Scene, names: ShortNames, radius_m: float) -> dict[str, Vector]:
+    """Kind and boundary points, by area id."""
+    cut = ((area, _boundary(area, radius_m)) for area in scene.areas)
+    return {names.areas[area.id]: [area.kind.value, points] for area, points in cut if points}
+
+
+def compass(heading_rad: float) -> str:
+    """The travel direction in words; +x is East, +y is North."""
+    return _COMPASS[round(heading_rad / (math.pi / 4.0)) % 8] + "wards"
+
+
+def relative_direction(heading_rad: float) -> str:
+    """The direction relative to the ego, which faces 0: within 45 degrees it is the same."""
+    turn = abs(math.remainder(heading_rad, 2.0 * math.pi))
+    if turn <= math.pi / 4.0:
+        return "same"
+    return "opposite" if turn >= 3.0 * math.pi / 4.0 else "crossing"
+
+
+def _lane_vector(lane: Lane, line: Polyline, names: ShortNames) -> Vector:
+    heading_rad = line.heading_at(line.project(0.0, 0.0).s_m)
+    return [
+        number_of(names.ways[lane.id]),
+        compass(heading_rad),
+        relative_direction(heading_rad),
+        _metres(lane.width_m),
+        _speed_limit(lane.speed_limit_mps),
+        _coordinates(line),
+    ]
+
+
+def _connector_vector(way: LaneConnector, line: Polyline, names: ShortNames) -> Vector:
+    return [
+        None if way.from_lane is None else names.ways.get(way.from_lane),
+        None if way.to_lane is None else names.ways.get(way.to_lane),
+        way.traffic_light.value,
+        way.turn_type.value,
+        _speed_limit(way.speed_limit_mps),
+        _coordinates(line),
+    ]
+
+
+def _boundary(area: Area, radius_m: float) -> list[list[float]]:
+    points = boundary_within(np.array(area.boundary_m, dtype=np.float64), radius_m)
+    if len(points) < 3:
+        return []
+    return [[_metres(x), _metres(y)] for x, y in simplified(points, _BOUNDARY_TOLERANCE_M)]
+
+
+def _coordinates(line: Polyline) -> list[list[float]]:
+    return [[_metres(x), _metres(y)] for x, y in line.resampled(SPACING_M).points_m]
+
+
+def _speed_limit(limit_mps: float | None) -> float | None:
+    return None if limit_mps is None else _metres(limit_mps)
+
+
+def _metres(value: float) -> float:
+    return round(float(value), 2) + 0.0
+
+
+def _listed(vectors: Mapping[str, Vector]) -> str:
+    lines = [f"{json.dumps(name)}: {json.dumps(vector)}" for name, vector in vectors.items()]
+    return "{" + ",\n ".join(lines) + "}"

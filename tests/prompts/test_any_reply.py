@@ -1,0 +1,100 @@
+"""No text whatever makes the reader raise anything but its own error."""
+
+from __future__ import annotations
+
+import contextlib
+import math
+import random
+
+from hypothesis import HealthCheck, example, given, settings
+from hypothesis import strategies as st
+
+from augment.errors import ReplyUnreadable
+from augment.prompts.reply import ReadReply, read_reply
+from tests.scenes import scene
+from tests.variants.answers import GOOD, agent, answer, block
+
+STREET = scene()
+PIECES = st.sampled_from(
+    [
+        *'{}[]",:/*`\\\n 0aé\ud800\0',
+        '"add":',
+        '"move":',
+        '"remove":',
+        "```json\n",
+        "```",
+        "NaN",
+        "1e999",
+        "-",
+        "null",
+        "//",
+        "/*",
+        '"id"',
+        "<think>",
+        "</think>",
+        block(agent()),
+    ]
+)
+JSON = st.recursive(
+    st.none() | st.booleans() | st.integers() | st.floats() | st.text(),
+    lambda inner: st.lists(inner) | st.dictionaries(st.text(), inner),
+    max_leaves=12,
+)
+
+
+# How long a draw takes says how busy the computer is, not how good the reader.
+UNHURRIED = settings(deadline=None, suppress_health_check=[HealthCheck.too_slow])
+
+
+def read(text: str) -> ReadReply | None:
+    with contextlib.suppress(ReplyUnreadable):
+        return read_reply(text, STREET)
+    return None
+
+
+@UNHURRIED
+@given(st.text())
+@example("{" * 5000)
+@example('{"add": [' + "{" * 5000)
+@example('{"add": "\ud800"}')
+@example('{"remove": ["\\ud800"]}')
+@example("/*" * 3000 + '"add":')
+def test_any_text(text: str) -> None:
+    read(text)
+
+
+@UNHURRIED
+@given(st.lists(PIECES, max_size=40).map("".join))
+def test_any_string_of_what_answers_are_made_of(text: str) -> None:
+    read(text)
+
+
+@UNHURRIED
+@given(st.dictionaries(st.sampled_from([*sorted(agent()), "walk_to"]), JSON))
+def test_any_fields_of_an_agent(fields: dict[str, object]) -> None:
+    read(answer(block(agent(**fields))))
+
+
+def test_ten_thousand_mutated_answers() -> None:
+    rng = random.Random(20_261_121)
+    for _ in range(10_000):
+        text = list(GOOD)
+        for _ in range(rng.randint(1, 6)):
+            at = rng.randrange(len(text))
+            text[at : at + rng.randint(0, 4)] = rng.choice(
+                ["", '"', "{", "}", "[", "]", ",", "\\", "9", "-", "e", "NaN", "`", "\n", "null"]
+            )
+        got = read("".join(text))
+        if got is not None:
+            for placed in got.modification.changed:
+                assert math.isfinite(placed.x_m + placed.y_m + placed.heading_rad)
+
+
+@UNHURRIED
+@given(st.text(alphabet=st.characters(exclude_characters="`")), st.text())
+def test_prose_around_a_good_answer_does_not_change_it(before: str, after: str) -> None:
+    if "</think>" in before + after:
+        return
+    wrapped = f"{before}\n{GOOD}\nThat is all: {after.replace('`', '')}"
+    expected = read_reply(GOOD, STREET).modification
+    assert read_reply(wrapped, STREET).modification == expected

@@ -1,0 +1,169 @@
+from __future__ import annotations
+
+import json
+import math
+from dataclasses import replace
+
+import pytest
+
+from augment.errors import ReplyUnreadable
+from augment.prompts.reply import notes_of, read_reply
+from augment.scene.entities import AgentType, TrafficAgent
+from tests.scenes import scene, vehicle
+from tests.variants.answers import GOOD, agent, block
+
+PARKED = TrafficAgent(
+    id="Agent2",
+    type=AgentType.VEHICLE,
+    x_m=21.4,
+    y_m=0.9,
+    heading_rad=0.0,
+    width_m=2.0,
+    length_m=4.8,
+    speed_mps=0.0,
+    lane_id="Lane1",
+)
+
+
+def problems(text: str) -> list[str]:
+    with pytest.raises(ReplyUnreadable) as raised:
+        read_reply(text, scene(agents=(vehicle("Agent7", 40.0, 0.0),)))
+    return raised.value.problems
+
+
+def test_an_answer_in_five_sections_is_read() -> None:
+    read = read_reply(GOOD, scene())
+    assert read.modification.added == (PARKED,)
+    assert not read.mended
+
+
+def test_agents_are_moved_and_removed_by_id() -> None:
+    street = scene(agents=(vehicle("Agent2", 20.0, 0.0), vehicle("Agent3", 30.0, 0.0)))
+    read = read_reply(block(move=[agent()], remove=["Agent3"]), street)
+    assert read.modification.moved == (PARKED,)
+    assert read.modification.removed == ("Agent3",)
+
+
+def test_an_empty_modification_is_readable() -> None:
+    assert read_reply(block(), scene()).modification.is_empty
+
+
+def test_a_pedestrian_may_walk() -> None:
+    walker = agent(type="PEDESTRIAN", width_m=0.8, length_m=0.9, walk_to=[21.4, 8], lane=None)
+    (added,) = read_reply(block(walker), scene()).modification.added
+    assert added.walk_to_m == (21.4, 8.0)
+    assert added.lane_id is None
+
+
+def test_a_heading_is_wrapped() -> None:
+    (added,) = read_reply(block(agent(heading_rad=4.0)), scene()).modification.added
+    assert added.heading_rad == pytest.approx(4.0 - 2.0 * math.pi)
+
+
+DRAFT = block(agent(x_m=3.0))
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        block(agent()),
+        f"```\n{block(agent())}\n```",
+        f"```JSON\r\n{block(agent())}\r\n```",
+        f"Draft:\n```json\n{DRAFT}\n```\nFinal:\n```json\n{block(agent())}\n```\nDone.",
+        f"<think>```json\n{DRAFT}\n```</think>{GOOD}",
+        f"{DRAFT}\nor rather {block(agent())} as {{asked}}",
+        GOOD + '\n```json\n{"note": "no more"}\n```',
+        GOOD + "\n```text\nnothing\n```",
+        f"  ```json\n{block(agent())}\n  ```",
+        f"```json\n{block(agent())}",
+        GOOD + '\n```json\n{"Action": "add"}\n```',
+    ],
+)
+def test_the_last_block_with_the_keys_counts(text: str) -> None:
+    assert read_reply(text, scene()).modification.added == (PARKED,)
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        GOOD.replace('"lane": "Lane1"}', '"lane": "Lane1",}'),
+        GOOD.replace("]}", "] , }"),
+        GOOD.replace('"move": [],', '"move": [], // nothing "moves": 1\n'),
+        GOOD.replace('"move": []', '/* none, */ "move": []'),
+        GOOD.replace('"remove": []', '"remove": [], // the end\n'),
+    ],
+)
+def test_comments_and_trailing_commas_are_mended(text: str) -> None:
+    read = read_reply(text, scene())
+    assert read.modification.added == (PARKED,)
+    assert read.mended
+
+
+def test_mending_leaves_strings_alone() -> None:
+    street = scene()
+    odd = replace(street.lanes[0], id="a//b,}")
+    with pytest.raises(ReplyUnreadable, match="none of the scene's"):
+        read_reply(block(agent(lane="a//b,}")) + ",", replace(street, lanes=(odd,)))
+
+
+@pytest.mark.parametrize(
+    ("text", "problem"),
+    [
+        ("I would put it 21.4 m ahead.", "no fenced JSON block"),
+        ("", "no fenced JSON block"),
+        (GOOD[:-30], "the JSON block breaks"),
+        (GOOD.replace("21.4", "19.0 + 2.4"), "the JSON block breaks"),
+        (GOOD.replace('"x_m": 21.4', '"x_m": 21,4'), "the JSON block breaks"),
+        (GOOD.replace("21.4", "21.4m"), "the JSON block breaks"),
+        (GOOD.replace('"x_m": 21.4', '"x_m": NaN'), "NaN is not a number"),
+        (GOOD.replace('"x_m": 21.4', '"x_m": -Infinity'), "-Infinity is not a number"),
+        (GOOD.replace('"x_m": 21.4', '"x_m": 1e999'), "add.0.x_m: Input should be a finite"),
+        (GOOD.replace('"x_m": 21.4', '"x_m": ' + "9" * 5000), "too many digits"),
+        (GOOD.replace('"x_m": 21.4', '"x_m": "21.4"'), "add.0.x_m: Input should be a valid"),
+        (GOOD.replace('"x_m": 21.4', '"x_m": true'), "add.0.x_m: Input should be a valid"),
+        (GOOD.replace('"y_m": 0.9', '"x_m": 0.9'), "'x_m' stands twice"),
+        (GOOD.replace("'", '"').replace('"add"', "'add'"), "the JSON block breaks"),
+        (block(agent(x_m=...)), "add.0.x_m: Field required"),
+        (block(agent(colour="red")), "add.0.colour: Extra inputs are not permitted"),
+        (block(agent(type="EGO_VEHICLE")), "add.0.type: Input should be 'VEHICLE'"),
+        (block(agent(heading_rad=90.0)), "add.0.heading_rad: Input should be less than"),
+        (block(agent(width_m=0.0)), "add.0.width_m: Input should be greater than"),
+        (block(agent(length_m=48.0)), "add.0.length_m: Input should be less than"),
+        (block(agent(speed_mps=-1.0)), "add.0.speed_mps: Input should be greater than"),
+        (block(agent(x_m=400.0)), "Agent2: x and y must lie between -80 and 80"),
+        (block(agent(lane="Lane9")), "Agent2: its lane is none of the scene's"),
+        (block(agent(walk_to=[1.0, 2.0])), "Agent2: only a PEDESTRIAN has walk_to"),
+        (block(agent(type="PEDESTRIAN", walk_to=[1.0])), "add.0.walk_to"),
+        (block(agent(), agent()), "named more than once: Agent2"),
+        (block(agent(id="Agent7")), "Agent7 is in the scene already"),
+        (block(agent(id="Agent1")), "Agent1 is in the scene already"),
+        (block(agent(id="Agent 2; drop")), "add.0.id: String should match"),
+        (block(remove=["Agent9"]), "Agent9 is not in the scene; its agents: Agent7"),
+        (block(remove=["Agent1"]), "Agent1 is the ego"),
+        (block(*[agent(id=f"Agent{n}") for n in range(8, 73)]), "add: List should have at most"),
+        ('{"add": ' + "[" * 100_000, "nested too deeply"),
+        ('{"add": "' + "x" * 200_000 + '"}', "longer than 200000 characters"),
+        (json.dumps([agent()]), "no fenced JSON block"),
+    ],
+)
+def test_what_can_not_be_read_is_refused_with_its_reason(text: str, problem: str) -> None:
+    assert problem in "\n".join(problems(text))
+
+
+def test_a_broken_final_block_is_not_replaced_by_an_earlier_draft() -> None:
+    final = block(agent()).replace("21.4", "19.0 + 2.4")
+    assert "breaks" in problems(f"```json\n{DRAFT}\n```\n```json\n{final}\n```")[0]
+
+
+def test_odd_ids_of_a_scene_are_known_by_their_short_forms() -> None:
+    odd = scene(agents=(replace(vehicle("truck <7>", 40.0, 0.0), lane_id="Lane1"),))
+    assert read_reply(block(remove=["Agent2"]), odd).modification.removed == ("truck <7>",)
+    with pytest.raises(ReplyUnreadable, match="its agents: Agent2") as raised:
+        read_reply(block(remove=["Agent5"]), odd)
+    assert "truck" not in str(raised.value)
+
+
+def test_notes_are_the_first_two_sections_in_any_dress() -> None:
+    dressed = GOOD.replace("Insights:", "## Insights:").replace("Summary:", "**Summary:**")
+    assert notes_of(dressed) == "One road, two lanes.\n\nA parked car ahead."
+    assert notes_of("nothing of that kind") == ""
