@@ -1,0 +1,73 @@
+"""The record of every call to a language model, kept as it happens.
+
+A service keeps it in rows; tests and one-off runs keep it in memory.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from enum import StrEnum
+from typing import Protocol
+
+from augment.errors import ModelFault
+from augment.llm.messages import Reply, Request
+
+
+class ModelRole(StrEnum):
+    """What a language model is asked to be: the paper's agents."""
+
+    MODIFIER = "modifier"
+    REVIEWER = "reviewer"
+    ENGINEER = "engineer"
+    VIEWER = "viewer"
+
+
+class Transcript(Protocol):
+    """Told of every attempt before it is sent, and of its end before anybody reads it."""
+
+    def asked(self, role: ModelRole, request: Request, prompt_version: str) -> int:
+        """Note that this request is about to be sent; returns the number of the call."""
+        ...
+
+    def answered(self, number: int, reply: Reply) -> None:
+        """Keep the raw answer to that call."""
+        ...
+
+    def broke(self, number: int, fault: ModelFault) -> None:
+        """Note that there was no answer to that call, and why."""
+        ...
+
+
+@dataclass(slots=True, kw_only=True)
+class RecordedCall:
+    """One attempt: a request, and either its reply or its fault (neither while under way)."""
+
+    number: int
+    role: ModelRole
+    request: Request
+    prompt_version: str
+    reply: Reply | None = None
+    fault: ModelFault | None = None
+
+
+@dataclass(slots=True)
+class MemoryTranscript:
+    """A transcript that lives as long as its run; calls are numbered from 1."""
+
+    calls: list[RecordedCall] = field(default_factory=list)
+
+    def asked(self, role: ModelRole, request: Request, prompt_version: str) -> int:
+        """Note a request; returns its number."""
+        number = len(self.calls) + 1
+        self.calls.append(
+            RecordedCall(number=number, role=role, request=request, prompt_version=prompt_version)
+        )
+        return number
+
+    def answered(self, number: int, reply: Reply) -> None:
+        """Keep the answer to that call."""
+        self.calls[number - 1].reply = reply
+
+    def broke(self, number: int, fault: ModelFault) -> None:
+        """Keep the fault of that call."""
+        self.calls[number - 1].fault = fault

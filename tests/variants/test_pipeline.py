@@ -1,0 +1,164 @@
+from __future__ import annotations
+
+import random
+from collections.abc import Iterable
+from dataclasses import replace
+
+import pytest
+
+from augment.errors import ModelFault, UnknownName
+from augment.llm.messages import Reply, Request, Speaker
+from augment.llm.patience import Patience
+from augment.llm.scripted import ScriptedClient
+from augment.prompts.fill import prompt_version
+from augment.variants.pipeline import Outcome, OutcomeStatus, run
+from augment.variants.recipes import OTM, Review
+from augment.variants.transcript import MemoryTranscript
+from tests.scenes import scene
+from tests.variants.answers import GOOD, agent, answer, block
+
+
+class Run:
+    """One run on the street, with everything that it did."""
+
+    def __init__(self, answers: Iterable[str | Reply | ModelFault]) -> None:
+        self.client = ScriptedClient(answers)
+        self.transcript = MemoryTranscript()
+        self.waits: list[float] = []
+
+    def outcome(self) -> Outcome:
+        return run(
+            OTM,
+            scene=scene(),
+            instruction="Add a parked car 21.4 m ahead.",
+            client=self.client,
+            model="some-model",
+            transcript=self.transcript,
+            patience=Patience(sleep=self.waits.append, rng=random.Random(0)),
+        )
+
+
+def test_one_good_answer_is_one_call_and_a_modification() -> None:
+    made = Run([GOOD])
+    outcome = made.outcome()
+    assert outcome.status is OutcomeStatus.DONE
+    assert outcome.modification is not None
+    assert [a.id for a in outcome.modification.added] == ["Agent2"]
+    assert outcome.notes == "One road, two lanes.\n\nA parked car ahead."
+    assert outcome.reason == ""
+    (call,) = made.transcript.calls
+    assert (call.number, call.role, call.prompt_version) == (1, "modifier", prompt_version())
+    assert call.request.model == "some-model"
+    assert call.reply is not None
+    assert call.reply.text == GOOD
+
+
+def test_an_unreadable_answer_is_asked_for_once_more_with_its_faults() -> None:
+    made = Run([answer(block(agent(x_m="21.4"))), GOOD])
+    assert made.outcome().status is OutcomeStatus.DONE
+    second = made.client.requests[1].messages
+    assert [m.speaker for m in second] == [
+        Speaker.SYSTEM,
+        Speaker.USER,
+        Speaker.ASSISTANT,
+        Speaker.USER,
+    ]
+    assert "add.0.x_m: Input should be a valid number" in second[3].text
+
+
+def test_two_unreadable_answers_are_an_outcome_and_no_third_call() -> None:
+    made = Run(["I would put it there.", "Really, there."])
+    outcome = made.outcome()
+    assert (outcome.status, outcome.modification) == (OutcomeStatus.UNREADABLE, None)
+    assert 'no fenced JSON block with the keys "add", "move", "remove"' in outcome.reason
+    assert [c.reply.text for c in made.transcript.calls if c.reply] == [
+        "I would put it there.",
+        "Really, there.",
+    ]
+
+
+def test_a_cut_off_answer_is_asked_for_again_with_twice_the_room() -> None:
+    made = Run([Reply(text=GOOD[:-40], finish_reason="length"), GOOD])
+    assert made.outcome().status is OutcomeStatus.DONE
+    first, second = made.client.requests
+    assert second.max_tokens == 2 * first.max_tokens
+    assert "cut off at its length limit" in second.messages[-1].text
+
+
+def test_an_empty_answer_is_echoed_as_such() -> None:
+    made = Run([Reply(text=""), GOOD])
+    assert made.outcome().status is OutcomeStatus.DONE
+    assert made.client.requests[1].messages[2].text == "(empty answer)"
+
+
+@pytest.mark.parametrize(
+    ("reply", "reason"),
+    [
+        (Reply(text="", refusal="I can't help with that."), "I can't help with that."),
+        (Reply(text="", finish_reason="content_filter"), "content filter"),
+    ],
+)
+def test_a_refusal_is_an_outcome_and_not_asked_again(reply: Reply, reason: str) -> None:
+    made = Run([reply])
+    outcome = made.outcome()
+    assert outcome.status is OutcomeStatus.REFUSED
+    assert reason in outcome.reason
+    assert made.transcript.calls[0].reply == reply
+
+
+def test_every_attempt_at_a_broken_wire_is_in_the_transcript() -> None:
+    fault = ModelFault("500", retryable=True, status=500)
+    made = Run([fault, fault, GOOD])
+    assert made.outcome().status is OutcomeStatus.DONE
+    assert [c.fault is fault for c in made.transcript.calls] == [True, True, False]
+    assert len(made.waits) == 2
+    assert 0.5 <= made.waits[0] <= 1.0 <= made.waits[1] <= 2.0
+
+
+def test_a_wire_that_stays_broken_is_nobodys_outcome() -> None:
+    fault = ModelFault("500", retryable=True, status=500)
+    made = Run([fault] * 3)
+    with pytest.raises(ModelFault) as raised:
+        made.outcome()
+    assert raised.value is fault
+    assert len(made.transcript.calls) == 3
+
+
+def test_a_fault_that_does_not_pass_costs_one_call() -> None:
+    made = Run([ModelFault("no such model", retryable=False, status=404)])
+    with pytest.raises(ModelFault, match="no such model"):
+        made.outcome()
+    assert len(made.transcript.calls) == 1
+    assert made.waits == []
+
+
+def test_the_transcript_has_the_answer_before_anybody_reads_it() -> None:
+    class Stops(MemoryTranscript):
+        def answered(self, number: int, reply: Reply) -> None:
+            raise KeyboardInterrupt
+
+    made = Run(["nothing that could be read"])
+    made.transcript = Stops()
+    with pytest.raises(KeyboardInterrupt):
+        made.outcome()
+    assert len(made.client.requests) == 1
+
+
+def test_a_recipe_that_nobody_can_run_is_refused() -> None:
+    with pytest.raises(UnknownName, match="tqa"):
+        run(
+            replace(OTM, slug="tqa", review=Review.TEXT),
+            scene=scene(),
+            instruction="Add a car.",
+            client=ScriptedClient([]),
+            model="m",
+            transcript=MemoryTranscript(),
+        )
+
+
+def test_a_request_keeps_what_is_asked_apart_from_how() -> None:
+    made = Run([GOOD])
+    made.outcome()
+    request: Request = made.client.requests[0]
+    assert request.messages[0].text.startswith("You are an editor of traffic scenes")
+    assert "> Add a parked car 21.4 m ahead." in request.messages[1].text
