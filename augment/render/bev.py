@@ -1,0 +1,67 @@
+"""The bird's-eye view: one renderer for every picture of a scene, whoever changed it.
+
+A voting picture carries no text but its scale and the distances at its edge, and its bytes depend
+on the scene, the change and the camera alone.
+"""
+
+from __future__ import annotations
+
+from augment.render import palette
+from augment.render.camera import Camera
+from augment.render.canvas import Canvas, Ground
+from augment.render.edges import draw_badges, outside, place_badges
+from augment.render.labels import draw_ghosts, draw_labels
+from augment.render.marks import draw_mark
+from augment.render.road import draw_ground
+from augment.render.scale import draw_grid, draw_scale, scale_box
+from augment.render.signals import draw_signals
+from augment.scene.entities import Scene, TrafficAgent
+from augment.scene.modification import Modification, apply
+
+
+def draw(
+    scene: Scene, modification: Modification, camera: Camera, *, labels: bool = False
+) -> bytes:
+    """The scene after a change, as the bytes of a PNG.
+
+    Args:
+        scene: The scene before the change.
+        modification: What changes; removed agents are gone, added and moved ones are marked.
+        camera: The window that all pictures of a scenario share (`camera_for`).
+        labels: Whether ids, metres and faint outlines of what is gone are drawn: for reviewers
+            and analysts, never for a vote.
+
+    Raises:
+        InvalidModification: The change does not fit the scene.
+    """
+    after = apply(scene, modification)
+    ground = Ground(Canvas(camera.width_px, camera.height_px, palette.PAPER), camera)
+    draw_ground(ground, after)
+    draw_grid(ground)
+    draw_signals(ground, after)
+    draw_scale(ground)
+    if labels:
+        draw_ghosts(ground, scene, modification)
+    changed = {agent.id for agent in modification.changed}
+    unchanged = [agent for agent in after.agents if agent.id not in changed]
+    for agent in _large_first(unchanged):
+        draw_mark(ground, agent, palette.OTHER_MARK)
+    draw_mark(ground, after.ego, palette.EGO_MARK)
+    for agent in _large_first(modification.changed):
+        draw_mark(ground, agent, palette.CHANGED_MARK)
+    if labels:
+        draw_labels(ground, after)
+    lost = [agent for agent in modification.changed if outside(ground, agent)]
+    seen = [agent for agent in (after.ego, *modification.changed) if agent not in lost]
+    draw_badges(ground, place_badges(ground, lost, seen, taken=(scale_box(ground),)))
+    return ground.canvas.png()
+
+
+def draw_original(scene: Scene, camera: Camera) -> bytes:
+    """The scene before any change, as the bytes of a PNG."""
+    return draw(scene, Modification(), camera)
+
+
+def _large_first(agents: list[TrafficAgent] | tuple[TrafficAgent, ...]) -> list[TrafficAgent]:
+    """In drawing order: a cone is never hidden under a bus."""
+    return sorted(agents, key=lambda agent: (-agent.length_m * agent.width_m, agent.id))

@@ -1,0 +1,94 @@
+"""Names and numbers inside a picture, for reviewers and analysts; never in a voting picture."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from augment.geometry.boxes import corners
+from augment.geometry.polyline import FloatArray
+from augment.render import palette
+from augment.render.canvas import Box, Ground, text_width_px
+from augment.render.scale import raster, scale_box
+from augment.scene.entities import Scene
+from augment.scene.lane_graph import Way
+from augment.scene.modification import Modification
+
+_TEXT_PX = 14
+
+
+def draw_ghosts(ground: Ground, scene: Scene, modification: Modification) -> None:
+    """Faint dashed outlines where removed and moved agents were before the change."""
+    gone = set(modification.removed) | {agent.id for agent in modification.moved}
+    for agent in scene.agents:
+        if agent.id in gone:
+            box = corners(agent.pose, agent.length_m, agent.width_m)
+            ring = ground.camera.to_pixels(np.vstack([box, box[:1]]))
+            ground.canvas.dashed(ring, palette.GHOST, 1.5, 5.0, 4.0)
+
+
+def draw_labels(ground: Ground, scene: Scene) -> None:
+    """Ids beside agents and on lanes, metres along the lower and the left edge."""
+    taken: list[Box] = [scale_box(ground)]
+    _metres(ground)
+    for agent in scene.everyone:
+        x, y = ground.at(agent.x_m, agent.y_m)
+        reach = ground.camera.to_pixels(corners(agent.pose, agent.length_m, agent.width_m))
+        (left, top), (right, bottom) = reach.min(axis=0), reach.max(axis=0)
+        aside = text_width_px(agent.id, _TEXT_PX) / 2.0 + 8.0
+        spots = [(x, top - 12.0), (x, bottom + 12.0), (right + aside, y), (left - aside, y)]
+        _label(ground, agent.id, palette.INK, [*spots, (x, y)], taken)
+    for agent in scene.everyone:
+        reach = ground.camera.to_pixels(corners(agent.pose, agent.length_m, agent.width_m))
+        taken.append((*reach.min(axis=0).tolist(), *reach.max(axis=0).tolist()))
+    ways: list[Way] = [*scene.lanes, *scene.connectors]
+    for way in ways:
+        spots = _spots(ground, way.centerline.points_m)
+        _label(ground, way.id, palette.LANE_TEXT, spots, taken)
+
+
+def _metres(ground: Ground) -> None:
+    camera = ground.camera
+    for x_m in raster(camera.x_min_m, camera.x_max_m):
+        x, _ = ground.at(x_m, 0.0)
+        at = (x, 10.0)
+        ground.canvas.text(at, f"{x_m:.0f}", palette.INK, 12, halo=palette.HALO)
+    for y_m in raster(camera.y_min_m, camera.y_max_m):
+        _, y = ground.at(0.0, y_m)
+        ground.canvas.text((16.0, y), f"{y_m:.0f}", palette.INK, 12, halo=palette.HALO)
+
+
+def _spots(ground: Ground, line_m: FloatArray) -> list[tuple[float, float]]:
+    """Places on a line that are in the picture, the middle one first."""
+    points = ground.camera.to_pixels(line_m)
+    count = max(2, int(np.hypot(*np.diff(points, axis=0).T).sum() / 40.0))
+    steps = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(points, axis=0).T))])
+    at = np.linspace(0.0, steps[-1], count + 1)
+    x, y = np.interp(at, steps, points[:, 0]), np.interp(at, steps, points[:, 1])
+    seen = [
+        (float(px), float(py))
+        for px, py in zip(x, y, strict=True)
+        if 40.0 < px < ground.canvas.width_px - 40.0 and 24.0 < py < ground.canvas.height_px - 16.0
+    ]
+    middle = len(seen) // 2
+    return sorted(seen, key=lambda spot: abs(seen.index(spot) - middle))
+
+
+def _label(
+    ground: Ground,
+    text: str,
+    colour: palette.Colour,
+    spots: list[tuple[float, float]],
+    taken: list[Box],
+) -> None:
+    """The text at the first spot that is free, or not at all."""
+    half = text_width_px(text, _TEXT_PX) / 2.0 + 2.0
+    for x, y in spots:
+        box = (x - half, y - 9.0, x + half, y + 9.0)
+        inside = box[0] >= 0.0 and box[1] >= 0.0 and box[2] <= ground.canvas.width_px
+        free = not any(
+            box[0] < b[2] and b[0] < box[2] and box[1] < b[3] and b[1] < box[3] for b in taken
+        )
+        if inside and box[3] <= ground.canvas.height_px and free:
+            ground.canvas.text((x, y), text, colour, _TEXT_PX, halo=palette.HALO)
+            taken.append(box)
+            return

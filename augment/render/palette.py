@@ -1,0 +1,82 @@
+"""The colours and line widths of the pictures: data alone.
+
+The paper's conventions: ego red, changed agents blue, drivable area grey, walkways olive. Marks
+never differ by colour alone; red and blue differ in lightness too. Widths are in picture pixels.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+Colour = tuple[int, int, int] | tuple[int, int, int, int]
+
+PAPER: Colour = (255, 255, 255)
+ROAD: Colour = (222, 224, 227)
+ROAD_EDGE: Colour = (138, 142, 148)
+INTERSECTION: Colour = (213, 215, 219)
+CARPARK: Colour = (233, 234, 236)
+WALKWAY: Colour = (225, 225, 190)
+WALKWAY_EDGE: Colour = (178, 178, 118)
+LANE_LINE: Colour = (255, 255, 255)
+LANE_SOLID: Colour = (138, 142, 148)
+ZEBRA: Colour = (255, 255, 255)
+ZEBRA_GROUND: Colour = (198, 201, 206)
+
+EGO_LANE: Colour = (20, 20, 20, 190)
+OTHER_LANE: Colour = (0, 0, 128, 105)
+CONNECTOR: Colour = (184, 134, 11, 125)
+
+GRID: Colour = (90, 95, 105, 42)
+GRID_AXIS: Colour = (90, 95, 105, 105)
+
+INK: Colour = (33, 37, 41)
+LANE_TEXT: Colour = (0, 0, 128)
+HALO: Colour = (255, 255, 255)
+PLATE: Colour = (255, 255, 255, 222)
+PLATE_EDGE: Colour = (150, 154, 160)
+GHOST: Colour = (90, 95, 105, 150)
+
+LIGHT_RED: Colour = (192, 28, 40)
+LIGHT_YELLOW: Colour = (226, 165, 0)
+LIGHT_GREEN: Colour = (30, 138, 74)
+LIGHT_UNKNOWN: Colour = (120, 124, 130)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class MarkStyle:
+    """How the mark of one class of agents looks.
+
+    Attributes:
+        detail: For what lies on the body: windscreen, nose, stripes.
+        hatch: Lines across the body, None without them.
+        outline_px: Drawn inside the true box, so that a thick outline adds no size.
+    """
+
+    fill: Colour
+    outline: Colour
+    detail: Colour
+    hatch: Colour | None
+    outline_px: float
+
+
+EGO_MARK = MarkStyle(
+    fill=(218, 30, 40),
+    outline=(122, 8, 16),
+    detail=(255, 255, 255),
+    hatch=None,
+    outline_px=2.0,
+)
+CHANGED_MARK = MarkStyle(
+    fill=(24, 72, 205),
+    outline=(6, 22, 92),
+    detail=(255, 255, 255),
+    hatch=(122, 160, 245),
+    outline_px=3.5,
+)
+OTHER_MARK = MarkStyle(
+    fill=(164, 168, 174),
+    outline=(84, 88, 94),
+    detail=(84, 88, 94),
+    hatch=None,
+    outline_px=1.5,
+)

@@ -1,0 +1,142 @@
+"""Plane shapes that the pictures are made of; any unit, any frame with y to the left of x."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from augment.geometry.polyline import FloatArray
+from augment.scene.lane_graph import Way
+
+# Where a line turns sharply its offset is held back to this multiple of the distance.
+_MITER_LIMIT = 2.0
+
+
+def offset(points: FloatArray, distance: float) -> FloatArray:
+    """A line (P, 2) shifted by a distance to its left (negative: right), (P, 2)."""
+    steps = np.diff(points, axis=0)
+    steps = steps / np.hypot(steps[:, 0], steps[:, 1])[:, None]
+    normals = np.column_stack([-steps[:, 1], steps[:, 0]])
+    before = np.vstack([normals[:1], normals])
+    after = np.vstack([normals, normals[-1:]])
+    middle = before + after
+    length = np.maximum(np.hypot(middle[:, 0], middle[:, 1]), 1e-9)
+    middle = middle / length[:, None]
+    stretch = np.minimum(2.0 / length, _MITER_LIMIT)
+    return np.asarray(points + distance * stretch[:, None] * middle, dtype=np.float64)
+
+
+def sides(way: Way) -> tuple[FloatArray, FloatArray]:
+    """The left and the right boundary of a way, (P, 2) each, from its map or its width."""
+    line, half = way.centerline.points_m, way.width_m / 2.0
+    left, right = way.left_boundary, way.right_boundary
+    return (
+        offset(line, half) if left is None else left.points_m,
+        offset(line, -half) if right is None else right.points_m,
+    )
+
+
+def ribbon(way: Way) -> FloatArray:
+    """The surface of a way as a polygon (P, 2)."""
+    left, right = sides(way)
+    return np.vstack([left, right[::-1]])
+
+
+def dashes(points: FloatArray, on: float, off: float) -> FloatArray:
+    """The dashes of a line (P, 2) as straight pieces (K, 2, 2); the first begins at its start."""
+    steps = np.diff(points, axis=0)
+    stations = np.concatenate([[0.0], np.cumsum(np.hypot(steps[:, 0], steps[:, 1]))])
+    starts = np.arange(0.0, stations[-1], on + off)
+    ends = np.minimum(starts + on, stations[-1])
+    both = np.stack([starts, ends], axis=1)
+    x = np.interp(both, stations, points[:, 0])
+    y = np.interp(both, stations, points[:, 1])
+    return np.stack([x, y], axis=2)
+
+
+def resampled(points: FloatArray, spacing: float) -> FloatArray:
+    """A line (P, 2) cut into equal pieces no longer than the spacing, (K, 2)."""
+    steps = np.diff(points, axis=0)
+    stations = np.concatenate([[0.0], np.cumsum(np.hypot(steps[:, 0], steps[:, 1]))])
+    at = np.linspace(0.0, stations[-1], math.ceil(stations[-1] / spacing) + 1)
+    return np.column_stack(
+        [np.interp(at, stations, points[:, 0]), np.interp(at, stations, points[:, 1])]
+    )
+
+
+def contains(polygon: FloatArray, points: FloatArray) -> NDArray[np.bool_]:
+    """Which of points (N, 2) lie inside a polygon (P, 2), (N,): even-odd rule."""
+    inside = np.zeros(len(points), dtype=bool)
+    low, high = polygon.min(axis=0), polygon.max(axis=0)
+    near = ((points >= low) & (points <= high)).all(axis=1)
+    if not near.any():
+        return inside
+    x, y = points[near, 0][:, None], points[near, 1][:, None]
+    (x0, y0), (x1, y1) = polygon.T, np.roll(polygon, -1, axis=0).T
+    straddles = (y0 > y) != (y1 > y)
+    rise = np.where(y1 == y0, 1.0, y1 - y0)
+    right_of = x < x0 + (y - y0) / rise * (x1 - x0)
+    inside[near] = (straddles & right_of).sum(axis=1) % 2 == 1
+    return inside
+
+
+def runs(flags: NDArray[np.bool_]) -> list[tuple[int, int]]:
+    """First and last index of each unbroken run of true flags."""
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], flags, [False]]).astype(np.int8)))
+    return [(int(first), int(end) - 1) for first, end in edges.reshape(-1, 2)]
+
+
+def stripes(
+    polygon: FloatArray, angle_rad: float, period: float, width: float
+) -> list[FloatArray]:
+    """Parallel stripes in a convex polygon (P, 2), their long sides in the given direction.
+
+    They lie evenly about the polygon's middle, which is left free.
+    """
+    normal = np.array([-math.sin(angle_rad), math.cos(angle_rad)])
+    across = polygon @ normal
+    middle = (across.min() + across.max()) / 2.0
+    count = math.ceil((across.max() - across.min()) / 2.0 / period)
+    found = []
+    for index in range(-count, count):
+        centre = middle + (index + 0.5) * period
+        piece = _half(polygon, normal, centre - width / 2.0)
+        piece = _half(piece, -normal, -(centre + width / 2.0))
+        if len(piece) >= 3:
+            found.append(piece)
+    return found
+
+
+def long_axis(polygon: FloatArray) -> tuple[float, float, float]:
+    """Direction of a polygon's longer extent, its length and its width (smallest rectangle)."""
+    best = (0.0, math.inf, 1.0)
+    for dx, dy in np.diff(np.vstack([polygon, polygon[:1]]), axis=0):
+        if math.hypot(dx, dy) < 1e-6:
+            continue
+        angle = math.atan2(dy, dx)
+        along = polygon @ np.array([math.cos(angle), math.sin(angle)])
+        across = polygon @ np.array([-math.sin(angle), math.cos(angle)])
+        length, width = float(np.ptp(along)), float(np.ptp(across))
+        if length * width < best[1] * best[2] - 1e-6:
+            best = (angle, length, width)
+    angle, length, width = best
+    return best if length >= width else (angle + math.pi / 2.0, width, length)
+
+
+def _half(polygon: FloatArray, normal: FloatArray, limit: float) -> FloatArray:
+    """The part of a polygon where the product with the normal is at least the limit."""
+    if not len(polygon):
+        return polygon
+    depth = polygon @ normal - limit
+    kept: list[FloatArray] = []
+    for index in range(len(polygon)):
+        here, following = depth[index], depth[(index + 1) % len(polygon)]
+        if here >= 0.0:
+            kept.append(polygon[index])
+        if (here < 0.0) != (following < 0.0):
+            share = here / (here - following)
+            step = polygon[(index + 1) % len(polygon)] - polygon[index]
+            kept.append(polygon[index] + share * step)
+    return np.array(kept).reshape(-1, 2)

@@ -1,0 +1,163 @@
+"""What a picture shows, by named pixels; never whole pictures."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from augment.errors import InvalidModification
+from augment.render.bev import draw, draw_original
+from augment.render.camera import camera_for
+from augment.scene.entities import AgentType, Area, AreaKind, Scene, TrafficAgent
+from augment.scene.modification import Modification
+from tests import scenes
+from tests.render.pictures import chunks, is_blue, is_grey, is_red, opened, patch, pixel_at
+
+STREET = scenes.scene()
+CAMERA = camera_for(STREET, None)
+
+
+def added(*agents: TrafficAgent) -> Modification:
+    return Modification(added=agents)
+
+
+def test_the_ego_is_red_the_lane_grey_the_walkway_olive() -> None:
+    png = draw_original(STREET, CAMERA)
+    assert opened(png).size == (1200, 800)
+    assert is_red(pixel_at(png, CAMERA, -0.3, 0.3))
+    lane = pixel_at(png, CAMERA, 21.2, 0.8)
+    assert is_grey(lane)
+    assert lane[0] < 240
+    red, green, blue = pixel_at(png, CAMERA, 21.2, -3.0)
+    assert min(red, green) - blue > 20
+    assert pixel_at(png, CAMERA, 21.2, 12.3) == (255, 255, 255)
+
+
+def test_an_added_agent_is_blue_where_it_stands() -> None:
+    png = draw(STREET, added(scenes.vehicle("New1", 20.0, 3.5)), CAMERA)
+    assert is_blue(pixel_at(png, CAMERA, 20.0, 3.5))
+    assert is_grey(pixel_at(draw_original(STREET, CAMERA), CAMERA, 20.3, 2.7))
+
+
+def test_left_of_the_ego_is_up_in_the_picture() -> None:
+    png = draw(STREET, added(scenes.vehicle("New1", 20.0, 8.0)), CAMERA)
+    blue = [is_blue(tuple(pixel)) for pixel in np.asarray(opened(png))[:, 700].tolist()]
+    assert any(blue[:400])
+    assert not any(blue[400:])
+
+
+def test_a_moved_agent_leaves_its_old_place_and_is_blue_at_its_new_one() -> None:
+    parked = scenes.vehicle("Agent2", 20.0, 0.0)
+    scene = scenes.scene(agents=(parked,))
+    png = draw(scene, Modification(moved=(replace(parked, x_m=30.0),)), CAMERA)
+    assert is_blue(pixel_at(png, CAMERA, 30.0, 0.0))
+    assert pixel_at(png, CAMERA, 20.3, 0.7) == pixel_at(
+        draw_original(STREET, CAMERA), CAMERA, 20.3, 0.7
+    )
+
+
+def test_a_removed_agent_is_gone_without_a_trace_in_a_vote_and_a_ghost_for_reviewers() -> None:
+    scene = scenes.scene(agents=(scenes.vehicle("Agent2", 20.0, 0.0),))
+    removed = Modification(removed=("Agent2",))
+    assert draw(scene, removed, CAMERA) == draw_original(STREET, CAMERA)
+    assert draw(scene, removed, CAMERA, labels=True) != draw(
+        STREET, Modification(), CAMERA, labels=True
+    )
+
+
+def test_others_are_grey() -> None:
+    png = draw_original(scenes.scene(agents=(scenes.vehicle("Agent2", 20.0, 0.0),)), CAMERA)
+    middle = pixel_at(png, CAMERA, 19.7, 0.4)
+    assert is_grey(middle)
+    assert middle[0] < 190
+
+
+def test_cones_differ_from_people_in_shape() -> None:
+    cone = draw(STREET, added(scenes.cone("New1", 20.3, 0.9)), CAMERA)
+    person = draw(STREET, added(scenes.pedestrian("New1", 20.3, 0.9)), CAMERA)
+    rows = []
+    for png in (cone, person):
+        pixels = patch(png, CAMERA, 20.3, 0.9, 12)
+        dark = pixels.min(axis=2) < 60
+        rows.append(dark.sum(axis=1)[dark.any(axis=1)])
+    triangle, circle = rows
+    assert triangle[1] < triangle[-3] / 2
+    assert abs(int(circle[1]) - int(circle[-2])) <= 3
+
+
+@pytest.mark.parametrize("kind", [kind for kind in AgentType if kind is not AgentType.EGO_VEHICLE])
+def test_every_type_has_a_mark_that_can_be_seen_in_the_widest_window(kind: AgentType) -> None:
+    far = added(scenes.vehicle("Ref", 210.0, 0.0))
+    camera = camera_for(STREET, far)
+    assert camera.px_per_m < 6.0
+    thing = replace(scenes.cone("New1", 102.5, 12.0), type=kind)
+    before, after = draw_original(STREET, camera), draw(STREET, added(thing), camera)
+    changed = patch(before, camera, 102.5, 12.0, 20) != patch(after, camera, 102.5, 12.0, 20)
+    assert changed.any(axis=2).any(axis=0).sum() >= 4
+
+
+def test_what_moves_has_a_tick_and_what_is_parked_has_none() -> None:
+    parked = scenes.vehicle("New1", 20.0, 3.5)
+    moving = replace(parked, speed_mps=8.0)
+    assert not is_blue(pixel_at(draw(STREET, added(parked), CAMERA), CAMERA, 26.0, 3.5))
+    assert is_blue(pixel_at(draw(STREET, added(moving), CAMERA), CAMERA, 26.0, 3.5))
+
+
+def test_the_same_picture_has_the_same_bytes_and_no_metadata() -> None:
+    change = added(scenes.vehicle("New1", 20.0, 3.5), scenes.vehicle("New2", 500.0, 3.5))
+    first, second = (draw(STREET, change, CAMERA) for _ in range(2))
+    assert first == second
+    assert set(chunks(first)) == {"IHDR", "IDAT", "IEND"}
+
+
+def test_a_change_that_does_not_fit_is_refused() -> None:
+    with pytest.raises(InvalidModification, match="Agent9"):
+        draw(STREET, Modification(removed=("Agent9",)), CAMERA)
+
+
+def everything() -> Scene:
+    """A junction with every kind of area and walkers beside it."""
+    square = ((20.0, -8.0), (36.0, -8.0), (36.0, 8.0), (20.0, 8.0))
+    areas = tuple(
+        Area(id=f"Area{index}", kind=kind, boundary_m=square)
+        for index, kind in enumerate(AreaKind)
+    )
+    walker = scenes.pedestrian("Agent2", 10.0, 5.0, (10.0, -5.0))
+    return replace(scenes.junction(), areas=areas, agents=(walker,))
+
+
+def test_lights_differ_in_shape_and_colour() -> None:
+    png = draw_original(scenes.junction(), CAMERA)
+    lamps = [pixel_at(png, CAMERA, 20.0, y_m) for y_m in (0.735, -0.735)]
+    assert is_red(lamps[0])
+    assert lamps[1][1] > lamps[1][0] + 50
+
+
+def test_labels_are_drawn_for_reviewers_only() -> None:
+    scene = everything()
+    assert draw(scene, Modification(), CAMERA) == draw_original(scene, CAMERA)
+    assert draw(scene, Modification(), CAMERA, labels=True) != draw_original(scene, CAMERA)
+
+
+def test_a_crosswalk_has_stripes_along_the_traffic() -> None:
+    zebra = Area(
+        id="Area9",
+        kind=AreaKind.CROSSWALK,
+        boundary_m=((27.0, -1.75), (30.0, -1.75), (30.0, 5.25), (27.0, 5.25)),
+    )
+    png = draw_original(replace(STREET, areas=(*STREET.areas, zebra)), CAMERA)
+    across = {pixel_at(png, CAMERA, 28.6, y_m) for y_m in np.arange(2.0, 4.8, 0.1)}
+    along = {pixel_at(png, CAMERA, x_m, 2.25) for x_m in np.arange(27.3, 29.7, 0.1)}
+    assert (255, 255, 255) in across
+    assert len(across) > len(along)
+
+
+def test_a_turned_vehicle_shows_where_it_faces() -> None:
+    there = draw(STREET, added(scenes.vehicle("New1", 20.0, 3.5)), CAMERA)
+    back = draw(STREET, added(scenes.vehicle("New1", 20.0, 3.5, math.pi)), CAMERA)
+    assert pixel_at(there, CAMERA, 21.3, 3.5)[0] > 200
+    assert pixel_at(back, CAMERA, 18.7, 3.5)[0] > 200
+    assert pixel_at(there, CAMERA, 18.7, 3.5)[0] < 200
