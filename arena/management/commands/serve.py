@@ -1,0 +1,58 @@
+"""`manage.py serve`: everything the product needs on one machine, until Ctrl-C."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from django.conf import settings
+from django.core.management import call_command
+from django.core.management.base import BaseCommand, CommandError, CommandParser
+
+from arena.errors import ArenaError
+from arena.serving.stack import Web, background, web_server
+from arena.serving.supervisor import Supervisor
+
+
+class Command(BaseCommand):
+    """Start what is missing, serve the pages, stop all of it together."""
+
+    help = (
+        "Serve Scenario Arena on this machine: a private Redis (unless REDIS_URL is set), a "
+        "worker and the web server. One Ctrl-C stops all of it."
+    )
+
+    def add_arguments(self, parser: CommandParser) -> None:
+        """Declare the options."""
+        parser.add_argument("--host", default="127.0.0.1", help="address to listen on")
+        parser.add_argument("--port", type=int, default=8000, help="port to listen on")
+        parser.add_argument("--web-workers", type=int, default=2, help="web server processes")
+        parser.add_argument("--concurrency", type=int, default=4, help="augmentations at once")
+
+    def handle(self, *args: Any, **options: Any) -> None:
+        """Run until somebody asks to stop."""
+        web = Web(host=options["host"], port=options["port"], workers=options["web_workers"])
+        try:
+            server = web_server(web)
+            self._prepare()
+            programs = [*background(concurrency=options["concurrency"]), server]
+            supervisor = Supervisor(programs, self._say)
+            with supervisor.signals():
+                try:
+                    supervisor.start()
+                    self.stdout.write(f"\nScenario Arena is at {web.address}  (Ctrl-C stops it)\n")
+                    supervisor.watch()
+                finally:
+                    self.stdout.write("Stopping ...")
+                    supervisor.stop()
+        except ArenaError as error:
+            raise CommandError(str(error)) from error
+        self.stdout.write("Everything is stopped.")
+
+    def _prepare(self) -> None:
+        """Bring tables and static files up to date; both do nothing when they are."""
+        call_command("migrate", interactive=False, verbosity=0)
+        settings.STATIC_ROOT.mkdir(parents=True, exist_ok=True)
+        call_command("collectstatic", interactive=False, verbosity=0)
+
+    def _say(self, name: str, line: str) -> None:
+        self.stdout.write(f"{name:8} | {line}")

@@ -1,0 +1,130 @@
+"""What the product needs on one machine: Redis, a worker, the web server, the stand-in model."""
+
+from __future__ import annotations
+
+import sys
+from dataclasses import dataclass
+from urllib.parse import urlsplit
+
+import redis
+from django.conf import settings
+
+from arena.errors import ArenaError
+from arena.serving.child import Program
+from arena.serving.probes import port_answers, redis_answers, require_free_port
+from arena.serving.redis_server import private_redis
+from augment.models import Endpoint
+
+MANAGE = (sys.executable, str(settings.BASE_DIR / "manage.py"))
+
+
+class AlreadyRunning(ArenaError):
+    """Another `manage.py serve` of the same folder is up."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Web:
+    """Where the pages are served, by how many processes."""
+
+    host: str = "127.0.0.1"
+    port: int = 8000
+    workers: int = 2
+    threads: int = 4
+
+    @property
+    def address(self) -> str:
+        """The address for a browser."""
+        shown = "localhost" if self.host in {"127.0.0.1", "0.0.0.0", "::1"} else self.host
+        return f"http://{shown}:{self.port}/"
+
+
+def background(*, concurrency: int) -> list[Program]:
+    """Redis where it is the private one, the stand-in models that are missing, and a worker.
+
+    Raises:
+        AlreadyRunning: The private Redis answers already.
+        NoRedisServer: It is needed and not here.
+    """
+    programs: list[Program] = []
+    if settings.REDIS_IS_PRIVATE:
+        if redis_answers(settings.PRIVATE_REDIS_SOCKET):
+            raise AlreadyRunning(
+                "Scenario Arena runs in this folder already (its private Redis answers on "
+                f"{settings.PRIVATE_REDIS_SOCKET}). Stop it first."
+            )
+        settings.VAR_DIR.mkdir(parents=True, exist_ok=True)
+        programs.append(private_redis(settings.PRIVATE_REDIS_SOCKET))
+    programs.extend(_missing_stand_ins())
+    programs.append(_worker(concurrency))
+    return programs
+
+
+def web_server(web: Web) -> Program:
+    """Gunicorn on a port that is free.
+
+    Raises:
+        PortTaken: It is not.
+    """
+    require_free_port(web.host, web.port)
+    arguments = (
+        *(sys.executable, "-m", "gunicorn", "arena.config.wsgi"),
+        *("--bind", f"[{web.host}]:{web.port}" if ":" in web.host else f"{web.host}:{web.port}"),
+        *("--workers", str(web.workers), "--threads", str(web.threads)),
+        *("--worker-tmp-dir", str(settings.VAR_DIR)),
+        "--no-control-socket",
+    )
+    return Program(
+        name="web", arguments=arguments, is_ready=lambda: port_answers(web.host, web.port)
+    )
+
+
+def _worker(concurrency: int) -> Program:
+    # Threads: the work is waiting for models and drawing in Pillow, which both let go of the
+    # interpreter; one process starts faster, and nothing of it can be left behind.
+    arguments = (
+        *(sys.executable, "-m", "celery", "--app", "arena.config", "worker"),
+        *("--pool", "threads", "--concurrency", str(concurrency)),
+        *("--loglevel", settings.LOG_LEVEL.lower(), "--quiet"),
+        *("--without-gossip", "--without-mingle"),
+    )
+    # In a container everybody is root; Celery's warning of that says nothing to this user.
+    environment = {"PYTHONWARNINGS": "ignore:You're running the worker"}
+    return Program(
+        name="worker", arguments=arguments, environment=environment, is_ready=_worker_listens
+    )
+
+
+def _worker_listens() -> bool:
+    """Whether a worker is subscribed to its remote control, which it does when it is up."""
+    client = _broker()
+    try:
+        return bool(client.exists("_kombu.binding.celery.pidbox"))
+    except (redis.RedisError, OSError):
+        return False
+    finally:
+        client.close()
+
+
+def _broker() -> redis.Redis:
+    url = str(settings.REDIS_URL)
+    if url.startswith("redis+socket://"):
+        return redis.Redis(unix_socket_path=url.removeprefix("redis+socket://").split("?")[0])
+    return redis.Redis.from_url(url)
+
+
+def _missing_stand_ins() -> list[Program]:
+    """One server for each simulated endpoint of this computer that nobody serves yet."""
+    programs = []
+    for endpoint in Endpoint.objects.filter(is_simulated=True):
+        address = urlsplit(endpoint.base_url)
+        host, port = address.hostname, address.port
+        if host not in {"localhost", "127.0.0.1"} or port is None or port_answers(host, port):
+            continue
+        programs.append(
+            Program(
+                name="fake_llm",
+                arguments=(*MANAGE, "fake_llm", "--port", str(port)),
+                is_ready=lambda host=host, port=port: port_answers(host, port),  # type: ignore[misc]
+            )
+        )
+    return programs

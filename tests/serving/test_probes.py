@@ -1,0 +1,38 @@
+from __future__ import annotations
+
+import socket
+from pathlib import Path
+
+import pytest
+
+from arena.serving import redis_server
+from arena.serving.probes import PortTaken, port_answers, redis_answers, require_free_port
+
+
+def test_a_taken_port_is_named_with_the_next_one() -> None:
+    with socket.create_server(("127.0.0.1", 0)) as server:
+        port = server.getsockname()[1]
+        assert port_answers("127.0.0.1", port)
+        with pytest.raises(PortTaken, match=rf"Port {port} .* --port {port + 1}"):
+            require_free_port("127.0.0.1", port)
+    assert not port_answers("127.0.0.1", port)
+
+
+def test_an_address_of_another_computer_is_refused() -> None:
+    with pytest.raises(PortTaken, match=r"192\.0\.2\.1"):
+        require_free_port("192.0.2.1", 8000)
+
+
+def test_no_redis_answers_where_there_is_none(tmp_path: Path) -> None:
+    assert not redis_answers(tmp_path / "redis.sock")
+    (tmp_path / "redis.sock").touch()
+    assert not redis_answers(tmp_path / "redis.sock")
+
+
+def test_without_any_redis_server_the_error_says_how_to_get_one(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    monkeypatch.setenv("PATH", str(tmp_path))
+    monkeypatch.setattr(redis_server, "find_spec", lambda name: None)
+    with pytest.raises(redis_server.NoRedisServer, match="apt install redis-server"):
+        redis_server.find_redis_server()
