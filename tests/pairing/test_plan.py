@@ -1,0 +1,214 @@
+from __future__ import annotations
+
+import time
+from collections import Counter
+from itertools import combinations
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from arena.errors import NothingToPlan
+from arena.pairing.plan import Entry, Plan, PlannedMatchup, Rules, plan
+
+
+def rules(
+    contestants: int = 3,
+    scenarios: int = 10,
+    experts: int = 2,
+    votes: int = 12,
+    seed: int = 1,
+    without: frozenset[tuple[int, int]] = frozenset(),
+    same: frozenset[tuple[int, int]] = frozenset(),
+) -> Rules:
+    """All cells but those (contestant, scenario) in `without`; those in `same` look alike."""
+    entries = tuple(
+        Entry(
+            scenario=f"s{s}",
+            contestant=f"c{c}",
+            picture=f"empty-{s}" if (c, s) in same else f"{c}-{s}",
+        )
+        for s in range(scenarios)
+        for c in range(contestants)
+        if (c, s) not in without
+    )
+    names = tuple(f"e{number}" for number in range(experts))
+    return Rules(entries=entries, experts=names, votes_per_expert=votes, seed=seed)
+
+
+def pair(matchup: PlannedMatchup) -> frozenset[str]:
+    return frozenset((matchup.left, matchup.right))
+
+
+def spread(counts: Counter[object], places: int) -> int:
+    """Most minus least, places that never occur counting as zero."""
+    values = list(counts.values()) + [0] * (places - len(counts))
+    return max(values) - min(values)
+
+
+def check_rules_hold(asked: Rules, made: Plan) -> None:
+    """What holds for every plan, whatever was available."""
+    pictures = {(entry.scenario, entry.contestant): entry.picture for entry in asked.entries}
+    for expert in asked.experts:
+        mine = [matchup for matchup in made.matchups if matchup.expert == expert]
+        assert [matchup.position for matchup in mine] == list(range(1, len(mine) + 1))
+        assert len(mine) == asked.votes_per_expert
+        assert len({(pair(matchup), matchup.scenario) for matchup in mine}) == len(mine)
+        last: dict[str, int] = {}
+        for matchup in mine:
+            seen = last.get(matchup.scenario)
+            assert seen is None or matchup.position - seen > made.scenario_gap
+            last[matchup.scenario] = matchup.position
+        shown = Counter(pair(matchup) for matchup in mine)
+        first_left = Counter(pair(m) for m in mine if m.left == min(m.left, m.right))
+        assert all(abs(2 * first_left[key] - shown[key]) <= 1 for key in shown)
+    for matchup in made.matchups:
+        left = pictures[matchup.scenario, matchup.left]
+        assert left != pictures[matchup.scenario, matchup.right]
+        assert 0 < matchup.draw_probability <= 1
+
+
+sizes = st.tuples(
+    st.integers(2, 6), st.integers(1, 9), st.integers(1, 5), st.integers(1, 60), st.integers(0, 9)
+)
+
+
+@given(sizes)
+@settings(max_examples=150, deadline=None)
+def test_a_full_plan_is_balanced_to_one(size: tuple[int, int, int, int, int]) -> None:
+    contestants, scenarios, experts, votes, seed = size
+    pairs = contestants * (contestants - 1) // 2
+    votes = min(votes, pairs * scenarios)
+    asked = rules(contestants, scenarios, experts, votes, seed)
+
+    made = plan(asked)
+
+    check_rules_hold(asked, made)
+    assert spread(Counter(pair(m) for m in made.matchups), pairs) <= 1
+    assert spread(Counter(m.scenario for m in made.matchups), scenarios) <= 1
+    for expert in asked.experts:
+        mine = [m for m in made.matchups if m.expert == expert]
+        assert spread(Counter(pair(m) for m in mine), pairs) <= 1
+        assert spread(Counter(m.scenario for m in mine), scenarios) <= 1
+    assert made.matchups[0].draw_probability == pytest.approx(1 / (pairs * scenarios))
+
+
+cells = st.frozensets(st.tuples(st.integers(0, 4), st.integers(0, 7)), max_size=14)
+
+
+@given(cells, cells, st.integers(1, 40), st.integers(1, 4), st.integers(0, 5))
+@settings(max_examples=150, deadline=None)
+def test_a_plan_with_holes_keeps_every_rule(
+    without: frozenset[tuple[int, int]],
+    same: frozenset[tuple[int, int]],
+    votes: int,
+    experts: int,
+    seed: int,
+) -> None:
+    asked = rules(5, 8, experts, votes, seed, without, same)
+    try:
+        made = plan(asked)
+    except NothingToPlan:
+        assert units(asked) < votes
+        return
+    check_rules_hold(asked, made)
+
+
+def units(asked: Rules) -> int:
+    count = 0
+    for one, other in combinations(asked.entries, 2):
+        count += one.scenario == other.scenario and one.picture != other.picture
+    return count
+
+
+@given(st.lists(st.integers(1, 6), min_size=2, max_size=7), st.integers(0, 3))
+@settings(max_examples=60, deadline=None)
+def test_the_scenario_gap_is_the_largest_possible(counts: list[int], seed: int) -> None:
+    """Contestants per scenario differ, all units are shown: the fullest scenario sets the gap."""
+    entries = tuple(
+        Entry(scenario=f"s{number}", contestant=f"c{c}", picture=f"{number}-{c}")
+        for number, contestants in enumerate(counts)
+        for c in range(contestants + 1)
+    )
+    showings = [(n + 1) * n // 2 for n in counts]
+    asked = Rules(entries=entries, experts=("e",), votes_per_expert=sum(showings), seed=seed)
+
+    made = plan(asked)
+
+    check_rules_hold(asked, made)
+    most, total = max(showings), sum(showings)
+    if most > 1:
+        fullest = showings.count(most)
+        fits = [g for g in range(6) if (most - 1) * (g + 1) + fullest <= total]
+        assert made.scenario_gap == max(fits)
+
+
+def test_the_gap_is_five_where_six_scenarios_allow_it() -> None:
+    made = plan(rules(4, 6, 3, 36))
+    assert made.scenario_gap == 5
+
+
+def test_three_scenarios_keep_two_between() -> None:
+    made = plan(rules(4, 3, 2, 18))
+    assert made.scenario_gap == 2
+
+
+def test_the_same_rules_give_the_same_plan_and_another_seed_another() -> None:
+    assert plan(rules(seed=3)) == plan(rules(seed=3))
+    assert plan(rules(seed=3)) != plan(rules(seed=4))
+
+
+def test_identical_pictures_are_listed_and_never_shown() -> None:
+    asked = rules(3, 4, 1, 5, same=frozenset({(0, 2), (1, 2)}))
+    made = plan(asked)
+    assert made.identical == (("s2", "c0", "c1"),)
+    check_rules_hold(asked, made)
+
+
+def test_units_are_spread_over_the_experts_before_any_is_repeated() -> None:
+    made = plan(rules(3, 10, 2, 15))
+    judged = Counter((pair(m), m.scenario) for m in made.matchups)
+    assert sum(count > 1 for count in judged.values()) <= 4, "a quarter by chance: 7 or 8 of 30"
+
+
+def test_an_odd_number_of_showings_leaves_no_side_ahead_over_all_experts() -> None:
+    made = plan(rules(2, 3, 6, 3))
+    assert Counter(m.left for m in made.matchups)["c0"] == 9
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_sides_are_a_fair_coin_for_every_contestant(seed: int) -> None:
+    made = plan(rules(9, 50, 9, 640, seed))
+    shown = Counter(m.left for m in made.matchups) + Counter(m.right for m in made.matchups)
+    left = Counter(m.left for m in made.matchups)
+    chi_square = sum((left[c] - shown[c] / 2) ** 2 / (shown[c] / 4) for c in shown)
+    assert chi_square < 27.9, "nine degrees of freedom, one in a thousand"
+
+
+@pytest.mark.parametrize(
+    ("experts", "votes", "limit_s"), [(6, 100, 0.3), (9, 640, 2.0)], ids=["600", "5760"]
+)
+def test_planning_is_fast(experts: int, votes: int, limit_s: float) -> None:
+    asked = rules(9, 50, experts, votes)
+    started = time.process_time()
+    plan(asked)
+    assert time.process_time() - started < limit_s
+
+
+def test_too_few_units_are_refused_with_both_numbers() -> None:
+    with pytest.raises(NothingToPlan, match=r"5 different pairs .*and 1 with.* is to judge 6"):
+        plan(rules(3, 2, 1, 6, same=frozenset({(0, 1), (1, 1)})))
+
+
+@pytest.mark.parametrize(
+    ("changes", "sentence"),
+    [
+        ({"votes": 0}, "Votes per expert must be 1 or more, not 0"),
+        ({"experts": 0}, "at least one expert"),
+        ({"contestants": 1}, "two contestants with pictures, not 1"),
+        ({"seed": -1}, "seed must be 0 or more"),
+    ],
+)
+def test_rules_that_make_no_sense_are_refused(changes: dict[str, int], sentence: str) -> None:
+    with pytest.raises(NothingToPlan, match=sentence):
+        plan(rules(**changes))  # type: ignore[arg-type]
