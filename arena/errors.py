@@ -33,3 +33,22 @@ class NothingToPlan(ArenaError):
 
 class NotRateable(ArenaError):
     """The votes do not determine a rating; the text says why."""
+
+
+class StudyStillOpen(ArenaError):
+    """Results of an open study are not shown by accident; looking early is a logged act.
+
+    Args:
+        name: The study.
+    """
+
+    def __init__(self, name: str) -> None:
+        self.name = name
+        super().__init__(
+            f"The study {name!r} is still open. Close it first, or look early on purpose: that "
+            "is written to the log."
+        )
+
+
+class NoSnapshot(ArenaError):
+    """The study has not been rated yet; rate it first."""

@@ -1,0 +1,30 @@
+"""manage.py close_study: take no more votes."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from django.core.management.base import BaseCommand, CommandError, CommandParser
+
+from arena.errors import ArenaError
+from arena.queries.studies import study_named
+from arena.services.studies import close_study
+from augment.errors import AugmentError
+
+
+class Command(BaseCommand):
+    """The door to arena.services.studies.close_study."""
+
+    help = "Close a study: it takes no more votes, and its results may be seen."
+
+    def add_arguments(self, parser: CommandParser) -> None:
+        """Which study."""
+        parser.add_argument("study", help="its name or its code")
+
+    def handle(self, *args: Any, **options: Any) -> None:
+        """Close the study and say so."""
+        try:
+            study = close_study(study=study_named(options["study"]))
+        except (ArenaError, AugmentError) as error:
+            raise CommandError(str(error)) from error
+        self.stdout.write(f"Closed {study.name!r}.")

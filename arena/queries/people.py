@@ -1,0 +1,24 @@
+"""Who somebody is."""
+
+from __future__ import annotations
+
+from django.contrib.auth.models import AnonymousUser, User
+from django.db.models import QuerySet
+
+ROLES = ("admin", "analyst", "expert")
+"""The groups of accounts, the most powerful first."""
+
+
+def role_of(user: User | AnonymousUser) -> str | None:
+    """The most powerful role of an account, None without one; costs a query."""
+    if not user.is_authenticated or not user.is_active:
+        return None
+    if user.is_superuser:
+        return "admin"
+    groups = set(user.groups.values_list("name", flat=True))
+    return next((role for role in ROLES if role in groups), None)
+
+
+def experts() -> QuerySet[User]:
+    """Active accounts that can be asked to vote."""
+    return User.objects.filter(is_active=True, groups__name="expert").select_related("person")

@@ -1,0 +1,56 @@
+"""Accounts with a role and a pseudonym."""
+
+from __future__ import annotations
+
+from django.contrib.auth.models import Group, User
+from django.db import transaction
+
+from arena.models import Person
+from arena.queries.people import ROLES
+from augment.errors import Conflict, UnknownName
+
+
+@transaction.atomic
+def create_person(
+    *,
+    username: str,
+    password: str | None,
+    role: str,
+    pseudonym: str | None = None,
+    is_simulated: bool = False,
+) -> User:
+    """Make an account; an admin may enter Django's admin too.
+
+    Args:
+        username: For the login.
+        password: None for an account that nobody can log in to by password.
+        role: "expert", "analyst" or "admin".
+        pseudonym: What others see instead of the name; "Expert 3" and so on by default.
+        is_simulated: The machine votes for it, and everything that comes of it says so.
+
+    Raises:
+        UnknownName: There is no such role.
+        Conflict: The username or the pseudonym is taken.
+    """
+    if role not in ROLES:
+        raise UnknownName("role", role, list(ROLES))
+    if User.objects.filter(username=username).exists():
+        raise Conflict(f"The username {username!r} is taken.")
+    if pseudonym is None:
+        pseudonym = _free_pseudonym(role)
+    elif Person.objects.filter(pseudonym=pseudonym).exists():
+        raise Conflict(f"The pseudonym {pseudonym!r} is taken.")
+    is_admin = role == "admin"
+    user = User.objects.create_user(
+        username, password=password, is_staff=is_admin, is_superuser=is_admin
+    )
+    user.groups.add(Group.objects.get_or_create(name=role)[0])
+    Person.objects.create(user=user, pseudonym=pseudonym, is_simulated=is_simulated)
+    return user
+
+
+def _free_pseudonym(role: str) -> str:
+    number = Person.objects.filter(user__groups__name=role).count() + 1
+    while Person.objects.filter(pseudonym=f"{role.capitalize()} {number}").exists():
+        number += 1
+    return f"{role.capitalize()} {number}"

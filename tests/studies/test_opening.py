@@ -1,0 +1,158 @@
+from __future__ import annotations
+
+from collections import Counter
+from dataclasses import replace
+
+import pytest
+from django.utils import timezone
+
+from arena.errors import NothingToPlan
+from arena.models import Matchup, Study
+from arena.pairing.plan import plan
+from arena.services.studies import close_study, open_study, rules_of
+from augment.errors import Conflict, UnknownName
+from augment.models import Augmentation, Contestant, Event, Scenario
+from tests.study_rows import KINDS, Cast, a_study, cast_of, picture
+
+pytestmark = pytest.mark.django_db
+
+
+def test_an_open_study_has_every_experts_matchups_and_a_line_in_the_log() -> None:
+    study = a_study(votes_per_expert=9)
+    assert study.state == Study.State.OPEN
+    assert study.opened_at is not None
+    per_expert = Counter(study.matchups.values_list("expert__username", flat=True))
+    assert per_expert == {"eva": 9, "finn": 9}
+    event = Event.objects.get(verb="study.opened")
+    assert event.object_code == str(study.code)
+    assert event.after == {"name": "Round 1", "matchups": 18, "seed": 7}
+
+
+def test_tokens_are_fresh_for_every_showing() -> None:
+    study = a_study()
+    tokens = [*study.matchups.values_list("left_token", flat=True)]
+    tokens += study.matchups.values_list("right_token", flat=True)
+    assert len(set(tokens)) == 36
+
+
+def test_the_stored_rules_give_the_stored_plan_again() -> None:
+    study = Study.objects.get(pk=a_study().pk)
+    planned = plan(rules_of(study))
+    stored = study.matchups.order_by("expert__username", "position").values_list(
+        "expert__username",
+        "position",
+        "scenario__slug",
+        "left__contestant__slug",
+        "right__contestant__slug",
+        "draw_probability",
+    )
+    assert list(stored) == [
+        (m.expert, m.position, m.scenario, m.left, m.right, m.draw_probability)
+        for m in planned.matchups
+    ]
+    assert study.rules["scenario_gap_kept"] == 5
+
+
+def test_a_gap_that_cannot_be_kept_is_said_in_the_rules() -> None:
+    study = a_study(scenarios=3, votes_per_expert=9)
+    assert (study.rules["scenario_gap"], study.rules["scenario_gap_kept"]) == (5, 2)
+
+
+def test_the_latest_picture_takes_part() -> None:
+    cast = cast_of(contestants=("ann", "bob"), scenarios=1)
+    place, ann = Scenario.objects.get(), Contestant.objects.get(slug="ann")
+    latest = picture(place, ann)
+    picture(place, ann, state=Augmentation.State.FAILED, image="")
+    study = open_study(name="Round 1", votes_per_expert=1, seed=1, **cast)
+    shown = {pk for pair in study.matchups.values_list("left", "right") for pk in pair}
+    assert latest.pk in shown
+
+
+def test_an_unreadable_answer_takes_part_as_the_unchanged_scene() -> None:
+    cast = cast_of(contestants=("ann", "bob"), scenarios=1)
+    place, ann = Scenario.objects.get(), Contestant.objects.get(slug="ann")
+    miss = picture(place, ann, state=Augmentation.State.UNREADABLE)
+    study = open_study(name="Round 1", votes_per_expert=1, seed=1, **cast)
+    shown = {pk for pair in study.matchups.values_list("left", "right") for pk in pair}
+    assert miss.pk in shown
+
+
+def test_identical_pictures_are_never_shown() -> None:
+    cast = cast_of(contestants=("ann", "bob"), scenarios=3)
+    for slug in cast["contestants"]:
+        place = Scenario.objects.get(slug="place-1")
+        picture(place, Contestant.objects.get(slug=slug), image="bev/empty.png")
+    study = open_study(name="Round 1", votes_per_expert=2, seed=1, **cast)
+    shown = set(study.matchups.values_list("scenario__slug", flat=True))
+    assert shown == {"place-0", "place-2"}
+    assert study.rules["identical"] == [["place-1", "ann", "bob"]]
+
+
+def test_missing_pictures_are_named_and_nothing_is_stored() -> None:
+    cast = cast_of()
+    Augmentation.objects.filter(contestant__slug="cid", scenario__slug="place-3").delete()
+    Augmentation.objects.filter(contestant__slug="bob", scenario__slug="place-0").update(
+        state="failed", finished_at=timezone.now()
+    )
+    with pytest.raises(NothingToPlan, match=r"of bob on place-0, cid on place-3\. Generate"):
+        open_study(name="Round 1", votes_per_expert=4, seed=1, **cast)
+    assert not Study.objects.exists()
+
+
+def test_too_few_units_leave_nothing_half_made() -> None:
+    cast = cast_of(scenarios=2)
+    with pytest.raises(NothingToPlan, match=r"6 different pairs to show, but each .* judge 7"):
+        open_study(name="Round 1", votes_per_expert=7, seed=1, **cast)
+    assert not Study.objects.exists()
+    assert not Matchup.objects.exists()
+
+
+@pytest.mark.parametrize("kind", ["contestants", "scenarios", "experts"])
+def test_an_unknown_name_is_refused_with_the_known_ones(kind: str) -> None:
+    cast = cast_of(scenarios=2)
+    known = sorted(cast[kind])  # type: ignore[literal-required]
+    cast[kind] = ["nobody", *known]  # type: ignore[literal-required]
+    with pytest.raises(UnknownName, match=f"'nobody'. Known: {', '.join(known)}"):
+        open_study(name="Round 1", votes_per_expert=2, seed=1, **cast)
+
+
+def test_a_taken_name_is_refused() -> None:
+    study = a_study()
+    with pytest.raises(Conflict, match="'Round 1' already"):
+        open_study(name=study.name, votes_per_expert=2, seed=1, **names_of(study))
+
+
+def names_of(study: Study) -> Cast:
+    return {
+        "contestants": list(study.contestants.values_list("slug", flat=True)),
+        "scenarios": list(study.scenarios.values_list("slug", flat=True)),
+        "experts": list(study.experts.values_list("username", flat=True)),
+    }
+
+
+def test_simulated_contestants_take_part_only_when_allowed() -> None:
+    cast = cast_of(kind=KINDS.SIMULATED)
+    with pytest.raises(Conflict, match="contestant ann, contestant bob"):
+        open_study(name="Round 1", votes_per_expert=2, seed=1, **cast)
+    allowed = open_study(name="Round 1", votes_per_expert=2, seed=1, allow_simulated=True, **cast)
+    assert allowed.allow_simulated
+
+
+def test_simulated_experts_take_part_only_when_allowed() -> None:
+    cast = cast_of(simulated_experts=True)
+    with pytest.raises(Conflict, match="expert eva, expert finn"):
+        open_study(name="Round 1", votes_per_expert=2, seed=1, **cast)
+
+
+def test_closing_is_logged_once_and_final() -> None:
+    study = a_study()
+    closed = close_study(study=study)
+    assert closed.state == Study.State.CLOSED
+    assert closed.closed_at is not None
+    assert close_study(study=study).closed_at == closed.closed_at
+    assert Event.objects.filter(verb="study.closed").count() == 1
+
+
+def test_planning_again_with_another_seed_gives_another_plan() -> None:
+    rules = rules_of(a_study())
+    assert plan(rules) != plan(replace(rules, seed=8))

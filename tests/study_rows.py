@@ -1,0 +1,113 @@
+"""Rows for tests of studies: contestants with pictures of scenarios, and the people who vote."""
+
+from __future__ import annotations
+
+import uuid
+from typing import TypedDict
+
+from django.contrib.auth.models import User
+from django.utils import timezone
+
+from arena.models import Matchup, Study, Vote
+from arena.services.people import create_person
+from arena.services.studies import open_study
+from arena.services.votes import cast_vote
+from augment.models import Augmentation, BaseScene, Contestant, GenerationJob, Scenario
+
+KINDS = Contestant.Kind
+
+
+class Cast(TypedDict):
+    """Who takes part, by the names that open_study takes."""
+
+    contestants: list[str]
+    scenarios: list[str]
+    experts: list[str]
+
+
+def contestant(slug: str, kind: str = KINDS.RULE, name: str | None = None) -> Contestant:
+    return Contestant.objects.create(slug=slug, name=name or slug.capitalize(), kind=kind)
+
+
+def scenario(slug: str) -> Scenario:
+    base, _ = BaseScene.objects.get_or_create(
+        slug="street", defaults={"document": {}, "source": "authored", "provenance": "a test"}
+    )
+    return Scenario.objects.create(
+        slug=slug, base_scene=base, type=Scenario.Type.NUDGE, instruction=f"Park a car on {slug}."
+    )
+
+
+def picture(
+    scenario: Scenario,
+    contestant: Contestant,
+    *,
+    image: str | None = None,
+    state: str = Augmentation.State.DONE,
+) -> Augmentation:
+    """What a job of its own made of the scenario."""
+    job = GenerationJob.objects.create(name="a job")
+    done = state == Augmentation.State.DONE
+    return Augmentation.objects.create(
+        job=job,
+        scenario=scenario,
+        contestant=contestant,
+        state=state,
+        modification={} if done else None,
+        image=f"bev/{uuid.uuid4().hex}.png" if image is None else image,
+        finished_at=timezone.now(),
+    )
+
+
+def cast_of(
+    *,
+    contestants: tuple[str, ...] = ("ann", "bob", "cid"),
+    scenarios: int = 6,
+    experts: tuple[str, ...] = ("eva", "finn"),
+    kind: str = KINDS.RULE,
+    simulated_experts: bool = False,
+) -> Cast:
+    """Everybody and everything that a study needs; returns the names as open_study takes them."""
+    places = [scenario(f"place-{number}") for number in range(scenarios)]
+    for slug in contestants:
+        row = contestant(slug, kind)
+        for place in places:
+            picture(place, row)
+    for username in experts:
+        expert(username, is_simulated=simulated_experts)
+    return {
+        "contestants": list(contestants),
+        "scenarios": [place.slug for place in places],
+        "experts": list(experts),
+    }
+
+
+def expert(username: str, *, is_simulated: bool = False) -> User:
+    return create_person(
+        username=username, password="a password", role="expert", is_simulated=is_simulated
+    )
+
+
+def a_study(*, votes_per_expert: int = 9, seed: int = 7, **cast: object) -> Study:
+    """An open study of three contestants, six scenarios and two experts, unless told otherwise."""
+    return open_study(
+        name="Round 1",
+        votes_per_expert=votes_per_expert,
+        seed=seed,
+        **cast_of(**cast),  # type: ignore[arg-type]
+    )
+
+
+def matchups_of(study: Study, username: str) -> list[Matchup]:
+    return list(study.matchups.filter(expert__username=username).order_by("position"))
+
+
+def vote(matchup: Matchup, outcome: str = "left", **more: object) -> Vote:
+    """A vote with a fresh key unless one is given."""
+    arguments: dict[str, object] = {"key": uuid.uuid4(), **more}
+    return cast_vote(
+        expert=matchup.expert,
+        matchup_code=matchup.code,
+        outcome=outcome,
+        **arguments,  # type: ignore[arg-type]
+    )

@@ -1,0 +1,217 @@
+from __future__ import annotations
+
+import uuid
+
+import pytest
+from django.db import IntegrityError, transaction
+from pytest_django import DjangoAssertNumQueries
+
+from arena.errors import AlreadyDecided, NotYours, StudyNotOpen
+from arena.models import Person, Vote
+from arena.queries.votes import current_votes, next_matchup, recent_votes, tallies, upcoming
+from arena.queries.votes import voting_progress as progress_of
+from arena.services.studies import close_study
+from arena.services.votes import cast_vote, mark_served
+from augment.errors import Conflict
+from tests.study_rows import a_study, expert, matchups_of, vote
+
+pytestmark = pytest.mark.django_db
+
+
+@pytest.mark.parametrize(
+    ("outcome", "winner"), [("left", "left_id"), ("equal", None), ("right", "right_id")]
+)
+def test_a_vote_stores_the_winner_apart_from_the_side(outcome: str, winner: str | None) -> None:
+    matchup = matchups_of(a_study(), "eva")[0]
+    stored = vote(matchup, outcome, ms_visible=4200)
+    assert stored.winner_id == (getattr(matchup, winner) if winner else None)
+    assert (stored.shown_left_id, stored.shown_right_id) == (matchup.left_id, matchup.right_id)
+    assert stored.ms_visible == 4200
+    assert not stored.is_simulated
+
+
+def test_the_same_key_again_is_the_same_vote() -> None:
+    matchup = matchups_of(a_study(), "eva")[0]
+    key = uuid.uuid4()
+    first = vote(matchup, "left", key=key)
+    again = vote(matchup, "left", key=str(key))
+    assert again.pk == first.pk
+    assert Vote.objects.count() == 1
+
+
+def test_the_same_key_with_another_outcome_is_refused_with_the_stored_one() -> None:
+    matchup = matchups_of(a_study(), "eva")[0]
+    key = uuid.uuid4()
+    vote(matchup, "left", key=key)
+    with pytest.raises(AlreadyDecided) as refused:
+        vote(matchup, "right", key=key)
+    assert refused.value.outcome == "left"
+
+
+def test_the_same_key_for_another_matchup_is_refused() -> None:
+    first, second, *_ = matchups_of(a_study(), "eva")
+    key = uuid.uuid4()
+    vote(first, key=key)
+    with pytest.raises(Conflict, match="another vote"):
+        vote(second, key=key)
+
+
+def test_another_key_for_a_decided_matchup_is_refused() -> None:
+    matchup = matchups_of(a_study(), "eva")[0]
+    vote(matchup, "equal")
+    with pytest.raises(AlreadyDecided) as refused:
+        vote(matchup, "equal")
+    assert refused.value.outcome == "equal"
+
+
+def test_a_change_is_appended_and_supersedes_the_current_vote() -> None:
+    study = a_study()
+    matchup = matchups_of(study, "eva")[0]
+    first = vote(matchup, "left")
+    second = vote(matchup, "right", supersedes=first.key)
+    third = vote(matchup, "equal", supersedes=second.key)
+    assert Vote.objects.count() == 3
+    assert list(current_votes(study)) == [third]
+    assert [v.outcome for v in recent_votes(study=study, expert=matchup.expert)] == ["equal"]
+
+
+def test_a_superseded_vote_cannot_be_superseded_again() -> None:
+    matchup = matchups_of(a_study(), "eva")[0]
+    first = vote(matchup, "left")
+    vote(matchup, "right", supersedes=first.key)
+    with pytest.raises(AlreadyDecided) as refused:
+        vote(matchup, "equal", supersedes=first.key)
+    assert refused.value.outcome == "right"
+
+
+def test_a_first_vote_has_nothing_to_supersede() -> None:
+    matchup = matchups_of(a_study(), "eva")[0]
+    with pytest.raises(Conflict, match="no vote yet"):
+        vote(matchup, supersedes=uuid.uuid4())
+
+
+def test_nobody_votes_on_somebody_elses_matchup() -> None:
+    theirs = matchups_of(a_study(), "finn")[0]
+    for stranger in (matchups_of(theirs.study, "eva")[0].expert, expert("gus")):
+        with pytest.raises(NotYours):
+            cast_vote(expert=stranger, matchup_code=theirs.code, key=uuid.uuid4(), outcome="left")
+    assert not Vote.objects.exists()
+
+
+def test_a_closed_study_takes_no_votes_but_knows_the_ones_it_has() -> None:
+    study = a_study()
+    first, second, *_ = matchups_of(study, "eva")
+    stored = vote(first)
+    close_study(study=study)
+    with pytest.raises(StudyNotOpen):
+        vote(second)
+    with pytest.raises(StudyNotOpen):
+        vote(first, "right", supersedes=stored.key)
+    assert vote(first, key=stored.key) == stored
+
+
+def test_an_unknown_outcome_is_refused() -> None:
+    with pytest.raises(ValueError, match="draw"):
+        vote(matchups_of(a_study(), "eva")[0], "draw")
+
+
+def test_the_vote_of_a_simulated_expert_says_so() -> None:
+    matchup = matchups_of(a_study(), "eva")[0]
+    Person.objects.filter(user=matchup.expert).update(is_simulated=True)
+    assert vote(matchup).is_simulated
+
+
+def test_the_database_itself_refuses_two_first_votes_and_a_winner_that_was_not_shown() -> None:
+    first, second, *_ = matchups_of(a_study(), "eva")
+    stored = vote(first)
+
+    def copy(**changes: object) -> Vote:
+        row = {
+            "key": uuid.uuid4(),
+            "matchup": first,
+            "expert": first.expert,
+            "shown_left": first.left,
+            "shown_right": first.right,
+            "outcome": "left",
+            "winner": first.left,
+            **changes,
+        }
+        return Vote(**row)
+
+    twice = copy()
+    same_key = copy(key=stored.key, matchup=second)
+    not_shown = copy(matchup=second, winner=first.right)
+    for bad in (twice, same_key, not_shown):
+        with pytest.raises(IntegrityError), transaction.atomic():
+            bad.save()
+    assert Vote.objects.count() == 1
+
+
+def test_a_vote_is_never_changed() -> None:
+    stored = vote(matchups_of(a_study(), "eva")[0])
+    stored.outcome = "right"
+    with pytest.raises(TypeError, match="append-only"):
+        stored.save()
+
+
+def test_the_next_matchups_follow_the_experts_own_order() -> None:
+    study = a_study()
+    mine = matchups_of(study, "eva")
+    eva = mine[0].expert
+    assert next_matchup(study=study, expert=eva) == mine[0]
+    vote(mine[0])
+    vote(mine[2])
+    assert upcoming(study=study, expert=eva, n=3) == [mine[1], mine[3], mine[4]]
+    for matchup in [mine[1], *mine[3:]]:
+        vote(matchup)
+    assert next_matchup(study=study, expert=eva) is None
+
+
+def test_progress_counts_matchups_and_foresees_the_end_at_the_experts_pace() -> None:
+    study = a_study(votes_per_expert=9)
+    mine = matchups_of(study, "eva")
+    eva = mine[0].expert
+    assert progress_of(study=study, expert=eva).minutes_left is None
+    first = vote(mine[0], ms_visible=30_000)
+    vote(mine[0], "equal", supersedes=first.key, ms_visible=30_000)
+    vote(mine[1], ms_visible=30_000)
+    progress = progress_of(study=study, expert=eva)
+    assert (progress.total, progress.voted, progress.left) == (9, 2, 7)
+    assert progress.minutes_left == 4
+
+
+def test_tallies_have_a_line_per_expert() -> None:
+    study = a_study()
+    first, second, *_ = matchups_of(study, "eva")
+    changed = vote(first, "left")
+    vote(first, "right", supersedes=changed.key)
+    vote(second, "equal")
+    lines = {line.expert.username: line for line in tallies(study)}
+    eva, finn = lines["eva"], lines["finn"]
+    assert (eva.total, eva.voted, eva.left_wins, eva.ties, eva.right_wins) == (9, 2, 0, 1, 1)
+    assert (finn.total, finn.voted) == (9, 0)
+    assert eva.pseudonym == "Expert 1"
+
+
+def test_served_is_remembered_from_the_first_time() -> None:
+    study = a_study()
+    matchup = matchups_of(study, "eva")[0]
+    mark_served(matchups=[matchup])
+    matchup.refresh_from_db()
+    first = matchup.served_at
+    assert first is not None
+    mark_served(matchups=[matchup])
+    matchup.refresh_from_db()
+    assert matchup.served_at == first
+
+
+def test_voting_costs_few_queries(django_assert_num_queries: DjangoAssertNumQueries) -> None:
+    study = a_study()
+    matchup = matchups_of(study, "eva")[0]
+    eva = matchup.expert
+    with django_assert_num_queries(1):
+        next_one = next_matchup(study=study, expert=eva)
+        assert next_one is not None
+        assert next_one.scenario.instruction
+    with django_assert_num_queries(6):
+        vote(matchup)

@@ -1,0 +1,63 @@
+"""Votes that arrive at once, on the database as it is configured."""
+
+from __future__ import annotations
+
+import uuid
+from collections import Counter
+from concurrent.futures import ThreadPoolExecutor
+
+import pytest
+from django.db import connection
+
+from arena.errors import AlreadyDecided
+from arena.models import Matchup, Vote
+from tests.study_rows import a_study, vote
+
+pytestmark = pytest.mark.django_db(transaction=True)
+
+THREADS = 8
+
+
+def cast(job: tuple[Matchup, uuid.UUID, str]) -> str:
+    """One vote in a thread of its own; what became of it."""
+    matchup, key, outcome = job
+    try:
+        return vote(matchup, outcome, key=key).outcome
+    except AlreadyDecided as error:
+        return f"decided: {error.outcome}"
+    finally:
+        connection.close()
+
+
+def at_once(jobs: list[tuple[Matchup, uuid.UUID, str]]) -> list[str]:
+    with ThreadPoolExecutor(max_workers=THREADS) as pool:
+        return list(pool.map(cast, jobs))
+
+
+def test_eight_threads_store_every_vote_once() -> None:
+    experts = tuple(f"expert-{number}" for number in range(THREADS))
+    study = a_study(experts=experts, scenarios=10, votes_per_expert=20)
+    matchups = study.matchups.select_related("expert")
+    jobs = [(matchup, uuid.uuid4(), "left") for matchup in matchups]
+    replayed = [job for job in jobs for _ in range(2)]
+
+    assert set(at_once(replayed)) == {"left"}
+
+    assert Vote.objects.count() == len(jobs) == 160
+    assert set(Vote.objects.values_list("key", flat=True)) == {key for _, key, _ in jobs}
+
+
+def test_eight_keys_for_one_matchup_leave_one_vote() -> None:
+    matchup = a_study().matchups.select_related("expert").first()
+    assert matchup is not None
+    became = Counter(at_once([(matchup, uuid.uuid4(), "equal") for _ in range(THREADS)]))
+    assert became == {"equal": 1, "decided: equal": THREADS - 1}
+    assert Vote.objects.count() == 1
+
+
+def test_one_key_eight_times_is_one_vote() -> None:
+    matchup = a_study().matchups.select_related("expert").first()
+    assert matchup is not None
+    key = uuid.uuid4()
+    assert set(at_once([(matchup, key, "right")] * THREADS)) == {"right"}
+    assert Vote.objects.count() == 1
