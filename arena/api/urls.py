@@ -2,6 +2,12 @@
 
 from __future__ import annotations
 
-from django.urls import URLPattern
+from django.urls import URLPattern, path
 
-urlpatterns: list[URLPattern] = []
+from arena.api.matchups import MatchupsView
+from arena.api.votes import VotesView
+
+urlpatterns: list[URLPattern] = [
+    path("matchups", MatchupsView.as_view(), name="api-matchups"),
+    path("votes", VotesView.as_view(), name="api-votes"),
+]

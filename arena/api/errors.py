@@ -1,0 +1,85 @@
+"""One shape for everything that goes wrong on the wire, and one table of status codes.
+
+    {"error": {"code": "already_decided", "message": "...", "outcome": "A"}}
+
+`message` is a sentence for a person. `fields` (per field a list of sentences) comes with 422,
+`outcome` (the stored one) with a matchup that is decided already.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+from django.core.exceptions import PermissionDenied
+from django.http import Http404
+from rest_framework import exceptions
+from rest_framework.response import Response
+from rest_framework.views import APIView
+
+from arena.api.letters import LETTERS
+from arena.errors import AlreadyDecided, ArenaError, NotYours, StudyNotOpen
+from augment.errors import AugmentError, Conflict
+
+STATUS: tuple[tuple[type[Exception], int, str], ...] = (
+    (NotYours, 404, "not_found"),
+    (Http404, 404, "not_found"),
+    (StudyNotOpen, 410, "study_not_open"),
+    (AlreadyDecided, 409, "already_decided"),
+    (Conflict, 409, "conflict"),
+    (ArenaError, 400, "refused"),
+    (AugmentError, 400, "refused"),
+    (exceptions.ValidationError, 422, "invalid"),
+    (exceptions.ParseError, 422, "invalid"),
+    (exceptions.NotAuthenticated, 401, "signed_out"),
+    (exceptions.AuthenticationFailed, 401, "signed_out"),
+    (exceptions.PermissionDenied, 403, "forbidden"),
+    (PermissionDenied, 403, "forbidden"),
+    (exceptions.MethodNotAllowed, 405, "method_not_allowed"),
+    (exceptions.NotAcceptable, 406, "not_acceptable"),
+    (exceptions.UnsupportedMediaType, 415, "unsupported_media_type"),
+    (exceptions.Throttled, 429, "too_fast"),
+)
+"""The first row that fits decides; what is in no row is a fault of ours and stays one."""
+
+
+class ApiView(APIView):
+    """What every resource shares: how errors look."""
+
+    def handle_exception(self, exc: Exception) -> Response:
+        """Turn an error of the table into its response; any other is raised again."""
+        found = _response(exc)
+        if found is None:
+            raise exc
+        found.exception = True
+        return found
+
+
+def _response(exc: Exception) -> Response | None:
+    for kind, status, code in STATUS:
+        if isinstance(exc, kind):
+            headers = {}
+            if status == 401:  # the browser can tell that it only has to sign in again
+                headers["WWW-Authenticate"] = "Session"
+            error = {"code": code, "message": _message(exc), **_extras(exc)}
+            return Response({"error": error}, status=status, headers=headers)
+    return None
+
+
+def _message(exc: Exception) -> str:
+    if isinstance(exc, exceptions.ValidationError):
+        return "The request can't be read; see the fields."
+    if isinstance(exc, exceptions.NotAuthenticated):
+        return "Please sign in again."
+    if isinstance(exc, exceptions.APIException):
+        return str(exc.detail)
+    return str(exc)
+
+
+def _extras(exc: Exception) -> dict[str, Any]:
+    if isinstance(exc, AlreadyDecided):
+        return {"outcome": LETTERS[exc.outcome]}
+    if isinstance(exc, exceptions.ValidationError):
+        return {"fields": exc.detail}
+    if isinstance(exc, exceptions.ParseError):
+        return {"fields": {"body": [str(exc.detail)]}}
+    return {}

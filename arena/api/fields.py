@@ -1,0 +1,38 @@
+"""Reading a request: known fields only, each of its own type."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from rest_framework import serializers
+
+
+class StrictSerializer(serializers.Serializer[Any]):
+    """A body whose unknown fields are refused, so that a misspelt one is never ignored."""
+
+    def run_validation(self, data: Any = serializers.empty) -> Any:
+        """The typed values.
+
+        Raises:
+            serializers.ValidationError: A field is unknown, missing or of the wrong type.
+        """
+        if not isinstance(data, Mapping):
+            raise serializers.ValidationError({"body": ["Must be a JSON object."]})
+        unknown = sorted(set(data) - set(self.fields))
+        if unknown:
+            allowed = ", ".join(self.fields)
+            raise serializers.ValidationError(
+                {name: [f"Unknown field. Known: {allowed}."] for name in unknown}
+            )
+        return super().run_validation(data)
+
+
+class WholeNumberField(serializers.IntegerField):
+    """An integer of JSON: neither a text nor a fraction nor true."""
+
+    def to_internal_value(self, data: Any) -> int:
+        """The number itself."""
+        if isinstance(data, bool) or not isinstance(data, int):
+            self.fail("invalid")
+        return super().to_internal_value(data)

@@ -1,0 +1,6 @@
+"""The letters of the wire: which side an expert sees as A and which as B."""
+
+from __future__ import annotations
+
+LETTERS = {"left": "A", "equal": "E", "right": "B"}
+OUTCOMES = {letter: outcome for outcome, letter in LETTERS.items()}

@@ -1,0 +1,16 @@
+"""The wire alone: the pages' view of an image is stood in for."""
+
+from __future__ import annotations
+
+from django.http import HttpRequest, HttpResponse
+from django.urls import include, path
+
+
+def image(request: HttpRequest, token: str) -> HttpResponse:
+    return HttpResponse(status=204)
+
+
+urlpatterns = [
+    path("api/v1/", include("arena.api.urls")),
+    path("i/<str:token>", image, name="matchup-image"),
+]
