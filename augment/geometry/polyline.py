@@ -117,10 +117,14 @@ class Polyline:
         inner = self.stations_m[(self.stations_m > low) & (self.stations_m < high)]
         return self._at(np.concatenate([[low], inner, [high]]))
 
-    def _at(self, stations_m: FloatArray) -> Polyline:
+    def points_at(self, stations_m: FloatArray) -> FloatArray:
+        """The points (N, 2) at the arc lengths (N,), which are clipped to the line."""
         x = np.interp(stations_m, self.stations_m, self.points_m[:, 0])
         y = np.interp(stations_m, self.stations_m, self.points_m[:, 1])
-        return Polyline(np.column_stack([x, y]))
+        return np.column_stack([x, y])
+
+    def _at(self, stations_m: FloatArray) -> Polyline:
+        return Polyline(self.points_at(stations_m))
 
     @cached_property
     def _directions(self) -> FloatArray:

@@ -159,8 +159,12 @@ def read(document: object, model: type[Read], *, what: str, format_name: str) ->
     try:
         return model.model_validate(document)
     except ValidationError as fault:
-        problems = [(path(*one["loc"]), _sentence(one)) for one in fault.errors()]
-        raise InvalidDocument(what, problems) from None
+        raise InvalidDocument(what, problems_of(fault)) from None
+
+
+def problems_of(fault: ValidationError) -> list[tuple[str, str]]:
+    """Each fault that pydantic found, as its path and a sentence."""
+    return [(path(*one["loc"]), _sentence(one)) for one in fault.errors()]
 
 
 def path(*steps: int | str) -> str:

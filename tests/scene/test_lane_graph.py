@@ -1,10 +1,12 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import pytest
 
 from augment.errors import UnknownName
+from augment.geometry.polyline import Polyline
 from augment.scene.entities import TurnType
 from augment.scene.lane_graph import LaneGraph
 from tests.scenes import junction, scene
@@ -49,3 +51,12 @@ def test_past_the_map_there_is_nothing() -> None:
 def test_an_unknown_lane_names_the_known_ones() -> None:
     with pytest.raises(UnknownName, match="Lane1, Lane2"):
         LaneGraph(scene()).way("Lane9")
+
+
+def test_a_lane_can_follow_another_with_no_connector_between() -> None:
+    first, second = scene().lanes
+    onward = replace(second, centerline=Polyline([(100.0, 0.0), (160.0, 0.0)]))
+    street = scene(lanes=(replace(first, successors=("Lane2",)), onward))
+    graph = LaneGraph(street)
+    assert graph.route("Lane1", 200.0) == ["Lane1", "Lane2"]
+    assert graph.predecessors("Lane2") == ("Lane1",)
