@@ -11,6 +11,7 @@ from django.contrib.auth.models import User
 from django.db import IntegrityError, transaction
 
 from augment.errors import Conflict, InvalidDocument, UnknownName
+from augment.formats import argoverse2
 from augment.formats.json_file import read_json
 from augment.models import BaseScene, Scenario
 from augment.scene.catalogue import ScenarioType
@@ -27,7 +28,7 @@ from augment.scene.recording import Recording
 from augment.scene.recording_codec import recording_to_document
 from augment.services.events import log_event
 
-SOURCES = ("json",)
+SOURCES = ("av2", "json")
 SLUG_LENGTH = 80
 
 
@@ -184,6 +185,8 @@ def check_slug(slug: str, *, what: str) -> None:
 
 
 def _read(source: str, path: Path, frame: int, slug: str) -> tuple[Scene, Recording | None]:
+    if source == "av2":
+        return argoverse2.read(path, frame=frame, name=slug)
     if source == "json":
         if frame != 0:
             raise InvalidDocument("scene", [("frame", f"a JSON scene has frame 0, not {frame}")])

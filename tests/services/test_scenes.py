@@ -10,7 +10,9 @@ from augment.errors import Conflict, InvalidDocument, InvalidModification, Unkno
 from augment.models import BaseScene, Event, Scenario
 from augment.scene.codec import modification_to_document, scene_to_document
 from augment.scene.modification import Modification
+from augment.scene.recording_codec import recording_from_document
 from augment.services.scenes import add_scenario, import_scene, reference_of, scene_of
+from tests.formats.av2_logs import write_log
 from tests.scenes import cone, scene, vehicle
 
 pytestmark = pytest.mark.django_db
@@ -46,6 +48,15 @@ def test_an_imported_scene_carries_its_slug_and_leaves_a_line_in_the_log(file: P
     assert row.recording is None
     event = Event.objects.get()
     assert (event.actor, event.verb, event.object_code) == (ada, "import", str(row.code))
+
+
+def test_a_recorded_scene_comes_with_its_recording(tmp_path: Path) -> None:
+    row = import_scene(source="av2", path=write_log(tmp_path / "log"), frame=1, slug="made")
+    row.refresh_from_db()
+    assert (row.source, row.document["name"]) == ("av2", "made")
+    recording = recording_from_document(row.recording)
+    assert len(recording.times_s) == 4
+    assert "log log, frame 1 of 5" in row.provenance
 
 
 def test_a_taken_slug_is_a_conflict(street: BaseScene, file: Path) -> None:
