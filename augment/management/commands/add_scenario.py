@@ -1,0 +1,60 @@
+"""Put an instruction to a stored scene."""
+
+from __future__ import annotations
+
+from argparse import ArgumentParser
+from pathlib import Path
+from typing import Any
+
+from django.core.management.base import BaseCommand, CommandError
+
+from augment.errors import AugmentError
+from augment.formats.json_file import read_json
+from augment.scene.catalogue import ScenarioType
+from augment.scene.codec import modification_from_document, modification_to_document
+from augment.services.scenes import add_scenario
+
+
+class Command(BaseCommand):
+    """`manage.py add_scenario --scene SLUG --type TYPE --instruction TEXT`."""
+
+    help = "Add a scenario: a scene, its type, an instruction and, if given, a reference."
+
+    def add_arguments(self, parser: ArgumentParser) -> None:
+        """Say what the command takes."""
+        types = ", ".join(member.value for member in ScenarioType)
+        parser.add_argument("--scene", required=True, help="the slug of a stored scene")
+        parser.add_argument("--type", required=True, help=f"one of {types}")
+        parser.add_argument("--instruction", required=True, help="what is to be changed")
+        parser.add_argument(
+            "--slug", help="the scenario's name; made up from the others if absent"
+        )
+        parser.add_argument(
+            "--reference", type=Path, metavar="FILE", help="a modification in the own JSON"
+        )
+        parser.add_argument(
+            "--keep-traffic", action="store_true", help="keep the recorded traffic in the scene"
+        )
+
+    def handle(self, *args: Any, **options: Any) -> None:
+        """Add, and say under which name."""
+        try:
+            scenario = add_scenario(
+                scene=options["scene"],
+                type=options["type"],
+                instruction=options["instruction"],
+                slug=options["slug"],
+                reference=_reference(options["reference"]),
+                keep_traffic=options["keep_traffic"],
+            )
+        except AugmentError as fault:
+            raise CommandError(str(fault)) from fault
+        with_reference = "with" if scenario.reference is not None else "without"
+        self.stdout.write(f"Added scenario {scenario.slug} {with_reference} a reference.")
+
+
+def _reference(file: Path | None) -> dict[str, Any] | None:
+    if file is None:
+        return None
+    document = read_json(file, what="modification")
+    return modification_to_document(modification_from_document(document))

@@ -1,0 +1,77 @@
+from __future__ import annotations
+
+import json
+import shutil
+from io import StringIO
+from pathlib import Path
+
+import pytest
+from django.core.management import call_command
+from django.core.management.base import CommandError
+
+from augment.models import BaseScene, Event
+from augment.scene.codec import scene_to_document
+from tests.formats.av2_logs import write_log
+from tests.scenes import junction
+
+pytestmark = pytest.mark.django_db
+
+
+def run(*arguments: object) -> str:
+    out = StringIO()
+    call_command("import_scene", *(str(one) for one in arguments), stdout=out)
+    return out.getvalue()
+
+
+def refused(*arguments: object) -> str:
+    before = BaseScene.objects.count(), Event.objects.count()
+    with pytest.raises(CommandError) as caught:
+        run(*arguments)
+    assert caught.value.returncode == 1
+    assert (BaseScene.objects.count(), Event.objects.count()) == before
+    return str(caught.value)
+
+
+def test_a_recorded_scene_is_imported_and_counted(tmp_path: Path) -> None:
+    out = run("av2", write_log(tmp_path / "log"), "--frame", 2, "--slug", "made")
+    assert out == (
+        "Imported scene made: 3 agents, 5 lanes, 2 connectors, 2 areas besides the ego.\n"
+    )
+    assert Event.objects.filter(verb="import", after__frame=2).exists()
+
+
+def test_a_scene_of_the_own_format_is_imported(tmp_path: Path) -> None:
+    file = tmp_path / "scene.json"
+    file.write_text(json.dumps(scene_to_document(junction())))
+    run("json", file, "--slug", "crossing")
+    assert BaseScene.objects.get(slug="crossing").source == "json"
+    assert "There is a scene called 'crossing' already" in refused(
+        "json", file, "--slug", "crossing"
+    )
+    assert "JSON scene has frame 0, not 3" in refused("json", file, "--slug", "x", "--frame", 3)
+
+
+def test_a_broken_scene_is_refused_with_the_place(tmp_path: Path) -> None:
+    document = scene_to_document(junction())
+    document["lanes"][1]["centerline_m"][0][1] = "zero"
+    file = tmp_path / "scene.json"
+    file.write_text(json.dumps(document))
+    assert "lanes[1].centerline_m[0][1]" in refused("json", file, "--slug", "crossing")
+    file.write_text(json.dumps(document)[:-20])
+    assert "scene.json: is not JSON" in refused("json", file, "--slug", "crossing")
+    assert "No such file" in refused("json", tmp_path / "gone.json", "--slug", "crossing")
+
+
+def test_a_log_without_its_map_is_refused(tmp_path: Path) -> None:
+    folder = write_log(tmp_path / "log")
+    shutil.rmtree(folder / "map")
+    assert "map/log_map_archive_*.json: no such file" in refused("av2", folder, "--slug", "made")
+    assert "gone: is not a folder" in refused("av2", tmp_path / "gone", "--slug", "made")
+
+
+def test_a_frame_source_or_slug_that_can_not_be_is_refused(tmp_path: Path) -> None:
+    folder = write_log(tmp_path / "log")
+    assert "frames 0 to 4" in refused("av2", folder, "--frame", 5, "--slug", "made")
+    assert "frames 0 to 4" in refused("av2", folder, "--frame=-1", "--slug", "made")
+    assert "Known: av2, json" in refused("osm", folder, "--slug", "made")
+    assert "lower-case letters" in refused("av2", folder, "--slug", "Made Up")
