@@ -101,6 +101,12 @@ def test_the_ego_stays_on_what_can_be_driven_on(folder: Path, frame: int) -> Non
     assert recording.ego[0, 3] == scene.ego.speed_mps
 
 
+def test_no_area_crosses_itself(start: tuple[Scene, Recording]) -> None:
+    areas = start[0].areas
+    assert [area.id for area in areas if not Polygon(area.boundary_m).is_valid] == []
+    assert {area.kind for area in areas} == {AreaKind.DRIVABLE, AreaKind.CROSSWALK}
+
+
 def test_frames_of_one_log_show_one_world(folder: Path, start: tuple[Scene, Recording]) -> None:
     _, first = start
     later_scene, later = argoverse2.read(folder, frame=60, name="recorded")
