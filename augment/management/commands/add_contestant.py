@@ -1,0 +1,64 @@
+"""Register a language model that runs one variant."""
+
+from __future__ import annotations
+
+from argparse import ArgumentParser
+from typing import Any
+
+from django.core.management.base import BaseCommand, CommandError
+
+from augment.errors import AugmentError
+from augment.services.contestants import add_contestant, ensure_builtin, ensure_endpoint
+
+
+class Command(BaseCommand):
+    """add_contestant SLUG --variant V --endpoint E --model M."""
+
+    help = (
+        "Register a language model that runs one variant. With --base-url the endpoint is made "
+        "in the same call; `--endpoint openai` needs no address where OPENAI_API_KEY is set."
+    )
+
+    def add_arguments(self, parser: ArgumentParser) -> None:
+        """The contestant, and what a new endpoint needs."""
+        parser.add_argument("slug", help="lower-case letters, digits and hyphens")
+        parser.add_argument("--variant", required=True, help="the recipe, for example otm")
+        parser.add_argument("--endpoint", required=True, help="the label of an endpoint")
+        parser.add_argument("--model", required=True, help="the model id on the endpoint")
+        parser.add_argument("--name", help="what people read; default: model and variant")
+        new = parser.add_argument_group("a new endpoint")
+        new.add_argument("--base-url", help="for example http://127.0.0.1:11434/v1")
+        new.add_argument(
+            "--key-variable",
+            default="",
+            help="the environment variable that holds the key where the worker runs",
+        )
+        new.add_argument(
+            "--simulated",
+            action="store_true",
+            help="the endpoint is a stand-in; its contestants count as simulated",
+        )
+
+    def handle(self, *args: Any, **options: Any) -> None:
+        """Make the endpoint if an address is given, then the contestant."""
+        if not options["base_url"] and (options["key_variable"] or options["simulated"]):
+            raise CommandError("--key-variable and --simulated need --base-url.")
+        try:
+            ensure_builtin()
+            if options["base_url"]:
+                ensure_endpoint(
+                    label=options["endpoint"],
+                    base_url=options["base_url"],
+                    key_variable=options["key_variable"],
+                    is_simulated=options["simulated"],
+                )
+            contestant = add_contestant(
+                slug=options["slug"],
+                variant=options["variant"],
+                endpoint=options["endpoint"],
+                model=options["model"],
+                name=options["name"],
+            )
+        except AugmentError as error:
+            raise CommandError(str(error)) from error
+        self.stdout.write(f"{contestant.slug}: {contestant.name} ({contestant.kind})")

@@ -1,0 +1,189 @@
+"""Contestants and the endpoints that some of them speak to. A key itself is never stored."""
+
+from __future__ import annotations
+
+import os
+import re
+
+from django.contrib.auth.models import User
+from django.db import transaction
+
+from augment.errors import Conflict, InvalidDocument, KeyMissing, UnknownName
+from augment.models import Contestant, Endpoint
+from augment.services.addresses import check_base_url
+from augment.services.events import log_event
+from augment.services.scenes import check_slug
+from augment.variants.recipes import recipe
+
+REFERENCE = "reference"
+RULE_PLACER = "rule-placer"
+_BUILTIN = {
+    REFERENCE: ("Reference", Contestant.Kind.REFERENCE),
+    RULE_PLACER: ("Rule placer", Contestant.Kind.RULE),
+}
+
+OPENAI = "openai"
+OPENAI_URL = "https://api.openai.com/v1"
+OPENAI_KEY = "OPENAI_API_KEY"
+NAME_LENGTH = 120
+
+
+@transaction.atomic
+def ensure_builtin() -> list[Contestant]:
+    """The contestants that need no endpoint: the reference and the rule placer."""
+    return [
+        Contestant.objects.get_or_create(slug=slug, defaults={"name": name, "kind": kind})[0]
+        for slug, (name, kind) in _BUILTIN.items()
+    ]
+
+
+@transaction.atomic
+def ensure_endpoint(
+    *,
+    label: str,
+    base_url: str,
+    key_variable: str = "",
+    is_simulated: bool = False,
+    actor: User | None = None,
+) -> Endpoint:
+    """The endpoint of that label, made or moved to that address.
+
+    Args:
+        label: Lower-case letters, digits and hyphens.
+        base_url: Up to and including "/v1" or its like.
+        key_variable: The environment variable that holds the key where the worker runs; empty
+            where none is needed.
+        is_simulated: Whether what it answers counts as simulated.
+        actor: Who wants it.
+
+    Raises:
+        InvalidDocument: The label, the address or the variable's name can't be used.
+        Conflict: The endpoint exists and is simulated where this one is not, or the reverse.
+    """
+    check_slug(label, what="endpoint")
+    if key_variable and not re.fullmatch(r"[A-Za-z_][A-Za-z0-9_]{0,79}", key_variable):
+        # The value is not repeated: somebody may have given the key itself.
+        problem = "the name of an environment variable is needed, not the key"
+        raise InvalidDocument("endpoint", [("key_variable", problem)])
+    wanted = {"base_url": check_base_url(base_url), "key_variable": key_variable}
+    endpoint, made = Endpoint.objects.get_or_create(
+        label=label, defaults=wanted | {"is_simulated": is_simulated}
+    )
+    if endpoint.is_simulated != is_simulated:
+        word = "simulated" if endpoint.is_simulated else "not simulated"
+        raise Conflict(f"Endpoint {label!r} is {word}, and stays so; choose another label.")
+    before = {"base_url": endpoint.base_url, "key_variable": endpoint.key_variable}
+    if made or before != wanted:
+        endpoint.base_url, endpoint.key_variable = wanted["base_url"], key_variable
+        endpoint.save(update_fields=["base_url", "key_variable"])
+        log_event(
+            actor=actor,
+            verb="add" if made else "change",
+            object_kind="endpoint",
+            object_code=endpoint.code,
+            before=None if made else before,
+            after={"label": label, "is_simulated": is_simulated} | wanted,
+        )
+    return endpoint
+
+
+@transaction.atomic
+def add_contestant(
+    *,
+    slug: str,
+    variant: str,
+    endpoint: str,
+    model: str,
+    name: str | None = None,
+    actor: User | None = None,
+) -> Contestant:
+    """A language model that runs one variant; a simulated one where the endpoint is simulated.
+
+    The same contestant twice is one; `openai` can be named without having been added where
+    OPENAI_API_KEY is set.
+
+    Args:
+        slug: Lower-case letters, digits and hyphens.
+        variant: The name of a recipe, in any case.
+        endpoint: The label of an endpoint.
+        model: The model id on that endpoint.
+        name: What people read; made from model and variant when None.
+        actor: Who adds it.
+
+    Raises:
+        UnknownName: No such variant or endpoint.
+        InvalidDocument: The slug, the model or the name can't be used.
+        Conflict: The slug belongs to another contestant.
+    """
+    check_slug(slug, what="contestant")
+    way = recipe(variant)
+    address = _endpoint(endpoint, actor)
+    model = _text("model", model)
+    wanted = {
+        "name": _text("name", f"{model} {way.slug.upper()}" if name is None else name),
+        "kind": Contestant.Kind.SIMULATED if address.is_simulated else Contestant.Kind.LLM,
+        "variant": way.slug,
+        "endpoint": address,
+        "model": model,
+    }
+    contestant, made = Contestant.objects.get_or_create(slug=slug, defaults=wanted)
+    if not made:
+        _refuse_another(contestant, wanted, named=name is not None)
+        return contestant
+    log_event(
+        actor=actor,
+        verb="add",
+        object_kind="contestant",
+        object_code=contestant.code,
+        after={"slug": slug} | wanted | {"endpoint": address.label},
+    )
+    return contestant
+
+
+def key_of(endpoint: Endpoint) -> str | None:
+    """The endpoint's key, read from the environment at the moment of the call.
+
+    Raises:
+        KeyMissing: The variable is not set; the sentence names it.
+    """
+    if not endpoint.key_variable:
+        return None
+    key = os.environ.get(endpoint.key_variable, "").strip()
+    if not key:
+        raise KeyMissing(endpoint.key_variable, endpoint.label)
+    return key
+
+
+# --- Private -----------------------------------------------------------------------------------
+
+
+def _endpoint(label: str, actor: User | None) -> Endpoint:
+    """The endpoint of that label; OpenAI's own appears where its key is at hand."""
+    found = Endpoint.objects.filter(label=label).first()
+    if found is not None:
+        return found
+    if label == OPENAI and os.environ.get(OPENAI_KEY):
+        return ensure_endpoint(
+            label=OPENAI, base_url=OPENAI_URL, key_variable=OPENAI_KEY, actor=actor
+        )
+    known = list(Endpoint.objects.values_list("label", flat=True))
+    raise UnknownName("endpoint", label, known)
+
+
+def _text(field: str, value: str) -> str:
+    """The value without blanks around it."""
+    value = value.strip()
+    if not value or len(value) > NAME_LENGTH or not value.isprintable():
+        rule = f"1 to {NAME_LENGTH} printable characters are needed"
+        raise InvalidDocument("contestant", [(field, rule)])
+    return value
+
+
+def _refuse_another(contestant: Contestant, wanted: dict[str, object], *, named: bool) -> None:
+    """Raise Conflict where the slug stands for something else."""
+    facts = [field for field in wanted if field != "name" or named]
+    if any(getattr(contestant, field) != wanted[field] for field in facts):
+        raise Conflict(
+            f"There is another contestant called {contestant.slug!r} already: "
+            f"{contestant.name} ({contestant.kind}); choose another slug."
+        )

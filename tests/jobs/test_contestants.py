@@ -1,0 +1,191 @@
+from __future__ import annotations
+
+from io import StringIO
+
+import pytest
+from django.core.management import CommandError, call_command
+
+from augment.errors import Conflict, InvalidDocument, KeyMissing, UnknownName
+from augment.models import Contestant, Endpoint, Event
+from augment.services import contestants
+
+pytestmark = pytest.mark.django_db
+LOCAL = "http://127.0.0.1:11434/v1"
+
+
+def local(*, is_simulated: bool = False, key_variable: str = "") -> Endpoint:
+    return contestants.ensure_endpoint(
+        label="local", base_url=LOCAL, is_simulated=is_simulated, key_variable=key_variable
+    )
+
+
+def add(slug: str = "llama-otm", **changes: str) -> Contestant:
+    facts = {"variant": "OTM", "endpoint": "local", "model": "llama3.1:70b"} | changes
+    return contestants.add_contestant(
+        slug=slug,
+        variant=facts["variant"],
+        endpoint=facts["endpoint"],
+        model=facts["model"],
+        name=facts.get("name"),
+    )
+
+
+def test_the_builtin_contestants_are_made_once() -> None:
+    contestants.ensure_builtin()
+    contestants.ensure_builtin()
+    assert list(Contestant.objects.values_list("slug", "kind")) == [
+        ("reference", "reference"),
+        ("rule-placer", "rule"),
+    ]
+
+
+def test_a_model_on_a_real_endpoint_is_a_language_model() -> None:
+    local()
+    made = add()
+    assert (made.kind, made.variant, made.model) == ("llm", "otm", "llama3.1:70b")
+    assert made.name == "llama3.1:70b OTM"
+    event = Event.objects.filter(object_kind="contestant").get()
+    assert (event.verb, event.object_code) == ("add", str(made.code))
+    assert event.after is not None
+    assert event.after["endpoint"] == "local"
+
+
+def test_a_model_on_a_simulated_endpoint_is_simulated() -> None:
+    local(is_simulated=True)
+    assert add().is_simulated
+
+
+def test_the_same_contestant_twice_is_one() -> None:
+    local()
+    assert add(name="Llama") == add()
+    assert Contestant.objects.count() == 1
+    assert Event.objects.filter(object_kind="contestant").count() == 1
+
+
+def test_a_slug_can_not_mean_two_contestants() -> None:
+    local()
+    add()
+    with pytest.raises(Conflict, match="another contestant called 'llama-otm'"):
+        add(model="qwen")
+
+
+def test_an_unknown_variant_names_the_known_ones() -> None:
+    local()
+    with pytest.raises(UnknownName, match=r"Unknown variant 'magic'.*otm"):
+        add(variant="magic")
+
+
+def test_an_unknown_endpoint_names_the_known_ones() -> None:
+    local()
+    with pytest.raises(UnknownName, match=r"Unknown endpoint 'cloud'\. Known: local"):
+        add(endpoint="cloud")
+
+
+def test_openai_can_be_named_where_its_key_is_set(monkeypatch: pytest.MonkeyPatch) -> None:
+    with pytest.raises(UnknownName):
+        add(endpoint="openai")
+    monkeypatch.setenv("OPENAI_API_KEY", "sk-very-secret")
+    made = add(endpoint="openai", model="gpt-4o")
+    assert made.endpoint is not None
+    assert made.endpoint.base_url == "https://api.openai.com/v1"
+    assert made.endpoint.key_variable == "OPENAI_API_KEY"
+    assert contestants.key_of(made.endpoint) == "sk-very-secret"
+    assert "sk-very-secret" not in str(list(Endpoint.objects.values()))
+    assert "sk-very-secret" not in str(list(Event.objects.values()))
+
+
+@pytest.mark.parametrize("model", ["", "  ", "a\nb", "m" * 121])
+def test_a_model_id_that_can_not_be_one_is_refused(model: str) -> None:
+    local()
+    with pytest.raises(InvalidDocument, match="model"):
+        add(model=model)
+
+
+def test_a_missing_key_names_the_variable(monkeypatch: pytest.MonkeyPatch) -> None:
+    endpoint = local(key_variable="LOCAL_KEY")
+    monkeypatch.setenv("LOCAL_KEY", " ")
+    with pytest.raises(KeyMissing, match=r"LOCAL_KEY.*'local'"):
+        contestants.key_of(endpoint)
+
+
+def test_an_endpoint_without_a_key_needs_none() -> None:
+    assert contestants.key_of(local()) is None
+
+
+def test_a_key_in_place_of_its_variable_is_refused_and_not_repeated() -> None:
+    with pytest.raises(InvalidDocument, match="not the key") as caught:
+        local(key_variable="sk-proj-123")
+    assert "sk-proj-123" not in str(caught.value)
+
+
+def test_an_endpoint_that_moves_is_logged_before_and_after() -> None:
+    local()
+    contestants.ensure_endpoint(label="local", base_url="http://127.0.0.1:9/v1/")
+    endpoint = Endpoint.objects.get()
+    assert endpoint.base_url == "http://127.0.0.1:9/v1"
+    event = Event.objects.filter(verb="change").get()
+    assert event.before == {"base_url": LOCAL, "key_variable": ""}
+
+
+def test_an_endpoint_does_not_become_simulated() -> None:
+    local()
+    with pytest.raises(Conflict, match="is not simulated, and stays so"):
+        local(is_simulated=True)
+
+
+@pytest.mark.parametrize(
+    "base_url",
+    [
+        "http://169.254.169.254/v1",
+        "http://[fe80::1]/v1",
+        "http://[::ffff:169.254.169.254]/v1",
+        "http://[fd00:ec2::254]/v1",
+        "http://2852039166/v1",
+        "http://0xa9.254.169.254/v1",
+        "http://metadata.google.internal/v1",
+        "http://METADATA.google.internal./v1",
+        "http://100.100.100.200/",
+        "http://0.0.0.0:80/v1",
+    ],
+)
+def test_link_local_and_metadata_addresses_are_refused(base_url: str) -> None:
+    with pytest.raises(InvalidDocument, match="link-local or metadata"):
+        contestants.ensure_endpoint(label="local", base_url=base_url)
+    assert not Endpoint.objects.exists()
+
+
+@pytest.mark.parametrize(
+    "base_url", ["", "api.openai.com/v1", "ftp://x/v1", "file:///etc/passwd", "http://x:port/v1"]
+)
+def test_what_is_no_web_address_is_refused(base_url: str) -> None:
+    with pytest.raises(InvalidDocument, match="an address such as"):
+        contestants.ensure_endpoint(label="local", base_url=base_url)
+
+
+@pytest.mark.parametrize("base_url", ["https://me:secret@x/v1", "https://x/v1?key=secret"])
+def test_an_address_carries_no_secret(base_url: str) -> None:
+    with pytest.raises(InvalidDocument, match="don't belong") as caught:
+        contestants.ensure_endpoint(label="local", base_url=base_url)
+    assert "secret" not in str(caught.value)
+
+
+def test_the_command_makes_endpoint_and_contestant_in_one_call() -> None:
+    said = StringIO()
+    facts = ("--variant", "otm", "--endpoint", "local", "--model", "fake-good")
+    call_command("add_contestant", "fake", *facts, "--base-url", LOCAL, "--simulated", stdout=said)
+    assert said.getvalue() == "fake: fake-good OTM (simulated)\n"
+    call_command("add_contestant", "fake-2", *facts, "--name", "Fake", stdout=said)
+    assert Contestant.objects.get(slug="fake-2").name == "Fake"
+    assert Contestant.objects.filter(slug="reference").exists()
+
+
+def test_the_command_says_what_is_known() -> None:
+    facts = ("--variant", "otm", "--endpoint", "cloud", "--model", "m")
+    with pytest.raises(CommandError, match=r"Unknown endpoint 'cloud'\. Known: none yet"):
+        call_command("add_contestant", "fake", *facts)
+
+
+def test_the_command_needs_an_address_for_a_key() -> None:
+    facts = ("--variant", "otm", "--endpoint", "local", "--model", "m", "--key-variable", "K")
+    with pytest.raises(CommandError, match="need --base-url"):
+        call_command("add_contestant", "fake", *facts)
