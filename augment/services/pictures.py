@@ -1,0 +1,62 @@
+"""Pictures of scenarios and augmentations, stored once under the hash of their bytes."""
+
+from __future__ import annotations
+
+import hashlib
+
+from django.core.files.base import ContentFile
+from django.core.files.storage import default_storage
+
+from augment.models import Scenario
+from augment.render.bev import draw
+from augment.render.camera import camera_for
+from augment.scene.entities import Scene
+from augment.scene.modification import Modification
+from augment.services.scenes import reference_of, scene_of
+
+
+def original_picture(scenario: Scenario) -> str:
+    """The name of the picture before any change; drawn where there is none yet.
+
+    What is drawn here takes about a tenth of a second: call it from a worker, not in a request.
+
+    Raises:
+        InvalidDocument: The stored scene can't be read.
+    """
+    kept = scenario.original_image
+    if kept and default_storage.exists(kept):
+        return kept
+    name = picture_of(scenario, scene_of(scenario), Modification())
+    Scenario.objects.filter(pk=scenario.pk).update(original_image=name)
+    scenario.original_image = name
+    return name
+
+
+def picture_of(scenario: Scenario, scene: Scene, modification: Modification) -> str:
+    """The name of the picture after a change.
+
+    Args:
+        scenario: Whose reference decides on the camera, the same for every contestant.
+        scene: The scene before the change.
+        modification: The change.
+
+    Raises:
+        InvalidModification: The change does not fit the scene.
+    """
+    camera = camera_for(scene, reference_of(scenario))
+    return store(draw(scene, modification, camera))
+
+
+def store(png: bytes) -> str:
+    """The name under which these bytes are kept, bev/<sha256>.png; written only if absent."""
+    name = f"bev/{hashlib.sha256(png).hexdigest()}.png"
+    if default_storage.exists(name):
+        if default_storage.size(name) == len(png):
+            return name
+        # A worker was killed in the middle of writing it.
+        default_storage.delete(name)
+    written = default_storage.save(name, ContentFile(png))
+    if written != name:
+        # Another worker was faster with the same bytes, and the storage made up a second name.
+        default_storage.delete(written)
+    return name

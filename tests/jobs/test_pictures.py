@@ -1,0 +1,62 @@
+from __future__ import annotations
+
+import hashlib
+
+import pytest
+from django.core.files.base import ContentFile
+from django.core.files.storage import default_storage
+
+from augment.scene.modification import Modification
+from augment.services.pictures import original_picture, picture_of, store
+from augment.services.scenes import scene_of
+from tests.jobs.rows import TWO_CONES, add_scenario
+
+NAME = f"bev/{hashlib.sha256(b'png').hexdigest()}.png"
+
+
+def read(name: str) -> bytes:
+    with default_storage.open(name) as file:
+        return bytes(file.read())
+
+
+def test_a_picture_is_named_by_its_bytes() -> None:
+    assert store(b"png") == NAME
+    assert read(NAME) == b"png"
+
+
+def test_the_same_picture_is_stored_once() -> None:
+    assert store(b"png") == store(b"png") == NAME
+    assert default_storage.listdir("bev")[1] == [NAME.removeprefix("bev/")]
+
+
+def test_a_picture_that_was_cut_off_is_written_again() -> None:
+    default_storage.save(NAME, ContentFile(b"p"))
+    assert store(b"png") == NAME
+    assert read(NAME) == b"png"
+
+
+@pytest.mark.django_db
+def test_the_original_picture_is_drawn_once_and_remembered() -> None:
+    scenario = add_scenario("street")
+    name = original_picture(scenario)
+    assert read(name).startswith(b"\x89PNG")
+    scenario.refresh_from_db()
+    assert scenario.original_image == name
+    assert name == picture_of(scenario, scene_of(scenario), Modification())
+    assert original_picture(scenario) == name
+
+
+@pytest.mark.django_db
+def test_an_original_picture_that_got_lost_is_drawn_again() -> None:
+    scenario = add_scenario("street")
+    name = original_picture(scenario)
+    default_storage.delete(name)
+    assert original_picture(scenario) == name
+    assert default_storage.exists(name)
+
+
+@pytest.mark.django_db
+def test_a_changed_scene_has_another_picture() -> None:
+    scenario = add_scenario("street")
+    changed = picture_of(scenario, scene_of(scenario), TWO_CONES)
+    assert changed != original_picture(scenario)
