@@ -1,4 +1,4 @@
-"""The sign of life of a worker, given by a thread of its own while the worker is busy."""
+"""What a worker does beside its work: a sign of life, and an outcome even when it crashes."""
 
 from __future__ import annotations
 
@@ -6,10 +6,13 @@ import logging
 from collections.abc import Iterator
 from contextlib import contextmanager
 from threading import Event, Thread
+from types import TracebackType
 
 from django.db import Error, connection
 from django.utils import timezone
 
+from augment.errors import ClaimLost
+from augment.models import Augmentation
 from augment.services import claims
 
 logger = logging.getLogger(__name__)
@@ -29,6 +32,41 @@ def heartbeat(held: claims.Claim, *, every_s: float) -> Iterator[None]:
     finally:
         stop.set()
         thread.join()
+
+
+class OutcomeOnCrash:
+    """Leaves no row hanging when its worker breaks; what broke still travels on, loudly.
+
+    An exception that nobody foresaw fails the row with its class and text. A worker that is told
+    to stop (SystemExit, KeyboardInterrupt) gives the row back. A lost claim ends quietly: the new
+    holder brings the outcome.
+    """
+
+    def __init__(self, held: claims.Claim) -> None:
+        self._held = held
+
+    def __enter__(self) -> None:
+        return None
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        traceback: TracebackType | None,
+    ) -> bool:
+        now = timezone.now()
+        if isinstance(error, ClaimLost):
+            logger.warning(
+                "Stopped work on augmentation %d: %s", self._held.augmentation_pk, error
+            )
+            return True
+        if isinstance(error, Exception):
+            reason = f"unexpected: {type(error).__name__}: {error}"
+            failed = claims.Settlement(state=Augmentation.State.FAILED, reason=reason)
+            claims.settle(held=self._held, settlement=failed, now=now)
+        elif error is not None:
+            claims.release(held=self._held, now=now)
+        return False
 
 
 def _beat_until(held: claims.Claim, every_s: float, stop: Event) -> None:

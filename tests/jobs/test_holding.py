@@ -1,0 +1,44 @@
+from __future__ import annotations
+
+import time
+from datetime import timedelta
+
+import pytest
+from django.utils import timezone
+
+from augment.services import claims
+from augment.services.holding import heartbeat
+from tests.jobs.rows import STALE, claimed, launch, only_row
+
+pytestmark = pytest.mark.django_db(transaction=True)
+
+
+def wait_for(is_so: object, within_s: float = 10.0) -> bool:
+    limit = time.monotonic() + within_s
+    while time.monotonic() < limit:
+        if is_so():  # type: ignore[operator]
+            return True
+        time.sleep(0.02)
+    return False
+
+
+def test_the_heart_beats_while_the_work_goes_on() -> None:
+    row = only_row(launch())
+    before = timezone.now() - timedelta(minutes=1)
+    held = claimed(row, now=before)
+
+    def has_beaten() -> bool:
+        row.refresh_from_db()
+        return row.heartbeat_at is not None and row.heartbeat_at > before
+
+    with heartbeat(held, every_s=0.05):
+        assert wait_for(has_beaten)
+        assert claims.requeue_stale(now=timezone.now(), older_than=STALE) == []
+
+
+def test_the_heart_stops_with_the_claim(caplog: pytest.LogCaptureFixture) -> None:
+    row = only_row(launch())
+    held = claimed(row, now=timezone.now() - timedelta(minutes=1))
+    claims.requeue_stale(now=timezone.now(), older_than=STALE)
+    with heartbeat(held, every_s=0.01):
+        assert wait_for(lambda: "somebody else's now" in caplog.text)
