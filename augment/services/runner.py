@@ -1,0 +1,198 @@
+"""One augmentation from claim to outcome: ask the contestant, keep the answer, draw, settle."""
+
+from __future__ import annotations
+
+import hashlib
+import logging
+from collections.abc import Callable
+from contextlib import AbstractContextManager
+from dataclasses import dataclass
+
+from django.conf import settings
+from django.utils import timezone
+
+from augment.errors import (
+    AugmentError,
+    ClaimLost,
+    InvalidModification,
+    ModelFault,
+)
+from augment.llm.client import ChatClient
+from augment.llm.openai_wire import OpenAIWire
+from augment.models import Augmentation, Contestant, Endpoint
+from augment.scene.codec import modification_from_document, modification_to_document
+from augment.scene.entities import Scene
+from augment.scene.modification import Modification
+from augment.services import claims, jobs
+from augment.services.contestants import key_of
+from augment.services.holding import OutcomeOnCrash, heartbeat
+from augment.services.pictures import original_picture, picture_of
+from augment.services.scenes import reference_of, scene_of
+from augment.services.transcripts import RowTranscript, sentence_of, storable
+from augment.variants import pipeline
+from augment.variants.recipes import recipe
+
+logger = logging.getLogger(__name__)
+
+Kind = Contestant.Kind
+State = Augmentation.State
+Connect = Callable[[Endpoint], AbstractContextManager[ChatClient]]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Answer:
+    """What a contestant made of a scenario, before it is drawn."""
+
+    state: Augmentation.State
+    modification: Modification | None = None
+    notes: str = ""
+    reason: str = ""
+
+
+def open_wire(endpoint: Endpoint) -> AbstractContextManager[ChatClient]:
+    """A client for the endpoint, with the key that its variable holds right now.
+
+    Raises:
+        KeyMissing: The variable is not set here.
+        ModelFault: The key can't be sent.
+    """
+    return OpenAIWire(
+        base_url=endpoint.base_url, api_key=key_of(endpoint), timeout_s=settings.LLM_TIMEOUT_S
+    )
+
+
+def work_on(*, augmentation_pk: int, worker: str = "", connect: Connect = open_wire) -> bool:
+    """Claim a row, run it and write its outcome. A row that nobody may claim is left alone.
+
+    Args:
+        augmentation_pk: The row.
+        worker: Who works, for the attempt's record.
+        connect: How an endpoint is reached.
+
+    Returns:
+        Whether the row was claimed.
+    """
+    held = claims.claim(augmentation_pk=augmentation_pk, worker=worker, now=timezone.now())
+    if held is None:
+        return False
+    row = _row(held)
+    try:
+        with heartbeat(held, every_s=settings.HEARTBEAT_S), OutcomeOnCrash(held):
+            settlement = run(row, held=held, connect=connect)
+            claims.settle(held=held, settlement=settlement, now=timezone.now())
+    finally:
+        jobs.finish_if_over(job_pk=row.job_id, now=timezone.now())
+    return True
+
+
+def run(
+    row: Augmentation, *, held: claims.Claim, connect: Connect = open_wire
+) -> claims.Settlement:
+    """How the row ends. Every foreseen fault is a failed outcome with a sentence.
+
+    Raises:
+        ClaimLost: The row was taken back meanwhile.
+    """
+    try:
+        scene = scene_of(row.scenario)
+        unchanged = original_picture(row.scenario)
+        answer = _kept(row) or _asked(row, scene, held, connect)
+        if answer.modification is None:
+            return _settlement(answer, image=unchanged)
+        _keep(held, answer)
+        image = picture_of(row.scenario, scene, answer.modification)
+        return _settlement(answer, image=image)
+    except ClaimLost:
+        raise
+    except ModelFault as fault:
+        return _failed(sentence_of(fault))
+    except InvalidModification as error:
+        return _failed(f"The modification does not fit the scene: {error}")
+    except AugmentError as error:
+        return _failed(str(error))
+
+
+# --- Private -----------------------------------------------------------------------------------
+
+
+def _row(held: claims.Claim) -> Augmentation:
+    rows = Augmentation.objects.select_related("scenario__base_scene", "contestant__endpoint")
+    return rows.get(pk=held.augmentation_pk)
+
+
+def _kept(row: Augmentation) -> Answer | None:
+    """The answer of an earlier attempt that was stored but not drawn any more."""
+    if row.modification is None:
+        return None
+    modification = modification_from_document(row.modification)
+    return Answer(state=State.DONE, modification=modification, notes=row.notes)
+
+
+def _keep(held: claims.Claim, answer: Answer) -> None:
+    assert answer.modification is not None
+    document = modification_to_document(answer.modification)
+    if not claims.keep_modification(held=held, modification=document, notes=answer.notes):
+        raise ClaimLost(f"attempt {held.attempt_number} has lost its row")
+
+
+def _asked(row: Augmentation, scene: Scene, held: claims.Claim, connect: Connect) -> Answer:
+    """What the contestant says now."""
+    match row.contestant.kind:
+        case Kind.REFERENCE:
+            return _from_reference(row)
+        case Kind.LLM | Kind.SIMULATED if row.contestant.endpoint is not None:
+            return _from_model(row, row.contestant.endpoint, scene, held, connect)
+    return Answer(
+        state=State.FAILED, reason=f"A job can't run contestants of kind {row.contestant.kind!r}."
+    )
+
+
+def _from_reference(row: Augmentation) -> Answer:
+    reference = reference_of(row.scenario)
+    if reference is None:
+        return Answer(state=State.FAILED, reason="The scenario has no reference modification.")
+    return Answer(state=State.DONE, modification=reference)
+
+
+def _from_model(
+    row: Augmentation, endpoint: Endpoint, scene: Scene, held: claims.Claim, connect: Connect
+) -> Answer:
+    with connect(endpoint) as client:
+        outcome = pipeline.run(
+            recipe(row.contestant.variant),
+            scene=scene,
+            instruction=row.scenario.instruction,
+            client=client,
+            model=row.contestant.model,
+            transcript=RowTranscript(held),
+        )
+    return Answer(
+        state=State(outcome.status.value),
+        modification=outcome.modification,
+        notes=storable(outcome.notes),
+        reason=storable(outcome.reason),
+    )
+
+
+def seed_of(slug: str) -> int:
+    """The seed of a scenario: the same in every job, another for every slug."""
+    return int.from_bytes(hashlib.sha256(slug.encode()).digest()[:4], "big")
+
+
+def _settlement(answer: Answer, *, image: str) -> claims.Settlement:
+    if answer.state == State.FAILED:
+        return _failed(answer.reason)
+    document = None
+    if answer.modification is not None:
+        document = modification_to_document(answer.modification)
+    return claims.Settlement(
+        state=answer.state,
+        reason=answer.reason,
+        modification=document,
+        notes=answer.notes,
+        image=image,
+    )
+
+
+def _failed(reason: str) -> claims.Settlement:
+    return claims.Settlement(state=State.FAILED, reason=storable(reason))

@@ -1,0 +1,270 @@
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator
+from contextlib import AbstractContextManager, contextmanager
+from datetime import timedelta
+from typing import Any
+
+import pytest
+from django.core.files.storage import default_storage
+from django.utils import timezone
+
+from augment.errors import ClaimLost, ModelFault
+from augment.llm.client import ChatClient
+from augment.llm.messages import Reply, Request
+from augment.llm.scripted import ScriptedClient
+from augment.models import Augmentation, Contestant, Endpoint, GenerationJob, ModelCall
+from augment.scene.codec import modification_from_document, modification_to_document
+from augment.scene.modification import Modification
+from augment.services import claims, jobs, runner
+from augment.services.holding import OutcomeOnCrash
+from tests.jobs.rows import (
+    INSTRUCTION,
+    STALE,
+    TWO_CONES,
+    add_kind,
+    add_model,
+    add_scenario,
+    launch,
+    only_row,
+)
+from tests.variants.answers import GOOD
+
+pytestmark = pytest.mark.django_db
+State = Augmentation.State
+
+
+class Wire:
+    """Endpoints that all answer from one script, and what they were asked for."""
+
+    def __init__(self, *answers: str | Reply | ModelFault) -> None:
+        self.client: ChatClient = ScriptedClient(answers)
+        self.opened: list[str] = []
+
+    def __call__(self, endpoint: Endpoint) -> AbstractContextManager[ChatClient]:
+        self.opened.append(endpoint.label)
+        return self._session()
+
+    @contextmanager
+    def _session(self) -> Iterator[ChatClient]:
+        yield self.client
+
+
+class Stumbling:
+    """A client that breaks in a way that nobody foresaw, after doing something."""
+
+    def __init__(self, error: BaseException) -> None:
+        self.error = error
+
+    def complete(self, request: Request) -> Reply:
+        raise self.error
+
+
+def one_job(kind: str, **columns: Any) -> Augmentation:
+    add_kind("someone", kind)
+    add_scenario("street", **columns)
+    return only_row(jobs.launch(name="R", contestants=["someone"], scenarios=["street"]))
+
+
+def model_job(*, key_variable: str = "", is_simulated: bool = False) -> Augmentation:
+    endpoint = Endpoint.objects.create(
+        label="local",
+        base_url="http://127.0.0.1:9/v1",
+        key_variable=key_variable,
+        is_simulated=is_simulated,
+    )
+    add_model("llama", endpoint=endpoint, model="llama3.1")
+    add_scenario("street")
+    return only_row(jobs.launch(name="R", contestants=["llama"], scenarios=["street"]))
+
+
+def ran(row: Augmentation, wire: Wire | None = None) -> Augmentation:
+    assert runner.work_on(augmentation_pk=row.pk, worker="w", connect=wire or Wire())
+    row.refresh_from_db()
+    return row
+
+
+def test_the_reference_runs_to_its_picture_and_the_job_is_finished() -> None:
+    row = ran(only_row(launch()))
+    assert row.state == State.DONE
+    assert row.modification is not None
+    assert modification_from_document(row.modification) == TWO_CONES
+    assert default_storage.exists(row.image)
+    row.scenario.refresh_from_db()
+    assert default_storage.exists(row.scenario.original_image)
+    assert row.image != row.scenario.original_image
+    row.job.refresh_from_db()
+    assert row.job.state == GenerationJob.State.FINISHED
+
+
+def test_a_message_that_comes_twice_does_nothing_the_second_time() -> None:
+    row = ran(only_row(launch()))
+    finished_at = row.finished_at
+    assert not runner.work_on(augmentation_pk=row.pk)
+    row.refresh_from_db()
+    assert row.finished_at == finished_at
+    assert row.attempts.count() == 1
+
+
+def test_a_reference_that_went_away_is_a_failure_with_a_sentence() -> None:
+    row = only_row(launch())
+    row.scenario.reference = None
+    row.scenario.save()
+    row = ran(row)
+    assert (row.state, row.reason) == (State.FAILED, "The scenario has no reference modification.")
+
+
+def test_a_reference_that_does_not_fit_is_a_failure_with_a_sentence() -> None:
+    gone = modification_to_document(Modification(removed=("Agent9",)))
+    row = ran(one_job(Contestant.Kind.REFERENCE, reference=gone))
+    assert row.state == State.FAILED
+    assert row.reason.startswith("The modification does not fit the scene: Agent9")
+
+
+def test_a_scene_that_can_not_be_read_is_a_failure_with_a_sentence() -> None:
+    row = only_row(launch())
+    row.scenario.base_scene.document = {"format": "nonsense"}
+    row.scenario.base_scene.save()
+    row = ran(row)
+    assert row.state == State.FAILED
+    assert "can't be read" in row.reason
+
+
+def test_a_scenario_has_a_seed_of_its_own() -> None:
+    assert runner.seed_of("street") == runner.seed_of("street") != runner.seed_of("street-2")
+
+
+def test_a_model_is_asked_and_every_call_is_kept() -> None:
+    reply = Reply(
+        text=GOOD,
+        model="llama3.1-2407",
+        finish_reason="stop",
+        prompt_tokens=900,
+        completion_tokens=120,
+        latency_s=1.5,
+    )
+    wire = Wire(reply)
+    row = ran(model_job(), wire)
+    assert (row.state, wire.opened) == (State.DONE, ["local"])
+    assert row.notes == "One road, two lanes.\n\nA parked car ahead."
+    call = ModelCall.objects.get()
+    assert (call.attempt.augmentation, call.number, call.role) == (row, 1, "modifier")
+    assert (call.answer, call.fault, call.finish_reason) == (GOOD, "", "stop")
+    assert (call.model_returned, call.prompt_tokens) == ("llama3.1-2407", 900)
+    assert (call.completion_tokens, call.latency_s) == (120, 1.5)
+    assert call.request["model"] == "llama3.1"
+    assert INSTRUCTION in json.dumps(call.request)
+    assert call.prompt_version
+
+
+def test_a_simulated_contestant_runs_like_a_model() -> None:
+    assert ran(model_job(is_simulated=True), Wire(GOOD)).state == State.DONE
+
+
+def test_an_answer_that_nobody_can_read_is_an_outcome_with_the_unchanged_picture() -> None:
+    row = ran(model_job(), Wire("Sorry?", "Pardon?"))
+    assert row.state == State.UNREADABLE
+    assert row.reason
+    assert row.modification is None
+    row.scenario.refresh_from_db()
+    assert row.image == row.scenario.original_image
+    answers = ModelCall.objects.order_by("number").values_list("answer", flat=True)
+    assert list(answers) == ["Sorry?", "Pardon?"]
+
+
+def test_a_refusal_is_an_outcome_with_the_unchanged_picture() -> None:
+    row = ran(model_job(), Wire(Reply(text="", refusal="I can't help with that.")))
+    assert row.state == State.REFUSED
+    assert "I can't help with that." in row.reason
+    assert ModelCall.objects.get().answer == "I can't help with that."
+
+
+def test_a_broken_wire_fails_with_the_status_and_leaves_the_call() -> None:
+    row = ran(model_job(), Wire(ModelFault("upstream broke", retryable=False, status=500)))
+    assert (row.state, row.reason) == (State.FAILED, "HTTP 500: upstream broke")
+    assert (row.image, row.modification) == ("", None)
+    call = ModelCall.objects.get()
+    assert (call.answer, call.fault) == (None, "HTTP 500: upstream broke")
+
+
+def test_a_missing_key_fails_and_names_the_variable() -> None:
+    row = model_job(key_variable="NO_SUCH_KEY_HERE")
+    assert runner.work_on(augmentation_pk=row.pk)
+    row.refresh_from_db()
+    assert row.state == State.FAILED
+    assert "NO_SUCH_KEY_HERE" in row.reason
+
+
+def test_a_failed_row_is_tried_again_on_request() -> None:
+    row = ran(model_job(), Wire(ModelFault("no", retryable=False)))
+    jobs.retry_failed(row.job)
+    row = ran(row, Wire(GOOD))
+    assert (row.state, row.reason) == (State.DONE, "")
+    assert list(row.attempts.values_list("number", "outcome")) == [(1, "failed"), (2, "done")]
+
+
+def test_an_attempt_that_was_lost_before_drawing_is_only_drawn_again() -> None:
+    row = model_job()
+    now = timezone.now()
+    held = claims.claim(augmentation_pk=row.pk, now=now - timedelta(minutes=1))
+    assert held is not None
+    document = modification_to_document(TWO_CONES)
+    claims.keep_modification(held=held, modification=document, notes="said before")
+    claims.requeue_stale(now=now, older_than=STALE)
+    wire = Wire()
+    row = ran(row, wire)
+    assert (row.state, row.notes, row.modification) == (State.DONE, "said before", document)
+    assert wire.opened == []
+
+
+def test_a_worker_whose_claim_was_taken_asks_no_model_and_writes_nothing() -> None:
+    row = model_job()
+    held = claims.claim(augmentation_pk=row.pk, now=timezone.now() - timedelta(minutes=1))
+    assert held is not None
+    claims.requeue_stale(now=timezone.now(), older_than=STALE)
+    with pytest.raises(ClaimLost):
+        runner.run(row, held=held, connect=Wire(GOOD))
+    assert not ModelCall.objects.exists()
+
+
+def test_a_claim_that_is_lost_while_drawing_ends_quietly() -> None:
+    row = only_row(launch())
+    held = claims.claim(augmentation_pk=row.pk, now=timezone.now() - timedelta(minutes=1))
+    assert held is not None
+    claims.requeue_stale(now=timezone.now(), older_than=STALE)
+    with OutcomeOnCrash(held):
+        runner.run(row, held=held)
+    row.refresh_from_db()
+    assert (row.state, row.modification) == (State.QUEUED, None)
+
+
+def test_what_nobody_foresaw_fails_the_row_and_is_raised() -> None:
+    row = model_job()
+    wire = Wire()
+    wire.client = Stumbling(ZeroDivisionError("division by zero"))
+    with pytest.raises(ZeroDivisionError):
+        runner.work_on(augmentation_pk=row.pk, connect=wire)
+    row.refresh_from_db()
+    assert row.state == State.FAILED
+    assert row.reason == "unexpected: ZeroDivisionError: division by zero"
+    assert row.attempts.get().outcome == "failed"
+    row.job.refresh_from_db()
+    assert row.job.state == GenerationJob.State.FINISHED
+
+
+def test_a_worker_that_is_told_to_stop_gives_its_row_back() -> None:
+    row = model_job()
+    wire = Wire()
+    wire.client = Stumbling(SystemExit(0))
+    with pytest.raises(SystemExit):
+        runner.work_on(augmentation_pk=row.pk, connect=wire)
+    row.refresh_from_db()
+    assert (row.state, row.claim) == (State.QUEUED, None)
+
+
+def test_answers_that_a_database_can_not_take_are_kept_all_the_same() -> None:
+    row = ran(model_job(), Wire("nul \0 and half \ud800", "again \0"))
+    assert row.state == State.UNREADABLE
+    answers = ModelCall.objects.order_by("number").values_list("answer", flat=True)
+    assert list(answers) == ["nul \u2400 and half \\ud800", "again \u2400"]
