@@ -164,10 +164,12 @@ def requeue_stale(*, now: datetime, older_than: timedelta) -> list[int]:
     return [row.pk for row in stale.select_related("job") if _take_back(row, now=now)]
 
 
-def unsent(*, now: datetime, older_than: timedelta) -> list[int]:
-    """Waiting rows that have no message, or one so old that it may be lost."""
+def unsent(*, now: datetime, older_than: timedelta, job_pk: int | None = None) -> list[int]:
+    """Waiting rows, of one job or of all, without a message or with one that old."""
     waiting = Augmentation.objects.filter(state=Augmentation.State.QUEUED)
-    lost = Q(sent_at=None) | Q(sent_at__lt=now - older_than)
+    if job_pk is not None:
+        waiting = waiting.filter(job=job_pk)
+    lost = Q(sent_at=None) | Q(sent_at__lte=now - older_than)
     return list(waiting.filter(lost).order_by("pk").values_list("pk", flat=True))
 
 

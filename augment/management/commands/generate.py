@@ -1,0 +1,140 @@
+"""Launch a generation job and, on demand, wait for its end."""
+
+from __future__ import annotations
+
+import time
+from argparse import ArgumentParser
+from typing import Any
+
+from django.core.management.base import BaseCommand, CommandError
+from django.db import transaction
+from django.utils import timezone
+
+from augment.errors import AugmentError
+from augment.models import Contestant, GenerationJob, Scenario
+from augment.services import jobs
+from augment.services.contestants import ensure_builtin
+from augment.services.job_summary import contestant_lines, failure_groups
+from augment.tasks import check_broker, enqueue_job
+
+POLL_S = 0.5
+HINT_AFTER_S = 10.0
+BAR_CELLS = 30
+
+
+class Command(BaseCommand):
+    """generate --contestants A B --scenarios X Y [--wait]."""
+
+    help = "Run contestants on scenarios; workers do it, `manage.py serve` starts them."
+
+    def add_arguments(self, parser: ArgumentParser) -> None:
+        """What to run, and whether to wait."""
+        parser.add_argument("--contestants", nargs="+", required=True, help="slugs, or all")
+        parser.add_argument(
+            "--scenarios", nargs="+", required=True, help="slugs, or all, or catalogue"
+        )
+        parser.add_argument("--name", help="what people call the job")
+        parser.add_argument("--wait", action="store_true", help="stay until the job is over")
+        parser.add_argument(
+            "--timeout", type=float, default=3600.0, help="seconds to wait at most"
+        )
+
+    def handle(self, *args: Any, **options: Any) -> None:
+        """Launch the job, then wait if asked to."""
+        try:
+            check_broker()
+            job = self._launch(options)
+        except AugmentError as error:
+            raise CommandError(str(error)) from error
+        total = jobs.progress(job).total
+        self.stdout.write(f"Job {job.code}, {job.name!r}: {total} to run.")
+        if options["wait"]:
+            self.wait(job, options["timeout"])
+            self.report(job)
+
+    def _launch(self, options: dict[str, Any]) -> GenerationJob:
+        ensure_builtin()
+        name = options["name"] or f"Job of {timezone.now():%Y-%m-%d %H:%M} UTC"
+        with transaction.atomic():
+            job = jobs.launch(
+                name=name,
+                contestants=_contestants(options["contestants"]),
+                scenarios=_scenarios(options["scenarios"]),
+            )
+            transaction.on_commit(lambda: enqueue_job(job.pk))
+        return job
+
+    def wait(self, job: GenerationJob, timeout_s: float) -> None:
+        """Show the progress until nothing is under way.
+
+        Raises:
+            CommandError: The time is up.
+        """
+        started = time.monotonic()
+        shown, hinted = "", False
+        while True:
+            counts = jobs.progress(job)
+            shown = self._show(counts, shown)
+            if not counts.under_way:
+                self.stdout.write("" if self.stdout.isatty() else "Over.")
+                return
+            waited = time.monotonic() - started
+            if waited > timeout_s:
+                raise CommandError(
+                    f"Still under way after {timeout_s:g} s: {counts.queued} wait, "
+                    f"{counts.running} run. The job goes on without this command."
+                )
+            if not hinted and waited > HINT_AFTER_S and counts.queued == counts.total:
+                self.stderr.write("No worker has taken anything yet; does `manage.py serve` run?")
+                hinted = True
+            time.sleep(POLL_S)
+
+    def _show(self, counts: jobs.JobProgress, before: str) -> str:
+        """A bar that moves on a terminal, elsewhere a line whenever something changed."""
+        text = f"{counts.ended} of {counts.total}, {counts.running} running"
+        if counts.failed:
+            text += f", {counts.failed} failed"
+        if text != before:
+            if self.stdout.isatty():
+                cells = BAR_CELLS * counts.ended // counts.total
+                bar = "#" * cells + "." * (BAR_CELLS - cells)
+                self.stdout.write(f"\r[{bar}] {text}   ", ending="")
+                self.stdout.flush()
+            else:
+                self.stdout.write(text)
+        return text
+
+    def report(self, job: GenerationJob) -> None:
+        """The table, the failures by reason, and exit code 1 if there is any."""
+        lines = contestant_lines(job)
+        width = max(len(line.slug) for line in lines)
+        self.stdout.write(f"{'contestant':{max(width, 10)}}  done  unreadable  refused  failed")
+        for line in lines:
+            self.stdout.write(
+                f"{line.slug:{max(width, 10)}}  {line.done:4}  {line.unreadable:10}  "
+                f"{line.refused:7}  {line.failed:6}"
+            )
+        failures = failure_groups(job)
+        for group in failures:
+            self.stdout.write(
+                f"failed {group.count} time{'s' * (group.count > 1)}: {group.reason}"
+            )
+        if failures:
+            failed = sum(group.count for group in failures)
+            raise CommandError(f"{failed} failed; see the reasons above.", returncode=1)
+
+
+def _contestants(given: list[str]) -> list[str]:
+    """The slugs; `all` stands for every one that a job can run."""
+    if given != ["all"]:
+        return given
+    runnable = Contestant.objects.filter(kind__in=jobs.RUNNABLE)
+    return list(runnable.values_list("slug", flat=True))
+
+
+def _scenarios(given: list[str]) -> list[str]:
+    """The slugs; `all` and `catalogue` stand for what is stored."""
+    rows = {"all": Scenario.objects.all(), "catalogue": Scenario.objects.filter(in_catalogue=True)}
+    if len(given) != 1 or given[0] not in rows:
+        return given
+    return list(rows[given[0]].values_list("slug", flat=True))

@@ -1,0 +1,210 @@
+from __future__ import annotations
+
+from collections.abc import Iterator
+from datetime import timedelta
+from io import StringIO
+
+import pytest
+from celery import current_app
+from django.core.management import CommandError, call_command
+from django.utils import timezone
+
+from augment import tasks
+from augment.errors import QueueUnreachable
+from augment.management.commands.generate import Command
+from augment.models import Augmentation, GenerationJob
+from augment.services import claims, jobs
+from tests.jobs.rows import add_kind, add_scenario, claimed, done, failed, launch, only_row
+
+pytestmark = pytest.mark.django_db
+State = Augmentation.State
+
+
+class Broker:
+    """A broker in memory, and how many messages wait there."""
+
+    def purge(self) -> None:
+        with current_app.connection_for_write() as connection:
+            channel = connection.default_channel
+            queue = current_app.conf.task_default_queue
+            channel.queue_declare(queue=queue)
+            channel.queue_purge(queue)
+
+    def __len__(self) -> int:
+        with current_app.connection_for_write() as connection:
+            declared = connection.default_channel.queue_declare(
+                queue=current_app.conf.task_default_queue
+            )
+            return int(declared.message_count)
+
+
+@pytest.fixture
+def broker() -> Iterator[Broker]:
+    before = current_app.conf.broker_url
+    current_app.conf.broker_url = "memory://"
+    made = Broker()
+    made.purge()
+    yield made
+    made.purge()
+    current_app.conf.broker_url = before
+
+
+@pytest.fixture
+def no_broker() -> Iterator[None]:
+    before = current_app.conf.broker_url
+    current_app.conf.broker_url = "redis+socket:///nowhere/redis.sock"
+    yield
+    current_app.conf.broker_url = before
+
+
+def test_a_job_is_sent_once(broker: Broker) -> None:
+    job = launch(scenarios=3)
+    assert tasks.enqueue_job(job.pk) == 3
+    assert tasks.enqueue_job(job.pk) == 0
+    assert len(broker) == 3
+    assert not job.augmentations.filter(sent_at=None).exists()
+
+
+def test_without_a_broker_the_error_names_the_address_and_the_rows_wait(no_broker: None) -> None:
+    job = launch()
+    with pytest.raises(QueueUnreachable, match=r"No Redis at .*nowhere.*manage\.py serve"):
+        tasks.enqueue_job(job.pk)
+    row = only_row(job)
+    assert (row.state, row.sent_at) == (State.QUEUED, None)
+
+
+def test_the_task_runs_its_row() -> None:
+    row = only_row(launch())
+    tasks.run_augmentation.run(row.pk)
+    row.refresh_from_db()
+    assert row.state == State.DONE
+    assert row.attempts.get().worker.startswith("here ")
+
+
+def test_the_task_leaves_a_row_alone_that_somebody_else_has() -> None:
+    row = only_row(launch())
+    held = claimed(row, now=timezone.now())
+    tasks.run_augmentation.run(row.pk)
+    assert claims.is_held(held=held)
+
+
+def test_recover_sends_what_was_never_sent(broker: Broker) -> None:
+    launch(scenarios=2)
+    tasks.recover(now=timezone.now())
+    assert len(broker) == 2
+
+
+def test_recover_takes_back_and_sends_what_a_dead_worker_held(broker: Broker) -> None:
+    row = only_row(launch())
+    now = timezone.now()
+    claims.mark_sent(ids=[row.pk], now=now - timedelta(minutes=1))
+    claimed(row, now=now - timedelta(minutes=1))
+    tasks.recover(now=now)
+    row.refresh_from_db()
+    assert row.state == State.QUEUED
+    assert row.sent_at is not None
+    assert len(broker) == 1
+
+
+def test_recover_leaves_alone_what_is_on_its_way(broker: Broker) -> None:
+    job = launch(scenarios=2)
+    tasks.enqueue_job(job.pk)
+    tasks.recover(now=timezone.now() + timedelta(minutes=5))
+    assert len(broker) == 2
+    tasks.recover(now=timezone.now() + timedelta(minutes=11))
+    assert len(broker) == 4
+
+
+def test_recover_sends_again_when_the_broker_has_forgotten(broker: Broker) -> None:
+    job = launch(scenarios=2)
+    tasks.enqueue_job(job.pk)
+    broker.purge()
+    tasks.recover(now=timezone.now())
+    assert len(broker) == 0
+    tasks.recover(now=timezone.now() + timedelta(minutes=1))
+    assert len(broker) == 2
+
+
+def test_a_worker_that_starts_sends_all_that_waits(broker: Broker) -> None:
+    job = launch(scenarios=2)
+    tasks.enqueue_job(job.pk)
+    tasks.recover(now=timezone.now(), at_start=True)
+    assert len(broker) == 4
+
+
+def test_recover_finishes_a_job_whose_last_worker_died_before_it_could(broker: Broker) -> None:
+    job = launch()
+    claims.settle(
+        held=claimed(only_row(job)), settlement=done(), now=timezone.now() + timedelta(minutes=1)
+    )
+    tasks.recover(now=timezone.now())
+    job.refresh_from_db()
+    assert job.state == GenerationJob.State.FINISHED
+
+
+def test_generate_launches_what_all_and_catalogue_stand_for(
+    broker: Broker, django_capture_on_commit_callbacks: object
+) -> None:
+    add_scenario("own")
+    add_scenario("shipped", in_catalogue=True)
+    said = StringIO()
+    with django_capture_on_commit_callbacks(execute=True):  # type: ignore[operator]
+        call_command("generate", "--contestants", "all", "--scenarios", "catalogue", stdout=said)
+    job = GenerationJob.objects.get()
+    assert set(job.augmentations.values_list("contestant__slug", "scenario__slug")) == {
+        ("reference", "shipped"),
+        ("rule-placer", "shipped"),
+    }
+    assert "2 to run" in said.getvalue()
+    assert len(broker) == 2
+
+
+def test_generate_without_a_broker_says_what_to_do_and_launches_nothing(no_broker: None) -> None:
+    add_scenario("street")
+    with pytest.raises(CommandError, match=r"No Redis at .*start `manage.py serve`"):
+        call_command("generate", "--contestants", "reference", "--scenarios", "all")
+    assert not GenerationJob.objects.exists()
+
+
+def test_generate_says_which_name_is_unknown(broker: Broker) -> None:
+    with pytest.raises(CommandError, match=r"Unknown contestant 'gpt'\. Known: reference"):
+        call_command("generate", "--contestants", "gpt", "--scenarios", "all")
+
+
+def test_generate_gives_up_waiting_and_says_so(broker: Broker) -> None:
+    add_scenario("street")
+    with pytest.raises(CommandError, match=r"Still under way after 0 s: 1 wait, 0 run"):
+        call_command(
+            "generate",
+            *("--contestants", "reference", "--scenarios", "street"),
+            *("--wait", "--timeout", "0"),
+            stdout=StringIO(),
+        )
+
+
+def test_the_report_groups_failures_by_reason_and_fails() -> None:
+    add_kind("rule-placer", "rule")
+    job = launch(scenarios=2, contestants=("reference", "rule-placer"))
+    outcomes = [done(), failed("HTTP 500"), failed("HTTP 500"), failed("no key")]
+    for row, outcome in zip(job.augmentations.order_by("pk"), outcomes, strict=True):
+        claims.settle(held=claimed(row), settlement=outcome, now=timezone.now())
+    said = StringIO()
+    with pytest.raises(CommandError, match="3 failed") as caught:
+        Command(stdout=said).report(job)
+    assert caught.value.returncode == 1
+    assert said.getvalue().splitlines() == [
+        "contestant   done  unreadable  refused  failed",
+        "reference       1           0        0       1",
+        "rule-placer     0           0        0       2",
+        "failed 2 times: HTTP 500",
+        "failed 1 time: no key",
+    ]
+
+
+def test_waiting_ends_with_the_job() -> None:
+    job = launch()
+    claims.settle(held=claimed(only_row(job)), settlement=done(), now=timezone.now())
+    said = StringIO()
+    Command(stdout=said).wait(job, timeout_s=1.0)
+    assert said.getvalue() == "1 of 1, 0 running\nOver.\n"
+    assert jobs.progress(job).done == 1
