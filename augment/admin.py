@@ -1,1 +1,164 @@
-"""Django's admin of augment, for rare edits."""
+"""Django's admin of augment, for rare edits. What is a record of the past can only be read."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from django.contrib import admin
+from django.http import HttpRequest
+
+from augment.models import (
+    Attempt,
+    Augmentation,
+    BaseScene,
+    Contestant,
+    Endpoint,
+    Event,
+    GenerationJob,
+    ModelCall,
+    Scenario,
+)
+
+
+class ReadOnly:
+    """Nobody adds, changes or deletes a row by hand."""
+
+    def has_add_permission(self, request: HttpRequest, obj: Any = None) -> bool:
+        """Never."""
+        return False
+
+    def has_change_permission(self, request: HttpRequest, obj: Any = None) -> bool:
+        """Never."""
+        return False
+
+    def has_delete_permission(self, request: HttpRequest, obj: Any = None) -> bool:
+        """Never."""
+        return False
+
+
+@admin.register(BaseScene)
+class BaseSceneAdmin(admin.ModelAdmin):
+    """Scenes; their documents come from files and are not typed in."""
+
+    list_display = ("slug", "source", "created_at")
+    list_filter = ("source",)
+    search_fields = ("slug", "provenance")
+    exclude = ("document", "recording")
+    readonly_fields = ("code", "source", "created_at")
+
+    def has_add_permission(self, request: HttpRequest) -> bool:
+        """`import_scene` reads scenes."""
+        return False
+
+
+@admin.register(Scenario)
+class ScenarioAdmin(admin.ModelAdmin):
+    """Scenarios."""
+
+    list_display = ("slug", "type", "base_scene", "in_catalogue", "keep_traffic")
+    list_filter = ("type", "in_catalogue", "keep_traffic")
+    list_select_related = ("base_scene",)
+    search_fields = ("slug", "instruction")
+    exclude = ("reference",)
+    readonly_fields = ("code", "original_image", "created_at")
+
+
+@admin.register(Endpoint)
+class EndpointAdmin(ReadOnly, admin.ModelAdmin):
+    """Endpoints; `add_contestant` makes and moves them, because it checks the address."""
+
+    list_display = ("label", "base_url", "key_variable", "is_simulated")
+    list_filter = ("is_simulated",)
+
+
+@admin.register(Contestant)
+class ContestantAdmin(admin.ModelAdmin):
+    """Contestants; only what people read can be changed, the rest is what was rated."""
+
+    list_display = ("slug", "name", "kind", "variant", "model", "endpoint")
+    list_filter = ("kind", "variant")
+    list_select_related = ("endpoint",)
+    search_fields = ("slug", "name", "model")
+    readonly_fields = ("code", "kind", "variant", "endpoint", "model", "created_at")
+
+
+class AugmentationInline(ReadOnly, admin.TabularInline):
+    """The rows of a job."""
+
+    model = Augmentation
+    fields = ("scenario", "contestant", "state", "reason", "finished_at")
+    extra = 0
+    show_change_link = True
+
+    def get_queryset(self, request: HttpRequest) -> Any:
+        """With what a line shows, in one query."""
+        return super().get_queryset(request).select_related("scenario", "contestant")
+
+
+@admin.register(GenerationJob)
+class GenerationJobAdmin(ReadOnly, admin.ModelAdmin):
+    """Jobs; they are launched, cancelled and retried on their own pages."""
+
+    list_display = ("name", "state", "launched_by", "created_at", "finished_at")
+    list_filter = ("state",)
+    list_select_related = ("launched_by",)
+    date_hierarchy = "created_at"
+    inlines = (AugmentationInline,)
+
+
+class AttemptInline(ReadOnly, admin.TabularInline):
+    """The tries at an augmentation."""
+
+    model = Attempt
+    extra = 0
+    show_change_link = True
+
+
+@admin.register(Augmentation)
+class AugmentationAdmin(ReadOnly, admin.ModelAdmin):
+    """Augmentations; only workers write them."""
+
+    list_display = ("code", "scenario", "contestant", "state", "finished_at")
+    list_filter = ("state", "contestant")
+    list_select_related = ("scenario", "contestant")
+    search_fields = ("code", "scenario__slug", "contestant__slug", "reason")
+    inlines = (AttemptInline,)
+
+
+class ModelCallInline(ReadOnly, admin.TabularInline):
+    """The calls of an attempt, without their long texts."""
+
+    model = ModelCall
+    fields = ("number", "role", "finish_reason", "prompt_tokens", "completion_tokens", "fault")
+    extra = 0
+    show_change_link = True
+
+
+@admin.register(Attempt)
+class AttemptAdmin(ReadOnly, admin.ModelAdmin):
+    """Attempts."""
+
+    list_display = ("augmentation", "number", "worker", "started_at", "finished_at", "outcome")
+    list_filter = ("outcome",)
+    list_select_related = ("augmentation",)
+    inlines = (ModelCallInline,)
+
+
+@admin.register(ModelCall)
+class ModelCallAdmin(ReadOnly, admin.ModelAdmin):
+    """Calls to language models, with the raw answers."""
+
+    list_display = ("code", "role", "model_returned", "finish_reason", "started_at", "latency_s")
+    list_filter = ("role", "finish_reason", "model_returned")
+    search_fields = ("code", "answer", "fault")
+
+
+@admin.register(Event)
+class EventAdmin(ReadOnly, admin.ModelAdmin):
+    """The log."""
+
+    list_display = ("at", "actor", "verb", "object_kind", "object_code")
+    list_filter = ("verb", "object_kind")
+    list_select_related = ("actor",)
+    search_fields = ("object_code", "actor__username")
+    date_hierarchy = "at"
