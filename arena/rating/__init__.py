@@ -1,1 +1,1 @@
-"""From votes to ratings, intervals and ranks: numpy and scipy only, values in, values out."""
+"""From votes to a rated table. Knows numpy and no framework; read leaderboard.py first."""

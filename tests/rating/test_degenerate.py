@@ -1,0 +1,127 @@
+"""Data that determine no rating say so; no number is made up."""
+
+from __future__ import annotations
+
+import pytest
+
+from arena.rating.bootstrap import Unit
+from arena.rating.comparisons import Comparison, as_arrays
+from arena.rating.connectivity import Status
+from arena.rating.leaderboard import Leaderboard, Method, rate
+from tests.rating.votes import named, versus
+
+
+def unrated(board: Leaderboard) -> bool:
+    return all(
+        value is None
+        for line in board.lines
+        for value in (line.rating, line.lower, line.upper, line.rank)
+    )
+
+
+@pytest.mark.parametrize("method", Method)
+def test_no_votes(method: Method) -> None:
+    board = rate(as_arrays(("a", "b"), []), method=method)
+    assert (board.status, board.explanation) == (Status.NO_VOTES, "There are no votes to rate.")
+    assert unrated(board)
+    assert [line.note for line in board.lines] == ["no votes", "no votes"]
+
+
+def test_no_contestants() -> None:
+    assert rate(as_arrays((), [])).status is Status.NO_VOTES
+
+
+def test_one_contestant() -> None:
+    board = rate(as_arrays(("a",), []))
+    assert board.status is Status.ONE_CONTESTANT
+    assert "only one contestant, a" in board.explanation
+
+
+def test_a_contestant_who_lost_everything_has_no_lower_limit() -> None:
+    votes = versus("a", "b", 5, 3, 4) + versus("a", "d", 20, 0, 0) + versus("b", "d", 20, 0, 0)
+    board = rate(named(votes))
+    assert board.status is Status.UNBOUNDED
+    assert board.explanation == (
+        "Nobody else scored against a, b: there is no upper limit. "
+        "d scored against nobody else: there is no lower limit."
+    )
+    assert unrated(board)
+    assert [line.losses for line in board.lines] == [4, 5, 40]
+
+
+def test_online_elo_rates_what_bradley_terry_cannot() -> None:
+    board = rate(named(versus("a", "b", 5, 0, 0)), method=Method.ELO, rounds=10)
+    assert board.status is Status.RATED
+    assert all(line.rating is not None for line in board.lines)
+
+
+@pytest.mark.parametrize("method", Method)
+def test_groups_that_never_met_are_named(method: Method) -> None:
+    votes = versus("a", "b", 3, 1, 2) + versus("c", "d", 1, 4, 1)
+    board = rate(named(votes), method=method, rounds=10)
+    assert board.status is Status.DISCONNECTED
+    assert "compared with each other: a, b; c, d." in board.explanation
+    assert unrated(board)
+
+
+def test_all_ties_are_rated_alike_without_an_interval() -> None:
+    board = rate(named(versus("a", "b", 0, 9, 0) + versus("b", "c", 0, 9, 0)))
+    assert board.status is Status.ALL_TIES
+    assert "Every vote is a tie" in board.explanation
+    for line in board.lines:
+        assert (line.rating, line.lower, line.upper, line.rank) == (1000.0, None, None, 1)
+
+
+def test_a_contestant_without_votes_leaves_the_others_rated() -> None:
+    board = rate(named(versus("a", "b", 30, 20, 15), "a", "b", "z"))
+    *rated, absent = board.lines
+    assert all(line.rating is not None for line in rated)
+    assert (absent.rating, absent.rank, absent.votes, absent.note) == (None, None, 0, "no votes")
+
+
+def test_rounds_without_ratings_are_counted_and_take_the_intervals_with_them() -> None:
+    """b scored once in twenty votes: more than a third of the resamples miss that vote."""
+    board = rate(named(versus("a", "b", 19, 0, 1)), rounds=1000, seed=1)
+    assert 300 < board.degenerate_rounds < 420
+    assert f"In {board.degenerate_rounds} of 1000 resamples" in board.explanation
+    for line in board.lines:
+        assert line.rating is not None
+        assert (line.lower, line.upper, line.rank) == (None, None, 1)
+
+
+def test_a_few_rounds_without_ratings_are_counted_and_left_out() -> None:
+    board = rate(named(versus("a", "b", 60, 0, 5)), rounds=2000, seed=1)
+    assert 0 < board.degenerate_rounds < 50
+    assert board.explanation == ""
+    assert board.lines[0].lower is not None
+
+
+def test_a_single_expert_leaves_nothing_to_resample_by_expert() -> None:
+    board = rate(named(versus("a", "b", 6, 0, 5)), unit=Unit.EXPERT, rounds=50)
+    assert board.lines[0].lower == board.lines[0].upper == board.lines[0].rating
+
+
+@pytest.mark.parametrize(
+    ("vote", "sentence"),
+    [
+        (Comparison(first="a", second="a", score=1.0), "vote 2: 'a' is compared with itself"),
+        (Comparison(first="a", second="x", score=1.0), "vote 2: 'x' is none of a, b"),
+        (Comparison(first="a", second="b", score=0.7), "vote 2: a score is 1, 0.5 or 0, not 0.7"),
+    ],
+)
+def test_votes_that_make_no_sense_are_refused_with_their_number(
+    vote: Comparison, sentence: str
+) -> None:
+    good = Comparison(first="a", second="b", score=0.5)
+    with pytest.raises(ValueError, match=sentence):
+        as_arrays(("a", "b"), [good, vote])
+
+
+def test_rules_that_make_no_sense_are_refused() -> None:
+    votes = named(versus("a", "b", 6, 0, 5))
+    with pytest.raises(ValueError, match="at least 1 round, not 0"):
+        rate(votes, rounds=0)
+    with pytest.raises(ValueError, match="single votes only, not by scenario"):
+        rate(votes, method=Method.ELO, unit=Unit.SCENARIO)
+    with pytest.raises(ValueError, match="named twice"):
+        as_arrays(("a", "a"), [])

@@ -1,0 +1,128 @@
+"""What must not change a rating, and how the counts hang together."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import assume, given, settings
+from hypothesis import strategies as st
+
+from arena.rating.bootstrap import Unit
+from arena.rating.comparisons import LOSS, TIE, WIN, Comparison, Comparisons, as_arrays, tally
+from arena.rating.leaderboard import Leaderboard, Method, rate
+
+NAMES = ("a", "b", "c", "d")
+votes_of_four = st.lists(
+    st.tuples(st.permutations(NAMES), st.sampled_from([WIN, TIE, LOSS]), st.sampled_from("xyz")),
+    min_size=20,
+    max_size=80,
+)
+
+
+def as_votes(drawn: list[tuple[list[str], float, str]]) -> list[Comparison]:
+    return [
+        Comparison(first=order[0], second=order[1], score=score, expert=expert)
+        for order, score, expert in drawn
+    ]
+
+
+def ratings(board: Leaderboard) -> dict[str, float]:
+    assume(all(line.rating is not None for line in board.lines))
+    return {line.name: line.rating or 0.0 for line in board.lines}
+
+
+def same(one: Leaderboard, other: Leaderboard) -> bool:
+    return ratings(one) == pytest.approx(ratings(other), abs=1e-5)
+
+
+@given(votes_of_four)
+@settings(max_examples=60, deadline=None)
+def test_swapping_the_sides_changes_nothing(drawn: list[tuple[list[str], float, str]]) -> None:
+    votes = as_votes(drawn)
+    swapped = [replace(v, first=v.second, second=v.first, score=1 - v.score) for v in votes]
+    one, other = (rate(as_arrays(NAMES, v), rounds=20) for v in (votes, swapped))
+    assert one == other
+
+
+@given(votes_of_four, st.randoms(use_true_random=False))
+@settings(max_examples=60, deadline=None)
+def test_the_order_of_the_votes_changes_nothing(
+    drawn: list[tuple[list[str], float, str]], shuffle: object
+) -> None:
+    votes = as_votes(drawn)
+    mixed = list(votes)
+    shuffle.shuffle(mixed)  # type: ignore[attr-defined]
+    one, other = (rate(as_arrays(NAMES, v), rounds=20) for v in (votes, mixed))
+    assert one == other
+
+
+@given(votes_of_four, st.permutations(NAMES))
+@settings(max_examples=60, deadline=None)
+def test_renaming_the_contestants_renames_the_table(
+    drawn: list[tuple[list[str], float, str]], names: list[str]
+) -> None:
+    votes = as_votes(drawn)
+    new = dict(zip(NAMES, names, strict=True))
+    renamed = [replace(v, first=new[v.first], second=new[v.second]) for v in votes]
+    one = ratings(rate(as_arrays(NAMES, votes), rounds=1))
+    other = ratings(rate(as_arrays(NAMES, renamed), rounds=1))
+    assert {new[name]: rating for name, rating in one.items()} == pytest.approx(other, abs=1e-5)
+
+
+@given(votes_of_four)
+@settings(max_examples=60, deadline=None)
+def test_every_vote_twice_leaves_the_ratings(drawn: list[tuple[list[str], float, str]]) -> None:
+    votes = as_votes(drawn)
+    assert same(
+        rate(as_arrays(NAMES, votes), rounds=1), rate(as_arrays(NAMES, votes * 2), rounds=1)
+    )
+
+
+@given(votes_of_four, st.sampled_from(Unit))
+@settings(max_examples=60, deadline=None)
+def test_the_mean_is_1000_whatever_the_unit(
+    drawn: list[tuple[list[str], float, str]], unit: Unit
+) -> None:
+    board = rate(as_arrays(NAMES, as_votes(drawn)), rounds=20, unit=unit)
+    assert np.mean(list(ratings(board).values())) == pytest.approx(1000, abs=1e-6)
+
+
+@given(votes_of_four)
+@settings(max_examples=60, deadline=None)
+def test_counts_add_up(drawn: list[tuple[list[str], float, str]]) -> None:
+    wins, ties, losses = tally(as_arrays(NAMES, as_votes(drawn))).sum(axis=0)
+    assert wins == losses
+    assert wins + ties + losses == 2 * len(drawn)
+
+
+@pytest.mark.parametrize("method", Method)
+def test_the_same_seed_gives_the_same_table_and_another_other_bounds(method: Method) -> None:
+    votes = some_votes()
+    one, same_seed, other = (
+        rate(votes, method=method, rounds=50, seed=seed) for seed in (1, 1, 2)
+    )
+    assert one == same_seed
+    assert one != other
+
+
+def some_votes() -> Comparisons:
+    rng = np.random.default_rng(0)
+    first = rng.integers(0, 4, 300)
+    return Comparisons(
+        names=NAMES,
+        first=first,
+        second=(first + rng.integers(1, 4, 300)) % 4,
+        score=rng.choice([WIN, TIE, LOSS], 300),
+        expert=rng.integers(0, 5, 300),
+        scenario=rng.integers(0, 7, 300),
+    )
+
+
+@pytest.mark.parametrize("unit", Unit)
+def test_a_block_of_rounds_draws_what_single_rounds_draw(unit: Unit) -> None:
+    few, many = rate(some_votes(), rounds=40, unit=unit), rate(some_votes(), rounds=41, unit=unit)
+    assert [line.rating for line in few.lines] == [line.rating for line in many.lines]
+    widths = [(line.upper or 0) - (line.lower or 0) for line in few.lines]
+    assert min(widths) > 0

@@ -1,0 +1,95 @@
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import choix
+import numpy as np
+import pytest
+
+from arena.rating import bradley_terry
+from arena.rating.comparisons import Comparisons, FloatArray, count_pairs
+from arena.rating.leaderboard import Method, rate
+from arena.rating.ranking import ranks
+from tests.rating.votes import named, simulated, versus
+
+HERE = Path(__file__).parent
+TABLES = sorted((HERE / "tables").glob("*.json"))
+PAPER = json.loads((HERE / "paper_table.json").read_text())["rows"]
+
+
+def fitted(votes: Comparisons) -> FloatArray:
+    counts = count_pairs(votes)
+    strengths = bradley_terry.fit(
+        contestants=len(votes.names),
+        low=counts.low,
+        high=counts.high,
+        games=counts.games[None],
+        scores=counts.scores[None],
+    )
+    return bradley_terry.to_elo(strengths[0])
+
+
+@pytest.mark.parametrize("path", TABLES, ids=[path.stem for path in TABLES])
+def test_bradley_terry_of_tables_computed_by_hand(path: Path) -> None:
+    table = json.loads(path.read_text())
+    votes = named([vote for row in table["votes"] for vote in versus(*row)])
+    expected = [table["elo"][name] for name in votes.names]
+    assert fitted(votes) == pytest.approx(expected, abs=1e-4), table["what"]
+
+
+def test_a_published_worked_example_comes_out() -> None:
+    """Four players, 22 games; the encyclopedia's table gives the strengths to three digits."""
+    votes = named(
+        versus("a", "b", 2, 0, 3)
+        + versus("a", "d", 1, 0, 4)
+        + versus("b", "c", 5, 0, 3)
+        + versus("c", "d", 1, 0, 3)
+    )
+    strengths = np.exp((fitted(votes) - 1000.0) / bradley_terry.ELO_PER_LOGIT)
+    assert strengths == pytest.approx([0.640, 1.043, 0.660, 2.270], abs=5e-4)
+
+
+@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("ties", [0.0, 0.5])
+def test_bradley_terry_agrees_with_choix(seed: int, ties: float) -> None:
+    votes = simulated([1090, 1040, 1000, 960, 910], 600, seed, ties=ties)
+    wins = []
+    for first, second, score in zip(votes.first, votes.second, votes.score, strict=True):
+        wins += [(first, second)] * int(2 * score) + [(second, first)] * int(2 - 2 * score)
+    theirs = choix.opt_pairwise(5, wins, method="Newton-CG", tol=1e-10)
+    assert fitted(votes) == pytest.approx(bradley_terry.to_elo(theirs), abs=1e-3)
+
+
+def test_a_hundred_points_are_64_percent() -> None:
+    votes = named(versus("a", "b", 64, 0, 36))
+    high, low = fitted(votes)
+    assert high - low == pytest.approx(100, abs=0.1)
+
+
+def test_the_papers_ranks_follow_from_its_printed_intervals() -> None:
+    elo, minus, plus = (np.array([row[column] for row in PAPER]) for column in (2, 3, 4))
+    assert ranks(elo - minus, elo + plus).tolist() == [row[1] for row in PAPER]
+
+
+def test_paper_mode_on_the_papers_ratings_gives_intervals_of_its_size() -> None:
+    """Vote resampling, a tie share of about 0.6: half-widths of about 9 to 16 points."""
+    votes = simulated([row[2] for row in PAPER], 5760, 1, ties=0.6)
+    board = rate(votes, rounds=1000, seed=1)
+    widths = [(line.upper or 0) - (line.lower or 0) for line in board.lines]
+    assert 8.5 < np.mean(widths) / 2 < 12.5
+    for line, row in zip(board.lines, PAPER, strict=True):
+        assert line.rating == pytest.approx(row[2], abs=20)
+
+
+def test_one_elo_vote_moves_half_of_k() -> None:
+    board = rate(named(versus("a", "b", 1, 0, 0)), method=Method.ELO, rounds=5)
+    assert [line.rating for line in board.lines] == [1002.0, 998.0]
+
+
+def test_online_elo_and_bradley_terry_agree_on_the_order() -> None:
+    votes = simulated([1100, 1050, 1000, 950, 900], 4000, 3)
+    for method in Method:
+        ratings = [line.rating or 0 for line in rate(votes, method=method, rounds=100).lines]
+        assert ratings == sorted(ratings, reverse=True)
+        assert np.mean(ratings) == pytest.approx(1000, abs=3)

@@ -1,0 +1,50 @@
+"""Votes for tests of ratings."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from arena.rating.bradley_terry import ELO_PER_LOGIT
+from arena.rating.comparisons import LOSS, TIE, WIN, Comparison, Comparisons, as_arrays
+
+
+def versus(first: str, second: str, wins: int, ties: int, losses: int) -> list[Comparison]:
+    scores = [WIN] * wins + [TIE] * ties + [LOSS] * losses
+    return [Comparison(first=first, second=second, score=score) for score in scores]
+
+
+def simulated(
+    elo: list[float],
+    votes: int,
+    seed: int,
+    *,
+    ties: float = 0.2,
+    experts: int = 9,
+    scenarios: int = 50,
+) -> Comparisons:
+    """Votes whose expected score is exactly logistic, ties included."""
+    rng = np.random.default_rng(seed)
+    truth = np.array(elo) / ELO_PER_LOGIT
+    first = rng.integers(0, len(elo), votes)
+    second = (first + rng.integers(1, len(elo), votes)) % len(elo)
+    expected = 1.0 / (1.0 + np.exp(truth[second] - truth[first]))
+    # A tie scores 1/2; the rest wins so often that the mean stays the expected score.
+    tie = ties * np.minimum(1.0, 2.0 * np.minimum(expected, 1.0 - expected))
+    drawn = rng.random(votes)
+    score = np.where(
+        drawn < expected - tie / 2, WIN, np.where(drawn < expected + tie / 2, TIE, LOSS)
+    )
+    return Comparisons(
+        names=tuple(f"c{number}" for number in range(len(elo))),
+        first=first,
+        second=second,
+        score=score,
+        expert=rng.integers(0, experts, votes),
+        scenario=rng.integers(0, scenarios, votes),
+    )
+
+
+def named(votes: list[Comparison], *names: str) -> Comparisons:
+    """The votes as arrays; names default to all that occur."""
+    seen = sorted({name for vote in votes for name in (vote.first, vote.second)})
+    return as_arrays(names or tuple(seen), votes)
