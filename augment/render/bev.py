@@ -11,7 +11,8 @@ from augment.render.camera import Camera
 from augment.render.canvas import Canvas, Ground
 from augment.render.edges import draw_badges, outside, place_badges
 from augment.render.labels import draw_ghosts, draw_labels
-from augment.render.marks import draw_mark
+from augment.render.marks import draw_mark, draw_way
+from augment.render.palette import MarkStyle
 from augment.render.road import draw_ground
 from augment.render.scale import draw_grid, draw_scale, scale_box
 from augment.render.signals import draw_signals
@@ -39,21 +40,21 @@ def draw(
     draw_ground(ground, after)
     draw_grid(ground)
     draw_signals(ground, after)
-    draw_scale(ground)
+    scale_px = scale_box(ground, scene)
+    draw_scale(ground, scale_px)
     if labels:
         draw_ghosts(ground, scene, modification)
-    changed = {agent.id for agent in modification.changed}
-    unchanged = [agent for agent in after.agents if agent.id not in changed]
-    for agent in _large_first(unchanged):
-        draw_mark(ground, agent, palette.OTHER_MARK)
-    draw_mark(ground, after.ego, palette.EGO_MARK)
-    for agent in _large_first(modification.changed):
-        draw_mark(ground, agent, palette.CHANGED_MARK)
-    if labels:
-        draw_labels(ground, after)
+    styled = _styled(after, modification)
+    # Every way lies under every mark: nobody is crossed out by somebody else's arrow.
+    for paint in (draw_way, draw_mark):
+        for agent, style in styled:
+            paint(ground, agent, style)
     lost = [agent for agent in modification.changed if outside(ground, agent)]
     seen = [agent for agent in (after.ego, *modification.changed) if agent not in lost]
-    draw_badges(ground, place_badges(ground, lost, seen, taken=(scale_box(ground),)))
+    badges = place_badges(ground, lost, seen, taken=(scale_px,))
+    draw_badges(ground, badges)
+    if labels:
+        draw_labels(ground, after, taken=[scale_px, *(badge.box_px for badge in badges)])
     return ground.canvas.png()
 
 
@@ -62,6 +63,22 @@ def draw_original(scene: Scene, camera: Camera) -> bytes:
     return draw(scene, Modification(), camera)
 
 
-def _large_first(agents: list[TrafficAgent] | tuple[TrafficAgent, ...]) -> list[TrafficAgent]:
-    """In drawing order: a cone is never hidden under a bus."""
-    return sorted(agents, key=lambda agent: (-agent.length_m * agent.width_m, agent.id))
+def _styled(after: Scene, modification: Modification) -> list[tuple[TrafficAgent, MarkStyle]]:
+    """Who is drawn how, in drawing order: the traffic, the ego, what changed.
+
+    Within each the large come first, so that a cone is never hidden under a bus.
+    """
+    changed = {agent.id for agent in modification.changed}
+    unchanged = [agent for agent in after.agents if agent.id not in changed]
+    return [
+        *((agent, palette.OTHER_MARK) for agent in sorted(unchanged, key=_small_last)),
+        (after.ego, palette.EGO_MARK),
+        *(
+            (agent, palette.CHANGED_MARK)
+            for agent in sorted(modification.changed, key=_small_last)
+        ),
+    ]
+
+
+def _small_last(agent: TrafficAgent) -> tuple[float, str]:
+    return -agent.length_m * agent.width_m, agent.id

@@ -7,6 +7,7 @@ averaged down at the end. Coordinates and widths are picture pixels all the same
 from __future__ import annotations
 
 import io
+from collections.abc import Callable
 from functools import cache
 
 import numpy as np
@@ -37,6 +38,7 @@ class Canvas:
         self._image = Image.new("RGB", (width_px * FINENESS, height_px * FINENESS), background)
         self._solid = ImageDraw.Draw(self._image)
         self._glass = ImageDraw.Draw(self._image, "RGBA")
+        self._texts: list[Callable[[ImageDraw.ImageDraw], None]] = []
 
     def fill(self, points_px: FloatArray, colour: Colour) -> None:
         """A filled polygon through points (P, 2)."""
@@ -100,20 +102,28 @@ class Canvas:
         anchor: str = "mm",
         halo: Colour | None = None,
     ) -> None:
-        """Text at a point; the anchor is Pillow's ("mm" for its middle)."""
-        self._solid.text(
-            (at_px[0] * FINENESS, at_px[1] * FINENESS),
-            text,
-            fill=colour,
-            font=_font(size_px * FINENESS),
-            anchor=anchor,
-            stroke_width=2 * FINENESS if halo else 0,
-            stroke_fill=halo,
+        """Text at a point, above everything else; the anchor is Pillow's ("mm" for its middle).
+
+        The font is smooth by itself, so text is set at the end and in the picture's own size.
+        """
+        self._texts.append(
+            lambda pen: pen.text(
+                at_px,
+                text,
+                fill=colour,
+                font=_font(size_px),
+                anchor=anchor,
+                stroke_width=2 if halo else 0,
+                stroke_fill=halo,
+            )
         )
 
     def png(self) -> bytes:
         """The finished picture: the same drawing gives the same bytes, and no metadata."""
         finished = self._image.reduce(FINENESS)
+        pen = ImageDraw.Draw(finished)
+        for write in self._texts:
+            write(pen)
         stream = io.BytesIO()
         finished.save(stream, format="PNG", compress_level=6)
         return stream.getvalue()
@@ -157,7 +167,7 @@ class Ground:
 
 def text_width_px(text: str, size_px: int) -> float:
     """How wide a text will be in the picture."""
-    return float(_font(size_px * FINENESS).getlength(text)) / FINENESS
+    return float(_font(size_px).getlength(text))
 
 
 @cache

@@ -56,7 +56,7 @@ def place_badges(
     """
     badges: list[Badge] = []
     boxes = list(taken)
-    marks = [_mark_box(ground, agent) for agent in seen]
+    marks = [mark_box(ground, agent) for agent in seen]
     for agent in sorted(lost, key=lambda agent: (math.hypot(agent.x_m, agent.y_m), agent.id)):
         text = distance_text(math.hypot(agent.x_m, agent.y_m))
         width = _ARROW_PX + text_width_px(text, TEXT_PX) + 2.0 * _PADDING_PX
@@ -86,6 +86,30 @@ def draw_badges(ground: Ground, badges: list[Badge]) -> None:
         ground.canvas.text(
             (right - _PADDING_PX, middle[1]), badge.text, palette.INK, TEXT_PX, anchor="rm"
         )
+
+
+def mark_box(ground: Ground, agent: TrafficAgent) -> Box:
+    """The upright box round an agent's own, in pixels."""
+    box = ground.camera.to_pixels(corners(agent.pose, agent.length_m, agent.width_m))
+    (left, top), (right, bottom) = box.min(axis=0), box.max(axis=0)
+    return float(left), float(top), float(right), float(bottom)
+
+
+def overlap(one: Box, other: Box, gap_px: float = 0.0) -> bool:
+    """Whether two boxes come nearer to each other than a gap."""
+    return (
+        one[0] < other[2] + gap_px
+        and other[0] < one[2] + gap_px
+        and one[1] < other[3] + gap_px
+        and other[1] < one[3] + gap_px
+    )
+
+
+def within(ground: Ground, box: Box) -> bool:
+    """Whether a box lies in the picture as a whole."""
+    left, top, right, bottom = box
+    canvas = ground.canvas
+    return left >= 0.0 and top >= 0.0 and right <= canvas.width_px and bottom <= canvas.height_px
 
 
 def distance_text(distance_m: float) -> str:
@@ -165,20 +189,5 @@ class _Ring:
 
 
 def _first_free(candidates: list[Box], taken: list[Box]) -> Box | None:
-    free = (box for box in candidates if not any(_overlap(box, other) for other in taken))
+    free = (box for box in candidates if not any(overlap(box, other, _GAP_PX) for other in taken))
     return next(free, None)
-
-
-def _mark_box(ground: Ground, agent: TrafficAgent) -> Box:
-    box = ground.camera.to_pixels(corners(agent.pose, agent.length_m, agent.width_m))
-    (left, top), (right, bottom) = box.min(axis=0), box.max(axis=0)
-    return float(left), float(top), float(right), float(bottom)
-
-
-def _overlap(one: Box, other: Box) -> bool:
-    return (
-        one[0] < other[2] + _GAP_PX
-        and other[0] < one[2] + _GAP_PX
-        and one[1] < other[3] + _GAP_PX
-        and other[1] < one[3] + _GAP_PX
-    )

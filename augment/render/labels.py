@@ -8,7 +8,8 @@ from augment.geometry.boxes import corners
 from augment.geometry.polyline import FloatArray
 from augment.render import palette
 from augment.render.canvas import Box, Ground, text_width_px
-from augment.render.scale import raster, scale_box
+from augment.render.edges import mark_box, overlap, within
+from augment.render.scale import raster
 from augment.scene.entities import Scene
 from augment.scene.lane_graph import Way
 from augment.scene.modification import Modification
@@ -26,24 +27,28 @@ def draw_ghosts(ground: Ground, scene: Scene, modification: Modification) -> Non
             ground.canvas.dashed(ring, palette.GHOST, 1.5, 5.0, 4.0)
 
 
-def draw_labels(ground: Ground, scene: Scene) -> None:
-    """Ids beside agents and on lanes, metres along the lower and the left edge."""
-    taken: list[Box] = [scale_box(ground)]
+def draw_labels(ground: Ground, scene: Scene, taken: list[Box]) -> None:
+    """Ids beside agents and on lanes, metres along the upper and the left edge.
+
+    Args:
+        ground: What is drawn on.
+        scene: The scene after the change.
+        taken: Boxes in pixels that stay free of text.
+    """
     _metres(ground)
-    for agent in scene.everyone:
+    marks = [mark_box(ground, agent) for agent in scene.everyone]
+    words = list(taken)
+    for agent, (left, top, right, bottom) in zip(scene.everyone, marks, strict=True):
         x, y = ground.at(agent.x_m, agent.y_m)
-        reach = ground.camera.to_pixels(corners(agent.pose, agent.length_m, agent.width_m))
-        (left, top), (right, bottom) = reach.min(axis=0), reach.max(axis=0)
         aside = text_width_px(agent.id, _TEXT_PX) / 2.0 + 8.0
         spots = [(x, top - 12.0), (x, bottom + 12.0), (right + aside, y), (left - aside, y)]
-        _label(ground, agent.id, palette.INK, [*spots, (x, y)], taken)
-    for agent in scene.everyone:
-        reach = ground.camera.to_pixels(corners(agent.pose, agent.length_m, agent.width_m))
-        taken.append((*reach.min(axis=0).tolist(), *reach.max(axis=0).tolist()))
+        spots += [(right + aside, top - 12.0), (left - aside, bottom + 12.0), (x, top - 30.0)]
+        if not _label(ground, agent.id, palette.INK, spots, words, marks):
+            _label(ground, agent.id, palette.INK, [*spots, (x, y)], words, [])
     ways: list[Way] = [*scene.lanes, *scene.connectors]
     for way in ways:
         spots = _spots(ground, way.centerline.points_m)
-        _label(ground, way.id, palette.LANE_TEXT, spots, taken)
+        _label(ground, way.id, palette.LANE_TEXT, spots, words, marks)
 
 
 def _metres(ground: Ground) -> None:
@@ -78,17 +83,18 @@ def _label(
     text: str,
     colour: palette.Colour,
     spots: list[tuple[float, float]],
-    taken: list[Box],
-) -> None:
-    """The text at the first spot that is free, or not at all."""
+    words: list[Box],
+    marks: list[Box],
+) -> bool:
+    """The text at the first spot in the picture that is free of words and marks, if there is one.
+
+    What is written is added to the words.
+    """
     half = text_width_px(text, _TEXT_PX) / 2.0 + 2.0
     for x, y in spots:
         box = (x - half, y - 9.0, x + half, y + 9.0)
-        inside = box[0] >= 0.0 and box[1] >= 0.0 and box[2] <= ground.canvas.width_px
-        free = not any(
-            box[0] < b[2] and b[0] < box[2] and box[1] < b[3] and b[1] < box[3] for b in taken
-        )
-        if inside and box[3] <= ground.canvas.height_px and free:
+        if within(ground, box) and not any(overlap(box, other) for other in words + marks):
             ground.canvas.text((x, y), text, colour, _TEXT_PX, halo=palette.HALO)
-            taken.append(box)
-            return
+            words.append(box)
+            return True
+    return False

@@ -26,11 +26,15 @@ _TICK_S = 1.0
 _Painter = Callable[[Ground, TrafficAgent, MarkStyle], None]
 
 
-def draw_mark(ground: Ground, agent: TrafficAgent, style: MarkStyle) -> None:
-    """One agent: its way on, its walk, and its mark on top of both."""
+def draw_way(ground: Ground, agent: TrafficAgent, style: MarkStyle) -> None:
+    """Where one agent is going: its motion, and its walk if it has one."""
     _motion(ground, agent, style)
     if agent.walk_to_m is not None:
         _walk(ground, agent, style)
+
+
+def draw_mark(ground: Ground, agent: TrafficAgent, style: MarkStyle) -> None:
+    """One agent where it is."""
     _PAINTERS[agent.type](ground, agent, style)
 
 

@@ -20,7 +20,7 @@ WALKWAY_EDGE: Colour = (178, 178, 118)
 LANE_LINE: Colour = (255, 255, 255)
 LANE_SOLID: Colour = (138, 142, 148)
 ZEBRA: Colour = (255, 255, 255)
-ZEBRA_GROUND: Colour = (198, 201, 206)
+ZEBRA_GROUND: Colour = (205, 208, 212)
 
 EGO_LANE: Colour = (20, 20, 20, 190)
 OTHER_LANE: Colour = (0, 0, 128, 105)
@@ -39,7 +39,6 @@ GHOST: Colour = (90, 95, 105, 150)
 LIGHT_RED: Colour = (192, 28, 40)
 LIGHT_YELLOW: Colour = (226, 165, 0)
 LIGHT_GREEN: Colour = (30, 138, 74)
-LIGHT_UNKNOWN: Colour = (120, 124, 130)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -67,7 +66,7 @@ EGO_MARK = MarkStyle(
     outline_px=2.0,
 )
 CHANGED_MARK = MarkStyle(
-    fill=(24, 72, 205),
+    fill=(20, 62, 192),
     outline=(6, 22, 92),
     detail=(255, 255, 255),
     hatch=(122, 160, 245),

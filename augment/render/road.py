@@ -25,9 +25,12 @@ from augment.scene.lane_graph import LaneGraph, Way
 
 _ROAD_AREAS = (AreaKind.DRIVABLE, AreaKind.CARPARK, AreaKind.INTERSECTION)
 _CHEVRON_EVERY_M = 12.0
+# Up to this ratio of length to width a crosswalk's shape does not say which way it leads.
+_STUB_RATIO = 1.5
 # The paint of a lane line, and its dashes and gaps.
 _LINE_M = 0.15
 _DASH_M = (2.0, 2.0)
+_INSET_M = 0.1
 
 
 def draw_ground(ground: Ground, scene: Scene) -> None:
@@ -89,9 +92,12 @@ def _crosswalks(ground: Ground, areas: list[Area], ways: list[Way]) -> None:
 def _traffic_direction(polygon: FloatArray, ways: list[Way]) -> float:
     """Along which axis of a crosswalk the cars drive: its stripes point there.
 
-    The axis nearest to the heading of the ways that cross it; without one, the shorter axis.
+    The shorter axis, since people walk along the longer one; on a stub that is about as wide as
+    long, the axis nearest to the heading of the ways there.
     """
-    along_rad, _, _ = long_axis(polygon)
+    along_rad, length_m, width_m = long_axis(polygon)
+    if length_m > _STUB_RATIO * width_m:
+        return along_rad + math.pi / 2.0
     x_m, y_m = polygon.mean(axis=0)
     votes = 0.0
     for way in ways:
@@ -127,15 +133,19 @@ def _lane_lines(ground: Ground, scene: Scene, ways: list[Way], roads: list[Float
 
 
 def _solid(ground: Ground, line_m: FloatArray, outwards: float, roads: list[FloatArray]) -> None:
-    """A thin solid line where there is road beyond it (on its left for 1, its right for -1)."""
+    """A thin solid line where there is road beyond it (on its left for 1, its right for -1).
+
+    It lies a little inside its own lane: two lanes that meet head on get a double line.
+    """
     fine = resampled(line_m, 2.0)
     beyond = offset(fine, 0.5 * outwards)
     beyond = (beyond[:-1] + beyond[1:]) / 2.0
     inside = np.zeros(len(beyond), dtype=bool)
     for road in roads:
         inside |= contains(road, beyond)
+    inner = offset(fine, -_INSET_M * outwards)
     for first, last in runs(inside):
-        ground.stroke(fine[first : last + 2], palette.LANE_SOLID, 1.8)
+        ground.stroke(inner[first : last + 2], palette.LANE_SOLID, 1.5)
 
 
 def _joined(graph: LaneGraph, connector: LaneConnector) -> Lane | None:

@@ -9,9 +9,15 @@ import numpy as np
 from augment.geometry.polyline import FloatArray
 from augment.render import palette
 from augment.render.canvas import Box, Ground
+from augment.scene.entities import Scene
 
 GRID_M = 5.0
 _TEXT_PX = 15
+_INSET_PX = 12.0
+_PADDING_PX = 28.0
+_HEIGHT_PX = 46.0
+# About half a car at the usual scale.
+_NEAR_PX = 50.0
 
 
 def draw_grid(ground: Ground) -> None:
@@ -31,29 +37,48 @@ def raster(low_m: float, high_m: float) -> list[float]:
     return [index * GRID_M for index in range(first, last + 1)]
 
 
-def scale_box(ground: Ground) -> Box:
-    """The plate of the scale bar, at the bottom left (left, top, right, bottom in pixels)."""
-    height = ground.canvas.height_px
-    bar_px = 2.0 * _unit_m(ground) * ground.camera.px_per_m
-    return 12.0, height - 12.0 - 44.0, 12.0 + bar_px + 50.0, height - 12.0
+def scale_box(ground: Ground, scene: Scene) -> Box:
+    """The plate of the scale bar (left, top, right, bottom in pixels), in a quiet corner.
+
+    The corner depends on the scene before the change alone, so that all pictures of a scenario
+    have their scale in the same place: bottom left, unless another one hides fewer agents.
+    """
+    width = 2.0 * _unit_m(ground) * ground.camera.px_per_m + 2.0 * _PADDING_PX
+    right, bottom = ground.canvas.width_px - _INSET_PX, ground.canvas.height_px - _INSET_PX
+    corners = [
+        (left, top, left + width, top + _HEIGHT_PX)
+        for top in (bottom - _HEIGHT_PX, _INSET_PX)
+        for left in (_INSET_PX, right - width)
+    ]
+    agents = [ground.at(agent.x_m, agent.y_m) for agent in scene.everyone]
+    return min(corners, key=lambda box: sum(_close(box, *at) for at in agents))
 
 
-def draw_scale(ground: Ground) -> None:
+def draw_scale(ground: Ground, box_px: Box) -> None:
     """A bar of two units, one filled, one empty, with their lengths beneath."""
-    left, top, right, bottom = scale_box(ground)
-    ground.canvas.plate((left, top, right, bottom), palette.PLATE, None, 6.0)
+    left, top, _, _ = box_px
+    ground.canvas.plate(box_px, palette.PLATE, None, 6.0)
     unit_m = _unit_m(ground)
     unit_px = unit_m * ground.camera.px_per_m
-    start, bar_top, bar_bottom = left + 12.0, top + 8.0, top + 15.0
-    ground.canvas.fill(_rectangle(start, bar_top, start + 2.0 * unit_px, bar_bottom), palette.INK)
+    start, bar_top, bar_bottom = left + _PADDING_PX, top + 9.0, top + 16.0
+    middle, end = start + unit_px, start + 2.0 * unit_px
+    ground.canvas.fill(_rectangle(start, bar_top, end, bar_bottom), palette.INK)
     ground.canvas.fill(
-        _rectangle(start + unit_px, bar_top + 1.5, start + 2.0 * unit_px - 1.5, bar_bottom - 1.5),
-        palette.PAPER,
+        _rectangle(middle, bar_top + 1.5, end - 1.5, bar_bottom - 1.5), palette.PAPER
     )
     for index in range(3):
         text = f"{index * unit_m:.0f}" + (" m" if index == 2 else "")
         at = (start + index * unit_px, bar_bottom + 12.0)
-        ground.canvas.text(at, text, palette.INK, _TEXT_PX, anchor="mm")
+        ground.canvas.text(at, text, palette.INK, _TEXT_PX)
+
+
+def _close(box: Box, x_px: float, y_px: float) -> bool:
+    """Whether a mark in the picture may touch the box."""
+    left, top, right, bottom = box
+    return (
+        max(0.0, left - _NEAR_PX) < x_px < right + _NEAR_PX
+        and max(0.0, top - _NEAR_PX) < y_px < bottom + _NEAR_PX
+    )
 
 
 def _unit_m(ground: Ground) -> float:

@@ -12,6 +12,8 @@ from augment.scene.lane_graph import Way
 
 # Where a line turns sharply its offset is held back to this multiple of the distance.
 _MITER_LIMIT = 2.0
+# How far the surface of a way goes on beyond its ends.
+_REACH = 0.1
 
 
 def offset(points: FloatArray, distance: float) -> FloatArray:
@@ -39,8 +41,8 @@ def sides(way: Way) -> tuple[FloatArray, FloatArray]:
 
 
 def ribbon(way: Way) -> FloatArray:
-    """The surface of a way as a polygon (P, 2)."""
-    left, right = sides(way)
+    """The surface of a way as a polygon (P, 2); it reaches a little into what comes next."""
+    left, right = (_lengthened(side) for side in sides(way))
     return np.vstack([left, right[::-1]])
 
 
@@ -123,6 +125,13 @@ def long_axis(polygon: FloatArray) -> tuple[float, float, float]:
             best = (angle, length, width)
     angle, length, width = best
     return best if length >= width else (angle + math.pi / 2.0, width, length)
+
+
+def _lengthened(points: FloatArray) -> FloatArray:
+    """A line with both ends drawn out; ways that bend meet at a slight angle, with a gap."""
+    steps = np.array([points[0] - points[1], points[-1] - points[-2]])
+    steps = steps / np.hypot(steps[:, 0], steps[:, 1])[:, None] * _REACH
+    return np.vstack([points[:1] + steps[:1], points[1:-1], points[-1:] + steps[1:]])
 
 
 def _half(polygon: FloatArray, normal: FloatArray, limit: float) -> FloatArray:

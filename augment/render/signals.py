@@ -1,7 +1,7 @@
 """Traffic lights: a bar across the start of the connectors that a light rules, and a small lamp.
 
 The lamp's shape says the state as its colour does: red a square, yellow a diamond, green a
-circle, unknown a ring.
+circle. A light of unknown state is not drawn: maps without lights say "unknown" everywhere.
 """
 
 from __future__ import annotations
@@ -19,7 +19,6 @@ _COLOURS = {
     TrafficLight.RED: palette.LIGHT_RED,
     TrafficLight.YELLOW: palette.LIGHT_YELLOW,
     TrafficLight.GREEN: palette.LIGHT_GREEN,
-    TrafficLight.UNKNOWN: palette.LIGHT_UNKNOWN,
 }
 _LEFT_TO_RIGHT = (TurnType.U_TURN, TurnType.LEFT, TurnType.STRAIGHT, TurnType.RIGHT)
 _LAMP_PX = 5.5
@@ -29,7 +28,7 @@ def draw_signals(ground: Ground, scene: Scene) -> None:
     """One bar for each place where ruled connectors begin, cut where their states differ."""
     starts: dict[str, list[LaneConnector]] = {}
     for connector in scene.connectors:
-        if connector.traffic_light is not TrafficLight.NONE:
+        if connector.traffic_light in _COLOURS:
             starts.setdefault(connector.from_lane or connector.id, []).append(connector)
     for connectors in starts.values():
         if ground.camera.shows(connectors[0].centerline.points_m[:1]):
@@ -37,9 +36,10 @@ def draw_signals(ground: Ground, scene: Scene) -> None:
 
 
 def _bar(ground: Ground, connectors: list[LaneConnector]) -> None:
-    first = connectors[0]
-    start, width_m = first.centerline.pose_at(0.0), 0.84 * first.width_m
     ordered = sorted(connectors, key=lambda one: _LEFT_TO_RIGHT.index(one.turn_type))
+    # The straightest way leaves its lane most squarely, so the bar is laid across that one.
+    first = min(ordered, key=lambda one: one.turn_type is not TurnType.STRAIGHT)
+    start, width_m = first.centerline.pose_at(0.0), 0.84 * first.width_m
     states = list(dict.fromkeys(connector.traffic_light for connector in ordered))
     part_m = width_m / len(states)
     for index, state in enumerate(states):
@@ -52,16 +52,9 @@ def _bar(ground: Ground, connectors: list[LaneConnector]) -> None:
 def _lamp(ground: Ground, start: Pose, left_m: float, state: TrafficLight) -> None:
     x_m, y_m = start.to_parent(np.array([[0.0, left_m]]))[0]
     centre = ground.at(float(x_m), float(y_m))
-    if state in (TrafficLight.GREEN, TrafficLight.UNKNOWN):
-        ring = state is TrafficLight.UNKNOWN
+    if state is TrafficLight.GREEN:
         ground.canvas.disc(centre, _LAMP_PX + 1.5, palette.PAPER)
-        ground.canvas.disc(
-            centre,
-            _LAMP_PX,
-            palette.PAPER if ring else _COLOURS[state],
-            outline=_COLOURS[state],
-            outline_px=2.0,
-        )
+        ground.canvas.disc(centre, _LAMP_PX, _COLOURS[state])
         return
     # A diamond is a square on its corner; the red square stands upright in the picture.
     first_rad = math.pi / 4.0 if state is TrafficLight.RED else 0.0

@@ -19,10 +19,11 @@ from tests.render.pictures import opened
 
 CAMERA = camera_for(scenes.scene(), None)
 GROUND = Ground(Canvas(1200, 800, (255, 255, 255)), CAMERA)
+SCALE = scale_box(GROUND, scenes.scene())
 
 
 def badges(*lost: TrafficAgent, seen: tuple[TrafficAgent, ...] = ()) -> list[Badge]:
-    return place_badges(GROUND, list(lost), list(seen), taken=(scale_box(GROUND),))
+    return place_badges(GROUND, list(lost), list(seen), taken=(SCALE,))
 
 
 def apart(one: Box, other: Box) -> bool:
@@ -55,7 +56,7 @@ def test_arrows_stay_inside_and_apart(count: int) -> None:
     ]
     found = badges(*crowd)
     assert len(found) == count
-    boxes = [badge.box_px for badge in found] + [scale_box(GROUND)]
+    boxes = [badge.box_px for badge in found] + [SCALE]
     assert all(apart(one, other) for one, other in combinations(boxes, 2))
     for left, top, right, bottom in boxes:
         assert left >= 0.0
