@@ -20,6 +20,8 @@ from augment.scene.entities import AgentType, TrafficAgent
 
 # A speed below which nothing is drawn as moving.
 _STANDING_MPS = 0.3
+# More than the half size of any mark that is drawn larger than it is.
+_LEAST_MARK_PX = 16.0
 # The tick at the nose of what moves is the way of this time.
 _TICK_S = 1.0
 
@@ -27,14 +29,18 @@ _Painter = Callable[[Ground, TrafficAgent, MarkStyle], None]
 
 
 def draw_way(ground: Ground, agent: TrafficAgent, style: MarkStyle) -> None:
-    """Where one agent is going: its motion, and its walk if it has one."""
-    _motion(ground, agent, style)
+    """Where one agent is going: its walk if it has one, else its motion."""
     if agent.walk_to_m is not None:
         _walk(ground, agent, style)
+    else:
+        _motion(ground, agent, style)
 
 
 def draw_mark(ground: Ground, agent: TrafficAgent, style: MarkStyle) -> None:
-    """One agent where it is."""
+    """One agent where it is; nothing for one that is out of the picture."""
+    box = corners(agent.pose, agent.length_m, agent.width_m)
+    if not ground.camera.shows(box, margin_m=_LEAST_MARK_PX / ground.camera.px_per_m):
+        return
     _PAINTERS[agent.type](ground, agent, style)
 
 

@@ -7,6 +7,7 @@ import math
 import numpy as np
 
 from augment.geometry.angles import difference
+from augment.geometry.frames import Pose
 from augment.geometry.polyline import FloatArray
 from augment.render import palette
 from augment.render.canvas import Ground
@@ -25,6 +26,7 @@ from augment.scene.lane_graph import LaneGraph, Way
 
 _ROAD_AREAS = (AreaKind.DRIVABLE, AreaKind.CARPARK, AreaKind.INTERSECTION)
 _CHEVRON_EVERY_M = 12.0
+_CHEVRON_M = np.array([[-0.5, 0.5], [0.25, 0.0], [-0.5, -0.5]])
 # Up to this ratio of length to width a crosswalk's shape does not say which way it leads.
 _STUB_RATIO = 1.5
 # The paint of a lane line, and its dashes and gaps.
@@ -42,8 +44,7 @@ def draw_ground(ground: Ground, scene: Scene) -> None:
     roads = _surface(ground, ways, areas)
     _crosswalks(ground, areas, ways)
     _lane_lines(ground, scene, ways, roads)
-    for way in ways:
-        _centreline(ground, scene, way)
+    _centrelines(ground, scene, ways)
 
 
 def _seen(ground: Ground, points_m: FloatArray) -> bool:
@@ -158,18 +159,29 @@ def _joined(graph: LaneGraph, connector: LaneConnector) -> Lane | None:
     return before if alone else None
 
 
-def _centreline(ground: Ground, scene: Scene, way: Way) -> None:
+def _centrelines(ground: Ground, scene: Scene, ways: list[Way]) -> None:
     """Thin dashes, and chevrons that point where the traffic goes."""
+    shown: list[Pose] = []
+    for way in ways:
+        colour = _line_colour(scene, way)
+        line = way.centerline
+        ground.dashed(line.points_m, colour, 1.4, 0.7, 0.8)
+        count = max(1, round(line.length_m / _CHEVRON_EVERY_M))
+        for index in range(count):
+            pose = line.pose_at((index + 0.5) * line.length_m / count)
+            points = pose.to_parent(_CHEVRON_M)
+            if _seen(ground, points) and not any(_alike(pose, other) for other in shown):
+                ground.stroke(points, colour, 1.8)
+                shown.append(pose)
+
+
+def _line_colour(scene: Scene, way: Way) -> palette.Colour:
     if isinstance(way, LaneConnector):
-        colour = palette.CONNECTOR
-    else:
-        colour = palette.EGO_LANE if way.id == scene.ego.lane_id else palette.OTHER_LANE
-    line = way.centerline
-    ground.dashed(line.points_m, colour, 1.4, 0.7, 0.8)
-    count = max(1, round(line.length_m / _CHEVRON_EVERY_M))
-    for index in range(count):
-        pose = line.pose_at((index + 0.5) * line.length_m / count)
-        tip = np.array([[-0.55, 0.55], [0.25, 0.0], [-0.55, -0.55]])
-        points = pose.to_parent(tip)
-        if _seen(ground, points):
-            ground.stroke(points, colour, 1.8)
+        return palette.CONNECTOR
+    return palette.EGO_LANE if way.id == scene.ego.lane_id else palette.OTHER_LANE
+
+
+def _alike(one: Pose, other: Pose) -> bool:
+    """Whether two chevrons say the same: connectors that part late run side by side."""
+    near = math.hypot(one.x_m - other.x_m, one.y_m - other.y_m) < 2.0
+    return near and abs(difference(one.heading_rad, other.heading_rad)) < math.radians(40.0)

@@ -106,6 +106,29 @@ def test_what_moves_has_a_tick_and_what_is_parked_has_none() -> None:
     assert is_blue(pixel_at(draw(STREET, added(moving), CAMERA), CAMERA, 26.0, 3.5))
 
 
+def test_a_walk_is_a_dashed_arrow_to_its_end() -> None:
+    walker = scenes.pedestrian("New1", 20.0, -3.0, (20.0, 7.0))
+    png = draw(STREET, added(walker), CAMERA)
+    line = [is_blue(pixel_at(png, CAMERA, 20.0, y_m)) for y_m in np.arange(-1.0, 6.5, 0.1)]
+    assert 0.4 < np.mean(line) < 0.8
+    assert is_blue(pixel_at(png, CAMERA, 20.0, 6.9))
+    assert not is_blue(pixel_at(png, CAMERA, 20.0, 7.6))
+
+
+def test_absurdly_long_walks_and_fast_agents_are_drawn() -> None:
+    walker = scenes.pedestrian("New1", 20.0, -3.0, (1e5, 1e5))
+    racer = replace(scenes.vehicle("New2", 10.0, 3.5), speed_mps=100.0, length_m=100.0)
+    assert opened(draw(STREET, added(walker, racer), CAMERA)).size == (1200, 800)
+
+
+def test_the_scale_is_in_the_same_corner_whatever_changed() -> None:
+    scene = scenes.scene(agents=(scenes.vehicle("Agent2", -10.0, -18.0),))
+    for change in (Modification(), Modification(removed=("Agent2",))):
+        png = draw(scene, change, CAMERA)
+        assert patch(png, CAMERA, 40.0, -17.5, 40).min() < 60
+    assert patch(draw_original(STREET, CAMERA), CAMERA, 40.0, -17.5, 40).min() > 150
+
+
 def test_the_same_picture_has_the_same_bytes_and_no_metadata() -> None:
     change = added(scenes.vehicle("New1", 20.0, 3.5), scenes.vehicle("New2", 500.0, 3.5))
     first, second = (draw(STREET, change, CAMERA) for _ in range(2))
