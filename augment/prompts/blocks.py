@@ -102,21 +102,23 @@ def _refuse(constant: str) -> object:
 
 
 def _once(pairs: list[tuple[str, object]]) -> dict[str, object]:
-    found = dict(pairs)
-    if len(found) < len(pairs):
-        doubled = next(key for key, _ in pairs if [k for k, _ in pairs].count(key) > 1)
-        raise _Broken(f"the key {doubled[:40]!a} stands twice in one object")
+    found: dict[str, object] = {}
+    for key, value in pairs:
+        if key in found:
+            raise _Broken(f"the key {key[:40]!a} stands twice in one object")
+        found[key] = value
     return found
 
 
-_STRING_OR_NOISE = re.compile(
-    r'("(?:[^"\\\n]|\\.)*")'  # a string stays as it is, whatever is in it
-    r"|//[^\n]*|/\*.*?\*/"  # comments go
-    r"|,(?=(?:\s|//[^\n]*(?:\n|$)|/\*.*?\*/)*[}\]])",  # so do commas before a closing bracket
-    re.DOTALL,
-)
+# Each of the pieces matches wherever it begins, closed or not: the time that a hostile answer
+# takes grows no faster than its length.
+_STRING = r'"[^"\\\n]*(?:\\.[^"\\\n]*)*"?'
+_STRING_OR_COMMENT = re.compile(rf"({_STRING})|//[^\n]*|/\*.*?(?:\*/|\Z)", re.DOTALL)
+_STRING_OR_COMMA = re.compile(rf"({_STRING})|,(?=\s*[}}\]])", re.DOTALL)
 
 
 def _mended(block: str) -> str:
     """Without comments and trailing commas: what models add and what cannot shift a number."""
-    return _STRING_OR_NOISE.sub(lambda match: match.group(1) or "", block)
+    for noise in (_STRING_OR_COMMENT, _STRING_OR_COMMA):
+        block = noise.sub(lambda match: match.group(1) or "", block)
+    return block

@@ -103,7 +103,7 @@ def read_reply(answer: str, scene: Scene, *, radius_m: float = DEFAULT_RADIUS_M)
 def notes_of(answer: str) -> str:
     """The sections Insights and Summary of an answer, shortened; empty without them."""
     heads = r"Insights|Summary|Modification Dict|Modification Calculations|Modified Vectors"
-    parts = re.split(rf"^[\s#*_]*({heads})[\s#*_]*:[\s*_]*", answer, flags=re.MULTILINE)
+    parts = re.split(rf"^[ \t#*_]*({heads})[ \t#*_]*:[ \t*_]*", answer, flags=re.MULTILINE)
     bodies = dict(zip(parts[1::2], parts[2::2], strict=True))
     told = [bodies.get("Insights", "").strip(), bodies.get("Summary", "").strip()]
     return "\n\n".join(part for part in told if part)[:LONGEST_NOTES]

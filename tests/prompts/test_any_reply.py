@@ -5,11 +5,14 @@ from __future__ import annotations
 import contextlib
 import math
 import random
+import time
 
+import pytest
 from hypothesis import HealthCheck, example, given, settings
 from hypothesis import strategies as st
 
 from augment.errors import ReplyUnreadable
+from augment.prompts.blocks import LONGEST_ANSWER
 from augment.prompts.reply import ReadReply, read_reply
 from tests.scenes import scene
 from tests.variants.answers import GOOD, agent, answer, block
@@ -73,6 +76,36 @@ def test_any_string_of_what_answers_are_made_of(text: str) -> None:
 @given(st.dictionaries(st.sampled_from([*sorted(agent()), "walk_to"]), JSON))
 def test_any_fields_of_an_agent(fields: dict[str, object]) -> None:
     read(answer(block(agent(**fields))))
+
+
+@pytest.mark.parametrize(
+    "unit",
+    [
+        *(
+            "/*",
+            ",/**/",
+            '\\"',
+            '"',
+            "{",
+            "[",
+            "\n",
+            "#",
+            " ",
+            "```\n",
+            "```",
+            "Insights",
+            "* ",
+            ",",
+        ),
+        *(", ", '"add":', '{"add":', "</think>", "//", '{"a":1}', '"a":1,', '{"add":1,"add":2}'),
+    ],
+)
+def test_no_answer_takes_long(unit: str) -> None:
+    started = time.process_time()
+    for before in ("", '{"add": "', '```json\n{"add":[', 'Insights: "'):
+        room = LONGEST_ANSWER - len(before)
+        read(before + unit * (room // len(unit)))
+    assert time.process_time() - started < 5.0
 
 
 def test_ten_thousand_mutated_answers() -> None:
