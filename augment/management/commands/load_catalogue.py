@@ -1,0 +1,43 @@
+"""Bring the catalogue's scenes and scenarios into the database."""
+
+from __future__ import annotations
+
+from argparse import ArgumentParser
+from pathlib import Path
+from typing import Any
+
+from django.conf import settings
+from django.core.management.base import BaseCommand, CommandError
+
+from augment.errors import AugmentError
+from augment.services.catalogue import load_catalogue
+
+
+class Command(BaseCommand):
+    """load_catalogue [--folder FOLDER]."""
+
+    help = (
+        "Load the catalogue: base scenes, instructions and reference modifications. "
+        "Running it again changes nothing."
+    )
+
+    def add_arguments(self, parser: ArgumentParser) -> None:
+        """Where the catalogue is."""
+        parser.add_argument(
+            "--folder",
+            type=Path,
+            default=settings.BASE_DIR / "fixtures",
+            help="holds scenes/*.json and scenarios/*.json; default: the project's own",
+        )
+
+    def handle(self, *args: Any, **options: Any) -> None:
+        """Load it and say what that changed."""
+        try:
+            report = load_catalogue(folder=options["folder"])
+        except AugmentError as error:
+            raise CommandError(str(error)) from error
+        for kind in ("scenes", "scenarios"):
+            added, changed, unchanged = (
+                getattr(report, f"{kind}_{step}") for step in ("added", "changed", "unchanged")
+            )
+            self.stdout.write(f"{kind}: {added} added, {changed} changed, {unchanged} unchanged")

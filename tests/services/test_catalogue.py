@@ -1,0 +1,188 @@
+from __future__ import annotations
+
+import json
+import shutil
+from collections.abc import Callable
+from io import StringIO
+from pathlib import Path
+from typing import Any
+
+import pytest
+from django.contrib.auth.models import User
+from django.core.management import CommandError, call_command
+
+from augment.errors import Conflict, InvalidDocument
+from augment.models import Augmentation, BaseScene, Contestant, Event, GenerationJob, Scenario
+from augment.scene.catalogue import ScenarioType
+from augment.scene.catalogue_codec import CatalogueEntry, entry_to_document
+from augment.scene.codec import scene_to_document
+from augment.scene.modification import Modification
+from augment.services.catalogue import CatalogueReport, load_catalogue
+from augment.services.scenes import add_scenario, import_scene, reference_of
+from tests.scenes import scene, vehicle
+
+pytestmark = pytest.mark.django_db
+
+OWN = Path(__file__).resolve().parents[2] / "fixtures"
+PARKED = CatalogueEntry(
+    slug="parked-car",
+    scene="street",
+    type=ScenarioType.NUDGE,
+    instruction="Add a parked car 20 m ahead.",
+    keep_traffic=False,
+    provenance="made for a test",
+    notes="",
+    reference=Modification(added=(vehicle("Agent2", 20.0, -0.8),)),
+)
+
+
+@pytest.fixture
+def folder(tmp_path: Path) -> Path:
+    folder = tmp_path / "shelf"
+    for name in ("scenes", "scenarios"):
+        (folder / name).mkdir(parents=True)
+    (folder / "scenes/street.json").write_text(json.dumps(scene_to_document(scene())))
+    (folder / "scenarios/parked-car.json").write_text(json.dumps(entry_to_document(PARKED)))
+    return folder
+
+
+def edit(file: Path, change: Callable[[dict[str, Any]], object]) -> None:
+    document = json.loads(file.read_text())
+    change(document)
+    file.write_text(json.dumps(document))
+
+
+def augment(scenario: Scenario) -> None:
+    job = GenerationJob.objects.create(name="first")
+    contestant = Contestant.objects.create(slug="ada", name="Ada", kind="human")
+    Augmentation.objects.create(job=job, scenario=scenario, contestant=contestant)
+
+
+def report(*, scenes: tuple[int, int, int], scenarios: tuple[int, int, int]) -> CatalogueReport:
+    return CatalogueReport(
+        scenes_added=scenes[0],
+        scenes_changed=scenes[1],
+        scenes_unchanged=scenes[2],
+        scenarios_added=scenarios[0],
+        scenarios_changed=scenarios[1],
+        scenarios_unchanged=scenarios[2],
+    )
+
+
+def test_a_folder_becomes_rows_and_lines_in_the_log(folder: Path) -> None:
+    ada = User.objects.create_user("ada")
+    assert load_catalogue(folder=folder, actor=ada) == report(
+        scenes=(1, 0, 0), scenarios=(1, 0, 0)
+    )
+    scenario = Scenario.objects.get()
+    assert (scenario.slug, scenario.type) == ("parked-car", "nudge_around_parked_vehicle")
+    assert scenario.in_catalogue
+    assert scenario.base_scene.source == "authored"
+    assert reference_of(scenario) == PARKED.reference
+    assert set(Event.objects.values_list("actor", "object_kind")) == {
+        (ada.pk, "scene"),
+        (ada.pk, "scenario"),
+    }
+
+
+def test_loading_again_changes_nothing(folder: Path) -> None:
+    load_catalogue(folder=folder)
+    events = Event.objects.count()
+    assert load_catalogue(folder=folder) == report(scenes=(0, 0, 1), scenarios=(0, 0, 1))
+    assert Event.objects.count() == events
+
+
+def test_the_projects_own_catalogue_loads_twice_through_the_command() -> None:
+    for scenes, scenarios in (("6 added, 0", "12 added, 0"), ("0 added, 0", "0 added, 0")):
+        out = StringIO()
+        call_command("load_catalogue", stdout=out)
+        assert f"scenes: {scenes} changed" in out.getvalue()
+        assert f"scenarios: {scenarios} changed" in out.getvalue()
+    assert Scenario.objects.filter(in_catalogue=True).count() == 12
+
+
+def test_an_unused_scenario_and_its_scene_may_change(folder: Path) -> None:
+    load_catalogue(folder=folder)
+    Scenario.objects.update(original_image="bev/old.png")
+    edit(folder / "scenarios/parked-car.json", lambda it: it.update(instruction="Park a car."))
+    edit(folder / "scenes/street.json", lambda it: it.update(provenance="mended"))
+    assert load_catalogue(folder=folder) == report(scenes=(0, 1, 0), scenarios=(0, 1, 0))
+    scenario = Scenario.objects.get()
+    assert (scenario.instruction, scenario.original_image) == ("Park a car.", "")
+    assert scenario.base_scene.provenance == "mended"
+
+
+@pytest.mark.parametrize(
+    ("file", "field"), [("scenarios/parked-car", "instruction"), ("scenes/street", "provenance")]
+)
+def test_what_was_augmented_already_is_not_changed(folder: Path, file: str, field: str) -> None:
+    load_catalogue(folder=folder)
+    augment(Scenario.objects.get())
+    edit(folder / f"{file}.json", lambda it: it.update({field: "other"}))
+    with pytest.raises(Conflict, match="1 augmentations were made from the old state"):
+        load_catalogue(folder=folder)
+    assert Scenario.objects.get().instruction == PARKED.instruction
+
+
+def test_a_changed_scene_with_somebodys_own_scenario_is_refused(folder: Path) -> None:
+    load_catalogue(folder=folder)
+    add_scenario(scene="street", type="jaywalking_pedestrian", instruction="walk", slug="mine")
+    edit(folder / "scenes/street.json", lambda it: it.update(provenance="mended"))
+    with pytest.raises(Conflict, match="outside the catalogue use it: mine"):
+        load_catalogue(folder=folder)
+
+
+def test_rows_from_elsewhere_are_never_replaced(folder: Path) -> None:
+    import_scene(source="json", path=folder / "scenes/street.json", frame=0, slug="street")
+    with pytest.raises(Conflict, match="from the source 'json'"):
+        load_catalogue(folder=folder)
+    BaseScene.objects.update(source="authored")
+    add_scenario(scene="street", type="jaywalking_pedestrian", instruction="x", slug="parked-car")
+    with pytest.raises(Conflict, match="not the catalogue's"):
+        load_catalogue(folder=folder)
+
+
+def test_every_problem_names_its_file_and_path_and_nothing_is_kept(folder: Path) -> None:
+    shutil.copy(folder / "scenes/street.json", folder / "scenes/other.json")
+    broken = folder / "scenarios/broken.json"
+    shutil.copy(folder / "scenarios/parked-car.json", broken)
+    edit(broken, lambda it: it["reference"]["add"][0].update(x_m="far"))
+    lost = folder / "scenarios/lost.json"
+    shutil.copy(folder / "scenarios/parked-car.json", lost)
+    edit(lost, lambda it: it.update(slug="lost", scene="nowhere"))
+    with pytest.raises(InvalidDocument) as caught:
+        load_catalogue(folder=folder)
+    assert [path for path, _ in caught.value.problems] == [
+        "scenes/other.json: name",
+        "scenarios/broken.json: reference.add[0].x_m",
+        "scenarios/lost.json: scene",
+    ]
+    assert not BaseScene.objects.exists()
+
+
+def test_a_reference_has_to_fit_its_scene(folder: Path) -> None:
+    file = folder / "scenarios/parked-car.json"
+    edit(file, lambda it: it["reference"]["add"][0].update(lane_id="Lane9"))
+    with pytest.raises(
+        InvalidDocument, match=r"parked-car.json: reference.Agent2.lane_id: 'Lane9'"
+    ):
+        load_catalogue(folder=folder)
+    edit(file, lambda it: it["reference"].update(add=[], remove=["Agent7"]))
+    with pytest.raises(InvalidDocument, match=r"parked-car.json: reference: Agent7 is not in"):
+        load_catalogue(folder=folder)
+
+
+def test_a_conflict_late_in_the_folder_undoes_everything(folder: Path) -> None:
+    load_catalogue(folder=folder)
+    augment(Scenario.objects.get())
+    shutil.copy(folder / "scenes/street.json", folder / "scenes/avenue.json")
+    edit(folder / "scenes/avenue.json", lambda it: it.update(name="avenue"))
+    edit(folder / "scenarios/parked-car.json", lambda it: it.update(instruction="other"))
+    with pytest.raises(Conflict):
+        load_catalogue(folder=folder)
+    assert [row.slug for row in BaseScene.objects.all()] == ["street"]
+
+
+def test_the_command_says_what_is_wrong(tmp_path: Path) -> None:
+    with pytest.raises(CommandError, match="holds no scenes"):
+        call_command("load_catalogue", "--folder", str(tmp_path))
