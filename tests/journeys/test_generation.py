@@ -1,0 +1,165 @@
+"""A generation job on a real Redis and real workers that are killed in the middle of it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import pytest
+
+from tests.processes import Machine, WaitingModel, machine, wait_until
+from tests.variants.answers import GOOD
+
+pytestmark = [pytest.mark.redis, pytest.mark.slow, pytest.mark.timeout(300)]
+
+SEED = """
+from augment.services import contestants
+from tests.jobs.rows import add_scenario
+contestants.ensure_builtin()
+contestants.ensure_endpoint(label="waiting", base_url="{base_url}", is_simulated=True)
+contestants.add_contestant(slug="waiting", variant="otm", endpoint="waiting", model="waits")
+for number in range(1, 4):
+    add_scenario(f"street-{{number}}")
+"""
+CHOSEN = ("--contestants", "reference", "waiting", "--scenarios", "all")
+BY_STATE = "SELECT state, COUNT(*) FROM augment_augmentation GROUP BY state"
+RUNNING = "SELECT id FROM augment_augmentation WHERE state = 'running'"
+ATTEMPTS = "SELECT augmentation_id, number, outcome FROM augment_attempt ORDER BY 1, 2"
+
+
+@pytest.fixture
+def model() -> Iterator[WaitingModel]:
+    with WaitingModel(GOOD) as served:
+        yield served
+
+
+@pytest.fixture
+def place(model: WaitingModel) -> Iterator[Machine]:
+    with machine() as made:
+        made.must("shell", "--verbosity", "0", "-c", SEED.format(base_url=model.base_url))
+        yield made
+
+
+def is_finished(place: Machine) -> bool:
+    return place.rows("SELECT state FROM augment_generationjob") == [("finished",)]
+
+
+def in_flight(place: Machine, model: WaitingModel, *, at_once: int = 2) -> set[int]:
+    """Wait until every thread of the worker waits for a model; for which rows that is."""
+    wait_until(lambda: model.asked == at_once, what="models are asked")
+    return {pk for (pk,) in place.rows(RUNNING)}
+
+
+def check_each_row_is_done_once(place: Machine, killed: set[int]) -> None:
+    assert place.rows(BY_STATE) == [("done", 6)]
+    tries: dict[int, list[tuple[int, str]]] = {}
+    for pk, number, outcome in place.rows(ATTEMPTS):
+        tries.setdefault(pk, []).append((number, outcome))
+    assert len(tries) == 6
+    for pk, numbered in tries.items():
+        assert numbered == ([(1, "lost"), (2, "done")] if pk in killed else [(1, "done")])
+    answered = "SELECT COUNT(*) FROM augment_modelcall WHERE answer IS NOT NULL"
+    assert place.rows(answered) == [(3,)]
+    images = {name for (name,) in place.rows("SELECT image FROM augment_augmentation")}
+    assert all((place.media / name).is_file() for name in images)
+
+
+@pytest.mark.parametrize("pool", ["threads", "prefork"])
+def test_a_job_survives_kill_9_of_its_worker(
+    place: Machine, model: WaitingModel, pool: str
+) -> None:
+    redis = place.redis()
+    worker = place.worker(pool=pool)
+    try:
+        place.must("generate", *CHOSEN)
+        killed = in_flight(place, model)
+        worker.kill()
+        assert len(killed) == 2
+        model.gate.set()
+        worker = place.worker(pool=pool)
+        wait_until(lambda: is_finished(place), what="the job is over", within_s=120)
+        check_each_row_is_done_once(place, killed)
+    finally:
+        worker.stop()
+        redis.stop()
+
+
+def test_a_job_survives_the_loss_of_redis_with_all_its_messages(
+    place: Machine, model: WaitingModel
+) -> None:
+    redis = place.redis()
+    worker = place.worker()
+    try:
+        place.must("generate", *CHOSEN)
+        killed = in_flight(place, model)
+        worker.kill()
+        redis.kill()
+        model.gate.set()
+        redis = place.redis()
+        worker = place.worker()
+        wait_until(lambda: is_finished(place), what="the job is over", within_s=120)
+        check_each_row_is_done_once(place, killed)
+    finally:
+        worker.stop()
+        redis.stop()
+
+
+def test_a_job_goes_on_when_redis_alone_comes_back_empty(
+    place: Machine, model: WaitingModel
+) -> None:
+    redis = place.redis()
+    worker = place.worker(concurrency=1)
+    try:
+        place.must("generate", *CHOSEN)
+        in_flight(place, model, at_once=1)
+        redis.kill()
+        redis = place.redis()
+        model.gate.set()
+        wait_until(lambda: is_finished(place), what="the job is over", within_s=120)
+        check_each_row_is_done_once(place, killed=set())
+    finally:
+        worker.stop()
+        redis.stop()
+
+
+def test_the_command_waits_for_the_job_and_reports(place: Machine, model: WaitingModel) -> None:
+    model.gate.set()
+    redis = place.redis()
+    worker = place.worker()
+    try:
+        said = place.must("generate", *CHOSEN, "--wait", "--timeout", "100")
+    finally:
+        worker.stop()
+        redis.stop()
+    assert said.splitlines()[-4:] == [
+        "Over.",
+        "contestant  done  unreadable  refused  failed",
+        "reference      3           0        0       0",
+        "waiting        3           0        0       0",
+    ]
+
+
+def test_a_failure_ends_the_command_with_1_and_its_reason(
+    place: Machine, model: WaitingModel
+) -> None:
+    redis = place.redis()
+    worker = place.worker()
+    facts = ("--variant", "otm", "--endpoint", "cloud", "--model", "m")
+    address = ("--base-url", model.base_url, "--key-variable", "NO_SUCH_KEY")
+    try:
+        place.must("add_contestant", "cloudy", *facts, *address)
+        chosen = ("--contestants", "cloudy", "--scenarios", "street-1", "street-2", "--wait")
+        ended = place.manage("generate", *chosen)
+    finally:
+        worker.stop()
+        redis.stop()
+    assert ended.returncode == 1
+    assert "failed 2 times: The environment variable NO_SUCH_KEY" in ended.stdout
+    assert "2 failed" in ended.stderr
+    assert model.asked == 0
+
+
+def test_without_redis_the_command_says_what_to_do(place: Machine) -> None:
+    ended = place.manage("generate", *CHOSEN)
+    assert ended.returncode == 1
+    assert "start `manage.py serve` or set REDIS_URL" in ended.stderr
+    assert place.rows(BY_STATE) == []
