@@ -36,31 +36,38 @@ class ReadOnly:
         return False
 
 
+class MadeElsewhere:
+    """Rows that services make, because they check what they are given and log it."""
+
+    def has_add_permission(self, request: HttpRequest) -> bool:
+        """Never by hand."""
+        return False
+
+
 @admin.register(BaseScene)
-class BaseSceneAdmin(admin.ModelAdmin):
+class BaseSceneAdmin(MadeElsewhere, admin.ModelAdmin):
     """Scenes; their documents come from files and are not typed in."""
 
     list_display = ("slug", "source", "created_at")
     list_filter = ("source",)
     search_fields = ("slug", "provenance")
     exclude = ("document", "recording")
-    readonly_fields = ("code", "source", "created_at")
-
-    def has_add_permission(self, request: HttpRequest) -> bool:
-        """`import_scene` reads scenes."""
-        return False
+    readonly_fields = ("code", "slug", "source", "created_at")
 
 
 @admin.register(Scenario)
-class ScenarioAdmin(admin.ModelAdmin):
-    """Scenarios."""
+class ScenarioAdmin(MadeElsewhere, admin.ModelAdmin):
+    """Scenarios; what contestants were asked stays as it was asked."""
 
     list_display = ("slug", "type", "base_scene", "in_catalogue", "keep_traffic")
     list_filter = ("type", "in_catalogue", "keep_traffic")
     list_select_related = ("base_scene",)
     search_fields = ("slug", "instruction")
     exclude = ("reference",)
-    readonly_fields = ("code", "original_image", "created_at")
+    readonly_fields = (
+        *("code", "slug", "type", "base_scene", "instruction", "keep_traffic"),
+        *("original_image", "created_at"),
+    )
 
 
 @admin.register(Endpoint)
@@ -69,17 +76,18 @@ class EndpointAdmin(ReadOnly, admin.ModelAdmin):
 
     list_display = ("label", "base_url", "key_variable", "is_simulated")
     list_filter = ("is_simulated",)
+    readonly_fields = ("code", "label", "base_url", "key_variable", "is_simulated")
 
 
 @admin.register(Contestant)
-class ContestantAdmin(admin.ModelAdmin):
+class ContestantAdmin(MadeElsewhere, admin.ModelAdmin):
     """Contestants; only what people read can be changed, the rest is what was rated."""
 
     list_display = ("slug", "name", "kind", "variant", "model", "endpoint")
     list_filter = ("kind", "variant")
     list_select_related = ("endpoint",)
     search_fields = ("slug", "name", "model")
-    readonly_fields = ("code", "kind", "variant", "endpoint", "model", "created_at")
+    readonly_fields = ("code", "slug", "kind", "variant", "endpoint", "model", "created_at")
 
 
 class AugmentationInline(ReadOnly, admin.TabularInline):

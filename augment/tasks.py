@@ -139,7 +139,9 @@ def _broker() -> Iterator[Any]:
             broker.ensure_connection(max_retries=1, interval_start=0, timeout=5)
             yield broker
         except run_augmentation.OperationalError as error:
-            raise QueueUnreachable(broker.as_uri()) from error
+            # The password is masked, and the mask is shown even where there is none.
+            address = broker.as_uri() if broker.password else broker.as_uri().replace(":**@", "")
+            raise QueueUnreachable(address) from error
 
 
 def _messages_waiting() -> int:

@@ -1,9 +1,12 @@
 from __future__ import annotations
 
 import time
+from concurrent.futures import ThreadPoolExecutor
 from datetime import timedelta
+from threading import Barrier
 
 import pytest
+from django.db import connection
 from django.utils import timezone
 
 from augment.services import claims
@@ -42,3 +45,20 @@ def test_the_heart_stops_with_the_claim(caplog: pytest.LogCaptureFixture) -> Non
     claims.requeue_stale(now=timezone.now(), older_than=STALE)
     with heartbeat(held, every_s=0.01):
         assert wait_for(lambda: "somebody else's now" in caplog.text)
+
+
+def test_of_eight_workers_that_reach_for_one_row_one_gets_it() -> None:
+    row = only_row(launch())
+    start = Barrier(8)
+
+    def reach() -> bool:
+        start.wait()
+        try:
+            return claims.claim(augmentation_pk=row.pk, now=timezone.now()) is not None
+        finally:
+            connection.close()
+
+    with ThreadPoolExecutor(8) as pool:
+        got = [future.result() for future in [pool.submit(reach) for _ in range(8)]]
+    assert sorted(got) == [False] * 7 + [True]
+    assert row.attempts.count() == 1

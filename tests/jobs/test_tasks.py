@@ -73,6 +73,14 @@ def test_without_a_broker_the_error_names_the_address_and_the_rows_wait(no_broke
     assert (row.state, row.sent_at) == (State.QUEUED, None)
 
 
+def test_the_address_of_a_broker_is_named_without_its_password(no_broker: None) -> None:
+    current_app.conf.broker_url = "redis://:sekret@127.0.0.1:1/0"
+    with pytest.raises(QueueUnreachable) as caught:
+        tasks.check_broker()
+    assert "127.0.0.1:1" in str(caught.value)
+    assert "sekret" not in str(caught.value)
+
+
 def test_the_task_runs_its_row() -> None:
     row = only_row(launch())
     tasks.run_augmentation.run(row.pk)

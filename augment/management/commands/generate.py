@@ -49,7 +49,10 @@ class Command(BaseCommand):
         total = jobs.progress(job).total
         self.stdout.write(f"Job {job.code}, {job.name!r}: {total} to run.")
         if options["wait"]:
-            self.wait(job, options["timeout"])
+            try:
+                self.wait(job, options["timeout"])
+            except KeyboardInterrupt:
+                raise CommandError("Not waited for; the job goes on.", returncode=130) from None
             self.report(job)
 
     def _launch(self, options: dict[str, Any]) -> GenerationJob:
