@@ -194,7 +194,11 @@ class Snapshot(models.Model):
     votes_left_out = models.JSONField(default=dict, help_text="how many votes, by reason")
     versions = models.JSONField(default=dict)
     status = models.TextField(blank=True, help_text="why there is no rating, if there is none")
+    degenerate_rounds = models.PositiveIntegerField(
+        default=0, help_text="bootstrap rounds that determined no rating; intervals leave them out"
+    )
     includes_simulated = models.BooleanField(default=False)
+    is_early = models.BooleanField(default=False, help_text="the study was still open")
     made_by = models.ForeignKey(
         settings.AUTH_USER_MODEL,
         null=True,

@@ -1,0 +1,105 @@
+"""Votes that the machine makes for a demonstration; they are marked as simulated everywhere.
+
+The simulated judge is honest and noisy: it prefers the change that lies nearer the scenario's
+reference, misjudges distances a little, calls close ones equal, and now and then presses just any
+key, as people do.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+from uuid import uuid5
+
+import numpy as np
+
+from arena.models import Study, Vote
+from arena.services.votes import cast_vote
+from augment.errors import Conflict
+from augment.models import Augmentation
+
+MISS_M = 10.0
+"""What an object counts that is missing, too many, or further off than this."""
+
+NOISE_M = 1.5
+TIE_M = 1.0
+SLIP = 0.08
+"""The share of votes that are any key; it also keeps who always loses within reach."""
+
+
+def simulate_votes(*, study: Study, seed: int) -> int:
+    """Vote on every undecided matchup of the study's simulated experts.
+
+    Args:
+        study: Open, and one that allows simulated votes.
+        seed: Of the judges' noise; the same study and seed give the same votes.
+
+    Returns:
+        How many votes were cast.
+
+    Raises:
+        Conflict: The study does not allow simulated votes.
+        StudyNotOpen: It takes no votes.
+    """
+    if not study.allow_simulated:
+        raise Conflict(f"The study {study.name!r} does not allow simulated votes.")
+    rng = np.random.default_rng(seed)
+    matchups = (
+        study.matchups.filter(votes=None, expert__person__is_simulated=True)
+        .select_related("expert", "scenario", "left", "right")
+        .order_by("expert__username", "position")
+    )
+    cast = 0
+    for matchup in list(matchups):
+        reference = matchup.scenario.reference
+        advantage = _error_m(reference, matchup.right) - _error_m(reference, matchup.left)
+        cast_vote(
+            expert=matchup.expert,
+            matchup_code=matchup.code,
+            key=uuid5(matchup.code, "simulated"),
+            outcome=_judge(advantage, rng),
+        )
+        cast += 1
+    return cast
+
+
+def _judge(advantage_m: float, rng: np.random.Generator) -> str:
+    """The outcome where the left change lies nearer by `advantage_m`."""
+    if rng.random() < SLIP:
+        return Vote.Outcome.values[rng.integers(3)]
+    perceived_m = advantage_m + rng.normal(0.0, NOISE_M)
+    if abs(perceived_m) < TIE_M:
+        return Vote.Outcome.EQUAL
+    return Vote.Outcome.LEFT if perceived_m > 0 else Vote.Outcome.RIGHT
+
+
+def _error_m(reference: dict[str, Any] | None, augmentation: Augmentation) -> float:
+    """Mean distance of what was changed from the reference, nearest pairs first.
+
+    Objects match within their type; one without a partner counts as a miss.
+    """
+    wanted, made = _changed(reference), _changed(augmentation.modification)
+    if not wanted and not made:
+        return 0.0
+    distances = sorted(
+        (math.dist((a["x_m"], a["y_m"]), (b["x_m"], b["y_m"])), i, j)
+        for i, a in enumerate(wanted)
+        for j, b in enumerate(made)
+        if a["type"] == b["type"]
+    )
+    used_wanted: set[int] = set()
+    used_made: set[int] = set()
+    total = 0.0
+    for distance_m, i, j in distances:
+        if i not in used_wanted and j not in used_made:
+            used_wanted.add(i)
+            used_made.add(j)
+            total += min(distance_m, MISS_M)
+    objects = max(len(wanted), len(made))
+    return (total + MISS_M * (objects - len(used_wanted))) / objects
+
+
+def _changed(modification: dict[str, Any] | None) -> list[dict[str, Any]]:
+    if modification is None:
+        return []
+    return [*modification.get("add", []), *modification.get("move", [])]
