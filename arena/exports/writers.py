@@ -1,0 +1,182 @@
+"""The leaderboard as a file. The same snapshot always gives the same bytes."""
+
+from __future__ import annotations
+
+import csv
+import io
+import json
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import partial
+from typing import Any
+
+from arena.exports.charts import interval_chart
+from arena.exports.latex import latex
+from arena.exports.tables import LeaderboardTable, Row
+from augment.errors import UnknownName
+
+COLUMNS = (
+    "rank", "model", "elo", "lower", "upper", "votes", "wins", "ties", "losses",
+    "slug", "kind", "simulated", "note", "study", "method", "study_simulated", "early",
+)  # fmt: skip
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Format:
+    """How a leaderboard can be written.
+
+    Attributes:
+        suffix: Of the file's name, without the dot.
+        write: Makes the file's bytes.
+    """
+
+    suffix: str
+    content_type: str
+    is_text: bool
+    write: Callable[[LeaderboardTable], bytes]
+
+
+def csv_bytes(table: LeaderboardTable) -> bytes:
+    """One line a contestant; what is unknown is empty, numbers have two decimals."""
+    sheet = io.StringIO()
+    writer = csv.writer(sheet, lineterminator="\n")
+    writer.writerow(COLUMNS)
+    for row in table.rows:
+        writer.writerow([_cell(value) for value in _values(table, row)])
+    return sheet.getvalue().encode()
+
+
+def json_bytes(table: LeaderboardTable) -> bytes:
+    """An object whose `standings` is a list of {model, rank, rating, lower, upper, votes, ...}."""
+    document: dict[str, Any] = {
+        "format": "scenario-arena/leaderboard",
+        "version": 1,
+        "study": table.study,
+        "simulated": table.simulated,
+        "early": table.early,
+        "method": {
+            "name": table.method,
+            "text": table.method_text,
+            "resampling_unit": table.unit,
+            "rounds": table.rounds,
+            "degenerate_rounds": table.degenerate_rounds,
+            "seed": table.seed,
+        },
+        "votes": {
+            "counted": table.votes,
+            "left_out": table.left_out,
+            "sha256": table.votes_sha256,
+        },
+        "status": table.status,
+        "standings": [
+            {
+                "model": row.model,
+                "slug": row.slug,
+                "kind": row.kind,
+                "simulated": row.simulated,
+                "rank": row.rank,
+                "rating": _rounded(row.elo),
+                "lower": _rounded(row.lower),
+                "upper": _rounded(row.upper),
+                "votes": row.votes,
+                "wins": row.wins,
+                "ties": row.ties,
+                "losses": row.losses,
+                "note": row.note,
+            }
+            for row in table.rows
+        ],
+    }
+    return (json.dumps(document, indent=2, ensure_ascii=False) + "\n").encode()
+
+
+def plain_text(table: LeaderboardTable) -> str:
+    """The table for a terminal, with its method and warnings beneath."""
+    head = ("Model", "Rank", "Elo", "95% CI", "Votes")
+    body = [
+        (row.model, row.rank_text, row.elo_text, row.interval_text, str(row.votes))
+        for row in table.rows
+    ]
+    widths = [max(len(line[column]) for line in (head, *body)) for column in range(len(head))]
+    lines = [
+        "  ".join(
+            cell.ljust(width) if column == 0 else cell.rjust(width)
+            for column, (cell, width) in enumerate(zip(line, widths, strict=True))
+        )
+        for line in (head, *body)
+    ]
+    left_out = ", ".join(f"{number} {reason}" for reason, number in table.left_out.items())
+    lines.append("")
+    lines.append(f"{table.votes} votes counted; left out: {left_out or 'none'}.")
+    lines.append(f"{table.method_text}.")
+    return "\n".join([*lines, *table.warnings])
+
+
+FORMATS = {
+    "csv": Format(
+        suffix="csv", content_type="text/csv; charset=utf-8", is_text=True, write=csv_bytes
+    ),
+    "json": Format(suffix="json", content_type="application/json", is_text=True, write=json_bytes),
+    "latex": Format(
+        suffix="tex",
+        content_type="application/x-tex; charset=utf-8",
+        is_text=True,
+        write=lambda table: latex(table).encode(),
+    ),
+    "svg": Format(
+        suffix="svg",
+        content_type="image/svg+xml",
+        is_text=True,
+        write=partial(interval_chart, file_format="svg"),
+    ),
+    "pdf": Format(
+        suffix="pdf",
+        content_type="application/pdf",
+        is_text=False,
+        write=partial(interval_chart, file_format="pdf"),
+    ),
+    "png": Format(
+        suffix="png",
+        content_type="image/png",
+        is_text=False,
+        write=partial(interval_chart, file_format="png"),
+    ),
+}
+
+
+def format_named(name: str) -> Format:
+    """How to write that format.
+
+    Raises:
+        UnknownName: Nobody knows it.
+    """
+    if name not in FORMATS:
+        raise UnknownName("format", name, list(FORMATS))
+    return FORMATS[name]
+
+
+def _values(table: LeaderboardTable, row: Row) -> tuple[object, ...]:
+    """In the order of COLUMNS."""
+    return (
+        row.rank, row.model, row.elo, row.lower, row.upper,
+        row.votes, row.wins, row.ties, row.losses,
+        row.slug, row.kind, row.simulated, row.note,
+        table.study, table.method_text, table.simulated, table.early,
+    )  # fmt: skip
+
+
+def _cell(value: object) -> str:
+    """A cell that no spreadsheet takes for a formula."""
+    if value is None:
+        return ""
+    if isinstance(value, bool):
+        return "yes" if value else "no"
+    if isinstance(value, float):
+        return f"{value:.2f}"
+    text = str(value)
+    guard = "'" if text.startswith(("=", "+", "-", "@", "\t", "\r", "\n")) else ""
+    return guard + text.replace("\r", " ").replace("\n", " ")
+
+
+def _rounded(value: float | None) -> float | None:
+    return None if value is None else round(value, 4)

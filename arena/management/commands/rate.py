@@ -1,0 +1,48 @@
+"""manage.py rate: freeze a rating of a study and print it."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from django.core.management.base import BaseCommand, CommandError, CommandParser
+
+from arena.errors import ArenaError
+from arena.exports.tables import leaderboard_table
+from arena.exports.writers import plain_text
+from arena.queries.studies import study_named
+from arena.services.ratings import rate
+from augment.errors import AugmentError
+
+
+class Command(BaseCommand):
+    """The door to arena.services.ratings.rate."""
+
+    help = "Rate the contestants of a study by its votes and keep the result."
+
+    def add_arguments(self, parser: CommandParser) -> None:
+        """Which study, and how."""
+        parser.add_argument("study", help="its name or its code")
+        parser.add_argument("--method", default="bt", help="bt (Bradley-Terry) or elo")
+        parser.add_argument("--rounds", type=int, default=1000, help="of the bootstrap")
+        parser.add_argument("--seed", type=int, default=0)
+        parser.add_argument(
+            "--unit", default="vote", help="what is resampled: vote, scenario, expert or two-way"
+        )
+        parser.add_argument(
+            "--early", action="store_true", help="rate an open study; this is logged"
+        )
+
+    def handle(self, *args: Any, **options: Any) -> None:
+        """Rate, then print the table."""
+        try:
+            snapshot = rate(
+                study=study_named(options["study"]),
+                method=options["method"],
+                rounds=options["rounds"],
+                seed=options["seed"],
+                unit=options["unit"],
+                early=options["early"],
+            )
+        except (ArenaError, AugmentError) as error:
+            raise CommandError(str(error)) from error
+        self.stdout.write(plain_text(leaderboard_table(snapshot)))

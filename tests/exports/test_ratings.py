@@ -1,0 +1,239 @@
+from __future__ import annotations
+
+from typing import Any
+
+import pytest
+from pytest_django import DjangoAssertNumQueries
+
+from arena.errors import NoSnapshot, StudyNotOpen, StudyStillOpen
+from arena.models import Snapshot, Study, Vote
+from arena.queries.results import (
+    ResultsAccess,
+    latest_snapshot,
+    results_access,
+    snapshot_to_export,
+)
+from arena.services.people import create_person
+from arena.services.ratings import rate
+from arena.services.simulation import simulate_votes
+from arena.services.studies import close_study, open_study
+from augment.errors import Conflict, UnknownName
+from augment.models import Augmentation, Contestant, Event, Scenario
+from tests.study_rows import KINDS, a_study, cast_of, matchups_of, vote
+
+pytestmark = pytest.mark.django_db
+
+STRENGTH = {"ann": 3, "bob": 2, "cid": 1}
+
+
+def voted_study() -> Study:
+    """Closed; the stronger wins two of three votes, every sixth is a tie."""
+    study = a_study(votes_per_expert=18)
+    for number, matchup in enumerate(study.matchups.order_by("expert", "position")):
+        left = STRENGTH[matchup.left.contestant.slug]
+        right = STRENGTH[matchup.right.contestant.slug]
+        better = ("left", "right") if left > right else ("right", "left")
+        vote(matchup, "equal" if number % 6 == 5 else better[number % 3 == 2])
+    return close_study(study=study)
+
+
+def lines(snapshot: Snapshot) -> list[tuple[Any, ...]]:
+    return list(
+        snapshot.standings.values_list(
+            "contestant__slug", "rank", "rating", "lower", "upper", "votes", "wins", "ties"
+        )
+    )
+
+
+def test_a_snapshot_has_a_line_per_contestant_that_agrees_with_a_count() -> None:
+    study = voted_study()
+    snapshot = rate(study=study, seed=5)
+    assert snapshot.votes_counted == 36
+    assert snapshot.votes_left_out == {}
+    assert [line[0] for line in lines(snapshot)] == ["ann", "bob", "cid"]
+    for standing in snapshot.standings.select_related("contestant"):
+        slug = standing.contestant.slug
+        votes = Vote.objects.filter(matchup__study=study)
+        wins = votes.filter(winner__contestant__slug=slug).count()
+        left = votes.filter(shown_left__contestant__slug=slug)
+        right = votes.filter(shown_right__contestant__slug=slug)
+        ties = (left | right).filter(outcome="equal").count()
+        assert (standing.wins, standing.ties) == (wins, ties)
+        assert standing.votes == left.count() + right.count() == 24
+    assert Event.objects.filter(verb="study.rated").count() == 1
+
+
+def test_the_same_votes_and_seed_give_the_same_standings() -> None:
+    study = voted_study()
+    one, again, other = (rate(study=study, seed=seed) for seed in (5, 5, 6))
+    assert (lines(one), one.votes_sha256) == (lines(again), again.votes_sha256)
+    assert lines(one) != lines(other)
+    assert one.votes_sha256 == other.votes_sha256
+    assert latest_snapshot(study) == other
+
+
+def test_only_current_votes_count() -> None:
+    study = a_study(votes_per_expert=4)
+    first, second, *_ = matchups_of(study, "eva")
+    old = vote(first, "left")
+    vote(first, "right", supersedes=old.key)
+    vote(second, "equal")
+    snapshot = rate(study=close_study(study=study))
+    assert snapshot.votes_counted == 2
+    assert snapshot.votes_left_out == {"superseded": 1}
+
+
+def test_votes_that_determine_nothing_leave_empty_ratings_and_a_reason() -> None:
+    snapshot = rate(study=close_study(study=a_study()))
+    assert snapshot.status == "There are no votes to rate."
+    assert {line[1:5] for line in lines(snapshot)} == {(None, None, None, None)}
+
+
+def test_an_open_study_is_rated_only_on_purpose_and_that_is_logged() -> None:
+    study = a_study()
+    with pytest.raises(StudyStillOpen, match="'Round 1' is still open"):
+        rate(study=study)
+    assert rate(study=study, early=True).is_early
+    assert Event.objects.filter(verb="study.rated_early").exists()
+
+
+def test_simulated_votes_stay_out_of_a_study_that_does_not_allow_them() -> None:
+    study = a_study(votes_per_expert=4)
+    first, second, *_ = matchups_of(study, "eva")
+    vote(first, "left")
+    first.expert.person.is_simulated = True
+    first.expert.person.save()
+    vote(second, "left")
+    snapshot = rate(study=close_study(study=study))
+    assert snapshot.votes_counted == 1
+    assert snapshot.votes_left_out == {"simulated": 1}
+    assert not snapshot.includes_simulated
+
+
+@pytest.mark.parametrize(
+    ("options", "error", "sentence"),
+    [
+        ({"method": "glicko"}, UnknownName, "'glicko'. Known: bt, elo"),
+        ({"unit": "pair"}, UnknownName, "'pair'. Known: vote, scenario, expert, two-way"),
+        ({"rounds": 0}, Conflict, "from 1 to 100000, not 0"),
+        ({"seed": -1}, Conflict, "not -1"),
+        ({"method": "elo", "unit": "expert"}, Conflict, "'expert' needs bt"),
+    ],
+)
+def test_rules_that_make_no_sense_are_refused(
+    options: dict[str, Any], error: type[Exception], sentence: str
+) -> None:
+    study = close_study(study=a_study())
+    with pytest.raises(error, match=sentence):
+        rate(study=study, **options)
+    assert not Snapshot.objects.exists()
+
+
+def test_every_method_and_unit_rates() -> None:
+    study = voted_study()
+    for unit in ("vote", "scenario", "expert", "two-way"):
+        assert lines(rate(study=study, unit=unit))[0][2] > 1000
+    assert lines(rate(study=study, method="elo"))[0][2] > 1000
+
+
+def test_rating_costs_few_queries(django_assert_max_num_queries: DjangoAssertNumQueries) -> None:
+    study = voted_study()
+    with django_assert_max_num_queries(10):
+        rate(study=study, rounds=10)
+
+
+def test_who_may_see_results() -> None:
+    study = a_study()
+    eva = matchups_of(study, "eva")[0].expert
+    gus, ana, adi = (
+        create_person(username=role, password="a password", role=role)
+        for role in ("expert", "analyst", "admin")
+    )
+
+    def access() -> list[str]:
+        return [results_access(user=user, study=study) for user in (eva, gus, ana, adi)]
+
+    none, early, full = ResultsAccess.NONE, ResultsAccess.EARLY, ResultsAccess.FULL
+    assert access() == [none, none, early, early]
+    study.experts.add(adi)
+    assert access() == [none, none, early, none], "who votes does not look, whatever the role"
+    study = close_study(study=study)
+    assert access() == [full, none, full, full]
+
+
+def test_a_study_without_a_rating_has_nothing_to_export() -> None:
+    with pytest.raises(NoSnapshot, match="no rating yet"):
+        snapshot_to_export(a_study())
+
+
+# --- Simulated votes ---------------------------------------------------------------------------
+
+
+def change(x_m: float, kind: str = "VEHICLE") -> dict[str, Any]:
+    return {"add": [{"type": kind, "x_m": x_m, "y_m": 0.0}], "move": [], "remove": []}
+
+
+def simulated_study(scenarios: int = 12) -> Study:
+    """ann places the car right, bob 3 m off, cid answers nothing."""
+    cast = cast_of(simulated_experts=True, scenarios=scenarios)
+    Scenario.objects.update(reference=change(20.0))
+    for slug, made in (("ann", change(20.1)), ("bob", change(23.0))):
+        Augmentation.objects.filter(contestant__slug=slug).update(modification=made)
+    Augmentation.objects.filter(contestant__slug="cid").update(
+        modification=None, state="unreadable"
+    )
+    return open_study(
+        name="Demo", votes_per_expert=3 * scenarios, seed=1, allow_simulated=True, **cast
+    )
+
+
+def test_simulated_experts_prefer_what_lies_nearer_the_reference() -> None:
+    study = simulated_study()
+    assert simulate_votes(study=study, seed=1) == 72
+    assert Vote.objects.filter(is_simulated=True).count() == 72
+    snapshot = rate(study=close_study(study=study))
+    assert snapshot.includes_simulated
+    assert [line[0] for line in lines(snapshot)] == ["ann", "bob", "cid"]
+    assert Vote.objects.filter(outcome="equal").exists()
+
+
+def test_simulated_votes_are_cast_once_and_the_same_for_the_same_seed() -> None:
+    study = simulated_study()
+    simulate_votes(study=study, seed=1)
+    assert simulate_votes(study=study, seed=1) == 0
+
+
+def test_simulated_votes_need_a_study_that_allows_them() -> None:
+    study = a_study()
+    with pytest.raises(Conflict, match="does not allow simulated votes"):
+        simulate_votes(study=study, seed=1)
+    demo = open_study(
+        name="Demo",
+        contestants=["ann", "bob"],
+        scenarios=["place-0"],
+        experts=["eva"],
+        votes_per_expert=1,
+        seed=1,
+        allow_simulated=True,
+    )
+    assert simulate_votes(study=demo, seed=1) == 0, "eva is a person"
+
+
+def test_a_closed_study_takes_no_simulated_votes() -> None:
+    study = close_study(study=simulated_study(2))
+    with pytest.raises(StudyNotOpen):
+        simulate_votes(study=study, seed=1)
+
+
+def test_a_simulated_contestant_makes_the_snapshot_simulated() -> None:
+    study = voted_study_with_simulated_contestants()
+    assert rate(study=study).includes_simulated
+
+
+def voted_study_with_simulated_contestants() -> Study:
+    cast = cast_of(kind=KINDS.SIMULATED, scenarios=2)
+    study = open_study(name="Demo", votes_per_expert=4, seed=1, allow_simulated=True, **cast)
+    for matchup in study.matchups.all():
+        vote(matchup, "equal")
+    assert Contestant.objects.filter(kind="simulated").count() == 3
+    return close_study(study=study)

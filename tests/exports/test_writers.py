@@ -1,0 +1,208 @@
+from __future__ import annotations
+
+import csv
+import io
+import json
+from dataclasses import replace
+
+import pytest
+
+from arena.exports.latex import escape, latex
+from arena.exports.tables import LeaderboardTable, Row
+from arena.exports.writers import FORMATS, csv_bytes, format_named, json_bytes, plain_text
+from augment.errors import UnknownName
+
+PAPER = (
+    ("interPlan", "", 1, 1042, 9, 11, 1960),
+    ("GPT-4o OTM", "OTM", 1, 1039, 9, 11, 1720),
+    ("Gemini-1.5-Flash vQA", "vQA", 1, 1025, 12, 13, 720),
+)
+
+
+def row(model: str, variant: str = "", **changes: object) -> Row:
+    made = Row(
+        model=model,
+        variant=variant,
+        slug=model.lower(),
+        kind="llm",
+        simulated=False,
+        rank=1,
+        elo=1000.0,
+        lower=990.0,
+        upper=1010.0,
+        votes=10,
+        wins=4,
+        ties=3,
+        losses=3,
+        note="",
+    )
+    return replace(made, **changes)  # type: ignore[arg-type]
+
+
+def table(*rows: Row, **changes: object) -> LeaderboardTable:
+    made = LeaderboardTable(
+        study="Round 1",
+        rows=rows,
+        method="bt",
+        rounds=1000,
+        unit="vote",
+        seed=7,
+        degenerate_rounds=0,
+        votes=5760,
+        left_out={"superseded": 3},
+        votes_sha256="ab" * 32,
+        status="",
+        simulated=False,
+        early=False,
+    )
+    return replace(made, **changes)  # type: ignore[arg-type]
+
+
+def papers_rows() -> list[Row]:
+    return [
+        row(
+            name,
+            variant,
+            rank=rank,
+            elo=elo + 0.2,
+            lower=float(elo - low),
+            upper=float(elo + up),
+            votes=votes,
+        )
+        for name, variant, rank, elo, low, up, votes in PAPER
+    ]
+
+
+def test_latex_has_the_form_of_the_papers_table() -> None:
+    body = [line for line in latex(table(*papers_rows())).splitlines() if line[0] != "%"]
+    assert body == [
+        r"\providecolor{llm_blue}{RGB}{105, 156, 219}",
+        r"\begin{table}",
+        r"    \centering",
+        r"    \begin{tabular}{l>{\columncolor{llm_blue!20}}c r r r}",
+        r"    \toprule",
+        r"    \textbf{Model} & \textbf{Rank} & \textbf{Elo}~$\uparrow$ & "
+        r"\textbf{95\% CI} & \textbf{Votes}\\",
+        r"    \midrule",
+        r"    interPlan & 1 & 1042 & -9/+11 & 1960\\",
+        r"    GPT-4o \texttt{OTM} & 1 & 1039 & -9/+11 & 1720\\",
+        r"    Gemini-1.5-Flash \texttt{vQA} & 1 & 1025 & -12/+13 & 720\\",
+        r"    \bottomrule",
+        r"    \end{tabular}",
+        r"    \caption{Elo with 95\% Confidence Intervals.}",
+        r"    \label{tab:elo}",
+        r"\end{table}",
+    ]
+
+
+def test_latex_names_the_method_and_says_what_is_simulated() -> None:
+    text = latex(table(row("Fake (simulated)", simulated=True), simulated=True, early=True))
+    assert "% Round 1: 5760 votes; Bradley-Terry on the Elo scale" in text
+    assert r"Intervals. (simulated, early)}" in text
+    assert "Fake (simulated) & 1" in text
+
+
+def test_tex_specials_are_escaped() -> None:
+    assert escape("a_b & 5% of $x {#1} ~^\\") == (
+        r"a\_b \& 5\% of \$x \{\#1\} \textasciitilde{}\textasciicircum{}\textbackslash{}"
+    )
+
+
+def test_a_line_break_in_a_name_cannot_leave_its_comment() -> None:
+    text = latex(table(row("x"), study="Round\n\\input{evil}"))
+    assert all(line.startswith("%") for line in text.splitlines() if "evil" in line)
+
+
+def test_what_is_unknown_is_two_hyphens_in_tables_and_empty_in_data() -> None:
+    unknown = table(row("x", elo=None, lower=None, upper=None, rank=None, note="no votes"))
+    assert r"    x & -- & -- & -- & 10\\" in latex(unknown)
+    assert parsed(unknown)[0]["elo"] == ""
+    assert json.loads(json_bytes(unknown))["standings"][0]["rating"] is None
+
+
+def parsed(given: LeaderboardTable) -> list[dict[str, str]]:
+    return list(csv.DictReader(io.StringIO(csv_bytes(given).decode())))
+
+
+def test_csv_has_a_line_per_contestant() -> None:
+    first, *_ = parsed(table(*papers_rows()))
+    assert first["model"] == "interPlan"
+    assert (first["rank"], first["elo"], first["lower"], first["upper"]) == (
+        "1",
+        "1042.20",
+        "1033.00",
+        "1053.00",
+    )
+    assert (first["votes"], first["wins"], first["ties"], first["losses"]) == (
+        "1960",
+        "4",
+        "3",
+        "3",
+    )
+    assert (first["simulated"], first["study_simulated"]) == ("no", "no")
+
+
+@pytest.mark.parametrize("start", ["=", "+", "-", "@", "\t", "\r", "\n"])
+def test_no_cell_is_a_formula(start: str) -> None:
+    line = parsed(table(row(f"{start}cmd|calc", note=f"{start}1"), study=f"{start}x"))[0]
+    kept = start.replace("\r", " ").replace("\n", " ")
+    assert [line["model"], line["note"], line["study"]] == [
+        f"'{kept}cmd|calc",
+        f"'{kept}1",
+        f"'{kept}x",
+    ]
+
+
+def test_a_negative_rating_is_a_number_not_a_formula() -> None:
+    assert parsed(table(row("x", elo=-12.5)))[0]["elo"] == "-12.50"
+
+
+def test_json_has_everything_that_makes_the_table_again() -> None:
+    document = json.loads(json_bytes(table(*papers_rows(), simulated=True)))
+    assert document["simulated"] is True
+    assert document["method"] == {
+        "name": "bt",
+        "text": "Bradley-Terry on the Elo scale, 95 % intervals by 1000 resamples of votes, "
+        "seed 7",
+        "resampling_unit": "vote",
+        "rounds": 1000,
+        "degenerate_rounds": 0,
+        "seed": 7,
+    }
+    assert document["votes"] == {
+        "counted": 5760,
+        "left_out": {"superseded": 3},
+        "sha256": "ab" * 32,
+    }
+    first = document["standings"][0]
+    wanted = ("model", "rank", "rating", "lower", "upper", "votes")
+    assert [first[key] for key in wanted] == ["interPlan", 1, 1042.2, 1033.0, 1053.0, 1960]
+
+
+def test_plain_text_says_method_and_warnings_beneath() -> None:
+    text = plain_text(table(*papers_rows(), simulated=True, degenerate_rounds=4))
+    assert "interPlan                1  1042   -9/+11   1960" in text
+    assert "5760 votes counted; left out: 3 superseded." in text
+    assert "Simulated: votes or contestants" in text
+    assert "4 of 1000 resamples determined no ratings" in text
+
+
+@pytest.mark.parametrize("name", FORMATS)
+def test_every_format_is_byte_identical_for_the_same_table(name: str) -> None:
+    given = table(*papers_rows(), row("No $votes", elo=None, lower=None, upper=None, rank=None))
+    assert FORMATS[name].write(given) == FORMATS[name].write(given)
+
+
+def test_the_chart_names_every_contestant_and_no_date() -> None:
+    svg = FORMATS["svg"].write(table(*papers_rows(), simulated=True)).decode()
+    for name, *_ in PAPER:
+        assert name in svg
+    assert "(simulated)" in svg
+    assert "<dc:date>" not in svg
+    assert FORMATS["png"].write(table(*papers_rows()))[:8] == b"\x89PNG\r\n\x1a\n"
+    assert FORMATS["pdf"].write(table(*papers_rows()))[:5] == b"%PDF-"
+
+
+def test_an_unknown_format_is_refused() -> None:
+    with pytest.raises(UnknownName, match=r"'xls'. Known: csv, json, latex"):
+        format_named("xls")
