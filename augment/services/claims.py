@@ -18,6 +18,7 @@ from django.db import transaction
 from django.db.models import Max, Q, QuerySet
 
 from augment.models import Attempt, Augmentation, GenerationJob
+from augment.services.texts import storable, storable_document
 
 logger = logging.getLogger(__name__)
 
@@ -65,11 +66,11 @@ def claim(*, augmentation_pk: int, now: datetime, worker: str = "") -> Claim | N
 
     Returns:
         The claim, or None when the row does not wait (any more): somebody else has it, it is
-        done, it was cancelled. A second delivery of a message therefore does nothing.
+        done, it or its job was cancelled. A second delivery of a message does nothing therefore.
     """
     token = uuid.uuid4()
     waiting = Augmentation.objects.filter(pk=augmentation_pk, state=Augmentation.State.QUEUED)
-    taken = waiting.update(
+    taken = waiting.exclude(job__in=_cancelled_jobs()).update(
         state=Augmentation.State.RUNNING, claim=token, heartbeat_at=now, finished_at=None
     )
     if not taken:
@@ -103,7 +104,9 @@ def keep_modification(*, held: Claim, modification: dict[str, Any], notes: str) 
     Returns:
         False when the claim is lost; nothing was written then.
     """
-    return bool(_row_of(held).update(modification=modification, notes=notes))
+    return bool(
+        _row_of(held).update(modification=storable_document(modification), notes=storable(notes))
+    )
 
 
 @transaction.atomic
@@ -113,18 +116,19 @@ def settle(*, held: Claim, settlement: Settlement, now: datetime) -> bool:
     Returns:
         False when the claim is lost: the result is dropped, because the row is somebody else's.
     """
+    reason = storable(settlement.reason)
     changes: dict[str, Any] = {
         "state": settlement.state,
-        "reason": settlement.reason,
+        "reason": reason,
         "image": settlement.image,
         "finished_at": now,
         "claim": None,
         "heartbeat_at": None,
     }
     if settlement.modification is not None:
-        changes |= {"modification": settlement.modification}
+        changes |= {"modification": storable_document(settlement.modification)}
     if settlement.notes:
-        changes |= {"notes": settlement.notes}
+        changes |= {"notes": storable(settlement.notes)}
     if not _row_of(held).update(**changes):
         logger.warning(
             "Dropped the result of attempt %d at augmentation %d: its claim was taken back.",
@@ -133,7 +137,7 @@ def settle(*, held: Claim, settlement: Settlement, now: datetime) -> bool:
         )
         return False
     Attempt.objects.filter(pk=held.attempt_pk).update(
-        finished_at=now, outcome=settlement.state, reason=settlement.reason
+        finished_at=now, outcome=settlement.state, reason=reason
     )
     return True
 
@@ -152,7 +156,8 @@ def release(*, held: Claim, now: datetime) -> bool:
 def requeue_stale(*, now: datetime, older_than: timedelta) -> list[int]:
     """Take back every claim whose last heartbeat is older than that.
 
-    Rows of a cancelled job become cancelled. A row that has lost LOST_LIMIT workers in a row
+    Rows of cancelled jobs become cancelled, also those that wait again since, because a worker
+    gave them back while somebody cancelled. A row that has lost LOST_LIMIT workers in a row
     fails, so that one that kills its workers can't keep them all busy.
 
     Returns:
@@ -161,7 +166,12 @@ def requeue_stale(*, now: datetime, older_than: timedelta) -> list[int]:
     stale = Augmentation.objects.filter(
         state=Augmentation.State.RUNNING, heartbeat_at__lt=now - older_than
     )
-    return [row.pk for row in stale.select_related("job") if _take_back(row, now=now)]
+    taken_back = [row.pk for row in stale if _take_back(row, now=now)]
+    orphans = Augmentation.objects.filter(
+        state=Augmentation.State.QUEUED, job__in=_cancelled_jobs()
+    )
+    orphans.update(state=Augmentation.State.CANCELLED, finished_at=now)
+    return taken_back
 
 
 def unsent(*, now: datetime, older_than: timedelta, job_pk: int | None = None) -> list[int]:
@@ -188,12 +198,16 @@ def _row_of(held: Claim) -> QuerySet[Augmentation]:
     )
 
 
+def _cancelled_jobs() -> QuerySet[GenerationJob]:
+    return GenerationJob.objects.filter(state=GenerationJob.State.CANCELLED)
+
+
 @transaction.atomic
 def _take_back(seen: Augmentation, *, now: datetime) -> bool:
     """End a stale claim, unless its holder was heard since; True when the row waits again."""
     lost = _lost_in_a_row(seen.pk) + 1
     changes: dict[str, Any] = {"state": Augmentation.State.QUEUED, "sent_at": None}
-    if seen.job.state == GenerationJob.State.CANCELLED:
+    if _cancelled_jobs().filter(pk=seen.job_id).exists():
         changes = {"state": Augmentation.State.CANCELLED, "finished_at": now}
     elif lost >= LOST_LIMIT:
         reason = f"Lost {lost} workers in a row at this one; look for the cause, then retry."

@@ -8,7 +8,7 @@ from datetime import datetime
 
 from django.contrib.auth.models import User
 from django.db import transaction
-from django.db.models import Count, Exists, OuterRef, Q
+from django.db.models import Count, Q
 from django.utils import timezone
 
 from augment.errors import Conflict, UnknownName
@@ -157,14 +157,30 @@ def finish_if_over(*, now: datetime, job_pk: int | None = None) -> int:
     Returns:
         How many jobs were finished by this call.
     """
-    under_way = Augmentation.objects.filter(job=OuterRef("pk"), state__in=Augmentation.UNDER_WAY)
-    over = GenerationJob.objects.filter(~Exists(under_way), state=GenerationJob.State.RUNNING)
+    running = GenerationJob.objects.filter(state=GenerationJob.State.RUNNING)
     if job_pk is not None:
-        over = over.filter(pk=job_pk)
-    return over.update(state=GenerationJob.State.FINISHED, finished_at=now)
+        running = running.filter(pk=job_pk)
+    return sum(_finish(pk, now) for pk in list(running.values_list("pk", flat=True)))
 
 
 # --- Private -----------------------------------------------------------------------------------
+
+
+@transaction.atomic
+def _finish(job_pk: int, now: datetime) -> int:
+    """Finish one job if it is over; 1 when this call did.
+
+    The lock comes first: a retry that is about to commit has changed the job's row, and its rows
+    are to be seen as waiting again.
+    """
+    running = GenerationJob.objects.select_for_update().filter(
+        pk=job_pk, state=GenerationJob.State.RUNNING
+    )
+    if not list(running.values_list("pk")):
+        return 0
+    if Augmentation.objects.filter(job=job_pk, state__in=Augmentation.UNDER_WAY).exists():
+        return 0
+    return running.update(state=GenerationJob.State.FINISHED, finished_at=now)
 
 
 def _contestants(slugs: Sequence[str]) -> list[Contestant]:

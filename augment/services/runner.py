@@ -28,7 +28,7 @@ from augment.services.contestants import key_of
 from augment.services.holding import OutcomeOnCrash, heartbeat
 from augment.services.pictures import original_picture, picture_of
 from augment.services.scenes import reference_of, scene_of
-from augment.services.transcripts import RowTranscript, sentence_of, storable
+from augment.services.transcripts import RowTranscript, sentence_of
 from augment.variants import pipeline
 from augment.variants.recipes import recipe
 
@@ -169,8 +169,8 @@ def _from_model(
     return Answer(
         state=State(outcome.status.value),
         modification=outcome.modification,
-        notes=storable(outcome.notes),
-        reason=storable(outcome.reason),
+        notes=outcome.notes,
+        reason=outcome.reason,
     )
 
 
@@ -195,4 +195,4 @@ def _settlement(answer: Answer, *, image: str) -> claims.Settlement:
 
 
 def _failed(reason: str) -> claims.Settlement:
-    return claims.Settlement(state=State.FAILED, reason=storable(reason))
+    return claims.Settlement(state=State.FAILED, reason=reason)

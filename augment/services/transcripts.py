@@ -13,6 +13,7 @@ from augment.errors import ClaimLost, ModelFault
 from augment.llm.messages import Reply, Request
 from augment.models import ModelCall
 from augment.services import claims
+from augment.services.texts import storable, storable_document
 from augment.variants.transcript import ModelRole
 
 
@@ -39,7 +40,7 @@ class RowTranscript:
             attempt_id=self._held.attempt_pk,
             number=self._numbers,
             role=role,
-            request=_storable_document(request.to_document()),
+            request=storable_document(request.to_document()),
             prompt_version=prompt_version,
             started_at=timezone.now(),
         )
@@ -70,19 +71,3 @@ def sentence_of(fault: ModelFault) -> str:
     if fault.status is None or str(fault.status) in text:
         return text
     return f"HTTP {fault.status}: {text}"
-
-
-def storable(text: str) -> str:
-    """The text as every database takes it: PostgreSQL has no NUL, UTF-8 no half characters."""
-    return text.replace("\0", "\u2400").encode("utf-8", "backslashreplace").decode("utf-8")
-
-
-def _storable_document(value: object) -> object:
-    """The document with each of its texts storable."""
-    if isinstance(value, str):
-        return storable(value)
-    if isinstance(value, dict):
-        return {key: _storable_document(item) for key, item in value.items()}
-    if isinstance(value, list):
-        return [_storable_document(item) for item in value]
-    return value

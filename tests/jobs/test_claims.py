@@ -112,6 +112,27 @@ def test_a_stale_row_of_a_cancelled_job_is_cancelled() -> None:
     assert only_row(job).state == State.CANCELLED
 
 
+def test_a_row_that_is_given_back_to_a_cancelled_job_is_cancelled() -> None:
+    job = launch()
+    row = only_row(job)
+    held = claimed(row)
+    jobs.cancel(job)
+    claims.release(held=held, now=LATER)
+    assert claims.claim(augmentation_pk=row.pk, now=LATER) is None
+    assert claims.requeue_stale(now=LATER, older_than=STALE) == []
+    assert only_row(job).state == State.CANCELLED
+
+
+def test_texts_that_a_database_can_not_take_are_kept_all_the_same() -> None:
+    row = only_row(launch())
+    held = claimed(row)
+    claims.keep_modification(held=held, modification={"id": "a\0"}, notes="b\ud800")
+    claims.settle(held=held, settlement=failed("c\0"), now=LATER)
+    row.refresh_from_db()
+    assert (row.notes, row.reason) == ("b\\ud800", "c\u2400")
+    assert row.modification == {"id": "a\u2400"}
+
+
 def test_a_row_that_kills_its_workers_fails_in_the_end() -> None:
     row = only_row(launch())
     for number in range(1, claims.LOST_LIMIT + 1):
