@@ -8,6 +8,7 @@ from django.db import transaction
 from arena.models import Person
 from arena.queries.people import ROLES
 from augment.errors import Conflict, UnknownName
+from augment.services.events import log_event
 
 
 @transaction.atomic
@@ -18,6 +19,7 @@ def create_person(
     role: str,
     pseudonym: str | None = None,
     is_simulated: bool = False,
+    actor: User | None = None,
 ) -> User:
     """Make an account; an admin may enter Django's admin too.
 
@@ -27,6 +29,7 @@ def create_person(
         role: "expert", "analyst" or "admin".
         pseudonym: What others see instead of the name; "Expert 3" and so on by default.
         is_simulated: The machine votes for it, and everything that comes of it says so.
+        actor: Who makes the account, for the log.
 
     Raises:
         UnknownName: There is no such role.
@@ -45,7 +48,14 @@ def create_person(
         username, password=password, is_staff=is_admin, is_superuser=is_admin
     )
     user.groups.add(Group.objects.get_or_create(name=role)[0])
-    Person.objects.create(user=user, pseudonym=pseudonym, is_simulated=is_simulated)
+    person = Person.objects.create(user=user, pseudonym=pseudonym, is_simulated=is_simulated)
+    log_event(
+        actor=actor,
+        verb="add",
+        object_kind="person",
+        object_code=person.code,
+        after={"role": role, "is_simulated": is_simulated},
+    )
     return user
 
 

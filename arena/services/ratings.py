@@ -86,7 +86,7 @@ def rate(
     _store_lines(snapshot, board, contestants)
     log_event(
         actor=actor,
-        verb="study.rated_early" if is_early else "study.rated",
+        verb="rate early" if is_early else "rate",
         object_kind="study",
         object_code=study.code,
         after={"snapshot": str(snapshot.code), "votes": len(votes)},
@@ -98,7 +98,7 @@ def log_early_look(*, study: Study, actor: User | None, what: str) -> None:
     """Write to the log that somebody looked at results of an open study on purpose."""
     log_event(
         actor=actor,
-        verb="results.opened_early",
+        verb="look early",
         object_kind="study",
         object_code=study.code,
         after={"what": what},

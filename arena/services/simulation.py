@@ -12,11 +12,13 @@ from typing import Any
 from uuid import uuid5
 
 import numpy as np
+from django.db import transaction
 
 from arena.models import Study, Vote
 from arena.services.votes import cast_vote
 from augment.errors import Conflict
 from augment.models import Augmentation
+from augment.services.events import log_event
 
 MISS_M = 10.0
 """What an object counts that is missing, too many, or further off than this."""
@@ -27,6 +29,7 @@ SLIP = 0.08
 """The share of votes that are any key; it also keeps who always loses within reach."""
 
 
+@transaction.atomic
 def simulate_votes(*, study: Study, seed: int) -> int:
     """Vote on every undecided matchup of the study's simulated experts.
 
@@ -60,6 +63,14 @@ def simulate_votes(*, study: Study, seed: int) -> int:
             outcome=_judge(advantage, rng),
         )
         cast += 1
+    if cast:
+        log_event(
+            actor=None,
+            verb="simulate votes",
+            object_kind="study",
+            object_code=study.code,
+            after={"votes": cast, "seed": seed},
+        )
     return cast
 
 

@@ -87,7 +87,7 @@ def open_study(
     _store(study, planned, cells, expert_rows)
     log_event(
         actor=actor,
-        verb="study.opened",
+        verb="open",
         object_kind="study",
         object_code=study.code,
         after={"name": name, "matchups": len(planned.matchups), "seed": seed},
@@ -116,7 +116,7 @@ def close_study(*, study: Study, actor: User | None = None) -> Study:
     study.save(update_fields=["state", "closed_at"])
     log_event(
         actor=actor,
-        verb="study.closed",
+        verb="close",
         object_kind="study",
         object_code=study.code,
         before={"state": "open"},

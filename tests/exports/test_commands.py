@@ -99,7 +99,7 @@ def test_an_open_study_is_exported_only_on_purpose_and_that_is_logged(tmp_path: 
     with pytest.raises(CommandError, match="still open"):
         run(*target)
     run(*target, "--early")
-    assert Event.objects.filter(verb="results.opened_early").count() == 1
+    assert Event.objects.filter(verb="look early").count() == 1
     assert ",yes\n" in (tmp_path / "x.csv").read_text()
 
 

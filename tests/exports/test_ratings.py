@@ -60,7 +60,7 @@ def test_a_snapshot_has_a_line_per_contestant_that_agrees_with_a_count() -> None
         ties = (left | right).filter(outcome="equal").count()
         assert (standing.wins, standing.ties) == (wins, ties)
         assert standing.votes == left.count() + right.count() == 24
-    assert Event.objects.filter(verb="study.rated").count() == 1
+    assert Event.objects.filter(verb="rate").count() == 1
 
 
 def test_the_same_votes_and_seed_give_the_same_standings() -> None:
@@ -94,7 +94,7 @@ def test_an_open_study_is_rated_only_on_purpose_and_that_is_logged() -> None:
     with pytest.raises(StudyStillOpen, match="'Round 1' is still open"):
         rate(study=study)
     assert rate(study=study, early=True).is_early
-    assert Event.objects.filter(verb="study.rated_early").exists()
+    assert Event.objects.filter(verb="rate early").exists()
 
 
 def test_simulated_votes_stay_out_of_a_study_that_does_not_allow_them() -> None:

@@ -23,7 +23,7 @@ def test_an_open_study_has_every_experts_matchups_and_a_line_in_the_log() -> Non
     assert study.opened_at is not None
     per_expert = Counter(study.matchups.values_list("expert__username", flat=True))
     assert per_expert == {"eva": 9, "finn": 9}
-    event = Event.objects.get(verb="study.opened")
+    event = Event.objects.get(verb="open")
     assert event.object_code == str(study.code)
     assert event.after == {"name": "Round 1", "matchups": 18, "seed": 7}
 
@@ -150,7 +150,7 @@ def test_closing_is_logged_once_and_final() -> None:
     assert closed.state == Study.State.CLOSED
     assert closed.closed_at is not None
     assert close_study(study=study).closed_at == closed.closed_at
-    assert Event.objects.filter(verb="study.closed").count() == 1
+    assert Event.objects.filter(verb="close").count() == 1
 
 
 def test_planning_again_with_another_seed_gives_another_plan() -> None:
