@@ -63,9 +63,8 @@ def rate(
     _check_draws(chosen, drawn, rounds, seed)
     votes, left_out = _votes_that_count(study)
     contestants = list(study.contestants.order_by("slug"))
-    comparisons = as_arrays(
-        [contestant.slug for contestant in contestants], [_comparison(vote) for vote in votes]
-    )
+    names = [contestant.slug for contestant in contestants]
+    comparisons = as_arrays(names, [_comparison(vote) for vote in votes])
     board = rate_votes(comparisons, method=chosen, rounds=rounds, unit=drawn, seed=seed)
     snapshot = Snapshot.objects.create(
         study=study,
@@ -84,13 +83,7 @@ def rate(
         made_by=actor,
     )
     _store_lines(snapshot, board, contestants)
-    log_event(
-        actor=actor,
-        verb="rate early" if is_early else "rate",
-        object_kind="study",
-        object_code=study.code,
-        after={"snapshot": str(snapshot.code), "votes": len(votes)},
-    )
+    _log(snapshot)
     return snapshot
 
 
@@ -192,6 +185,16 @@ def _digest(votes: Sequence[Vote]) -> str:
     ]
     text = "\n".join(json.dumps(line, ensure_ascii=True) for line in lines)
     return hashlib.sha256(text.encode()).hexdigest()
+
+
+def _log(snapshot: Snapshot) -> None:
+    log_event(
+        actor=snapshot.made_by,
+        verb="rate early" if snapshot.is_early else "rate",
+        object_kind="study",
+        object_code=snapshot.study.code,
+        after={"snapshot": str(snapshot.code), "votes": snapshot.votes_counted},
+    )
 
 
 def _store_lines(snapshot: Snapshot, board: Leaderboard, contestants: list[Contestant]) -> None:

@@ -62,15 +62,7 @@ def open_study(
     if not allow_simulated:
         _refuse_simulated(contestant_rows, expert_rows)
     cells = _latest_pictures(contestant_rows, scenario_rows)
-    rules = Rules(
-        entries=tuple(
-            Entry(scenario=scenario, contestant=contestant, picture=cell.image)
-            for (scenario, contestant), cell in sorted(cells.items())
-        ),
-        experts=tuple(expert.username for expert in expert_rows),
-        votes_per_expert=votes_per_expert,
-        seed=seed,
-    )
+    rules = _rules(cells, expert_rows, votes_per_expert, seed)
     planned = plan(rules)
     study = Study.objects.create(
         name=name,
@@ -195,6 +187,18 @@ def _latest_pictures(contestants: list[Contestant], scenarios: list[Scenario]) -
             f"There is no picture yet of {', '.join(missing[:8])}{more}. Generate them first."
         )
     return cells
+
+
+def _rules(cells: Cells, experts: list[User], votes_per_expert: int, seed: int) -> Rules:
+    return Rules(
+        entries=tuple(
+            Entry(scenario=scenario, contestant=contestant, picture=cell.image)
+            for (scenario, contestant), cell in sorted(cells.items())
+        ),
+        experts=tuple(expert.username for expert in experts),
+        votes_per_expert=votes_per_expert,
+        seed=seed,
+    )
 
 
 # --- What is kept ------------------------------------------------------------------------------
