@@ -1,0 +1,96 @@
+"""Marks of states: always a shape, a colour and a word."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from django import template
+from django.utils.html import format_html
+from django.utils.safestring import SafeString
+
+from arena.models import Study
+from augment.models import Augmentation, GenerationJob
+
+register = template.Library()
+
+_TONES = {
+    "queued": "quiet",
+    "running": "busy",
+    "done": "good",
+    "finished": "good",
+    "unreadable": "warn",
+    "refused": "warn",
+    "failed": "bad",
+    "cancelled": "quiet",
+    "draft": "quiet",
+    "open": "busy",
+    "closed": "good",
+}
+_ICONS = {"finished": "done"}
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Mark:
+    """How a state looks: the tone's class, the icon's template, the word."""
+
+    tone: str
+    icon: str
+    label: str
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Segment:
+    """A part of a stacked bar, in percent of its width."""
+
+    tone: str
+    label: str
+    number: int
+    start: float
+    width: float
+
+
+@register.filter
+def mark(row: Augmentation | GenerationJob | Study) -> Mark:
+    """The mark of a row with a state."""
+    return _mark(row.state, row.get_state_display())
+
+
+@register.filter
+def mark_of(state: Augmentation.State) -> Mark:
+    """The mark of an augmentation's state."""
+    return _mark(state.value, str(state.label))
+
+
+@register.filter
+def segments(by_state: dict[Augmentation.State, int]) -> list[Segment]:
+    """A stacked bar of the states that occur: outcomes first, what waits last."""
+    order = sorted(
+        by_state, key=lambda state: (state in Augmentation.UNDER_WAY, state == "queued")
+    )
+    total = sum(by_state.values()) or 1
+    found, start = [], 0.0
+    for state in order:
+        width = 100.0 * by_state[state] / total
+        if width:
+            look = _mark(state.value, str(state.label))
+            found.append(
+                Segment(
+                    tone=look.tone,
+                    label=look.label,
+                    number=by_state[state],
+                    start=start,
+                    width=width,
+                )
+            )
+        start += width
+    return found
+
+
+@register.simple_tag
+def percent(part: int, whole: int) -> SafeString:
+    """A share, rounded down so that 100 % means all."""
+    return format_html("{}&nbsp;%", 100 * part // whole if whole else 0)
+
+
+def _mark(state: str, label: str) -> Mark:
+    return Mark(tone=_TONES[state], icon=f"icons/{_ICONS.get(state, state)}.svg", label=label)

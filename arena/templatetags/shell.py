@@ -1,0 +1,65 @@
+"""The frame of every page: who looks at it and where they can go."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from django import template
+from django.http import HttpRequest
+from django.template.context import Context
+from django.urls import reverse
+
+from arena.queries.profiles import Profile, profile_of
+
+register = template.Library()
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Link:
+    """One entry of the navigation."""
+
+    label: str
+    url: str
+    is_current: bool
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Shell:
+    """What the frame needs to know; without a profile nobody is signed in."""
+
+    profile: Profile | None
+    links: list[Link]
+
+
+_SECTIONS: dict[str, tuple[str, frozenset[str]]] = {
+    "home": ("Home", frozenset({"home"})),
+    "scenarios": ("Scenarios", frozenset({"scenarios", "scenario"})),
+    "jobs": ("Jobs", frozenset({"jobs", "job-new", "job", "augmentation"})),
+    "studies": ("Studies", frozenset({"studies", "study-new", "study", "results"})),
+}
+_MENU = {
+    "expert": ("home",),
+    "analyst": ("home", "scenarios", "jobs", "studies"),
+    "admin": ("home", "scenarios", "jobs", "studies"),
+}
+
+
+@register.simple_tag(takes_context=True)
+def shell(context: Context) -> Shell:
+    """Profile and navigation of whoever made the request."""
+    request: HttpRequest | None = context.get("request")
+    user = getattr(request, "user", None)
+    profile = profile_of(user) if user is not None else None
+    if request is None or profile is None or profile.role is None:
+        return Shell(profile=profile, links=[])
+    match = request.resolver_match
+    here = match.url_name if match else None
+    return Shell(
+        profile=profile,
+        links=[
+            Link(
+                label=_SECTIONS[name][0], url=reverse(name), is_current=here in _SECTIONS[name][1]
+            )
+            for name in _MENU[profile.role]
+        ],
+    )

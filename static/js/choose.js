@@ -1,0 +1,34 @@
+// Whole groups by one tick, and how many augmentations that makes. Without it the form works too.
+const form = document.querySelector("[data-choose]");
+
+function members(group) {
+  return [...group.querySelectorAll("input[type=checkbox]:not([data-all])")];
+}
+
+function refresh() {
+  for (const group of form.querySelectorAll("[data-group]")) {
+    const all = group.querySelector("[data-all]");
+    if (!all) continue;
+    const ticked = members(group).filter((box) => box.checked).length;
+    all.checked = ticked > 0 && ticked === members(group).length;
+    all.indeterminate = ticked > 0 && !all.checked;
+  }
+  const sum = form.querySelector("[data-sum]");
+  if (!sum) return;
+  const contestants = form.querySelectorAll("[name=contestants]:checked").length;
+  const scenarios = form.querySelectorAll("[name=scenarios]:checked").length;
+  sum.hidden = false;
+  sum.querySelector("[data-contestants]").textContent = contestants;
+  sum.querySelector("[data-scenarios]").textContent = scenarios;
+  sum.querySelector("[data-total]").textContent = contestants * scenarios;
+}
+
+form.addEventListener("change", (event) => {
+  if (event.target.matches("[data-all]")) {
+    for (const box of members(event.target.closest("[data-group]"))) {
+      box.checked = event.target.checked;
+    }
+  }
+  refresh();
+});
+refresh();
