@@ -104,6 +104,7 @@ TEMPLATES = [
         },
     }
 ]
+CSRF_FAILURE_VIEW = "arena.web.faults.forged"
 LOGIN_URL = "login"
 LOGIN_REDIRECT_URL = "home"
 LOGOUT_REDIRECT_URL = "login"

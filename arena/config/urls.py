@@ -10,3 +10,7 @@ urlpatterns = [
     path("api/v1/", include("arena.api.urls")),
     path("", include("arena.web.urls")),
 ]
+
+handler403 = "arena.web.faults.refused"
+handler404 = "arena.web.faults.missing"
+handler500 = "arena.web.faults.broken"

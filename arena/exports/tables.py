@@ -16,6 +16,7 @@ UNITS = {
     "two-way": "experts and scenarios",
 }
 UNKNOWN = "--"
+SIMULATED = " (simulated)"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -42,6 +43,11 @@ class Row:
     ties: int
     losses: int
     note: str
+
+    @property
+    def name(self) -> str:
+        """The name alone, for pages that mark what is simulated by a badge."""
+        return self.model.removesuffix(SIMULATED)
 
     @property
     def rank_text(self) -> str:
@@ -139,7 +145,7 @@ def _row(standing: Standing) -> Row:
     name, variant = contestant.name, contestant.variant
     last_word = name.rpartition(" ")[2]
     return Row(
-        model=f"{name} (simulated)" if contestant.is_simulated else name,
+        model=f"{name}{SIMULATED}" if contestant.is_simulated else name,
         variant=last_word if variant and last_word.lower() == variant.lower() else "",
         slug=contestant.slug,
         kind=contestant.kind,

@@ -26,11 +26,15 @@ class ResultsAccess(StrEnum):
 
 
 def results_access(*, user: User, study: Study) -> ResultsAccess:
-    """What the user may see; whoever votes in an open study sees nothing, whatever the role."""
+    """What the user may see; whoever votes in an open study sees nothing, whatever the role.
+
+    An expert who still judges the same contestants in another study waits until that one closes.
+    """
     votes_in_it = study.experts.filter(pk=user.pk).exists()
     staff = role_of(user) in ("admin", "analyst")
     if study.state == Study.State.CLOSED:
-        return ResultsAccess.FULL if staff or votes_in_it else ResultsAccess.NONE
+        reads = staff or (votes_in_it and not _still_judges(user, study))
+        return ResultsAccess.FULL if reads else ResultsAccess.NONE
     return ResultsAccess.EARLY if staff and not votes_in_it else ResultsAccess.NONE
 
 
@@ -49,3 +53,9 @@ def snapshot_to_export(study: Study) -> Snapshot:
     if found is None:
         raise NoSnapshot(f"The study {study.name!r} has no rating yet. Rate it first.")
     return found
+
+
+def _still_judges(user: User, study: Study) -> bool:
+    """Whether an open study of this expert has a contestant of this one."""
+    is_open = user.studies.filter(state=Study.State.OPEN)
+    return is_open.filter(contestants__in=study.contestants.all()).exists()

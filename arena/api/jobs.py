@@ -1,0 +1,48 @@
+"""How far a job is, for a page that asks every two seconds."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import uuid
+
+from django.shortcuts import get_object_or_404
+from rest_framework.permissions import BasePermission
+from rest_framework.request import Request
+from rest_framework.response import Response
+from rest_framework.views import APIView
+
+from arena.api.errors import ApiView
+from arena.queries import jobs
+from arena.queries.people import role_of
+from augment.models import GenerationJob
+
+
+class StaffOnly(BasePermission):
+    """Admins and analysts; experts must not learn who took part in what."""
+
+    def has_permission(self, request: Request, view: APIView) -> bool:
+        """Whether the account may know of jobs."""
+        return role_of(request.user) in ("admin", "analyst")
+
+
+class JobProgressView(ApiView):
+    """GET answers 304 while nothing has changed since the ETag that came with the request."""
+
+    permission_classes = (StaffOnly,)
+
+    def get(self, request: Request, code: uuid.UUID) -> Response:
+        """State, counts by state, and whether anything is still under way."""
+        found = jobs.counts(get_object_or_404(GenerationJob, code=code))
+        body = {
+            "state": found.job.state,
+            "total": found.total,
+            "settled": found.settled,
+            "by_state": {state.value: number for state, number in found.by_state.items()},
+            "is_over": found.under_way == 0,
+        }
+        digest = hashlib.sha256(json.dumps(body, sort_keys=True).encode()).hexdigest()[:32]
+        headers = {"ETag": f'"{digest}"', "Cache-Control": "private, no-cache"}
+        if headers["ETag"] in request.headers.get("If-None-Match", ""):
+            return Response(status=304, headers=headers)
+        return Response(body, headers=headers)

@@ -1,0 +1,43 @@
+"""What the house holds: the counts that an admin's home page starts from."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from arena.models import Study, Vote
+from augment.models import Augmentation, Contestant, GenerationJob, Scenario
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Inventory:
+    """How much of everything there is."""
+
+    scenarios: int
+    contestants: int
+    jobs: int
+    jobs_running: int
+    done: int
+    failed: int
+    studies: int
+    studies_open: int
+    studies_closed: int
+    votes: int
+
+
+def take() -> Inventory:
+    """Count; failed augmentations of cancelled jobs don't count, nobody waits for them."""
+    jobs = GenerationJob.objects
+    augmentations = Augmentation.objects
+    failed = augmentations.filter(state=Augmentation.State.FAILED)
+    return Inventory(
+        scenarios=Scenario.objects.count(),
+        contestants=Contestant.objects.count(),
+        jobs=jobs.count(),
+        jobs_running=jobs.filter(state=GenerationJob.State.RUNNING).count(),
+        done=augmentations.filter(state=Augmentation.State.DONE).count(),
+        failed=failed.exclude(job__state=GenerationJob.State.CANCELLED).count(),
+        studies=Study.objects.count(),
+        studies_open=Study.objects.filter(state=Study.State.OPEN).count(),
+        studies_closed=Study.objects.filter(state=Study.State.CLOSED).count(),
+        votes=Vote.objects.filter(supersedes=None).count(),
+    )

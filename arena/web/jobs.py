@@ -1,0 +1,110 @@
+"""Pages of generation jobs."""
+
+from __future__ import annotations
+
+import uuid
+from functools import partial
+from typing import cast
+
+from django.contrib import messages
+from django.contrib.auth.models import User
+from django.db import transaction
+from django.http import HttpRequest, HttpResponse
+from django.shortcuts import get_object_or_404, redirect, render
+from django.views.decorators.http import require_http_methods, require_POST, require_safe
+
+from arena.queries import jobs, scenarios
+from arena.web.access import ADMIN, STAFF, only
+from arena.web.forms import LaunchForm
+from augment.errors import AugmentError, QueueUnreachable
+from augment.models import Contestant, GenerationJob
+from augment.services import contestants
+from augment.services import jobs as service
+from augment.tasks import enqueue_job
+
+
+@only(*STAFF)
+@require_safe
+def jobs_page(request: HttpRequest) -> HttpResponse:
+    """Every job with its bar."""
+    return render(request, "jobs/list.html", {"jobs": jobs.every()})
+
+
+@only(ADMIN)
+@require_http_methods(["GET", "HEAD", "POST"])
+def new_job_page(request: HttpRequest) -> HttpResponse:
+    """Choose contestants and scenarios, then launch."""
+    contestants.ensure_builtin()
+    form = LaunchForm(
+        request.POST or None,
+        contestants=list(Contestant.objects.select_related("endpoint").order_by("name")),
+        groups=scenarios.by_type(),
+    )
+    if request.method == "POST" and form.is_valid():
+        try:
+            job = _launch(request, form)
+        except AugmentError as error:
+            form.add_error(None, str(error))
+        else:
+            messages.success(request, f"“{job.name}” is on its way.")
+            return redirect("job", code=job.code)
+    return render(request, "jobs/new.html", {"form": form}, status=422 if form.errors else 200)
+
+
+@only(*STAFF)
+@require_safe
+def job_page(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
+    """Progress, the grid, and failures by their reason."""
+    job = get_object_or_404(GenerationJob.objects.select_related("launched_by__person"), code=code)
+    context = {"counts": jobs.counts(job), "grid": jobs.grid(job), "failures": jobs.failures(job)}
+    return render(request, "jobs/job.html", context)
+
+
+@only(ADMIN)
+@require_POST
+def retry_job(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
+    """Queue again what failed."""
+    job = get_object_or_404(GenerationJob, code=code)
+    try:
+        with transaction.atomic():
+            service.retry_failed(job=job, actor=cast(User, request.user))
+            transaction.on_commit(partial(_send, request, job.pk))
+    except AugmentError as error:
+        messages.error(request, str(error))
+    else:
+        messages.success(request, "What failed is queued again.")
+    return redirect("job", code=code)
+
+
+@only(ADMIN)
+@require_POST
+def cancel_job(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
+    """Start nothing new; what is done stays."""
+    job = get_object_or_404(GenerationJob, code=code)
+    try:
+        service.cancel(job=job, actor=cast(User, request.user))
+    except AugmentError as error:
+        messages.error(request, str(error))
+    else:
+        messages.success(request, "Cancelled. What is done stays.")
+    return redirect("job", code=code)
+
+
+def _launch(request: HttpRequest, form: LaunchForm) -> GenerationJob:
+    with transaction.atomic():
+        job = service.launch(
+            name=form.cleaned_data["name"],
+            contestants=form.cleaned_data["contestants"],
+            scenarios=form.cleaned_data["scenarios"],
+            actor=cast(User, request.user),
+        )
+        transaction.on_commit(partial(_send, request, job.pk))
+    return job
+
+
+def _send(request: HttpRequest, job_pk: int) -> None:
+    """Put the job's rows on the queue; without a queue they wait, and the person is told."""
+    try:
+        enqueue_job(job_pk)
+    except QueueUnreachable as error:
+        messages.warning(request, str(error))

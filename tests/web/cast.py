@@ -1,0 +1,84 @@
+"""Who and what the tests of pages look at: one account per role, a job, studies, a picture."""
+
+from __future__ import annotations
+
+import struct
+import zlib
+from dataclasses import dataclass
+
+from django.contrib.auth.models import User
+from django.test import Client
+
+from arena.models import Study
+from arena.services.people import create_person
+from augment.models import Augmentation, Contestant, GenerationJob
+from augment.services.pictures import store
+from tests import study_rows
+from tests.jobs import rows
+
+ROLES = ("admin", "analyst", "expert")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class World:
+    """A study with pictures, open; a job; and somebody of each role who takes part in nothing."""
+
+    study: Study
+    job: GenerationJob
+    augmentation: Augmentation
+    expert: User
+
+
+def png(shade: int = 0) -> bytes:
+    """The smallest picture there is, one grey pixel."""
+
+    def chunk(kind: bytes, data: bytes) -> bytes:
+        check = zlib.crc32(kind + data)
+        return struct.pack(">I", len(data)) + kind + data + struct.pack(">I", check)
+
+    head = struct.pack(">IIBBBBB", 1, 1, 8, 0, 0, 0, 0)
+    body = zlib.compress(bytes([0, shade]))
+    return b"\x89PNG\r\n\x1a\n" + chunk(b"IHDR", head) + chunk(b"IDAT", body) + chunk(b"IEND", b"")
+
+
+def people() -> dict[str, User]:
+    """One account per role; the password of all is "a password"."""
+    return {
+        role: create_person(username=f"the-{role}", password="a password", role=role)
+        for role in ROLES
+    }
+
+
+def signed_in(user: User) -> Client:
+    client = Client()
+    client.force_login(user)
+    return client
+
+
+def status(user: User, url: str) -> int:
+    """What a GET answers; a picture is read to its end, which closes its file."""
+    answer = signed_in(user).get(url)
+    if answer.streaming:
+        b"".join(answer)
+    return answer.status_code
+
+
+def world() -> World:
+    """Six scenarios by three contestants; two experts, eva and finn, with nine matchups each."""
+    study = study_rows.a_study()
+    for number, augmentation in enumerate(Augmentation.objects.all()):
+        augmentation.image = store(png(number))
+        augmentation.save(update_fields=["image"])
+    job = rows.launch(scenarios=2, contestants=("reference",))
+    return World(
+        study=study,
+        job=job,
+        augmentation=job.augmentations.first() or Augmentation(),
+        expert=User.objects.get(username="eva"),
+    )
+
+
+def names_of_contestants() -> list[str]:
+    """Every word that would tell an expert who made what."""
+    found = Contestant.objects.values_list("slug", "name", "code")
+    return [str(word) for row in found for word in row]

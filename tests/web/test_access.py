@@ -1,0 +1,120 @@
+"""Every page times every role, as one table."""
+
+from __future__ import annotations
+
+import uuid
+
+import pytest
+from django.test import Client
+from django.urls import reverse
+
+from arena.services.studies import close_study
+from arena.web.urls import urlpatterns
+from tests.web.cast import World, people, signed_in, status, world
+
+pytestmark = pytest.mark.django_db
+
+STRANGER = str(uuid.uuid4())
+PAGES: dict[str, tuple[int, int, int]] = {
+    # address: admin, analyst, expert
+    "home": (200, 200, 200),
+    "jobs": (200, 200, 403),
+    "job-new": (200, 403, 403),
+    "job": (200, 200, 403),
+    "job-progress": (200, 200, 403),
+    "augmentation": (200, 200, 403),
+    "scenarios": (200, 200, 403),
+    "scenario": (200, 200, 403),
+    "picture": (200, 200, 403),
+    "studies": (200, 200, 403),
+    "study-new": (200, 403, 403),
+    "study": (200, 200, 403),
+    "results": (403, 403, 403),
+    "results-export": (403, 403, 403),
+    "vote": (403, 403, 404),
+    "matchup-image": (200, 403, 404),
+}
+ACTIONS: dict[str, tuple[int, int, int]] = {
+    "job-retry": (302, 403, 403),
+    "job-cancel": (302, 403, 403),
+    "study-rate": (403, 403, 403),
+    "study-close": (302, 403, 403),
+    "theme": (302, 302, 302),
+}
+OPEN_TO_THE_WORLD = {"login", "logout"}
+
+
+def address(name: str, here: World) -> str:
+    shown = here.study.matchups.filter(expert=here.expert).get(position=1)
+    arguments: dict[str, dict[str, object]] = {
+        "job": {"code": here.job.code},
+        "job-progress": {"code": here.job.code},
+        "job-retry": {"code": here.job.code},
+        "job-cancel": {"code": here.job.code},
+        "augmentation": {"code": here.augmentation.code},
+        "scenario": {"code": here.augmentation.scenario.code},
+        "picture": {"kind": "augmentation", "code": shown.left.code},
+        "results-export": {"code": here.study.code, "form": "csv"},
+        "matchup-image": {"token": shown.left_token},
+    }
+    with_study = ("study", "study-close", "study-rate", "results", "vote")
+    found = {"code": here.study.code} if name in with_study else arguments.get(name, {})
+    return reverse(name, kwargs=found)
+
+
+def test_every_role_gets_what_the_table_says() -> None:
+    here, accounts = world(), people()
+    for name, expected in PAGES.items():
+        url = address(name, here)
+        found = tuple(status(user, url) for user in accounts.values())
+        assert found == expected, name
+
+
+def test_every_action_is_for_the_roles_of_the_table() -> None:
+    here, accounts = world(), people()
+    for name, expected in ACTIONS.items():
+        url = address(name, here)
+        found = tuple(signed_in(user).post(url).status_code for user in accounts.values())
+        assert found == expected, name
+
+
+def test_an_action_needs_a_post() -> None:
+    here, admin = world(), people()["admin"]
+    for name in ACTIONS:
+        assert signed_in(admin).get(address(name, here)).status_code == 405, name
+
+
+def test_the_login_alone_is_open_to_the_world() -> None:
+    here = world()
+    for name in {**PAGES, **ACTIONS}.keys() - {"job-progress"}:
+        answer = Client().get(address(name, here))
+        assert answer.status_code == 302, name
+        assert answer.headers["Location"].startswith(reverse("login")), name
+    assert Client().get(address("job-progress", here)).status_code in (401, 403)
+    assert Client().get(reverse("login")).status_code == 200
+
+
+def test_the_table_misses_no_page() -> None:
+    known = {*PAGES, *ACTIONS, *OPEN_TO_THE_WORLD}
+    assert {pattern.name for pattern in urlpatterns} - known == set()
+
+
+def test_an_account_without_a_role_sees_that_it_has_none() -> None:
+    person = people()["expert"]
+    person.groups.clear()
+    assert "no role yet" in signed_in(person).get(reverse("home")).content.decode()
+
+
+def test_results_open_to_their_experts_and_to_staff_when_the_study_closes() -> None:
+    here, accounts = world(), people()
+    close_study(study=here.study)
+    url = reverse("results", args=[here.study.code])
+    assert signed_in(accounts["analyst"]).get(url).status_code == 200
+    assert signed_in(here.expert).get(url).status_code == 200
+    assert signed_in(accounts["expert"]).get(url).status_code == 403
+
+
+@pytest.mark.parametrize("name", ["job", "augmentation", "scenario", "study", "results"])
+def test_an_unknown_code_is_404_even_for_an_admin(name: str) -> None:
+    url = reverse(name, kwargs={"code": STRANGER})
+    assert signed_in(people()["admin"]).get(url).status_code == 404

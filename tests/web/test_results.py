@@ -1,0 +1,123 @@
+"""The results page: the table, its files, and what is said with them."""
+
+from __future__ import annotations
+
+import csv
+import io
+import json
+
+import pytest
+from django.contrib.auth.models import User
+from django.urls import reverse
+
+from arena.models import Study
+from arena.services.ratings import rate
+from arena.services.studies import close_study, open_study
+from augment.models import Contestant
+from tests import study_rows
+from tests.web.cast import people, signed_in
+
+pytestmark = pytest.mark.django_db
+
+
+def judged(**cast: object) -> Study:
+    """A closed study in which ann beats everybody and bob beats cid."""
+    study = study_rows.a_study(**cast)  # type: ignore[arg-type]
+    for matchup in study.matchups.select_related("left__contestant", "right__contestant"):
+        is_left = matchup.left.contestant.slug < matchup.right.contestant.slug
+        study_rows.vote(matchup, "left" if is_left else "right")
+    return close_study(study=study)
+
+
+def shown(study: Study, user: User | None = None) -> str:
+    reader = user or people()["analyst"]
+    answer = signed_in(reader).get(reverse("results", args=[study.code]))
+    assert answer.status_code == 200
+    return answer.content.decode()
+
+
+def test_a_closed_study_without_a_rating_offers_to_rate_it() -> None:
+    study, analyst = judged(), people()["analyst"]
+    assert "Not rated yet" in shown(study, analyst)
+    signed_in(analyst).post(reverse("study-rate", args=[study.code]))
+    assert study.snapshots.count() == 1
+    assert "18 votes counted" in shown(study, analyst)
+
+
+def test_the_table_says_rank_rating_interval_and_votes_with_the_method_beneath() -> None:
+    study = judged()
+    rate(study=study, rounds=50)
+    page = shown(study)
+    order = [page.index(f'<th scope="row">{name}') for name in ("Ann", "Bob", "Cid")]
+    assert order == sorted(order)
+    for said in ("Bradley-Terry on the Elo scale", "50 rounds", "seed 0", "SHA-256", "one more"):
+        assert said in page
+
+
+def test_one_vote_each_way_is_drawn_with_its_interval() -> None:
+    study = study_rows.a_study()
+    for n, matchup in enumerate(study.matchups.all()):
+        study_rows.vote(matchup, ("left", "equal", "right")[n % 3])
+    study = close_study(study=study)
+    rate(study=study, rounds=50)
+    page = shown(study)
+    assert 'class="intervals"' in page
+    assert page.count('class="whisker"') == 3
+
+
+def test_files_carry_the_numbers_of_the_page() -> None:
+    study, analyst = judged(), signed_in(people()["analyst"])
+    rate(study=study, rounds=50)
+
+    def file(form: str) -> str:
+        answer = analyst.get(reverse("results-export", args=[study.code, form]))
+        assert answer.headers["Content-Disposition"].startswith("attachment; filename=")
+        return answer.content.decode()
+
+    lines = list(csv.DictReader(io.StringIO(file("csv"))))
+    assert [line["model"] for line in lines] == ["Ann", "Bob", "Cid"]
+    assert json.loads(file("json"))["votes"]["counted"] == 18
+    assert "Ann" in file("latex")
+    assert file("csv") == file("csv")
+    assert analyst.get(reverse("results-export", args=[study.code, "docx"])).status_code == 404
+
+
+def test_what_is_simulated_is_said_on_every_page_of_the_study() -> None:
+    cast = study_rows.cast_of(kind=Contestant.Kind.SIMULATED, simulated_experts=True)
+    study = open_study(name="Round 1", votes_per_expert=9, seed=7, allow_simulated=True, **cast)
+    for matchup in study.matchups.all():
+        study_rows.vote(matchup)
+    study = close_study(study=study)
+    rate(study=study, rounds=50)
+    reader = people()["analyst"]
+    page = shown(study, reader)
+    assert "Simulated votes and contestants count in this study." in page
+    assert page.count("simulated</span>") == 3
+    for name in ("studies", "home"):
+        assert "simulated</span>" in signed_in(reader).get(reverse(name)).content.decode()
+    overview = signed_in(reader).get(reverse("study", args=[study.code])).content.decode()
+    assert "Simulated votes and contestants count in this study." in overview
+
+
+def test_an_expert_reads_results_only_once_no_open_study_has_the_same_contestants() -> None:
+    study = judged()
+    eva = User.objects.get(username="eva")
+    url = reverse("results", args=[study.code])
+    assert signed_in(eva).get(url).status_code == 200
+    second = open_study(
+        name="Round 2", votes_per_expert=3, seed=1, experts=["eva"],
+        contestants=["ann", "bob"], scenarios=["place-0", "place-1", "place-2"],
+    )  # fmt: skip
+    assert signed_in(eva).get(url).status_code == 403
+    assert url not in signed_in(eva).get("/").content.decode()
+    close_study(study=second)
+    assert signed_in(eva).get(url).status_code == 200
+
+
+def test_a_study_without_votes_is_explained_rather_than_rated() -> None:
+    study = close_study(study=study_rows.a_study())
+    snapshot = rate(study=study, rounds=50)
+    page = shown(study)
+    assert snapshot.status
+    assert snapshot.status.split(".")[0] in page.replace("&#x27;", "'")
+    assert 'class="intervals"' not in page

@@ -1,0 +1,159 @@
+"""The voting page: one vote per decision, nothing of who made what."""
+
+from __future__ import annotations
+
+import re
+import uuid
+
+import pytest
+from django.test import Client
+from django.urls import reverse
+
+from arena.models import Matchup, Vote
+from arena.queries.votes import next_matchup
+from arena.services.studies import close_study
+from tests import study_rows
+from tests.web.cast import World, names_of_contestants, people, signed_in, status, world
+
+pytestmark = pytest.mark.django_db
+
+
+def page(here: World) -> str:
+    return reverse("vote", args=[here.study.code])
+
+
+def following(here: World) -> Matchup:
+    found = next_matchup(study=here.study, expert=here.expert)
+    assert found is not None
+    return found
+
+
+def ballot(matchup: Matchup, outcome: str = "left", **more: object) -> dict[str, object]:
+    return {"key": uuid.uuid4(), "matchup": matchup.code, "outcome": outcome, **more}
+
+
+def test_a_press_saves_one_vote_and_leads_to_the_next_pair() -> None:
+    here = world()
+    expert, first = signed_in(here.expert), following(here)
+    answer = expert.post(page(here), ballot(first, "right", ms_visible=4200))
+    assert answer.status_code == 302
+    assert answer.headers["Location"] == page(here)
+    vote = Vote.objects.get()
+    assert (vote.matchup, vote.outcome, vote.winner_id) == (first, "right", first.right_id)
+    assert vote.ms_visible == 4200
+    assert str(first.code) not in expert.get(page(here)).content.decode()
+
+
+def test_a_double_press_is_one_vote() -> None:
+    here = world()
+    expert, sent = signed_in(here.expert), ballot(following(here))
+    assert [expert.post(page(here), sent).status_code for _ in range(2)] == [302, 302]
+    assert Vote.objects.count() == 1
+
+
+def test_going_back_and_pressing_again_keeps_the_first_vote_and_says_so() -> None:
+    here = world()
+    expert, first = signed_in(here.expert), following(here)
+    expert.post(page(here), ballot(first, "left"))
+    answer = expert.post(page(here), ballot(first, "right"), follow=True)
+    assert Vote.objects.get().outcome == "left"
+    assert "your first vote counts" in answer.content.decode()
+
+
+def test_a_vote_for_somebody_elses_matchup_is_404_and_not_kept() -> None:
+    here = world()
+    others = study_rows.matchups_of(here.study, "finn")[0]
+    assert signed_in(here.expert).post(page(here), ballot(others)).status_code == 404
+    assert not Vote.objects.exists()
+
+
+@pytest.mark.parametrize(
+    "broken",
+    [{"outcome": "both"}, {"outcome": ""}, {"key": "7"}, {"matchup": "7"}, {"ms_visible": "-1"}],
+)
+def test_what_is_no_answer_is_refused_with_the_pair_still_there(broken: dict[str, str]) -> None:
+    here = world()
+    sent = ballot(following(here)) | broken
+    answer = signed_in(here.expert).post(page(here), sent)
+    assert answer.status_code == 422
+    assert "nothing was saved" in answer.content.decode()
+    assert not Vote.objects.exists()
+
+
+def test_a_vote_without_the_forms_token_is_refused() -> None:
+    here = world()
+    strict = Client(enforce_csrf_checks=True)
+    strict.force_login(here.expert)
+    answer = strict.post(page(here), ballot(following(here)))
+    assert answer.status_code == 403
+    assert "too old to be sent" in answer.content.decode()
+
+
+def test_a_closed_study_is_said_kindly_and_takes_no_vote() -> None:
+    here = world()
+    expert, first = signed_in(here.expert), following(here)
+    close_study(study=here.study)
+    answer = expert.post(page(here), ballot(first), follow=True)
+    assert answer.status_code == 200
+    assert "This study is closed" in answer.content.decode()
+    assert not Vote.objects.exists()
+
+
+def test_the_last_vote_leads_to_the_thanks() -> None:
+    here = world()
+    for matchup in study_rows.matchups_of(here.study, "eva"):
+        study_rows.vote(matchup)
+    shown = signed_in(here.expert).get(page(here)).content.decode()
+    assert "You are done." in shown
+    assert "9 votes saved" in shown
+
+
+def test_the_page_works_without_a_script_and_says_where_one_is() -> None:
+    here = world()
+    shown = signed_in(here.expert).get(page(here)).content.decode()
+    assert re.findall(r'name="outcome" value="(\w+)"', shown) == ["left", "equal", "right"]
+    assert "0 of 9" in shown
+    assert following(here).scenario.instruction in shown
+    assert shown.count('width="1200" height="800"') == 2
+
+
+def test_every_showing_has_a_key_of_its_own_and_is_never_cached() -> None:
+    here, key = world(), r'name="key" value="([0-9a-f-]+)"'
+    expert = signed_in(here.expert)
+    answers = [expert.get(page(here)) for _ in range(2)]
+    keys = {re.search(key, answer.content.decode())[1] for answer in answers}  # type: ignore[index]
+    assert len(keys) == 2
+    assert "no-store" in answers[0].headers["Cache-Control"]
+
+
+def test_neither_page_nor_headers_tell_who_made_what() -> None:
+    here = world()
+    expert = signed_in(here.expert)
+    for url in (page(here), reverse("home")):
+        answer = expert.get(url)
+        said = answer.content.decode() + str(answer.headers)
+        leaked = [word for word in names_of_contestants() if word in said]
+        assert leaked == [], url
+        assert not re.search(r"\b(model|LLM|generated|ground truth)\b", said, re.IGNORECASE), url
+
+
+def test_a_picture_goes_out_bare_and_to_its_expert_alone() -> None:
+    here = world()
+    shown = following(here)
+    url = reverse("matchup-image", args=[shown.left_token])
+    answer = signed_in(here.expert).get(url)
+    assert b"".join(answer).startswith(b"\x89PNG")
+    assert answer.headers["Content-Type"] == "image/png"
+    assert answer.headers["Cache-Control"] == "private, max-age=31536000, immutable"
+    assert answer.headers["Content-Disposition"] == "inline"
+    assert not {"ETag", "Last-Modified"} & set(answer.headers)
+    other = study_rows.matchups_of(here.study, "finn")[0]
+    theirs = reverse("matchup-image", args=[other.right_token])
+    assert signed_in(here.expert).get(theirs).status_code == 404
+    assert status(people()["admin"], theirs) == 200
+    assert signed_in(here.expert).get(reverse("matchup-image", args=["x"])).status_code == 404
+
+
+def test_another_experts_study_is_404() -> None:
+    here = world()
+    assert signed_in(people()["expert"]).get(page(here)).status_code == 404
