@@ -1,0 +1,193 @@
+"""Rules of the house that the import contracts can't say."""
+
+from __future__ import annotations
+
+import ast
+import re
+import subprocess
+import sys
+
+import pytest
+
+from tests.house.source import ROOT, dotted, functions, imported, modules
+
+HEAVY = {
+    "openai": ("augment.llm.openai_wire",),
+    "shapely": ("augment.checks", "augment.scene", "augment.simulation", "augment.formats"),
+    "pandas": ("augment.formats", "arena.exports"),
+    "pyarrow": ("augment.formats", "arena.exports"),
+    "matplotlib": ("arena.exports",),
+    "scipy.stats": ("arena.rating",),
+}
+READS_SETTINGS = (
+    "arena.config",
+    *("arena.services", "arena.tasks", "arena.apps", "arena.management", "arena.serving"),
+    *("augment.services", "augment.tasks", "augment.apps", "augment.management"),
+)
+SEEDED = {"Random", "default_rng", "Generator", "SeedSequence", "PCG64", "BitGenerator"}
+FORBIDDEN_NAMES = {"utils", "helpers", "common", "base", "manager"}
+
+
+def within(name: str, packages: tuple[str, ...]) -> bool:
+    return any(name == package or name.startswith(package + ".") for package in packages)
+
+
+def heavy_of(name: str) -> str | None:
+    return next((heavy for heavy in HEAVY if within(name, (heavy,))), None)
+
+
+def test_randomness_is_an_argument() -> None:
+    # `random.Random` and `default_rng` make generators with a seed of their own; the functions of
+    # the modules share one.
+    shared = re.compile(r"(np\.|numpy\.)?random\.(\w+)")
+    found = [
+        f"{name}:{node.lineno} {called}"
+        for name, tree in modules()
+        for node in ast.walk(tree)
+        if isinstance(node, ast.Attribute)
+        for called in [dotted(node)]
+        for match in [shared.fullmatch(called)]
+        if match and match.group(2) not in SEEDED
+    ] + [
+        f"{name}:{node.lineno} imports {alias.name} from random"
+        for name, tree in modules()
+        for node in ast.walk(tree)
+        if isinstance(node, ast.ImportFrom) and node.module == "random"
+        for alias in node.names
+        if alias.name not in SEEDED
+    ]
+    assert found == []
+
+
+def test_settings_are_read_only_where_processes_are_put_together() -> None:
+    found = [
+        f"{name}:{node.lineno}"
+        for name, tree in modules()
+        for node in ast.walk(tree)
+        if isinstance(node, ast.ImportFrom)
+        and node.module == "django.conf"
+        and not within(name, READS_SETTINGS)
+        and not name.endswith(".models")  # the name of the user model alone
+    ]
+    assert found == []
+
+
+def test_models_read_only_the_name_of_the_user_model() -> None:
+    found = [
+        f"{name}:{node.lineno} {dotted(node)}"
+        for name, tree in modules()
+        if name.endswith(".models")
+        for node in ast.walk(tree)
+        if isinstance(node, ast.Attribute)
+        and dotted(node).startswith("settings.")
+        and node.attr != "AUTH_USER_MODEL"
+    ]
+    assert found == []
+
+
+def test_only_heavy_packages_are_imported_inside_functions_and_only_by_their_owners() -> None:
+    found = []
+    for name, tree in modules():
+        inner = {
+            id(node)
+            for function in functions(tree)
+            for node in ast.walk(function)
+            if isinstance(node, ast.Import | ast.ImportFrom)
+        }
+        for node in ast.walk(tree):
+            if not isinstance(node, ast.Import | ast.ImportFrom):
+                continue
+            for target in imported(node):
+                heavy = heavy_of(target)
+                if id(node) in inner and (heavy is None or not within(name, HEAVY[heavy])):
+                    found.append(f"{name}:{node.lineno} imports {target} inside a function")
+                if id(node) not in inner and heavy is not None and not _for_types(tree, node):
+                    found.append(f"{name}:{node.lineno} imports {target} at its start")
+    assert found == []
+
+
+def _for_types(tree: ast.Module, wanted: ast.AST) -> bool:
+    """Whether the import stands under `if TYPE_CHECKING:`."""
+    return any(
+        wanted in ast.walk(node)
+        for node in tree.body
+        if isinstance(node, ast.If) and dotted(node.test).endswith("TYPE_CHECKING")
+    )
+
+
+def test_no_package_is_called_a_drawer() -> None:
+    found = [name for name, _ in modules() if set(name.split(".")) & FORBIDDEN_NAMES]
+    assert found == []
+
+
+def test_no_error_is_swallowed_whole() -> None:
+    found = [
+        f"{name}:{node.lineno}"
+        for name, tree in modules()
+        for node in ast.walk(tree)
+        if isinstance(node, ast.ExceptHandler)
+        and (node.type is None or dotted(node.type) in {"Exception", "BaseException"})
+    ]
+    assert found == []
+
+
+def test_functions_and_files_stay_small() -> None:
+    long = [
+        f"{name}:{function.lineno} {function.name}"
+        for name, tree in modules()
+        for function in functions(tree)
+        if (function.end_lineno or 0) - function.lineno + 1 > 60
+    ]
+    assert long == []
+    big = [
+        str(path.relative_to(ROOT))
+        for package in ("arena", "augment", "static")
+        for ending in ("*.py", "*.js")
+        for path in (ROOT / package).rglob(ending)
+        if "migrations" not in path.parts and len(path.read_text().splitlines()) > 400
+    ]
+    assert big == []
+
+
+def test_templates_hold_no_inline_script_style_or_unescaped_text() -> None:
+    wrong = re.compile(r"<script>|<style|\sstyle=|\son\w+=[\"']|\|\s*safe\b|autoescape off", re.I)
+    found = [
+        f"{path.relative_to(ROOT)}: {match.group()}"
+        for path in sorted((ROOT / "templates").rglob("*.html"))
+        for match in [wrong.search(path.read_text())]
+        if match
+    ]
+    assert found == []
+
+
+@pytest.mark.parametrize(
+    "start",
+    [
+        "import arena.config.wsgi; from django.urls import get_resolver;"
+        "get_resolver().url_patterns; import arena.config.urls",
+        "import arena.rating",
+    ],
+    ids=["a web worker", "the rating alone"],
+)
+def test_no_heavy_package_is_loaded_at_start(start: str) -> None:
+    code = f"import sys; {start}; print(*sorted(n for n in sys.modules if '_' != n[0]))"
+    loaded = subprocess.run(
+        [sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, check=True
+    ).stdout.split()
+    assert [name for name in loaded if name in HEAVY] == []
+
+
+def test_the_rating_starts_no_framework() -> None:
+    code = "import sys, arena.rating; print(*sys.modules)"
+    loaded = subprocess.run(
+        [sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, check=True
+    ).stdout.split()
+    assert {"django", "celery", "redis"} & set(loaded) == set()
+
+
+def test_every_variable_of_the_settings_is_explained() -> None:
+    settings = (ROOT / "arena" / "config" / "settings.py").read_text()
+    variables = set(re.findall(r'env\.\w+\(\s*"([A-Z_]+)"', settings))
+    explained = (ROOT / "docs" / "deploying.md").read_text()
+    assert variables
+    assert [name for name in sorted(variables) if f"`{name}`" not in explained] == []

@@ -1,0 +1,52 @@
+"""A wrong setting stops the start with a sentence that names the variable."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from tests.house.source import ROOT
+
+
+def start(**environment: str) -> subprocess.CompletedProcess[str]:
+    return subprocess.run(
+        [sys.executable, "manage.py", "diffsettings"],
+        cwd=ROOT,
+        env={**os.environ, **environment},
+        capture_output=True,
+        text=True,
+    )
+
+
+@pytest.mark.parametrize(
+    ("name", "value", "allowed"),
+    [
+        ("ARENA_DEBUG", "maybe", "use 1 or 0"),
+        ("DATABASE_URL", "mysql://root@localhost/arena", "postgresql://USER"),
+        ("REDIS_URL", "http://localhost:6379", "redis://HOST:PORT/N"),
+        ("ARENA_STALE_AFTER_S", "soon", "a whole number from 2 to 3600"),
+        ("ARENA_STALE_AFTER_S", "1", "a whole number from 2 to 3600"),
+        ("ARENA_LOG_LEVEL", "loud", "one of debug, info, warning, error"),
+        ("ARENA_MEDIA_DIR", str(ROOT / "manage.py"), "a folder is needed"),
+    ],
+)
+def test_a_wrong_value_stops_the_start(name: str, value: str, allowed: str) -> None:
+    finished = start(**{name: value})
+    assert finished.returncode != 0
+    last = finished.stderr.strip().splitlines()[-1]
+    assert name in last
+    assert allowed in last
+
+
+def test_the_secret_key_is_made_once_and_kept_private(tmp_path: Path) -> None:
+    environment = {"ARENA_VAR_DIR": str(tmp_path / "var")}
+    assert start(**environment).returncode == 0
+    kept = tmp_path / "var" / "secret_key"
+    first = kept.read_text()
+    assert kept.stat().st_mode & 0o077 == 0
+    assert start(**environment).returncode == 0
+    assert kept.read_text() == first
