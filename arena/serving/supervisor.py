@@ -68,9 +68,22 @@ class Supervisor:
             ChildFailed: A program crashed too often; everything is stopped already.
         """
         while not self._stopping.wait(POLL_S):
-            for place, child in enumerate(self._children):
-                if child.exit_code is not None and not self._stopping.is_set():
-                    self._children[place] = self._start_again(child)
+            self.check()
+
+    def check(self) -> None:
+        """Start again what has crashed.
+
+        Raises:
+            ChildFailed: A program crashed too often; everything is stopped already.
+        """
+        for place, child in enumerate(self._children):
+            if child.exit_code is not None and not self._stopping.is_set():
+                self._children[place] = self._start_again(child)
+
+    @property
+    def is_stopping(self) -> bool:
+        """Whether somebody asked to stop."""
+        return self._stopping.is_set()
 
     def ask_to_stop(self) -> None:
         """Let `watch` return; safe to call from a signal handler."""

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from typing import Any
 
-from django.conf import settings
 from django.core.management import call_command
 from django.core.management.base import BaseCommand, CommandError, CommandParser
 
@@ -33,7 +32,7 @@ class Command(BaseCommand):
         web = Web(host=options["host"], port=options["port"], workers=options["web_workers"])
         try:
             server = web_server(web)
-            self._prepare()
+            call_command("prepare", verbosity=0)
             programs = [*background(concurrency=options["concurrency"]), server]
             supervisor = Supervisor(programs, self._say)
             with supervisor.signals():
@@ -47,12 +46,6 @@ class Command(BaseCommand):
         except ArenaError as error:
             raise CommandError(str(error)) from error
         self.stdout.write("Everything is stopped.")
-
-    def _prepare(self) -> None:
-        """Bring tables and static files up to date; both do nothing when they are."""
-        call_command("migrate", interactive=False, verbosity=0)
-        settings.STATIC_ROOT.mkdir(parents=True, exist_ok=True)
-        call_command("collectstatic", interactive=False, verbosity=0)
 
     def _say(self, name: str, line: str) -> None:
         self.stdout.write(f"{name:8} | {line}")

@@ -1,0 +1,48 @@
+"""`manage.py add_person`: an account with a role."""
+
+from __future__ import annotations
+
+import getpass
+import secrets
+import sys
+from typing import Any
+
+from django.core.management.base import BaseCommand, CommandError, CommandParser
+
+from arena.errors import ArenaError
+from arena.services.people import create_person
+from augment.errors import AugmentError
+
+
+class Command(BaseCommand):
+    """Make an expert, an analyst or an admin."""
+
+    help = (
+        "Make an account. The password is asked for; where nobody can be asked it is made up and "
+        "printed once."
+    )
+
+    def add_arguments(self, parser: CommandParser) -> None:
+        """Declare the options."""
+        parser.add_argument("username")
+        parser.add_argument("--role", required=True, help="expert, analyst or admin")
+        parser.add_argument("--pseudonym", help="what others see; a numbered one by default")
+
+    def handle(self, *args: Any, **options: Any) -> None:
+        """Make the account."""
+        asked = sys.stdin.isatty()
+        password = getpass.getpass("Password: ") if asked else secrets.token_urlsafe(12)
+        if not password:
+            raise CommandError("An empty password is no password; nothing was made.")
+        try:
+            user = create_person(
+                username=options["username"],
+                password=password,
+                role=options["role"],
+                pseudonym=options["pseudonym"],
+            )
+        except (ArenaError, AugmentError) as error:
+            raise CommandError(str(error)) from error
+        self.stdout.write(f"Made {options['role']} {user.username} ({user.person.pseudonym}).")
+        if not asked:
+            self.stdout.write(f"Password (shown once): {password}")

@@ -1,0 +1,89 @@
+"""`manage.py demo`: the main job on the catalogue, unattended, then served."""
+
+from __future__ import annotations
+
+import time
+from pathlib import Path
+from typing import Any
+
+from django.conf import settings
+from django.core.management import call_command
+from django.core.management.base import BaseCommand, CommandError, CommandParser
+
+from arena.errors import ArenaError
+from arena.serving import demo
+from arena.serving.stack import Web, background, web_server
+from arena.serving.supervisor import Supervisor
+from augment.errors import AugmentError
+
+
+class Command(BaseCommand):
+    """Do the whole job with simulated contestants and votes, and say where everything is."""
+
+    help = (
+        "Load the catalogue, augment every scenario with every contestant, let simulated experts "
+        "vote, rate, export the table, and serve the result."
+    )
+
+    def add_arguments(self, parser: CommandParser) -> None:
+        """Declare the options."""
+        parser.add_argument("--host", default="127.0.0.1", help="address to listen on")
+        parser.add_argument("--port", type=int, default=8000, help="port to listen on")
+        parser.add_argument("--no-serve", action="store_true", help="stop before serving")
+
+    def handle(self, *args: Any, **options: Any) -> None:
+        """Run the demo; a fault of any step ends it with a sentence."""
+        started = time.monotonic()
+        web = Web(host=options["host"], port=options["port"])
+        try:
+            server = [] if options["no_serve"] else [web_server(web)]
+            call_command("prepare", verbosity=0)
+            demo.prepare(self.stdout.write)
+            supervisor = Supervisor([*background(concurrency=2), *server], self._keep)
+            with supervisor.signals():
+                try:
+                    supervisor.start()
+                    demo.generate(self.stdout.write, supervisor.check)
+                    board = demo.vote_and_rate(self.stdout.write, settings.VAR_DIR / "demo")
+                    self._show(board, web, time.monotonic() - started, serve=bool(server))
+                    if server and not supervisor.is_stopping:
+                        supervisor.watch()
+                finally:
+                    supervisor.stop()
+        except (ArenaError, AugmentError) as error:
+            raise CommandError(str(error)) from error
+
+    def _show(self, board: demo.Leaderboard, web: Web, took_s: float, *, serve: bool) -> None:
+        table = next(path for path in board.files if path.suffix == ".csv").read_text()
+        lines = [
+            "",
+            f"{board.study.name}, rated:",
+            *(f"  {line}" for line in table.splitlines()),
+            "",
+            f"Tables:   {', '.join(str(_short(path)) for path in board.files)}",
+            f"Pictures: {_short(settings.MEDIA_ROOT)}/bev/",
+            f"The demo took {took_s:.0f} s.",
+        ]
+        if serve:
+            lines += [
+                "",
+                f"Scenario Arena is at {web.address}  (Ctrl-C stops it)",
+                *(f"  sign in as {name:8} password {demo.PASSWORD}" for name, _ in demo.PEOPLE),
+                f"  Vote as 'expert' in the study {demo.OPEN_STUDY!r}.",
+            ]
+        self.stdout.write("\n".join(lines))
+        self.stdout.flush()
+
+    @staticmethod
+    def _keep(name: str, line: str) -> None:
+        """What the children say goes to a file; the demo's own lines stay readable."""
+        folder = settings.VAR_DIR / "log"
+        folder.mkdir(parents=True, exist_ok=True)
+        with (folder / f"{name}.log").open("a") as log:
+            log.write(f"{line}\n")
+
+
+def _short(path: Path) -> Path:
+    """The path as seen from here, where that is shorter."""
+    here = Path.cwd()
+    return path.relative_to(here) if path.is_relative_to(here) else path

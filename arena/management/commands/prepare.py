@@ -1,0 +1,21 @@
+"""`manage.py prepare`: bring tables and static files up to date; a second run changes nothing."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from django.conf import settings
+from django.core.management import call_command
+from django.core.management.base import BaseCommand
+
+
+class Command(BaseCommand):
+    """What has to be done once after every update, before anything is served."""
+
+    help = "Apply migrations and collect the static files."
+
+    def handle(self, *args: Any, **options: Any) -> None:
+        """Apply and collect."""
+        call_command("migrate", interactive=False, verbosity=0)
+        settings.STATIC_ROOT.mkdir(parents=True, exist_ok=True)
+        call_command("collectstatic", interactive=False, verbosity=0)

@@ -1,0 +1,173 @@
+"""The main job on the catalogue, from the scenes to the exported table, with simulated votes.
+
+Every step can be repeated: what is there already is used again, so a second run changes nothing.
+"""
+
+from __future__ import annotations
+
+import socket
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+from django.conf import settings
+from django.contrib.auth.models import User
+
+from arena.errors import ArenaError
+from arena.exports.leaderboard import FORMATS, write_leaderboard
+from arena.models import Study
+from arena.services.people import create_person
+from arena.services.ratings import rate
+from arena.services.simulation import simulate_votes
+from arena.services.studies import close_study, open_study
+from augment.models import Augmentation, Contestant, Endpoint, GenerationJob, Scenario
+from augment.services.catalogue import load_catalogue
+from augment.services.contestants import add_contestant, ensure_builtin, ensure_endpoint
+from augment.services.jobs import launch, progress
+from augment.tasks import enqueue_job
+
+PASSWORD = "arena-demo"  # for the demo's own accounts on this computer
+STAND_IN = "stand-in"
+SIMULATED = (
+    ("sim-good-otm", "fake-good", "Simulated good OTM"),
+    ("sim-careless-otm", "fake-careless", "Simulated careless OTM"),
+)
+SIMULATED_EXPERTS = tuple(f"sim-expert-{number}" for number in range(1, 6))
+PEOPLE = (("admin", "admin"), ("analyst", "analyst"), ("expert", "expert"))
+JOB = "Demo: the catalogue"
+SIMULATED_STUDY = "Demo (simulated votes)"
+OPEN_STUDY = "Try it yourself"
+SEED = 7
+SIMULATED_VOTES_EACH = 40
+YOUR_VOTES = 30
+JOB_LIMIT_S = 150.0
+
+
+class DemoFailed(ArenaError):
+    """A step of the demo did not end as it should; the text says which and how."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Leaderboard:
+    """Where the demo left its table."""
+
+    study: Study
+    files: tuple[Path, ...]
+
+
+def prepare(say: Callable[[str], None]) -> None:
+    """Scenes, scenarios, contestants and people; nothing here needs a running worker."""
+    report = load_catalogue(folder=settings.BASE_DIR / "fixtures")
+    say(f"Catalogue: {report}")
+    ensure_builtin()
+    ensure_endpoint(label=STAND_IN, base_url=_stand_in_address(), is_simulated=True)
+    for slug, model, name in SIMULATED:
+        add_contestant(slug=slug, variant="otm", endpoint=STAND_IN, model=model, name=name)
+    names = ", ".join(Contestant.objects.values_list("slug", flat=True))
+    say(f"Contestants: {names}")
+    for username, role in PEOPLE:
+        _person(username, role)
+    for username in SIMULATED_EXPERTS:
+        _person(username, "expert", is_simulated=True)
+
+
+def generate(say: Callable[[str], None], look: Callable[[], None]) -> GenerationJob:
+    """Every contestant on every scenario of the catalogue, through the workers.
+
+    Args:
+        say: Gets a line for every bit of progress.
+        look: Called again and again; it raises where a worker is gone for good.
+
+    Raises:
+        DemoFailed: It takes too long, or rows failed.
+    """
+    job = GenerationJob.objects.filter(name=JOB).first() or launch(
+        name=JOB, contestants=_contestants(), scenarios=_scenarios()
+    )
+    enqueue_job(job.pk)
+    deadline, last = time.monotonic() + JOB_LIMIT_S, -1
+    while (now := progress(job)).under_way:
+        look()
+        if time.monotonic() > deadline:
+            raise DemoFailed(f"The job {JOB!r} is not done after {JOB_LIMIT_S:.0f} s: {now}.")
+        if now.ended != last and now.ended % 8 == 0:
+            say(f"  {now.ended} of {now.total} augmentations")
+            last = now.ended
+        time.sleep(0.2)
+    say(
+        f"Augmentations: {now.done} done, {now.unreadable} unreadable, {now.refused} refused, "
+        f"{now.failed} failed"
+    )
+    if now.failed:
+        reasons = job.augmentations.filter(state=Augmentation.State.FAILED)
+        raise DemoFailed("; ".join(sorted(set(reasons.values_list("reason", flat=True)))))
+    return job
+
+
+def vote_and_rate(say: Callable[[str], None], folder: Path) -> Leaderboard:
+    """A study with simulated votes, closed and rated, and its table as files."""
+    study = Study.objects.filter(name=SIMULATED_STUDY).first()
+    if study is None:
+        study = open_study(
+            name=SIMULATED_STUDY,
+            contestants=_contestants(),
+            scenarios=_scenarios(),
+            experts=SIMULATED_EXPERTS,
+            votes_per_expert=SIMULATED_VOTES_EACH,
+            seed=SEED,
+            allow_simulated=True,
+        )
+        simulate_votes(study=study, seed=SEED)
+        study = close_study(study=study)
+        rate(study=study, rounds=1000, seed=SEED)
+    if not Study.objects.filter(name=OPEN_STUDY).exists():
+        open_study(
+            name=OPEN_STUDY,
+            contestants=_contestants(),
+            scenarios=_scenarios(),
+            experts=["expert"],
+            votes_per_expert=YOUR_VOTES,
+            seed=SEED,
+            allow_simulated=True,
+        )
+    snapshot = study.snapshots.latest("made_at")
+    say(f"Votes: {snapshot.votes_counted} simulated ones counted in {SIMULATED_STUDY!r}")
+    folder.mkdir(parents=True, exist_ok=True)
+    files = []
+    for kind in FORMATS:
+        path = folder / f"leaderboard.{ {'latex': 'tex'}.get(kind, kind) }"
+        write_leaderboard(snapshot, kind, path)
+        files.append(path)
+    return Leaderboard(study=study, files=tuple(files))
+
+
+def _contestants() -> list[str]:
+    return list(Contestant.objects.values_list("slug", flat=True))
+
+
+def _scenarios() -> list[str]:
+    return list(Scenario.objects.filter(in_catalogue=True).values_list("slug", flat=True))
+
+
+def _person(username: str, role: str, *, is_simulated: bool = False) -> None:
+    if not User.objects.filter(username=username).exists():
+        create_person(
+            username=username,
+            password=None if is_simulated else PASSWORD,
+            role=role,
+            is_simulated=is_simulated,
+        )
+
+
+def _stand_in_address() -> str:
+    """The address that it had before, unless somebody else listens there now."""
+    kept = Endpoint.objects.filter(label=STAND_IN).first()
+    with socket.socket() as probe:
+        probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        port = int(kept.base_url.rsplit(":", 1)[1].split("/")[0]) if kept else 0
+        try:
+            probe.bind(("127.0.0.1", port))
+        except OSError:
+            probe.bind(("127.0.0.1", 0))
+        return f"http://127.0.0.1:{probe.getsockname()[1]}/v1"
