@@ -8,6 +8,8 @@ from pathlib import Path
 import pytest
 from pytest_django import Settings
 
+from tests.stack import Home
+
 
 @pytest.fixture(scope="session")
 def realdata() -> Path:
@@ -37,3 +39,14 @@ def _own_files(settings: Settings, tmp_path: Path) -> None:
     }
     settings.WHITENOISE_AUTOREFRESH = True
     settings.PASSWORD_HASHERS = ["django.contrib.auth.hashers.MD5PasswordHasher"]
+
+
+@pytest.fixture(scope="session")
+def demo_home(tmp_path_factory: pytest.TempPathFactory) -> Home:
+    """What `make demo SERVE=0` leaves behind; tests that change it take a copy.
+
+    The folder's name is short, because the path of a socket may not be long.
+    """
+    home = Home(folder=tmp_path_factory.mktemp("demo"))
+    home.must("demo", "--no-serve")
+    return home

@@ -1,0 +1,65 @@
+"""`make demo SERVE=0`: the main job, unattended, on the real parts."""
+
+from __future__ import annotations
+
+import csv
+import json
+import struct
+from pathlib import Path
+
+import pytest
+
+from tests.stack import Home
+
+pytestmark = [pytest.mark.redis, pytest.mark.slow, pytest.mark.xdist_group("demo")]
+
+
+def standings(home: Home) -> list[dict[str, str]]:
+    with (home.folder / "var" / "demo" / "leaderboard.csv").open(newline="") as file:
+        return list(csv.DictReader(file))
+
+
+def test_it_leaves_a_leaderboard_of_at_least_three_contestants(demo_home: Home) -> None:
+    rows = standings(demo_home)
+    assert len(rows) >= 3
+    assert sum(int(row["votes"]) for row in rows) == 2 * 200
+    document = json.loads((demo_home.folder / "var" / "demo" / "leaderboard.json").read_text())
+    assert len(document["standings"]) == len(rows)
+    assert r"\toprule" in (demo_home.folder / "var" / "demo" / "leaderboard.tex").read_text()
+
+
+def test_every_file_says_that_it_is_simulated(demo_home: Home) -> None:
+    for path in (demo_home.folder / "var" / "demo").iterdir():
+        assert "simulated" in path.read_text().lower(), path.name
+
+
+def test_its_pictures_are_plain_pngs_of_the_agreed_size(demo_home: Home) -> None:
+    pictures = list((demo_home.folder / "media" / "bev").glob("*.png"))
+    assert len(pictures) >= 24
+    for picture in pictures:
+        data = picture.read_bytes()
+        assert struct.unpack(">II", data[16:24]) == (1200, 800)
+        assert set(chunks(data)) <= {b"IHDR", b"PLTE", b"tRNS", b"IDAT", b"IEND"}
+
+
+def test_the_careless_contestant_loses_to_the_reference(demo_home: Home) -> None:
+    rating = {row["contestant"]: float(row["rating"]) for row in standings(demo_home)}
+    by_word = {word: value for name, value in rating.items() for word in name.lower().split()}
+    assert by_word["careless"] < by_word["reference"]
+
+
+def test_a_second_run_uses_what_is_there(demo_home: Home, tmp_path: Path) -> None:
+    again = demo_home.copy(tmp_path / "again")
+    before = (again.folder / "var" / "demo" / "leaderboard.csv").read_bytes()
+    again.must("demo", "--no-serve")
+    assert (again.folder / "var" / "demo" / "leaderboard.csv").read_bytes() == before
+
+
+def chunks(data: bytes) -> list[bytes]:
+    """The kinds of the chunks of a PNG, in order."""
+    kinds, at = [], 8
+    while at < len(data):
+        (length,) = struct.unpack(">I", data[at : at + 4])
+        kinds.append(data[at + 4 : at + 8])
+        at += 12 + length
+    return kinds
