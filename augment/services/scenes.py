@@ -123,11 +123,7 @@ def add_scenario(
         modification = modification_from_document(reference)
         check_reference(scene_of(scenario), modification)
         scenario.reference = modification_to_document(modification)
-    try:
-        with transaction.atomic():
-            scenario.save(force_insert=True)
-    except IntegrityError:  # somebody else was faster
-        raise Conflict(f"There is a scenario called {slug!r} already; try again.") from None
+    _insert(scenario)
     after = {"slug": slug, "scene": base_scene.slug, "type": kind.value}
     log_event(
         actor=actor,
@@ -137,6 +133,16 @@ def add_scenario(
         after=after | {"has_reference": reference is not None, "keep_traffic": keep_traffic},
     )
     return scenario
+
+
+def _insert(scenario: Scenario) -> None:
+    try:
+        with transaction.atomic():
+            scenario.save(force_insert=True)
+    except IntegrityError:  # somebody else was faster
+        raise Conflict(
+            f"There is a scenario called {scenario.slug!r} already; try again."
+        ) from None
 
 
 def scene_of(scenario: Scenario) -> Scene:
