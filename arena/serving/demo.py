@@ -15,7 +15,9 @@ from django.conf import settings
 from django.contrib.auth.models import User
 
 from arena.errors import ArenaError
-from arena.exports.leaderboard import FORMATS, write_leaderboard
+from arena.exports.files import write_whole
+from arena.exports.tables import leaderboard_table
+from arena.exports.writers import FORMATS, plain_text
 from arena.models import Study
 from arena.services.people import create_person
 from arena.services.ratings import rate
@@ -50,9 +52,9 @@ class DemoFailed(ArenaError):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Leaderboard:
-    """Where the demo left its table."""
+    """The table for a terminal, and where its files are."""
 
-    study: Study
+    text: str
     files: tuple[Path, ...]
 
 
@@ -131,15 +133,13 @@ def vote_and_rate(say: Callable[[str], None], folder: Path) -> Leaderboard:
             seed=SEED,
             allow_simulated=True,
         )
-    snapshot = study.snapshots.latest("made_at")
-    say(f"Votes: {snapshot.votes_counted} simulated ones counted in {SIMULATED_STUDY!r}")
+    table = leaderboard_table(study.snapshots.latest("made_at"))
     folder.mkdir(parents=True, exist_ok=True)
     files = []
-    for kind in FORMATS:
-        path = folder / f"leaderboard.{ {'latex': 'tex'}.get(kind, kind) }"
-        write_leaderboard(snapshot, kind, path)
-        files.append(path)
-    return Leaderboard(study=study, files=tuple(files))
+    for chosen in FORMATS.values():
+        files.append(folder / f"leaderboard.{chosen.suffix}")
+        write_whole(files[-1], chosen.write(table))
+    return Leaderboard(text=plain_text(table), files=tuple(files))
 
 
 def _contestants() -> list[str]:

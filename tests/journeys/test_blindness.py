@@ -49,8 +49,7 @@ def eva(client: Client, study: Study) -> Client:
 def secrets_of(study: Study) -> list[str]:
     """Everything that tells who made a picture."""
     told = [*SECRETS, "llama", "otm", "hosted"]
-    for row in study.contestants.all():
-        told.append(str(row.code))
+    told += [str(contestant.code) for contestant in study.contestants.all()]
     for row in Augmentation.objects.select_related("job"):
         told += [str(row.code), str(row.job.code), row.image]
     return told

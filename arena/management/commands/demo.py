@@ -54,11 +54,9 @@ class Command(BaseCommand):
             raise CommandError(str(error)) from error
 
     def _show(self, board: demo.Leaderboard, web: Web, took_s: float, *, serve: bool) -> None:
-        table = next(path for path in board.files if path.suffix == ".csv").read_text()
         lines = [
             "",
-            f"{board.study.name}, rated:",
-            *(f"  {line}" for line in table.splitlines()),
+            board.text,
             "",
             f"Tables:   {', '.join(str(_short(path)) for path in board.files)}",
             f"Pictures: {_short(settings.MEDIA_ROOT)}/bev/",

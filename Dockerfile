@@ -1,0 +1,13 @@
+# One image for the web server and the workers; compose.yaml puts them together.
+FROM python:3.12-slim
+ENV PYTHONUNBUFFERED=1 PYTHONDONTWRITEBYTECODE=1
+RUN useradd --create-home arena
+WORKDIR /home/arena/app
+COPY requirements.txt .
+RUN pip install --no-cache-dir --require-hashes -r requirements.txt
+COPY . .
+RUN mkdir -p /data/var /data/media && chown -R arena /data
+USER arena
+ENV ARENA_VAR_DIR=/data/var ARENA_MEDIA_DIR=/data/media
+EXPOSE 8000
+CMD ["sh", "-c", "python manage.py prepare && exec gunicorn arena.config.wsgi --bind 0.0.0.0:8000 --workers 2 --threads 4"]
