@@ -47,6 +47,6 @@ def demo_home(tmp_path_factory: pytest.TempPathFactory) -> Home:
 
     The folder's name is short, because the path of a socket may not be long.
     """
-    home = Home(folder=tmp_path_factory.mktemp("demo"))
+    home = Home.at(tmp_path_factory.mktemp("demo"))
     home.must("demo", "--no-serve")
     return home

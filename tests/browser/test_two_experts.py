@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import csv
-import sqlite3
 from collections import Counter
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
@@ -104,20 +103,17 @@ def test_two_browsers_vote_at_once_and_the_export_agrees(home: Home, tmp_path: P
 
 def votes(home: Home) -> list[dict[str, str]]:
     """Every vote of the study, straight from the database."""
-    with sqlite3.connect(home.database) as connection:
-        connection.row_factory = sqlite3.Row
-        found = connection.execute(
-            "SELECT v.matchup_id AS matchup, v.outcome, l.slug AS left, r.slug AS right"
-            " FROM arena_vote v JOIN arena_matchup m ON m.id = v.matchup_id"
-            " JOIN arena_study s ON s.id = m.study_id"
-            " JOIN augment_augmentation al ON al.id = m.left_id"
-            " JOIN augment_contestant l ON l.id = al.contestant_id"
-            " JOIN augment_augmentation ar ON ar.id = m.right_id"
-            " JOIN augment_contestant r ON r.id = ar.contestant_id"
-            " WHERE s.name = ?",
-            (STUDY,),
-        )
-        return [dict(row) for row in found]
+    found = home.rows(
+        "SELECT v.matchup_id, v.outcome, l.slug, r.slug"
+        " FROM arena_vote v JOIN arena_matchup m ON m.id = v.matchup_id"
+        " JOIN arena_study s ON s.id = m.study_id"
+        " JOIN augment_augmentation al ON al.id = m.left_id"
+        " JOIN augment_contestant l ON l.id = al.contestant_id"
+        " JOIN augment_augmentation ar ON ar.id = m.right_id"
+        " JOIN augment_contestant r ON r.id = ar.contestant_id"
+        f" WHERE s.name = '{STUDY}'"
+    )
+    return [dict(zip(("matchup", "outcome", "left", "right"), row, strict=True)) for row in found]
 
 
 def count_by_hand(rows: list[dict[str, str]]) -> dict[str, dict[str, int]]:
