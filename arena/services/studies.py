@@ -129,18 +129,6 @@ def rules_of(study: Study) -> Rules:
     )
 
 
-def _rules(cells: Cells, experts: list[User], votes_per_expert: int, seed: int) -> Rules:
-    return Rules(
-        entries=tuple(
-            Entry(scenario=scenario, contestant=contestant, picture=cell.image)
-            for (scenario, contestant), cell in sorted(cells.items())
-        ),
-        experts=tuple(expert.username for expert in experts),
-        votes_per_expert=votes_per_expert,
-        seed=seed,
-    )
-
-
 # --- Who and what takes part -------------------------------------------------------------------
 
 

@@ -23,8 +23,9 @@ from arena.services.people import create_person
 from arena.services.ratings import rate
 from arena.services.simulation import simulate_votes
 from arena.services.studies import close_study, open_study
-from augment.models import Augmentation, Contestant, Endpoint, GenerationJob, Scenario
+from augment.models import Augmentation, Contestant, Endpoint, GenerationJob
 from augment.services.catalogue import load_catalogue
+from augment.services.choosing import ALL, CATALOGUE, chosen_contestants, chosen_scenarios
 from augment.services.contestants import add_contestant, ensure_builtin, ensure_endpoint
 from augment.services.jobs import launch, progress
 from augment.tasks import enqueue_job
@@ -85,7 +86,7 @@ def generate(say: Callable[[str], None], look: Callable[[], None]) -> Generation
         DemoFailed: It takes too long, or rows failed.
     """
     job = GenerationJob.objects.filter(name=JOB).first() or launch(
-        name=JOB, contestants=_contestants(), scenarios=_scenarios()
+        name=JOB, contestants=chosen_contestants([ALL]), scenarios=chosen_scenarios([CATALOGUE])
     )
     enqueue_job(job.pk)
     deadline, last = time.monotonic() + JOB_LIMIT_S, -1
@@ -113,8 +114,8 @@ def vote_and_rate(say: Callable[[str], None], folder: Path) -> Leaderboard:
     if study is None:
         study = open_study(
             name=SIMULATED_STUDY,
-            contestants=_contestants(),
-            scenarios=_scenarios(),
+            contestants=chosen_contestants([ALL]),
+            scenarios=chosen_scenarios([CATALOGUE]),
             experts=SIMULATED_EXPERTS,
             votes_per_expert=SIMULATED_VOTES_EACH,
             seed=SEED,
@@ -126,8 +127,8 @@ def vote_and_rate(say: Callable[[str], None], folder: Path) -> Leaderboard:
     if not Study.objects.filter(name=OPEN_STUDY).exists():
         open_study(
             name=OPEN_STUDY,
-            contestants=_contestants(),
-            scenarios=_scenarios(),
+            contestants=chosen_contestants([ALL]),
+            scenarios=chosen_scenarios([CATALOGUE]),
             experts=["expert"],
             votes_per_expert=YOUR_VOTES,
             seed=SEED,
@@ -140,14 +141,6 @@ def vote_and_rate(say: Callable[[str], None], folder: Path) -> Leaderboard:
         files.append(folder / f"leaderboard.{chosen.suffix}")
         write_whole(files[-1], chosen.write(table))
     return Leaderboard(text=plain_text(table), files=tuple(files))
-
-
-def _contestants() -> list[str]:
-    return list(Contestant.objects.values_list("slug", flat=True))
-
-
-def _scenarios() -> list[str]:
-    return list(Scenario.objects.filter(in_catalogue=True).values_list("slug", flat=True))
 
 
 def _person(username: str, role: str, *, is_simulated: bool = False) -> None:

@@ -9,6 +9,7 @@ from django.core.management.base import BaseCommand, CommandError, CommandParser
 from arena.errors import ArenaError
 from arena.services.studies import open_study
 from augment.errors import AugmentError
+from augment.services.choosing import chosen_contestants, chosen_scenarios
 
 
 class Command(BaseCommand):
@@ -35,8 +36,8 @@ class Command(BaseCommand):
         try:
             study = open_study(
                 name=options["name"],
-                contestants=options["contestants"],
-                scenarios=options["scenarios"],
+                contestants=chosen_contestants(options["contestants"]),
+                scenarios=chosen_scenarios(options["scenarios"]),
                 experts=options["experts"],
                 votes_per_expert=options["votes_per_expert"],
                 seed=options["seed"],

@@ -11,8 +11,9 @@ from django.db import transaction
 from django.utils import timezone
 
 from augment.errors import AugmentError
-from augment.models import Contestant, GenerationJob, Scenario
+from augment.models import GenerationJob
 from augment.services import jobs
+from augment.services.choosing import chosen_contestants, chosen_scenarios
 from augment.services.contestants import ensure_builtin
 from augment.services.job_summary import contestant_lines, failure_groups
 from augment.tasks import check_broker, enqueue_job
@@ -61,8 +62,8 @@ class Command(BaseCommand):
         with transaction.atomic():
             job = jobs.launch(
                 name=name,
-                contestants=_contestants(options["contestants"]),
-                scenarios=_scenarios(options["scenarios"]),
+                contestants=chosen_contestants(options["contestants"]),
+                scenarios=chosen_scenarios(options["scenarios"]),
             )
             transaction.on_commit(lambda: enqueue_job(job.pk))
         return job
@@ -125,19 +126,3 @@ class Command(BaseCommand):
         if failures:
             failed = sum(group.count for group in failures)
             raise CommandError(f"{failed} failed; see the reasons above.", returncode=1)
-
-
-def _contestants(given: list[str]) -> list[str]:
-    """The slugs; `all` stands for every one that a job can run."""
-    if given != ["all"]:
-        return given
-    runnable = Contestant.objects.filter(kind__in=jobs.RUNNABLE)
-    return list(runnable.values_list("slug", flat=True))
-
-
-def _scenarios(given: list[str]) -> list[str]:
-    """The slugs; `all` and `catalogue` stand for what is stored."""
-    rows = {"all": Scenario.objects.all(), "catalogue": Scenario.objects.filter(in_catalogue=True)}
-    if len(given) != 1 or given[0] not in rows:
-        return given
-    return list(rows[given[0]].values_list("slug", flat=True))
