@@ -150,7 +150,7 @@ def test_a_picture_comes_without_traces_and_only_to_its_expert(eva: Client, stud
     assert mine is not None
     assert hers is not None
     answer = eva.get(f"/i/{mine.left_token}")
-    answer.close()
+    assert answer.getvalue().startswith(b"\x89PNG")
     assert answer.status_code == 200
     assert {"ETag", "Last-Modified"} & set(answer.headers) == set()
     assert answer.headers.get("Content-Disposition", "inline") == "inline"
