@@ -1,0 +1,147 @@
+"""Construction zones of the rule placer: a taper, a line or a ring of cones, and one worker.
+
+s runs along the ego's lane from the ego's centre, d to the left of it.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from augment.baselines.rule_placer_ground import Ground
+from augment.errors import InstructionNotUnderstood
+from augment.instruction.intent import ConesRequest, LaneChoice, LateralTarget, Shape, Side
+from augment.scene.entities import AgentType, TrafficAgent
+from augment.scene.lane_graph import PlaceOnWay
+from augment.scene.sizes import LENGTH_WIDTH_M
+
+_EDGE_M = LENGTH_WIDTH_M[AgentType.TRAFFIC_CONE][1] / 2.0
+"""A cone at a lane boundary stands inside of it."""
+
+_WORKER_GAP_M = 1.6
+"""How far from the cones a worker stands; interPlan's are 0.8 to 4.0 m from the nearest."""
+
+Place = tuple[float, float]
+"""(s, d)."""
+
+
+def cones(
+    request: ConesRequest, ground: Ground, distance_m: float, rng: np.random.Generator
+) -> tuple[TrafficAgent, ...]:
+    """The cones in order, then the worker; ids are still empty.
+
+    Raises:
+        InstructionNotUnderstood: The lanes end before the last cone, or there is no such lane.
+    """
+    spacing_m = float(rng.uniform(request.spacing.low_m, request.spacing.high_m))
+    if spacing_m < 2.0 * _EDGE_M:
+        raise InstructionNotUnderstood(f"Cones {spacing_m:g} m apart would stand in each other.")
+    lane = request.spot.lane
+    half_lane_m = ground.way(ground.beside(ground.along(distance_m), lane)).width_m / 2.0
+    if request.shape is Shape.RING:
+        places = _ring(distance_m, request.count, spacing_m, half_lane_m - _EDGE_M)
+        worker = (distance_m, 0.0)
+    elif request.shape is Shape.LINE:
+        d_m = _line_side(request, ground) * (half_lane_m - _EDGE_M)
+        places = [(distance_m + index * spacing_m, d_m) for index in range(request.count)]
+        worker = _beside_line(places, ground, lane)
+    else:
+        sign = _sign(request.start or ground.kerb)
+        places = _taper(distance_m, request.count, spacing_m, sign * (half_lane_m - _EDGE_M))
+        worker = _behind_taper(places, sign)
+    made = [
+        _standing(AgentType.TRAFFIC_CONE, _at(ground, lane, place), ground) for place in places
+    ]
+    if request.has_worker:
+        made.append(_standing(AgentType.PEDESTRIAN, _at(ground, lane, worker), ground))
+    return tuple(made)
+
+
+# Private
+
+
+def _taper(start_m: float, count: int, spacing_m: float, from_d_m: float) -> list[Place]:
+    """From one boundary to the other, the neighbours `spacing_m` apart, as slanted as needed."""
+    if count == 1:
+        return [(start_m, from_d_m)]
+    across_m = min(2.0 * abs(from_d_m) / (count - 1), spacing_m)
+    along_m = math.sqrt(spacing_m**2 - across_m**2)
+    inwards_m = -math.copysign(across_m, from_d_m)
+    return [(start_m + i * along_m, from_d_m + i * inwards_m) for i in range(count)]
+
+
+def _behind_taper(places: list[Place], sign: float) -> Place:
+    """Beside the middle of a taper, on the side that it closes (beyond the cones, at `sign`)."""
+    (first_s, first_d), (last_s, last_d) = places[0], places[-1]
+    length_m = math.hypot(last_s - first_s, last_d - first_d)
+    if length_m == 0.0:
+        return first_s + _WORKER_GAP_M, first_d
+    along, across = (last_s - first_s) / length_m, abs(last_d - first_d) / length_m
+    middle_s, middle_d = (first_s + last_s) / 2.0, (first_d + last_d) / 2.0
+    return middle_s + across * _WORKER_GAP_M, middle_d + sign * along * _WORKER_GAP_M
+
+
+def _beside_line(places: list[Place], ground: Ground, lane: LaneChoice) -> Place:
+    """Beside the middle of a line: off the road if the line's outer side is, else in its lane."""
+    middle_m, d_m = (places[0][0] + places[-1][0]) / 2.0, places[0][1]
+    gap_m = math.copysign(_WORKER_GAP_M, d_m or _sign(ground.kerb))
+    outside = (middle_m, d_m + gap_m)
+    is_free = ground.lane_at(_at(ground, lane, outside).pose) is None
+    return outside if is_free else (middle_m, d_m - gap_m)
+
+
+def _ring(centre_m: float, count: int, spacing_m: float, widest_m: float) -> list[Place]:
+    """A circle around the centre, or two rows in the lane where the lane is too narrow for it.
+
+    An odd cone closes the rows towards the ego.
+    """
+    if count < 3:
+        raise InstructionNotUnderstood("A ring needs at least three cones.")
+    radius_m = spacing_m / (2.0 * math.sin(math.pi / count))
+    if radius_m <= widest_m:
+        angles = (math.pi + 2.0 * math.pi * index / count for index in range(count))
+        return [(centre_m + radius_m * math.cos(a), radius_m * math.sin(a)) for a in angles]
+    side_m, rows = min(spacing_m / 2.0, widest_m), count // 2
+    first_m = centre_m - (rows - 1) * spacing_m / 2.0
+    along = [first_m + index * spacing_m for index in range(rows)]
+    closing = [(first_m - math.sqrt(spacing_m**2 - side_m**2), 0.0)] if count % 2 else []
+    return [*closing, *((s, -side_m) for s in along), *((s, side_m) for s in reversed(along))]
+
+
+def _line_side(request: ConesRequest, ground: Ground) -> float:
+    """1 for the left boundary of the ego's direction, -1 for the right one, 0 for the centre."""
+    return {
+        LateralTarget.LANE_CENTRE: 0.0,
+        LateralTarget.LEFT_BOUNDARY: 1.0,
+        LateralTarget.RIGHT_BOUNDARY: -1.0,
+        LateralTarget.KERB: _sign(ground.kerb),
+        LateralTarget.CENTRE_LINE: _sign(ground.kerb.other),
+    }[request.spot.lateral.target]
+
+
+def _sign(side: Side) -> float:
+    return 1.0 if side is Side.LEFT else -1.0
+
+
+def _at(ground: Ground, lane: LaneChoice, place: Place) -> PlaceOnWay:
+    """The place (s, d): s along the ego's lane, d from the centre of the lane asked for."""
+    s_m, d_m = place
+    centre = ground.beside(ground.along(s_m), lane)
+    sign = -1.0 if lane is LaneChoice.ONCOMING else 1.0
+    return ground.graph.place(centre.way_id, centre.s_m, sign * d_m)
+
+
+def _standing(kind: AgentType, place: PlaceOnWay, ground: Ground) -> TrafficAgent:
+    length_m, width_m = LENGTH_WIDTH_M[kind]
+    on_lane = abs(place.d_m) <= ground.way(place).width_m / 2.0
+    return TrafficAgent(
+        id="",
+        type=kind,
+        x_m=place.pose.x_m,
+        y_m=place.pose.y_m,
+        heading_rad=place.pose.heading_rad,
+        length_m=length_m,
+        width_m=width_m,
+        lane_id=place.way_id if on_lane else ground.lane_at(place.pose),
+    )

@@ -1,0 +1,178 @@
+"""The ground that the rule placer stands on: distances along the ego's lane, sides, road edges.
+
+Frame: ego frame of the scene. d is to the left of a lane's own direction, in metres.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from augment.errors import InstructionNotUnderstood
+from augment.geometry.angles import difference
+from augment.geometry.frames import Pose
+from augment.instruction.intent import LaneChoice, Setting, Side
+from augment.scene.entities import AreaKind, Lane, LaneConnector, Point, Scene
+from augment.scene.lane_graph import LaneGraph, PlaceOnWay, Way
+
+_STEP_M = 0.25
+_GAP_M = 1.5
+"""A strip of this width that nobody drives on is the end of the road."""
+
+_WIDEST_M = 30.0
+_ONCOMING_WITHIN_M = 15.0
+
+
+class Ground:
+    """A scene read from the ego's place on its lane.
+
+    Raises:
+        InstructionNotUnderstood: The ego stands on no lane, so nothing lies along it.
+    """
+
+    def __init__(self, scene: Scene) -> None:
+        self.scene = scene
+        self.graph = LaneGraph(scene)
+        own = scene.ego.lane_id
+        if own not in self.graph.ways:
+            own = self.graph.under(0.0, 0.0, 0.0)
+        if own is None:
+            raise InstructionNotUnderstood("The ego stands on no lane of the map.")
+        self._own = own
+        self._start_m = self.graph.way(own).centerline.project(0.0, 0.0).s_m
+        self.kerb = Side(scene.traffic_side.value)
+
+    def along(self, distance_m: float, d_m: float = 0.0) -> PlaceOnWay:
+        """The place that far along the ego's lane (negative: back) and d to its left.
+
+        Raises:
+            InstructionNotUnderstood: The lanes end before.
+        """
+        place = self.graph.along(self._own, self._start_m, distance_m, d_m)
+        if place is None:
+            end, where = self._reach(distance_m)
+            raise InstructionNotUnderstood(f"The lanes end {end:.0f} m {where} the ego.")
+        return place
+
+    def beside(self, place: PlaceOnWay, lane: LaneChoice) -> PlaceOnWay:
+        """The place on a lane next to a place on the ego's own; there the centre of that lane.
+
+        Raises:
+            InstructionNotUnderstood: The map has no such lane there.
+        """
+        if lane is LaneChoice.OWN:
+            return place
+        way_id = self._oncoming(place) if lane is LaneChoice.ONCOMING else None
+        way = self.graph.way(place.way_id)
+        if lane is LaneChoice.LEFT and isinstance(way, Lane):
+            way_id = way.left_neighbor
+        if lane is LaneChoice.RIGHT and isinstance(way, Lane):
+            way_id = way.right_neighbor
+        if way_id is None or way_id not in self.graph.ways:
+            words = "oncoming lane" if lane is LaneChoice.ONCOMING else f"lane on the {lane}"
+            raise InstructionNotUnderstood(f"The map has no {words} beside the ego's lane there.")
+        s_m = self.graph.way(way_id).centerline.project(place.pose.x_m, place.pose.y_m).s_m
+        return self.graph.place(way_id, s_m)
+
+    def way(self, place: PlaceOnWay) -> Way:
+        """The lane or connector of a place."""
+        return self.graph.way(place.way_id)
+
+    def has_neighbour(self, place: PlaceOnWay, side: Side) -> bool:
+        """Whether another lane of the same direction lies on that side of the place's lane."""
+        way = self.way(place)
+        if not isinstance(way, Lane):
+            return False
+        return (way.left_neighbor if side is Side.LEFT else way.right_neighbor) is not None
+
+    def lane_at(self, pose: Pose) -> str | None:
+        """The id of the lane under a pose, None off every lane."""
+        return self.graph.under(pose.x_m, pose.y_m, pose.heading_rad)
+
+    def road_edge_m(self, pose: Pose, side: Side) -> float:
+        """How far from a pose the road ends on that side, straight across.
+
+        Raises:
+            InstructionNotUnderstood: There is road for 30 m, as in the middle of a junction.
+        """
+        sign = 1.0 if side is Side.LEFT else -1.0
+        near = [
+            way
+            for way in self.graph.ways.values()
+            if way.centerline.project(pose.x_m, pose.y_m).distance_m <= _WIDEST_M + way.width_m
+        ]
+        edge_m = 0.0
+        for step in range(1, int(_WIDEST_M / _STEP_M) + 1):
+            across_m = step * _STEP_M
+            x_m, y_m = pose.to_parent(np.array([[0.0, sign * across_m]]))[0]
+            if self.within((x_m, y_m), AreaKind.WALKWAY):
+                return edge_m
+            if self._is_road((x_m, y_m), near):
+                edge_m = across_m
+            elif across_m - edge_m >= _GAP_M:
+                return edge_m
+        raise InstructionNotUnderstood(f"The map shows no edge of the road on the {side} there.")
+
+    def within(self, point_m: Point, kind: AreaKind) -> bool:
+        """Whether a point lies in an area of that kind."""
+        return any(
+            area.kind is kind and _inside(point_m, np.array(area.boundary_m))
+            for area in self.scene.areas
+        )
+
+    def fits(self, place: PlaceOnWay, path_m: NDArray[np.float64], setting: Setting) -> bool:
+        """Whether a place, and the points (P, 2) walked from there, are in a setting."""
+        if setting is Setting.OFF_CROSSWALK:
+            return not any(self.within((x, y), AreaKind.CROSSWALK) for x, y in path_m)
+        point = (place.pose.x_m, place.pose.y_m)
+        if any(area.kind is AreaKind.INTERSECTION for area in self.scene.areas):
+            inside = self.within(point, AreaKind.INTERSECTION)
+        else:
+            inside = isinstance(self.way(place), LaneConnector)
+        return inside is (setting is Setting.IN_INTERSECTION)
+
+    # Private
+
+    def _reach(self, distance_m: float) -> tuple[float, str]:
+        """How far the lanes run from the ego in the direction of a distance too great."""
+        low, high = 0.0, abs(distance_m)
+        sign = math.copysign(1.0, distance_m)
+        while high - low > 0.1:
+            middle = (low + high) / 2.0
+            found = self.graph.along(self._own, self._start_m, sign * middle)
+            low, high = (low, middle) if found is None else (middle, high)
+        return low, "ahead of" if sign > 0.0 else "behind"
+
+    def _oncoming(self, place: PlaceOnWay) -> str | None:
+        """The nearest way across the road that leads the other way."""
+        for step in range(1, int(_ONCOMING_WITHIN_M / _STEP_M)):
+            for d_m in (step * _STEP_M, -step * _STEP_M):
+                x_m, y_m = place.pose.to_parent(np.array([[0.0, d_m]]))[0]
+                way_id = self.graph.under(x_m, y_m, place.pose.heading_rad + math.pi)
+                if way_id is None:
+                    continue
+                line = self.graph.way(way_id).centerline
+                heading_rad = line.heading_at(line.project(x_m, y_m).s_m)
+                if abs(difference(heading_rad, place.pose.heading_rad)) > math.radians(135.0):
+                    return way_id
+        return None
+
+    def _is_road(self, point_m: Point, ways: list[Way]) -> bool:
+        on_way = any(
+            way.centerline.project(*point_m).distance_m <= way.width_m / 2.0 for way in ways
+        )
+        return on_way or self.within(point_m, AreaKind.DRIVABLE)
+
+
+def _inside(point_m: Point, boundary_m: NDArray[np.float64]) -> bool:
+    """Whether a point lies in a polygon (P, 2): an odd number of its sides is to the right."""
+    x, y = point_m
+    start, end = boundary_m, np.roll(boundary_m, -1, axis=0)
+    spans = (start[:, 1] > y) != (end[:, 1] > y)
+    if not spans.any():
+        return False
+    a, b = start[spans], end[spans]
+    crossing_x = a[:, 0] + (y - a[:, 1]) * (b[:, 0] - a[:, 0]) / (b[:, 1] - a[:, 1])
+    return bool(np.count_nonzero(crossing_x > x) % 2)
