@@ -11,9 +11,11 @@ from dataclasses import dataclass
 from django.conf import settings
 from django.utils import timezone
 
+from augment.baselines import rule_placer
 from augment.errors import (
     AugmentError,
     ClaimLost,
+    InstructionNotUnderstood,
     InvalidModification,
     ModelFault,
 )
@@ -140,6 +142,8 @@ def _asked(row: Augmentation, scene: Scene, held: claims.Claim, connect: Connect
     match row.contestant.kind:
         case Kind.REFERENCE:
             return _from_reference(row)
+        case Kind.RULE:
+            return _from_rules(row, scene)
         case Kind.LLM | Kind.SIMULATED if row.contestant.endpoint is not None:
             return _from_model(row, row.contestant.endpoint, scene, held, connect)
     return Answer(
@@ -152,6 +156,18 @@ def _from_reference(row: Augmentation) -> Answer:
     if reference is None:
         return Answer(state=State.FAILED, reason="The scenario has no reference modification.")
     return Answer(state=State.DONE, modification=reference)
+
+
+def _from_rules(row: Augmentation, scene: Scene) -> Answer:
+    try:
+        placement = rule_placer.place(
+            scene, row.scenario.instruction, seed=seed_of(row.scenario.slug)
+        )
+    except InstructionNotUnderstood as refusal:
+        parts = {"Understood": refusal.understood, "Not understood": refusal.ignored}
+        notes = [f"{title}: {'; '.join(read)}." for title, read in parts.items() if read]
+        return Answer(state=State.REFUSED, reason=refusal.reason, notes=" ".join(notes))
+    return Answer(state=State.DONE, modification=placement.modification, notes=placement.notes)
 
 
 def _from_model(

@@ -131,6 +131,23 @@ def test_a_scene_that_can_not_be_read_is_a_failure_with_a_sentence() -> None:
     assert "can't be read" in row.reason
 
 
+def test_the_rule_placer_places_the_same_each_time() -> None:
+    first = ran(one_job(Contestant.Kind.RULE))
+    assert first.state == State.DONE
+    again = jobs.launch(name="R2", contestants=["someone"], scenarios=["street"])
+    second = ran(only_row(again))
+    assert second.modification == first.modification
+    assert second.image == first.image
+
+
+def test_the_rule_placer_refuses_what_it_does_not_understand() -> None:
+    row = ran(one_job(Contestant.Kind.RULE, instruction="Make it nicer."))
+    assert row.state == State.REFUSED
+    assert row.reason
+    row.scenario.refresh_from_db()
+    assert row.image == row.scenario.original_image
+
+
 def test_a_scenario_has_a_seed_of_its_own() -> None:
     assert runner.seed_of("street") == runner.seed_of("street") != runner.seed_of("street-2")
 
