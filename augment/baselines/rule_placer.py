@@ -71,7 +71,9 @@ def place(scene: Scene, instruction: str, *, seed: int = 0) -> Placement:
         for request in intent.requests:
             agents, distance_m = _fitted(request, ground, added, rng)
             added += agents
-            sentences.append(described(request, distance_m, agents))
+            sentences.append(
+                described(request, distance_m, across_m=ground.left_of_lane_m(agents[0]))
+            )
     except InstructionNotUnderstood as refusal:
         raise InstructionNotUnderstood(
             refusal.reason, understood=intent.understood, ignored=intent.ignored

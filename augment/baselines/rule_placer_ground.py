@@ -14,7 +14,7 @@ from augment.errors import InstructionNotUnderstood
 from augment.geometry.angles import difference
 from augment.geometry.frames import Pose
 from augment.instruction.intent import LaneChoice, Setting, Side
-from augment.scene.entities import AreaKind, Lane, LaneConnector, Point, Scene
+from augment.scene.entities import AreaKind, Lane, LaneConnector, Point, Scene, TrafficAgent
 from augment.scene.lane_graph import LaneGraph, PlaceOnWay, Way
 
 _STEP_M = 0.25
@@ -90,6 +90,12 @@ class Ground:
     def lane_at(self, pose: Pose) -> str | None:
         """The id of the lane under a pose, None off every lane."""
         return self.graph.under(pose.x_m, pose.y_m, pose.heading_rad)
+
+    def left_of_lane_m(self, agent: TrafficAgent) -> float:
+        """How far an agent stands left of the centre of its lane, 0 off every lane."""
+        if agent.lane_id is None:
+            return 0.0
+        return self.graph.way(agent.lane_id).centerline.project(agent.x_m, agent.y_m).d_m
 
     def road_edge_m(self, pose: Pose, side: Side) -> float:
         """How far from a pose the road ends on that side, straight across.

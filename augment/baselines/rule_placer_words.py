@@ -3,17 +3,16 @@
 from __future__ import annotations
 
 from augment.instruction.intent import (
+    Body,
     ConesRequest,
     CrashRequest,
     LaneChoice,
     LateralTarget,
-    Nearness,
     Relation,
     Request,
     VehicleRequest,
     WalkRequest,
 )
-from augment.scene.entities import TrafficAgent
 
 _LANES = {
     LaneChoice.OWN: "the ego's lane",
@@ -23,15 +22,24 @@ _LANES = {
 }
 
 
-def described(request: Request, distance_m: float, agents: tuple[TrafficAgent, ...]) -> str:
-    """One sentence: what stands where. `distance_m` is along the ego's lane."""
+def described(request: Request, distance_m: float, *, across_m: float) -> str:
+    """One sentence: what stands where.
+
+    Args:
+        request: What was asked for.
+        distance_m: Where it came to stand along the ego's lane, by its size.
+        across_m: How far from the centre of its lane, for a vehicle.
+    """
     relation = "ahead of" if request.spot.relation is Relation.AHEAD else "behind"
-    where = f"{distance_m:.1f} m {relation} the ego along its lane"
+    where = (
+        f"{distance_m:.1f} m {relation} the ego along its lane{_why_there(request, distance_m)}"
+    )
     lane = _LANES[request.spot.lane]
     match request:
         case VehicleRequest():
-            motion = f"driving at {request.speed_mps:g} m/s" if request.speed_mps else "standing"
-            return f"A {request.body}, {motion}, {where}, in {lane}, {_across(request)}."
+            motion = f"driving at {request.speed_mps:.1f} m/s" if request.speed_mps else "standing"
+            across = _across(request, abs(across_m))
+            return f"A {request.body}, {motion}, {where}, in {lane}, {across}."
         case WalkRequest():
             who = "A pedestrian" if request.count == 1 else f"{request.count} pedestrians"
             return (
@@ -42,19 +50,24 @@ def described(request: Request, distance_m: float, agents: tuple[TrafficAgent, .
             worker = " and one worker" if request.has_worker else ""
             return f"{request.count} cones in a {request.shape}{worker}, {where}, in {lane}."
         case CrashRequest():
-            return f"{request.count} crashed {request.body}s, the nearest {where}, in {lane}."
+            plural = "buses" if request.body is Body.BUS else f"{request.body}s"
+            return f"{request.count} crashed {plural}, the nearest {where}, in {lane}."
 
 
-def _across(request: VehicleRequest) -> str:
+def _why_there(request: Request, distance_m: float) -> str:
+    """A remark where the distance is not simply the one in the sentence."""
+    asked = request.spot.distance
+    if asked.is_range:
+        return f" (drawn from {asked})"
+    if abs(distance_m - asked.low_m) > 0.01:
+        return f" (moved from {asked.low_m:g} m, where it had no room)"
+    return ""
+
+
+def _across(request: VehicleRequest, offset_m: float) -> str:
     lateral = request.spot.lateral
     if lateral.target is LateralTarget.LANE_CENTRE:
         return "on the lane centre"
-    if lateral.offset is not None:
-        return f"{lateral.offset} from the lane centre towards the {lateral.target}"
-    words = {
-        Nearness.SLIGHTLY: "slightly towards",
-        Nearness.AT_EDGE: "at",
-        Nearness.HALF_OUT: "half beyond",
-        Nearness.OUTSIDE: "beyond",
-    }[lateral.nearness]
-    return f"{words} the {lateral.target}"
+    drawn = lateral.offset is not None and lateral.offset.is_range
+    remark = f" (drawn from {lateral.offset})" if drawn else ""
+    return f"{offset_m:.2f} m{remark} from the lane centre towards the {lateral.target}"

@@ -281,6 +281,15 @@ def test_notes_say_what_was_placed_assumed_and_ignored() -> None:
     assert placement.understood == ("Park", "a car", "24 m ahead of the ego")
 
 
+def test_notes_tell_drawn_and_moved_numbers() -> None:
+    drawn = place(scene(), PAPER)
+    (car,) = drawn.modification.added
+    assert f"{car.y_m:.2f} m (drawn from 0 to 1.5 m) from the lane centre" in drawn.notes
+    busy = scene(agents=(vehicle("Agent2", 16.4, 0.0),))
+    moved = place(busy, "a parked car about 21 m ahead of the ego")
+    assert "21.2 m ahead of the ego along its lane (moved from 21 m, where it had" in moved.notes
+
+
 def test_a_refusal_on_the_map_still_tells_what_was_read() -> None:
     with pytest.raises(InstructionNotUnderstood) as refused:
         place(scene(), "a parked car 160 m ahead of the ego")
