@@ -6,6 +6,7 @@ Frame: ego frame of the scene. d is to the left of a lane's own direction, in me
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,6 +23,8 @@ _GAP_M = 1.5
 """A strip of this width that nobody drives on is the end of the road."""
 
 _WIDEST_M = 30.0
+_BESIDE_LANES_M = 4.0
+_ALONG_RAD = math.radians(30.0)
 _ONCOMING_WITHIN_M = 15.0
 
 
@@ -98,28 +101,17 @@ class Ground:
         return self.graph.way(agent.lane_id).centerline.project(agent.x_m, agent.y_m).d_m
 
     def road_edge_m(self, pose: Pose, side: Side) -> float:
-        """How far from a pose the road ends on that side, straight across.
+        """How far from a pose on a lane its road ends on that side, straight across.
 
-        Raises:
-            InstructionNotUnderstood: There is road for 30 m, as in the middle of a junction.
+        The road is the lanes that run along with it, in either direction, and what else can be
+        driven on up to 4 m beyond them: a parking lane belongs to it, a side road does not.
         """
-        sign = 1.0 if side is Side.LEFT else -1.0
-        near = [
-            way
-            for way in self.graph.ways.values()
-            if way.centerline.project(pose.x_m, pose.y_m).distance_m <= _WIDEST_M + way.width_m
-        ]
-        edge_m = 0.0
-        for step in range(1, int(_WIDEST_M / _STEP_M) + 1):
-            across_m = step * _STEP_M
-            x_m, y_m = pose.to_parent(np.array([[0.0, sign * across_m]]))[0]
-            if self.within((x_m, y_m), AreaKind.WALKWAY):
-                return edge_m
-            if self._is_road((x_m, y_m), near):
-                edge_m = across_m
-            elif across_m - edge_m >= _GAP_M:
-                return edge_m
-        raise InstructionNotUnderstood(f"The map shows no edge of the road on the {side} there.")
+        near = [way for way in self.graph.ways.values() if self._runs_along(way, pose)]
+        lanes_m = self._scan(pose, side, 0.0, lambda point: _on_any(near, point))
+        end_m = self._scan(
+            pose, side, lanes_m, lambda point: self.within(point, AreaKind.DRIVABLE)
+        )
+        return end_m if end_m - lanes_m <= _BESIDE_LANES_M else lanes_m
 
     def within(self, point_m: Point, kind: AreaKind) -> bool:
         """Whether a point lies in an area of that kind."""
@@ -165,11 +157,31 @@ class Ground:
                     return way_id
         return None
 
-    def _is_road(self, point_m: Point, ways: list[Way]) -> bool:
-        on_way = any(
-            way.centerline.project(*point_m).distance_m <= way.width_m / 2.0 for way in ways
+    def _runs_along(self, way: Way, pose: Pose) -> bool:
+        place = way.centerline.project(pose.x_m, pose.y_m)
+        turn_rad = abs(difference(way.centerline.heading_at(place.s_m), pose.heading_rad))
+        return place.distance_m <= _WIDEST_M + way.width_m / 2.0 and (
+            min(turn_rad, math.pi - turn_rad) <= _ALONG_RAD
         )
-        return on_way or self.within(point_m, AreaKind.DRIVABLE)
+
+    def _scan(
+        self, pose: Pose, side: Side, start_m: float, is_road: Callable[[Point], bool]
+    ) -> float:
+        """The last road straight across from `start_m` on, before a walkway or a gap."""
+        sign = 1.0 if side is Side.LEFT else -1.0
+        end_m = across_m = start_m
+        while across_m - end_m < _GAP_M and across_m < _WIDEST_M:
+            across_m += _STEP_M
+            x_m, y_m = pose.to_parent(np.array([[0.0, sign * across_m]]))[0]
+            if self.within((x_m, y_m), AreaKind.WALKWAY):
+                break
+            if is_road((x_m, y_m)):
+                end_m = across_m
+        return end_m
+
+
+def _on_any(ways: list[Way], point_m: Point) -> bool:
+    return any(way.centerline.project(*point_m).distance_m <= way.width_m / 2.0 for way in ways)
 
 
 def _inside(point_m: Point, boundary_m: NDArray[np.float64]) -> bool:

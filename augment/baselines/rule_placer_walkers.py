@@ -26,7 +26,7 @@ def walkers(
     """The pedestrians, the first at the distance and each further one 1.2 m further on.
 
     Raises:
-        InstructionNotUnderstood: The lanes end before, or the map shows no edge of the road.
+        InstructionNotUnderstood: The lanes end before.
     """
     del rng  # nothing about a walk is drawn
     return tuple(

@@ -158,6 +158,30 @@ def test_a_walk_over_a_narrow_road_is_seven_metres_long() -> None:
     assert math.dist((walker.x_m, walker.y_m), walker.walk_to_m) == pytest.approx(7.0, abs=0.01)
 
 
+def test_a_walk_ends_at_the_egos_road_where_a_side_road_opens() -> None:
+    mouth = Area(
+        id="Area9",
+        kind=AreaKind.DRIVABLE,
+        boundary_m=((10.0, 5.0), (26.0, 5.0), (26.0, 60.0), (10.0, 60.0)),
+    )
+    side_road = Lane(id="Side", centerline=Polyline([(18.0, 60.0), (18.0, 5.0)]), width_m=3.5)
+    road = scene()
+    opened = scene(lanes=(*road.lanes, side_road), areas=(road.areas[0], road.areas[1], mouth))
+    (walker,) = added(opened, "a jaywalker crosses from right to left 18 m ahead of the ego")
+    assert walker.walk_to_m == pytest.approx((18.0, 5.75), abs=0.26)
+
+
+def test_a_parking_lane_belongs_to_the_road() -> None:
+    parking = Area(
+        id="Area9",
+        kind=AreaKind.DRIVABLE,
+        boundary_m=((-50.0, -4.0), (100.0, -4.0), (100.0, -1.75), (-50.0, -1.75)),
+    )
+    wide = scene(areas=(scene().areas[0], parking))
+    (walker,) = added(wide, "a jaywalker crosses from right to left 18 m ahead of the ego")
+    assert walker.y_m == pytest.approx(-4.5, abs=0.26)
+
+
 def test_pedestrians_walk_side_by_side() -> None:
     walkers = added(scene(), "three pedestrians cross from left to right 18 m ahead")
     assert [walker.x_m for walker in walkers] == [18.0, 19.2, 20.4]
