@@ -45,6 +45,7 @@ def vote_all(address: str, username: str, *, by_key: bool) -> list[str]:
             here = page.input_value("input[name=matchup]")
             if by_key:
                 page.wait_for_timeout(250)
+                page.wait_for_function("!document.getElementById('vote').inert")
                 page.keyboard.press(str(("left", "equal", "right").index(answer) + 1))
             else:
                 page.click(f"button[name=outcome][value={answer}]")
