@@ -1,0 +1,120 @@
+"""What the checks know about a scene before anybody changes it; made once, asked often.
+
+Frame: the scene's. Places relative to the ego go by its pose, wherever that is.
+"""
+
+from __future__ import annotations
+
+import heapq
+from dataclasses import dataclass
+from functools import cached_property
+
+from augment.checks.surfaces import Surface
+from augment.checks.ways import Beside, Ways, best_aligned
+from augment.geometry.polyline import Polyline
+from augment.scene.entities import AreaKind, Scene
+from augment.scene.lane_graph import LaneGraph
+
+REACH_M = 300.0
+"""How far ahead and behind the ego distances along the lanes are followed."""
+ROUTE_M = 150.0
+"""How far the ego's lane is followed for its corridor."""
+
+_ROAD = (AreaKind.DRIVABLE, AreaKind.CARPARK, AreaKind.INTERSECTION)
+_WALKS = (AreaKind.WALKWAY, AreaKind.CROSSWALK)
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Ground:
+    """The lanes and surfaces of one scene, and the ego on them.
+
+    Attributes:
+        scene: The scene before the change.
+        graph: What follows what.
+        ways: Where every lane and connector lies.
+    """
+
+    scene: Scene
+    graph: LaneGraph
+    ways: Ways
+
+    @classmethod
+    def of(cls, scene: Scene) -> Ground:
+        """The ground of a scene; surfaces are laid out when they are first asked for."""
+        graph = LaneGraph(scene)
+        return cls(scene=scene, graph=graph, ways=Ways(graph.ways.values()))
+
+    @cached_property
+    def road(self) -> Surface:
+        """What vehicles may stand on."""
+        areas = (area for area in self.scene.areas if area.kind in _ROAD)
+        return Surface.of(self.graph.ways.values(), areas)
+
+    @cached_property
+    def everything(self) -> Surface:
+        """Everything that the map shows: the road, walkways and crosswalks."""
+        return self.road.with_areas(area for area in self.scene.areas if area.kind in _WALKS)
+
+    @cached_property
+    def carparks(self) -> Surface:
+        """Where vehicles stand in any direction."""
+        return Surface.of(areas=(a for a in self.scene.areas if a.kind is AreaKind.CARPARK))
+
+    @property
+    def shows_walkways(self) -> bool:
+        """Whether the map says at all where people walk."""
+        return any(area.kind is AreaKind.WALKWAY for area in self.scene.areas)
+
+    @cached_property
+    def ego_place(self) -> Beside | None:
+        """The ego beside its own lane, None where the map has no lane for it."""
+        ego = self.scene.ego
+        beside = self.ways.beside(ego.x_m, ego.y_m)
+        named = [one for one in beside if one.way_id == ego.lane_id]
+        return named[0] if named else best_aligned(beside, ego.heading_rad)
+
+    @cached_property
+    def starts_m(self) -> tuple[tuple[str, float], ...]:
+        """How far ahead of the ego ways begin, measured along the lanes: id and metres.
+
+        Successors of the ego's way are followed forwards, predecessors backwards, both up to
+        `REACH_M`. On a loop a way comes twice: once ahead, once behind.
+        """
+        place = self.ego_place
+        if place is None:
+            return ()
+        ahead = self._reached(place.way_id, -place.s_m, forwards=True)
+        behind = self._reached(place.way_id, -place.s_m, forwards=False)
+        return (*ahead.items(), *behind.items())
+
+    @cached_property
+    def route(self) -> tuple[Polyline, float] | None:
+        """The ego's lane and what follows it straightest, from the ego on, and its mean width."""
+        place = self.ego_place
+        if place is None:
+            return None
+        names = self.graph.route(place.way_id, place.s_m + ROUTE_M)
+        ways = [self.graph.ways[name] for name in names]
+        points = [point for way in ways for point in way.centerline.points_m.tolist()]
+        line = Polyline(points)
+        if line.length_m - place.s_m < 1.0:
+            return None
+        width_m = sum(way.width_m for way in ways) / len(ways)
+        return line.between(place.s_m, line.length_m), width_m
+
+    def _reached(self, way_id: str, start_m: float, *, forwards: bool) -> dict[str, float]:
+        """Dijkstra over whole ways: the signed distance from the ego to each way's start."""
+        lengths = {name: way.centerline.length_m for name, way in self.graph.ways.items()}
+        found: dict[str, float] = {}
+        queue = [(abs(start_m), way_id, start_m)]
+        while queue:
+            _, here, begins_m = heapq.heappop(queue)
+            if here in found:
+                continue
+            found[here] = begins_m
+            following = self.graph.successors(here) if forwards else self.graph.predecessors(here)
+            for name in following:
+                next_m = begins_m + lengths[here] if forwards else begins_m - lengths[name]
+                if name not in found and -REACH_M - lengths[name] < next_m < REACH_M:
+                    heapq.heappush(queue, (abs(next_m), name, next_m))
+        return found

@@ -1,0 +1,145 @@
+"""Mapped ground as polygons: how much of a box lies outside, how far a point is from it.
+
+The one module of the checks that knows shapely. Frame: the scene's.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from functools import cached_property
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from augment.scene.entities import Area
+from augment.scene.lane_graph import Way
+
+if TYPE_CHECKING:
+    from shapely.geometry.base import BaseGeometry
+
+FloatArray = NDArray[np.float64]
+
+
+class Surface:
+    """The union of polygons, which are joined only where somebody asks.
+
+    Args:
+        pieces: Valid shapely polygons (P,); empty ones are dropped.
+    """
+
+    def __init__(self, pieces: NDArray[np.object_]) -> None:
+        import shapely
+
+        self._pieces = pieces[~shapely.is_empty(pieces)]
+        self._tree = shapely.STRtree(self._pieces)
+
+    @classmethod
+    def of(cls, ways: Iterable[Way] = (), areas: Iterable[Area] = ()) -> Surface:
+        """The ground of lanes and connectors and of areas.
+
+        Ways go by their boundaries where the map has both, else by their width. An area that
+        crosses itself is taken as the ground that it encloses.
+        """
+        return cls(np.concatenate([_strips(list(ways)), _rings(list(areas))]))
+
+    def with_areas(self, areas: Iterable[Area]) -> Surface:
+        """This ground and more areas."""
+        return Surface(np.concatenate([self._pieces, _rings(list(areas))]))
+
+    @property
+    def is_empty(self) -> bool:
+        """Whether the map has no such ground at all."""
+        return len(self._pieces) == 0
+
+    def share_outside(self, corners_m: FloatArray) -> float:
+        """The part, 0 to 1, of a box with the corners (4, 2) that lies off the surface."""
+        import shapely
+
+        box = shapely.Polygon(corners_m)
+        near = self._pieces[self._tree.query(box, predicate="intersects")]
+        if any(piece.covers(box) for piece in near):
+            return 0.0
+        left = float(shapely.difference(box, shapely.union_all(near)).area) / float(box.area)
+        return min(1.0, max(0.0, left))
+
+    def distance_m(self, x_m: float, y_m: float) -> float:
+        """From the point to the surface, 0 on it; infinite where there is none."""
+        import shapely
+
+        if self.is_empty:
+            return float("inf")
+        _, distances = self._tree.query_nearest(
+            shapely.Point(x_m, y_m), return_distance=True, all_matches=False
+        )
+        return float(distances[0])
+
+    def distance_to_hull_m(self, x_m: float, y_m: float) -> float:
+        """From the point to the smallest convex region around the whole surface, 0 inside."""
+        import shapely
+
+        return (
+            float("inf") if self.is_empty else float(self._hull.distance(shapely.Point(x_m, y_m)))
+        )
+
+    @cached_property
+    def _hull(self) -> BaseGeometry:
+        import shapely
+
+        points: BaseGeometry = shapely.MultiPoint(shapely.get_coordinates(self._pieces))
+        return points.convex_hull
+
+
+def gaps_m(boxes_m: FloatArray) -> FloatArray:
+    """The gap (N, N) between every two boxes with corners (N, 4, 2); 0 where they meet."""
+    import shapely
+
+    boxes = np.asarray(shapely.polygons(boxes_m), dtype=object)
+    return np.asarray(shapely.distance(boxes[:, None], boxes[None, :]), dtype=np.float64)
+
+
+# Private
+
+
+def _strips(ways: Sequence[Way]) -> NDArray[np.object_]:
+    """One polygon a way."""
+    import shapely
+
+    outlines = [_outline(way) for way in ways]
+    strips = _polygons([outline for outline in outlines if outline is not None])
+    made = np.full(len(ways), None, dtype=object)
+    made[[outline is not None for outline in outlines]] = strips
+    # Those without an outline, and those whose outline crosses itself.
+    broad = np.flatnonzero(~shapely.is_valid(made)).tolist()
+    lines = [shapely.LineString(ways[index].centerline.points_m) for index in broad]
+    halves_m = [ways[index].width_m / 2.0 for index in broad]
+    made[broad] = shapely.buffer(lines, halves_m, cap_style="flat", quad_segs=4)
+    return made
+
+
+def _outline(way: Way) -> FloatArray | None:
+    if way.left_boundary is None or way.right_boundary is None:
+        return None
+    return np.concatenate([way.left_boundary.points_m, way.right_boundary.points_m[::-1]])
+
+
+def _rings(areas: Sequence[Area]) -> NDArray[np.object_]:
+    """One geometry an area."""
+    import shapely
+
+    made = _polygons([np.array(area.boundary_m, dtype=np.float64) for area in areas])
+    crossing = ~shapely.is_valid(made)
+    # A buffer of nothing keeps the polygons and drops the lines that mending may leave.
+    made[crossing] = shapely.buffer(shapely.make_valid(made[crossing]), 0.0)
+    return made
+
+
+def _polygons(outlines: Sequence[FloatArray]) -> NDArray[np.object_]:
+    """Polygons (N,) of outlines (P, 2), closed or not."""
+    import shapely
+
+    if not outlines:
+        return np.empty(0, dtype=object)
+    owners = np.repeat(np.arange(len(outlines)), [len(outline) for outline in outlines])
+    rings = shapely.linearrings(np.concatenate(outlines), indices=owners)
+    return np.asarray(shapely.polygons(rings), dtype=object)
