@@ -1,1 +1,7 @@
-"""Geometric findings about a modification, as values with numbers."""
+"""Deterministic checks of a modification: each finding is a measured fact with its numbers."""
+
+from augment.checks.finding import Finding, Kind, Severity
+from augment.checks.ground import Ground
+from augment.checks.registry import findings, findings_on
+
+__all__ = ["Finding", "Ground", "Kind", "Severity", "findings", "findings_on"]

@@ -1,0 +1,60 @@
+"""The lane or connector that an agent is on, how far along it and how far off its centre."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from augment.checks.finding import Finding, Kind, Severity
+from augment.checks.situation import Situation
+from augment.checks.ways import Beside
+
+
+def lane(situation: Situation) -> Iterator[Finding]:
+    """A fact for every changed agent: the lane under it, or how far it is off the nearest."""
+    for agent in situation.changed:
+        under = situation.under(agent)
+        nearest = situation.nearest(agent)
+        if under is not None:
+            yield _on(agent.id, under)
+        elif nearest is not None:
+            yield _off(agent.id, nearest)
+
+
+def _on(agent_id: str, place: Beside) -> Finding:
+    side = "left" if place.d_m >= 0.0 else "right"
+    offset = "on" if abs(place.d_m) < 0.005 else f"{{left_m:.2f}} m to the {side} of"
+    return Finding(
+        kind=Kind.LANE,
+        severity=Severity.FACT,
+        agents=(agent_id,),
+        ways=(place.way_id,),
+        measured={
+            "along_m": place.s_m,
+            "left_m": place.d_m,
+            "lane_width_m": place.width_m,
+            "off_m": 0.0,
+        },
+        template=(
+            f"{{agents[0]}} is on {{ways[0]}}, {{along_m:.1f}} m along it and {offset} its centre "
+            "line; the lane is {lane_width_m:.1f} m wide."
+        ),
+    )
+
+
+def _off(agent_id: str, place: Beside) -> Finding:
+    return Finding(
+        kind=Kind.LANE,
+        severity=Severity.FACT,
+        agents=(agent_id,),
+        ways=(place.way_id,),
+        measured={
+            "along_m": place.s_m,
+            "left_m": place.d_m,
+            "lane_width_m": place.width_m,
+            "off_m": place.off_m,
+        },
+        template=(
+            "{agents[0]} is {off_m:.1f} m off every lane; the nearest lane is {ways[0]} at "
+            "{along_m:.1f} m along it."
+        ),
+    )

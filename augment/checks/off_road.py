@@ -1,0 +1,92 @@
+"""How much of an agent stands where its kind does not belong."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from augment.checks.finding import Finding, Kind, Severity
+from augment.checks.situation import VEHICLES, Situation
+from augment.scene.entities import AgentType, TrafficAgent
+
+SEEN_SHARE = 0.02
+KERB_SHARE = 0.15
+"""A third of a metre of a car's width: maps and placements are no better."""
+MOST_SHARE = 0.5
+EDGE_M = 1.0
+"""Cones stand on the road or as far beside it as this."""
+NEAR_ROAD_M = 3.0
+FAR_FROM_PATHS_M = 10.0
+
+_EDGE = frozenset({AgentType.TRAFFIC_CONE, AgentType.BARRIER})
+
+
+def off_road(situation: Situation) -> Iterator[Finding]:
+    """Changed agents off their ground; nothing for who stands where its kind belongs.
+
+    Vehicles belong on the road: a fact up to a share that no map resolves, doubtful up to half
+    of the box (half on the kerb), wrong above. Cones and barriers belong on the road or within a
+    metre of it. All others may also be on walkways and crosswalks; on a map without walkways
+    it is unknown whether they are, so off it is a fact.
+    """
+    if situation.ground.road.is_empty:
+        return
+    for agent in situation.changed:
+        if agent.type in VEHICLES:
+            finding = _vehicle(agent, situation)
+        elif agent.type in _EDGE:
+            finding = _cone(agent, situation)
+        else:
+            finding = _on_foot(agent, situation)
+        if finding is not None:
+            yield finding
+
+
+def _vehicle(agent: TrafficAgent, situation: Situation) -> Finding | None:
+    share = situation.ground.road.share_outside(situation.boxes[agent.id].corners_m)
+    if share <= SEEN_SHARE:
+        return None
+    severity = Severity.FACT
+    if share > KERB_SHARE:
+        severity = Severity.DOUBTFUL if share <= MOST_SHARE else Severity.WRONG
+    gap_m = situation.ground.road.distance_m(agent.x_m, agent.y_m)
+    return Finding(
+        kind=Kind.OFF_ROAD,
+        severity=severity,
+        agents=(agent.id,),
+        measured={"outside_share": share, "gap_m": gap_m},
+        template=(
+            "{outside_share:.0%} of {agents[0]} is outside the drivable area; its centre is "
+            + ("{gap_m:.1f} m off it." if gap_m > 0.0 else "on it.")
+        ),
+    )
+
+
+def _cone(agent: TrafficAgent, situation: Situation) -> Finding | None:
+    gap_m = situation.ground.road.distance_m(agent.x_m, agent.y_m)
+    if gap_m <= EDGE_M:
+        return None
+    return Finding(
+        kind=Kind.OFF_ROAD,
+        severity=Severity.DOUBTFUL if gap_m <= NEAR_ROAD_M else Severity.WRONG,
+        agents=(agent.id,),
+        measured={"outside_share": 1.0, "gap_m": gap_m},
+        template="{agents[0]} is {gap_m:.1f} m off the road and its edge.",
+    )
+
+
+def _on_foot(agent: TrafficAgent, situation: Situation) -> Finding | None:
+    ground = situation.ground.everything
+    gap_m = ground.distance_m(agent.x_m, agent.y_m)
+    if gap_m == 0.0:
+        return None
+    severity = Severity.FACT
+    if situation.ground.shows_walkways:
+        severity = Severity.DOUBTFUL if gap_m <= FAR_FROM_PATHS_M else Severity.WRONG
+    share = ground.share_outside(situation.boxes[agent.id].corners_m)
+    return Finding(
+        kind=Kind.OFF_ROAD,
+        severity=severity,
+        agents=(agent.id,),
+        measured={"outside_share": share, "gap_m": gap_m},
+        template="{agents[0]} is {gap_m:.1f} m off everything that the map shows.",
+    )

@@ -1,0 +1,85 @@
+"""Whether a pedestrian's walk crosses the lane that the ego drives on."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+
+import numpy as np
+from numpy.typing import NDArray
+
+from augment.checks.finding import Finding, Kind, Severity
+from augment.checks.situation import Situation, is_stopped
+from augment.geometry.polyline import Polyline
+from augment.scene.entities import AgentType, Point, TrafficAgent
+
+ASSUMED_WALK_M = 30.0
+"""How far a pedestrian without an end point is followed; the longest known walk is 28.8 m."""
+
+
+def walk_crossing(situation: Situation) -> Iterator[Finding]:
+    """A fact for every changed pedestrian who walks: where it crosses the ego's way, if it does.
+
+    The ego's way is its lane and what follows straightest, from the ego's centre on.
+    """
+    if situation.ground.route is None:
+        return
+    line, width_m = situation.ground.route
+    for agent in situation.changed:
+        end = _end(agent)
+        if agent.type is AgentType.PEDESTRIAN and end is not None:
+            yield _finding(agent, end, line, width_m)
+
+
+def _end(agent: TrafficAgent) -> Point | None:
+    if agent.walk_to_m is not None or is_stopped(agent):
+        return agent.walk_to_m
+    return (
+        agent.x_m + ASSUMED_WALK_M * math.cos(agent.heading_rad),
+        agent.y_m + ASSUMED_WALK_M * math.sin(agent.heading_rad),
+    )
+
+
+def _finding(agent: TrafficAgent, end: Point, line: Polyline, width_m: float) -> Finding:
+    start = (agent.x_m, agent.y_m)
+    crosses_at_m = _meeting(np.array(start), np.array(end), line)
+    first, last = line.project(*start), line.project(*end)
+    steps_into = min(first.distance_m, last.distance_m) <= width_m / 2.0
+    assumed = "" if agent.walk_to_m is not None else ", keeping its heading,"
+    if crosses_at_m is not None:
+        hands = ("left", "right") if first.d_m > last.d_m else ("right", "left")
+        words = (
+            f" crosses the ego's lane from {hands[0]} to {hands[1]}, "
+            "{crosses_at_m:.1f} m ahead of the ego along the lanes."
+        )
+    elif steps_into:
+        words = " starts or ends in the ego's lane and does not cross its middle."
+    else:
+        words = " does not cross the ego's lane."
+    return Finding(
+        kind=Kind.WALK_CROSSING,
+        severity=Severity.FACT,
+        agents=(agent.id,),
+        measured={
+            "crosses_at_m": crosses_at_m,
+            "start_left_m": first.d_m,
+            "end_left_m": last.d_m,
+        },
+        template=f"The walk of {{agents[0]}}{assumed}{words}",
+    )
+
+
+def _meeting(start: NDArray[np.float64], end: NDArray[np.float64], line: Polyline) -> float | None:
+    """The first arc length at which the walk from start to end, each (2,), meets the line."""
+    begins = line.points_m[:-1]
+    steps, walk = np.diff(line.points_m, axis=0), end - start
+    turn = steps[:, 0] * walk[1] - steps[:, 1] * walk[0]
+    offset = start - begins
+    with np.errstate(divide="ignore", invalid="ignore"):  # a walk along a segment never meets it
+        along = (offset[:, 0] * walk[1] - offset[:, 1] * walk[0]) / turn
+        walked = (offset[:, 0] * steps[:, 1] - offset[:, 1] * steps[:, 0]) / turn
+    meets = (along >= 0.0) & (along <= 1.0) & (walked >= 0.0) & (walked <= 1.0)
+    if not meets.any():
+        return None
+    lengths = np.hypot(steps[:, 0], steps[:, 1])
+    return float((line.stations_m[:-1] + along * lengths)[meets].min())

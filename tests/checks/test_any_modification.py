@@ -1,0 +1,120 @@
+"""Whatever the modification: no error, true sentences, and the same findings wherever it lies."""
+
+from __future__ import annotations
+
+import math
+
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+from augment.checks import Finding, Kind, findings
+from augment.geometry.frames import Pose
+from augment.scene.entities import AgentType, Area, AreaKind, Scene, TrafficAgent
+from augment.scene.modification import Modification
+from tests.checks.worlds import moved_agent, moved_scene
+from tests.scenes import cone, curve, junction, scene, vehicle
+
+WORLDS = (
+    scene(),
+    scene(agents=(vehicle("Agent20", 30.0, 0.3), cone("Agent21", 12.0, 3.0))),
+    curve(),
+    junction(),
+    scene(lanes=()),
+    scene(areas=()),
+    scene(lanes=(), areas=()),
+    scene(
+        areas=(Area(id="A", kind=AreaKind.DRIVABLE, boundary_m=((0, 0), (9, 9), (9, 0), (0, 9))),)
+    ),
+)
+PLACEABLE = [kind for kind in AgentType if kind is not AgentType.EGO_VEHICLE]
+UNHURRIED = settings(deadline=None, suppress_health_check=[HealthCheck.too_slow])
+
+
+def odd(low: float, high: float) -> st.SearchStrategy[float]:
+    """Numbers off every threshold, where rounding of a moved scene would decide."""
+    steps = st.integers(math.ceil(low * 97.0), math.floor(high * 97.0))
+    return steps.map(lambda step: step / 97.0 + 0.00213)
+
+
+def agents(number: st.SearchStrategy[float], most_m: float) -> st.SearchStrategy[TrafficAgent]:
+    return st.builds(
+        TrafficAgent,
+        id=st.sampled_from(["Agent2", "Agent3", "Agent4"]),
+        type=st.sampled_from(PLACEABLE),
+        x_m=number,
+        y_m=number,
+        heading_rad=odd(-6.2, 6.2),
+        width_m=odd(0.1, most_m),
+        length_m=odd(0.1, most_m),
+        speed_mps=odd(0.0, 99.0),
+        lane_id=st.sampled_from([None, "Lane1", "Connector1", "Lane77"]),
+        walk_to_m=st.none() | st.tuples(number, number),
+    )
+
+
+def changes(number: st.SearchStrategy[float], most_m: float) -> st.SearchStrategy[Modification]:
+    added = st.lists(agents(number, most_m), max_size=3, unique_by=lambda agent: agent.id)
+    return added.map(lambda several: Modification(added=tuple(several)))
+
+
+@UNHURRIED
+@given(
+    st.sampled_from(WORLDS),
+    changes(
+        st.floats(-100_000.0, 100_000.0) | st.sampled_from([0.0, 1.75, 3.5, 20.0, -50.0]), 90.0
+    ),
+)
+def test_no_modification_raises(world: Scene, change: Modification) -> None:
+    found = findings(world, change)
+    changed = [agent.id for agent in change.changed]
+    assert [changed.index(one.agents[0]) for one in found] == sorted(
+        changed.index(one.agents[0]) for one in found
+    )
+    for one in found:
+        assert all(value is None or math.isfinite(value) for value in one.measured.values())
+        assert one.agents[0] in one.sentence()
+        assert one.sentence().endswith(".")
+
+
+@UNHURRIED
+@given(
+    st.sampled_from(WORLDS),
+    changes(odd(-20.0, 60.0), 9.0),
+    st.builds(Pose, x_m=odd(-900, 900), y_m=odd(-900, 900), heading_rad=odd(-3.1, 3.1)),
+)
+def test_findings_do_not_ask_where_the_world_lies(
+    world: Scene, change: Modification, frame: Pose
+) -> None:
+    moved = Modification(added=tuple(moved_agent(agent, frame) for agent in change.added))
+    here = findings(world, change)
+    there = findings(moved_scene(world, frame), moved)
+    assert _told(here) == _told(there)
+    for one, other in zip(_comparable(here), _comparable(there), strict=True):
+        for name in one.measured.keys() - {"lane_heading_rad"}:
+            assert other.measured[name] == pytest.approx(one.measured[name], abs=1e-5), name
+
+
+@UNHURRIED
+@given(st.floats(1e-320, 1e-3))
+def test_boxes_of_no_size_raise_nothing(size_m: float) -> None:
+    speck = TrafficAgent(
+        id="Agent2",
+        type=AgentType.VEHICLE,
+        x_m=0.0,
+        y_m=0.0,
+        heading_rad=0.0,
+        width_m=size_m,
+        length_m=size_m,
+    )
+    kinds = {one.kind for one in findings(scene(), Modification(added=(speck,)))}
+    assert {Kind.SIZE, Kind.OVERLAP} <= kinds
+
+
+def _comparable(found: tuple[Finding, ...]) -> list[Finding]:
+    """Without what is about the number of a heading, which a moved scene changes."""
+    return [one for one in found if one.kind is not Kind.DEGREES]
+
+
+def _told(found: tuple[Finding, ...]) -> list[object]:
+    return [(one.kind, one.severity, one.agents, one.ways) for one in _comparable(found)]

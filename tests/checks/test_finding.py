@@ -1,0 +1,39 @@
+"""A finding is a value with a sentence."""
+
+from __future__ import annotations
+
+import pytest
+
+from augment.checks import Finding, Kind, Severity
+from augment.checks.registry import CHECKS
+
+OFF = Finding(
+    kind=Kind.LANE,
+    severity=Severity.FACT,
+    agents=("Agent2",),
+    ways=("42811-b",),
+    measured={"off_m": 7.28, "left_m": -9.0, "along_lanes_m": None},
+    template="{agents[0]} is {off_m:.1f} m off {ways[0]}, {left_m:.1f} m to its right.",
+)
+
+
+def test_its_sentence_tells_sizes_and_leaves_signs_to_the_words() -> None:
+    assert OFF.sentence() == "Agent2 is 7.3 m off 42811-b, 9.0 m to its right."
+
+
+def test_its_sentence_calls_things_what_the_reader_calls_them() -> None:
+    assert OFF.sentence({"42811-b": "Lane3"}).startswith("Agent2 is 7.3 m off Lane3,")
+
+
+def test_a_name_with_braces_is_only_a_name() -> None:
+    assert OFF.sentence({"Agent2": "{ways[0]}"}).startswith("{ways[0]} is 7.3 m")
+
+
+def test_its_numbers_stay_what_they_are() -> None:
+    with pytest.raises(TypeError):
+        OFF.measured["off_m"] = 0.0  # type: ignore[index]
+    assert len({OFF, OFF}) == 1
+
+
+def test_every_kind_has_its_check() -> None:
+    assert sorted(check.__name__ for check in CHECKS) == sorted(kind.value for kind in Kind)

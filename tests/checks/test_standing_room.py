@@ -1,0 +1,175 @@
+"""Off the road, outside the map, on top of each other, of no such size or speed."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import pytest
+
+from augment.checks import Kind, Severity
+from augment.checks.surfaces import Surface
+from augment.geometry.boxes import corners
+from augment.geometry.frames import Pose
+from augment.scene.entities import AgentType, Area, AreaKind, TrafficAgent
+from tests.checks.worlds import found_in, of_kind, severities
+from tests.scenes import EGO, cone, junction, pedestrian, scene, vehicle
+
+BUS = replace(vehicle("Agent2", 40.0, 0.0), type=AgentType.BUS, length_m=7.456, width_m=2.079)
+
+
+@pytest.mark.parametrize(
+    ("y_m", "share", "severity"),
+    [
+        (0.0, None, None),
+        (-0.75, None, None),
+        (-0.95, 0.1, Severity.FACT),
+        (-1.55, 0.4, Severity.DOUBTFUL),
+        (-1.95, 0.6, Severity.WRONG),
+        (-6.0, 1.0, Severity.WRONG),
+    ],
+)
+def test_the_share_of_a_car_outside_the_road(
+    y_m: float, share: float | None, severity: Severity | None
+) -> None:
+    found = of_kind(found_in(scene(), vehicle("Agent2", 30.0, y_m)), Kind.OFF_ROAD)
+    assert [one.severity for one in found] == ([severity] if severity else [])
+    if share is not None:
+        assert found[0].measured["outside_share"] == pytest.approx(share)
+        assert f"{share:.0%} of Agent2 is outside the drivable area" in found[0].sentence()
+
+
+def test_connectors_are_road_as_well() -> None:
+    car = vehicle("Agent2", 28.0, 0.0)
+    assert not of_kind(found_in(junction(), car), Kind.OFF_ROAD)
+
+
+@pytest.mark.parametrize(
+    ("agent", "severity"),
+    [
+        (cone("Agent2", 30.0, -2.5), None),
+        (cone("Agent2", 30.0, -3.5), Severity.DOUBTFUL),
+        (cone("Agent2", 30.0, -5.5), Severity.WRONG),
+        (pedestrian("Agent2", 30.0, -4.0), None),
+        (pedestrian("Agent2", 30.0, 0.0), None),
+        (pedestrian("Agent2", 30.0, -6.0), Severity.DOUBTFUL),
+        (pedestrian("Agent2", 30.0, -16.0), Severity.WRONG),
+    ],
+)
+def test_cones_keep_to_the_road_s_edge_and_people_may_use_walkways(
+    agent: TrafficAgent, severity: Severity | None
+) -> None:
+    found = of_kind(found_in(scene(), agent), Kind.OFF_ROAD)
+    assert [one.severity for one in found] == ([severity] if severity else [])
+
+
+def test_where_the_map_has_no_walkways_people_off_it_are_a_fact() -> None:
+    bare = scene(areas=scene().areas[:1])
+    (off,) = of_kind(found_in(bare, pedestrian("Agent2", 30.0, -4.0)), Kind.OFF_ROAD)
+    assert off.severity is Severity.FACT
+    assert off.sentence() == "Agent2 is 2.2 m off everything that the map shows."
+
+
+def test_outside_the_mapped_region() -> None:
+    (outside,) = of_kind(found_in(scene(), vehicle("Agent2", 130.0, 0.0)), Kind.OUTSIDE_MAP)
+    assert outside.severity is Severity.WRONG
+    assert outside.sentence() == "Agent2 is 30.0 m outside the mapped region."
+    assert not of_kind(found_in(scene(), vehicle("Agent2", 99.0, 0.0)), Kind.OUTSIDE_MAP)
+
+
+def test_an_area_that_crosses_itself_is_the_ground_that_it_encloses() -> None:
+    tie = Area(id="A", kind=AreaKind.DRIVABLE, boundary_m=((0, 0), (4, 4), (4, 0), (0, 4)))
+    flat = Area(id="B", kind=AreaKind.DRIVABLE, boundary_m=((0, 0), (4, 0), (9, 0)))
+    box = corners(Pose(x_m=2.0, y_m=2.0, heading_rad=0.0), 4.0, 4.0)
+    assert Surface.of(areas=(tie, flat)).share_outside(box) == pytest.approx(0.5)
+    assert Surface.of(areas=(flat,)).is_empty
+
+
+@pytest.mark.parametrize(
+    ("gap_m", "severity"),
+    [(0.1, None), (-0.24, Severity.FACT), (-0.72, Severity.DOUBTFUL), (-2.0, Severity.WRONG)],
+)
+def test_two_stopped_cars_may_touch(gap_m: float, severity: Severity | None) -> None:
+    cars = vehicle("Agent2", 30.0, 0.0), vehicle("Agent3", 34.8 + gap_m, 0.0)
+    found = of_kind(found_in(scene(), *cars), Kind.OVERLAP)
+    assert [one.severity for one in found] == ([severity] if severity else [])
+    if found:
+        assert found[0].agents == ("Agent2", "Agent3")
+        assert found[0].measured["share_of_smaller"] == pytest.approx(-gap_m / 4.8)
+
+
+def test_a_moving_car_touches_nobody() -> None:
+    cars = replace(vehicle("Agent2", 30.0, 0.0), speed_mps=5.0), vehicle("Agent3", 34.4, 0.0)
+    assert (Kind.OVERLAP, Severity.WRONG) in severities(found_in(scene(), *cars))
+
+
+def test_any_overlap_with_the_ego_is_wrong() -> None:
+    close = vehicle("Agent2", (EGO.length_m + 4.8) / 2.0 - 0.05, 0.0)
+    (overlap,) = of_kind(found_in(scene(), close), Kind.OVERLAP)
+    assert overlap.severity is Severity.WRONG
+    assert overlap.agents == ("Agent2", "Agent1")
+    assert overlap.sentence() == (
+        "Agent2 and the ego overlap by 1% of the smaller box, 0.05 m deep."
+    )
+
+
+def test_the_small_box_counts() -> None:
+    inside = cone("Agent3", 41.0, 0.2)
+    (overlap,) = of_kind(found_in(scene(), BUS, inside), Kind.OVERLAP)
+    assert overlap.measured["share_of_smaller"] == pytest.approx(1.0)
+    assert overlap.severity is Severity.WRONG
+
+
+def test_what_was_recorded_is_in_the_way_too() -> None:
+    busy = scene(agents=(vehicle("Agent2", 30.0, 0.0),))
+    assert (Kind.OVERLAP, Severity.WRONG) in severities(found_in(busy, vehicle("Agent3", 31, 0)))
+
+
+def test_two_agents_on_the_same_spot() -> None:
+    found = found_in(scene(), vehicle("Agent2", 30, 0), vehicle("Agent3", 30.1, 0))
+    (twice,) = of_kind(found, Kind.DUPLICATE)
+    assert twice.severity is Severity.WRONG
+    assert twice.sentence() == "Agent2 and Agent3 are on the same spot, 0.10 m apart."
+    row = [cone(f"Agent{number}", 30.0 + number, 0.0) for number in range(2, 6)]
+    assert not of_kind(found_in(scene(), *row), Kind.DUPLICATE)
+
+
+@pytest.mark.parametrize(
+    ("agent", "severity", "words"),
+    [
+        (BUS, None, ""),
+        (replace(BUS, length_m=2.079, width_m=7.456), Severity.WRONG, "look swapped"),
+        (replace(BUS, length_m=24.0), Severity.DOUBTFUL, "unusual for a bus"),
+        (replace(pedestrian("Agent2", 30, 0), length_m=4.8), Severity.WRONG, "for a pedestrian"),
+        (replace(cone("Agent2", 30, 0), width_m=1.2), Severity.DOUBTFUL, "for a traffic cone"),
+    ],
+)
+def test_sizes(agent: TrafficAgent, severity: Severity | None, words: str) -> None:
+    found = of_kind(found_in(scene(), agent), Kind.SIZE)
+    assert [one.severity for one in found] == ([severity] if severity else [])
+    assert all(words in one.sentence() for one in found)
+
+
+@pytest.mark.parametrize(
+    ("agent", "speed_mps", "severity", "words"),
+    [
+        (BUS, 13.0, None, ""),
+        (BUS, 22.0, Severity.DOUBTFUL, "22.0 m/s, where the limit is 13.9 m/s."),
+        (BUS, 30.0, Severity.DOUBTFUL, "unusual for a bus"),
+        (BUS, 60.0, Severity.WRONG, "unusual for a bus"),
+        (BUS, -2.0, Severity.DOUBTFUL, "2.0 m/s, backwards."),
+        (pedestrian("Agent2", 30, 0), 5.0, Severity.DOUBTFUL, "unusual for a pedestrian"),
+        (cone("Agent2", 30, 0), 1.0, Severity.WRONG, "unusual for a traffic cone"),
+    ],
+)
+def test_speeds(
+    agent: TrafficAgent, speed_mps: float, severity: Severity | None, words: str
+) -> None:
+    found = of_kind(found_in(scene(), replace(agent, speed_mps=speed_mps)), Kind.SPEED)
+    assert [one.severity for one in found] == ([severity] if severity else [])
+    assert all(words in one.sentence() for one in found)
+
+
+def test_nothing_is_held_against_a_well_parked_car() -> None:
+    car = replace(vehicle("Agent2", 21.5, -0.7, math.radians(2.0)), lane_id="Lane1")
+    assert severities(found_in(scene(), car)) == set()
