@@ -1,0 +1,109 @@
+"""The references of the catalogue are sound, and each injected fault is named by its kind."""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Callable
+from dataclasses import replace
+
+import pytest
+
+from augment.checks import Kind, Severity, findings
+from augment.scene.entities import AgentType, TrafficAgent, TrafficSide
+from augment.scene.modification import Modification
+from tests.checks.worlds import Reference, references, severities
+from tests.scenes import cone
+
+REFERENCES = references()
+VEHICLES = [
+    one
+    for one in REFERENCES
+    if one.modification.added[0].type in (AgentType.VEHICLE, AgentType.BUS)
+]
+
+
+def _named(one: Reference) -> str:
+    return one.slug
+
+
+def _off_road(reference: Reference) -> TrafficAgent:
+    """The first agent 6 m further towards the kerb, before any side street."""
+    towards_kerb = 1.0 if reference.scene.traffic_side is TrafficSide.LEFT else -1.0
+    agent = reference.modification.added[0]
+    return replace(agent, x_m=15.0, y_m=towards_kerb * 6.0, heading_rad=0.0)
+
+
+def _on_the_ego(reference: Reference) -> TrafficAgent:
+    return replace(reference.modification.added[0], x_m=1.0, y_m=0.5, lane_id=None)
+
+
+def _turned(reference: Reference) -> TrafficAgent:
+    agent = reference.modification.added[0]
+    return replace(
+        agent, heading_rad=agent.heading_rad - math.copysign(math.pi, agent.heading_rad)
+    )
+
+
+@pytest.mark.parametrize("reference", REFERENCES, ids=_named)
+def test_a_reference_has_nothing_wrong(reference: Reference) -> None:
+    assert severities(findings(reference.scene, reference.modification)) == set()
+
+
+@pytest.mark.parametrize("reference", VEHICLES, ids=_named)
+@pytest.mark.parametrize(
+    ("inject", "kind", "severity"),
+    [
+        (_off_road, Kind.OFF_ROAD, Severity.WRONG),
+        (_on_the_ego, Kind.OVERLAP, Severity.WRONG),
+        (_turned, Kind.HEADING, Severity.DOUBTFUL),
+    ],
+)
+def test_an_injected_fault_is_named(
+    reference: Reference,
+    inject: Callable[[Reference], TrafficAgent],
+    kind: Kind,
+    severity: Severity,
+) -> None:
+    alone = Modification(added=(inject(reference),))
+    assert (kind, severity) in severities(findings(reference.scene, alone))
+
+
+@pytest.mark.parametrize("reference", REFERENCES, ids=_named)
+def test_the_same_thing_twice_is_named(reference: Reference) -> None:
+    added = reference.modification.added
+    twin = replace(added[0], id="Agent99")
+    found = findings(reference.scene, Modification(added=(*added, twin)))
+    named = severities(found)
+    assert {(Kind.DUPLICATE, Severity.WRONG), (Kind.OVERLAP, Severity.WRONG)} <= named
+    twins = [one for one in found if one.kind is Kind.DUPLICATE]
+    assert [one.agents for one in twins] == [(added[0].id, "Agent99")]
+
+
+@pytest.mark.parametrize(
+    "reference", [one for one in REFERENCES if one.slug.startswith("jaywalker")], ids=_named
+)
+def test_a_pedestrian_who_walks_backwards_is_named(reference: Reference) -> None:
+    turned = Modification(added=(_turned(reference),))
+    assert severities(findings(reference.scene, turned)) == {(Kind.WALK_HEADING, Severity.WRONG)}
+
+
+def test_eight_agents_are_checked_in_a_blink(capsys: pytest.CaptureFixture[str]) -> None:
+    slowest_ms = 0.0
+    for reference in REFERENCES:
+        extra = tuple(
+            cone(f"Agent{number}", 20.0 + number - 90, 0.3)
+            for number in range(90, 98 - len(reference.modification.added))
+        )
+        eight = Modification(added=(*reference.modification.added, *extra))
+        findings(reference.scene, eight)
+        slowest_ms = max(slowest_ms, min(_took_ms(reference, eight) for _ in range(5)))
+    with capsys.disabled():
+        print(f"\neight agents, slowest scene of the catalogue: {slowest_ms:.1f} ms")
+    assert slowest_ms < 20.0
+
+
+def _took_ms(reference: Reference, change: Modification) -> float:
+    began = time.perf_counter()
+    findings(reference.scene, change)
+    return (time.perf_counter() - began) * 1000.0
