@@ -63,10 +63,9 @@ def mark_of(state: Augmentation.State) -> Mark:
 
 @register.filter
 def segments(by_state: dict[Augmentation.State, int]) -> list[Segment]:
-    """A stacked bar of the states that occur: outcomes first, what waits last."""
-    order = sorted(
-        by_state, key=lambda state: (state in Augmentation.UNDER_WAY, state == "queued")
-    )
+    """A stacked bar of the states that occur; what waits stays empty, what runs comes last."""
+    begun = [state for state in by_state if state != Augmentation.State.QUEUED]
+    order = sorted(begun, key=lambda state: state in Augmentation.UNDER_WAY)
     total = sum(by_state.values()) or 1
     found, start = [], 0.0
     for state in order:

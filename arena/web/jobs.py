@@ -46,7 +46,7 @@ def new_job_page(request: HttpRequest) -> HttpResponse:
         except AugmentError as error:
             form.add_error(None, str(error))
         else:
-            messages.success(request, f"“{job.name}” is on its way.")
+            messages.success(request, f"“{job.name}” is launched.")
             return redirect("job", code=job.code)
     return render(request, "jobs/new.html", {"form": form}, status=422 if form.errors else 200)
 
