@@ -18,13 +18,13 @@ _LOOK_EVERY_M = 0.5
 def line_within(line: Polyline, radius_m: float) -> Polyline | None:
     """The line from where it first comes within the radius of the origin to where it last does.
 
-    None where it never does, or for less than half a metre.
+    None where it never does, or for no more than a moment.
     """
-    fine = line.resampled(_LOOK_EVERY_M)
-    inside = np.flatnonzero(np.hypot(*fine.points_m.T) <= radius_m)
+    stations_m = np.append(np.arange(0.0, line.length_m, _LOOK_EVERY_M), line.length_m)
+    inside = stations_m[np.hypot(*line.points_at(stations_m).T) <= radius_m]
     if len(inside) < 2:
         return None
-    return line.between(float(fine.stations_m[inside[0]]), float(fine.stations_m[inside[-1]]))
+    return line.between(float(inside[0]), float(inside[-1]))
 
 
 def boundary_within(boundary_m: FloatArray, radius_m: float) -> FloatArray:

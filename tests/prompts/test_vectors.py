@@ -136,6 +136,11 @@ def test_a_line_is_shown_from_its_first_to_its_last_point_within() -> None:
     assert line_within(Polyline([(-100.0, 40.0), (100.0, 40.0)]), 30.0) is None
 
 
+def test_a_bent_line_within_the_radius_keeps_its_very_end() -> None:
+    line = curve(20.0).lanes[0].centerline
+    assert line_within(line, 500.0) == line
+
+
 def test_a_boundary_is_cut_and_loses_points_that_say_nothing() -> None:
     square = np.array([[0, 0], [50, 0], [50, 50], [0, 50]], dtype=float)
     assert sorted(map(tuple, boundary_within(square, 10.0))) == [
