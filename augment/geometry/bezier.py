@@ -1,0 +1,286 @@
+"""A cubic Bezier curve, read by its arc length, and its fit to a directed line.
+
+Frame: any plane frame in metres. t is the curve's own parameter, 0 to 1; s is the arc length
+from its first control point. N places, 4 control points.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from augment.geometry.frames import Pose
+from augment.geometry.polyline import Polyline, Projection
+
+FloatArray = NDArray[np.float64]
+
+CHORD_REACH_M = 2.5
+"""A line's heading is read between the points this far before and behind: lines drawn by hand or
+by a sensor wiggle from point to point, and what drives along them does not."""
+
+_INTERVALS = 32
+_KNOTS = np.linspace(0.0, 1.0, _INTERVALS + 1)
+_NODES, _WEIGHTS = (0.5 * part for part in np.polynomial.legendre.leggauss(5))
+_NODES = _NODES + 0.5
+_NEWTON_STEPS = 3
+_REFITS = 8
+_FIT_SAMPLES = (12, 120)
+_ERROR_EVERY_M = 0.05
+_ERROR_SAMPLES = (8, 600)
+
+
+@dataclass(frozen=True, eq=False)
+class CubicBezier:
+    """Four control points (4, 2) in metres; the curve runs from the first to the last.
+
+    Raises:
+        ValueError: They are not (4, 2), not finite, or all in one place.
+    """
+
+    control_m: FloatArray
+
+    def __init__(self, control_m: ArrayLike) -> None:
+        control = np.array(control_m, dtype=np.float64)
+        if control.shape != (4, 2):
+            raise ValueError(f"a curve needs control points of shape (4, 2), not {control.shape}")
+        if not np.isfinite(control).all():
+            raise ValueError("a curve needs finite coordinates")
+        if np.ptp(control, axis=0).max() < 1e-6:
+            raise ValueError("a curve needs control points in more than one place")
+        control.flags.writeable = False
+        object.__setattr__(self, "control_m", control)
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, CubicBezier) and np.array_equal(self.control_m, other.control_m)
+
+    def __hash__(self) -> int:
+        return hash(self.control_m.tobytes())
+
+    @property
+    def length_m(self) -> float:
+        """The arc length from the first control point to the last."""
+        return float(self._lengths_m[-1])
+
+    def points(self, t: FloatArray) -> FloatArray:
+        """The points (N, 2) at the parameters (N,)."""
+        c0, c1, c2, c3 = self._powers
+        column = t[:, None]
+        return np.asarray(c0 + column * (c1 + column * (c2 + column * c3)), dtype=np.float64)
+
+    def derivatives(self, t: FloatArray) -> FloatArray:
+        """The change of the point with the parameter, (N, 2), at the parameters (N,)."""
+        _, c1, c2, c3 = self._powers
+        column = t[:, None]
+        return np.asarray(c1 + column * (2.0 * c2 + column * 3.0 * c3), dtype=np.float64)
+
+    def headings(self, t: FloatArray) -> FloatArray:
+        """The directions of travel (N,) in radians at the parameters (N,)."""
+        steps = self.derivatives(t)
+        still = np.hypot(steps[:, 0], steps[:, 1]) < 1e-6 * np.ptp(self.control_m, axis=0).max()
+        if still.any():
+            # Where a control point is doubled the curve stands still; it leaves along the chord.
+            nearby = np.clip(t[still] + 1e-3, 0.0, 1.0), np.clip(t[still] - 1e-3, 0.0, 1.0)
+            steps[still] = self.points(nearby[0]) - self.points(nearby[1])
+        return np.arctan2(steps[:, 1], steps[:, 0])
+
+    def parameters_at(self, stations_m: ArrayLike) -> FloatArray:
+        """The parameters (N,) at the arc lengths (N,), which are clipped to the curve."""
+        lengths = self._lengths_m
+        stations = np.clip(np.asarray(stations_m, dtype=np.float64), 0.0, lengths[-1])
+        index = np.clip(np.searchsorted(lengths, stations, side="right") - 1, 0, _INTERVALS - 1)
+        low = _KNOTS[index]
+        wanted = stations - lengths[index]
+        steps = np.maximum(np.diff(lengths), 1e-12)
+        t = low + wanted / steps[index] / _INTERVALS
+        for _ in range(_NEWTON_STEPS):
+            speed = np.maximum(self._speeds(t), 1e-9)
+            t = t - (self._run(low, t) - wanted) / speed
+            t = np.clip(t, low, low + 1.0 / _INTERVALS)
+        return t
+
+    def length_to(self, t: float) -> float:
+        """The arc length from the first control point to the parameter."""
+        index = min(int(t * _INTERVALS), _INTERVALS - 1)
+        low, high = np.array([_KNOTS[index]]), np.array([t])
+        return float(self._lengths_m[index] + self._run(low, high)[0])
+
+    def pose_at(self, s_m: float, d_m: float = 0.0) -> Pose:
+        """Position and direction of travel at s, d to the left; the ends are extended straight."""
+        t = self.parameters_at([s_m])
+        heading_rad = float(self.headings(t)[0])
+        x_m, y_m = self.points(t)[0]
+        over_m = s_m - min(max(s_m, 0.0), self.length_m)
+        cos, sin = math.cos(heading_rad), math.sin(heading_rad)
+        return Pose(
+            x_m=float(x_m) + over_m * cos - d_m * sin,
+            y_m=float(y_m) + over_m * sin + d_m * cos,
+            heading_rad=heading_rad,
+        )
+
+    def project(self, x_m: float, y_m: float) -> Projection:
+        """The nearest place on the curve; of equally near ones the first."""
+        point = np.array([[x_m, y_m]])
+        t = _nearest_parameters(self, point, self._first_guess(point))
+        ((dx, dy),) = point - self.points(t)
+        heading_rad = float(self.headings(t)[0])
+        left = math.cos(heading_rad) * dy - math.sin(heading_rad) * dx
+        distance = math.hypot(dx, dy)
+        return Projection(
+            s_m=self.length_to(float(t[0])), d_m=math.copysign(distance, left), distance_m=distance
+        )
+
+    def split(self, t: float) -> tuple[CubicBezier, CubicBezier]:
+        """The curve before and behind a parameter strictly between 0 and 1 (de Casteljau)."""
+        levels = [self.control_m]
+        while len(levels[-1]) > 1:
+            levels.append((1.0 - t) * levels[-1][:-1] + t * levels[-1][1:])
+        return (
+            CubicBezier([level[0] for level in levels]),
+            CubicBezier([level[-1] for level in reversed(levels)]),
+        )
+
+    @cached_property
+    def _powers(self) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
+        """The coefficients of 1, t, t^2 and t^3."""
+        p0, p1, p2, p3 = self.control_m
+        return p0, 3.0 * (p1 - p0), 3.0 * (p0 - 2.0 * p1 + p2), p3 - p0 + 3.0 * (p1 - p2)
+
+    @cached_property
+    def _lengths_m(self) -> FloatArray:
+        """The arc length at each knot, (K + 1,)."""
+        return np.concatenate([[0.0], np.cumsum(self._run(_KNOTS[:-1], _KNOTS[1:]))])
+
+    def _speeds(self, t: FloatArray) -> FloatArray:
+        steps = self.derivatives(t)
+        return np.asarray(np.hypot(steps[:, 0], steps[:, 1]), dtype=np.float64)
+
+    def _run(self, low: FloatArray, high: FloatArray) -> FloatArray:
+        """The arc lengths (N,) between parameters of one interval, by Gauss and Legendre."""
+        t = low[:, None] + (high - low)[:, None] * _NODES
+        speeds = self._speeds(t.ravel()).reshape(t.shape)
+        return np.asarray((high - low) * (speeds @ _WEIGHTS), dtype=np.float64)
+
+    def _first_guess(self, point: FloatArray) -> FloatArray:
+        gaps = self.points(_KNOTS) - point
+        return _KNOTS[[int(np.argmin((gaps * gaps).sum(axis=1)))]]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class FitError:
+    """How far a curve is from the line that it stands for, at its worst place.
+
+    Attributes:
+        position_m: Between the places at the same part of the way.
+        heading_rad: Against the line's chord of 2.5 m either way, where the line is that long.
+    """
+
+    position_m: float
+    heading_rad: float
+
+
+def fit(
+    line: Polyline, *, start_rad: float | None = None, end_rad: float | None = None
+) -> CubicBezier:
+    """The cubic with the line's two ends that comes closest to it in the sense of least squares.
+
+    The parameters of the line's points start as their share of the way and are then moved to the
+    nearest points of the curve, a few times over.
+
+    Args:
+        line: What to come close to.
+        start_rad: The heading that the curve must have at its beginning, None where it is free.
+        end_rad: The same for its end; curves that share a heading at a joint have no kink there.
+    """
+    count = int(np.clip(line.length_m / 0.5, *_FIT_SAMPLES))
+    shares = np.linspace(0.0, 1.0, count + 1)
+    points = line.points_at(shares * line.length_m)
+    arms = _arms(start_rad), _arms(end_rad)
+    t = shares
+    curve = _least_squares(points, t, arms)
+    for _ in range(_REFITS):
+        t = np.maximum.accumulate(_nearest_parameters(curve, points, t, steps=1))
+        curve = _least_squares(points, t, arms)
+    return curve
+
+
+def fit_error(
+    curve: CubicBezier, line: Polyline, start_m: float = 0.0, end_m: float | None = None
+) -> FitError:
+    """How far the curve is from the line between two stations, at every 0.05 m (600 at most).
+
+    The same part of the way is compared with the same part: a curve that has the right shape but
+    runs ahead of its line is wrong by that much.
+    """
+    end_m = line.length_m if end_m is None else end_m
+    count = int(np.clip((end_m - start_m) / _ERROR_EVERY_M, *_ERROR_SAMPLES))
+    shares = np.linspace(0.0, 1.0, count + 1)
+    t = curve.parameters_at(shares * curve.length_m)
+    stations = start_m + shares * (end_m - start_m)
+    gaps = curve.points(t) - line.points_at(stations)
+    inner = (stations >= CHORD_REACH_M) & (stations <= line.length_m - CHORD_REACH_M)
+    turns = curve.headings(t[inner]) - chord_headings(line, stations[inner])
+    turns = np.abs(np.remainder(turns + math.pi, 2.0 * math.pi) - math.pi)
+    return FitError(
+        position_m=float(np.hypot(gaps[:, 0], gaps[:, 1]).max()),
+        heading_rad=float(turns.max(initial=0.0)),
+    )
+
+
+def chord_headings(line: Polyline, stations_m: FloatArray) -> FloatArray:
+    """The headings (N,) of the chords from 2.5 m before to 2.5 m behind the stations (N,)."""
+    chords = line.points_at(stations_m + CHORD_REACH_M) - line.points_at(
+        stations_m - CHORD_REACH_M
+    )
+    return np.arctan2(chords[:, 1], chords[:, 0])
+
+
+# Private
+
+
+def _arms(heading_rad: float | None) -> FloatArray:
+    """The directions (2, 2) or (1, 2) in which an inner control point may move from its end."""
+    if heading_rad is None:
+        return np.eye(2)
+    return np.array([[math.cos(heading_rad), math.sin(heading_rad)]])
+
+
+def _least_squares(
+    points: FloatArray, t: FloatArray, arms: tuple[FloatArray, FloatArray]
+) -> CubicBezier:
+    """The cubic with the first and the last of the points (N, 2), closest to all at t (N,)."""
+    first, last = points[0], points[-1]
+    rest = 1.0 - t
+    inner = 3.0 * rest * rest * t, 3.0 * rest * t * t
+    ends = np.outer(rest**3 + inner[0], first) + np.outer(t**3 + inner[1], last)
+    rows = np.column_stack(
+        [
+            np.outer(weight, arm).ravel()
+            for weight, side in zip(inner, arms, strict=True)
+            for arm in side
+        ]
+    )
+    # The normal equations have four unknowns at most; lstsq bears it if they depend on each other.
+    found = np.linalg.lstsq(rows.T @ rows, rows.T @ (points - ends).ravel(), rcond=None)[0]
+    starts, finishes = found[: len(arms[0])], found[len(arms[0]) :]
+    # A curve that leaves against its heading would turn back on itself.
+    if len(starts) == 1:
+        starts = np.maximum(starts, 1e-2)
+    if len(finishes) == 1:
+        finishes = np.minimum(finishes, -1e-2)
+    return CubicBezier([first, first + starts @ arms[0], last + finishes @ arms[1], last])
+
+
+def _nearest_parameters(
+    curve: CubicBezier, points: FloatArray, t: FloatArray, *, steps: int = 8
+) -> FloatArray:
+    """The parameters (N,) moved towards the curve's points nearest to `points` (N, 2)."""
+    for _ in range(steps):
+        along = curve.derivatives(t)
+        gaps = curve.points(t) - points
+        share = (gaps * along).sum(axis=1) / np.maximum((along * along).sum(axis=1), 1e-12)
+        t = np.clip(t - share, 0.0, 1.0)
+    return t

@@ -1,0 +1,174 @@
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from hypothesis import assume, given
+from hypothesis import strategies as st
+from hypothesis.extra.numpy import arrays
+
+from augment.geometry.bezier import CubicBezier, FloatArray, fit, fit_error
+from augment.geometry.frames import Pose
+from augment.geometry.polyline import Polyline
+from tests.scenes import curve as curved_scene
+
+KAPPA = 4.0 / 3.0 * (math.sqrt(2.0) - 1.0)
+QUARTER = CubicBezier([(10, 0), (10, 10 * KAPPA), (10 * KAPPA, 10), (0, 10)])
+"""The usual cubic for a quarter of a circle of 10 m; it is 3 mm off at most."""
+
+STRAIGHT = CubicBezier([(0, 0), (10, 0), (20, 0), (30, 0)])
+
+
+@st.composite
+def curves(draw: st.DrawFn) -> CubicBezier:
+    control = draw(arrays(np.float64, (4, 2), elements=st.floats(-100.0, 100.0)))
+    assume(np.ptp(control, axis=0).max() > 1.0)
+    return CubicBezier(control)
+
+
+@st.composite
+def lane_like(draw: st.DrawFn) -> CubicBezier:
+    """A curve as a lane's is: it goes on forward all the way."""
+    headings = [draw(st.floats(-0.7, 0.7)) for _ in range(3)]
+    lengths = [draw(st.floats(3.0, 40.0)) for _ in range(3)]
+    steps = [(r * math.cos(a), r * math.sin(a)) for r, a in zip(lengths, headings, strict=True)]
+    return CubicBezier(np.vstack([[(0.0, 0.0)], np.cumsum(steps, axis=0)]))
+
+
+def de_casteljau(control: FloatArray, t: float) -> FloatArray:
+    while len(control) > 1:
+        control = (1.0 - t) * control[:-1] + t * control[1:]
+    return np.asarray(control[0], dtype=np.float64)
+
+
+def dense_length(curve: CubicBezier, until: float = 1.0) -> float:
+    points = curve.points(np.linspace(0.0, until, 40_001))
+    return float(np.hypot(*np.diff(points, axis=0).T).sum())
+
+
+@given(curve=curves(), t=st.floats(0.0, 1.0))
+def test_a_point_is_what_de_casteljau_finds(curve: CubicBezier, t: float) -> None:
+    assert curve.points(np.array([t]))[0] == pytest.approx(
+        de_casteljau(curve.control_m, t), abs=1e-10
+    )
+
+
+@given(curve=curves())
+def test_a_curve_begins_and_ends_in_its_end_points(curve: CubicBezier) -> None:
+    start, end = curve.pose_at(0.0), curve.pose_at(curve.length_m)
+    assert (start.x_m, start.y_m) == pytest.approx(tuple(curve.control_m[0]), abs=1e-6)
+    assert (end.x_m, end.y_m) == pytest.approx(tuple(curve.control_m[3]), abs=1e-6)
+
+
+@given(curve=curves(), t=st.floats(0.01, 0.99))
+def test_the_halves_of_a_split_curve_are_the_curve(curve: CubicBezier, t: float) -> None:
+    first, second = curve.split(t)
+    shares = np.linspace(0.0, 1.0, 7)
+    assert first.points(shares) == pytest.approx(curve.points(shares * t), abs=1e-9)
+    assert second.points(shares) == pytest.approx(curve.points(t + shares * (1 - t)), abs=1e-9)
+
+
+@given(curve=lane_like())
+def test_arc_length_is_that_of_a_dense_line(curve: CubicBezier) -> None:
+    assert curve.length_m == pytest.approx(dense_length(curve), abs=1e-5)
+    assert curve.length_to(0.37) == pytest.approx(dense_length(curve, 0.37), abs=1e-5)
+
+
+@given(curve=curves())
+def test_going_further_never_goes_back(curve: CubicBezier) -> None:
+    stations = np.linspace(0.0, curve.length_m, 200)
+    assert (np.diff(curve.parameters_at(stations)) >= 0.0).all()
+    lengths = [curve.length_to(t) for t in np.linspace(0.0, 1.0, 33)]
+    assert (np.diff(lengths) >= 0.0).all()
+
+
+@given(curve=lane_like(), share=st.floats(0.0, 1.0))
+def test_the_place_at_an_arc_length_has_that_arc_length(curve: CubicBezier, share: float) -> None:
+    s_m = share * curve.length_m
+    assert curve.length_to(float(curve.parameters_at([s_m])[0])) == pytest.approx(s_m, abs=1e-8)
+
+
+@given(
+    curve=lane_like(),
+    share=st.floats(0.0, 1.0),
+    pose=st.builds(
+        Pose,
+        x_m=st.floats(-500.0, 500.0),
+        y_m=st.floats(-500.0, 500.0),
+        heading_rad=st.floats(-3.1, 3.1),
+    ),
+)
+def test_a_moved_and_turned_curve_has_moved_and_turned_poses(
+    curve: CubicBezier, share: float, pose: Pose
+) -> None:
+    moved = CubicBezier(pose.to_parent(curve.control_m))
+    assert moved.length_m == pytest.approx(curve.length_m, abs=1e-8)
+    there = moved.pose_at(share * moved.length_m, 1.5)
+    wanted = pose.pose_to_parent(curve.pose_at(share * curve.length_m, 1.5))
+    assert (there.x_m, there.y_m) == pytest.approx((wanted.x_m, wanted.y_m), abs=1e-6)
+    assert math.remainder(there.heading_rad - wanted.heading_rad, math.tau) == pytest.approx(
+        0.0, abs=1e-6
+    )
+
+
+@given(curve=lane_like(), share=st.floats(0.02, 0.98), d_m=st.floats(-1.5, 1.5))
+def test_projecting_a_position_gives_it_back(curve: CubicBezier, share: float, d_m: float) -> None:
+    pose = curve.pose_at(share * curve.length_m, d_m)
+    place = curve.project(pose.x_m, pose.y_m)
+    # Inside a bend tighter than the offset another place may be nearer.
+    assert place.distance_m <= abs(d_m) + 1e-6
+    if place.distance_m > abs(d_m) - 1e-6:
+        back = curve.pose_at(place.s_m, place.d_m)
+        assert (back.x_m, back.y_m) == pytest.approx((pose.x_m, pose.y_m), abs=1e-3)
+
+
+def test_a_quarter_of_a_circle_is_read_as_one() -> None:
+    pose = QUARTER.pose_at(QUARTER.length_m / 2.0, 1.0)
+    assert QUARTER.length_m == pytest.approx(5.0 * math.pi, abs=0.01)
+    assert pose.heading_rad == pytest.approx(0.75 * math.pi)
+    assert math.hypot(pose.x_m, pose.y_m) == pytest.approx(9.0, abs=0.003)
+
+
+def test_the_ends_are_extended_straight() -> None:
+    before, behind = STRAIGHT.pose_at(-3.0, 1.0), STRAIGHT.pose_at(34.0)
+    assert (before.x_m, before.y_m) == pytest.approx((-3.0, 1.0))
+    assert (behind.x_m, behind.y_m) == pytest.approx((34.0, 0.0))
+
+
+def test_a_doubled_control_point_still_has_a_heading() -> None:
+    doubled = CubicBezier([(0, 0), (0, 0), (5, 5), (5, 5)])
+    assert doubled.pose_at(0.0).heading_rad == pytest.approx(math.pi / 4)
+    assert doubled.pose_at(doubled.length_m).heading_rad == pytest.approx(math.pi / 4)
+
+
+def test_a_fit_finds_a_curve_again() -> None:
+    line = Polyline(QUARTER.points(QUARTER.parameters_at(np.linspace(0, QUARTER.length_m, 200))))
+    found = fit(line)
+    assert fit_error(found, line).position_m < 0.01
+    assert found.length_m == pytest.approx(QUARTER.length_m, abs=0.005)
+
+
+def test_a_fit_keeps_the_ends_and_takes_the_headings_it_is_given() -> None:
+    line = curved_scene().lanes[0].centerline.between(50.0, 110.0)
+    found = fit(line, start_rad=0.1, end_rad=1.2)
+    assert np.array_equal(found.control_m[[0, 3]], line.points_m[[0, -1]])
+    assert found.pose_at(0.0).heading_rad == pytest.approx(0.1)
+    assert found.pose_at(found.length_m).heading_rad == pytest.approx(1.2)
+
+
+def test_the_error_of_a_fit_is_its_worst_place() -> None:
+    line = Polyline([(0, 0), (30, 0)])
+    assert fit_error(STRAIGHT, line).position_m == pytest.approx(0.0, abs=1e-9)
+    aside = CubicBezier(STRAIGHT.control_m + np.array([0.0, 0.4]))
+    assert fit_error(aside, line).position_m == pytest.approx(0.4)
+    turned = CubicBezier(STRAIGHT.control_m @ np.array([[0.0, 1.0], [-1.0, 0.0]]))
+    assert fit_error(turned, line).heading_rad == pytest.approx(math.pi / 2)
+
+
+@pytest.mark.parametrize(
+    "control", [[], [(0, 0)] * 4, [(0, 0)] * 3, [(0, 0), (1, 1), (2, 2), (math.nan, 3)]]
+)
+def test_what_is_no_curve_is_refused(control: list[tuple[float, float]]) -> None:
+    with pytest.raises(ValueError, match="a curve needs"):
+        CubicBezier(control)
