@@ -63,8 +63,8 @@ class LaneGraph:
         return tuple(sorted(self._next[way_id], key=lambda name: self._bend(way_id, name)))
 
     def predecessors(self, way_id: str) -> tuple[str, ...]:
-        """Ids of what leads here."""
-        return tuple(self._previous[way_id])
+        """Ids of what leads here, straightest first."""
+        return tuple(sorted(self._previous[way_id], key=lambda name: self._bend(name, way_id)))
 
     def under(self, x_m: float, y_m: float, heading_rad: float | None = None) -> str | None:
         """The way whose width covers the point; of several the best aligned, else the nearest."""
