@@ -1,0 +1,24 @@
+"""Rows of augment: scenes, scenarios, contestants, jobs and what they produced.
+
+Rows are the truth; a Celery message carries one id. Every row that a person can see in a URL has
+a random `code`; primary keys stay inside.
+"""
+
+from augment.models.calls import ModelCall
+from augment.models.contestants import Contestant, Endpoint
+from augment.models.events import Event
+from augment.models.jobs import Attempt, Augmentation, GenerationJob
+from augment.models.scenes import SLUG_HELP, BaseScene, Scenario
+
+__all__ = [
+    "SLUG_HELP",
+    "Attempt",
+    "Augmentation",
+    "BaseScene",
+    "Contestant",
+    "Endpoint",
+    "Event",
+    "GenerationJob",
+    "ModelCall",
+    "Scenario",
+]

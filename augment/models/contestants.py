@@ -1,0 +1,79 @@
+"""Contestants, and the endpoints that some of them speak to."""
+
+from __future__ import annotations
+
+import uuid
+
+from django.db import models
+from django.db.models import Q
+
+from augment.models.scenes import SLUG_HELP
+
+
+class Endpoint(models.Model):
+    """An OpenAI-compatible address. The key itself is never stored, only where to find it."""
+
+    code = models.UUIDField(default=uuid.uuid4, unique=True, editable=False)
+    label = models.SlugField(max_length=80, unique=True, help_text=SLUG_HELP)
+    base_url = models.URLField(help_text="for example https://api.openai.com/v1")
+    key_variable = models.CharField(
+        max_length=80,
+        blank=True,
+        help_text="the environment variable that holds the key; empty where none is needed",
+    )
+    is_simulated = models.BooleanField(
+        default=False, help_text="the project's own stand-in: what it answers counts as simulated"
+    )
+
+    class Meta:
+        ordering = ("label",)
+
+    def __str__(self) -> str:
+        return self.label
+
+
+class Contestant(models.Model):
+    """Who is rated."""
+
+    class Kind(models.TextChoices):
+        REFERENCE = "reference", "Reference"
+        HUMAN = "human", "Human"
+        LLM = "llm", "Language model"
+        RULE = "rule", "Rules"
+        BASELINE = "baseline", "Baseline"
+        SIMULATED = "simulated", "Simulated"
+
+    code = models.UUIDField(default=uuid.uuid4, unique=True, editable=False)
+    slug = models.SlugField(max_length=80, unique=True, help_text=SLUG_HELP)
+    name = models.CharField(max_length=120)
+    kind = models.CharField(max_length=20, choices=Kind.choices)
+    variant = models.CharField(max_length=20, blank=True, help_text="otm, fc, ...; empty without")
+    endpoint = models.ForeignKey(
+        Endpoint, null=True, blank=True, on_delete=models.PROTECT, related_name="contestants"
+    )
+    model = models.CharField(max_length=120, blank=True, help_text="the model id on the endpoint")
+    created_at = models.DateTimeField(auto_now_add=True)
+
+    class Meta:
+        ordering = ("slug",)
+        constraints = (
+            models.CheckConstraint(
+                name="contestant_kind_is_known",
+                condition=Q(
+                    kind__in=["reference", "human", "llm", "rule", "baseline", "simulated"]
+                ),
+            ),
+            models.CheckConstraint(
+                name="contestant_variant_has_endpoint_and_model",
+                condition=Q(variant="", endpoint=None, model="")
+                | (~Q(variant="") & Q(endpoint__isnull=False) & ~Q(model="")),
+            ),
+        )
+
+    def __str__(self) -> str:
+        return self.name
+
+    @property
+    def is_simulated(self) -> bool:
+        """Whether it must never mix into a rating unless somebody switched that on."""
+        return self.kind == self.Kind.SIMULATED

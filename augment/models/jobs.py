@@ -1,0 +1,138 @@
+"""Jobs, their rows, and the tries at each row."""
+
+from __future__ import annotations
+
+import uuid
+
+from django.conf import settings
+from django.db import models
+from django.db.models import F, Q
+
+from augment.models.contestants import Contestant
+from augment.models.scenes import Scenario
+
+
+class GenerationJob(models.Model):
+    """Contestants x scenarios, launched by an admin."""
+
+    class State(models.TextChoices):
+        RUNNING = "running", "Running"
+        CANCELLED = "cancelled", "Cancelled"
+        FINISHED = "finished", "Finished"
+
+    code = models.UUIDField(default=uuid.uuid4, unique=True, editable=False)
+    name = models.CharField(max_length=120)
+    state = models.CharField(max_length=20, choices=State.choices, default=State.RUNNING)
+    contestants = models.ManyToManyField(Contestant, related_name="jobs")
+    scenarios = models.ManyToManyField(Scenario, related_name="jobs")
+    launched_by = models.ForeignKey(
+        settings.AUTH_USER_MODEL,
+        null=True,
+        blank=True,
+        on_delete=models.PROTECT,
+        related_name="generation_jobs",
+    )
+    created_at = models.DateTimeField(auto_now_add=True)
+    finished_at = models.DateTimeField(null=True, blank=True)
+
+    class Meta:
+        ordering = ("-created_at", "-pk")
+
+    def __str__(self) -> str:
+        return self.name
+
+
+class Augmentation(models.Model):
+    """One row of a job: scenario x contestant -> modification, image, and why not if not.
+
+    `queued` and `running` are under way; all other states are outcomes. `unreadable` and `refused`
+    are the contestant's own and count as a miss: their picture is the unchanged scene. `failed`
+    is a fault of the machinery (an endpoint that answers 500) and may be tried again.
+    """
+
+    class State(models.TextChoices):
+        QUEUED = "queued", "Waiting"
+        RUNNING = "running", "Running"
+        DONE = "done", "Done"
+        UNREADABLE = "unreadable", "Unreadable answer"
+        REFUSED = "refused", "Refused"
+        FAILED = "failed", "Failed"
+        CANCELLED = "cancelled", "Cancelled"
+
+    SHOWABLE = (State.DONE, State.UNREADABLE, State.REFUSED)
+    """States with a picture that an expert can judge."""
+
+    UNDER_WAY = (State.QUEUED, State.RUNNING)
+
+    code = models.UUIDField(default=uuid.uuid4, unique=True, editable=False)
+    job = models.ForeignKey(GenerationJob, on_delete=models.CASCADE, related_name="augmentations")
+    scenario = models.ForeignKey(Scenario, on_delete=models.PROTECT, related_name="augmentations")
+    contestant = models.ForeignKey(
+        Contestant, on_delete=models.PROTECT, related_name="augmentations"
+    )
+    state = models.CharField(max_length=20, choices=State.choices, default=State.QUEUED)
+    modification = models.JSONField(null=True, blank=True)
+    notes = models.TextField(blank=True, help_text="what the contestant said about its own work")
+    reason = models.TextField(blank=True, help_text="why there is no modification")
+    image = models.CharField(max_length=120, blank=True, help_text="name in the media storage")
+    claim = models.UUIDField(null=True, blank=True, help_text="who works on it right now")
+    heartbeat_at = models.DateTimeField(null=True, blank=True)
+    sent_at = models.DateTimeField(null=True, blank=True, help_text="last put on the queue")
+    created_at = models.DateTimeField(auto_now_add=True)
+    finished_at = models.DateTimeField(null=True, blank=True)
+
+    class Meta:
+        ordering = ("scenario__slug", "contestant__slug")
+        constraints = (
+            models.UniqueConstraint(
+                name="one_augmentation_per_cell", fields=("job", "scenario", "contestant")
+            ),
+            models.CheckConstraint(
+                name="running_augmentation_is_claimed",
+                condition=(
+                    Q(state="running") & Q(claim__isnull=False) & Q(heartbeat_at__isnull=False)
+                )
+                | (~Q(state="running") & Q(claim=None)),
+            ),
+            models.CheckConstraint(
+                name="done_augmentation_has_modification_and_image",
+                condition=~Q(state="done") | (Q(modification__isnull=False) & ~Q(image="")),
+            ),
+        )
+        indexes = (
+            models.Index(fields=("job", "state")),
+            models.Index(fields=("state", "sent_at")),
+        )
+
+    def __str__(self) -> str:
+        return str(self.code)
+
+
+class Attempt(models.Model):
+    """One try at an augmentation, from claim to outcome; a killed worker leaves it unfinished."""
+
+    augmentation = models.ForeignKey(
+        Augmentation, on_delete=models.CASCADE, related_name="attempts"
+    )
+    number = models.PositiveIntegerField()
+    worker = models.CharField(max_length=120, blank=True)
+    started_at = models.DateTimeField()
+    finished_at = models.DateTimeField(null=True, blank=True)
+    outcome = models.CharField(max_length=20, blank=True)
+    reason = models.TextField(blank=True)
+
+    class Meta:
+        ordering = ("number",)
+        constraints = (
+            models.UniqueConstraint(
+                name="attempt_number_is_unique", fields=("augmentation", "number")
+            ),
+            models.CheckConstraint(name="attempt_counts_from_one", condition=Q(number__gte=1)),
+            models.CheckConstraint(
+                name="attempt_ends_after_start",
+                condition=Q(finished_at=None) | Q(finished_at__gte=F("started_at")),
+            ),
+        )
+
+    def __str__(self) -> str:
+        return f"attempt {self.number}"
