@@ -20,13 +20,13 @@ serve: $(VENV)/.runtime ## Serve what is there
 
 test: lint chromium ## Every check and every test, on SQLite, Redis, PostgreSQL and in a browser
 	$(BIN)/python -m pytest -n 2 --dist loadgroup
-	$(BIN)/python -m tests.on_postgres -m postgres
+	$(BIN)/python -m tests.on_postgres -m "postgres and not redis" -n 2
 
 fast: $(VENV)/.test ## The tests that need neither a browser nor a server
 	$(BIN)/python -m pytest -n 2 -m "not browser and not redis and not slow"
 
 postgres: $(VENV)/.test ## The tests of rows and concurrency on a real PostgreSQL
-	$(BIN)/python -m tests.on_postgres -m postgres
+	$(BIN)/python -m tests.on_postgres -m "postgres and not redis" -n 2
 
 lint: $(VENV)/.test ## Format, style, floors and types
 	$(BIN)/ruff format --check .

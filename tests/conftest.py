@@ -11,6 +11,17 @@ from pytest_django import Settings
 from tests.stack import Home
 
 
+ON_POSTGRES = {"api", "exports", "jobs", "services", "studies", "votes", "web"}
+"""Folders whose tests are about rows: `make test` runs them on PostgreSQL as well."""
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    for item in items:
+        folder = item.path.relative_to(Path(__file__).parent).parts[0]
+        if folder in ON_POSTGRES and item.get_closest_marker("django_db"):
+            item.add_marker(pytest.mark.postgres)
+
+
 @pytest.fixture(scope="session")
 def realdata() -> Path:
     """The recorded scenes; without REALDATA_DIR a named skip, which CI does not allow."""
