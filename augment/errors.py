@@ -140,3 +140,15 @@ class KeyMissing(AugmentError):
             f"The environment variable {variable}, which holds the key of endpoint "
             f"{endpoint!r}, is not set where the worker runs."
         )
+
+
+class BudgetSpent(AugmentError):
+    """The next call could pass the cap of its job. Stop; raising the cap lets the job go on.
+
+    Args:
+        limit: Which cap, as a person reads it: "2.50 USD", "100 calls".
+    """
+
+    def __init__(self, limit: str) -> None:
+        self.limit = limit
+        super().__init__(f"The next call could pass the job's cap of {limit}.")

@@ -18,6 +18,7 @@ _TONES = {
     "running": "busy",
     "done": "good",
     "finished": "good",
+    "stopped_at_cap": "warn",
     "unreadable": "warn",
     "refused": "warn",
     "failed": "bad",
@@ -26,7 +27,7 @@ _TONES = {
     "open": "busy",
     "closed": "good",
 }
-_ICONS = {"finished": "done"}
+_ICONS = {"finished": "done", "stopped_at_cap": "stop"}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -6,10 +6,20 @@ Everything that is stored, replayed or shown goes through these values.
 from __future__ import annotations
 
 import base64
+from collections.abc import Callable
 from dataclasses import dataclass
 from enum import StrEnum
 
 DEFAULT_MAX_TOKENS = 8192
+
+
+ImageUrl = Callable[[bytes], str]
+"""How an image is written into a document: on the wire as the image itself."""
+
+
+def data_url(png: bytes) -> str:
+    """The image itself as a URL."""
+    return "data:image/png;base64," + base64.b64encode(png).decode("ascii")
 
 
 class Speaker(StrEnum):
@@ -32,12 +42,12 @@ class Message:
     text: str
     images: tuple[bytes, ...] = ()
 
-    def to_document(self) -> dict[str, object]:
+    def to_document(self, *, image_url: ImageUrl = data_url) -> dict[str, object]:
         """The message in the form of the OpenAI-compatible wire."""
         if not self.images:
             return {"role": self.speaker.value, "content": self.text}
         parts: list[dict[str, object]] = [{"type": "text", "text": self.text}]
-        parts += [{"type": "image_url", "image_url": {"url": _data_url(i)}} for i in self.images]
+        parts += [{"type": "image_url", "image_url": {"url": image_url(i)}} for i in self.images]
         return {"role": self.speaker.value, "content": parts}
 
 
@@ -56,11 +66,11 @@ class Request:
     temperature: float | None = None
     seed: int | None = None
 
-    def to_document(self) -> dict[str, object]:
+    def to_document(self, *, image_url: ImageUrl = data_url) -> dict[str, object]:
         """The body of the request on the OpenAI-compatible wire, ready for JSON."""
         document: dict[str, object] = {
             "model": self.model,
-            "messages": [message.to_document() for message in self.messages],
+            "messages": [message.to_document(image_url=image_url) for message in self.messages],
             "max_completion_tokens": self.max_tokens,
         }
         if self.temperature is not None:
@@ -94,7 +104,3 @@ class Reply:
     def is_cut_off(self) -> bool:
         """Whether the answer stopped at its length limit."""
         return self.finish_reason == "length"
-
-
-def _data_url(png: bytes) -> str:
-    return "data:image/png;base64," + base64.b64encode(png).decode("ascii")

@@ -4,7 +4,7 @@ Rows are the truth; a Celery message carries one id. Every row that a person can
 a random `code`; primary keys stay inside.
 """
 
-from augment.models.calls import ModelCall
+from augment.models.calls import ModelCall, TranscriptNote
 from augment.models.contestants import Contestant, Endpoint
 from augment.models.events import Event
 from augment.models.jobs import Attempt, Augmentation, GenerationJob
@@ -21,4 +21,5 @@ __all__ = [
     "GenerationJob",
     "ModelCall",
     "Scenario",
+    "TranscriptNote",
 ]

@@ -3,22 +3,30 @@
 from __future__ import annotations
 
 import uuid
+from decimal import Decimal
 
 from django.conf import settings
 from django.db import models
 from django.db.models import F, Q
 
+from augment.llm.costs import usd_of
 from augment.models.contestants import Contestant
 from augment.models.scenes import Scenario
 
 
 class GenerationJob(models.Model):
-    """Contestants x scenarios, launched by an admin."""
+    """Contestants x scenarios, launched by an admin, within caps on what it may use.
+
+    Money is counted in whole nano-dollars, so that sums are exact on every database. Each call
+    moves its worst case into `reserved_*` before it is sent, and what it used into `spent_*`
+    afterwards; a cap is compared with the sum of both. Null is no cap.
+    """
 
     class State(models.TextChoices):
         RUNNING = "running", "Running"
         CANCELLED = "cancelled", "Cancelled"
         FINISHED = "finished", "Finished"
+        STOPPED_AT_CAP = "stopped_at_cap", "Stopped at cap"
 
     code = models.UUIDField(default=uuid.uuid4, unique=True, editable=False)
     name = models.CharField(max_length=120)
@@ -32,6 +40,18 @@ class GenerationJob(models.Model):
         on_delete=models.PROTECT,
         related_name="generation_jobs",
     )
+    is_fresh = models.BooleanField(
+        default=False, help_text="ask anew what was answered in other jobs before"
+    )
+    cap_nano_usd = models.PositiveBigIntegerField(null=True, blank=True)
+    cap_calls = models.PositiveIntegerField(null=True, blank=True)
+    cap_tokens = models.PositiveBigIntegerField(null=True, blank=True)
+    reserved_nano_usd = models.PositiveBigIntegerField(default=0)
+    reserved_calls = models.PositiveIntegerField(default=0)
+    reserved_tokens = models.PositiveBigIntegerField(default=0)
+    spent_nano_usd = models.PositiveBigIntegerField(default=0)
+    spent_calls = models.PositiveIntegerField(default=0)
+    spent_tokens = models.PositiveBigIntegerField(default=0)
     created_at = models.DateTimeField(auto_now_add=True)
     finished_at = models.DateTimeField(null=True, blank=True)
 
@@ -40,6 +60,21 @@ class GenerationJob(models.Model):
 
     def __str__(self) -> str:
         return self.name
+
+    @property
+    def cap_usd(self) -> Decimal | None:
+        """The money cap, None without one."""
+        return None if self.cap_nano_usd is None else usd_of(self.cap_nano_usd)
+
+    @property
+    def reserved_usd(self) -> Decimal:
+        """The worst case of the calls in flight, as far as their prices are known."""
+        return usd_of(self.reserved_nano_usd)
+
+    @property
+    def spent_usd(self) -> Decimal:
+        """What was used, as far as prices are known."""
+        return usd_of(self.spent_nano_usd)
 
 
 class Augmentation(models.Model):

@@ -11,10 +11,10 @@ from django.utils import timezone
 
 from augment.errors import ClaimLost, ModelFault
 from augment.llm.messages import Reply, Request
-from augment.models import ModelCall
+from augment.models import ModelCall, TranscriptNote
 from augment.services import claims
 from augment.services.texts import storable, storable_document
-from augment.variants.transcript import ModelRole
+from augment.variants.transcript import ModelRole, NoteKind
 
 
 class RowTranscript:
@@ -26,6 +26,11 @@ class RowTranscript:
     def __init__(self, held: claims.Claim) -> None:
         self._held = held
         self._numbers = 0
+        self._notes = 0
+
+    def known(self, role: ModelRole, request: Request, prompt_version: str) -> Reply | None:
+        """None: every request is sent."""
+        return None
 
     def asked(self, role: ModelRole, request: Request, prompt_version: str) -> int:
         """Store a request; returns its number, from 1.
@@ -60,6 +65,17 @@ class RowTranscript:
     def broke(self, number: int, fault: ModelFault) -> None:
         """Store why there was no answer to that call."""
         self._call(number).update(fault=storable(sentence_of(fault)))
+
+    def note(self, kind: NoteKind, document: dict[str, object]) -> None:
+        """Store what happened since the last call."""
+        self._notes += 1
+        TranscriptNote.objects.create(
+            attempt_id=self._held.attempt_pk,
+            number=self._notes,
+            after_call=self._numbers,
+            kind=kind,
+            document=storable_document(document),
+        )
 
     def _call(self, number: int) -> QuerySet[ModelCall]:
         return ModelCall.objects.filter(attempt_id=self._held.attempt_pk, number=number)

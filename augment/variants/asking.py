@@ -23,9 +23,15 @@ class Conversation:
     def ask(self, role: ModelRole, request: Request, prompt_version: str) -> Reply:
         """The reply to the request; every attempt is in the transcript before it is judged.
 
+        What the transcript knows the answer to is not sent.
+
         Raises:
             ModelFault: The last attempt broke, or the fault is one that does not pass.
+            BudgetSpent: The transcript's budget has no room for the next attempt.
         """
+        before = self.transcript.known(role, request, prompt_version)
+        if before is not None:
+            return before
         attempt = 1
         while True:
             number = self.transcript.asked(role, request, prompt_version)

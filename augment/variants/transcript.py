@@ -22,8 +22,23 @@ class ModelRole(StrEnum):
     VIEWER = "viewer"
 
 
+class NoteKind(StrEnum):
+    """What a transcript notes between two calls."""
+
+    ROUND = "round"
+    TOOL_CALL = "tool_call"
+    REVIEW = "review"
+
+
 class Transcript(Protocol):
     """Told of every attempt before it is sent, and of its end before anybody reads it."""
+
+    def known(self, role: ModelRole, request: Request, prompt_version: str) -> Reply | None:
+        """An answer that this request had before, recorded as a call that cost nothing.
+
+        None where the request is to be sent.
+        """
+        ...
 
     def asked(self, role: ModelRole, request: Request, prompt_version: str) -> int:
         """Note that this request is about to be sent; returns the number of the call."""
@@ -35,6 +50,10 @@ class Transcript(Protocol):
 
     def broke(self, number: int, fault: ModelFault) -> None:
         """Note that there was no answer to that call, and why."""
+        ...
+
+    def note(self, kind: NoteKind, document: dict[str, object]) -> None:
+        """Keep what happened since the last call: ready for JSON, shown as it is."""
         ...
 
 
@@ -50,11 +69,25 @@ class RecordedCall:
     fault: ModelFault | None = None
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class RecordedNote:
+    """What happened after that call (0 before the first)."""
+
+    after_call: int
+    kind: NoteKind
+    document: dict[str, object]
+
+
 @dataclass(slots=True)
 class MemoryTranscript:
     """A transcript that lives as long as its run; calls are numbered from 1."""
 
     calls: list[RecordedCall] = field(default_factory=list)
+    notes: list[RecordedNote] = field(default_factory=list)
+
+    def known(self, role: ModelRole, request: Request, prompt_version: str) -> Reply | None:
+        """None: every request is sent."""
+        return None
 
     def asked(self, role: ModelRole, request: Request, prompt_version: str) -> int:
         """Note a request; returns its number."""
@@ -71,3 +104,7 @@ class MemoryTranscript:
     def broke(self, number: int, fault: ModelFault) -> None:
         """Keep the fault of that call."""
         self.calls[number - 1].fault = fault
+
+    def note(self, kind: NoteKind, document: dict[str, object]) -> None:
+        """Keep the note behind the last call."""
+        self.notes.append(RecordedNote(after_call=len(self.calls), kind=kind, document=document))
