@@ -282,5 +282,8 @@ def _nearest_parameters(
         along = curve.derivatives(t)
         gaps = curve.points(t) - points
         share = (gaps * along).sum(axis=1) / np.maximum((along * along).sum(axis=1), 1e-12)
-        t = np.clip(t - share, 0.0, 1.0)
+        moved = np.clip(t - share, 0.0, 1.0)
+        if np.abs(moved - t).max() < 1e-9:
+            break
+        t = moved
     return t
