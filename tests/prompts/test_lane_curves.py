@@ -1,0 +1,39 @@
+from __future__ import annotations
+
+import json
+
+from augment.prompts.lane_curves import control_points, lane_curves
+from augment.prompts.names import short_names
+from tests.scenes import curve, junction, scene
+
+
+def test_lanes_and_connectors_are_curves_that_know_their_neighbours() -> None:
+    cross = junction()
+    curves = lane_curves(cross, short_names(cross), 80.0)
+    assert list(curves) == ["Lane1", "Lane2", "Lane3", "Connector1", "Connector2"]
+    assert curves["Lane1"].after == ("Connector1", "Connector2")
+    assert (curves["Lane3"].before, curves["Lane3"].after) == (("Connector2",), ())
+    assert curves["Connector1"].width_m == 3.5
+
+
+def test_what_is_not_shown_joins_nothing() -> None:
+    cross = junction()
+    curves = lane_curves(cross, short_names(cross), 18.0)
+    assert list(curves) == ["Lane1"]
+    assert curves["Lane1"].after == ()
+
+
+def test_control_points_are_written_to_the_centimetre() -> None:
+    street = scene()
+    (lane1, _) = lane_curves(street, short_names(street), 30.0).values()
+    assert json.dumps(control_points(lane1.lane)) == (
+        "[[[-30.0, 0.0], [-10.0, 0.0], [10.0, 0.0], [30.0, 0.0]]]"
+    )
+
+
+def test_pieces_of_one_lane_share_the_point_at_their_joint() -> None:
+    bend = curve(12.0)
+    (lane,) = lane_curves(bend, short_names(bend), 80.0).values()
+    pieces = control_points(lane.lane)
+    assert len(pieces) == len(lane.pieces) > 1
+    assert pieces[0][3] == pieces[1][0]
