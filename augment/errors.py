@@ -78,6 +78,20 @@ class ReplyUnreadable(AugmentError):
         super().__init__("The answer can't be read: " + "; ".join(problems))
 
 
+class ToolError(AugmentError):
+    """A model called a tool in a way that has no answer. Give it the sentence; it may call again.
+
+    Args:
+        tool: The name of the tool.
+        problem: What is wrong, and what would be right.
+    """
+
+    def __init__(self, tool: str, problem: str) -> None:
+        self.tool = tool
+        self.problem = problem
+        super().__init__(f"{tool}: {problem}")
+
+
 class ModelFault(AugmentError):
     """The wire or the endpoint broke before there was an answer.
 

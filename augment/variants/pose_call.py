@@ -1,0 +1,123 @@
+"""One call of the tool `pose_on_lane`, read strictly from what a language model wrote."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+from augment.errors import ToolError
+from augment.geometry.bezier import CubicBezier
+
+TOOL = "pose_on_lane"
+LANE_START = "lane"
+"""The start that means the beginning of the lane; any other start is an agent's id."""
+
+FURTHEST_M = 1000.0
+WIDEST_M = 30.0
+
+_ARGUMENTS = ("lane", "start", "distance_m", "lateral_m")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PoseCall:
+    """The arguments of a call.
+
+    Attributes:
+        lane: The id of a lane, a connector or a piece, or a curve given by its control points.
+        start: "lane" or an agent's id.
+        distance_m: From the start along the lane, negative to go back.
+        lateral_m: To the left of the lane, negative to the right.
+    """
+
+    lane: str | CubicBezier
+    start: str
+    distance_m: float
+    lateral_m: float = 0.0
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class CallLimits:
+    """How often a model may call its tools before it has to answer.
+
+    Attributes:
+        calls: In one round.
+        identical: Of these with the very same arguments.
+    """
+
+    calls: int = 8
+    identical: int = 3
+
+    def check(self, earlier: Sequence[object], arguments: object) -> None:
+        """Refuse a call that is one too many after the earlier ones of the round.
+
+        Raises:
+            ToolError: It is.
+        """
+        if len(earlier) >= self.calls:
+            raise ToolError(
+                TOOL, f"no call is left: {self.calls} are allowed. Answer with what you have."
+            )
+        if sum(call == arguments for call in earlier) >= self.identical:
+            raise ToolError(
+                TOOL,
+                f"this very call was answered {self.identical} times and its answer does not "
+                "change. Use that answer or change the arguments.",
+            )
+
+
+def read_call(arguments: object) -> PoseCall:
+    """The arguments as a typed call.
+
+    Raises:
+        ToolError: They are not; the sentence names the argument and what is allowed.
+    """
+    if not isinstance(arguments, Mapping):
+        raise ToolError(TOOL, f"the arguments must be one JSON object with {_listed(_ARGUMENTS)}")
+    unknown = [str(name)[:40] for name in arguments if name not in _ARGUMENTS]
+    if unknown:
+        raise ToolError(
+            TOOL, f"there is no argument {unknown[0]!r}; there are {_listed(_ARGUMENTS)}"
+        )
+    missing = [name for name in _ARGUMENTS[:3] if name not in arguments]
+    if missing:
+        raise ToolError(TOOL, f"{_listed(missing)} must be given")
+    start = arguments["start"]
+    if not isinstance(start, str):
+        raise ToolError(TOOL, f'start must be "{LANE_START}" or the id of an agent')
+    return PoseCall(
+        lane=_lane(arguments["lane"]),
+        start=start,
+        distance_m=_number("distance_m", arguments["distance_m"], FURTHEST_M),
+        lateral_m=_number("lateral_m", arguments.get("lateral_m", 0.0), WIDEST_M),
+    )
+
+
+# Private
+
+
+def _lane(value: object) -> str | CubicBezier:
+    if isinstance(value, str):
+        return value
+    form = "lane must be an id or four control points [[x, y], [x, y], [x, y], [x, y]]"
+    if not (isinstance(value, list) and len(value) == 4):
+        raise ToolError(TOOL, form)
+    if not all(isinstance(point, list) and len(point) == 2 for point in value):
+        raise ToolError(TOOL, form)
+    try:
+        return CubicBezier([[_number("lane", x, FURTHEST_M) for x in point] for point in value])
+    except ValueError as fault:
+        raise ToolError(TOOL, f"lane: {fault}") from None
+
+
+def _number(name: str, value: object, limit: float) -> float:
+    # True is a number to Python, and an integer may be too large for a float.
+    if isinstance(value, bool) or not isinstance(value, int | float):
+        raise ToolError(TOOL, f"{name} must be a number, without quotes and without a unit")
+    if not (abs(value) <= limit and math.isfinite(value)):
+        raise ToolError(TOOL, f"{name} must be between {-limit:g} and {limit:g}")
+    return float(value)
+
+
+def _listed(names: Sequence[str]) -> str:
+    return ", ".join(names)

@@ -1,0 +1,1 @@
+"""Measurements to run by hand; each prints its table: python -m tests.benchmarks.<name>."""

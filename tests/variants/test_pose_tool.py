@@ -1,0 +1,231 @@
+from __future__ import annotations
+
+import json
+import math
+from dataclasses import replace
+from importlib.resources import files
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from augment.errors import ToolError
+from augment.geometry.bezier import CubicBezier
+from augment.geometry.polyline import Polyline
+from augment.prompts.lane_curves import control_points
+from augment.scene.entities import Lane
+from augment.variants.pose_call import FURTHEST_M, TOOL, WIDEST_M, CallLimits
+from augment.variants.pose_tool import PoseTool
+from tests.scenes import curve, junction, scene, vehicle
+
+JUNCTION = PoseTool(junction())
+STREET = PoseTool(scene(agents=(vehicle("Agent2", 12.0, 3.9, math.pi),)))
+BEND = PoseTool(curve())
+
+
+def winding() -> PoseTool:
+    line = Polyline([(x, 12.0 * math.sin(x / 18.0)) for x in np.linspace(0, 75, 151).tolist()])
+    return PoseTool(scene(lanes=(Lane(id="Lane1", centerline=line, width_m=3.5),), areas=()))
+
+
+def test_a_distance_from_the_ego_is_measured_along_its_lane() -> None:
+    place = BEND.pose_on_lane("Lane1", "Agent1", 10.0 + 40.0 * math.radians(30.0), 1.0)
+    assert place.pose.x_m == pytest.approx(10.0 + 39.0 * math.sin(math.radians(30.0)), abs=0.3)
+    assert place.pose.y_m == pytest.approx(40.0 - 39.0 * math.cos(math.radians(30.0)), abs=0.3)
+    assert math.degrees(place.pose.heading_rad) == pytest.approx(30.0, abs=3.0)
+    assert place.start_lateral_m == pytest.approx(0.0, abs=0.01)
+
+
+def test_left_and_right_are_seen_in_the_direction_of_travel() -> None:
+    left = STREET.pose_on_lane("Lane2", "Agent2", 5.0, 0.5)
+    assert (left.pose.x_m, left.pose.y_m) == pytest.approx((7.0, 3.0), abs=0.01)
+    assert left.start_lateral_m == pytest.approx(-0.4)
+    assert STREET.pose_on_lane("Lane2", "Agent2", 5.0, -0.5).pose.y_m == pytest.approx(4.0)
+
+
+def test_the_answer_carries_what_an_agent_of_the_block_needs() -> None:
+    assert JUNCTION.answer({"lane": "Lane1", "start": "Agent1", "distance_m": 15}) == {
+        "x_m": 15.0,
+        "y_m": 0.0,
+        "heading_rad": 0.0,
+        "heading_deg": 0.0,
+        "lane": "Lane1",
+        "along_m": 65.0,
+        "remaining_m": 5.0,
+        "lane_width_m": 3.5,
+        "next_lanes": ["Connector1", "Connector2"],
+        "route": ["Lane1"],
+        "start_lateral_m": 0.0,
+    }
+
+
+def test_a_distance_runs_on_straight_over_connectors_and_back_again() -> None:
+    ahead = JUNCTION.pose_on_lane("Lane1", "lane", 90.0)
+    assert ahead.route == ("Lane1", "Connector1", "Lane2")
+    assert ahead.lane == "Lane2"
+    assert ahead.along_m == pytest.approx(4.0)
+    assert ahead.pose.x_m == pytest.approx(40.0)
+    back = JUNCTION.pose_on_lane("Lane2", "lane", -36.0)
+    assert back.lane == "Lane1"
+    assert back.pose.x_m == pytest.approx(0.0)
+
+
+def test_a_turn_is_taken_by_naming_its_connector() -> None:
+    place = JUNCTION.pose_on_lane("Connector2", "lane", 20.0)
+    assert place.route == ("Connector2", "Lane3")
+    assert place.pose.x_m == pytest.approx(28.0, abs=0.01)
+    assert place.pose.heading_rad == pytest.approx(math.pi / 2, abs=0.01)
+
+
+def test_a_piece_begins_where_the_one_before_it_ends() -> None:
+    tool = winding()
+    way = tool.curves["Lane1"]
+    assert way.pieces[:2] == ("Lane1a", "Lane1b")
+    second = tool.pose_on_lane("Lane1b", "lane", 3.0)
+    assert second == tool.pose_on_lane("Lane1", "lane", way.lane.pieces[1].start_m + 3.0)
+    assert tool.pose_on_lane("Lane1a", "lane", 60.0).lane == "Lane1"
+
+
+def test_control_points_copied_from_the_prompt_are_their_lane() -> None:
+    (control,) = control_points(JUNCTION.curves["Lane1"].lane)
+    call = {"lane": control, "start": "lane", "distance_m": 75.0}
+    assert JUNCTION.answer(call) == JUNCTION.answer({**call, "lane": "Lane1"})
+
+
+def test_control_points_of_no_lane_are_a_curve_that_ends() -> None:
+    control = [[0, 10], [10, 10], [20, 10], [30, 10]]
+    call = {"lane": control, "start": "Agent1", "distance_m": 12.5, "lateral_m": -2}
+    answer = JUNCTION.answer(call)
+    assert (answer["x_m"], answer["y_m"], answer["lane"]) == (12.5, 8.0, None)
+    assert (answer["lane_width_m"], answer["remaining_m"]) == (None, 17.5)
+    assert "between 0.00 and 30.00" in str(JUNCTION.answer({**call, "distance_m": 31}))
+
+
+def test_only_what_the_prompt_shows_is_known() -> None:
+    near = PoseTool(scene(agents=(vehicle("Agent2", 60.0, 0.0),)), radius_m=30.0)
+    assert near.pose_on_lane("Lane1", "lane", 0.0).pose.x_m == pytest.approx(-30.0)
+    assert near.pose_on_lane("Lane1", "lane", 60.0).next_lanes == ()
+    with pytest.raises(ToolError, match="no agent 'Agent2'"):
+        near.pose_on_lane("Lane1", "Agent2", 0.0)
+    cut = PoseTool(junction(), radius_m=18.0)
+    assert cut.curves["Lane1"].after == ()
+
+
+def test_ids_from_other_peoples_files_go_by_their_short_forms() -> None:
+    street = scene()
+    tool = PoseTool(replace(street, lanes=(replace(street.lanes[0], id="ignore all"),)))
+    assert tool.pose_on_lane("Lane1", "lane", 1.0).lane == "Lane1"
+    assert "ignore" not in str(tool.answer({"lane": "x", "start": "lane", "distance_m": 0}))
+
+
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [
+        ({"lane": "Lane9"}, "no lane 'Lane9'. Is Lane3 meant? Known: Lane1, Lane2, Lane3, Conn"),
+        ({"start": "Agent7"}, "no agent 'Agent7'. Is Agent1 meant? Known: Agent1. Or start at"),
+        ({"lane": "Lane2", "start": "Agent1"}, "36.0 m before the beginning of it. To start from"),
+        ({"distance_m": 300}, "(Lane1 -> Connector1 -> Lane2): from this start distance_m can be"),
+        ({"distance_m": -300}, "begin 250.00 m short of that (Lane1): from this start distance_m"),
+        ({"distance_m": "20"}, "distance_m must be a number, without quotes"),
+        ({"distance_m": True}, "distance_m must be a number"),
+        ({"distance_m": math.nan}, "distance_m must be between -1000 and 1000"),
+        ({"distance_m": 10**400}, "distance_m must be between -1000 and 1000"),
+        ({"lateral_m": 31}, "lateral_m must be between -30 and 30"),
+        ({"start": 3}, 'start must be "lane" or the id of an agent'),
+        ({"lane": [[0, 0], [1, 1]]}, "lane must be an id or four control points"),
+        ({"lane": [[0, 0], [1], [2, 2], [3, 3]]}, "lane must be an id or four control points"),
+        ({"lane": [[0, 0]] * 4}, "lane: a curve needs control points in more than one place"),
+        ({"offset": 1}, "no argument 'offset'; there are lane, start, distance_m, lateral_m"),
+    ],
+)
+def test_a_call_that_cannot_be_answered_says_why(change: dict[str, object], said: str) -> None:
+    call = {"lane": "Lane1", "start": "Agent1", "distance_m": 10.0, **change}
+    answer = JUNCTION.answer(call)
+    assert list(answer) == ["error"]
+    assert said in str(answer["error"])
+
+
+def test_the_bound_that_an_error_names_can_be_called() -> None:
+    with pytest.raises(ToolError) as fault:
+        JUNCTION.pose_on_lane("Lane1", "Agent1", 300.0)
+    bound = float(fault.value.problem.split("can be ")[1].split(" ")[0])
+    assert JUNCTION.pose_on_lane("Lane1", "Agent1", bound).remaining_m == pytest.approx(0.0)
+
+
+def test_what_is_missing_is_named_and_no_object_is_no_call() -> None:
+    assert JUNCTION.answer({"lane": "Lane1"}) == {"error": "start, distance_m must be given"}
+    assert "one JSON object" in str(JUNCTION.answer(["Lane1", "lane", 3]))
+
+
+def test_an_agent_beside_another_lane_is_told_which() -> None:
+    assert 'call with lane "Lane1"' in str(
+        JUNCTION.answer({"lane": "Lane2", "start": "Agent1", "distance_m": 1})
+    )
+
+
+any_json = st.recursive(
+    st.none() | st.booleans() | st.floats() | st.integers() | st.text(max_size=5),
+    lambda inner: st.lists(inner, max_size=4) | st.dictionaries(st.text(max_size=3), inner),
+    max_leaves=8,
+)
+
+
+@given(
+    arguments=any_json
+    | st.fixed_dictionaries(
+        {
+            "lane": any_json | st.sampled_from(["Lane1", "Connector2"]),
+            "start": any_json | st.sampled_from(["lane", "Agent1"]),
+            "distance_m": any_json | st.floats(-200, 200),
+        },
+        optional={"lateral_m": any_json | st.floats(-5, 5)},
+    )
+)
+def test_whatever_is_called_the_answer_is_json(arguments: object) -> None:
+    json.dumps(JUNCTION.answer(arguments), allow_nan=False)
+
+
+@given(
+    control=st.lists(
+        st.lists(st.floats(-1000, 1000, allow_subnormal=False), min_size=2, max_size=2),
+        min_size=4,
+        max_size=4,
+    ),
+    distance_m=st.floats(-50, 500),
+)
+def test_any_curve_has_a_finite_answer_or_an_error(
+    control: list[list[float]], distance_m: float
+) -> None:
+    answer = JUNCTION.answer({"lane": control, "start": "Agent1", "distance_m": distance_m})
+    json.dumps(answer, allow_nan=False)
+
+
+def test_a_curve_is_taken_as_a_value_too() -> None:
+    straight = CubicBezier([(0, 0), (1, 0), (2, 0), (3, 0)])
+    assert JUNCTION.pose_on_lane(straight, "lane", 3.0).remaining_m == pytest.approx(0.0)
+
+
+def test_calls_are_limited_and_identical_ones_more_so() -> None:
+    limits = CallLimits()
+    call = {"lane": "Lane1", "start": "lane", "distance_m": 1}
+    others = [{**call, "distance_m": number} for number in range(2, 9)]
+    limits.check([call, call, *others[:5]], call)
+    with pytest.raises(ToolError, match="answered 3 times"):
+        limits.check([call, call, call], call)
+    with pytest.raises(ToolError, match="no call is left: 8 are allowed"):
+        limits.check([call, *others], {**call, "distance_m": 99})
+
+
+def test_the_texts_tell_of_the_tool_as_it_is() -> None:
+    texts = files("augment.prompts").joinpath("text")
+    schema = json.loads(texts.joinpath("pose_on_lane.json").read_text(encoding="utf-8"))
+    parameters = schema["function"]["parameters"]
+    assert schema["function"]["name"] == TOOL
+    assert list(parameters["properties"]) == ["lane", "start", "distance_m", "lateral_m"]
+    assert parameters["properties"]["distance_m"]["maximum"] == FURTHEST_M
+    assert parameters["properties"]["lateral_m"]["minimum"] == -WIDEST_M
+    told = texts.joinpath("pose_on_lane.md").read_text(encoding="utf-8")
+    answer = JUNCTION.answer({"lane": "Lane1", "start": "Agent1", "distance_m": 1})
+    for name in (*parameters["properties"], *answer, "error"):
+        assert name in told
