@@ -1,1 +1,1 @@
-"""The stand-in language-model server: it works from the request alone."""
+"""The stand-in language-model server: real HTTP, no model. It works from the request alone."""

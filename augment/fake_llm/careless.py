@@ -1,0 +1,201 @@
+"""The typical mistakes of weak models, made on purpose and the same every time.
+
+A right placement is bent in the frame of the lane ahead of the ego: s along it, d to its left.
+Which mistake is made depends on nothing but the prompt. Frame otherwise: ego frame.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import math
+import random
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from augment.geometry.angles import wrap
+from augment.geometry.polyline import Polyline
+from augment.scene.entities import AgentType, Scene, TrafficAgent
+from augment.scene.lane_graph import LaneGraph
+from augment.scene.modification import Modification
+
+_UNREADABLE_SHARE = 0.1
+_RIGHT_SHARE = 0.25
+_AHEAD_M = 200.0
+_NOTICEABLE_M = 1.0
+_NOTICEABLE_RAD = 0.15
+
+Agents = tuple[TrafficAgent, ...]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Bent:
+    """A placement gone wrong.
+
+    Attributes:
+        mistake: Its name, "none" where it stayed about right.
+    """
+
+    modification: Modification
+    mistake: str
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Setting:
+    """What a mistake looks at: the lane ahead as one line, the map, and the dice."""
+
+    line: Polyline
+    ego_s_m: float
+    graph: LaneGraph
+    rng: random.Random
+
+
+def dice(prompt: str) -> random.Random:
+    """Dice that fall the same for the same prompt, on every computer."""
+    return random.Random(int.from_bytes(hashlib.sha256(prompt.encode()).digest()[:8], "big"))
+
+
+def is_unreadable(rng: random.Random) -> bool:
+    """Whether this is one of the answers that nobody can read."""
+    return rng.random() < _UNREADABLE_SHARE
+
+
+def bend(scene: Scene, right: Modification, rng: random.Random) -> Bent:
+    """The right modification with a small inaccuracy and, mostly, one mistake.
+
+    Of the mistakes only those are drawn that make a difference here: a straight line is no
+    mistake on a straight road.
+    """
+    setting = _setting(scene, rng)
+    if setting is None or not right.added:
+        return Bent(modification=right, mistake="none")
+    shaky = _shifted(right.added, setting, rng.uniform(-1.5, 1.5))
+    made = {name: mistake(shaky, setting) for name, mistake in MISTAKES.items()}
+    possible = sorted(name for name, agents in made.items() if _differs(agents, shaky))
+    if not possible or rng.random() < _RIGHT_SHARE:
+        return Bent(modification=replace(right, added=shaky), mistake="none")
+    name = rng.choice(possible)
+    return Bent(modification=replace(right, added=made[name]), mistake=name)
+
+
+def straight_line(agents: Agents, setting: _Setting) -> Agents:
+    """The distance is laid out straight ahead of the ego instead of along the lane."""
+    bent = []
+    for agent in agents:
+        place = setting.line.project(agent.x_m, agent.y_m)
+        x_m, y_m = place.s_m - setting.ego_s_m, place.d_m
+        bent.append(_at(agent, x_m, y_m, agent.heading_rad))
+    return tuple(bent)
+
+
+def ego_heading(agents: Agents, setting: _Setting) -> Agents:
+    """The heading ignores how the lane runs."""
+    return tuple(
+        replace(agent, heading_rad=wrap(agent.heading_rad - _lane_heading(agent, setting.line)))
+        for agent in agents
+    )
+
+
+def neighbour_lane(agents: Agents, setting: _Setting) -> Agents:
+    """Everything lands one lane beside where it belongs."""
+    found = setting.graph.nearest(agents[0].x_m, agents[0].y_m)
+    width_m = setting.graph.ways[found[0]].width_m if found else 3.5
+    return _shifted(agents, setting, 0.0, setting.rng.choice([-1.0, 1.0]) * width_m)
+
+
+def wrong_side(agents: Agents, setting: _Setting) -> Agents:
+    """The offset from the lane's centreline is taken to the other side."""
+    bent = []
+    for agent in agents:
+        found = setting.graph.nearest(agent.x_m, agent.y_m)
+        if found is None or abs(found[1].d_m) > 2.0:
+            bent.append(agent)
+            continue
+        line = setting.graph.ways[found[0]].centerline
+        bent.append(_at(agent, *line.position(found[1].s_m, -found[1].d_m), agent.heading_rad))
+    return tuple(bent)
+
+
+def distance(agents: Agents, setting: _Setting) -> Agents:
+    """5 to 12 m too near or too far."""
+    far = setting.rng.choice([-1.0, 1.0])
+    return _shifted(agents, setting, far * setting.rng.uniform(5.0, 12.0))
+
+
+def heap(agents: Agents, setting: _Setting) -> Agents:
+    """All vehicles lie on top of the first."""
+    cars = [agent for agent in agents if agent.type in (AgentType.VEHICLE, AgentType.BUS)]
+    return tuple(
+        _at(agent, cars[0].x_m + 0.2 * n, cars[0].y_m, agent.heading_rad)
+        for n, agent in enumerate(agents)
+        if agent in cars
+    ) + tuple(agent for agent in agents if agent not in cars)
+
+
+def facing_away(agents: Agents, setting: _Setting) -> Agents:
+    """Pedestrians look away from the road that they are to cross, and go nowhere."""
+    return tuple(
+        replace(agent, heading_rad=wrap(agent.heading_rad + math.pi), walk_to_m=None)
+        if agent.type is AgentType.PEDESTRIAN
+        else agent
+        for agent in agents
+    )
+
+
+MISTAKES: dict[str, Callable[[Agents, _Setting], Agents]] = {
+    "straight-line": straight_line,
+    "ego-heading": ego_heading,
+    "neighbour-lane": neighbour_lane,
+    "wrong-side": wrong_side,
+    "distance": distance,
+    "heap": heap,
+    "facing-away": facing_away,
+}
+
+
+def _setting(scene: Scene, rng: random.Random) -> _Setting | None:
+    """None where the ego is on no lane: then there is nothing to measure along."""
+    graph = LaneGraph(scene)
+    way = graph.under(0.0, 0.0, 0.0)
+    if way is None:
+        return None
+    points = [graph.ways[name].centerline.points_m for name in graph.route(way, _AHEAD_M)]
+    line = Polyline(np.vstack(points))
+    return _Setting(line=line, ego_s_m=line.project(0.0, 0.0).s_m, graph=graph, rng=rng)
+
+
+def _shifted(agents: Agents, setting: _Setting, along_m: float, left_m: float = 0.0) -> Agents:
+    """Everybody moved along and across the lane ahead, turned as it turns."""
+    moved = []
+    for agent in agents:
+        place = setting.line.project(agent.x_m, agent.y_m)
+        s_m, d_m = place.s_m + along_m, place.d_m + left_m
+        turn = setting.line.heading_at(s_m) - setting.line.heading_at(place.s_m)
+        x_m, y_m = setting.line.position(s_m, d_m)
+        moved.append(_at(agent, x_m, y_m, wrap(agent.heading_rad + turn)))
+    return tuple(moved)
+
+
+def _at(agent: TrafficAgent, x_m: float, y_m: float, heading_rad: float) -> TrafficAgent:
+    """The agent in another place; its walk goes along."""
+    walk = agent.walk_to_m
+    if walk is not None:
+        walk = (walk[0] + x_m - agent.x_m, walk[1] + y_m - agent.y_m)
+    return replace(agent, x_m=x_m, y_m=y_m, heading_rad=heading_rad, walk_to_m=walk)
+
+
+def _lane_heading(agent: TrafficAgent, line: Polyline) -> float:
+    return line.heading_at(line.project(agent.x_m, agent.y_m).s_m)
+
+
+def _differs(agents: Agents, others: Agents) -> bool:
+    return any(
+        math.hypot(a.x_m - b.x_m, a.y_m - b.y_m) > _NOTICEABLE_M
+        or abs(wrap(a.heading_rad - b.heading_rad)) > _NOTICEABLE_RAD
+        for a, b in zip(sorted(agents, key=_by_id), sorted(others, key=_by_id), strict=True)
+    )
+
+
+def _by_id(agent: TrafficAgent) -> str:
+    return agent.id

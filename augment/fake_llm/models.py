@@ -1,0 +1,228 @@
+"""The stand-in's models: behaviour is chosen by the model's name.
+
+`fake-good` and `fake-careless` answer; each of the others breaks in one way that real servers do.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
+from threading import Lock
+
+from augment.baselines.rule_placer import place
+from augment.errors import InstructionNotUnderstood
+from augment.fake_llm import answers, careless
+from augment.fake_llm.sight import NothingSeen, Task, task_of
+from augment.fake_llm.wire import ChatRequest, Response, as_json, completion, error
+from augment.scene.modification import Modification
+
+
+@dataclass(slots=True)
+class Surroundings:
+    """What an answer may depend on besides its request.
+
+    Attributes:
+        slow_s: How long `fake-slow` keeps everybody waiting.
+    """
+
+    slow_s: float = 30.0
+    _seen: set[str] = field(default_factory=set)
+    _lock: Lock = field(default_factory=Lock)
+
+    def is_first(self, request: ChatRequest) -> bool:
+        """Whether this very request comes for the first time."""
+        key = request.model_dump_json()
+        with self._lock:
+            first = key not in self._seen
+            self._seen.add(key)
+        return first
+
+
+Behaviour = Callable[[ChatRequest, Surroundings], Response]
+
+
+def respond(request: ChatRequest, surroundings: Surroundings) -> Response:
+    """What the model of that name answers; an unknown one is a 404 that names the known."""
+    behaviour = MODELS.get(request.model)
+    if behaviour is None:
+        known = ", ".join(sorted(MODELS))
+        message = f"The model {request.model!r} does not exist. Known: {known}."
+        return error(404, message, param="model", code="model_not_found")
+    return behaviour(request, surroundings)
+
+
+def good_answer(request: ChatRequest) -> str:
+    """A right answer, or an honest one to what is not understood."""
+    try:
+        task = task_of(request.messages)
+    except NothingSeen:
+        return answers.SEES_NOTHING
+    try:
+        return answers.told(task, _placed(task), _summary(task))
+    except InstructionNotUnderstood as refused:
+        return answers.declined(task, refused.reason)
+
+
+def careless_answer(request: ChatRequest) -> str:
+    """An answer with the typical mistakes of weak models; about one in ten can't be read."""
+    try:
+        task = task_of(request.messages)
+    except NothingSeen:
+        return answers.SEES_NOTHING
+    rng = careless.dice(task.prompt)
+    try:
+        right = _placed(task)
+    except InstructionNotUnderstood as refused:
+        return answers.declined(task, refused.reason)
+    if careless.is_unreadable(rng):
+        return answers.told(task, right, _summary(task)).partition("```")[0]
+    bent = careless.bend(task.scene, right, rng)
+    return answers.told(task, bent.modification, _summary(task))
+
+
+def _placed(task: Task) -> Modification:
+    placement = place(task.scene, task.instruction)
+    return answers.renumbered(placement.modification, task.first_new)
+
+
+def _summary(task: Task) -> str:
+    return f"The user wants: {' '.join(task.instruction.split())}"
+
+
+def _good(request: ChatRequest, _: Surroundings) -> Response:
+    return as_json(completion(request, good_answer(request)))
+
+
+def _careless(request: ChatRequest, _: Surroundings) -> Response:
+    return as_json(completion(request, careless_answer(request)))
+
+
+def _slow(request: ChatRequest, surroundings: Surroundings) -> Response:
+    return replace(_good(request, surroundings), wait_s=surroundings.slow_s)
+
+
+def _500(request: ChatRequest, _: Surroundings) -> Response:
+    return error(500, "The server had an error.", kind="server_error")
+
+
+def _500_then_ok(request: ChatRequest, surroundings: Surroundings) -> Response:
+    answer = _500 if surroundings.is_first(request) else _good
+    return answer(request, surroundings)
+
+
+def _429(request: ChatRequest, _: Surroundings) -> Response:
+    return _too_many("1")
+
+
+def _429_long(request: ChatRequest, _: Surroundings) -> Response:
+    return _too_many("600")
+
+
+def _too_many(retry_after: str) -> Response:
+    return error(
+        429,
+        "Rate limit reached.",
+        kind="requests",
+        code="rate_limit_exceeded",
+        headers={"Retry-After": retry_after},
+    )
+
+
+def _quota(request: ChatRequest, _: Surroundings) -> Response:
+    message = "You exceeded your current quota."
+    return error(429, message, kind="insufficient_quota", code="insufficient_quota")
+
+
+def _context(request: ChatRequest, _: Surroundings) -> Response:
+    message = "This model's maximum context length is 4096 tokens."
+    return error(400, message, param="messages", code="context_length_exceeded")
+
+
+def _list_error(request: ChatRequest, _: Surroundings) -> Response:
+    body = [{"error": {"code": 400, "message": "Invalid value.", "status": "INVALID_ARGUMENT"}}]
+    return as_json(body, status=400)
+
+
+def _html(request: ChatRequest, _: Surroundings) -> Response:
+    return Response(body=b"<html><body>Sign in</body></html>", content_type="text/html")
+
+
+def _broken_json(request: ChatRequest, surroundings: Surroundings) -> Response:
+    whole = _good(request, surroundings)
+    return replace(whole, body=whole.body[: len(whole.body) // 2])
+
+
+def _dropped(request: ChatRequest, surroundings: Surroundings) -> Response:
+    whole = _good(request, surroundings)
+    return replace(whole, cut_at=len(whole.body) // 2)
+
+
+def _no_choices(request: ChatRequest, _: Surroundings) -> Response:
+    return as_json(completion(request, "") | {"choices": []})
+
+
+def _null_choices(request: ChatRequest, _: Surroundings) -> Response:
+    return as_json(completion(request, "") | {"choices": None})
+
+
+def _no_usage(request: ChatRequest, _: Surroundings) -> Response:
+    return as_json(completion(request, good_answer(request), with_usage=False))
+
+
+def _refuse(request: ChatRequest, _: Surroundings) -> Response:
+    return as_json(completion(request, None, refusal="I can't help with that."))
+
+
+def _filtered(request: ChatRequest, _: Surroundings) -> Response:
+    return as_json(completion(request, None, finish_reason="content_filter"))
+
+
+def _prose(request: ChatRequest, _: Surroundings) -> Response:
+    text = "The car should stand some way ahead of the ego, a little to the side of its lane."
+    return as_json(completion(request, text))
+
+
+def _cut_off(request: ChatRequest, _: Surroundings) -> Response:
+    text = good_answer(request)
+    middle = text.find("```json") + len("```json") + 40
+    return as_json(completion(request, text[:middle], finish_reason="length"))
+
+
+def _nan(request: ChatRequest, _: Surroundings) -> Response:
+    return as_json(completion(request, _spoilt_block('"x_m": NaN')))
+
+
+def _too_few(request: ChatRequest, _: Surroundings) -> Response:
+    return as_json(completion(request, _spoilt_block('"x_m": 20.0')))
+
+
+def _spoilt_block(fields: str) -> str:
+    start = json.dumps({"id": "Agent2", "type": "VEHICLE"})[:-1]
+    return f'Modified Vectors:\n```json\n{{"add": [{start}, {fields}}}]}}\n```\n'
+
+
+MODELS: dict[str, Behaviour] = {
+    "fake-good": _good,
+    "fake-careless": _careless,
+    "fake-500": _500,
+    "fake-500-then-ok": _500_then_ok,
+    "fake-429": _429,
+    "fake-429-long": _429_long,
+    "fake-quota": _quota,
+    "fake-context": _context,
+    "fake-list-error": _list_error,
+    "fake-html": _html,
+    "fake-slow": _slow,
+    "fake-broken-json": _broken_json,
+    "fake-dropped": _dropped,
+    "fake-no-choices": _no_choices,
+    "fake-null-choices": _null_choices,
+    "fake-no-usage": _no_usage,
+    "fake-refuse": _refuse,
+    "fake-filtered": _filtered,
+    "fake-prose": _prose,
+    "fake-cut-off": _cut_off,
+    "fake-nan": _nan,
+    "fake-too-few": _too_few,
+}

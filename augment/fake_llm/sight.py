@@ -1,0 +1,232 @@
+"""What the stand-in sees: the scene and the wish, read back out of a request's messages.
+
+It knows nothing else: no database, no file, no list of scenarios.
+Frame: ego frame.
+"""
+
+from __future__ import annotations
+
+import json
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from augment.fake_llm.wire import SpokenMessage
+from augment.geometry.angles import difference
+from augment.geometry.frames import Pose
+from augment.geometry.polyline import Polyline
+from augment.prompts.fill import QUOTE
+from augment.scene.entities import (
+    AgentType,
+    Area,
+    AreaKind,
+    Lane,
+    LaneConnector,
+    Origin,
+    Scene,
+    TrafficAgent,
+    TrafficLight,
+    TrafficSide,
+    TurnType,
+)
+
+_USUAL_WIDTH_M = 3.5
+_FINE_M = 0.5
+_SHORTEST_PIECE_M = 1.0
+_JOINT_M = 0.1
+
+Vectors = dict[str, list]  # type: ignore[type-arg]
+
+
+class NothingSeen(Exception):
+    """The messages hold no scene with a wish that can be read; the text says what is missing."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Task:
+    """What somebody is asked to do.
+
+    Attributes:
+        prompt: The text that it was read from.
+        first_new: The number of the first new agent.
+    """
+
+    prompt: str
+    scene: Scene
+    instruction: str
+    first_new: int
+
+
+def task_of(messages: Sequence[SpokenMessage]) -> Task:
+    """The task in the first message of a user that holds one.
+
+    Raises:
+        NothingSeen: None does.
+    """
+    for message in messages:
+        if message.role == "user" and "\nAgents:\n" in message.text:
+            try:
+                return _task(message.text)
+            except (ValueError, TypeError, KeyError, IndexError) as error:
+                raise NothingSeen(f"the scene can't be read ({type(error).__name__})") from None
+    raise NothingSeen("no message of a user holds a scene")
+
+
+def smooth(points_m: NDArray[np.float64]) -> Polyline:
+    """A curve through points (P, 2) a few metres apart, as a fine line.
+
+    Cubic pieces whose slope at each point is that of the parabola through it and its neighbours.
+    """
+    points = np.asarray(points_m, dtype=np.float64)
+    if len(points) > 2 and np.hypot(*(points[-1] - points[-2])) < _SHORTEST_PIECE_M:
+        # The direction of a very short last piece is mostly rounding.
+        points = np.delete(points, -2, axis=0)
+    coarse = Polyline(points)
+    points, stations = coarse.points_m, coarse.stations_m
+    if len(points) == 2:
+        return coarse
+    h = np.diff(stations)[:, None]
+    slopes = np.diff(points, axis=0) / h
+    inner = (slopes[:-1] * h[1:] + slopes[1:] * h[:-1]) / (h[:-1] + h[1:])
+    ends = 2.0 * slopes[[0, -1]] - inner[[0, -1]]
+    tangents = np.vstack([ends[:1], inner, ends[1:]])
+    at = np.unique(np.concatenate([np.arange(0.0, stations[-1], _FINE_M), stations]))
+    piece = np.clip(np.searchsorted(stations, at, side="right") - 1, 0, len(points) - 2)
+    t = ((at - stations[piece]) / h[piece, 0])[:, None]
+    start, end = points[piece], points[piece + 1]
+    leave, arrive = tangents[piece] * h[piece], tangents[piece + 1] * h[piece]
+    curve = (
+        (2 * t**3 - 3 * t**2 + 1) * start
+        + (t**3 - 2 * t**2 + t) * leave
+        + (3 * t**2 - 2 * t**3) * end
+        + (t**3 - t**2) * arrive
+    )
+    return Polyline(curve)
+
+
+def _task(text: str) -> Task:
+    agents = [_agent(name, vector) for name, vector in _list(text, "Agents").items()]
+    lanes = tuple(_lane(name, vector) for name, vector in _list(text, "Lanes").items())
+    widths = {lane.id: lane.width_m for lane in lanes}
+    side = re.search(r"^Traffic drives on the (left|right)-hand side", text, re.MULTILINE)
+    first_new = re.search(r"^The first new agent is Agent(\d+)\.$", text, re.MULTILINE)
+    if side is None or first_new is None:
+        raise NothingSeen("the side of the road or the first new agent is not named")
+    scene = Scene(
+        name="seen",
+        ego=next(agent for agent in agents if agent.type is AgentType.EGO_VEHICLE),
+        traffic_side=TrafficSide(side.group(1)),
+        origin=Origin(frame="prompt", pose=Pose(x_m=0.0, y_m=0.0, heading_rad=0.0)),
+        provenance="read from a prompt",
+        agents=tuple(agent for agent in agents if agent.type is not AgentType.EGO_VEHICLE),
+        lanes=_joined(lanes),
+        connectors=tuple(
+            _connector(name, vector, widths)
+            for name, vector in _list(text, "Lane connectors").items()
+        ),
+        areas=tuple(
+            Area(id=name, kind=AreaKind(vector[0]), boundary_m=tuple(map(_point, vector[1])))
+            for name, vector in _list(text, "Areas").items()
+        ),
+    )
+    return Task(
+        prompt=text,
+        scene=scene,
+        instruction=_instruction(text),
+        first_new=int(first_new.group(1)),
+    )
+
+
+def _list(text: str, title: str) -> Vectors:
+    """The JSON object under a heading."""
+    start = text.index(f"\n{title}:\n") + len(title) + 3
+    found, _ = json.JSONDecoder().raw_decode(text, start)
+    return dict(found)
+
+
+def _instruction(text: str) -> str:
+    quoted = re.search(r"^<instruction>\n(.*?)\n</instruction>$", text, re.DOTALL | re.MULTILINE)
+    if quoted is None:
+        raise NothingSeen("there is no instruction")
+    return "\n".join(line.removeprefix(QUOTE) for line in quoted.group(1).split("\n"))
+
+
+def _agent(name: str, vector: Sequence[object]) -> TrafficAgent:
+    kind, *numbers, lane = vector
+    x, y, heading, width, length, speed = (float(str(number)) for number in numbers)
+    return TrafficAgent(
+        id=name,
+        type=AgentType(str(kind)),
+        x_m=x,
+        y_m=y,
+        heading_rad=heading,
+        width_m=width,
+        length_m=length,
+        speed_mps=speed,
+        lane_id=None if lane is None else str(lane),
+    )
+
+
+def _lane(name: str, vector: Sequence[object]) -> Lane:
+    _, _, _, width, limit, points = vector
+    return Lane(
+        id=name,
+        centerline=smooth(np.array(points, dtype=np.float64)),
+        width_m=float(str(width)),
+        speed_limit_mps=None if limit is None else float(str(limit)),
+    )
+
+
+def _connector(name: str, vector: Sequence[object], widths: dict[str, float]) -> LaneConnector:
+    before, after, light, turn, limit, points = vector
+    ends = [None if end is None else str(end) for end in (before, after)]
+    return LaneConnector(
+        id=name,
+        from_lane=ends[0],
+        to_lane=ends[1],
+        centerline=smooth(np.array(points, dtype=np.float64)),
+        # The paper's table gives a connector no width; it is as wide as what it joins.
+        width_m=next((widths[end] for end in ends if end in widths), _USUAL_WIDTH_M),
+        traffic_light=TrafficLight(str(light)),
+        turn_type=TurnType(str(turn)),
+        speed_limit_mps=None if limit is None else float(str(limit)),
+    )
+
+
+def _joined(lanes: tuple[Lane, ...]) -> tuple[Lane, ...]:
+    """The lanes with those beside them and those that begin where they end: no list names them."""
+    return tuple(
+        replace(
+            lane,
+            left_neighbor=_beside(lane, lanes, 1.0),
+            right_neighbor=_beside(lane, lanes, -1.0),
+            successors=tuple(other.id for other in lanes if _follows(lane, other)),
+        )
+        for lane in lanes
+    )
+
+
+def _follows(lane: Lane, other: Lane) -> bool:
+    end, start = lane.centerline.points_m[-1], other.centerline.points_m[0]
+    return other is not lane and float(np.hypot(*(start - end))) < _JOINT_M
+
+
+def _beside(lane: Lane, lanes: tuple[Lane, ...], side: float) -> str | None:
+    middle = lane.centerline.pose_at(lane.centerline.length_m / 2.0)
+    for other in lanes:
+        place = other.centerline.project(middle.x_m, middle.y_m)
+        # Seen from the other lane this one lies on the far side.
+        gap = -side * place.d_m
+        width = (lane.width_m + other.width_m) / 2.0
+        turn = difference(other.centerline.heading_at(place.s_m), middle.heading_rad)
+        if other is not lane and abs(gap - width) < 0.4 * width and abs(turn) < 0.5:
+            return other.id
+    return None
+
+
+def _point(pair: Sequence[float]) -> tuple[float, float]:
+    x, y = pair
+    return float(x), float(y)

@@ -1,0 +1,95 @@
+from __future__ import annotations
+
+import math
+import random
+from collections import Counter
+from dataclasses import replace
+
+import pytest
+
+from augment.fake_llm.careless import MISTAKES, bend, dice, is_unreadable
+from augment.fake_llm.server import FakeServer
+from augment.scene.entities import Scene, TrafficAgent
+from augment.scene.modification import Modification
+from tests.fake_llm.asking import outcome
+from tests.scenes import curve, pedestrian, scene, vehicle
+
+PARKED = replace(vehicle("Agent2", 21.4, 0.6), lane_id="Lane1")
+ROUND_THE_BEND = replace(vehicle("Agent2", 10.0 + 40.0 * math.sin(0.7), 9.4, 0.7), lane_id="Lane1")
+
+
+def drawn(shown: Scene, *right: TrafficAgent) -> dict[str, Modification]:
+    """One modification of each mistake that comes up in 300 draws."""
+    bent = [bend(shown, Modification(added=right), random.Random(n)) for n in range(300)]
+    return {made.mistake: made.modification for made in bent}
+
+
+def test_only_mistakes_that_make_a_difference_are_made() -> None:
+    assert set(drawn(scene(), PARKED)) == {"none", "neighbour-lane", "wrong-side", "distance"}
+    crash = drawn(scene(), PARKED, replace(PARKED, id="Agent3", x_m=25.0, heading_rad=0.5))
+    assert "heap" in crash
+    bend_mistakes = set(drawn(curve(), ROUND_THE_BEND))
+    assert {"straight-line", "ego-heading", "distance"} <= bend_mistakes
+    walker = pedestrian("Agent2", 18.0, -5.0, (18.0, 6.0))
+    assert "facing-away" in drawn(scene(), walker)
+    assert {name for made in (scene(), curve()) for name in drawn(made, PARKED)} <= {
+        *MISTAKES,
+        "none",
+    }
+
+
+def test_a_mistake_is_what_its_name_says() -> None:
+    made = drawn(scene(), PARKED)
+    (far,) = made["distance"].added
+    assert 3.4 < abs(far.x_m - 21.4) < 13.6
+    (beside,) = made["neighbour-lane"].added
+    assert abs(beside.y_m - 0.6) == pytest.approx(3.5)
+    (mirrored,) = made["wrong-side"].added
+    assert mirrored.y_m == pytest.approx(-0.6)
+    (about,) = made["none"].added
+    assert abs(about.x_m - 21.4) <= 1.5
+    (straight,) = drawn(curve(), ROUND_THE_BEND)["straight-line"].added
+    assert straight.y_m < 1.0
+    (askew,) = drawn(curve(), ROUND_THE_BEND)["ego-heading"].added
+    assert abs(askew.heading_rad) < 0.1
+
+
+def test_a_heap_is_one_car_upon_the_other() -> None:
+    other = replace(PARKED, id="Agent3", x_m=25.0, heading_rad=0.5)
+    first, second = drawn(scene(), PARKED, other)["heap"].added
+    assert math.hypot(first.x_m - second.x_m, first.y_m - second.y_m) < 0.5
+
+
+def test_a_pedestrian_who_faces_away_goes_nowhere() -> None:
+    walker = pedestrian("Agent2", 18.0, -5.0, (18.0, 6.0))
+    (away,) = drawn(scene(), walker)["facing-away"].added
+    assert away.walk_to_m is None
+    assert away.heading_rad == pytest.approx(-math.pi / 2.0)
+
+
+def test_the_dice_fall_the_same_for_the_same_prompt() -> None:
+    assert dice("a").random() == dice("a").random()
+    assert dice("a").random() != dice("b").random()
+
+
+def test_about_one_answer_in_ten_can_not_be_read() -> None:
+    fallen = Counter(is_unreadable(dice(f"prompt {n}")) for n in range(2000))
+    assert 0.07 < fallen[True] / 2000 < 0.13
+
+
+def test_it_answers_most_wishes_wrongly_and_always_the_same(server: FakeServer) -> None:
+    wishes = [
+        f"Add a parked vehicle {17.0 + n / 2.0} m ahead of the ego in its lane." for n in range(40)
+    ]
+    made = [outcome(server, "fake-careless", curve(), wish) for wish in wishes]
+    right = [outcome(server, "fake-good", curve(), wish) for wish in wishes]
+    assert made[:3] == [outcome(server, "fake-careless", curve(), wish) for wish in wishes[:3]]
+    assert {outcome.status.value for outcome in made} == {"done", "unreadable"}
+    errors_m = [
+        math.dist((a.x_m, a.y_m), (b.x_m, b.y_m))
+        for wrong, good in zip(made, right, strict=True)
+        if wrong.modification and good.modification
+        for a, b in zip(wrong.modification.added, good.modification.added, strict=True)
+    ]
+    assert len(errors_m) >= 24
+    assert sum(error > 2.0 for error in errors_m) >= len(errors_m) / 3

@@ -1,0 +1,132 @@
+"""Every model of the stand-in through the wire and along the recipe: what becomes of it."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import pytest
+
+from augment.errors import ModelFault
+from augment.fake_llm.models import MODELS
+from augment.fake_llm.server import FakeServer, running
+from augment.variants.transcript import MemoryTranscript
+from tests.fake_llm.asking import outcome
+from tests.scenes import curve, junction, scene, vehicle
+
+WISH = "Add a parked vehicle 21.4 m ahead of the ego in its lane."
+KEY = "sk-planted-4f7a9c0d1e2b3a"
+
+OUTCOMES = {
+    "fake-good": ("done", 1),
+    "fake-500-then-ok": ("done", 2),
+    "fake-no-usage": ("done", 1),
+    "fake-refuse": ("refused", 1),
+    "fake-filtered": ("refused", 1),
+    "fake-prose": ("unreadable", 2),
+    "fake-cut-off": ("unreadable", 2),
+    "fake-nan": ("unreadable", 2),
+    "fake-too-few": ("unreadable", 2),
+    "fake-500": ("fault", 3),
+    "fake-429": ("fault", 3),
+    "fake-429-long": ("fault", 1),
+    "fake-quota": ("fault", 1),
+    "fake-context": ("fault", 1),
+    "fake-list-error": ("fault", 1),
+    "fake-html": ("fault", 1),
+    "fake-slow": ("fault", 3),
+    "fake-broken-json": ("fault", 3),
+    "fake-dropped": ("fault", 3),
+    "fake-no-choices": ("fault", 3),
+    "fake-null-choices": ("fault", 3),
+}
+
+
+def test_every_model_but_the_careless_has_an_outcome_of_its_own() -> None:
+    assert OUTCOMES.keys() | {"fake-careless"} == MODELS.keys()
+
+
+@pytest.mark.parametrize("model", OUTCOMES)
+def test_each_model_comes_to_its_outcome_in_so_many_calls(model: str) -> None:
+    wanted, calls = OUTCOMES[model]
+    transcript = MemoryTranscript()
+    with running(slow_s=30.0) as server:
+        try:
+            made = outcome(
+                server,
+                model,
+                scene(),
+                WISH,
+                transcript=transcript,
+                key=KEY,
+                timeout_s=0.5 if model == "fake-slow" else 10.0,
+            )
+            status, shown = made.status.value, repr(made)
+        except ModelFault as fault:
+            status, shown = "fault", repr(fault) + repr(vars(fault))
+    assert (status, len(transcript.calls)) == (wanted, calls)
+    assert all((call.reply is None) != (call.fault is None) for call in transcript.calls)
+    assert KEY not in shown + repr(transcript.calls)
+
+
+@pytest.mark.parametrize("distance_m", [13.7, 26.2, 44.9])
+def test_an_unseen_sentence_is_placed_right_on_an_unseen_curve(
+    server: FakeServer, distance_m: float
+) -> None:
+    radius_m = 33.0
+    wish = f"Add a parked vehicle {distance_m} m ahead of the ego in its lane."
+    made = outcome(server, "fake-good", curve(radius_m), wish)
+    assert made.modification is not None
+    (car,) = made.modification.added
+    turned = (distance_m - 10.0) / radius_m
+    true = 10.0 + radius_m * math.sin(turned), radius_m * (1.0 - math.cos(turned))
+    assert math.dist((car.x_m, car.y_m), true) < 0.3
+    assert car.heading_rad == pytest.approx(turned, abs=math.radians(3.0))
+    assert (car.id, car.lane_id, car.speed_mps) == ("Agent2", "Lane1", 0.0)
+
+
+def test_a_distance_runs_on_over_a_connector(server: FakeServer) -> None:
+    made = outcome(
+        server,
+        "fake-good",
+        junction(),
+        "Add a parked vehicle 43.5 m ahead of the ego in its lane.",
+    )
+    assert made.modification is not None
+    (car,) = made.modification.added
+    assert (car.x_m, car.y_m) == pytest.approx((43.5, 0.0), abs=0.1)
+    assert car.lane_id == "Lane2"
+
+
+def test_a_new_agent_gets_the_first_new_id(server: FakeServer) -> None:
+    busy = scene(agents=(vehicle("Agent4", 60.0, 3.5, math.pi),))
+    made = outcome(server, "fake-good", busy, WISH)
+    assert made.modification is not None
+    assert [agent.id for agent in made.modification.added] == ["Agent5"]
+
+
+@pytest.mark.parametrize("model", ["fake-good", "fake-careless"])
+def test_what_is_not_understood_is_said_and_changes_nothing(
+    server: FakeServer, model: str
+) -> None:
+    made = outcome(server, model, scene(), "Paint the sky green.")
+    assert made.modification is not None
+    assert made.modification.is_empty
+    assert "I did not understand the instruction" in made.notes
+
+
+def test_the_answer_has_five_sections_with_computed_numbers(server: FakeServer) -> None:
+    transcript = MemoryTranscript()
+    outcome(server, "fake-good", scene(), WISH, transcript=transcript)
+    reply = transcript.calls[0].reply
+    assert reply is not None
+    heads = ["Insights:", "Summary:", "Modification Dict:", "Modification Calculations:"]
+    places = [reply.text.index(head) for head in [*heads, "Modified Vectors:\n```json"]]
+    assert places == sorted(places)
+    assert "21.40 m along the lanes from the ego, on Lane1" in reply.text
+    assert '[{"Action": "add", "Modified_Agent": "Agent2"}]' in reply.text
+
+
+def test_a_scene_with_the_ego_off_every_lane_is_answered(server: FakeServer) -> None:
+    nowhere = scene(lanes=(), areas=(), ego=replace(scene().ego, lane_id=None))
+    assert outcome(server, "fake-careless", nowhere, WISH).status in {"done", "unreadable"}
