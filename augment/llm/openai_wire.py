@@ -24,6 +24,7 @@ DEFAULT_TIMEOUT_S = 180.0
 CONNECT_TIMEOUT_S = 10.0
 
 _OPENAI_HOSTS = (".openai.com", ".openai.azure.com")
+_HERE = ("localhost", "127.0.0.1", "::1")
 _KEYLESS = "no-key"
 """Sent where an endpoint needs no key: without one the package would look for OPENAI_API_KEY."""
 
@@ -115,16 +116,20 @@ def _client(base_url: str, key: str, timeout_s: float) -> openai.OpenAI:
         max_retries=0,
         timeout=openai.Timeout(timeout_s, connect=min(CONNECT_TIMEOUT_S, timeout_s)),
         default_headers=headers if foreign else None,  # type: ignore[arg-type]
-        # A redirect would carry the scene to a host that nobody entered.
-        http_client=openai.DefaultHttpxClient(follow_redirects=False),
+        http_client=openai.DefaultHttpxClient(
+            # A redirect would carry the scene to a host that nobody entered.
+            follow_redirects=False,
+            # The environment's proxy can't reach what listens on this computer alone.
+            trust_env=host not in _HERE,
+        ),
     )
 
 
 def _cause(error: BaseException) -> str:
     """The kind of the innermost fault; its text may hold parts of the request."""
     inner = error
-    while inner.__cause__ is not None:
-        inner = inner.__cause__
+    while (deeper := inner.__cause__ or inner.__context__) is not None:
+        inner = deeper
     if isinstance(inner, OSError) and inner.strerror:
         return inner.strerror
     return type(inner).__name__

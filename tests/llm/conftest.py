@@ -1,0 +1,13 @@
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import pytest
+
+from augment.fake_llm.server import FakeServer, running
+
+
+@pytest.fixture(scope="session")
+def server() -> Iterator[FakeServer]:
+    with running(slow_s=30.0) as serving:
+        yield serving
