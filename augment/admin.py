@@ -13,11 +13,14 @@ from augment.models import (
     BaseScene,
     Contestant,
     Endpoint,
+    EndpointModel,
     Event,
     GenerationJob,
     ModelCall,
     Scenario,
 )
+from augment.services.endpoints import facts_of
+from augment.services.events import log_event
 
 
 class ReadOnly:
@@ -70,13 +73,60 @@ class ScenarioAdmin(MadeElsewhere, admin.ModelAdmin):
     )
 
 
-@admin.register(Endpoint)
-class EndpointAdmin(ReadOnly, admin.ModelAdmin):
-    """Endpoints; `add_contestant` makes and moves them, because it checks the address."""
+class EndpointModelInline(admin.StackedInline):
+    """The models of an endpoint: what they can do, what they cost, what the probe saw."""
 
-    list_display = ("label", "base_url", "key_variable", "is_simulated")
+    model = EndpointModel
+    extra = 0
+    readonly_fields = ("refused_parameters", "probed_at", "probe_report")
+    fieldsets = (
+        (None, {"fields": (("model", "model_class"),)}),
+        (
+            "Abilities (unknown until probed or entered)",
+            {
+                "fields": (
+                    ("native_tools", "vision", "json_schema", "temperature"),
+                    ("reasoning_effort", "context_tokens", "max_output_tokens"),
+                    "refused_parameters",
+                )
+            },
+        ),
+        (
+            "Price per million tokens (unknown where empty)",
+            {"fields": (("price_in_usd", "price_out_usd"), ("price_as_of", "price_source"))},
+        ),
+        ("Last probe", {"classes": ("collapse",), "fields": ("probed_at", "probe_report")}),
+    )
+
+
+@admin.register(Endpoint)
+class EndpointAdmin(admin.ModelAdmin):
+    """Endpoints; every change is logged, and who is simulated stays so."""
+
+    list_display = ("label", "base_url", "key_variable", "is_simulated", "max_concurrency")
     list_filter = ("is_simulated",)
-    readonly_fields = ("code", "label", "base_url", "key_variable", "is_simulated")
+    inlines = (EndpointModelInline,)
+
+    def get_readonly_fields(self, request: HttpRequest, obj: Any = None) -> tuple[str, ...]:
+        """What contestants were named and rated by can't be changed any more."""
+        return ("code",) if obj is None else ("code", "label", "is_simulated")
+
+    def save_model(self, request: HttpRequest, obj: Any, form: Any, change: bool) -> None:
+        """Remember how it was, for the log."""
+        form.before = facts_of(obj) if change else None
+        super().save_model(request, obj, form, change)
+
+    def save_related(self, request: HttpRequest, form: Any, formsets: Any, change: bool) -> None:
+        """Log the endpoint with its models, before and after."""
+        super().save_related(request, form, formsets, change)
+        log_event(
+            actor=request.user,  # type: ignore[arg-type]
+            verb="change" if change else "add",
+            object_kind="endpoint",
+            object_code=form.instance.code,
+            before=form.before,
+            after=facts_of(form.instance),
+        )
 
 
 @admin.register(Contestant)

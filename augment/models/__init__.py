@@ -5,7 +5,8 @@ a random `code`; primary keys stay inside.
 """
 
 from augment.models.calls import ModelCall, TranscriptNote
-from augment.models.contestants import Contestant, Endpoint
+from augment.models.contestants import Contestant
+from augment.models.endpoints import CallLease, Endpoint, EndpointModel
 from augment.models.events import Event
 from augment.models.jobs import Attempt, Augmentation, GenerationJob
 from augment.models.scenes import SLUG_HELP, BaseScene, Scenario
@@ -15,8 +16,10 @@ __all__ = [
     "Attempt",
     "Augmentation",
     "BaseScene",
+    "CallLease",
     "Contestant",
     "Endpoint",
+    "EndpointModel",
     "Event",
     "GenerationJob",
     "ModelCall",

@@ -1,4 +1,4 @@
-"""Contestants, and the endpoints that some of them speak to."""
+"""Who is rated."""
 
 from __future__ import annotations
 
@@ -7,29 +7,8 @@ import uuid
 from django.db import models
 from django.db.models import Q
 
+from augment.models.endpoints import Endpoint
 from augment.models.scenes import SLUG_HELP
-
-
-class Endpoint(models.Model):
-    """An OpenAI-compatible address. The key itself is never stored, only where to find it."""
-
-    code = models.UUIDField(default=uuid.uuid4, unique=True, editable=False)
-    label = models.SlugField(max_length=80, unique=True, help_text=SLUG_HELP)
-    base_url = models.URLField(help_text="for example https://api.openai.com/v1")
-    key_variable = models.CharField(
-        max_length=80,
-        blank=True,
-        help_text="the environment variable that holds the key; empty where none is needed",
-    )
-    is_simulated = models.BooleanField(
-        default=False, help_text="the project's own stand-in: what it answers counts as simulated"
-    )
-
-    class Meta:
-        ordering = ("label",)
-
-    def __str__(self) -> str:
-        return self.label
 
 
 class Contestant(models.Model):

@@ -9,8 +9,9 @@ from django.contrib.auth.models import User
 from django.db import transaction
 
 from augment.errors import Conflict, InvalidDocument, KeyMissing, UnknownName
+from augment.llm.addresses import check_base_url
 from augment.models import Contestant, Endpoint
-from augment.services.addresses import check_base_url
+from augment.services.endpoints import model_at
 from augment.services.events import log_event
 from augment.services.scenes import check_slug
 from augment.variants.recipes import recipe
@@ -99,7 +100,8 @@ def add_contestant(
 ) -> Contestant:
     """A language model that runs one variant; a simulated one where the endpoint is simulated.
 
-    The same contestant twice is one; `openai` can be named without having been added where
+    The same contestant twice is one. What the model can do and costs has a row of its own, made
+    empty here where there is none; `openai` can be named without having been added where
     OPENAI_API_KEY is set.
 
     Args:
@@ -126,6 +128,7 @@ def add_contestant(
         "endpoint": address,
         "model": model,
     }
+    model_at(endpoint=address, model=model)
     contestant, made = Contestant.objects.get_or_create(slug=slug, defaults=wanted)
     if not made:
         _refuse_another(contestant, wanted, named=name is not None)

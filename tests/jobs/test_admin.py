@@ -12,6 +12,7 @@ from augment.models import (
     Augmentation,
     Contestant,
     Endpoint,
+    EndpointModel,
     Event,
     GenerationJob,
     ModelCall,
@@ -41,6 +42,7 @@ def past_job() -> None:
     )
     claims.settle(held=held, settlement=done(), now=timezone.now())
     endpoint = Endpoint.objects.create(label="local", base_url="http://127.0.0.1:9/v1")
+    EndpointModel.objects.create(endpoint=endpoint, model="llama3.1")
     add_model("llama", endpoint=endpoint, model="llama3.1")
 
 

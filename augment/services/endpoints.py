@@ -1,0 +1,36 @@
+"""Endpoints and what is known of their models, for the log, the client and the money."""
+
+from __future__ import annotations
+
+import json
+from typing import Any
+
+from django.core.serializers.json import DjangoJSONEncoder
+from django.db import transaction
+
+from augment.models import Endpoint, EndpointModel
+
+_LIMITS = (
+    *("label", "base_url", "key_variable", "is_simulated"),
+    *("max_concurrency", "requests_per_minute"),
+)
+_KNOWN = (
+    *("model", "model_class", "native_tools", "vision", "json_schema", "temperature"),
+    *("refused_parameters", "reasoning_effort", "context_tokens", "max_output_tokens"),
+    *("price_in_usd", "price_out_usd", "price_as_of", "price_source"),
+)
+
+
+@transaction.atomic
+def model_at(*, endpoint: Endpoint, model: str) -> EndpointModel:
+    """What is known of the model at the endpoint; a new row knows nothing."""
+    return EndpointModel.objects.get_or_create(endpoint=endpoint, model=model)[0]
+
+
+def facts_of(endpoint: Endpoint) -> dict[str, Any]:
+    """The endpoint and its models as they are stored now, ready for the log."""
+    facts: dict[str, Any] = dict(Endpoint.objects.values(*_LIMITS).get(pk=endpoint.pk))
+    facts["models"] = list(endpoint.models.order_by("model").values(*_KNOWN))
+    # Dates and decimals become texts; a decimal as a number would lose digits.
+    document: dict[str, Any] = json.loads(json.dumps(facts, cls=DjangoJSONEncoder))
+    return document

@@ -1,0 +1,154 @@
+"""Endpoints and their models as rows, and as admins edit them."""
+
+from __future__ import annotations
+
+from datetime import date
+from decimal import Decimal
+from typing import Any
+
+import pytest
+from django.contrib.auth.models import User
+from django.db import IntegrityError
+from django.test import Client
+from django.urls import reverse
+
+from augment.models import Endpoint, EndpointModel, Event
+from augment.services import contestants
+
+pytestmark = pytest.mark.django_db
+LOCAL = "http://127.0.0.1:11434/v1"
+
+
+def form(*models: dict[str, Any], **changes: Any) -> dict[str, Any]:
+    """What a browser sends from the page of an endpoint."""
+    fields = {
+        "label": "local",
+        "base_url": LOCAL,
+        "key_variable": "",
+        "max_concurrency": "4",
+        "requests_per_minute": "",
+    }
+    sent = fields | changes
+    held = sum("id" in model for model in models)
+    sent |= {"models-TOTAL_FORMS": str(len(models)), "models-INITIAL_FORMS": str(held)}
+    for number, model in enumerate(models):
+        sent |= {f"models-{number}-{name}": value for name, value in model.items()}
+    return sent
+
+
+@pytest.fixture
+def office(client: Client) -> Client:
+    client.force_login(User.objects.create_superuser("admin", password="x"))
+    return client
+
+
+def problems(page: Any) -> str:
+    errors = [str(page.context["adminform"].form.errors)]
+    errors += [str(inline.formset.errors) for inline in page.context["inline_admin_formsets"]]
+    return " ".join(errors)
+
+
+def test_a_contestant_brings_its_model_which_is_unknown() -> None:
+    contestants.ensure_endpoint(label="local", base_url=LOCAL)
+    for variant in ("otm", "otm"):
+        contestants.add_contestant(
+            slug="llama", variant=variant, endpoint="local", model="llama3.1"
+        )
+    known = EndpointModel.objects.get()
+    assert (known.endpoint.label, known.model, known.model_class) == ("local", "llama3.1", "")
+    abilities = (known.native_tools, known.vision, known.json_schema, known.temperature)
+    assert abilities == (None, None, None, None)
+    assert not known.is_priced
+
+
+@pytest.mark.parametrize(
+    "columns",
+    [
+        {"price_in_usd": Decimal(1)},
+        {"price_out_usd": Decimal(1)},
+        {"price_in_usd": Decimal(-1), "price_out_usd": Decimal(1)},
+        {"model_class": "huge"},
+        {"context_tokens": 0},
+    ],
+)
+def test_half_a_price_or_an_unknown_class_is_not_stored(columns: dict[str, Any]) -> None:
+    endpoint = Endpoint.objects.create(label="local", base_url=LOCAL)
+    with pytest.raises(IntegrityError):
+        EndpointModel.objects.create(endpoint=endpoint, model="m", **columns)
+
+
+@pytest.mark.parametrize("limits", [{"max_concurrency": 0}, {"requests_per_minute": 0}])
+def test_a_limit_lets_somebody_in(limits: dict[str, int]) -> None:
+    with pytest.raises(IntegrityError):
+        Endpoint.objects.create(label="local", base_url=LOCAL, **limits)
+
+
+def test_an_admin_adds_an_endpoint_with_a_model_and_it_is_logged(office: Client) -> None:
+    model = {
+        "model": "llama3.1",
+        "model_class": "open_weight",
+        "vision": "false",
+        "native_tools": "unknown",
+        "price_in_usd": "0.34",
+        "price_out_usd": "0.39",
+        "price_as_of": "2026-11-20",
+        "price_source": "the host's page",
+    }
+    sent = form(model, base_url="http://vllm:8000/v1/", requests_per_minute="60")
+    page = office.post(reverse("admin:augment_endpoint_add"), sent)
+    assert page.status_code == 302, problems(page)
+    endpoint = Endpoint.objects.get()
+    assert (endpoint.base_url, endpoint.requests_per_minute) == ("http://vllm:8000/v1", 60)
+    known = endpoint.models.get()
+    assert (known.vision, known.native_tools, known.price_as_of) == (
+        False,
+        None,
+        date(2026, 11, 20),
+    )
+    event = Event.objects.get()
+    assert (event.verb, event.actor) == ("add", User.objects.get())
+    assert event.after is not None
+    assert event.after["models"][0]["price_in_usd"] == "0.340000"
+
+
+def test_a_change_is_logged_before_and_after(office: Client) -> None:
+    endpoint = Endpoint.objects.create(label="local", base_url=LOCAL)
+    page = reverse("admin:augment_endpoint_change", args=[endpoint.pk])
+    assert office.post(page, form(max_concurrency="2", label="other")).status_code == 302
+    endpoint.refresh_from_db()
+    assert (endpoint.max_concurrency, endpoint.label) == (2, "local")
+    event = Event.objects.get()
+    assert event.before is not None
+    assert event.after is not None
+    assert (event.before["max_concurrency"], event.after["max_concurrency"]) == (4, 2)
+
+
+@pytest.mark.parametrize(
+    ("field", "value", "sentence"),
+    [
+        ("base_url", "http://169.254.169.254/v1", "link-local or metadata"),
+        ("base_url", "http://metadata.google.internal/v1", "link-local or metadata"),
+        ("base_url", "https://me:pass@x/v1", "belong into the address"),
+        ("key_variable", "sk-proj-123", "not the key"),
+        ("max_concurrency", "0", "greater than or equal to 1"),
+    ],
+)
+def test_the_form_refuses_what_the_services_refuse(
+    office: Client, field: str, value: str, sentence: str
+) -> None:
+    page = office.post(reverse("admin:augment_endpoint_add"), form(**{field: value}))
+    assert page.status_code == 200
+    assert sentence in problems(page)
+    assert not Endpoint.objects.exists()
+
+
+def test_a_price_needs_a_date_and_a_source(office: Client) -> None:
+    model = {"model": "m", "price_in_usd": "1", "price_out_usd": "2"}
+    page = office.post(reverse("admin:augment_endpoint_add"), form(model))
+    assert "both halves, a date and a source" in problems(page)
+
+
+def test_only_admins_edit_endpoints(client: Client) -> None:
+    clerk = User.objects.create_user("clerk", password="x", is_staff=True)
+    client.force_login(clerk)
+    assert client.get(reverse("admin:augment_endpoint_changelist")).status_code == 403
