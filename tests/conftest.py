@@ -10,7 +10,6 @@ from pytest_django import Settings
 
 from tests.stack import Home
 
-
 ON_POSTGRES = {"api", "exports", "jobs", "services", "studies", "votes", "web"}
 """Folders whose tests are about rows: `make test` runs them on PostgreSQL as well."""
 
