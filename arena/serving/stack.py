@@ -82,9 +82,9 @@ def _worker(concurrency: int) -> Program:
     # Threads: the work is waiting for models and drawing in Pillow, which both let go of the
     # interpreter; one process starts faster, and nothing of it can be left behind.
     arguments = (
-        *(sys.executable, "-m", "celery", "--app", "arena.config", "worker"),
+        *(sys.executable, "-m", "celery", "--app", "arena.config", "--quiet", "worker"),
         *("--pool", "threads", "--concurrency", str(concurrency)),
-        *("--loglevel", settings.LOG_LEVEL.lower(), "--quiet"),
+        *("--loglevel", settings.LOG_LEVEL.lower()),
         *("--without-gossip", "--without-mingle"),
     )
     # In a container everybody is root; Celery's warning of that says nothing to this user.
