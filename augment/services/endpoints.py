@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import json
+from datetime import datetime
 from typing import Any
 
 from django.core.serializers.json import DjangoJSONEncoder
 from django.db import transaction
+from django.utils import timezone
 
 from augment.models import Endpoint, EndpointModel
+from augment.services.price_list import listed_price
 
 _LIMITS = (
     *("label", "base_url", "key_variable", "is_simulated"),
@@ -23,8 +26,14 @@ _KNOWN = (
 
 @transaction.atomic
 def model_at(*, endpoint: Endpoint, model: str) -> EndpointModel:
-    """What is known of the model at the endpoint; a new row knows nothing."""
-    return EndpointModel.objects.get_or_create(endpoint=endpoint, model=model)[0]
+    """What is known of the model at the endpoint.
+
+    A new row knows the price, if genai-prices lists it, and nothing else.
+    """
+    row, made = EndpointModel.objects.get_or_create(endpoint=endpoint, model=model)
+    if made and not endpoint.is_simulated:
+        _fill_price(row, now=timezone.now())
+    return row
 
 
 def facts_of(endpoint: Endpoint) -> dict[str, Any]:
@@ -34,3 +43,16 @@ def facts_of(endpoint: Endpoint) -> dict[str, Any]:
     # Dates and decimals become texts; a decimal as a number would lose digits.
     document: dict[str, Any] = json.loads(json.dumps(facts, cls=DjangoJSONEncoder))
     return document
+
+
+# --- Private -----------------------------------------------------------------------------------
+
+
+def _fill_price(row: EndpointModel, *, now: datetime) -> None:
+    """Copy the listed price with its date and source; who edits it later has the last word."""
+    listed = listed_price(base_url=row.endpoint.base_url, model=row.model, now=now)
+    if listed is None:
+        return
+    row.price_in_usd, row.price_out_usd = listed.in_usd, listed.out_usd
+    row.price_as_of, row.price_source = now.date(), listed.source
+    row.save(update_fields=["price_in_usd", "price_out_usd", "price_as_of", "price_source"])

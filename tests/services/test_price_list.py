@@ -1,0 +1,78 @@
+from __future__ import annotations
+
+from datetime import UTC, datetime
+from decimal import Decimal
+
+import pytest
+
+from augment.models import EndpointModel
+from augment.services import contestants
+from augment.services.price_list import listed_price
+
+NOW = datetime(2026, 11, 20, tzinfo=UTC)
+OPENAI = "https://api.openai.com/v1"
+
+
+def add(slug: str) -> None:
+    contestants.add_contestant(slug=slug, variant="otm", endpoint="openai", model="gpt-4o")
+
+
+def test_a_listed_model_has_a_price_and_a_source() -> None:
+    found = listed_price(base_url=OPENAI, model="gpt-4o", now=NOW)
+    assert found is not None
+    assert (found.in_usd, found.out_usd) == (Decimal("2.5"), Decimal(10))
+    assert found.source.startswith("genai-prices 0.")
+    assert found.source.endswith(": openai/gpt-4o")
+
+
+def test_a_price_is_that_of_its_day() -> None:
+    google = "https://generativelanguage.googleapis.com/v1beta/openai"
+    later = datetime(2027, 1, 2, tzinfo=UTC)
+    prices = [
+        listed_price(base_url=google, model="gemini-3.8-flash", now=day) for day in (NOW, later)
+    ]
+    assert [price and price.in_usd for price in prices] == [Decimal("0.75"), Decimal("1.5")]
+
+
+def test_where_long_prompts_cost_more_the_source_says_from_where_on() -> None:
+    found = listed_price(base_url=OPENAI, model="gpt-6-luna", now=NOW)
+    assert found is not None
+    assert found.in_usd == Decimal("0.1")
+    assert "prompts up to 272000 tokens" in found.source
+
+
+@pytest.mark.parametrize(
+    ("base_url", "model"),
+    [
+        (OPENAI, "gpt-nobody-knows"),
+        (OPENAI, "text-embedding-3-small"),
+        ("http://127.0.0.1:11434/v1", "gpt-4o"),
+        ("https://api.openai.com.example.net/v1", "gpt-4o"),
+    ],
+)
+def test_what_is_not_listed_is_unknown(base_url: str, model: str) -> None:
+    assert listed_price(base_url=base_url, model=model, now=NOW) is None
+
+
+@pytest.mark.django_db
+def test_a_new_contestant_brings_the_listed_price_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("OPENAI_API_KEY", "sk-planted")
+    add("gpt-4o-otm")
+    row = EndpointModel.objects.get()
+    assert (row.price_in_usd, row.price_out_usd) == (Decimal("2.5"), Decimal(10))
+    assert row.price_as_of is not None
+    assert "openai/gpt-4o" in row.price_source
+
+    row.price_in_usd = Decimal(1)
+    row.price_source = "our contract"
+    row.save()
+    add("gpt-4o-again")
+    row.refresh_from_db()
+    assert (row.price_in_usd, row.price_source) == (Decimal(1), "our contract")
+
+
+@pytest.mark.django_db
+def test_a_stand_in_costs_nobody_knows_what() -> None:
+    contestants.ensure_endpoint(label="openai", base_url=OPENAI, is_simulated=True)
+    add("fake")
+    assert not EndpointModel.objects.get().is_priced
