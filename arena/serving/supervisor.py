@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import signal
-import threading
 import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
@@ -42,7 +41,8 @@ class Supervisor:
         self._clock = clock
         self._children: list[Child] = []
         self._crashes: dict[str, list[float]] = {}
-        self._stopping = threading.Event()
+        # A plain flag, polled: a signal handler may not take the lock of what it interrupts.
+        self._stopping = False
         self._interrupts = 0
 
     def start(self) -> None:
@@ -52,7 +52,7 @@ class Supervisor:
             ChildFailed: One did not come up; those before it are stopped again.
         """
         for program in self._programs:
-            if self._stopping.is_set():
+            if self._stopping:
                 return
             self._children.append(Child(program, self._say))
             try:
@@ -67,8 +67,9 @@ class Supervisor:
         Raises:
             ChildFailed: A program crashed too often; everything is stopped already.
         """
-        while not self._stopping.wait(POLL_S):
+        while not self._stopping:
             self.check()
+            time.sleep(POLL_S)
 
     def check(self) -> None:
         """Start again what has crashed.
@@ -77,21 +78,21 @@ class Supervisor:
             ChildFailed: A program crashed too often; everything is stopped already.
         """
         for place, child in enumerate(self._children):
-            if child.exit_code is not None and not self._stopping.is_set():
+            if child.exit_code is not None and not self._stopping:
                 self._children[place] = self._start_again(child)
 
     @property
     def is_stopping(self) -> bool:
         """Whether somebody asked to stop."""
-        return self._stopping.is_set()
+        return self._stopping
 
     def ask_to_stop(self) -> None:
         """Let `watch` return; safe to call from a signal handler."""
-        self._stopping.set()
+        self._stopping = True
 
     def stop(self) -> None:
         """Stop every child, the last started first."""
-        self._stopping.set()
+        self._stopping = True
         while self._children:
             self._children.pop().stop(at_once=self._interrupts > 1)
 
@@ -113,7 +114,7 @@ class Supervisor:
 
     def _await_ready(self, child: Child) -> None:
         deadline = self._clock() + child.program.ready_within_s
-        while not self._stopping.is_set():
+        while not self._stopping:
             if child.exit_code is not None:
                 raise self._failure(child, f"ended with exit code {child.exit_code}")
             if child.program.is_ready():
