@@ -7,11 +7,8 @@ import uuid
 from typing import Any
 
 from django.conf import settings
-from django.contrib.auth.models import User
 from django.db import models
 from django.db.models import F, Q
-from django.db.models.signals import post_save
-from django.dispatch import receiver
 
 from augment.models import Augmentation, Contestant, Scenario
 
@@ -40,13 +37,6 @@ class Person(models.Model):
 
     def __str__(self) -> str:
         return self.pseudonym
-
-
-@receiver(post_save, sender=settings.AUTH_USER_MODEL)
-def give_a_person(instance: User, created: bool, raw: bool, **_: object) -> None:
-    """Every account has a Person, also one that Django's own admin or createsuperuser made."""
-    if created and not raw:
-        Person.objects.create(user=instance, pseudonym=f"Person {secrets.token_hex(4)}")
 
 
 class Study(models.Model):

@@ -32,10 +32,10 @@ def profile_of(user: User | AnonymousUser) -> Profile | None:
     """What the page's frame shows of a person; None for somebody who is not signed in."""
     if not user.is_authenticated:
         return None
-    person = Person.objects.get(user=user)
-    stored = person.preferences.get("theme")
+    person = Person.objects.filter(user=user).first()
+    stored = person.preferences.get("theme") if person else None
     return Profile(
-        name=person.pseudonym,
+        name=person.pseudonym if person else user.get_username(),
         role=role_of(user),
         theme=Theme(stored) if stored in set(Theme) else Theme.AUTO,
     )

@@ -48,9 +48,7 @@ def create_person(
         username, password=password, is_staff=is_admin, is_superuser=is_admin
     )
     user.groups.add(Group.objects.get_or_create(name=role)[0])
-    person = user.person  # made together with the account
-    person.pseudonym, person.is_simulated = pseudonym, is_simulated
-    person.save()
+    person = Person.objects.create(user=user, pseudonym=pseudonym, is_simulated=is_simulated)
     log_event(
         actor=actor,
         verb="add",

@@ -101,7 +101,7 @@ def _cast(
         outcome=outcome,
         winner_id=winner,
         supersedes=old,
-        is_simulated=matchup.expert.person.is_simulated,
+        is_simulated=_is_simulated(matchup.expert),
         ms_visible=ms_visible,
     )
 
@@ -151,6 +151,10 @@ def _superseded(known: list[Vote], supersedes: UUID | None) -> Vote | None:
     if supersedes != current.key:
         raise AlreadyDecided(current.outcome)
     return current
+
+
+def _is_simulated(expert: User) -> bool:
+    return hasattr(expert, "person") and expert.person.is_simulated
 
 
 def _uuid(value: UUID | str) -> UUID:

@@ -18,6 +18,7 @@ from django.db import transaction
 from django.db.models import Max, Q, QuerySet
 
 from augment.models import Attempt, Augmentation, GenerationJob
+from augment.services import budget
 from augment.services.texts import storable, storable_document
 
 logger = logging.getLogger(__name__)
@@ -58,6 +59,7 @@ class TryEnd(StrEnum):
 
     LOST = "lost"
     RELEASED = "released"
+    STOPPED = "stopped at cap"
 
 
 @transaction.atomic
@@ -66,11 +68,12 @@ def claim(*, augmentation_pk: int, now: datetime, worker: str = "") -> Claim | N
 
     Returns:
         The claim, or None when the row does not wait (any more): somebody else has it, it is
-        done, it or its job was cancelled. A second delivery of a message does nothing therefore.
+        done, it or its job was cancelled, the job stopped at its cap. A second delivery of a
+        message does nothing therefore.
     """
     token = uuid.uuid4()
     waiting = Augmentation.objects.filter(pk=augmentation_pk, state=Augmentation.State.QUEUED)
-    taken = waiting.exclude(job__in=_cancelled_jobs()).update(
+    taken = waiting.exclude(job__in=_closed_jobs()).update(
         state=Augmentation.State.RUNNING, claim=token, heartbeat_at=now, finished_at=None
     )
     if not taken:
@@ -93,9 +96,12 @@ def beat(*, held: Claim, now: datetime) -> bool:
     return bool(_row_of(held).update(heartbeat_at=now))
 
 
-def is_held(*, held: Claim) -> bool:
-    """Whether the row still carries the claim."""
-    return _row_of(held).exists()
+def is_held(*, held: Claim, lock: bool = False) -> bool:
+    """Whether the row still carries the claim; locked, it does until the transaction ends."""
+    row = _row_of(held)
+    if lock:
+        return row.select_for_update().values_list("pk").first() is not None
+    return row.exists()
 
 
 def keep_modification(*, held: Claim, modification: dict[str, Any], notes: str) -> bool:
@@ -136,6 +142,7 @@ def settle(*, held: Claim, settlement: Settlement, now: datetime) -> bool:
             held.augmentation_pk,
         )
         return False
+    budget.settle_unseen(attempt_pk=held.attempt_pk, now=now)
     Attempt.objects.filter(pk=held.attempt_pk).update(
         finished_at=now, outcome=settlement.state, reason=reason
     )
@@ -143,13 +150,18 @@ def settle(*, held: Claim, settlement: Settlement, now: datetime) -> bool:
 
 
 @transaction.atomic
-def release(*, held: Claim, now: datetime) -> bool:
+def release(
+    *, held: Claim, now: datetime, end: TryEnd = TryEnd.RELEASED, reason: str = ""
+) -> bool:
     """Give an unfinished row back to the queue; False when the claim is lost already."""
     if not _row_of(held).update(
         state=Augmentation.State.QUEUED, claim=None, heartbeat_at=None, sent_at=None
     ):
         return False
-    Attempt.objects.filter(pk=held.attempt_pk).update(finished_at=now, outcome=TryEnd.RELEASED)
+    budget.settle_unseen(attempt_pk=held.attempt_pk, now=now)
+    Attempt.objects.filter(pk=held.attempt_pk).update(
+        finished_at=now, outcome=end, reason=storable(reason)
+    )
     return True
 
 
@@ -175,8 +187,13 @@ def requeue_stale(*, now: datetime, older_than: timedelta) -> list[int]:
 
 
 def unsent(*, now: datetime, older_than: timedelta, job_pk: int | None = None) -> list[int]:
-    """Waiting rows, of one job or of all, without a message or with one that old."""
-    waiting = Augmentation.objects.filter(state=Augmentation.State.QUEUED)
+    """Waiting rows, of one job or of all, without a message or with one that old.
+
+    What waits in a job that stopped at its cap waits for somebody to raise it.
+    """
+    waiting = Augmentation.objects.filter(state=Augmentation.State.QUEUED).exclude(
+        job__in=GenerationJob.objects.filter(state=GenerationJob.State.STOPPED_AT_CAP)
+    )
     if job_pk is not None:
         waiting = waiting.filter(job=job_pk)
     lost = Q(sent_at=None) | Q(sent_at__lte=now - older_than)
@@ -202,6 +219,12 @@ def _cancelled_jobs() -> QuerySet[GenerationJob]:
     return GenerationJob.objects.filter(state=GenerationJob.State.CANCELLED)
 
 
+def _closed_jobs() -> QuerySet[GenerationJob]:
+    """Jobs in which nothing is started any more, or not for now."""
+    states = GenerationJob.State
+    return GenerationJob.objects.filter(state__in=[states.CANCELLED, states.STOPPED_AT_CAP])
+
+
 @transaction.atomic
 def _take_back(seen: Augmentation, *, now: datetime) -> bool:
     """End a stale claim, unless its holder was heard since; True when the row waits again."""
@@ -215,6 +238,7 @@ def _take_back(seen: Augmentation, *, now: datetime) -> bool:
     row = Augmentation.objects.filter(pk=seen.pk, claim=seen.claim, heartbeat_at=seen.heartbeat_at)
     if not row.update(claim=None, heartbeat_at=None, **changes):
         return False
+    budget.settle_unseen(row_pk=seen.pk, now=now)
     # The attempt stays without an end: nobody saw it.
     Attempt.objects.filter(augmentation_id=seen.pk, finished_at=None, outcome="").update(
         outcome=TryEnd.LOST, reason="The worker stopped without a word."

@@ -11,7 +11,7 @@ from types import TracebackType
 from django.db import Error, connection
 from django.utils import timezone
 
-from augment.errors import ClaimLost
+from augment.errors import BudgetSpent, ClaimLost
 from augment.models import Augmentation
 from augment.services import claims
 
@@ -38,8 +38,9 @@ class OutcomeOnCrash:
     """Leaves no row hanging when its worker breaks; what broke still travels on, loudly.
 
     An exception that nobody foresaw fails the row with its class and text. A worker that is told
-    to stop (SystemExit, KeyboardInterrupt) gives the row back. A lost claim ends quietly: the new
-    holder brings the outcome.
+    to stop (SystemExit, KeyboardInterrupt) gives the row back. So does one whose job has no room
+    for the next call, and ends quietly. A lost claim ends quietly as well: the new holder brings
+    the outcome.
     """
 
     def __init__(self, held: claims.Claim) -> None:
@@ -59,6 +60,9 @@ class OutcomeOnCrash:
             logger.warning(
                 "Stopped work on augmentation %d: %s", self._held.augmentation_pk, error
             )
+            return True
+        if isinstance(error, BudgetSpent):
+            claims.release(held=self._held, now=now, end=claims.TryEnd.STOPPED, reason=str(error))
             return True
         if isinstance(error, Exception):
             reason = f"unexpected: {type(error).__name__}: {error}"

@@ -5,14 +5,17 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from datetime import datetime
+from typing import Any
 
 from django.contrib.auth.models import User
 from django.db import transaction
-from django.db.models import Count, Q
+from django.db.models import Case, Count, F, Q, Value, When
 from django.utils import timezone
 
 from augment.errors import Conflict, UnknownName
 from augment.models import Augmentation, Contestant, GenerationJob, Scenario
+from augment.services.budget import limit_of
+from augment.services.caps import Caps, check_caps
 from augment.services.events import log_event
 
 Kind = Contestant.Kind
@@ -20,6 +23,12 @@ State = Augmentation.State
 
 RUNNABLE = (Kind.REFERENCE, Kind.RULE, Kind.LLM, Kind.SIMULATED)
 """Kinds that a job can run; what humans and outside baselines made is imported."""
+
+
+NO_CAPS = Caps()
+
+OPEN = (GenerationJob.State.RUNNING, GenerationJob.State.STOPPED_AT_CAP)
+"""States of jobs that are not over."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -52,6 +61,8 @@ def launch(
     name: str,
     contestants: Sequence[str],
     scenarios: Sequence[str],
+    caps: Caps = NO_CAPS,
+    is_fresh: bool = False,
     actor: User | None = None,
 ) -> GenerationJob:
     """Write a job and one waiting row per contestant and scenario; the door sends the messages.
@@ -60,17 +71,24 @@ def launch(
         name: What people call it.
         contestants: Slugs; a slug given twice counts once.
         scenarios: Slugs; a slug given twice counts once.
+        caps: What it may use at most.
+        is_fresh: Whether language models are asked anew what they answered in other jobs before.
         actor: Who launches it, None for the machine.
 
     Raises:
         UnknownName: A slug that nobody registered.
-        Conflict: Nothing is chosen, a contestant can't be run, or the reference is to run on
-            scenarios that have none.
+        Conflict: Nothing is chosen, a contestant can't be run, the reference is to run on
+            scenarios that have none, or a cap in USD meets a price that nobody knows.
     """
     who = _contestants(contestants)
     where = _scenarios(scenarios)
     _refuse_impossible(who, where)
-    job = GenerationJob.objects.create(name=name, launched_by_id=actor.pk if actor else None)
+    job = GenerationJob.objects.create(
+        name=name,
+        launched_by_id=actor.pk if actor else None,
+        is_fresh=is_fresh,
+        **check_caps(caps, who),
+    )
     job.contestants.set(who)
     job.scenarios.set(where)
     Augmentation.objects.bulk_create(
@@ -78,11 +96,15 @@ def launch(
         for scenario in where
         for contestant in who
     )
-    after = {
+    after: dict[str, Any] = {
         "name": name,
         "contestants": [contestant.slug for contestant in who],
         "scenarios": [scenario.slug for scenario in where],
     }
+    if caps != NO_CAPS:
+        after["cap"] = limit_of(job)
+    if is_fresh:
+        after["is_fresh"] = True
     log_event(
         actor=actor, verb="launch", object_kind="job", object_code=str(job.code), after=after
     )
@@ -102,9 +124,10 @@ def cancel(job: GenerationJob, actor: User | None = None) -> GenerationJob:
     Raises:
         Conflict: The job is over already.
     """
-    running = GenerationJob.objects.filter(pk=job.pk, state=GenerationJob.State.RUNNING)
+    still_open = GenerationJob.objects.filter(pk=job.pk, state__in=OPEN)
+    before = still_open.values_list("state", flat=True).first()
     now = timezone.now()
-    if not running.update(state=GenerationJob.State.CANCELLED, finished_at=now):
+    if not still_open.update(state=GenerationJob.State.CANCELLED, finished_at=now):
         job.refresh_from_db()
         raise Conflict(f"Job {job.name!r} is {job.get_state_display().lower()} already.")
     waiting = Augmentation.objects.filter(job=job, state=State.QUEUED)
@@ -114,7 +137,7 @@ def cancel(job: GenerationJob, actor: User | None = None) -> GenerationJob:
         verb="cancel",
         object_kind="job",
         object_code=str(job.code),
-        before={"state": GenerationJob.State.RUNNING.value},
+        before={"state": before},
         after={"state": GenerationJob.State.CANCELLED.value, "cancelled": stopped},
     )
     job.refresh_from_db()
@@ -125,13 +148,15 @@ def cancel(job: GenerationJob, actor: User | None = None) -> GenerationJob:
 def retry_failed(job: GenerationJob, actor: User | None = None) -> GenerationJob:
     """Let every failed row wait again; outcomes of the contestants themselves stay.
 
+    In a job that stopped at its cap they wait, with the others, until it is resumed.
+
     Raises:
         Conflict: The job was cancelled, or nothing in it failed.
     """
-    open_again = GenerationJob.objects.filter(pk=job.pk).exclude(
-        state=GenerationJob.State.CANCELLED
-    )
-    if not open_again.update(state=GenerationJob.State.RUNNING, finished_at=None):
+    states = GenerationJob.State
+    kept = Case(When(state=states.STOPPED_AT_CAP, then=F("state")), default=Value(states.RUNNING))
+    open_again = GenerationJob.objects.filter(pk=job.pk).exclude(state=states.CANCELLED)
+    if not open_again.update(state=kept, finished_at=None):
         raise Conflict(f"Job {job.name!r} was cancelled; launch a new one instead.")
     failed = Augmentation.objects.filter(job=job, state=State.FAILED)
     again = failed.update(state=State.QUEUED, reason="", finished_at=None, sent_at=None)

@@ -47,9 +47,9 @@ def picture_of(scenario: Scenario, scene: Scene, modification: Modification) -> 
     return store(draw(scene, modification, camera))
 
 
-def store(png: bytes) -> str:
-    """The name under which these bytes are kept, bev/<sha256>.png; written only if absent."""
-    name = f"bev/{hashlib.sha256(png).hexdigest()}.png"
+def store(png: bytes, *, folder: str = "bev") -> str:
+    """The name under which these bytes are kept, <folder>/<sha256>.png; written only if absent."""
+    name = f"{folder}/{hashlib.sha256(png).hexdigest()}.png"
     if default_storage.exists(name):
         if default_storage.size(name) == len(png):
             return name

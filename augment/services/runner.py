@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 import logging
 from collections.abc import Callable
 from contextlib import AbstractContextManager
@@ -14,6 +13,7 @@ from django.utils import timezone
 from augment.baselines import rule_placer
 from augment.errors import (
     AugmentError,
+    BudgetSpent,
     ClaimLost,
     InstructionNotUnderstood,
     InvalidModification,
@@ -30,6 +30,7 @@ from augment.services.contestants import key_of
 from augment.services.holding import OutcomeOnCrash, heartbeat
 from augment.services.pictures import original_picture, picture_of
 from augment.services.scenes import reference_of, scene_of
+from augment.services.seeds import seed_of
 from augment.services.transcripts import RowTranscript, sentence_of
 from augment.variants import pipeline
 from augment.variants.recipes import recipe
@@ -94,6 +95,7 @@ def run(
 
     Raises:
         ClaimLost: The row was taken back meanwhile.
+        BudgetSpent: The job has no room for the next call.
     """
     try:
         scene = scene_of(row.scenario)
@@ -104,7 +106,7 @@ def run(
         _keep(held, answer)
         image = picture_of(row.scenario, scene, answer.modification)
         return _settlement(answer, image=image)
-    except ClaimLost:
+    except (ClaimLost, BudgetSpent):
         raise
     except ModelFault as fault:
         return _failed(sentence_of(fault))
@@ -118,7 +120,9 @@ def run(
 
 
 def _row(held: claims.Claim) -> Augmentation:
-    rows = Augmentation.objects.select_related("scenario__base_scene", "contestant__endpoint")
+    rows = Augmentation.objects.select_related(
+        "job", "scenario__base_scene", "contestant__endpoint"
+    )
     return rows.get(pk=held.augmentation_pk)
 
 
@@ -180,7 +184,7 @@ def _from_model(
             instruction=row.scenario.instruction,
             client=client,
             model=row.contestant.model,
-            transcript=RowTranscript(held),
+            transcript=RowTranscript(held, row, endpoint),
         )
     return Answer(
         state=State(outcome.status.value),
@@ -188,11 +192,6 @@ def _from_model(
         notes=outcome.notes,
         reason=outcome.reason,
     )
-
-
-def seed_of(slug: str) -> int:
-    """The seed of a scenario: the same in every job, another for every slug."""
-    return int.from_bytes(hashlib.sha256(slug.encode()).digest()[:4], "big")
 
 
 def _settlement(answer: Answer, *, image: str) -> claims.Settlement:

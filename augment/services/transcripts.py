@@ -1,70 +1,144 @@
-"""Every call to a language model as a row.
+"""Every call to a language model as a row, within the budget of its job.
 
-The request is stored before it is sent, the answer before it is read, each in a transaction of
-its own: a crash in between loses nothing that was paid for.
+The request is stored and its worst case reserved before it is sent, the answer stored before it
+is read, each in a transaction of its own: a crash in between loses nothing that was paid for.
 """
 
 from __future__ import annotations
 
-from django.db.models import QuerySet
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+from django.db import transaction
 from django.utils import timezone
 
-from augment.errors import ClaimLost, ModelFault
+from augment.errors import BudgetSpent, ClaimLost, ModelFault
+from augment.llm.costs import Price, WorstCase, worst_case
+from augment.llm.fingerprint import image_reference, request_hash
 from augment.llm.messages import Reply, Request
-from augment.models import ModelCall, TranscriptNote
-from augment.services import claims
+from augment.models import Augmentation, Endpoint, GenerationJob, ModelCall, TranscriptNote
+from augment.services import answers, budget, claims
+from augment.services.pictures import store
+from augment.services.prices import price_of
 from augment.services.texts import storable, storable_document
 from augment.variants.transcript import ModelRole, NoteKind
+
+IMAGES = "asked"
+"""The folder in the media storage of the images that models are shown."""
+
+FIRST_WAIT_S, LONGEST_WAIT_S = 0.05, 1.0
+"""Between looks at a budget whose room is held by calls in flight."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Open:
+    """A call in flight."""
+
+    pk: int
+    worst: WorstCase
+    price: Price | None
 
 
 class RowTranscript:
     """A transcript that writes rows of one attempt.
 
-    Nothing more is asked for an attempt whose claim was taken back: its result would be dropped.
+    Nothing more is asked for an attempt whose claim was taken back (its result would be dropped)
+    or whose job has no room for the call.
+
+    Args:
+        held: The claim on the row.
+        row: The augmentation, with its job.
+        endpoint: Who is asked.
+        sleep: Waits for that many seconds.
     """
 
-    def __init__(self, held: claims.Claim) -> None:
+    def __init__(
+        self,
+        held: claims.Claim,
+        row: Augmentation,
+        endpoint: Endpoint,
+        *,
+        sleep: Callable[[float], None] = time.sleep,
+    ) -> None:
         self._held = held
+        self._row = row
+        self._endpoint = endpoint
+        self._sleep = sleep
         self._numbers = 0
         self._notes = 0
+        self._open: dict[int, _Open] = {}
+        self._prices: dict[str, Price | None] = {}
 
     def known(self, role: ModelRole, request: Request, prompt_version: str) -> Reply | None:
-        """None: every request is sent."""
-        return None
-
-    def asked(self, role: ModelRole, request: Request, prompt_version: str) -> int:
-        """Store a request; returns its number, from 1.
+        """The answer that this request had before, recorded as a call that cost nothing.
 
         Raises:
             ClaimLost: The row is somebody else's now.
         """
-        if not claims.is_held(held=self._held):
-            raise ClaimLost(f"attempt {self._held.attempt_number} has lost its row")
-        self._numbers += 1
-        ModelCall.objects.create(
-            attempt_id=self._held.attempt_pk,
-            number=self._numbers,
-            role=role,
-            request=storable_document(request.to_document()),
-            prompt_version=prompt_version,
-            started_at=timezone.now(),
+        columns = self._columns(role, request, prompt_version)
+        earlier = answers.earlier(
+            request_hash=columns["request_hash"],
+            augmentation_pk=self._row.pk,
+            attempt_pk=self._held.attempt_pk,
+            is_fresh=self._row.job.is_fresh,
         )
-        return self._numbers
+        if earlier is None:
+            return None
+        with transaction.atomic():
+            self._insist_on_claim()
+            ModelCall.objects.create(
+                **columns,
+                **answers.columns_of_copy(earlier, now=timezone.now()),
+                number=self._numbers + 1,
+            )
+        self._numbers += 1
+        return answers.reply_of(earlier)
+
+    def asked(self, role: ModelRole, request: Request, prompt_version: str) -> int:
+        """Reserve the worst case of a request and store it; returns its number, from 1.
+
+        Where calls in flight hold the room that this one needs, waits for them to end.
+
+        Raises:
+            ClaimLost: The row is somebody else's now.
+            BudgetSpent: The job has no room for the call, and is stopped.
+            Conflict: The job is capped in USD and the price is unknown.
+        """
+        columns = self._columns(role, request, prompt_version)
+        for message in request.messages:
+            for png in message.images:
+                store(png, folder=IMAGES)
+        worst, price = worst_case(request), self._price_of(request.model)
+        wait_s = FIRST_WAIT_S
+        while True:
+            room, pk = self._try(columns, worst, price)
+            if room == budget.Room.TAKEN:
+                self._numbers += 1
+                self._open[self._numbers] = _Open(pk=pk, worst=worst, price=price)
+                return self._numbers
+            if room == budget.Room.SPENT:
+                job = GenerationJob.objects.get(pk=self._row.job_id)
+                raise BudgetSpent(budget.limit_of(job))
+            self._sleep(wait_s)
+            wait_s = min(1.5 * wait_s, LONGEST_WAIT_S)
 
     def answered(self, number: int, reply: Reply) -> None:
-        """Store the raw answer to that call; a refusal that says nothing else is the answer."""
-        self._call(number).update(
-            answer=storable(reply.text or reply.refusal or ""),
-            model_returned=storable(reply.model)[:120],
-            finish_reason=storable(reply.finish_reason)[:40],
-            prompt_tokens=reply.prompt_tokens,
-            completion_tokens=reply.completion_tokens,
-            latency_s=reply.latency_s,
-        )
+        """Store the raw answer to that call and what it used."""
+        call = self._open.pop(number)
+        used = budget.used_by_reply(reply, worst=call.worst, price=call.price)
+        with transaction.atomic():
+            ModelCall.objects.filter(pk=call.pk).update(**answers.columns_of(reply))
+            budget.settle(call_pk=call.pk, used=used, now=timezone.now())
 
     def broke(self, number: int, fault: ModelFault) -> None:
-        """Store why there was no answer to that call."""
-        self._call(number).update(fault=storable(sentence_of(fault)))
+        """Store why there was no answer to that call, and what it may have used."""
+        call = self._open.pop(number)
+        used = budget.used_by_fault(fault, worst=call.worst, price=call.price)
+        with transaction.atomic():
+            ModelCall.objects.filter(pk=call.pk).update(fault=storable(sentence_of(fault)))
+            budget.settle(call_pk=call.pk, used=used, now=timezone.now())
 
     def note(self, kind: NoteKind, document: dict[str, object]) -> None:
         """Store what happened since the last call."""
@@ -77,8 +151,45 @@ class RowTranscript:
             document=storable_document(document),
         )
 
-    def _call(self, number: int) -> QuerySet[ModelCall]:
-        return ModelCall.objects.filter(attempt_id=self._held.attempt_pk, number=number)
+    def _columns(self, role: ModelRole, request: Request, version: str) -> dict[str, Any]:
+        """What a call's row says about the request, whoever answers it."""
+        document = storable_document(request.to_document(image_url=image_reference))
+        return {
+            "attempt_id": self._held.attempt_pk,
+            "role": role,
+            "request": document,
+            "request_hash": request_hash(
+                base_url=self._endpoint.base_url, document=document, prompt_version=version
+            ),
+            "prompt_version": version,
+        }
+
+    @transaction.atomic
+    def _try(
+        self, columns: dict[str, Any], worst: WorstCase, price: Price | None
+    ) -> tuple[budget.Room, int]:
+        """Take room and write the row in one transaction, or nothing of both."""
+        self._insist_on_claim()
+        room = budget.reserve(job_pk=self._row.job_id, worst=worst, price=price)
+        if room != budget.Room.TAKEN:
+            return room, 0
+        call = ModelCall.objects.create(
+            **columns,
+            number=self._numbers + 1,
+            started_at=timezone.now(),
+            reserved_tokens=worst.tokens,
+            reserved_nano_usd=worst.nano_usd(price),
+        )
+        return room, call.pk
+
+    def _insist_on_claim(self) -> None:
+        if not claims.is_held(held=self._held, lock=True):
+            raise ClaimLost(f"attempt {self._held.attempt_number} has lost its row")
+
+    def _price_of(self, model: str) -> Price | None:
+        if model not in self._prices:
+            self._prices[model] = price_of(self._endpoint, model)
+        return self._prices[model]
 
 
 def sentence_of(fault: ModelFault) -> str:

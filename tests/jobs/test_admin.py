@@ -39,6 +39,7 @@ def past_job() -> None:
         role="modifier",
         request={},
         started_at=timezone.now(),
+        settled_at=timezone.now(),
     )
     claims.settle(held=held, settlement=done(), now=timezone.now())
     endpoint = Endpoint.objects.create(label="local", base_url="http://127.0.0.1:9/v1")

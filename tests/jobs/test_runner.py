@@ -19,6 +19,7 @@ from augment.scene.codec import modification_from_document, modification_to_docu
 from augment.scene.modification import Modification
 from augment.services import claims, jobs, runner
 from augment.services.holding import OutcomeOnCrash
+from augment.services.seeds import seed_of
 from tests.jobs.rows import (
     INSTRUCTION,
     STALE,
@@ -149,7 +150,7 @@ def test_the_rule_placer_refuses_what_it_does_not_understand() -> None:
 
 
 def test_a_scenario_has_a_seed_of_its_own() -> None:
-    assert runner.seed_of("street") == runner.seed_of("street") != runner.seed_of("street-2")
+    assert seed_of("street") == seed_of("street") != seed_of("street-2")
 
 
 def test_a_model_is_asked_and_every_call_is_kept() -> None:

@@ -13,7 +13,9 @@ from augment import tasks
 from augment.errors import QueueUnreachable
 from augment.management.commands.generate import Command
 from augment.models import Augmentation, GenerationJob
-from augment.services import claims, jobs
+from augment.services import claims, jobs, runner
+from augment.services.caps import Caps
+from tests.jobs.models import Model, add_llama, llama_job
 from tests.jobs.rows import add_kind, add_scenario, claimed, done, failed, launch, only_row
 
 pytestmark = pytest.mark.django_db
@@ -216,3 +218,55 @@ def test_waiting_ends_with_the_job() -> None:
     Command(stdout=said).wait(job, timeout_s=1.0)
     assert said.getvalue() == "1 of 1, 0 running\nOver.\n"
     assert jobs.progress(job).done == 1
+
+
+def test_generate_caps_the_job_it_launches(broker: Broker) -> None:
+    add_llama(price="1")
+    add_scenario("street")
+    chosen = ("--contestants", "llama", "--scenarios", "street")
+    caps = ("--cap", "2.50", "--cap-calls", "7", "--cap-tokens", "9000", "--fresh")
+    call_command("generate", *chosen, *caps, stdout=StringIO())
+    job = GenerationJob.objects.get()
+    assert (str(job.cap_usd), job.cap_calls, job.cap_tokens) == ("2.5", 7, 9000)
+    assert job.is_fresh
+
+
+def test_generate_refuses_a_cap_in_usd_without_prices(broker: Broker) -> None:
+    add_llama()
+    add_scenario("street")
+    chosen = ("--contestants", "llama", "--scenarios", "street")
+    with pytest.raises(CommandError, match="cap the job by calls or tokens instead"):
+        call_command("generate", *chosen, "--cap", "1", stdout=StringIO())
+    assert not GenerationJob.objects.exists()
+
+
+def test_waiting_ends_when_the_job_stops_at_its_cap() -> None:
+    job = llama_job(caps=Caps(tokens=5))
+    runner.work_on(augmentation_pk=only_row(job).pk, connect=Model())
+    with pytest.raises(CommandError, match="Stopped at its cap of 5 tokens with 1 left") as caught:
+        Command(stdout=StringIO()).wait(job, timeout_s=1.0)
+    assert caught.value.returncode == 3
+
+
+def test_a_stopped_job_is_sent_again_once_it_is_resumed(
+    broker: Broker, django_capture_on_commit_callbacks: object
+) -> None:
+    job = llama_job(caps=Caps(tokens=5))
+    tasks.enqueue_job(job.pk)
+    runner.work_on(augmentation_pk=only_row(job).pk, connect=Model())
+    broker.purge()
+    tasks.recover(now=timezone.now(), at_start=True)
+    assert len(broker) == 0
+    said = StringIO()
+    with django_capture_on_commit_callbacks(execute=True):  # type: ignore[operator]
+        call_command("resume_job", str(job.code), "--cap-tokens", "90000", stdout=said)
+    assert said.getvalue() == f"Job {job.code}, capped at 90000 tokens: 1 to run.\n"
+    assert len(broker) == 1
+
+
+def test_a_job_that_runs_is_not_resumed(broker: Broker) -> None:
+    job = llama_job(caps=Caps(calls=5))
+    with pytest.raises(CommandError, match="only one that stopped"):
+        call_command("resume_job", str(job.code), "--cap-calls", "6", stdout=StringIO())
+    job.refresh_from_db()
+    assert job.cap_calls == 5

@@ -75,10 +75,12 @@ def test_a_made_up_theme_or_a_foreign_address_changes_nothing() -> None:
     assert Person.objects.get(user=expert).preferences == {}
 
 
-def test_an_account_that_was_made_elsewhere_has_a_home_too() -> None:
+def test_an_account_without_a_person_still_has_a_home() -> None:
     bare = User.objects.create_user("bare", password="a password")
     bare.groups.add(Group.objects.get_or_create(name="analyst")[0])
-    assert bare.person.pseudonym in home(bare)
+    assert "bare" in home(bare)
+    signed_in(bare).post(reverse("theme"), {"theme": "light"})
+    assert 'data-theme="light"' in home(bare)
 
 
 def test_a_wrong_password_is_said_and_the_name_kept() -> None:

@@ -11,8 +11,10 @@ from django.db import transaction
 from django.utils import timezone
 
 from augment.errors import AugmentError
+from augment.management.arguments import add_cap_arguments, caps_of
 from augment.models import GenerationJob
 from augment.services import jobs
+from augment.services.budget import limit_of
 from augment.services.choosing import chosen_contestants, chosen_scenarios
 from augment.services.contestants import ensure_builtin
 from augment.services.job_summary import contestant_lines, failure_groups
@@ -21,10 +23,12 @@ from augment.tasks import check_broker, enqueue_job
 POLL_S = 0.5
 HINT_AFTER_S = 10.0
 BAR_CELLS = 30
+STOPPED = 3
+"""Exit code of a wait that a cap has ended."""
 
 
 class Command(BaseCommand):
-    """generate --contestants A B --scenarios X Y [--wait]."""
+    """generate --contestants A B --scenarios X Y [--cap USD] [--wait]."""
 
     help = "Run contestants on scenarios; workers do it, `manage.py serve` starts them."
 
@@ -35,6 +39,10 @@ class Command(BaseCommand):
             "--scenarios", nargs="+", required=True, help="slugs, or all, or catalogue"
         )
         parser.add_argument("--name", help="what people call the job")
+        add_cap_arguments(parser)
+        parser.add_argument(
+            "--fresh", action="store_true", help="ask anew what models answered in other jobs"
+        )
         parser.add_argument("--wait", action="store_true", help="stay until the job is over")
         parser.add_argument(
             "--timeout", type=float, default=3600.0, help="seconds to wait at most"
@@ -64,6 +72,8 @@ class Command(BaseCommand):
                 name=name,
                 contestants=chosen_contestants(options["contestants"]),
                 scenarios=chosen_scenarios(options["scenarios"]),
+                caps=caps_of(options),
+                is_fresh=options["fresh"],
             )
             transaction.on_commit(lambda: enqueue_job(job.pk))
         return job
@@ -72,7 +82,7 @@ class Command(BaseCommand):
         """Show the progress until nothing is under way.
 
         Raises:
-            CommandError: The time is up.
+            CommandError: The time is up, or the job stopped at its cap.
         """
         started = time.monotonic()
         shown, hinted = "", False
@@ -82,6 +92,12 @@ class Command(BaseCommand):
             if not counts.under_way:
                 self.stdout.write("" if self.stdout.isatty() else "Over.")
                 return
+            if is_stopped(job) and not counts.running:
+                raise CommandError(
+                    f"Stopped at its cap of {limit_of(job)} with {counts.queued} left; "
+                    f"`manage.py resume_job {job.code}` with a higher cap goes on.",
+                    returncode=STOPPED,
+                )
             waited = time.monotonic() - started
             if waited > timeout_s:
                 raise CommandError(
@@ -126,3 +142,9 @@ class Command(BaseCommand):
         if failures:
             failed = sum(group.count for group in failures)
             raise CommandError(f"{failed} failed; see the reasons above.", returncode=1)
+
+
+def is_stopped(job: GenerationJob) -> bool:
+    """Whether the job stands at its cap right now."""
+    states = GenerationJob.State
+    return GenerationJob.objects.filter(pk=job.pk, state=states.STOPPED_AT_CAP).exists()

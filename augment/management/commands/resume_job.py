@@ -1,0 +1,50 @@
+"""Let a job that stopped at its cap go on."""
+
+from __future__ import annotations
+
+import uuid
+from argparse import ArgumentParser
+from typing import Any
+
+from django.core.management.base import BaseCommand, CommandError
+from django.db import transaction
+
+from augment.errors import AugmentError
+from augment.management.arguments import add_cap_arguments, caps_of
+from augment.models import GenerationJob
+from augment.services import caps, jobs
+from augment.services.budget import limit_of
+from augment.tasks import check_broker, enqueue_job
+
+
+class Command(BaseCommand):
+    """resume_job JOB [--cap USD] [--cap-calls N] [--cap-tokens N]."""
+
+    help = (
+        "Raise the caps of a job that stopped at one, and let it go on with what is left. What "
+        "was answered already is not asked again."
+    )
+
+    def add_arguments(self, parser: ArgumentParser) -> None:
+        """The job and its new caps."""
+        parser.add_argument("job", type=uuid.UUID, help="the job's code, as on its page")
+        add_cap_arguments(parser)
+
+    def handle(self, *args: Any, **options: Any) -> None:
+        """Raise what is given, then resume."""
+        job = GenerationJob.objects.filter(code=options["job"]).first()
+        if job is None:
+            raise CommandError(f"There is no job {options['job']}.")
+        wanted = caps_of(options)
+        try:
+            check_broker()
+            with transaction.atomic():
+                if wanted != jobs.NO_CAPS:
+                    job = caps.raise_cap(job, caps=wanted)
+                job = caps.resume(job)
+                pk = job.pk
+                transaction.on_commit(lambda: enqueue_job(pk))
+        except AugmentError as error:
+            raise CommandError(str(error)) from error
+        waiting = jobs.progress(job).queued
+        self.stdout.write(f"Job {job.code}, capped at {limit_of(job)}: {waiting} to run.")

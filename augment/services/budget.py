@@ -1,0 +1,195 @@
+"""What the calls of a job use: reserved before each by one conditional UPDATE, settled after it.
+
+    spent + reserved + worst case <= cap
+
+holds for every cap whenever a call is sent, with any number of workers: the database compares and
+adds in one statement. A call that ends moves its reservation into what is spent; one that nobody
+saw the end of counts with its worst case.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from datetime import datetime
+from enum import StrEnum
+
+from django.db import transaction
+from django.db.models import F, Q
+
+from augment.errors import Conflict, ModelFault
+from augment.llm.costs import Price, WorstCase, usd_of
+from augment.llm.messages import Reply
+from augment.models import GenerationJob, ModelCall
+from augment.services.events import log_event
+
+State = GenerationJob.State
+
+
+class Room(StrEnum):
+    """Whether a job has room for one more call."""
+
+    TAKEN = "taken"
+    BUSY = "busy"
+    SPENT = "spent"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Used:
+    """What a call used.
+
+    Attributes:
+        nano_usd: None where the price is unknown.
+        is_estimated: Whether the worst case stands in for what nobody knows.
+    """
+
+    tokens: int
+    nano_usd: int | None
+    is_estimated: bool
+
+
+@transaction.atomic
+def reserve(*, job_pk: int, worst: WorstCase, price: Price | None) -> Room:
+    """Take room for one call, or stop the job if it could not have any.
+
+    Returns:
+        TAKEN: The worst case is reserved. BUSY: calls in flight hold the room and may leave some
+        when they end. SPENT: even alone the call could pass a cap; the job is stopped.
+
+    Raises:
+        Conflict: The job is capped in USD and the price is unknown.
+    """
+    nano_usd = worst.nano_usd(price)
+    jobs = GenerationJob.objects.filter(pk=job_pk)
+    # A money cap admits nothing whose price is unknown.
+    fits = Q(cap_nano_usd=None)
+    alone = Q(cap_nano_usd=None)
+    if nano_usd is not None:
+        fits |= Q(cap_nano_usd__gte=F("spent_nano_usd") + F("reserved_nano_usd") + nano_usd)
+        alone |= Q(cap_nano_usd__gte=F("spent_nano_usd") + nano_usd)
+    for name, needed in (("calls", 1), ("tokens", worst.tokens)):
+        cap, spent, reserved = f"cap_{name}", F(f"spent_{name}"), F(f"reserved_{name}")
+        fits &= Q(**{cap: None}) | Q(**{f"{cap}__gte": spent + reserved + needed})
+        alone &= Q(**{cap: None}) | Q(**{f"{cap}__gte": spent + needed})
+    taken = (
+        jobs.filter(fits)
+        .exclude(state=State.STOPPED_AT_CAP)
+        .update(
+            reserved_nano_usd=F("reserved_nano_usd") + (nano_usd or 0),
+            reserved_calls=F("reserved_calls") + 1,
+            reserved_tokens=F("reserved_tokens") + worst.tokens,
+        )
+    )
+    if taken:
+        return Room.TAKEN
+    if nano_usd is None and jobs.exclude(cap_nano_usd=None).exists():
+        raise Conflict("The job is capped in USD, but the price of the model is unknown.")
+    if jobs.filter(state=State.RUNNING).exclude(alone).update(state=State.STOPPED_AT_CAP):
+        _log_stop(jobs.get())
+    has_room = jobs.filter(alone).exclude(state=State.STOPPED_AT_CAP).exists()
+    return Room.BUSY if has_room else Room.SPENT
+
+
+@transaction.atomic
+def settle(*, call_pk: int, used: Used, now: datetime) -> None:
+    """Turn a call's reservation into what it used.
+
+    A call that was settled with its worst case, because its worker was thought dead, is corrected.
+    """
+    call = ModelCall.objects.select_for_update().get(pk=call_pk)
+    job = GenerationJob.objects.filter(augmentations__attempts=call.attempt_id)
+    if call.settled_at is None:
+        job.update(
+            reserved_nano_usd=F("reserved_nano_usd") - (call.reserved_nano_usd or 0),
+            reserved_calls=F("reserved_calls") - 1,
+            reserved_tokens=F("reserved_tokens") - call.reserved_tokens,
+            spent_nano_usd=F("spent_nano_usd") + (used.nano_usd or 0),
+            spent_calls=F("spent_calls") + 1,
+            spent_tokens=F("spent_tokens") + used.tokens,
+        )
+    else:
+        job.update(
+            spent_nano_usd=F("spent_nano_usd") + (used.nano_usd or 0) - (call.cost_nano_usd or 0),
+            spent_tokens=F("spent_tokens") + used.tokens - (call.spent_tokens or 0),
+        )
+    ModelCall.objects.filter(pk=call_pk).update(
+        spent_tokens=used.tokens,
+        cost_nano_usd=used.nano_usd,
+        is_cost_estimated=used.is_estimated,
+        settled_at=now,
+    )
+
+
+@transaction.atomic
+def settle_unseen(
+    *, now: datetime, attempt_pk: int | None = None, row_pk: int | None = None
+) -> int:
+    """Settle the calls in flight of an attempt, or of a row, that nobody will see the end of.
+
+    They may have been answered and billed, so their worst case counts.
+
+    Returns:
+        How many there were.
+    """
+    calls = ModelCall.objects.filter(settled_at=None)
+    if attempt_pk is not None:
+        calls = calls.filter(attempt=attempt_pk)
+    else:
+        calls = calls.filter(attempt__augmentation=row_pk)
+    unseen = list(calls)
+    for call in unseen:
+        used = Used(
+            tokens=call.reserved_tokens, nano_usd=call.reserved_nano_usd, is_estimated=True
+        )
+        settle(call_pk=call.pk, used=used, now=now)
+    return len(unseen)
+
+
+def used_by_reply(reply: Reply, *, worst: WorstCase, price: Price | None) -> Used:
+    """What an answered call used; where the server did not say, its worst case."""
+    prompt, completion = reply.prompt_tokens, reply.completion_tokens
+    seen = WorstCase(
+        prompt_tokens=worst.prompt_tokens if prompt is None else prompt,
+        completion_tokens=worst.completion_tokens if completion is None else completion,
+    )
+    return Used(
+        tokens=seen.tokens,
+        nano_usd=seen.nano_usd(price),
+        is_estimated=prompt is None or completion is None,
+    )
+
+
+def used_by_fault(fault: ModelFault, *, worst: WorstCase, price: Price | None) -> Used:
+    """What a call without an answer used.
+
+    An endpoint that answers with an error bills nothing. A time-out, a broken connection or an
+    answer that is none may be billed all the same.
+    """
+    if fault.status is not None and fault.status >= 400:
+        return Used(tokens=0, nano_usd=0, is_estimated=False)
+    return Used(tokens=worst.tokens, nano_usd=worst.nano_usd(price), is_estimated=True)
+
+
+def limit_of(job: GenerationJob) -> str:
+    """The caps of a job as a person reads them."""
+    parts = []
+    if job.cap_nano_usd is not None:
+        parts.append(f"{usd_of(job.cap_nano_usd).normalize():f} USD")
+    if job.cap_calls is not None:
+        parts.append(f"{job.cap_calls} calls")
+    if job.cap_tokens is not None:
+        parts.append(f"{job.cap_tokens} tokens")
+    return ", ".join(parts) or "nothing"
+
+
+# --- Private -----------------------------------------------------------------------------------
+
+
+def _log_stop(job: GenerationJob) -> None:
+    log_event(
+        actor=None,
+        verb="stop",
+        object_kind="job",
+        object_code=job.code,
+        before={"state": State.RUNNING.value},
+        after={"state": State.STOPPED_AT_CAP.value, "cap": limit_of(job)},
+    )

@@ -1,0 +1,127 @@
+"""Eight workers and a cap that admits about half: never above it, and nothing paid twice."""
+
+from __future__ import annotations
+
+import queue
+from collections import Counter
+from concurrent.futures import ThreadPoolExecutor
+from decimal import Decimal
+
+import pytest
+from django.db import connection
+
+from augment.models import GenerationJob, ModelCall
+from augment.services import caps, claims, jobs, runner
+from augment.services.caps import Caps
+from tests.jobs.models import (
+    COMPLETION_TOKENS,
+    PROMPT_TOKENS,
+    Model,
+    after_a_second_look,
+    llama_job,
+)
+from tests.jobs.rows import NOON, STALE
+
+pytestmark = [pytest.mark.django_db(transaction=True), pytest.mark.slow]
+
+WORKERS = 8
+SCENARIOS = 16
+CALLS = 2 * SCENARIOS
+USED = PROMPT_TOKENS + COMPLETION_TOKENS
+ONE_WORST_CASE = 20_000
+"""Tokens; more than one call of these reserves, so that the last ones fit as well."""
+
+HALF: dict[str, Caps] = {
+    "calls": Caps(calls=CALLS // 2 + 1),
+    "tokens": Caps(tokens=CALLS // 2 * USED + ONE_WORST_CASE),
+    "usd": Caps(usd=Decimal(CALLS // 2 * USED + ONE_WORST_CASE) / 1_000_000),
+}
+"""Caps for a model that costs 1 USD per million tokens."""
+
+ALL: dict[str, Caps] = {
+    "calls": Caps(calls=CALLS),
+    "tokens": Caps(tokens=CALLS * USED + ONE_WORST_CASE),
+    "usd": Caps(usd=Decimal(CALLS * USED + ONE_WORST_CASE) / 1_000_000),
+}
+
+
+class Watcher:
+    """Looks at the job's counters while calls are in flight, and remembers what was wrong."""
+
+    def __init__(self, job: GenerationJob) -> None:
+        self.job_pk = job.pk
+        self.seen = 0
+        self.above: list[str] = []
+
+    def __call__(self) -> None:
+        job = GenerationJob.objects.get(pk=self.job_pk)
+        self.seen += 1
+        for name in ("nano_usd", "calls", "tokens"):
+            cap = getattr(job, f"cap_{name}")
+            held = getattr(job, f"spent_{name}") + getattr(job, f"reserved_{name}")
+            if cap is not None and held > cap:
+                self.above.append(f"{held} of {cap} {name}")
+
+
+def run_all(job: GenerationJob, model: Model, watcher: Watcher) -> None:
+    """Eight workers, each with what a queue hands it, until nothing is left to hand out."""
+    waiting: queue.SimpleQueue[int] = queue.SimpleQueue()
+    for pk in claims.unsent(now=NOON, older_than=STALE, job_pk=job.pk):
+        waiting.put(pk)
+
+    def work(number: int) -> None:
+        try:
+            while True:
+                runner.work_on(
+                    augmentation_pk=waiting.get_nowait(), worker=f"{number}", connect=model
+                )
+                watcher()
+        except queue.Empty:
+            return
+        finally:
+            connection.close()
+
+    with ThreadPoolExecutor(max_workers=WORKERS) as pool:
+        list(pool.map(work, range(WORKERS)))
+    job.refresh_from_db()
+
+
+@pytest.mark.parametrize("kind", ["usd", "calls", "tokens"])
+def test_eight_workers_stay_below_the_cap_and_resume_pays_for_nothing_twice(kind: str) -> None:
+    job = llama_job(scenarios=SCENARIOS, price="1", caps=HALF[kind])
+    watcher = Watcher(job)
+    model = Model(after_a_second_look, looking_on=watcher)
+
+    run_all(job, model, watcher)
+
+    assert job.get_state_display().lower() == "stopped at cap"
+    assert len(model.requests) == pytest.approx(CALLS / 2, abs=CALLS / 4)
+    assert jobs.progress(job).failed == 0
+    assert jobs.progress(job).queued > 0
+    assert claims.unsent(now=NOON, older_than=STALE) == []
+    asked_before = len(model.requests)
+    check_the_books(job)
+
+    caps.raise_cap(job, caps=ALL[kind])
+    caps.resume(job)
+    run_all(job, model, watcher)
+
+    assert (job.state, jobs.progress(job).done) == (GenerationJob.State.FINISHED, SCENARIOS)
+    assert asked_before < len(model.requests) == CALLS
+    assert set(Counter(model.requests).values()) == {1}, "no answered call is repeated"
+    assert watcher.above == []
+    assert watcher.seen > CALLS
+    check_the_books(job)
+    assert job.spent_calls == CALLS
+    assert job.spent_tokens == job.spent_nano_usd // 1000 == CALLS * USED
+
+
+def check_the_books(job: GenerationJob) -> None:
+    """What the job has reserved and spent is what its calls say."""
+    calls = ModelCall.objects.filter(attempt__augmentation__job=job)
+    paid = [call for call in calls if not call.is_cached]
+    assert all(call.settled_at for call in paid)
+    assert (job.reserved_calls, job.reserved_tokens, job.reserved_nano_usd) == (0, 0, 0)
+    assert job.spent_calls == len(paid)
+    assert job.spent_tokens == sum(call.spent_tokens or 0 for call in paid)
+    assert job.spent_nano_usd == sum(call.cost_nano_usd or 0 for call in paid)
