@@ -39,7 +39,8 @@ class JobProgressView(ApiView):
             "total": found.total,
             "settled": found.settled,
             "by_state": {state.value: number for state, number in found.by_state.items()},
-            "is_over": found.under_way == 0,
+            "calls": found.job.spent_calls,
+            "is_over": not found.is_moving,
         }
         digest = hashlib.sha256(json.dumps(body, sort_keys=True).encode()).hexdigest()[:32]
         headers = {"ETag": f'"{digest}"', "Cache-Control": "private, no-cache"}

@@ -30,6 +30,13 @@ class JobCounts:
         return sum(self.by_state[state] for state in Augmentation.UNDER_WAY)
 
     @property
+    def is_moving(self) -> bool:
+        """Whether anything will change by itself: not where all that is left waits at a cap."""
+        if self.job.state == GenerationJob.State.STOPPED_AT_CAP:
+            return self.by_state[State.RUNNING] > 0
+        return self.under_way > 0
+
+    @property
     def settled(self) -> int:
         """What has its outcome, whichever it is."""
         return self.total - self.under_way

@@ -10,6 +10,7 @@ from django.contrib.auth.models import User
 from arena.queries.profiles import Theme
 from arena.queries.scenarios import TypeGroup
 from augment.models import Contestant
+from augment.services.caps import Caps
 
 
 class ThemeForm(forms.Form):
@@ -86,8 +87,25 @@ class ChoiceForm(forms.Form):
         found.choices = choices
 
 
-class LaunchForm(ChoiceForm):
+class CapsForm(forms.Form):
+    """What a job may use at most; an empty field is no cap, or one that stays."""
+
+    cap_usd = forms.DecimalField(required=False, max_digits=16, decimal_places=9)
+    cap_calls = forms.IntegerField(required=False)
+    cap_tokens = forms.IntegerField(required=False)
+
+    def caps(self) -> Caps:
+        """What was entered, once the form is valid."""
+        entered = self.cleaned_data
+        return Caps(
+            usd=entered["cap_usd"], calls=entered["cap_calls"], tokens=entered["cap_tokens"]
+        )
+
+
+class LaunchForm(ChoiceForm, CapsForm):
     """A new job."""
+
+    is_fresh = forms.BooleanField(required=False)
 
 
 class StudyForm(ChoiceForm):

@@ -15,11 +15,13 @@ from django.views.decorators.http import require_http_methods, require_POST, req
 
 from arena.queries import jobs, scenarios
 from arena.web.access import ADMIN, STAFF, only
-from arena.web.forms import LaunchForm
+from arena.web.forms import CapsForm, LaunchForm
 from augment.errors import AugmentError, QueueUnreachable
 from augment.models import Contestant, GenerationJob
-from augment.services import contestants
+from augment.services import caps, contestants
 from augment.services import jobs as service
+from augment.services.caps import Caps
+from augment.services.job_costs import costs_of
 from augment.tasks import enqueue_job
 
 
@@ -56,7 +58,12 @@ def new_job_page(request: HttpRequest) -> HttpResponse:
 def job_page(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
     """Progress, the grid, and failures by their reason."""
     job = get_object_or_404(GenerationJob.objects.select_related("launched_by__person"), code=code)
-    context = {"counts": jobs.counts(job), "grid": jobs.grid(job), "failures": jobs.failures(job)}
+    context = {
+        "counts": jobs.counts(job),
+        "costs": costs_of(job),
+        "grid": jobs.grid(job),
+        "failures": jobs.failures(job),
+    }
     return render(request, "jobs/job.html", context)
 
 
@@ -90,12 +97,37 @@ def cancel_job(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
     return redirect("job", code=code)
 
 
+@only(ADMIN)
+@require_POST
+def resume_job(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
+    """Raise the caps that are given, then go on with what is left."""
+    job = get_object_or_404(GenerationJob, code=code)
+    form = CapsForm(request.POST)
+    if not form.is_valid():
+        messages.error(request, "A cap is a number; nothing was changed.")
+        return redirect("job", code=code)
+    try:
+        with transaction.atomic():
+            actor = cast(User, request.user)
+            if form.caps() != Caps():
+                job = caps.raise_cap(job, caps=form.caps(), actor=actor)
+            caps.resume(job, actor=actor)
+            transaction.on_commit(partial(_send, request, job.pk))
+    except AugmentError as error:
+        messages.error(request, str(error))
+    else:
+        messages.success(request, "What is left is queued again.")
+    return redirect("job", code=code)
+
+
 def _launch(request: HttpRequest, form: LaunchForm) -> GenerationJob:
     with transaction.atomic():
         job = service.launch(
             name=form.cleaned_data["name"],
             contestants=form.cleaned_data["contestants"],
             scenarios=form.cleaned_data["scenarios"],
+            caps=form.caps(),
+            is_fresh=form.cleaned_data["is_fresh"],
             actor=cast(User, request.user),
         )
         transaction.on_commit(partial(_send, request, job.pk))

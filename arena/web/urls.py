@@ -24,6 +24,7 @@ urlpatterns: list[URLPattern] = [
     path("jobs/<uuid:code>/", jobs.job_page, name="job"),
     path("jobs/<uuid:code>/retry/", jobs.retry_job, name="job-retry"),
     path("jobs/<uuid:code>/cancel/", jobs.cancel_job, name="job-cancel"),
+    path("jobs/<uuid:code>/resume/", jobs.resume_job, name="job-resume"),
     path("augmentations/<uuid:code>/", scenarios.augmentation_page, name="augmentation"),
     path("studies/", studies.studies_page, name="studies"),
     path("studies/new/", studies.new_study_page, name="study-new"),

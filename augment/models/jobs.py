@@ -62,6 +62,12 @@ class GenerationJob(models.Model):
         return self.name
 
     @property
+    def is_capped(self) -> bool:
+        """Whether there is any cap."""
+        caps = (self.cap_nano_usd, self.cap_calls, self.cap_tokens)
+        return any(cap is not None for cap in caps)
+
+    @property
     def cap_usd(self) -> Decimal | None:
         """The money cap, None without one."""
         return None if self.cap_nano_usd is None else usd_of(self.cap_nano_usd)

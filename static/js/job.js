@@ -34,7 +34,10 @@ async function ask() {
   etag = answer.headers.get("ETag") ?? "";
   if (!isFirst || progress.is_over) await showAnew();
   if (progress.is_over) {
-    document.getElementById("said").textContent = `All ${progress.total} are settled.`;
+    const isStopped = progress.settled < progress.total;
+    document.getElementById("said").textContent = isStopped
+      ? `Stopped at its cap: ${progress.settled} of ${progress.total} are settled.`
+      : `All ${progress.total} are settled.`;
   }
   return progress.is_over;
 }

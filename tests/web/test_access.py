@@ -37,6 +37,7 @@ PAGES: dict[str, tuple[int, int, int]] = {
 ACTIONS: dict[str, tuple[int, int, int]] = {
     "job-retry": (302, 403, 403),
     "job-cancel": (302, 403, 403),
+    "job-resume": (302, 403, 403),
     "study-rate": (403, 403, 403),
     "study-close": (302, 403, 403),
     "theme": (302, 302, 302),
@@ -51,6 +52,7 @@ def address(name: str, here: World) -> str:
         "job-progress": {"code": here.job.code},
         "job-retry": {"code": here.job.code},
         "job-cancel": {"code": here.job.code},
+        "job-resume": {"code": here.job.code},
         "augmentation": {"code": here.augmentation.code},
         "scenario": {"code": here.augmentation.scenario.code},
         "picture": {"kind": "augmentation", "code": shown.left.code},

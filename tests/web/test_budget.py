@@ -1,0 +1,117 @@
+"""Caps on the pages: entered at launch, shown beside what is used, raised where a job stopped."""
+
+from __future__ import annotations
+
+from decimal import Decimal
+
+import pytest
+from django.urls import reverse
+
+from arena.templatetags.money import usd
+from augment.llm.messages import Reply
+from augment.models import GenerationJob
+from augment.services import runner
+from augment.services.caps import Caps
+from tests.jobs.models import Model, add_llama, llama_job
+from tests.jobs.rows import add_scenario, only_row
+from tests.variants.answers import GOOD
+from tests.web.cast import people, signed_in
+
+pytestmark = pytest.mark.django_db
+
+
+def page_of(job: GenerationJob, role: str = "admin") -> str:
+    answer = signed_in(people()[role]).get(reverse("job", args=[job.code]))
+    return " ".join(answer.content.decode().split())
+
+
+def ran(job: GenerationJob, model: Model | None = None) -> GenerationJob:
+    runner.work_on(augmentation_pk=only_row(job).pk, connect=model or Model())
+    job.refresh_from_db()
+    return job
+
+
+def test_a_job_is_launched_with_its_caps() -> None:
+    add_llama(price="1")
+    add_scenario("street")
+    sent = {"name": "R", "contestants": ["llama"], "scenarios": ["street"], "is_fresh": "on"}
+    caps = {"cap_usd": "2.50", "cap_calls": "40", "cap_tokens": ""}
+    signed_in(people()["admin"]).post(reverse("job-new"), sent | caps)
+    job = GenerationJob.objects.get()
+    assert (job.cap_usd, job.cap_calls, job.cap_tokens) == (Decimal("2.5"), 40, None)
+    assert job.is_fresh
+
+
+def test_a_cap_in_usd_without_a_price_is_refused_in_words() -> None:
+    add_llama()
+    add_scenario("street")
+    sent = {"name": "R", "contestants": ["llama"], "scenarios": ["street"], "cap_usd": "1"}
+    answer = signed_in(people()["admin"]).post(reverse("job-new"), sent)
+    assert answer.status_code == 422
+    assert "cap the job by calls or tokens instead" in " ".join(answer.content.decode().split())
+    assert not GenerationJob.objects.exists()
+
+
+@pytest.mark.parametrize("caps", [{"cap_usd": "much"}, {"cap_calls": "1.5"}, {"cap_tokens": "-3"}])
+def test_a_cap_that_is_none_is_not_launched(caps: dict[str, str]) -> None:
+    add_llama(price="1")
+    add_scenario("street")
+    sent = {"name": "R", "contestants": ["llama"], "scenarios": ["street"]} | caps
+    assert signed_in(people()["admin"]).post(reverse("job-new"), sent).status_code == 422
+    assert not GenerationJob.objects.exists()
+
+
+def test_the_page_shows_what_is_spent_beside_the_cap() -> None:
+    shown = page_of(ran(llama_job(price="2", caps=Caps(usd=Decimal("0.5")))))
+    assert "$0.0020" in shown
+    assert "$0.50" in shown
+    assert "unknown" not in shown
+
+
+def test_an_unknown_cost_is_shown_as_unknown_and_never_as_zero() -> None:
+    shown = page_of(ran(llama_job(caps=Caps(calls=10))))
+    assert "unknown" in shown
+    assert "$0.00" not in shown
+
+
+def test_the_page_says_where_the_worst_case_counts() -> None:
+    silent = Model(lambda request: Reply(text=GOOD))
+    assert "1 call did not say what they used" in page_of(ran(llama_job(), silent))
+
+
+def test_a_stopped_job_is_raised_and_resumed_from_its_page() -> None:
+    job = ran(llama_job(caps=Caps(tokens=5)))
+    admin = signed_in(people()["admin"])
+    url, resume = reverse("job", args=[job.code]), reverse("job-resume", args=[job.code])
+    shown = admin.get(url).content.decode()
+    assert "Stopped at cap" in shown
+    assert "Stopped at its cap." in shown
+    progress = admin.get(reverse("job-progress", args=[job.code])).json()
+    assert (progress["state"], progress["is_over"]) == ("stopped_at_cap", True)
+    for wrong, sentence in (("3", "must be higher"), ("many", "A cap is a number")):
+        assert sentence in admin.post(resume, {"cap_tokens": wrong}, follow=True).content.decode()
+    job.refresh_from_db()
+    assert (job.state, job.cap_tokens) == (GenerationJob.State.STOPPED_AT_CAP, 5)
+    admin.post(resume, {"cap_tokens": "90000"})
+    job.refresh_from_db()
+    assert (job.state, job.cap_tokens) == (GenerationJob.State.RUNNING, 90_000)
+
+
+def test_an_analyst_sees_that_a_job_stopped_and_has_no_button() -> None:
+    shown = page_of(ran(llama_job(caps=Caps(tokens=5))), role="analyst")
+    assert "An admin can raise it." in shown
+    assert "Raise and resume" not in shown
+
+
+@pytest.mark.parametrize(
+    ("amount", "shown"),
+    [
+        (None, "unknown"),
+        (Decimal(0), "$0.00"),
+        (Decimal("1234.5"), "$1,234.50"),
+        (Decimal("0.00345"), "$0.0034"),
+        (Decimal("0.000000001"), "less than $0.0001"),
+    ],
+)
+def test_an_amount_is_short_and_honest(amount: Decimal | None, shown: str) -> None:
+    assert usd(amount) == shown
