@@ -23,7 +23,7 @@ from arena.services.people import create_person
 from arena.services.ratings import rate
 from arena.services.simulation import simulate_votes
 from arena.services.studies import close_study, open_study
-from augment.models import Augmentation, Contestant, Endpoint, GenerationJob
+from augment.models import Augmentation, BaseScene, Contestant, Endpoint, GenerationJob
 from augment.services.catalogue import load_catalogue
 from augment.services.choosing import ALL, CATALOGUE, chosen_contestants, chosen_scenarios
 from augment.services.contestants import add_contestant, ensure_builtin, ensure_endpoint
@@ -61,8 +61,9 @@ class Leaderboard:
 
 def prepare(say: Callable[[str], None]) -> None:
     """Scenes, scenarios, contestants and people; nothing here needs a running worker."""
-    report = load_catalogue(folder=settings.BASE_DIR / "fixtures")
-    say(f"Catalogue: {report}")
+    load_catalogue(folder=settings.BASE_DIR / "fixtures")
+    count = len(chosen_scenarios([CATALOGUE]))
+    say(f"Catalogue: {count} scenarios on {BaseScene.objects.count()} scenes")
     ensure_builtin()
     ensure_endpoint(label=STAND_IN, base_url=_stand_in_address(), is_simulated=True)
     for slug, model, name in SIMULATED:
