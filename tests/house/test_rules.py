@@ -18,6 +18,7 @@ HEAVY = {
     "pandas": ("augment.formats", "arena.exports"),
     "pyarrow": ("augment.formats", "arena.exports"),
     "matplotlib": ("arena.exports",),
+    "scipy.optimize": ("augment.metrics",),
     "scipy.stats": ("arena.rating",),
 }
 READS_SETTINGS = (

@@ -1,0 +1,171 @@
+from __future__ import annotations
+
+import itertools
+import math
+from dataclasses import replace
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from augment.metrics.displacement import CLASS_OF, Displacement, displacement
+from augment.scene.entities import AgentType, TrafficAgent
+from augment.scene.modification import Modification
+from tests.scenes import cone, pedestrian, vehicle
+
+
+def placed(*agents: TrafficAgent) -> Modification:
+    return Modification(added=agents)
+
+
+def pairs(found: Displacement) -> dict[str, str]:
+    return {match.generated: match.reference for match in found.matches}
+
+
+def test_the_distance_is_between_the_centres() -> None:
+    found = displacement(placed(vehicle("g", 3.0, 4.0, 1.2)), placed(vehicle("r", 0.0, 0.0)))
+    assert found.distances_m == (5.0,)
+    assert found.mean_m == 5.0
+    assert (found.missing, found.surplus) == ((), ())
+
+
+def test_the_matching_has_the_smallest_sum_not_the_nearest_first() -> None:
+    # g1 is nearest to r1 (1 m), but then g2 is 9 m from r2: 10 m. Crosswise it is 4 + 4 m.
+    reference = placed(vehicle("r1", 0.0, 0.0), vehicle("r2", 5.0, 0.0))
+    generated = placed(vehicle("g1", 1.0, 0.0), vehicle("g2", -4.0, 0.0))
+    found = displacement(generated, reference)
+    assert pairs(found) == {"g1": "r2", "g2": "r1"}
+    assert found.distances_m == (4.0, 4.0)
+
+
+def test_of_two_wanted_the_one_without_a_counterpart_is_missing() -> None:
+    reference = placed(vehicle("r1", 0.0, 0.0), vehicle("r2", 20.0, 0.0))
+    found = displacement(placed(vehicle("g1", 18.0, 0.0)), reference)
+    assert pairs(found) == {"g1": "r2"}
+    assert found.distances_m == (2.0,)
+    assert (found.missing, found.surplus) == (("r1",), ())
+
+
+def test_of_three_placed_the_two_farthest_are_surplus() -> None:
+    generated = placed(cone("g1", 9.0, 0.0), cone("g2", 10.5, 0.0), cone("g3", 40.0, 0.0))
+    found = displacement(generated, placed(cone("r1", 10.0, 0.0)))
+    assert pairs(found) == {"g2": "r1"}
+    assert (found.missing, found.surplus) == ((), ("g1", "g3"))
+
+
+def test_nothing_stands_for_an_object_of_another_class() -> None:
+    reference = placed(pedestrian("r1", 10.0, 0.0), cone("r2", 20.0, 0.0))
+    generated = placed(vehicle("g1", 10.0, 0.0), cone("g2", 21.0, 0.0))
+    found = displacement(generated, reference)
+    assert pairs(found) == {"g2": "r2"}
+    assert (found.missing, found.surplus) == (("r1",), ("g1",))
+
+
+def test_a_bus_stands_for_a_car() -> None:
+    bus = replace(vehicle("g", 12.0, 0.0), type=AgentType.BUS)
+    assert displacement(placed(bus), placed(vehicle("r", 10.0, 0.0))).distances_m == (2.0,)
+
+
+def test_every_type_of_agent_has_a_class() -> None:
+    assert set(CLASS_OF) == set(AgentType)
+
+
+def test_an_answer_that_nobody_could_read_misses_everything() -> None:
+    found = displacement(None, placed(vehicle("r1", 0.0, 0.0), cone("r2", 1.0, 0.0)))
+    assert found == Displacement(missing=("r1", "r2"))
+    assert found.mean_m is None
+
+
+def test_an_empty_change_misses_everything_and_an_empty_reference_wants_nothing() -> None:
+    one = placed(vehicle("a", 0.0, 0.0))
+    assert displacement(Modification(), one).missing == ("a",)
+    assert displacement(one, Modification()).surplus == ("a",)
+    assert displacement(Modification(), Modification()) == Displacement()
+
+
+def test_a_moved_object_counts_where_it_went_and_a_removed_one_not_at_all() -> None:
+    reference = Modification(moved=(vehicle("Agent2", 10.0, 0.0),), removed=("Agent3",))
+    found = displacement(Modification(moved=(vehicle("Agent2", 10.0, 3.0),)), reference)
+    assert found.distances_m == (3.0,)
+    assert (found.missing, found.surplus) == ((), ())
+
+
+# Properties
+
+# The first example loads scipy.optimize, which is slower than Hypothesis allows an example.
+unhurried = settings(deadline=None)
+
+MAKERS = (vehicle, cone, pedestrian)
+metres = st.floats(-60.0, 60.0)
+
+
+@st.composite
+def changes(draw: st.DrawFn) -> Modification:
+    places = draw(st.lists(st.tuples(st.sampled_from(MAKERS), metres, metres), max_size=6))
+    return placed(*(make(f"a{n}", x_m, y_m) for n, (make, x_m, y_m) in enumerate(places)))
+
+
+def turned(change: Modification, angle: float, dx_m: float, dy_m: float) -> Modification:
+    cos, sin = math.cos(angle), math.sin(angle)
+    return placed(
+        *(
+            replace(
+                agent,
+                x_m=cos * agent.x_m - sin * agent.y_m + dx_m,
+                y_m=sin * agent.x_m + cos * agent.y_m + dy_m,
+                heading_rad=agent.heading_rad + angle,
+            )
+            for agent in change.added
+        )
+    )
+
+
+@unhurried
+@given(change=changes())
+def test_the_reference_is_exactly_where_the_reference_is(change: Modification) -> None:
+    found = displacement(change, change)
+    assert found.distances_m == (0.0,) * len(change.added)
+    assert (found.missing, found.surplus) == ((), ())
+
+
+@unhurried
+@given(
+    generated=changes(), reference=changes(), angle=st.floats(-4.0, 4.0), dx_m=metres, dy_m=metres
+)
+def test_turning_and_shifting_the_world_changes_nothing(
+    generated: Modification, reference: Modification, angle: float, dx_m: float, dy_m: float
+) -> None:
+    before = displacement(generated, reference)
+    after = displacement(
+        turned(generated, angle, dx_m, dy_m), turned(reference, angle, dx_m, dy_m)
+    )
+    assert sum(after.distances_m) == pytest.approx(sum(before.distances_m), abs=1e-4)
+    assert (len(after.missing), len(after.surplus)) == (len(before.missing), len(before.surplus))
+
+
+@unhurried
+@given(generated=changes(), reference=changes(), data=st.data())
+def test_the_order_of_the_objects_changes_nothing(
+    generated: Modification, reference: Modification, data: st.DataObject
+) -> None:
+    shuffled = placed(*data.draw(st.permutations(generated.added)))
+    before, after = displacement(generated, reference), displacement(shuffled, reference)
+    assert sum(after.distances_m) == pytest.approx(sum(before.distances_m), abs=1e-4)
+    assert len(after.surplus) == len(before.surplus)
+
+
+def test_of_equal_sums_the_even_one_counts_in_whatever_order() -> None:
+    reference = placed(vehicle("r1", 1.0, 0.0), vehicle("r2", 2.0, 0.0))
+    cars = (vehicle("g1", 0.0, 0.0), vehicle("g2", 1.0, 0.0))
+    for order in itertools.permutations(cars):
+        assert displacement(placed(*order), reference).distances_m == (1.0, 1.0)
+
+
+@unhurried
+@given(generated=changes(), reference=changes())
+def test_every_object_is_matched_or_counted_once(
+    generated: Modification, reference: Modification
+) -> None:
+    found = displacement(generated, reference)
+    assert len(found.matches) + len(found.missing) == len(reference.added)
+    assert len(found.matches) + len(found.surplus) == len(generated.added)

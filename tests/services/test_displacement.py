@@ -1,0 +1,146 @@
+"""Displacement of stored rows; the street's reference has cones at (20, 0.5) and (25, -0.5)."""
+
+from __future__ import annotations
+
+import pytest
+from django.db import connection
+from django.test.utils import CaptureQueriesContext
+
+from augment.errors import UnknownName
+from augment.models import Augmentation, Contestant, GenerationJob, Scenario
+from augment.scene.catalogue import ScenarioType
+from augment.scene.codec import modification_to_document
+from augment.scene.modification import Modification
+from augment.services.displacement import (
+    By,
+    Group,
+    Unmeasured,
+    groups,
+    of_augmentation,
+    of_job,
+    of_latest,
+    types_named,
+)
+from tests.jobs import rows
+from tests.scenes import cone
+
+pytestmark = pytest.mark.django_db
+
+NEAR = Modification(added=(cone("Agent2", 20.0, 1.5), cone("Agent3", 25.0, 1.5)))  # 1 m and 2 m
+
+
+def ended(
+    job: GenerationJob,
+    scenario: Scenario,
+    contestant: Contestant,
+    *,
+    state: str = Augmentation.State.DONE,
+    change: Modification = NEAR,
+) -> Augmentation:
+    is_done = state == Augmentation.State.DONE
+    return Augmentation.objects.create(
+        job=job,
+        scenario=scenario,
+        contestant=contestant,
+        state=state,
+        modification=modification_to_document(change) if is_done else None,
+        image="bev/x.png" if is_done else "",
+    )
+
+
+def a_job() -> GenerationJob:
+    return GenerationJob.objects.create(name="Round 1")
+
+
+def only(found: list[Group]) -> Group:
+    assert len(found) == 1
+    return found[0]
+
+
+def matched(found: list[Group]) -> int:
+    return sum(group.summary.n for group in found)
+
+
+def test_the_reference_against_itself_is_exactly_zero() -> None:
+    row = ended(a_job(), rows.add_scenario("one"), rows.add_kind("ann"), change=rows.TWO_CONES)
+    found = of_augmentation(row).displacement
+    assert found is not None
+    assert found.distances_m == (0.0, 0.0)
+
+
+def test_a_job_is_summed_up_per_contestant() -> None:
+    job, one, two = a_job(), rows.add_scenario("one"), rows.add_scenario("two")
+    ann = rows.add_kind("ann", Contestant.Kind.SIMULATED)
+    ended(job, one, ann)
+    ended(job, two, ann, state="unreadable")
+    group = only(groups(of_job(job), by=By.CONTESTANT))
+    assert (group.heading, group.slug, group.is_simulated) == ("ann", "ann", True)
+    assert (group.summary.augmentations, group.summary.n) == (2, 2)
+    assert (group.summary.missing, group.summary.surplus) == (2, 0)
+    assert group.summary.box is not None
+    assert group.summary.box.mean_m == pytest.approx(1.5)
+
+
+@pytest.mark.parametrize("state", ["unreadable", "refused"])
+def test_an_answer_without_a_modification_misses_everything(state: str) -> None:
+    row = ended(a_job(), rows.add_scenario("one"), rows.add_kind("ann"), state=state)
+    found = of_augmentation(row).displacement
+    assert found is not None
+    assert found.missing == ("Agent2", "Agent3")
+
+
+def test_what_cannot_be_measured_says_why_and_counts_nowhere() -> None:
+    job, ann = a_job(), rows.add_kind("ann")
+    ended(job, rows.add_scenario("bare", reference=None), ann)
+    ended(job, rows.add_scenario("broken"), ann, state="failed")
+    odd = ended(job, rows.add_scenario("odd"), ann)
+    Augmentation.objects.filter(pk=odd.pk).update(modification={})
+    found = of_job(job)
+    assert {one.row.scenario.slug: one.why_not for one in found} == {
+        "bare": Unmeasured.NO_REFERENCE,
+        "broken": Unmeasured.UNFINISHED,
+        "odd": Unmeasured.UNREADABLE_ROW,
+    }
+    assert groups(found, by=By.TYPE) == []
+
+
+def test_by_variant_leaves_out_the_ambiguous_types_unless_asked() -> None:
+    job, ann = a_job(), rows.add_kind("ann")
+    ended(job, rows.add_scenario("works"), ann)
+    ended(job, rows.add_scenario("parked", type=ScenarioType.NUDGE), ann)
+    found = of_job(job)
+    assert only(groups(found, by=By.VARIANT)).summary.augmentations == 1
+    assert only(groups(found, by=By.VARIANT, types=tuple(ScenarioType))).summary.augmentations == 2
+    assert [group.heading for group in groups(found, by=By.TYPE)] == [
+        "Construction zone",
+        "Nudge around parked vehicle",
+    ]
+
+
+def test_the_latest_outcome_of_every_cell_counts_whatever_its_job() -> None:
+    one, ann = rows.add_scenario("one"), rows.add_kind("ann")
+    ended(a_job(), one, ann, change=rows.TWO_CONES)
+    latest = ended(a_job(), one, ann)
+    ended(a_job(), one, ann, state="failed")
+    assert [found.row.pk for found in of_latest()] == [latest.pk]
+
+
+def test_a_job_is_read_by_one_query_however_long_it_is() -> None:
+    job, people = a_job(), [rows.add_kind("ann"), rows.add_kind("bob")]
+    for number in range(4):
+        scenario = rows.add_scenario(f"street-{number}")
+        for contestant in people:
+            ended(job, scenario, contestant)
+    with CaptureQueriesContext(connection) as queries:
+        assert matched(groups(of_job(job), by=By.TYPE)) == 16
+    assert len(queries) == 1
+    with CaptureQueriesContext(connection) as queries:
+        assert matched(groups(of_latest(), by=By.TYPE)) == 16
+    assert len(queries) == 1
+
+
+def test_types_go_by_their_names() -> None:
+    assert types_named(["all"]) == tuple(ScenarioType)
+    assert types_named(["jaywalking_pedestrian"]) == (ScenarioType.JAYWALKER,)
+    with pytest.raises(UnknownName, match="jaywalking_pedestrian"):
+        types_named(["jaywalker"])
