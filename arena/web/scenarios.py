@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import re
 import uuid
 
-from django.http import Http404, HttpRequest, HttpResponse, HttpResponseBase
+from django.http import Http404, HttpRequest, HttpResponse, HttpResponseBase, JsonResponse
 from django.shortcuts import get_object_or_404, render
 from django.views.decorators.http import require_safe
 
@@ -13,6 +14,9 @@ from arena.queries.modifications import modification_lines
 from arena.web.access import STAFF, only
 from arena.web.pictures import picture_response
 from augment.models import Augmentation, Scenario
+from augment.services.transcript_export import transcript_of
+from augment.services.transcript_steps import totals_of, tries_of
+from augment.services.transcripts import IMAGES
 
 
 @only(*STAFF)
@@ -41,14 +45,35 @@ def scenario_page(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
 @require_safe
 def augmentation_page(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
     """One augmentation with everything that led to it."""
-    rows = Augmentation.objects.select_related("job", "scenario", "contestant")
-    augmentation = get_object_or_404(rows, code=code)
+    augmentation = _augmentation(code)
+    tries = tries_of(augmentation)
     context = {
         "augmentation": augmentation,
         "lines": modification_lines(augmentation.modification),
-        "attempts": list(augmentation.attempts.prefetch_related("calls")),
+        "tries": tries,
+        "totals": totals_of(tries),
     }
     return render(request, "jobs/augmentation.html", context)
+
+
+@only(*STAFF)
+@require_safe
+def transcript(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
+    """The whole record of an augmentation as one JSON file."""
+    document = transcript_of(_augmentation(code))
+    answer = JsonResponse(document, json_dumps_params={"indent": 2, "ensure_ascii": False})
+    answer["Content-Disposition"] = f'attachment; filename="transcript-{code}.json"'
+    answer["Cache-Control"] = "private, no-store"
+    return answer
+
+
+@only(*STAFF)
+@require_safe
+def asked_image(request: HttpRequest, digest: str) -> HttpResponseBase:
+    """An image that a language model was shown, by the hash that its request names."""
+    if not re.fullmatch(r"[0-9a-f]{64}", digest):
+        raise Http404
+    return picture_response(f"{IMAGES}/{digest}.png")
 
 
 @only(*STAFF)
@@ -62,3 +87,8 @@ def picture(request: HttpRequest, kind: str, code: uuid.UUID) -> HttpResponseBas
     else:
         raise Http404
     return picture_response(name)
+
+
+def _augmentation(code: uuid.UUID) -> Augmentation:
+    rows = Augmentation.objects.select_related("job", "scenario", "contestant__endpoint")
+    return get_object_or_404(rows, code=code)

@@ -1,0 +1,164 @@
+"""The record of an augmentation as steps in their order: calls, and what happened between them."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator
+from dataclasses import dataclass
+from decimal import Decimal
+from typing import Any
+
+from django.db.models import Prefetch
+
+from augment.llm.fingerprint import IMAGE_SCHEME
+from augment.models import Attempt, Augmentation, ModelCall, TranscriptNote
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SaidMessage:
+    """One message of a request, to be read.
+
+    Attributes:
+        images: SHA-256 of each.
+        rest: Whatever else it carries (calls of tools, the id of one), as JSON; empty mostly.
+    """
+
+    role: str
+    text: str
+    images: tuple[str, ...]
+    rest: str
+
+    @property
+    def length(self) -> int:
+        """In characters."""
+        return len(self.text)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Step:
+    """A call or, where that is None, a note."""
+
+    call: ModelCall | None = None
+    note: TranscriptNote | None = None
+
+    @property
+    def messages(self) -> list[SaidMessage]:
+        """What was asked, oldest first."""
+        return [] if self.call is None else messages_of(self.call.request)
+
+    @property
+    def parameters(self) -> dict[str, Any]:
+        """What was asked for beside the messages."""
+        asked = {} if self.call is None else self.call.request
+        return {name: value for name, value in asked.items() if name not in ("messages", "model")}
+
+    @property
+    def extras_text(self) -> str:
+        """What else the answer carried, such as native calls of tools."""
+        return _pretty(self.call.extras) if self.call and self.call.extras else ""
+
+    @property
+    def note_text(self) -> str:
+        """The note's document, to be read."""
+        return "" if self.note is None else _pretty(self.note.document)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Try:
+    """One attempt with its steps."""
+
+    attempt: Attempt
+    steps: list[Step]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Totals:
+    """What all calls of an augmentation used; None where that is not known of every one.
+
+    Attributes:
+        calls: Those that were sent.
+        cached: Those that were answered from the store and cost nothing.
+        spent_tokens: What counts against caps: the worst case where usage is unknown.
+    """
+
+    calls: int
+    cached: int
+    prompt_tokens: int | None
+    completion_tokens: int | None
+    spent_tokens: int
+    cost_usd: Decimal | None
+    is_cost_estimated: bool
+
+
+def tries_of(augmentation: Augmentation) -> list[Try]:
+    """Every attempt, the first one first; three queries."""
+    calls = Prefetch(
+        "calls", ModelCall.objects.select_related("served_from__attempt__augmentation")
+    )
+    attempts = augmentation.attempts.prefetch_related(calls, "notes")
+    return [Try(attempt=attempt, steps=list(_steps(attempt))) for attempt in attempts]
+
+
+def totals_of(tries: list[Try]) -> Totals:
+    """The sums over all attempts."""
+    calls = [step.call for one in tries for step in one.steps if step.call is not None]
+    paid = [call for call in calls if not call.is_cached]
+    answered = [call for call in paid if call.answer is not None]
+    costs = [call.cost_usd for call in paid]
+    known = [cost for cost in costs if cost is not None]
+    return Totals(
+        calls=len(paid),
+        cached=len(calls) - len(paid),
+        prompt_tokens=_sum([call.prompt_tokens for call in answered]),
+        completion_tokens=_sum([call.completion_tokens for call in answered]),
+        spent_tokens=sum(call.spent_tokens or 0 for call in paid),
+        cost_usd=sum(known, Decimal(0)) if len(known) == len(costs) else None,
+        is_cost_estimated=any(call.is_cost_estimated for call in paid),
+    )
+
+
+def messages_of(request: dict[str, Any]) -> list[SaidMessage]:
+    """The messages of a stored request."""
+    return [_message(message) for message in request.get("messages", [])]
+
+
+def images_in(request: dict[str, Any]) -> list[str]:
+    """The SHA-256 of every image that a stored request refers to."""
+    return [digest for message in messages_of(request) for digest in message.images]
+
+
+# --- Private -----------------------------------------------------------------------------------
+
+
+def _steps(attempt: Attempt) -> Iterator[Step]:
+    """Each note behind the call after which it was made."""
+    notes = list(attempt.notes.all())
+    yield from (Step(note=note) for note in notes if note.after_call == 0)
+    for call in attempt.calls.all():
+        yield Step(call=call)
+        yield from (Step(note=note) for note in notes if note.after_call == call.number)
+
+
+def _message(message: dict[str, Any]) -> SaidMessage:
+    content = message.get("content")
+    parts: list[dict[str, Any]] = [{"type": "text", "text": content or ""}]
+    if isinstance(content, list):
+        parts = content
+    texts = [part["text"] for part in parts if part.get("type") == "text"]
+    urls = [part["image_url"]["url"] for part in parts if part.get("type") == "image_url"]
+    rest = {name: value for name, value in message.items() if name not in ("role", "content")}
+    return SaidMessage(
+        role=str(message.get("role", "")),
+        text="\n".join(texts),
+        images=tuple(url.removeprefix(IMAGE_SCHEME) for url in urls),
+        rest=_pretty(rest) if rest else "",
+    )
+
+
+def _sum(counts: list[int | None]) -> int | None:
+    known = [count for count in counts if count is not None]
+    return sum(known) if len(known) == len(counts) else None
+
+
+def _pretty(document: object) -> str:
+    return json.dumps(document, indent=2, ensure_ascii=False)

@@ -1,0 +1,149 @@
+"""The record of an augmentation, as one document that says everything."""
+
+from __future__ import annotations
+
+import base64
+import hashlib
+import json
+from io import StringIO
+from pathlib import Path
+from uuid import uuid4
+
+import pytest
+from django.core.management import CommandError, call_command
+from django.utils import timezone
+
+from augment.errors import ModelFault
+from augment.llm.messages import Message, Reply, Request, Speaker
+from augment.models import Augmentation, ModelCall
+from augment.services import caps, jobs, runner
+from augment.services.caps import Caps
+from augment.services.transcript_export import transcript_of
+from augment.services.transcript_steps import messages_of, totals_of, tries_of
+from augment.services.transcripts import RowTranscript
+from augment.variants.transcript import ModelRole, NoteKind
+from tests.jobs.models import Model, after_a_second_look, llama_job, reply
+from tests.jobs.rows import INSTRUCTION, claimed, only_row
+from tests.variants.answers import GOOD
+
+pytestmark = pytest.mark.django_db
+
+
+def ran(row: Augmentation, model: Model) -> Augmentation:
+    runner.work_on(augmentation_pk=row.pk, worker="w", connect=model)
+    row.refresh_from_db()
+    return row
+
+
+def looking(row: Augmentation) -> RowTranscript:
+    assert row.contestant.endpoint is not None
+    return RowTranscript(claimed(row, now=timezone.now()), row, row.contestant.endpoint)
+
+
+def test_the_document_holds_the_whole_record() -> None:
+    row = ran(only_row(llama_job(price="2")), Model(after_a_second_look))
+    document = json.loads(json.dumps(transcript_of(row)))
+    assert (document["format"], document["version"]) == ("scenario-arena/transcript", 1)
+    assert document["augmentation"]["state"] == "done"
+    assert document["augmentation"]["modification"] == row.modification
+    assert document["augmentation"]["seed"] > 0
+    assert INSTRUCTION in document["scenario"]["instruction"]
+    assert document["contestant"]["model"] == "llama3.1"
+    assert document["contestant"]["endpoint"]["base_url"] == "http://127.0.0.1:9/v1"
+    (attempt,) = document["attempts"]
+    first, second = attempt["steps"]
+    assert (attempt["outcome"], attempt["worker"]) == ("done", "w")
+    assert (first["answer"], second["answer"]) == ("Sorry?", GOOD)
+    assert (first["number"], first["role"], first["kind"]) == (1, "modifier", "call")
+    assert (first["prompt_tokens"], first["completion_tokens"]) == (900, 120)
+    assert (first["cost_usd"], first["is_cost_estimated"]) == ("0.00204", False)
+    assert (first["model_returned"], first["latency_s"]) == ("llama3.1-2407", 0.1)
+    assert first["prompt_version"]
+    assert len(first["request_hash"]) == 64
+    assert first["request"]["messages"][-1]["role"] == "user"
+    assert document["totals"] == {
+        "calls": 2,
+        "calls_from_store": 0,
+        "prompt_tokens": 1800,
+        "completion_tokens": 240,
+        "spent_tokens": 2040,
+        "cost_usd": "0.00408",
+        "is_cost_estimated": False,
+    }
+
+
+def test_what_is_unknown_is_null_and_not_zero() -> None:
+    row = ran(only_row(llama_job()), Model(lambda request: Reply(text=GOOD)))
+    document = transcript_of(row)
+    (call,) = document["attempts"][0]["steps"]
+    assert [call[name] for name in ("prompt_tokens", "cost_usd", "latency_s")] == [None] * 3
+    assert document["totals"]["prompt_tokens"] is None
+    assert document["totals"]["cost_usd"] is None
+    assert document["totals"]["is_cost_estimated"]
+
+
+def test_every_attempt_and_every_fault_is_in_it() -> None:
+    job = llama_job()
+    row = ran(only_row(job), Model(ModelFault("upstream broke", retryable=False, status=500)))
+    jobs.retry_failed(job)
+    document = transcript_of(ran(row, Model()))
+    first, second = document["attempts"]
+    assert (first["outcome"], second["outcome"]) == ("failed", "done")
+    assert first["steps"][0]["fault"] == "HTTP 500: upstream broke"
+    assert first["steps"][0]["answer"] is None
+
+
+def test_a_call_from_the_store_names_its_source() -> None:
+    job = llama_job(price="1", caps=Caps(calls=1))
+    model = Model(after_a_second_look)
+    row = ran(only_row(job), model)
+    caps.raise_cap(job, caps=Caps(calls=2))
+    caps.resume(job)
+    document = transcript_of(ran(row, model))
+    paid = document["attempts"][0]["steps"][0]
+    copied, last = document["attempts"][1]["steps"]
+    assert (copied["served_from"], copied["cost_usd"]) == (paid["code"], "0")
+    assert (paid["served_from"], last["served_from"]) == (None, None)
+    totals = totals_of(tries_of(row))
+    assert (totals.calls, totals.cached, totals.spent_tokens) == (2, 1, 2040)
+
+
+def test_rounds_tools_and_reviews_stand_between_the_calls() -> None:
+    row = only_row(llama_job())
+    transcript = looking(row)
+    transcript.note(NoteKind.ROUND, {"round": 1})
+    for text in ("Go.", "On."):
+        message = Message(speaker=Speaker.USER, text=text)
+        request = Request(model="m", messages=(message,))
+        transcript.answered(transcript.asked(ModelRole.MODIFIER, request, "p1"), reply())
+        transcript.note(NoteKind.TOOL_CALL, {"call": "pose_on_lane", "for": text})
+    steps = transcript_of(row)["attempts"][0]["steps"]
+    assert [step["kind"] for step in steps] == ["round", "call", "tool_call", "call", "tool_call"]
+    assert steps[2]["document"] == {"call": "pose_on_lane", "for": "Go."}
+
+
+def test_images_are_in_the_document_once() -> None:
+    row = only_row(llama_job())
+    transcript = looking(row)
+    message = Message(speaker=Speaker.USER, text="Look.", images=(b"a picture",) * 2)
+    transcript.asked(ModelRole.VIEWER, Request(model="m", messages=(message,)), "p1")
+    digest = hashlib.sha256(b"a picture").hexdigest()
+    assert transcript_of(row)["images"] == {digest: base64.b64encode(b"a picture").decode()}
+    (said,) = messages_of(ModelCall.objects.get().request)
+    assert (said.text, said.images, said.rest) == ("Look.", (digest, digest), "")
+
+
+def test_the_command_writes_it_to_a_file_or_to_the_terminal(tmp_path: Path) -> None:
+    row = ran(only_row(llama_job()), Model())
+    said, file = StringIO(), tmp_path / "t.json"
+    call_command("transcript", str(row.code), stdout=said)
+    call_command("transcript", str(row.code), "--out", str(file), stdout=StringIO())
+    assert json.loads(said.getvalue()) == json.loads(file.read_text()) == transcript_of(row)
+
+
+def test_the_command_says_what_it_can_not_do(tmp_path: Path) -> None:
+    row = only_row(llama_job())
+    with pytest.raises(CommandError, match="There is no augmentation"):
+        call_command("transcript", str(uuid4()))
+    with pytest.raises(CommandError, match="Can't write"):
+        call_command("transcript", str(row.code), "--out", str(tmp_path))

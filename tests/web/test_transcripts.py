@@ -1,0 +1,96 @@
+"""The page of a transcript, its JSON, and the pictures that models were shown."""
+
+from __future__ import annotations
+
+import hashlib
+
+import pytest
+from django.urls import reverse
+from django.utils import timezone
+
+from augment.llm.messages import Message, Request, Speaker
+from augment.models import Augmentation
+from augment.services import jobs, runner
+from augment.services.transcripts import RowTranscript
+from augment.variants.transcript import ModelRole, NoteKind
+from tests.jobs.models import Model, llama_job, reply
+from tests.jobs.rows import claimed, only_row
+from tests.web.cast import people, png, signed_in
+
+pytestmark = pytest.mark.django_db
+
+EVIL = "<script>alert(1)</script>"
+
+
+def ran(row: Augmentation, model: Model | None = None) -> Augmentation:
+    runner.work_on(augmentation_pk=row.pk, worker="w", connect=model or Model())
+    row.refresh_from_db()
+    return row
+
+
+def page_of(row: Augmentation) -> str:
+    answer = signed_in(people()["analyst"]).get(reverse("augmentation", args=[row.code]))
+    assert answer.status_code == 200
+    return " ".join(answer.content.decode().split())
+
+
+def test_the_page_shows_role_tokens_cost_and_the_answer() -> None:
+    shown = page_of(ran(only_row(llama_job(price="2"))))
+    assert "Call 1, modifier" in shown
+    assert "900 tokens in, 120 out" in shown
+    assert "$0.0020" in shown
+    assert "A parked car ahead." in shown
+    assert "llama3.1-2407" in shown
+    assert "Prompt version" in shown
+
+
+def test_an_unknown_cost_is_called_unknown() -> None:
+    assert "cost unknown" in page_of(ran(only_row(llama_job())))
+
+
+def test_a_call_from_the_store_is_marked_and_leads_to_its_source() -> None:
+    first = ran(only_row(llama_job(price="1")))
+    job = jobs.launch(name="Again", contestants=["llama"], scenarios=["street-1"])
+    shown = page_of(ran(only_row(job)))
+    assert "answered from the store" in shown
+    source = f"{reverse('augmentation', args=[first.code])}#call-1-1"
+    assert source in shown
+
+
+def test_what_a_model_says_is_never_markup() -> None:
+    shown = page_of(ran(only_row(llama_job()), Model(lambda request: reply(EVIL))))
+    assert EVIL not in shown
+    assert "&lt;script&gt;alert(1)" in shown
+
+
+def test_rounds_reviews_and_pictures_are_on_the_page() -> None:
+    row = only_row(llama_job())
+    assert row.contestant.endpoint is not None
+    transcript = RowTranscript(claimed(row, now=timezone.now()), row, row.contestant.endpoint)
+    transcript.note(NoteKind.ROUND, {"round": 7})
+    message = Message(speaker=Speaker.USER, text=EVIL, images=(png(),))
+    transcript.asked(ModelRole.VIEWER, Request(model="m", messages=(message,)), "p1")
+    transcript.note(NoteKind.REVIEW, {"mean": 4.25, "said": EVIL})
+    staff = signed_in(people()["analyst"])
+    shown = staff.get(reverse("augmentation", args=[row.code])).content.decode()
+    digest = hashlib.sha256(png()).hexdigest()
+    image = reverse("asked-image", args=[digest])
+    assert image in shown
+    assert "Round" in shown
+    assert "4.25" in shown
+    assert EVIL not in shown
+    assert b"".join(staff.get(image)) == png()
+
+
+@pytest.mark.parametrize("digest", ["0" * 64, "0" * 63, "A" * 64, "secret_key"])
+def test_no_other_file_is_given_out(digest: str) -> None:
+    url = reverse("asked-image", args=[digest])
+    assert signed_in(people()["admin"]).get(url).status_code == 404
+
+
+def test_the_json_is_a_file_for_staff() -> None:
+    row = ran(only_row(llama_job()))
+    answer = signed_in(people()["analyst"]).get(reverse("transcript", args=[row.code]))
+    assert answer.headers["Content-Type"] == "application/json"
+    assert f"transcript-{row.code}.json" in answer.headers["Content-Disposition"]
+    assert answer.json()["augmentation"]["code"] == str(row.code)
