@@ -116,6 +116,48 @@ class ModelFault(AugmentError):
         super().__init__(message)
 
 
+class ParameterRefused(ModelFault):
+    """The endpoint does not take one parameter of the request. Send it again without.
+
+    Args:
+        parameter: Its name on the wire.
+        message: What the endpoint said, free of keys.
+        status: The HTTP status.
+    """
+
+    def __init__(self, parameter: str, message: str, *, status: int) -> None:
+        self.parameter = parameter
+        super().__init__(message, retryable=True, status=status)
+
+
+class EndpointBusy(ModelFault):
+    """No place was free at the endpoint; nothing was sent. Raise its limits or wait.
+
+    Args:
+        endpoint: Its label.
+        waited_s: For how long somebody waited.
+    """
+
+    def __init__(self, endpoint: str, waited_s: float) -> None:
+        self.endpoint = endpoint
+        super().__init__(
+            f"no place was free at endpoint {endpoint!r} for {waited_s:g} s: "
+            "raise its limits or run fewer workers",
+            retryable=False,
+        )
+
+
+class ContextTruncated(ModelFault):
+    """The endpoint silently cut the prompt. Give it a larger window; asking again cuts again.
+
+    Args:
+        message: What shows it, with numbers.
+    """
+
+    def __init__(self, message: str) -> None:
+        super().__init__(message, retryable=False)
+
+
 class ModelRefused(AugmentError):
     """The model answered that it will not do this. An outcome, never retried."""
 

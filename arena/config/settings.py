@@ -187,6 +187,7 @@ HEARTBEAT_S = env.integer("ARENA_HEARTBEAT_S", default=5, low=1, high=60)
 STALE_AFTER_S = env.integer("ARENA_STALE_AFTER_S", default=20, low=2, high=3600)
 RECOVER_EVERY_S = env.integer("ARENA_RECOVER_EVERY_S", default=30, low=1, high=3600)
 
+LLM_QUEUE_S = env.integer("ARENA_LLM_QUEUE_S", default=1800, low=1, high=86400)
 LLM_TIMEOUT_S = env.integer("ARENA_LLM_TIMEOUT_S", default=120, low=1, high=3600)
 
 # --- What it says about itself -----------------------------------------------------------------

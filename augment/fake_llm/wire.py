@@ -15,8 +15,10 @@ from typing import Annotated, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, field_validator
 
-_PNG = "data:image/png;base64,"
+from augment.llm.window import least_tokens
+
 _CHARACTERS_PER_TOKEN = 4
+_PNG = "data:image/png;base64,"
 
 
 class BadRequest(Exception):
@@ -151,11 +153,8 @@ def completion(
     with_usage: bool = True,
 ) -> dict[str, object]:
     """A chat completion with that text; the same request and text give the same document."""
-    asked = sum(len(message.text) for message in request.messages)
-    prompt_tokens, completion_tokens = (
-        1 + asked // _CHARACTERS_PER_TOKEN,
-        1 + len(text or refusal or "") // _CHARACTERS_PER_TOKEN,
-    )
+    prompt_tokens = 1 + sum(_tokens(message.text) for message in request.messages)
+    completion_tokens = 1 + _tokens(text or refusal or "")
     digest = hashlib.sha256((request.model_dump_json() + str(text)).encode()).hexdigest()
     made: dict[str, object] = {
         "id": f"chatcmpl-{digest[:24]}",
@@ -178,6 +177,11 @@ def completion(
             "total_tokens": prompt_tokens + completion_tokens,
         }
     return made
+
+
+def _tokens(text: str) -> int:
+    """About as many as a vocabulary makes of it: words of four characters, single numbers."""
+    return max(len(text) // _CHARACTERS_PER_TOKEN, least_tokens(text))
 
 
 def as_json(document: object, **changes: object) -> Response:

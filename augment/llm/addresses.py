@@ -7,10 +7,15 @@ network stay allowed, because own model servers live there.
 from __future__ import annotations
 
 import socket
+from collections.abc import Callable
 from ipaddress import IPv4Address, IPv6Address, ip_address
+from typing import Any
 from urllib.parse import SplitResult, urlsplit
 
 from augment.errors import InvalidDocument
+
+Resolve = Callable[..., list[Any]]
+"""What `socket.getaddrinfo` does."""
 
 _METADATA_NAMES = frozenset(
     {"metadata", "metadata.google.internal", "metadata.goog", "metadata.azure.internal"}
@@ -33,6 +38,30 @@ def check_base_url(base_url: str) -> str:
     if problem:
         raise InvalidDocument("endpoint", [("base_url", f"{problem}")])
     return base_url.rstrip("/")
+
+
+def check_resolved(base_url: str, *, resolve: Resolve = socket.getaddrinfo) -> None:
+    """Look where the name leads today; a name that nobody knows leads nowhere and passes.
+
+    Whoever owns a name can still change it between this look and the call.
+
+    Raises:
+        InvalidDocument: One of its addresses is link-local or metadata.
+    """
+    parts = _split(base_url)
+    host = (parts.hostname if parts else None) or ""
+    try:
+        found = {entry[4][0] for entry in resolve(host, None, type=socket.SOCK_STREAM)}
+    except (OSError, UnicodeError):
+        return
+    for text in sorted(map(str, found)):
+        address = _address(text)
+        if address is not None and _is_forbidden(address):
+            problem = f"{host} leads to {text}, a link-local or metadata address"
+            raise InvalidDocument("endpoint", [("base_url", problem)])
+
+
+# --- Private -----------------------------------------------------------------------------------
 
 
 def _problem(base_url: str) -> str | None:

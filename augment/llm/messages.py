@@ -51,13 +51,62 @@ class Message:
         return {"role": self.speaker.value, "content": parts}
 
 
+class LengthName(StrEnum):
+    """What the limit of the answer's length is called on the wire; old servers know one."""
+
+    MAX_COMPLETION_TOKENS = "max_completion_tokens"
+    MAX_TOKENS = "max_tokens"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Tool:
+    """A function that a model may call.
+
+    Attributes:
+        parameters: A JSON schema of its arguments.
+    """
+
+    name: str
+    description: str
+    parameters: dict[str, object]
+
+    def to_document(self) -> dict[str, object]:
+        """The tool in the form of the OpenAI-compatible wire."""
+        function = {
+            "name": self.name,
+            "description": self.description,
+            "parameters": self.parameters,
+        }
+        return {"type": "function", "function": function}
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class AnswerSchema:
+    """The JSON schema that an answer must fit."""
+
+    name: str
+    schema: dict[str, object]
+
+    def to_document(self) -> dict[str, object]:
+        """The schema as a `response_format` of the OpenAI-compatible wire."""
+        return {
+            "type": "json_schema",
+            "json_schema": {"name": self.name, "schema": self.schema, "strict": True},
+        }
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Request:
     """One question to one model; it knows neither address nor key.
 
     Attributes:
         max_tokens: The most that the answer may have, reasoning included.
-        temperature, seed: Left out of the request where None.
+        temperature, seed, reasoning_effort: Left out of the request where None.
+        tools: What the model may call natively. Servers drop one of the two where tools and a
+            schema of the answer come together, so a request never has both.
+
+    Raises:
+        ValueError: It has both.
     """
 
     model: str
@@ -65,19 +114,44 @@ class Request:
     max_tokens: int = DEFAULT_MAX_TOKENS
     temperature: float | None = None
     seed: int | None = None
+    reasoning_effort: str | None = None
+    tools: tuple[Tool, ...] = ()
+    answer_schema: AnswerSchema | None = None
+    length_name: LengthName = LengthName.MAX_COMPLETION_TOKENS
+
+    def __post_init__(self) -> None:
+        if self.tools and self.answer_schema is not None:
+            raise ValueError("a request has tools or a schema of the answer, never both")
 
     def to_document(self, *, image_url: ImageUrl = data_url) -> dict[str, object]:
         """The body of the request on the OpenAI-compatible wire, ready for JSON."""
         document: dict[str, object] = {
             "model": self.model,
             "messages": [message.to_document(image_url=image_url) for message in self.messages],
-            "max_completion_tokens": self.max_tokens,
+            self.length_name.value: self.max_tokens,
         }
-        if self.temperature is not None:
-            document["temperature"] = self.temperature
-        if self.seed is not None:
-            document["seed"] = self.seed
+        for name in ("temperature", "seed", "reasoning_effort"):
+            value = getattr(self, name)
+            if value is not None:
+                document[name] = value
+        if self.tools:
+            document["tools"] = [tool.to_document() for tool in self.tools]
+        if self.answer_schema is not None:
+            document["response_format"] = self.answer_schema.to_document()
         return document
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ToolCall:
+    """A function that the model wants called.
+
+    Attributes:
+        arguments: The JSON text as it came; it may be broken.
+    """
+
+    id: str
+    name: str
+    arguments: str
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -89,6 +163,7 @@ class Reply:
         model: The model id that the server named, empty where it named none.
         finish_reason: Why the model stopped ("stop", "length", ...), empty where unknown.
         refusal: What the model said when it declined, None where it did not.
+        tool_calls: What the model wants called natively.
         latency_s: From sending the request to the whole answer.
     """
 
@@ -99,6 +174,7 @@ class Reply:
     prompt_tokens: int | None = None
     completion_tokens: int | None = None
     latency_s: float | None = None
+    tool_calls: tuple[ToolCall, ...] = ()
 
     @property
     def is_cut_off(self) -> bool:

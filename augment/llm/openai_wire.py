@@ -12,7 +12,8 @@ from types import TracebackType
 from typing import TYPE_CHECKING, Self
 from urllib.parse import urlsplit
 
-from augment.errors import ModelFault
+from augment.errors import InvalidDocument, ModelFault
+from augment.llm.addresses import check_resolved
 from augment.llm.messages import Reply, Request
 from augment.llm.wire_faults import Secret, fault_of_status, retry_after_s
 from augment.llm.wire_reply import reply_of
@@ -39,7 +40,8 @@ class OpenAIWire:
         timeout_s: The longest silence while waiting for the answer.
 
     Raises:
-        ModelFault: The key can't be sent, or OPENAI_CUSTOM_HEADERS is set: the package would add
+        ModelFault: The key can't be sent, the host's name leads to a link-local or metadata
+            address today, or OPENAI_CUSTOM_HEADERS is set: the package would add
             those headers to requests to whatever host, and who set them meant OpenAI's.
     """
 
@@ -55,7 +57,15 @@ class OpenAIWire:
         if not (key.isascii() and key.isprintable() and " " not in key):
             raise ModelFault("the key has characters that no key may have", retryable=False)
         self._secret = Secret(key)
+        try:
+            check_resolved(base_url)
+        except InvalidDocument as error:
+            raise ModelFault(error.problems[0][1], retryable=False) from None
         self._client = _client(base_url, key or _KEYLESS, timeout_s)
+
+    def fitted(self, request: Request) -> Request:
+        """The request as it is: the wire knows no model."""
+        return request
 
     def complete(self, request: Request) -> Reply:
         """The endpoint's answer to one request.
@@ -65,18 +75,18 @@ class OpenAIWire:
         """
         import openai
 
+        document = request.to_document()
         started = time.monotonic()
         try:
             # Typed loosely on purpose: our document is what the wire takes, and is tested so.
-            answer: object = self._client.chat.completions.create(**request.to_document())  # type: ignore[call-overload]
+            answer: object = self._client.chat.completions.create(**document)  # type: ignore[call-overload]
         except openai.APITimeoutError:
             fault = ModelFault("the endpoint took too long to answer", retryable=True)
         except openai.APIConnectionError as error:
             fault = ModelFault(f"the connection failed: {_cause(error)}", retryable=True)
         except openai.APIStatusError as error:
-            fault = fault_of_status(
-                error.status_code, error.body, retry_after_s(dict(error.response.headers))
-            )
+            wait_s = retry_after_s(dict(error.response.headers))
+            fault = fault_of_status(error.status_code, error.body, wait_s, sent=document)
         except openai.OpenAIError as error:
             fault = ModelFault(f"the request failed: {type(error).__name__}", retryable=False)
         except ValueError:

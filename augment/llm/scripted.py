@@ -23,6 +23,10 @@ class ScriptedClient:
         self._answers = list(answers)
         self.requests: list[Request] = []
 
+    def fitted(self, request: Request) -> Request:
+        """The request as it is: a script takes everything."""
+        return request
+
     def complete(self, request: Request) -> Reply:
         """The next answer of the script.
 

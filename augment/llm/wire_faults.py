@@ -3,15 +3,27 @@
 from __future__ import annotations
 
 import math
+import re
 import time
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 from email.utils import parsedate_to_datetime
 
-from augment.errors import ModelFault
+from augment.errors import ModelFault, ParameterRefused
+from augment.llm.messages import LengthName
 
 _PASSING = frozenset({408, 409, 425, 429})
 _SPENT = frozenset({"insufficient_quota", "billing_hard_limit_reached", "billing_not_active"})
+_ABOUT_THE_REQUEST = frozenset({400, 422})
+_LENGTHS = frozenset(LengthName)
+_DROPPABLE = frozenset({"temperature", "seed", "reasoning_effort", "response_format"}) | _LENGTHS
+"""What a request can do without, or say in another way."""
+_NOT_TAKEN = frozenset({"unsupported_parameter", "unknown_parameter"})
+_SAYS_UNKNOWN = re.compile(
+    r"unsupported|unknown|unrecognized|unexpected|not (supported|permitted|allowed)|"
+    r"extra (inputs|fields)|cannot find field",
+    re.IGNORECASE,
+)
 _LONGEST_TEXT = 300
 
 
@@ -29,25 +41,33 @@ class Secret:
 
     def cleared(self, fault: ModelFault) -> ModelFault:
         """The same fault with the key taken out of its text."""
-        return ModelFault(
-            self.out_of(str(fault)),
-            retryable=fault.retryable,
-            status=fault.status,
-            retry_after_s=fault.retry_after_s,
-        )
+        fault.args = (self.out_of(str(fault)),)
+        return fault
 
 
-def fault_of_status(status: int, body: object, wait_s: float | None) -> ModelFault:
+def fault_of_status(
+    status: int, body: object, wait_s: float | None, *, sent: Collection[str] = ()
+) -> ModelFault:
     """The fault that an HTTP status and its decoded body stand for.
 
     An exhausted quota comes as a 429 and does not pass by waiting.
+
+    Args:
+        status: Of the answer.
+        body: Of the answer, decoded.
+        wait_s: What the headers ask for.
+        sent: The names of what the request had, of which the endpoint may refuse one.
     """
-    message, code = _message_and_code(body)
+    message, code, param = _message_code_and_param(body)
     passing = (status in _PASSING or status >= 500) and code not in _SPENT
     shown = message if len(message) <= _LONGEST_TEXT else message[:_LONGEST_TEXT] + "..."
     text = f"the endpoint answered {status}" + (f" ({code})" if code else "")
+    text = f"{text}: {shown}" if shown else text
+    refused = _refused(message, code, param, sent) if status in _ABOUT_THE_REQUEST else None
+    if refused:
+        return ParameterRefused(refused, text, status=status)
     return ModelFault(
-        f"{text}: {shown}" if shown else text,
+        text,
         retryable=passing,
         status=status,
         retry_after_s=wait_s if passing else None,
@@ -78,13 +98,30 @@ def _number(value: str) -> float | None:
     return number if math.isfinite(number) else None
 
 
-def _message_and_code(body: object) -> tuple[str, str]:
-    """The message and code of an error body; Gemini's compatible endpoint wraps it in a list."""
+def _refused(message: str, code: str, param: str, sent: Collection[str]) -> str | None:
+    """The parameter of the request that an error is about, None where it is about another thing.
+
+    Servers that do not name it (`param`) name it in their message. An answer's limit that is too
+    large is no parameter that is not taken.
+    """
+    named = [param.partition(".")[0]] if param else re.findall(r"\w+", message)
+    found = next((name for name in named if name in _DROPPABLE and name in sent), None)
+    if found in _LENGTHS and code not in _NOT_TAKEN and not _SAYS_UNKNOWN.search(message):
+        return None
+    return found
+
+
+def _message_code_and_param(body: object) -> tuple[str, str, str]:
+    """What an error body says; Gemini's compatible endpoint wraps it in a list."""
     if isinstance(body, list) and body:
         body = body[0]
     if isinstance(body, dict) and isinstance(body.get("error"), dict):
         body = body["error"]
     if not isinstance(body, dict):
-        return "", ""
-    message, code = body.get("message"), body.get("code")
-    return str(message or ""), code if isinstance(code, str) else ""
+        return "", "", ""
+    message, code, param = (body.get(name) for name in ("message", "code", "param"))
+    return (
+        str(message or ""),
+        code if isinstance(code, str) else "",
+        param if isinstance(param, str) else "",
+    )

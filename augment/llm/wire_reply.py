@@ -7,7 +7,7 @@ or lack any field. So nothing here is taken on trust.
 from __future__ import annotations
 
 from augment.errors import ModelFault
-from augment.llm.messages import Reply
+from augment.llm.messages import Reply, ToolCall
 from augment.llm.wire_faults import Secret
 
 
@@ -44,7 +44,26 @@ def reply_of(answer: object, *, latency_s: float, secret: Secret) -> Reply:
         prompt_tokens=_count(getattr(usage, "prompt_tokens", None)),
         completion_tokens=_count(getattr(usage, "completion_tokens", None)),
         latency_s=latency_s,
+        tool_calls=_tool_calls(getattr(message, "tool_calls", None), secret),
     )
+
+
+def _tool_calls(calls: object, secret: Secret) -> tuple[ToolCall, ...]:
+    """Those calls that name a function; their arguments stay as they came."""
+    made = []
+    for call in calls if isinstance(calls, list) else []:
+        function = getattr(call, "function", None)
+        name = _text(getattr(function, "name", None))
+        if name:
+            arguments = _text(getattr(function, "arguments", None))
+            made.append(
+                ToolCall(
+                    id=secret.out_of(_text(getattr(call, "id", None))),
+                    name=secret.out_of(name),
+                    arguments=secret.out_of(arguments),
+                )
+            )
+    return tuple(made)
 
 
 def _text(value: object) -> str:

@@ -5,12 +5,13 @@ Faults are no answers and are never served. What was served is served again from
 
 from __future__ import annotations
 
+from dataclasses import asdict
 from datetime import datetime
 from typing import Any
 
-from augment.llm.messages import Reply
+from augment.llm.messages import Reply, ToolCall
 from augment.models import ModelCall
-from augment.services.texts import storable
+from augment.services.texts import storable, storable_document
 
 _COPIED = ("answer", "refusal", "extras", "model_returned", "finish_reason")
 _COUNTS = ("prompt_tokens", "completion_tokens")
@@ -44,6 +45,7 @@ def columns_of(reply: Reply) -> dict[str, Any]:
     return {
         "answer": storable(reply.text or reply.refusal or ""),
         "refusal": None if reply.refusal is None else storable(reply.refusal),
+        "extras": _extras_of(reply),
         "model_returned": storable(reply.model)[:120],
         "finish_reason": storable(reply.finish_reason)[:40],
         "prompt_tokens": reply.prompt_tokens,
@@ -59,6 +61,7 @@ def reply_of(call: ModelCall) -> Reply:
         model=call.model_returned,
         finish_reason=call.finish_reason,
         refusal=call.refusal,
+        tool_calls=tuple(ToolCall(**made) for made in (call.extras or {}).get("tool_calls", [])),
         prompt_tokens=call.prompt_tokens,
         completion_tokens=call.completion_tokens,
     )
@@ -69,3 +72,14 @@ def columns_of_copy(source: ModelCall, *, now: datetime) -> dict[str, Any]:
     copied = {name: getattr(source, name) for name in (*_COPIED, *_COUNTS)}
     nothing = {"spent_tokens": 0, "cost_nano_usd": 0, "started_at": now, "settled_at": now}
     return copied | nothing | {"served_from_id": source.served_from_id or source.pk}
+
+
+# --- Private -----------------------------------------------------------------------------------
+
+
+def _extras_of(reply: Reply) -> dict[str, Any] | None:
+    """What a reply carries beside its text, None for most."""
+    if not reply.tool_calls:
+        return None
+    extras: dict[str, Any] = {"tool_calls": [asdict(made) for made in reply.tool_calls]}
+    return dict(storable_document(extras))

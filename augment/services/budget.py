@@ -16,7 +16,7 @@ from enum import StrEnum
 from django.db import transaction
 from django.db.models import F, Q
 
-from augment.errors import Conflict, ModelFault
+from augment.errors import Conflict, EndpointBusy, ModelFault
 from augment.llm.costs import Price, WorstCase, usd_of
 from augment.llm.messages import Reply
 from augment.models import GenerationJob, ModelCall
@@ -161,10 +161,11 @@ def used_by_reply(reply: Reply, *, worst: WorstCase, price: Price | None) -> Use
 def used_by_fault(fault: ModelFault, *, worst: WorstCase, price: Price | None) -> Used:
     """What a call without an answer used.
 
-    An endpoint that answers with an error bills nothing. A time-out, a broken connection or an
-    answer that is none may be billed all the same.
+    An endpoint that answers with an error, or was not asked at all, bills nothing. A time-out, a
+    broken connection or an answer that is none may be billed all the same.
     """
-    if fault.status is not None and fault.status >= 400:
+    was_sent = not isinstance(fault, EndpointBusy)
+    if not was_sent or (fault.status is not None and fault.status >= 400):
         return Used(tokens=0, nano_usd=0, is_estimated=False)
     return Used(tokens=worst.tokens, nano_usd=worst.nano_usd(price), is_estimated=True)
 

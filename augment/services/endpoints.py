@@ -10,7 +10,9 @@ from django.core.serializers.json import DjangoJSONEncoder
 from django.db import transaction
 from django.utils import timezone
 
+from augment.llm.profile import Profile
 from augment.models import Endpoint, EndpointModel
+from augment.services.events import log_event
 from augment.services.price_list import listed_price
 
 _LIMITS = (
@@ -36,6 +38,38 @@ def model_at(*, endpoint: Endpoint, model: str) -> EndpointModel:
     return row
 
 
+def profile_of(*, endpoint: Endpoint, model: str) -> Profile:
+    """What the model takes, as far as its row knows; nothing is known of one without a row."""
+    row = EndpointModel.objects.filter(endpoint=endpoint, model=model).first()
+    return Profile() if row is None else _profile(row)
+
+
+@transaction.atomic
+def remember_refusal(*, endpoint: Endpoint, model: str, parameter: str) -> Profile:
+    """Note that the model does not take this parameter.
+
+    Returns:
+        What it takes now.
+    """
+    model_at(endpoint=endpoint, model=model)
+    rows = EndpointModel.objects.select_for_update(no_key=True)
+    row = rows.get(endpoint=endpoint, model=model)
+    before = _profile(row)
+    after = before.without(parameter)
+    if after != before:
+        row.temperature, row.json_schema = after.temperature, after.json_schema
+        row.refused_parameters = sorted(after.refused)
+        row.save(update_fields=["temperature", "json_schema", "refused_parameters"])
+        log_event(
+            actor=None,
+            verb="learn",
+            object_kind="model",
+            object_code=row.code,
+            after={"endpoint": endpoint.label, "model": model, "refuses": parameter},
+        )
+    return after
+
+
 def facts_of(endpoint: Endpoint) -> dict[str, Any]:
     """The endpoint and its models as they are stored now, ready for the log."""
     facts: dict[str, Any] = dict(Endpoint.objects.values(*_LIMITS).get(pk=endpoint.pk))
@@ -46,6 +80,18 @@ def facts_of(endpoint: Endpoint) -> dict[str, Any]:
 
 
 # --- Private -----------------------------------------------------------------------------------
+
+
+def _profile(row: EndpointModel) -> Profile:
+    return Profile(
+        native_tools=row.native_tools,
+        vision=row.vision,
+        json_schema=row.json_schema,
+        temperature=row.temperature,
+        refused=frozenset(row.refused_parameters),
+        reasoning_effort=row.reasoning_effort,
+        max_output_tokens=row.max_output_tokens,
+    )
 
 
 def _fill_price(row: EndpointModel, *, now: datetime) -> None:

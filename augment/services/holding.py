@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import logging
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from threading import Event, Thread
 from types import TracebackType
@@ -20,12 +20,19 @@ logger = logging.getLogger(__name__)
 
 @contextmanager
 def heartbeat(held: claims.Claim, *, every_s: float) -> Iterator[None]:
-    """Beat for the claim until the block is left, or until the claim is lost.
+    """Beat for the claim until the block is left, or until the claim is lost."""
+    with repeating(lambda: _beat(held), every_s=every_s, name="heartbeat"):
+        yield
+
+
+@contextmanager
+def repeating(beat: Callable[[], bool], *, every_s: float, name: str) -> Iterator[None]:
+    """Beat every so many seconds until the block is left, or until a beat says False.
 
     The thread has a database connection of its own, which is closed with it.
     """
     stop = Event()
-    thread = Thread(target=_beat_until, args=(held, every_s, stop), name="heartbeat", daemon=True)
+    thread = Thread(target=_beat_until, args=(beat, every_s, stop), name=name, daemon=True)
     thread.start()
     try:
         yield
@@ -73,12 +80,11 @@ class OutcomeOnCrash:
         return False
 
 
-def _beat_until(held: claims.Claim, every_s: float, stop: Event) -> None:
-    """Beat, then wait, until told to stop."""
+def _beat_until(beat: Callable[[], bool], every_s: float, stop: Event) -> None:
+    """Wait, then beat, until told to stop."""
     try:
         while not stop.wait(every_s):
-            if not _beat(held):
-                logger.warning("Augmentation %d is somebody else's now.", held.augmentation_pk)
+            if not beat():
                 return
     finally:
         connection.close()
@@ -87,8 +93,11 @@ def _beat_until(held: claims.Claim, every_s: float, stop: Event) -> None:
 def _beat(held: claims.Claim) -> bool:
     """One beat; a database that can't take it now gets the next one."""
     try:
-        return claims.beat(held=held, now=timezone.now())
+        is_ours = claims.beat(held=held, now=timezone.now())
     except Error as error:
         logger.warning("No heartbeat for augmentation %d: %s", held.augmentation_pk, error)
         connection.close()
         return True
+    if not is_ours:
+        logger.warning("Augmentation %d is somebody else's now.", held.augmentation_pk)
+    return is_ours

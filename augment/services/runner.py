@@ -26,7 +26,9 @@ from augment.scene.codec import modification_from_document, modification_to_docu
 from augment.scene.entities import Scene
 from augment.scene.modification import Modification
 from augment.services import claims, jobs
+from augment.services.call_limits import Queue
 from augment.services.contestants import key_of
+from augment.services.endpoint_client import EndpointClient
 from augment.services.holding import OutcomeOnCrash, heartbeat
 from augment.services.pictures import original_picture, picture_of
 from augment.services.scenes import reference_of, scene_of
@@ -52,25 +54,29 @@ class Answer:
     reason: str = ""
 
 
-def open_wire(endpoint: Endpoint) -> AbstractContextManager[ChatClient]:
+def open_wire(endpoint: Endpoint, held: claims.Claim) -> AbstractContextManager[ChatClient]:
     """A client for the endpoint, with the key that its variable holds right now.
+
+    Its calls wait for a place at the endpoint as long as the claim is held.
 
     Raises:
         KeyMissing: The variable is not set here.
         ModelFault: The key can't be sent.
     """
-    return OpenAIWire(
+    wire = OpenAIWire(
         base_url=endpoint.base_url, api_key=key_of(endpoint), timeout_s=settings.LLM_TIMEOUT_S
     )
+    queue = Queue(longest_s=settings.LLM_QUEUE_S, still_wanted=lambda: _insist(held))
+    return EndpointClient(wire, endpoint, queue)
 
 
-def work_on(*, augmentation_pk: int, worker: str = "", connect: Connect = open_wire) -> bool:
+def work_on(*, augmentation_pk: int, worker: str = "", connect: Connect | None = None) -> bool:
     """Claim a row, run it and write its outcome. A row that nobody may claim is left alone.
 
     Args:
         augmentation_pk: The row.
         worker: Who works, for the attempt's record.
-        connect: How an endpoint is reached.
+        connect: How an endpoint is reached; None over the wire.
 
     Returns:
         Whether the row was claimed.
@@ -89,7 +95,7 @@ def work_on(*, augmentation_pk: int, worker: str = "", connect: Connect = open_w
 
 
 def run(
-    row: Augmentation, *, held: claims.Claim, connect: Connect = open_wire
+    row: Augmentation, *, held: claims.Claim, connect: Connect | None = None
 ) -> claims.Settlement:
     """How the row ends. Every foreseen fault is a failed outcome with a sentence.
 
@@ -119,6 +125,11 @@ def run(
 # --- Private -----------------------------------------------------------------------------------
 
 
+def _insist(held: claims.Claim) -> None:
+    if not claims.is_held(held=held):
+        raise ClaimLost(f"attempt {held.attempt_number} has lost its row")
+
+
 def _row(held: claims.Claim) -> Augmentation:
     rows = Augmentation.objects.select_related(
         "job", "scenario__base_scene", "contestant__endpoint"
@@ -141,7 +152,7 @@ def _keep(held: claims.Claim, answer: Answer) -> None:
         raise ClaimLost(f"attempt {held.attempt_number} has lost its row")
 
 
-def _asked(row: Augmentation, scene: Scene, held: claims.Claim, connect: Connect) -> Answer:
+def _asked(row: Augmentation, scene: Scene, held: claims.Claim, connect: Connect | None) -> Answer:
     """What the contestant says now."""
     match row.contestant.kind:
         case Kind.REFERENCE:
@@ -175,9 +186,14 @@ def _from_rules(row: Augmentation, scene: Scene) -> Answer:
 
 
 def _from_model(
-    row: Augmentation, endpoint: Endpoint, scene: Scene, held: claims.Claim, connect: Connect
+    row: Augmentation,
+    endpoint: Endpoint,
+    scene: Scene,
+    held: claims.Claim,
+    connect: Connect | None,
 ) -> Answer:
-    with connect(endpoint) as client:
+    opened = open_wire(endpoint, held) if connect is None else connect(endpoint)
+    with opened as client:
         outcome = pipeline.run(
             recipe(row.contestant.variant),
             scene=scene,

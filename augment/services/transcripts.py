@@ -124,12 +124,18 @@ class RowTranscript:
             self._sleep(wait_s)
             wait_s = min(1.5 * wait_s, LONGEST_WAIT_S)
 
-    def answered(self, number: int, reply: Reply) -> None:
-        """Store the raw answer to that call and what it used."""
+    def answered(self, number: int, reply: Reply, fault: ModelFault | None = None) -> None:
+        """Store the raw answer to that call and what it used.
+
+        An answer with a fault is kept and paid for, but never served again.
+        """
         call = self._open.pop(number)
         used = budget.used_by_reply(reply, worst=call.worst, price=call.price)
         with transaction.atomic():
-            ModelCall.objects.filter(pk=call.pk).update(**answers.columns_of(reply))
+            ModelCall.objects.filter(pk=call.pk).update(
+                **answers.columns_of(reply),
+                fault="" if fault is None else storable(sentence_of(fault)),
+            )
             budget.settle(call_pk=call.pk, used=used, now=timezone.now())
 
     def broke(self, number: int, fault: ModelFault) -> None:

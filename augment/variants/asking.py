@@ -4,10 +4,11 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from augment.errors import ModelFault
+from augment.errors import ModelFault, ParameterRefused
 from augment.llm.client import ChatClient
 from augment.llm.messages import Reply, Request
 from augment.llm.patience import Patience
+from augment.llm.window import cut_of
 from augment.variants.transcript import ModelRole, Transcript
 
 
@@ -23,15 +24,27 @@ class Conversation:
     def ask(self, role: ModelRole, request: Request, prompt_version: str) -> Reply:
         """The reply to the request; every attempt is in the transcript before it is judged.
 
-        What the transcript knows the answer to is not sent.
+        The request goes without what the model does not take, and what the transcript knows the
+        answer to is not sent.
 
         Raises:
+            ContextTruncated: There is an answer, but to a part of the prompt.
             ModelFault: The last attempt broke, or the fault is one that does not pass.
             BudgetSpent: The transcript's budget has no room for the next attempt.
         """
-        before = self.transcript.known(role, request, prompt_version)
-        if before is not None:
-            return before
+        while True:
+            sent = self.client.fitted(request)
+            reply = self.transcript.known(role, sent, prompt_version)
+            try:
+                reply = reply or self._answer(role, sent, prompt_version)
+            except ParameterRefused:
+                if self.client.fitted(request) == sent:
+                    raise
+                continue
+            return reply
+
+    def _answer(self, role: ModelRole, request: Request, prompt_version: str) -> Reply:
+        """The reply to the request as it is, after as many attempts as patience allows."""
         attempt = 1
         while True:
             number = self.transcript.asked(role, request, prompt_version)
@@ -40,10 +53,13 @@ class Conversation:
             except ModelFault as fault:
                 self.transcript.broke(number, fault)
                 wait_s = self.patience.wait_s(fault, attempt=attempt)
-                if wait_s is None:
+                if wait_s is None or isinstance(fault, ParameterRefused):
                     raise
                 self.patience.sleep(wait_s)
                 attempt += 1
             else:
-                self.transcript.answered(number, reply)
+                cut = cut_of(request, reply)
+                self.transcript.answered(number, reply, cut)
+                if cut is not None:
+                    raise cut
                 return reply

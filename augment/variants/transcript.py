@@ -44,8 +44,8 @@ class Transcript(Protocol):
         """Note that this request is about to be sent; returns the number of the call."""
         ...
 
-    def answered(self, number: int, reply: Reply) -> None:
-        """Keep the raw answer to that call."""
+    def answered(self, number: int, reply: Reply, fault: ModelFault | None = None) -> None:
+        """Keep the raw answer to that call, and what shows that it is none to rely on."""
         ...
 
     def broke(self, number: int, fault: ModelFault) -> None:
@@ -97,9 +97,10 @@ class MemoryTranscript:
         )
         return number
 
-    def answered(self, number: int, reply: Reply) -> None:
+    def answered(self, number: int, reply: Reply, fault: ModelFault | None = None) -> None:
         """Keep the answer to that call."""
         self.calls[number - 1].reply = reply
+        self.calls[number - 1].fault = fault
 
     def broke(self, number: int, fault: ModelFault) -> None:
         """Keep the fault of that call."""

@@ -19,7 +19,7 @@ from tests.jobs.rows import INSTRUCTION, add_model, add_scenario
 from tests.variants.answers import GOOD
 
 MODEL = "llama3.1"
-PROMPT_TOKENS, COMPLETION_TOKENS = 900, 120
+PROMPT_TOKENS, COMPLETION_TOKENS = 2900, 120
 
 Answer = Callable[[Request], Reply]
 
@@ -58,6 +58,9 @@ class Model:
         self._answer = answer or (lambda request: reply())
         self._looking_on = looking_on
         self._lock = threading.Lock()
+
+    def fitted(self, request: Request) -> Request:
+        return request
 
     def complete(self, request: Request) -> Reply:
         with self._lock:

@@ -3,19 +3,21 @@
 from __future__ import annotations
 
 import hashlib
+from dataclasses import replace
 
 import pytest
 from django.core.files.storage import default_storage
 from django.utils import timezone
 
 from augment.errors import ModelFault
-from augment.llm.messages import Message, Reply, Request, Speaker
+from augment.llm.messages import Message, Reply, Request, Speaker, ToolCall
 from augment.models import Augmentation, GenerationJob, ModelCall
-from augment.services import jobs, runner
+from augment.services import answers, jobs, runner
 from augment.services.transcripts import RowTranscript
 from augment.variants.transcript import ModelRole, NoteKind
-from tests.jobs.models import Model, llama_job
+from tests.jobs.models import Model, llama_job, reply
 from tests.jobs.rows import claimed, only_row
+from tests.variants.answers import GOOD
 
 pytestmark = pytest.mark.django_db
 
@@ -112,3 +114,24 @@ def test_notes_are_kept_in_their_order_between_calls() -> None:
         (0, "round", {"round": 1}),
         (1, "review", {"mean": 4.5, "said": "nul ␀"}),
     ]
+
+
+def test_an_answer_to_a_cut_prompt_is_kept_and_paid_for_but_never_served() -> None:
+    cut = Model(lambda request: replace(reply(), prompt_tokens=12))
+    job = llama_job(price="1")
+    assert "silently cut" in ran(job, cut).reason
+    call = ModelCall.objects.get()
+    assert (call.answer, call.prompt_tokens) == (GOOD, 12)
+    assert "silently cut" in call.fault
+    job.refresh_from_db()
+    assert job.spent_tokens > 0
+    whole = Model()
+    assert ran(again(), whole).state == DONE
+    assert len(whole.requests) == 1
+
+
+def test_what_a_model_wants_called_is_part_of_its_answer() -> None:
+    wanted = ToolCall(id="c1", name="pose_on_lane", arguments='{"lane": "Lane1"')
+    columns = answers.columns_of(replace(reply(), tool_calls=(wanted,)))
+    assert answers.reply_of(ModelCall(**columns)).tool_calls == (wanted,)
+    assert answers.columns_of(reply())["extras"] is None

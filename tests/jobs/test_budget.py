@@ -8,7 +8,7 @@ from decimal import Decimal
 import pytest
 from django.utils import timezone
 
-from augment.errors import Conflict, ModelFault
+from augment.errors import Conflict, EndpointBusy, ModelFault
 from augment.llm.costs import Price, WorstCase
 from augment.llm.messages import Reply
 from augment.models import Augmentation, EndpointModel, Event, GenerationJob, ModelCall
@@ -38,10 +38,10 @@ def test_a_call_turns_its_reservation_into_what_it_used() -> None:
     job = llama_job(price="2")
     assert ran(job).state == ROW.DONE
     call = ModelCall.objects.get()
-    assert call.spent_tokens == 1020 < call.reserved_tokens
+    assert call.spent_tokens == 3020 < call.reserved_tokens
     assert call.reserved_usd == 2 * Decimal(call.reserved_tokens) / 1_000_000
     assert (call.cost_usd, call.is_cost_estimated) == (Decimal("0.00204"), False)
-    assert (job.spent_usd, job.spent_calls, job.spent_tokens) == (Decimal("0.00204"), 1, 1020)
+    assert (job.spent_usd, job.spent_calls, job.spent_tokens) == (Decimal("0.00204"), 1, 3020)
     assert (job.reserved_nano_usd, job.reserved_calls, job.reserved_tokens) == (0, 0, 0)
 
 
@@ -49,8 +49,8 @@ def test_an_unknown_price_leaves_the_cost_unknown() -> None:
     job = llama_job()
     ran(job)
     call = ModelCall.objects.get()
-    assert (call.cost_usd, call.reserved_usd, call.spent_tokens) == (None, None, 1020)
-    assert (job.spent_calls, job.spent_tokens) == (1, 1020)
+    assert (call.cost_usd, call.reserved_usd, call.spent_tokens) == (None, None, 3020)
+    assert (job.spent_calls, job.spent_tokens) == (1, 3020)
 
 
 def test_unknown_usage_counts_with_its_worst_case_and_says_so() -> None:
@@ -69,6 +69,7 @@ def test_unknown_usage_counts_with_its_worst_case_and_says_so() -> None:
         (ModelFault("upstream broke", retryable=False, status=500), False),
         (ModelFault("too slow", retryable=False), True),
         (ModelFault("no choice", retryable=False, status=200), True),
+        (EndpointBusy("local", 1800.0), False),
     ],
 )
 def test_a_fault_counts_where_it_may_be_billed(fault: ModelFault, is_billed: bool) -> None:
@@ -183,7 +184,7 @@ def test_a_worker_that_was_only_slow_corrects_what_its_call_used() -> None:
     used = budget.used_by_reply(reply(), worst=WORST, price=ONE_USD)
     budget.settle(call_pk=call.pk, used=used, now=timezone.now())
     job.refresh_from_db()
-    assert (job.spent_calls, job.spent_tokens, job.spent_nano_usd) == (1, 1020, 1_020_000)
+    assert (job.spent_calls, job.spent_tokens, job.spent_nano_usd) == (1, 3020, 3_020_000)
     assert (job.reserved_calls, job.reserved_tokens) == (0, 0)
 
 

@@ -58,6 +58,9 @@ class Stumbling:
     def __init__(self, error: BaseException) -> None:
         self.error = error
 
+    def fitted(self, request: Request) -> Request:
+        return request
+
     def complete(self, request: Request) -> Reply:
         raise self.error
 
@@ -158,7 +161,7 @@ def test_a_model_is_asked_and_every_call_is_kept() -> None:
         text=GOOD,
         model="llama3.1-2407",
         finish_reason="stop",
-        prompt_tokens=900,
+        prompt_tokens=9000,
         completion_tokens=120,
         latency_s=1.5,
     )
@@ -169,7 +172,7 @@ def test_a_model_is_asked_and_every_call_is_kept() -> None:
     call = ModelCall.objects.get()
     assert (call.attempt.augmentation, call.number, call.role) == (row, 1, "modifier")
     assert (call.answer, call.fault, call.finish_reason) == (GOOD, "", "stop")
-    assert (call.model_returned, call.prompt_tokens) == ("llama3.1-2407", 900)
+    assert (call.model_returned, call.prompt_tokens) == ("llama3.1-2407", 9000)
     assert (call.completion_tokens, call.latency_s) == (120, 1.5)
     assert call.request["model"] == "llama3.1"
     assert INSTRUCTION in json.dumps(call.request)

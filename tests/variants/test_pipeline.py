@@ -134,7 +134,7 @@ def test_a_fault_that_does_not_pass_costs_one_call() -> None:
 
 def test_the_transcript_has_the_answer_before_anybody_reads_it() -> None:
     class Stops(MemoryTranscript):
-        def answered(self, number: int, reply: Reply) -> None:
+        def answered(self, number: int, reply: Reply, fault: ModelFault | None = None) -> None:
             raise KeyboardInterrupt
 
     made = Run(["nothing that could be read"])

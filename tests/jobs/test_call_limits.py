@@ -1,0 +1,169 @@
+"""Places at an endpoint, on the database as it is configured."""
+
+from __future__ import annotations
+
+import threading
+import time
+import uuid
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
+from datetime import datetime, timedelta
+
+import pytest
+from django.db import connection
+
+from augment.errors import ClaimLost, EndpointBusy
+from augment.models import CallLease, Endpoint
+from augment.services.call_limits import LEASE, MINUTE, Queue, admit, place_at
+from tests.jobs.rows import NOON
+
+THREADS = 8
+
+
+def at(moment: datetime) -> Callable[[], datetime]:
+    return lambda: moment
+
+
+def local(**limits: int) -> Endpoint:
+    return Endpoint.objects.create(label="local", base_url="http://127.0.0.1:9/v1", **limits)
+
+
+class Counter:
+    """Calls that take a moment, and how many of them were under way at once."""
+
+    def __init__(self, endpoint: Endpoint) -> None:
+        self.endpoint = endpoint
+        self.now = self.most = 0
+        self.started: list[float] = []
+        self._lock = threading.Lock()
+
+    def call(self, queue: Queue) -> None:
+        try:
+            with place_at(self.endpoint, queue):
+                with self._lock:
+                    self.now += 1
+                    self.most = max(self.most, self.now)
+                    self.started.append(time.monotonic())
+                time.sleep(0.02)
+                with self._lock:
+                    self.now -= 1
+        finally:
+            connection.close()
+
+
+@pytest.mark.django_db(transaction=True)
+def test_eight_threads_never_pass_the_limit_of_calls_at_once() -> None:
+    calls = Counter(local(max_concurrency=3))
+    with ThreadPoolExecutor(max_workers=THREADS) as pool:
+        list(pool.map(calls.call, [Queue(longest_s=60.0)] * 32))
+    assert len(calls.started) == 32
+    assert 1 < calls.most <= 3
+    assert not CallLease.objects.filter(finished_at=None).exists()
+
+
+@pytest.mark.django_db(transaction=True)
+def test_eight_threads_never_pass_the_limit_of_starts_in_a_minute() -> None:
+    # A "minute" of a second and a half, so that the test can see several.
+    queue = Queue(longest_s=60.0, minute=timedelta(seconds=1.5))
+    calls = Counter(local(max_concurrency=8, requests_per_minute=5))
+    with ThreadPoolExecutor(max_workers=THREADS) as pool:
+        list(pool.map(calls.call, [queue] * 14))
+    started = sorted(calls.started)
+    assert len(started) == 14
+    gaps = [later - first for first, later in zip(started, started[5:], strict=False)]
+    assert min(gaps) >= 1.0
+
+
+@pytest.mark.django_db
+def test_a_place_is_free_again_when_its_call_ended() -> None:
+    endpoint = local(max_concurrency=1)
+    queue = Queue(longest_s=0.0, sleep=lambda _: None)
+    for _ in range(2):
+        with (
+            place_at(endpoint, queue),
+            pytest.raises(EndpointBusy, match="'local' for 0 s"),
+            place_at(endpoint, queue),
+        ):
+            pass
+    with pytest.raises(ZeroDivisionError), place_at(endpoint, queue):
+        1 / 0  # noqa: B018
+    with place_at(endpoint, queue):
+        pass
+
+
+@pytest.mark.django_db
+def test_a_dead_worker_keeps_its_place_until_its_lease_runs_out() -> None:
+    endpoint = local(max_concurrency=1)
+    assert isinstance(admit(endpoint_pk=endpoint.pk, clock=at(NOON)), uuid.UUID)
+    assert admit(endpoint_pk=endpoint.pk, clock=at(NOON + LEASE / 2)) == 0.0
+    assert isinstance(admit(endpoint_pk=endpoint.pk, clock=at(NOON + LEASE)), uuid.UUID)
+
+
+@pytest.mark.django_db
+def test_a_start_that_waits_for_the_minute_is_told_how_long() -> None:
+    endpoint = local(max_concurrency=9, requests_per_minute=2)
+    for second in (0, 10):
+        moment = NOON + timedelta(seconds=second)
+        assert isinstance(admit(endpoint_pk=endpoint.pk, clock=at(moment)), uuid.UUID)
+    later = NOON + timedelta(seconds=20)
+    assert admit(endpoint_pk=endpoint.pk, clock=at(later)) == MINUTE.total_seconds() - 20
+    assert isinstance(admit(endpoint_pk=endpoint.pk, clock=at(NOON + MINUTE)), uuid.UUID)
+
+
+@pytest.mark.django_db
+def test_limits_count_for_their_own_endpoint() -> None:
+    first = local(max_concurrency=1)
+    other = Endpoint.objects.create(label="other", base_url="http://127.0.0.1:8/v1")
+    admit(endpoint_pk=first.pk, clock=at(NOON))
+    assert isinstance(admit(endpoint_pk=other.pk, clock=at(NOON)), uuid.UUID)
+
+
+@pytest.mark.django_db
+def test_a_limit_that_an_admin_raises_counts_at_once() -> None:
+    endpoint = local(max_concurrency=1)
+    admit(endpoint_pk=endpoint.pk, clock=at(NOON))
+    Endpoint.objects.update(max_concurrency=2)
+    assert isinstance(admit(endpoint_pk=endpoint.pk, clock=at(NOON)), uuid.UUID)
+
+
+@pytest.mark.django_db
+def test_who_waits_asks_whether_the_call_is_still_wanted() -> None:
+    endpoint = local(max_concurrency=1)
+    asked = []
+
+    def wanted() -> None:
+        asked.append(1)
+        if len(asked) == 3:
+            raise ClaimLost("the row is somebody else's")
+
+    with place_at(endpoint, Queue(longest_s=0.0)):
+        waiting = Queue(longest_s=60.0, still_wanted=wanted, sleep=lambda _: None)
+        with pytest.raises(ClaimLost), place_at(endpoint, waiting):
+            pass
+
+
+@pytest.mark.django_db
+def test_old_leases_are_cleared_away_but_for_those_of_calls_under_way() -> None:
+    endpoint = local(max_concurrency=9)
+    for _ in range(3):
+        admit(endpoint_pk=endpoint.pk, clock=at(NOON))
+    ended, long, dead = CallLease.objects.order_by("pk")
+    hour = NOON + timedelta(hours=1)
+    CallLease.objects.filter(pk=ended.pk).update(finished_at=NOON)
+    CallLease.objects.filter(pk=long.pk).update(expires_at=hour + LEASE)
+    admit(endpoint_pk=endpoint.pk, clock=at(hour))
+    left = CallLease.objects.filter(started_at=NOON).get()
+    assert left == long
+    assert dead != long
+
+
+@pytest.mark.django_db(transaction=True)
+def test_a_long_call_renews_its_lease() -> None:
+    endpoint = local()
+    with place_at(endpoint, Queue(longest_s=1.0, renew_every_s=0.02)):
+        first = CallLease.objects.get().expires_at
+        for _ in range(200):
+            if CallLease.objects.get().expires_at > first:
+                break
+            time.sleep(0.02)
+        assert CallLease.objects.get().expires_at > first

@@ -1,0 +1,210 @@
+"""The client of an endpoint: over the real wire to a stand-in, with rows behind it."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
+from threading import Thread
+from typing import Any
+
+import pytest
+
+from augment.errors import ContextTruncated, EndpointBusy, KeyMissing, ModelFault, ParameterRefused
+from augment.llm.messages import Message, Request, Speaker
+from augment.llm.openai_wire import OpenAIWire
+from augment.llm.patience import Patience
+from augment.models import Augmentation, CallLease, Endpoint, EndpointModel, Event, ModelCall
+from augment.services import jobs, runner
+from augment.services.call_limits import Queue, place_at
+from augment.services.endpoint_client import EndpointClient
+from augment.variants.asking import Conversation
+from augment.variants.transcript import MemoryTranscript, ModelRole
+from tests.jobs.rows import add_model, add_scenario, only_row
+
+pytestmark = pytest.mark.django_db(transaction=True)
+ASKED = Request(
+    model="picky",
+    messages=(Message(speaker=Speaker.USER, text="Hello"),),
+    temperature=0.0,
+    seed=7,
+)
+
+
+class Picky(ThreadingHTTPServer):
+    """A server that answers 400 to some parameters, and remembers every body."""
+
+    daemon_threads = True
+
+    def __init__(self, refuses: tuple[str, ...], prompt_tokens: int | None) -> None:
+        super().__init__(("127.0.0.1", 0), _Handler)
+        self.refuses = refuses
+        self.prompt_tokens = prompt_tokens
+        self.bodies: list[dict[str, Any]] = []
+
+    @property
+    def url(self) -> str:
+        return f"http://127.0.0.1:{self.server_address[1]}/v1"
+
+    def answer(self, body: dict[str, Any]) -> tuple[int, dict[str, Any]]:
+        for name in self.refuses:
+            if name in body:
+                problem = f"Unsupported parameter: {name!r}."
+                return 400, {"error": {"message": problem, "param": name, "code": None}}
+        message = {"role": "assistant", "content": "Hi"}
+        choice = {"index": 0, "finish_reason": "stop", "message": message}
+        made = {"id": "1", "object": "chat.completion", "created": 0, "model": body["model"]}
+        usage = {"prompt_tokens": self.prompt_tokens, "completion_tokens": 1}
+        return 200, made | {"choices": [choice], "usage": usage}
+
+
+class _Handler(BaseHTTPRequestHandler):
+    server: Picky
+
+    def do_POST(self) -> None:
+        body = json.loads(self.rfile.read(int(self.headers["Content-Length"])))
+        self.server.bodies.append(body)
+        status, document = self.server.answer(body)
+        text = json.dumps(document).encode()
+        self.send_response(status)
+        self.send_header("Content-Type", "application/json")
+        self.send_header("Content-Length", str(len(text)))
+        self.end_headers()
+        self.wfile.write(text)
+
+    def log_message(self, format: str, *args: object) -> None:
+        pass
+
+
+@contextmanager
+def picky(*refuses: str, prompt_tokens: int | None = 3) -> Iterator[Picky]:
+    server = Picky(refuses, prompt_tokens)
+    thread = Thread(target=server.serve_forever, args=(0.05,), daemon=True)
+    thread.start()
+    try:
+        yield server
+    finally:
+        server.shutdown()
+        server.server_close()
+        thread.join()
+
+
+@dataclass
+class Asking:
+    """A conversation with an endpoint, as a variant has it."""
+
+    server: Picky
+    endpoint: Endpoint = field(init=False)
+    transcript: MemoryTranscript = field(default_factory=MemoryTranscript)
+
+    def __post_init__(self) -> None:
+        self.endpoint, _ = Endpoint.objects.get_or_create(
+            label="local", defaults={"base_url": self.server.url}
+        )
+
+    def ask(self, request: Request = ASKED) -> str:
+        wire = OpenAIWire(base_url=self.endpoint.base_url, api_key=None, timeout_s=5.0)
+        with EndpointClient(wire, self.endpoint, Queue(longest_s=0.0)) as client:
+            conversation = Conversation(
+                client=client,
+                model=request.model,
+                transcript=self.transcript,
+                patience=Patience(attempts=1),
+            )
+            return conversation.ask(ModelRole.MODIFIER, request, "v1").text
+
+
+def test_a_refused_parameter_is_dropped_logged_and_remembered(
+    caplog: pytest.LogCaptureFixture,
+) -> None:
+    with picky("temperature", "seed", "max_completion_tokens") as server:
+        assert Asking(server).ask() == "Hi"
+        assert [sorted(body) for body in server.bodies][-1] == ["max_tokens", "messages", "model"]
+        assert len(server.bodies) == 4
+        server.bodies.clear()
+        assert Asking(server).ask() == "Hi"
+        assert len(server.bodies) == 1
+    known = EndpointModel.objects.get()
+    assert known.temperature is False
+    assert known.refused_parameters == ["max_completion_tokens", "seed"]
+    assert caplog.text.count("picky at endpoint local does not take") == 3
+    assert Event.objects.filter(verb="learn", object_code=known.code).count() == 3
+
+
+def test_every_attempt_is_in_the_transcript_as_it_was_sent() -> None:
+    with picky("seed") as server:
+        asking = Asking(server)
+        asking.ask()
+        calls = asking.transcript.calls
+        assert [call.request.to_document() for call in calls] == server.bodies
+    first, second = calls
+    assert isinstance(first.fault, ParameterRefused)
+    assert (second.request.seed, second.fault) == (None, None)
+
+
+def test_a_limit_that_is_taken_by_no_name_ends_the_asking() -> None:
+    with picky("max_completion_tokens", "max_tokens") as server:
+        with pytest.raises(ModelFault, match="its cost has no bound"):
+            Asking(server).ask()
+        assert len(server.bodies) == 2
+
+
+def test_a_refusal_that_can_not_be_helped_is_raised_once() -> None:
+    EndpointModel.objects.create(
+        endpoint=Endpoint.objects.create(label="local", base_url="http://127.0.0.1:1/v1"),
+        model="picky",
+        reasoning_effort="none",
+    )
+    with picky("reasoning_effort") as server:
+        Endpoint.objects.update(base_url=server.url)
+        assert Asking(server).ask() == "Hi"
+        assert ["reasoning_effort" in body for body in server.bodies] == [True, False]
+
+
+def test_a_cut_prompt_is_a_fault_whose_answer_is_kept() -> None:
+    with picky(prompt_tokens=4096) as server:
+        asking = Asking(server)
+        with pytest.raises(ContextTruncated, match="exactly at 4096"):
+            asking.ask()
+        assert len(server.bodies) == 1
+    reply = asking.transcript.calls[0].reply
+    assert reply is not None
+    assert reply.text == "Hi"
+
+
+def test_each_call_takes_a_place_and_gives_it_back() -> None:
+    with picky() as server:
+        asking = Asking(server)
+        asking.ask()
+        lease = CallLease.objects.get()
+        assert lease.finished_at is not None
+        Endpoint.objects.update(max_concurrency=1)
+        with place_at(asking.endpoint, Queue(longest_s=0.0)), pytest.raises(EndpointBusy):
+            asking.ask()
+        assert len(server.bodies) == 1
+
+
+def test_a_worker_goes_through_the_limits_and_the_profile() -> None:
+    with picky("seed", prompt_tokens=None) as server:
+        endpoint = Endpoint.objects.create(label="local", base_url=server.url)
+        EndpointModel.objects.create(endpoint=endpoint, model="m", temperature=False)
+        add_model("m", endpoint=endpoint, model="m")
+        add_scenario("street")
+        row = only_row(jobs.launch(name="R", contestants=["m"], scenarios=["street"]))
+        runner.work_on(augmentation_pk=row.pk)
+        assert all("temperature" not in body for body in server.bodies)
+        assert CallLease.objects.count() == len(server.bodies) == ModelCall.objects.count() > 0
+    row.refresh_from_db()
+    assert row.state == Augmentation.State.UNREADABLE
+
+
+def test_a_missing_key_is_found_before_a_place_is_taken() -> None:
+    endpoint = Endpoint.objects.create(
+        label="local", base_url="http://127.0.0.1:1/v1", key_variable="NOT_SET_HERE"
+    )
+    row_claim: Any = None
+    with pytest.raises(KeyMissing):
+        runner.open_wire(endpoint, row_claim)
+    assert not CallLease.objects.exists()

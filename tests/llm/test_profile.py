@@ -1,0 +1,100 @@
+from __future__ import annotations
+
+from dataclasses import replace
+
+import pytest
+
+from augment.errors import ModelFault
+from augment.llm.messages import (
+    AnswerSchema,
+    LengthName,
+    Message,
+    Request,
+    Speaker,
+    Tool,
+)
+from augment.llm.profile import Profile
+
+HELLO = Message(speaker=Speaker.USER, text="Hello")
+SCHEMA = AnswerSchema(name="sum", schema={"type": "object"})
+TOOL = Tool(name="double", description="Doubles.", parameters={"type": "object"})
+ASKED = Request(model="m", messages=(HELLO,), temperature=0.0, seed=7, answer_schema=SCHEMA)
+
+
+def test_what_nobody_knows_is_tried() -> None:
+    assert Profile().fitted(ASKED) == ASKED
+
+
+@pytest.mark.parametrize(
+    ("parameter", "left_out"),
+    [("temperature", "temperature"), ("seed", "seed"), ("response_format", "answer_schema")],
+)
+def test_what_was_refused_is_left_out(parameter: str, left_out: str) -> None:
+    fitted = Profile().without(parameter).fitted(ASKED)
+    assert fitted == replace(ASKED, **{left_out: None})  # type: ignore[arg-type]
+    assert parameter not in fitted.to_document()
+
+
+def test_the_limit_of_the_length_goes_by_its_other_name() -> None:
+    fitted = Profile().without("max_completion_tokens").fitted(ASKED)
+    assert fitted.length_name == LengthName.MAX_TOKENS
+    document = fitted.to_document()
+    assert document["max_tokens"] == ASKED.max_tokens
+    assert "max_completion_tokens" not in document
+
+
+def test_a_model_without_a_limit_of_the_length_is_not_asked() -> None:
+    boundless = Profile().without("max_completion_tokens").without("max_tokens")
+    with pytest.raises(ModelFault, match="its cost has no bound") as caught:
+        boundless.fitted(ASKED)
+    assert not caught.value.retryable
+
+
+def test_no_answer_is_asked_to_be_longer_than_the_model_can() -> None:
+    assert Profile(max_output_tokens=100).fitted(ASKED).max_tokens == 100
+    assert Profile(max_output_tokens=10**6).fitted(ASKED).max_tokens == ASKED.max_tokens
+
+
+def test_the_effort_is_that_of_the_row_unless_the_request_says_so() -> None:
+    profile = Profile(reasoning_effort="none")
+    assert profile.fitted(ASKED).to_document()["reasoning_effort"] == "none"
+    own = replace(ASKED, reasoning_effort="low")
+    assert profile.fitted(own).reasoning_effort == "low"
+    assert profile.without("reasoning_effort").fitted(own).reasoning_effort is None
+
+
+def test_a_blind_model_is_shown_nothing() -> None:
+    seen = replace(ASKED, messages=(replace(HELLO, images=(b"\x89PNG",)),))
+    assert Profile(vision=True).fitted(seen) == Profile().fitted(seen) == seen
+    with pytest.raises(ModelFault, match="m at this endpoint can't see pictures"):
+        Profile(vision=False).fitted(seen)
+
+
+def test_a_model_without_native_tools_is_not_given_any() -> None:
+    armed = replace(ASKED, answer_schema=None, tools=(TOOL,))
+    assert Profile().fitted(armed) == armed
+    with pytest.raises(ModelFault, match="no native tool calls"):
+        Profile(native_tools=False).fitted(armed)
+
+
+def test_tools_and_a_schema_never_go_together() -> None:
+    with pytest.raises(ValueError, match="never both"):
+        replace(ASKED, tools=(TOOL,))
+
+
+def test_tools_and_schemas_have_the_form_of_the_wire() -> None:
+    assert ASKED.to_document()["response_format"] == {
+        "type": "json_schema",
+        "json_schema": {"name": "sum", "schema": {"type": "object"}, "strict": True},
+    }
+    armed = replace(ASKED, answer_schema=None, tools=(TOOL,))
+    assert armed.to_document()["tools"] == [
+        {
+            "type": "function",
+            "function": {
+                "name": "double",
+                "description": "Doubles.",
+                "parameters": {"type": "object"},
+            },
+        }
+    ]
