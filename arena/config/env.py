@@ -87,8 +87,11 @@ def folder(name: str, *, default: Path) -> Path:
     return read(name, default, parse, "a folder is needed, and this is a file")
 
 
-def database(name: str, *, default: str) -> dict[str, object]:
-    """A database by its URL: sqlite:///PATH or postgresql://USER:PASSWORD@HOST:PORT/NAME."""
+def database(name: str, *, default: Path) -> dict[str, object]:
+    """A database by its URL: sqlite:///PATH or postgresql://USER:PASSWORD@HOST:PORT/NAME.
+
+    The default is an SQLite file, given as a path: not every path can be written as a URL.
+    """
 
     def parse(raw: str) -> dict[str, object]:
         if urlsplit(raw).scheme not in {"sqlite", "postgres", "postgresql"}:
@@ -96,7 +99,11 @@ def database(name: str, *, default: str) -> dict[str, object]:
         return dict(dj_database_url.parse(raw))
 
     allowed = "use sqlite:///PATH or postgresql://USER:PASSWORD@HOST:PORT/NAME"
-    return read(name, parse(default), parse, allowed)
+    standard: dict[str, object] = {
+        "ENGINE": "django.db.backends.sqlite3",
+        "NAME": str(default),
+    }
+    return read(name, standard, parse, allowed)
 
 
 def redis(name: str, *, default: str) -> str:

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import hashlib
 import os
+import re
 import secrets
 import tempfile
 from pathlib import Path
@@ -135,7 +136,7 @@ def _database() -> dict[str, object]:
     transaction that turns into a writer can't wait. IMMEDIATE ones queue up instead, and WAL lets
     readers go on meanwhile.
     """
-    found = env.database("DATABASE_URL", default=f"sqlite:///{VAR_DIR / 'arena.sqlite3'}")
+    found = env.database("DATABASE_URL", default=VAR_DIR / "arena.sqlite3")
     if found["ENGINE"] == "django.db.backends.sqlite3":
         found["OPTIONS"] = {
             "timeout": 20,
@@ -166,9 +167,10 @@ WHITENOISE_KEEP_ONLY_HASHED_FILES = True
 # --- Background work ---------------------------------------------------------------------------
 
 # Without REDIS_URL every process of this folder meets on one socket, where `manage.py serve`
-# starts a private Redis: a second terminal reaches the running one. Sockets have short paths only.
+# starts a private Redis: a second terminal reaches the running one. Sockets have short paths only,
+# and the path is part of a URL, in which some signs mean something else.
 PRIVATE_REDIS_SOCKET = VAR_DIR / "redis.sock"
-if len(str(PRIVATE_REDIS_SOCKET)) > 100:
+if not re.fullmatch(r"[A-Za-z0-9/._ -]{1,100}", str(PRIVATE_REDIS_SOCKET)):
     digest = hashlib.sha256(str(VAR_DIR).encode()).hexdigest()[:16]
     PRIVATE_REDIS_SOCKET = Path(tempfile.gettempdir()) / f"arena-{digest}.sock"
 REDIS_URL = env.redis("REDIS_URL", default=f"redis+socket://{PRIVATE_REDIS_SOCKET}")

@@ -50,3 +50,30 @@ def test_the_secret_key_is_made_once_and_kept_private(tmp_path: Path) -> None:
     assert kept.stat().st_mode & 0o077 == 0
     assert start(**environment).returncode == 0
     assert kept.read_text() == first
+
+
+def test_a_folder_may_have_signs_that_mean_something_in_addresses(tmp_path: Path) -> None:
+    folder = tmp_path / "my 100%25 #1?é"
+    program = (
+        "from django.conf import settings as s; import arena.config;"
+        "from kombu.utils.url import parse_url;"
+        "print(s.DATABASES['default']['NAME']);"
+        "print(s.PRIVATE_REDIS_SOCKET, s.REDIS_URL);"
+        "print(parse_url(s.REDIS_URL)['virtual_host'])"
+    )
+    said = subprocess.run(
+        [sys.executable, "-c", program],
+        cwd=ROOT,
+        env={
+            **{k: v for k, v in os.environ.items() if k not in {"DATABASE_URL", "REDIS_URL"}},
+            "ARENA_VAR_DIR": str(folder),
+            "DJANGO_SETTINGS_MODULE": "arena.config.settings",
+        },
+        capture_output=True,
+        text=True,
+        check=True,
+    ).stdout.splitlines()
+    assert said[0] == str(folder / "arena.sqlite3")
+    socket, address = said[1].split(" ")
+    assert address == f"redis+socket://{socket}"
+    assert said[2] == socket.removeprefix("/")
