@@ -56,15 +56,42 @@ def integer(name: str, *, default: int, low: int, high: int) -> int:
 
 
 def names(name: str, *, default: tuple[str, ...]) -> list[str]:
-    """A list, separated by commas."""
-    return list(
-        read(
-            name,
-            default,
-            lambda raw: tuple(part.strip() for part in raw.split(",") if part.strip()),
-            "names separated by commas are needed",
+    """A list of at least one name, separated by commas."""
+
+    def parse(raw: str) -> tuple[str, ...]:
+        found = tuple(part.strip() for part in raw.split(",") if part.strip())
+        if not found:
+            raise ValueError(raw)
+        return found
+
+    return list(read(name, default, parse, "names separated by commas are needed"))
+
+
+def origins(name: str) -> list[str]:
+    """Addresses of other servers with their scheme, separated by commas; none by default."""
+
+    def parse(raw: str) -> list[str]:
+        found = [part.strip() for part in raw.split(",") if part.strip()]
+        for part in found:
+            address = urlsplit(part)
+            if address.scheme not in {"http", "https"} or not address.hostname:
+                raise ValueError(part)
+        return found
+
+    return read(name, [], parse, "use https://NAME, more than one separated by commas")
+
+
+def at_least_twice(longer: str, longer_s: int, shorter: str, shorter_s: int) -> None:
+    """Two settings that only work together.
+
+    Raises:
+        ImproperlyConfigured: The longer time is not twice the shorter one.
+    """
+    if longer_s < 2 * shorter_s:
+        raise ImproperlyConfigured(
+            f"{longer}={longer_s} can't be used with {shorter}={shorter_s}: it must be at least "
+            "twice as long."
         )
-    )
 
 
 def choice(name: str, *, default: str, allowed: tuple[str, ...]) -> str:
@@ -76,15 +103,16 @@ def choice(name: str, *, default: str, allowed: tuple[str, ...]) -> str:
 
 
 def folder(name: str, *, default: Path) -> Path:
-    """An absolute folder; it need not exist yet, but nothing else may stand there."""
+    """An absolute folder; it need not exist yet, but it must be possible to make it."""
 
     def parse(raw: str) -> Path:
         path = Path(raw).expanduser().resolve()
-        if path.exists() and not path.is_dir():
+        nearest = next(place for place in (path, *path.parents) if place.exists())
+        if not raw or not nearest.is_dir() or not os.access(nearest, os.W_OK):
             raise ValueError(raw)
         return path
 
-    return read(name, default, parse, "a folder is needed, and this is a file")
+    return read(name, default, parse, "a folder is needed that can be written to")
 
 
 def database(name: str, *, default: Path) -> dict[str, object]:
@@ -96,7 +124,10 @@ def database(name: str, *, default: Path) -> dict[str, object]:
     def parse(raw: str) -> dict[str, object]:
         if urlsplit(raw).scheme not in {"sqlite", "postgres", "postgresql"}:
             raise ValueError(raw)
-        return dict(dj_database_url.parse(raw))
+        found = dict(dj_database_url.parse(raw))
+        if found["NAME"] in {"", ":memory:"}:  # every process would have one of its own
+            raise ValueError(raw)
+        return found
 
     allowed = "use sqlite:///PATH or postgresql://USER:PASSWORD@HOST:PORT/NAME"
     standard: dict[str, object] = {
@@ -110,7 +141,16 @@ def redis(name: str, *, default: str) -> str:
     """The URL of a Redis: redis://HOST:PORT/N, rediss:// or unix (redis+socket:///PATH)."""
 
     def parse(raw: str) -> str:
-        if urlsplit(raw).scheme not in {"redis", "rediss", "redis+socket"}:
+        address = urlsplit(raw)
+        if address.scheme == "redis+socket":
+            place = address.path
+        elif address.scheme in {"redis", "rediss"}:
+            place = address.hostname or ""
+            int(address.path.strip("/") or 0)
+            _ = address.port  # raises where it is no port
+        else:
+            place = ""
+        if not place:
             raise ValueError(raw)
         return raw
 

@@ -23,7 +23,7 @@ VAR_DIR = env.folder("ARENA_VAR_DIR", default=BASE_DIR / "var")
 
 DEBUG = env.boolean("ARENA_DEBUG", default=False)
 ALLOWED_HOSTS = env.names("ARENA_HOSTS", default=("localhost", "127.0.0.1", "[::1]"))
-CSRF_TRUSTED_ORIGINS = env.names("ARENA_ORIGINS", default=())
+CSRF_TRUSTED_ORIGINS = env.origins("ARENA_ORIGINS")
 HTTPS = env.boolean("ARENA_HTTPS", default=False)
 
 
@@ -187,6 +187,8 @@ CELERY_TIMEZONE = "UTC"
 
 HEARTBEAT_S = env.integer("ARENA_HEARTBEAT_S", default=5, low=1, high=60)
 STALE_AFTER_S = env.integer("ARENA_STALE_AFTER_S", default=20, low=2, high=3600)
+# Else every row would be taken away from the worker that is busy with it.
+env.at_least_twice("ARENA_STALE_AFTER_S", STALE_AFTER_S, "ARENA_HEARTBEAT_S", HEARTBEAT_S)
 RECOVER_EVERY_S = env.integer("ARENA_RECOVER_EVERY_S", default=30, low=1, high=3600)
 
 LLM_QUEUE_S = env.integer("ARENA_LLM_QUEUE_S", default=1800, low=1, high=86400)
