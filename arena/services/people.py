@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from django.contrib.auth.models import Group, User
+from django.core.exceptions import ValidationError
 from django.db import transaction
 
 from arena.models import Person
 from arena.queries.people import ROLES
-from augment.errors import Conflict, UnknownName
+from augment.errors import Conflict, InvalidDocument, UnknownName
 from augment.services.events import log_event
+from augment.services.texts import one_line
 
 
 @transaction.atomic
@@ -33,10 +35,14 @@ def create_person(
 
     Raises:
         UnknownName: There is no such role.
+        InvalidDocument: The username or the pseudonym is empty, too long or has other signs.
         Conflict: The username or the pseudonym is taken.
     """
     if role not in ROLES:
         raise UnknownName("role", role, list(ROLES))
+    _check_username(username)
+    if pseudonym is not None:
+        pseudonym = one_line("pseudonym", pseudonym, what="person", longest=60)
     if User.objects.filter(username=username).exists():
         raise Conflict(f"The username {username!r} is taken.")
     if pseudonym is None:
@@ -57,6 +63,14 @@ def create_person(
         after={"role": role, "is_simulated": is_simulated},
     )
     return user
+
+
+def _check_username(username: str) -> None:
+    """Raise InvalidDocument for a name that Django's own forms would refuse."""
+    try:
+        User._meta.get_field("username").clean(username, None)
+    except ValidationError as error:
+        raise InvalidDocument("person", [("username", " ".join(error.messages))]) from None
 
 
 def _free_pseudonym(role: str) -> str:

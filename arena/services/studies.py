@@ -7,7 +7,7 @@ from dataclasses import asdict
 from typing import Any
 
 from django.contrib.auth.models import User
-from django.db import transaction
+from django.db import IntegrityError, transaction
 from django.db.models import F
 from django.utils import timezone
 
@@ -18,6 +18,7 @@ from arena.queries.people import experts as expert_accounts
 from augment.errors import Conflict, UnknownName
 from augment.models import Augmentation, Contestant, Scenario
 from augment.services.events import log_event
+from augment.services.texts import one_line
 
 PLANNER = "balanced-1"
 """Name and version of the planner, kept with the rules so that a plan can be made again."""
@@ -50,12 +51,14 @@ def open_study(
         actor: Who opens it, for the log.
 
     Raises:
+        InvalidDocument: The name is empty, too long or not one line.
         UnknownName: A contestant, scenario or expert does not exist.
-        Conflict: The name is taken, or something simulated takes part unasked.
+        Conflict: The name is taken, the seed is out of range, or something simulated takes part
+            unasked.
         NothingToPlan: Pictures are missing, or too few to fill the votes; the text has numbers.
     """
-    if Study.objects.filter(name=name).exists():
-        raise Conflict(f"There is a study named {name!r} already.")
+    name = _free_name(name)
+    _check_seed(seed)
     contestant_rows = _contestants(contestants)
     scenario_rows = _scenarios(scenarios)
     expert_rows = _experts(experts)
@@ -64,7 +67,7 @@ def open_study(
     cells = _latest_pictures(contestant_rows, scenario_rows)
     rules = _rules(cells, expert_rows, votes_per_expert, seed)
     planned = plan(rules)
-    study = Study.objects.create(
+    study = Study(
         name=name,
         state=Study.State.OPEN,
         votes_per_expert=votes_per_expert,
@@ -73,6 +76,7 @@ def open_study(
         allow_simulated=allow_simulated,
         opened_at=timezone.now(),
     )
+    _insert(study)
     study.contestants.set(contestant_rows)
     study.scenarios.set(scenario_rows)
     study.experts.set(expert_rows)
@@ -130,6 +134,18 @@ def rules_of(study: Study) -> Rules:
 
 
 # --- Who and what takes part -------------------------------------------------------------------
+
+
+def _free_name(name: str) -> str:
+    name = one_line("name", name, what="study")
+    if Study.objects.filter(name=name).exists():
+        raise _taken(name)
+    return name
+
+
+def _check_seed(seed: int) -> None:
+    if not 0 <= seed < 2**63:
+        raise Conflict(f"A seed goes from 0 to 2^63 - 1, not {seed}.")
 
 
 def _contestants(slugs: Sequence[str]) -> list[Contestant]:
@@ -202,6 +218,18 @@ def _rules(cells: Cells, experts: list[User], votes_per_expert: int, seed: int) 
 
 
 # --- What is kept ------------------------------------------------------------------------------
+
+
+def _insert(study: Study) -> None:
+    try:
+        with transaction.atomic():
+            study.save(force_insert=True)
+    except IntegrityError:  # somebody else was faster
+        raise _taken(study.name) from None
+
+
+def _taken(name: str) -> Conflict:
+    return Conflict(f"There is a study named {name!r} already.")
 
 
 def _frozen_rules(rules: Rules, planned: Plan) -> dict[str, Any]:

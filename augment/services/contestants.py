@@ -14,6 +14,7 @@ from augment.models import Contestant, Endpoint
 from augment.services.endpoints import model_at
 from augment.services.events import log_event
 from augment.services.scenes import check_slug
+from augment.services.texts import one_line
 from augment.variants.recipes import recipe
 
 REFERENCE = "reference"
@@ -26,7 +27,6 @@ _BUILTIN = {
 OPENAI = "openai"
 OPENAI_URL = "https://api.openai.com/v1"
 OPENAI_KEY = "OPENAI_API_KEY"
-NAME_LENGTH = 120
 
 
 @transaction.atomic
@@ -120,9 +120,11 @@ def add_contestant(
     check_slug(slug, what="contestant")
     way = recipe(variant)
     address = _endpoint(endpoint, actor)
-    model = _text("model", model)
+    model = one_line("model", model, what="contestant")
     wanted = {
-        "name": _text("name", f"{model} {way.slug.upper()}" if name is None else name),
+        "name": one_line(
+            "name", f"{model} {way.slug.upper()}" if name is None else name, what="contestant"
+        ),
         "kind": Contestant.Kind.SIMULATED if address.is_simulated else Contestant.Kind.LLM,
         "variant": way.slug,
         "endpoint": address,
@@ -171,15 +173,6 @@ def _endpoint(label: str, actor: User | None) -> Endpoint:
         )
     known = list(Endpoint.objects.values_list("label", flat=True))
     raise UnknownName("endpoint", label, known)
-
-
-def _text(field: str, value: str) -> str:
-    """The value without blanks around it."""
-    value = value.strip()
-    if not value or len(value) > NAME_LENGTH or not value.isprintable():
-        rule = f"1 to {NAME_LENGTH} printable characters are needed"
-        raise InvalidDocument("contestant", [(field, rule)])
-    return value
 
 
 def _refuse_another(contestant: Contestant, wanted: dict[str, object], *, named: bool) -> None:

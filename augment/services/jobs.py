@@ -17,6 +17,7 @@ from augment.models import Augmentation, Contestant, GenerationJob, Scenario
 from augment.services.budget import limit_of
 from augment.services.caps import Caps, check_caps
 from augment.services.events import log_event
+from augment.services.texts import one_line
 
 Kind = Contestant.Kind
 State = Augmentation.State
@@ -76,10 +77,12 @@ def launch(
         actor: Who launches it, None for the machine.
 
     Raises:
+        InvalidDocument: The name is empty, too long or not one line.
         UnknownName: A slug that nobody registered.
         Conflict: Nothing is chosen, a contestant can't be run, the reference is to run on
             scenarios that have none, or a cap in USD meets a price that nobody knows.
     """
+    name = one_line("name", name, what="job")
     who = _contestants(contestants)
     where = _scenarios(scenarios)
     _refuse_impossible(who, where)

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from typing import Any
 
+from augment.errors import InvalidDocument
+
 
 def storable(text: str) -> str:
     """The text without what can't be stored: PostgreSQL has no NUL, UTF-8 no half characters."""
@@ -18,4 +20,23 @@ def storable_document(value: Any) -> Any:
         return {storable(key): storable_document(item) for key, item in value.items()}
     if isinstance(value, list):
         return [storable_document(item) for item in value]
+    return value
+
+
+def one_line(field: str, value: str, *, what: str, longest: int = 120) -> str:
+    """A name that people read, without blanks around it.
+
+    Args:
+        field: Which name, for the error.
+        value: What was given.
+        what: The kind of thing that bears the name.
+        longest: How many characters its column takes.
+
+    Raises:
+        InvalidDocument: It is empty, too long or has line breaks or other signs without a shape.
+    """
+    value = value.strip()
+    if not value or len(value) > longest or not value.isprintable():
+        rule = f"1 to {longest} printable characters are needed"
+        raise InvalidDocument(what, [(field, rule)])
     return value

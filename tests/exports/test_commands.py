@@ -5,6 +5,7 @@ import json
 from pathlib import Path
 
 import pytest
+from django.contrib.auth.models import User
 from django.core.management import CommandError, call_command
 from django.test import Client
 
@@ -128,6 +129,20 @@ def test_people_get_a_role_and_a_pseudonym_of_their_own() -> None:
         expert("eva")
     with pytest.raises(UnknownName, match=r"'boss'. Known: admin, analyst, expert"):
         create_person(username="bo", password=None, role="boss")
+
+
+@pytest.mark.parametrize("username", ["", "two words", "two\nlines", "n" * 151])
+def test_a_username_that_no_form_would_take_is_refused(username: str) -> None:
+    with pytest.raises(CommandError, match="person can't be read: username: "):
+        run("add_person", username, "--role", "expert")
+    assert not User.objects.exists()
+
+
+@pytest.mark.parametrize("pseudonym", ["", "two\nlines", "n" * 61])
+def test_a_pseudonym_that_is_not_one_line_is_refused(pseudonym: str) -> None:
+    with pytest.raises(CommandError, match="pseudonym: 1 to 60 printable characters"):
+        run("add_person", "eva", "--role", "expert", "--pseudonym", pseudonym)
+    assert not User.objects.exists()
 
 
 def test_votes_and_ratings_can_only_be_read_in_the_admin() -> None:

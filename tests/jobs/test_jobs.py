@@ -4,7 +4,7 @@ import pytest
 from django.contrib.auth.models import User
 from pytest_django import DjangoAssertNumQueries
 
-from augment.errors import Conflict, UnknownName
+from augment.errors import Conflict, InvalidDocument, UnknownName
 from augment.models import Augmentation, Contestant, Event, GenerationJob
 from augment.services import claims, jobs
 from tests.jobs.rows import NOON, add_kind, add_scenario, claimed, done, failed, launch
@@ -72,6 +72,14 @@ def test_a_job_of_nothing_is_refused(empty: str) -> None:
     chosen = {"contestants": ["reference"], "scenarios": ["street"]} | {empty: []}
     with pytest.raises(Conflict, match=f"at least one {empty[:-1]}"):
         jobs.launch(name="R", contestants=chosen["contestants"], scenarios=chosen["scenarios"])
+
+
+@pytest.mark.parametrize("name", [" ", "two\nlines", "n" * 121])
+def test_a_name_that_is_not_one_line_is_refused(name: str) -> None:
+    add_kind("reference")
+    add_scenario("street")
+    with pytest.raises(InvalidDocument, match="job can't be read: name: "):
+        jobs.launch(name=name, contestants=["reference"], scenarios=["street"])
 
 
 def test_what_a_human_made_can_not_be_run() -> None:

@@ -10,7 +10,7 @@ from arena.errors import NothingToPlan
 from arena.models import Matchup, Study
 from arena.pairing.plan import plan
 from arena.services.studies import close_study, open_study, rules_of
-from augment.errors import Conflict, UnknownName
+from augment.errors import Conflict, InvalidDocument, UnknownName
 from augment.models import Augmentation, Contestant, Event, Scenario
 from tests.study_rows import KINDS, Cast, a_study, cast_of, picture
 
@@ -128,6 +128,19 @@ def names_of(study: Study) -> Cast:
         "scenarios": list(study.scenarios.values_list("slug", flat=True)),
         "experts": list(study.experts.values_list("username", flat=True)),
     }
+
+
+@pytest.mark.parametrize("name", ["", "  ", "two\nlines", "n" * 121, "nul\0"])
+def test_a_name_that_is_not_one_line_is_refused(name: str) -> None:
+    with pytest.raises(InvalidDocument, match="study can't be read: name: 1 to 120 printable"):
+        open_study(name=name, votes_per_expert=3, seed=7, **cast_of())
+    assert not Study.objects.exists()
+
+
+@pytest.mark.parametrize("seed", [-1, 2**63])
+def test_a_seed_that_can_not_be_stored_is_refused(seed: int) -> None:
+    with pytest.raises(Conflict, match="A seed goes from 0 to 2\\^63 - 1"):
+        open_study(name="Round 1", votes_per_expert=3, seed=seed, **cast_of())
 
 
 def test_simulated_contestants_take_part_only_when_allowed() -> None:
