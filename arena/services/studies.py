@@ -67,16 +67,7 @@ def open_study(
     cells = _latest_pictures(contestant_rows, scenario_rows)
     rules = _rules(cells, expert_rows, votes_per_expert, seed)
     planned = plan(rules)
-    study = Study(
-        name=name,
-        state=Study.State.OPEN,
-        votes_per_expert=votes_per_expert,
-        seed=seed,
-        rules=_frozen_rules(rules, planned),
-        allow_simulated=allow_simulated,
-        opened_at=timezone.now(),
-    )
-    _insert(study)
+    study = _insert(name, rules, planned, allow_simulated)
     study.contestants.set(contestant_rows)
     study.scenarios.set(scenario_rows)
     study.experts.set(expert_rows)
@@ -220,12 +211,20 @@ def _rules(cells: Cells, experts: list[User], votes_per_expert: int, seed: int) 
 # --- What is kept ------------------------------------------------------------------------------
 
 
-def _insert(study: Study) -> None:
+def _insert(name: str, rules: Rules, planned: Plan, allow_simulated: bool) -> Study:
     try:
         with transaction.atomic():
-            study.save(force_insert=True)
+            return Study.objects.create(
+                name=name,
+                state=Study.State.OPEN,
+                votes_per_expert=rules.votes_per_expert,
+                seed=rules.seed,
+                rules=_frozen_rules(rules, planned),
+                allow_simulated=allow_simulated,
+                opened_at=timezone.now(),
+            )
     except IntegrityError:  # somebody else was faster
-        raise _taken(study.name) from None
+        raise _taken(name) from None
 
 
 def _taken(name: str) -> Conflict:
