@@ -2,19 +2,10 @@
 
 from __future__ import annotations
 
-import io
-from typing import Any
-
+from arena.exports.drawing import GRID, INK, MARK, drawn, house_style
 from arena.exports.tables import LeaderboardTable
 
 _ROW_IN = 0.34
-_INK, _GRID, _MARK = "#1d2733", "#d5dbe3", "#2f6db5"
-# Nothing that differs between two runs may get into a file: no date, no random ids, no version.
-_METADATA: dict[str, dict[str, Any]] = {
-    "svg": {"Date": None, "Creator": None},
-    "pdf": {"CreationDate": None, "Creator": None, "Producer": None},
-    "png": {"Software": None},
-}
 
 
 def interval_chart(table: LeaderboardTable, *, file_format: str) -> bytes:
@@ -24,33 +15,25 @@ def interval_chart(table: LeaderboardTable, *, file_format: str) -> bytes:
         table: Contestants without a rating keep their line, without a dot.
         file_format: "svg", "pdf" or "png".
     """
-    import matplotlib
     from matplotlib.figure import Figure
 
-    settings: dict[Any, Any] = {
-        "svg.hashsalt": "scenario-arena",
-        "svg.fonttype": "none",
-        "text.parse_math": False,  # a dollar sign in a name is a dollar sign
-    }
-    with matplotlib.rc_context(settings):
+    with house_style():
         figure = Figure(figsize=(6.4, 1.1 + _ROW_IN * len(table.rows)), layout="constrained")
         axes = figure.add_subplot()
         for place, row in enumerate(table.rows):
             if row.elo is None:
                 continue
             if row.lower is not None and row.upper is not None:
-                axes.plot([row.lower, row.upper], [place, place], color=_MARK, linewidth=1.6)
-            axes.plot([row.elo], [place], marker="o", markersize=5, color=_MARK)
+                axes.plot([row.lower, row.upper], [place, place], color=MARK, linewidth=1.6)
+            axes.plot([row.elo], [place], marker="o", markersize=5, color=MARK)
         axes.set_yticks(range(len(table.rows)), [row.model for row in table.rows])
         axes.set_ylim(len(table.rows) - 0.5, -0.5)
-        axes.set_xlabel(_label(table), color=_INK)
-        axes.grid(axis="x", color=_GRID, linewidth=0.6)
+        axes.set_xlabel(_label(table), color=INK)
+        axes.grid(axis="x", color=GRID, linewidth=0.6)
         axes.set_axisbelow(True)
         axes.spines[["top", "right", "left"]].set_visible(False)
-        axes.tick_params(axis="y", length=0, colors=_INK)
-        picture = io.BytesIO()
-        figure.savefig(picture, format=file_format, dpi=200, metadata=_METADATA[file_format])
-    return picture.getvalue()
+        axes.tick_params(axis="y", length=0, colors=INK)
+        return drawn(figure, file_format)
 
 
 def _label(table: LeaderboardTable) -> str:

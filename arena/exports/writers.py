@@ -5,12 +5,11 @@ from __future__ import annotations
 import csv
 import io
 import json
-from collections.abc import Callable
-from dataclasses import dataclass
 from functools import partial
 from typing import Any
 
 from arena.exports.charts import interval_chart
+from arena.exports.formats import Format, cell, rounded
 from arena.exports.latex import latex
 from arena.exports.tables import LeaderboardTable, Row
 from augment.errors import UnknownName
@@ -21,28 +20,13 @@ COLUMNS = (
 )  # fmt: skip
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Format:
-    """How a leaderboard can be written.
-
-    Attributes:
-        suffix: Of the file's name, without the dot.
-        write: Makes the file's bytes.
-    """
-
-    suffix: str
-    content_type: str
-    is_text: bool
-    write: Callable[[LeaderboardTable], bytes]
-
-
 def csv_bytes(table: LeaderboardTable) -> bytes:
     """One line a contestant; what is unknown is empty, numbers have two decimals."""
     sheet = io.StringIO()
     writer = csv.writer(sheet, lineterminator="\n")
     writer.writerow(COLUMNS)
     for row in table.rows:
-        writer.writerow([_cell(value) for value in _values(table, row)])
+        writer.writerow([cell(value) for value in _values(table, row)])
     return sheet.getvalue().encode()
 
 
@@ -75,9 +59,9 @@ def json_bytes(table: LeaderboardTable) -> bytes:
                 "kind": row.kind,
                 "simulated": row.simulated,
                 "rank": row.rank,
-                "rating": _rounded(row.elo),
-                "lower": _rounded(row.lower),
-                "upper": _rounded(row.upper),
+                "rating": rounded(row.elo),
+                "lower": rounded(row.lower),
+                "upper": rounded(row.upper),
                 "votes": row.votes,
                 "wins": row.wins,
                 "ties": row.ties,
@@ -112,7 +96,7 @@ def plain_text(table: LeaderboardTable) -> str:
     return "\n".join([*lines, *table.warnings])
 
 
-FORMATS = {
+FORMATS: dict[str, Format[LeaderboardTable]] = {
     "csv": Format(
         suffix="csv", content_type="text/csv; charset=utf-8", is_text=True, write=csv_bytes
     ),
@@ -144,7 +128,7 @@ FORMATS = {
 }
 
 
-def format_named(name: str) -> Format:
+def format_named(name: str) -> Format[LeaderboardTable]:
     """How to write that format.
 
     Raises:
@@ -163,20 +147,3 @@ def _values(table: LeaderboardTable, row: Row) -> tuple[object, ...]:
         row.slug, row.kind, row.simulated, row.note,
         table.study, table.method_text, table.simulated, table.early,
     )  # fmt: skip
-
-
-def _cell(value: object) -> str:
-    """A cell that no spreadsheet takes for a formula."""
-    if value is None:
-        return ""
-    if isinstance(value, bool):
-        return "yes" if value else "no"
-    if isinstance(value, float):
-        return f"{value:.2f}"
-    text = str(value)
-    guard = "'" if text.startswith(("=", "+", "-", "@", "\t", "\r", "\n")) else ""
-    return guard + text.replace("\r", " ").replace("\n", " ")
-
-
-def _rounded(value: float | None) -> float | None:
-    return None if value is None else round(value, 4)

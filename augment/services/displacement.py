@@ -32,6 +32,7 @@ __all__ = [
     "of_augmentation",
     "of_job",
     "of_latest",
+    "spelled",
     "summarise",
     "types_named",
 ]
@@ -42,6 +43,11 @@ PLACED_EXACTLY = (ScenarioType.JAYWALKER, ScenarioType.NUDGE, ScenarioType.OVERT
 """The types of the paper's figure by variant: a crash or a construction zone can lie in many
 places that all follow the instruction."""
 
+
+SPELLING = {"otm": "OTM", "fc": "FC", "tqa": "tQA", "vqa": "vQA"}
+"""The variants as the paper spells and orders them; combined ones are joined by a plus."""
+
+NO_VARIANT = "Without a variant"
 
 Place = tuple[int, str, str, str]
 """Sorts the groups; rows of the same place are one group."""
@@ -114,7 +120,7 @@ def of_augmentation(row: Augmentation) -> Measured:
 
 
 def groups(
-    measured: Iterable[Measured], *, by: By, types: Collection[ScenarioType] | None = None
+    measured: Iterable[Measured], *, by: By, types: Collection[str] | None = None
 ) -> list[Group]:
     """What was measured, summed up: by type in the catalogue's order, else by name.
 
@@ -147,6 +153,12 @@ def types_named(names: Sequence[str]) -> tuple[ScenarioType, ...]:
         if name not in known:
             raise UnknownName("scenario type", name, ["all", *known])
     return tuple(known[name] for name in names)
+
+
+def spelled(variant: str) -> str:
+    """A variant as the paper spells it: "fc+tqa" is FC+tQA."""
+    parts = [SPELLING.get(part, part) for part in variant.lower().split("+")]
+    return "+".join(parts) if variant else NO_VARIANT
 
 
 # Private
@@ -188,10 +200,18 @@ def _place(row: Augmentation, by: By) -> Place:
     match by:
         case By.TYPE:
             return (Scenario.Type.values.index(row.scenario.type), "", *who)
-        case By.VARIANT:  # what has no variant comes last
-            return (int(not contestant.variant), contestant.variant.lower(), *who)
+        case By.VARIANT:
+            return (_rank(contestant.variant), contestant.variant.lower(), *who)
         case By.CONTESTANT:
             return (0, "", *who)
+
+
+def _rank(variant: str) -> int:
+    """The paper's four in its order, then combinations, then what has no variant."""
+    known = list(SPELLING)
+    if not variant:
+        return len(known) + 1
+    return known.index(variant.lower()) if variant.lower() in known else len(known)
 
 
 def _group(cell: list[tuple[Augmentation, Displacement]], by: By) -> Group:
@@ -199,7 +219,7 @@ def _group(cell: list[tuple[Augmentation, Displacement]], by: By) -> Group:
     contestant = row.contestant
     headings = {
         By.TYPE: row.scenario.get_type_display(),
-        By.VARIANT: contestant.variant or "without a variant",
+        By.VARIANT: spelled(contestant.variant),
         By.CONTESTANT: contestant.name,
     }
     return Group(

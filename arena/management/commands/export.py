@@ -8,51 +8,107 @@ from typing import Any
 from django.core.management.base import BaseCommand, CommandError, CommandParser
 
 from arena.errors import ArenaError, StudyStillOpen
+from arena.exports import displacement_writers
+from arena.exports.displacement_table import displacement_table
 from arena.exports.files import write_whole
+from arena.exports.samples import SHEET_FORMATS, sheet_bytes, sheet_of
 from arena.exports.tables import leaderboard_table
-from arena.exports.writers import FORMATS, Format, format_named
+from arena.exports.writers import FORMATS, format_named
 from arena.models import Study
+from arena.queries.jobs import grid, job_named
 from arena.queries.results import snapshot_to_export
 from arena.queries.studies import study_named
 from arena.services.ratings import log_early_look
-from augment.errors import AugmentError
+from augment.errors import AugmentError, UnknownName
+from augment.services.displacement import By, types_named
+
+Written = tuple[bytes, str, bool]
+"""A file's bytes, its ending, and whether it is text."""
 
 
 class Command(BaseCommand):
     """One subcommand per kind of result."""
 
-    help = "Write results to files; the same snapshot always gives the same bytes."
+    help = "Write results to files; the same snapshot or job always gives the same bytes."
 
     def add_arguments(self, parser: CommandParser) -> None:
-        """What to export, of which study, where to."""
+        """What to export, of which study or job, where to."""
         kinds = parser.add_subparsers(dest="what", required=True, metavar="WHAT")
         leaderboard = kinds.add_parser("leaderboard", help="the newest rating of a study")
         leaderboard.add_argument("study", help="its name or its code")
         leaderboard.add_argument("--format", default="csv", help=f"one of {', '.join(FORMATS)}")
-        leaderboard.add_argument("--out", required=True, help="a file; - for standard output")
         leaderboard.add_argument(
             "--early", action="store_true", help="export from an open study; this is logged"
         )
+        displacement = kinds.add_parser("displacement", help="how far from the references")
+        displacement.add_argument("job", help="its name or its code")
+        displacement.add_argument("--by", default="type", help=f"one of {', '.join(By)}")
+        displacement.add_argument(
+            "--types",
+            nargs="+",
+            help="scenario types, or all; by variant only those with definite places unless given",
+        )
+        displacement.add_argument(
+            "--format", default="csv", help=f"one of {', '.join(displacement_writers.FORMATS)}"
+        )
+        samples = kinds.add_parser("samples", help="a sheet of pictures with captions")
+        samples.add_argument("job", help="its name or its code")
+        samples.add_argument("--scenarios", nargs="+", required=True, help="slugs, top to bottom")
+        samples.add_argument("--contestants", nargs="+", required=True, help="left to right")
+        samples.add_argument(
+            "--format", help=f"one of {', '.join(SHEET_FORMATS)}; else the file's ending says it"
+        )
+        for kind in (leaderboard, displacement, samples):
+            kind.add_argument("--out", required=True, help="a file; - for standard output")
 
     def handle(self, *args: Any, **options: Any) -> None:
         """Write the file."""
+        write = {
+            "leaderboard": self._leaderboard,
+            "displacement": self._displacement,
+            "samples": self._samples,
+        }
         try:
-            study = study_named(options["study"])
-            chosen = format_named(options["format"])
-            snapshot = snapshot_to_export(study)
-            if study.state == Study.State.OPEN:
-                if not options["early"]:
-                    raise StudyStillOpen(study.name)
-                log_early_look(study=study, actor=None, what=f"leaderboard as {options['format']}")
-            content = chosen.write(leaderboard_table(snapshot))
+            content, suffix, is_text = write[options["what"]](options)
         except (ArenaError, AugmentError) as error:
             raise CommandError(str(error)) from error
-        self._deliver(content, options["out"], chosen)
+        self._deliver(content, options["out"], suffix, is_text)
 
-    def _deliver(self, content: bytes, out: str, chosen: Format) -> None:
+    def _leaderboard(self, options: dict[str, Any]) -> Written:
+        study = study_named(options["study"])
+        chosen = format_named(options["format"])
+        snapshot = snapshot_to_export(study)
+        if study.state == Study.State.OPEN:
+            if not options["early"]:
+                raise StudyStillOpen(study.name)
+            log_early_look(study=study, actor=None, what=f"leaderboard as {options['format']}")
+        return chosen.write(leaderboard_table(snapshot)), chosen.suffix, chosen.is_text
+
+    def _displacement(self, options: dict[str, Any]) -> Written:
+        chosen = displacement_writers.format_named(options["format"])
+        if options["by"] not in set(By):
+            raise UnknownName("grouping", options["by"], list(By))
+        types = None if options["types"] is None else types_named(options["types"])
+        table = displacement_table(job_named(options["job"]), by=By(options["by"]), types=types)
+        return chosen.write(table), chosen.suffix, chosen.is_text
+
+    def _samples(self, options: dict[str, Any]) -> Written:
+        form = options["format"] or Path(options["out"]).suffix.removeprefix(".")
+        if form not in SHEET_FORMATS:
+            raise UnknownName("format", form, list(SHEET_FORMATS))
+        job = job_named(options["job"])
+        sheet = sheet_of(
+            job.name,
+            grid(job),
+            scenarios=options["scenarios"],
+            contestants=options["contestants"],
+        )
+        return sheet_bytes(sheet, file_format=form), form, False
+
+    def _deliver(self, content: bytes, out: str, suffix: str, is_text: bool) -> None:
         if out == "-":
-            if not chosen.is_text:
-                raise CommandError(f"A {chosen.suffix} file can't go to a terminal: name a file.")
+            if not is_text:
+                raise CommandError(f"A {suffix} file can't go to a terminal: name a file.")
             self.stdout.write(content.decode(), ending="")
             return
         try:

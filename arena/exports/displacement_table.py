@@ -1,0 +1,111 @@
+"""The displacement errors of a job as a table: what its files, chart and page show."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from arena.exports.published import BY_VARIANT, PublishedBox
+from arena.exports.tables import SIMULATED
+from augment.models import GenerationJob, Scenario
+from augment.services.displacement import (
+    PLACED_EXACTLY,
+    By,
+    Group,
+    Measured,
+    groups,
+    of_job,
+)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class DisplacementTable:
+    """A job's groups in order, and all that must be said with them.
+
+    Attributes:
+        types: The scenario types that count, by their names.
+        measured: Every row of the job, for whoever wants the single values.
+        left_out: Augmentations without a displacement, by reason.
+        published: The paper's boxes to stand beside, empty where they answer another question.
+    """
+
+    job: str
+    by: By
+    types: tuple[str, ...]
+    groups: tuple[Group, ...]
+    measured: tuple[Measured, ...]
+    left_out: dict[str, int]
+    published: tuple[PublishedBox, ...]
+
+    @property
+    def simulated(self) -> bool:
+        """Whether a contestant in it is simulated."""
+        return any(group.is_simulated for group in self.groups)
+
+    @property
+    def types_text(self) -> str:
+        """Which scenario types count, in words."""
+        if len(self.types) == len(Scenario.Type.values):
+            return "All five scenario types"
+        labels = [str(Scenario.Type(one).label) for one in self.types]
+        return "Scenario types: " + ", ".join(labels)
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """Sentences that belong beneath every form of it."""
+        said = [
+            f"{self.types_text}.",
+            "Distances between centres, in metres, of objects matched within their class so that "
+            "their sum is smallest; each matched object counts once.",
+            "Missing and surplus objects are counted and have no distance; an unreadable or "
+            "refused answer misses all.",
+        ]
+        if self.by is By.VARIANT and self.is_papers_choice:
+            said.append(
+                "As in the paper, construction zone and accident site are left out: their "
+                "objects can lie in many places that all follow the instruction."
+            )
+        if self.left_out:
+            reasons = ", ".join(f"{number} ({why})" for why, number in self.left_out.items())
+            said.append(f"Augmentations not measured: {reasons}.")
+        if self.simulated:
+            said.append("Simulated contestants are marked; they say nothing about a real one.")
+        return tuple(said)
+
+    @property
+    def is_papers_choice(self) -> bool:
+        """Whether the types are those of the paper's figure by variant."""
+        return set(self.types) == set(PLACED_EXACTLY)
+
+
+def displacement_table(
+    job: GenerationJob, *, by: By, types: Sequence[str] | None = None
+) -> DisplacementTable:
+    """The table of a job; one query.
+
+    Args:
+        job: Whose augmentations are measured.
+        by: What to group by, beside the contestant.
+        types: The scenario types that count; None for the paper's choice: by variant those whose
+            places are definite, else all.
+    """
+    measured = of_job(job)
+    if types is None:
+        types = PLACED_EXACTLY if by is By.VARIANT else tuple(Scenario.Type.values)
+    chosen = tuple(one for one in Scenario.Type.values if one in set(types))
+    left_out = Counter(one.why_not.value for one in measured if one.why_not is not None)
+    return DisplacementTable(
+        job=job.name,
+        by=by,
+        types=chosen,
+        groups=tuple(groups(measured, by=by, types=chosen)),
+        measured=tuple(one for one in measured if one.row.scenario.type in chosen),
+        left_out=dict(sorted(left_out.items())),
+        published=BY_VARIANT if by is By.VARIANT and set(chosen) == set(PLACED_EXACTLY) else (),
+    )
+
+
+def marked(group: Group) -> str:
+    """The contestant's name, with "(simulated)" where that is so."""
+    return f"{group.contestant}{SIMULATED}" if group.is_simulated else group.contestant

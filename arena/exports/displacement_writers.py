@@ -1,0 +1,185 @@
+"""Displacement errors as a file. The same job always gives the same bytes."""
+
+from __future__ import annotations
+
+import csv
+import io
+import json
+from functools import partial
+from typing import Any
+
+from arena.exports.displacement_chart import box_plot
+from arena.exports.displacement_table import DisplacementTable, marked
+from arena.exports.formats import Format, cell, rounded
+from arena.exports.published import SOURCE, PublishedBox
+from augment.errors import UnknownName
+from augment.services.displacement import Box, Group, Measured
+
+COLUMNS = (
+    "group", "contestant", "slug", "model", "variant", "simulated", "augmentations", "n",
+    "missing", "surplus", "median_m", "q1_m", "q3_m", "mean_m", "low_m", "high_m", "outliers_m",
+    "source", "types",
+)  # fmt: skip
+MEASURED = "measured"
+
+
+def csv_bytes(table: DisplacementTable) -> bytes:
+    """One line a group, then one a published box; what is unknown is empty."""
+    sheet = io.StringIO()
+    writer = csv.writer(sheet, lineterminator="\n")
+    writer.writerow(COLUMNS)
+    types = " ".join(table.types)
+    for group in table.groups:
+        found = group.summary
+        writer.writerow(
+            [
+                *(cell(value) for value in _who(group)),
+                *(cell(n) for n in (found.augmentations, found.n, found.missing, found.surplus)),
+                *_numbers(found.box),
+                MEASURED,
+                types,
+            ]
+        )
+    for box in table.published:
+        numbers = [f"{one:.1f}" for one in (box.median_m, box.q1_m, box.q3_m)]
+        named = [box.variant, f"{box.model} {box.variant} (paper)", "", box.model, box.variant]
+        counts = ["no", "", "", "", ""]
+        writer.writerow(
+            [*named, *counts, *numbers, "", "", f"{box.high_m:.1f}", "", SOURCE, types]
+        )
+    return sheet.getvalue().encode()
+
+
+def json_bytes(table: DisplacementTable) -> bytes:
+    """Groups, published boxes, and every augmentation with its own distances."""
+    document: dict[str, Any] = {
+        "format": "scenario-arena/displacement",
+        "version": 1,
+        "job": table.job,
+        "by": table.by.value,
+        "types": list(table.types),
+        "simulated": table.simulated,
+        "notes": list(table.notes),
+        "not_measured": table.left_out,
+        "groups": [_group(group) for group in table.groups],
+        "published": [_published(box) for box in table.published],
+        "augmentations": [_single(one) for one in table.measured if one.displacement is not None],
+    }
+    return (json.dumps(document, indent=2, ensure_ascii=False) + "\n").encode()
+
+
+FORMATS: dict[str, Format[DisplacementTable]] = {
+    "csv": Format(
+        suffix="csv", content_type="text/csv; charset=utf-8", is_text=True, write=csv_bytes
+    ),
+    "json": Format(suffix="json", content_type="application/json", is_text=True, write=json_bytes),
+    "svg": Format(
+        suffix="svg",
+        content_type="image/svg+xml",
+        is_text=True,
+        write=partial(box_plot, file_format="svg"),
+    ),
+    "pdf": Format(
+        suffix="pdf",
+        content_type="application/pdf",
+        is_text=False,
+        write=partial(box_plot, file_format="pdf"),
+    ),
+    "png": Format(
+        suffix="png",
+        content_type="image/png",
+        is_text=False,
+        write=partial(box_plot, file_format="png"),
+    ),
+}
+
+
+def format_named(name: str) -> Format[DisplacementTable]:
+    """How to write that format.
+
+    Raises:
+        UnknownName: Nobody knows it.
+    """
+    if name not in FORMATS:
+        raise UnknownName("format", name, list(FORMATS))
+    return FORMATS[name]
+
+
+# Private
+
+
+def _who(group: Group) -> tuple[object, ...]:
+    return (
+        group.heading, marked(group), group.slug, group.model, group.variant, group.is_simulated,
+    )  # fmt: skip
+
+
+def _numbers(box: Box | None) -> list[str]:
+    """Median, quartiles, mean, whiskers and outliers, to the millimetre."""
+    if box is None:
+        return [""] * 7
+    numbers = (box.median_m, box.q1_m, box.q3_m, box.mean_m, box.low_m, box.high_m)
+    outliers = " ".join(f"{one:.3f}" for one in box.outliers_m)
+    return [*(f"{one:.3f}" for one in numbers), outliers]
+
+
+def _group(group: Group) -> dict[str, Any]:
+    found = group.summary
+    return {
+        "group": group.heading,
+        "contestant": group.contestant,
+        "slug": group.slug,
+        "model": group.model,
+        "variant": group.variant,
+        "simulated": group.is_simulated,
+        "augmentations": found.augmentations,
+        "n": found.n,
+        "missing": found.missing,
+        "surplus": found.surplus,
+        "box": None if found.box is None else _box(found.box),
+    }
+
+
+def _box(box: Box) -> dict[str, Any]:
+    return {
+        "median_m": rounded(box.median_m),
+        "q1_m": rounded(box.q1_m),
+        "q3_m": rounded(box.q3_m),
+        "mean_m": rounded(box.mean_m),
+        "low_m": rounded(box.low_m),
+        "high_m": rounded(box.high_m),
+        "outliers_m": [rounded(one) for one in box.outliers_m],
+    }
+
+
+def _published(box: PublishedBox) -> dict[str, Any]:
+    return {
+        "source": SOURCE,
+        "model": box.model,
+        "variant": box.variant,
+        "median_m": box.median_m,
+        "q1_m": box.q1_m,
+        "q3_m": box.q3_m,
+        "high_m": box.high_m,
+    }
+
+
+def _single(one: Measured) -> dict[str, Any]:
+    assert one.displacement is not None
+    return {
+        "scenario": one.row.scenario.slug,
+        "type": one.row.scenario.type,
+        "contestant": one.row.contestant.slug,
+        "state": one.row.state,
+        "missing": list(one.displacement.missing),
+        "surplus": list(one.displacement.surplus),
+        "matches": [
+            {
+                "reference": match.reference,
+                "generated": match.generated,
+                "class": match.object_class.value,
+                "distance_m": rounded(match.distance_m),
+            }
+            for match in one.displacement.matches
+        ],
+    }

@@ -1,0 +1,147 @@
+"""A sheet of pictures, scenarios down and contestants across: the paper's qualitative figure."""
+
+from __future__ import annotations
+
+import io
+import textwrap
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from django.core.files.storage import default_storage
+
+from arena.exports.drawing import INK, SIMULATED, SOFT, drawn, house_style
+from arena.exports.tables import SIMULATED as SIMULATED_WORD
+from arena.queries.jobs import Grid, Row
+from augment.errors import UnknownName
+from augment.models import Augmentation, Contestant
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+SHEET_FORMATS = ("pdf", "png")
+
+_WIDTH_IN, _HEIGHT_IN = 3.2, 3.2 * 2.0 / 3.0
+_CAPTION_IN, _HEAD_IN, _FOOT_IN = 0.42, 0.3, 0.28
+_LEGEND = (
+    "Ego vehicle red, changed agents blue. Every row has one camera for all its pictures. "
+    "An unreadable or refused answer shows the unchanged scene."
+)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Sheet:
+    """What is on the sheet, in its order."""
+
+    job: str
+    contestants: tuple[Contestant, ...]
+    rows: tuple[Row, ...]
+
+
+def sheet_of(
+    job: str, grid: Grid, *, scenarios: Sequence[str], contestants: Sequence[str]
+) -> Sheet:
+    """The chosen cells of a job's grid, in the order in which they were named.
+
+    Raises:
+        UnknownName: The job has no such scenario or contestant.
+    """
+    columns = {contestant.slug: n for n, contestant in enumerate(grid.contestants)}
+    lines = {row.scenario.slug: row for row in grid.rows}
+    for kind, names, known in (
+        ("contestant of this job", contestants, columns),
+        ("scenario of this job", scenarios, lines),
+    ):
+        for name in names:
+            if name not in known:
+                raise UnknownName(kind, name, list(known))
+    chosen = [columns[slug] for slug in contestants]
+    return Sheet(
+        job=job,
+        contestants=tuple(grid.contestants[n] for n in chosen),
+        rows=tuple(
+            Row(scenario=lines[slug].scenario, cells=[lines[slug].cells[n] for n in chosen])
+            for slug in scenarios
+        ),
+    )
+
+
+def sheet_bytes(sheet: Sheet, *, file_format: str) -> bytes:
+    """The sheet as a file.
+
+    Args:
+        sheet: At least one scenario and one contestant.
+        file_format: "pdf" or "png".
+    """
+    from matplotlib.figure import Figure
+
+    across, down = len(sheet.contestants), len(sheet.rows)
+    row_in = _HEIGHT_IN + _CAPTION_IN
+    size = (_WIDTH_IN * across, _HEAD_IN + row_in * down + _FOOT_IN)
+    with house_style():
+        figure = Figure(figsize=size)
+        for n, contestant in enumerate(sheet.contestants):
+            is_simulated = contestant.is_simulated
+            figure.text(
+                (n + 0.5) / across,
+                1.0 - 0.55 * _HEAD_IN / size[1],
+                contestant.name + (SIMULATED_WORD if is_simulated else ""),
+                ha="center",
+                va="center",
+                fontsize=9,
+                fontweight="bold",
+                color=SIMULATED if is_simulated else INK,
+            )
+        for line, row in enumerate(sheet.rows):
+            top_in = size[1] - _HEAD_IN - row_in * line
+            for n, cell in enumerate(row.cells):
+                left = (n + 0.01) / across
+                place = (
+                    left,
+                    (top_in - _HEIGHT_IN) / size[1],
+                    0.98 / across,
+                    _HEIGHT_IN / size[1],
+                )
+                _picture(figure.add_axes(place), cell)
+            caption = _caption(chr(ord("a") + line % 26), row, across)
+            middle = (top_in - _HEIGHT_IN - 0.06) / size[1]
+            figure.text(0.5, middle, caption, ha="center", va="top", fontsize=8, color=INK)
+        figure.text(0.5, 0.09 / size[1], _legend(across), ha="center", fontsize=6, color=SOFT)
+        return drawn(figure, file_format)
+
+
+# Private
+
+
+def _picture(axes: Axes, cell: Augmentation | None) -> None:
+    """The cell's picture, or a word on why there is none."""
+    from matplotlib.image import imread
+
+    axes.set_xticks([])
+    axes.set_yticks([])
+    axes.spines[:].set_color(SOFT)
+    axes.spines[:].set_linewidth(0.5)
+    if cell is not None and cell.image and default_storage.exists(cell.image):
+        with default_storage.open(cell.image) as file:
+            axes.imshow(imread(io.BytesIO(file.read()), format="png"), aspect="auto")
+        if cell.state != Augmentation.State.DONE:
+            axes.set_title(_word(cell), fontsize=7, color=SOFT, y=0.02, va="bottom")
+        return
+    axes.text(0.5, 0.5, _word(cell), ha="center", va="center", fontsize=8, color=SOFT)
+
+
+def _word(cell: Augmentation | None) -> str:
+    if cell is None:
+        return "not part of the job"
+    if cell.state in Augmentation.SHOWABLE and cell.state != Augmentation.State.DONE:
+        return f"{cell.get_state_display()}: unchanged scene"
+    return f"no picture: {cell.get_state_display().lower()}"
+
+
+def _caption(letter: str, row: Row, across: int) -> str:
+    text = f"({letter}) {row.scenario.get_type_display()}: “{row.scenario.instruction.strip()}”"
+    return "\n".join(textwrap.wrap(text, width=50 * across, max_lines=2, placeholder=" …"))
+
+
+def _legend(across: int) -> str:
+    return "\n".join(textwrap.wrap(_LEGEND, width=72 * across))

@@ -1,0 +1,229 @@
+from __future__ import annotations
+
+import csv
+import io
+import json
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+from django.core.management import CommandError, call_command
+
+from arena.exports.displacement_chart import box_plot
+from arena.exports.displacement_table import DisplacementTable, displacement_table
+from arena.exports.displacement_writers import COLUMNS, FORMATS, csv_bytes, json_bytes
+from arena.exports.published import BY_VARIANT, SOURCE
+from augment.models import Augmentation, Contestant, GenerationJob
+from augment.scene.catalogue import ScenarioType
+from augment.scene.codec import modification_to_document
+from augment.scene.modification import Modification
+from augment.services.displacement import By
+from augment.services.pictures import store
+from tests.jobs import rows
+from tests.scenes import cone
+from tests.web.cast import png
+
+pytestmark = pytest.mark.django_db
+
+
+def a_job(*, aside_m: float = 2.0) -> GenerationJob:
+    """Ann puts the first cone aside and leaves out the second; sim's answers are unreadable."""
+    job = GenerationJob.objects.create(name="Round 1")
+    ann = rows.add_kind("ann", Contestant.Kind.RULE)
+    sim = rows.add_kind("sim", Contestant.Kind.SIMULATED)
+    change = Modification(added=(cone("Agent2", 20.0, 0.5 + aside_m),))
+    kinds = {"works": ScenarioType.CONSTRUCTION_ZONE, "parked": ScenarioType.NUDGE}
+    for slug, kind in kinds.items():
+        scenario = rows.add_scenario(slug, type=kind)
+        Augmentation.objects.create(
+            job=job,
+            scenario=scenario,
+            contestant=ann,
+            state="done",
+            modification=modification_to_document(change),
+            image=store(png()),
+        )
+        Augmentation.objects.create(
+            job=job, scenario=scenario, contestant=sim, state="unreadable", image=store(png(9))
+        )
+    return job
+
+
+def table(by: By = By.TYPE, **changes: float) -> DisplacementTable:
+    return displacement_table(a_job(**changes), by=by)
+
+
+def lines_of(content: bytes) -> list[dict[str, str]]:
+    return list(csv.DictReader(io.StringIO(content.decode())))
+
+
+def run(*arguments: object) -> str:
+    out = io.StringIO()
+    call_command("export", *map(str, arguments), stdout=out, stderr=io.StringIO())
+    return out.getvalue()
+
+
+def test_csv_has_a_line_per_type_and_contestant_and_leaves_the_unknown_empty() -> None:
+    found = lines_of(csv_bytes(table()))
+    assert list(found[0]) == list(COLUMNS)
+    assert [(line["group"], line["contestant"]) for line in found] == [
+        ("Construction zone", "ann"),
+        ("Construction zone", "sim (simulated)"),
+        ("Nudge around parked vehicle", "ann"),
+        ("Nudge around parked vehicle", "sim (simulated)"),
+    ]
+    ann, sim = found[:2]
+    assert (ann["median_m"], ann["n"], ann["missing"], ann["surplus"]) == ("2.000", "1", "1", "0")
+    assert (sim["median_m"], sim["n"], sim["missing"], sim["simulated"]) == ("", "0", "2", "yes")
+
+
+def test_by_variant_says_which_types_it_leaves_out_and_shows_the_papers_boxes_beside() -> None:
+    shown = table(By.VARIANT)
+    assert any("construction zone and accident site are left out" in one for one in shown.notes)
+    found = lines_of(csv_bytes(shown))
+    assert {line["augmentations"] for line in found if line["source"] == "measured"} == {"1"}
+    published = [line for line in found if line["source"] == SOURCE]
+    assert len(published) == len(BY_VARIANT) == 10
+    assert published[0]["contestant"] == "GPT-4o OTM (paper)"
+    assert (published[0]["q1_m"], published[0]["median_m"], published[0]["q3_m"]) == (
+        "1.2",
+        "1.5",
+        "2.1",
+    )
+    assert (published[0]["mean_m"], published[0]["n"]) == ("", "")
+
+
+def test_all_five_types_stand_without_the_papers_boxes_which_answer_another_question() -> None:
+    shown = displacement_table(a_job(), by=By.VARIANT, types=tuple(ScenarioType))
+    assert shown.published == ()
+    assert shown.notes[0] == "All five scenario types."
+    assert {group.summary.augmentations for group in shown.groups} == {2}
+
+
+def test_json_holds_every_single_distance() -> None:
+    document = json.loads(json_bytes(table()))
+    assert document["simulated"] is True
+    single = document["augmentations"][0]
+    assert (single["contestant"], single["scenario"]) == ("ann", "parked")
+    assert single["matches"] == [
+        {
+            "reference": "Agent2",
+            "generated": "Agent2",
+            "class": "traffic cone",
+            "distance_m": 2.0,
+        }
+    ]
+    assert single["missing"] == ["Agent3"]
+
+
+def test_what_was_not_measured_is_said() -> None:
+    job = a_job()
+    job.augmentations.filter(contestant__slug="sim").update(state="failed")
+    notes = displacement_table(job, by=By.TYPE).notes
+    assert "Augmentations not measured: 2 (waits, runs, failed or was cancelled)." in notes
+
+
+@pytest.mark.parametrize("name", sorted(FORMATS))
+def test_the_same_job_gives_the_same_bytes(name: str) -> None:
+    job = a_job()
+    write = FORMATS[name].write
+    first, again = (write(displacement_table(job, by=By.VARIANT)) for _ in range(2))
+    assert first == again
+    assert b"2026" not in first[:400]
+
+
+@pytest.mark.parametrize("by", list(By))
+def test_the_chart_names_and_marks_everybody(by: By) -> None:
+    shown = box_plot(table(by), file_format="svg").decode()
+    assert "sim (simulated)" in shown
+    assert "n 0, " in shown
+    assert ("read from the paper's figure" in shown.replace("&#x27;", "'")) is (by is By.VARIANT)
+
+
+def test_outliers_far_beyond_the_whiskers_turn_the_axis_logarithmic() -> None:
+    near = table()
+    group = near.groups[0]
+    assert group.summary.box is not None
+    far = replace(group.summary.box, outliers_m=(90.0,))
+    wide = replace(near, groups=(replace(group, summary=replace(group.summary, box=far)),))
+    assert "logarithmic beyond 1 m" not in box_plot(near, file_format="svg").decode()
+    assert "logarithmic beyond 1 m" in box_plot(wide, file_format="svg").decode()
+
+
+def test_a_job_of_which_nothing_is_measured_still_has_a_chart() -> None:
+    job = GenerationJob.objects.create(name="Empty")
+    assert b"Displacement error" in box_plot(
+        displacement_table(job, by=By.CONTESTANT), file_format="svg"
+    )
+
+
+def test_the_command_writes_what_it_is_asked_for(tmp_path: Path) -> None:
+    job = a_job()
+    assert "ann" in run("displacement", job.code, "--by", "contestant", "--out", "-")
+    run("displacement", "Round 1", "--format", "pdf", "--out", tmp_path / "box.pdf")
+    assert (tmp_path / "box.pdf").read_bytes().startswith(b"%PDF")
+
+
+@pytest.mark.parametrize(
+    ("arguments", "sentence"),
+    [
+        (("displacement", "Round 2", "--out", "-"), "Unknown job 'Round 2'. Known: Round 1."),
+        (("displacement", "Round 1", "--by", "month", "--out", "-"), "Unknown grouping 'month'"),
+        (("displacement", "Round 1", "--types", "boat", "--out", "-"), "scenario type 'boat'"),
+        (("displacement", "Round 1", "--format", "gif", "--out", "-"), "Unknown format 'gif'"),
+        (("displacement", "Round 1", "--format", "pdf", "--out", "-"), "can't go to a terminal"),
+    ],
+)
+def test_a_wrong_wish_is_a_sentence(arguments: tuple[str, ...], sentence: str) -> None:
+    a_job()
+    with pytest.raises(CommandError, match=sentence):
+        run(*arguments)
+
+
+def test_two_jobs_of_one_name_go_by_their_codes() -> None:
+    job = a_job()
+    GenerationJob.objects.create(name="Round 1")
+    with pytest.raises(CommandError, match=f"2 jobs are called 'Round 1'.*{job.code}"):
+        run("displacement", "Round 1", "--out", "-")
+
+
+# The sheet of samples
+
+SHEET = ("samples", "Round 1", "--scenarios", "works", "parked", "--contestants", "sim", "ann")
+
+
+@pytest.mark.parametrize("name", ["sheet.pdf", "sheet.png"])
+def test_the_sheet_of_samples_has_the_same_bytes_twice(tmp_path: Path, name: str) -> None:
+    a_job()
+    made = []
+    for _ in range(2):
+        run(*SHEET, "--out", tmp_path / name)
+        made.append((tmp_path / name).read_bytes())
+    assert made[0] == made[1]
+    assert made[0].startswith((b"%PDF", b"\x89PNG"))
+
+
+def test_a_sheet_without_a_picture_says_why(tmp_path: Path) -> None:
+    a_job().augmentations.filter(contestant__slug="sim").update(image="", state="cancelled")
+    run(*SHEET, "--out", tmp_path / "sheet.pdf")
+    assert (tmp_path / "sheet.pdf").exists()
+
+
+@pytest.mark.parametrize(
+    ("scenario", "contestant", "out", "sentence"),
+    [
+        ("works", "bob", "x.png", "Unknown contestant of this job 'bob'. Known: ann, sim."),
+        ("moon", "ann", "x.png", "Unknown scenario of this job 'moon'"),
+        ("works", "ann", "x.svg", "Unknown format 'svg'. Known: pdf, png."),
+    ],
+)
+def test_a_sheet_of_what_is_not_there_is_refused(
+    tmp_path: Path, scenario: str, contestant: str, out: str, sentence: str
+) -> None:
+    a_job()
+    with pytest.raises(CommandError, match=sentence):
+        run(
+            *("samples", "Round 1", "--scenarios", scenario),
+            *("--contestants", contestant, "--out", tmp_path / out),
+        )
+    assert list(tmp_path.glob("*.*")) == []
