@@ -11,17 +11,22 @@ from redis.retry import Retry
 
 from arena.errors import ArenaError
 
+HIGHEST_PORT = 65_535
+
 
 class PortTaken(ArenaError):
-    """Somebody else listens where the product should."""
+    """The product can't listen where it should: mostly somebody else does already."""
 
 
 def require_free_port(host: str, port: int) -> None:
     """Return if a server can listen there.
 
     Raises:
-        PortTaken: Another program does already, or the address is not this computer's.
+        PortTaken: Another program does already, the address is not this computer's, or the
+            number is none of a port.
     """
+    if not 1 <= port <= HIGHEST_PORT:
+        raise PortTaken(f"A port goes from 1 to {HIGHEST_PORT}, not {port}.")
     family = socket.AF_INET6 if ":" in host else socket.AF_INET
     with socket.socket(family, socket.SOCK_STREAM) as probe:
         probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)

@@ -4,11 +4,15 @@ from __future__ import annotations
 
 import csv
 import json
+import signal
 import struct
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
 
+from tests.processes import ROOT, wait_until
 from tests.stack import Home
 
 pytestmark = [pytest.mark.redis, pytest.mark.slow, pytest.mark.xdist_group("demo")]
@@ -53,6 +57,24 @@ def test_a_second_run_uses_what_is_there(demo_home: Home, tmp_path: Path) -> Non
     before = (again.folder / "var" / "demo" / "leaderboard.csv").read_bytes()
     again.must("demo", "--no-serve")
     assert (again.folder / "var" / "demo" / "leaderboard.csv").read_bytes() == before
+
+
+def test_ctrl_c_in_the_middle_ends_it_at_once(tmp_path: Path) -> None:
+    log = tmp_path / "demo.log"
+    with log.open("w") as file:
+        demo = subprocess.Popen(
+            [sys.executable, "manage.py", "demo", "--no-serve"],
+            cwd=ROOT,
+            env=Home.at(tmp_path).environment,
+            stdout=file,
+            stderr=subprocess.STDOUT,
+        )
+    wait_until(lambda: "0 of " in log.read_text(), what="the job is under way")
+    demo.send_signal(signal.SIGINT)
+    assert demo.wait(timeout=20) == 130
+    assert "The demo was stopped before it was done" in log.read_text()
+    assert "Traceback" not in log.read_text()
+    assert "Augmentations:" not in log.read_text()
 
 
 def chunks(data: bytes) -> list[bytes]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -11,10 +12,13 @@ from django.core.management import call_command
 from django.core.management.base import BaseCommand, CommandError, CommandParser
 
 from arena.errors import ArenaError
+from arena.management.commands.serve import INTERRUPTED
 from arena.serving import demo
 from arena.serving.stack import Web, background, web_server
 from arena.serving.supervisor import Supervisor
 from augment.errors import AugmentError
+
+STOPPED = "The demo was stopped before it was done; started again, it goes on from there."
 
 
 class Command(BaseCommand):
@@ -43,7 +47,7 @@ class Command(BaseCommand):
             with supervisor.signals():
                 try:
                     supervisor.start()
-                    demo.generate(self.stdout.write, supervisor.check)
+                    demo.generate(self.stdout.write, partial(_look_at, supervisor))
                     board = demo.vote_and_rate(self.stdout.write, settings.VAR_DIR / "demo")
                     self._show(board, web, time.monotonic() - started, serve=bool(server))
                     if server and not supervisor.is_stopping:
@@ -52,6 +56,8 @@ class Command(BaseCommand):
                     supervisor.stop()
         except (ArenaError, AugmentError) as error:
             raise CommandError(str(error)) from error
+        except KeyboardInterrupt:
+            raise CommandError(STOPPED, returncode=INTERRUPTED) from None
 
     def _show(self, board: demo.Leaderboard, web: Web, took_s: float, *, serve: bool) -> None:
         lines = [
@@ -79,6 +85,13 @@ class Command(BaseCommand):
         folder.mkdir(parents=True, exist_ok=True)
         with (folder / f"{name}.log").open("a") as log:
             log.write(f"{line}\n")
+
+
+def _look_at(supervisor: Supervisor) -> None:
+    """Start again what crashed, and end the wait when somebody pressed Ctrl-C."""
+    supervisor.check()
+    if supervisor.is_stopping:
+        raise KeyboardInterrupt
 
 
 def _short(path: Path) -> Path:

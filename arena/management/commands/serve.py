@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from argparse import ArgumentTypeError
 from typing import Any
 
 from django.core.management import call_command
@@ -10,6 +11,9 @@ from django.core.management.base import BaseCommand, CommandError, CommandParser
 from arena.errors import ArenaError
 from arena.serving.stack import Web, background, web_server
 from arena.serving.supervisor import Supervisor
+
+INTERRUPTED = 130
+"""The exit code of what Ctrl-C ended before it was done, as shells have it."""
 
 
 class Command(BaseCommand):
@@ -24,8 +28,12 @@ class Command(BaseCommand):
         """Declare the options."""
         parser.add_argument("--host", default="127.0.0.1", help="address to listen on")
         parser.add_argument("--port", type=int, default=8000, help="port to listen on")
-        parser.add_argument("--web-workers", type=int, default=2, help="web server processes")
-        parser.add_argument("--concurrency", type=int, default=4, help="augmentations at once")
+        parser.add_argument(
+            "--web-workers", type=_one_or_more, default=2, help="web server processes"
+        )
+        parser.add_argument(
+            "--concurrency", type=_one_or_more, default=4, help="augmentations at once"
+        )
 
     def handle(self, *args: Any, **options: Any) -> None:
         """Run until somebody asks to stop."""
@@ -45,7 +53,16 @@ class Command(BaseCommand):
                     supervisor.stop()
         except ArenaError as error:
             raise CommandError(str(error)) from error
+        except KeyboardInterrupt:  # before anything was started
+            raise CommandError("Stopped before anything ran.", returncode=INTERRUPTED) from None
         self.stdout.write("Everything is stopped.")
 
     def _say(self, name: str, line: str) -> None:
         self.stdout.write(f"{name:8} | {line}")
+
+
+def _one_or_more(text: str) -> int:
+    number = int(text)
+    if number < 1:
+        raise ArgumentTypeError(f"1 or more is needed, not {number}")
+    return number
