@@ -221,5 +221,5 @@ def _completion(model: str, answer: str) -> dict[str, object]:
                 "message": {"role": "assistant", "content": answer},
             }
         ],
-        "usage": {"prompt_tokens": 900, "completion_tokens": 120, "total_tokens": 1020},
+        "usage": {"prompt_tokens": 2900, "completion_tokens": 120, "total_tokens": 3020},
     }

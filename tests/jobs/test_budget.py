@@ -40,8 +40,8 @@ def test_a_call_turns_its_reservation_into_what_it_used() -> None:
     call = ModelCall.objects.get()
     assert call.spent_tokens == 3020 < call.reserved_tokens
     assert call.reserved_usd == 2 * Decimal(call.reserved_tokens) / 1_000_000
-    assert (call.cost_usd, call.is_cost_estimated) == (Decimal("0.00204"), False)
-    assert (job.spent_usd, job.spent_calls, job.spent_tokens) == (Decimal("0.00204"), 1, 3020)
+    assert (call.cost_usd, call.is_cost_estimated) == (Decimal("0.00604"), False)
+    assert (job.spent_usd, job.spent_calls, job.spent_tokens) == (Decimal("0.00604"), 1, 3020)
     assert (job.reserved_nano_usd, job.reserved_calls, job.reserved_tokens) == (0, 0, 0)
 
 

@@ -55,8 +55,8 @@ def test_the_document_holds_the_whole_record() -> None:
     assert (attempt["outcome"], attempt["worker"]) == ("done", "w")
     assert (first["answer"], second["answer"]) == ("Sorry?", GOOD)
     assert (first["number"], first["role"], first["kind"]) == (1, "modifier", "call")
-    assert (first["prompt_tokens"], first["completion_tokens"]) == (900, 120)
-    assert (first["cost_usd"], first["is_cost_estimated"]) == ("0.00204", False)
+    assert (first["prompt_tokens"], first["completion_tokens"]) == (2900, 120)
+    assert (first["cost_usd"], first["is_cost_estimated"]) == ("0.00604", False)
     assert (first["model_returned"], first["latency_s"]) == ("llama3.1-2407", 0.1)
     assert first["prompt_version"]
     assert len(first["request_hash"]) == 64
@@ -64,10 +64,10 @@ def test_the_document_holds_the_whole_record() -> None:
     assert document["totals"] == {
         "calls": 2,
         "calls_from_store": 0,
-        "prompt_tokens": 1800,
+        "prompt_tokens": 5800,
         "completion_tokens": 240,
-        "spent_tokens": 2040,
-        "cost_usd": "0.00408",
+        "spent_tokens": 6040,
+        "cost_usd": "0.01208",
         "is_cost_estimated": False,
     }
 
@@ -105,7 +105,7 @@ def test_a_call_from_the_store_names_its_source() -> None:
     assert (copied["served_from"], copied["cost_usd"]) == (paid["code"], "0")
     assert (paid["served_from"], last["served_from"]) == (None, None)
     totals = totals_of(tries_of(row))
-    assert (totals.calls, totals.cached, totals.spent_tokens) == (2, 1, 2040)
+    assert (totals.calls, totals.cached, totals.spent_tokens) == (2, 1, 6040)
 
 
 def test_rounds_tools_and_reviews_stand_between_the_calls() -> None:

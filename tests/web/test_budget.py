@@ -63,7 +63,7 @@ def test_a_cap_that_is_none_is_not_launched(caps: dict[str, str]) -> None:
 
 def test_the_page_shows_what_is_spent_beside_the_cap() -> None:
     shown = page_of(ran(llama_job(price="2", caps=Caps(usd=Decimal("0.5")))))
-    assert "$0.0020" in shown
+    assert "$0.0060" in shown
     assert "$0.50" in shown
     assert "unknown" not in shown
 

@@ -37,8 +37,8 @@ def page_of(row: Augmentation) -> str:
 def test_the_page_shows_role_tokens_cost_and_the_answer() -> None:
     shown = page_of(ran(only_row(llama_job(price="2"))))
     assert "Call 1, modifier" in shown
-    assert "900 tokens in, 120 out" in shown
-    assert "$0.0020" in shown
+    assert "2900 tokens in, 120 out" in shown
+    assert "$0.0060" in shown
     assert "A parked car ahead." in shown
     assert "llama3.1-2407" in shown
     assert "Prompt version" in shown
