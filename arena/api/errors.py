@@ -10,13 +10,14 @@ from __future__ import annotations
 
 from typing import Any
 
-from django.core.exceptions import PermissionDenied
+from django.core.exceptions import PermissionDenied, RequestDataTooBig
 from django.http import Http404
 from rest_framework import exceptions
 from rest_framework.response import Response
 from rest_framework.views import APIView
 
 from arena.api.letters import LETTERS
+from arena.api.parsing import SoundJSONParser
 from arena.errors import AlreadyDecided, ArenaError, NotYours, StudyNotOpen
 from augment.errors import AugmentError, Conflict
 
@@ -36,6 +37,7 @@ STATUS: tuple[tuple[type[Exception], int, str], ...] = (
     (PermissionDenied, 403, "forbidden"),
     (exceptions.MethodNotAllowed, 405, "method_not_allowed"),
     (exceptions.NotAcceptable, 406, "not_acceptable"),
+    (RequestDataTooBig, 413, "too_large"),
     (exceptions.UnsupportedMediaType, 415, "unsupported_media_type"),
     (exceptions.Throttled, 429, "too_fast"),
 )
@@ -43,7 +45,9 @@ STATUS: tuple[tuple[type[Exception], int, str], ...] = (
 
 
 class ApiView(APIView):
-    """What every resource shares: how errors look."""
+    """What every resource shares: how a body is read and how errors look."""
+
+    parser_classes = (SoundJSONParser,)
 
     def handle_exception(self, exc: Exception) -> Response:
         """Turn an error of the table into its response; any other is raised again."""
@@ -70,6 +74,8 @@ def _message(exc: Exception) -> str:
         return "The request can't be read; see the fields."
     if isinstance(exc, exceptions.NotAuthenticated):
         return "Please sign in again."
+    if isinstance(exc, RequestDataTooBig):
+        return "The request is too large to be read."
     if isinstance(exc, exceptions.APIException):
         return str(exc.detail)
     return str(exc)

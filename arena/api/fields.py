@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import uuid
 from collections.abc import Mapping
 from typing import Any
 
@@ -35,4 +36,14 @@ class WholeNumberField(serializers.IntegerField):
         """The number itself."""
         if isinstance(data, bool) or not isinstance(data, int):
             self.fail("invalid")
+        return super().to_internal_value(data)
+
+
+class CodeField(serializers.UUIDField):
+    """A UUID as a text of JSON: no number stands for one."""
+
+    def to_internal_value(self, data: Any) -> uuid.UUID:
+        """The UUID itself."""
+        if not isinstance(data, str):
+            self.fail("invalid", value=data)
         return super().to_internal_value(data)

@@ -10,7 +10,7 @@ from rest_framework.request import Request
 from rest_framework.response import Response
 
 from arena.api.errors import ApiView
-from arena.api.fields import StrictSerializer, WholeNumberField
+from arena.api.fields import CodeField, StrictSerializer, WholeNumberField
 from arena.api.letters import OUTCOMES
 from arena.api.matchups import AHEAD, next_ones
 from arena.queries.votes import votes_saved
@@ -22,10 +22,10 @@ LONGEST_MS = 2**31 - 1
 class VoteBody(StrictSerializer):
     """One decision of an expert."""
 
-    key = serializers.UUIDField()
-    matchup = serializers.UUIDField()
+    key = CodeField()
+    matchup = CodeField()
     outcome = serializers.ChoiceField(choices=list(OUTCOMES))
-    supersedes = serializers.UUIDField(required=False, allow_null=True, default=None)
+    supersedes = CodeField(required=False, allow_null=True, default=None)
     ms_visible = WholeNumberField(
         required=False, allow_null=True, default=None, min_value=0, max_value=LONGEST_MS
     )

@@ -136,6 +136,9 @@ def test_a_closed_study_answers_410_and_still_confirms_what_it_has(study: Study)
         ({"outcome": "left"}, "outcome"),
         ({"outcome": None}, "outcome"),
         ({"key": "1"}, "key"),
+        ({"key": 5}, "key"),
+        ({"matchup": 5}, "matchup"),
+        ({"supersedes": 5}, "supersedes"),
         ({"matchup": None}, "matchup"),
         ({"supersedes": "x"}, "supersedes"),
         ({"ms_visible": -1}, "ms_visible"),
@@ -157,6 +160,13 @@ def test_a_bad_body_answers_422_with_the_field(
 def test_a_body_that_is_no_object_answers_422(study: Study, raw: str) -> None:
     response = signed_in("eva").post("/api/v1/votes", raw, content_type="application/json")
     assert "body" in error_of(response, 422, "invalid")["fields"]
+
+
+def test_a_body_too_deep_or_too_long_to_read_is_refused(study: Study) -> None:
+    client = signed_in("eva")
+    error = error_of(post(client, "[" * 100_000), 422, "invalid")
+    assert "nested too deeply" in error["fields"]["body"][0]
+    error_of(post(client, '{"key": "' + "x" * 3_000_000 + '"}'), 413, "too_large")
 
 
 @pytest.mark.parametrize(
