@@ -7,23 +7,13 @@ import json
 import uuid
 
 from django.shortcuts import get_object_or_404
-from rest_framework.permissions import BasePermission
 from rest_framework.request import Request
 from rest_framework.response import Response
-from rest_framework.views import APIView
 
+from arena.api.access import StaffOnly
 from arena.api.errors import ApiView
 from arena.queries import jobs
-from arena.queries.people import role_of
 from augment.models import GenerationJob
-
-
-class StaffOnly(BasePermission):
-    """Admins and analysts; experts must not learn who took part in what."""
-
-    def has_permission(self, request: Request, view: APIView) -> bool:
-        """Whether the account may know of jobs."""
-        return role_of(request.user) in ("admin", "analyst")
 
 
 class JobProgressView(ApiView):

@@ -12,6 +12,7 @@ from rest_framework import serializers
 from rest_framework.request import Request
 from rest_framework.response import Response
 
+from arena.api.access import ExpertsOnly
 from arena.api.errors import ApiView
 from arena.api.fields import StrictSerializer
 from arena.errors import StudyNotOpen
@@ -34,6 +35,8 @@ class MatchupsQuery(StrictSerializer):
 @method_decorator(never_cache, name="dispatch")
 class MatchupsView(ApiView):
     """The expert's own next matchups; nobody else's, and nothing about who made the pictures."""
+
+    permission_classes = (ExpertsOnly,)
 
     def get(self, request: Request) -> Response:
         """A list, empty when all is done."""

@@ -9,6 +9,7 @@ from rest_framework import serializers
 from rest_framework.request import Request
 from rest_framework.response import Response
 
+from arena.api.access import ExpertsOnly
 from arena.api.errors import ApiView
 from arena.api.fields import CodeField, StrictSerializer, WholeNumberField
 from arena.api.letters import OUTCOMES
@@ -34,6 +35,8 @@ class VoteBody(StrictSerializer):
 @method_decorator(never_cache, name="dispatch")
 class VotesView(ApiView):
     """Votes of the one who is signed in; there is no way to name somebody else."""
+
+    permission_classes = (ExpertsOnly,)
 
     def post(self, request: Request) -> Response:
         """Store the vote once, however often it arrives."""

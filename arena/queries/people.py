@@ -20,5 +20,10 @@ def role_of(user: User | AnonymousUser) -> str | None:
 
 
 def experts() -> QuerySet[User]:
-    """Active accounts that can be asked to vote."""
-    return User.objects.filter(is_active=True, groups__name="expert").select_related("person")
+    """Active accounts that can be asked to vote: experts who are not analysts or admins too.
+
+    Those may know which contestant made what, and their role opens no voting page.
+    """
+    more = ("admin", "analyst")
+    found = User.objects.filter(is_active=True, is_superuser=False, groups__name="expert")
+    return found.exclude(groups__name__in=more).select_related("person")

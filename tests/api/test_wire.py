@@ -4,7 +4,7 @@ import uuid
 from typing import Any
 
 import pytest
-from django.contrib.auth.models import User
+from django.contrib.auth.models import Group, User
 from django.test import Client
 from pytest_django import DjangoAssertNumQueries
 
@@ -181,6 +181,15 @@ def test_without_a_session_the_answer_is_401(study: Study) -> None:
     client = Client()
     error_of(client.get(f"/api/v1/matchups?study={study.code}"), 401, "signed_out")
     error_of(post(client, body_for(matchups_of(study, "eva")[0])), 401, "signed_out")
+
+
+@pytest.mark.parametrize("role", ["analyst", "admin"])
+def test_who_was_given_another_role_no_longer_votes(study: Study, role: str) -> None:
+    User.objects.get(username="eva").groups.add(Group.objects.get_or_create(name=role)[0])
+    client = signed_in("eva")
+    error_of(post(client, body_for(matchups_of(study, "eva")[0])), 403, "forbidden")
+    error_of(client.get(f"/api/v1/matchups?study={study.code}"), 403, "forbidden")
+    assert not Vote.objects.exists()
 
 
 def test_a_vote_from_another_site_answers_403(study: Study) -> None:

@@ -189,3 +189,10 @@ def test_the_command_needs_an_address_for_a_key() -> None:
     facts = ("--variant", "otm", "--endpoint", "local", "--model", "m", "--key-variable", "K")
     with pytest.raises(CommandError, match="need --base-url"):
         call_command("add_contestant", "fake", *facts)
+
+
+def test_a_contestant_that_is_refused_leaves_no_endpoint_behind() -> None:
+    facts = ("--variant", "none", "--endpoint", "here", "--model", "m", "--base-url", LOCAL)
+    with pytest.raises(CommandError, match="Unknown variant"):
+        call_command("add_contestant", "fake", *facts)
+    assert not Endpoint.objects.exists()

@@ -4,6 +4,7 @@ from collections import Counter
 from dataclasses import replace
 
 import pytest
+from django.contrib.auth.models import Group, User
 from django.utils import timezone
 
 from arena.errors import NothingToPlan
@@ -155,6 +156,14 @@ def test_simulated_experts_take_part_only_when_allowed() -> None:
     cast = cast_of(simulated_experts=True)
     with pytest.raises(Conflict, match="expert eva, expert finn"):
         open_study(name="Round 1", votes_per_expert=2, seed=1, **cast)
+
+
+def test_who_may_know_the_contestants_is_not_asked_to_vote() -> None:
+    cast = cast_of()
+    finn = User.objects.get(username="finn")
+    finn.groups.add(Group.objects.get_or_create(name="analyst")[0])
+    with pytest.raises(UnknownName, match=r"Unknown expert 'finn'. Known: eva"):
+        open_study(name="Round 1", votes_per_expert=3, seed=7, **cast)
 
 
 def test_closing_is_logged_once_and_final() -> None:

@@ -6,8 +6,10 @@ from argparse import ArgumentParser
 from typing import Any
 
 from django.core.management.base import BaseCommand, CommandError
+from django.db import transaction
 
 from augment.errors import AugmentError
+from augment.models import Contestant
 from augment.services.contestants import add_contestant, ensure_builtin, ensure_endpoint
 
 
@@ -44,21 +46,26 @@ class Command(BaseCommand):
         if not options["base_url"] and (options["key_variable"] or options["simulated"]):
             raise CommandError("--key-variable and --simulated need --base-url.")
         try:
-            ensure_builtin()
-            if options["base_url"]:
-                ensure_endpoint(
-                    label=options["endpoint"],
-                    base_url=options["base_url"],
-                    key_variable=options["key_variable"],
-                    is_simulated=options["simulated"],
-                )
-            contestant = add_contestant(
-                slug=options["slug"],
-                variant=options["variant"],
-                endpoint=options["endpoint"],
-                model=options["model"],
-                name=options["name"],
-            )
+            contestant = self._add(options)
         except AugmentError as error:
             raise CommandError(str(error)) from error
         self.stdout.write(f"{contestant.slug}: {contestant.name} ({contestant.kind})")
+
+    @transaction.atomic
+    def _add(self, options: dict[str, Any]) -> Contestant:
+        """Endpoint and contestant, or neither of them."""
+        ensure_builtin()
+        if options["base_url"]:
+            ensure_endpoint(
+                label=options["endpoint"],
+                base_url=options["base_url"],
+                key_variable=options["key_variable"],
+                is_simulated=options["simulated"],
+            )
+        return add_contestant(
+            slug=options["slug"],
+            variant=options["variant"],
+            endpoint=options["endpoint"],
+            model=options["model"],
+            name=options["name"],
+        )
