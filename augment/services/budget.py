@@ -24,6 +24,11 @@ from augment.services.events import log_event
 
 State = GenerationJob.State
 
+_COUNTED = (
+    *("reserved_tokens", "reserved_nano_usd"),
+    *("spent_tokens", "cost_nano_usd", "settled_at"),
+)
+
 
 class Room(StrEnum):
     """Whether a job has room for one more call."""
@@ -95,7 +100,8 @@ def settle(*, call_pk: int, used: Used, now: datetime) -> None:
 
     A call that was settled with its worst case, because its worker was thought dead, is corrected.
     """
-    call = ModelCall.objects.select_for_update().get(pk=call_pk)
+    # Not the request and the answer, which are long.
+    call = ModelCall.objects.select_for_update().only("attempt_id", *_COUNTED).get(pk=call_pk)
     job = GenerationJob.objects.filter(augmentations__attempts=call.attempt_id)
     if call.settled_at is None:
         job.update(
@@ -135,7 +141,7 @@ def settle_unseen(
         calls = calls.filter(attempt=attempt_pk)
     else:
         calls = calls.filter(attempt__augmentation=row_pk)
-    unseen = list(calls)
+    unseen = list(calls.only(*_COUNTED))
     for call in unseen:
         used = Used(
             tokens=call.reserved_tokens, nano_usd=call.reserved_nano_usd, is_estimated=True

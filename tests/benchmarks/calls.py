@@ -1,0 +1,75 @@
+"""The two callers that the benchmark of calls compares."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from decimal import Decimal
+from typing import Any
+
+import openai
+from django.core.management import call_command
+from django.utils import timezone
+
+from augment.llm.messages import Message, Request, Speaker
+from augment.llm.openai_wire import OpenAIWire
+from augment.llm.patience import Patience
+from augment.models import EndpointModel
+from augment.services import claims, jobs
+from augment.services.caps import Caps
+from augment.services.contestants import add_contestant, ensure_endpoint
+from augment.services.transcripts import RowTranscript
+from augment.variants.asking import Conversation
+from augment.variants.transcript import ModelRole
+from tests.jobs.rows import add_scenario, only_row
+
+Call = Callable[[int], object]
+
+
+def bare_client(base_url: str, model: str) -> Call:
+    """What the package needs by itself."""
+    client = openai.OpenAI(api_key="none", base_url=base_url, max_retries=0)
+
+    def call(number: int) -> object:
+        document: dict[str, Any] = _request(model, f"bare {number}").to_document()
+        return client.chat.completions.create(**document)
+
+    return call
+
+
+def conversation(base_url: str, model: str) -> Call:
+    """What a worker does for a call in a job with a cap in USD, calls and tokens."""
+    call_command("migrate", verbosity=0)
+    endpoint = ensure_endpoint(label="bench", base_url=base_url, is_simulated=True)
+    price = {"price_in_usd": "0.1", "price_out_usd": "0.5", "price_as_of": "2026-11-20"}
+    EndpointModel.objects.update_or_create(
+        endpoint=endpoint, model=model, defaults={**price, "price_source": "made up"}
+    )
+    add_contestant(slug="bench", variant="otm", endpoint="bench", model=model)
+    add_scenario("bench")
+    caps = Caps(usd=Decimal(1000), calls=10**6, tokens=10**12)
+    job = jobs.launch(name="Bench", contestants=["bench"], scenarios=["bench"], caps=caps)
+    row = only_row(job)
+    held = claims.claim(augmentation_pk=row.pk, now=timezone.now(), worker="bench")
+    assert held is not None
+    talk = Conversation(
+        client=OpenAIWire(base_url=base_url, api_key=None),
+        model=model,
+        transcript=RowTranscript(held, row, endpoint),
+        patience=Patience(),
+    )
+
+    def call(number: int) -> object:
+        request = _request(model, f"ours {number}")
+        return talk.ask(ModelRole.MODIFIER, request, "bench")
+
+    return call
+
+
+def _request(model: str, name: str) -> Request:
+    """About 24 kB of numbers, as a scene has them; no two requests are the same."""
+    numbers = " ".join(f"({0.37 * step:.2f}, {-1.83 * step:.2f})" for step in range(1400))
+    messages = (
+        Message(speaker=Speaker.SYSTEM, text="You place agents in a scene."),
+        Message(speaker=Speaker.USER, text=f"{name}: {numbers}"),
+    )
+    return Request(model=model, messages=messages)
