@@ -12,6 +12,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from datetime import datetime
 from enum import StrEnum
+from typing import Any
 
 from django.db import transaction
 from django.db.models import F, Q
@@ -52,7 +53,7 @@ class Used:
     is_estimated: bool
 
 
-@transaction.atomic
+@transaction.atomic(savepoint=False)
 def reserve(*, job_pk: int, worst: WorstCase, price: Price | None) -> Room:
     """Take room for one call, or stop the job if it could not have any.
 
@@ -65,16 +66,7 @@ def reserve(*, job_pk: int, worst: WorstCase, price: Price | None) -> Room:
     """
     nano_usd = worst.nano_usd(price)
     jobs = GenerationJob.objects.filter(pk=job_pk)
-    # A money cap admits nothing whose price is unknown.
-    fits = Q(cap_nano_usd=None)
-    alone = Q(cap_nano_usd=None)
-    if nano_usd is not None:
-        fits |= Q(cap_nano_usd__gte=F("spent_nano_usd") + F("reserved_nano_usd") + nano_usd)
-        alone |= Q(cap_nano_usd__gte=F("spent_nano_usd") + nano_usd)
-    for name, needed in (("calls", 1), ("tokens", worst.tokens)):
-        cap, spent, reserved = f"cap_{name}", F(f"spent_{name}"), F(f"reserved_{name}")
-        fits &= Q(**{cap: None}) | Q(**{f"{cap}__gte": spent + reserved + needed})
-        alone &= Q(**{cap: None}) | Q(**{f"{cap}__gte": spent + needed})
+    fits = _within_caps(worst, nano_usd, with_reserved=True)
     taken = (
         jobs.filter(fits)
         .exclude(state=State.STOPPED_AT_CAP)
@@ -88,15 +80,18 @@ def reserve(*, job_pk: int, worst: WorstCase, price: Price | None) -> Room:
         return Room.TAKEN
     if nano_usd is None and jobs.exclude(cap_nano_usd=None).exists():
         raise Conflict("The job is capped in USD, but the price of the model is unknown.")
+    alone = _within_caps(worst, nano_usd, with_reserved=False)
     if jobs.filter(state=State.RUNNING).exclude(alone).update(state=State.STOPPED_AT_CAP):
         _log_stop(jobs.get())
     has_room = jobs.filter(alone).exclude(state=State.STOPPED_AT_CAP).exists()
     return Room.BUSY if has_room else Room.SPENT
 
 
-@transaction.atomic
-def settle(*, call_pk: int, used: Used, now: datetime) -> None:
-    """Turn a call's reservation into what it used.
+@transaction.atomic(savepoint=False)
+def settle(
+    *, call_pk: int, used: Used, now: datetime, answer: dict[str, Any] | None = None
+) -> None:
+    """Turn a call's reservation into what it used, and store the columns of its answer with it.
 
     A call that was settled with its worst case, because its worker was thought dead, is corrected.
     """
@@ -122,6 +117,7 @@ def settle(*, call_pk: int, used: Used, now: datetime) -> None:
         cost_nano_usd=used.nano_usd,
         is_cost_estimated=used.is_estimated,
         settled_at=now,
+        **(answer or {}),
     )
 
 
@@ -189,6 +185,21 @@ def limit_of(job: GenerationJob) -> str:
 
 
 # --- Private -----------------------------------------------------------------------------------
+
+
+def _within_caps(worst: WorstCase, nano_usd: int | None, *, with_reserved: bool) -> Q:
+    """Jobs that one more such call fits into; a cap in USD admits no unknown price."""
+    condition = Q()
+    needs = {"nano_usd": nano_usd, "calls": 1, "tokens": worst.tokens}
+    for name, needed in needs.items():
+        fits = Q(**{f"cap_{name}": None})
+        if needed is not None:
+            used = F(f"spent_{name}") + needed
+            if with_reserved:
+                used += F(f"reserved_{name}")
+            fits |= Q(**{f"cap_{name}__gte": used})
+        condition &= fits
+    return condition
 
 
 def _log_stop(job: GenerationJob) -> None:

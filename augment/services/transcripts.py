@@ -70,6 +70,7 @@ class RowTranscript:
         self._notes = 0
         self._open: dict[int, _Open] = {}
         self._prices: dict[str, Price | None] = {}
+        self._last: tuple[ModelRole, Request, str, dict[str, Any]] | None = None
 
     def known(self, role: ModelRole, request: Request, prompt_version: str) -> Reply | None:
         """The answer that this request had before, recorded as a call that cost nothing.
@@ -131,20 +132,17 @@ class RowTranscript:
         """
         call = self._open.pop(number)
         used = budget.used_by_reply(reply, worst=call.worst, price=call.price)
-        with transaction.atomic():
-            ModelCall.objects.filter(pk=call.pk).update(
-                **answers.columns_of(reply),
-                fault="" if fault is None else storable(sentence_of(fault)),
-            )
-            budget.settle(call_pk=call.pk, used=used, now=timezone.now())
+        answer = answers.columns_of(reply)
+        if fault is not None:
+            answer["fault"] = storable(sentence_of(fault))
+        budget.settle(call_pk=call.pk, used=used, now=timezone.now(), answer=answer)
 
     def broke(self, number: int, fault: ModelFault) -> None:
         """Store why there was no answer to that call, and what it may have used."""
         call = self._open.pop(number)
         used = budget.used_by_fault(fault, worst=call.worst, price=call.price)
-        with transaction.atomic():
-            ModelCall.objects.filter(pk=call.pk).update(fault=storable(sentence_of(fault)))
-            budget.settle(call_pk=call.pk, used=used, now=timezone.now())
+        broken = {"fault": storable(sentence_of(fault))}
+        budget.settle(call_pk=call.pk, used=used, now=timezone.now(), answer=broken)
 
     def note(self, kind: NoteKind, document: dict[str, object]) -> None:
         """Store what happened since the last call."""
@@ -158,9 +156,14 @@ class RowTranscript:
         )
 
     def _columns(self, role: ModelRole, request: Request, version: str) -> dict[str, Any]:
-        """What a call's row says about the request, whoever answers it."""
+        """What a call's row says about the request, whoever answers it.
+
+        Asked of one request several times in a row: whether it is known, and for each attempt.
+        """
+        if self._last is not None and self._last[:3] == (role, request, version):
+            return self._last[3]
         document = storable_document(request.to_document(image_url=image_reference))
-        return {
+        columns = {
             "attempt_id": self._held.attempt_pk,
             "role": role,
             "request": document,
@@ -169,6 +172,8 @@ class RowTranscript:
             ),
             "prompt_version": version,
         }
+        self._last = (role, request, version, columns)
+        return columns
 
     @transaction.atomic
     def _try(

@@ -11,10 +11,9 @@ from django.core.management import call_command
 from django.utils import timezone
 
 from augment.llm.messages import Message, Request, Speaker
-from augment.llm.openai_wire import OpenAIWire
 from augment.llm.patience import Patience
 from augment.models import EndpointModel
-from augment.services import claims, jobs
+from augment.services import claims, jobs, runner
 from augment.services.caps import Caps
 from augment.services.contestants import add_contestant, ensure_endpoint
 from augment.services.transcripts import RowTranscript
@@ -52,7 +51,7 @@ def conversation(base_url: str, model: str) -> Call:
     held = claims.claim(augmentation_pk=row.pk, now=timezone.now(), worker="bench")
     assert held is not None
     talk = Conversation(
-        client=OpenAIWire(base_url=base_url, api_key=None),
+        client=runner.open_wire(endpoint, held).__enter__(),
         model=model,
         transcript=RowTranscript(held, row, endpoint),
         patience=Patience(),
