@@ -15,6 +15,7 @@ from django.views.decorators.http import require_http_methods, require_POST, req
 
 from arena.queries import jobs, scenarios
 from arena.web.access import ADMIN, STAFF, only
+from arena.web.displacement import section
 from arena.web.forms import CapsForm, LaunchForm
 from augment.errors import AugmentError, QueueUnreachable
 from augment.models import Contestant, GenerationJob
@@ -58,12 +59,15 @@ def new_job_page(request: HttpRequest) -> HttpResponse:
 def job_page(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
     """Progress, the grid, and failures by their reason."""
     job = get_object_or_404(GenerationJob.objects.select_related("launched_by__person"), code=code)
-    context = {
-        "counts": jobs.counts(job),
+    found = jobs.counts(job)
+    context: dict[str, object] = {
+        "counts": found,
         "costs": costs_of(job),
         "grid": jobs.grid(job),
         "failures": jobs.failures(job),
     }
+    if not found.is_moving:  # a page that shows itself anew every two seconds measures nothing
+        context["displacement"] = section(request, job)
     return render(request, "jobs/job.html", context)
 
 

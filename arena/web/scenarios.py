@@ -14,6 +14,8 @@ from arena.queries.modifications import modification_lines
 from arena.web.access import STAFF, only
 from arena.web.pictures import picture_response
 from augment.models import Augmentation, Scenario
+from augment.services.displacement import of_augmentation
+from augment.services.findings import checked
 from augment.services.transcript_export import transcript_of
 from augment.services.transcript_steps import totals_of, tries_of
 from augment.services.transcripts import IMAGES
@@ -50,6 +52,8 @@ def augmentation_page(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
     context = {
         "augmentation": augmentation,
         "lines": modification_lines(augmentation.modification),
+        "measured": of_augmentation(augmentation),
+        "checked": checked(augmentation),
         "tries": tries,
         "totals": totals_of(tries),
     }
@@ -90,5 +94,7 @@ def picture(request: HttpRequest, kind: str, code: uuid.UUID) -> HttpResponseBas
 
 
 def _augmentation(code: uuid.UUID) -> Augmentation:
-    rows = Augmentation.objects.select_related("job", "scenario", "contestant__endpoint")
+    rows = Augmentation.objects.select_related(
+        "job", "scenario__base_scene", "contestant__endpoint"
+    ).defer("scenario__base_scene__recording")
     return get_object_or_404(rows, code=code)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from django.contrib.auth import views as auth
 from django.urls import URLPattern, path
 
-from arena.web import home, jobs, results, scenarios, studies, voting
+from arena.web import displacement, home, jobs, results, scenarios, studies, voting
 
 urlpatterns: list[URLPattern] = [
     path("", home.home, name="home"),
@@ -25,6 +25,11 @@ urlpatterns: list[URLPattern] = [
     path("jobs/<uuid:code>/retry/", jobs.retry_job, name="job-retry"),
     path("jobs/<uuid:code>/cancel/", jobs.cancel_job, name="job-cancel"),
     path("jobs/<uuid:code>/resume/", jobs.resume_job, name="job-resume"),
+    path(
+        "jobs/<uuid:code>/displacement.<slug:form>",
+        displacement.export,
+        name="displacement-export",
+    ),
     path("augmentations/<uuid:code>/", scenarios.augmentation_page, name="augmentation"),
     path("augmentations/<uuid:code>/transcript.json", scenarios.transcript, name="transcript"),
     path("asked/<slug:digest>.png", scenarios.asked_image, name="asked-image"),
