@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from functools import lru_cache
 
 from augment.errors import ContextTruncated
 from augment.llm.messages import Reply, Request
@@ -17,8 +18,12 @@ _PIECE = re.compile(r"(?:[^\r\n\w]|_)?[^\W\d_]+|\d{1,3}|(?:[^\s\w]|_)+")
 """Words, numbers of up to three digits, runs of signs: usual vocabularies cut at least there."""
 
 
+@lru_cache(maxsize=64)
 def least_tokens(text: str) -> int:
-    """A number of tokens that the text has at least, whatever the vocabulary."""
+    """A number of tokens that the text has at least, whatever the vocabulary.
+
+    Remembered, because the turns of one conversation repeat every message before them.
+    """
     return len(_PIECE.findall(text))
 
 
