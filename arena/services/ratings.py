@@ -78,7 +78,7 @@ def rate(
         versions={"python": platform.python_version(), "numpy": numpy.__version__},
         status=board.explanation,
         degenerate_rounds=board.degenerate_rounds,
-        includes_simulated=_any_simulated(votes),
+        includes_simulated=_any_simulated(votes, contestants),
         is_early=is_early,
         made_by=actor,
     )
@@ -155,8 +155,10 @@ def _is_simulated(vote: Vote) -> bool:
     return vote.is_simulated or any(contestant.is_simulated for contestant in contestants)
 
 
-def _any_simulated(votes: Sequence[Vote]) -> bool:
-    return any(_is_simulated(vote) for vote in votes)
+def _any_simulated(votes: Sequence[Vote], contestants: Sequence[Contestant]) -> bool:
+    """Whether something in the table is simulated, be it a line without votes."""
+    rated = any(contestant.is_simulated for contestant in contestants)
+    return rated or any(_is_simulated(vote) for vote in votes)
 
 
 def _comparison(vote: Vote) -> Comparison:

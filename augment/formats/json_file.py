@@ -19,14 +19,17 @@ def read_json(file: Path, *, what: str) -> object:
         what: The kind of document, for the sentence.
 
     Raises:
-        InvalidDocument: No such file, too large, no JSON, or a name twice in one object.
+        InvalidDocument: No such file, too large, no JSON, a name twice in one object, or a text
+            that no database takes.
     """
     try:
         size = file.stat().st_size
         if size > MAX_BYTES:
             text = f"{size} bytes; at most {MAX_BYTES} are read"
             raise InvalidDocument(what, [(file.name, text)])
-        return json.loads(file.read_text(encoding="utf-8"), object_pairs_hook=_object)
+        value = json.loads(file.read_text(encoding="utf-8"), object_pairs_hook=_object)
+        _check_texts(value)
+        return value
     except OSError as fault:
         raise InvalidDocument(what, [(str(file), fault.strerror or "can't be read")]) from None
     except RecursionError:
@@ -42,3 +45,18 @@ def _object(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
         doubled = sorted({name for name in names if names.count(name) > 1})
         raise ValueError(f"named twice in one object: {', '.join(doubled)}")
     return made
+
+
+def _check_texts(value: object) -> None:
+    """Raise ValueError for a text with NUL or half a character, which JSON can escape."""
+    if isinstance(value, str):
+        if "\0" in value:
+            raise ValueError(f"NUL in {value[:40]!r}")
+        value.encode()
+    elif isinstance(value, dict):
+        for name, item in value.items():
+            _check_texts(name)
+            _check_texts(item)
+    elif isinstance(value, list):
+        for item in value:
+            _check_texts(item)

@@ -27,9 +27,12 @@ from augment.scene.modification import Modification, check_fits, without_traffic
 from augment.scene.recording import Recording
 from augment.scene.recording_codec import recording_to_document
 from augment.services.events import log_event
+from augment.services.texts import check_prose
 
 SOURCES = ("av2", "json")
 SLUG_LENGTH = 80
+INSTRUCTION_LENGTH = 2_000
+"""An instruction is read above the pictures, and by models: a few sentences."""
 
 
 @transaction.atomic
@@ -105,8 +108,7 @@ def add_scenario(
     """
     base_scene = _base_scene(scene)
     kind = _type(type)
-    if not instruction.strip():
-        raise InvalidDocument("scenario", [("instruction", "is empty")])
+    check_prose("instruction", instruction, what="scenario", longest=INSTRUCTION_LENGTH)
     if slug is None:
         slug = _free_slug(base_scene, kind)
     check_slug(slug, what="scenario")

@@ -40,3 +40,18 @@ def one_line(field: str, value: str, *, what: str, longest: int = 120) -> str:
         rule = f"1 to {longest} printable characters are needed"
         raise InvalidDocument(what, [(field, rule)])
     return value
+
+
+def check_prose(field: str, value: str, *, what: str, longest: int) -> None:
+    """Whether a text that may have several lines can be stored and shown.
+
+    Raises:
+        InvalidDocument: It is empty, too long, or holds NUL or half a character.
+    """
+    if not value.strip():
+        raise InvalidDocument(what, [(field, "is empty")])
+    if len(value) > longest:
+        rule = f"{len(value)} characters are too many, at most {longest} are allowed"
+        raise InvalidDocument(what, [(field, rule)])
+    if storable(value) != value:
+        raise InvalidDocument(what, [(field, "holds signs that no database takes")])

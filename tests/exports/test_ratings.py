@@ -230,6 +230,17 @@ def test_a_simulated_contestant_makes_the_snapshot_simulated() -> None:
     assert rate(study=study).includes_simulated
 
 
+def test_a_simulated_line_without_a_vote_makes_the_snapshot_simulated() -> None:
+    study = open_study(
+        name="Round 2",
+        votes_per_expert=3,
+        seed=7,
+        allow_simulated=True,
+        **cast_of(kind=KINDS.SIMULATED),
+    )
+    assert rate(study=close_study(study=study)).includes_simulated
+
+
 def voted_study_with_simulated_contestants() -> Study:
     cast = cast_of(kind=KINDS.SIMULATED, scenarios=2)
     study = open_study(name="Demo", votes_per_expert=4, seed=1, allow_simulated=True, **cast)

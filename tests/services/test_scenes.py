@@ -89,6 +89,31 @@ def test_a_scenario_without_a_slug_gets_the_next_free_one() -> None:
     assert scenario(type="avoid_crashed_cars").slug == "street-accident-site-1"
 
 
+@pytest.mark.parametrize(
+    ("instruction", "problem"),
+    [
+        (" \n", "is empty"),
+        ("a" * 2_001, "2001 characters are too many, at most 2000"),
+        ("a\0b", "signs that no database takes"),
+        ("a\ud800b", "signs that no database takes"),
+    ],
+)
+@pytest.mark.usefixtures("street")
+def test_an_instruction_that_can_not_be_kept_is_refused(instruction: str, problem: str) -> None:
+    with pytest.raises(InvalidDocument, match=problem):
+        scenario(instruction=instruction)
+    assert not Scenario.objects.exists()
+
+
+@pytest.mark.parametrize("escaped", ["\\u0000", "\\ud800"])
+def test_a_scene_with_a_text_that_no_database_takes_is_refused(file: Path, escaped: str) -> None:
+    document = scene_to_document(BUSY) | {"provenance": "HERE"}
+    file.write_text(json.dumps(document).replace("HERE", escaped))
+    with pytest.raises(InvalidDocument, match=r"busy\.json"):
+        import_scene(source="json", path=file, frame=0, slug="street")
+    assert not BaseScene.objects.exists()
+
+
 @pytest.mark.usefixtures("street")
 def test_traffic_goes_unless_it_is_kept() -> None:
     assert scene_of(scenario()).agents == ()
