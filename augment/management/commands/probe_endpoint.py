@@ -1,0 +1,60 @@
+"""Ask an endpoint what it can do."""
+
+from __future__ import annotations
+
+from argparse import ArgumentParser
+from typing import Any
+
+from django.core.management.base import BaseCommand, CommandError
+
+from augment.errors import AugmentError, UnknownName
+from augment.llm.questions import Ability
+from augment.models import Endpoint
+from augment.services.probe import Finding, ProbeReport, probe
+
+_WORDS = {True: "yes", False: "no", None: "unknown"}
+
+
+class Command(BaseCommand):
+    """probe_endpoint LABEL --model M."""
+
+    help = (
+        "Ask an endpoint about six tiny questions (some 8,000 tokens in all) and store what its "
+        "model can do: answer, take a temperature, a JSON schema and native tools, see pictures, "
+        "and read a long prompt to its beginning."
+    )
+
+    def add_arguments(self, parser: ArgumentParser) -> None:
+        """Who is asked."""
+        parser.add_argument("label", help="the label of an endpoint")
+        parser.add_argument("--model", required=True, help="the model id on the endpoint")
+
+    def handle(self, *args: Any, **options: Any) -> None:
+        """Ask, print a table and fail where nobody answers."""
+        label = options["label"]
+        try:
+            if not Endpoint.objects.filter(label=label).exists():
+                known = list(Endpoint.objects.values_list("label", flat=True))
+                raise UnknownName("endpoint", label, known)
+            report = probe(label=label, model=options["model"])
+        except AugmentError as error:
+            raise CommandError(str(error)) from error
+        for finding in report.findings:
+            self.stdout.write(_line(finding))
+        self._sum_up(report)
+        if not report.has(Ability.ANSWERS):
+            raise CommandError(f"{options['model']} at endpoint {label} does not answer.")
+
+    def _sum_up(self, report: ProbeReport) -> None:
+        self.stdout.write(f"{'usage':14}{_WORDS[report.counts_tokens]}")
+        returned = ", ".join(report.models_returned) or "unknown"
+        self.stdout.write(f"{'model id':14}{returned}")
+        if report.refused:
+            self.stdout.write(f"{'not taken':14}{', '.join(report.refused)}")
+        cost = "unknown" if report.cost_usd is None else f"{report.cost_usd} USD"
+        self.stdout.write(f"{'cost':14}{cost}, {report.calls} calls")
+
+
+def _line(finding: Finding) -> str:
+    tokens = "" if finding.prompt_tokens is None else f"{finding.prompt_tokens} tokens in"
+    return f"{finding.ability:14}{_WORDS[finding.has_it]:9}{tokens:16}{finding.note}".rstrip()

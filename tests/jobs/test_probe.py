@@ -1,0 +1,258 @@
+"""The probe, over the real wire, at servers that can do more or less."""
+
+from __future__ import annotations
+
+import io
+import json
+from collections.abc import Iterator
+from contextlib import contextmanager
+from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
+from io import StringIO
+from threading import Thread
+from typing import Any
+
+import pytest
+from django.core.management import CommandError, call_command
+from PIL import Image
+
+from augment.fake_llm.server import running
+from augment.llm.patience import Patience
+from augment.llm.questions import MARKER, Ability, questions_for, two_halves
+from augment.llm.window import least_tokens
+from augment.models import CallLease, Endpoint, EndpointModel, Event
+from augment.services.probe import ProbeReport, probe
+
+pytestmark = pytest.mark.django_db(transaction=True)
+EVERYTHING = frozenset(
+    {"temperature", "response_format", "tools", "images", "window", "usage", "seed"}
+)
+KEY = "sk-planted-4f7a9c0d1e2b3a"
+
+
+class Candidate(ThreadingHTTPServer):
+    """A server that can do what it is told it can."""
+
+    daemon_threads = True
+
+    def __init__(self, can: frozenset[str], status: int) -> None:
+        super().__init__(("127.0.0.1", 0), _Handler)
+        self.can, self.status = can, status
+
+    @property
+    def url(self) -> str:
+        return f"http://127.0.0.1:{self.server_address[1]}/v1"
+
+    def answer(self, body: dict[str, Any]) -> tuple[int, dict[str, Any]]:
+        if self.status != 200:
+            return self.status, _error(f"wrong key {KEY}", None)
+        for name in ("temperature", "seed", "response_format", "tools"):
+            if name in body and name not in self.can:
+                return 400, _error(f"Unsupported: {name}", name)
+        content = body["messages"][0]["content"]
+        if not isinstance(content, str) and "images" not in self.can:
+            if "a bad day" in self.can:
+                return 503, _error("busy", None)
+            return 400, _error("This model takes no image_url", None)
+        message = {"role": "assistant", "content": self._said(body, content)}
+        if "tools" in body:
+            function = {"name": "double", "arguments": '{"number": 21}'}
+            message["tool_calls"] = [{"id": "c1", "type": "function", "function": function}]  # type: ignore[assignment]
+        text = content if isinstance(content, str) else content[0]["text"]
+        prompt_tokens = least_tokens(text) + 8
+        if "window" not in self.can:
+            prompt_tokens = min(prompt_tokens, 4096)
+        made = {"id": "1", "object": "chat.completion", "created": 0, "model": "m-2026"}
+        made["choices"] = [{"index": 0, "finish_reason": "stop", "message": message}]
+        if "usage" in self.can:
+            made["usage"] = {"prompt_tokens": prompt_tokens, "completion_tokens": 2}
+        return 200, made
+
+    def _said(self, body: dict[str, Any], content: Any) -> str | None:
+        if not isinstance(content, str):
+            return "Green, then yellow."
+        if "response_format" in body:
+            return '{"sum": 42}'
+        if "tools" in body:
+            return None
+        if MARKER in content:
+            return MARKER if "window" in self.can else "I was told no word."
+        return "Ready, steady."
+
+
+def _error(message: str, param: str | None) -> dict[str, Any]:
+    return {"error": {"message": message, "type": "x", "param": param, "code": None}}
+
+
+class _Handler(BaseHTTPRequestHandler):
+    server: Candidate
+
+    def do_POST(self) -> None:
+        body = json.loads(self.rfile.read(int(self.headers["Content-Length"])))
+        status, document = self.server.answer(body)
+        text = json.dumps(document).encode()
+        self.send_response(status)
+        self.send_header("Content-Type", "application/json")
+        self.send_header("Content-Length", str(len(text)))
+        self.end_headers()
+        self.wfile.write(text)
+
+    def log_message(self, format: str, *args: object) -> None:
+        pass
+
+
+@contextmanager
+def candidate(can: frozenset[str] = EVERYTHING, status: int = 200) -> Iterator[Candidate]:
+    server = Candidate(can, status)
+    thread = Thread(target=server.serve_forever, args=(0.05,), daemon=True)
+    thread.start()
+    Endpoint.objects.create(label="local", base_url=server.url)
+    try:
+        yield server
+    finally:
+        server.shutdown()
+        server.server_close()
+        thread.join()
+
+
+def asked() -> ProbeReport:
+    return probe(label="local", model="m", patience=Patience(attempts=1))
+
+
+def row() -> EndpointModel:
+    return EndpointModel.objects.get(model="m")
+
+
+def test_a_server_that_can_do_everything() -> None:
+    with candidate():
+        report = asked()
+    assert {made.ability: made.has_it for made in report.findings} == dict.fromkeys(Ability, True)
+    assert (report.calls, report.refused, report.counts_tokens) == (6, [], True)
+    assert report.models_returned == ["m-2026"]
+    known = row()
+    abilities = (known.native_tools, known.vision, known.json_schema, known.temperature)
+    assert abilities == (True, True, True, True)
+    assert known.probed_at == report.probed_at
+    assert known.probe_report is not None
+    assert len(known.probe_report["findings"]) == 6
+    assert Event.objects.get(verb="probe").object_code == str(known.code)
+    assert CallLease.objects.filter(finished_at__isnull=False).count() == 6
+
+
+@pytest.mark.parametrize(
+    ("lacks", "ability"),
+    [
+        ("temperature", Ability.TEMPERATURE),
+        ("response_format", Ability.JSON_SCHEMA),
+        ("tools", Ability.NATIVE_TOOLS),
+        ("images", Ability.VISION),
+        ("window", Ability.WHOLE_PROMPT),
+    ],
+)
+def test_what_a_server_can_not_do_is_found_and_nothing_else(lacks: str, ability: Ability) -> None:
+    with candidate(EVERYTHING - {lacks}):
+        report = asked()
+    found = {made.ability: made.has_it for made in report.findings}
+    assert found == dict.fromkeys(Ability, True) | {ability: False}
+
+
+def test_a_cut_window_is_told_with_its_numbers() -> None:
+    with candidate(EVERYTHING - {"window"}):
+        report = asked()
+    assert "silently cut the prompt" in report.findings[-1].note
+    assert "4096" in report.findings[-1].note
+
+
+def test_a_window_that_is_cut_uncounted_is_found_by_the_lost_word() -> None:
+    with candidate(EVERYTHING - {"window", "usage"}):
+        report = asked()
+    assert report.has(Ability.WHOLE_PROMPT) is False
+    assert not report.counts_tokens
+
+
+def test_a_parameter_beside_the_question_is_gone_without() -> None:
+    with candidate(EVERYTHING - {"seed"}):
+        report = asked()
+    assert report.has(Ability.TEMPERATURE) is True
+    assert report.refused == row().refused_parameters == ["seed"]
+
+
+def test_a_server_that_does_not_answer_is_asked_once_and_forgets_nothing(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setenv("LOCAL_KEY", KEY)
+    with candidate(status=401):
+        endpoint = Endpoint.objects.get()
+        Endpoint.objects.update(key_variable="LOCAL_KEY")
+        EndpointModel.objects.create(endpoint=endpoint, model="m", vision=True)
+        report = asked()
+    assert (report.calls, report.has(Ability.ANSWERS)) == (1, False)
+    assert row().vision is True
+    assert "401" in report.findings[0].note
+    assert KEY not in str(list(EndpointModel.objects.values())) + str(list(Event.objects.values()))
+
+
+def test_what_was_known_stays_where_the_answer_does_not_tell() -> None:
+    with candidate() as server:
+        asked()
+        server.can = EVERYTHING - {"images"} | {"a bad day"}
+        report = asked()
+    assert report.has(Ability.VISION) is None
+    assert "503" in report.findings[4].note
+    assert row().vision is True
+
+
+def test_the_cost_is_recorded_where_the_price_is_known() -> None:
+    with candidate():
+        assert asked().cost_usd is None
+        EndpointModel.objects.update(price_in_usd=1, price_out_usd=2)
+        report = asked()
+    tokens = [
+        (made.prompt_tokens or 0) + 2 * (made.completion_tokens or 0) for made in report.findings
+    ]
+    assert report.cost_usd is not None
+    assert float(report.cost_usd) == pytest.approx(sum(tokens) / 1_000_000)
+    event = Event.objects.filter(verb="probe").first()
+    assert event is not None
+    assert event.after is not None
+    assert event.after["cost_usd"] == report.cost_usd
+
+
+def test_the_command_prints_a_table() -> None:
+    said = StringIO()
+    with candidate(EVERYTHING - {"images", "seed"}):
+        call_command("probe_endpoint", "local", "--model", "m", stdout=said)
+    lines = said.getvalue().splitlines()
+    assert lines[0].split()[:2] == ["answers", "yes"]
+    assert lines[4].split()[:2] == ["vision", "no"]
+    assert lines[6:9] == ["usage         yes", "model id      m-2026", "not taken     seed"]
+    assert lines[9] == "cost          unknown, 7 calls"
+
+
+def test_the_command_fails_where_nobody_answers() -> None:
+    with candidate(status=404), pytest.raises(CommandError, match="m at endpoint local does not"):
+        call_command("probe_endpoint", "local", "--model", "m", stdout=StringIO())
+    with pytest.raises(CommandError, match=r"Unknown endpoint 'cloud'\. Known: local"):
+        call_command("probe_endpoint", "cloud", "--model", "m")
+
+
+def test_the_stand_in_can_be_probed() -> None:
+    with running() as server:
+        Endpoint.objects.create(label="local", base_url=server.url, is_simulated=True)
+        report = probe(label="local", model="fake-good")
+    assert report.has(Ability.ANSWERS) is True
+    assert report.has(Ability.TEMPERATURE) is True
+    assert report.counts_tokens
+    assert report.models_returned == ["fake-good"]
+
+
+def test_the_picture_of_the_question_has_two_halves() -> None:
+    picture = Image.open(io.BytesIO(two_halves()))
+    picture.load()
+    assert picture.getpixel((10, 50)) == (0, 128, 0)
+    assert picture.getpixel((80, 50)) == (255, 255, 0)
+
+
+def test_the_long_question_is_longer_than_the_usual_small_window() -> None:
+    text = questions_for("m")[-1].request.messages[0].text
+    assert 0.7 * least_tokens(text) > 4096
+    assert text.index(MARKER) < 100
