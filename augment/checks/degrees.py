@@ -15,7 +15,10 @@ EXACT_RAD = 6e-4
 """How well a heading with three decimals meets the one that a wrapped number of degrees gives."""
 
 _DIRECTED = frozenset({AgentType.VEHICLE, AgentType.BUS, AgentType.BICYCLE, AgentType.PEDESTRIAN})
-_ROUND = tuple(range(-360 + ROUND_DEG, 361, ROUND_DEG))
+_ROUND = tuple(
+    deg for deg in range(-360 + ROUND_DEG, 361, ROUND_DEG) if abs(math.sin(deg)) > EXACT_RAD
+)
+"""Without 355: as radians that is 113 half turns, and half a turn is what facing back means."""
 
 
 def degrees(situation: Situation) -> Iterator[Finding]:

@@ -12,7 +12,9 @@ from pydantic import Field, Strict
 
 from augment.errors import InvalidDocument
 from augment.scene.catalogue import ScenarioType
+from augment.scene.claims import Claim, ClaimKind
 from augment.scene.codec import modification_from_document, modification_to_document
+from augment.scene.entities import AgentType
 from augment.scene.modification import Modification
 from augment.scene.schema import VERSION, Document, read
 
@@ -30,6 +32,7 @@ class CatalogueEntry:
         instruction: What is to be changed, in the user's words.
         keep_traffic: Whether the recorded traffic stays in the scene.
         notes: What a reader of the catalogue should know; may be empty.
+        claims: What the instruction says about the reference; may be empty.
     """
 
     slug: str
@@ -40,6 +43,16 @@ class CatalogueEntry:
     provenance: str
     notes: str
     reference: Modification
+    claims: tuple[Claim, ...] = ()
+
+
+class ClaimDocument(Document):
+    """A `Claim`."""
+
+    kind: Annotated[ClaimKind, Strict(False)]
+    value: float
+    agents: list[Text] = []
+    type: Annotated[AgentType, Strict(False)] | None = None
 
 
 class EntryDocument(Document):
@@ -54,6 +67,7 @@ class EntryDocument(Document):
     keep_traffic: bool
     provenance: Text
     notes: str = ""
+    claims: list[ClaimDocument] = []
     reference: dict[str, Any]
 
 
@@ -69,6 +83,7 @@ def entry_to_document(entry: CatalogueEntry) -> dict[str, Any]:
         "keep_traffic": entry.keep_traffic,
         "provenance": entry.provenance,
         "notes": entry.notes,
+        "claims": [_claim_to_document(claim) for claim in entry.claims],
         "reference": modification_to_document(entry.reference),
     }
 
@@ -95,4 +110,17 @@ def entry_from_document(document: object) -> CatalogueEntry:
         provenance=given.provenance,
         notes=given.notes,
         reference=reference,
+        claims=tuple(
+            Claim(kind=one.kind, value=one.value, agents=tuple(one.agents), type=one.type)
+            for one in given.claims
+        ),
     )
+
+
+def _claim_to_document(claim: Claim) -> dict[str, Any]:
+    document: dict[str, Any] = {"kind": claim.kind.value}
+    if claim.agents:
+        document["agents"] = list(claim.agents)
+    if claim.type is not None:
+        document["type"] = claim.type.value
+    return {**document, "value": claim.value}

@@ -62,7 +62,7 @@ def load_catalogue(*, folder: Path, actor: User | None = None) -> CatalogueRepor
             fit together; every problem names its file and the path inside it.
         Conflict: A slug belongs to a row from elsewhere, or what changed is in use.
     """
-    scenes, entries = _read_folder(folder)
+    scenes, entries = read_catalogue(folder)
     scene_steps = [_store_scene(scene, actor) for scene in scenes.values()]
     scenario_steps = [_store_scenario(entry, actor) for entry in entries]
     return CatalogueReport(
@@ -75,10 +75,12 @@ def load_catalogue(*, folder: Path, actor: User | None = None) -> CatalogueRepor
     )
 
 
-# Private: files
+def read_catalogue(folder: Path) -> tuple[dict[str, Scene], list[CatalogueEntry]]:
+    """The scenes by name and the scenarios of a folder, each fitting its scene.
 
-
-def _read_folder(folder: Path) -> tuple[dict[str, Scene], list[CatalogueEntry]]:
+    Raises:
+        InvalidDocument: As `load_catalogue`.
+    """
     problems: Problems = []
     scenes = {
         name: scene
@@ -99,6 +101,9 @@ def _read_folder(folder: Path) -> tuple[dict[str, Scene], list[CatalogueEntry]]:
     if problems:
         raise InvalidDocument("catalogue", problems)
     return scenes, entries
+
+
+# Private: files
 
 
 def _read_files(

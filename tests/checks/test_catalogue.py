@@ -16,10 +16,13 @@ from tests.checks.worlds import Reference, references, severities
 from tests.scenes import cone
 
 REFERENCES = references()
+FACING = {"nudge-ferry-road", "overtake-terrace-row-facing"}
+"""Here the instruction asks for a vehicle that faces the traffic."""
 VEHICLES = [
     one
     for one in REFERENCES
     if one.modification.added[0].type in (AgentType.VEHICLE, AgentType.BUS)
+    and one.slug not in FACING
 ]
 
 
@@ -47,7 +50,8 @@ def _turned(reference: Reference) -> TrafficAgent:
 
 @pytest.mark.parametrize("reference", REFERENCES, ids=_named)
 def test_a_reference_has_nothing_wrong(reference: Reference) -> None:
-    assert severities(findings(reference.scene, reference.modification)) == set()
+    asked_for = {(Kind.HEADING, Severity.DOUBTFUL)} if reference.slug in FACING else set()
+    assert severities(findings(reference.scene, reference.modification)) == asked_for
 
 
 @pytest.mark.parametrize("reference", VEHICLES, ids=_named)
@@ -81,7 +85,9 @@ def test_the_same_thing_twice_is_named(reference: Reference) -> None:
 
 
 @pytest.mark.parametrize(
-    "reference", [one for one in REFERENCES if one.slug.startswith("jaywalker")], ids=_named
+    "reference",
+    [one for one in REFERENCES if one.modification.added[0].walk_to_m is not None],
+    ids=_named,
 )
 def test_a_pedestrian_who_walks_backwards_is_named(reference: Reference) -> None:
     turned = Modification(added=(_turned(reference),))

@@ -93,12 +93,12 @@ def test_loading_again_changes_nothing(folder: Path) -> None:
 
 
 def test_the_projects_own_catalogue_loads_twice_through_the_command() -> None:
-    for scenes, scenarios in (("6 added, 0", "12 added, 0"), ("0 added, 0", "0 added, 0")):
+    for scenes, scenarios in (("12 added, 0", "50 added, 0"), ("0 added, 0", "0 added, 0")):
         out = StringIO()
         call_command("load_catalogue", stdout=out)
         assert f"scenes: {scenes} changed" in out.getvalue()
         assert f"scenarios: {scenarios} changed" in out.getvalue()
-    assert Scenario.objects.filter(in_catalogue=True).count() == 12
+    assert Scenario.objects.filter(in_catalogue=True).count() == 50
 
 
 def test_an_unused_scenario_and_its_scene_may_change(folder: Path) -> None:

@@ -1,0 +1,61 @@
+"""Hold the catalogue's references against their instructions, the checks and the camera."""
+
+from __future__ import annotations
+
+from argparse import ArgumentParser
+from pathlib import Path
+from typing import Any
+
+from django.conf import settings
+from django.core.management.base import BaseCommand, CommandError
+
+from augment.errors import AugmentError
+from augment.services.catalogue_check import CatalogueCheck, ScenarioCheck, check_catalogue
+
+
+class Command(BaseCommand):
+    """check_catalogue [--folder FOLDER]."""
+
+    help = (
+        "Check that every reference passes the geometric checks, agrees with the numbers of its "
+        "instruction and fits into its picture; exit status 1 with reasons otherwise."
+    )
+
+    def add_arguments(self, parser: ArgumentParser) -> None:
+        """Where the catalogue is."""
+        parser.add_argument(
+            "--folder",
+            type=Path,
+            default=settings.BASE_DIR / "fixtures",
+            help="holds scenes/*.json and scenarios/*.json; default: the project's own",
+        )
+
+    def handle(self, *args: Any, **options: Any) -> None:
+        """Print a line for each scenario, then the reasons."""
+        try:
+            found = check_catalogue(folder=options["folder"])
+        except AugmentError as error:
+            raise CommandError(str(error)) from error
+        width = max((len(one.slug) for one in found.scenarios), default=8)
+        self.stdout.write(f"{'scenario':{width}}  claims  grammar  result")
+        for one in found.scenarios:
+            self.stdout.write(_line(one, width))
+        reasons = _reasons(found)
+        if reasons:
+            raise CommandError("\n".join(reasons))
+        understood = sum(one.understood is not None for one in found.scenarios)
+        self.stdout.write(
+            f"{len(found.scenarios)} scenarios are as their instructions say; the grammar "
+            f"understands {understood} of them."
+        )
+
+
+def _line(one: ScenarioCheck, width: int) -> str:
+    read = "refuses" if one.understood is None else f"{one.understood} read"
+    result = f"{len(one.reasons)} reasons" if one.reasons else "good"
+    return f"{one.slug:{width}}  {one.claims:>6}  {read:>7}  {result}"
+
+
+def _reasons(found: CatalogueCheck) -> list[str]:
+    own = [f"{one.slug}: {reason}" for one in found.scenarios for reason in one.reasons]
+    return [*own, *found.reasons]

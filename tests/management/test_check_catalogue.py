@@ -1,0 +1,84 @@
+from __future__ import annotations
+
+import json
+import shutil
+from collections.abc import Callable
+from io import StringIO
+from pathlib import Path
+from typing import Any
+
+import pytest
+from django.core.management import call_command
+from django.core.management.base import CommandError
+
+from tests.fixtures.shelf import FOLDER, SLUGS
+
+
+@pytest.fixture
+def folder(tmp_path: Path) -> Path:
+    """A copy of one scenario of the catalogue and its scene."""
+    for name in ("scenes/plane-tree-street.json", "scenarios/nudge-plane-tree-street.json"):
+        (tmp_path / name).parent.mkdir()
+        shutil.copy(FOLDER / name, tmp_path / name)
+    return tmp_path
+
+
+def edit(folder: Path, change: Callable[[dict[str, Any]], object]) -> None:
+    file = folder / "scenarios/nudge-plane-tree-street.json"
+    document = json.loads(file.read_text())
+    change(document)
+    file.write_text(json.dumps(document))
+
+
+def checked(folder: Path) -> str:
+    out = StringIO()
+    call_command("check_catalogue", "--folder", str(folder), stdout=out)
+    return out.getvalue()
+
+
+def test_the_projects_own_catalogue_is_clean() -> None:
+    said = checked(FOLDER)
+    assert said.count(" good\n") == len(SLUGS) == 50
+    assert "50 scenarios are as their instructions say" in said
+
+
+def test_a_clean_folder_says_how_many_claims_were_held_against_each_reference(
+    folder: Path,
+) -> None:
+    assert "nudge-plane-tree-street       4   4 read  good" in checked(folder)
+
+
+def test_a_reference_that_is_elsewhere_than_said_is_refused(folder: Path) -> None:
+    edit(folder, lambda it: it["reference"]["add"][0].update(x_m=24.0, y_m=-1.0))
+    with pytest.raises(CommandError) as fault:
+        checked(folder)
+    reasons = str(fault.value)
+    assert "ahead_m of Agent2: 21.5 is said, 24 is measured" in reasons
+    assert "left_m of Agent2: -1.3 is said, -1 is measured" in reasons
+    assert "read from the sentence: ahead_m of Agent2" in reasons
+
+
+def test_a_reference_with_something_wrong_is_refused(folder: Path) -> None:
+    edit(folder, lambda it: it["reference"]["add"][0].update(x_m=0.0, y_m=0.0))
+    with pytest.raises(CommandError, match="wrong: Agent2 and the ego overlap"):
+        checked(folder)
+
+
+def test_a_number_that_nobody_claims_is_named(folder: Path) -> None:
+    edit(folder, lambda it: it.update(instruction="Park a car 19 m ahead of the ego."))
+    with pytest.raises(CommandError, match="the instruction says 19, and no claim does"):
+        checked(folder)
+
+
+def test_a_claim_about_nobody_is_named(folder: Path) -> None:
+    edit(folder, lambda it: it["claims"][1].update(agents=["Agent9"]))
+    with pytest.raises(CommandError, match=r"ahead_m of Agent9: 21\.5 is said, nothing is"):
+        checked(folder)
+
+
+def test_two_scenarios_that_differ_by_numbers_alone_are_named(folder: Path) -> None:
+    text = (folder / "scenarios/nudge-plane-tree-street.json").read_text()
+    twin = text.replace("nudge-plane-tree-street", "twin").replace("21.5", "31.5")
+    (folder / "scenarios/twin.json").write_text(twin)
+    with pytest.raises(CommandError, match="differ by numbers alone"):
+        checked(folder)
