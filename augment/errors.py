@@ -162,6 +162,18 @@ class ModelRefused(AugmentError):
     """The model answered that it will not do this. An outcome, never retried."""
 
 
+class ReviewUnusable(AugmentError):
+    """A review could not be had. What was reviewed stands without one.
+
+    Args:
+        reason: Who failed and how.
+    """
+
+    def __init__(self, reason: str) -> None:
+        self.reason = reason
+        super().__init__(f"The review is unusable: {reason}")
+
+
 class QueueUnreachable(AugmentError):
     """No broker takes messages. The rows wait and are sent by the next worker that starts.
 

@@ -20,6 +20,9 @@ from augment.scene.entities import AgentType, Scene, TrafficAgent
 from augment.scene.lane_graph import LaneGraph
 from augment.scene.modification import Modification
 
+SPARED_BY_TOOL = frozenset({"straight-line", "ego-heading"})
+"""Mistakes that nobody makes who asks a function for poses on lanes."""
+
 _UNREADABLE_SHARE = 0.1
 _RIGHT_SHARE = 0.25
 _AHEAD_M = 200.0
@@ -61,17 +64,38 @@ def is_unreadable(rng: random.Random) -> bool:
     return rng.random() < _UNREADABLE_SHARE
 
 
-def bend(scene: Scene, right: Modification, rng: random.Random) -> Bent:
+def too_far(scene: Scene, right: Modification) -> Modification:
+    """The right modification, 8 m too far along the lanes."""
+    setting = _setting(scene, random.Random(0))
+    if setting is None:
+        moved = tuple(_at(a, a.x_m + 8.0, a.y_m, a.heading_rad) for a in right.added)
+    else:
+        moved = _shifted(right.added, setting, 8.0)
+    return replace(right, added=moved)
+
+
+def bend(
+    scene: Scene,
+    right: Modification,
+    rng: random.Random,
+    spared: frozenset[str] = frozenset(),
+) -> Bent:
     """The right modification with a small inaccuracy and, mostly, one mistake.
 
     Of the mistakes only those are drawn that make a difference here: a straight line is no
     mistake on a straight road.
+
+    Args:
+        scene: What the task shows.
+        right: What was asked for.
+        rng: The dice.
+        spared: Mistakes that are not made.
     """
     setting = _setting(scene, rng)
     if setting is None or not right.added:
         return Bent(modification=right, mistake="none")
     shaky = _shifted(right.added, setting, rng.uniform(-1.5, 1.5))
-    made = {name: mistake(shaky, setting) for name, mistake in MISTAKES.items()}
+    made = {n: mistake(shaky, setting) for n, mistake in MISTAKES.items() if n not in spared}
     possible = sorted(name for name, agents in made.items() if _differs(agents, shaky))
     if not possible or rng.random() < _RIGHT_SHARE:
         return Bent(modification=replace(right, added=shaky), mistake="none")

@@ -1,6 +1,8 @@
 """The stand-in's models: behaviour is chosen by the model's name.
 
-`fake-good` and `fake-careless` answer; each of the others breaks in one way that real servers do.
+`fake-good` and `fake-careless` play every role; `fake-qa-...` are wrong at first, for ever, or
+review without ratings; three use their function wrongly; each of the others breaks in one way
+that real servers do.
 """
 
 from __future__ import annotations
@@ -10,12 +12,8 @@ from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from threading import Lock
 
-from augment.baselines.rule_placer import place
-from augment.errors import InstructionNotUnderstood
-from augment.fake_llm import answers, careless
-from augment.fake_llm.sight import NothingSeen, Task, task_of
+from augment.fake_llm import careless, playing
 from augment.fake_llm.wire import ChatRequest, Response, as_json, completion, error
-from augment.scene.modification import Modification
 
 
 @dataclass(slots=True)
@@ -53,49 +51,19 @@ def respond(request: ChatRequest, surroundings: Surroundings) -> Response:
 
 
 def good_answer(request: ChatRequest) -> str:
-    """A right answer, or an honest one to what is not understood."""
-    try:
-        task = task_of(request.messages)
-    except NothingSeen:
-        return answers.SEES_NOTHING
-    try:
-        return answers.told(task, _placed(task), _summary(task))
-    except InstructionNotUnderstood as refused:
-        return answers.declined(task, refused.reason)
+    """A right answer in whatever role, or an honest one to what is not understood."""
+    return playing.GOOD.answer(request).text
 
 
-def careless_answer(request: ChatRequest) -> str:
-    """An answer with the typical mistakes of weak models; about one in ten can't be read."""
-    try:
-        task = task_of(request.messages)
-    except NothingSeen:
-        return answers.SEES_NOTHING
-    rng = careless.dice(task.prompt)
-    try:
-        right = _placed(task)
-    except InstructionNotUnderstood as refused:
-        return answers.declined(task, refused.reason)
-    if careless.is_unreadable(rng):
-        return answers.told(task, right, _summary(task)).partition("```")[0]
-    bent = careless.bend(task.scene, right, rng)
-    return answers.told(task, bent.modification, _summary(task))
+def _as(character: playing.Character) -> Behaviour:
+    def played(request: ChatRequest, _: Surroundings) -> Response:
+        said = character.answer(request)
+        return as_json(completion(request, said.text or None, calls=said.calls))
+
+    return played
 
 
-def _placed(task: Task) -> Modification:
-    placement = place(task.scene, task.instruction)
-    return answers.renumbered(placement.modification, task.first_new)
-
-
-def _summary(task: Task) -> str:
-    return f"The user wants: {' '.join(task.instruction.split())}"
-
-
-def _good(request: ChatRequest, _: Surroundings) -> Response:
-    return as_json(completion(request, good_answer(request)))
-
-
-def _careless(request: ChatRequest, _: Surroundings) -> Response:
-    return as_json(completion(request, careless_answer(request)))
+_good = _as(playing.GOOD)
 
 
 def _slow(request: ChatRequest, surroundings: Surroundings) -> Response:
@@ -197,6 +165,12 @@ def _too_few(request: ChatRequest, _: Surroundings) -> Response:
     return as_json(completion(request, _spoilt_block('"x_m": 20.0')))
 
 
+def _garbage(request: ChatRequest, _: Surroundings) -> Response:
+    rng = careless.dice(request.model_dump_json())
+    alphabet = '{}[]",:0123456789.-eE\n\\`#*abcXYZ \u00e9\u2028\x00add"move"remove"call"'
+    return as_json(completion(request, "".join(rng.choices(alphabet, k=2000))))
+
+
 def _spoilt_block(fields: str) -> str:
     start = json.dumps({"id": "Agent2", "type": "VEHICLE"})[:-1]
     return f'Modified Vectors:\n```json\n{{"add": [{start}, {fields}}}]}}\n```\n'
@@ -204,7 +178,14 @@ def _spoilt_block(fields: str) -> str:
 
 MODELS: dict[str, Behaviour] = {
     "fake-good": _good,
-    "fake-careless": _careless,
+    "fake-careless": _as(playing.CARELESS),
+    "fake-qa-low": _as(playing.LEARNING),
+    "fake-qa-never": _as(playing.STUBBORN),
+    "fake-qa-nonnumeric": _as(playing.NONNUMERIC),
+    "fake-tool-loop": _as(playing.LOOPING),
+    "fake-unknown-tool": _as(playing.MISNAMING),
+    "fake-bad-tool-args": _as(playing.MISCALLING),
+    "fake-garbage": _garbage,
     "fake-500": _500,
     "fake-500-then-ok": _500_then_ok,
     "fake-429": _429,

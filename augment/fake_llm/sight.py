@@ -7,18 +7,21 @@ Frame: ego frame.
 from __future__ import annotations
 
 import json
+import math
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from augment.fake_llm.wire import SpokenMessage
 from augment.geometry.angles import difference
+from augment.geometry.bezier import CubicBezier
 from augment.geometry.frames import Pose
 from augment.geometry.polyline import Polyline
-from augment.prompts.fill import QUOTE
+from augment.prompts.texts import QUOTE
 from augment.scene.entities import (
     AgentType,
     Area,
@@ -108,8 +111,8 @@ def smooth(points_m: NDArray[np.float64]) -> Polyline:
 
 
 def _task(text: str) -> Task:
-    agents = [_agent(name, vector) for name, vector in _list(text, "Agents").items()]
-    lanes = tuple(_lane(name, vector) for name, vector in _list(text, "Lanes").items())
+    agents = [agent_of(name, vector) for name, vector in list_of(text, "Agents").items()]
+    lanes = tuple(_lane(name, vector) for name, vector in list_of(text, "Lanes").items())
     widths = {lane.id: lane.width_m for lane in lanes}
     side = re.search(r"^Traffic drives on the (left|right)-hand side", text, re.MULTILINE)
     first_new = re.search(r"^The first new agent is Agent(\d+)\.$", text, re.MULTILINE)
@@ -125,11 +128,11 @@ def _task(text: str) -> Task:
         lanes=_joined(lanes),
         connectors=tuple(
             _connector(name, vector, widths)
-            for name, vector in _list(text, "Lane connectors").items()
+            for name, vector in list_of(text, "Lane connectors").items()
         ),
         areas=tuple(
             Area(id=name, kind=AreaKind(vector[0]), boundary_m=tuple(map(_point, vector[1])))
-            for name, vector in _list(text, "Areas").items()
+            for name, vector in list_of(text, "Areas").items()
         ),
     )
     return Task(
@@ -140,8 +143,12 @@ def _task(text: str) -> Task:
     )
 
 
-def _list(text: str, title: str) -> Vectors:
-    """The JSON object under a heading."""
+def list_of(text: str, title: str) -> Vectors:
+    """The JSON object under a heading.
+
+    Raises:
+        ValueError: There is none.
+    """
     start = text.index(f"\n{title}:\n") + len(title) + 3
     found, _ = json.JSONDecoder().raw_decode(text, start)
     return dict(found)
@@ -154,7 +161,8 @@ def _instruction(text: str) -> str:
     return "\n".join(line.removeprefix(QUOTE) for line in quoted.group(1).split("\n"))
 
 
-def _agent(name: str, vector: Sequence[object]) -> TrafficAgent:
+def agent_of(name: str, vector: Sequence[object]) -> TrafficAgent:
+    """The agent that a vector of the prompt describes."""
     kind, *numbers, lane = vector
     x, y, heading, width, length, speed = (float(str(number)) for number in numbers)
     return TrafficAgent(
@@ -170,30 +178,42 @@ def _agent(name: str, vector: Sequence[object]) -> TrafficAgent:
     )
 
 
-def _lane(name: str, vector: Sequence[object]) -> Lane:
+def _lane(name: str, vector: Sequence[Any]) -> Lane:
     _, _, _, width, limit, points = vector
     return Lane(
         id=name,
-        centerline=smooth(np.array(points, dtype=np.float64)),
+        centerline=_line(points),
         width_m=float(str(width)),
         speed_limit_mps=None if limit is None else float(str(limit)),
     )
 
 
-def _connector(name: str, vector: Sequence[object], widths: dict[str, float]) -> LaneConnector:
+def _connector(name: str, vector: Sequence[Any], widths: dict[str, float]) -> LaneConnector:
     before, after, light, turn, limit, points = vector
     ends = [None if end is None else str(end) for end in (before, after)]
     return LaneConnector(
         id=name,
         from_lane=ends[0],
         to_lane=ends[1],
-        centerline=smooth(np.array(points, dtype=np.float64)),
+        centerline=_line(points),
         # The paper's table gives a connector no width; it is as wide as what it joins.
         width_m=next((widths[end] for end in ends if end in widths), _USUAL_WIDTH_M),
         traffic_light=TrafficLight(str(light)),
         turn_type=TurnType(str(turn)),
         speed_limit_mps=None if limit is None else float(str(limit)),
     )
+
+
+def _line(coordinates: list[Any]) -> Polyline:
+    """A centreline from points, or from the control points of Bezier pieces."""
+    if not isinstance(coordinates[0][0], list):
+        return smooth(np.array(coordinates, dtype=np.float64))
+    pieces = []
+    for control in coordinates:
+        curve = CubicBezier(control)
+        count = max(2, math.ceil(curve.length_m / _FINE_M) + 1)
+        pieces.append(curve.points(curve.parameters_at(np.linspace(0.0, curve.length_m, count))))
+    return Polyline(np.vstack([pieces[0], *(piece[1:] for piece in pieces[1:])]))
 
 
 def _joined(lanes: tuple[Lane, ...]) -> tuple[Lane, ...]:

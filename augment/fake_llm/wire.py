@@ -9,12 +9,13 @@ import base64
 import binascii
 import hashlib
 import json
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Annotated, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, field_validator
 
+from augment.fake_llm.png import size_of
 from augment.llm.window import least_tokens
 
 _CHARACTERS_PER_TOKEN = 4
@@ -60,9 +61,13 @@ class ImageUrl(_Strict):
             png = base64.b64decode(url.removeprefix(_PNG), validate=True)
         except binascii.Error:
             raise ValueError("the image is not base64") from None
-        if not png.startswith(b"\x89PNG"):
-            raise ValueError("the image is not a PNG")
+        size_of(png)
         return url
+
+    @property
+    def size_px(self) -> tuple[int, int]:
+        """Width and height."""
+        return size_of(base64.b64decode(self.url.removeprefix(_PNG)))
 
 
 class ImagePart(_Strict):
@@ -75,18 +80,59 @@ class ImagePart(_Strict):
 Part = Annotated[TextPart | ImagePart, Field(discriminator="type")]
 
 
+class CalledFunction(_Strict):
+    """A function with its arguments, a JSON text."""
+
+    name: str
+    arguments: str
+
+
+class CalledTool(_Strict):
+    """A call that an assistant made; what this server hung on it has to come back."""
+
+    id: Annotated[str, Field(min_length=1)]
+    type: Literal["function"]
+    function: CalledFunction
+    extra_content: dict[str, dict[str, str]]
+
+
 class SpokenMessage(_Strict):
     """One turn of the conversation."""
 
-    role: Literal["system", "developer", "user", "assistant"]
-    content: str | Annotated[list[Part], Field(min_length=1)]
+    role: Literal["system", "developer", "user", "assistant", "tool"]
+    content: str | Annotated[list[Part], Field(min_length=1)] | None
+    tool_calls: Annotated[list[CalledTool], Field(min_length=1)] | None = None
+    tool_call_id: str | None = None
 
     @property
     def text(self) -> str:
         """All text of the turn."""
+        if self.content is None:
+            return ""
         if isinstance(self.content, str):
             return self.content
         return "\n".join(part.text for part in self.content if isinstance(part, TextPart))
+
+    @property
+    def images(self) -> list[ImageUrl]:
+        """All pictures of the turn."""
+        parts = self.content if isinstance(self.content, list) else []
+        return [part.image_url for part in parts if isinstance(part, ImagePart)]
+
+
+class OfferedFunction(_Strict):
+    """A function that may be called."""
+
+    name: Annotated[str, Field(pattern=r"^[a-zA-Z0-9_-]{1,64}$")]
+    description: str
+    parameters: dict[str, object]
+
+
+class OfferedTool(_Strict):
+    """A tool that may be called."""
+
+    type: Literal["function"]
+    function: OfferedFunction
 
 
 class ChatRequest(_Strict):
@@ -98,6 +144,8 @@ class ChatRequest(_Strict):
     max_tokens: Annotated[int, Field(ge=1)] | None = None
     temperature: Annotated[float, Field(ge=0.0, le=2.0)] | None = None
     seed: int | None = None
+    tools: Annotated[list[OfferedTool], Field(min_length=1)] | None = None
+    tool_choice: Literal["auto", "none"] | None = None
     stream: Literal[False] = False
 
 
@@ -134,14 +182,75 @@ def chat_request(body: bytes) -> ChatRequest:
         first = error.errors(include_url=False, include_input=False)[0]
         path = ".".join(str(part) for part in first["loc"])
         raise BadRequest(f"{path}: {first['msg']}", path) from None
-    if request.messages[-1].role != "user":
-        raise BadRequest("the last message must be the user's", "messages")
     for index, message in enumerate(request.messages):
-        if not message.text.strip():
-            raise BadRequest(f"messages.{index} is empty", f"messages.{index}.content")
-        if message.role != "user" and not isinstance(message.content, str):
-            raise BadRequest("only a user shows images", f"messages.{index}.content")
+        _check_turn(index, message)
+    _check_calls(request)
+    _check_end(request)
     return request
+
+
+def _check_turn(index: int, message: SpokenMessage) -> None:
+    if not message.text.strip() and not message.tool_calls:
+        raise BadRequest(f"messages.{index} is empty", f"messages.{index}.content")
+    if message.role != "user" and isinstance(message.content, list):
+        raise BadRequest("only a user shows images", f"messages.{index}.content")
+    if message.tool_calls and message.role != "assistant":
+        raise BadRequest("only an assistant calls tools", f"messages.{index}.tool_calls")
+    if (message.role == "tool") != (message.tool_call_id is not None):
+        raise BadRequest("a tool, and nobody else, names a call", f"messages.{index}.tool_call_id")
+
+
+def _check_calls(request: ChatRequest) -> None:
+    """Every call is answered once, right behind it, and comes back as it was made."""
+    open_calls: list[str] = []
+    for index, message in enumerate(request.messages):
+        path = f"messages.{index}"
+        if message.role == "tool":
+            if message.tool_call_id not in open_calls:
+                raise BadRequest("there is no such call", f"{path}.tool_call_id")
+            open_calls.remove(message.tool_call_id)
+            continue
+        if open_calls:
+            raise BadRequest(f"the call {open_calls[0]!r} is not answered", path)
+        for call in message.tool_calls or []:
+            if call.extra_content != {"fake": {"signature": signature_of(call.id)}}:
+                raise BadRequest("the signature of a call is missing", f"{path}.tool_calls")
+            open_calls.append(call.id)
+    if open_calls:
+        raise BadRequest(f"the call {open_calls[0]!r} is not answered", "messages")
+
+
+def _check_end(request: ChatRequest) -> None:
+    if request.messages[-1].role not in ("user", "tool"):
+        raise BadRequest("the last message must be the user's", "messages")
+    if request.tools is not None:
+        return
+    if request.tool_choice is not None:
+        raise BadRequest("there are no tools to choose from", "tool_choice")
+    if any(message.tool_calls for message in request.messages):
+        raise BadRequest("tools are called and none is named", "tools")
+
+
+def signature_of(call_id: str) -> str:
+    """What this server hangs on a call, and insists on getting back."""
+    return hashlib.sha256(call_id.encode()).hexdigest()[:16]
+
+
+def tool_calls(calls: Sequence[tuple[str, str]], seed: str) -> list[dict[str, object]]:
+    """Calls (name, arguments) in the form of the wire, numbered and signed."""
+    made: list[dict[str, object]] = []
+    for number, (name, arguments) in enumerate(calls):
+        digest = hashlib.sha256(f"{seed}:{number}".encode()).hexdigest()
+        call_id = f"call_{digest[:16]}"
+        made.append(
+            {
+                "id": call_id,
+                "type": "function",
+                "function": {"name": name, "arguments": arguments},
+                "extra_content": {"fake": {"signature": signature_of(call_id)}},
+            }
+        )
+    return made
 
 
 def completion(
@@ -151,11 +260,15 @@ def completion(
     finish_reason: str = "stop",
     refusal: str | None = None,
     with_usage: bool = True,
+    calls: Sequence[tuple[str, str]] = (),
 ) -> dict[str, object]:
     """A chat completion with that text; the same request and text give the same document."""
     prompt_tokens = 1 + sum(_tokens(message.text) for message in request.messages)
     completion_tokens = 1 + _tokens(text or refusal or "")
     digest = hashlib.sha256((request.model_dump_json() + str(text)).encode()).hexdigest()
+    message: dict[str, object] = {"role": "assistant", "content": text, "refusal": refusal}
+    if calls:
+        message["tool_calls"] = tool_calls(calls, digest)
     made: dict[str, object] = {
         "id": f"chatcmpl-{digest[:24]}",
         "object": "chat.completion",
@@ -164,8 +277,8 @@ def completion(
         "choices": [
             {
                 "index": 0,
-                "message": {"role": "assistant", "content": text, "refusal": refusal},
-                "finish_reason": finish_reason,
+                "message": message,
+                "finish_reason": "tool_calls" if calls else finish_reason,
                 "logprobs": None,
             }
         ],

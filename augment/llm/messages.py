@@ -6,6 +6,7 @@ Everything that is stored, replayed or shown goes through these values.
 from __future__ import annotations
 
 import base64
+import json
 from collections.abc import Callable
 from dataclasses import dataclass
 from enum import StrEnum
@@ -28,6 +29,29 @@ class Speaker(StrEnum):
     SYSTEM = "system"
     USER = "user"
     ASSISTANT = "assistant"
+    TOOL = "tool"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ToolCall:
+    """A function that the model wants called.
+
+    Attributes:
+        arguments: The JSON text as it came; it may be broken.
+        extra: What else the endpoint hung on the call, such as a signature of the model's
+            thoughts, as JSON; some endpoints refuse the next request where it does not come back.
+    """
+
+    id: str
+    name: str
+    arguments: str
+    extra: str = ""
+
+    def to_document(self) -> dict[str, object]:
+        """The call in the form of the OpenAI-compatible wire, with all that hung on it."""
+        extra: dict[str, object] = json.loads(self.extra) if self.extra else {}
+        function = {"name": self.name, "arguments": self.arguments}
+        return extra | {"id": self.id, "type": "function", "function": function}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -36,16 +60,27 @@ class Message:
 
     Attributes:
         images: PNG files that go with the text, in order; only a user shows images.
+        calls: Of tools, made by an assistant.
+        answers: The id of the call that a tool's message answers, empty for all others.
     """
 
     speaker: Speaker
     text: str
     images: tuple[bytes, ...] = ()
+    calls: tuple[ToolCall, ...] = ()
+    answers: str = ""
 
     def to_document(self, *, image_url: ImageUrl = data_url) -> dict[str, object]:
         """The message in the form of the OpenAI-compatible wire."""
+        said: dict[str, object] = {"role": self.speaker.value, "content": self.text}
+        if self.calls:
+            # Several servers refuse an empty text beside calls.
+            calls = [call.to_document() for call in self.calls]
+            return said | {"content": self.text or None, "tool_calls": calls}
+        if self.answers:
+            return said | {"tool_call_id": self.answers}
         if not self.images:
-            return {"role": self.speaker.value, "content": self.text}
+            return said
         parts: list[dict[str, object]] = [{"type": "text", "text": self.text}]
         parts += [{"type": "image_url", "image_url": {"url": image_url(i)}} for i in self.images]
         return {"role": self.speaker.value, "content": parts}
@@ -80,6 +115,13 @@ class Tool:
         return {"type": "function", "function": function}
 
 
+class ToolChoice(StrEnum):
+    """Whether a model may call the tools that a request names."""
+
+    AUTO = "auto"
+    NONE = "none"
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class AnswerSchema:
     """The JSON schema that an answer must fit."""
@@ -104,6 +146,7 @@ class Request:
         temperature, seed, reasoning_effort: Left out of the request where None.
         tools: What the model may call natively. Servers drop one of the two where tools and a
             schema of the answer come together, so a request never has both.
+        tool_choice: Counts only where there are tools.
 
     Raises:
         ValueError: It has both.
@@ -116,6 +159,7 @@ class Request:
     seed: int | None = None
     reasoning_effort: str | None = None
     tools: tuple[Tool, ...] = ()
+    tool_choice: ToolChoice = ToolChoice.AUTO
     answer_schema: AnswerSchema | None = None
     length_name: LengthName = LengthName.MAX_COMPLETION_TOKENS
 
@@ -136,22 +180,10 @@ class Request:
                 document[name] = value
         if self.tools:
             document["tools"] = [tool.to_document() for tool in self.tools]
+            document["tool_choice"] = self.tool_choice.value
         if self.answer_schema is not None:
             document["response_format"] = self.answer_schema.to_document()
         return document
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class ToolCall:
-    """A function that the model wants called.
-
-    Attributes:
-        arguments: The JSON text as it came; it may be broken.
-    """
-
-    id: str
-    name: str
-    arguments: str
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -6,6 +6,8 @@ or lack any field. So nothing here is taken on trust.
 
 from __future__ import annotations
 
+import json
+
 from augment.errors import ModelFault
 from augment.llm.messages import Reply, ToolCall
 from augment.llm.wire_faults import Secret
@@ -51,16 +53,18 @@ def reply_of(answer: object, *, latency_s: float, secret: Secret) -> Reply:
 def _tool_calls(calls: object, secret: Secret) -> tuple[ToolCall, ...]:
     """Those calls that name a function; their arguments stay as they came."""
     made = []
-    for call in calls if isinstance(calls, list) else []:
+    for number, call in enumerate(calls if isinstance(calls, list) else [], start=1):
         function = getattr(call, "function", None)
         name = _text(getattr(function, "name", None))
+        extra = getattr(call, "model_extra", None)
         if name:
-            arguments = _text(getattr(function, "arguments", None))
             made.append(
                 ToolCall(
-                    id=secret.out_of(_text(getattr(call, "id", None))),
+                    # Some servers number no calls; the answer to one must name it.
+                    id=secret.out_of(_text(getattr(call, "id", None))) or f"call_{number}",
                     name=secret.out_of(name),
-                    arguments=secret.out_of(arguments),
+                    arguments=secret.out_of(_text(getattr(function, "arguments", None))),
+                    extra=secret.out_of(json.dumps(extra, sort_keys=True)) if extra else "",
                 )
             )
     return tuple(made)

@@ -63,6 +63,7 @@ class Migration(migrations.Migration):
                 ('kind', models.CharField(choices=[('reference', 'Reference'), ('human', 'Human'), ('llm', 'Language model'), ('rule', 'Rules'), ('baseline', 'Baseline'), ('simulated', 'Simulated')], max_length=20)),
                 ('variant', models.CharField(blank=True, help_text='otm, fc, ...; empty without', max_length=20)),
                 ('model', models.CharField(blank=True, help_text='the model id on the endpoint', max_length=120)),
+                ('roles', models.JSONField(blank=True, default=dict, help_text='who else plays a role: {"viewer": {"endpoint": label, "model": id}}')),
                 ('created_at', models.DateTimeField(auto_now_add=True)),
             ],
             options={
@@ -268,7 +269,7 @@ class Migration(migrations.Migration):
                 ('id', models.BigAutoField(auto_created=True, primary_key=True, serialize=False, verbose_name='ID')),
                 ('number', models.PositiveIntegerField()),
                 ('after_call', models.PositiveIntegerField(help_text='0 before the first call')),
-                ('kind', models.CharField(help_text='round, tool_call, review', max_length=20)),
+                ('kind', models.CharField(help_text='round, tool_call, review, kept', max_length=20)),
                 ('document', models.JSONField()),
                 ('attempt', models.ForeignKey(on_delete=django.db.models.deletion.CASCADE, related_name='notes', to='augment.attempt')),
             ],

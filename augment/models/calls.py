@@ -83,7 +83,7 @@ class TranscriptNote(models.Model):
     attempt = models.ForeignKey(Attempt, on_delete=models.CASCADE, related_name="notes")
     number = models.PositiveIntegerField()
     after_call = models.PositiveIntegerField(help_text="0 before the first call")
-    kind = models.CharField(max_length=20, help_text="round, tool_call, review")
+    kind = models.CharField(max_length=20, help_text="round, tool_call, review, kept")
     document = models.JSONField()
 
     class Meta:

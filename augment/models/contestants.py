@@ -31,6 +31,11 @@ class Contestant(models.Model):
         Endpoint, null=True, blank=True, on_delete=models.PROTECT, related_name="contestants"
     )
     model = models.CharField(max_length=120, blank=True, help_text="the model id on the endpoint")
+    roles = models.JSONField(
+        default=dict,
+        blank=True,
+        help_text='who else plays a role: {"viewer": {"endpoint": label, "model": id}}',
+    )
     created_at = models.DateTimeField(auto_now_add=True)
 
     class Meta:

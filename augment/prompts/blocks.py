@@ -13,7 +13,7 @@ from augment.errors import ReplyUnreadable
 LONGEST_ANSWER = 200_000
 """Characters; a longer answer is not looked at."""
 
-_FENCE = re.compile(r"^[ \t]*```[^\n`]*\n(.*?)(?:^[ \t]*```|\Z)", re.DOTALL | re.MULTILINE)
+FENCE = re.compile(r"^[ \t]*```[^\n`]*\n(.*?)(?:^[ \t]*```|\Z)", re.DOTALL | re.MULTILINE)
 
 
 def last_object(answer: str, keys: frozenset[str]) -> tuple[dict[str, object], bool]:
@@ -28,7 +28,7 @@ def last_object(answer: str, keys: frozenset[str]) -> tuple[dict[str, object], b
     if len(answer) > LONGEST_ANSWER:
         raise ReplyUnreadable([f"the answer is longer than {LONGEST_ANSWER} characters"])
     named = re.compile("|".join(rf'"{re.escape(key)}"\s*:' for key in sorted(keys)))
-    for block in _candidates(_without_thoughts(answer)):
+    for block in _candidates(without_thoughts(answer)):
         if not named.search(block):
             continue
         found, mended = _loaded(block)
@@ -38,14 +38,26 @@ def last_object(answer: str, keys: frozenset[str]) -> tuple[dict[str, object], b
     raise ReplyUnreadable([f"there is no fenced JSON block with the keys {wanted}"])
 
 
-def _without_thoughts(answer: str) -> str:
+def strict_json(written: str) -> object:
+    """The one JSON value in that text, as strictly read as a block.
+
+    Raises:
+        ReplyUnreadable: It is none.
+    """
+    try:
+        return _strict(written)
+    except _Broken as broken:
+        raise ReplyUnreadable([str(broken)]) from None
+
+
+def without_thoughts(answer: str) -> str:
     """What follows the last reasoning tag of models that think aloud."""
     return answer.rpartition("</think>")[2]
 
 
 def _candidates(answer: str) -> list[str]:
     """Fenced blocks (the last may lack its end), last first; without any, bare objects."""
-    fenced = [match.group(1) for match in _FENCE.finditer(answer)]
+    fenced = [match.group(1) for match in FENCE.finditer(answer)]
     return (fenced or _bare_objects(answer))[::-1]
 
 

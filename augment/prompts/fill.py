@@ -1,84 +1,144 @@
-"""Prompt texts filled with a scene and an instruction: the only place where that happens.
+"""What the modifier is told: prompt texts filled with a scene, an instruction and what came back.
 
-The texts are package data under `text/`. What is the same for every scenario comes first, then
-the scene, then the instruction, so that an endpoint can reuse the unchanged beginning.
+What is the same for every scenario comes first, then the scene, then the instruction, so that an
+endpoint can reuse the unchanged beginning.
 """
 
 from __future__ import annotations
 
-import hashlib
-import unicodedata
+import json
 from collections.abc import Sequence
+from dataclasses import dataclass
+from enum import StrEnum
 from functools import cache
-from importlib.resources import files
 
-from augment.llm.messages import Message, Speaker
-from augment.prompts.vectors import DEFAULT_RADIUS_M, scene_text
+from augment.llm.messages import Message, Speaker, Tool
+from augment.prompts.texts import (
+    QUOTE,
+    filled,
+    prompt_version,
+    quoted,
+    said_by_model,
+    said_by_user,
+    text,
+)
+from augment.prompts.vectors import DEFAULT_RADIUS_M, LaneFormat, scene_text
 from augment.scene.entities import Scene
 
-QUOTE = "> "
-"""Stands before every line of the user's instruction: no line of it can end the quotation."""
+__all__ = ["QUOTE", "Calling", "Form", "modifier_messages", "prompt_version", "quoted"]
 
-_LONGEST_ECHO = 20_000
+
+class Calling(StrEnum):
+    """How the modifier calls the pose tool: not at all, by a line of its answer, or natively."""
+
+    NONE = "none"
+    IN_PROMPT = "in_prompt"
+    NATIVE = "native"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Form:
+    """In which form the modifier gets its task.
+
+    Attributes:
+        lanes: How lanes are written down.
+        radius_m: How far around the ego the scene is written down.
+        calls, identical: How many calls are answered, and of these the very same.
+    """
+
+    lanes: LaneFormat = LaneFormat.POLYLINE
+    calling: Calling = Calling.NONE
+    radius_m: float = DEFAULT_RADIUS_M
+    calls: int = 8
+    identical: int = 3
 
 
 def modifier_messages(
-    scene: Scene, instruction: str, *, radius_m: float = DEFAULT_RADIUS_M
+    scene: Scene, instruction: str, form: Form | None = None
 ) -> tuple[Message, ...]:
     """What the modifier is asked first."""
-    task = _filled(
-        "task.md", scene=scene_text(scene, radius_m=radius_m), quoted=quoted(instruction)
+    form = form or Form()
+    task = filled(
+        "task.md",
+        scene=scene_text(scene, radius_m=form.radius_m, lanes=form.lanes),
+        quoted=quoted(instruction),
     )
-    return (
-        Message(speaker=Speaker.SYSTEM, text=_text("modifier.md")),
-        Message(speaker=Speaker.USER, text=task),
-    )
+    return Message(speaker=Speaker.SYSTEM, text=_modifier(form)), said_by_user(task)
 
 
 def re_ask_messages(
     messages: tuple[Message, ...], answer: str, problems: Sequence[str]
 ) -> tuple[Message, ...]:
     """The conversation so far, the answer that can't be read, and what is wrong with it."""
-    listed = "\n".join(f"- {problem}" for problem in problems)
-    # An empty turn is refused by several servers.
-    said = answer[:_LONGEST_ECHO] or "(empty answer)"
-    return (
-        *messages,
-        Message(speaker=Speaker.ASSISTANT, text=said),
-        Message(speaker=Speaker.USER, text=_filled("re_ask.md", problems=listed)),
+    asked = filled("re_ask.md", problems=_listed(problems))
+    return (*messages, said_by_model(answer), said_by_user(asked))
+
+
+def regenerate_messages(
+    messages: tuple[Message, ...], feedback: Sequence[str], *, is_measured: bool
+) -> tuple[Message, ...]:
+    """The conversation so far, and what a review found about its last answer.
+
+    Args:
+        messages: Up to and including that answer.
+        feedback: One entry a problem.
+        is_measured: Whether these are measured facts rather than somebody's opinion.
+    """
+    words = filled("measured.md" if is_measured else "feedback.md", feedback=_listed(feedback))
+    return (*messages, said_by_user(words))
+
+
+def result_text(results: Sequence[str], *, is_over: bool) -> str:
+    """What the program says about calls made in the prompt: each result as one line of JSON."""
+    lines = "\n".join(f"{number}. {result}" for number, result in enumerate(results, start=1))
+    return filled("function_result.md", results=lines, rest=go_on_text(is_over=is_over))
+
+
+def go_on_text(*, is_over: bool) -> str:
+    """Whether more calls are answered."""
+    return text("calls_are_over.md" if is_over else "calls_go_on.md")
+
+
+@cache
+def pose_tool() -> Tool:
+    """The pose tool as endpoints with native calls are told of it."""
+    function = json.loads(text("pose_on_lane.json"))["function"]
+    return Tool(
+        name=function["name"],
+        description=function["description"],
+        parameters=function["parameters"],
     )
 
 
-def quoted(instruction: str) -> str:
-    """The instruction as a quotation, line by line, without control characters."""
-    clean = ("".join(map(_printable, line)).strip() for line in instruction.splitlines())
-    return "\n".join(QUOTE + line for line in clean if line)
+def input_format(lanes: LaneFormat = LaneFormat.POLYLINE) -> str:
+    """How a scene is written down."""
+    return filled("input_format.md", coordinates=text(f"lanes_{lanes}.md"))
+
+
+_WORK = {Calling.NONE: "walked", Calling.IN_PROMPT: "called", Calling.NATIVE: "native"}
 
 
 @cache
-def prompt_version() -> str:
-    """Twelve hexadecimal digits that change with every change to any prompt text."""
-    digest = hashlib.sha256()
-    for entry in sorted(files(__package__).joinpath("text").iterdir(), key=lambda e: e.name):
-        digest.update(entry.name.encode() + b"\0" + entry.read_bytes() + b"\0")
-    return digest.hexdigest()[:12]
+def _modifier(form: Form) -> str:
+    tools = ""
+    if form.calling is not Calling.NONE:
+        tools = filled(
+            f"calls_{form.calling}.md",
+            function=text("pose_on_lane.md"),
+            calls=str(form.calls),
+            identical=str(form.identical),
+        )
+    manner = "walked" if form.calling is Calling.NONE else "called"
+    return filled(
+        "modifier.md",
+        input_format=input_format(form.lanes),
+        distances=text(f"distances_{manner}.md"),
+        tools=tools,
+        calculations=text(f"calculations_{manner}.md"),
+        example=text(f"example_{form.lanes}.md"),
+        work=text(f"work_{_WORK[form.calling]}.md"),
+    )
 
 
-@cache
-def _text(name: str) -> str:
-    return files(__package__).joinpath("text", name).read_text(encoding="utf-8").strip()
-
-
-def _filled(name: str, **values: str) -> str:
-    """The text with each {{name}} replaced once; what is filled in is not looked at again."""
-    filled = []
-    rest = _text(name)
-    while "{{" in rest:
-        before, _, rest = rest.partition("{{")
-        key, _, rest = rest.partition("}}")
-        filled += [before, values[key]]
-    return "".join([*filled, rest])
-
-
-def _printable(character: str) -> str:
-    return " " if unicodedata.category(character).startswith("C") else character
+def _listed(entries: Sequence[str]) -> str:
+    return "\n".join(f"- {entry}" for entry in entries)

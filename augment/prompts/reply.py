@@ -10,12 +10,13 @@ import re
 from dataclasses import dataclass, replace
 from typing import Annotated, Literal, TypeVar
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from pydantic import Field
 
 from augment.errors import InvalidModification, ReplyUnreadable
 from augment.geometry.angles import wrap
 from augment.prompts.blocks import last_object
 from augment.prompts.names import ShortNames, short_names
+from augment.prompts.strict import Strict, validated
 from augment.prompts.vectors import DEFAULT_RADIUS_M
 from augment.scene.entities import AgentType, Scene, TrafficAgent
 from augment.scene.modification import Modification, check_fits
@@ -40,11 +41,7 @@ _Size = Annotated[float, Field(ge=0.2, le=20.0)]
 _Several = Annotated[list[_Item], Field(max_length=MOST_AGENTS)]
 
 
-class _Strict(BaseModel):
-    model_config = ConfigDict(strict=True, extra="forbid", allow_inf_nan=False, frozen=True)
-
-
-class _Agent(_Strict):
+class _Agent(Strict):
     id: _Id
     type: _PLACEABLE
     x_m: float
@@ -57,7 +54,7 @@ class _Agent(_Strict):
     walk_to: Annotated[list[float], Field(min_length=2, max_length=2)] | None = None
 
 
-class _Block(_Strict):
+class _Block(Strict):
     add: _Several[_Agent] = []
     move: _Several[_Agent] = []
     remove: _Several[_Id] = []
@@ -89,10 +86,7 @@ def read_reply(answer: str, scene: Scene, *, radius_m: float = DEFAULT_RADIUS_M)
         ReplyUnreadable: Whatever is wrong with the answer; nothing else is ever raised.
     """
     found, mended = last_object(answer, _KEYS)
-    try:
-        block = _Block.model_validate(found)
-    except ValidationError as error:
-        raise ReplyUnreadable(_sentences(error)) from None
+    block = validated(_Block, found)
     problems = _misplaced(block, scene, radius_m)
     if problems:
         raise ReplyUnreadable(problems)
@@ -107,15 +101,6 @@ def notes_of(answer: str) -> str:
     bodies = dict(zip(parts[1::2], parts[2::2], strict=True))
     told = [bodies.get("Insights", "").strip(), bodies.get("Summary", "").strip()]
     return "\n\n".join(part for part in told if part)[:LONGEST_NOTES]
-
-
-def _sentences(error: ValidationError) -> list[str]:
-    """What pydantic found, each with its path and without echoing what the model wrote."""
-    found = []
-    for fault in error.errors(include_url=False, include_input=False, include_context=False)[:8]:
-        path = ".".join(ascii(part).strip("'")[:40] for part in fault["loc"]) or "the block"
-        found.append(f"{path}: {fault['msg']}")
-    return found
 
 
 def _misplaced(block: _Block, scene: Scene, radius_m: float) -> list[str]:

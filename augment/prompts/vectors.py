@@ -1,44 +1,93 @@
 """A scene as the paper's table of input vectors: separate lists for each kind of entity.
 
 Frame: ego frame, metres to two decimals, radians to three. Lanes are centrelines sampled every
-5 m. Only what lies within a radius of the ego is written down.
+5 m, or the control points of cubic Bezier pieces. Only what lies within a radius of the ego is
+written down.
 """
 
 from __future__ import annotations
 
 import json
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
+from enum import StrEnum
 
 import numpy as np
 
 from augment.geometry.polyline import Polyline
 from augment.prompts.clip import boundary_within, line_within, simplified
+from augment.prompts.lane_curves import control_points
 from augment.prompts.names import ShortNames, number_of, short_names
+from augment.scene.bezier_lanes import bezier_lane
 from augment.scene.entities import Area, Lane, LaneConnector, Scene, TrafficAgent
+from augment.scene.modification import Modification
 
 SPACING_M = 5.0
 DEFAULT_RADIUS_M = 80.0
 
 Vector = list[object]
+Coordinates = Callable[[Polyline], list[object]]
+"""How the shown part of a centreline is written down."""
 
 _COMPASS = ("East", "Northeast", "North", "Northwest", "West", "Southwest", "South", "Southeast")
 _BOUNDARY_TOLERANCE_M = 0.1
 
 
-def scene_text(scene: Scene, *, radius_m: float = DEFAULT_RADIUS_M) -> str:
+def polyline_coordinates(line: Polyline) -> list[object]:
+    """Points every 5 m."""
+    return [[_metres(x), _metres(y)] for x, y in line.resampled(SPACING_M).points_m]
+
+
+def bezier_coordinates(line: Polyline) -> list[object]:
+    """Pieces in order of travel, each four control points."""
+    return list(control_points(bezier_lane(line)))
+
+
+class LaneFormat(StrEnum):
+    """How a lane is written down: points every 5 m, or four control points of a cubic Bezier."""
+
+    POLYLINE = "polyline"
+    BEZIER = "bezier"
+
+
+COORDINATES: dict[LaneFormat, Coordinates] = {
+    LaneFormat.POLYLINE: polyline_coordinates,
+    LaneFormat.BEZIER: bezier_coordinates,
+}
+
+
+def scene_text(
+    scene: Scene,
+    *,
+    radius_m: float = DEFAULT_RADIUS_M,
+    lanes: LaneFormat = LaneFormat.POLYLINE,
+) -> str:
     """The four lists under their headings, one entity a line, and what the lists can't say."""
-    names = short_names(scene)
+    names, coordinates = short_names(scene), COORDINATES[lanes]
     lists = {
         "Agents": agent_vectors(scene, names, radius_m),
-        "Lanes": lane_vectors(scene, names, radius_m),
-        "Lane connectors": connector_vectors(scene, names, radius_m),
+        "Lanes": lane_vectors(scene, names, radius_m, coordinates),
+        "Lane connectors": connector_vectors(scene, names, radius_m, coordinates),
         "Areas": area_vectors(scene, names, radius_m),
     }
     parts = [f"{title}:\n{_listed(vectors)}" for title, vectors in lists.items()]
     parts.append(f"Traffic drives on the {scene.traffic_side.value}-hand side of the road.")
     parts.append(f"The first new agent is {names.next_agent}.")
     return "\n\n".join(parts)
+
+
+def changes_text(scene: Scene, modification: Modification) -> str:
+    """What was added, moved and removed, as three lists under their headings."""
+    names = short_names(scene)
+    lists = {
+        "Added agents": {agent.id: _walker_vector(agent, names) for agent in modification.added},
+        "Moved agents": {
+            names.agents[agent.id]: _walker_vector(agent, names) for agent in modification.moved
+        },
+    }
+    parts = [f"{title}:\n{_listed(vectors)}" for title, vectors in lists.items()]
+    removed = [names.agents[name] for name in modification.removed]
+    return "\n\n".join([*parts, f"Removed agents:\n{json.dumps(removed)}"])
 
 
 def agent_vectors(scene: Scene, names: ShortNames, radius_m: float) -> dict[str, Vector]:
@@ -64,21 +113,31 @@ def agent_vector(agent: TrafficAgent, names: ShortNames) -> Vector:
     ]
 
 
-def lane_vectors(scene: Scene, names: ShortNames, radius_m: float) -> dict[str, Vector]:
+def lane_vectors(
+    scene: Scene,
+    names: ShortNames,
+    radius_m: float,
+    coordinates: Coordinates = polyline_coordinates,
+) -> dict[str, Vector]:
     """Lane number, travel direction, direction relative to the ego, width, limit, coordinates."""
     shown = ((lane, line_within(lane.centerline, radius_m)) for lane in scene.lanes)
     return {
-        names.ways[lane.id]: _lane_vector(lane, line, names)
+        names.ways[lane.id]: _lane_vector(lane, line, names, coordinates)
         for lane, line in shown
         if line is not None
     }
 
 
-def connector_vectors(scene: Scene, names: ShortNames, radius_m: float) -> dict[str, Vector]:
+def connector_vectors(
+    scene: Scene,
+    names: ShortNames,
+    radius_m: float,
+    coordinates: Coordinates = polyline_coordinates,
+) -> dict[str, Vector]:
     """From lane, to lane, light, turn, speed limit, coordinates, by connector id."""
     shown = ((way, line_within(way.centerline, radius_m)) for way in scene.connectors)
     return {
-        names.ways[way.id]: _connector_vector(way, line, names)
+        names.ways[way.id]: _connector_vector(way, line, names, coordinates)
         for way, line in shown
         if line is not None
     }
@@ -103,7 +162,15 @@ def relative_direction(heading_rad: float) -> str:
     return "opposite" if turn >= 3.0 * math.pi / 4.0 else "crossing"
 
 
-def _lane_vector(lane: Lane, line: Polyline, names: ShortNames) -> Vector:
+def _walker_vector(agent: TrafficAgent, names: ShortNames) -> Vector:
+    """An agent's vector, with the end of its walk if it walks."""
+    walk: Vector = [] if agent.walk_to_m is None else [[_metres(v) for v in agent.walk_to_m]]
+    return agent_vector(agent, names) + walk
+
+
+def _lane_vector(
+    lane: Lane, line: Polyline, names: ShortNames, coordinates: Coordinates
+) -> Vector:
     heading_rad = line.heading_at(line.project(0.0, 0.0).s_m)
     return [
         number_of(names.ways[lane.id]),
@@ -111,18 +178,20 @@ def _lane_vector(lane: Lane, line: Polyline, names: ShortNames) -> Vector:
         relative_direction(heading_rad),
         _metres(lane.width_m),
         _speed_limit(lane.speed_limit_mps),
-        _coordinates(line),
+        coordinates(line),
     ]
 
 
-def _connector_vector(way: LaneConnector, line: Polyline, names: ShortNames) -> Vector:
+def _connector_vector(
+    way: LaneConnector, line: Polyline, names: ShortNames, coordinates: Coordinates
+) -> Vector:
     return [
         None if way.from_lane is None else names.ways.get(way.from_lane),
         None if way.to_lane is None else names.ways.get(way.to_lane),
         way.traffic_light.value,
         way.turn_type.value,
         _speed_limit(way.speed_limit_mps),
-        _coordinates(line),
+        coordinates(line),
     ]
 
 
@@ -131,10 +200,6 @@ def _boundary(area: Area, radius_m: float) -> list[list[float]]:
     if len(points) < 3:
         return []
     return [[_metres(x), _metres(y)] for x, y in simplified(points, _BOUNDARY_TOLERANCE_M)]
-
-
-def _coordinates(line: Polyline) -> list[list[float]]:
-    return [[_metres(x), _metres(y)] for x, y in line.resampled(SPACING_M).points_m]
 
 
 def _speed_limit(limit_mps: float | None) -> float | None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import re
+from collections.abc import Mapping
 
 from django.contrib.auth.models import User
 from django.db import transaction
@@ -13,9 +14,14 @@ from augment.llm.addresses import check_base_url
 from augment.models import Contestant, Endpoint
 from augment.services.endpoints import model_at
 from augment.services.events import log_event
+from augment.services.roles import Seat, check_roles, documents_of
 from augment.services.scenes import check_slug
 from augment.services.texts import one_line
-from augment.variants.recipes import recipe
+from augment.variants.recipes import Recipe, recipe
+from augment.variants.transcript import ModelRole
+
+Kind = Contestant.Kind
+LONGEST_NAME = 120
 
 REFERENCE = "reference"
 RULE_PLACER = "rule-placer"
@@ -96,6 +102,7 @@ def add_contestant(
     endpoint: str,
     model: str,
     name: str | None = None,
+    roles: Mapping[ModelRole, tuple[str | None, str]] | None = None,
     actor: User | None = None,
 ) -> Contestant:
     """A language model that runs one variant; a simulated one where the endpoint is simulated.
@@ -110,38 +117,42 @@ def add_contestant(
         endpoint: The label of an endpoint.
         model: The model id on that endpoint.
         name: What people read; made from model and variant when None.
+        roles: Who else plays a reviewer's role: the label of an endpoint (None: the contestant's
+            own) and the model id there.
         actor: Who adds it.
 
     Raises:
         UnknownName: No such variant or endpoint.
-        InvalidDocument: The slug, the model or the name can't be used.
+        InvalidDocument: The slug, a model, a role or the name can't be used.
         Conflict: The slug belongs to another contestant.
     """
     check_slug(slug, what="contestant")
     way = recipe(variant)
     address = _endpoint(endpoint, actor)
     model = one_line("model", model, what="contestant")
+    others = _seats(way, roles or {}, address, actor)
+    seats = [Seat(endpoint=address, model=model), *others.values()]
+    if name is None:
+        given = (f"{role} {seat.model}" for role, seat in others.items())
+        title = " ".join([model, way.slug.upper(), *given])[:LONGEST_NAME]
+    else:
+        title = one_line("name", name, what="contestant")
+    simulated = any(seat.endpoint.is_simulated for seat in seats)
     wanted = {
-        "name": one_line(
-            "name", f"{model} {way.slug.upper()}" if name is None else name, what="contestant"
-        ),
-        "kind": Contestant.Kind.SIMULATED if address.is_simulated else Contestant.Kind.LLM,
+        "name": title,
+        "kind": Kind.SIMULATED if simulated else Kind.LLM,
         "variant": way.slug,
         "endpoint": address,
         "model": model,
+        "roles": documents_of(others),
     }
-    model_at(endpoint=address, model=model)
+    for seat in seats:
+        model_at(endpoint=seat.endpoint, model=seat.model)
     contestant, made = Contestant.objects.get_or_create(slug=slug, defaults=wanted)
-    if not made:
+    if made:
+        _log_added(contestant, actor)
+    else:
         _refuse_another(contestant, wanted, named=name is not None)
-        return contestant
-    log_event(
-        actor=actor,
-        verb="add",
-        object_kind="contestant",
-        object_code=contestant.code,
-        after={"slug": slug} | wanted | {"endpoint": address.label},
-    )
     return contestant
 
 
@@ -173,6 +184,36 @@ def _endpoint(label: str, actor: User | None) -> Endpoint:
         )
     known = list(Endpoint.objects.values_list("label", flat=True))
     raise UnknownName("endpoint", label, known)
+
+
+def _log_added(contestant: Contestant, actor: User | None) -> None:
+    facts = ("slug", "name", "kind", "variant", "model", "roles")
+    assert contestant.endpoint is not None
+    log_event(
+        actor=actor,
+        verb="add",
+        object_kind="contestant",
+        object_code=contestant.code,
+        after={name: getattr(contestant, name) for name in facts}
+        | {"endpoint": contestant.endpoint.label},
+    )
+
+
+def _seats(
+    way: Recipe,
+    roles: Mapping[ModelRole, tuple[str | None, str]],
+    own: Endpoint,
+    actor: User | None,
+) -> dict[ModelRole, Seat]:
+    """Who plays the roles that were given away."""
+    check_roles(way, roles)
+    return {
+        role: Seat(
+            endpoint=own if label is None else _endpoint(label, actor),
+            model=one_line(f"roles.{role}", model, what="contestant"),
+        )
+        for role, (label, model) in sorted(roles.items())
+    }
 
 
 def _refuse_another(contestant: Contestant, wanted: dict[str, object], *, named: bool) -> None:

@@ -17,6 +17,7 @@ from augment.models import Augmentation, Contestant, GenerationJob, Scenario
 from augment.services.budget import limit_of
 from augment.services.caps import Caps, check_caps
 from augment.services.events import log_event
+from augment.services.roles import blind_viewers
 from augment.services.texts import one_line
 
 Kind = Contestant.Kind
@@ -80,7 +81,8 @@ def launch(
         InvalidDocument: The name is empty, too long or not one line.
         UnknownName: A slug that nobody registered.
         Conflict: Nothing is chosen, a contestant can't be run, the reference is to run on
-            scenarios that have none, or a cap in USD meets a price that nobody knows.
+            scenarios that have none, a viewer can't see, or a cap in USD meets a price that
+            nobody knows.
     """
     name = one_line("name", name, what="job")
     who = _contestants(contestants)
@@ -242,6 +244,12 @@ def _refuse_impossible(who: list[Contestant], where: list[Scenario]) -> None:
         raise Conflict(
             f"A job can't run {', '.join(strangers)}: what humans or outside programs made is "
             "imported."
+        )
+    blind = blind_viewers(who)
+    if blind:
+        raise Conflict(
+            f"Visual QA needs a viewer that sees, and these see text alone: {', '.join(blind)}. "
+            "Give the contestant another viewer or another variant."
         )
     references = [row.slug for row in who if row.kind == Kind.REFERENCE]
     without = [row.slug for row in where if row.reference is None]

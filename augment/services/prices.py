@@ -6,6 +6,7 @@ from collections.abc import Iterable
 
 from augment.llm.costs import Price
 from augment.models import Contestant, Endpoint, EndpointModel
+from augment.services.roles import seats_of
 
 
 def price_of(endpoint: Endpoint, model: str) -> Price | None:
@@ -19,8 +20,9 @@ def price_of(endpoint: Endpoint, model: str) -> Price | None:
 def unpriced(contestants: Iterable[Contestant]) -> list[str]:
     """What the contestants ask models whose price is unknown, as "model at endpoint"."""
     found = {
-        f"{row.model} at {row.endpoint.label}"
+        str(seat)
         for row in contestants
-        if row.endpoint is not None and price_of(row.endpoint, row.model) is None
+        for seat in seats_of(row).values()
+        if price_of(seat.endpoint, seat.model) is None
     }
     return sorted(found)

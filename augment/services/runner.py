@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import logging
 from collections.abc import Callable
-from contextlib import AbstractContextManager
+from contextlib import AbstractContextManager, ExitStack
 from dataclasses import dataclass
 
 from django.conf import settings
@@ -31,11 +31,14 @@ from augment.services.contestants import key_of
 from augment.services.endpoint_client import EndpointClient
 from augment.services.holding import OutcomeOnCrash, heartbeat
 from augment.services.pictures import original_picture, picture_of
+from augment.services.roles import seats_of
 from augment.services.scenes import reference_of, scene_of
 from augment.services.seeds import seed_of
 from augment.services.transcripts import RowTranscript, sentence_of
 from augment.variants import pipeline
+from augment.variants.cast import Player
 from augment.variants.recipes import recipe
+from augment.variants.transcript import ModelRole
 
 logger = logging.getLogger(__name__)
 
@@ -192,15 +195,30 @@ def _from_model(
     held: claims.Claim,
     connect: Connect | None,
 ) -> Answer:
-    opened = open_wire(endpoint, held) if connect is None else connect(endpoint)
-    with opened as client:
+    seats = seats_of(row.contestant)
+    sites = {seat.endpoint.pk: seat.endpoint for seat in seats.values()}
+    with ExitStack() as opened:
+        clients = {
+            pk: opened.enter_context(open_wire(site, held) if connect is None else connect(site))
+            for pk, site in sites.items()
+        }
+        others: dict[ModelRole, Player] = {
+            role: Player(client=clients[seat.endpoint.pk], model=seat.model)
+            for role, seat in seats.items()
+            if role is not ModelRole.MODIFIER
+        }
+        known = seats[ModelRole.MODIFIER].known
         outcome = pipeline.run(
             recipe(row.contestant.variant),
             scene=scene,
             instruction=row.scenario.instruction,
-            client=client,
+            client=clients[endpoint.pk],
             model=row.contestant.model,
-            transcript=RowTranscript(held, row, endpoint),
+            transcript=RowTranscript(
+                held, row, endpoint, others={role: seats[role].endpoint for role in others}
+            ),
+            native_tools=known is not None and known.native_tools is True,
+            others=others,
         )
     return Answer(
         state=State(outcome.status.value),

@@ -7,7 +7,7 @@ is read, each in a transaction of its own: a crash in between loses nothing that
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -51,6 +51,7 @@ class RowTranscript:
         held: The claim on the row.
         row: The augmentation, with its job.
         endpoint: Who is asked.
+        others: Who is asked in the roles that have an endpoint of their own.
         sleep: Waits for that many seconds.
     """
 
@@ -60,16 +61,18 @@ class RowTranscript:
         row: Augmentation,
         endpoint: Endpoint,
         *,
+        others: Mapping[ModelRole, Endpoint] | None = None,
         sleep: Callable[[float], None] = time.sleep,
     ) -> None:
         self._held = held
         self._row = row
         self._endpoint = endpoint
+        self._others = dict(others or {})
         self._sleep = sleep
         self._numbers = 0
         self._notes = 0
         self._open: dict[int, _Open] = {}
-        self._prices: dict[str, Price | None] = {}
+        self._prices: dict[tuple[int, str], Price | None] = {}
         self._last: tuple[ModelRole, Request, str, dict[str, Any]] | None = None
 
     def known(self, role: ModelRole, request: Request, prompt_version: str) -> Reply | None:
@@ -111,7 +114,7 @@ class RowTranscript:
         for message in request.messages:
             for png in message.images:
                 store(png, folder=IMAGES)
-        worst, price = worst_case(request), self._price_of(request.model)
+        worst, price = worst_case(request), self._price_of(self._at(role), request.model)
         wait_s = FIRST_WAIT_S
         while True:
             room, pk = self._try(columns, worst, price)
@@ -168,7 +171,7 @@ class RowTranscript:
             "role": role,
             "request": document,
             "request_hash": request_hash(
-                base_url=self._endpoint.base_url, document=document, prompt_version=version
+                base_url=self._at(role).base_url, document=document, prompt_version=version
             ),
             "prompt_version": version,
         }
@@ -197,10 +200,14 @@ class RowTranscript:
         if not claims.is_held(held=self._held, lock=True):
             raise ClaimLost(f"attempt {self._held.attempt_number} has lost its row")
 
-    def _price_of(self, model: str) -> Price | None:
-        if model not in self._prices:
-            self._prices[model] = price_of(self._endpoint, model)
-        return self._prices[model]
+    def _at(self, role: ModelRole) -> Endpoint:
+        return self._others.get(role, self._endpoint)
+
+    def _price_of(self, endpoint: Endpoint, model: str) -> Price | None:
+        asked = (endpoint.pk, model)
+        if asked not in self._prices:
+            self._prices[asked] = price_of(endpoint, model)
+        return self._prices[asked]
 
 
 def sentence_of(fault: ModelFault) -> str:

@@ -1,55 +1,99 @@
-"""The Scenario Modifier Agent: asks, reads, and asks once more where it can't read."""
+"""The Scenario Modifier Agent: asks, has its calls answered, reads, and asks once more."""
 
 from __future__ import annotations
 
-from augment.errors import ModelRefused, ReplyUnreadable
-from augment.llm.messages import Message, Reply, Request
+from dataclasses import dataclass
+
 from augment.prompts import fill
+from augment.prompts.fill import Calling, Form
 from augment.prompts.reply import ReadReply, read_reply
+from augment.prompts.texts import said_by_model
 from augment.scene.entities import Scene
-from augment.variants.asking import Conversation
-from augment.variants.recipes import Recipe
+from augment.variants.cast import Asking, Cast, Messages
+from augment.variants.pose_tool import PoseTool
+from augment.variants.recipes import Recipe, Tools
+from augment.variants.tool_loop import ToolDesk, ask_with_tool
 from augment.variants.transcript import ModelRole
 
 
-def modify(
-    recipe: Recipe, *, scene: Scene, instruction: str, conversation: Conversation
-) -> ReadReply:
-    """The modifier's answer, read.
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Draft:
+    """What the modifier made in one round.
 
-    Raises:
-        ReplyUnreadable: Neither the first answer nor the re-asked one can be read.
-        ModelRefused: The model declined, or its endpoint's filter did.
-        ModelFault: The wire broke for good.
+    Attributes:
+        read: Its answer, understood.
+        messages: The conversation up to and including that answer.
     """
-    limits = recipe.limits
-    messages = fill.modifier_messages(scene, instruction, radius_m=limits.radius_m)
-    max_tokens = limits.max_tokens
-    for _ in range(limits.re_asks):
-        reply = _ask(conversation, messages, max_tokens)
-        try:
-            return _read(reply, scene, limits.radius_m)
-        except ReplyUnreadable as unreadable:
-            messages = fill.re_ask_messages(messages, reply.text, unreadable.problems)
-            max_tokens *= 2 if reply.is_cut_off else 1
-    return _read(_ask(conversation, messages, max_tokens), scene, limits.radius_m)
+
+    read: ReadReply
+    messages: Messages
 
 
-def _ask(conversation: Conversation, messages: tuple[Message, ...], max_tokens: int) -> Reply:
-    request = Request(model=conversation.model, messages=messages, max_tokens=max_tokens)
-    reply = conversation.ask(ModelRole.MODIFIER, request, fill.prompt_version())
-    if reply.refusal is not None:
-        raise ModelRefused(reply.refusal or "The model declined without a reason.")
-    if reply.finish_reason == "content_filter":
-        raise ModelRefused("The endpoint's content filter withheld the answer.")
-    return reply
+def form_of(recipe: Recipe, *, native_tools: bool = False) -> Form:
+    """The form in which a recipe's modifier gets its task."""
+    calling = Calling.NONE
+    if recipe.tools is Tools.POSE:
+        calling = Calling.NATIVE if native_tools else Calling.IN_PROMPT
+    return Form(
+        lanes=recipe.lane_format,
+        calling=calling,
+        radius_m=recipe.limits.radius_m,
+        calls=recipe.limits.calls.calls,
+        identical=recipe.limits.calls.identical,
+    )
 
 
-def _read(reply: Reply, scene: Scene, radius_m: float) -> ReadReply:
-    try:
-        return read_reply(reply.text, scene, radius_m=radius_m)
-    except ReplyUnreadable as unreadable:
-        if not reply.is_cut_off:
-            raise
-        cut = "the answer was cut off at its length limit: be shorter"
-        raise ReplyUnreadable([cut, *unreadable.problems]) from None
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Modifier:
+    """One modifier at work on one scene."""
+
+    recipe: Recipe
+    scene: Scene
+    cast: Cast
+
+    @property
+    def form(self) -> Form:
+        """The form in which it gets its task."""
+        native = self.cast.player(ModelRole.MODIFIER).native_tools
+        return form_of(self.recipe, native_tools=native)
+
+    def task(self, instruction: str) -> Messages:
+        """What it is asked first."""
+        return fill.modifier_messages(self.scene, instruction, self.form)
+
+    def draft(self, messages: Messages) -> Draft:
+        """One round: its answer to the conversation so far, read.
+
+        Raises:
+            ReplyUnreadable: Neither the first answer nor the re-asked one can be read.
+            ModelRefused: The model declined, or its endpoint's filter did.
+            ModelFault: The wire broke for good.
+        """
+        limits, form = self.recipe.limits, self.form
+        reply = None
+        if form.calling is not Calling.NONE:
+            desk = ToolDesk(
+                tool=PoseTool(self.scene, limits.radius_m),
+                limits=limits.calls,
+                transcript=self.cast.transcript,
+            )
+            messages, reply = ask_with_tool(
+                self.cast,
+                messages,
+                desk=desk,
+                calling=form.calling,
+                max_tokens=limits.max_tokens,
+            )
+        asking = Asking(
+            cast=self.cast,
+            role=ModelRole.MODIFIER,
+            again=fill.re_ask_messages,
+            max_tokens=limits.max_tokens,
+            re_asks=limits.re_asks,
+            tools=(fill.pose_tool(),) if form.calling is Calling.NATIVE else (),
+        )
+        read, asked, answer = asking.read(messages, self._read, reply)
+        return Draft(read=read, messages=(*asked, said_by_model(answer.text)))
+
+    def _read(self, answer: str) -> ReadReply:
+        return read_reply(answer, self.scene, radius_m=self.recipe.limits.radius_m)

@@ -1,11 +1,13 @@
 """Read first: from a scene and an instruction to an outcome, along a recipe.
 
-Scene -> prompt -> answer -> Modification. An answer that nobody can read and a refusal are
-outcomes of the model and count as such; a broken wire is nobody's outcome and is raised.
+Scene -> prompt -> answer -> Modification, and back with a review's findings where the recipe has
+a review (rounds.py). An answer that nobody can read and a refusal are outcomes of the model and
+count as such; a broken wire is nobody's outcome and is raised.
 """
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from enum import StrEnum
 
@@ -14,10 +16,11 @@ from augment.llm.client import ChatClient
 from augment.llm.patience import Patience
 from augment.scene.entities import Scene
 from augment.scene.modification import Modification
-from augment.variants.asking import Conversation
-from augment.variants.modifier import modify
+from augment.variants.cast import Cast, Player
+from augment.variants.modifier import Modifier
 from augment.variants.recipes import RECIPES, Recipe
-from augment.variants.transcript import Transcript
+from augment.variants.rounds import modify_and_review
+from augment.variants.transcript import ModelRole, Transcript
 
 
 class OutcomeStatus(StrEnum):
@@ -34,14 +37,16 @@ class Outcome:
 
     Attributes:
         modification: None unless the status is done.
-        notes: What the model said about its own work.
+        notes: What the model said about its own work, and what a review made of it.
         reason: Why there is no modification, empty where there is one.
+        is_accepted: What the review said of the modification, None without a usable review.
     """
 
     modification: Modification | None
     notes: str
     status: OutcomeStatus
     reason: str = ""
+    is_accepted: bool | None = None
 
 
 def run(
@@ -53,6 +58,8 @@ def run(
     model: str,
     transcript: Transcript,
     patience: Patience | None = None,
+    native_tools: bool = False,
+    others: Mapping[ModelRole, Player] | None = None,
 ) -> Outcome:
     """Let a model modify a scene as the recipe says.
 
@@ -64,6 +71,8 @@ def run(
         model: The model id that it is asked for.
         transcript: Is handed every raw answer before it is read.
         patience: How faults that may pass are waited out; by default three attempts.
+        native_tools: Whether the modifier calls its tools natively instead of in its answer.
+        others: Who plays the reviewers' roles; by default the modifier's model does.
 
     Raises:
         UnknownName: Nobody can run a recipe with these parts.
@@ -71,16 +80,26 @@ def run(
     """
     if recipe not in RECIPES.values():
         raise UnknownName("recipe", recipe.slug, sorted(RECIPES))
-    conversation = Conversation(
-        client=client, model=model, transcript=transcript, patience=patience or Patience()
+    modifying = Player(client=client, model=model, native_tools=native_tools)
+    cast = Cast(
+        players={**(others or {}), ModelRole.MODIFIER: modifying},
+        transcript=transcript,
+        patience=patience or Patience(),
     )
+    modifier = Modifier(recipe=recipe, scene=scene, cast=cast)
     try:
-        read = modify(recipe, scene=scene, instruction=instruction, conversation=conversation)
+        result = modify_and_review(modifier, instruction)
     except ReplyUnreadable as unreadable:
         return _without(OutcomeStatus.UNREADABLE, "; ".join(unreadable.problems))
     except ModelRefused as refused:
         return _without(OutcomeStatus.REFUSED, str(refused))
-    return Outcome(modification=read.modification, notes=read.notes, status=OutcomeStatus.DONE)
+    read = result.kept.read
+    return Outcome(
+        modification=read.modification,
+        notes="\n\n".join(part for part in (read.notes, result.remark) if part),
+        status=OutcomeStatus.DONE,
+        is_accepted=result.is_accepted,
+    )
 
 
 def _without(status: OutcomeStatus, reason: str) -> Outcome:

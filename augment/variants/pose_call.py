@@ -62,7 +62,7 @@ class CallLimits:
             raise ToolError(
                 TOOL,
                 f"this very call was answered {self.identical} times and its answer does not "
-                "change. Use that answer or change the arguments.",
+                "change. Answer with what you have.",
             )
 
 

@@ -28,6 +28,7 @@ class NoteKind(StrEnum):
     ROUND = "round"
     TOOL_CALL = "tool_call"
     REVIEW = "review"
+    KEPT = "kept"
 
 
 class Transcript(Protocol):

@@ -19,6 +19,13 @@ KEY = "sk-planted-4f7a9c0d1e2b3a"
 
 OUTCOMES = {
     "fake-good": ("done", 1),
+    "fake-qa-low": ("done", 1),
+    "fake-qa-never": ("done", 1),
+    "fake-qa-nonnumeric": ("done", 1),
+    "fake-tool-loop": ("done", 1),
+    "fake-unknown-tool": ("done", 1),
+    "fake-bad-tool-args": ("done", 1),
+    "fake-garbage": ("unreadable", 2),
     "fake-500-then-ok": ("done", 2),
     "fake-no-usage": ("done", 1),
     "fake-refuse": ("refused", 1),

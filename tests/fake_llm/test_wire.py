@@ -1,14 +1,20 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 
 import pytest
 
-from augment.fake_llm.wire import BadRequest, chat_request, completion
-from augment.llm.messages import Message, Request, Speaker
+from augment.fake_llm.png import size_of
+from augment.fake_llm.wire import BadRequest, chat_request, completion, signature_of
+from augment.llm.messages import Message, Request, Speaker, Tool, ToolCall, ToolChoice, data_url
+from augment.render.bev import draw_original
+from augment.render.camera import camera_for
+from tests.scenes import scene
 
 HELLO = {"role": "user", "content": "Hello"}
-PNG = {"type": "image_url", "image_url": {"url": "data:image/png;base64,iVBORw0KGgo="}}
+PICTURE = draw_original(scene(), camera_for(scene(), None))
+PNG = {"type": "image_url", "image_url": {"url": data_url(PICTURE)}}
 
 
 def body(**changes: object) -> bytes:
@@ -19,7 +25,7 @@ def body(**changes: object) -> bytes:
 def test_what_our_own_client_sends_is_accepted() -> None:
     messages = (
         Message(speaker=Speaker.SYSTEM, text="Be good."),
-        Message(speaker=Speaker.USER, text="Look", images=(b"\x89PNG",)),
+        Message(speaker=Speaker.USER, text="Look", images=(PICTURE,)),
         Message(speaker=Speaker.ASSISTANT, text="Yes"),
         Message(speaker=Speaker.USER, text="Again"),
     )
@@ -70,7 +76,14 @@ def test_a_request_that_breaks_the_rules_is_refused(sent: bytes, param: str | No
 def test_an_image_must_be_a_png_in_base64() -> None:
     text = {"type": "text", "text": "Look"}
     assert chat_request(body(messages=[HELLO | {"content": [text, PNG]}]))
-    for url in ("data:image/png;base64,!", "data:image/png;base64,AAAA"):
+    damaged = [
+        b"",
+        PICTURE[:8],
+        PICTURE[:-20],
+        PICTURE[:5000] + PICTURE[5001:],
+        PICTURE.replace(b"IDAT", b"IDAX"),
+    ]
+    for url in ("data:image/png;base64,!", *map(data_url, damaged)):
         with pytest.raises(BadRequest):
             chat_request(
                 body(messages=[HELLO | {"content": [text, PNG | {"image_url": {"url": url}}]}])
@@ -81,3 +94,59 @@ def test_tokens_are_counted_from_what_was_said() -> None:
     request = chat_request(body(messages=[HELLO | {"content": "x" * 400}]))
     usage = completion(request, "y" * 40)["usage"]
     assert usage == {"prompt_tokens": 101, "completion_tokens": 11, "total_tokens": 112}
+
+
+def test_a_picture_says_its_size() -> None:
+    assert size_of(PICTURE) == (1200, 800)
+
+
+TOOL = Tool(name="look", description="Looks.", parameters={"type": "object"})
+CALL = ToolCall(
+    id="call_1",
+    name="look",
+    arguments="{}",
+    extra=json.dumps({"extra_content": {"fake": {"signature": signature_of("call_1")}}}),
+)
+ASKED = Message(speaker=Speaker.USER, text="Where?")
+CALLED = Message(speaker=Speaker.ASSISTANT, text="", calls=(CALL,))
+TOLD = Message(speaker=Speaker.TOOL, text="There.", answers="call_1")
+
+
+def sent_with(*messages: Message, tools: tuple[Tool, ...] = (TOOL,)) -> bytes:
+    request = Request(
+        model="fake-good", messages=messages, tools=tools, tool_choice=ToolChoice.NONE
+    )
+    return json.dumps(request.to_document()).encode()
+
+
+def test_calls_and_their_answers_are_accepted_as_our_client_sends_them() -> None:
+    request = chat_request(sent_with(ASKED, CALLED, TOLD))
+    assert [message.role for message in request.messages] == ["user", "assistant", "tool"]
+    assert request.tool_choice == "none"
+
+
+@pytest.mark.parametrize(
+    ("messages", "said"),
+    [
+        ((ASKED, CALLED), "the call 'call_1' is not answered"),
+        ((ASKED, CALLED, ASKED), "the call 'call_1' is not answered"),
+        ((ASKED, TOLD), "there is no such call"),
+        ((ASKED, CALLED, TOLD, TOLD), "there is no such call"),
+        ((ASKED, replace(CALLED, calls=(replace(CALL, extra=""),)), TOLD), "extra_content"),
+        (
+            (ASKED, replace(CALLED, calls=(replace(CALL, id="call_2"),))),
+            "the signature of a call is missing",
+        ),
+        ((ASKED, replace(CALLED, speaker=Speaker.USER), TOLD), "only an assistant calls tools"),
+    ],
+)
+def test_a_call_is_answered_once_and_comes_back_as_it_was(
+    messages: tuple[Message, ...], said: str
+) -> None:
+    with pytest.raises(BadRequest, match=said):
+        chat_request(sent_with(*messages))
+
+
+def test_calls_need_their_tools_in_every_request() -> None:
+    with pytest.raises(BadRequest, match="tools are called and none is named"):
+        chat_request(sent_with(ASKED, CALLED, TOLD, tools=()))

@@ -11,10 +11,13 @@ from django.db import transaction
 from augment.errors import AugmentError
 from augment.models import Contestant
 from augment.services.contestants import add_contestant, ensure_builtin, ensure_endpoint
+from augment.variants.transcript import ModelRole
+
+ROLES = (ModelRole.REVIEWER, ModelRole.ENGINEER, ModelRole.VIEWER)
 
 
 class Command(BaseCommand):
-    """add_contestant SLUG --variant V --endpoint E --model M."""
+    """add_contestant SLUG --variant V --endpoint E --model M [--reviewer M[@E]] ..."""
 
     help = (
         "Register a language model that runs one variant. With --base-url the endpoint is made "
@@ -28,6 +31,12 @@ class Command(BaseCommand):
         parser.add_argument("--endpoint", required=True, help="the label of an endpoint")
         parser.add_argument("--model", required=True, help="the model id on the endpoint")
         parser.add_argument("--name", help="what people read; default: model and variant")
+        for role in ROLES:
+            parser.add_argument(
+                f"--{role}",
+                metavar="MODEL[@ENDPOINT]",
+                help=f"who plays the {role}, where the variant has one; default: the model itself",
+            )
         new = parser.add_argument_group("a new endpoint")
         new.add_argument("--base-url", help="for example http://127.0.0.1:11434/v1")
         new.add_argument(
@@ -68,4 +77,11 @@ class Command(BaseCommand):
             endpoint=options["endpoint"],
             model=options["model"],
             name=options["name"],
+            roles={role: _seat(options[role]) for role in ROLES if options[role]},
         )
+
+
+def _seat(written: str) -> tuple[str | None, str]:
+    """The endpoint, None where there is none, and the model; a model may have an @ of its own."""
+    model, at, label = written.rpartition("@")
+    return (label, model) if at else (None, label)

@@ -1,0 +1,162 @@
+"""The stand-in's characters: each plays every role, in its own manner."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+from augment.baselines.rule_placer import place
+from augment.errors import InstructionNotUnderstood
+from augment.fake_llm import answers, careless, judging, tool_use
+from augment.fake_llm.hearing import Heard, Part, heard
+from augment.fake_llm.sight import NothingSeen, Task, list_of, task_of
+from augment.fake_llm.wire import ChatRequest
+from augment.scene.modification import Modification
+
+Calls = tuple[tuple[str, str], ...]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Said:
+    """An answer: a text, native calls of functions (name, arguments), or both."""
+
+    text: str
+    calls: Calls = ()
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Character:
+    """A manner of playing every role.
+
+    Attributes:
+        bend: What becomes of a right modification, given the task and what was heard.
+        spoil: What becomes of a modifier's finished answer.
+        judge: What a reviewer finds.
+        rate: A reviewer's answer.
+        decide: An engineer's verdict.
+        first_calls: Calls that come before the right ones: name and arguments as written.
+        never_stops: Whether it calls as long as it may, and longer.
+    """
+
+    bend: Callable[[Task, Modification, Heard], Modification] = lambda task, right, _: right
+    spoil: Callable[[Task, str, Heard], str] = lambda task, text, _: text
+    judge: Callable[[Task], list[judging.Problem]] = judging.problems_of
+    rate: Callable[[Sequence[judging.Problem]], str] = judging.rated
+    decide: Callable[[Sequence[judging.Problem]], str] = judging.decided
+    first_calls: Calls = ()
+    never_stops: bool = False
+
+    def answer(self, request: ChatRequest) -> Said:
+        """What it says, from the request alone."""
+        understood = heard(request)
+        if understood.part is Part.VIEWER:
+            return Said(text=judging.seen(request))
+        try:
+            task = task_of(request.messages)
+        except NothingSeen:
+            return Said(text=answers.SEES_NOTHING)
+        match understood.part:
+            case Part.MODIFIER:
+                return self._modified(task, understood)
+            case Part.REVIEWER:
+                return Said(text=self.rate(self.judge(task)))
+        if any(one.role == "assistant" for one in request.messages):
+            return Said(text=self.decide(self.judge(task)))
+        return Said(text=judging.asked(list(list_of(task.prompt, "Added agents"))))
+
+    def _modified(self, task: Task, understood: Heard) -> Said:
+        if self.never_stops and (understood.may_call or understood.called):
+            return _calling(understood, _endless())
+        if self.first_calls and understood.may_call and not understood.called:
+            return _calling(understood, self.first_calls)
+        try:
+            right = place(task.scene, task.instruction).modification
+        except InstructionNotUnderstood as refused:
+            return Said(text=answers.declined(task, refused.reason))
+        made = self.bend(task, answers.renumbered(right, task.first_new), understood)
+        wanted = tool_use.calls_for(task.scene, made)
+        spared = len(self.first_calls)
+        if understood.may_call and wanted and len(understood.results) <= spared:
+            return _calling(understood, _named(wanted[: 8 - spared]))
+        results = understood.results[spared:]
+        made = tool_use.with_results(task.scene, made, results)
+        text = answers.told(task, made, _summary(task))
+        return Said(text=self.spoil(task, text, understood))
+
+
+def _calling(understood: Heard, calls: Calls) -> Said:
+    if understood.is_native:
+        return Said(text="", calls=calls)
+    lines = "\n".join(
+        f'{{"call": {json.dumps(name)}, "arguments": {arguments}}}' for name, arguments in calls
+    )
+    return Said(text=f"I look up the places that I need.\n\n{lines}")
+
+
+def _named(wanted: Sequence[dict[str, object]]) -> Calls:
+    return tuple((tool_use.TOOL, json.dumps(one)) for one in wanted)
+
+
+def _endless() -> Calls:
+    return _named([{"lane": "Lane1", "start": "lane", "distance_m": 1.0}])
+
+
+def _summary(task: Task) -> str:
+    return f"The user wants: {' '.join(task.instruction.split())}"
+
+
+def _careless(task: Task, right: Modification, understood: Heard) -> Modification:
+    rng = careless.dice(_all_told(task, understood))
+    if careless.is_unreadable(rng):
+        return right
+    spared = careless.SPARED_BY_TOOL if understood.called or understood.may_call else frozenset()
+    return careless.bend(task.scene, right, rng, spared).modification
+
+
+def _mumbled(task: Task, text: str, understood: Heard) -> str:
+    rng = careless.dice(_all_told(task, understood))
+    return text.partition("```")[0] if careless.is_unreadable(rng) else text
+
+
+def _all_told(task: Task, understood: Heard) -> str:
+    """The prompt and all feedback: a new round is a new throw of the dice."""
+    return "\n".join([task.prompt, *understood.feedback])
+
+
+def _overlooking(task: Task) -> list[judging.Problem]:
+    return judging.overlooked(judging.problems_of(task), careless.dice(task.prompt))
+
+
+def _learning(task: Task, right: Modification, understood: Heard) -> Modification:
+    """Too far at first, right after feedback."""
+    return right if understood.feedback else careless.too_far(task.scene, right)
+
+
+def _stubborn(task: Task, right: Modification, _: Heard) -> Modification:
+    return careless.too_far(task.scene, right)
+
+
+def _in_words(problems: Sequence[judging.Problem]) -> str:
+    """Ratings as words, which is none of a reviewer's scale."""
+    block = {"ratings": dict.fromkeys(("compliance", "realism", "logical_consistency"), "four")}
+    return f"Review:\n```json\n{json.dumps(block | {'feedback': []})}\n```\n"
+
+
+def _perhaps(problems: Sequence[judging.Problem]) -> str:
+    return 'It depends.\n```json\n{"verdict": "perhaps", "feedback": []}\n```\n'
+
+
+GOOD = Character()
+CARELESS = Character(bend=_careless, spoil=_mumbled, judge=_overlooking)
+LEARNING = Character(bend=_learning)
+STUBBORN = Character(bend=_stubborn)
+NONNUMERIC = Character(rate=_in_words, decide=_perhaps)
+LOOPING = Character(never_stops=True)
+MISNAMING = Character(first_calls=(("nearest_lane", '{"x_m": 20.0, "y_m": 0.0}'),))
+MISCALLING = Character(
+    first_calls=(
+        (tool_use.TOOL, '{"lane": "Lane1", "start": "lane"'),
+        (tool_use.TOOL, '{"lane": "Lane1", "start": "lane", "distance_m": "ten metres"}'),
+    )
+)

@@ -1,0 +1,69 @@
+"""Print the exact messages that a variant sends for a scenario."""
+
+from __future__ import annotations
+
+from argparse import ArgumentParser
+from typing import Any
+
+from django.core.management.base import BaseCommand, CommandError
+
+from augment.errors import AugmentError
+from augment.services.prompts import prompt_of
+from augment.variants.showing import Shown
+from augment.variants.transcript import ModelRole
+
+
+class Command(BaseCommand):
+    """prompt SCENARIO VARIANT [--role R] [--native-tools]."""
+
+    help = (
+        "Print the exact messages that a variant sends for a scenario, an estimate of their "
+        "tokens, and how well Bezier lanes fit. Reviewers are shown the scenario's reference."
+    )
+
+    def add_arguments(self, parser: ArgumentParser) -> None:
+        """What to show."""
+        parser.add_argument("scenario", help="the slug of a scenario")
+        parser.add_argument("variant", help="the recipe, for example otm")
+        parser.add_argument(
+            "--role", choices=[role.value for role in ModelRole], default=ModelRole.MODIFIER.value
+        )
+        parser.add_argument(
+            "--native-tools",
+            action="store_true",
+            help="as for a model that calls tools natively",
+        )
+
+    def handle(self, *args: Any, **options: Any) -> None:
+        """Print the messages, then what is known about them."""
+        try:
+            shown = prompt_of(
+                scenario=options["scenario"],
+                variant=options["variant"],
+                role=ModelRole(options["role"]),
+                native_tools=options["native_tools"],
+            )
+        except AugmentError as error:
+            raise CommandError(str(error)) from error
+        for message in shown.messages:
+            self.stdout.write(f"=== {message.speaker}\n{message.text}\n")
+            for png in message.images:
+                self.stdout.write(f"[a PNG of {len(png)} bytes]\n")
+        for tool in shown.tools:
+            self.stdout.write(f"=== tool\n{tool}\n")
+        self.stdout.write("=== about this prompt")
+        for line in _facts(shown):
+            self.stdout.write(line)
+
+
+def _facts(shown: Shown) -> list[str]:
+    images = sum(len(message.images) for message in shown.messages)
+    facts = [f"About {shown.tokens} tokens of text" + (f" and {images} picture" * bool(images))]
+    if shown.fit is not None:
+        fit = shown.fit
+        facts.append(
+            f"{fit.lanes} lanes and connectors in {fit.pieces} Bezier pieces; worst position "
+            f"error {fit.position_m:.2f} m ({fit.worst_lane}), worst heading error "
+            f"{fit.heading_deg:.1f} degrees"
+        )
+    return facts

@@ -1,0 +1,85 @@
+"""Who plays which role of a contestant: by default its own model plays them all."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+
+from augment.errors import Conflict, InvalidDocument
+from augment.models import Contestant, Endpoint, EndpointModel
+from augment.variants.recipes import Recipe, recipe
+from augment.variants.showing import roles_of
+from augment.variants.transcript import ModelRole
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Seat:
+    """A model at an endpoint."""
+
+    endpoint: Endpoint
+    model: str
+
+    def __str__(self) -> str:
+        return f"{self.model} at {self.endpoint.label}"
+
+    @property
+    def known(self) -> EndpointModel | None:
+        """What is known of the model there, None where nobody entered anything."""
+        return EndpointModel.objects.filter(endpoint=self.endpoint, model=self.model).first()
+
+
+def check_roles(way: Recipe, roles: Iterable[ModelRole]) -> None:
+    """Refuse roles that nobody plays in a recipe, and the modifier's, which is the contestant's.
+
+    Raises:
+        InvalidDocument: One is named.
+    """
+    free = [role for role in roles_of(way) if role is not ModelRole.MODIFIER]
+    allowed = f"{way.slug} has {', '.join(free) or 'no role besides the modifier'}"
+    problems = [(f"roles.{role}", allowed) for role in roles if role not in free]
+    if problems:
+        raise InvalidDocument("contestant", problems)
+
+
+def seats_of(contestant: Contestant) -> dict[ModelRole, Seat]:
+    """Who plays each role of a contestant's variant; nobody where it has none.
+
+    Raises:
+        UnknownName: Its variant is none of ours any more.
+        Conflict: An endpoint that it names is gone.
+    """
+    if contestant.endpoint is None:
+        return {}
+    own = Seat(endpoint=contestant.endpoint, model=contestant.model)
+    seats = dict.fromkeys(roles_of(recipe(contestant.variant)), own)
+    for name, chosen in contestant.roles.items():
+        endpoint = Endpoint.objects.filter(label=chosen["endpoint"]).first()
+        if endpoint is None:
+            raise Conflict(
+                f"The {name} of {contestant.slug} sits at endpoint {chosen['endpoint']!r}, which "
+                "does not exist any more."
+            )
+        seats[ModelRole(name)] = Seat(endpoint=endpoint, model=chosen["model"])
+    return seats
+
+
+def documents_of(seats: Mapping[ModelRole, Seat]) -> dict[str, dict[str, str]]:
+    """The seats as they are stored with a contestant."""
+    return {
+        role.value: {"endpoint": seat.endpoint.label, "model": seat.model}
+        for role, seat in sorted(seats.items())
+    }
+
+
+def blind_viewers(contestants: Iterable[Contestant]) -> list[str]:
+    """Contestants whose viewer is known to see nothing, each as "slug (model at endpoint)".
+
+    Who is not known to be blind may try.
+    """
+    found = []
+    for contestant in contestants:
+        seat = seats_of(contestant).get(ModelRole.VIEWER)
+        known = None if seat is None else seat.known
+        if known is not None and known.vision is False:
+            found.append(f"{contestant.slug} ({seat})")
+    return found

@@ -1,0 +1,153 @@
+"""Who plays which role, and how a role is asked until its answer can be read."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import TypeVar
+
+from augment.errors import ModelRefused, ReplyUnreadable
+from augment.llm.client import ChatClient
+from augment.llm.messages import Message, Reply, Request, Tool, ToolChoice
+from augment.llm.patience import Patience
+from augment.prompts.texts import prompt_version
+from augment.variants.asking import Conversation
+from augment.variants.transcript import ModelRole, Transcript
+
+Messages = tuple[Message, ...]
+_Read = TypeVar("_Read")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Player:
+    """Who plays a role.
+
+    Attributes:
+        model: The model id that the client is asked for.
+        native_tools: Whether the model is to call tools natively instead of in its answer.
+    """
+
+    client: ChatClient
+    model: str
+    native_tools: bool = False
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Cast:
+    """Who is talked to, and what keeps the record.
+
+    Attributes:
+        players: By role; a role without one is played by the modifier's.
+    """
+
+    players: Mapping[ModelRole, Player]
+    transcript: Transcript
+    patience: Patience
+
+    def player(self, role: ModelRole) -> Player:
+        """Who plays that role."""
+        return self.players.get(role, self.players[ModelRole.MODIFIER])
+
+    def ask(
+        self,
+        role: ModelRole,
+        messages: Messages,
+        *,
+        max_tokens: int,
+        tools: tuple[Tool, ...] = (),
+        tool_choice: ToolChoice = ToolChoice.AUTO,
+    ) -> Reply:
+        """The reply of whoever plays the role.
+
+        Raises:
+            ModelRefused: The model declined, or its endpoint's filter did.
+            ModelFault: The last attempt broke, or the fault is one that does not pass.
+            BudgetSpent: The transcript's budget has no room for the next attempt.
+        """
+        player = self.player(role)
+        request = Request(
+            model=player.model,
+            messages=messages,
+            max_tokens=max_tokens,
+            tools=tools,
+            tool_choice=tool_choice,
+        )
+        conversation = Conversation(
+            client=player.client,
+            model=player.model,
+            transcript=self.transcript,
+            patience=self.patience,
+        )
+        reply = conversation.ask(role, request, prompt_version())
+        if reply.refusal is not None:
+            raise ModelRefused(reply.refusal or "The model declined without a reason.")
+        if reply.finish_reason == "content_filter":
+            raise ModelRefused("The endpoint's content filter withheld the answer.")
+        return reply
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Asking:
+    """How an answer is asked for until it can be read.
+
+    Attributes:
+        again: The conversation that asks once more: from the one so far, the answer's text and
+            what is wrong with it.
+        re_asks: How often that is done.
+    """
+
+    cast: Cast
+    role: ModelRole
+    again: Callable[[Messages, str, list[str]], Messages]
+    max_tokens: int
+    re_asks: int
+    tools: tuple[Tool, ...] = ()
+
+    def read(
+        self,
+        messages: Messages,
+        reader: Callable[[str], _Read],
+        reply: Reply | None = None,
+    ) -> tuple[_Read, Messages, Reply]:
+        """What was read, the conversation that led to the answer, and the answer.
+
+        Args:
+            messages: What is asked.
+            reader: From a text to what it says, raising ReplyUnreadable.
+            reply: The first answer, where it is there already.
+
+        Raises:
+            ReplyUnreadable: No answer can be read.
+            ModelRefused: The model declined, or its endpoint's filter did.
+            ModelFault: The wire broke for good.
+        """
+        max_tokens = self.max_tokens
+        reply = reply or self._ask(messages, max_tokens)
+        for _ in range(self.re_asks):
+            try:
+                return _read(reply, reader), messages, reply
+            except ReplyUnreadable as unreadable:
+                messages = self.again(messages, reply.text, unreadable.problems)
+                max_tokens *= 2 if reply.is_cut_off else 1
+                reply = self._ask(messages, max_tokens)
+        return _read(reply, reader), messages, reply
+
+    def _ask(self, messages: Messages, max_tokens: int) -> Reply:
+        # Tools are named where the conversation holds calls, and can't be called any more.
+        return self.cast.ask(
+            self.role,
+            messages,
+            max_tokens=max_tokens,
+            tools=self.tools,
+            tool_choice=ToolChoice.NONE,
+        )
+
+
+def _read(reply: Reply, reader: Callable[[str], _Read]) -> _Read:
+    try:
+        return reader(reply.text)
+    except ReplyUnreadable as unreadable:
+        if not reply.is_cut_off:
+            raise
+        cut = "the answer was cut off at its length limit: be shorter"
+        raise ReplyUnreadable([cut, *unreadable.problems]) from None

@@ -1,0 +1,55 @@
+"""Geometric review, our own: the deterministic checks speak, no model does.
+
+What they measure and find wrong or doubtful goes back to the modifier as facts. They know nothing
+of the instruction, so a doubtful finding may be just what was asked for: a modifier that keeps its
+modification in spite of doubts has the last word, in spite of what is wrong it has not.
+"""
+
+from __future__ import annotations
+
+from augment.checks import Finding, Ground, Severity, findings_on
+from augment.prompts.names import short_names
+from augment.variants.verdict import Submission, Verdict
+
+_TOLD = (Severity.WRONG, Severity.DOUBTFUL)
+
+
+def review_geometry(submission: Submission, ground: Ground) -> Verdict:
+    """What the checks make of a modification.
+
+    Args:
+        submission: What is reviewed.
+        ground: Of the submission's scene.
+    """
+    found = findings_on(ground, submission.modification)
+    told = [one for severity in _TOLD for one in found if one.severity is severity]
+    wrong = sum(one.severity is Severity.WRONG for one in told)
+    doubtful = len(told) - wrong
+    insists = doubtful > 0 and submission.modification == submission.earlier
+    accepted = wrong == 0 and (doubtful == 0 or insists)
+    names = short_names(submission.scene)
+    known = names.agents | names.ways
+    return Verdict(
+        is_accepted=accepted,
+        score=(-float(wrong), -float(doubtful)),
+        feedback=tuple(
+            f"{one.severity.value.capitalize()}: {one.sentence(known)}" for one in told
+        ),
+        is_measured=True,
+        summary=f"{wrong} findings wrong, {doubtful} doubtful",
+        document={
+            "wrong": wrong,
+            "doubtful": doubtful,
+            "accepted": accepted,
+            "findings": [_document(one, known) for one in found],
+        },
+    )
+
+
+def _document(finding: Finding, names: dict[str, str]) -> dict[str, object]:
+    return {
+        "kind": finding.kind.value,
+        "severity": finding.severity.value,
+        "agents": list(finding.agents),
+        "sentence": finding.sentence(names),
+    }

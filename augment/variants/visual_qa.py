@@ -1,0 +1,121 @@
+"""Visual QA: an engineer asks, a viewer looks at the rendered picture, the engineer decides.
+
+The viewer gets the picture and the questions alone. The picture is drawn by the one renderer, with
+ids and metres in it, under the ids that the engineer's vectors use; its window depends on the
+scene and on what is reviewed, never on a reference.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import partial
+
+from augment.errors import ModelRefused, ReplyUnreadable, ReviewUnusable
+from augment.prompts import fill_review
+from augment.prompts.names import short_names
+from augment.prompts.review import read_questions, read_sight, read_verdict
+from augment.prompts.texts import said_by_model
+from augment.render.bev import draw
+from augment.render.camera import camera_for
+from augment.scene.entities import Scene
+from augment.scene.modification import Modification
+from augment.variants.cast import Asking, Cast, Messages
+from augment.variants.recipes import Limits
+from augment.variants.transcript import ModelRole
+from augment.variants.verdict import Submission, Verdict
+
+
+def review_picture(submission: Submission, cast: Cast, limits: Limits) -> Verdict:
+    """The engineer's verdict on what the viewer sees.
+
+    Raises:
+        ReviewUnusable: One of the two declined or can't be read, not even asked once more.
+        ModelFault: The wire broke for good.
+    """
+    engineer = Asking(
+        cast=cast,
+        role=ModelRole.ENGINEER,
+        again=fill_review.review_re_ask_messages,
+        max_tokens=limits.max_tokens,
+        re_asks=limits.re_asks,
+    )
+    messages = fill_review.engineer_messages(
+        submission.scene,
+        submission.instruction,
+        submission.modification,
+        radius_m=limits.radius_m,
+    )
+    try:
+        questions, asked, reply = engineer.read(messages, read_questions)
+        seen = _seen(submission, questions, replace(engineer, role=ModelRole.VIEWER))
+        said: Messages = (*asked, said_by_model(reply.text))
+        verdict, _, _ = engineer.read(
+            fill_review.verdict_messages(said, questions, seen), read_verdict
+        )
+    except ReplyUnreadable as unreadable:
+        raise ReviewUnusable("; ".join(unreadable.problems)) from unreadable
+    except ModelRefused as refused:
+        raise ReviewUnusable(f"a reviewer declined: {refused}") from refused
+    return Verdict(
+        is_accepted=verdict.is_accepted,
+        score=(float(verdict.is_accepted),),
+        feedback=tuple(entry.sentence for entry in verdict.feedback),
+        summary="accepted" if verdict.is_accepted else f"{len(verdict.feedback)} problems named",
+        document={
+            "questions": list(questions),
+            "answers": {str(number): said for number, said in sorted(seen.items())},
+            "accepted": verdict.is_accepted,
+            "feedback": [entry.model_dump() for entry in verdict.feedback],
+        },
+    )
+
+
+def picture(scene: Scene, modification: Modification) -> bytes:
+    """What the viewer is shown: a PNG with ids, metres and the change."""
+    shown, change = _under_short_names(scene, modification)
+    return draw(shown, change, camera_for(shown, change), labels=True)
+
+
+def _seen(submission: Submission, questions: tuple[str, ...], asking: Asking) -> dict[int, str]:
+    png = picture(submission.scene, submission.modification)
+    asking = replace(
+        asking, again=lambda told, said, _: fill_review.viewer_re_ask_messages(told, said)
+    )
+    messages = fill_review.viewer_messages(questions, png)
+    seen, _, _ = asking.read(messages, partial(read_sight, count=len(questions)))
+    return seen
+
+
+def _under_short_names(scene: Scene, modification: Modification) -> tuple[Scene, Modification]:
+    """Both under the ids that the prompts use."""
+    names = short_names(scene)
+    shown = replace(
+        scene,
+        ego=replace(scene.ego, id=names.agents[scene.ego.id]),
+        agents=tuple(replace(a, id=names.agents[a.id]) for a in scene.agents),
+        lanes=tuple(
+            replace(
+                lane,
+                id=names.ways[lane.id],
+                left_neighbor=names.ways.get(lane.left_neighbor or ""),
+                right_neighbor=names.ways.get(lane.right_neighbor or ""),
+                successors=tuple(names.ways[n] for n in lane.successors if n in names.ways),
+            )
+            for lane in scene.lanes
+        ),
+        connectors=tuple(
+            replace(
+                way,
+                id=names.ways[way.id],
+                from_lane=names.ways.get(way.from_lane or ""),
+                to_lane=names.ways.get(way.to_lane or ""),
+            )
+            for way in scene.connectors
+        ),
+    )
+    change = Modification(
+        added=modification.added,
+        moved=tuple(replace(a, id=names.agents[a.id]) for a in modification.moved),
+        removed=tuple(names.agents[name] for name in modification.removed),
+    )
+    return shown, change

@@ -1,0 +1,187 @@
+"""A contestant may give its reviewers' roles to other models, at other endpoints."""
+
+from __future__ import annotations
+
+import io
+from collections.abc import Iterator
+from contextlib import AbstractContextManager, contextmanager
+from decimal import Decimal
+
+import pytest
+from django.core.management import call_command
+
+from augment.errors import Conflict, InvalidDocument, UnknownName
+from augment.fake_llm.server import FakeServer, running
+from augment.llm.client import ChatClient
+from augment.llm.openai_wire import OpenAIWire
+from augment.models import Augmentation, Contestant, Endpoint, EndpointModel, ModelCall
+from augment.services import contestants, jobs, runner
+from augment.services.caps import Caps
+from augment.variants.transcript import ModelRole
+from tests.jobs.rows import add_scenario, only_row
+
+pytestmark = pytest.mark.django_db
+
+
+@pytest.fixture(scope="module")
+def server() -> Iterator[FakeServer]:
+    with running() as serving:
+        yield serving
+
+
+@contextmanager
+def wire(endpoint: Endpoint) -> Iterator[ChatClient]:
+    with OpenAIWire(base_url=endpoint.base_url, api_key=None) as client:
+        yield client
+
+
+def opened(endpoint: Endpoint) -> AbstractContextManager[ChatClient]:
+    return wire(endpoint)
+
+
+def add(variant: str, **roles: tuple[str | None, str]) -> Contestant:
+    contestants.ensure_endpoint(label="here", base_url="http://127.0.0.1:1/v1")
+    contestants.ensure_endpoint(label="there", base_url="http://127.0.0.1:2/v1")
+    return contestants.add_contestant(
+        slug="one",
+        variant=variant,
+        endpoint="here",
+        model="text-model",
+        roles={ModelRole(role): seat for role, seat in roles.items()},
+    )
+
+
+def sees(model: str, endpoint: str, *, vision: bool | None) -> None:
+    EndpointModel.objects.update_or_create(
+        endpoint=Endpoint.objects.get(label=endpoint), model=model, defaults={"vision": vision}
+    )
+
+
+def test_roles_are_stored_by_label_and_model() -> None:
+    made = add("vqa", viewer=("there", "eyes"), engineer=(None, "boss"))
+    assert made.roles == {
+        "viewer": {"endpoint": "there", "model": "eyes"},
+        "engineer": {"endpoint": "here", "model": "boss"},
+    }
+    assert made.name == "text-model VQA engineer boss viewer eyes"
+    assert EndpointModel.objects.filter(endpoint__label="there", model="eyes").exists()
+
+
+def test_the_same_contestant_with_another_viewer_is_another() -> None:
+    add("vqa", viewer=("there", "eyes"))
+    assert add("vqa", viewer=("there", "eyes")).slug == "one"
+    with pytest.raises(Conflict, match="another contestant called 'one'"):
+        add("vqa", viewer=("there", "other-eyes"))
+
+
+def test_a_role_that_nobody_plays_is_refused() -> None:
+    with pytest.raises(InvalidDocument, match=r"roles.viewer: tqa has reviewer"):
+        add("tqa", viewer=("there", "eyes"))
+    with pytest.raises(InvalidDocument, match="otm has no role besides the modifier"):
+        add("otm", reviewer=(None, "boss"))
+    with pytest.raises(InvalidDocument, match=r"roles.modifier"):
+        add("vqa", modifier=(None, "boss"))
+    with pytest.raises(UnknownName, match="Unknown endpoint 'nowhere'"):
+        add("vqa", viewer=("nowhere", "eyes"))
+
+
+def test_a_simulated_reviewer_makes_a_simulated_contestant() -> None:
+    contestants.ensure_endpoint(
+        label="stand-in", base_url="http://127.0.0.1:3/v1", is_simulated=True
+    )
+    assert add("tqa", reviewer=("stand-in", "fake-good")).is_simulated
+
+
+def test_visual_qa_with_a_viewer_known_to_be_blind_is_refused_at_launch() -> None:
+    add("vqa")
+    add_scenario("street-1")
+    sees("text-model", "here", vision=False)
+    with pytest.raises(Conflict, match=r"these see text alone: one \(text-model at here\)"):
+        jobs.launch(name="J", contestants=["one"], scenarios=["street-1"])
+
+
+@pytest.mark.parametrize("vision", [True, None])
+def test_another_viewer_lets_a_blind_model_do_visual_qa(vision: bool | None) -> None:
+    add("vqa", viewer=("there", "eyes"))
+    add_scenario("street-1")
+    sees("text-model", "here", vision=False)
+    sees("eyes", "there", vision=vision)
+    jobs.launch(name="J", contestants=["one"], scenarios=["street-1"])
+
+
+def test_a_cap_in_money_needs_the_price_of_every_role() -> None:
+    add("tqa", reviewer=("there", "boss"))
+    add_scenario("street-1")
+    EndpointModel.objects.filter(model="text-model").update(price_in_usd=1, price_out_usd=2)
+    with pytest.raises(Conflict, match="boss at there"):
+        jobs.launch(
+            name="J", contestants=["one"], scenarios=["street-1"], caps=Caps(usd=Decimal(1))
+        )
+
+
+def test_each_role_is_asked_at_its_own_endpoint(server: FakeServer) -> None:
+    with running() as other:
+        contestants.ensure_endpoint(label="a", base_url=server.url, is_simulated=True)
+        contestants.ensure_endpoint(label="b", base_url=other.url, is_simulated=True)
+        contestants.add_contestant(
+            slug="two",
+            variant="fc+vqa",
+            endpoint="a",
+            model="fake-qa-low",
+            roles={
+                ModelRole.VIEWER: ("b", "fake-careless"),
+                ModelRole.ENGINEER: ("b", "fake-good"),
+            },
+        )
+        add_scenario("street-1")
+        EndpointModel.objects.filter(model="fake-qa-low").update(native_tools=True)
+        job = jobs.launch(name="J", contestants=["two"], scenarios=["street-1"])
+        row = only_row(job)
+        runner.work_on(augmentation_pk=row.pk, connect=opened)
+    row.refresh_from_db()
+    assert row.state == Augmentation.State.DONE, row.reason
+    asked = [
+        (call.role[0], call.request["model"]) for call in ModelCall.objects.order_by("number")
+    ]
+    low, boss, eyes = ("m", "fake-qa-low"), ("e", "fake-good"), ("v", "fake-careless")
+    assert asked == [low, low, boss, eyes, boss] * 2
+    first = ModelCall.objects.get(number=1)
+    assert first.request["tools"][0]["function"]["name"] == "pose_on_lane"
+    assert first.extras is not None
+    assert first.extras["tool_calls"][0]["name"] == "pose_on_lane"
+    kinds = list(row.attempts.get().notes.values_list("kind", flat=True))
+    assert kinds == ["tool_call", "round", "review"] * 2 + ["kept"]
+
+
+def test_a_run_that_was_answered_before_is_replayed_with_its_native_calls(
+    server: FakeServer,
+) -> None:
+    contestants.ensure_endpoint(label="a", base_url=server.url, is_simulated=True)
+    contestants.add_contestant(slug="two", variant="fc", endpoint="a", model="fake-good")
+    EndpointModel.objects.update(native_tools=True)
+    add_scenario("street-1")
+    for number in (1, 2):
+        job = jobs.launch(name=f"J{number}", contestants=["two"], scenarios=["street-1"])
+        runner.work_on(augmentation_pk=only_row(job).pk, connect=opened)
+    first, second = Augmentation.objects.order_by("pk")
+    assert first.modification == second.modification
+    assert list(ModelCall.objects.order_by("pk").values_list("served_from", flat=True))[:2] == [
+        None,
+        None,
+    ]
+    assert ModelCall.objects.filter(served_from__isnull=False).count() == 2
+
+
+def test_the_command_takes_models_and_endpoints() -> None:
+    contestants.ensure_endpoint(label="there", base_url="http://127.0.0.1:2/v1")
+    out = io.StringIO()
+    call_command(
+        *("add_contestant", "one", "--variant", "vqa", "--model", "text-model"),
+        *("--endpoint", "here", "--base-url", "http://127.0.0.1:1/v1"),
+        *("--viewer", "eyes@2@there", "--engineer", "boss"),
+        stdout=out,
+    )
+    assert Contestant.objects.get(slug="one").roles == {
+        "viewer": {"endpoint": "there", "model": "eyes@2"},
+        "engineer": {"endpoint": "here", "model": "boss"},
+    }

@@ -1,0 +1,82 @@
+"""A changed prompt is a visible change: look at it, then write the file anew.
+
+python -m tests.prompts.test_golden
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from augment.prompts.fill import regenerate_messages, result_text
+from augment.prompts.fill_review import viewer_messages
+from augment.prompts.texts import said_by_user
+from augment.scene.modification import Modification
+from augment.variants.modifier import form_of
+from augment.variants.recipes import RECIPES, Review
+from augment.variants.showing import Shown, shown_prompt
+from augment.variants.transcript import ModelRole
+from tests.scenes import junction, pedestrian, vehicle
+
+GOLDEN = Path(__file__).parent / "golden"
+WISH = "Add a parked car 21.4 m ahead of the ego.\nIt stands 0.5 m left of the lane centre."
+DONE = Modification(
+    added=(vehicle("Agent2", 21.4, 0.5), pedestrian("Agent3", 24.0, -5.0, (24.0, 5.0)))
+)
+
+CASES = [
+    ("otm", ModelRole.MODIFIER, False),
+    ("fc", ModelRole.MODIFIER, False),
+    ("fc", ModelRole.MODIFIER, True),
+    ("tqa", ModelRole.REVIEWER, False),
+    ("vqa", ModelRole.ENGINEER, False),
+    ("vqa", ModelRole.VIEWER, False),
+]
+
+
+def shown(variant: str, role: ModelRole, native: bool) -> str:
+    made: Shown = shown_prompt(RECIPES[variant], role, junction(), WISH, DONE, native_tools=native)
+    parts = [f"=== {m.speaker}\n{m.text}\n" for m in made.messages]
+    return "\n".join(parts)
+
+
+def name(variant: str, role: ModelRole, native: bool) -> str:
+    return f"{variant}-{role}{'-native' if native else ''}.txt"
+
+
+@pytest.mark.parametrize("case", CASES, ids=lambda case: name(*case))
+def test_the_prompt_is_what_the_golden_file_says(case: tuple[str, ModelRole, bool]) -> None:
+    assert shown(*case) == (GOLDEN / name(*case)).read_text(encoding="utf-8")
+
+
+def test_what_is_said_between_two_answers_is_what_the_golden_file_says() -> None:
+    assert between() == (GOLDEN / "between.txt").read_text(encoding="utf-8")
+
+
+def between() -> str:
+    """Results and feedback, which come in the middle of a conversation."""
+    told = [
+        said_by_user(result_text(['{"x_m": 1.0}', '{"error": "no"}'], is_over=False)),
+        said_by_user(result_text(['{"error": "no call is left"}'], is_over=True)),
+        *regenerate_messages(
+            (), ["It is in Lane2. Reason: a. Corrective action: b."], is_measured=False
+        ),
+        *regenerate_messages((), ["Wrong: Agent2 overlaps Agent3."], is_measured=True),
+    ]
+    return "\n".join(f"=== {message.speaker}\n{message.text}\n" for message in told)
+
+
+def test_every_recipe_shows_one_of_these_prompts() -> None:
+    for one in RECIPES.values():
+        form = form_of(one)
+        assert (form.lanes, form.calling) in {("polyline", "none"), ("bezier", "in_prompt")}
+        if one.review is Review.VISUAL:
+            (_, task) = viewer_messages(["a?", "b?", "c?"], b"png")
+            assert task.images == (b"png",)
+
+
+if __name__ == "__main__":
+    for one in CASES:
+        (GOLDEN / name(*one)).write_text(shown(*one), encoding="utf-8")
+    (GOLDEN / "between.txt").write_text(between(), encoding="utf-8")
