@@ -31,6 +31,7 @@ RENEW_EVERY_S = 15.0
 MINUTE = timedelta(seconds=61)
 """A second more than a minute, because a call is sent a little after it was admitted."""
 
+_CLEAR_EVERY = 64
 _FIRST_WAIT_S, _LONGEST_WAIT_S = 0.05, 2.0
 
 
@@ -88,10 +89,16 @@ def admit(
     wait_s = _wait_s(endpoint, now, minute)
     if wait_s is not None:
         return wait_s
-    old = CallLease.objects.filter(endpoint=endpoint, started_at__lt=now - 2 * minute)
-    old.filter(Q(finished_at__isnull=False) | Q(expires_at__lt=now)).delete()
     lease = CallLease.objects.create(endpoint=endpoint, started_at=now, expires_at=now + LEASE)
+    if lease.pk % _CLEAR_EVERY == 0:
+        clear_old(endpoint_pk=endpoint_pk, now=now, minute=minute)
     return lease.token
+
+
+def clear_old(*, endpoint_pk: int, now: datetime, minute: timedelta = MINUTE) -> None:
+    """Delete the leases that count for nothing any more."""
+    old = CallLease.objects.filter(endpoint=endpoint_pk, started_at__lt=now - 2 * minute)
+    old.filter(Q(finished_at__isnull=False) | Q(expires_at__lt=now)).delete()
 
 
 # --- Private -----------------------------------------------------------------------------------
@@ -115,16 +122,16 @@ def _wait_for(endpoint: Endpoint, queue: Queue) -> uuid.UUID:
     """The token of a place, after waiting for it."""
     give_up_at = time.monotonic() + queue.longest_s
     backoff_s = _FIRST_WAIT_S
-    while True:
+    wait_s = admit(endpoint_pk=endpoint.pk, clock=queue.clock, minute=queue.minute)
+    while not isinstance(wait_s, uuid.UUID):
         queue.still_wanted()
-        wait_s = _look(endpoint, queue)
-        if isinstance(wait_s, uuid.UUID):
-            return wait_s
         if time.monotonic() > give_up_at:
             raise EndpointBusy(endpoint.label, queue.longest_s)
         backoff_s = min(2.0 * backoff_s, _LONGEST_WAIT_S)
         shortest_s = min(max(wait_s, 0.5 * backoff_s), _LONGEST_WAIT_S)
         queue.sleep(shortest_s + 0.5 * backoff_s * queue.rng.random())
+        wait_s = _look(endpoint, queue)
+    return wait_s
 
 
 def _look(endpoint: Endpoint, queue: Queue) -> uuid.UUID | float:

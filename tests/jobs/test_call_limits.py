@@ -14,7 +14,7 @@ from django.db import connection
 
 from augment.errors import ClaimLost, EndpointBusy
 from augment.models import CallLease, Endpoint
-from augment.services.call_limits import LEASE, MINUTE, Queue, admit, place_at
+from augment.services.call_limits import LEASE, MINUTE, Queue, admit, clear_old, place_at
 from tests.jobs.rows import NOON
 
 THREADS = 8
@@ -151,8 +151,8 @@ def test_old_leases_are_cleared_away_but_for_those_of_calls_under_way() -> None:
     hour = NOON + timedelta(hours=1)
     CallLease.objects.filter(pk=ended.pk).update(finished_at=NOON)
     CallLease.objects.filter(pk=long.pk).update(expires_at=hour + LEASE)
-    admit(endpoint_pk=endpoint.pk, clock=at(hour))
-    left = CallLease.objects.filter(started_at=NOON).get()
+    clear_old(endpoint_pk=endpoint.pk, now=hour)
+    left = CallLease.objects.get()
     assert left == long
     assert dead != long
 
