@@ -21,6 +21,9 @@ from arena.queries.studies import study_named
 from arena.services.ratings import log_early_look
 from augment.errors import AugmentError, UnknownName
 from augment.services.displacement import By, types_named
+from augment.services.interplan import job_as_interplan
+
+MODIFICATION_FORMATS = ("interplan",)
 
 Written = tuple[bytes, str, bool]
 """A file's bytes, its ending, and whether it is text."""
@@ -58,7 +61,13 @@ class Command(BaseCommand):
         samples.add_argument(
             "--format", help=f"one of {', '.join(SHEET_FORMATS)}; else the file's ending says it"
         )
-        for kind in (leaderboard, displacement, samples):
+        modifications = kinds.add_parser("modifications", help="what a job's contestants made")
+        modifications.add_argument("job", help="its name or its code")
+        modifications.add_argument(
+            "--format", default="interplan", help=f"one of {', '.join(MODIFICATION_FORMATS)}"
+        )
+        modifications.add_argument("--contestant", help="the slug of one; all unless given")
+        for kind in (leaderboard, displacement, samples, modifications):
             kind.add_argument("--out", required=True, help="a file; - for standard output")
 
     def handle(self, *args: Any, **options: Any) -> None:
@@ -67,6 +76,7 @@ class Command(BaseCommand):
             "leaderboard": self._leaderboard,
             "displacement": self._displacement,
             "samples": self._samples,
+            "modifications": self._modifications,
         }
         try:
             content, suffix, is_text = write[options["what"]](options)
@@ -104,6 +114,17 @@ class Command(BaseCommand):
             contestants=options["contestants"],
         )
         return sheet_bytes(sheet, file_format=form), form, False
+
+    def _modifications(self, options: dict[str, Any]) -> Written:
+        if options["format"] not in MODIFICATION_FORMATS:
+            raise UnknownName("format", options["format"], list(MODIFICATION_FORMATS))
+        text, losses = job_as_interplan(
+            job_named(options["job"]), contestant=options["contestant"]
+        )
+        for loss in losses:
+            self.stderr.write(f"Lost: {loss}.")
+        self.stderr.write(f"{len(losses)} things could not be said in interPlan's format.")
+        return text.encode(), "yaml", True
 
     def _deliver(self, content: bytes, out: str, suffix: str, is_text: bool) -> None:
         if out == "-":

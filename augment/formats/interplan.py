@@ -1,0 +1,127 @@
+"""interPlan's modification file: its keys, and what one special scenario holds.
+
+Frames: the file is in the global frame, metres and radians, which here is the frame that a
+scene's origin is given in; agents are in their scene's ego frame. Positions are box centres.
+"""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any, Final
+
+import yaml
+
+from augment.scene.catalogue import ScenarioType
+from augment.scene.entities import Scene
+from augment.scene.modification import Modification
+
+STANDING_WALK_M: Final = 1.5
+"""A walk up to here is a worker's: interPlan's construction workers step 1.0 m."""
+WALK_S: Final = 15.0
+"""How long a walk takes after its activation, whatever its length."""
+MOST_ENTRIES: Final = 100
+"""The index of a special scenario has at most two digits."""
+
+GOALS: Final = ("left", "right", "straight")
+ACCEL_MAX_MPS2: Final = 1.0
+DECEL_MAX_MPS2: Final = 2.0
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Cell:
+    """One modification to be written.
+
+    Attributes:
+        name: What a person calls it, for the file's comments and the report.
+        keeps_traffic: Whether the recorded vehicles stay.
+    """
+
+    name: str
+    scene: Scene
+    type: ScenarioType
+    modification: Modification
+    keeps_traffic: bool = False
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Loss:
+    """Something that the format can't say, or that had to be made up."""
+
+    cell: str
+    text: str
+
+    def __str__(self) -> str:
+        return f"{self.cell}: {self.text}"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ReadEntry:
+    """One special scenario as a modification.
+
+    Attributes:
+        id: interPlan's own name: base token, "-s" and the index.
+        left_out: What of it a modification can't say.
+    """
+
+    id: str
+    scene: str
+    type: ScenarioType
+    modification: Modification
+    left_out: tuple[str, ...]
+
+
+def token_of(scene_name: str) -> str:
+    """The base token that stands for a scene: 16 hexadecimal digits, always the same."""
+    return hashlib.sha256(scene_name.encode()).hexdigest()[:16]
+
+
+def details(entries: Mapping[str, dict[str, Any]]) -> dict[str, Any]:
+    """What interPlan keeps for one base token, with these special scenarios by index."""
+    return {
+        "extra_agents_to_spawn": [],
+        "roadblock_locations_to_spawn_agents": [],
+        "goal": dict.fromkeys(GOALS),
+        "spawn_in_intersection": False,
+        "special_scenario": {_Quoted(index): entry for index, entry in entries.items()},
+    }
+
+
+def yaml_text(by_token: Mapping[str, dict[str, Any]], comments: list[str]) -> str:
+    """The whole file; tokens are quoted, since some would be read as numbers."""
+    document = {
+        "accel_max": ACCEL_MAX_MPS2,
+        "decel_max": DECEL_MAX_MPS2,
+        "scenario_specifics": None,
+        "modification_details_dictionary": {
+            _Quoted(token): one for token, one in by_token.items()
+        },
+    }
+    body = yaml.dump(document, Dumper=_Dumper, sort_keys=False, allow_unicode=True, width=99)
+    head = "".join(f"# {' '.join(line.split())}\n" for line in comments)
+    return head + body
+
+
+class _Quoted(str):
+    __slots__ = ()
+
+
+class _Dumper(yaml.SafeDumper):
+    """Points on one line, tokens and indices in quotes, no anchors."""
+
+    def ignore_aliases(self, data: object) -> bool:
+        return True
+
+
+def _quoted(dumper: _Dumper, text: _Quoted) -> yaml.ScalarNode:
+    return dumper.represent_scalar("tag:yaml.org,2002:str", str(text), style='"')
+
+
+def _list(dumper: _Dumper, items: list[Any]) -> yaml.SequenceNode:
+    is_row = all(isinstance(item, (float, int, type(None))) for item in items)
+    return dumper.represent_sequence("tag:yaml.org,2002:seq", items, flow_style=is_row)
+
+
+_Dumper.add_representer(_Quoted, _quoted)
+_Dumper.add_representer(list, _list)

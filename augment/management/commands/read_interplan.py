@@ -1,0 +1,60 @@
+"""Turn interPlan's special scenarios into reference modifications."""
+
+from __future__ import annotations
+
+import json
+from argparse import ArgumentParser
+from pathlib import Path
+from typing import Any
+
+from django.core.management.base import BaseCommand, CommandError
+
+from augment.errors import AugmentError
+from augment.scene.codec import modification_to_document
+from augment.services.interplan import references_from_interplan
+
+
+class Command(BaseCommand):
+    """read_interplan FILE --out FOLDER [--scene TOKEN=SLUG ...]."""
+
+    help = (
+        "Write each special scenario of an interPlan modification file as a modification in the "
+        "own JSON, which add_scenario --reference takes."
+    )
+
+    def add_arguments(self, parser: ArgumentParser) -> None:
+        """Say what the command takes."""
+        parser.add_argument("file", type=Path, help="interPlan's YAML")
+        parser.add_argument("--out", type=Path, required=True, help="a folder for the JSON files")
+        parser.add_argument(
+            "--scene",
+            action="append",
+            metavar="TOKEN=SLUG",
+            help="a stored scene in the file's frame; default: the tokens of our own exports",
+        )
+
+    def handle(self, *args: Any, **options: Any) -> None:
+        """Write a file for each, and say what was left out."""
+        try:
+            found = references_from_interplan(options["file"], scenes=_scenes(options["scene"]))
+            options["out"].mkdir(parents=True, exist_ok=True)
+            for one in found:
+                document = modification_to_document(one.modification)
+                file = options["out"] / f"{one.id}.json"
+                file.write_text(json.dumps(document, indent=2) + "\n", encoding="utf-8")
+                left_out = f"; left out: {', '.join(one.left_out)}" if one.left_out else ""
+                self.stdout.write(f"{file}: {one.type} on {one.scene}{left_out}")
+        except AugmentError as error:
+            raise CommandError(str(error)) from error
+        except OSError as error:
+            raise CommandError(f"{options['out']} can't be written: {error.strerror}.") from error
+        self.stdout.write(f"{len(found)} special scenarios read.")
+
+
+def _scenes(given: list[str] | None) -> dict[str, str] | None:
+    if given is None:
+        return None
+    pairs = [one.partition("=") for one in given]
+    if not all(token and slug for token, _, slug in pairs):
+        raise CommandError("--scene takes TOKEN=SLUG.")
+    return {token: slug for token, _, slug in pairs}

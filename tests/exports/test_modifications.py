@@ -1,0 +1,117 @@
+"""A job goes out as interPlan's file and comes back as reference modifications."""
+
+from __future__ import annotations
+
+import json
+from io import StringIO
+from pathlib import Path
+
+import pytest
+import yaml
+from django.core.management import call_command
+from django.core.management.base import CommandError
+
+from augment.formats.interplan import token_of
+from augment.models import Augmentation, Contestant, GenerationJob, Scenario
+from augment.services.catalogue import load_catalogue
+from augment.services.pictures import store
+from tests.fixtures.shelf import FOLDER
+from tests.jobs import rows
+from tests.web.cast import png
+
+pytestmark = pytest.mark.django_db
+
+SLUGS = ("crash-mill-junction", "roadworks-mill-junction", "nudge-ferry-road")
+
+
+@pytest.fixture
+def job() -> GenerationJob:
+    """Everything of two scenes from the reference, and nothing from a contestant that refused."""
+    load_catalogue(folder=FOLDER)
+    job = GenerationJob.objects.create(name="Round 1")
+    reference = rows.add_kind("reference")
+    rule = rows.add_kind("rule", Contestant.Kind.RULE)
+    for slug in SLUGS:
+        scenario = Scenario.objects.get(slug=slug)
+        Augmentation.objects.create(
+            job=job,
+            scenario=scenario,
+            contestant=reference,
+            state="done",
+            modification=scenario.reference,
+            image=store(png()),
+        )
+        Augmentation.objects.create(
+            job=job, scenario=scenario, contestant=rule, state="refused", image=store(png())
+        )
+    return job
+
+
+def export(*options: str) -> tuple[str, str]:
+    out, err = StringIO(), StringIO()
+    arguments = ("modifications", "Round 1", "--format", "interplan", *options)
+    call_command("export", *arguments, stdout=out, stderr=err)
+    return out.getvalue(), err.getvalue()
+
+
+def test_a_job_goes_to_a_file_and_back(job: GenerationJob, tmp_path: Path) -> None:
+    file = tmp_path / "interplan.yaml"
+    _, said = export("--out", str(file))
+    assert "Lost: crash-mill-junction by rule: there is no modification: refused." in said
+    details = yaml.safe_load(file.read_text())["modification_details_dictionary"]
+    assert set(details) == {token_of("mill-junction"), token_of("ferry-road")}
+    assert list(details[token_of("mill-junction")]["special_scenario"]) == ["0", "1"]
+    call_command("read_interplan", str(file), "--out", str(tmp_path / "read"), stdout=StringIO())
+    for index, slug in ((0, SLUGS[0]), (1, SLUGS[1])):
+        name = f"{token_of('mill-junction')}-s{index}.json"
+        read = json.loads((tmp_path / "read" / name).read_text())
+        wanted = Scenario.objects.get(slug=slug).reference
+        assert wanted is not None
+        for made, given in zip(read["add"], wanted["add"], strict=True):
+            assert made["type"] == given["type"]
+            for key in ("x_m", "y_m"):
+                assert made[key] == pytest.approx(given[key], abs=0.01)
+            assert made["heading_rad"] == pytest.approx(given["heading_rad"], abs=0.001)
+
+
+def test_one_contestant_can_be_chosen(job: GenerationJob) -> None:
+    text, said = export("--contestant", "rule", "--out", "-")
+    assert yaml.safe_load(text)["modification_details_dictionary"] == {}
+    assert "3 things could not be said" in said
+
+
+def test_scenes_can_be_named_for_foreign_tokens(job: GenerationJob, tmp_path: Path) -> None:
+    file = tmp_path / "foreign.yaml"
+    text, _ = export("--contestant", "reference", "--out", "-")
+    file.write_text(text.replace(token_of("ferry-road"), "00000000000000ab"))
+    out = StringIO()
+    arguments = ("--scene", "00000000000000ab=ferry-road", "--out", str(tmp_path))
+    call_command("read_interplan", str(file), *arguments, stdout=out)
+    assert "1 special scenarios read" in out.getvalue()
+    assert (tmp_path / "00000000000000ab-s0.json").exists()
+
+
+@pytest.mark.parametrize(
+    ("options", "sentence"),
+    [
+        (("--contestant", "nobody"), "Unknown contestant 'nobody'. Known: reference, rule"),
+        (("--format", "toml"), "Unknown format 'toml'"),
+    ],
+)
+def test_a_wrong_wish_is_a_sentence(
+    job: GenerationJob, options: tuple[str, ...], sentence: str
+) -> None:
+    with pytest.raises(CommandError) as fault:
+        export(*options, "--out", "-")
+    assert sentence in str(fault.value)
+
+
+def test_a_file_that_is_not_there_and_a_scene_nobody_has_are_named(tmp_path: Path) -> None:
+    with pytest.raises(CommandError, match="can't be read"):
+        call_command("read_interplan", str(tmp_path / "none.yaml"), "--out", str(tmp_path))
+    with pytest.raises(CommandError, match="Unknown scene 'nowhere'"):
+        call_command(
+            "read_interplan", "none.yaml", "--scene", "ab=nowhere", "--out", str(tmp_path)
+        )
+    with pytest.raises(CommandError, match="TOKEN=SLUG"):
+        call_command("read_interplan", "none.yaml", "--scene", "ab", "--out", str(tmp_path))
