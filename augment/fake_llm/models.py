@@ -12,8 +12,15 @@ from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from threading import Lock
 
-from augment.fake_llm import careless, playing
-from augment.fake_llm.wire import ChatRequest, Response, as_json, completion, error
+from augment.fake_llm import careless, playing, probing
+from augment.fake_llm.wire import (
+    ChatRequest,
+    Response,
+    as_json,
+    completion,
+    error,
+    prompt_tokens_of,
+)
 
 
 @dataclass(slots=True)
@@ -57,13 +64,37 @@ def good_answer(request: ChatRequest) -> str:
 
 def _as(character: playing.Character) -> Behaviour:
     def played(request: ChatRequest, _: Surroundings) -> Response:
-        said = character.answer(request)
-        return as_json(completion(request, said.text or None, calls=said.calls))
+        return as_json(_completed(character, request))
 
     return played
 
 
+def _completed(character: playing.Character, request: ChatRequest) -> dict[str, object]:
+    probed = probing.answer_to(request)
+    if probed is not None:
+        return completion(request, probed[0] or None, calls=probed[1])
+    said = character.answer(request)
+    return completion(request, said.text or None, calls=said.calls)
+
+
 _good = _as(playing.GOOD)
+
+
+def _no_vision(request: ChatRequest, surroundings: Surroundings) -> Response:
+    if any(message.images for message in request.messages):
+        return error(400, "This model does not support image input.", param="messages")
+    return _good(request, surroundings)
+
+
+def _cuts_context(request: ChatRequest, _: Surroundings) -> Response:
+    """As servers do that keep to their window without a word: 200, and the front is gone."""
+    whole = _completed(playing.GOOD, request)
+    if prompt_tokens_of(request) <= probing.WINDOW_TOKENS:
+        return as_json(whole)
+    cut = _completed(playing.GOOD, probing.cut_to_window(request))
+    window = probing.WINDOW_TOKENS
+    usage = {"prompt_tokens": window, "completion_tokens": 9, "total_tokens": window + 9}
+    return as_json(cut | {"usage": usage})
 
 
 def _slow(request: ChatRequest, surroundings: Surroundings) -> Response:
@@ -186,6 +217,8 @@ MODELS: dict[str, Behaviour] = {
     "fake-unknown-tool": _as(playing.MISNAMING),
     "fake-bad-tool-args": _as(playing.MISCALLING),
     "fake-garbage": _garbage,
+    "fake-no-vision": _no_vision,
+    "fake-cuts-context": _cuts_context,
     "fake-500": _500,
     "fake-500-then-ok": _500_then_ok,
     "fake-429": _429,

@@ -135,6 +135,21 @@ class OfferedTool(_Strict):
     function: OfferedFunction
 
 
+class NamedSchema(_Strict):
+    """A JSON schema that the answer must fit."""
+
+    name: Annotated[str, Field(pattern=r"^[a-zA-Z0-9_-]{1,64}$")]
+    schema_: Annotated[dict[str, object], Field(alias="schema")]
+    strict: bool = False
+
+
+class ResponseFormat(_Strict):
+    """The form of the answer."""
+
+    type: Literal["json_schema"]
+    json_schema: NamedSchema
+
+
 class ChatRequest(_Strict):
     """The body of a POST to /v1/chat/completions."""
 
@@ -146,6 +161,7 @@ class ChatRequest(_Strict):
     seed: int | None = None
     tools: Annotated[list[OfferedTool], Field(min_length=1)] | None = None
     tool_choice: Literal["auto", "none"] | None = None
+    response_format: ResponseFormat | None = None
     stream: Literal[False] = False
 
 
@@ -224,6 +240,8 @@ def _check_end(request: ChatRequest) -> None:
     if request.messages[-1].role not in ("user", "tool"):
         raise BadRequest("the last message must be the user's", "messages")
     if request.tools is not None:
+        if request.response_format is not None:
+            raise BadRequest("tools and a schema of the answer exclude each other", "tools")
         return
     if request.tool_choice is not None:
         raise BadRequest("there are no tools to choose from", "tool_choice")
@@ -263,7 +281,7 @@ def completion(
     calls: Sequence[tuple[str, str]] = (),
 ) -> dict[str, object]:
     """A chat completion with that text; the same request and text give the same document."""
-    prompt_tokens = 1 + sum(_tokens(message.text) for message in request.messages)
+    prompt_tokens = prompt_tokens_of(request)
     completion_tokens = 1 + _tokens(text or refusal or "")
     digest = hashlib.sha256((request.model_dump_json() + str(text)).encode()).hexdigest()
     message: dict[str, object] = {"role": "assistant", "content": text, "refusal": refusal}
@@ -290,6 +308,11 @@ def completion(
             "total_tokens": prompt_tokens + completion_tokens,
         }
     return made
+
+
+def prompt_tokens_of(request: ChatRequest) -> int:
+    """About as many tokens as the messages have."""
+    return 1 + sum(_tokens(message.text) for message in request.messages)
 
 
 def _tokens(text: str) -> int:

@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import pytest
 
-from augment.errors import ModelFault
+from augment.errors import ContextTruncated, ModelFault
 from augment.fake_llm.models import MODELS
 from augment.fake_llm.server import FakeServer, running
 from augment.variants.transcript import MemoryTranscript
@@ -26,6 +26,8 @@ OUTCOMES = {
     "fake-unknown-tool": ("done", 1),
     "fake-bad-tool-args": ("done", 1),
     "fake-garbage": ("unreadable", 2),
+    "fake-no-vision": ("done", 1),
+    "fake-cuts-context": ("fault", 1),
     "fake-500-then-ok": ("done", 2),
     "fake-no-usage": ("done", 1),
     "fake-refuse": ("refused", 1),
@@ -72,7 +74,10 @@ def test_each_model_comes_to_its_outcome_in_so_many_calls(model: str) -> None:
         except ModelFault as fault:
             status, shown = "fault", repr(fault) + repr(vars(fault))
     assert (status, len(transcript.calls)) == (wanted, calls)
-    assert all((call.reply is None) != (call.fault is None) for call in transcript.calls)
+    if model == "fake-cuts-context":
+        assert isinstance(transcript.calls[0].fault, ContextTruncated)
+    else:
+        assert all((call.reply is None) != (call.fault is None) for call in transcript.calls)
     assert KEY not in shown + repr(transcript.calls)
 
 

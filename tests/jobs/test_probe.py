@@ -235,14 +235,22 @@ def test_the_command_fails_where_nobody_answers() -> None:
         call_command("probe_endpoint", "cloud", "--model", "m")
 
 
-def test_the_stand_in_can_be_probed() -> None:
+@pytest.mark.parametrize(
+    ("model", "lacks"),
+    [
+        ("fake-good", None),
+        ("fake-no-vision", Ability.VISION),
+        ("fake-cuts-context", Ability.WHOLE_PROMPT),
+    ],
+)
+def test_the_stand_in_can_be_probed(model: str, lacks: Ability | None) -> None:
     with running() as server:
         Endpoint.objects.create(label="local", base_url=server.url, is_simulated=True)
-        report = probe(label="local", model="fake-good")
-    assert report.has(Ability.ANSWERS) is True
-    assert report.has(Ability.TEMPERATURE) is True
+        report = probe(label="local", model=model)
+    found = {made.ability: made.has_it for made in report.findings}
+    assert found == {ability: ability != lacks for ability in Ability}
     assert report.counts_tokens
-    assert report.models_returned == ["fake-good"]
+    assert report.models_returned == [model]
 
 
 def test_the_picture_of_the_question_has_two_halves() -> None:
