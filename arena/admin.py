@@ -7,7 +7,16 @@ from typing import Any
 from django.contrib import admin
 from django.http import HttpRequest
 
-from arena.models import Matchup, Person, Snapshot, Standing, Study, Vote
+from arena.models import (
+    FaultLabel,
+    LabellingRound,
+    Matchup,
+    Person,
+    Snapshot,
+    Standing,
+    Study,
+    Vote,
+)
 
 
 class ReadOnly:
@@ -83,3 +92,21 @@ class SnapshotAdmin(ReadOnly, admin.ModelAdmin):
     list_display = ("study", "method", "resampling_unit", "votes_counted", "made_at")
     list_select_related = ("study",)
     inlines = (StandingInline,)
+
+
+@admin.register(LabellingRound)
+class LabellingRoundAdmin(ReadOnly, admin.ModelAdmin):
+    """The plan of a labelling is fixed when it opens."""
+
+    list_display = ("name", "job", "seed", "opened_at")
+    list_select_related = ("job",)
+
+
+@admin.register(FaultLabel)
+class FaultLabelAdmin(ReadOnly, admin.ModelAdmin):
+    """What experts said; a label is never changed."""
+
+    list_display = ("augmentation", "expert", "position", "heading", "logic", "at")
+    list_select_related = ("augmentation", "expert")
+    list_filter = ("position", "heading", "logic")
+    exclude = ("task",)

@@ -52,3 +52,7 @@ class StudyStillOpen(ArenaError):
 
 class NoSnapshot(ArenaError):
     """The study has not been rated yet; rate it first."""
+
+
+class AlreadyLabelled(ArenaError):
+    """The expert has labelled this picture otherwise; the first label counts."""

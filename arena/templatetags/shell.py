@@ -34,7 +34,7 @@ class Shell:
 _SECTIONS: dict[str, tuple[str, frozenset[str]]] = {
     "home": ("Home", frozenset({"home"})),
     "scenarios": ("Scenarios", frozenset({"scenarios", "scenario"})),
-    "jobs": ("Jobs", frozenset({"jobs", "job-new", "job", "augmentation"})),
+    "jobs": ("Jobs", frozenset({"jobs", "job-new", "job", "faults", "augmentation"})),
     "studies": ("Studies", frozenset({"studies", "study-new", "study", "results"})),
 }
 _MENU = {

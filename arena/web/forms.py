@@ -11,6 +11,7 @@ from arena.queries.profiles import Theme
 from arena.queries.scenarios import TypeGroup
 from augment.models import Contestant
 from augment.services.caps import Caps
+from augment.services.fault_guess import FaultClass
 
 
 class ThemeForm(forms.Form):
@@ -141,3 +142,37 @@ class VoteForm(forms.Form):
         choices=[("left", "A is better"), ("equal", "Equal"), ("right", "B is better")]
     )
     ms_visible = forms.IntegerField(required=False, min_value=0, max_value=86_400_000)
+
+
+class LabelForm(forms.Form):
+    """The faults that an expert sees in one picture: any of three, or none."""
+
+    task = forms.UUIDField()
+    position = forms.BooleanField(required=False)
+    heading = forms.BooleanField(required=False)
+    logic = forms.BooleanField(required=False)
+    note = forms.CharField(required=False, max_length=2000)
+
+    def faults(self) -> frozenset[FaultClass]:
+        """What was ticked, once the form is valid."""
+        return frozenset(fault for fault in FaultClass if self.cleaned_data[fault.value])
+
+
+class LabellingForm(forms.Form):
+    """A new labelling of a job."""
+
+    name = forms.CharField(max_length=120, strip=True)
+    experts = forms.MultipleChoiceField(error_messages={"required": "Choose at least one expert."})
+    seed = forms.IntegerField(initial=1, min_value=0, max_value=2**63 - 1)
+
+    def __init__(self, *args: Any, experts: list[User], **kwargs: Any) -> None:
+        super().__init__(*args, **kwargs)
+        self.accounts = [user for user in experts if not user.person.is_simulated]
+        found = self.fields["experts"]
+        assert isinstance(found, forms.ChoiceField)
+        found.choices = [(user.username, user.username) for user in self.accounts]
+
+    @property
+    def chosen_experts(self) -> list[str]:
+        """For the template."""
+        return list(self["experts"].value() or ())

@@ -11,7 +11,7 @@ from django.utils.http import url_has_allowed_host_and_scheme
 from django.views.decorators.http import require_POST, require_safe
 
 from arena.models import Study
-from arena.queries import inventory, jobs, progress
+from arena.queries import faults, inventory, jobs, progress
 from arena.queries.people import role_of
 from arena.queries.results import ResultsAccess, results_access
 from arena.services.preferences import choose_theme
@@ -56,6 +56,7 @@ def _expert(request: HttpRequest) -> HttpResponse:
         "to_do": [line for line in is_open if line.left],
         "finished": [line for line in is_open if not line.left],
         "closed": closed,
+        "labellings": faults.of_expert(expert),
         "readable": {
             line.study.pk: results_access(user=expert, study=line.study) is ResultsAccess.FULL
             for line in closed

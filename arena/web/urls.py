@@ -5,7 +5,7 @@ from __future__ import annotations
 from django.contrib.auth import views as auth
 from django.urls import URLPattern, path
 
-from arena.web import displacement, home, jobs, results, scenarios, studies, voting
+from arena.web import displacement, home, jobs, labelling, results, scenarios, studies, voting
 
 urlpatterns: list[URLPattern] = [
     path("", home.home, name="home"),
@@ -30,6 +30,9 @@ urlpatterns: list[URLPattern] = [
         displacement.export,
         name="displacement-export",
     ),
+    path("jobs/<uuid:code>/faults/", labelling.faults_page, name="faults"),
+    path("jobs/<uuid:code>/faults.<slug:form>", labelling.export, name="faults-export"),
+    path("label/<uuid:code>/", labelling.label_page, name="label"),
     path("augmentations/<uuid:code>/", scenarios.augmentation_page, name="augmentation"),
     path("augmentations/<uuid:code>/transcript.json", scenarios.transcript, name="transcript"),
     path("asked/<slug:digest>.png", scenarios.asked_image, name="asked-image"),

@@ -13,8 +13,9 @@ from django.core.files.storage import default_storage
 from django.test import Client
 from django.urls import URLPattern, URLResolver, get_resolver
 
-from arena.models import Study
-from augment.models import Augmentation, Contestant, Endpoint
+from arena.models import LabellingRound, Study
+from arena.services.faults import open_labelling
+from augment.models import Augmentation, Contestant, Endpoint, GenerationJob
 from tests.study_rows import a_study
 
 pytestmark = pytest.mark.django_db
@@ -37,6 +38,9 @@ def study() -> Study:
     )
     for row in Augmentation.objects.all():
         default_storage.save(row.image, ContentFile(b"\x89PNG\r\n\x1a\n" + row.image.encode()))
+    job = GenerationJob.objects.filter(augmentations__contestant__slug="zanzibar").first()
+    assert job is not None
+    open_labelling(name="Faults", job=job, experts=["eva"], seed=1)
     return study
 
 
@@ -89,6 +93,7 @@ def every_address(study: Study) -> list[str]:
         "augmentation": row.code,
         "scenario": row.scenario.code,
         "contestant": row.contestant.code,
+        "labelling": LabellingRound.objects.get().code,
     }
     found = []
     for pattern in patterns(get_resolver().url_patterns):
@@ -131,6 +136,7 @@ def test_following_every_link_tells_nothing(eva: Client, study: Study) -> None:
     seen = crawl(eva, ["/", f"/api/v1/matchups?study={study.code}&n=4"])
     assert any(address.startswith("/i/") for address in seen), "the crawl saw no picture"
     assert any("/vote/" in address for address in seen), "the crawl saw no voting page"
+    assert any("/label/" in address for address in seen), "the crawl saw no labelling page"
     assert leaks(study, seen) == []
 
 
@@ -173,3 +179,12 @@ def test_a_planted_leak_is_found(eva: Client, study: Study) -> None:
     study.name = "Zanzibar against the rest"
     study.save()
     assert leaks(study, crawl(eva, ["/"])) != []
+
+
+def test_the_page_after_a_label_tells_nothing_either(eva: Client, study: Study) -> None:
+    labelling = LabellingRound.objects.get()
+    page = f"/label/{labelling.code}/"
+    eva.post(page, {"task": labelling.tasks.all()[0].code, "position": "on"})
+    seen = crawl(eva, [page])
+    assert b"The automatic checks" in seen[page][1]
+    assert leaks(study, seen) == []

@@ -8,7 +8,7 @@ from typing import Any
 from django.core.management.base import BaseCommand, CommandError, CommandParser
 
 from arena.errors import ArenaError, StudyStillOpen
-from arena.exports import displacement_writers
+from arena.exports import displacement_writers, faults
 from arena.exports.displacement_table import displacement_table
 from arena.exports.files import write_whole
 from arena.exports.samples import SHEET_FORMATS, sheet_bytes, sheet_of
@@ -67,7 +67,10 @@ class Command(BaseCommand):
             "--format", default="interplan", help=f"one of {', '.join(MODIFICATION_FORMATS)}"
         )
         modifications.add_argument("--contestant", help="the slug of one; all unless given")
-        for kind in (leaderboard, displacement, samples, modifications):
+        labels = kinds.add_parser("faults", help="how often experts saw which fault")
+        labels.add_argument("job", help="its name or its code")
+        labels.add_argument("--format", default="csv", help=f"one of {', '.join(faults.FORMATS)}")
+        for kind in (leaderboard, displacement, samples, modifications, labels):
             kind.add_argument("--out", required=True, help="a file; - for standard output")
 
     def handle(self, *args: Any, **options: Any) -> None:
@@ -77,6 +80,7 @@ class Command(BaseCommand):
             "displacement": self._displacement,
             "samples": self._samples,
             "modifications": self._modifications,
+            "faults": self._faults,
         }
         try:
             content, suffix, is_text = write[options["what"]](options)
@@ -100,6 +104,11 @@ class Command(BaseCommand):
             raise UnknownName("grouping", options["by"], list(By))
         types = None if options["types"] is None else types_named(options["types"])
         table = displacement_table(job_named(options["job"]), by=By(options["by"]), types=types)
+        return chosen.write(table), chosen.suffix, chosen.is_text
+
+    def _faults(self, options: dict[str, Any]) -> Written:
+        chosen = faults.format_named(options["format"])
+        table = faults.fault_table(job_named(options["job"]))
         return chosen.write(table), chosen.suffix, chosen.is_text
 
     def _samples(self, options: dict[str, Any]) -> Written:

@@ -1,0 +1,227 @@
+"""Fault labels of a job in the form of the paper's table, and how well the checks foresaw them."""
+
+from __future__ import annotations
+
+import csv
+import io
+from collections import defaultdict
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from arena.exports.formats import Format, cell
+from arena.exports.latex import escape
+from arena.exports.tables import SIMULATED
+from arena.models import FaultLabel
+from arena.queries.faults import labels_of
+from arena.rating.agreement import cohens_kappa
+from augment.errors import UnknownName
+from augment.models import Augmentation, Contestant, GenerationJob
+from augment.services.fault_guess import FaultClass
+
+COLUMNS = (
+    "contestant", "slug", "simulated", "all", "position", "heading", "logic",
+    "augmentations_labelled", "labels", "without_modification",
+)  # fmt: skip
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class FaultLine:
+    """One contestant's faults.
+
+    Attributes:
+        counts: Augmentations by class of fault; an augmentation with two counts in both.
+        labelled: Augmentations with a label.
+        labels: Labels on them, over all experts.
+        without_modification: Unreadable and refused answers, which nobody labels.
+    """
+
+    name: str
+    slug: str
+    is_simulated: bool
+    counts: dict[FaultClass, int]
+    labelled: int
+    labels: int
+    without_modification: int
+
+    @property
+    def all(self) -> int:
+        """The sum over the classes, as the paper has it."""
+        return sum(self.counts.values())
+
+    @property
+    def position(self) -> int:
+        """For the template."""
+        return self.counts[FaultClass.POSITION]
+
+    @property
+    def heading(self) -> int:
+        """For the template."""
+        return self.counts[FaultClass.HEADING]
+
+    @property
+    def logic(self) -> int:
+        """For the template."""
+        return self.counts[FaultClass.LOGIC]
+
+    @property
+    def marked(self) -> str:
+        """The name, with "(simulated)" where that is so."""
+        return f"{self.name}{SIMULATED}" if self.is_simulated else self.name
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Agreement:
+    """The checks' first guess against the experts, for one class of faults.
+
+    Attributes:
+        kappa: None where it is not defined.
+        n: Labels with a guess beside them.
+    """
+
+    fault: str
+    kappa: float | None
+    n: int
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class FaultTable:
+    """All contestants of a job, by name."""
+
+    job: str
+    lines: tuple[FaultLine, ...]
+    agreement: tuple[Agreement, ...]
+
+    @property
+    def labels(self) -> int:
+        """Over all contestants."""
+        return sum(line.labels for line in self.lines)
+
+
+def fault_table(job: GenerationJob) -> FaultTable:
+    """The table of a job; two queries.
+
+    Of several experts on one augmentation a fault counts where more than half of them see it.
+    """
+    labels = list(labels_of(job))
+    found: defaultdict[int, list[FaultLabel]] = defaultdict(list)
+    for label in labels:
+        found[label.augmentation_id].append(label)
+    rows = job.augmentations.select_related("contestant").only(
+        "state", "job", "contestant__name", "contestant__slug", "contestant__kind"
+    )
+    by_contestant: defaultdict[Contestant, list[Augmentation]] = defaultdict(list)
+    for row in rows.order_by("contestant__name", "contestant__slug"):
+        by_contestant[row.contestant].append(row)
+    return FaultTable(
+        job=job.name,
+        lines=tuple(_line(who, own, found) for who, own in by_contestant.items()),
+        agreement=tuple(_agreement(fault, labels) for fault in FaultClass),
+    )
+
+
+def csv_bytes(table: FaultTable) -> bytes:
+    """One line a contestant."""
+    sheet = io.StringIO()
+    writer = csv.writer(sheet, lineterminator="\n")
+    writer.writerow(COLUMNS)
+    for line in table.lines:
+        values = (
+            line.marked, line.slug, line.is_simulated, line.all, line.position, line.heading,
+            line.logic, line.labelled, line.labels, line.without_modification,
+        )  # fmt: skip
+        writer.writerow([cell(value) for value in values])
+    return sheet.getvalue().encode()
+
+
+def latex(table: FaultTable) -> str:
+    """The paper's table "Error Count per Category": needs booktabs and xcolor with `table`."""
+    kappas = ", ".join(f"{one.fault} {_kappa(one)} (n={one.n})" for one in table.agreement)
+    lines = [
+        r"% \usepackage{booktabs} and \usepackage[table]{xcolor}",
+        f"% {' '.join(table.job.split())}: {table.labels} labels",
+        f"% Cohen's kappa of the checks' first guess and the experts: {kappas}",
+        r"\providecolor{llm_blue}{RGB}{105, 156, 219}",
+        r"\begin{table}",
+        r"    \centering",
+        r"    \begin{tabular}{l>{\columncolor{llm_blue!20}}rrrr}",
+        r"    \toprule",
+        r"    \textbf{Model} & \textbf{All}~$\downarrow$ & \textbf{Position}~$\downarrow$"
+        r" & \textbf{Heading}~$\downarrow$ & \textbf{Logic}~$\downarrow$ \\",
+        r"    \midrule",
+        *(
+            f"    {escape(line.marked)} & {line.all} & {line.position} & {line.heading} "
+            rf"& {line.logic}\\"
+            for line in table.lines
+            if line.labelled
+        ),
+        r"    \bottomrule",
+        r"    \end{tabular}",
+        r"    \caption{Error Count per Category.}",
+        r"    \label{tab:manual_eval}",
+        r"\end{table}",
+    ]
+    return "\n".join(lines) + "\n"
+
+
+FORMATS: dict[str, Format[FaultTable]] = {
+    "csv": Format(
+        suffix="csv", content_type="text/csv; charset=utf-8", is_text=True, write=csv_bytes
+    ),
+    "latex": Format(
+        suffix="tex",
+        content_type="application/x-tex; charset=utf-8",
+        is_text=True,
+        write=lambda table: latex(table).encode(),
+    ),
+}
+
+
+def format_named(name: str) -> Format[FaultTable]:
+    """How to write that format.
+
+    Raises:
+        UnknownName: Nobody knows it.
+    """
+    if name not in FORMATS:
+        raise UnknownName("format", name, list(FORMATS))
+    return FORMATS[name]
+
+
+# Private
+
+
+def _line(
+    who: Contestant, rows: Sequence[Augmentation], found: dict[int, list[FaultLabel]]
+) -> FaultLine:
+    labelled = [found[row.pk] for row in rows if row.pk in found]
+    missed = (Augmentation.State.UNREADABLE, Augmentation.State.REFUSED)
+    return FaultLine(
+        name=who.name,
+        slug=who.slug,
+        is_simulated=who.is_simulated,
+        counts={
+            fault: sum(_is_seen(fault, labels) for labels in labelled) for fault in FaultClass
+        },
+        labelled=len(labelled),
+        labels=sum(len(labels) for labels in labelled),
+        without_modification=sum(row.state in missed for row in rows),
+    )
+
+
+def _is_seen(fault: FaultClass, labels: Sequence[FaultLabel]) -> bool:
+    seen: int = sum(getattr(label, fault.value) for label in labels)
+    return 2 * seen > len(labels)
+
+
+def _agreement(fault: FaultClass, labels: Sequence[FaultLabel]) -> Agreement:
+    pairs = [
+        (getattr(label, f"guessed_{fault.value}"), getattr(label, fault.value))
+        for label in labels
+        if label.guessed_position is not None
+    ]
+    kappa = cohens_kappa([one for one, _ in pairs], [other for _, other in pairs])
+    return Agreement(fault=fault.value, kappa=kappa, n=len(pairs))
+
+
+def _kappa(one: Agreement) -> str:
+    return "undefined" if one.kappa is None else f"{one.kappa:.2f}"

@@ -1,0 +1,76 @@
+"""What an expert labels next, and how far everybody is."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from uuid import UUID
+
+from django.contrib.auth.models import User
+from django.db.models import Count, QuerySet
+
+from arena.errors import NotYours
+from arena.models import FaultLabel, LabellingRound, LabelTask
+from augment.models import GenerationJob
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class LabellingProgress:
+    """A labelling and how many of its planned showings have a label."""
+
+    labelling: LabellingRound
+    planned: int
+    labelled: int
+
+    @property
+    def left(self) -> int:
+        """What still waits for a label."""
+        return self.planned - self.labelled
+
+
+def of_expert(expert: User) -> list[LabellingProgress]:
+    """The labellings that an expert was invited to, counted over their own showings."""
+    rows = LabellingRound.objects.filter(tasks__expert=expert)
+    return _counted(rows)
+
+
+def of_job(job: GenerationJob) -> list[LabellingProgress]:
+    """The labellings of a job over all their experts."""
+    return _counted(job.labellings.all())
+
+
+def labelling_of(*, expert: User, code: UUID) -> LabellingProgress:
+    """One of the expert's own labellings.
+
+    Raises:
+        NotYours: There is none with that code, or the expert takes no part in it.
+    """
+    found = _counted(LabellingRound.objects.filter(code=code, tasks__expert=expert))
+    if not found:
+        raise NotYours("You do not take part in this labelling.")
+    return found[0]
+
+
+def next_task(*, labelling: LabellingRound, expert: User) -> LabelTask | None:
+    """What the expert labels next, None when all is done."""
+    waiting = labelling.tasks.filter(expert=expert, label=None)
+    return (
+        waiting.select_related("augmentation__scenario")
+        .defer("augmentation__modification", "augmentation__scenario__reference")
+        .order_by("position")
+        .first()
+    )
+
+
+def labels_of(job: GenerationJob) -> QuerySet[FaultLabel]:
+    """Every label on the augmentations of a job."""
+    return FaultLabel.objects.filter(augmentation__job=job).order_by("augmentation", "pk")
+
+
+def _counted(rows: QuerySet[LabellingRound]) -> list[LabellingProgress]:
+    counted = rows.annotate(
+        planned=Count("tasks", distinct=True), labelled=Count("tasks__label", distinct=True)
+    )
+    return [
+        LabellingProgress(labelling=row, planned=row.planned, labelled=row.labelled)
+        for row in counted
+    ]

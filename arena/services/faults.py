@@ -1,0 +1,148 @@
+"""Labelling faults: a round is planned before the first label, and a label is never changed."""
+
+from __future__ import annotations
+
+import random
+from collections.abc import Sequence
+from functools import partial
+from uuid import UUID
+
+from django.contrib.auth.models import User
+from django.db import IntegrityError, transaction
+
+from arena.errors import AlreadyLabelled, NothingToPlan, NotYours
+from arena.models import FaultLabel, LabellingRound, LabelTask
+from arena.queries.people import experts as expert_accounts
+from augment.errors import Conflict, UnknownName
+from augment.models import Augmentation, GenerationJob
+from augment.services.events import log_event
+from augment.services.fault_guess import FaultClass, guess
+from augment.services.texts import one_line, storable
+
+NOTE_LENGTH = 2000
+
+
+@transaction.atomic
+def open_labelling(
+    *,
+    name: str,
+    job: GenerationJob,
+    experts: Sequence[str],
+    seed: int,
+    actor: User | None = None,
+) -> LabellingRound:
+    """Plan that each expert looks at every finished augmentation of a job, in an order of its own.
+
+    What an expert was planned to label before is left out.
+
+    Args:
+        name: Experts see it.
+        job: Whose augmentations with a modification are labelled.
+        experts: Usernames of accounts with the role expert.
+        seed: The orders are a pure function of it.
+        actor: Who opens it.
+
+    Raises:
+        UnknownName: There is no such expert.
+        Conflict: The name is taken, or an expert is simulated.
+        NothingToPlan: Nothing of the job is left to label for these experts.
+    """
+    name = one_line("name", name, what="labelling")
+    if LabellingRound.objects.filter(name=name).exists():
+        raise Conflict(f"There is a labelling called {name!r} already; choose another name.")
+    people = _experts(experts)
+    labelling = LabellingRound.objects.create(name=name, job=job, seed=seed)
+    labelling.experts.set(people)
+    tasks = [task for expert in people for task in _planned(labelling, expert)]
+    if not tasks:
+        raise NothingToPlan("These experts have nothing left to label in this job.")
+    LabelTask.objects.bulk_create(tasks)
+    log_event(
+        actor=actor,
+        verb="open",
+        object_kind="labelling",
+        object_code=labelling.code,
+        after={
+            "name": name,
+            "job": str(job.code),
+            "experts": [expert.username for expert in people],
+            "seed": seed,
+            "tasks": len(tasks),
+        },
+    )
+    return labelling
+
+
+def save_label(
+    *, expert: User, task_code: UUID, faults: frozenset[FaultClass], note: str = ""
+) -> FaultLabel:
+    """Store what an expert sees in one augmentation; the same again is the same label.
+
+    Raises:
+        NotYours: The task is somebody else's or does not exist.
+        AlreadyLabelled: It has another label.
+    """
+    save = partial(_save, expert=expert, task_code=task_code, faults=faults, note=note)
+    try:
+        return save()
+    except IntegrityError:
+        # Another request was faster; looked at again, this one is its replay or too late.
+        return save()
+
+
+# Private
+
+
+def _experts(usernames: Sequence[str]) -> list[User]:
+    known = {user.username: user for user in expert_accounts()}
+    for username in usernames:
+        if username not in known:
+            raise UnknownName("expert", username, sorted(known))
+    found = [known[username] for username in sorted(set(usernames))]
+    simulated = [user.username for user in found if user.person.is_simulated]
+    if simulated:
+        raise Conflict(f"Simulated experts label nothing: {', '.join(simulated)}.")
+    return found
+
+
+def _planned(labelling: LabellingRound, expert: User) -> list[LabelTask]:
+    rows = Augmentation.objects.filter(job=labelling.job, state=Augmentation.State.DONE)
+    left = rows.exclude(label_tasks__expert=expert).order_by("scenario__slug", "contestant__slug")
+    order = list(left.values_list("pk", flat=True))
+    random.Random(f"{labelling.seed}/{expert.username}").shuffle(order)
+    return [
+        LabelTask(labelling=labelling, expert=expert, position=n, augmentation_id=pk)
+        for n, pk in enumerate(order, start=1)
+    ]
+
+
+@transaction.atomic
+def _save(
+    *, expert: User, task_code: UUID, faults: frozenset[FaultClass], note: str
+) -> FaultLabel:
+    task = (
+        LabelTask.objects.select_related("augmentation__scenario__base_scene")
+        .filter(code=task_code, expert=expert)
+        .first()
+    )
+    if task is None:
+        raise NotYours("This picture is not yours to label.")
+    note = storable(note.strip())[:NOTE_LENGTH]
+    said = {fault.value: fault in faults for fault in FaultClass}
+    known = FaultLabel.objects.filter(task=task).first()
+    if known is not None:
+        if any(getattr(known, name) != value for name, value in said.items()):
+            raise AlreadyLabelled
+        return known
+    guessed = guess(task.augmentation)
+    return FaultLabel.objects.create(
+        augmentation=task.augmentation,
+        expert=expert,
+        task=task,
+        note=note,
+        **said,
+        **{
+            f"guessed_{fault.value}": None if guessed is None else fault in guessed
+            for fault in FaultClass
+        },
+    )

@@ -1,0 +1,128 @@
+"""Labelling faults: the page of an expert, which tells nothing of who made what, and of a job."""
+
+from __future__ import annotations
+
+import uuid
+from typing import cast
+
+from django.contrib import messages
+from django.contrib.auth.models import User
+from django.http import Http404, HttpRequest, HttpResponse
+from django.shortcuts import get_object_or_404, redirect, render
+from django.utils.text import slugify
+from django.views.decorators.cache import never_cache
+from django.views.decorators.http import require_http_methods, require_safe
+
+from arena.errors import AlreadyLabelled, ArenaError, NotYours
+from arena.exports.faults import fault_table, format_named
+from arena.models import FaultLabel
+from arena.queries import faults
+from arena.queries.people import experts, role_of
+from arena.services.faults import open_labelling, save_label
+from arena.web.access import ADMIN, EXPERT, STAFF, only
+from arena.web.forms import LabelForm, LabellingForm
+from augment.errors import AugmentError, UnknownName
+from augment.models import GenerationJob
+from augment.services.fault_guess import FaultClass
+
+
+@only(EXPERT)
+@never_cache
+@require_http_methods(["GET", "HEAD", "POST"])
+def label_page(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
+    """The next picture; a label is saved and followed by a redirect."""
+    expert = cast(User, request.user)
+    try:
+        progress = faults.labelling_of(expert=expert, code=code)
+        if request.method == "POST":
+            return _save(request, expert, code)
+    except NotYours as error:
+        raise Http404 from error
+    task = faults.next_task(labelling=progress.labelling, expert=expert)
+    context = {"progress": progress, "task": task, "faults": list(FaultClass)}
+    return render(request, "label/label.html" if task else "label/done.html", context)
+
+
+@only(*STAFF)
+@require_http_methods(["GET", "HEAD", "POST"])
+def faults_page(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
+    """What was labelled in a job, and the form that opens a labelling."""
+    job = get_object_or_404(GenerationJob, code=code)
+    form = LabellingForm(
+        request.POST or None, experts=list(experts().order_by("person__pseudonym"))
+    )
+    if request.method == "POST":
+        if role_of(request.user) != ADMIN:
+            return HttpResponse(status=403)
+        if form.is_valid() and _open(request, job, form):
+            return redirect("faults", code=code)
+    context = {
+        "job": job,
+        "form": form,
+        "table": fault_table(job),
+        "labellings": faults.of_job(job),
+    }
+    return render(request, "label/job.html", context, status=422 if form.errors else 200)
+
+
+@only(*STAFF)
+@require_safe
+def export(request: HttpRequest, code: uuid.UUID, form: str) -> HttpResponse:
+    """The faults of a job as a file."""
+    job = get_object_or_404(GenerationJob, code=code)
+    try:
+        chosen = format_named(form)
+    except UnknownName as error:
+        raise Http404 from error
+    name = f"{slugify(job.name) or 'job'}-faults.{chosen.suffix}"
+    return HttpResponse(
+        chosen.write(fault_table(job)),
+        content_type=chosen.content_type,
+        headers={"Content-Disposition": f'attachment; filename="{name}"'},
+    )
+
+
+# Private
+
+
+def _save(request: HttpRequest, expert: User, code: uuid.UUID) -> HttpResponse:
+    form = LabelForm(request.POST)
+    if not form.is_valid():
+        messages.error(request, "That could not be read; nothing was saved.")
+        return redirect("label", code=code)
+    try:
+        label = save_label(
+            expert=expert,
+            task_code=form.cleaned_data["task"],
+            faults=form.faults(),
+            note=form.cleaned_data["note"],
+        )
+    except AlreadyLabelled:
+        messages.info(request, "You had labelled that picture before; your first label counts.")
+    else:
+        messages.success(request, f"Saved. {_guess(label)}")
+    return redirect("label", code=code)
+
+
+def _guess(label: FaultLabel) -> str:
+    """What the checks had guessed, told only now."""
+    if label.guessed_position is None:
+        return "The automatic checks could not look at that picture."
+    seen = [fault.value for fault in FaultClass if getattr(label, f"guessed_{fault.value}")]
+    return f"The automatic checks had guessed: {', '.join(seen) or 'no fault'}."
+
+
+def _open(request: HttpRequest, job: GenerationJob, form: LabellingForm) -> bool:
+    try:
+        labelling = open_labelling(
+            name=form.cleaned_data["name"],
+            job=job,
+            experts=form.cleaned_data["experts"],
+            seed=form.cleaned_data["seed"],
+            actor=cast(User, request.user),
+        )
+    except (ArenaError, AugmentError) as error:
+        form.add_error(None, str(error))
+        return False
+    messages.success(request, f"“{labelling.name}” is open; its experts can label now.")
+    return True

@@ -1,0 +1,23 @@
+"""The automatic first guess of a stored augmentation's faults."""
+
+from __future__ import annotations
+
+from augment.checks import findings
+from augment.errors import InvalidDocument, InvalidModification
+from augment.metrics.fault_guess import FaultClass, first_guess
+from augment.models import Augmentation
+from augment.scene.codec import modification_from_document
+from augment.services.scenes import scene_of
+
+__all__ = ["FaultClass", "guess"]
+
+
+def guess(row: Augmentation) -> frozenset[FaultClass] | None:
+    """What the checks make of a row; None where it can't be read or has no modification."""
+    if row.modification is None:
+        return None
+    try:
+        found = findings(scene_of(row.scenario), modification_from_document(row.modification))
+    except (InvalidDocument, InvalidModification):
+        return None
+    return first_guess(found)

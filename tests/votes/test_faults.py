@@ -1,0 +1,172 @@
+"""Opening a labelling, labelling, and what comes out of it."""
+
+from __future__ import annotations
+
+import csv
+import io
+
+import pytest
+from django.contrib.auth.models import User
+from django.core.management import call_command
+from django.db import IntegrityError, transaction
+
+from arena.errors import AlreadyLabelled, NothingToPlan, NotYours
+from arena.exports.faults import csv_bytes, fault_table, latex
+from arena.models import FaultLabel, LabellingRound, LabelTask
+from arena.queries.faults import labelling_of, next_task, of_expert
+from arena.services.faults import open_labelling, save_label
+from augment.errors import Conflict, UnknownName
+from augment.models import GenerationJob
+from augment.services.fault_guess import FaultClass
+from tests.exports.test_displacement import a_job
+from tests.study_rows import expert
+
+pytestmark = pytest.mark.django_db
+
+P, H, L = FaultClass.POSITION, FaultClass.HEADING, FaultClass.LOGIC
+NONE: frozenset[FaultClass] = frozenset()
+
+
+@pytest.fixture
+def job() -> GenerationJob:
+    """Ann has two augmentations with a modification; sim's two answers were unreadable."""
+    return a_job()
+
+
+@pytest.fixture
+def eva() -> User:
+    return expert("eva")
+
+
+def opened(job: GenerationJob, *names: str, name: str = "Faults", seed: int = 1) -> LabellingRound:
+    return open_labelling(name=name, job=job, experts=names, seed=seed)
+
+
+def tasks_of(labelling: LabellingRound, user: User) -> list[LabelTask]:
+    return list(labelling.tasks.filter(expert=user).order_by("position"))
+
+
+def save(task: LabelTask, *faults: FaultClass, note: str = "") -> FaultLabel:
+    return save_label(expert=task.expert, task_code=task.code, faults=frozenset(faults), note=note)
+
+
+def test_every_expert_gets_every_finished_augmentation_once(job: GenerationJob, eva: User) -> None:
+    expert("finn")
+    labelling = opened(job, "eva", "finn")
+    tasks = tasks_of(labelling, eva)
+    assert [task.position for task in tasks] == [1, 2]
+    assert {task.augmentation.contestant.slug for task in tasks} == {"ann"}
+    tokens = [task.token for task in labelling.tasks.all()]
+    tokens += [task.original_token for task in labelling.tasks.all()]
+    assert len(set(tokens)) == 8
+
+
+def test_what_was_planned_before_is_not_planned_again(job: GenerationJob, eva: User) -> None:
+    opened(job, "eva")
+    with pytest.raises(NothingToPlan):
+        opened(job, "eva", name="Again")
+    assert LabellingRound.objects.count() == 1
+
+
+def test_a_labelling_needs_real_experts_and_a_name_of_its_own(job: GenerationJob) -> None:
+    expert("sim-eva", is_simulated=True)
+    expert("finn")
+    with pytest.raises(UnknownName, match="nobody"):
+        opened(job, "nobody")
+    with pytest.raises(Conflict, match="sim-eva"):
+        opened(job, "sim-eva")
+    opened(job, "finn")
+    with pytest.raises(Conflict, match="called 'Faults' already"):
+        opened(job, "finn")
+
+
+def test_a_label_keeps_any_faults_a_note_and_what_the_checks_had_guessed(
+    job: GenerationJob, eva: User
+) -> None:
+    first, second = tasks_of(opened(job, "eva"), eva)
+    label = save(first, P, L, note=" in the kerb ")
+    assert (label.position, label.heading, label.logic) == (True, False, True)
+    assert label.note == "in the kerb"
+    assert label.guessed_heading is False
+    assert not save(second).position
+
+
+def test_the_same_label_twice_is_one_and_another_is_refused(job: GenerationJob, eva: User) -> None:
+    task = tasks_of(opened(job, "eva"), eva)[0]
+    assert save(task, H).pk == save(task, H).pk
+    with pytest.raises(AlreadyLabelled):
+        save(task, P)
+    assert FaultLabel.objects.get().heading
+
+
+def test_nobody_labels_for_somebody_else(job: GenerationJob, eva: User) -> None:
+    finn = expert("finn")
+    labelling = opened(job, "eva")
+    with pytest.raises(NotYours):
+        save_label(expert=finn, task_code=tasks_of(labelling, eva)[0].code, faults=NONE)
+    with pytest.raises(NotYours):
+        labelling_of(expert=finn, code=labelling.code)
+
+
+def test_the_next_one_comes_until_all_are_labelled(job: GenerationJob, eva: User) -> None:
+    labelling = opened(job, "eva")
+    for left in (2, 1):
+        assert [line.left for line in of_expert(eva)] == [left]
+        task = next_task(labelling=labelling, expert=eva)
+        assert task is not None
+        save(task)
+    assert next_task(labelling=labelling, expert=eva) is None
+    assert labelling_of(expert=eva, code=labelling.code).left == 0
+
+
+def test_the_database_takes_one_label_per_expert_and_a_whole_guess(
+    job: GenerationJob, eva: User
+) -> None:
+    label = save(tasks_of(opened(job, "eva"), eva)[0])
+    for changes in ({"guessed_logic": None}, {"pk": None}):
+        again = FaultLabel.objects.get(pk=label.pk)
+        for name, value in changes.items():
+            setattr(again, name, value)
+        again._state.adding = again.pk is None
+        with pytest.raises(IntegrityError), transaction.atomic():
+            again.save()
+
+
+def test_of_several_experts_more_than_half_must_see_a_fault(job: GenerationJob, eva: User) -> None:
+    finn = expert("finn")
+    labelling = opened(job, "eva", "finn")
+    by_eva, by_finn = tasks_of(labelling, eva), tasks_of(labelling, finn)
+    by_finn.sort(key=lambda task: task.augmentation_id != by_eva[0].augmentation_id)
+    save(by_eva[0], P, H)
+    save(by_finn[0], P)
+    save(by_eva[1], L)
+    ann, sim = fault_table(job).lines
+    assert (ann.position, ann.heading, ann.logic, ann.all) == (1, 0, 1, 2)
+    assert (ann.labelled, ann.labels, sim.labelled, sim.without_modification) == (2, 3, 0, 2)
+
+
+def test_agreement_compares_guess_and_label(job: GenerationJob, eva: User) -> None:
+    first, second = tasks_of(opened(job, "eva"), eva)
+    save(first, P)
+    save(second)
+    FaultLabel.objects.filter(task=first).update(guessed_position=True)
+    FaultLabel.objects.filter(task=second).update(guessed_position=False)
+    position, heading, _ = fault_table(job).agreement
+    assert (position.kappa, position.n) == (1.0, 2)
+    assert heading.n == 2
+
+
+def test_the_files_have_the_papers_columns(job: GenerationJob, eva: User) -> None:
+    save(tasks_of(opened(job, "eva"), eva)[0], P)
+    table = fault_table(job)
+    lines = list(csv.DictReader(io.StringIO(csv_bytes(table).decode())))
+    assert [(line["contestant"], line["all"]) for line in lines] == [
+        ("ann", "1"),
+        ("sim (simulated)", "0"),
+    ]
+    text = latex(table)
+    assert r"    ann & 1 & 1 & 0 & 0\\" in text
+    assert "sim" not in text.partition("midrule")[2]  # nobody labelled it
+    out = io.StringIO()
+    call_command("export", "faults", "Round 1", "--format", "latex", "--out", "-", stdout=out)
+    assert out.getvalue() == text

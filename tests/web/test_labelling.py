@@ -1,0 +1,100 @@
+"""The pages of fault labels."""
+
+from __future__ import annotations
+
+import pytest
+from django.contrib.auth.models import User
+from django.urls import reverse
+
+from arena.models import FaultLabel, LabellingRound
+from arena.services.faults import open_labelling
+from augment.models import GenerationJob, Scenario
+from augment.services.pictures import store
+from tests.exports.test_displacement import a_job
+from tests.study_rows import expert
+from tests.web.cast import people, png, signed_in
+
+pytestmark = pytest.mark.django_db
+
+
+@pytest.fixture
+def job() -> GenerationJob:
+    job = a_job()
+    Scenario.objects.update(original_image=store(png(5)))
+    return job
+
+
+@pytest.fixture
+def eva() -> User:
+    return expert("eva")
+
+
+@pytest.fixture
+def labelling(job: GenerationJob, eva: User) -> LabellingRound:
+    return open_labelling(name="Faults", job=job, experts=["eva"], seed=1)
+
+
+def test_an_expert_labels_by_a_press_and_learns_the_guess_only_afterwards(
+    labelling: LabellingRound, eva: User
+) -> None:
+    client, url = signed_in(eva), reverse("label", args=[labelling.code])
+    page = client.get(url).content.decode()
+    assert "automatic checks" not in page
+    assert "Place a traffic cone" in page
+    task = labelling.tasks.get(position=1)
+    answer = client.post(url, {"task": task.code, "position": "on", "note": "far off"})
+    assert answer.headers["Location"] == url
+    label = FaultLabel.objects.get()
+    assert (label.position, label.heading, label.logic, label.note) == (
+        True, False, False, "far off",
+    )  # fmt: skip
+    assert "The automatic checks had guessed:" in client.get(url).content.decode()
+
+
+def test_after_the_last_picture_the_page_says_so(labelling: LabellingRound, eva: User) -> None:
+    client, url = signed_in(eva), reverse("label", args=[labelling.code])
+    assert "Start labelling" in client.get(reverse("home")).content.decode()
+    for task in labelling.tasks.all():
+        client.post(url, {"task": task.code})
+    assert "You are done." in client.get(url).content.decode()
+    assert "2 of 2 labelled" in client.get(reverse("home")).content.decode()
+
+
+def test_a_second_and_a_broken_answer_change_nothing(labelling: LabellingRound, eva: User) -> None:
+    client, url = signed_in(eva), reverse("label", args=[labelling.code])
+    task = labelling.tasks.get(position=1)
+    client.post(url, {"task": task.code})
+    shown = client.post(url, {"task": task.code, "logic": "on"}, follow=True).content.decode()
+    assert "your first label counts" in shown
+    broken = client.post(url, {"task": "x"}, follow=True).content.decode()
+    assert "nothing was saved" in broken
+    assert FaultLabel.objects.count() == 1
+
+
+def test_pictures_go_out_to_their_expert_alone(labelling: LabellingRound, eva: User) -> None:
+    task, finn = labelling.tasks.get(position=1), expert("finn")
+    for token in (task.token, task.original_token):
+        url = reverse("matchup-image", args=[token])
+        assert signed_in(eva).get(url).getvalue().startswith(b"\x89PNG")
+        assert signed_in(finn).get(url).status_code == 404
+    assert signed_in(finn).get(reverse("label", args=[labelling.code])).status_code == 404
+
+
+def test_an_admin_opens_a_labelling_and_an_analyst_reads_it(job: GenerationJob, eva: User) -> None:
+    accounts, url = people(), reverse("faults", args=[job.code])
+    sent = {"name": "Faults", "experts": ["eva"], "seed": "1"}
+    assert signed_in(accounts["analyst"]).post(url, sent).status_code == 403
+    admin = signed_in(accounts["admin"])
+    assert admin.post(url, {**sent, "experts": []}).status_code == 422
+    assert "is open" in admin.post(url, sent, follow=True).content.decode()
+    again = admin.post(url, sent)
+    assert (again.status_code, "already" in again.content.decode()) == (422, True)
+    labelling = LabellingRound.objects.get()
+    signed_in(eva).post(
+        reverse("label", args=[labelling.code]), {"task": labelling.tasks.all()[0].code}
+    )
+    shown = signed_in(accounts["analyst"]).get(url).content.decode()
+    assert "Cohen’s kappa" in shown
+    assert "1 of 2" in shown
+    table = signed_in(accounts["analyst"]).get(reverse("faults-export", args=[job.code, "csv"]))
+    assert table.content.startswith(b"contestant,slug")
