@@ -1,0 +1,128 @@
+"""Ten thousand spoilt answers, to every role of every variant, without a crash.
+
+    python -m tests.benchmarks.mutated_answers [COUNT]
+
+A run of a variant is recorded with the stand-in's good answers. Then it is played again, one of
+its answers spoilt: characters cut out, doubled or replaced, numbers and words exchanged, the
+answer cut off or swapped for another role's. Whatever comes, the run ends in an outcome whose
+numbers are finite, or in the refusal that the answer says; anything else is printed and counted.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+import random
+import sys
+import time
+from collections import Counter
+from collections.abc import Sequence
+
+from augment.fake_llm.playing import GOOD, LEARNING, Character
+from augment.fake_llm.wire import chat_request
+from augment.llm.messages import Reply, Request
+from augment.llm.patience import Patience
+from augment.variants.pipeline import Outcome, run
+from augment.variants.recipes import RECIPES
+from augment.variants.transcript import MemoryTranscript
+from tests.fixtures.shelf import SLUGS, entry, shown_scene
+
+COUNT = 10_000
+SEED = 20_261_121
+PIECES = (
+    *("", '"', "{", "}", "[", "]", ",", "\\", "9", "-", "e", "NaN", "1e999", "`", "\n", "null"),
+    *("true", "Lane99", "Agent1", '"call"', "```", "</think>", "\x00", "\ud800", "\u202e", "5.5"),
+)
+VARIANTS = ("otm", "fc", "tqa", "geo", "fc+tqa")
+"""The visual ones draw a picture in each round; they are played in every twentieth run."""
+VISUAL = ("vqa", "fc+vqa")
+
+
+class Answering:
+    """Answers as a character does, but for one answer that it spoils.
+
+    Args:
+        character: Who answers, as the stand-in would.
+        spoilt: The number of the spoilt answer, from 0.
+        rng: How it is spoilt.
+    """
+
+    def __init__(self, character: Character, spoilt: int, rng: random.Random) -> None:
+        self._character = character
+        self._spoilt = spoilt
+        self._rng = rng
+        self._given: list[str] = []
+
+    def fitted(self, request: Request) -> Request:
+        return request
+
+    def complete(self, request: Request) -> Reply:
+        text = _right_answer(self._character, request)
+        if len(self._given) == self._spoilt:
+            text = spoilt(text, self._given, self._rng)
+        self._given.append(text)
+        return Reply(text=text, model="m", finish_reason="stop")
+
+
+def spoilt(text: str, others: Sequence[str], rng: random.Random) -> str:
+    """The text with something wrong."""
+    if others and rng.random() < 0.05:
+        return rng.choice(list(others))
+    if rng.random() < 0.1:
+        return text[: rng.randrange(len(text))]
+    made = list(text)
+    for _ in range(rng.randint(1, 8)):
+        at = rng.randrange(len(made) + 1)
+        if rng.random() < 0.2:
+            made[at:at] = made[max(0, at - rng.randint(1, 200)) : at]
+        else:
+            made[at : at + rng.randint(0, 6)] = rng.choice(PIECES)
+    return "".join(made)
+
+
+def play(number: int, seed: int = SEED) -> Outcome:
+    """One run with one spoilt answer; the same for the same number."""
+    rng = random.Random(seed + number)
+    variant = rng.choice(VISUAL if number % 20 == 0 else VARIANTS)
+    slug = rng.choice(SLUGS)
+    answering = Answering(rng.choice([GOOD, LEARNING]), rng.randrange(6), rng)
+    outcome = run(
+        RECIPES[variant],
+        scene=shown_scene(slug),
+        instruction=entry(slug).instruction,
+        client=answering,
+        model="m",
+        transcript=MemoryTranscript(),
+        patience=Patience(sleep=lambda _: None, rng=rng),
+    )
+    for agent in outcome.modification.changed if outcome.modification else ():
+        assert math.isfinite(agent.x_m + agent.y_m + agent.heading_rad + agent.speed_mps)
+    return outcome
+
+
+def main(count: int) -> int:
+    outcomes: Counter[str] = Counter()
+    crashes = 0
+    began = time.perf_counter()
+    for number in range(count):
+        try:
+            outcome = play(number)
+        except Exception as error:  # the point is that there is none
+            crashes += 1
+            print(f"run {number}: {type(error).__name__}: {error}")
+        else:
+            outcomes[f"{outcome.status}, accepted: {outcome.is_accepted}"] += 1
+    for name, times in outcomes.most_common():
+        print(f"{times:>7}  {name}")
+    print(f"{count} runs, {crashes} crashes, {time.perf_counter() - began:.0f} s")
+    return crashes
+
+
+def _right_answer(character: Character, request: Request) -> str:
+    document = request.to_document()
+    # As the wire would carry it; a lone half of a character is none that JSON can't carry.
+    return character.answer(chat_request(json.dumps(document).encode())).text
+
+
+if __name__ == "__main__":
+    sys.exit(bool(main(int(sys.argv[1]) if len(sys.argv) > 1 else COUNT)))

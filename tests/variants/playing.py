@@ -1,0 +1,101 @@
+"""One run of any recipe against a script, with everything that it did."""
+
+from __future__ import annotations
+
+import json
+import random
+from collections.abc import Iterable, Mapping
+
+from augment.errors import ModelFault
+from augment.llm.messages import Reply, ToolCall
+from augment.llm.patience import Patience
+from augment.llm.scripted import ScriptedClient
+from augment.scene.entities import Scene
+from augment.variants.cast import Player
+from augment.variants.pipeline import Outcome, run
+from augment.variants.recipes import recipe
+from augment.variants.transcript import MemoryTranscript, ModelRole
+from tests.scenes import scene
+from tests.variants.answers import agent, answer, block
+
+WISH = "Add a parked car 21.4 m ahead."
+Script = Iterable[str | Reply | ModelFault]
+
+
+class Play:
+    def __init__(
+        self,
+        variant: str,
+        script: Script,
+        *,
+        shown: Scene | None = None,
+        native: bool = False,
+        others: Mapping[ModelRole, Player] | None = None,
+    ) -> None:
+        self.client = ScriptedClient(script)
+        self.transcript = MemoryTranscript()
+        self.outcome: Outcome = run(
+            recipe(variant),
+            scene=shown or scene(),
+            instruction=WISH,
+            client=self.client,
+            model="m",
+            transcript=self.transcript,
+            patience=Patience(sleep=lambda _: None, rng=random.Random(0)),
+            native_tools=native,
+            others=others,
+        )
+
+    @property
+    def roles(self) -> str:
+        """The first letter of each call's role, in order."""
+        return "".join(call.role[0] for call in self.transcript.calls)
+
+    @property
+    def x_m(self) -> float:
+        """Where the first added agent of the outcome is."""
+        assert self.outcome.modification is not None
+        return self.outcome.modification.added[0].x_m
+
+    def notes(self, kind: str) -> list[dict[str, object]]:
+        return [note.document for note in self.transcript.notes if note.kind == kind]
+
+
+def car(x_m: float, **changes: object) -> str:
+    """A readable answer with one car."""
+    return answer(block(agent(**({"x_m": x_m, "y_m": 0.0} | changes))))
+
+
+def rating(compliance: object, realism: object, logic: object, *feedback: str) -> str:
+    ratings = {"compliance": compliance, "realism": realism, "logical_consistency": logic}
+    return _fenced({"ratings": ratings, "feedback": [_correction(one) for one in feedback]})
+
+
+def questions(count: int = 3) -> str:
+    return _fenced({"questions": [f"Where is Agent{n}?" for n in range(2, 2 + count)]})
+
+
+def verdict(*feedback: str, said: str | None = None) -> str:
+    word = said or ("feedback" if feedback else "accept")
+    return _fenced({"verdict": word, "feedback": [_correction(one) for one in feedback]})
+
+
+def call(name: str = "pose_on_lane", **arguments: object) -> str:
+    given = {"lane": "Lane1", "start": "Agent1", "distance_m": 21.4} | arguments
+    return json.dumps({"call": name, "arguments": given})
+
+
+def native(*arguments: str, name: str = "pose_on_lane", extra: str = "") -> Reply:
+    calls = tuple(
+        ToolCall(id=f"c{n}", name=name, arguments=one, extra=extra)
+        for n, one in enumerate(arguments)
+    )
+    return Reply(text="", finish_reason="tool_calls", tool_calls=calls)
+
+
+def _fenced(document: object) -> str:
+    return f"Done.\n```json\n{json.dumps(document)}\n```\n"
+
+
+def _correction(problem: str) -> dict[str, str]:
+    return {"problem": problem, "reason": "Because.", "corrective_action": "Move it."}

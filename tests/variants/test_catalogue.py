@@ -1,0 +1,149 @@
+"""Every variant on every scenario of the catalogue, over real HTTP against the stand-in.
+
+Call counts and their order are those of the paper: m modifier, r reviewer, e engineer, v viewer.
+"""
+
+from __future__ import annotations
+
+import math
+import random
+from collections.abc import Iterator
+
+import pytest
+
+from augment.baselines.rule_placer import place
+from augment.fake_llm.server import FakeServer, running
+from augment.llm.openai_wire import OpenAIWire
+from augment.llm.patience import Patience
+from augment.variants.pipeline import Outcome, OutcomeStatus, run
+from augment.variants.recipes import RECIPES, Review, Tools, recipe
+from augment.variants.transcript import MemoryTranscript
+from tests.baselines.test_rule_placer_catalogue import PLACED
+from tests.fixtures.shelf import SLUGS, entry, shown_scene
+
+CALLS_OF_GOOD = {
+    "otm": "m",
+    "fc": "mm",
+    "tqa": "mr",
+    "vqa": "meve",
+    "geo": "m",
+    "fc+tqa": "mmr",
+    "fc+vqa": "mmeve",
+    "fc+geo": "mm",
+}
+CALLS_OF_LOW = {
+    "tqa": "mrmr",
+    "vqa": "mevemeve",
+    "fc+tqa": "mmrmmr",
+    "fc+vqa": "mmevemmeve",
+}
+KINDS = ("crash", "jaywalker", "nudge", "overtake", "roadworks")
+CALLS_OF_NEVER = {"tqa": "mrmrmr", "vqa": "mevemevemeve"}
+
+
+SOME = [next(slug for slug in PLACED if slug.startswith(kind)) for kind in KINDS]
+
+
+@pytest.fixture(scope="module")
+def server() -> Iterator[FakeServer]:
+    with running() as serving:
+        yield serving
+
+
+def played(
+    server: FakeServer, model: str, variant: str, slug: str, *, native: bool = False
+) -> tuple[Outcome, MemoryTranscript]:
+    transcript = MemoryTranscript()
+    with OpenAIWire(base_url=server.url, api_key=None, timeout_s=30.0) as client:
+        outcome = run(
+            recipe(variant),
+            scene=shown_scene(slug),
+            instruction=entry(slug).instruction,
+            client=client,
+            model=model,
+            transcript=transcript,
+            patience=Patience(sleep=lambda _: None, rng=random.Random(0)),
+            native_tools=native,
+        )
+    return outcome, transcript
+
+
+def order(transcript: MemoryTranscript) -> str:
+    return "".join(call.role[0] for call in transcript.calls)
+
+
+def test_every_recipe_is_played() -> None:
+    assert CALLS_OF_GOOD.keys() == RECIPES.keys()
+
+
+@pytest.mark.slow
+@pytest.mark.timeout(400)
+@pytest.mark.parametrize("variant", CALLS_OF_GOOD)
+def test_every_variant_does_every_scenario(server: FakeServer, variant: str) -> None:
+    reviewed = RECIPES[variant].review is not Review.NONE
+    for slug in SLUGS:
+        outcome, transcript = played(server, "fake-good", variant, slug)
+        assert outcome.status is OutcomeStatus.DONE, slug
+        assert outcome.is_accepted is (True if reviewed else None), slug
+        assert outcome.modification is not None
+        # The stand-in looks up no place for a wish that it does not understand.
+        looks_up = not outcome.modification.is_empty
+        calls = CALLS_OF_GOOD[variant]
+        assert order(transcript) == (calls if looks_up else calls.replace("mm", "m")), slug
+        _is_complete(transcript, variant, looks_up=looks_up)
+        if slug in PLACED:
+            _is_where_it_belongs(outcome, slug)
+
+
+@pytest.mark.parametrize("slug", SOME)
+@pytest.mark.parametrize("variant", CALLS_OF_LOW)
+def test_a_low_rating_costs_one_more_round(server: FakeServer, variant: str, slug: str) -> None:
+    outcome, transcript = played(server, "fake-qa-low", variant, slug)
+    assert (order(transcript), outcome.is_accepted) == (CALLS_OF_LOW[variant], True)
+    _is_where_it_belongs(outcome, slug)
+
+
+@pytest.mark.parametrize("slug", SOME[:2])
+@pytest.mark.parametrize("variant", CALLS_OF_NEVER)
+def test_there_are_two_regenerations_and_no_third(
+    server: FakeServer, variant: str, slug: str
+) -> None:
+    outcome, transcript = played(server, "fake-qa-never", variant, slug)
+    assert (order(transcript), outcome.is_accepted) == (CALLS_OF_NEVER[variant], False)
+
+
+@pytest.mark.parametrize("slug", PLACED[::4])
+def test_native_calls_place_as_calls_in_the_answer_do(server: FakeServer, slug: str) -> None:
+    written, _ = played(server, "fake-good", "fc", slug)
+    native, transcript = played(server, "fake-good", "fc", slug, native=True)
+    assert order(transcript) == "mm"
+    assert native.modification == written.modification
+
+
+@pytest.mark.parametrize("slug", SOME)
+def test_a_careless_model_comes_to_an_end_in_every_variant(server: FakeServer, slug: str) -> None:
+    for variant in RECIPES:
+        outcome, transcript = played(server, "fake-careless", variant, slug)
+        assert outcome.status in (OutcomeStatus.DONE, OutcomeStatus.UNREADABLE)
+        assert len(transcript.calls) <= 18
+
+
+def _is_complete(transcript: MemoryTranscript, variant: str, *, looks_up: bool) -> None:
+    """Every call has its raw answer; tools, rounds and reviews are noted behind their calls."""
+    assert all(call.reply is not None and call.reply.model for call in transcript.calls)
+    assert len({call.prompt_version for call in transcript.calls}) == 1
+    kinds = [note.kind.value for note in transcript.notes]
+    way = RECIPES[variant]
+    assert ("tool_call" in kinds) is (looks_up and way.tools is Tools.POSE)
+    rest = [kind for kind in kinds if kind != "tool_call"]
+    assert rest == ([] if way.review is Review.NONE else ["round", "review", "kept"])
+
+
+def _is_where_it_belongs(outcome: Outcome, slug: str) -> None:
+    """Everything within half a metre of where the rules put it, whatever was in between."""
+    meant = list(place(shown_scene(slug), entry(slug).instruction).modification.added)
+    assert outcome.modification is not None
+    assert len(outcome.modification.added) == len(meant)
+    for agent in outcome.modification.added:
+        gaps = [math.hypot(one.x_m - agent.x_m, one.y_m - agent.y_m) for one in meant]
+        assert min(gaps) < 0.5

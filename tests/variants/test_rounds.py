@@ -1,0 +1,220 @@
+"""Reviews and rounds: who is asked in which order, what counts in the end, what is on record."""
+
+from __future__ import annotations
+
+import pytest
+
+from augment.errors import ModelFault
+from augment.llm.messages import Reply
+from augment.llm.scripted import ScriptedClient
+from augment.variants.cast import Player
+from augment.variants.pipeline import OutcomeStatus
+from augment.variants.transcript import ModelRole
+from tests.scenes import scene, vehicle
+from tests.variants.playing import Play, car, questions, rating, verdict
+
+LOW, HIGH = rating(2, 3, 2, "It is too near."), rating(4, 4, 4)
+SEEN = "1. In Lane1.\n2. cannot see\n3. Yes."
+
+
+def test_a_rating_of_four_on_average_is_content() -> None:
+    play = Play("tqa", [car(21.4), HIGH])
+    assert (play.roles, play.outcome.is_accepted) == ("mr", True)
+    assert "Text QA: round 1 of 1 counts: mean rating 4.00" in play.outcome.notes
+
+
+def test_a_mean_below_four_sends_the_feedback_back() -> None:
+    play = Play("tqa", [car(15.0), rating(5, 3, 3, "It is too near."), car(21.4), HIGH])
+    assert (play.roles, play.x_m) == ("mrmr", 21.4)
+    again = play.client.requests[2].messages
+    assert [message.speaker for message in again] == ["system", "user", "assistant", "user"]
+    assert again[2].text == car(15.0)
+    assert "- It is too near. Reason: Because. Corrective action: Move it." in again[3].text
+
+
+def test_the_reviewer_gets_vectors_and_no_reasoning() -> None:
+    play = Play("tqa", [car(21.4), HIGH])
+    told, task = play.client.requests[1].messages
+    assert "Common problems" in told.text
+    assert "One road, two lanes" not in task.text  # the modifier's insights
+    assert '"Agent2": ["VEHICLE", 21.4, 0.0, 0.0, 2.0, 4.8, 0.0, "Lane1"]' in task.text
+    assert "> Add a parked car 21.4 m ahead." in task.text
+    assert '"Lane1": [1, "Eastwards"' in task.text
+
+
+def test_the_best_rated_of_three_rounds_counts_and_each_is_on_record() -> None:
+    rounds = [car(10.0), rating(2, 2, 2, "a"), car(20.0), rating(3, 4, 4, "b"), car(30.0)]
+    play = Play("tqa", [*rounds, rating(1, 1, 1, "c")])
+    assert (play.roles, play.x_m, play.outcome.is_accepted) == ("mrmrmr", 20.0, False)
+    assert [note["round"] for note in play.notes("round")] == [1, 2, 3]
+    assert [note["mean"] for note in play.notes("review")] == [2.0, 3.6667, 1.0]
+    assert play.notes("kept") == [{"round": 2, "rounds": 3, "accepted": False, "remark": ""}]
+    assert "round 2 of 3 counts" in play.outcome.notes
+    assert "No round was accepted." in play.outcome.notes
+
+
+def test_of_equally_rated_rounds_the_last_counts() -> None:
+    low = rating(3, 3, 3, "a")
+    assert Play("tqa", [car(10.0), low, car(20.0), low, car(30.0), low]).x_m == 30.0
+
+
+@pytest.mark.parametrize(
+    "ratings",
+    [
+        rating("four", 4, 4),
+        rating(4.5, 4, 4),
+        rating(True, 4, 4),
+        rating(6, 4, 4),
+        rating(0, 4, 4),
+        rating(None, 4, 4),
+        rating(2, 2, 2),  # nothing that the modifier could be told
+        "All is well.",
+        "",
+    ],
+)
+def test_ratings_that_are_none_are_asked_for_once_more(ratings: str) -> None:
+    play = Play("tqa", [car(21.4), ratings, HIGH])
+    assert (play.roles, play.outcome.is_accepted) == ("mrr", True)
+
+
+def test_an_unusable_review_lets_the_modifiers_result_stand() -> None:
+    play = Play("tqa", [car(21.4), "Fine.", "Really fine."])
+    assert (play.outcome.status, play.outcome.is_accepted) == (OutcomeStatus.DONE, None)
+    assert "The review is unusable: the reviewer: there is no fenced" in play.outcome.notes
+    assert "unusable" in play.notes("review")[0]
+
+
+def test_a_reviewer_that_declines_is_unusable() -> None:
+    play = Play("tqa", [car(21.4), Reply(text="", refusal="I don't judge.")])
+    assert play.outcome.status is OutcomeStatus.DONE
+    assert "declined: I don't judge." in play.outcome.notes
+
+
+def test_a_later_review_that_fails_leaves_the_newest_round() -> None:
+    play = Play("tqa", [car(10.0), LOW, car(20.0), "Fine.", "Fine."])
+    assert play.x_m == 20.0
+
+
+def test_a_regeneration_that_can_not_be_read_leaves_the_round_before() -> None:
+    play = Play("tqa", [car(10.0), LOW, "There.", "There."])
+    assert (play.roles, play.x_m, play.outcome.is_accepted) == ("mrmm", 10.0, False)
+    assert "Round 2 brought no modification" in play.outcome.notes
+
+
+def test_a_regeneration_that_is_refused_leaves_the_round_before() -> None:
+    play = Play("tqa", [car(10.0), LOW, Reply(text="", refusal="No more.")])
+    assert (play.outcome.status, play.x_m) == (OutcomeStatus.DONE, 10.0)
+
+
+def test_an_unreadable_first_round_is_never_reviewed() -> None:
+    play = Play("tqa", ["There.", "There."])
+    assert (play.roles, play.outcome.status) == ("mm", OutcomeStatus.UNREADABLE)
+
+
+def test_a_broken_wire_at_the_reviewer_is_nobodys_outcome() -> None:
+    with pytest.raises(ModelFault, match="gone"):
+        Play("tqa", [car(10.0), ModelFault("gone", retryable=False)])
+
+
+def test_engineer_viewer_engineer_and_an_accepted_round_ends_it() -> None:
+    play = Play("vqa", [car(21.4), questions(), SEEN, verdict()])
+    assert (play.roles, play.outcome.is_accepted) == ("meve", True)
+    viewed = play.client.requests[2].messages[-1]
+    assert viewed.images[0].startswith(b"\x89PNG")
+    assert "1. Where is Agent2?" in viewed.text
+    assert "Add a parked car" not in viewed.text
+    weighed = play.client.requests[3].messages
+    assert [one.speaker for one in weighed] == ["system", "user", "assistant", "user"]
+    assert "> 2. Where is Agent3? -> cannot see" in weighed[-1].text
+
+
+def test_the_engineers_feedback_goes_back_and_the_accepted_round_counts() -> None:
+    first = [car(10.0), questions(), SEEN, verdict("It is too near.")]
+    play = Play("vqa", [*first, car(21.4), questions(8), "8: there", verdict()])
+    assert (play.roles, play.x_m, play.outcome.is_accepted) == ("mevemeve", 21.4, True)
+
+
+def test_without_an_accepted_round_the_last_counts_and_is_marked() -> None:
+    def turn(x_m: float) -> list[str]:
+        return [car(x_m), questions(), SEEN, verdict("No.")]
+
+    play = Play("vqa", [*turn(10.0), *turn(20.0), *turn(30.0)])
+    assert (play.roles, play.x_m, play.outcome.is_accepted) == ("meve" * 3, 30.0, False)
+    assert "No round was accepted." in play.outcome.notes
+
+
+@pytest.mark.parametrize(
+    ("script", "roles"),
+    [
+        ([questions(2), questions(9)], "mee"),
+        ([questions(), "I see a car.", "A car."], "mevv"),
+        ([questions(), SEEN, verdict(said="feedback"), verdict("Bad.", said="accept")], "mevee"),
+        ([questions(), Reply(text="", refusal="No picture.")], "mev"),
+        ([questions(), Reply(text="", finish_reason="content_filter")], "mev"),
+    ],
+)
+def test_a_visual_review_that_fails_anywhere_is_unusable(
+    script: list[str | Reply], roles: str
+) -> None:
+    play = Play("vqa", [car(21.4), *script])
+    assert (play.roles, play.outcome.status) == (roles, OutcomeStatus.DONE)
+    assert play.outcome.is_accepted is None
+    assert "The review is unusable" in play.outcome.notes
+
+
+def test_a_viewer_asked_again_is_shown_the_picture_again() -> None:
+    play = Play("vqa", [car(21.4), questions(), "A car.", SEEN, verdict()])
+    assert play.roles == "mevve"
+    assert play.client.requests[3].messages[1].images == play.client.requests[2].messages[1].images
+
+
+def test_every_role_may_be_played_by_another() -> None:
+    engineer = ScriptedClient([questions(), verdict()])
+    viewer = ScriptedClient([SEEN])
+    play = Play(
+        "vqa",
+        [car(21.4)],
+        others={
+            ModelRole.ENGINEER: Player(client=engineer, model="boss"),
+            ModelRole.VIEWER: Player(client=viewer, model="eyes"),
+        },
+    )
+    assert [call.request.model for call in play.transcript.calls] == ["m", "boss", "eyes", "boss"]
+    assert len(play.client.requests) == 1
+
+
+def test_measured_facts_go_back_and_no_model_reviews() -> None:
+    play = Play("geo", [car(21.4, y_m=30.0), car(21.4)])
+    assert (play.roles, play.x_m, play.outcome.is_accepted) == ("mm", 21.4, True)
+    told = play.client.requests[1].messages[-1].text
+    assert told.startswith("Your placement was measured against the map.")
+    assert "- Wrong: 100% of Agent2 is outside the drivable area" in told
+    findings = play.notes("review")[0]["findings"]
+    assert isinstance(findings, list)
+    assert {"kind", "severity", "agents", "sentence"} == findings[0].keys()
+
+
+def test_a_modifier_that_insists_on_what_is_only_doubtful_has_the_last_word() -> None:
+    kerb = car(21.4, y_m=-1.5)
+    play = Play("geo", [kerb, kerb])
+    assert (play.roles, play.outcome.is_accepted) == ("mm", True)
+    assert "0 findings wrong" in play.outcome.notes
+
+
+def test_a_modifier_that_insists_on_what_is_wrong_has_not() -> None:
+    off = car(21.4, y_m=30.0)
+    play = Play("geo", [off, off, off])
+    assert (play.roles, play.outcome.is_accepted) == ("mmm", False)
+
+
+def test_the_least_wrong_round_counts() -> None:
+    off, kerb = car(21.4, y_m=30.0), car(22.0, y_m=-1.5)
+    assert Play("geo", [kerb, off, off]).x_m == 22.0
+
+
+def test_findings_are_told_under_the_prompts_names() -> None:
+    busy = scene(agents=(vehicle("recorded/77", 21.4, 0.0),))
+    play = Play("geo", [car(21.4, id="Agent3"), car(40.0, id="Agent3")], shown=busy)
+    told = play.client.requests[1].messages[-1].text
+    assert "Agent2" in told
+    assert "recorded" not in told

@@ -1,0 +1,13 @@
+"""A small helping of `python -m tests.benchmarks.mutated_answers`."""
+
+from __future__ import annotations
+
+import pytest
+
+from tests.benchmarks.mutated_answers import play
+
+
+@pytest.mark.parametrize("start", range(0, 120, 12))
+def test_a_spoilt_answer_never_breaks_a_run(start: int) -> None:
+    for number in range(start, start + 12):
+        assert play(number).status in {"done", "unreadable", "refused"}

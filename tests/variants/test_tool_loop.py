@@ -1,0 +1,147 @@
+"""The FC variant: calls in the answer and native ones, their limits, and what goes wrong."""
+
+from __future__ import annotations
+
+import json
+
+import pytest
+
+from augment.llm.messages import Message, Reply, Speaker, ToolChoice
+from augment.variants.pipeline import OutcomeStatus
+from tests.variants.playing import Play, call, car, native, rating
+
+POSE = '{"lane": "Lane1", "start": "Agent1", "distance_m": 21.4, "lateral_m": 0.5}'
+
+
+def results(message: Message) -> list[dict[str, object]]:
+    """What the program said about calls in the answer."""
+    lines = [line for line in message.text.splitlines() if line[:2].rstrip(".").isdigit()]
+    return [json.loads(line.partition(". ")[2]) for line in lines]
+
+
+def test_calls_in_an_answer_are_answered_in_order_and_then_read_on() -> None:
+    first = f"I look it up.\n{call()}\n{call(distance_m=30.0, lateral_m=-1.0)}"
+    play = Play("fc", [first, car(21.4)])
+    assert (play.roles, play.x_m) == ("mm", 21.4)
+    said, told = play.client.requests[1].messages[2:]
+    assert (said.speaker, said.text) == (Speaker.ASSISTANT, first)
+    assert told.speaker is Speaker.USER
+    assert told.text.startswith("Function result")
+    assert [(one["x_m"], one["y_m"]) for one in results(told)] == [(21.4, 0.0), (30.0, -1.0)]
+    assert play.client.requests[0].tools == ()
+    assert [note["tool"] for note in play.notes("tool_call")] == ["pose_on_lane"] * 2
+
+
+def test_an_answer_with_a_call_is_no_final_answer() -> None:
+    play = Play("fc", [f"{call()}\n{car(99.0)}", car(21.4)])
+    assert play.x_m == 21.4
+
+
+def test_a_model_may_answer_without_a_call() -> None:
+    assert Play("fc", [car(21.4)]).roles == "m"
+
+
+@pytest.mark.parametrize(
+    ("line", "said"),
+    [
+        ('{"call": "pose_on_lane", "arguments": {"lane": "Lane1"', "one line of the form"),
+        ('{"call": "pose_on_lane"}', "no other keys"),
+        ('{"call": "pose_on_lane", "arguments": {}, "id": 1}', "no other keys"),
+        ('{"call": 3, "arguments": {}}', "has the form"),
+        (call("nearest_lane"), "there is no function 'nearest_lane'; there is pose_on_lane"),
+        (call(lane="Lane9"), "there is no lane 'Lane9'"),
+        (call(distance_m="21.4 m"), "distance_m must be a number"),
+        ('{"call": "pose_on_lane", "arguments": [1]}', "must be one JSON object"),
+        ('{"call": "pose_on_lane", "arguments": {"distance_m": NaN}}', "NaN is not a number"),
+    ],
+)
+def test_what_is_wrong_with_a_call_goes_back_as_text(line: str, said: str) -> None:
+    play = Play("fc", [line, car(21.4)])
+    (result,) = results(play.client.requests[1].messages[-1])
+    assert said in str(result["error"])
+    assert play.outcome.status is OutcomeStatus.DONE
+
+
+def test_after_eight_calls_none_is_answered_and_an_answer_is_due() -> None:
+    calls = [call(distance_m=float(n)) for n in range(1, 11)]
+    play = Play("fc", [*calls[:9], car(21.4)])
+    assert play.roles == "m" * 10
+    last = play.client.requests[9].messages[-1].text
+    assert "no call is left: 8 are allowed" in last
+    assert last.endswith("Give your answer in the five sections now, with what you have.")
+
+
+def test_many_calls_in_one_answer_are_cut_off_after_the_first_too_many() -> None:
+    play = Play("fc", ["\n".join(call(distance_m=float(n)) for n in range(1, 40)), car(21.4)])
+    told = play.client.requests[1].messages[-1]
+    assert [("error" in one) for one in results(told)] == [False] * 8 + [True]
+
+
+def test_a_model_in_a_loop_is_stopped_and_unreadable() -> None:
+    play = Play("fc", [call()] * 6)
+    assert play.outcome.status is OutcomeStatus.UNREADABLE
+    assert play.roles == "m" * 6
+    assert "answered 3 times" in play.client.requests[4].messages[-1].text
+    assert "could not be read" in play.client.requests[5].messages[-1].text
+
+
+def test_native_calls_are_answered_one_by_one_and_come_back_as_they_were() -> None:
+    signed = '{"extra_content": {"google": {"thought_signature": "abc"}}}'
+    play = Play("fc", [native(POSE, POSE, extra=signed), car(21.4)], native=True)
+    first, second = play.client.requests
+    assert [tool.name for tool in first.tools] == ["pose_on_lane"]
+    assert '{"call"' not in first.messages[0].text
+    said, *told = second.messages[2:]
+    document = said.to_document()
+    assert document["content"] is None
+    calls = document["tool_calls"]
+    assert isinstance(calls, list)
+    assert calls[0]["extra_content"] == {"google": {"thought_signature": "abc"}}
+    assert [(one.speaker, one.answers) for one in told] == [
+        (Speaker.TOOL, "c0"),
+        (Speaker.TOOL, "c1"),
+    ]
+    assert json.loads(told[0].text)["y_m"] == 0.5
+    assert (second.tool_choice, play.x_m) == (ToolChoice.AUTO, 21.4)
+
+
+def test_broken_native_arguments_are_told_and_go_back_as_none() -> None:
+    play = Play("fc", [native('{"lane": "Lane1"'), car(21.4)], native=True)
+    said, told = play.client.requests[1].messages[2:]
+    assert said.calls[0].arguments == "{}"
+    assert "the arguments are not JSON" in json.loads(told.text)["error"]
+
+
+def test_every_native_call_has_a_result_even_beyond_the_limit() -> None:
+    many = [json.dumps({"lane": "Lane1", "start": "lane", "distance_m": n}) for n in range(12)]
+    play = Play("fc", [native(*many), car(21.4)], native=True)
+    request = play.client.requests[1]
+    assert [one.answers for one in request.messages[3:]] == [f"c{n}" for n in range(12)]
+    assert request.tool_choice is ToolChoice.NONE
+    assert "error" in json.loads(request.messages[-1].text)
+
+
+def test_an_unreadable_answer_after_native_calls_is_asked_again_with_the_tool_named() -> None:
+    play = Play("fc", [native(POSE), "There.", car(21.4)], native=True)
+    last = play.client.requests[2]
+    assert [tool.name for tool in last.tools] == ["pose_on_lane"]
+    assert last.tool_choice is ToolChoice.NONE
+    assert play.x_m == 21.4
+
+
+def test_a_native_call_that_nobody_offered_is_no_answer() -> None:
+    play = Play("otm", [native(POSE), native(POSE)])
+    assert play.outcome.status is OutcomeStatus.UNREADABLE
+
+
+def test_each_round_has_calls_of_its_own() -> None:
+    calls = [call(distance_m=float(n)) for n in range(1, 9)]
+    low, high = rating(1, 1, 1, "Too near."), rating(5, 5, 5)
+    play = Play("fc+tqa", [*calls, car(10.0), low, *calls, car(21.4), high])
+    assert play.roles == "m" * 9 + "r" + "m" * 9 + "r"
+    assert play.x_m == 21.4
+
+
+def test_a_refusal_in_the_middle_of_calls_is_a_refusal() -> None:
+    play = Play("fc", [call(), Reply(text="", refusal="No.")])
+    assert play.outcome.status is OutcomeStatus.REFUSED
