@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 from pytest_django import Settings
 
-from tests.stack import Home
+from tests.stack import SMALL_DEMO, Home
 
 ON_POSTGRES = {"api", "exports", "jobs", "services", "studies", "votes", "web"}
 """Folders whose tests are about rows: `make test` runs them on PostgreSQL as well."""
@@ -55,10 +55,7 @@ def _own_files(settings: Settings, tmp_path: Path) -> None:
 
 @pytest.fixture(scope="session")
 def demo_home(tmp_path_factory: pytest.TempPathFactory) -> Home:
-    """What `make demo SERVE=0` leaves behind; tests that change it take a copy.
-
-    The folder's name is short, because the path of a socket may not be long.
-    """
+    """What a small `make demo SERVE=0` leaves behind; tests that change it take a copy."""
     home = Home.at(tmp_path_factory.mktemp("demo"))
-    home.must("demo", "--no-serve")
+    home.must(*SMALL_DEMO)
     return home

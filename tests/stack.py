@@ -16,9 +16,16 @@ from urllib.request import urlopen
 
 from tests.processes import ROOT, Machine, wait_until
 
+SMALL_DEMO = ("demo", "--no-serve", "--per-type", "2")
+
 
 class Home(Machine):
     """A machine that starts its own Redis, as a newcomer's does."""
+
+    def must(self, *arguments: str) -> str:
+        ended = self.manage(*arguments, within_s=280.0)
+        assert ended.returncode == 0, ended.stdout + ended.stderr
+        return ended.stdout
 
     @classmethod
     def at(cls, folder: Path) -> Home:

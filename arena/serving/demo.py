@@ -23,9 +23,9 @@ from arena.services.people import create_person
 from arena.services.ratings import rate
 from arena.services.simulation import simulate_votes
 from arena.services.studies import close_study, open_study
-from augment.models import Augmentation, BaseScene, Contestant, Endpoint, GenerationJob
+from augment.models import Augmentation, BaseScene, Contestant, Endpoint, GenerationJob, Scenario
 from augment.services.catalogue import load_catalogue
-from augment.services.choosing import ALL, CATALOGUE, chosen_contestants, chosen_scenarios
+from augment.services.choosing import ALL, chosen_contestants
 from augment.services.contestants import add_contestant, ensure_builtin, ensure_endpoint
 from augment.services.jobs import launch, progress
 from augment.tasks import enqueue_job
@@ -44,7 +44,7 @@ OPEN_STUDY = "Try it yourself"
 SEED = 7
 SIMULATED_VOTES_EACH = 40
 YOUR_VOTES = 30
-JOB_LIMIT_S = 150.0
+JOB_LIMIT_S = 600.0
 
 
 class DemoFailed(ArenaError):
@@ -62,7 +62,7 @@ class Leaderboard:
 def prepare(say: Callable[[str], None]) -> None:
     """Scenes, scenarios, contestants and people; nothing here needs a running worker."""
     load_catalogue(folder=settings.BASE_DIR / "fixtures")
-    count = len(chosen_scenarios([CATALOGUE]))
+    count = len(scenarios_of(None))
     say(f"Catalogue: {count} scenarios on {BaseScene.objects.count()} scenes")
     ensure_builtin()
     ensure_endpoint(label=STAND_IN, base_url=_stand_in_address(), is_simulated=True)
@@ -76,10 +76,21 @@ def prepare(say: Callable[[str], None]) -> None:
         _person(username, "expert", is_simulated=True)
 
 
-def generate(say: Callable[[str], None], look: Callable[[], None]) -> GenerationJob:
-    """Every contestant on every scenario of the catalogue, through the workers.
+def scenarios_of(per_type: int | None) -> list[str]:
+    """Slugs of the catalogue: the first so many of each type, all where None is given."""
+    kinds: dict[str, list[str]] = {}
+    for slug, kind in Scenario.objects.filter(in_catalogue=True).values_list("slug", "type"):
+        kinds.setdefault(kind, []).append(slug)
+    return [slug for slugs in kinds.values() for slug in slugs[:per_type]]
+
+
+def generate(
+    scenarios: list[str], say: Callable[[str], None], look: Callable[[], None]
+) -> GenerationJob:
+    """Every contestant on every one of the scenarios, through the workers.
 
     Args:
+        scenarios: Slugs.
         say: Gets a line for every bit of progress.
         look: Called again and again; it raises where a worker is gone for good.
 
@@ -87,7 +98,7 @@ def generate(say: Callable[[str], None], look: Callable[[], None]) -> Generation
         DemoFailed: It takes too long, or rows failed.
     """
     job = GenerationJob.objects.filter(name=JOB).first() or launch(
-        name=JOB, contestants=chosen_contestants([ALL]), scenarios=chosen_scenarios([CATALOGUE])
+        name=JOB, contestants=chosen_contestants([ALL]), scenarios=scenarios
     )
     enqueue_job(job.pk)
     deadline, last = time.monotonic() + JOB_LIMIT_S, -1
@@ -109,14 +120,14 @@ def generate(say: Callable[[str], None], look: Callable[[], None]) -> Generation
     return job
 
 
-def vote_and_rate(say: Callable[[str], None], folder: Path) -> Leaderboard:
+def vote_and_rate(scenarios: list[str], say: Callable[[str], None], folder: Path) -> Leaderboard:
     """A study with simulated votes, closed and rated, and its table as files."""
     study = Study.objects.filter(name=SIMULATED_STUDY).first()
     if study is None:
         study = open_study(
             name=SIMULATED_STUDY,
             contestants=chosen_contestants([ALL]),
-            scenarios=chosen_scenarios([CATALOGUE]),
+            scenarios=scenarios,
             experts=SIMULATED_EXPERTS,
             votes_per_expert=SIMULATED_VOTES_EACH,
             seed=SEED,
@@ -129,7 +140,7 @@ def vote_and_rate(say: Callable[[str], None], folder: Path) -> Leaderboard:
         open_study(
             name=OPEN_STUDY,
             contestants=chosen_contestants([ALL]),
-            scenarios=chosen_scenarios([CATALOGUE]),
+            scenarios=scenarios,
             experts=["expert"],
             votes_per_expert=YOUR_VOTES,
             seed=SEED,

@@ -17,6 +17,7 @@ pytestmark = [
     pytest.mark.browser,
     pytest.mark.redis,
     pytest.mark.slow,
+    pytest.mark.timeout(600),
     pytest.mark.xdist_group("demo"),
 ]
 STUDY = "Two at once"
@@ -40,20 +41,15 @@ def vote_all(address: str, username: str, *, by_key: bool) -> list[str]:
         sign_in(page, address, username)
         page.click("a[href*='/vote/']")
         for number in range(VOTES):
-            page.wait_for_function("[...document.images].every(i => i.complete && i.naturalWidth)")
+            # Both pictures are decoded when the form takes answers.
+            page.wait_for_selector("form#vote:not([inert])")
             answer = ("left", "equal", "right")[(number + len(username)) % 3]
             here = page.input_value("input[name=matchup]")
             if by_key:
-                page.wait_for_timeout(250)
-                page.wait_for_function("!document.getElementById('vote').inert")
                 page.keyboard.press(str(("left", "equal", "right").index(answer) + 1))
             else:
                 page.click(f"button[name=outcome][value={answer}]")
-            page.wait_for_function(
-                "here => document.readyState === 'complete' && "
-                "document.querySelector('input[name=matchup]')?.value !== here",
-                arg=here,
-            )
+            page.locator(f"input[name=matchup][value='{here}']").wait_for(state="detached")
             answers.append(answer)
         assert "You are done" in page.inner_text("main")
     return answers
@@ -68,10 +64,21 @@ def home(demo_home: Home, tmp_path_factory: pytest.TempPathFactory) -> Home:
         set_password(home, username)
     home.must(
         *("open_study", STUDY, "--contestants", "reference", "rule-placer", "sim-careless-otm"),
-        *("--scenarios", "catalogue", "--experts", "ada", "grace"),
+        *("--scenarios", *augmented(home), "--experts", "ada", "grace"),
         *("--votes-per-expert", str(VOTES), "--seed", "3", "--allow-simulated"),
     )
     return home
+
+
+def augmented(home: Home) -> list[str]:
+    """The scenarios that the demo's job was about."""
+    return [
+        slug
+        for (slug,) in home.rows(
+            "SELECT slug FROM augment_scenario WHERE id IN"
+            " (SELECT scenario_id FROM augment_augmentation)"
+        )
+    ]
 
 
 def set_password(home: Home, username: str) -> None:

@@ -34,6 +34,9 @@ class Command(BaseCommand):
         parser.add_argument("--host", default="127.0.0.1", help="address to listen on")
         parser.add_argument("--port", type=int, default=8000, help="port to listen on")
         parser.add_argument("--no-serve", action="store_true", help="stop before serving")
+        parser.add_argument(
+            "--per-type", type=int, metavar="N", help="only N scenarios of each type; default: all"
+        )
 
     def handle(self, *args: Any, **options: Any) -> None:
         """Run the demo; a fault of any step ends it with a sentence."""
@@ -43,12 +46,15 @@ class Command(BaseCommand):
             server = [] if options["no_serve"] else [web_server(web)]
             call_command("prepare", verbosity=0)
             demo.prepare(self.stdout.write)
+            scenarios = demo.scenarios_of(options["per_type"])
             supervisor = Supervisor([*background(concurrency=2), *server], self._keep)
             with supervisor.signals():
                 try:
                     supervisor.start()
-                    demo.generate(self.stdout.write, partial(_look_at, supervisor))
-                    board = demo.vote_and_rate(self.stdout.write, settings.VAR_DIR / "demo")
+                    demo.generate(scenarios, self.stdout.write, partial(_look_at, supervisor))
+                    board = demo.vote_and_rate(
+                        scenarios, self.stdout.write, settings.VAR_DIR / "demo"
+                    )
                     self._show(board, web, time.monotonic() - started, serve=bool(server))
                     if server and not supervisor.is_stopping:
                         supervisor.watch()
