@@ -137,7 +137,9 @@ class ContestantAdmin(MadeElsewhere, admin.ModelAdmin):
     list_filter = ("kind", "variant")
     list_select_related = ("endpoint",)
     search_fields = ("slug", "name", "model")
-    readonly_fields = ("code", "slug", "kind", "variant", "endpoint", "model", "created_at")
+    readonly_fields = (
+        *("code", "slug", "kind", "variant", "endpoint", "model", "roles", "created_at"),
+    )
 
 
 class AugmentationInline(ReadOnly, admin.TabularInline):

@@ -58,6 +58,7 @@ def _contestant(contestant: Contestant) -> dict[str, Any]:
         "kind": contestant.kind,
         "variant": contestant.variant or None,
         "model": contestant.model or None,
+        "roles": contestant.roles,
         "endpoint": None
         if endpoint is None
         else {
