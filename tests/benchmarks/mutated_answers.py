@@ -1,11 +1,11 @@
 """Ten thousand spoilt answers, to every role of every variant, without a crash.
 
-    python -m tests.benchmarks.mutated_answers [COUNT]
+    python -m tests.benchmarks.mutated_answers [COUNT [FIRST]]
 
-A run of a variant is recorded with the stand-in's good answers. Then it is played again, one of
-its answers spoilt: characters cut out, doubled or replaced, numbers and words exchanged, the
-answer cut off or swapped for another role's. Whatever comes, the run ends in an outcome whose
-numbers are finite, or in the refusal that the answer says; anything else is printed and counted.
+A run of a variant is played with the stand-in's good answers, but from some answer on most of
+them, the re-asked ones too, are spoilt: characters cut out, doubled or replaced, numbers and words
+exchanged, the answer cut off or swapped for another role's. Whatever comes, the run ends in an
+outcome whose numbers are finite; anything else is printed and counted.
 """
 
 from __future__ import annotations
@@ -39,11 +39,11 @@ VISUAL = ("vqa", "fc+vqa")
 
 
 class Answering:
-    """Answers as a character does, but for one answer that it spoils.
+    """Answers as a character does, but from one answer on it spoils most of them.
 
     Args:
         character: Who answers, as the stand-in would.
-        spoilt: The number of the spoilt answer, from 0.
+        spoilt: The number of the first spoilt answer, from 0.
         rng: How it is spoilt.
     """
 
@@ -58,7 +58,8 @@ class Answering:
 
     def complete(self, request: Request) -> Reply:
         text = _right_answer(self._character, request)
-        if len(self._given) == self._spoilt:
+        first, later = len(self._given) == self._spoilt, len(self._given) > self._spoilt
+        if first or (later and self._rng.random() < 0.6):
             text = spoilt(text, self._given, self._rng)
         self._given.append(text)
         return Reply(text=text, model="m", finish_reason="stop")
@@ -100,11 +101,11 @@ def play(number: int, seed: int = SEED) -> Outcome:
     return outcome
 
 
-def main(count: int) -> int:
+def main(count: int, first: int = 0) -> int:
     outcomes: Counter[str] = Counter()
     crashes = 0
     began = time.perf_counter()
-    for number in range(count):
+    for number in range(first, first + count):
         try:
             outcome = play(number)
         except Exception as error:  # the point is that there is none
@@ -125,4 +126,5 @@ def _right_answer(character: Character, request: Request) -> str:
 
 
 if __name__ == "__main__":
-    sys.exit(bool(main(int(sys.argv[1]) if len(sys.argv) > 1 else COUNT)))
+    numbers = [int(argument) for argument in sys.argv[1:3]]
+    sys.exit(bool(main(*numbers) if numbers else main(COUNT)))
