@@ -4,20 +4,58 @@ from __future__ import annotations
 
 import os
 from pathlib import Path
+from typing import Any
 
 import pytest
+from django.db import connection
+from hypothesis import HealthCheck
+from hypothesis import settings as hypothesis_settings
 from pytest_django import Settings
+from xdist.scheduler import LoadScopeScheduling
 
+from tests.on_postgres import FOLDERS
+from tests.processes import copy_database, machine
 from tests.stack import SMALL_DEMO, Home
 
-ON_POSTGRES = {"api", "exports", "jobs", "services", "studies", "votes", "web"}
-"""Folders whose tests are about rows: `make test` runs them on PostgreSQL as well."""
+GROUPS = {
+    "tests/journeys/test_demo.py": "demo_home",
+    "tests/browser/test_two_experts.py": "demo_home",
+    "tests/browser/": "browser",
+}
+"""Tests that share a fixture which takes long to make: they run in one process, in this order of
+what a test's address begins with."""
+
+MIGRATED = "migrated.sqlite3"
+
+# Whether a property holds does not depend on how busy the machine is.
+hypothesis_settings.register_profile(
+    "unhurried", deadline=None, suppress_health_check=[HealthCheck.too_slow]
+)
+hypothesis_settings.load_profile("unhurried")
+
+
+class Grouped(LoadScopeScheduling):  # type: ignore[misc] # it has no types
+    """Sends a group to one process and any other test by itself, the largest group first.
+
+    xdist_group marks do nothing with pytest 9: the address of a test can't be written any more.
+    """
+
+    def _split_scope(self, nodeid: str) -> str:
+        fitting = (group for start, group in GROUPS.items() if nodeid.startswith(start))
+        return next(fitting, nodeid)
+
+
+@pytest.hookimpl(optionalhook=True)
+def pytest_xdist_make_scheduler(config: pytest.Config, log: Any) -> LoadScopeScheduling | None:
+    return Grouped(config, log) if config.getoption("dist") == "loadgroup" else None
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    # What takes long starts first, so that no worker is left alone with it in the end.
+    items.sort(key=lambda item: item.get_closest_marker("slow") is None)
     for item in items:
         folder = item.path.relative_to(Path(__file__).parent).parts[0]
-        if folder in ON_POSTGRES and item.get_closest_marker("django_db"):
+        if folder in FOLDERS and item.get_closest_marker("django_db"):
             item.add_marker(pytest.mark.postgres)
 
 
@@ -51,6 +89,25 @@ def _own_files(settings: Settings, tmp_path: Path) -> None:
     }
     settings.WHITENOISE_AUTOREFRESH = True
     settings.PASSWORD_HASHERS = ["django.contrib.auth.hashers.MD5PasswordHasher"]
+
+
+@pytest.fixture(scope="session")
+def django_db_setup(django_db_setup: None, tmp_path_factory: pytest.TempPathFactory) -> None:
+    """The database of the tests; on SQLite a copy is kept of what it is before any test."""
+    database = connection.settings_dict
+    is_made = database["NAME"] == database["TEST"]["NAME"]  # only where some test asks for it
+    if is_made and connection.vendor == "sqlite":
+        copy_database(Path(database["NAME"]), tmp_path_factory.getbasetemp() / MIGRATED)
+
+
+@pytest.fixture(scope="session")
+def migrated(django_db_setup: None, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """An empty, migrated SQLite file; what changes it takes a copy."""
+    kept = tmp_path_factory.getbasetemp() / MIGRATED
+    if not kept.exists():
+        with machine() as made:
+            copy_database(made.database, kept)
+    return kept
 
 
 @pytest.fixture(scope="session")

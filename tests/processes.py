@@ -12,11 +12,12 @@ import sys
 import tempfile
 import threading
 import time
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager, suppress
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import closing, contextmanager, suppress
 from dataclasses import dataclass
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any
 
 from arena.serving.probes import redis_answers
@@ -24,9 +25,10 @@ from arena.serving.redis_server import find_redis_server
 
 ROOT = Path(__file__).resolve().parents[1]
 SOCKET = "redis.sock"
+LONG_AGO = "2026-01-01 00:00:00"
 
 
-def wait_until(is_so: Callable[[], bool], *, what: str, within_s: float = 60.0) -> None:
+def wait_until(is_so: Callable[[], bool], *, what: str, within_s: float = 120.0) -> None:
     limit = time.monotonic() + within_s
     while not is_so():
         assert time.monotonic() < limit, f"not within {within_s:g} s: {what}"
@@ -57,12 +59,12 @@ class Process:
     def kill(self) -> None:
         """As `kill -9` does, the whole group."""
         self._signal(signal.SIGKILL)
-        self._started.wait(10)
+        self._started.wait(60)
 
     def stop(self) -> None:
         self._signal(signal.SIGTERM)
         try:
-            self._started.wait(15)
+            self._started.wait(60)
         except subprocess.TimeoutExpired:
             self.kill()
 
@@ -86,7 +88,7 @@ class Machine:
     def media(self) -> Path:
         return self.folder / "media"
 
-    def manage(self, *arguments: str, within_s: float = 120.0) -> subprocess.CompletedProcess[str]:
+    def manage(self, *arguments: str, within_s: float = 300.0) -> subprocess.CompletedProcess[str]:
         return subprocess.run(
             [sys.executable, "manage.py", *arguments],
             cwd=ROOT,
@@ -102,18 +104,34 @@ class Machine:
         assert ended.returncode == 0, ended.stdout + ended.stderr
         return ended.stdout
 
+    def must_all(self, *commands: tuple[str, ...]) -> str:
+        """Several commands one after the other, in one process: its start takes the longest."""
+        calls = "".join(f"call_command(*{list(command)!r});" for command in commands)
+        code = f"from django.core.management import call_command;{calls}"
+        return self.must("shell", "--verbosity", "0", "-c", code)
+
+    @property
+    def database(self) -> Path:
+        return self.folder / "db.sqlite3"
+
     def rows(self, query: str) -> list[tuple[Any, ...]]:
-        connection = sqlite3.connect(self.folder / "db.sqlite3", timeout=20)
+        connection = sqlite3.connect(self.database, timeout=60, isolation_level=None)
         try:
             return connection.execute(query).fetchall()
         finally:
             connection.close()
 
+    def age(self, column: str, *, state: str) -> None:
+        """Let what rows in a state remember of the clock be long ago, so that no test waits."""
+        self.rows(
+            f"UPDATE augment_augmentation SET {column} = '{LONG_AGO}' WHERE state = '{state}'"
+        )
+
     def redis(self) -> Process:
         arguments = [str(find_redis_server()), "--port", "0", "--unixsocket", str(self.socket)]
         arguments += ["--save", "", "--appendonly", "no", "--dir", str(self.folder)]
         started = Process(arguments, environment=self.environment, log=self.folder / "redis.log")
-        wait_until(lambda: redis_answers(self.socket), what="Redis answers", within_s=20)
+        wait_until(lambda: redis_answers(self.socket), what="Redis answers")
         return started
 
     def worker(self, *, pool: str = "threads", concurrency: int = 2) -> Process:
@@ -129,8 +147,10 @@ class Machine:
 
 
 @contextmanager
-def machine(**changes: str) -> Iterator[Machine]:
-    """An installation with an empty, migrated SQLite file; nothing runs yet.
+def machine(
+    changes: Mapping[str, str] = MappingProxyType({}), *, database: Path | None = None
+) -> Iterator[Machine]:
+    """An installation with a copy of an SQLite file, else of an empty one; nothing runs yet.
 
     The folder is a short one of its own, because a socket's path has 108 bytes.
     """
@@ -142,16 +162,25 @@ def machine(**changes: str) -> Iterator[Machine]:
         "DATABASE_URL": f"sqlite:///{folder / 'db.sqlite3'}",
         "REDIS_URL": f"redis+socket://{folder / SOCKET}",
         "ARENA_HEARTBEAT_S": "1",
-        "ARENA_STALE_AFTER_S": "4",
+        "ARENA_STALE_AFTER_S": "120",  # a busy machine is no dead one; see Machine.age
         "ARENA_RECOVER_EVERY_S": "1",
         "PYTHONWARNINGS": "ignore",
     }
-    made = Machine(folder=folder, environment=environment | changes)
+    made = Machine(folder=folder, environment=environment | dict(changes))
     try:
-        made.must("migrate", "--verbosity", "0")
+        if database is None:
+            made.must("migrate", "--verbosity", "0")
+        else:
+            copy_database(database, made.database)
         yield made
     finally:
         shutil.rmtree(folder)
+
+
+def copy_database(source: Path, to: Path) -> None:
+    """An SQLite file as it is now, with what is still in its log."""
+    with closing(sqlite3.connect(source)) as given, closing(sqlite3.connect(to)) as made:
+        given.backup(made)
 
 
 class WaitingModel:
@@ -164,8 +193,7 @@ class WaitingModel:
     """
 
     def __init__(self, answer: str) -> None:
-        self.gate = threading.Event()
-        self.asked = 0
+        self.start_anew()
         self._counting = threading.Lock()
         self._server = ThreadingHTTPServer(("127.0.0.1", 0), self._handler(answer))
         self._thread = threading.Thread(target=self._server.serve_forever, daemon=True)
@@ -181,6 +209,11 @@ class WaitingModel:
         self._server.server_close()
         self._thread.join()
 
+    def start_anew(self) -> None:
+        """As if nobody had asked yet, the gate closed."""
+        self.gate = threading.Event()
+        self.asked = 0
+
     def _count(self) -> None:
         with self._counting:
             self.asked += 1
@@ -192,7 +225,7 @@ class WaitingModel:
             def do_POST(self) -> None:
                 request = json.loads(self.rfile.read(int(self.headers["Content-Length"])))
                 outside._count()
-                outside.gate.wait(60)
+                outside.gate.wait(600)
                 body = json.dumps(_completion(request["model"], answer)).encode()
                 # Who asked may have been killed meanwhile.
                 with suppress(BrokenPipeError, ConnectionResetError):

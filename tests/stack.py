@@ -23,7 +23,7 @@ class Home(Machine):
     """A machine that starts its own Redis, as a newcomer's does."""
 
     def must(self, *arguments: str) -> str:
-        ended = self.manage(*arguments, within_s=280.0)
+        ended = self.manage(*arguments, within_s=500.0)
         assert ended.returncode == 0, ended.stdout + ended.stderr
         return ended.stdout
 
@@ -64,12 +64,13 @@ class Home(Machine):
             wait_until(
                 lambda: answers(f"{address}/login/") or process.poll() is not None,
                 what="the login page answers",
+                within_s=240.0,
             )
             assert process.poll() is None, log.read_text()
             yield address
         finally:
             process.send_signal(signal.SIGINT)
-            process.wait(timeout=40)
+            process.wait(timeout=120)
 
 
 def free_port() -> int:
@@ -80,7 +81,7 @@ def free_port() -> int:
 
 def answers(address: str) -> bool:
     try:
-        with urlopen(address, timeout=5):
+        with urlopen(address, timeout=30):
             return True
     except (URLError, OSError):
         return False

@@ -5,21 +5,18 @@ from pathlib import Path
 import pytest
 
 from augment.baselines.rule_placer import place
-from augment.formats import argoverse2
 from augment.geometry.angles import difference
 from augment.scene.lane_graph import LaneGraph
 from augment.scene.modification import apply, without_traffic
 from tests.instruction.test_parse import PAPER
+from tests.recorded import recorded
 
 pytestmark = pytest.mark.realdata
-
-LOG = "7fab2350-7eaf-3b7e-a39d-6937a4c1bede"
 
 
 @pytest.mark.parametrize("frame", [0, 30, 60])
 def test_the_papers_vehicle_stands_on_the_egos_lane(realdata: Path, frame: int) -> None:
-    recorded, _ = argoverse2.read(realdata / "av2_sensor" / LOG, frame=frame, name="recorded")
-    scene = without_traffic(recorded)
+    scene = without_traffic(recorded(realdata, frame)[0])
     modification = place(scene, PAPER).modification
     (car,) = modification.added
     assert apply(scene, modification).agents == (car,)

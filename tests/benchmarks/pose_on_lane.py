@@ -21,7 +21,8 @@ from augment.prompts.lane_curves import control_points
 from augment.scene.bezier_lanes import bezier_lane
 from augment.scene.entities import Scene
 from augment.variants.pose_tool import PoseTool
-from tests.variants.pose_accuracy import accuracy, authored_scenes, recorded_scene, whole_map
+from tests.recorded import recorded
+from tests.variants.pose_accuracy import accuracy, authored_scenes, whole_map
 
 CALLS = 600
 COLUMNS = (
@@ -45,7 +46,7 @@ def main() -> None:
     print("".join(f"{title:>{width}}" for title, width in COLUMNS))
     scenes = authored_scenes()
     if folder := os.environ.get("REALDATA_DIR"):
-        scenes.append(recorded_scene(Path(folder)))
+        scenes.append(recorded(Path(folder))[0])
     for scene in scenes:
         cells = (scene.name, *_accuracy_cells(scene), *_time_cells(scene))
         print("".join(f"{cell:>{width}}" for cell, (_, width) in zip(cells, COLUMNS, strict=True)))

@@ -8,21 +8,19 @@ from pathlib import Path
 import pytest
 
 from augment.checks import Kind, Severity, findings
-from augment.formats import argoverse2
 from augment.scene.entities import AgentType, Scene
 from augment.scene.modification import Modification
+from tests.recorded import recorded
 
 pytestmark = pytest.mark.realdata
 
-LOG = "7fab2350-7eaf-3b7e-a39d-6937a4c1bede"
 FRAMES = (0, 30, 60, 90, 120, 150)
 DRIVES_MPS = 2.0
 
 
 @pytest.fixture(scope="module")
 def scenes(realdata: Path) -> list[Scene]:
-    folder = realdata / "av2_sensor" / LOG
-    return [argoverse2.read(folder, frame=frame, name="recorded")[0] for frame in FRAMES]
+    return [recorded(realdata, frame)[0] for frame in FRAMES]
 
 
 def test_most_recorded_vehicles_have_nothing_wrong(

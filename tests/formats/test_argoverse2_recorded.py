@@ -4,34 +4,26 @@ from __future__ import annotations
 
 import json
 import math
-import time
 from pathlib import Path
 
 import numpy as np
 import pytest
 from shapely import Point, Polygon, union_all
 
-from augment.formats import argoverse2
 from augment.geometry.angles import difference
 from augment.scene.codec import scene_from_document, scene_to_document
 from augment.scene.entities import AgentType, AreaKind, Scene, TrafficSide
 from augment.scene.lane_graph import LaneGraph
 from augment.scene.recording import Recording
 from augment.scene.recording_codec import recording_from_document, recording_to_document
+from tests.recorded import recorded
 
 pytestmark = pytest.mark.realdata
 
-LOG = "7fab2350-7eaf-3b7e-a39d-6937a4c1bede"
 
-
-@pytest.fixture(scope="module")
-def folder(realdata: Path) -> Path:
-    return realdata / "av2_sensor" / LOG
-
-
-@pytest.fixture(scope="module")
-def start(folder: Path) -> tuple[Scene, Recording]:
-    return argoverse2.read(folder, frame=0, name="recorded")
+@pytest.fixture
+def start(realdata: Path) -> tuple[Scene, Recording]:
+    return recorded(realdata)
 
 
 def test_the_ego_is_as_fast_as_the_data_sets_notes_say(start: tuple[Scene, Recording]) -> None:
@@ -91,8 +83,8 @@ def test_what_drives_heads_where_it_drives(start: tuple[Scene, Recording]) -> No
 
 
 @pytest.mark.parametrize("frame", [0, 60])
-def test_the_ego_stays_on_what_can_be_driven_on(folder: Path, frame: int) -> None:
-    scene, recording = argoverse2.read(folder, frame=frame, name="recorded")
+def test_the_ego_stays_on_what_can_be_driven_on(realdata: Path, frame: int) -> None:
+    scene, recording = recorded(realdata, frame)
     drivable = union_all(
         [Polygon(area.boundary_m) for area in scene.areas if area.kind is AreaKind.DRIVABLE]
     )
@@ -107,9 +99,9 @@ def test_no_area_crosses_itself(start: tuple[Scene, Recording]) -> None:
     assert {area.kind for area in areas} == {AreaKind.DRIVABLE, AreaKind.CROSSWALK}
 
 
-def test_frames_of_one_log_show_one_world(folder: Path, start: tuple[Scene, Recording]) -> None:
+def test_frames_of_one_log_show_one_world(realdata: Path, start: tuple[Scene, Recording]) -> None:
     _, first = start
-    later_scene, later = argoverse2.read(folder, frame=60, name="recorded")
+    later_scene, later = recorded(realdata, 60)
     x_m, y_m, heading_rad = first.ego[60, :3]
     cos, sin = math.cos(heading_rad), math.sin(heading_rad)
     back = later.ego[:, :2] @ np.array([[cos, sin], [-sin, cos]]) + np.array([x_m, y_m])
@@ -125,9 +117,3 @@ def test_it_survives_the_way_through_json_exactly(start: tuple[Scene, Recording]
     back = recording_from_document(json.loads(text))
     for given, kept in zip(recording.tracks, back.tracks, strict=True):
         assert np.array_equal(given.states, kept.states, equal_nan=True)
-
-
-def test_reading_takes_a_few_seconds_at_most(folder: Path) -> None:
-    began = time.perf_counter()
-    argoverse2.read(folder, frame=30, name="recorded")
-    assert time.perf_counter() - began < 5.0

@@ -1,6 +1,5 @@
 from __future__ import annotations
 
-import time
 from concurrent.futures import ThreadPoolExecutor
 from datetime import timedelta
 from threading import Barrier
@@ -12,17 +11,9 @@ from django.utils import timezone
 from augment.services import claims
 from augment.services.holding import heartbeat
 from tests.jobs.rows import STALE, claimed, launch, only_row
+from tests.processes import wait_until
 
 pytestmark = pytest.mark.django_db(transaction=True)
-
-
-def wait_for(is_so: object, within_s: float = 10.0) -> bool:
-    limit = time.monotonic() + within_s
-    while time.monotonic() < limit:
-        if is_so():  # type: ignore[operator]
-            return True
-        time.sleep(0.02)
-    return False
 
 
 def test_the_heart_beats_while_the_work_goes_on() -> None:
@@ -35,7 +26,7 @@ def test_the_heart_beats_while_the_work_goes_on() -> None:
         return row.heartbeat_at is not None and row.heartbeat_at > before
 
     with heartbeat(held, every_s=0.05):
-        assert wait_for(has_beaten)
+        wait_until(has_beaten, what="the heart has beaten")
         assert claims.requeue_stale(now=timezone.now(), older_than=STALE) == []
 
 
@@ -44,7 +35,7 @@ def test_the_heart_stops_with_the_claim(caplog: pytest.LogCaptureFixture) -> Non
     held = claimed(row, now=timezone.now() - timedelta(minutes=1))
     claims.requeue_stale(now=timezone.now(), older_than=STALE)
     with heartbeat(held, every_s=0.01):
-        assert wait_for(lambda: "somebody else's now" in caplog.text)
+        wait_until(lambda: "somebody else's now" in caplog.text, what="it is given up")
 
 
 def test_of_eight_workers_that_reach_for_one_row_one_gets_it() -> None:

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from pathlib import Path
 
 import pytest
 
 from tests.processes import Machine, WaitingModel, machine, wait_until
 from tests.variants.answers import GOOD
 
-pytestmark = [pytest.mark.redis, pytest.mark.slow, pytest.mark.timeout(300)]
+pytestmark = [pytest.mark.redis, pytest.mark.slow, pytest.mark.timeout(600)]
 
 SEED = """
 from augment.services import contestants
@@ -26,16 +27,30 @@ RUNNING = "SELECT id FROM augment_augmentation WHERE state = 'running'"
 ATTEMPTS = "SELECT augmentation_id, number, outcome FROM augment_attempt ORDER BY 1, 2"
 
 
-@pytest.fixture
-def model() -> Iterator[WaitingModel]:
+@pytest.fixture(scope="module")
+def served() -> Iterator[WaitingModel]:
     with WaitingModel(GOOD) as served:
         yield served
 
 
+@pytest.fixture(scope="module")
+def seeded(migrated: Path, served: WaitingModel) -> Iterator[Path]:
+    """A database with three scenarios and the contestants; every test has a copy."""
+    with machine(database=migrated) as made:
+        made.must("shell", "--verbosity", "0", "-c", SEED.format(base_url=served.base_url))
+        yield made.database
+
+
 @pytest.fixture
-def place(model: WaitingModel) -> Iterator[Machine]:
-    with machine() as made:
-        made.must("shell", "--verbosity", "0", "-c", SEED.format(base_url=model.base_url))
+def model(served: WaitingModel) -> Iterator[WaitingModel]:
+    served.start_anew()
+    yield served
+    served.gate.set()
+
+
+@pytest.fixture
+def place(seeded: Path) -> Iterator[Machine]:
+    with machine(database=seeded) as made:
         yield made
 
 
@@ -74,9 +89,10 @@ def test_a_job_survives_kill_9_of_its_worker(
         killed = in_flight(place, model)
         worker.kill()
         assert len(killed) == 2
+        place.age("heartbeat_at", state="running")
         model.gate.set()
         worker = place.worker(pool=pool)
-        wait_until(lambda: is_finished(place), what="the job is over", within_s=120)
+        wait_until(lambda: is_finished(place), what="the job is over", within_s=240)
         check_each_row_is_done_once(place, killed)
     finally:
         worker.stop()
@@ -93,10 +109,11 @@ def test_a_job_survives_the_loss_of_redis_with_all_its_messages(
         killed = in_flight(place, model)
         worker.kill()
         redis.kill()
+        place.age("heartbeat_at", state="running")
         model.gate.set()
         redis = place.redis()
         worker = place.worker()
-        wait_until(lambda: is_finished(place), what="the job is over", within_s=120)
+        wait_until(lambda: is_finished(place), what="the job is over", within_s=240)
         check_each_row_is_done_once(place, killed)
     finally:
         worker.stop()
@@ -112,9 +129,10 @@ def test_a_job_goes_on_when_redis_alone_comes_back_empty(
         place.must("generate", *CHOSEN)
         in_flight(place, model, at_once=1)
         redis.kill()
+        place.age("sent_at", state="queued")
         redis = place.redis()
         model.gate.set()
-        wait_until(lambda: is_finished(place), what="the job is over", within_s=120)
+        wait_until(lambda: is_finished(place), what="the job is over", within_s=240)
         check_each_row_is_done_once(place, killed=set())
     finally:
         worker.stop()
@@ -126,7 +144,7 @@ def test_the_command_waits_for_the_job_and_reports(place: Machine, model: Waitin
     redis = place.redis()
     worker = place.worker()
     try:
-        said = place.must("generate", *CHOSEN, "--wait", "--timeout", "100")
+        said = place.must("generate", *CHOSEN, "--wait", "--timeout", "240")
     finally:
         worker.stop()
         redis.stop()

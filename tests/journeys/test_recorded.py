@@ -11,19 +11,29 @@ from augment.scene.codec import modification_from_document, scene_from_document
 from augment.scene.lane_graph import LaneGraph
 from tests.processes import machine
 
-pytestmark = [pytest.mark.realdata, pytest.mark.redis, pytest.mark.slow]
+pytestmark = [
+    pytest.mark.realdata,
+    pytest.mark.redis,
+    pytest.mark.slow,
+    pytest.mark.timeout(600),
+]
 INSTRUCTION = (
     "add a parked vehicle in front of ego at about 21.4 m, slightly towards the left lane boundary"
 )
 
 
-def test_the_car_stands_where_the_sentence_says_on_the_real_road(realdata: Path) -> None:
+def test_the_car_stands_where_the_sentence_says_on_the_real_road(
+    realdata: Path, migrated: Path
+) -> None:
     (log,) = (realdata / "av2_sensor").iterdir()
-    with machine() as place:
-        place.must("import_scene", "av2", str(log), "--frame", "0", "--slug", "pittsburgh")
-        place.must(
-            *("add_scenario", "--scene", "pittsburgh", "--type", "nudge_around_parked_vehicle"),
-            *("--slug", "parked", "--instruction", INSTRUCTION, "--keep-traffic"),
+    with machine(database=migrated) as place:
+        place.must_all(
+            ("import_scene", "av2", str(log), "--frame", "0", "--slug", "pittsburgh"),
+            (
+                *("add_scenario", "--scene", "pittsburgh"),
+                *("--type", "nudge_around_parked_vehicle"),
+                *("--slug", "parked", "--instruction", INSTRUCTION, "--keep-traffic"),
+            ),
         )
         redis, worker = place.redis(), place.worker()
         try:

@@ -65,6 +65,33 @@ def agents(name: str, lane_ids: list[str]) -> st.SearchStrategy[TrafficAgent]:
     )
 
 
+def connectors(lane_ids: list[str]) -> st.SearchStrategy[LaneConnector]:
+    some_lane = st.none() | st.sampled_from(lane_ids)
+    some_line = st.none() | lines()
+    return st.builds(
+        LaneConnector,
+        id=st.just("Connector1"),
+        from_lane=some_lane,
+        to_lane=some_lane,
+        centerline=lines(),
+        width_m=sizes,
+        traffic_light=st.sampled_from(TrafficLight),
+        turn_type=st.sampled_from(TurnType),
+        speed_limit_mps=limits,
+        left_boundary=some_line,
+        right_boundary=some_line,
+    )
+
+
+def areas() -> st.SearchStrategy[Area]:
+    return st.builds(
+        Area,
+        id=st.just("Area1"),
+        kind=st.sampled_from(AreaKind),
+        boundary_m=st.lists(points, min_size=3, max_size=6, unique=True).map(tuple),
+    )
+
+
 @st.composite
 def scenes(draw: st.DrawFn) -> Scene:
     names = [f"Lane{number}" for number in range(1, draw(st.integers(1, 3)) + 1)]
@@ -87,25 +114,6 @@ def scenes(draw: st.DrawFn) -> Scene:
         )
         for name in names
     )
-    connector = st.builds(
-        LaneConnector,
-        id=st.just("Connector1"),
-        from_lane=some_lane,
-        to_lane=some_lane,
-        centerline=lines(),
-        width_m=sizes,
-        traffic_light=st.sampled_from(TrafficLight),
-        turn_type=st.sampled_from(TurnType),
-        speed_limit_mps=limits,
-        left_boundary=some_line,
-        right_boundary=some_line,
-    )
-    area = st.builds(
-        Area,
-        id=st.just("Area1"),
-        kind=st.sampled_from(AreaKind),
-        boundary_m=st.lists(points, min_size=3, max_size=6, unique=True).map(tuple),
-    )
     pose = st.builds(Pose, x_m=metres, y_m=metres, heading_rad=st.floats(-math.pi, math.pi))
     return Scene(
         name=draw(st.text(min_size=1, max_size=20)),
@@ -115,8 +123,8 @@ def scenes(draw: st.DrawFn) -> Scene:
         provenance="made for a test",
         agents=tuple(draw(agents(f"Agent{n}", names)) for n in range(2, draw(st.integers(2, 5)))),
         lanes=lanes,
-        connectors=(draw(connector),),
-        areas=(draw(area),),
+        connectors=(draw(connectors(names)),),
+        areas=(draw(areas()),),
     )
 
 

@@ -11,7 +11,6 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from augment.formats import argoverse2
 from augment.prompts.names import short_names
 from augment.scene.codec import scene_from_document
 from augment.scene.entities import Scene
@@ -19,7 +18,6 @@ from augment.scene.lane_graph import LaneGraph
 from augment.variants.pose_tool import PoseTool
 
 AUTHORED = Path(__file__).parents[2] / "fixtures" / "scenes"
-RECORDED = Path("av2_sensor") / "7fab2350-7eaf-3b7e-a39d-6937a4c1bede"
 
 CHORD_M = 2.5
 STEP_M = 0.25
@@ -43,10 +41,6 @@ def authored_scenes() -> list[Scene]:
         scene_from_document(json.loads(path.read_text(encoding="utf-8")))
         for path in sorted(AUTHORED.glob("*.json"))
     ]
-
-
-def recorded_scene(realdata: Path, frame: int = 0) -> Scene:
-    return argoverse2.read(realdata / RECORDED, frame=frame, name="recorded")[0]
 
 
 def whole_map(scene: Scene) -> PoseTool:

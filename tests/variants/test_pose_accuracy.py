@@ -7,7 +7,8 @@ import pytest
 from augment.prompts.names import short_names
 from augment.scene.entities import Scene
 from augment.scene.lane_graph import LaneGraph
-from tests.variants.pose_accuracy import accuracy, authored_scenes, recorded_scene, whole_map
+from tests.recorded import recorded
+from tests.variants.pose_accuracy import accuracy, authored_scenes, whole_map
 
 
 @pytest.mark.parametrize("scene", authored_scenes(), ids=lambda scene: scene.name)
@@ -22,7 +23,7 @@ def test_on_authored_lanes_the_tool_is_on_the_lane_and_along_it(scene: Scene) ->
 def test_on_recorded_lanes_the_tool_is_on_the_lane_and_mostly_along_it(
     realdata: Path, frame: int
 ) -> None:
-    found = accuracy(whole_map(recorded_scene(realdata, frame)))
+    found = accuracy(whole_map(recorded(realdata, frame)[0]))
     print(
         f"recorded lanes: at most {found.position_m.max():.3f} m off ({found.worst_position_on}), "
         f"heading {found.heading_deg(95):.2f} degrees at the 95th percentile, "
@@ -34,7 +35,7 @@ def test_on_recorded_lanes_the_tool_is_on_the_lane_and_mostly_along_it(
 
 @pytest.mark.realdata
 def test_on_recorded_lanes_a_distance_leads_where_the_centrelines_lead(realdata: Path) -> None:
-    scene = recorded_scene(realdata)
+    scene, _ = recorded(realdata)
     tool, graph, names = whole_map(scene), LaneGraph(scene), short_names(scene)
     start = scene.ego.lane_id
     assert start is not None
