@@ -1,10 +1,12 @@
-"""An instruction as an intent: everything in it is read, or it is refused.
+"""An instruction as an intent: all that may change a placement is read, or it is refused.
 
 The way through: `tokens` -> `reading` (rules, longest phrase first) -> `grouping` (which phrase
 belongs to which object) -> `assembly` (the typed requests).
 """
 
 from __future__ import annotations
+
+from functools import lru_cache
 
 from augment.errors import InstructionNotUnderstood
 from augment.instruction.assembly import requested
@@ -13,18 +15,20 @@ from augment.instruction.grouping import grouped
 from augment.instruction.intent import Intent
 from augment.instruction.reading import Read, read
 from augment.instruction.tokens import Token
-from augment.instruction.wording import REFUSED
+from augment.instruction.word_lists import REFUSED
 
 MOST_CHARACTERS = 2000
 """Longer texts are refused unread: the longest sentence of the catalogue has some 250."""
 
 
+@lru_cache(maxsize=512)
 def parse(text: str) -> Intent:
-    """What an instruction asks for.
+    """What an instruction asks for; remembered, because many contestants get the same one.
 
     Raises:
-        InstructionNotUnderstood: A word has no meaning here, something that a placement needs is
-            missing, or two parts contradict each other. Nothing is guessed.
+        InstructionNotUnderstood: A word that may change the placement has no meaning here,
+            something that a placement needs is missing, or two parts contradict each other.
+            Nothing is guessed.
     """
     if not text.strip():
         raise InstructionNotUnderstood("The instruction is empty.")
@@ -35,26 +39,33 @@ def parse(text: str) -> Intent:
     found = read(text)
     understood = tuple(part.words for part in found.reads if not _is_purpose(part))
     ignored = tuple(part.words for part in found.reads if _is_purpose(part))
+    passed = tuple(token.text for token in found.passed)
+    strange = sorted((*found.unknown, *found.passed), key=lambda token: token.start)
     if found.unknown:
         raise InstructionNotUnderstood(
             _why(found.unknown),
             understood=understood,
-            ignored=tuple(token.text for token in found.unknown),
+            ignored=tuple(token.text for token in strange),
         )
     try:
         requests, assumed = requested(grouped(found.reads))
     except InstructionNotUnderstood as refusal:
-        raise InstructionNotUnderstood(
-            refusal.reason, understood=understood, ignored=ignored
-        ) from refusal
-    return Intent(requests=requests, understood=understood, ignored=ignored, assumed=assumed)
+        reason = f"{refusal.reason} {_why(found.passed)}" if found.passed else refusal.reason
+        raise InstructionNotUnderstood(reason, understood=understood, ignored=passed) from refusal
+    return Intent(
+        requests=requests,
+        understood=understood,
+        ignored=ignored,
+        not_understood=passed,
+        assumed=assumed,
+    )
 
 
 # Private
 
 
 def _is_purpose(part: Read) -> bool:
-    return any(isinstance(fact, Purpose) for fact in part.facts)
+    return all(isinstance(fact, Purpose) for fact in part.facts)
 
 
 def _why(unknown: tuple[Token, ...]) -> str:

@@ -88,6 +88,24 @@ class Shape(StrEnum):
     TAPER = "taper"
     LINE = "line"
     RING = "ring"
+    ROW = "row across the lane"
+
+
+class Bearing(StrEnum):
+    """A direction from a neighbour, as seen in the ego's direction of travel."""
+
+    AHEAD = "in front of"
+    BEHIND = "behind"
+    LEFT = "left of"
+    RIGHT = "right of"
+
+
+class Post(StrEnum):
+    """Where a worker stands by the cones."""
+
+    BEHIND = "behind the cones"
+    BESIDE = "beside the cones"
+    AT_LAST = "beside the last cones"
 
 
 class Setting(StrEnum):
@@ -95,7 +113,14 @@ class Setting(StrEnum):
 
     BEFORE_INTERSECTION = "before the intersection"
     IN_INTERSECTION = "in the intersection"
+    AT_INTERSECTION = "at the intersection"
+    AFTER_INTERSECTION = "past the intersection"
+    IN_BEND = "in the bend"
+    ON_CROSSWALK = "on the crosswalk"
     OFF_CROSSWALK = "away from the crosswalk"
+    BY_PARKED = "beside parked vehicles"
+    BY_PARKED_LEFT = "between parked vehicles on the left"
+    BY_PARKED_RIGHT = "between parked vehicles on the right"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -125,12 +150,15 @@ class Lateral:
     Attributes:
         on_shoulder: The sentence says that it stands (partly) beside the road, so the target has
             to be the kerb's side.
+        also: A second name of the same side, "the kerb side (left)", which the map has to bear
+            out.
     """
 
     target: LateralTarget = LateralTarget.LANE_CENTRE
     offset: Length | None = None
     nearness: Nearness = Nearness.SLIGHTLY
     on_shoulder: bool = False
+    also: LateralTarget | None = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -146,10 +174,12 @@ class Spot:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class VehicleRequest:
-    """One vehicle that stands (speed 0) or moves.
+    """Vehicles that stand (speed 0) or move; the first of them at the spot.
 
     Attributes:
         turn_deg: On top of `facing`, positive to the left.
+        count: More than one stand in a row along the lane, each further one further on.
+        spacing: Between the centres of neighbours in a row, None for a default.
     """
 
     spot: Spot
@@ -157,15 +187,30 @@ class VehicleRequest:
     facing: Facing = Facing.WITH_LANE
     turn_deg: float = 0.0
     speed_mps: float = 0.0
+    count: int = 1
+    spacing: Length | None = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class WalkRequest:
-    """Pedestrians who cross the road, side by side; the first of them at the spot."""
+    """Pedestrians who cross the road, side by side; the first of them at the spot.
+
+    Attributes:
+        speed_mps: None where the sentence names none; a walk takes 15 s then.
+        drift_m: How much further along the lane a walk ends than it begins.
+        is_file: They walk one behind the other.
+        behind: How far behind the first one the others walk in a file, where that is said.
+        on_road: The first one stands in the ego's lane already.
+    """
 
     spot: Spot
     start: Side
     count: int = 1
+    speed_mps: float | None = None
+    drift_m: float = 0.0
+    is_file: bool = False
+    behind: tuple[Length, ...] = ()
+    on_road: bool = False
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -175,6 +220,11 @@ class ConesRequest:
     Attributes:
         spot: Of the first cone, or of a ring's centre.
         start: The lane boundary at which a taper begins, None for the kerb's.
+        ends_in_middle: A taper ends in the middle of the lane, not at its other boundary.
+        both_sides: A line of `count` cones along each boundary of the lane.
+        reach_m: From the first cone to the last along the lane, None where the spacing says it.
+        post: Where the worker stands, None for a default of the shape.
+        post_side: To which side of the cones, where that is said.
     """
 
     spot: Spot
@@ -182,21 +232,46 @@ class ConesRequest:
     count: int
     spacing: Length
     start: Side | None = None
+    ends_in_middle: bool = False
+    both_sides: bool = False
+    reach_m: float | None = None
     has_worker: bool = False
+    post: Post | None = None
+    post_side: Side | None = None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class CrashedCar:
+    """A further vehicle of an accident, against the one named before it.
+
+    Attributes:
+        gap: Between the two centres, None for as close as they get.
+        turn_deg: Against the one before, positive to the left; None where none is named.
+        is_signed: The sentence names the side that it is turned to.
+    """
+
+    gap: Length | None = None
+    bearing: Bearing = Bearing.AHEAD
+    turn_deg: float | None = None
+    is_signed: bool = False
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class CrashRequest:
-    """Vehicles that have run into each other; the spot is that of the nearest.
+    """Vehicles that have run into each other; the spot is that of the first.
 
     Attributes:
         turn_deg: The angle between neighbours, None where the sentence names none.
+        facing: Of the first one, against its lane.
+        others: What is said of the further ones in order; none where it is left open.
     """
 
     spot: Spot
     count: int
     body: Body = Body.CAR
     turn_deg: float | None = None
+    facing: Facing = Facing.WITH_LANE
+    others: tuple[CrashedCar, ...] = ()
 
 
 Request = VehicleRequest | WalkRequest | ConesRequest | CrashRequest
@@ -209,10 +284,12 @@ class Intent:
     Attributes:
         understood: The parts that were read, in order, in the sentence's own words.
         ignored: Parts that were read and change nothing (what the ego should do about it).
+        not_understood: Words that nothing is known about but that they change nothing.
         assumed: What the sentence left open and a documented default filled.
     """
 
     requests: tuple[Request, ...]
     understood: tuple[str, ...] = ()
     ignored: tuple[str, ...] = ()
+    not_understood: tuple[str, ...] = ()
     assumed: tuple[str, ...] = ()

@@ -72,6 +72,17 @@ class Phrase:
         for end, values in _match(self.pieces, tokens, start, slots, {}, begun=False):
             yield end, self.build(Found(values))
 
+    def first_words(self) -> frozenset[str] | None:
+        """The words that it can begin with, None where it can begin with a slot."""
+        words: frozenset[str] = frozenset()
+        for piece in self.pieces:
+            if piece.slot:
+                return None
+            words |= piece.words
+            if not piece.optional:
+                break
+        return words
+
 
 def phrases(build: Build, *patterns: str) -> tuple[Phrase, ...]:
     """Patterns that mean the same.

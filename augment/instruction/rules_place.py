@@ -1,4 +1,4 @@
-"""Rules about where: distance, direction, lane, offset, surroundings."""
+"""Rules about where: distance, direction, lane, surroundings."""
 
 from __future__ import annotations
 
@@ -9,24 +9,36 @@ from augment.instruction.facts import (
     Distance,
     Fact,
     InLane,
-    Offset,
-    Shoulder,
+    PartlyIn,
+    Purpose,
+    Reaches,
     Surroundings,
     Towards,
+    WrongSide,
 )
-from augment.instruction.intent import (
-    LaneChoice,
-    LateralTarget,
-    Length,
-    Nearness,
-    Relation,
-    Setting,
-    Side,
-)
-from augment.instruction.phrases import Found, means, phrases
+from augment.instruction.intent import LaneChoice, LateralTarget, Length, Relation, Setting, Side
+from augment.instruction.phrases import Found, Phrase, means, phrases
 
-_SLIGHT = "slight|small|little"
-_SLIGHTLY = "slightly|somewhat"
+_START = "starting|starts|start|beginning|begins|begin"
+_AHEAD_OF = (
+    "further|farther? ahead|forward|forwards|onwards|upfront",
+    "further? ahead of <ego>",
+    "further? in front",
+    "further? in front of <ego>",
+    "further|farther? down|along|up|on <ego>? road|street|lane|way|route|path",
+    "from <ego> in|along its? direction of? travel|driving|motion?",
+    "away? ahead",
+    "straight|directly|dead|right|up|out? ahead of? <ego>?",
+    "straight|directly|right? in front of? <ego>?",
+    "away in front of? <ego>?",
+    "away? down|along|up <ego>? road|street|lane|way|route|path",
+    "beyond|past <us>",
+    "up front",
+    "to front of <ego>",
+    "ahead on|along road|street|lane|way|route|path",
+    "away? in <ego>? direction of? travel|driving|motion?",
+    "in|from direction of travel of <ego>",
+)
 
 
 def _distance(found: Found) -> tuple[Fact, ...]:
@@ -55,30 +67,31 @@ DISTANCE = (
     )
     + phrases(
         _distance,
-        "at|in <length>",
-        "at <length> away? from <ego>",
-        "<length> away from <ego>",
-        "<length> from <ego>",
+        "at|in|after <length>",
+        "at? <length> away? from|to <ego>",
+        "at? <length> away",
         "at? distance of? <length>",
         "at? distance of? <length> away? from|to <ego>",
-        "starting|starts|start|beginning|begins|begin at <length>",
+        f"{_START} at|from? <length>",
+        f"{_START} at|from? <length> from <ego>",
     )
     + phrases(
         _ahead,
-        "at? distance? of? <length> ahead|forward",
-        "at? distance? of? <length> ahead of <ego>",
-        "at? distance? of? <length> in front",
-        "at? distance? of? <length> in front of <ego>",
-        "at? distance? of? <length> further? down road|street|lane",
-        "at? distance? of? <length> further? along road|street|lane",
-        "starting|starts|start|beginning|begins|begin at? <length> ahead",
-        "starting|starts|start|beginning|begins|begin at? <length> ahead of <ego>",
-        "starting|starts|start|beginning|begins|begin at? <length> in front of <ego>",
+        *(f"at|in? distance? of? <length> {tail}" for tail in _AHEAD_OF),
+        "from <length> <ahead>? on|onwards|onward",
+        "from <length> <ahead>",
+        *(f"{_START} at|from? distance? of? <length> {tail}" for tail in _AHEAD_OF[:4]),
+        "ahead|forward at|by <length>",
+        "ahead of <ego> at|by? distance? of? <length>",
+        "in front of <ego> at|by? distance? of? <length>",
+        "in front at? distance? of? <length>",
+        "ahead at? distance? of? <length>",
     )
     + phrases(
         _behind,
         "at? distance? of? <length> behind <ego>",
         "at? distance? of? <length> back? to|at rear of <ego>",
+        "behind <ego> at|by? distance? of? <length>",
     )
 )
 
@@ -88,6 +101,8 @@ DIRECTION = (
         "ahead",
         "ahead of <ego>",
         "in front of <ego>",
+        "dead|straight|right|directly ahead",
+        "in front",
         "in front of / in travel direction of <ego>",
         "in front of / in direction of travel of <ego>",
         "in <ego> travel|driving direction",
@@ -96,11 +111,12 @@ DIRECTION = (
         "in its? direction of travel",
         "in direction of travel of <ego>",
         "in <ego> direction of travel",
+        "further? down|along|up <ego>? road|street|lane",
     )
     + phrases(
         means((Direction(Relation.AHEAD), InLane(LaneChoice.OWN))),
-        "in|into <ego> path",
-        "in|into path of <ego>",
+        "in|into|on <ego> path",
+        "in|into|on path of <ego>",
         "in <ego> way",
         "directly|right|straight in front of <ego>",
         "directly|right|straight ahead of <ego>",
@@ -108,124 +124,177 @@ DIRECTION = (
     + phrases(means((Direction(Relation.BEHIND),)), "behind <ego>")
 )
 
-IN_LANE = phrases(
-    lambda found: (InLane(found.get("lane", LaneChoice)),),
-    "in|on|into|onto|inside|within <lane>",
-    "blocking|blocks|block|close|closes|closing <lane>",
-    "blocking|blocks|block|close|closes|closing <lane> with|by",
-    "occupying|occupies <lane>",
+
+def _reaches(found: Found) -> tuple[Fact, ...]:
+    start, end = found.maybe("a", Length), found.maybe("b", Length)
+    ahead = (Direction(Relation.AHEAD),) if found.maybe("ahead", str) else ()
+    return (Reaches(start, end, found.maybe("size", Length)), *ahead)
+
+
+_END = "ending|ends|end|finishing|finishes|stopping|reaching|reaches|extending|extends|up|to|until"
+
+EXTENT = phrases(
+    _reaches,
+    f"{_START}|from at? <a:length> <ahead>? ,? and? {_END} at|to? <b:length> <ahead>?",
+    "between <a:length> <ahead>? and <b:length> <ahead>?",
+    "reaching|extending|running|stretching from <a:length> <ahead>? to|until <b:length> <ahead>?",
+    "over length|stretch|distance of? <size:length>",
+    "over|along <size:length>",
+    "<size:length> long",
+    "with length of <size:length>",
+)
+
+_BLOCK = (
+    "fill|fills|filling|obstruct|cover|covers|covering|bar|bars|barring|shut|shuts|shutting|"
+    "blocking|blocks|block|close|closes|closing|narrow|narrowing|narrows|obstruct|obstructing|"
+    "obstructs|occupy|occupying|occupies"
+)
+_WHOLLY = "completely|fully|totally|entirely|wholly"
+_WHOLE = "whole|entire|full|complete"
+_DEAD = "right|exactly|precisely|dead|directly|bang|smack|squarely|plumb|slap"
+_BLOCKED = "blocked|closed|obstructed|narrowed|occupied"
+
+IN_LANE = (
+    phrases(
+        lambda found: (InLane(found.get("lane", LaneChoice)),),
+        "in|on|into|onto|inside|within|along <lane>",
+        "( <lane> )",
+        "next|close to <ego> in <lane>",
+    )
+    + phrases(
+        lambda found: (InLane(found.get("lane", LaneChoice)), Purpose(is_passed=True)),
+        f"{_WHOLLY}? {_BLOCK} off|down|up? {_WHOLE}? <lane> off|down? with|by?",
+        f"takes|taking|took up {_WHOLE}? <lane>",
+        f"{_BLOCK} off <lane> with|by?",
+        f"<lane> is? completely|fully? {_BLOCKED} by|with?",
+    )
+    + phrases(
+        means((InLane(LaneChoice.OWN), Purpose(is_passed=True))),
+        f"{_WHOLLY}? {_BLOCK} off? {_WHOLE}? lane|road|way|street off? with|by?",
+        "<ego> way|path is? completely|fully? blocked|obstructed|barred by?",
+        f"lane|road|way|street is? completely|fully? {_BLOCKED} by|with?",
+    )
+)
+
+BLOCKED_AT = phrases(
+    lambda found: (
+        *_ahead(found),
+        InLane(found.maybe("lane", LaneChoice) or LaneChoice.OWN),
+        Purpose(is_passed=True),
+    ),
+    f"<lane> is? {_WHOLLY}? {_BLOCKED} at? <length> <ahead> by",
+    f"<ego>? lane|road|way|route|path is? {_WHOLLY}? {_BLOCKED} at? <length> <ahead> by",
 )
 
 AT_CENTRE = phrases(
-    means((Towards(LateralTarget.LANE_CENTRE),)), "in|on|at <centre>", "centred|centered in lane"
+    means((Towards(LateralTarget.LANE_CENTRE),)),
+    f"{_DEAD}? in|on|at <centre>",
+    "centred|centered|centrally in lane",
+    "with? no|zero lateral? offset from|to? <centre>?",
+    "without any? lateral? offset from|to? <centre>?",
 ) + phrases(
     lambda found: (Towards(LateralTarget.LANE_CENTRE), InLane(found.get("lane", LaneChoice))),
-    "in|on|at centre|center|middle|centerline|centreline of <lane>",
-    "centred|centered in <lane>",
+    f"{_DEAD}? in|on|at centre|center|middle|centerline|centreline of <lane>",
+    "centred|centered|centrally in|on <lane>",
     "in|on|at <lane> 's? centre|center|middle",
 )
 
-
-def _offset(found: Found) -> tuple[Fact, ...]:
-    return (Offset(found.get("length", Length)),)
-
-
-def _beside_centre(found: Found) -> tuple[Fact, ...]:
-    left = found.get("side", Side) is Side.LEFT
-    target = LateralTarget.LEFT_BOUNDARY if left else LateralTarget.RIGHT_BOUNDARY
-    length = found.maybe("length", Length)
-    return (Towards(target), *(() if length is None else (Offset(length),)))
+_SEEN = "bend|curve|turn|corner"
+_JUNCTION = "intersection|junction|crossroads"
+_ZEBRA = "pedestrian|zebra? crosswalk|crosswalks|crossing|zebra"
 
 
-OFFSET = (
-    phrases(
-        _offset,
-        f"with? {_SLIGHT}? lateral? offset of|by? anything|somewhere? randomly? <length>",
-        f"with? {_SLIGHT}? lateral? offset of|by? anything|somewhere? randomly? <length> "
-        "from|to|off <centre>",
-        "<length> offset",
-        "<length> offset from|to|off <centre>",
-        "at? <length> away? from|off|beside <centre>",
-        "shifted|displaced by? <length>",
-        "shifted|displaced by? <length> from|off <centre>",
-    )
-    + phrases(
-        _beside_centre,
-        f"{_SLIGHTLY}? to|on? <side> of <centre>",
-        "<length> to|on? <side> of <centre>",
-        "offset|shifted|displaced by? <length> to <side>",
-        "<length> to <side>",
-    )
-    + phrases(
-        means((Offset(None),)),
-        f"with? {_SLIGHT} lateral? offset",
-        f"with? {_SLIGHT} lateral? offset from|to|off <centre>",
-        f"{_SLIGHTLY} offset",
-        f"{_SLIGHTLY} offset from|to|off <centre>",
-        "offset from|to|off <centre>",
-        f"{_SLIGHTLY} off <centre>",
-    )
-)
+def _setting(setting: Setting, *patterns: str) -> tuple[Phrase, ...]:
+    return phrases(means((Surroundings(setting),)), *patterns)
 
 
-TOWARDS = (
-    phrases(
-        lambda found: (Towards(found.get("boundary", LateralTarget)),),
-        "offset|shifted|displaced? towards|toward|to <boundary>",
-        "towards|toward <boundary:plain>",
-        "offset|shifted|displaced towards|toward|to <boundary:plain>",
-    )
-    + phrases(
-        lambda found: (Towards(found.get("boundary", LateralTarget), Nearness.SLIGHTLY),),
-        f"{_SLIGHTLY} offset|shifted|displaced? towards|toward|to <boundary>",
-        f"{_SLIGHTLY} offset|shifted|displaced? towards|toward|to <boundary:plain>",
-        f"with? {_SLIGHT} offset towards|toward|to <boundary>",
-        f"with? {_SLIGHT} offset towards|toward|to <boundary:plain>",
-        "bit|little offset|shifted|displaced? towards|toward|to <boundary>",
-    )
-    + phrases(
-        lambda found: (Towards(found.get("boundary", LateralTarget), Nearness.AT_EDGE),),
-        "at|along|by|near|on <boundary>",
-        "next|close to <boundary>",
-        "hugging|touching <boundary>",
-    )
-)
+def _by_parked(found: Found) -> tuple[Fact, ...]:
+    side = found.maybe("side", Side)
+    setting = {
+        None: Setting.BY_PARKED,
+        Side.LEFT: Setting.BY_PARKED_LEFT,
+        Side.RIGHT: Setting.BY_PARKED_RIGHT,
+    }[side]
+    return (Surroundings(setting),)
 
-SHOULDER = phrases(
-    lambda found: (Shoulder(found.maybe("side", Side), Nearness.HALF_OUT),),
-    "partly|partially|half|halfway on|onto <side>? hard? shoulder",
-    "partly|partially|half|halfway on|onto <side>? <walkway>",
-    "with two wheels on <side>? hard? shoulder",
-    "with two wheels on <side>? <walkway>",
-) + phrases(
-    lambda found: (Shoulder(found.maybe("side", Side), Nearness.OUTSIDE),),
-    "on|onto <side>? hard? shoulder",
-)
 
 SURROUNDINGS = (
-    phrases(
-        means((Surroundings(Setting.BEFORE_INTERSECTION),)),
-        "before intersection|junction|crossroads",
+    _setting(
+        Setting.BEFORE_INTERSECTION,
+        f"just|shortly|right|directly|still? before <ego>? reaches|reaching? {_JUNCTION}",
+        f"just|shortly? short of {_JUNCTION}",
+        f"ahead of {_JUNCTION}",
+        f"in front of {_JUNCTION}",
     )
+    + _setting(
+        Setting.IN_INTERSECTION,
+        f"in|inside|on|within middle|centre|center? of? {_JUNCTION}",
+    )
+    + _setting(Setting.AT_INTERSECTION, f"at|near|by {_JUNCTION}")
     + phrases(
-        means((Surroundings(Setting.IN_INTERSECTION),)),
-        "in|inside|on|within middle? of? intersection|junction|crossroads",
+        means((Surroundings(Setting.AFTER_INTERSECTION), Direction(Relation.AHEAD))),
+        f"just|shortly|right|directly? past|beyond|after|behind {_JUNCTION}",
+        f"on other|far side of {_JUNCTION}",
     )
+    + _setting(
+        Setting.IN_BEND,
+        f"in|inside|on|within|through|around|across|at {_SEEN}",
+        f"in|at|near|around start|beginning|entrance|entry|middle|end of {_SEEN}",
+        "where road|street bends|curves|turns",
+        f"where {_SEEN} begins|starts",
+    )
+    + _setting(
+        Setting.OFF_CROSSWALK,
+        f"well|far? away from {_ZEBRA}",
+        f"off|outside {_ZEBRA}",
+        f"well|far? clear of {_ZEBRA}",
+        f"some|good? distance from {_ZEBRA}",
+        f"far from {_ZEBRA}",
+        f"outside of {_ZEBRA}",
+        f"not using|at|on|near? {_ZEBRA}",
+        f"where there is no {_ZEBRA}",
+    )
+    + _setting(Setting.ON_CROSSWALK, f"on|over|using {_ZEBRA}")
     + phrases(
-        means((Surroundings(Setting.OFF_CROSSWALK),)),
-        "away from|off|outside crosswalk|crosswalks|zebra crossing?",
-        "away from|off|outside pedestrian crossing",
-        "outside of crosswalk|crosswalks|zebra crossing?",
+        _by_parked,
+        "in gap? between|in|of <parked>",
+        "in gap? between|in|of <parked> on|to|along <side> side? of? road|street?",
+        "in gap in? row|line of <parked> on|to|along <side> side? of? road|street?",
+        "between <parked> on|to|along <side> side? of? road|street?",
+        "between <parked>",
+        "next to <parked>",
+        "beside|alongside|among|amongst|amid <parked>",
+        "beside|alongside|among|amongst <parked> on|to|along <side> side?",
     )
+)
+
+_STICKS = "sticks|sticking|protrudes|protruding|juts|jutting|pokes|poking|sits|leans|hangs"
+
+COVERS = phrases(
+    means((PartlyIn(),)),
+    "partly|partially|half blocking|blocks|block|covers|covering|in|into|on|occupying|occupies "
+    "<lane>",
+    "partly|partially|half blocking|blocks|block|covers|covering|obstructs lane|road|way",
+    "blocking|blocks|covers|covering|occupying|occupies|takes|taking up? part|half|some of <lane>",
+    *(f"still? {_STICKS} out? of|from|into|beyond {what}" for what in ("<parked>", "<road>")),
+    f"{_STICKS} out",
+    "so|such? that? <road> is only? partly|partially|half blocked|covered|obstructed|occupied",
+    "only? partly|partially|half parked|standing? in|on|inside its|parking bay|space|spot",
+    "has? not made it? into|in its? parking? bay|row|gap|space|spot",
+    "has? not fully|completely|quite|properly? parked|pulled in|over?",
+    "not fully|completely|quite|properly? in|inside|off bay|row|gap|space|road|lane",
+) + phrases(
+    means((WrongSide(),)),
+    "on|along|at wrong side of? road|street?",
 )
 
 PLACE_RULES = {
+    "extent": EXTENT,
     "distance": DISTANCE,
     "direction": DIRECTION,
     "lane": IN_LANE,
+    "blocked lane": BLOCKED_AT,
     "lane centre": AT_CENTRE,
-    "offset": OFFSET,
-    "side of the lane": TOWARDS,
-    "shoulder": SHOULDER,
     "surroundings": SURROUNDINGS,
+    "part of the lane": COVERS,
 }

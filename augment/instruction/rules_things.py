@@ -1,30 +1,25 @@
-"""Rules about what: the nouns, what they do, and how they stand together."""
+"""Rules about what: vehicles and accidents, and the words that name them."""
 
 from __future__ import annotations
 
 from augment.instruction.facts import (
+    Bears,
     Crashed,
-    Crosses,
-    Faces,
     Fact,
     InLane,
     Kind,
     Mention,
     Moving,
-    Sides,
+    Row,
     Standing,
     Thing,
     Turned,
 )
-from augment.instruction.intent import Body, Facing, LaneChoice, Side
+from augment.instruction.intent import Bearing, Body, LaneChoice, Side
 from augment.instruction.phrases import Build, Found, means, phrases
-from augment.instruction.quantities import Angle, Speed
 
-_WALKER = "pedestrian|person|walker"
-_WALKERS = "pedestrians|persons|people|walkers"
-_CRASHED = "crashed|collided|wrecked"
-_MOVING = "moving|driving|travelling|traveling|going|approaching|moves|drives|approaches|goes"
-_ACCIDENT = "accident|crash|collision|pileup"
+_CRASHED = "crashed|collided|wrecked|damaged|smashed|crumpled|colliding"
+_ACCIDENT = "accident|crash|collision|pileup|wreck|smash|shunt|prang|smashup"
 
 
 def thing(kind: Kind, *more: Fact) -> Build:
@@ -37,7 +32,7 @@ def that(kind: Kind) -> Build:
     return means((Thing(kind=kind, is_definite=True),))
 
 
-def _many(kind: Kind, *more: Fact) -> Build:
+def many(kind: Kind, *more: Fact) -> Build:
     """A build for a plural noun, with or without its number."""
     return lambda found: (
         Thing(kind=kind, count=found.maybe("count", int), is_plural=True),
@@ -56,6 +51,10 @@ def _vehicle(found: Found) -> tuple[Fact, ...]:
     return (thing, Standing()) if found.maybe("standing", str) else (thing,)
 
 
+def _row(found: Found) -> tuple[Fact, ...]:
+    return (*_vehicle(found), Row())
+
+
 def _that_vehicle(found: Found) -> tuple[Fact, ...]:
     body = found.maybe("bodies", Body) or found.get("body", Body)
     thing = Thing(kind=Kind.VEHICLE, body=body, is_definite=True)
@@ -67,155 +66,145 @@ def _oncoming_vehicle(found: Found) -> tuple[Fact, ...]:
 
 
 def _crash(found: Found) -> tuple[Fact, ...]:
-    count, body = found.maybe("count", int), found.maybe("bodies", Body)
+    count = found.maybe("count", int)
+    body = found.maybe("bodies", Body) or found.maybe("body", Body)
     return (Thing(kind=Kind.CRASH, count=count, body=body), Crashed())
 
 
+def _crash_turned(degrees: float) -> Build:
+    return lambda found: (*_crash(found), Turned(degrees))
+
+
+_HIT = "has|have|had|was|were? hit|struck|rammed|touched|hitting|hits"
+_BESIDE = {Side.LEFT: Bearing.LEFT, Side.RIGHT: Bearing.RIGHT}
+_SITE = "site|scene|spot?"
+_OF = "of|between|with|involving|among|consisting"
+
 VEHICLES = (
-    phrases(_vehicle, "<count>? <standing>? <body>", "<count>? <standing>? <bodies>")
-    + phrases(
-        _that_vehicle, "the|this|that <standing>? <body>", "the|these|those <standing>? <bodies>"
-    )
-    + phrases(_oncoming_vehicle, "<count>? oncoming <body>", "<count>? oncoming <bodies>")
-)
-
-CRASHES = phrases(
-    _crash,
-    f"<count> {_CRASHED} <bodies>",
-    f"car|traffic? {_ACCIDENT} site|scene?",
-    f"car|traffic? {_ACCIDENT} site|scene? of|between|with|involving <count> {_CRASHED}? <bodies>",
-    f"<count> <body> {_ACCIDENT}",
-) + phrases(
-    means((Crashed(),)),
-    "have|has|had|are|just? crashed|collided",
-    "has|have? happened|occurred",
-    "have|has|had|are|just? crashed|collided into|with it|each|one other|another?",
-    "jammed|pushed|wedged|leaning|stuck against|into it",
-    "jammed|pushed|wedged|leaning|stuck against|into each|one other|another",
-)
-
-PEDESTRIANS = (
-    phrases(thing(Kind.PEDESTRIAN), f"<count>? {_WALKER}")
-    + phrases(_many(Kind.PEDESTRIAN), f"<count>? {_WALKERS}", f"group of <count> {_WALKERS}")
-    + phrases(
-        thing(Kind.PEDESTRIAN, Crosses()),
-        "<count>? jaywalker",
-        f"<count>? jaywalking|crossing {_WALKER}",
-    )
-    + phrases(
-        _many(Kind.PEDESTRIAN, Crosses()),
-        "<count>? jaywalkers",
-        f"<count>? jaywalking|crossing {_WALKERS}",
-        f"group of <count> jaywalking|crossing {_WALKERS}",
-        "group of <count> jaywalkers",
-    )
-    + phrases(
-        that(Kind.PEDESTRIAN), f"the {_WALKER}", f"the {_WALKERS}", "the jaywalker|jaywalkers"
-    )
-)
-
-_CROSS = "cross|crosses|crossing|jaywalks|jaywalking|jaywalk"
-_WALK = "walk|walks|walking|step|steps|stepping|run|runs|running|go|goes|going|come|comes|coming"
-
-
-def _sides(found: Found) -> tuple[Fact, ...]:
-    return (Sides(found.maybe("start", Side), found.maybe("end", Side)),)
-
-
-_EDGE = "side|kerb|curb|walkway|sidewalk|pavement|edge"
-
-CROSSING = phrases(
-    means((Crosses(),)),
-    f"{_CROSS} <road>?",
-    f"{_CROSS} in front of <ego>",
-    f"{_WALK} across|over <road>",
-    f"{_WALK} onto|into <road>",
-) + phrases(
-    _sides,
-    f"from? <start:side> {_EDGE}? to <end:side> {_EDGE}? one?",
-    f"from? <start:side> {_EDGE}? of road|street to <end:side> {_EDGE}? of? road|street?",
-    f"from? <start:side> {_EDGE}? to <end:side> {_EDGE}? of road|street",
-    f"from <start:side> {_EDGE}?",
-    f"from <start:side> {_EDGE}? of road|street",
-    "off|from|leaves|leaving <start:side> <walkway>",
-    "steps|stepping|walks|walking|comes|coming off|from <start:side> <walkway>",
-    f"to <end:side> {_EDGE} of? road|street?",
-)
-
-OFF_WALKWAY = phrases(
-    means((Mention(),)),
-    f"{_WALK} off|from|out <walkway>",
-    "off|leaves|leaving <walkway>",
-)
-
-
-def _turned(found: Found) -> tuple[Fact, ...]:
-    return (Turned(found.get("angle", Angle).degrees, found.maybe("side", Side)),)
-
-
-MOTION = phrases(
-    means((Standing(),)),
-    "park|parks|parking|parked",
-    "has|have? stopped",
-    "stand|stands|standing still?",
-    "is|are? stationary|immobile|standing|abandoned",
-    "broken|breaks|broke down",
-) + phrases(
-    lambda found: (Moving(found.get("speed", Speed).mps),),
-    f"{_MOVING} at|with speed? of? <speed>",
-    "at|with speed? of? <speed>",
-)
-
-HEADING = (
     phrases(
-        means((Faces(Facing.WITH_LANE),)),
-        "facing|heading|pointing|in? same way|direction as|like <ego>",
-        "facing|heading|pointing in|along direction of travel|traffic",
-        "facing|heading|pointing along lane",
-        "aligned with lane",
+        _vehicle,
+        "<count>? other? <standing>? <body>",
+        "<count>? other? <standing>? <bodies>",
     )
     + phrases(
-        means((Faces(Facing.AGAINST_LANE),)),
-        "facing|heading|pointing <ego>",
-        "facing|heading|pointing towards|toward <ego>",
-        "facing|heading|pointing in? opposite way|direction",
-        "facing|heading|pointing against traffic|lane",
-        "facing|heading|pointing in? wrong way",
-        "wrong way round?",
+        lambda found: (Thing(kind=Kind.VEHICLE, count=1, body=found.get("body", Body)),),
+        "a second|third|further|following <body>",
     )
     + phrases(
-        means((Faces(Facing.ACROSS),)),
-        "sideways",
-        "across <lane>",
-        "across lane",
-        "perpendicular to <lane>",
-        "perpendicular to lane",
+        _row,
+        "row|line|queue|column of <count> <standing>? <bodies>",
+        "<count> <standing> <bodies> in row|line",
     )
     + phrases(
-        _turned,
-        "at? angle of? <angle>",
-        "turned|rotated|angled by? <angle>",
-        "turned|rotated|angled by? <angle> to <side>",
-        "turned|rotated|angled to <side> by <angle>",
+        _that_vehicle,
+        "the|this|that|same <standing>? <body>",
+        "the|these|those|both <standing>? <bodies>",
     )
-    + phrases(means((Mention(),)), "turned|rotated|angled|twisted against|towards|to each other")
+    + phrases(
+        _oncoming_vehicle,
+        "<count>? oncoming|approaching <body>",
+        "<count>? oncoming|approaching <bodies>",
+        "<count>? <body> coming|approaching towards|toward|from opposite? <ego>|direction",
+        "<count>? <body> coming|approaching from opposite|other|oncoming direction|side|way",
+        "<count>? <body> coming|approaching towards|toward <ego>",
+        "<count>? <body> in oncoming traffic",
+    )
+    + phrases(
+        means((InLane(LaneChoice.ONCOMING), Moving())),
+        "coming|comes|approaching|approaches|driving|drives from opposite|oncoming|other "
+        "direction|side|way",
+        "coming|comes|driving|drives|moving towards|toward <ego>",
+    )
+    + phrases(means((InLane(LaneChoice.ONCOMING),)), "oncoming|opposing traffic|lane :")
 )
 
-MENTIONS = phrases(
-    means((Mention(),)),
-    "<ego>",
-    "first|nearest|nearer|closest|closer one|cone|car|vehicle",
-    "other|second|third|others one|car|vehicle?",
-    "all|both|each|some of? them|cars|vehicles?",
+CRASHES = (
+    phrases(
+        _crash,
+        f"<count> {_CRASHED} <bodies>",
+        f"car|traffic|road|vehicle? {_ACCIDENT} {_SITE}",
+        f"car|traffic|road? {_ACCIDENT} {_SITE} {_OF} of? <count> {_CRASHED}? <bodies>",
+        f"<count> <body> {_ACCIDENT}",
+        f"{_ACCIDENT} {_SITE} {_OF} of? <count> {_CRASHED}? <bodies>",
+        "pile up",
+        "pile up of|with|involving <count> <bodies>",
+        "<count> <body> pile up",
+    )
+    + phrases(
+        _crash_turned(180.0),
+        f"head on|frontal|front {_ACCIDENT}",
+        f"head on {_ACCIDENT} {_OF} <count> <bodies>",
+        f"frontal {_ACCIDENT} {_OF} <count> <bodies>",
+    )
+    + phrases(
+        _crash_turned(0.0),
+        f"rear end|ender {_ACCIDENT}?",
+        f"rear end {_ACCIDENT} {_OF} <count> <bodies>",
+    )
+    + phrases(
+        means((Crashed(),)),
+        "have|has|had|are|just|been? crashed|collided",
+        "crashed|collided|involved|entangled in accident|collision|crash?",
+        "has|have? happened|occurred|taken place?",
+        "have|has|had|are|just? crashed|collided into|with it|each|one other|another?",
+        "have|has|had|are|just? smashed|slammed|ploughed|plowed|banged|bashed|rammed|knocked "
+        "into it|each|one other|another?",
+        "crash|collide into|with? it|each|one other|another?",
+        "crashing|colliding into|with? it|each|one other|another?",
+        "caught|tangled up? in collision|crash|accident|pileup",
+        "fender bender",
+        "collide|collides",
+        "came|come|comes into contact",
+        "came|come|comes|crashed|collided together",
+        "had accident|crash|collision",
+        "has|have|are|just? crashed|collided|smashed|slammed together",
+        "crash|smash together",
+        "have|has? hit each|one other|another",
+        "are|is|were|was involved",
+        "are|is|were|was? involved in fender bender",
+        "are|is|were|was? involved in accident|crash|collision|pileup",
+        "has|have|had|was|were? hit|struck|rammed|touched|hitting|hits",
+        "has|have|had|was|were? hit|struck|rammed|touched|hitting|hits it|each|one other|another?",
+        "has|have? run|driven|ran|drove|slid|skidded|bumped into it|each|one? other|another?",
+        "have|has had accident|crash|collision",
+        "have|has? piled up|into each? other?",
+        "jammed|pushed|wedged|leaning|stuck|lodged|resting|pressed against|into|on|to? it",
+        "jammed|pushed|wedged|leaning|stuck|lodged|pressed against|into|to each|one|the "
+        "other|another|first",
+        "touching|touch|touches each|one? other|another|it?",
+        "have|has|had|are|just? crashed|collided|driven|run|slid into its? side|rear|back|door",
+        "interlocked|tangled|entangled|colliding",
+        "has|have? come|came to rest|halt against it|other|first one|car?",
+        "after crash|collision|accident",
+        "after having? crashed|collided",
+    )
+    + phrases(
+        means((Crashed(), Bears(Bearing.BEHIND))),
+        f"{_HIT} it|one|other|first one|car? from|in|into|at its? behind|rear|back",
+        f"{_HIT} rear|back|tail of? it|other|first one|car?",
+    )
+    + phrases(
+        lambda found: (Crashed(), Bears(_BESIDE[found.get("side", Side)])),
+        f"{_HIT} it|one|other|first one|car? from|on|in|into|at its? <side> side|flank?",
+        f"{_HIT} its <side> side|flank",
+    )
+    + phrases(means((Thing(kind=Kind.VEHICLE, count=1, joins=True),)), "another one")
+    + phrases(
+        means((Thing(kind=Kind.VEHICLE, count=1, joins=True), Bears(Bearing.BEHIND))),
+        "car|vehicle|one behind|following it|this",
+        "following car|vehicle",
+    )
+    + phrases(
+        means((Thing(kind=Kind.VEHICLE, count=1, joins=True), Bears(Bearing.AHEAD))),
+        "car|vehicle|one in front|ahead of it|this",
+    )
+    + phrases(
+        means((Mention(),)),
+        "turning|coming|emerging|pulling|driving out? of|from side|minor|cross? street|road",
+        "went|going|driving|driven|travelling|goes straight on|ahead|through?",
+        "coming from side|minor|cross street|road",
+        "chain reaction",
+    )
 )
 
-THING_RULES = {
-    "vehicle": VEHICLES,
-    "accident": CRASHES,
-    "pedestrian": PEDESTRIANS,
-    "crossing": CROSSING,
-    "stepping off": OFF_WALKWAY,
-    "motion": MOTION,
-    "heading": HEADING,
-    "mention": MENTIONS,
-}
+THING_RULES = {"vehicle": VEHICLES, "accident": CRASHES}

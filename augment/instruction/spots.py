@@ -12,6 +12,8 @@ from augment.instruction.facts import (
     Fact,
     InLane,
     Offset,
+    PartlyIn,
+    Reaches,
     Shoulder,
     Surroundings,
     Towards,
@@ -21,6 +23,7 @@ from augment.instruction.intent import (
     LaneChoice,
     Lateral,
     LateralTarget,
+    Length,
     Nearness,
     Side,
     Spot,
@@ -64,6 +67,7 @@ def spot_of(facts: Sequence[Fact], assumed: list[str], *, whole_lane: bool = Fal
         InstructionNotUnderstood: The distance, its direction or a side is missing, or two differ.
     """
     lengths = [fact.length for fact in gather(facts, Distance)]
+    lengths += [_drawn_from(fact) for fact in gather(facts, Reaches)]
     if not lengths:
         raise InstructionNotUnderstood("How far away is not said.")
     if len({(length.low_m, length.high_m) for length in lengths}) > 1:
@@ -86,13 +90,23 @@ def spot_of(facts: Sequence[Fact], assumed: list[str], *, whole_lane: bool = Fal
 # Private
 
 
+def _drawn_from(reach: Reaches) -> Length:
+    """For what has no length itself, "from 15 m to 20 m" is a range to draw a distance from."""
+    if reach.start is None or reach.end is None or reach.start.low_m > reach.end.high_m:
+        raise InstructionNotUnderstood("A length along the road means something for cones alone.")
+    return Length(low_m=reach.start.low_m, high_m=reach.end.high_m)
+
+
 def _lateral(facts: Sequence[Fact], assumed: list[str]) -> Lateral:
     towards, shoulder = gather(facts, Towards), only(gather(facts, Shoulder), "shoulders")
     offsets = gather(facts, Offset)
     named = {fact.target for fact in towards}
     if not named and shoulder:
         named = {_SHOULDERS[shoulder.side]}
-    if len(named) > 1:
+    by_map = named & {LateralTarget.KERB, LateralTarget.CENTRE_LINE}
+    also = next(iter(by_map)) if len(named) == 2 and len(by_map) == 1 else None
+    named -= {also}
+    if len(named) > 1 or (also and LateralTarget.LANE_CENTRE in named):
         raise InstructionNotUnderstood(f"Two sides contradict each other: {_listed(named)}.")
     length = only([fact.length for fact in offsets if fact.length is not None], "offsets")
     is_offset = length.high_m > 0.0 if length else bool(offsets)
@@ -101,7 +115,9 @@ def _lateral(facts: Sequence[Fact], assumed: list[str]) -> Lateral:
         raise InstructionNotUnderstood(
             "To which side of the lane centre it is offset is not said."
         )
-    nearness = only([fact.nearness for fact in towards if fact.nearness], "offsets")
+    nearness = _nearness(towards)
+    if gather(facts, PartlyIn) and target is LateralTarget.LANE_CENTRE and not named:
+        raise InstructionNotUnderstood("How far it stands in the lane is not said.")
     if nearness is None:
         nearness = shoulder.nearness if shoulder else Nearness.SLIGHTLY
     if length is None and target is not LateralTarget.LANE_CENTRE:
@@ -110,8 +126,18 @@ def _lateral(facts: Sequence[Fact], assumed: list[str]) -> Lateral:
     elif not named and length is None:
         assumed.append("in the middle of the lane")
     return Lateral(
-        target=target, offset=length, nearness=nearness, on_shoulder=shoulder is not None
+        target=target,
+        offset=length,
+        nearness=nearness,
+        on_shoulder=shoulder is not None,
+        also=also,
     )
+
+
+def _nearness(towards: list[Towards]) -> Nearness | None:
+    """The strongest word: at the edge is more than slightly."""
+    named = {fact.nearness for fact in towards if fact.nearness}
+    return Nearness.AT_EDGE if Nearness.AT_EDGE in named else next(iter(named), None)
 
 
 def _listed(targets: set[LateralTarget]) -> str:

@@ -6,7 +6,8 @@ from augment.instruction.intent import Length
 from augment.instruction.phrases import Found, means, phrases
 from augment.instruction.reading import RULES, read
 from augment.instruction.tokens import tokenize
-from augment.instruction.wording import FILLERS, SLOTS
+from augment.instruction.word_lists import FILLERS
+from augment.instruction.wording import SLOTS
 
 
 def longest(pattern: str, text: str) -> int:

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from augment.errors import InstructionNotUnderstood
 from augment.instruction import parse
 from augment.instruction.reading import RULES
-from augment.instruction.wording import FILLERS
+from augment.instruction.word_lists import FILLERS
 
 WORDS = sorted(
     {
@@ -64,9 +64,9 @@ WORDS = sorted(
         ("add a parked car -20 m ahead", "-"),
         ("add a parked car 1,5 m ahead", "1,5"),
         ("add a parked car 20 s ahead", "20"),
-        ("add a parked car 20 m ahead of the bus", "of"),
-        ("add a parked car 20 m behind the bus", "behind"),
-        ("add a parked car 20 m ahead, next to the bus", "next"),
+        ("add a parked car 20 m ahead of the bus", "a distance from a neighbour"),
+        ("add a parked car 20 m behind the bus", "a distance from a neighbour"),
+        ("add a parked car 20 m ahead, next to the bus", "to"),
         ("add a parked car 20 m ahead. The bus stands still.", "was not named before"),
         ("add a parked car 20 m ahead and 30 m ahead", "distances contradict"),
         ("add a parked car 20 m ahead of the ego, behind the ego", "directions contradict"),
@@ -98,6 +98,18 @@ WORDS = sorted(
         ("a ring of 8 cones along the left lane boundary 20 m ahead", "means nothing"),
         ("an accident 20 m ahead", "How many vehicles"),
         ("an accident of 9 cars 20 m ahead", "from 1 to 4"),
+        ("a parked car 20 m ahead, partly blocking the lane", "How far it stands in the lane"),
+        ("a parked car 20 m ahead on the wrong side of the road", "depends on where it faces"),
+        ("a car 20 m ahead, 1 m left of the lane centre, at the right kerb", "contradict"),
+        ("a car moves 20 m ahead", "moves"),
+        ("12 cones on both sides of the lane, starting 20 m ahead", "on both together"),
+        ("7 cones from 20 m to 32 m ahead along the kerb, 5 m apart", "contradict"),
+        ("cones every 5 m from 20 m to 32 m ahead along the kerb", "no whole number"),
+        ("cones starting 30 m ahead and ending 20 m ahead along the kerb", "end before"),
+        ("two crashed cars 20 m ahead, the third one 4 m in front of it", "More than 2"),
+        ("a bus and a car have collided 20 m ahead", "different kinds"),
+        ("a bus has hit a car 20 m ahead", "different kinds"),
+        ("three pedestrians cross from left to right 20 m ahead, the second follows 2 m", "clear"),
         ("remove the parked car 20 m ahead", "only adding"),
         ("move the bus 20 m ahead", "only adding"),
         ("do not add a parked car 20 m ahead", "negations"),
