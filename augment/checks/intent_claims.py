@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterator
+from itertools import pairwise
 
 from augment.instruction.intent import (
     Body,
@@ -78,12 +79,13 @@ class _Reader:
 
     def _vehicle(self, request: VehicleRequest) -> Iterator[Claim]:
         kind = AgentType.BUS if request.body is Body.BUS else AgentType.VEHICLE
-        names = self._take(kind, 1)
-        yield from _ahead(request.spot, names)
-        yield from self._lateral(request.spot, names)
-        if request.facing in _FACING_DEG:
-            turn_deg = _FACING_DEG[request.facing] + request.turn_deg
-            yield Claim(kind=ClaimKind.TURN, value=turn_deg, agents=names)
+        names = self._take(kind, request.count)
+        yield from _ahead(request.spot, names[:1])
+        for name in names:
+            yield from self._lateral(request.spot, (name,))
+            if request.facing in _FACING_DEG:
+                turn_deg = _FACING_DEG[request.facing] + request.turn_deg
+                yield Claim(kind=ClaimKind.TURN, value=turn_deg, agents=(name,))
 
     def _walkers(self, request: WalkRequest) -> Iterator[Claim]:
         names = self._take(AgentType.PEDESTRIAN, request.count)
@@ -91,13 +93,19 @@ class _Reader:
         value = 1.0 if request.start is Side.LEFT else -1.0
         for name in names:
             yield Claim(kind=ClaimKind.CROSSES_FROM, value=value, agents=(name,))
+            if request.drift_m:
+                yield Claim(kind=ClaimKind.WALKS_ON, value=request.drift_m, agents=(name,))
+        for name, behind in zip(names[1:], request.behind, strict=False):
+            if not behind.is_range:
+                yield Claim(kind=ClaimKind.GAP, value=behind.low_m, agents=(names[0], name))
 
     def _cones(self, request: ConesRequest) -> Iterator[Claim]:
-        names = self._take(AgentType.TRAFFIC_CONE, request.count)
+        rows = 2 if request.both_sides else 1
+        names = self._take(AgentType.TRAFFIC_CONE, request.count * rows)[: request.count]
         if request.has_worker:
             self._take(AgentType.PEDESTRIAN, 1)
         yield from _ahead(request.spot, names if request.shape is Shape.RING else names[:1])
-        if not request.spacing.is_range:
+        if not request.spacing.is_range and request.reach_m is None:
             yield Claim(kind=ClaimKind.SPACING, value=request.spacing.low_m, agents=names)
 
     def _crash(self, request: CrashRequest) -> Iterator[Claim]:
@@ -105,6 +113,12 @@ class _Reader:
         yield from _ahead(request.spot, names[:1])
         if request.turn_deg is not None:
             yield Claim(kind=ClaimKind.TURNED_APART, value=abs(request.turn_deg), agents=names)
+        for other, pair in zip(request.others, pairwise(names), strict=False):
+            if request.turn_deg is None and other.turn_deg is not None:
+                value = abs(other.turn_deg)
+                yield Claim(kind=ClaimKind.TURNED_APART, value=value, agents=pair)
+            if other.gap is not None and not other.gap.is_range:
+                yield Claim(kind=ClaimKind.GAP, value=other.gap.low_m, agents=pair)
 
     def _lateral(self, spot: Spot, names: tuple[str, ...]) -> Iterator[Claim]:
         offset = spot.lateral.offset

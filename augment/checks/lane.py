@@ -23,25 +23,26 @@ def lane(situation: Situation) -> Iterator[Finding]:
 def _on(agent_id: str, place: Beside) -> Finding:
     side = "left" if place.d_m >= 0.0 else "right"
     offset = "on" if abs(place.d_m) < 0.005 else f"{{left_m:.2f}} m to the {side} of"
-    return Finding(
-        kind=Kind.LANE,
-        severity=Severity.FACT,
-        agents=(agent_id,),
-        ways=(place.way_id,),
-        measured={
-            "along_m": place.s_m,
-            "left_m": place.d_m,
-            "lane_width_m": place.width_m,
-            "off_m": 0.0,
-        },
-        template=(
-            f"{{agents[0]}} is on {{ways[0]}}, {{along_m:.1f}} m along it and {offset} its centre "
-            "line; the lane is {lane_width_m:.1f} m wide."
-        ),
+    return _fact(
+        agent_id,
+        place,
+        0.0,
+        f"{{agents[0]}} is on {{ways[0]}}, {{along_m:.1f}} m along it and {offset} its centre "
+        "line; the lane is {lane_width_m:.1f} m wide.",
     )
 
 
 def _off(agent_id: str, place: Beside) -> Finding:
+    return _fact(
+        agent_id,
+        place,
+        place.off_m,
+        "{agents[0]} is {off_m:.1f} m off every lane; the nearest lane is {ways[0]} at "
+        "{along_m:.1f} m along it.",
+    )
+
+
+def _fact(agent_id: str, place: Beside, off_m: float, template: str) -> Finding:
     return Finding(
         kind=Kind.LANE,
         severity=Severity.FACT,
@@ -51,10 +52,7 @@ def _off(agent_id: str, place: Beside) -> Finding:
             "along_m": place.s_m,
             "left_m": place.d_m,
             "lane_width_m": place.width_m,
-            "off_m": place.off_m,
+            "off_m": off_m,
         },
-        template=(
-            "{agents[0]} is {off_m:.1f} m off every lane; the nearest lane is {ways[0]} at "
-            "{along_m:.1f} m along it."
-        ),
+        template=template,
     )

@@ -15,6 +15,8 @@ MOST_SHARE = 0.5
 EDGE_M = 1.0
 """Cones stand on the road or as far beside it as this."""
 NEAR_ROAD_M = 3.0
+VERGE_M = 2.0
+"""Beside everything that a map shows people stand on verges that it does not show."""
 FAR_FROM_PATHS_M = 10.0
 
 _EDGE = frozenset({AgentType.TRAFFIC_CONE, AgentType.BARRIER})
@@ -25,8 +27,8 @@ def off_road(situation: Situation) -> Iterator[Finding]:
 
     Vehicles belong on the road: a fact up to a share that no map resolves, doubtful up to half
     of the box (half on the kerb), wrong above. Cones and barriers belong on the road or within a
-    metre of it. All others may also be on walkways and crosswalks; on a map without walkways
-    it is unknown whether they are, so off it is a fact.
+    metre of it. All others may also be on walkways and crosswalks and on a verge beside them; on
+    a map without walkways it is unknown whether they are, so off it is a fact.
     """
     if situation.ground.road.is_empty:
         return
@@ -80,7 +82,7 @@ def _on_foot(agent: TrafficAgent, situation: Situation) -> Finding | None:
     if gap_m == 0.0:
         return None
     severity = Severity.FACT
-    if situation.ground.shows_walkways:
+    if situation.ground.shows_walkways and gap_m > VERGE_M:
         severity = Severity.DOUBTFUL if gap_m <= FAR_FROM_PATHS_M else Severity.WRONG
     share = ground.share_outside(situation.boxes[agent.id].corners_m)
     return Finding(

@@ -26,12 +26,13 @@ def walk_crossing(situation: Situation) -> Iterator[Finding]:
         return
     line, width_m = situation.ground.route
     for agent in situation.changed:
-        end = _end(agent)
+        end = end_of_walk(agent)
         if agent.type is AgentType.PEDESTRIAN and end is not None:
             yield _finding(agent, end, line, width_m)
 
 
-def _end(agent: TrafficAgent) -> Point | None:
+def end_of_walk(agent: TrafficAgent) -> Point | None:
+    """Where a walk ends: as the agent says, else straight on; None for who stands."""
     if agent.walk_to_m is not None or is_stopped(agent):
         return agent.walk_to_m
     return (

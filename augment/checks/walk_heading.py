@@ -15,6 +15,9 @@ BACKWARDS_ABOVE_DEG = 90.0
 SHORT_M = 1.5
 """A step of a worker who stands has no direction that anybody would have to face."""
 
+NOWHERE_M = 0.001
+"""Below a millimetre the direction of a walk is rounding."""
+
 
 def walk_heading(situation: Situation) -> Iterator[Finding]:
     """The turn of every changed agent with a walk against it: doubtful above 30 degrees.
@@ -29,6 +32,14 @@ def walk_heading(situation: Situation) -> Iterator[Finding]:
 def _finding(agent: TrafficAgent, to_x_m: float, to_y_m: float) -> Finding:
     dx, dy = to_x_m - agent.x_m, to_y_m - agent.y_m
     walk_m = math.hypot(dx, dy)
+    if walk_m < NOWHERE_M:
+        return Finding(
+            kind=Kind.WALK_HEADING,
+            severity=Severity.FACT,
+            agents=(agent.id,),
+            measured={"turn_deg": None, "walk_m": walk_m},
+            template="{agents[0]} has a walk that ends where it starts.",
+        )
     turn_deg = math.degrees(difference(agent.heading_rad, math.atan2(dy, dx)))
     severity = Severity.FACT
     if walk_m > SHORT_M and abs(turn_deg) > ALONG_BELOW_DEG:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import time
 from collections.abc import Callable
 from dataclasses import replace
 
@@ -13,7 +12,6 @@ from augment.checks import Kind, Severity, findings
 from augment.scene.entities import AgentType, TrafficAgent, TrafficSide
 from augment.scene.modification import Modification
 from tests.checks.worlds import Reference, references, severities
-from tests.scenes import cone
 
 REFERENCES = references()
 FACING = {"nudge-ferry-road", "overtake-terrace-row-facing"}
@@ -92,24 +90,3 @@ def test_the_same_thing_twice_is_named(reference: Reference) -> None:
 def test_a_pedestrian_who_walks_backwards_is_named(reference: Reference) -> None:
     turned = Modification(added=(_turned(reference),))
     assert severities(findings(reference.scene, turned)) == {(Kind.WALK_HEADING, Severity.WRONG)}
-
-
-def test_eight_agents_are_checked_in_a_blink(capsys: pytest.CaptureFixture[str]) -> None:
-    slowest_ms = 0.0
-    for reference in REFERENCES:
-        extra = tuple(
-            cone(f"Agent{number}", 20.0 + number - 90, 0.3)
-            for number in range(90, 98 - len(reference.modification.added))
-        )
-        eight = Modification(added=(*reference.modification.added, *extra))
-        findings(reference.scene, eight)
-        slowest_ms = max(slowest_ms, min(_took_ms(reference, eight) for _ in range(5)))
-    with capsys.disabled():
-        print(f"\neight agents, slowest scene of the catalogue: {slowest_ms:.1f} ms")
-    assert slowest_ms < 20.0
-
-
-def _took_ms(reference: Reference, change: Modification) -> float:
-    began = time.perf_counter()
-    findings(reference.scene, change)
-    return (time.perf_counter() - began) * 1000.0

@@ -142,3 +142,11 @@ def test_bicycles_stand_at_any_angle() -> None:
     (standing,) = of_kind(found_in(scene(), bicycle), Kind.HEADING)
     (riding,) = of_kind(found_in(scene(), replace(bicycle, speed_mps=4.0)), Kind.HEADING)
     assert (standing.severity, riding.severity) == (Severity.FACT, Severity.DOUBTFUL)
+
+
+def test_a_walk_that_ends_where_it_starts_has_no_direction() -> None:
+    stays = replace(walker(0.0), walk_to_m=(walker(0.0).x_m, walker(0.0).y_m))
+    (heading,) = of_kind(found_in(scene(), stays), Kind.WALK_HEADING)
+    assert heading.severity is Severity.FACT
+    assert heading.measured == {"turn_deg": None, "walk_m": 0.0}
+    assert heading.sentence() == f"{stays.id} has a walk that ends where it starts."

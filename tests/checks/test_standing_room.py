@@ -52,7 +52,8 @@ def test_connectors_are_road_as_well() -> None:
         (cone("Agent2", 30.0, -5.5), Severity.WRONG),
         (pedestrian("Agent2", 30.0, -4.0), None),
         (pedestrian("Agent2", 30.0, 0.0), None),
-        (pedestrian("Agent2", 30.0, -6.0), Severity.DOUBTFUL),
+        (pedestrian("Agent2", 30.0, -6.0), Severity.FACT),
+        (pedestrian("Agent2", 30.0, -6.5), Severity.DOUBTFUL),
         (pedestrian("Agent2", 30.0, -16.0), Severity.WRONG),
     ],
 )

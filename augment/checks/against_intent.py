@@ -1,0 +1,102 @@
+"""All checks of a modification, with what an instruction asks for where it was understood.
+
+The scene, the modification and the intent are all that is looked at: never a reference, never
+anybody's label.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import replace
+
+from augment.checks.asked import Asked, AskedCheck
+from augment.checks.asked_across import asked_across
+from augment.checks.asked_crash import asked_crash
+from augment.checks.asked_distance import asked_distance
+from augment.checks.asked_heading import asked_heading
+from augment.checks.asked_things import (
+    asked_count,
+    asked_motion,
+    asked_spacing,
+    asked_type,
+    unasked,
+)
+from augment.checks.asked_walk import asked_walk
+from augment.checks.finding import Finding, Kind, Severity
+from augment.checks.ground import Ground
+from augment.checks.own_way import OwnWay
+from augment.checks.parties import cast
+from augment.checks.registry import findings_on
+from augment.instruction.intent import Intent
+from augment.scene.modification import Modification
+
+ASKED_CHECKS: tuple[AskedCheck, ...] = (
+    asked_count,
+    asked_type,
+    asked_distance,
+    asked_across,
+    asked_heading,
+    asked_crash,
+    asked_walk,
+    asked_motion,
+    asked_spacing,
+    unasked,
+)
+
+
+def judged(
+    ground: Ground, modification: Modification, intent: Intent | None
+) -> tuple[Finding, ...]:
+    """What was measured, what was asked for first, then agent by agent.
+
+    Args:
+        ground: Of the scene before the change.
+        modification: The change.
+        intent: What the instruction asks for; None where it was not understood. Then only the
+            checks that need none are made.
+
+    Raises:
+        InvalidModification: The modification does not fit the scene.
+    """
+    found = findings_on(ground, modification)
+    way = None if intent is None else OwnWay.of(ground)
+    if intent is None or way is None:
+        return found
+    casting = cast(intent, modification.added, way)
+    asked = Asked(modification=modification, way=way, casting=casting)
+    held = [one for check in ASKED_CHECKS for one in check(asked)]
+    return (*held, *_settled(found, held, asked))
+
+
+def _settled(found: Iterable[Finding], held: Iterable[Finding], asked: Asked) -> Iterable[Finding]:
+    """The findings of the checks that ask for nothing, now that it is known what was asked for.
+
+    What is doubtful "unless the instruction asks for it" is a fact where it does: a heading
+    against the lane of who has been held against a request; half off the road, of a car whose
+    place across it has been, or of what stands where that belongs which it is taken for. Where
+    and how a thing stands that nobody asked for is no fault of its own.
+    """
+    mistyped = {agent.id for party in asked.parties for agent, _ in party.mistyped}
+    answering = {agent.id for party in asked.parties for agent in party.everyone}
+    surplus = {agent.id for agent in asked.casting.surplus}
+    across = {
+        name
+        for one in held
+        if one.kind in (Kind.ASKED_ACROSS, Kind.ASKED_SIDE)
+        for name in one.agents
+    }
+    for one in found:
+        name = one.agents[0]
+        is_settled = (
+            (one.kind is Kind.HEADING and name in answering)
+            or (
+                one.kind is Kind.OFF_ROAD
+                and one.severity is Severity.DOUBTFUL
+                and name in across | mistyped
+            )
+            or (one.kind in _OF_PLACE and name in surplus)
+        )
+        yield replace(one, severity=Severity.FACT) if is_settled else one
+
+
+_OF_PLACE = frozenset({Kind.HEADING, Kind.DEGREES, Kind.WALK_HEADING, Kind.OFF_ROAD})

@@ -1,0 +1,57 @@
+"""What the checks against an intent look at: a modification, and who answers what in it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+
+from augment.checks.finding import Finding, Severity
+from augment.checks.own_way import OwnWay
+from augment.checks.parties import Casting, Party
+from augment.scene.entities import TrafficAgent, TrafficSide
+from augment.scene.modification import Modification
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Asked:
+    """One modification, held against one intent."""
+
+    modification: Modification
+    way: OwnWay
+    casting: Casting
+
+    @property
+    def kerb(self) -> float:
+        """On which side the kerb is: 1 left, -1 right."""
+        return 1.0 if self.way.ground.scene.traffic_side is TrafficSide.LEFT else -1.0
+
+    @property
+    def parties(self) -> tuple[Party, ...]:
+        """The requests with those who answer them."""
+        return self.casting.parties
+
+    def ahead_m(self, agent: TrafficAgent) -> float:
+        """How far along the ego's way an agent is."""
+        return self.way.of_agent(agent).ahead_m
+
+    def left_m(self, agent: TrafficAgent) -> float:
+        """How far left of the middle of the ego's way an agent is."""
+        return self.way.of_agent(agent).left_m
+
+
+AskedCheck = Callable[[Asked], Iterator[Finding]]
+
+
+def outside(value: float, low: float, high: float) -> float:
+    """How far a value is outside a range, 0 within it."""
+    return max(low - value, value - high, 0.0)
+
+
+def severity(*, fits: bool) -> Severity:
+    """What was asked for in so many words is there, or it is wrong."""
+    return Severity.FACT if fits else Severity.WRONG
+
+
+def hand(left: float) -> str:
+    """The side of a number whose left is positive."""
+    return "left" if left >= 0.0 else "right"

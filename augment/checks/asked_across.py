@@ -1,0 +1,228 @@
+"""The place across the road against the lane, the side and the offset that were asked for.
+
+Right lane and distance, but left and right exchanged: that is no wrong place but a wrong side,
+a fault of reasoning.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+from augment.checks.asked import Asked, hand, outside, severity
+from augment.checks.crash_order import in_order
+from augment.checks.finding import Finding, Kind
+from augment.checks.own_way import Band
+from augment.checks.parties import Party
+from augment.checks.tolerances import ACROSS_M, EDGE_M, MIDDLE_M
+from augment.instruction.intent import (
+    ConesRequest,
+    CrashRequest,
+    LaneChoice,
+    Lateral,
+    LateralTarget,
+    Nearness,
+    Shape,
+    Side,
+    VehicleRequest,
+    WalkRequest,
+)
+from augment.scene.entities import TrafficAgent
+
+_SLIGHT_M = 1.5
+"""The end of the paper's range for a slight offset."""
+_FAR_OUT_M = 3.0
+"""How far beside the road something may stand that is to stand beside it."""
+_TAPER_M = 1.0
+"""Cones of which the last is this far across from the first run from one side to the other."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Wanted:
+    """Where across its lane something belongs, left positive, and how far off it may be."""
+
+    low_m: float
+    high_m: float
+    allowed_m: float
+
+    def off_m(self, left_m: float) -> float:
+        return outside(left_m, self.low_m, self.high_m)
+
+    @property
+    def mirrored(self) -> _Wanted:
+        return _Wanted(low_m=-self.high_m, high_m=-self.low_m, allowed_m=self.allowed_m)
+
+
+def asked_across(asked: Asked) -> Iterator[Finding]:
+    """Vehicles by their offset, crashes and cones by the lane that they are in."""
+    for party in asked.parties:
+        request = party.request
+        if isinstance(request, WalkRequest) or not party.placed:
+            continue
+        first = min(party.placed, key=lambda one: (abs(asked.ahead_m(one)), one.id))
+        band = asked.way.band(request.spot.lane, asked.ahead_m(first))
+        if band is None:
+            continue
+        if isinstance(request, VehicleRequest):
+            for agent in party.placed:
+                yield _vehicle(asked, request, agent, band)
+        elif isinstance(request, CrashRequest) and party.missing:
+            continue  # it may be the nearest that is missing, and the others lie anywhere
+        elif isinstance(request, CrashRequest):
+            if party.is_exact:
+                first = in_order(party, request, asked.way)[0]
+            left_m = asked.left_m(first) - band.left_m
+            others = (one for one in party.everyone if one is not first)
+            yield _in_lane((first, *others), left_m, band, "The first of the crashed vehicles")
+        elif isinstance(request, ConesRequest):
+            yield from _cones(asked, party, request, band)
+
+
+# Private
+
+
+def _vehicle(asked: Asked, request: VehicleRequest, agent: TrafficAgent, band: Band) -> Finding:
+    left_m = asked.left_m(agent) - band.left_m
+    wanted = _wanted(request.spot.lateral, asked.kerb, band, agent.width_m / 2.0)
+    is_other_side = (
+        wanted.off_m(left_m) > wanted.allowed_m
+        and wanted.mirrored.off_m(left_m) <= wanted.allowed_m
+    )
+    if is_other_side:
+        return _other_side((agent,), left_m, wanted)
+    belongs_m = band.left_m + min(max(left_m, wanted.low_m), wanted.high_m)
+    lane = _LANES[request.spot.lane]
+    if wanted.low_m == wanted.high_m == 0.0:
+        words = "the lane centre is asked for"
+    elif wanted.low_m == wanted.high_m:
+        words = f"{{asked_low_m:.2g}} m to the {hand(wanted.low_m)} is asked for"
+    else:
+        side = hand(wanted.low_m + wanted.high_m)
+        low, high = ("low", "high") if wanted.low_m >= 0.0 else ("high", "low")
+        words = f"{{asked_{low}_m:.2g}} to {{asked_{high}_m:.2g}} m to the {side} is asked for"
+    return Finding(
+        kind=Kind.ASKED_ACROSS,
+        severity=severity(fits=wanted.off_m(left_m) <= wanted.allowed_m),
+        agents=(agent.id,),
+        belongs_m=asked.way.position(asked.ahead_m(agent), belongs_m),
+        measured={"left_m": left_m, "asked_low_m": wanted.low_m, "asked_high_m": wanted.high_m},
+        template=(
+            f"{{agents[0]}} is {{left_m:.2f}} m to the {hand(left_m)} of the centre of {lane}; "
+            f"{words}."
+        ),
+    )
+
+
+def _wanted(lateral: Lateral, kerb: float, band: Band, half_box_m: float) -> _Wanted:
+    """Where a vehicle belongs; sides are those of the ego's direction."""
+    sign = _SIGNS[lateral.target] or kerb * _KERB_SIGNS[lateral.target]
+    if sign == 0.0:
+        return _Wanted(low_m=0.0, high_m=0.0, allowed_m=MIDDLE_M)
+    half_lane_m = band.width_m / 2.0
+    if lateral.offset is not None:
+        near_m, far_m = lateral.offset.low_m, lateral.offset.high_m
+    else:
+        near_m, far_m = {
+            Nearness.SLIGHTLY: (0.0, _SLIGHT_M),
+            Nearness.AT_EDGE: (half_lane_m - half_box_m, half_lane_m),
+            Nearness.HALF_OUT: (half_lane_m, half_lane_m),
+            Nearness.OUTSIDE: (half_lane_m + half_box_m, half_lane_m + half_box_m + _FAR_OUT_M),
+        }[lateral.nearness]
+    low_m, high_m = sorted((sign * near_m, sign * far_m))
+    return _Wanted(low_m=low_m, high_m=high_m, allowed_m=ACROSS_M)
+
+
+def _cones(asked: Asked, party: Party, request: ConesRequest, band: Band) -> Iterator[Finding]:
+    """A line by its side of the lane, all other shapes by their middle and their first cone."""
+    cones = sorted(party.placed, key=asked.ahead_m)
+    everyone = (*cones, *party.workers)
+    lefts = [asked.left_m(one) - band.left_m for one in cones]
+    middle_m = sum(lefts) / len(lefts)
+    target = request.spot.lateral.target
+    sign = _SIGNS[target] or asked.kerb * _KERB_SIGNS[target]
+    if request.shape is Shape.LINE and sign and not request.both_sides:
+        edge_m = sign * band.width_m / 2.0
+        wanted = _Wanted(low_m=edge_m, high_m=edge_m, allowed_m=ACROSS_M)
+        if wanted.off_m(middle_m) > ACROSS_M >= wanted.mirrored.off_m(middle_m):
+            yield _other_side(cones, middle_m, wanted)
+            return
+        yield Finding(
+            kind=Kind.ASKED_ACROSS,
+            severity=severity(fits=wanted.off_m(middle_m) <= ACROSS_M),
+            agents=tuple(one.id for one in everyone),
+            measured={"left_m": middle_m, "asked_low_m": edge_m, "asked_high_m": edge_m},
+            template=(
+                f"The line of cones is {{left_m:.2f}} m to the {hand(middle_m)} of the lane "
+                f"centre; the {hand(edge_m)} boundary, {{asked_low_m:.2f}} m off, is asked for."
+            ),
+        )
+        return
+    yield _in_lane(everyone, middle_m, band, "The middle of the cones")
+    if request.shape is Shape.TAPER and abs(lefts[0] - lefts[-1]) > _TAPER_M:
+        start = asked.kerb if request.start is None else _HANDS[request.start]
+        yield _taper_side(cones, lefts, start)
+
+
+def _taper_side(cones: Sequence[TrafficAgent], lefts: Sequence[float], start: float) -> Finding:
+    begins = lefts[0] - lefts[-1]
+    return Finding(
+        kind=Kind.ASKED_SIDE,
+        severity=severity(fits=begins * start > 0.0),
+        agents=tuple(one.id for one in cones),
+        measured={"first_left_m": lefts[0], "last_left_m": lefts[-1]},
+        template=(
+            f"The taper begins at the {hand(begins)} of the lane with {{agents[0]}}; "
+            f"the {hand(start)} is asked for."
+        ),
+    )
+
+
+def _in_lane(agents: Sequence[TrafficAgent], left_m: float, band: Band, what: str) -> Finding:
+    beyond_m = abs(left_m) - band.width_m / 2.0
+    return Finding(
+        kind=Kind.ASKED_ACROSS,
+        severity=severity(fits=beyond_m <= EDGE_M),
+        agents=tuple(one.id for one in agents),
+        measured={"left_m": left_m, "lane_width_m": band.width_m},
+        template=(
+            f"{what} is {{left_m:.2f}} m to the {hand(left_m)} of the centre of the lane that is "
+            "asked for, which is {lane_width_m:.1f} m wide."
+        ),
+    )
+
+
+def _other_side(agents: Sequence[TrafficAgent], left_m: float, wanted: _Wanted) -> Finding:
+    side = hand(wanted.low_m + wanted.high_m)
+    return Finding(
+        kind=Kind.ASKED_SIDE,
+        severity=severity(fits=False),
+        agents=tuple(one.id for one in agents),
+        measured={"left_m": left_m, "asked_low_m": wanted.low_m, "asked_high_m": wanted.high_m},
+        template=(
+            f"{{agents[0]}} is {{left_m:.2f}} m to the {hand(left_m)} of the lane centre; the "
+            f"same to the {side} is asked for: left and right are exchanged."
+        ),
+    )
+
+
+_HANDS = {Side.LEFT: 1.0, Side.RIGHT: -1.0}
+_SIGNS = {
+    LateralTarget.LEFT_BOUNDARY: 1.0,
+    LateralTarget.RIGHT_BOUNDARY: -1.0,
+    LateralTarget.KERB: 0.0,
+    LateralTarget.CENTRE_LINE: 0.0,
+    LateralTarget.LANE_CENTRE: 0.0,
+}
+_KERB_SIGNS = {
+    LateralTarget.LEFT_BOUNDARY: 0.0,
+    LateralTarget.RIGHT_BOUNDARY: 0.0,
+    LateralTarget.KERB: 1.0,
+    LateralTarget.CENTRE_LINE: -1.0,
+    LateralTarget.LANE_CENTRE: 0.0,
+}
+_LANES = {
+    LaneChoice.OWN: "the ego's lane",
+    LaneChoice.LEFT: "the lane on the left",
+    LaneChoice.RIGHT: "the lane on the right",
+    LaneChoice.ONCOMING: "the oncoming lane",
+}

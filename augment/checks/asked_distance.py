@@ -1,0 +1,125 @@
+"""The distance along the ego's lane against the one that was asked for."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from augment.checks.asked import Asked, outside, severity
+from augment.checks.crash_order import in_order
+from augment.checks.finding import Finding, Kind
+from augment.checks.parties import Party
+from augment.checks.tolerances import CRASH_M, DISTANCE_M, DISTANCE_SHARE
+from augment.instruction.intent import (
+    ConesRequest,
+    CrashRequest,
+    Length,
+    Relation,
+    Shape,
+    VehicleRequest,
+    WalkRequest,
+)
+from augment.scene.entities import TrafficAgent
+
+
+def asked_distance(asked: Asked) -> Iterator[Finding]:
+    """One finding a request: wrong beyond the tolerance.
+
+    A crash counts by its first vehicle, cones by the first, a ring by its middle, pedestrians
+    by where a walk begins or meets the ego's way. Where the number is wrong, which is a fault of
+    its own, any may be the first, and where the first is missing the next one is.
+    """
+    for party in asked.parties:
+        if party.placed:
+            yield _finding(asked, party)
+
+
+def _finding(asked: Asked, party: Party) -> Finding:
+    spot = party.request.spot
+    sign = 1.0 if spot.relation is Relation.AHEAD else -1.0
+    first, measured_m = _measured(asked, party, sign)
+    wanted = spot.distance
+    off_m = outside(measured_m, wanted.low_m, wanted.high_m)
+    allowed_m = max(DISTANCE_M, DISTANCE_SHARE * wanted.high_m) + _to_next_m(party)
+    side = "ahead of" if measured_m * sign >= 0.0 else "behind"
+    where = "ahead" if sign > 0.0 else "behind"
+    what, range_words = _words(party, wanted)
+    belongs_m = sign * min(max(measured_m, wanted.low_m), wanted.high_m)
+    return Finding(
+        kind=Kind.ASKED_DISTANCE,
+        severity=severity(fits=off_m <= allowed_m),
+        agents=(first.id, *(one.id for one in party.everyone if one is not first)),
+        belongs_m=asked.way.position(belongs_m, asked.left_m(first)),
+        measured={
+            "along_m": measured_m,
+            "asked_low_m": wanted.low_m,
+            "asked_high_m": wanted.high_m,
+            "off_m": off_m,
+        },
+        template=(
+            f"{what} is {{along_m:.1f}} m {side} the ego along its lane; "
+            f"{range_words} m {where} is asked for."
+        ),
+    )
+
+
+def _measured(asked: Asked, party: Party, sign: float) -> tuple[TrafficAgent, float]:
+    """Who tells the distance, and the distance in the direction asked for."""
+    request, wanted = party.request, party.request.spot.distance
+    along = [(sign * asked.ahead_m(one), one) for one in (*party.placed, *party.spare)]
+    if isinstance(request, WalkRequest):
+        along += [
+            (sign * asked.way.place(*point).ahead_m, one)
+            for one in party.placed
+            for point in _ends_on_road(asked, one)
+        ]
+    elif isinstance(request, ConesRequest) and request.shape is Shape.RING:
+        middle_m = sum(value for value, _ in along) / len(along)
+        return min(along, key=lambda item: (item[0], item[1].id))[1], middle_m
+    elif isinstance(request, CrashRequest) and party.is_exact:
+        first = in_order(party, request, asked.way)[0]
+        return first, sign * asked.ahead_m(first)
+    elif isinstance(request, (ConesRequest, VehicleRequest)) and party.is_exact:
+        value, agent = min(along, key=lambda item: (item[0], item[1].id))
+        return agent, value
+    value, agent = min(
+        along, key=lambda item: (outside(item[0], wanted.low_m, wanted.high_m), item[1].id)
+    )
+    return agent, value
+
+
+def _to_next_m(party: Party) -> float:
+    """How much further the next one stands where one is missing."""
+    if not party.missing:
+        return 0.0
+    if isinstance(party.request, CrashRequest):
+        return CRASH_M
+    return party.request.spacing.high_m if isinstance(party.request, ConesRequest) else 0.0
+
+
+def _ends_on_road(asked: Asked, agent: TrafficAgent) -> Iterator[tuple[float, float]]:
+    """Where a walk is level with the middle of the ego's way, if it gets there."""
+    if agent.walk_to_m is None:
+        return
+    start, end = asked.left_m(agent), asked.way.place(*agent.walk_to_m).left_m
+    if start * end < 0.0:
+        share = start / (start - end)
+        yield (
+            agent.x_m + share * (agent.walk_to_m[0] - agent.x_m),
+            agent.y_m + share * (agent.walk_to_m[1] - agent.y_m),
+        )
+
+
+def _words(party: Party, wanted: Length) -> tuple[str, str]:
+    request = party.request
+    if isinstance(request, CrashRequest):
+        what = "The first of the crashed vehicles, {agents[0]},"
+    elif isinstance(request, ConesRequest):
+        is_ring = request.shape is Shape.RING
+        what = "The middle of the cones" if is_ring else "The first cone, {agents[0]},"
+    elif isinstance(request, WalkRequest):
+        what = "The walk of {agents[0]}"
+    else:
+        what = "{agents[0]}"
+    return what, "{asked_low_m:.4g} to {asked_high_m:.4g}" if wanted.is_range else (
+        "{asked_low_m:.4g}"
+    )

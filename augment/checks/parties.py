@@ -1,0 +1,196 @@
+"""Who answers which part of an instruction: added agents, dealt out to the requests."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from enum import StrEnum
+
+from augment.checks.own_way import OwnWay
+from augment.checks.tolerances import LONG_VEHICLE_M
+from augment.instruction.intent import (
+    Body,
+    ConesRequest,
+    CrashRequest,
+    Intent,
+    Relation,
+    Request,
+    Spot,
+    VehicleRequest,
+    WalkRequest,
+)
+from augment.scene.entities import AgentType, Point, TrafficAgent
+
+
+class Role(StrEnum):
+    """What an agent is in its request, in the words of a sentence."""
+
+    VEHICLE = "vehicle"
+    CAR = "car"
+    BUS = "bus"
+    WALKER = "pedestrian"
+    CONE = "cone"
+    WORKER = "worker"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Party:
+    """A request and those who answer it.
+
+    Attributes:
+        agents: Of the main role and the right type, the nearest to the ego first.
+        workers: Those that stand beside cones.
+        mistyped: Taken for what is missing, though of another type; with what they should be.
+        missing: How many agents of each role nobody stands for.
+        spare: Those of the main role that are one too many, whichever of them it is.
+    """
+
+    request: Request
+    agents: tuple[TrafficAgent, ...] = ()
+    workers: tuple[TrafficAgent, ...] = ()
+    mistyped: tuple[tuple[TrafficAgent, Role], ...] = ()
+    missing: tuple[tuple[Role, int], ...] = ()
+    spare: tuple[TrafficAgent, ...] = ()
+
+    @property
+    def everyone(self) -> tuple[TrafficAgent, ...]:
+        """All of them."""
+        return (*self.agents, *self.workers, *(agent for agent, _ in self.mistyped))
+
+    @property
+    def placed(self) -> tuple[TrafficAgent, ...]:
+        """Those who tell where the party stands: all but the workers."""
+        stand_ins = (agent for agent, role in self.mistyped if role is not Role.WORKER)
+        return (*self.agents, *stand_ins)
+
+    @property
+    def is_exact(self) -> bool:
+        """Whether nobody is missing, spare or of another type."""
+        return not (self.missing or self.spare or self.mistyped)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Casting:
+    """All parties, and the added agents that no request asks for."""
+
+    parties: tuple[Party, ...]
+    surplus: tuple[TrafficAgent, ...]
+
+
+def cast(intent: Intent, added: Sequence[TrafficAgent], way: OwnWay) -> Casting:
+    """Deal the added agents out to the requests, each to the nearest spot that takes its type.
+
+    What is left over stands in, whatever its type, for what is still missing.
+    """
+    wanted = [
+        place for number, one in enumerate(intent.requests) for place in _places(number, one)
+    ]
+    spots = [middle_of(one.spot, way) for one in intent.requests]
+    near = sorted(
+        (math.dist(spots[place.party], (agent.x_m, agent.y_m)), number, index)
+        for number, place in enumerate(wanted)
+        for index, agent in enumerate(added)
+    )
+    taken: dict[int, int] = {}
+    for suits in (_suits, _is_any):
+        for _, number, index in near:
+            is_free = number not in taken and index not in taken.values()
+            if is_free and suits(wanted[number], added[index]):
+                taken[number] = index
+    return Casting(
+        parties=tuple(
+            _party(number, one, wanted, added, taken, way)
+            for number, one in enumerate(intent.requests)
+        ),
+        surplus=tuple(one for n, one in enumerate(added) if n not in taken.values()),
+    )
+
+
+def middle_of(spot: Spot, way: OwnWay) -> Point:
+    """The point that a spot names: the middle of its range, on the middle of its lane."""
+    sign = 1.0 if spot.relation is Relation.AHEAD else -1.0
+    ahead_m = sign * (spot.distance.low_m + spot.distance.high_m) / 2.0
+    band = way.band(spot.lane, ahead_m)
+    return way.position(ahead_m, 0.0 if band is None else band.left_m)
+
+
+# Private
+
+
+@dataclass(frozen=True, slots=True)
+class _Place:
+    """One agent that a request needs."""
+
+    party: int
+    role: Role
+    body: Body | None = None
+
+
+def _places(party: int, request: Request) -> Iterator[_Place]:
+    match request:
+        case VehicleRequest() | CrashRequest():
+            for _ in range(request.count):
+                yield _Place(party, _role(request.body), request.body)
+        case WalkRequest():
+            for _ in range(request.count):
+                yield _Place(party, Role.WALKER)
+        case ConesRequest():
+            for _ in range(request.count * (1 + request.both_sides)):
+                yield _Place(party, Role.CONE)
+            if request.has_worker:
+                yield _Place(party, Role.WORKER)
+
+
+def _role(body: Body) -> Role:
+    return {Body.BUS: Role.BUS, Body.VEHICLE: Role.VEHICLE}.get(body, Role.CAR)
+
+
+def _suits(place: _Place, agent: TrafficAgent) -> bool:
+    match place.role:
+        case Role.BUS:
+            is_long = agent.type is AgentType.VEHICLE and agent.length_m >= LONG_VEHICLE_M
+            return agent.type is AgentType.BUS or is_long
+        case Role.CAR:
+            return agent.type is AgentType.VEHICLE
+        case Role.VEHICLE:
+            return agent.type in (AgentType.VEHICLE, AgentType.BUS)
+        case Role.CONE:
+            return agent.type is AgentType.TRAFFIC_CONE
+        case Role.WALKER | Role.WORKER:
+            return agent.type is AgentType.PEDESTRIAN
+
+
+def _is_any(place: _Place, agent: TrafficAgent) -> bool:
+    return True
+
+
+def _party(
+    party: int,
+    request: Request,
+    wanted: Sequence[_Place],
+    added: Sequence[TrafficAgent],
+    taken: dict[int, int],
+    way: OwnWay,
+) -> Party:
+    own = [(number, place) for number, place in enumerate(wanted) if place.party == party]
+    found = [(place, added[taken[number]]) for number, place in own if number in taken]
+    right = [(place.role, agent) for place, agent in found if _suits(place, agent)]
+    left = [place.role for number, place in own if number not in taken]
+    return Party(
+        request=request,
+        agents=tuple(
+            sorted(
+                (agent for role, agent in right if role is not Role.WORKER),
+                key=lambda agent: abs(way.of_agent(agent).ahead_m),
+            )
+        ),
+        workers=tuple(agent for role, agent in right if role is Role.WORKER),
+        mistyped=tuple((agent, place.role) for place, agent in found if not _suits(place, agent)),
+        missing=tuple((role, left.count(role)) for role in dict.fromkeys(left)),
+        spare=tuple(
+            agent
+            for n, agent in enumerate(added)
+            if n not in taken.values() and _suits(own[0][1], agent)
+        ),
+    )
