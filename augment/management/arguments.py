@@ -4,7 +4,10 @@ from __future__ import annotations
 
 from argparse import ArgumentParser, ArgumentTypeError
 from decimal import Decimal, InvalidOperation
+from pathlib import Path
 from typing import Any
+
+from django.conf import settings
 
 from augment.services.caps import Caps
 
@@ -26,6 +29,16 @@ def add_cap_arguments(parser: ArgumentParser) -> None:
 def caps_of(options: dict[str, Any]) -> Caps:
     """What was given."""
     return Caps(usd=options["cap_usd"], calls=options["cap_calls"], tokens=options["cap_tokens"])
+
+
+def add_folder_argument(parser: ArgumentParser) -> None:
+    """--folder FOLDER: where the catalogue is."""
+    parser.add_argument(
+        "--folder",
+        type=Path,
+        default=settings.BASE_DIR / "fixtures",
+        help="holds scenes/*.json and scenarios/*.json; default: the project's own",
+    )
 
 
 def _usd(text: str) -> Decimal:

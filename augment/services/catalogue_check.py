@@ -13,7 +13,8 @@ from pathlib import Path
 
 import numpy as np
 
-from augment.checks import Ground, Severity, findings_on
+from augment.checks import Ground, Severity
+from augment.checks.against_intent import judged
 from augment.checks.claims import broken
 from augment.checks.intent_claims import claims_of
 from augment.errors import InstructionNotUnderstood
@@ -72,19 +73,21 @@ def check_catalogue(*, folder: Path) -> CatalogueCheck:
 def _check(whole: Scene, entry: CatalogueEntry) -> ScenarioCheck:
     scene = whole if entry.keep_traffic else without_traffic(whole)
     ground = Ground.of(scene)
+    try:
+        intent = parse(entry.instruction)
+    except InstructionNotUnderstood:
+        intent = None  # its author's claims alone count then
     reasons = [
-        f"wrong: {one.sentence()}"
-        for one in findings_on(ground, entry.reference)
-        if one.severity is Severity.WRONG
+        f"{one.severity}: {one.sentence()}"
+        for one in judged(ground, entry.reference, intent)
+        # What is doubtful may be what was asked for, where nobody knows what that is.
+        if one.severity is Severity.WRONG or (one.is_fault and intent is not None)
     ]
     reasons += [str(one) for one in broken(ground, entry.reference, entry.claims)]
     reasons += [*_unclaimed(entry), *_unseen(scene, entry)]
     understood = None
-    try:
-        read = claims_of(parse(entry.instruction), entry.reference, scene.traffic_side)
-    except InstructionNotUnderstood:
-        pass  # its author's claims alone count then
-    else:
+    if intent is not None:
+        read = claims_of(intent, entry.reference, scene.traffic_side)
         understood = len(read)
         reasons += [
             f"read from the sentence: {one}" for one in broken(ground, entry.reference, read)

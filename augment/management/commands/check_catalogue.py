@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 from argparse import ArgumentParser
-from pathlib import Path
 from typing import Any
 
-from django.conf import settings
 from django.core.management.base import BaseCommand, CommandError
 
 from augment.errors import AugmentError
+from augment.management.arguments import add_folder_argument
 from augment.services.catalogue_check import CatalogueCheck, ScenarioCheck, check_catalogue
 
 
@@ -23,12 +22,7 @@ class Command(BaseCommand):
 
     def add_arguments(self, parser: ArgumentParser) -> None:
         """Where the catalogue is."""
-        parser.add_argument(
-            "--folder",
-            type=Path,
-            default=settings.BASE_DIR / "fixtures",
-            help="holds scenes/*.json and scenarios/*.json; default: the project's own",
-        )
+        add_folder_argument(parser)
 
     def handle(self, *args: Any, **options: Any) -> None:
         """Print a line for each scenario, then the reasons."""
