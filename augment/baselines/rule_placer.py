@@ -1,19 +1,24 @@
 """The rule placer: a contestant without a language model, which refuses rather than guesses.
 
-The instruction becomes an intent, the intent places along the lanes, the places agents. What does
-not fit is shifted a little along the lane; if that doesn't help, it is refused.
+The instruction becomes an intent, the intent places along the lanes, the places agents. Every
+placement is held against the same checks that judge everybody's; where one finds something, the
+placement gives way a little along the lane or is made in another way, and if nothing helps, it is
+refused.
 """
 
 from __future__ import annotations
 
+import itertools
 from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from augment.baselines.rule_placer_cones import cones
+from augment.baselines.rule_placer_crash import crash, ways_to_crash
 from augment.baselines.rule_placer_ground import Ground
-from augment.baselines.rule_placer_vehicles import crash, vehicle
+from augment.baselines.rule_placer_jury import Jury, numbered
+from augment.baselines.rule_placer_vehicles import vehicle
 from augment.baselines.rule_placer_walkers import walkers
 from augment.baselines.rule_placer_words import described
 from augment.errors import InstructionNotUnderstood
@@ -46,12 +51,14 @@ class Placement:
     Attributes:
         understood: The parts of the sentence that were read, in its own words.
         ignored: Parts that were read and place nothing.
+        not_understood: Words that were passed over, because they place nothing either way.
         notes: All that in sentences, for a page.
     """
 
     modification: Modification
     understood: tuple[str, ...]
     ignored: tuple[str, ...]
+    not_understood: tuple[str, ...]
     notes: str
 
 
@@ -65,23 +72,22 @@ def place(scene: Scene, instruction: str, *, seed: int = 0) -> Placement:
     intent = parse(instruction)
     rng = np.random.default_rng(seed)
     try:
-        ground = Ground(scene)
+        ground, jury = Ground(scene), Jury(scene)
         added: _Agents = ()
         sentences = []
         for request in intent.requests:
-            agents, distance_m = _fitted(request, ground, added, rng)
+            agents, distance_m = _fitted(request, ground, jury, added, rng)
             added += agents
             sentences.append(
                 described(request, distance_m, across_m=ground.left_of_lane_m(agents[0]))
             )
     except InstructionNotUnderstood as refusal:
-        raise InstructionNotUnderstood(
-            refusal.reason, understood=intent.understood, ignored=intent.ignored
-        ) from refusal
+        raise InstructionNotUnderstood(refusal.reason, understood=intent.understood) from refusal
     return Placement(
-        modification=Modification(added=_numbered(added, scene)),
+        modification=Modification(added=numbered(added, scene)),
         understood=intent.understood,
         ignored=intent.ignored,
+        not_understood=intent.not_understood,
         notes=_notes(sentences, intent),
     )
 
@@ -90,16 +96,17 @@ def place(scene: Scene, instruction: str, *, seed: int = 0) -> Placement:
 
 
 def _fitted(
-    request: Request, ground: Ground, added: _Agents, rng: np.random.Generator
+    request: Request, ground: Ground, jury: Jury, added: _Agents, rng: np.random.Generator
 ) -> tuple[_Agents, float]:
-    """The agents of a request at the first distance near the asked one that fits, and it."""
+    """The agents of a request nearest to the asked distance that the checks pass, and it."""
     spot = request.spot
     asked_m = float(rng.uniform(spot.distance.low_m, spot.distance.high_m))
     sign = 1.0 if spot.relation is Relation.AHEAD else -1.0
     draw = int(rng.integers(2**32))
     tolerance_m = _SHIFT_ABOUT_M if spot.distance.is_approximate else _SHIFT_EXACT_M
     first_problem = ""
-    for shift_m in _shifts(tolerance_m):
+    best: tuple[int, _Agents, float] | None = None
+    for shift_m, way in itertools.product(_shifts(tolerance_m), range(_ways(request))):
         distance_m = asked_m + shift_m
         if spot.distance.is_range and not (
             spot.distance.low_m <= distance_m <= spot.distance.high_m
@@ -107,13 +114,24 @@ def _fitted(
             continue
         again = np.random.default_rng(draw)
         agents = tuple(
-            _rounded(agent) for agent in _made(request, ground, sign * distance_m, again)
+            _rounded(agent) for agent in _made(request, ground, sign * distance_m, again, way)
         )
         problem = _problem(request, ground, sign * distance_m, agents, added)
         if problem is None:
-            return agents, distance_m
-        first_problem = first_problem or problem
+            verdict = jury.verdict(request, added, agents)
+            if verdict.is_clean:
+                return agents, distance_m
+            if verdict.wrong is None and (best is None or verdict.doubts < best[0]):
+                best = verdict.doubts, agents, distance_m
+            problem = verdict.wrong
+        first_problem = first_problem or problem or ""
+    if best is not None:
+        return best[1], best[2]
     raise InstructionNotUnderstood(first_problem)
+
+
+def _ways(request: Request) -> int:
+    return ways_to_crash(request) if isinstance(request, CrashRequest) else 1
 
 
 def _shifts(tolerance_m: float) -> list[float]:
@@ -123,7 +141,7 @@ def _shifts(tolerance_m: float) -> list[float]:
 
 
 def _made(
-    request: Request, ground: Ground, distance_m: float, rng: np.random.Generator
+    request: Request, ground: Ground, distance_m: float, rng: np.random.Generator, way: int
 ) -> _Agents:
     match request:
         case VehicleRequest():
@@ -133,7 +151,7 @@ def _made(
         case ConesRequest():
             return cones(request, ground, distance_m, rng)
         case CrashRequest():
-            return crash(request, ground, distance_m, rng)
+            return crash(request, ground, distance_m, rng, way=way)
 
 
 def _problem(
@@ -145,10 +163,9 @@ def _problem(
             if overlap(_box(agent), _box(other)).depth_m > 0.0:
                 name = "the ego" if other is ground.scene.ego else other.id or "what was added"
                 return f"{abs(distance_m):.1f} m from the ego it would stand in {name}."
-    here = ground.along(distance_m)
     path_m = np.array([point for agent in agents for point in _path(agent)])
     for setting in request.spot.settings:
-        if not ground.fits(here, path_m, setting):
+        if not ground.fits(distance_m, path_m, setting):
             return f"{abs(distance_m):.1f} m from the ego is not {setting}."
     return None
 
@@ -178,19 +195,6 @@ def _rounded(agent: TrafficAgent) -> TrafficAgent:
 
 def _millimetres(length_m: float) -> float:
     return round(length_m, 3) + 0.0  # + 0.0 makes -0.0 a plain zero
-
-
-def _numbered(agents: _Agents, scene: Scene) -> _Agents:
-    """The agents with the ids that follow the highest AgentN of the scene."""
-    numbers = [
-        int(agent.id.removeprefix("Agent"))
-        for agent in scene.everyone
-        if agent.id.removeprefix("Agent").isdecimal()
-    ]
-    first = max(numbers, default=0) + 1
-    return tuple(
-        replace(agent, id=f"Agent{number}") for number, agent in enumerate(agents, start=first)
-    )
 
 
 def _notes(sentences: list[str], intent: Intent) -> str:

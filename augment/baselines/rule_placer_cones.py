@@ -1,4 +1,4 @@
-"""Construction zones of the rule placer: a taper, a line or a ring of cones, and one worker.
+"""Construction zones of the rule placer: a taper, a line, a row or a ring of cones, and a worker.
 
 s runs along the ego's lane from the ego's centre, d to the left of it.
 """
@@ -11,7 +11,14 @@ import numpy as np
 
 from augment.baselines.rule_placer_ground import Ground
 from augment.errors import InstructionNotUnderstood
-from augment.instruction.intent import ConesRequest, LaneChoice, LateralTarget, Shape, Side
+from augment.instruction.intent import (
+    ConesRequest,
+    LaneChoice,
+    LateralTarget,
+    Post,
+    Shape,
+    Side,
+)
 from augment.scene.entities import AgentType, TrafficAgent
 from augment.scene.lane_graph import PlaceOnWay
 from augment.scene.sizes import LENGTH_WIDTH_M
@@ -39,21 +46,13 @@ def cones(
         raise InstructionNotUnderstood(f"Cones {spacing_m:g} m apart would stand in each other.")
     lane = request.spot.lane
     half_lane_m = ground.way(ground.beside(ground.along(distance_m), lane)).width_m / 2.0
-    if request.shape is Shape.RING:
-        places = _ring(distance_m, request.count, spacing_m, half_lane_m - _EDGE_M)
-        worker = (distance_m, 0.0)
-    elif request.shape is Shape.LINE:
-        d_m = _line_side(request, ground) * (half_lane_m - _EDGE_M)
-        places = [(distance_m + index * spacing_m, d_m) for index in range(request.count)]
-        worker = _beside_line(places, ground, lane)
-    else:
-        sign = _sign(request.start or ground.kerb)
-        places = _taper(distance_m, request.count, spacing_m, sign * (half_lane_m - _EDGE_M))
-        worker = _behind_taper(places, sign)
+    edge_m = half_lane_m - _EDGE_M
+    places = _places(request, ground, distance_m, spacing_m, edge_m)
     made = [
         _standing(AgentType.TRAFFIC_CONE, _at(ground, lane, place), ground) for place in places
     ]
     if request.has_worker:
+        worker = _worker(request, ground, places)
         made.append(_standing(AgentType.PEDESTRIAN, _at(ground, lane, worker), ground))
     return tuple(made)
 
@@ -61,11 +60,61 @@ def cones(
 # Private
 
 
-def _taper(start_m: float, count: int, spacing_m: float, from_d_m: float) -> list[Place]:
-    """From one boundary to the other, the neighbours `spacing_m` apart, as slanted as needed."""
+def _places(
+    request: ConesRequest, ground: Ground, distance_m: float, spacing_m: float, edge_m: float
+) -> list[Place]:
+    count = request.count
+    gaps = max(count - 1, 1)
+    along_m = spacing_m if request.reach_m is None else request.reach_m / gaps
+    if along_m < 2.0 * _EDGE_M:
+        raise InstructionNotUnderstood(f"{count} cones have no room on {request.reach_m:g} m.")
+    match request.shape:
+        case Shape.RING:
+            return _ring(distance_m, count, spacing_m, edge_m)
+        case Shape.ROW:
+            first_m = (count - 1) * spacing_m / 2.0
+            return [(distance_m, first_m - index * spacing_m) for index in range(count)]
+        case Shape.LINE:
+            sides = (1.0, -1.0) if request.both_sides else (_line_side(request, ground),)
+            return [
+                (distance_m + index * along_m, side * edge_m)
+                for side in sides
+                for index in range(count)
+            ]
+    from_d_m = _sign(request.start or ground.kerb) * edge_m
+    across_m = abs(from_d_m) if request.ends_in_middle else 2.0 * abs(from_d_m)
+    if request.reach_m is not None:
+        inwards_m = -math.copysign(across_m / gaps, from_d_m)
+        return [(distance_m + i * along_m, from_d_m + i * inwards_m) for i in range(count)]
+    return _taper(distance_m, count, spacing_m, from_d_m, across_m)
+
+
+def _worker(request: ConesRequest, ground: Ground, places: list[Place]) -> Place:
+    """Where the worker stands: as said, else where people stand at such a shape."""
+    if request.shape is Shape.RING:
+        return sum(s for s, _ in places) / len(places), 0.0
+    if request.post is Post.AT_LAST or request.post_side is not None:
+        near = places[-2:] if request.post is Post.AT_LAST else places
+        middle_m = sum(s for s, _ in near) / len(near)
+        d_m = sum(d for _, d in near) / len(near)
+        side = _sign(request.post_side or request.start or ground.kerb)
+        return middle_m, d_m + side * _WORKER_GAP_M
+    if request.shape is Shape.ROW:
+        return places[0][0] + _WORKER_GAP_M, 0.0
+    if request.shape is Shape.TAPER:
+        return _behind_taper(places, _sign(request.start or ground.kerb))
+    if request.post is Post.BEHIND:
+        return places[-1][0] + _WORKER_GAP_M, places[-1][1]
+    return _beside_line(places, ground, request.spot.lane)
+
+
+def _taper(
+    start_m: float, count: int, spacing_m: float, from_d_m: float, whole_m: float
+) -> list[Place]:
+    """Across `whole_m` of the lane, the neighbours `spacing_m` apart, as slanted as needed."""
     if count == 1:
         return [(start_m, from_d_m)]
-    across_m = min(2.0 * abs(from_d_m) / (count - 1), spacing_m)
+    across_m = min(whole_m / (count - 1), spacing_m)
     along_m = math.sqrt(spacing_m**2 - across_m**2)
     inwards_m = -math.copysign(across_m, from_d_m)
     return [(start_m + i * along_m, from_d_m + i * inwards_m) for i in range(count)]

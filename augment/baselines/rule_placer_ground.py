@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,7 +16,15 @@ from augment.errors import InstructionNotUnderstood
 from augment.geometry.angles import difference
 from augment.geometry.frames import Pose
 from augment.instruction.intent import LaneChoice, Setting, Side
-from augment.scene.entities import AreaKind, Lane, LaneConnector, Point, Scene, TrafficAgent
+from augment.scene.entities import (
+    AgentType,
+    AreaKind,
+    Lane,
+    LaneConnector,
+    Point,
+    Scene,
+    TrafficAgent,
+)
 from augment.scene.lane_graph import LaneGraph, PlaceOnWay, Way
 
 _STEP_M = 0.25
@@ -26,6 +35,12 @@ _WIDEST_M = 30.0
 _BESIDE_LANES_M = 4.0
 _ALONG_RAD = math.radians(30.0)
 _ONCOMING_WITHIN_M = 15.0
+_NEAR_M = 10.0
+_BEND_WITHIN_M, _BEND_RAD = 25.0, math.radians(1.5)
+"""Over 50 m of a straight road the direction changes by less."""
+
+_PARKED_WITHIN_M, _STANDS_BELOW_MPS = 12.0, 0.5
+_PARKED_TYPES = frozenset({AgentType.VEHICLE, AgentType.BUS})
 
 
 class Ground:
@@ -120,18 +135,66 @@ class Ground:
             for area in self.scene.areas
         )
 
-    def fits(self, place: PlaceOnWay, path_m: NDArray[np.float64], setting: Setting) -> bool:
-        """Whether a place, and the points (P, 2) walked from there, are in a setting."""
-        if setting is Setting.OFF_CROSSWALK:
-            return not any(self.within((x, y), AreaKind.CROSSWALK) for x, y in path_m)
-        point = (place.pose.x_m, place.pose.y_m)
-        if any(area.kind is AreaKind.INTERSECTION for area in self.scene.areas):
-            inside = self.within(point, AreaKind.INTERSECTION)
-        else:
-            inside = isinstance(self.way(place), LaneConnector)
-        return inside is (setting is Setting.IN_INTERSECTION)
+    def fits(self, distance_m: float, path_m: NDArray[np.float64], setting: Setting) -> bool:
+        """Whether a place along the lane, and the points (P, 2) walked there, are in a setting."""
+        match setting:
+            case Setting.OFF_CROSSWALK:
+                return not self._meets_crosswalk(path_m)
+            case Setting.ON_CROSSWALK:
+                return self._meets_crosswalk(path_m)
+            case Setting.IN_BEND:
+                return self._bends(distance_m)
+            case Setting.IN_INTERSECTION:
+                return self._in_junction(distance_m)
+            case Setting.AT_INTERSECTION:
+                near = (distance_m - _NEAR_M, distance_m, distance_m + _NEAR_M)
+                return any(self._in_junction(one) for one in near)
+            case Setting.BEFORE_INTERSECTION:
+                return not self._crosses_junction(distance_m)
+            case Setting.AFTER_INTERSECTION:
+                past = self._crosses_junction(distance_m)
+                return past and not self._in_junction(distance_m)
+        return self._is_by_parked(distance_m, setting)
 
     # Private
+
+    def _meets_crosswalk(self, path_m: NDArray[np.float64]) -> bool:
+        return any(self.within((x, y), AreaKind.CROSSWALK) for x, y in path_m)
+
+    def _in_junction(self, distance_m: float) -> bool:
+        place = self.graph.along(self._own, self._start_m, distance_m)
+        if place is None:
+            return False
+        if any(area.kind is AreaKind.INTERSECTION for area in self.scene.areas):
+            return self.within((place.pose.x_m, place.pose.y_m), AreaKind.INTERSECTION)
+        return isinstance(self.way(place), LaneConnector)
+
+    def _crosses_junction(self, distance_m: float) -> bool:
+        """Whether an intersection lies between the ego and a place, or at the place."""
+        steps = max(2, int(abs(distance_m)))
+        return any(self._in_junction(float(s)) for s in np.linspace(0.0, distance_m, steps))
+
+    def _bends(self, distance_m: float) -> bool:
+        around = [
+            self.graph.along(self._own, self._start_m, distance_m + step)
+            for step in (-_BEND_WITHIN_M, 0.0, _BEND_WITHIN_M)
+        ]
+        headings = [place.pose.heading_rad for place in around if place is not None]
+        turns = [abs(difference(after, before)) for before, after in pairwise(headings)]
+        return sum(turns) >= _BEND_RAD
+
+    def _is_by_parked(self, distance_m: float, setting: Setting) -> bool:
+        """Whether vehicles stand beside a place on the lane, on the side that is asked for."""
+        pose = self.along(distance_m).pose
+        sides = {Setting.BY_PARKED_LEFT: (1.0,), Setting.BY_PARKED_RIGHT: (-1.0,)}
+        for agent in self.scene.agents:
+            if agent.type not in _PARKED_TYPES or abs(agent.speed_mps) > _STANDS_BELOW_MPS:
+                continue
+            local = pose.pose_to_local(agent.pose)
+            near = math.hypot(local.x_m, local.y_m) <= _PARKED_WITHIN_M
+            if near and math.copysign(1.0, local.y_m) in sides.get(setting, (1.0, -1.0)):
+                return True
+        return False
 
     def _reach(self, distance_m: float) -> tuple[float, str]:
         """How far the lanes run from the ego in the direction of a distance too great."""

@@ -1,13 +1,14 @@
-"""Pedestrians of the rule placer: from one edge of the road straight across to the other."""
+"""Pedestrians of the rule placer: from one edge of the road across to the other."""
 
 from __future__ import annotations
+
+import math
 
 import numpy as np
 
 from augment.baselines.rule_placer_ground import Ground
-from augment.geometry.angles import wrap
 from augment.instruction.intent import Side, WalkRequest
-from augment.scene.entities import AgentType, TrafficAgent
+from augment.scene.entities import AgentType, Point, TrafficAgent
 from augment.scene.sizes import LENGTH_WIDTH_M
 
 WALK_S = 15.0
@@ -23,36 +24,52 @@ _APART_M = 1.2
 def walkers(
     request: WalkRequest, ground: Ground, distance_m: float, rng: np.random.Generator
 ) -> tuple[TrafficAgent, ...]:
-    """The pedestrians, the first at the distance and each further one 1.2 m further on.
+    """The pedestrians: side by side 1.2 m apart along the road, or in a file behind the first.
 
     Raises:
         InstructionNotUnderstood: The lanes end before.
     """
-    del rng  # nothing about a walk is drawn
-    return tuple(
-        _walker(request.start, ground, distance_m + index * _APART_M)
-        for index in range(request.count)
-    )
+    made = []
+    for index in range(request.count):
+        behind_m = 0.0
+        if request.is_file and index > 0:
+            asked = request.behind[index - 1]
+            behind_m = float(rng.uniform(asked.low_m, asked.high_m))
+        along_m = 0.0 if request.is_file else index * _APART_M
+        made.append(_walker(request, ground, distance_m + along_m, behind_m))
+    return tuple(made)
 
 
-def _walker(start: Side, ground: Ground, distance_m: float) -> TrafficAgent:
-    centre = ground.along(distance_m).pose
-    sign = 1.0 if start is Side.LEFT else -1.0
-    from_m = ground.road_edge_m(centre, start) + _BEYOND_EDGE_M
-    to_m = ground.road_edge_m(centre, start.other) + _BEYOND_EDGE_M
-    length_m = min(max(from_m + to_m, SHORTEST_M), LONGEST_M)
-    across_m = np.array([[0.0, sign * from_m], [0.0, sign * (from_m - length_m)]])
-    begin, end = centre.to_parent(across_m)
-    box_length_m, box_width_m = LENGTH_WIDTH_M[AgentType.PEDESTRIAN]
+def _walker(
+    request: WalkRequest, ground: Ground, distance_m: float, behind_m: float
+) -> TrafficAgent:
+    place = ground.along(distance_m)
+    if request.on_road:
+        from_m = ground.way(place).width_m / 4.0
+    else:
+        from_m = ground.road_edge_m(place.pose, request.start) + _BEYOND_EDGE_M
+    arrives = ground.along(distance_m + request.drift_m).pose
+    to_m = ground.road_edge_m(arrives, request.start.other) + _BEYOND_EDGE_M
+    sign = 1.0 if request.start is Side.LEFT else -1.0
+    begin = place.pose.to_parent(np.array([[0.0, sign * (from_m + behind_m)]]))[0]
+    end = arrives.to_parent(np.array([[0.0, -sign * to_m]]))[0]
+    length_m = math.dist(begin, end)
+    walked_m = min(max(length_m, SHORTEST_M), LONGEST_M)
+    end = begin + (end - begin) * (walked_m / length_m)
+    return _made(ground, tuple(begin), tuple(end), request.speed_mps or walked_m / WALK_S)
+
+
+def _made(ground: Ground, begin: Point, end: Point, speed_mps: float) -> TrafficAgent:
+    length_m, width_m = LENGTH_WIDTH_M[AgentType.PEDESTRIAN]
     return TrafficAgent(
         id="",
         type=AgentType.PEDESTRIAN,
         x_m=float(begin[0]),
         y_m=float(begin[1]),
-        heading_rad=wrap(centre.heading_rad - sign * np.pi / 2.0),
-        length_m=box_length_m,
-        width_m=box_width_m,
-        speed_mps=round(length_m / WALK_S, 2),
-        lane_id=None,
+        heading_rad=math.atan2(end[1] - begin[1], end[0] - begin[0]),
+        length_m=length_m,
+        width_m=width_m,
+        speed_mps=round(speed_mps, 2),
+        lane_id=ground.graph.under(float(begin[0]), float(begin[1])),
         walk_to_m=(float(end[0]), float(end[1])),
     )

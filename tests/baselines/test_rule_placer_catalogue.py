@@ -1,14 +1,18 @@
-"""The rule placer on the sentences of the committed catalogue that its grammar understands.
+"""The rule placer on the sentences of the committed catalogue.
 
-The others it has to refuse. Some sentences were written with the grammar in sight, so this shows
+Some sentences were written with the grammar in sight, so this shows
 that nothing broke, not how well it reads free text: docs/catalogue.md has that number."""
 
 from __future__ import annotations
 
+from functools import cache
+
 import pytest
 
-from augment.baselines.rule_placer import place
-from augment.errors import InstructionNotUnderstood
+from augment.baselines.rule_placer import Placement, place
+from augment.checks import Ground, Severity
+from augment.checks.against_intent import judged
+from augment.instruction import parse
 from augment.scene.catalogue import ScenarioType
 from augment.scene.entities import AgentType, TrafficAgent
 from augment.scene.modification import apply
@@ -19,27 +23,29 @@ def of_type(agents: tuple[TrafficAgent, ...], kind: AgentType) -> list[TrafficAg
     return [agent for agent in agents if agent.type is kind]
 
 
-def is_placed(slug: str) -> bool:
-    try:
-        place(shown_scene(slug), entry(slug).instruction)
-    except InstructionNotUnderstood:
-        return False
-    return True
+@cache
+def placed(slug: str) -> Placement:
+    """What the rules make of a scenario, worked out once."""
+    return place(shown_scene(slug), entry(slug).instruction)
 
 
-PLACED = [slug for slug in SLUGS if is_placed(slug)]
+def test_every_scenario_of_the_catalogue_is_placed() -> None:
+    assert [slug for slug in SLUGS if placed(slug).modification.is_empty] == []
 
 
-def test_two_thirds_are_placed_some_of_every_type() -> None:
-    assert len(PLACED) >= 32
-    assert {entry(slug).type for slug in PLACED} == set(ScenarioType)
+@pytest.mark.parametrize("slug", SLUGS)
+def test_the_checks_find_nothing_in_a_placement(slug: str) -> None:
+    entry_ = entry(slug)
+    scene = shown_scene(slug)
+    found = judged(Ground.of(scene), placed(slug).modification, parse(entry_.instruction))
+    assert [one.sentence() for one in found if one.severity is not Severity.FACT] == []
 
 
-@pytest.mark.parametrize("slug", PLACED)
+@pytest.mark.parametrize("slug", SLUGS)
 def test_what_is_understood_is_placed_beside_its_reference(slug: str) -> None:
     reference = entry(slug).reference
     assert reference is not None
-    placement = place(shown_scene(slug), entry(slug).instruction)
+    placement = placed(slug)
     apply(shown_scene(slug), placement.modification)
     made = placement.modification.added
     assert [agent.type for agent in made] == [agent.type for agent in reference.added]
@@ -53,13 +59,17 @@ def test_what_is_understood_is_placed_beside_its_reference(slug: str) -> None:
             assert here.left_m == pytest.approx(there.left_m, abs=1.5)
 
 
-@pytest.mark.parametrize("slug", [slug for slug in PLACED if slug.startswith("jaywalker")])
+@pytest.mark.parametrize("slug", [slug for slug in SLUGS if slug.startswith("jaywalker")])
 def test_walks_begin_and_end_beside_those_of_the_reference(slug: str) -> None:
     reference = entry(slug).reference
     assert reference is not None
-    walkers = place(shown_scene(slug), entry(slug).instruction).modification.added
-    for walker, wanted in zip(walkers, reference.added, strict=True):
+    pairs = zip(
+        of_type(placed(slug).modification.added, AgentType.PEDESTRIAN),
+        of_type(reference.added, AgentType.PEDESTRIAN),
+        strict=True,
+    )
+    for walker, wanted in pairs:
         assert walker.walk_to_m is not None
         assert wanted.walk_to_m is not None
         assert (walker.x_m, walker.y_m) == pytest.approx((wanted.x_m, wanted.y_m), abs=1.5)
-        assert walker.walk_to_m == pytest.approx(wanted.walk_to_m, abs=1.5)
+        assert walker.walk_to_m == pytest.approx(wanted.walk_to_m, abs=2.0)

@@ -1,0 +1,130 @@
+"""How the rule placer places people who cross, cones and crashed cars."""
+
+from __future__ import annotations
+
+import itertools
+import math
+
+import numpy as np
+import pytest
+
+from augment.geometry.boxes import Box, overlap
+from augment.geometry.polyline import Polyline
+from augment.scene.entities import AgentType, Area, AreaKind, Lane
+from tests.baselines.placing import added, refusal
+from tests.scenes import curve, scene
+
+
+@pytest.mark.parametrize(
+    ("text", "start", "end", "heading_rad"),
+    [
+        ("from right to left", (18.0, -2.25), (18.0, 5.75), math.pi / 2),
+        ("from left to right", (18.0, 5.75), (18.0, -2.25), -math.pi / 2),
+    ],
+)
+def test_a_pedestrian_crosses_from_edge_to_edge(
+    text: str, start: tuple[float, float], end: tuple[float, float], heading_rad: float
+) -> None:
+    (walker,) = added(scene(), f"a pedestrian crosses the road {text}, 18 m ahead of the ego")
+    assert walker.type is AgentType.PEDESTRIAN
+    assert walker.walk_to_m is not None
+    assert (walker.x_m, walker.y_m) == pytest.approx(start, abs=0.26)
+    assert walker.walk_to_m == pytest.approx(end, abs=0.26)
+    assert walker.heading_rad == pytest.approx(heading_rad, abs=1e-4)
+    assert walker.speed_mps == pytest.approx(math.dist(start, end) / 15.0, abs=0.03)
+
+
+def test_a_walk_over_a_narrow_road_is_seven_metres_long() -> None:
+    (walker,) = added(curve(), "a jaywalker crosses from left to right 5 m ahead")
+    assert walker.walk_to_m is not None
+    assert math.dist((walker.x_m, walker.y_m), walker.walk_to_m) == pytest.approx(7.0, abs=0.01)
+
+
+def test_a_walk_ends_at_the_egos_road_where_a_side_road_opens() -> None:
+    mouth = Area(
+        id="Area9",
+        kind=AreaKind.DRIVABLE,
+        boundary_m=((10.0, 5.0), (26.0, 5.0), (26.0, 60.0), (10.0, 60.0)),
+    )
+    side_road = Lane(id="Side", centerline=Polyline([(18.0, 60.0), (18.0, 5.0)]), width_m=3.5)
+    road = scene()
+    opened = scene(lanes=(*road.lanes, side_road), areas=(road.areas[0], road.areas[1], mouth))
+    (walker,) = added(opened, "a jaywalker crosses from right to left 18 m ahead of the ego")
+    assert walker.walk_to_m == pytest.approx((18.0, 5.75), abs=0.26)
+
+
+def test_a_parking_lane_belongs_to_the_road() -> None:
+    parking = Area(
+        id="Area9",
+        kind=AreaKind.DRIVABLE,
+        boundary_m=((-50.0, -4.0), (100.0, -4.0), (100.0, -1.75), (-50.0, -1.75)),
+    )
+    wide = scene(areas=(scene().areas[0], parking))
+    (walker,) = added(wide, "a jaywalker crosses from right to left 18 m ahead of the ego")
+    assert walker.y_m == pytest.approx(-4.5, abs=0.26)
+
+
+def test_pedestrians_walk_side_by_side() -> None:
+    walkers = added(scene(), "three pedestrians cross from left to right 18 m ahead")
+    assert [walker.x_m for walker in walkers] == [18.0, 19.2, 20.4]
+    assert [walker.id for walker in walkers] == ["Agent2", "Agent3", "Agent4"]
+
+
+def test_a_taper_closes_the_lane_and_a_worker_stands_behind_it() -> None:
+    *cones, worker = added(
+        scene(),
+        "Add a construction zone: a taper of 6 traffic cones, 2.5 m apart, from the left lane "
+        "boundary towards the right one, the first cone 20 m ahead of the ego.",
+    )
+    gaps = [math.dist((a.x_m, a.y_m), (b.x_m, b.y_m)) for a, b in itertools.pairwise(cones)]
+    assert gaps == pytest.approx([2.5] * 5, abs=0.01)
+    assert (cones[0].x_m, cones[0].y_m, cones[-1].y_m) == (20.0, 1.5, -1.5)
+    assert worker.type is AgentType.PEDESTRIAN
+    assert worker.walk_to_m is None
+    assert 0.8 < min(math.dist((worker.x_m, worker.y_m), (c.x_m, c.y_m)) for c in cones) < 4.0
+
+
+def test_a_line_of_cones_follows_a_curved_boundary() -> None:
+    cones = added(
+        curve(40.0), "a line of 4 cones along the left lane boundary, starting 20 m ahead"
+    )
+    radii = [math.hypot(c.x_m - 10.0, c.y_m - 40.0) for c in cones]
+    assert radii == pytest.approx([38.5] * 4, abs=0.02)
+
+
+@pytest.mark.parametrize(("count", "apart_m"), [(3, 1.5), (8, 2.5), (7, 2.0)])
+def test_a_ring_stays_in_its_lane_and_closes(count: int, apart_m: float) -> None:
+    cones = added(scene(), f"a ring of {count} cones 25 m ahead, {apart_m} m apart")
+    assert max(abs(c.y_m) for c in cones) <= 1.75
+    points = np.array([(c.x_m, c.y_m) for c in cones])
+    gaps = np.hypot(*(points - np.roll(points, 1, axis=0)).T)
+    assert gaps == pytest.approx(apart_m, abs=0.51)
+
+
+@pytest.mark.parametrize("count", [2, 3, 4])
+def test_crashed_cars_touch_at_most_and_leave_little_room(count: int) -> None:
+    cars = added(scene(), f"an accident of {count} cars, the nearest one 25 m ahead of the ego")
+    boxes = [Box(pose=car.pose, length_m=car.length_m, width_m=car.width_m) for car in cars]
+    assert len(cars) == count
+    assert cars[0].x_m == 25.0
+    for i, first in enumerate(boxes):
+        assert all(overlap(first, second).depth_m == 0.0 for second in boxes[i + 1 :])
+    for a, b in itertools.pairwise(cars):
+        assert 3.3 < math.dist((a.x_m, a.y_m), (b.x_m, b.y_m)) < 6.0
+
+
+def test_an_accidents_angle_is_the_one_asked_for() -> None:
+    a, b = added(scene(), "two crashed cars 25 m ahead at an angle of 80 degrees")
+    assert math.degrees(b.heading_rad - a.heading_rad) == pytest.approx(80.0, abs=0.01)
+
+
+def test_away_from_the_crosswalk_is_checked_along_the_whole_walk() -> None:
+    crosswalk = Area(
+        id="Area9",
+        kind=AreaKind.CROSSWALK,
+        boundary_m=((17.0, 2.0), (19.0, 2.0), (19.0, 4.0), (17.0, 4.0)),
+    )
+    marked = scene(areas=(*scene().areas, crosswalk))
+    text = "a jaywalker crosses from right to left {} m ahead, away from the crosswalk"
+    assert "away from the crosswalk" in refusal(marked, text.format(18))
+    assert len(added(marked, text.format(24))) == 1
