@@ -1,0 +1,218 @@
+"""LCTGen-inspired quantised code, without its neural generator: what brackets alone cost.
+
+The rule placer's own placement becomes a code (`quantised_code`), and the code alone is placed
+again: somewhere on the centrelines that it leaves open, drawn by a seed. Everything finer is
+lost, and what is no vehicle has no code at all. It is not LCTGen: that has a trained network
+where this has a draw, and a language model where this has the best code there can be.
+Frame: ego frame.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from augment.baselines import rule_placer
+from augment.baselines.quantised_code import (
+    FURTHEST_M,
+    Code,
+    bins_of,
+    code_of,
+    direction_of,
+    quadrants_of,
+)
+from augment.errors import InstructionNotUnderstood
+from augment.geometry.boxes import Box, overlap
+from augment.geometry.polyline import Polyline
+from augment.instruction.grammar import parse
+from augment.instruction.intent import ConesRequest, WalkRequest
+from augment.scene.entities import AgentType, Scene, TrafficAgent
+from augment.scene.lane_graph import Way
+from augment.scene.modification import Modification
+from augment.scene.sizes import LENGTH_WIDTH_M
+
+BIN_M = {"quantised-5m": 5.0, "quantised-20m": 20.0}
+"""The contestants by their slugs, and how wide a bin of the distance is."""
+
+_STEP_M = 0.5
+_DRAWS = 50
+_UNKNOWN = {WalkRequest: "pedestrians", ConesRequest: "cones"}
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Placement:
+    """What was placed, and from which codes.
+
+    Attributes:
+        notes: The codes in words, and what they could not be held to.
+    """
+
+    modification: Modification
+    codes: tuple[Code, ...]
+    notes: str
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Places:
+    """Points every half metre along all centrelines within reach of a code.
+
+    Attributes:
+        points_m, headings_rad: (P, 2) and (P,), in the direction of travel.
+        way_ids: Of the lane or connector, (P,).
+    """
+
+    points_m: NDArray[np.float64]
+    headings_rad: NDArray[np.float64]
+    way_ids: tuple[str, ...]
+
+
+def place(scene: Scene, instruction: str, *, bin_m: float, seed: int = 0) -> Placement:
+    """Vehicles where their codes allow; the same for the same seed.
+
+    Args:
+        scene: Where.
+        instruction: What is asked for.
+        bin_m: The width of a bin of the distance, 5 or 20 m in LCTGen's prompts.
+        seed: Of the draws.
+
+    Raises:
+        InstructionNotUnderstood: Something that is no vehicle is asked for, the rule placer
+            refuses the instruction, or no place is left.
+    """
+    _refuse_others(instruction)
+    right = rule_placer.place(scene, instruction, seed=seed)
+    vehicles = right.modification.added
+    codes = tuple(code_of(agent, bin_m=bin_m) for agent in vehicles)
+    rng = np.random.default_rng(seed)
+    places = places_of(scene)
+    made: list[TrafficAgent] = []
+    notes = []
+    for agent, code in zip(vehicles, codes, strict=True):
+        allowed, relaxed = allowed_by(code, places, bin_m=bin_m)
+        drawn = _drawn(code, agent.id, places, allowed, (*scene.everyone, *made), rng)
+        notes.append(f"{agent.id}: {code.words(bin_m)}{relaxed}.")
+        if drawn is None:
+            notes.append(f"{agent.id} is left out: no place was free.")
+        else:
+            made.append(drawn)
+    if not made:
+        raise InstructionNotUnderstood(
+            "Every place that the code allows is taken.", understood=right.understood
+        )
+    return Placement(
+        modification=Modification(added=tuple(made)), codes=codes, notes=" ".join(notes)
+    )
+
+
+def places_of(scene: Scene) -> Places:
+    """Where vehicles can be put, whatever the code; every place lies on a centreline.
+
+    Raises:
+        InstructionNotUnderstood: No centreline comes near enough to the ego.
+    """
+    points, headings, ids = [], [], []
+    ways: list[Way] = [*scene.lanes, *scene.connectors]
+    for way in ways:
+        found, turned = _along(way.centerline)
+        near = np.hypot(found[:, 0], found[:, 1]) <= FURTHEST_M
+        points.append(found[near])
+        headings.append(turned[near])
+        ids += [way.id] * int(near.sum())
+    if not ids:
+        raise InstructionNotUnderstood(f"No lane lies within {FURTHEST_M:g} m of the ego.")
+    return Places(
+        points_m=np.vstack(points), headings_rad=np.concatenate(headings), way_ids=tuple(ids)
+    )
+
+
+def allowed_by(code: Code, places: Places, *, bin_m: float) -> tuple[NDArray[np.intp], str]:
+    """Indices of the places that a code leaves open, and in words what had to be given up.
+
+    Given up, until some place is left: the side, the direction, both, all but the bin, and in the
+    end the bin, of which the nearest with a lane counts.
+    """
+    bins = bins_of(places.points_m, bin_m=bin_m)
+    in_bin = bins == code.distance_bin
+    in_quadrant = quadrants_of(places.points_m) == code.quadrant
+    ahead = (places.points_m[:, 0] > 0.0) == code.quadrant.is_front
+    facing = np.array([direction_of(heading) is code.direction for heading in places.headings_rad])
+    for choice, said in (
+        (in_bin & in_quadrant & facing, ""),
+        (in_bin & ahead & facing, ", its side given up"),
+        (in_bin & in_quadrant, ", its direction given up"),
+        (in_bin & ahead, ", its side and direction given up"),
+        (in_bin, ", all but the distance given up"),
+    ):
+        if choice.any():
+            return np.flatnonzero(choice), said
+    gaps = np.abs(bins - code.distance_bin)
+    return np.flatnonzero(gaps == gaps.min()), ", only the nearest bin with a lane kept"
+
+
+# --- Private -----------------------------------------------------------------------------------
+
+
+def _refuse_others(instruction: str) -> None:
+    intent = parse(instruction)
+    asked = [name for kind, name in _UNKNOWN.items() if any(_are(kind, intent.requests))]
+    if asked:
+        raise InstructionNotUnderstood(
+            f"The code knows vehicles alone, and {' and '.join(asked)} are asked for.",
+            understood=intent.understood,
+            ignored=intent.ignored,
+        )
+
+
+def _are(kind: type, requests: Sequence[object]) -> list[bool]:
+    return [isinstance(request, kind) for request in requests]
+
+
+def _along(line: Polyline) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Points (P, 2) every half metre along a line and its headings (P,) there."""
+    at_m = np.arange(_STEP_M / 2.0, line.length_m, _STEP_M)
+    points = np.column_stack([np.interp(at_m, line.stations_m, axis) for axis in line.points_m.T])
+    steps = np.diff(line.points_m, axis=0)
+    piece = np.clip(np.searchsorted(line.stations_m, at_m, side="right") - 1, 0, len(steps) - 1)
+    return points, np.arctan2(steps[piece, 1], steps[piece, 0])
+
+
+def _drawn(
+    code: Code,
+    name: str,
+    places: Places,
+    allowed: NDArray[np.intp],
+    others: Sequence[TrafficAgent],
+    rng: np.random.Generator,
+) -> TrafficAgent | None:
+    """A vehicle at one of the places, None where every draw met somebody else."""
+    length_m, width_m = LENGTH_WIDTH_M[AgentType.VEHICLE]
+    made = TrafficAgent(
+        id=name,
+        type=AgentType.VEHICLE,
+        x_m=0.0,
+        y_m=0.0,
+        heading_rad=0.0,
+        length_m=length_m,
+        width_m=width_m,
+        speed_mps=code.speed_mps,
+    )
+    for _ in range(_DRAWS):
+        index = int(rng.choice(allowed))
+        x_m, y_m = places.points_m[index]
+        made = replace(
+            made,
+            x_m=round(float(x_m), 3),
+            y_m=round(float(y_m), 3),
+            heading_rad=round(float(places.headings_rad[index]), 5),
+            lane_id=places.way_ids[index],
+        )
+        if not any(overlap(_box(made), _box(other)).depth_m > 0.0 for other in others):
+            return made
+    return None
+
+
+def _box(agent: TrafficAgent) -> Box:
+    return Box(pose=agent.pose, length_m=agent.length_m, width_m=agent.width_m)

@@ -1,0 +1,167 @@
+"""Vehicles said in brackets, and what is lost by it."""
+
+from __future__ import annotations
+
+import math
+from collections import defaultdict
+from functools import cache
+from itertools import product
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from augment.baselines import quantised, rule_placer
+from augment.baselines.quantised import allowed_by, places_of
+from augment.baselines.quantised_code import Action, Code, Direction, Quadrant, code_of
+from augment.errors import InstructionNotUnderstood
+from augment.scene.entities import AgentType, TrafficAgent
+from tests.benchmarks.displacement import PLACERS, made, measured
+from tests.fixtures.shelf import SLUGS
+from tests.scenes import scene as street
+
+PARKED = "Park a car in the ego's lane 22 m ahead of the ego."
+SEEDS = 2
+
+
+def vehicle(x_m: float, y_m: float, heading_rad: float = 0.0, speed_mps: float = 0.0) -> Code:
+    agent = TrafficAgent(
+        id="Agent2",
+        type=AgentType.VEHICLE,
+        x_m=x_m,
+        y_m=y_m,
+        heading_rad=heading_rad,
+        width_m=2.0,
+        length_m=4.8,
+        speed_mps=speed_mps,
+    )
+    return code_of(agent, bin_m=5.0)
+
+
+@pytest.mark.parametrize(
+    ("x_m", "y_m", "quadrant"),
+    [
+        (10.0, 1.0, Quadrant.FRONT_LEFT),
+        (-10.0, 1.0, Quadrant.BACK_LEFT),
+        (-10.0, -1.0, Quadrant.BACK_RIGHT),
+        (10.0, -1.0, Quadrant.FRONT_RIGHT),
+        (10.0, 0.0, Quadrant.FRONT_RIGHT),
+    ],
+)
+def test_quadrants_are_counted_as_in_the_prompts(
+    x_m: float, y_m: float, quadrant: Quadrant
+) -> None:
+    assert vehicle(x_m, y_m).quadrant is quadrant
+
+
+@pytest.mark.parametrize(
+    ("x_m", "y_m", "number"),
+    [(4.9, 0.0, 0), (5.0, 0.0, 1), (30.0, 40.0, 10), (71.9, 0.0, 14), (200.0, 0.0, 14)],
+)
+def test_bins_are_of_the_straight_line_up_to_72_m(x_m: float, y_m: float, number: int) -> None:
+    assert vehicle(x_m, y_m).distance_bin == number
+
+
+@pytest.mark.parametrize(
+    ("degrees", "direction"),
+    [
+        (44, Direction.SAME),
+        (-44, Direction.SAME),
+        (46, Direction.ACROSS_TO_LEFT),
+        (-134, Direction.ACROSS_TO_RIGHT),
+        (136, Direction.OPPOSITE),
+        (-179, Direction.OPPOSITE),
+    ],
+)
+def test_directions_are_to_45_degrees(degrees: float, direction: Direction) -> None:
+    assert vehicle(10.0, 0.0, math.radians(degrees)).direction is direction
+
+
+def test_speeds_become_the_middle_of_their_bin_and_none_stays_none() -> None:
+    assert vehicle(10.0, 0.0, speed_mps=6.0).speed_mps == 6.25
+    standing = vehicle(10.0, 0.0)
+    assert (standing.action, standing.speed_mps) == (Action.STOP, 0.0)
+
+
+@given(st.floats(-70.0, 70.0), st.floats(-70.0, 70.0), st.floats(-3.1, 3.1), st.floats(0.0, 19.0))
+def test_nothing_finer_than_the_code_gets_through(
+    x_m: float, y_m: float, heading_rad: float, speed_mps: float
+) -> None:
+    code = vehicle(x_m, y_m, heading_rad, speed_mps)
+    assert 0 <= code.distance_bin <= 14
+    assert abs(code.speed_mps - speed_mps) <= 2.5
+    assert code.words(5.0).startswith(code.quadrant.name.replace("_", " ").lower())
+
+
+@pytest.mark.parametrize("bin_m", [5.0, 20.0])
+def test_it_stands_on_a_centreline_within_its_code(bin_m: float) -> None:
+    scene = street()
+    (right,) = rule_placer.place(scene, PARKED, seed=3).modification.added
+    placed = quantised.place(scene, PARKED, bin_m=bin_m, seed=3)
+    (made,) = placed.modification.added
+    assert made.lane_id is not None
+    lane = next(lane for lane in scene.lanes if lane.id == made.lane_id)
+    assert lane.centerline.project(made.x_m, made.y_m).distance_m < 0.01
+    assert code_of(made, bin_m=bin_m) == code_of(right, bin_m=bin_m) == placed.codes[0]
+    assert (made.length_m, made.width_m, made.type) == (4.8, 2.0, AgentType.VEHICLE)
+
+
+def test_the_seed_alone_decides_where() -> None:
+    def x_m(seed: int) -> float:
+        return quantised.place(street(), PARKED, bin_m=20.0, seed=seed).modification.added[0].x_m
+
+    assert x_m(1) == x_m(1)
+    assert len({x_m(seed) for seed in range(8)}) > 4
+    assert all(20.0 <= x_m(seed) <= 40.0 for seed in range(8))
+
+
+@pytest.mark.parametrize(
+    ("wish", "named"),
+    [
+        ("Add a pedestrian crossing from the left 15 m in front of the ego.", "pedestrians"),
+        ("Set up a construction zone with 6 cones 20 m ahead in the ego's lane.", "cones"),
+    ],
+)
+def test_what_is_no_vehicle_is_refused_by_name(wish: str, named: str) -> None:
+    with pytest.raises(InstructionNotUnderstood, match=f"vehicles alone, and {named} are asked"):
+        quantised.place(street(), wish, bin_m=5.0)
+
+
+def test_what_has_no_place_gives_up_side_and_direction_before_the_distance() -> None:
+    places = places_of(street())
+    code = vehicle(-22.0, 30.0, math.pi / 2.0)
+    allowed, said = allowed_by(code, places, bin_m=5.0)
+    assert said
+    away_m = np.hypot(*places.points_m[allowed].T)
+    assert ((away_m >= 35.0) & (away_m < 40.0)).all()
+
+
+def test_on_an_empty_map_it_refuses() -> None:
+    with pytest.raises(InstructionNotUnderstood):
+        quantised.place(street(lanes=()), PARKED, bin_m=5.0)
+
+
+@cache
+def errors_m() -> dict[str, list[float]]:
+    """By contestant the distances of all it placed, where all three place something."""
+    found: defaultdict[str, list[float]] = defaultdict(list)
+    for slug, seed in product(SLUGS, range(SEEDS)):
+        tried = {}
+        for name, place in PLACERS.items():
+            modification = made(place, slug, seed)
+            if modification is None:
+                break  # the others are not asked for what is not compared
+            tried[name] = modification
+        else:
+            for name, modification in tried.items():
+                found[name] += measured(slug, modification).distances_m
+    return dict(found)
+
+
+def test_finer_brackets_lose_less_and_none_lose_least_over_the_catalogue() -> None:
+    found = errors_m()
+    assert min(len(values) for values in found.values()) > 15 * SEEDS
+    for measure in (np.median, np.mean):
+        fine = measure(found["quantised-5m"])
+        assert measure(found["rule-placer"]) + 0.5 < fine < measure(found["quantised-20m"]) - 0.5
