@@ -3,37 +3,39 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from enum import StrEnum
 
-from augment.checks import Finding, Kind, Severity
+from augment.checks.finding import FaultClass, Finding, Kind
 
+__all__ = ["FaultClass", "first_guess"]
 
-class FaultClass(StrEnum):
-    """The paper's three classes of faults; a modification may have any of them, or none."""
-
-    POSITION = "position"
-    HEADING = "heading"
-    LOGIC = "logic"
-
-
-CLASS_OF = {
-    Kind.EGO_OFFSET: FaultClass.POSITION,
-    Kind.LANE_DISTANCE: FaultClass.POSITION,
-    Kind.LANE: FaultClass.POSITION,
-    Kind.OFF_ROAD: FaultClass.POSITION,
-    Kind.OUTSIDE_MAP: FaultClass.POSITION,
-    Kind.HEADING: FaultClass.HEADING,
-    Kind.DEGREES: FaultClass.HEADING,
-    Kind.WALK_HEADING: FaultClass.HEADING,
-    Kind.LANE_NAMED: FaultClass.LOGIC,
-    Kind.WALK_CROSSING: FaultClass.LOGIC,
-    Kind.OVERLAP: FaultClass.LOGIC,
-    Kind.DUPLICATE: FaultClass.LOGIC,
-    Kind.SIZE: FaultClass.LOGIC,
-    Kind.SPEED: FaultClass.LOGIC,
-}
+_FOLLOWS_PLACE = frozenset(
+    {Kind.OVERLAP, Kind.WALK_CROSSING, Kind.ASKED_CROSSING, Kind.LANE_NAMED}
+)
 
 
 def first_guess(findings: Iterable[Finding]) -> frozenset[FaultClass]:
-    """The classes in which anything was found wrong or doubtful; plain facts say nothing."""
-    return frozenset(CLASS_OF[one.kind] for one in findings if one.severity is not Severity.FACT)
+    """The classes in which something was found wrong or doubtful, by its cause.
+
+    A fault counts once, where it begins. The paper's heading errors are those of agents whose
+    position is about right; so at a wrong place the heading, a contact with somebody who is in
+    the right place and a walk that crosses nothing follow from the place. A contact may
+    also follow from a wrong heading. Two that are both misplaced and overlap do so on their own
+    account.
+    """
+    faults = [one for one in findings if one.is_fault]
+    misplaced = _names(faults, FaultClass.POSITION)
+    turned = {one for one in _names(faults, FaultClass.HEADING) if one not in misplaced}
+    return frozenset(one.fault for one in faults if not _follows(one, misplaced, turned))
+
+
+def _names(faults: Iterable[Finding], fault: FaultClass) -> set[str]:
+    return {name for one in faults if one.fault is fault for name in one.agents}
+
+
+def _follows(finding: Finding, misplaced: set[str], turned: set[str]) -> bool:
+    if finding.fault is FaultClass.HEADING:
+        return bool(finding.agents) and finding.agents[0] in misplaced
+    if finding.kind is Kind.OVERLAP:
+        is_alone = len(misplaced.intersection(finding.agents)) == 1
+        return is_alone or bool(turned.intersection(finding.agents))
+    return finding.kind in _FOLLOWS_PLACE and bool(misplaced.intersection(finding.agents))

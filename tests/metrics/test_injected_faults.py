@@ -1,0 +1,44 @@
+"""The checks name what was done wrong on purpose, and nothing where all is right."""
+
+from __future__ import annotations
+
+import inspect
+
+import pytest
+
+from augment.baselines.simulated_faults import FaultKind
+from augment.checks.against_intent import judged
+from augment.checks.finding import FaultClass
+from tests.benchmarks.injected_faults import Tally, measure, shifted_share
+
+COUNT = 150
+
+
+@pytest.fixture(scope="module")
+def tally() -> Tally:
+    return measure(COUNT, seed=20)
+
+
+@pytest.mark.parametrize("fault", list(FaultClass))
+def test_precision_and_recall_are_above_nine_in_ten(tally: Tally, fault: FaultClass) -> None:
+    assert tally.hits[fault] >= COUNT / 5
+    assert tally.precision(fault) > 0.9
+    assert tally.recall(fault) > 0.9
+
+
+def test_every_kind_takes_part(tally: Tally) -> None:
+    assert set(tally.named) == set(FaultKind)
+
+
+def test_right_placements_are_left_alone(tally: Tally) -> None:
+    assert tally.right == COUNT
+    assert tally.clean >= 0.98 * COUNT
+
+
+def test_a_shift_is_called_a_fault_beyond_the_tolerance_and_not_before() -> None:
+    assert shifted_share(1.0) == 0.0
+    assert shifted_share(4.0) >= 0.98
+
+
+def test_the_checks_are_given_neither_reference_nor_label() -> None:
+    assert list(inspect.signature(judged).parameters) == ["ground", "modification", "intent"]
