@@ -11,7 +11,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import StrEnum
 
-from augment.fake_llm.wire import ChatRequest, SpokenMessage
+from augment.fake_llm.requests import ChatRequest, SpokenMessage
 from augment.prompts.texts import text
 
 _RESULT = text("function_result.md").partition("\n")[0]

@@ -14,8 +14,8 @@ from collections.abc import Sequence
 
 from augment.baselines.rule_placer import place
 from augment.errors import InstructionNotUnderstood
+from augment.fake_llm.requests import ChatRequest
 from augment.fake_llm.sight import Task, agent_of, list_of
-from augment.fake_llm.wire import ChatRequest
 from augment.geometry.angles import difference
 from augment.scene.entities import AgentType, TrafficAgent
 

@@ -13,8 +13,8 @@ from dataclasses import dataclass, field, replace
 from threading import Lock
 
 from augment.fake_llm import careless, playing, probing
-from augment.fake_llm.wire import (
-    ChatRequest,
+from augment.fake_llm.requests import ChatRequest
+from augment.fake_llm.responses import (
     Response,
     as_json,
     completion,

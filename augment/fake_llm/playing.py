@@ -10,8 +10,8 @@ from augment.baselines.rule_placer import place
 from augment.errors import InstructionNotUnderstood
 from augment.fake_llm import answers, careless, judging, tool_use
 from augment.fake_llm.hearing import Heard, Part, heard
+from augment.fake_llm.requests import ChatRequest
 from augment.fake_llm.sight import NothingSeen, Task, list_of, task_of
-from augment.fake_llm.wire import ChatRequest
 from augment.scene.modification import Modification
 
 Calls = tuple[tuple[str, str], ...]

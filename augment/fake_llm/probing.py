@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import re
 
-from augment.fake_llm.wire import ChatRequest
+from augment.fake_llm.requests import ChatRequest
 
 WINDOW_TOKENS = 2048
 """The context window of `fake-cuts-context`."""

@@ -9,7 +9,8 @@ from contextlib import contextmanager
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 
 from augment.fake_llm.models import MODELS, Surroundings, respond
-from augment.fake_llm.wire import BadRequest, Response, as_json, chat_request, error
+from augment.fake_llm.requests import BadRequest, chat_request
+from augment.fake_llm.responses import Response, as_json, error
 
 _LONGEST_BODY = 32_000_000
 

@@ -11,12 +11,13 @@ import math
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from augment.fake_llm.wire import SpokenMessage
+from augment.fake_llm.requests import SpokenMessage
 from augment.geometry.angles import difference
 from augment.geometry.bezier import CubicBezier
 from augment.geometry.frames import Pose
@@ -110,7 +111,9 @@ def smooth(points_m: NDArray[np.float64]) -> Polyline:
     return Polyline(curve)
 
 
+@lru_cache(maxsize=64)
 def _task(text: str) -> Task:
+    """The task in a text; remembered, because a conversation brings it again with every call."""
     agents = [agent_of(name, vector) for name, vector in list_of(text, "Agents").items()]
     lanes = tuple(_lane(name, vector) for name, vector in list_of(text, "Lanes").items())
     widths = {lane.id: lane.width_m for lane in lanes}

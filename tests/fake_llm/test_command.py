@@ -23,9 +23,9 @@ def test_it_says_where_it_listens_and_stops_cleanly(number: signal.Signals) -> N
         line = process.stdout.readline()
         assert "http://127.0.0.1:" in line
         port = int(line.rsplit(":", 1)[1].split("/")[0])
-        socket.create_connection(("127.0.0.1", port), timeout=5).close()
+        socket.create_connection(("127.0.0.1", port), timeout=60).close()
         process.send_signal(number)
-        out, err = process.communicate(timeout=20)
+        out, err = process.communicate(timeout=60)
     assert (process.returncode, err) == (0, "")
     assert "has stopped" in out
 

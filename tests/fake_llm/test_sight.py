@@ -6,8 +6,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from augment.fake_llm.requests import SpokenMessage
 from augment.fake_llm.sight import NothingSeen, smooth, task_of
-from augment.fake_llm.wire import SpokenMessage
 from augment.geometry.polyline import Polyline
 from augment.prompts.fill import modifier_messages
 from augment.scene.entities import Lane, Scene, TrafficSide

@@ -6,10 +6,11 @@ from dataclasses import replace
 import pytest
 
 from augment.fake_llm.png import size_of
-from augment.fake_llm.wire import BadRequest, chat_request, completion, signature_of
+from augment.fake_llm.requests import BadRequest, chat_request, signature_of
+from augment.fake_llm.responses import completion
 from augment.llm.messages import Message, Request, Speaker, Tool, ToolCall, ToolChoice, data_url
-from augment.render.bev import draw_original
 from augment.render.camera import camera_for
+from tests.render.pictures import draw_original
 from tests.scenes import scene
 
 HELLO = {"role": "user", "content": "Hello"}

@@ -8,9 +8,17 @@ import struct
 import numpy as np
 from PIL import Image
 
+from augment.render.bev import draw
 from augment.render.camera import Camera
+from augment.scene.entities import Scene
+from augment.scene.modification import Modification
 
 Pixel = tuple[int, int, int]
+
+
+def draw_original(scene: Scene, camera: Camera) -> bytes:
+    """The scene before any change."""
+    return draw(scene, Modification(), camera)
 
 
 def opened(png: bytes) -> Image.Image:

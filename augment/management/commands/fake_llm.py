@@ -10,6 +10,7 @@ from typing import Any
 
 from django.core.management.base import BaseCommand, CommandError, CommandParser
 
+from augment.fake_llm.models import MODELS
 from augment.fake_llm.server import running
 
 _STOP = (signal.SIGINT, signal.SIGTERM)
@@ -18,7 +19,10 @@ _STOP = (signal.SIGINT, signal.SIGTERM)
 class Command(BaseCommand):
     """Serves /v1/chat/completions without a model, until it is interrupted."""
 
-    help = "Run the stand-in language-model server (OpenAI-compatible, no key needed)."
+    help = (
+        "Run the stand-in language-model server (OpenAI-compatible, no key needed). What it does "
+        f"is chosen by the model: {', '.join(MODELS)}."
+    )
     requires_system_checks = ()
 
     def add_arguments(self, parser: CommandParser) -> None:
