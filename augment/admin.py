@@ -138,7 +138,8 @@ class ContestantAdmin(MadeElsewhere, admin.ModelAdmin):
     list_select_related = ("endpoint",)
     search_fields = ("slug", "name", "model")
     readonly_fields = (
-        *("code", "slug", "kind", "variant", "endpoint", "model", "roles", "created_at"),
+        *("code", "slug", "kind", "variant", "endpoint", "model", "roles", "error_rates"),
+        "created_at",
     )
 
 

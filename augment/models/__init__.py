@@ -4,6 +4,7 @@ Rows are the truth; a Celery message carries one id. Every row that a person can
 a random `code`; primary keys stay inside.
 """
 
+from augment.models.append_only import AppendOnly
 from augment.models.calls import ModelCall, TranscriptNote
 from augment.models.contestants import Contestant
 from augment.models.endpoints import CallLease, Endpoint, EndpointModel
@@ -13,6 +14,7 @@ from augment.models.scenes import SLUG_HELP, BaseScene, Scenario
 
 __all__ = [
     "SLUG_HELP",
+    "AppendOnly",
     "Attempt",
     "Augmentation",
     "BaseScene",

@@ -21,6 +21,7 @@ class Contestant(models.Model):
         RULE = "rule", "Rules"
         BASELINE = "baseline", "Baseline"
         SIMULATED = "simulated", "Simulated"
+        CHECK = "check", "Attention check"
 
     code = models.UUIDField(default=uuid.uuid4, unique=True, editable=False)
     slug = models.SlugField(max_length=80, unique=True, help_text=SLUG_HELP)
@@ -36,6 +37,11 @@ class Contestant(models.Model):
         blank=True,
         help_text='who else plays a role: {"viewer": {"endpoint": label, "model": id}}',
     )
+    error_rates = models.JSONField(
+        null=True,
+        blank=True,
+        help_text='of simulated errors: {"position": 0.1, ...}; null for all others',
+    )
     created_at = models.DateTimeField(auto_now_add=True)
 
     class Meta:
@@ -44,13 +50,20 @@ class Contestant(models.Model):
             models.CheckConstraint(
                 name="contestant_kind_is_known",
                 condition=Q(
-                    kind__in=["reference", "human", "llm", "rule", "baseline", "simulated"]
+                    kind__in=[
+                        *("reference", "human", "llm", "rule", "baseline", "simulated"),
+                        "check",  # nobody to be rated: its pictures are broken on purpose
+                    ]
                 ),
             ),
             models.CheckConstraint(
                 name="contestant_variant_has_endpoint_and_model",
                 condition=Q(variant="", endpoint=None, model="")
                 | (~Q(variant="") & Q(endpoint__isnull=False) & ~Q(model="")),
+            ),
+            models.CheckConstraint(
+                name="contestant_with_error_rates_is_simulated",
+                condition=Q(error_rates__isnull=True) | Q(kind="simulated", endpoint=None),
             ),
         )
 

@@ -154,11 +154,6 @@ class EndpointModel(models.Model):
     def __str__(self) -> str:
         return f"{self.model} at {self.endpoint}"
 
-    @property
-    def is_priced(self) -> bool:
-        """Whether a call's cost is known."""
-        return self.price_in_usd is not None and self.price_out_usd is not None
-
     def clean(self) -> None:
         """A price needs its other half, a date and a source.
 

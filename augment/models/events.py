@@ -7,8 +7,10 @@ from typing import Any
 from django.conf import settings
 from django.db import models
 
+from augment.models.append_only import AppendOnly
 
-class Event(models.Model):
+
+class Event(AppendOnly):
     """One line of the append-only log: who did what to which object, when, before and after."""
 
     actor = models.ForeignKey(
@@ -32,16 +34,6 @@ class Event(models.Model):
 
     def __str__(self) -> str:
         return f"{self.verb} {self.object_kind} {self.object_code}"
-
-    def save(self, *args: Any, **kwargs: Any) -> None:
-        """Insert the line.
-
-        Raises:
-            TypeError: It is stored already; the log is append-only.
-        """
-        if not self._state.adding:
-            raise TypeError("the event log is append-only; a line can't be changed")
-        super().save(*args, **kwargs)
 
     def delete(self, *args: Any, **kwargs: Any) -> tuple[int, dict[str, int]]:
         """Never.

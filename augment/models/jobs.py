@@ -115,6 +115,12 @@ class Augmentation(models.Model):
     modification = models.JSONField(null=True, blank=True)
     notes = models.TextField(blank=True, help_text="what the contestant said about its own work")
     reason = models.TextField(blank=True, help_text="why there is no modification")
+    injected = models.JSONField(
+        null=True,
+        blank=True,
+        help_text='what a simulated contestant did wrong: {"class": ..., "fault": ...}; its true '
+        "label, for analysts alone",
+    )
     image = models.CharField(max_length=120, blank=True, help_text="name in the media storage")
     claim = models.UUIDField(null=True, blank=True, help_text="who works on it right now")
     heartbeat_at = models.DateTimeField(null=True, blank=True)
