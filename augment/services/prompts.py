@@ -6,7 +6,7 @@ from augment.errors import Conflict, UnknownName
 from augment.models import Scenario
 from augment.scene.modification import Modification
 from augment.services.scenes import reference_of, scene_of
-from augment.variants.recipes import recipe
+from augment.variants.recipes import Tools, recipe
 from augment.variants.showing import Shown, roles_of, shown_prompt
 from augment.variants.transcript import ModelRole
 
@@ -24,12 +24,14 @@ def prompt_of(
 
     Raises:
         UnknownName: No such scenario or variant.
-        Conflict: Nobody plays that role in the variant.
+        Conflict: Nobody plays that role in the variant, or it is to call natively and has no tool.
     """
     way = recipe(variant)
     if role not in roles_of(way):
         played = ", ".join(roles_of(way))
         raise Conflict(f"Nobody plays the {role} in {way.slug}; its roles: {played}.")
+    if native_tools and (role is not ModelRole.MODIFIER or way.tools is Tools.NONE):
+        raise Conflict(f"The {role} of {way.slug} calls no function, natively or otherwise.")
     row = Scenario.objects.select_related("base_scene").filter(slug=scenario).first()
     if row is None:
         known = Scenario.objects.values_list("slug", flat=True)

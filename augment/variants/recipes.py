@@ -21,6 +21,7 @@ __all__ = [
     "OTM",
     "PAPER",
     "RECIPES",
+    "SPELLING",
     "TQA",
     "VQA",
     "Keep",
@@ -30,7 +31,11 @@ __all__ = [
     "Review",
     "Tools",
     "recipe",
+    "spelled",
 ]
+
+SPELLING = {"otm": "OTM", "fc": "FC", "tqa": "tQA", "vqa": "vQA", "geo": "geo"}
+"""The variants as the paper spells and orders them, then ours."""
 
 
 class Tools(StrEnum):
@@ -137,3 +142,8 @@ def recipe(name: str) -> Recipe:
         return RECIPES[name.strip().lower()]
     except KeyError:
         raise UnknownName("variant", name, sorted(RECIPES)) from None
+
+
+def spelled(slug: str) -> str:
+    """A variant as people read it: "fc+tqa" is FC+tQA; one that is none of ours stays as it is."""
+    return "+".join(SPELLING.get(part, part) for part in slug.lower().split("+"))

@@ -10,7 +10,7 @@ from functools import partial
 
 from augment.errors import ModelRefused, ReplyUnreadable, ReviewUnusable
 from augment.prompts import fill_review
-from augment.prompts.review import read_ratings
+from augment.prompts.review import RatedReview, read_ratings
 from augment.variants.cast import Asking, Cast
 from augment.variants.recipes import Limits
 from augment.variants.transcript import ModelRole
@@ -45,8 +45,12 @@ def review_text(submission: Submission, cast: Cast, limits: Limits) -> Verdict:
         raise ReviewUnusable(f"the reviewer: {'; '.join(unreadable.problems)}") from unreadable
     except ModelRefused as refused:
         raise ReviewUnusable(f"the reviewer declined: {refused}") from refused
+    return _verdict(review, limits.accepted_from)
+
+
+def _verdict(review: RatedReview, accepted_from: float) -> Verdict:
     ratings = review.ratings
-    accepted = ratings.mean >= limits.accepted_from
+    accepted = ratings.mean >= accepted_from
     return Verdict(
         is_accepted=accepted,
         score=(ratings.mean,),

@@ -2,6 +2,7 @@ from __future__ import annotations
 
 import io
 import re
+from pathlib import Path
 
 import pytest
 from django.core.management import call_command
@@ -42,11 +43,21 @@ def test_the_viewer_gets_a_picture() -> None:
     assert re.search(r"\[a PNG of \d{4,} bytes\]", printed("street-1", "vqa", "--role", "viewer"))
 
 
+def test_the_picture_can_be_kept(tmp_path: Path) -> None:
+    add_scenario("street-1")
+    file = tmp_path / "seen.png"
+    said = printed("street-1", "vqa", "--role", "viewer", "--picture", str(file))
+    assert f"[a PNG of {file.stat().st_size} bytes]" in said
+    assert file.read_bytes().startswith(b"\x89PNG")
+
+
 @pytest.mark.parametrize(
     ("args", "said"),
     [
         (("street-1", "otm", "--role", "viewer"), "Nobody plays the viewer in otm"),
         (("street-1", "zero-shot"), "Unknown variant 'zero-shot'"),
+        (("street-1", "otm", "--native-tools"), "The modifier of otm calls no function"),
+        (("street-1", "otm", "--picture", "out.png"), "Only the viewer is shown a picture"),
         (("nowhere", "otm"), "Unknown scenario 'nowhere'. Known: street-1."),
     ],
 )

@@ -3,18 +3,20 @@
 from __future__ import annotations
 
 from argparse import ArgumentParser
+from pathlib import Path
 from typing import Any
 
 from django.core.management.base import BaseCommand, CommandError
 
 from augment.errors import AugmentError
+from augment.prompts.texts import prompt_version
 from augment.services.prompts import prompt_of
 from augment.variants.showing import Shown
 from augment.variants.transcript import ModelRole
 
 
 class Command(BaseCommand):
-    """prompt SCENARIO VARIANT [--role R] [--native-tools]."""
+    """prompt SCENARIO VARIANT [--role R] [--native-tools] [--picture FILE]."""
 
     help = (
         "Print the exact messages that a variant sends for a scenario, an estimate of their "
@@ -33,6 +35,9 @@ class Command(BaseCommand):
             action="store_true",
             help="as for a model that calls tools natively",
         )
+        parser.add_argument(
+            "--picture", type=Path, metavar="FILE", help="where the viewer's PNG is written"
+        )
 
     def handle(self, *args: Any, **options: Any) -> None:
         """Print the messages, then what is known about them."""
@@ -45,6 +50,9 @@ class Command(BaseCommand):
             )
         except AugmentError as error:
             raise CommandError(str(error)) from error
+        pictures = [png for message in shown.messages for png in message.images]
+        if options["picture"] is not None:
+            self._keep(options["picture"], pictures)
         for message in shown.messages:
             self.stdout.write(f"=== {message.speaker}\n{message.text}\n")
             for png in message.images:
@@ -55,10 +63,19 @@ class Command(BaseCommand):
         for line in _facts(shown):
             self.stdout.write(line)
 
+    def _keep(self, file: Path, pictures: list[bytes]) -> None:
+        if not pictures:
+            raise CommandError("Only the viewer is shown a picture: --role viewer.")
+        try:
+            file.write_bytes(pictures[0])
+        except OSError as error:
+            raise CommandError(f"{file} can't be written: {error.strerror}.") from error
+
 
 def _facts(shown: Shown) -> list[str]:
     images = sum(len(message.images) for message in shown.messages)
     facts = [f"About {shown.tokens} tokens of text" + (f" and {images} picture" * bool(images))]
+    facts.append(f"Prompt version {prompt_version()}")
     if shown.fit is not None:
         fit = shown.fit
         facts.append(
