@@ -130,7 +130,19 @@ class ParameterRefused(ModelFault):
         super().__init__(message, retryable=True, status=status)
 
 
-class EndpointBusy(ModelFault):
+class NotSent(ModelFault):
+    """The request never left this computer: there is nothing to be billed for.
+
+    Args:
+        message: What kept it here.
+        retryable: Whether it may get through later.
+    """
+
+    def __init__(self, message: str, *, retryable: bool = False) -> None:
+        super().__init__(message, retryable=retryable)
+
+
+class EndpointBusy(NotSent):
     """No place was free at the endpoint; nothing was sent. Raise its limits or wait.
 
     Args:
@@ -142,8 +154,7 @@ class EndpointBusy(ModelFault):
         self.endpoint = endpoint
         super().__init__(
             f"no place was free at endpoint {endpoint!r} for {waited_s:g} s: "
-            "raise its limits or run fewer workers",
-            retryable=False,
+            "raise its limits or run fewer workers"
         )
 
 

@@ -2,9 +2,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Protocol
 
 from augment.llm.messages import Reply, Request
+
+Sending = Callable[[], None]
+"""Called once, when a request is about to leave this computer; what it raises keeps it here."""
+
+
+def unwatched() -> None:
+    """For requests that nobody keeps a record of."""
 
 
 class ChatClient(Protocol):
@@ -18,14 +26,19 @@ class ChatClient(Protocol):
         """
         ...
 
-    def complete(self, request: Request) -> Reply:
+    def complete(self, request: Request, *, sending: Sending = unwatched) -> Reply:
         """The answer to this request.
 
         A refusal is a reply (`Reply.refusal`); so is an answer that was cut off.
+
+        Args:
+            request: What is asked.
+            sending: Is called after every wait, right before the request is sent.
 
         Raises:
             ParameterRefused: The endpoint does not take a parameter; `fitted` knows it from now
                 on, if it can do without.
             ModelFault: The wire or the endpoint broke before there was an answer.
+            ClaimLost: Nobody needs the answer any more; nothing was sent.
         """
         ...

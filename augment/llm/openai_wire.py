@@ -8,12 +8,14 @@ from __future__ import annotations
 
 import os
 import time
+from collections.abc import Iterator
 from types import TracebackType
 from typing import TYPE_CHECKING, Self
 from urllib.parse import urlsplit
 
-from augment.errors import InvalidDocument, ModelFault
+from augment.errors import InvalidDocument, ModelFault, NotSent
 from augment.llm.addresses import check_resolved
+from augment.llm.client import Sending, unwatched
 from augment.llm.messages import Reply, Request
 from augment.llm.wire_faults import Secret, fault_of_status, retry_after_s
 from augment.llm.wire_reply import reply_of
@@ -26,6 +28,9 @@ CONNECT_TIMEOUT_S = 10.0
 
 _OPENAI_HOSTS = (".openai.com", ".openai.azure.com")
 _HERE = ("localhost", "127.0.0.1", "::1")
+_NO_CONNECTION = {"ConnectError", "ConnectTimeout", "PoolTimeout"}
+"""Kinds of the package's transport that end before the first byte of a request."""
+
 _KEYLESS = "no-key"
 """Sent where an endpoint needs no key: without one the package would look for OPENAI_API_KEY."""
 
@@ -67,7 +72,7 @@ class OpenAIWire:
         """The request as it is: the wire knows no model."""
         return request
 
-    def complete(self, request: Request) -> Reply:
+    def complete(self, request: Request, *, sending: Sending = unwatched) -> Reply:
         """The endpoint's answer to one request.
 
         Raises:
@@ -76,14 +81,15 @@ class OpenAIWire:
         import openai
 
         document = request.to_document()
+        sending()
         started = time.monotonic()
         try:
             # Typed loosely on purpose: our document is what the wire takes, and is tested so.
             answer: object = self._client.chat.completions.create(**document)  # type: ignore[call-overload]
-        except openai.APITimeoutError:
-            fault = ModelFault("the endpoint took too long to answer", retryable=True)
+        except openai.APITimeoutError as error:
+            fault = _unanswered("the endpoint took too long to answer", error)
         except openai.APIConnectionError as error:
-            fault = ModelFault(f"the connection failed: {_cause(error)}", retryable=True)
+            fault = _unanswered(f"the connection failed: {_cause(error)}", error)
         except openai.APIStatusError as error:
             wait_s = retry_after_s(dict(error.response.headers))
             fault = fault_of_status(error.status_code, error.body, wait_s, sent=document)
@@ -117,7 +123,8 @@ class OpenAIWire:
 def _client(base_url: str, key: str, timeout_s: float) -> openai.OpenAI:
     import openai
 
-    host = (urlsplit(base_url).hostname or "").lower()
+    address = urlsplit(base_url)
+    host = (address.hostname or "").lower()
     foreign = not f".{host}".endswith(_OPENAI_HOSTS)
     headers = dict.fromkeys(("OpenAI-Organization", "OpenAI-Project"), openai.omit)
     return openai.OpenAI(
@@ -131,15 +138,31 @@ def _client(base_url: str, key: str, timeout_s: float) -> openai.OpenAI:
             follow_redirects=False,
             # The environment's proxy can't reach what listens on this computer alone.
             trust_env=host not in _HERE,
+            # Plain HTTP shows no certificate, and loading those to check one by takes longer than
+            # a call on this computer.
+            verify=address.scheme != "http",
         ),
     )
 
 
+def _unanswered(message: str, error: BaseException) -> ModelFault:
+    """The fault of a request that got no answer; one without a connection was not even sent."""
+    if any(type(one).__name__ in _NO_CONNECTION for one in _causes(error)):
+        return NotSent(message, retryable=True)
+    return ModelFault(message, retryable=True)
+
+
+def _causes(error: BaseException) -> Iterator[BaseException]:
+    """The error and what led to it, the innermost last."""
+    inner: BaseException | None = error
+    while inner is not None:
+        yield inner
+        inner = inner.__cause__ or inner.__context__
+
+
 def _cause(error: BaseException) -> str:
     """The kind of the innermost fault; its text may hold parts of the request."""
-    inner = error
-    while (deeper := inner.__cause__ or inner.__context__) is not None:
-        inner = deeper
+    *_, inner = _causes(error)
     if isinstance(inner, OSError) and inner.strerror:
         return inner.strerror
     return type(inner).__name__

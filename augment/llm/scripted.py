@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 
 from augment.errors import ModelFault
+from augment.llm.client import Sending, unwatched
 from augment.llm.messages import Reply, Request
 
 
@@ -27,13 +28,14 @@ class ScriptedClient:
         """The request as it is: a script takes everything."""
         return request
 
-    def complete(self, request: Request) -> Reply:
+    def complete(self, request: Request, *, sending: Sending = unwatched) -> Reply:
         """The next answer of the script.
 
         Raises:
             ModelFault: The script says so here.
             ScriptRanOut: There is no further answer.
         """
+        sending()
         self.requests.append(request)
         if len(self.requests) > len(self._answers):
             raise ScriptRanOut(f"the script has {len(self._answers)} answers and no more")

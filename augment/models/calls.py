@@ -16,7 +16,7 @@ class ModelCall(models.Model):
 
     Unknown is null, never zero. A call with `served_from` was answered from the store: it costs
     nothing and counts for nothing. Until `settled_at` the call is in flight, and the reservation
-    is part of its job's.
+    is part of its job's. Before `sent_at` nothing of it has left this computer.
     """
 
     code = models.UUIDField(default=uuid.uuid4, unique=True, editable=False)
@@ -39,7 +39,10 @@ class ModelCall(models.Model):
     prompt_version = models.CharField(max_length=64, blank=True)
     prompt_tokens = models.PositiveIntegerField(null=True, blank=True)
     completion_tokens = models.PositiveIntegerField(null=True, blank=True)
-    started_at = models.DateTimeField()
+    started_at = models.DateTimeField(help_text="room was reserved, the wait for a place began")
+    sent_at = models.DateTimeField(
+        null=True, blank=True, help_text="null while it waits, and for ever where it was not sent"
+    )
     latency_s = models.FloatField(null=True, blank=True)
     reserved_tokens = models.PositiveBigIntegerField(default=0)
     reserved_nano_usd = models.PositiveBigIntegerField(null=True, blank=True)

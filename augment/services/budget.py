@@ -3,8 +3,8 @@
     spent + reserved + worst case <= cap
 
 holds for every cap whenever a call is sent, with any number of workers: the database compares and
-adds in one statement. A call that ends moves its reservation into what is spent; one that nobody
-saw the end of counts with its worst case.
+adds in one statement. A call that ends moves its reservation into what is spent. One that nobody
+saw the end of counts with its worst case if it was sent, and for nothing if it was not.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from typing import Any
 from django.db import transaction
 from django.db.models import F, Q
 
-from augment.errors import Conflict, EndpointBusy, ModelFault
+from augment.errors import Conflict, ModelFault, NotSent
 from augment.llm.costs import Price, WorstCase, usd_of
 from augment.llm.messages import Reply
 from augment.models import GenerationJob, ModelCall
@@ -27,7 +27,7 @@ State = GenerationJob.State
 
 _COUNTED = (
     *("reserved_tokens", "reserved_nano_usd"),
-    *("spent_tokens", "cost_nano_usd", "settled_at"),
+    *("spent_tokens", "cost_nano_usd", "settled_at", "sent_at"),
 )
 
 
@@ -46,11 +46,16 @@ class Used:
     Attributes:
         nano_usd: None where the price is unknown.
         is_estimated: Whether the worst case stands in for what nobody knows.
+        calls: 1, or 0 where nothing was sent.
     """
 
     tokens: int
     nano_usd: int | None
     is_estimated: bool
+    calls: int = 1
+
+
+_NOTHING = Used(tokens=0, nano_usd=0, is_estimated=False, calls=0)
 
 
 @transaction.atomic(savepoint=False)
@@ -93,7 +98,7 @@ def settle(
 ) -> None:
     """Turn a call's reservation into what it used, and store the columns of its answer with it.
 
-    A call that was settled with its worst case, because its worker was thought dead, is corrected.
+    A call that was settled because its worker was thought dead is corrected.
     """
     # Not the request and the answer, which are long.
     call = ModelCall.objects.select_for_update().only("attempt_id", *_COUNTED).get(pk=call_pk)
@@ -104,12 +109,14 @@ def settle(
             reserved_calls=F("reserved_calls") - 1,
             reserved_tokens=F("reserved_tokens") - call.reserved_tokens,
             spent_nano_usd=F("spent_nano_usd") + (used.nano_usd or 0),
-            spent_calls=F("spent_calls") + 1,
+            spent_calls=F("spent_calls") + used.calls,
             spent_tokens=F("spent_tokens") + used.tokens,
         )
     else:
+        counted = _used_unseen(call).calls
         job.update(
             spent_nano_usd=F("spent_nano_usd") + (used.nano_usd or 0) - (call.cost_nano_usd or 0),
+            spent_calls=F("spent_calls") + used.calls - counted,
             spent_tokens=F("spent_tokens") + used.tokens - (call.spent_tokens or 0),
         )
     ModelCall.objects.filter(pk=call_pk).update(
@@ -127,22 +134,24 @@ def settle_unseen(
 ) -> int:
     """Settle the calls in flight of an attempt, or of a row, that nobody will see the end of.
 
-    They may have been answered and billed, so their worst case counts.
+    What was sent may have been answered and billed, so its worst case counts. What still waited
+    for its place was not sent, and can't be any more: see `RowTranscript.sending`.
 
     Returns:
         How many there were.
     """
-    calls = ModelCall.objects.filter(settled_at=None)
+    # Locked, so that none is sent between the look at it and its settlement.
+    calls = ModelCall.objects.select_for_update(of=("self",)).filter(settled_at=None)
     if attempt_pk is not None:
         calls = calls.filter(attempt=attempt_pk)
     else:
         calls = calls.filter(attempt__augmentation=row_pk)
     unseen = list(calls.only(*_COUNTED))
     for call in unseen:
-        used = Used(
-            tokens=call.reserved_tokens, nano_usd=call.reserved_nano_usd, is_estimated=True
-        )
-        settle(call_pk=call.pk, used=used, now=now)
+        fault = "nobody saw the end: its worker stopped"
+        if call.sent_at is None:
+            fault = "not sent: its worker stopped while it waited for a place"
+        settle(call_pk=call.pk, used=_used_unseen(call), now=now, answer={"fault": fault})
     return len(unseen)
 
 
@@ -166,8 +175,9 @@ def used_by_fault(fault: ModelFault, *, worst: WorstCase, price: Price | None) -
     An endpoint that answers with an error, or was not asked at all, bills nothing. A time-out, a
     broken connection or an answer that is none may be billed all the same.
     """
-    was_sent = not isinstance(fault, EndpointBusy)
-    if not was_sent or (fault.status is not None and fault.status >= 400):
+    if isinstance(fault, NotSent):
+        return _NOTHING
+    if fault.status is not None and fault.status >= 400:
         return Used(tokens=0, nano_usd=0, is_estimated=False)
     return Used(tokens=worst.tokens, nano_usd=worst.nano_usd(price), is_estimated=True)
 
@@ -185,6 +195,13 @@ def limit_of(job: GenerationJob) -> str:
 
 
 # --- Private -----------------------------------------------------------------------------------
+
+
+def _used_unseen(call: ModelCall) -> Used:
+    """What counts for a call that nobody saw the end of."""
+    if call.sent_at is None:
+        return _NOTHING
+    return Used(tokens=call.reserved_tokens, nano_usd=call.reserved_nano_usd, is_estimated=True)
 
 
 def _within_caps(worst: WorstCase, nano_usd: int | None, *, with_reserved: bool) -> Q:

@@ -115,6 +115,11 @@ def keep_modification(*, held: Claim, modification: dict[str, Any], notes: str) 
     )
 
 
+def note_injected(*, held: Claim, injected: dict[str, str]) -> bool:
+    """Store the true label of a simulated answer; False when the claim is lost."""
+    return bool(_row_of(held).update(injected=injected))
+
+
 @transaction.atomic
 def settle(*, held: Claim, settlement: Settlement, now: datetime) -> bool:
     """Write the outcome and close the attempt.

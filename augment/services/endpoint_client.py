@@ -7,6 +7,7 @@ from types import TracebackType
 from typing import Self
 
 from augment.errors import ParameterRefused
+from augment.llm.client import Sending, unwatched
 from augment.llm.messages import Reply, Request
 from augment.llm.openai_wire import OpenAIWire
 from augment.llm.profile import Profile
@@ -40,17 +41,18 @@ class EndpointClient:
         """
         return self._profile(request.model).fitted(request)
 
-    def complete(self, request: Request) -> Reply:
+    def complete(self, request: Request, *, sending: Sending = unwatched) -> Reply:
         """The endpoint's answer, after waiting for a place.
 
         Raises:
             ParameterRefused: A parameter is not taken; it is left out from now on.
             EndpointBusy: There was no place.
             ModelFault: There was no answer.
+            ClaimLost: Nobody needs the answer any more; nothing was sent.
         """
         try:
             with place_at(self._endpoint, self._queue):
-                return self._wire.complete(request)
+                return self._wire.complete(request, sending=sending)
         except ParameterRefused as refused:
             self._learn(request.model, refused)
             raise

@@ -29,7 +29,8 @@ def transcript_of(augmentation: Augmentation) -> dict[str, Any]:
             "state": augmentation.state,
             "reason": augmentation.reason,
             "notes": augmentation.notes,
-            "modification": augmentation.modification,
+            "modification": _same_order(augmentation.modification),
+            "injected": _same_order(augmentation.injected),
             "seed": seed_of(scenario.slug),
             "created_at": _time(augmentation.created_at),
             "finished_at": _time(augmentation.finished_at),
@@ -58,7 +59,7 @@ def _contestant(contestant: Contestant) -> dict[str, Any]:
         "kind": contestant.kind,
         "variant": contestant.variant or None,
         "model": contestant.model or None,
-        "roles": contestant.roles,
+        "roles": _same_order(contestant.roles),
         "endpoint": None
         if endpoint is None
         else {
@@ -99,7 +100,7 @@ def _step(step: Step) -> dict[str, Any]:
     if step.call is not None:
         return _call(step.call)
     assert step.note is not None
-    return {"kind": step.note.kind, "document": step.note.document}
+    return {"kind": step.note.kind, "document": _same_order(step.note.document)}
 
 
 def _call(call: ModelCall) -> dict[str, Any]:
@@ -110,12 +111,12 @@ def _call(call: ModelCall) -> dict[str, Any]:
         "number": call.number,
         "role": call.role,
         "prompt_version": call.prompt_version,
-        "request": call.request,
+        "request": _same_order(call.request),
         "request_hash": call.request_hash,
         "served_from": None if source is None else str(source.code),
         "answer": call.answer,
         "refusal": call.refusal,
-        "extras": call.extras,
+        "extras": _same_order(call.extras),
         "fault": call.fault or None,
         "model_returned": call.model_returned or None,
         "finish_reason": call.finish_reason or None,
@@ -125,6 +126,7 @@ def _call(call: ModelCall) -> dict[str, Any]:
         "cost_usd": _money(call.cost_usd),
         "is_cost_estimated": call.is_cost_estimated,
         "started_at": _time(call.started_at),
+        "sent_at": _time(call.sent_at),
         "latency_s": call.latency_s,
     }
 
@@ -141,6 +143,15 @@ def _image(name: str) -> str | None:
         return None
     with default_storage.open(name) as file:
         return base64.b64encode(file.read()).decode("ascii")
+
+
+def _same_order(stored: Any) -> Any:
+    """A stored document with sorted keys: PostgreSQL keeps them in an order of its own."""
+    if isinstance(stored, dict):
+        return {name: _same_order(stored[name]) for name in sorted(stored)}
+    if isinstance(stored, list):
+        return [_same_order(one) for one in stored]
+    return stored
 
 
 def _time(at: datetime | None) -> str | None:

@@ -6,6 +6,7 @@ import json
 from collections.abc import Iterator
 from dataclasses import dataclass
 from decimal import Decimal
+from textwrap import indent
 from typing import Any
 
 from django.db.models import Prefetch
@@ -59,8 +60,10 @@ class Step:
 
     @property
     def note_text(self) -> str:
-        """The note's document, to be read."""
-        return "" if self.note is None else _pretty(self.note.document)
+        """The note's document, to be read: a line for each part, texts as they are."""
+        if self.note is None:
+            return ""
+        return "\n".join(_line(name, part) for name, part in self.note.document.items())
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -102,13 +105,13 @@ def tries_of(augmentation: Augmentation) -> list[Try]:
 def totals_of(tries: list[Try]) -> Totals:
     """The sums over all attempts."""
     calls = [step.call for one in tries for step in one.steps if step.call is not None]
-    paid = [call for call in calls if not call.is_cached]
+    paid = [call for call in calls if call.sent_at is not None]
     answered = [call for call in paid if call.answer is not None]
     costs = [call.cost_usd for call in paid]
     known = [cost for cost in costs if cost is not None]
     return Totals(
         calls=len(paid),
-        cached=len(calls) - len(paid),
+        cached=sum(call.is_cached for call in calls),
         prompt_tokens=_sum([call.prompt_tokens for call in answered]),
         completion_tokens=_sum([call.completion_tokens for call in answered]),
         spent_tokens=sum(call.spent_tokens or 0 for call in paid),
@@ -158,6 +161,11 @@ def _message(message: dict[str, Any]) -> SaidMessage:
 def _sum(counts: list[int | None]) -> int | None:
     known = [count for count in counts if count is not None]
     return sum(known) if len(known) == len(counts) else None
+
+
+def _line(name: str, part: object) -> str:
+    text = part if isinstance(part, str) else _pretty(part)
+    return f"{name}:\n{indent(text, '  ')}" if "\n" in text else f"{name}: {text}"
 
 
 def _pretty(document: object) -> str:

@@ -14,7 +14,7 @@ from typing import Any
 from django.db import transaction
 from django.utils import timezone
 
-from augment.errors import BudgetSpent, ClaimLost, ModelFault
+from augment.errors import BudgetSpent, ClaimLost, ModelFault, NotSent
 from augment.llm.costs import Price, WorstCase, worst_case
 from augment.llm.fingerprint import image_reference, request_hash
 from augment.llm.messages import Reply, Request
@@ -128,6 +128,16 @@ class RowTranscript:
             self._sleep(wait_s)
             wait_s = min(1.5 * wait_s, LONGEST_WAIT_S)
 
+    def sending(self, number: int) -> None:
+        """Store that the call is sent now; from here on it may be billed.
+
+        Raises:
+            ClaimLost: Somebody took the row over and settled the call as one that never was.
+        """
+        call = ModelCall.objects.filter(pk=self._open[number].pk, settled_at=None)
+        if not call.update(sent_at=timezone.now()):
+            raise ClaimLost(f"attempt {self._held.attempt_number} has lost its row")
+
     def answered(self, number: int, reply: Reply, fault: ModelFault | None = None) -> None:
         """Store the raw answer to that call and what it used.
 
@@ -136,15 +146,17 @@ class RowTranscript:
         call = self._open.pop(number)
         used = budget.used_by_reply(reply, worst=call.worst, price=call.price)
         answer = answers.columns_of(reply)
-        if fault is not None:
-            answer["fault"] = storable(sentence_of(fault))
+        # Also where there is none: the worker may have been thought dead meanwhile.
+        answer["fault"] = "" if fault is None else storable(sentence_of(fault))
         budget.settle(call_pk=call.pk, used=used, now=timezone.now(), answer=answer)
 
     def broke(self, number: int, fault: ModelFault) -> None:
         """Store why there was no answer to that call, and what it may have used."""
         call = self._open.pop(number)
         used = budget.used_by_fault(fault, worst=call.worst, price=call.price)
-        broken = {"fault": storable(sentence_of(fault))}
+        broken: dict[str, Any] = {"fault": storable(sentence_of(fault))}
+        if isinstance(fault, NotSent):
+            broken["sent_at"] = None
         budget.settle(call_pk=call.pk, used=used, now=timezone.now(), answer=broken)
 
     def note(self, kind: NoteKind, document: dict[str, object]) -> None:

@@ -45,6 +45,14 @@ class Transcript(Protocol):
         """Note that this request is about to be sent; returns the number of the call."""
         ...
 
+    def sending(self, number: int) -> None:
+        """Note that this call leaves the computer now, after every wait.
+
+        Raises:
+            ClaimLost: Nobody needs the answer any more; it is not to be sent.
+        """
+        ...
+
     def answered(self, number: int, reply: Reply, fault: ModelFault | None = None) -> None:
         """Keep the raw answer to that call, and what shows that it is none to rely on."""
         ...
@@ -97,6 +105,9 @@ class MemoryTranscript:
             RecordedCall(number=number, role=role, request=request, prompt_version=prompt_version)
         )
         return number
+
+    def sending(self, number: int) -> None:
+        """Nothing: whoever keeps this record is alive to see the end of the call."""
 
     def answered(self, number: int, reply: Reply, fault: ModelFault | None = None) -> None:
         """Keep the answer to that call."""

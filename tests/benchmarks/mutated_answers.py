@@ -17,9 +17,11 @@ import sys
 import time
 from collections import Counter
 from collections.abc import Sequence
+from functools import lru_cache
 
 from augment.fake_llm.playing import GOOD, LEARNING, Character
-from augment.fake_llm.wire import chat_request
+from augment.fake_llm.requests import chat_request
+from augment.llm.client import Sending, unwatched
 from augment.llm.messages import Reply, Request
 from augment.llm.patience import Patience
 from augment.variants.pipeline import Outcome, run
@@ -56,7 +58,8 @@ class Answering:
     def fitted(self, request: Request) -> Request:
         return request
 
-    def complete(self, request: Request) -> Reply:
+    def complete(self, request: Request, *, sending: Sending = unwatched) -> Reply:
+        sending()
         text = _right_answer(self._character, request)
         first, later = len(self._given) == self._spoilt, len(self._given) > self._spoilt
         if first or (later and self._rng.random() < 0.6):
@@ -113,6 +116,8 @@ def main(count: int, first: int = 0) -> int:
             print(f"run {number}: {type(error).__name__}: {error}")
         else:
             outcomes[f"{outcome.status}, accepted: {outcome.is_accepted}"] += 1
+        if (number + 1) % 1000 == 0:
+            print(f"{number + 1 - first} runs, {crashes} crashes so far", flush=True)
     for name, times in outcomes.most_common():
         print(f"{times:>7}  {name}")
     print(f"{count} runs, {crashes} crashes, {time.perf_counter() - began:.0f} s")
@@ -120,9 +125,17 @@ def main(count: int, first: int = 0) -> int:
 
 
 def _right_answer(character: Character, request: Request) -> str:
-    document = request.to_document()
     # As the wire would carry it; a lone half of a character is none that JSON can't carry.
-    return character.answer(chat_request(json.dumps(document).encode())).text
+    return _said(character, json.dumps(request.to_document()).encode())
+
+
+@lru_cache(maxsize=2000)
+def _said(character: Character, body: bytes) -> str:
+    """The stand-in answers the same body the same way: of many runs it is asked once.
+
+    What reads the answer is asked every time.
+    """
+    return character.answer(chat_request(body)).text
 
 
 if __name__ == "__main__":

@@ -9,7 +9,7 @@ from datetime import date
 from decimal import Decimal
 
 from augment.errors import ModelFault
-from augment.llm.client import ChatClient
+from augment.llm.client import ChatClient, Sending, unwatched
 from augment.llm.messages import Reply, Request
 from augment.models import Contestant, Endpoint, EndpointModel, GenerationJob
 from augment.services import jobs
@@ -46,6 +46,7 @@ class Model:
     Args:
         answer: What it answers, or the fault that it breaks with.
         looking_on: Is called while a call is in flight.
+        waiting: Is called before it, while the call waits for its place.
     """
 
     def __init__(
@@ -53,16 +54,20 @@ class Model:
         answer: Answer | ModelFault | None = None,
         *,
         looking_on: Callable[[], None] = lambda: None,
+        waiting: Callable[[], None] = lambda: None,
     ) -> None:
         self.requests: list[Request] = []
         self._answer = answer or (lambda request: reply())
         self._looking_on = looking_on
+        self._waiting = waiting
         self._lock = threading.Lock()
 
     def fitted(self, request: Request) -> Request:
         return request
 
-    def complete(self, request: Request) -> Reply:
+    def complete(self, request: Request, *, sending: Sending = unwatched) -> Reply:
+        self._waiting()
+        sending()
         with self._lock:
             self.requests.append(request)
         self._looking_on()

@@ -8,15 +8,16 @@ from decimal import Decimal
 import pytest
 from django.utils import timezone
 
-from augment.errors import Conflict, EndpointBusy, ModelFault
+from augment.errors import ClaimLost, EndpointBusy, ModelFault, NotSent
 from augment.llm.costs import Price, WorstCase
 from augment.llm.messages import Reply
 from augment.models import Augmentation, EndpointModel, Event, GenerationJob, ModelCall
 from augment.services import budget, caps, claims, jobs, runner
 from augment.services.budget import Room
 from augment.services.caps import Caps
-from tests.jobs.models import Model, add_llama, after_a_second_look, llama_job, reply
-from tests.jobs.rows import NOON, STALE, add_scenario, launch, only_row
+from augment.services.job_costs import costs_of
+from tests.jobs.models import Model, after_a_second_look, llama_job, reply
+from tests.jobs.rows import NOON, STALE, launch, only_row
 from tests.variants.answers import GOOD
 
 pytestmark = pytest.mark.django_db
@@ -69,7 +70,6 @@ def test_unknown_usage_counts_with_its_worst_case_and_says_so() -> None:
         (ModelFault("upstream broke", retryable=False, status=500), False),
         (ModelFault("too slow", retryable=False), True),
         (ModelFault("no choice", retryable=False, status=200), True),
-        (EndpointBusy("local", 1800.0), False),
     ],
 )
 def test_a_fault_counts_where_it_may_be_billed(fault: ModelFault, is_billed: bool) -> None:
@@ -80,6 +80,58 @@ def test_a_fault_counts_where_it_may_be_billed(fault: ModelFault, is_billed: boo
     assert call.is_cost_estimated == is_billed
     assert job.spent_calls == 1
     assert job.reserved_calls == job.reserved_tokens == 0
+
+
+def test_a_call_that_found_no_place_counts_nothing() -> None:
+    job = llama_job(price="1", caps=Caps(usd=Decimal(1)))
+    row = ran(job, Model(EndpointBusy("local", 1800.0)))
+    assert row.state == ROW.FAILED
+    assert_nothing_is_counted(job)
+
+
+def test_an_endpoint_that_is_down_uses_up_no_cap() -> None:
+    job = llama_job(price="1", caps=Caps(calls=1))
+    row = ran(job, Model(NotSent("the connection failed: Connection refused")))
+    assert row.state == ROW.FAILED
+    assert_nothing_is_counted(job)
+    assert ModelCall.objects.get().sent_at is None
+
+
+def test_a_fault_that_is_free_makes_no_sum_of_unknown_prices() -> None:
+    job = llama_job()
+    ran(job, Model(ModelFault("no such model", retryable=False, status=404)))
+    assert not costs_of(job).is_money_unknown
+    jobs.retry_failed(job)
+    ran(job)
+    costs = costs_of(job)
+    assert (costs.paid, costs.unpriced, costs.is_money_unknown) == (2, 1, True)
+
+
+@pytest.mark.parametrize("queue_finds_out", [True, False])
+def test_a_claim_that_is_lost_before_a_call_is_sent_costs_nothing(queue_finds_out: bool) -> None:
+    job = llama_job(price="1", caps=Caps(usd=Decimal(1)))
+    row = only_row(job)
+
+    def lose_the_claim() -> None:
+        """Another worker takes the row while the call waits for its place."""
+        claims.requeue_stale(now=timezone.now() + 2 * STALE, older_than=STALE)
+        assert_nothing_is_counted(job)
+        if queue_finds_out:
+            raise ClaimLost("attempt 1 has lost its row")
+
+    model = Model(waiting=lose_the_claim)
+    assert ran(job, model).state == ROW.QUEUED
+    assert model.requests == []
+    assert_nothing_is_counted(job)
+    call = ModelCall.objects.get(attempt__augmentation=row)
+    assert (call.sent_at, call.cost_usd, call.is_cost_estimated) == (None, Decimal(0), False)
+    assert call.fault == "not sent: attempt 1 has lost its row"
+
+
+def assert_nothing_is_counted(job: GenerationJob) -> None:
+    job.refresh_from_db()
+    assert (job.spent_calls, job.spent_tokens, job.spent_nano_usd) == (0, 0, 0)
+    assert (job.reserved_calls, job.reserved_tokens, job.reserved_nano_usd) == (0, 0, 0)
 
 
 def test_each_attempt_at_a_request_is_a_reservation_of_its_own() -> None:
@@ -171,7 +223,24 @@ def test_a_call_of_a_dead_worker_counts_with_its_worst_case() -> None:
     job.refresh_from_db()
     assert (job.reserved_calls, job.spent_calls) == (0, 1)
     assert (job.spent_tokens, job.spent_nano_usd) == (1000, 1_000_000)
-    assert ModelCall.objects.get().is_cost_estimated
+    call = ModelCall.objects.get()
+    assert call.is_cost_estimated
+    assert call.fault == "nobody saw the end: its worker stopped"
+
+
+def test_a_call_that_waited_when_its_worker_died_counts_nothing() -> None:
+    job = llama_job(price="1")
+    held = claims.claim(
+        augmentation_pk=only_row(job).pk, now=timezone.now() - timedelta(minutes=1)
+    )
+    assert held is not None
+    in_flight(job, held, is_sent=False)
+    claims.requeue_stale(now=timezone.now(), older_than=STALE)
+    assert_nothing_is_counted(job)
+    call = ModelCall.objects.get()
+    assert (call.cost_usd, call.spent_tokens, call.is_cost_estimated) == (Decimal(0), 0, False)
+    assert call.fault == "not sent: its worker stopped while it waited for a place"
+    assert costs_of(job).paid == 0
 
 
 def test_a_worker_that_was_only_slow_corrects_what_its_call_used() -> None:
@@ -188,7 +257,7 @@ def test_a_worker_that_was_only_slow_corrects_what_its_call_used() -> None:
     assert (job.reserved_calls, job.reserved_tokens) == (0, 0)
 
 
-def in_flight(job: GenerationJob, held: claims.Claim) -> ModelCall:
+def in_flight(job: GenerationJob, held: claims.Claim, *, is_sent: bool = True) -> ModelCall:
     assert budget.reserve(job_pk=job.pk, worst=WORST, price=ONE_USD) == Room.TAKEN
     return ModelCall.objects.create(
         attempt_id=held.attempt_pk,
@@ -196,6 +265,7 @@ def in_flight(job: GenerationJob, held: claims.Claim) -> ModelCall:
         role="modifier",
         request={},
         started_at=timezone.now(),
+        sent_at=timezone.now() if is_sent else None,
         reserved_tokens=WORST.tokens,
         reserved_nano_usd=WORST.nano_usd(ONE_USD),
     )
@@ -214,81 +284,14 @@ def test_a_worker_that_is_told_to_stop_settles_its_call_in_flight() -> None:
     assert only_row(job).state == ROW.QUEUED
 
 
-def test_a_money_cap_needs_every_price() -> None:
-    with pytest.raises(Conflict, match=r"nobody knows that of llama3\.1 at local: cap the job by"):
-        llama_job(caps=Caps(usd=Decimal(1)))
-    assert not GenerationJob.objects.exists()
+def test_a_worker_that_is_told_to_stop_while_its_call_waits_spends_nothing() -> None:
+    job = llama_job(price="1")
 
+    def stop() -> None:
+        raise SystemExit(0)
 
-def test_a_money_cap_takes_contestants_that_cost_nothing() -> None:
-    add_llama(price="1")
-    add_scenario("street")
-    launch()
-    job = jobs.launch(
-        name="R",
-        contestants=["llama", "reference"],
-        scenarios=["street"],
-        caps=Caps(usd=Decimal("2.50")),
-    )
-    assert job.cap_usd == Decimal("2.5")
-    event = Event.objects.filter(verb="launch").first()
-    assert event is not None
-    assert event.after is not None
-    assert event.after["cap"] == "2.5 USD"
-
-
-@pytest.mark.parametrize(
-    "given",
-    [
-        Caps(usd=Decimal(0)),
-        Caps(usd=Decimal("NaN")),
-        Caps(usd=Decimal("-1")),
-        Caps(calls=0),
-        Caps(tokens=-5),
-        Caps(calls=10**12),
-    ],
-)
-def test_a_cap_that_can_not_be_is_refused(given: Caps) -> None:
-    with pytest.raises(Conflict, match="is more than 0 and at most"):
-        given.columns()
-
-
-def test_caps_are_only_raised_and_only_where_there_are_any() -> None:
-    job = llama_job(caps=Caps(calls=5))
-    for given, sentence in (
-        (Caps(), "Say which cap"),
-        (Caps(calls=5), "must be higher than the one of 5 calls"),
-        (Caps(tokens=10), "has no such cap; its cap is 5 calls"),
-    ):
-        with pytest.raises(Conflict, match=sentence):
-            caps.raise_cap(job, caps=given)
-    job = caps.raise_cap(job, caps=Caps(calls=6))
-    assert job.cap_calls == 6
-    assert Event.objects.get(verb="raise cap").after == {"cap": "6 calls"}
-    jobs.cancel(job)
-    with pytest.raises(Conflict, match="is cancelled already"):
-        caps.raise_cap(job, caps=Caps(calls=7))
-
-
-def test_only_a_stopped_job_is_resumed() -> None:
-    with pytest.raises(Conflict, match="is running; only one that stopped at its cap"):
-        caps.resume(llama_job())
-
-
-def test_a_stopped_job_can_be_cancelled() -> None:
-    job = llama_job(caps=Caps(tokens=5))
-    ran(job)
-    jobs.cancel(job)
-    assert (job.state, only_row(job).state) == (JOB.CANCELLED, ROW.CANCELLED)
-
-
-def test_retrying_in_a_stopped_job_leaves_it_stopped() -> None:
-    job = llama_job(scenarios=2, caps=Caps(calls=1))
-    first, second = job.augmentations.order_by("pk")
-    broken = Model(ModelFault("no", retryable=False, status=500))
-    runner.work_on(augmentation_pk=first.pk, connect=broken)
-    runner.work_on(augmentation_pk=second.pk, connect=Model())
-    job.refresh_from_db()
-    assert job.state == JOB.STOPPED_AT_CAP
-    jobs.retry_failed(job)
-    assert (job.state, jobs.progress(job).queued) == (JOB.STOPPED_AT_CAP, 2)
+    model = Model(waiting=stop)
+    with pytest.raises(SystemExit):
+        ran(job, model)
+    assert (only_row(job).state, model.requests) == (ROW.QUEUED, [])
+    assert_nothing_is_counted(job)

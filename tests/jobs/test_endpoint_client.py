@@ -2,12 +2,8 @@
 
 from __future__ import annotations
 
-import json
-from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import AbstractContextManager
 from dataclasses import dataclass, field
-from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
-from threading import Thread
 from typing import Any
 
 import pytest
@@ -23,6 +19,7 @@ from augment.services.endpoint_client import EndpointClient
 from augment.variants.asking import Conversation
 from augment.variants.transcript import MemoryTranscript, ModelRole
 from tests.jobs.rows import add_model, add_scenario, only_row
+from tests.llm.json_server import JsonServer, serving
 
 pytestmark = pytest.mark.django_db(transaction=True)
 ASKED = Request(
@@ -33,22 +30,17 @@ ASKED = Request(
 )
 
 
-class Picky(ThreadingHTTPServer):
+class Picky(JsonServer):
     """A server that answers 400 to some parameters, and remembers every body."""
 
-    daemon_threads = True
-
     def __init__(self, refuses: tuple[str, ...], prompt_tokens: int | None) -> None:
-        super().__init__(("127.0.0.1", 0), _Handler)
+        super().__init__()
         self.refuses = refuses
         self.prompt_tokens = prompt_tokens
         self.bodies: list[dict[str, Any]] = []
 
-    @property
-    def url(self) -> str:
-        return f"http://127.0.0.1:{self.server_address[1]}/v1"
-
     def answer(self, body: dict[str, Any]) -> tuple[int, dict[str, Any]]:
+        self.bodies.append(body)
         for name in self.refuses:
             if name in body:
                 problem = f"Unsupported parameter: {name!r}."
@@ -60,35 +52,8 @@ class Picky(ThreadingHTTPServer):
         return 200, made | {"choices": [choice], "usage": usage}
 
 
-class _Handler(BaseHTTPRequestHandler):
-    server: Picky
-
-    def do_POST(self) -> None:
-        body = json.loads(self.rfile.read(int(self.headers["Content-Length"])))
-        self.server.bodies.append(body)
-        status, document = self.server.answer(body)
-        text = json.dumps(document).encode()
-        self.send_response(status)
-        self.send_header("Content-Type", "application/json")
-        self.send_header("Content-Length", str(len(text)))
-        self.end_headers()
-        self.wfile.write(text)
-
-    def log_message(self, format: str, *args: object) -> None:
-        pass
-
-
-@contextmanager
-def picky(*refuses: str, prompt_tokens: int | None = 3) -> Iterator[Picky]:
-    server = Picky(refuses, prompt_tokens)
-    thread = Thread(target=server.serve_forever, args=(0.05,), daemon=True)
-    thread.start()
-    try:
-        yield server
-    finally:
-        server.shutdown()
-        server.server_close()
-        thread.join()
+def picky(*refuses: str, prompt_tokens: int | None = 3) -> AbstractContextManager[Picky]:
+    return serving(Picky(refuses, prompt_tokens))
 
 
 @dataclass

@@ -58,7 +58,7 @@ def test_a_contestant_brings_its_model_which_is_unknown() -> None:
     assert (known.endpoint.label, known.model, known.model_class) == ("local", "llama3.1", "")
     abilities = (known.native_tools, known.vision, known.json_schema, known.temperature)
     assert abilities == (None, None, None, None)
-    assert not known.is_priced
+    assert (known.price_in_usd, known.price_out_usd) == (None, None)
 
 
 @pytest.mark.parametrize(

@@ -3,12 +3,9 @@
 from __future__ import annotations
 
 import io
-import json
 from collections.abc import Iterator
 from contextlib import contextmanager
-from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from io import StringIO
-from threading import Thread
 from typing import Any
 
 import pytest
@@ -21,6 +18,7 @@ from augment.llm.questions import MARKER, Ability, questions_for, two_halves
 from augment.llm.window import least_tokens
 from augment.models import CallLease, Endpoint, EndpointModel, Event
 from augment.services.probe import ProbeReport, probe
+from tests.llm.json_server import JsonServer, serving
 
 pytestmark = pytest.mark.django_db(transaction=True)
 EVERYTHING = frozenset(
@@ -29,18 +27,12 @@ EVERYTHING = frozenset(
 KEY = "sk-planted-4f7a9c0d1e2b3a"
 
 
-class Candidate(ThreadingHTTPServer):
+class Candidate(JsonServer):
     """A server that can do what it is told it can."""
 
-    daemon_threads = True
-
     def __init__(self, can: frozenset[str], status: int) -> None:
-        super().__init__(("127.0.0.1", 0), _Handler)
+        super().__init__()
         self.can, self.status = can, status
-
-    @property
-    def url(self) -> str:
-        return f"http://127.0.0.1:{self.server_address[1]}/v1"
 
     def answer(self, body: dict[str, Any]) -> tuple[int, dict[str, Any]]:
         if self.status != 200:
@@ -83,35 +75,11 @@ def _error(message: str, param: str | None) -> dict[str, Any]:
     return {"error": {"message": message, "type": "x", "param": param, "code": None}}
 
 
-class _Handler(BaseHTTPRequestHandler):
-    server: Candidate
-
-    def do_POST(self) -> None:
-        body = json.loads(self.rfile.read(int(self.headers["Content-Length"])))
-        status, document = self.server.answer(body)
-        text = json.dumps(document).encode()
-        self.send_response(status)
-        self.send_header("Content-Type", "application/json")
-        self.send_header("Content-Length", str(len(text)))
-        self.end_headers()
-        self.wfile.write(text)
-
-    def log_message(self, format: str, *args: object) -> None:
-        pass
-
-
 @contextmanager
 def candidate(can: frozenset[str] = EVERYTHING, status: int = 200) -> Iterator[Candidate]:
-    server = Candidate(can, status)
-    thread = Thread(target=server.serve_forever, args=(0.05,), daemon=True)
-    thread.start()
-    Endpoint.objects.create(label="local", base_url=server.url)
-    try:
+    with serving(Candidate(can, status)) as server:
+        Endpoint.objects.create(label="local", base_url=server.url)
         yield server
-    finally:
-        server.shutdown()
-        server.server_close()
-        thread.join()
 
 
 def asked() -> ProbeReport:

@@ -7,6 +7,7 @@ import hashlib
 import json
 from io import StringIO
 from pathlib import Path
+from typing import Any
 from uuid import uuid4
 
 import pytest
@@ -14,8 +15,9 @@ from django.core.management import CommandError, call_command
 from django.utils import timezone
 
 from augment.errors import ModelFault
+from augment.llm.fingerprint import request_hash
 from augment.llm.messages import Message, Reply, Request, Speaker
-from augment.models import Augmentation, ModelCall
+from augment.models import Augmentation, ModelCall, TranscriptNote
 from augment.services import caps, jobs, runner
 from augment.services.caps import Caps
 from augment.services.transcript_export import transcript_of
@@ -131,6 +133,38 @@ def test_images_are_in_the_document_once() -> None:
     assert transcript_of(row)["images"] == {digest: base64.b64encode(b"a picture").decode()}
     (said,) = messages_of(ModelCall.objects.get().request)
     assert (said.text, said.images, said.rest) == ("Look.", (digest, digest), "")
+
+
+def test_the_order_in_which_a_database_keeps_keys_does_not_show() -> None:
+    """PostgreSQL keeps the keys of a stored document in an order of its own."""
+
+    def backwards(document: Any) -> Any:
+        if isinstance(document, dict):
+            return {name: backwards(document[name]) for name in reversed(document)}
+        return [backwards(one) for one in document] if isinstance(document, list) else document
+
+    row = ran(only_row(llama_job()), Model())
+    call = ModelCall.objects.get()
+    note = TranscriptNote.objects.create(
+        attempt=call.attempt,
+        number=1,
+        after_call=1,
+        kind=NoteKind.KEPT,
+        document={"round": 1, "accepted": None, "remark": ""},
+    )
+    before = json.dumps(transcript_of(row))
+    call.request, note.document = backwards(call.request), backwards(note.document)
+    call.save()
+    note.save()
+    row.modification = backwards(row.modification)
+    row.save()
+    assert json.dumps(transcript_of(Augmentation.objects.get(pk=row.pk))) == before
+    known = request_hash(
+        base_url="http://127.0.0.1:9/v1",
+        document=ModelCall.objects.get().request,
+        prompt_version=call.prompt_version,
+    )
+    assert known == call.request_hash
 
 
 def test_the_command_writes_it_to_a_file_or_to_the_terminal(tmp_path: Path) -> None:

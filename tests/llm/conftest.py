@@ -9,5 +9,5 @@ from augment.fake_llm.server import FakeServer, running
 
 @pytest.fixture(scope="session")
 def server() -> Iterator[FakeServer]:
-    with running(slow_s=30.0) as serving:
+    with running(slow_s=3600.0) as serving:
         yield serving

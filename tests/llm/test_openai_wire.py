@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 import socket
+import ssl
 import time
 import traceback
 from collections.abc import Callable, Iterator
+from typing import Any
 
 import pytest
 
-from augment.errors import ModelFault
+from augment.errors import ModelFault, NotSent
 from augment.fake_llm.server import FakeServer, running
 from augment.llm.messages import Message, Reply, Request, Speaker
 from augment.llm.openai_wire import OpenAIWire
@@ -31,7 +33,7 @@ def request(model: str) -> Request:
 
 @pytest.fixture
 def ask(server: FakeServer) -> Iterator[Ask]:
-    with OpenAIWire(base_url=server.url, api_key=None, timeout_s=5.0) as client:
+    with OpenAIWire(base_url=server.url, api_key=None, timeout_s=60.0) as client:
         yield lambda model: client.complete(request(model))
 
 
@@ -42,13 +44,15 @@ def fault(ask: Ask, model: str) -> ModelFault:
 
 
 def test_an_answer_comes_with_model_usage_and_latency(ask: Ask) -> None:
+    started = time.monotonic()
     reply = ask("fake-good")
+    took_s = time.monotonic() - started
     assert reply.text.startswith("I can't find a scene")
     assert (reply.model, reply.finish_reason, reply.refusal) == ("fake-good", "stop", None)
     assert reply.prompt_tokens is not None
     assert reply.completion_tokens is not None
     assert reply.latency_s is not None
-    assert 0.0 < reply.latency_s < 5.0
+    assert 0.0 < reply.latency_s <= took_s
 
 
 @pytest.mark.parametrize(
@@ -92,21 +96,20 @@ def test_a_fault_is_one_call_and_the_next_may_succeed(ask: Ask) -> None:
 
 def test_a_slow_endpoint_is_given_up_after_the_timeout() -> None:
     with (
-        running(slow_s=30.0) as server,
+        running(slow_s=3600.0) as server,
         OpenAIWire(base_url=server.url, api_key=None, timeout_s=0.3) as client,
     ):
-        started = time.monotonic()
         broken = fault(lambda model: client.complete(request(model)), "fake-slow")
-    assert time.monotonic() - started < 5.0
     assert (broken.retryable, broken.status) == (True, None)
     assert "took too long" in str(broken)
 
 
-def test_an_address_where_nobody_listens_is_a_fault_that_may_pass() -> None:
+def test_an_address_where_nobody_listens_was_sent_nothing_and_may_be_asked_again() -> None:
     with socket.create_server(("127.0.0.1", 0)) as taken:
         port = taken.getsockname()[1]
     with OpenAIWire(base_url=f"http://127.0.0.1:{port}/v1", api_key=None) as client:
         broken = fault(lambda model: client.complete(request(model)), "fake-good")
+    assert isinstance(broken, NotSent)
     assert broken.retryable
     assert "refused" in str(broken)
 
@@ -248,3 +251,11 @@ def test_what_a_database_can_not_hold_is_replaced() -> None:
     body = GOOD | {"choices": [choice]}
     with recorder(body=body) as server, OpenAIWire(base_url=server.url, api_key=None) as client:
         assert client.complete(request("m")).text == "a\ufffdb?c"
+
+
+def test_the_certificate_of_an_endpoint_is_checked() -> None:
+    with OpenAIWire(base_url="HTTPS://127.0.0.1:1/v1", api_key=None) as client:
+        inner: Any = client._client
+        checked_by = inner._client._transport._pool._ssl_context
+    assert checked_by.verify_mode is ssl.CERT_REQUIRED
+    assert checked_by.check_hostname

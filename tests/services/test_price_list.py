@@ -75,4 +75,5 @@ def test_a_new_contestant_brings_the_listed_price_once(monkeypatch: pytest.Monke
 def test_a_stand_in_costs_nobody_knows_what() -> None:
     contestants.ensure_endpoint(label="openai", base_url=OPENAI, is_simulated=True)
     add("fake")
-    assert not EndpointModel.objects.get().is_priced
+    known = EndpointModel.objects.get()
+    assert (known.price_in_usd, known.price_out_usd) == (None, None)

@@ -52,7 +52,8 @@ class Command(BaseCommand):
         if report.refused:
             self.stdout.write(f"{'not taken':14}{', '.join(report.refused)}")
         cost = "unknown" if report.cost_usd is None else f"{report.cost_usd} USD"
-        self.stdout.write(f"{'cost':14}{cost}, {report.calls} calls")
+        calls = "1 call" if report.calls == 1 else f"{report.calls} calls"
+        self.stdout.write(f"{'cost':14}{cost}, {calls}")
 
 
 def _line(finding: Finding) -> str:

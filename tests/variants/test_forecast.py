@@ -1,0 +1,82 @@
+"""What a recipe is said to ask, beside what it asks."""
+
+from __future__ import annotations
+
+import json
+import random
+
+import pytest
+
+from augment.fake_llm.playing import GOOD, LOOPING, STUBBORN, Character
+from augment.fake_llm.requests import chat_request
+from augment.llm.client import Sending, unwatched
+from augment.llm.messages import Reply, Request
+from augment.llm.patience import Patience
+from augment.variants.forecast import CallRange, calls_of, most_tokens
+from augment.variants.pipeline import run
+from augment.variants.recipes import FC, OTM, RECIPES, TQA, VQA
+from augment.variants.transcript import MemoryTranscript, ModelRole
+from tests.fixtures.shelf import entry, shown_scene
+
+SLUG = "overtake-terrace-row"
+MODIFIER, REVIEWER = ModelRole.MODIFIER, ModelRole.REVIEWER
+ENGINEER, VIEWER = ModelRole.ENGINEER, ModelRole.VIEWER
+
+
+class Playing:
+    """Answers as a character of the stand-in."""
+
+    def __init__(self, character: Character) -> None:
+        self._character = character
+
+    def fitted(self, request: Request) -> Request:
+        return request
+
+    def complete(self, request: Request, *, sending: Sending = unwatched) -> Reply:
+        sending()
+        body = json.dumps(request.to_document()).encode()
+        said = self._character.answer(chat_request(body))
+        return Reply(text=said.text, model="m", finish_reason="stop")
+
+
+def calls_made(variant: str, character: Character) -> dict[ModelRole, int]:
+    transcript = MemoryTranscript()
+    run(
+        RECIPES[variant],
+        scene=shown_scene(SLUG),
+        instruction=entry(SLUG).instruction,
+        client=Playing(character),
+        model="m",
+        transcript=transcript,
+        patience=Patience(sleep=lambda _: None, rng=random.Random(1)),
+    )
+    roles = [call.role for call in transcript.calls]
+    return {role: roles.count(role) for role in dict.fromkeys(roles)}
+
+
+@pytest.mark.parametrize("variant", ["otm", "fc", "tqa", "vqa", "geo", "fc+tqa"])
+@pytest.mark.parametrize("character", [GOOD, STUBBORN, LOOPING], ids=["good", "stubborn", "loop"])
+def test_no_run_asks_less_or_more_often_than_said(variant: str, character: Character) -> None:
+    said = calls_of(RECIPES[variant])
+    made = calls_made(variant, character)
+    assert set(made) <= set(said)
+    for role, count in made.items():
+        assert said[role].least <= count <= said[role].most
+
+
+def test_the_calls_of_the_papers_variants() -> None:
+    one = CallRange(least=1, usual=1, most=2)
+    assert calls_of(OTM) == {MODIFIER: one}
+    # Eight calls, the ninth that is refused, the answer and its re-ask.
+    assert calls_of(FC) == {MODIFIER: CallRange(least=1, usual=2, most=11)}
+    three_rounds = CallRange(least=1, usual=1, most=6)
+    assert calls_of(TQA) == {MODIFIER: three_rounds, REVIEWER: three_rounds}
+    twelve = CallRange(least=2, usual=2, most=12)
+    assert calls_of(VQA) == {MODIFIER: three_rounds, ENGINEER: twelve, VIEWER: three_rounds}
+
+
+def test_the_most_tokens_of_one_answer_and_its_re_ask() -> None:
+    use = most_tokens(OTM, {MODIFIER: 5000})[MODIFIER]
+    turn = 2 * 8192 + 2000
+    assert use.prompt == 5000 + (5000 + turn)
+    assert use.completion == 2 * 2 * 8192
