@@ -5,10 +5,13 @@ from __future__ import annotations
 import os
 import re
 from collections.abc import Mapping
+from dataclasses import asdict
 
 from django.contrib.auth.models import User
 from django.db import transaction
 
+from augment.baselines.quantised import BIN_M
+from augment.baselines.simulated import Rates
 from augment.errors import Conflict, InvalidDocument, KeyMissing, UnknownName
 from augment.llm.addresses import check_base_url
 from augment.models import Contestant, Endpoint
@@ -17,7 +20,7 @@ from augment.services.events import log_event
 from augment.services.roles import Seat, check_roles, documents_of
 from augment.services.scenes import check_slug
 from augment.services.texts import one_line
-from augment.variants.recipes import Recipe, recipe
+from augment.variants.recipes import Recipe, recipe, spelled
 from augment.variants.transcript import ModelRole
 
 Kind = Contestant.Kind
@@ -28,6 +31,9 @@ RULE_PLACER = "rule-placer"
 _BUILTIN = {
     REFERENCE: ("Reference", Contestant.Kind.REFERENCE),
     RULE_PLACER: ("Rule placer", Contestant.Kind.RULE),
+} | {
+    slug: (f"Quantised code, {bin_m:g} m", Contestant.Kind.BASELINE)
+    for slug, bin_m in BIN_M.items()
 }
 
 OPENAI = "openai"
@@ -37,7 +43,7 @@ OPENAI_KEY = "OPENAI_API_KEY"
 
 @transaction.atomic
 def ensure_builtin() -> list[Contestant]:
-    """The contestants that need no endpoint: the reference and the rule placer."""
+    """The contestants that need no endpoint: the reference, the rule placer, the baselines."""
     return [
         Contestant.objects.get_or_create(slug=slug, defaults={"name": name, "kind": kind})[0]
         for slug, (name, kind) in _BUILTIN.items()
@@ -116,7 +122,8 @@ def add_contestant(
         variant: The name of a recipe, in any case.
         endpoint: The label of an endpoint.
         model: The model id on that endpoint.
-        name: What people read; made from model and variant when None.
+        name: What people read; made from model and variant when None, and from the endpoint
+            where another contestant is called so.
         roles: Who else plays a reviewer's role: the label of an endpoint (None: the contestant's
             own) and the model id there.
         actor: Who adds it.
@@ -132,10 +139,8 @@ def add_contestant(
     model = one_line("model", model, what="contestant")
     others = _seats(way, roles or {}, address, actor)
     seats = [Seat(endpoint=address, model=model), *others.values()]
-    if name is None:
-        given = (f"{role} {seat.model}" for role, seat in others.items())
-        title = " ".join([model, way.slug.upper(), *given])[:LONGEST_NAME]
-    else:
+    title = _title(slug, model, way, others, address)
+    if name is not None:
         title = one_line("name", name, what="contestant")
     simulated = any(seat.endpoint.is_simulated for seat in seats)
     wanted = {
@@ -151,6 +156,46 @@ def add_contestant(
     contestant, made = Contestant.objects.get_or_create(slug=slug, defaults=wanted)
     if made:
         _log_added(contestant, actor)
+    else:
+        _refuse_another(contestant, wanted, named=name is not None)
+    return contestant
+
+
+@transaction.atomic
+def add_simulated(
+    *, slug: str, rates: Rates, name: str | None = None, actor: User | None = None
+) -> Contestant:
+    """A contestant that knows the reference and gets it wrong at set rates.
+
+    Args:
+        slug: Lower-case letters, digits and hyphens.
+        rates: How often it makes which class of error.
+        name: What people read; it says that the errors are simulated when None.
+        actor: Who adds it.
+
+    Raises:
+        InvalidDocument: The slug or the name can't be used.
+        Conflict: The slug belongs to another contestant.
+    """
+    check_slug(slug, what="contestant")
+    shares = ", ".join(f"{share:.0%} {kind}" for kind, share in asdict(rates).items() if share)
+    title = f"Simulated errors ({shares or 'none'})"[:LONGEST_NAME]
+    if name is not None:
+        title = one_line("name", name, what="contestant")
+    wanted: dict[str, object] = {
+        "name": title,
+        "kind": Kind.SIMULATED,
+        "error_rates": asdict(rates),
+    }
+    contestant, made = Contestant.objects.get_or_create(slug=slug, defaults=wanted)
+    if made:
+        log_event(
+            actor=actor,
+            verb="add",
+            object_kind="contestant",
+            object_code=contestant.code,
+            after={"slug": slug, **wanted},
+        )
     else:
         _refuse_another(contestant, wanted, named=name is not None)
     return contestant
@@ -182,8 +227,23 @@ def _endpoint(label: str, actor: User | None) -> Endpoint:
         return ensure_endpoint(
             label=OPENAI, base_url=OPENAI_URL, key_variable=OPENAI_KEY, actor=actor
         )
+    if label == OPENAI:
+        raise Conflict(
+            f"Endpoint {OPENAI!r} was not added yet: set {OPENAI_KEY} here, or name its address."
+        )
     known = list(Endpoint.objects.values_list("label", flat=True))
     raise UnknownName("endpoint", label, known)
+
+
+def _title(
+    slug: str, model: str, way: Recipe, others: Mapping[ModelRole, Seat], own: Endpoint
+) -> str:
+    """What people read where nobody chose a name; not what another contestant is called."""
+    given = (f"{role} {seat.model}" for role, seat in others.items())
+    title = " ".join([model, spelled(way.slug), *given])[:LONGEST_NAME]
+    if Contestant.objects.filter(name=title).exclude(slug=slug).exists():
+        title = f"{title} at {own.label}"[:LONGEST_NAME]
+    return title
 
 
 def _log_added(contestant: Contestant, actor: User | None) -> None:

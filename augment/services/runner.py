@@ -6,11 +6,12 @@ import logging
 from collections.abc import Callable
 from contextlib import AbstractContextManager, ExitStack
 from dataclasses import dataclass
+from functools import partial
 
 from django.conf import settings
 from django.utils import timezone
 
-from augment.baselines import rule_placer
+from augment.baselines import quantised, rule_placer, simulated
 from augment.errors import (
     AugmentError,
     BudgetSpent,
@@ -44,6 +45,7 @@ logger = logging.getLogger(__name__)
 
 Kind = Contestant.Kind
 State = Augmentation.State
+Placed = rule_placer.Placement | quantised.Placement
 Connect = Callable[[Endpoint], AbstractContextManager[ChatClient]]
 
 
@@ -161,7 +163,12 @@ def _asked(row: Augmentation, scene: Scene, held: claims.Claim, connect: Connect
         case Kind.REFERENCE:
             return _from_reference(row)
         case Kind.RULE:
-            return _from_rules(row, scene)
+            return _from_placer(row, rule_placer.place, scene)
+        case Kind.BASELINE if row.contestant.slug in quantised.BIN_M:
+            bin_m = quantised.BIN_M[row.contestant.slug]
+            return _from_placer(row, partial(quantised.place, bin_m=bin_m), scene)
+        case Kind.SIMULATED if row.contestant.error_rates is not None:
+            return _from_errors(row, scene, row.contestant.error_rates, held)
         case Kind.LLM | Kind.SIMULATED if row.contestant.endpoint is not None:
             return _from_model(row, row.contestant.endpoint, scene, held, connect)
     return Answer(
@@ -176,16 +183,47 @@ def _from_reference(row: Augmentation) -> Answer:
     return Answer(state=State.DONE, modification=reference)
 
 
-def _from_rules(row: Augmentation, scene: Scene) -> Answer:
+def _from_placer(row: Augmentation, place: Callable[..., Placed], scene: Scene) -> Answer:
+    """What a contestant that asks nobody makes of the instruction, or why it refuses."""
     try:
-        placement = rule_placer.place(
-            scene, row.scenario.instruction, seed=seed_of(row.scenario.slug)
-        )
+        placed = place(scene, row.scenario.instruction, seed=seed_of(row.scenario.slug))
     except InstructionNotUnderstood as refusal:
-        parts = {"Understood": refusal.understood, "Not understood": refusal.ignored}
-        notes = [f"{title}: {'; '.join(read)}." for title, read in parts.items() if read]
-        return Answer(state=State.REFUSED, reason=refusal.reason, notes=" ".join(notes))
-    return Answer(state=State.DONE, modification=placement.modification, notes=placement.notes)
+        notes = _how_read(refusal.understood, refusal.ignored)
+        return Answer(state=State.REFUSED, reason=refusal.reason, notes=notes)
+    notes = placed.notes
+    if isinstance(placed, rule_placer.Placement):
+        notes = f"{notes}\n{_how_read(placed.understood, placed.not_understood)}"
+    return Answer(state=State.DONE, modification=placed.modification, notes=notes)
+
+
+def _how_read(understood: tuple[str, ...], unread: tuple[str, ...]) -> str:
+    """What was understood of an instruction and what was not, a line each."""
+    parts = {"Understood": understood, "Not understood": unread}
+    return "\n".join(
+        f"{title}: {', '.join(f'“{words}”' for words in read) or 'nothing'}."
+        for title, read in parts.items()
+    )
+
+
+def _from_errors(
+    row: Augmentation, scene: Scene, rates: dict[str, object], held: claims.Claim
+) -> Answer:
+    """The reference with the errors of a simulated contestant; their label is kept apart."""
+    reference = reference_of(row.scenario)
+    if reference is None:
+        return Answer(state=State.FAILED, reason="The scenario has no reference modification.")
+    made = simulated.simulate(
+        scene,
+        reference,
+        simulated.rates_of(rates),
+        seed=seed_of(f"{row.contestant.slug}/{row.scenario.slug}"),
+    )
+    label = {"class": made.fault_class, "fault": made.fault}
+    if not claims.note_injected(held=held, injected=label):
+        raise ClaimLost(f"attempt {held.attempt_number} has lost its row")
+    if made.modification is None:
+        return Answer(state=State.UNREADABLE, reason=made.reason)
+    return Answer(state=State.DONE, modification=made.modification)
 
 
 def _from_model(

@@ -34,6 +34,8 @@ def test_the_builtin_contestants_are_made_once() -> None:
     contestants.ensure_builtin()
     contestants.ensure_builtin()
     assert list(Contestant.objects.values_list("slug", "kind")) == [
+        ("quantised-20m", "baseline"),
+        ("quantised-5m", "baseline"),
         ("reference", "reference"),
         ("rule-placer", "rule"),
     ]
@@ -53,6 +55,15 @@ def test_a_model_on_a_real_endpoint_is_a_language_model() -> None:
 def test_a_model_on_a_simulated_endpoint_is_simulated() -> None:
     local(is_simulated=True)
     assert add().is_simulated
+
+
+def test_the_same_model_elsewhere_is_told_apart_by_its_endpoint() -> None:
+    local()
+    contestants.ensure_endpoint(label="cloud", base_url="http://127.0.0.1:10/v1")
+    here, there = add(), add(slug="llama-there", endpoint="cloud")
+    assert (here.name, there.name) == ("llama3.1:70b OTM", "llama3.1:70b OTM at cloud")
+    assert add() == here
+    assert add(slug="llama-there", endpoint="cloud") == there
 
 
 def test_the_same_contestant_twice_is_one() -> None:
@@ -82,7 +93,7 @@ def test_an_unknown_endpoint_names_the_known_ones() -> None:
 
 
 def test_openai_can_be_named_where_its_key_is_set(monkeypatch: pytest.MonkeyPatch) -> None:
-    with pytest.raises(UnknownName):
+    with pytest.raises(Conflict, match="set OPENAI_API_KEY here, or name its address"):
         add(endpoint="openai")
     monkeypatch.setenv("OPENAI_API_KEY", "sk-very-secret")
     made = add(endpoint="openai", model="gpt-4o")
@@ -196,3 +207,33 @@ def test_a_contestant_that_is_refused_leaves_no_endpoint_behind() -> None:
     with pytest.raises(CommandError, match="Unknown variant"):
         call_command("add_contestant", "fake", *facts)
     assert not Endpoint.objects.exists()
+
+
+def test_simulated_errors_need_no_endpoint_and_say_what_they_are() -> None:
+    said = StringIO()
+    call_command("add_contestant", "sim-low-error", "--errors", "low", stdout=said)
+    made = Contestant.objects.get(slug="sim-low-error")
+    assert said.getvalue() == (
+        "sim-low-error: Simulated errors (6% position, 4% logic) (simulated)\n"
+    )
+    assert made.is_simulated
+    assert made.error_rates == {"position": 0.06, "heading": 0.0, "logic": 0.04, "format": 0.0}
+    call_command("add_contestant", "sim-low-error", "--errors", "position=0.06,logic=0.04")
+    with pytest.raises(CommandError, match="another contestant called 'sim-low-error'"):
+        call_command("add_contestant", "sim-low-error", "--errors", "high")
+
+
+@pytest.mark.parametrize(
+    ("given", "problem"),
+    [
+        (("--errors", "some"), "presets: low, mid, high"),
+        (("--errors", "logic=2"), "2 is no share from 0 to 1"),
+        (("--errors", "low", "--model", "m"), "so it goes without --model"),
+        (("--errors", "low", "--viewer", "v", "--simulated"), "without --viewer, --simulated"),
+        (("--model", "m"), "Name --variant, --endpoint for a language model, or --errors"),
+    ],
+)
+def test_errors_or_a_model_but_not_half_of_either(given: tuple[str, ...], problem: str) -> None:
+    with pytest.raises(CommandError, match=problem):
+        call_command("add_contestant", "sim", *given)
+    assert not Contestant.objects.filter(slug="sim").exists()

@@ -63,7 +63,7 @@ def test_roles_are_stored_by_label_and_model() -> None:
         "viewer": {"endpoint": "there", "model": "eyes"},
         "engineer": {"endpoint": "here", "model": "boss"},
     }
-    assert made.name == "text-model VQA engineer boss viewer eyes"
+    assert made.name == "text-model vQA engineer boss viewer eyes"
     assert EndpointModel.objects.filter(endpoint__label="there", model="eyes").exists()
 
 

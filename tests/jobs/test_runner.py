@@ -1,55 +1,33 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator
-from contextlib import AbstractContextManager, contextmanager
 from datetime import timedelta
-from typing import Any
 
 import pytest
 from django.core.files.storage import default_storage
 from django.utils import timezone
 
 from augment.errors import ClaimLost, ModelFault
-from augment.llm.client import ChatClient
+from augment.llm.client import Sending, unwatched
 from augment.llm.messages import Reply, Request
-from augment.llm.scripted import ScriptedClient
-from augment.models import Augmentation, Contestant, Endpoint, GenerationJob, ModelCall
+from augment.models import Augmentation, Endpoint, GenerationJob, ModelCall
 from augment.scene.codec import modification_from_document, modification_to_document
-from augment.scene.modification import Modification
 from augment.services import claims, jobs, runner
 from augment.services.holding import OutcomeOnCrash
-from augment.services.seeds import seed_of
 from tests.jobs.rows import (
     INSTRUCTION,
     STALE,
     TWO_CONES,
-    add_kind,
     add_model,
     add_scenario,
     launch,
     only_row,
 )
+from tests.jobs.running import Wire, ran
 from tests.variants.answers import GOOD
 
 pytestmark = pytest.mark.django_db
 State = Augmentation.State
-
-
-class Wire:
-    """Endpoints that all answer from one script, and what they were asked for."""
-
-    def __init__(self, *answers: str | Reply | ModelFault) -> None:
-        self.client: ChatClient = ScriptedClient(answers)
-        self.opened: list[str] = []
-
-    def __call__(self, endpoint: Endpoint) -> AbstractContextManager[ChatClient]:
-        self.opened.append(endpoint.label)
-        return self._session()
-
-    @contextmanager
-    def _session(self) -> Iterator[ChatClient]:
-        yield self.client
 
 
 class Stumbling:
@@ -61,14 +39,9 @@ class Stumbling:
     def fitted(self, request: Request) -> Request:
         return request
 
-    def complete(self, request: Request) -> Reply:
+    def complete(self, request: Request, *, sending: Sending = unwatched) -> Reply:
+        sending()
         raise self.error
-
-
-def one_job(kind: str, **columns: Any) -> Augmentation:
-    add_kind("someone", kind)
-    add_scenario("street", **columns)
-    return only_row(jobs.launch(name="R", contestants=["someone"], scenarios=["street"]))
 
 
 def model_job(*, key_variable: str = "", is_simulated: bool = False) -> Augmentation:
@@ -81,12 +54,6 @@ def model_job(*, key_variable: str = "", is_simulated: bool = False) -> Augmenta
     add_model("llama", endpoint=endpoint, model="llama3.1")
     add_scenario("street")
     return only_row(jobs.launch(name="R", contestants=["llama"], scenarios=["street"]))
-
-
-def ran(row: Augmentation, wire: Wire | None = None) -> Augmentation:
-    assert runner.work_on(augmentation_pk=row.pk, worker="w", connect=wire or Wire())
-    row.refresh_from_db()
-    return row
 
 
 def test_the_reference_runs_to_its_picture_and_the_job_is_finished() -> None:
@@ -111,21 +78,6 @@ def test_a_message_that_comes_twice_does_nothing_the_second_time() -> None:
     assert row.attempts.count() == 1
 
 
-def test_a_reference_that_went_away_is_a_failure_with_a_sentence() -> None:
-    row = only_row(launch())
-    row.scenario.reference = None
-    row.scenario.save()
-    row = ran(row)
-    assert (row.state, row.reason) == (State.FAILED, "The scenario has no reference modification.")
-
-
-def test_a_reference_that_does_not_fit_is_a_failure_with_a_sentence() -> None:
-    gone = modification_to_document(Modification(removed=("Agent9",)))
-    row = ran(one_job(Contestant.Kind.REFERENCE, reference=gone))
-    assert row.state == State.FAILED
-    assert row.reason.startswith("The modification does not fit the scene: Agent9")
-
-
 def test_a_scene_that_can_not_be_read_is_a_failure_with_a_sentence() -> None:
     row = only_row(launch())
     row.scenario.base_scene.document = {"format": "nonsense"}
@@ -133,27 +85,6 @@ def test_a_scene_that_can_not_be_read_is_a_failure_with_a_sentence() -> None:
     row = ran(row)
     assert row.state == State.FAILED
     assert "can't be read" in row.reason
-
-
-def test_the_rule_placer_places_the_same_each_time() -> None:
-    first = ran(one_job(Contestant.Kind.RULE))
-    assert first.state == State.DONE
-    again = jobs.launch(name="R2", contestants=["someone"], scenarios=["street"])
-    second = ran(only_row(again))
-    assert second.modification == first.modification
-    assert second.image == first.image
-
-
-def test_the_rule_placer_refuses_what_it_does_not_understand() -> None:
-    row = ran(one_job(Contestant.Kind.RULE, instruction="Make it nicer."))
-    assert row.state == State.REFUSED
-    assert row.reason
-    row.scenario.refresh_from_db()
-    assert row.image == row.scenario.original_image
-
-
-def test_a_scenario_has_a_seed_of_its_own() -> None:
-    assert seed_of("street") == seed_of("street") != seed_of("street-2")
 
 
 def test_a_model_is_asked_and_every_call_is_kept() -> None:

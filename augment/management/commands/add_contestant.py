@@ -1,4 +1,4 @@
-"""Register a language model that runs one variant."""
+"""Register a language model that runs one variant, or simulated errors."""
 
 from __future__ import annotations
 
@@ -8,12 +8,23 @@ from typing import Any
 from django.core.management.base import BaseCommand, CommandError
 from django.db import transaction
 
-from augment.errors import AugmentError
+from augment.baselines.simulated import PRESETS, Rates, rates_of
+from augment.errors import AugmentError, InvalidDocument
 from augment.models import Contestant
-from augment.services.contestants import add_contestant, ensure_builtin, ensure_endpoint
+from augment.services.contestants import (
+    add_contestant,
+    add_simulated,
+    ensure_builtin,
+    ensure_endpoint,
+)
 from augment.variants.transcript import ModelRole
 
 ROLES = (ModelRole.REVIEWER, ModelRole.ENGINEER, ModelRole.VIEWER)
+
+_OF_MODELS = (
+    *("variant", "endpoint", "model", *(role.value for role in ROLES)),
+    *("base_url", "key_variable", "simulated"),
+)
 
 
 class Command(BaseCommand):
@@ -21,15 +32,21 @@ class Command(BaseCommand):
 
     help = (
         "Register a language model that runs one variant. With --base-url the endpoint is made "
-        "in the same call; `--endpoint openai` needs no address where OPENAI_API_KEY is set."
+        "in the same call; `--endpoint openai` needs no address where OPENAI_API_KEY is set. "
+        "With --errors instead of all that: the reference with simulated errors at set rates."
     )
 
     def add_arguments(self, parser: ArgumentParser) -> None:
         """The contestant, and what a new endpoint needs."""
         parser.add_argument("slug", help="lower-case letters, digits and hyphens")
-        parser.add_argument("--variant", required=True, help="the recipe, for example otm")
-        parser.add_argument("--endpoint", required=True, help="the label of an endpoint")
-        parser.add_argument("--model", required=True, help="the model id on the endpoint")
+        parser.add_argument("--variant", help="the recipe, for example otm")
+        parser.add_argument("--endpoint", help="the label of an endpoint")
+        parser.add_argument("--model", help="the model id on the endpoint")
+        parser.add_argument(
+            "--errors",
+            metavar="RATES",
+            help=f"{', '.join(PRESETS)}, or shares: position=0.1,heading=0.05,logic=0.1,format=0",
+        )
         parser.add_argument("--name", help="what people read; default: model and variant")
         for role in ROLES:
             parser.add_argument(
@@ -52,6 +69,14 @@ class Command(BaseCommand):
 
     def handle(self, *args: Any, **options: Any) -> None:
         """Make the endpoint if an address is given, then the contestant."""
+        needed = [name for name in ("variant", "endpoint", "model") if not options[name]]
+        if options["errors"] is None and needed:
+            raise CommandError(f"Name {_flags(needed)} for a language model, or --errors instead.")
+        given = [name for name in _OF_MODELS if options[name]]
+        if options["errors"] is not None and given:
+            raise CommandError(
+                f"--errors asks no language model, so it goes without {_flags(given)}."
+            )
         if not options["base_url"] and (options["key_variable"] or options["simulated"]):
             raise CommandError("--key-variable and --simulated need --base-url.")
         try:
@@ -64,6 +89,9 @@ class Command(BaseCommand):
     def _add(self, options: dict[str, Any]) -> Contestant:
         """Endpoint and contestant, or neither of them."""
         ensure_builtin()
+        if options["errors"] is not None:
+            rates = _rates(options["errors"])
+            return add_simulated(slug=options["slug"], rates=rates, name=options["name"])
         if options["base_url"]:
             ensure_endpoint(
                 label=options["endpoint"],
@@ -79,6 +107,29 @@ class Command(BaseCommand):
             name=options["name"],
             roles={role: _seat(options[role]) for role in ROLES if options[role]},
         )
+
+
+def _flags(names: list[str]) -> str:
+    return ", ".join(f"--{name.replace('_', '-')}" for name in names)
+
+
+def _rates(written: str) -> Rates:
+    """A preset by its name, or shares by the names of their classes.
+
+    Raises:
+        InvalidDocument: It is neither.
+    """
+    if written in PRESETS:
+        return PRESETS[written]
+    shares: dict[str, object] = {}
+    for part in written.split(","):
+        name, _, value = part.partition("=")
+        try:
+            shares[name.strip()] = float(value)
+        except ValueError:
+            problem = f"{value!r} is no number; presets: {', '.join(PRESETS)}"
+            raise InvalidDocument("set of error rates", [(name.strip(), problem)]) from None
+    return rates_of(shares)
 
 
 def _seat(written: str) -> tuple[str | None, str]:

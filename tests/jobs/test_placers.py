@@ -1,0 +1,106 @@
+"""Rows of the contestants that ask no language model."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import pytest
+
+from augment.models import Augmentation, Contestant
+from augment.scene.codec import modification_to_document
+from augment.scene.modification import Modification
+from augment.services import contestants, jobs
+from augment.services.seeds import seed_of
+from tests.jobs.rows import add_kind, add_scenario, launch, only_row
+from tests.jobs.running import ran
+
+pytestmark = pytest.mark.django_db
+State = Augmentation.State
+
+
+def one_job(kind: str, **columns: Any) -> Augmentation:
+    add_kind("someone", kind)
+    add_scenario("street", **columns)
+    return only_row(jobs.launch(name="R", contestants=["someone"], scenarios=["street"]))
+
+
+def test_a_reference_that_went_away_is_a_failure_with_a_sentence() -> None:
+    row = only_row(launch())
+    row.scenario.reference = None
+    row.scenario.save()
+    row = ran(row)
+    assert (row.state, row.reason) == (State.FAILED, "The scenario has no reference modification.")
+
+
+def test_a_reference_that_does_not_fit_is_a_failure_with_a_sentence() -> None:
+    gone = modification_to_document(Modification(removed=("Agent9",)))
+    row = ran(one_job(Contestant.Kind.REFERENCE, reference=gone))
+    assert row.state == State.FAILED
+    assert row.reason.startswith("The modification does not fit the scene: Agent9")
+
+
+def test_the_rule_placer_places_the_same_each_time() -> None:
+    first = ran(one_job(Contestant.Kind.RULE))
+    assert first.state == State.DONE
+    again = jobs.launch(name="R2", contestants=["someone"], scenarios=["street"])
+    second = ran(only_row(again))
+    assert second.modification == first.modification
+    assert second.image == first.image
+
+
+def test_the_rule_placer_refuses_what_it_does_not_understand() -> None:
+    row = ran(one_job(Contestant.Kind.RULE, instruction="Make it nicer."))
+    assert row.state == State.REFUSED
+    assert row.reason
+    row.scenario.refresh_from_db()
+    assert row.image == row.scenario.original_image
+
+
+PARKED = "Park a car in the ego's lane 22 m ahead of the ego."
+
+
+def quantised(slug: str, instruction: str) -> Augmentation:
+    add_scenario(f"street-{slug}", instruction=instruction)
+    contestants.ensure_builtin()
+    job = jobs.launch(name="Q", contestants=[slug], scenarios=[f"street-{slug}"])
+    return ran(only_row(job))
+
+
+@pytest.mark.parametrize("slug", ["quantised-5m", "quantised-20m"])
+def test_the_quantised_baselines_place_vehicles_and_tell_their_codes(slug: str) -> None:
+    row = quantised(slug, PARKED)
+    assert row.state == State.DONE
+    assert "Agent2: front right, 20 to " in row.notes
+    assert "direction same, stands" in row.notes
+
+
+def test_the_quantised_baselines_refuse_what_is_no_vehicle() -> None:
+    row = quantised("quantised-5m", "Add a pedestrian crossing from the left 15 m ahead.")
+    assert row.state == State.REFUSED
+    assert row.reason == "The code knows vehicles alone, and pedestrians are asked for."
+
+
+def test_a_scenario_has_a_seed_of_its_own() -> None:
+    assert seed_of("street") == seed_of("street") != seed_of("street-2")
+
+
+def test_a_placement_tells_what_was_understood_of_the_instruction() -> None:
+    row = ran(one_job(Contestant.Kind.RULE))
+    *_, understood, rest = row.notes.splitlines()
+    assert understood.startswith("Understood: “")
+    assert rest == "Not understood: nothing."
+
+
+def test_a_placement_tells_what_was_passed_over_in_the_instruction() -> None:
+    text = "Put a parked, sadly rusty car 20 m ahead of us."
+    row = ran(one_job(Contestant.Kind.RULE, instruction=text))
+    assert row.state == State.DONE
+    assert row.notes.endswith("Not understood: “sadly”, “rusty”.")
+
+
+def test_a_refusal_tells_what_was_understood_and_what_not() -> None:
+    text = "Put a parked car 20 m ahead beside the fountain."
+    row = ran(one_job(Contestant.Kind.RULE, instruction=text))
+    assert row.state == State.REFUSED
+    assert "“a parked car”" in row.notes
+    assert row.notes.endswith("Not understood: “beside”, “fountain”.")
