@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from datetime import datetime
-from typing import Any
+from typing import Any, TypeVar
 
 from django.contrib.auth.models import User
 from django.db import transaction
-from django.db.models import Case, Count, F, Q, Value, When
+from django.db.models import Case, Count, F, Q, QuerySet, Value, When
 from django.utils import timezone
 
 from augment.errors import Conflict, UnknownName
@@ -17,15 +17,12 @@ from augment.models import Augmentation, Contestant, GenerationJob, Scenario
 from augment.services.budget import limit_of
 from augment.services.caps import Caps, check_caps
 from augment.services.events import log_event
-from augment.services.roles import blind_viewers
+from augment.services.feasible import refuse_impossible
 from augment.services.texts import one_line
 
-Kind = Contestant.Kind
 State = Augmentation.State
 
-RUNNABLE = (Kind.REFERENCE, Kind.RULE, Kind.LLM, Kind.SIMULATED)
-"""Kinds that a job can run; what humans and outside baselines made is imported."""
-
+_Row = TypeVar("_Row", Contestant, Scenario)
 
 NO_CAPS = Caps()
 
@@ -87,7 +84,7 @@ def launch(
     name = one_line("name", name, what="job")
     who = _contestants(contestants)
     where = _scenarios(scenarios)
-    _refuse_impossible(who, where)
+    refuse_impossible(who, where)
     job = GenerationJob.objects.create(
         name=name,
         launched_by_id=actor.pk if actor else None,
@@ -214,47 +211,18 @@ def _finish(job_pk: int, now: datetime) -> int:
 
 
 def _contestants(slugs: Sequence[str]) -> list[Contestant]:
-    """The rows in the given order."""
-    found = {row.slug: row for row in Contestant.objects.filter(slug__in=slugs)}
-    for slug in slugs:
-        if slug not in found:
-            known = Contestant.objects.values_list("slug", flat=True)
-            raise UnknownName("contestant", slug, list(known))
-    return [found[slug] for slug in dict.fromkeys(slugs)]
+    return _in_order(Contestant.objects.all(), slugs, "contestant")
 
 
 def _scenarios(slugs: Sequence[str]) -> list[Scenario]:
-    """The rows in the given order, without their scenes."""
-    found = {row.slug: row for row in Scenario.objects.filter(slug__in=slugs)}
+    """Without their scenes."""
+    return _in_order(Scenario.objects.all(), slugs, "scenario")
+
+
+def _in_order(rows: QuerySet[_Row], slugs: Sequence[str], what: str) -> list[_Row]:
+    """The rows of those slugs in the given order, each once."""
+    found = {row.slug: row for row in rows.filter(slug__in=slugs)}
     for slug in slugs:
         if slug not in found:
-            known = Scenario.objects.values_list("slug", flat=True)
-            raise UnknownName("scenario", slug, list(known))
+            raise UnknownName(what, slug, list(rows.values_list("slug", flat=True)))
     return [found[slug] for slug in dict.fromkeys(slugs)]
-
-
-def _refuse_impossible(who: list[Contestant], where: list[Scenario]) -> None:
-    """Raise Conflict for a job that could not run to its end."""
-    if not who:
-        raise Conflict("Choose at least one contestant.")
-    if not where:
-        raise Conflict("Choose at least one scenario.")
-    strangers = [row.slug for row in who if row.kind not in RUNNABLE]
-    if strangers:
-        raise Conflict(
-            f"A job can't run {', '.join(strangers)}: what humans or outside programs made is "
-            "imported."
-        )
-    blind = blind_viewers(who)
-    if blind:
-        raise Conflict(
-            f"Visual QA needs a viewer that sees, and these see text alone: {', '.join(blind)}. "
-            "Give the contestant another viewer or another variant."
-        )
-    references = [row.slug for row in who if row.kind == Kind.REFERENCE]
-    without = [row.slug for row in where if row.reference is None]
-    if references and without:
-        raise Conflict(
-            f"{references[0]} can't run on scenarios without a reference modification: "
-            f"{', '.join(without)}."
-        )

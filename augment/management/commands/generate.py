@@ -17,6 +17,7 @@ from augment.services import jobs
 from augment.services.budget import limit_of
 from augment.services.choosing import chosen_contestants, chosen_scenarios
 from augment.services.contestants import ensure_builtin
+from augment.services.estimates import estimate
 from augment.services.job_summary import contestant_lines, failure_groups
 from augment.tasks import check_broker, enqueue_job
 
@@ -43,6 +44,9 @@ class Command(BaseCommand):
         parser.add_argument(
             "--fresh", action="store_true", help="ask anew what models answered in other jobs"
         )
+        parser.add_argument(
+            "--estimate", action="store_true", help="say what it would use, and launch nothing"
+        )
         parser.add_argument("--wait", action="store_true", help="stay until the job is over")
         parser.add_argument(
             "--timeout", type=float, default=3600.0, help="seconds to wait at most"
@@ -51,6 +55,9 @@ class Command(BaseCommand):
     def handle(self, *args: Any, **options: Any) -> None:
         """Launch the job, then wait if asked to."""
         try:
+            if options["estimate"]:
+                self._estimate(options)
+                return
             check_broker()
             job = self._launch(options)
         except AugmentError as error:
@@ -63,6 +70,23 @@ class Command(BaseCommand):
             except KeyboardInterrupt:
                 raise CommandError("Not waited for; the job goes on.", returncode=130) from None
             self.report(job)
+
+    def _estimate(self, options: dict[str, Any]) -> None:
+        ensure_builtin()
+        found = estimate(
+            chosen_contestants(options["contestants"]), chosen_scenarios(options["scenarios"])
+        )
+        self.stdout.write(f"{found.rows} to run, {found.asking_rows} of them ask models.")
+        for line in found.lines:
+            least, usual, most = line.calls
+            basis = f"{line.seen} earlier runs" if line.seen else "a guess from its prompts"
+            money = "cost unknown"
+            if line.usd is not None and line.usd_most is not None:
+                money = f"{line.usd:.4f} USD expected, {line.usd_most:.2f} at most"
+            self.stdout.write(
+                f"{line.slug}: calls {usual} expected ({least} to {most}), tokens "
+                f"{line.tokens_in} in, {line.tokens_out} out, {money} ({basis})"
+            )
 
     def _launch(self, options: dict[str, Any]) -> GenerationJob:
         ensure_builtin()

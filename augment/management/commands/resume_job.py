@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import uuid
 from argparse import ArgumentParser
 from typing import Any
 
@@ -11,9 +10,9 @@ from django.db import transaction
 
 from augment.errors import AugmentError
 from augment.management.arguments import add_cap_arguments, caps_of
-from augment.models import GenerationJob
 from augment.services import caps, jobs
 from augment.services.budget import limit_of
+from augment.services.choosing import job_named
 from augment.tasks import check_broker, enqueue_job
 
 
@@ -27,16 +26,14 @@ class Command(BaseCommand):
 
     def add_arguments(self, parser: ArgumentParser) -> None:
         """The job and its new caps."""
-        parser.add_argument("job", type=uuid.UUID, help="the job's code, as on its page")
+        parser.add_argument("job", help="its name or its code")
         add_cap_arguments(parser)
 
     def handle(self, *args: Any, **options: Any) -> None:
         """Raise what is given, then resume."""
-        job = GenerationJob.objects.filter(code=options["job"]).first()
-        if job is None:
-            raise CommandError(f"There is no job {options['job']}.")
         wanted = caps_of(options)
         try:
+            job = job_named(options["job"])
             check_broker()
             with transaction.atomic():
                 if wanted != jobs.NO_CAPS:

@@ -1,0 +1,86 @@
+"""What no job can do, said in words before it is launched."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from django.db.models import Q
+
+from augment.baselines.quantised import BIN_M
+from augment.errors import AugmentError, Conflict, KeyMissing
+from augment.models import Contestant, Scenario
+from augment.services.contestants import key_of
+from augment.services.roles import blind_viewers, seats_of
+
+Kind = Contestant.Kind
+
+_KINDS = (Kind.REFERENCE, Kind.RULE, Kind.LLM, Kind.SIMULATED)
+
+RUNNABLE = Q(kind__in=_KINDS) | Q(kind=Kind.BASELINE, slug__in=BIN_M)
+"""Whom a job can run; what humans and outside baselines made is imported."""
+
+
+def is_runnable(contestant: Contestant) -> bool:
+    """Whether it is one of RUNNABLE."""
+    is_ours = contestant.kind == Kind.BASELINE and contestant.slug in BIN_M
+    return contestant.kind in _KINDS or is_ours
+
+
+def obstacle(contestant: Contestant) -> str:
+    """Why no job can run a contestant, whatever the scenarios; empty where one can."""
+    if not is_runnable(contestant):
+        return "made by people or by an outside program, and imported"
+    try:
+        seats_of(contestant)
+    except AugmentError as error:
+        return str(error)
+    if blind_viewers([contestant]):
+        return "its viewer sees text alone; visual QA needs vision"
+    return ""
+
+
+def keys_missing(contestant: Contestant) -> list[str]:
+    """Environment variables with keys that a contestant needs and this process does not have.
+
+    Workers elsewhere may have them: this is a warning, no obstacle.
+    """
+    missing = set()
+    for seat in seats_of(contestant).values():
+        try:
+            key_of(seat.endpoint)
+        except KeyMissing as error:
+            missing.add(error.variable)
+    return sorted(missing)
+
+
+def refuse_impossible(who: Sequence[Contestant], where: Sequence[Scenario]) -> None:
+    """Do nothing for a job that can run to its end.
+
+    Raises:
+        Conflict: Nothing is chosen, or a contestant can't run, or not on these scenarios.
+    """
+    if not who:
+        raise Conflict("Choose at least one contestant.")
+    if not where:
+        raise Conflict("Choose at least one scenario.")
+    strangers = [row.slug for row in who if not is_runnable(row)]
+    if strangers:
+        raise Conflict(
+            f"A job can't run {', '.join(strangers)}: what humans or outside programs made is "
+            "imported."
+        )
+    blind = blind_viewers(who)
+    if blind:
+        raise Conflict(
+            f"Visual QA needs a viewer that sees, and these see text alone: {', '.join(blind)}. "
+            "Give the contestant another viewer or another variant."
+        )
+    references = [
+        row.slug for row in who if row.kind == Kind.REFERENCE or row.error_rates is not None
+    ]
+    without = [row.slug for row in where if row.reference is None]
+    if references and without:
+        raise Conflict(
+            f"{references[0]} can't run on scenarios without a reference modification: "
+            f"{', '.join(without)}."
+        )

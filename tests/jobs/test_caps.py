@@ -1,0 +1,99 @@
+"""Caps: which there can be, how they are raised, and what becomes of a job that reached one."""
+
+from __future__ import annotations
+
+from decimal import Decimal
+
+import pytest
+
+from augment.errors import Conflict, ModelFault
+from augment.models import Augmentation, Event, GenerationJob
+from augment.services import caps, jobs, runner
+from augment.services.caps import Caps
+from tests.jobs.models import Model, add_llama, llama_job
+from tests.jobs.rows import add_scenario, launch, only_row
+
+pytestmark = pytest.mark.django_db
+
+ROW, JOB = Augmentation.State, GenerationJob.State
+
+
+def test_a_money_cap_needs_every_price() -> None:
+    with pytest.raises(Conflict, match=r"nobody knows that of llama3\.1 at local: cap the job by"):
+        llama_job(caps=Caps(usd=Decimal(1)))
+    assert not GenerationJob.objects.exists()
+
+
+def test_a_money_cap_takes_contestants_that_cost_nothing() -> None:
+    add_llama(price="1")
+    add_scenario("street")
+    launch()
+    job = jobs.launch(
+        name="R",
+        contestants=["llama", "reference"],
+        scenarios=["street"],
+        caps=Caps(usd=Decimal("2.50")),
+    )
+    assert job.cap_usd == Decimal("2.5")
+    event = Event.objects.filter(verb="launch").first()
+    assert event is not None
+    assert event.after is not None
+    assert event.after["cap"] == "2.5 USD"
+
+
+@pytest.mark.parametrize(
+    "given",
+    [
+        Caps(usd=Decimal(0)),
+        Caps(usd=Decimal("NaN")),
+        Caps(usd=Decimal("-1")),
+        Caps(calls=0),
+        Caps(tokens=-5),
+        Caps(calls=10**12),
+    ],
+)
+def test_a_cap_that_can_not_be_is_refused(given: Caps) -> None:
+    with pytest.raises(Conflict, match="is more than 0 and at most"):
+        given.columns()
+
+
+def test_caps_are_only_raised_and_only_where_there_are_any() -> None:
+    job = llama_job(caps=Caps(calls=5))
+    for given, sentence in (
+        (Caps(), "Say which cap"),
+        (Caps(calls=5), "must be higher than the one of 5 calls"),
+        (Caps(tokens=10), "has no such cap; its cap is 5 calls"),
+    ):
+        with pytest.raises(Conflict, match=sentence):
+            caps.raise_cap(job, caps=given)
+    job = caps.raise_cap(job, caps=Caps(calls=6))
+    assert job.cap_calls == 6
+    assert Event.objects.get(verb="raise cap").after == {"cap": "6 calls"}
+    jobs.cancel(job)
+    with pytest.raises(Conflict, match="is cancelled already"):
+        caps.raise_cap(job, caps=Caps(calls=7))
+
+
+def test_only_a_stopped_job_is_resumed() -> None:
+    with pytest.raises(Conflict, match="is running; only one that stopped at its cap"):
+        caps.resume(llama_job())
+
+
+def test_a_stopped_job_can_be_cancelled() -> None:
+    job = llama_job(caps=Caps(tokens=5))
+    runner.work_on(augmentation_pk=only_row(job).pk, connect=Model())
+    job.refresh_from_db()
+    jobs.cancel(job)
+    assert (job.state, only_row(job).state) == (JOB.CANCELLED, ROW.CANCELLED)
+
+
+def test_retrying_in_a_stopped_job_leaves_it_stopped() -> None:
+    job = llama_job(scenarios=2, caps=Caps(calls=1))
+    first, second = job.augmentations.order_by("pk")
+    broken = Model(ModelFault("no", retryable=False, status=500))
+    runner.work_on(augmentation_pk=first.pk, connect=broken)
+    runner.work_on(augmentation_pk=second.pk, connect=Model())
+    job.refresh_from_db()
+    assert job.state == JOB.STOPPED_AT_CAP
+    jobs.retry_failed(job)
+    assert (job.state, jobs.progress(job).queued) == (JOB.STOPPED_AT_CAP, 2)
