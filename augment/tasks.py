@@ -21,7 +21,7 @@ from django.db import Error, connection
 from django.utils import timezone
 
 from augment.errors import QueueUnreachable
-from augment.services import claims, jobs, runner
+from augment.services import claims, jobs, marked_pictures, runner
 
 logger = logging.getLogger(__name__)
 
@@ -39,6 +39,22 @@ def run_augmentation(self: Any, augmentation_pk: int) -> None:
     """Run one row, unless somebody else has it or it has an outcome."""
     worker = f"{self.request.hostname or 'here'} {os.getpid()}"
     runner.work_on(augmentation_pk=augmentation_pk, worker=worker[:120])
+
+
+@shared_task(name="augment.draw_marks", ignore_result=True)
+def draw_marks(augmentation_pk: int) -> None:
+    """Draw the faults that the checks find in one row; a second time nothing is left to do."""
+    marked_pictures.draw_marked(augmentation_pk=augmentation_pk)
+
+
+def enqueue_marks(augmentation_pk: int) -> None:
+    """Have a row's faults drawn; for transaction.on_commit.
+
+    Raises:
+        QueueUnreachable: No broker.
+    """
+    with _broker() as broker:
+        draw_marks.apply_async((augmentation_pk,), connection=broker, retry=False)
 
 
 def enqueue(ids: Iterable[int]) -> int:

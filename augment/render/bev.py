@@ -6,9 +6,12 @@ on the scene, the change and the camera alone.
 
 from __future__ import annotations
 
+from dataclasses import replace
+from functools import lru_cache
+
 from augment.render import palette
 from augment.render.camera import Camera
-from augment.render.canvas import Canvas, Ground
+from augment.render.canvas import Box, Canvas, Ground
 from augment.render.edges import draw_badges, outside, place_badges
 from augment.render.labels import draw_ghosts, draw_labels
 from augment.render.marks import draw_mark, draw_way
@@ -35,14 +38,26 @@ def draw(
     Raises:
         InvalidModification: The change does not fit the scene.
     """
+    ground, taken = painted(scene, modification, camera, ghosts=labels)
+    if labels:
+        draw_labels(ground, apply(scene, modification), taken=taken)
+    return ground.canvas.png()
+
+
+def painted(
+    scene: Scene, modification: Modification, camera: Camera, *, ghosts: bool = True
+) -> tuple[Ground, list[Box]]:
+    """All of a picture but its labels, and the boxes in pixels that text keeps free of.
+
+    Raises:
+        InvalidModification: The change does not fit the scene.
+    """
     after = apply(scene, modification)
-    ground = Ground(Canvas(camera.width_px, camera.height_px, palette.PAPER), camera)
-    draw_ground(ground, after)
-    draw_grid(ground)
+    ground = _flat(replace(after, agents=()), camera).copy()
     draw_signals(ground, after)
     scale_px = scale_box(ground, scene)
     draw_scale(ground, scale_px)
-    if labels:
+    if ghosts:
         draw_ghosts(ground, scene, modification)
     styled = _styled(after, modification)
     # Every way lies under every mark: nobody is crossed out by somebody else's arrow.
@@ -53,14 +68,19 @@ def draw(
     seen = [agent for agent in (after.ego, *modification.changed) if agent not in lost]
     badges = place_badges(ground, lost, seen, taken=(scale_px,))
     draw_badges(ground, badges)
-    if labels:
-        draw_labels(ground, after, taken=[scale_px, *(badge.box_px for badge in badges)])
-    return ground.canvas.png()
+    return ground, [scale_px, *(badge.box_px for badge in badges)]
 
 
-def draw_original(scene: Scene, camera: Camera) -> bytes:
-    """The scene before any change, as the bytes of a PNG."""
-    return draw(scene, Modification(), camera)
+@lru_cache(maxsize=2)
+def _flat(scene: Scene, camera: Camera) -> Ground:
+    """All that lies flat under the traffic, half of the work; nobody draws on it, only on copies.
+
+    A job runs the contestants of a scenario one after the other. Two, because each holds 26 MB.
+    """
+    ground = Ground(Canvas(camera.width_px, camera.height_px, palette.PAPER), camera)
+    draw_ground(ground, scene)
+    draw_grid(ground)
+    return ground
 
 
 def _styled(after: Scene, modification: Modification) -> list[tuple[TrafficAgent, MarkStyle]]:

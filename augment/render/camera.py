@@ -18,7 +18,6 @@ from augment.scene.entities import Scene, TrafficAgent
 from augment.scene.modification import Modification
 
 WIDTH_PX = 1200
-HEIGHT_PX = 800
 STEP_M = 5.0
 MARGIN_M = 3.0
 # The widest window, 5 px/m: beyond it a car is a speck, and an arrow at the edge tells more.

@@ -6,6 +6,7 @@ averaged down at the end. Coordinates and widths are picture pixels all the same
 
 from __future__ import annotations
 
+import copy
 import io
 from collections.abc import Callable
 from functools import cache
@@ -35,10 +36,15 @@ class Canvas:
     def __init__(self, width_px: int, height_px: int, background: Colour) -> None:
         self.width_px = width_px
         self.height_px = height_px
-        self._image = Image.new("RGB", (width_px * FINENESS, height_px * FINENESS), background)
-        self._solid = ImageDraw.Draw(self._image)
-        self._glass = ImageDraw.Draw(self._image, "RGBA")
         self._texts: list[Callable[[ImageDraw.ImageDraw], None]] = []
+        self._draw_on(Image.new("RGB", (width_px * FINENESS, height_px * FINENESS), background))
+
+    def copy(self) -> Canvas:
+        """The same picture on a surface of its own."""
+        made = copy.copy(self)
+        made._texts = list(self._texts)
+        made._draw_on(self._image.copy())
+        return made
 
     def fill(self, points_px: FloatArray, colour: Colour) -> None:
         """A filled polygon through points (P, 2)."""
@@ -128,6 +134,11 @@ class Canvas:
         finished.save(stream, format="PNG", compress_level=6)
         return stream.getvalue()
 
+    def _draw_on(self, image: Image.Image) -> None:
+        self._image = image
+        self._solid = ImageDraw.Draw(image)
+        self._glass = ImageDraw.Draw(image, "RGBA")
+
     def _pen(self, colour: Colour) -> ImageDraw.ImageDraw:
         # Blending is slower than covering, so only see-through colours pay for it.
         return self._glass if len(colour) == 4 else self._solid
@@ -139,6 +150,10 @@ class Ground:
     def __init__(self, canvas: Canvas, camera: Camera) -> None:
         self.canvas = canvas
         self.camera = camera
+
+    def copy(self) -> Ground:
+        """The same on a surface of its own."""
+        return Ground(self.canvas.copy(), self.camera)
 
     def fill(self, points_m: FloatArray, colour: Colour) -> None:
         """A filled polygon through points (P, 2)."""

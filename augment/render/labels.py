@@ -59,6 +59,8 @@ def _metres(ground: Ground) -> None:
         ground.canvas.text(at, f"{x_m:.0f}", palette.INK, 12, halo=palette.HALO)
     for y_m in raster(camera.y_min_m, camera.y_max_m):
         _, y = ground.at(0.0, y_m)
+        # A dash of a lane beside the number would read as its minus sign.
+        ground.canvas.plate((1.0, y - 8.0, 31.0, y + 8.0), palette.HALO, None, 3.0)
         ground.canvas.text((16.0, y), f"{y_m:.0f}", palette.INK, 12, halo=palette.HALO)
 
 

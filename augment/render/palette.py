@@ -33,8 +33,11 @@ INK: Colour = (33, 37, 41)
 LANE_TEXT: Colour = (0, 0, 128)
 HALO: Colour = (255, 255, 255)
 PLATE: Colour = (255, 255, 255, 222)
-PLATE_EDGE: Colour = (150, 154, 160)
 GHOST: Colour = (90, 95, 105, 150)
+
+WRONG: Colour = (170, 0, 110)
+DOUBTFUL: Colour = (150, 92, 0)
+STAMP: Colour = (120, 80, 165)
 
 LIGHT_RED: Colour = (192, 28, 40)
 LIGHT_YELLOW: Colour = (226, 165, 0)

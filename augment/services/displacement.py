@@ -17,6 +17,7 @@ from augment.scene.catalogue import ScenarioType
 from augment.scene.codec import modification_from_document
 from augment.scene.modification import Modification
 from augment.services.scenes import reference_of
+from augment.variants.recipes import SPELLING, spelled
 
 __all__ = [
     "PLACED_EXACTLY",
@@ -32,6 +33,7 @@ __all__ = [
     "of_augmentation",
     "of_job",
     "of_latest",
+    "of_rows",
     "spelled",
     "summarise",
     "types_named",
@@ -44,8 +46,8 @@ PLACED_EXACTLY = (ScenarioType.JAYWALKER, ScenarioType.NUDGE, ScenarioType.OVERT
 places that all follow the instruction."""
 
 
-SPELLING = {"otm": "OTM", "fc": "FC", "tqa": "tQA", "vqa": "vQA"}
-"""The variants as the paper spells and orders them; combined ones are joined by a plus."""
+VARIANTS = tuple(SPELLING.values())
+"""How a group of one variant is headed, the paper's first and in its order."""
 
 NO_VARIANT = "Without a variant"
 
@@ -65,7 +67,7 @@ class Unmeasured(StrEnum):
     """Why an augmentation has no displacement."""
 
     UNFINISHED = "waits, runs, failed or was cancelled"
-    NO_REFERENCE = "its scenario has no reference"
+    NO_REFERENCE = "its scenario has no reference that can be read"
     UNREADABLE_ROW = "its stored modification can't be read"
 
 
@@ -114,6 +116,11 @@ def of_latest() -> list[Measured]:
     return [*_measured(_rows().filter(pk__in=youngest))]
 
 
+def of_rows(ids: Collection[int]) -> list[Measured]:
+    """The augmentations with these primary keys; one query."""
+    return [*_measured(_rows().filter(pk__in=ids))]
+
+
 def of_augmentation(row: Augmentation) -> Measured:
     """One row whose scenario is loaded; no query."""
     return next(_measured([row]))
@@ -155,12 +162,6 @@ def types_named(names: Sequence[str]) -> tuple[ScenarioType, ...]:
     return tuple(known[name] for name in names)
 
 
-def spelled(variant: str) -> str:
-    """A variant as the paper spells it: "fc+tqa" is FC+tQA."""
-    parts = [SPELLING.get(part, part) for part in variant.lower().split("+")]
-    return "+".join(parts) if variant else NO_VARIANT
-
-
 # Private
 
 
@@ -176,8 +177,15 @@ def _measured(rows: Iterable[Augmentation]) -> Iterator[Measured]:
     references: dict[int, Modification | None] = {}
     for row in rows:
         if row.scenario_id not in references:
-            references[row.scenario_id] = reference_of(row.scenario)
+            references[row.scenario_id] = _reference(row.scenario)
         yield _one(row, references[row.scenario_id])
+
+
+def _reference(scenario: Scenario) -> Modification | None:
+    try:
+        return reference_of(scenario)
+    except InvalidDocument:
+        return None
 
 
 def _one(row: Augmentation, reference: Modification | None) -> Measured:
@@ -219,7 +227,7 @@ def _group(cell: list[tuple[Augmentation, Displacement]], by: By) -> Group:
     contestant = row.contestant
     headings = {
         By.TYPE: row.scenario.get_type_display(),
-        By.VARIANT: spelled(contestant.variant),
+        By.VARIANT: spelled(contestant.variant) or NO_VARIANT,
         By.CONTESTANT: contestant.name,
     }
     return Group(

@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-from augment.checks import findings
 from augment.errors import InvalidDocument, InvalidModification
 from augment.metrics.fault_guess import FaultClass, first_guess
 from augment.models import Augmentation
-from augment.scene.codec import modification_from_document
-from augment.services.scenes import scene_of
+from augment.services.judging import findings_of
 
 __all__ = ["FaultClass", "guess"]
 
@@ -17,7 +15,6 @@ def guess(row: Augmentation) -> frozenset[FaultClass] | None:
     if row.modification is None:
         return None
     try:
-        found = findings(scene_of(row.scenario), modification_from_document(row.modification))
+        return first_guess(findings_of(row))
     except (InvalidDocument, InvalidModification):
         return None
-    return first_guess(found)

@@ -4,13 +4,11 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from augment.checks import Severity, findings
+from augment.checks import Finding, Severity
 from augment.errors import InvalidDocument, InvalidModification
 from augment.models import Augmentation
-from augment.scene.codec import modification_from_document
-from augment.services.scenes import scene_of
-
-_ORDER = (Severity.WRONG, Severity.DOUBTFUL, Severity.FACT)
+from augment.services.judging import findings_of, intent_of
+from augment.services.marked_pictures import is_drawn, marked_name, numbered
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -20,11 +18,13 @@ class FindingLine:
     Attributes:
         severity: "wrong", "doubtful" or "fact".
         kind: What was measured, in words: "off road".
+        fault: The class of fault that it speaks for, empty for a fact.
         sentence: With its numbers; agents go by their ids in the modification.
     """
 
     severity: str
     kind: str
+    fault: str
     sentence: str
 
 
@@ -34,14 +34,20 @@ class Checked:
 
     Attributes:
         problem: Why nothing could be checked, empty where it was.
+        is_against_intent: Whether the instruction was understood and held against it.
+        picture: The name of the picture that shows the faults by their numbers, empty without.
+        is_drawn: Whether that picture is there.
     """
 
     lines: tuple[FindingLine, ...] = ()
+    is_against_intent: bool = False
+    picture: str = ""
+    is_drawn: bool = False
     problem: str = ""
 
     @property
     def faults(self) -> list[FindingLine]:
-        """What is wrong or doubtful."""
+        """What is wrong or doubtful, in the order of the numbers in the picture."""
         return [line for line in self.lines if line.severity != Severity.FACT]
 
     @property
@@ -55,17 +61,23 @@ def checked(row: Augmentation) -> Checked | None:
     if row.modification is None:
         return None
     try:
-        found = findings(scene_of(row.scenario), modification_from_document(row.modification))
+        found = findings_of(row)
     except (InvalidDocument, InvalidModification) as error:
         return Checked(problem=str(error))
-    lines = [
-        FindingLine(
-            severity=one.severity.value,
-            kind=one.kind.value.replace("_", " "),
-            sentence=one.sentence(),
-        )
-        for severity in _ORDER
-        for one in found
-        if one.severity is severity
-    ]
-    return Checked(lines=tuple(lines))
+    facts = [one for one in found if not one.is_fault]
+    name = marked_name(row, found)
+    return Checked(
+        lines=tuple(_line(one) for one in (*numbered(found), *facts)),
+        is_against_intent=intent_of(row.scenario) is not None,
+        picture=name,
+        is_drawn=is_drawn(name),
+    )
+
+
+def _line(one: Finding) -> FindingLine:
+    return FindingLine(
+        severity=one.severity.value,
+        kind=one.kind.value.replace("_", " "),
+        fault=one.fault.value if one.is_fault else "",
+        sentence=one.sentence(),
+    )

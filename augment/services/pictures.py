@@ -9,7 +9,7 @@ from django.core.files.storage import default_storage
 
 from augment.models import Scenario
 from augment.render.bev import draw
-from augment.render.camera import camera_for
+from augment.render.camera import Camera, camera_for
 from augment.scene.entities import Scene
 from augment.scene.modification import Modification
 from augment.services.scenes import reference_of, scene_of
@@ -32,6 +32,15 @@ def original_picture(scenario: Scenario) -> str:
     return name
 
 
+def camera_of(scenario: Scenario) -> Camera:
+    """The window that all pictures of a scenario show.
+
+    Raises:
+        InvalidDocument: The stored scene can't be read.
+    """
+    return camera_for(scene_of(scenario), reference_of(scenario))
+
+
 def picture_of(scenario: Scenario, scene: Scene, modification: Modification) -> str:
     """The name of the picture after a change.
 
@@ -50,13 +59,18 @@ def picture_of(scenario: Scenario, scene: Scene, modification: Modification) -> 
 def store(png: bytes, *, folder: str = "bev") -> str:
     """The name under which these bytes are kept, <folder>/<sha256>.png; written only if absent."""
     name = f"{folder}/{hashlib.sha256(png).hexdigest()}.png"
+    store_as(name, png)
+    return name
+
+
+def store_as(name: str, png: bytes) -> None:
+    """Keep these bytes under a name that belongs to them alone; written only if absent."""
     if default_storage.exists(name):
         if default_storage.size(name) == len(png):
-            return name
+            return
         # A worker was killed in the middle of writing it.
         default_storage.delete(name)
     written = default_storage.save(name, ContentFile(png))
     if written != name:
         # Another worker was faster with the same bytes, and the storage made up a second name.
         default_storage.delete(written)
-    return name

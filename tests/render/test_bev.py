@@ -9,12 +9,21 @@ import numpy as np
 import pytest
 
 from augment.errors import InvalidModification
-from augment.render.bev import draw, draw_original
+from augment.render.bev import draw
 from augment.render.camera import camera_for
 from augment.scene.entities import AgentType, Area, AreaKind, Scene, TrafficAgent
 from augment.scene.modification import Modification
 from tests import scenes
-from tests.render.pictures import chunks, is_blue, is_grey, is_red, opened, patch, pixel_at
+from tests.render.pictures import (
+    chunks,
+    draw_original,
+    is_blue,
+    is_grey,
+    is_red,
+    opened,
+    patch,
+    pixel_at,
+)
 
 STREET = scenes.scene()
 CAMERA = camera_for(STREET, None)
@@ -134,6 +143,15 @@ def test_the_same_picture_has_the_same_bytes_and_no_metadata() -> None:
     first, second = (draw(STREET, change, CAMERA) for _ in range(2))
     assert first == second
     assert set(chunks(first)) == {"IHDR", "IDAT", "IEND"}
+
+
+def test_no_picture_leaves_a_trace_on_the_next_of_its_scene() -> None:
+    before = draw_original(STREET, CAMERA)
+    draw(STREET, added(scenes.vehicle("New1", 20.0, 3.5)), CAMERA, labels=True)
+    assert draw_original(STREET, CAMERA) == before
+    other = scenes.scene(agents=(scenes.vehicle("Agent2", 20.0, 0.0),))
+    assert draw_original(other, CAMERA) != before
+    assert draw_original(STREET, replace(CAMERA, x_max_m=CAMERA.x_max_m + 5.0)) != before
 
 
 def test_a_change_that_does_not_fit_is_refused() -> None:

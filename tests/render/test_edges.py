@@ -7,7 +7,7 @@ from itertools import combinations
 
 import pytest
 
-from augment.render.bev import draw, draw_original
+from augment.render.bev import draw
 from augment.render.camera import camera_for
 from augment.render.canvas import Box, Canvas, Ground
 from augment.render.edges import Badge, distance_text, outside, place_badges
@@ -15,7 +15,7 @@ from augment.render.scale import scale_box
 from augment.scene.entities import TrafficAgent
 from augment.scene.modification import Modification
 from tests import scenes
-from tests.render.pictures import opened
+from tests.render.pictures import draw_original, opened
 
 CAMERA = camera_for(scenes.scene(), None)
 GROUND = Ground(Canvas(1200, 800, (255, 255, 255)), CAMERA)
