@@ -1,0 +1,33 @@
+"""manage.py draw_checks: pictures for attention checks."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from django.core.management.base import BaseCommand, CommandError, CommandParser
+
+from augment.errors import AugmentError
+from augment.services.attention import draw_checks
+from augment.services.choosing import chosen_scenarios
+
+
+class Command(BaseCommand):
+    """The door to augment.services.attention.draw_checks."""
+
+    help = (
+        "Draw, for scenarios with a reference, a picture that is broken on purpose: everything "
+        "that the reference places, heaped across the ego. Studies that are opened afterwards can "
+        "hide attention checks among their pairs."
+    )
+
+    def add_arguments(self, parser: CommandParser) -> None:
+        """Which scenarios."""
+        parser.add_argument("scenarios", nargs="+", metavar="SLUG", help="or: all, or: catalogue")
+
+    def handle(self, *args: Any, **options: Any) -> None:
+        """Draw what is missing and say how many there are."""
+        try:
+            drawn = draw_checks(scenarios=chosen_scenarios(options["scenarios"]))
+        except AugmentError as error:
+            raise CommandError(str(error)) from error
+        self.stdout.write(f"{len(drawn)} pictures drawn for attention checks.")
