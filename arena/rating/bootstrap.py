@@ -3,22 +3,29 @@
 What is drawn with replacement is the unit: votes, whole scenarios, whole experts, or both at
 once (a vote counts as often as its expert times its scenario is drawn).
 
-Notation: B rounds, P pairs, V votes, K cells (expert x scenario).
+Notation: R rows, P pairs, K cells (expert x scenario), B rounds, which are the last axis.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import dataclass
 from enum import StrEnum
 
 import numpy as np
+from numpy.typing import NDArray
 
-from arena.rating.comparisons import Comparisons, FloatArray, IntArray, PairCounts
+from arena.rating.comparisons import Comparisons, FloatArray, IntArray, PairCounts, renumbered
+from arena.rating.draws import Multinomial
 
 LEVEL = 0.95
 
-_NUMBERS_AT_ONCE = 2_000_000
+_NUMBERS_AT_ONCE = 500_000
 """How many numbers a block of rounds may hold; more only costs memory."""
+_LARGEST_TABLE = 2_000_000
+_NUMBERS_OF_TABLES = 12_000_000
+_EMPTIEST = 500
+"""A table with more places than this for each row takes longer than going row by row."""
 
 
 class Unit(StrEnum):
@@ -30,16 +37,31 @@ class Unit(StrEnum):
     TWO_WAY = "two-way"
 
 
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Rounds:
+    """Some rounds of resampled votes.
+
+    Attributes:
+        games: (P, B) comparisons of each pair.
+        scores: (P, B) what `low` scored in them, a tie half.
+        ties: (B,) ties of all pairs together.
+    """
+
+    games: FloatArray
+    scores: FloatArray
+    ties: FloatArray
+
+
 def resample(
     votes: Comparisons, counts: PairCounts, *, unit: Unit, rounds: int, seed: int
-) -> Iterator[tuple[FloatArray, FloatArray]]:
-    """Blocks of (games, scores), each (b, P), `rounds` rows in all.
+) -> Iterator[Rounds]:
+    """Blocks of rounds, `rounds` in all.
 
     Args:
         votes: What was voted.
         counts: The same, by pair.
         unit: What is drawn.
-        rounds: B.
+        rounds: How many.
         seed: The same seed gives the same rounds.
     """
     if unit is Unit.VOTE:
@@ -47,10 +69,10 @@ def resample(
     return _clusters(votes, counts, unit, rounds, seed)
 
 
-def interval(samples: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """The percentile interval (C,), (C,) of samples (B, C)."""
-    tail = 50.0 * (1.0 - LEVEL)
-    lower, upper = np.percentile(samples, [tail, 100.0 - tail], axis=0)
+def interval(samples: FloatArray, *, level: float = LEVEL) -> tuple[FloatArray, FloatArray]:
+    """The percentile interval (C,), (C,) of samples (C, B)."""
+    tail = 50.0 * (1.0 - level)
+    lower, upper = np.percentile(samples, [tail, 100.0 - tail], axis=1)
     return lower, upper
 
 
@@ -60,52 +82,166 @@ def _blocks(rounds: int, width: int) -> Iterator[int]:
         yield min(size, rounds - start)
 
 
-def _votes(
-    counts: PairCounts, rounds: int, rng: np.random.Generator
-) -> Iterator[tuple[FloatArray, FloatArray]]:
+def _votes(counts: PairCounts, rounds: int, rng: np.random.Generator) -> Iterator[Rounds]:
     """Votes of one pair and outcome are alike, so drawing votes is drawing counts of them."""
-    seen = counts.outcomes.ravel()
+    seen = counts.outcomes.T.ravel()
     kinds = np.flatnonzero(seen)
-    total = int(seen.sum())
+    kind_counts = Multinomial(seen[kinds])
     for size in _blocks(rounds, len(seen)):
-        drawn = np.zeros((size, len(seen)))
-        drawn[:, kinds] = rng.multinomial(total, seen[kinds] / total, size=size)
-        by_outcome = drawn.reshape(size, -1, 3)
-        yield by_outcome.sum(axis=2), by_outcome[:, :, 0] + 0.5 * by_outcome[:, :, 1]
+        drawn = kind_counts.draw(rng, size)
+        if len(kinds) < len(seen):
+            everything = np.zeros((len(seen), size))
+            everything[kinds] = drawn
+            drawn = everything
+        wins, ties, losses = drawn.reshape(3, -1, size)
+        of_all = ties.sum(axis=0)
+        losses += wins
+        losses += ties
+        ties *= 0.5
+        wins += ties
+        yield Rounds(games=losses, scores=wins, ties=of_all)
+
+
+# --- Clusters: a scenario's or an expert's votes are drawn together ------------------------------
 
 
 def _clusters(
     votes: Comparisons, counts: PairCounts, unit: Unit, rounds: int, seed: int
-) -> Iterator[tuple[FloatArray, FloatArray]]:
-    """A cluster's votes are drawn together: rounds are weights of clusters times their counts."""
-    experts = int(votes.expert.max()) + 1
-    scenarios = int(votes.scenario.max()) + 1
-    cells, cell_of = np.unique(votes.expert * scenarios + votes.scenario, return_inverse=True)
-    per_cell = _counts_per_cell(counts, cell_of, len(cells))
-    of_experts, of_scenarios = (
-        np.random.default_rng(child) for child in np.random.SeedSequence(seed).spawn(2)
+) -> Iterator[Rounds]:
+    """Rounds are weights of clusters times their counts."""
+    experts, expert_of = renumbered(votes.expert)
+    scenarios, scenario_of = renumbered(votes.scenario)
+    cells, cell_of = renumbered(expert_of * len(scenarios) + scenario_of)
+    weights = _Weights(
+        expert_of=cells // len(scenarios),
+        scenario_of=cells % len(scenarios),
+        experts=len(experts) if unit in (Unit.EXPERT, Unit.TWO_WAY) else 0,
+        scenarios=len(scenarios) if unit in (Unit.SCENARIO, Unit.TWO_WAY) else 0,
+        seed=seed,
     )
+    if len(cells) * len(counts.low) > _EMPTIEST * len(votes):
+        return _row_by_row(votes, counts, cell_of, weights, rounds)
+    return _by_tables(_Tables(votes, counts, cell_of, len(cells)), weights, rounds)
+
+
+def _by_tables(tables: _Tables, weights: _Weights, rounds: int) -> Iterator[Rounds]:
+    """Many rounds at once: one product of matrices for each table."""
+    numbers = _NUMBERS_OF_TABLES if tables.are_several else _NUMBERS_AT_ONCE
+    at_once = max(1, numbers // max(tables.cells, 2 * tables.pairs))
+    for first in range(0, rounds, at_once):
+        games, scores, ties = tables.times(weights.draw(min(at_once, rounds - first)))
+        begin = 0
+        for size in _blocks(games.shape[1], 2 * tables.pairs):
+            block = slice(begin, begin + size)
+            yield Rounds(
+                games=games[:, block].astype(np.float64),
+                scores=scores[:, block].astype(np.float64),
+                ties=ties[block].astype(np.float64),
+            )
+            begin += size
+
+
+def _row_by_row(
+    votes: Comparisons, counts: PairCounts, cell_of: IntArray, weights: _Weights, rounds: int
+) -> Iterator[Rounds]:
+    """One round after the other, where tables would be nearly empty."""
     pairs = len(counts.low)
-    for size in _blocks(rounds, len(cells) + 2 * pairs):
-        weight = np.ones((size, len(cells)))
-        if unit in (Unit.EXPERT, Unit.TWO_WAY):
-            weight *= _draws(of_experts, experts, size)[:, cells // scenarios]
-        if unit in (Unit.SCENARIO, Unit.TWO_WAY):
-            weight *= _draws(of_scenarios, scenarios, size)[:, cells % scenarios]
-        drawn = weight @ per_cell
-        yield drawn[:, :pairs], drawn[:, pairs:]
+    place = counts.outcome_of * pairs + counts.pair_of
+    for _ in range(rounds):
+        weight = weights.draw(1)[cell_of, 0].astype(np.float64) * votes.count
+        drawn = np.bincount(place, weights=weight, minlength=3 * pairs).astype(np.float64)
+        wins, ties, losses = drawn.reshape(3, pairs, 1)
+        yield Rounds(games=wins + ties + losses, scores=wins + 0.5 * ties, ties=ties.sum(axis=0))
 
 
-def _draws(rng: np.random.Generator, clusters: int, size: int) -> IntArray:
-    """(size, clusters) how often each cluster is drawn."""
-    return np.asarray(rng.multinomial(clusters, np.full(clusters, 1.0 / clusters), size=size))
+class _Tables:
+    """What each cell holds of each pair: games and scores, a table for some pairs at a time.
+
+    Single precision holds whole and half numbers exactly up to 8 million votes of one pair.
+    """
+
+    def __init__(
+        self, votes: Comparisons, counts: PairCounts, cell_of: IntArray, cells: int
+    ) -> None:
+        self.pairs, self.cells = len(counts.low), cells
+        order = np.argsort(counts.pair_of, kind="stable")
+        self._pair_of = counts.pair_of[order].astype(np.int32)
+        self._cell_of = cell_of[order].astype(np.int32)
+        self._games = votes.count[order].astype(np.float32)
+        half_points = (2 - counts.outcome_of[order]).astype(np.float32)
+        self._scores = np.float32(0.5) * half_points * self._games
+        tied = votes.count * (counts.outcome_of == 1)
+        self._ties = np.bincount(cell_of, weights=tied, minlength=cells).astype(np.float32)
+        self._at_once = max(1, _LARGEST_TABLE // cells)
+        self._only = self._table(0) if self._at_once >= self.pairs else None
+
+    @property
+    def are_several(self) -> bool:
+        """Then they are made anew for every product, of as many rounds as there is room for."""
+        return self._only is None
+
+    def times(
+        self, weight: NDArray[np.float32]
+    ) -> tuple[NDArray[np.float32], NDArray[np.float32], NDArray[np.float32]]:
+        """(P, B) games, (P, B) scores, (B,) ties for weights (K, B)."""
+        found = np.empty((2, self.pairs, weight.shape[1]), dtype=np.float32)
+        for first in range(0, self.pairs, self._at_once):
+            table = self._table(first) if self._only is None else self._only
+            for kind in range(2):
+                np.matmul(table[kind], weight, out=found[kind, first : first + self._at_once])
+        return found[0], found[1], self._ties @ weight
+
+    def _table(self, first: int) -> NDArray[np.float32]:
+        """(2, pairs from `first`, K)."""
+        pairs = min(self._at_once, self.pairs - first)
+        begin, end = np.searchsorted(self._pair_of, [first, first + pairs])
+        rows = slice(begin, end)
+        place = (self._pair_of[rows] - first) * self.cells + self._cell_of[rows]
+        table = np.empty((2, pairs * self.cells), dtype=np.float32)
+        for kind, values in enumerate((self._games, self._scores)):
+            table[kind] = np.bincount(place, weights=values[rows], minlength=table.shape[1])
+        return table.reshape(2, pairs, self.cells)
 
 
-def _counts_per_cell(counts: PairCounts, cell_of: IntArray, cells: int) -> FloatArray:
-    """(K, 2P): the games of each pair, then what `low` scored, in votes of each cell."""
-    pairs = len(counts.low)
-    place = cell_of * pairs + counts.pair_of
-    score = 1.0 - 0.5 * counts.outcome_of
-    games = np.bincount(place, minlength=cells * pairs).reshape(cells, pairs)
-    scores = np.bincount(place, weights=score, minlength=cells * pairs).reshape(cells, pairs)
-    return np.hstack([games.astype(np.float64), scores])
+class _Weights:
+    """How often each cell is drawn: its expert's draws times its scenario's.
+
+    0 experts or scenarios means that they are not drawn and count once.
+    """
+
+    def __init__(
+        self,
+        *,
+        expert_of: IntArray,
+        scenario_of: IntArray,
+        experts: int,
+        scenarios: int,
+        seed: int,
+    ) -> None:
+        self._drawn = [
+            (np.random.default_rng(child), size, of_cell)
+            for child, size, of_cell in zip(
+                np.random.SeedSequence(seed).spawn(2),
+                (experts, scenarios),
+                (expert_of, scenario_of),
+                strict=True,
+            )
+            if size
+        ]
+
+    def draw(self, rounds: int) -> NDArray[np.float32]:
+        """(K, B)."""
+        factors = [
+            _draws(rng, size, rounds).take(of_cell, axis=0) for rng, size, of_cell in self._drawn
+        ]
+        weight = factors[0]
+        for factor in factors[1:]:
+            weight *= factor
+        return weight
+
+
+def _draws(rng: np.random.Generator, clusters: int, rounds: int) -> NDArray[np.float32]:
+    """(clusters, B) how often each is drawn when as many are drawn as there are."""
+    place = rng.integers(0, clusters, size=(rounds, clusters)).T * rounds + np.arange(rounds)
+    drawn = np.bincount(place.ravel(), minlength=clusters * rounds)
+    return drawn.reshape(clusters, rounds).astype(np.float32)

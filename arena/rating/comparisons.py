@@ -1,13 +1,15 @@
 """Votes as arrays, and counted by pair.
 
-Notation: V votes, C contestants, P pairs that met, B bootstrap rounds. Contestants, experts and
-scenarios are integers from 0; `names` gives the contestants' names.
+Votes that agree in everything may stand in one row with their number.
+
+Notation: R rows, C contestants, P pairs that met. Contestants, experts and scenarios are integers
+from 0; `names` gives the contestants' names.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, field, fields, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -33,13 +35,17 @@ class Comparison:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Comparisons:
-    """All votes; every array is (V,) and read-only.
+    """All votes; every array is (R,) and read-only.
+
+    A row is one vote, or `count` votes of one expert on one scenario, pair, side and outcome: what
+    a GROUP BY of these gives. Only online Elo in recorded order looks at the order of the rows.
 
     Attributes:
         names: (C,) of the contestants.
-        first, second: Who was compared.
+        first, second: Who was compared; `first` was shown on the left.
         score: What `first` scored: 1, 0.5 or 0.
         expert, scenario: Whose vote it is, and on what.
+        count: How many votes the row stands for, at least 1; by default each for one.
     """
 
     names: tuple[str, ...]
@@ -48,13 +54,22 @@ class Comparisons:
     score: FloatArray
     expert: IntArray
     scenario: IntArray
+    count: IntArray = field(default_factory=lambda: np.empty(0, dtype=np.int64))
 
     def __post_init__(self) -> None:
-        for field in fields(self)[1:]:
-            getattr(self, field.name).flags.writeable = False
+        if len(self.score) and not len(self.count):
+            object.__setattr__(self, "count", np.ones(len(self.score), dtype=np.int64))
+        for column in fields(self)[1:]:
+            getattr(self, column.name).flags.writeable = False
 
     def __len__(self) -> int:
+        """Rows, not votes."""
         return len(self.score)
+
+    @property
+    def votes(self) -> int:
+        """How many votes there are."""
+        return int(self.count.sum())
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -64,8 +79,8 @@ class PairCounts:
     Attributes:
         low, high: (P,) contestants.
         outcomes: (P, 3) how often low won, neither, high won.
-        pair_of: (V,) the pair of each vote.
-        outcome_of: (V,) 0 where low won, 1 for a tie, 2 where high won.
+        pair_of: (R,) the pair of each row.
+        outcome_of: (R,) 0 where low won, 1 for a tie, 2 where high won.
     """
 
     low: IntArray
@@ -86,7 +101,10 @@ class PairCounts:
 
 
 def as_arrays(names: Sequence[str], votes: Iterable[Comparison]) -> Comparisons:
-    """Number the names and put the votes into arrays, in the given order.
+    """Number the names and put the votes into arrays, a row each, in the given order.
+
+    Experts and scenarios are numbered in the order of their names, so that the order of the votes
+    changes nothing.
 
     Args:
         names: Every contestant, also those without votes.
@@ -99,8 +117,9 @@ def as_arrays(names: Sequence[str], votes: Iterable[Comparison]) -> Comparisons:
     number = {name: index for index, name in enumerate(names)}
     if len(number) < len(names):
         raise ValueError("a contestant is named twice")
-    experts: dict[str, int] = {}
-    scenarios: dict[str, int] = {}
+    votes = list(votes)
+    experts = _numbered(vote.expert for vote in votes)
+    scenarios = _numbered(vote.scenario for vote in votes)
     rows = []
     for count, vote in enumerate(votes, start=1):
         for name in (vote.first, vote.second):
@@ -114,8 +133,8 @@ def as_arrays(names: Sequence[str], votes: Iterable[Comparison]) -> Comparisons:
             (
                 number[vote.first],
                 number[vote.second],
-                experts.setdefault(vote.expert, len(experts)),
-                scenarios.setdefault(vote.scenario, len(scenarios)),
+                experts[vote.expert],
+                scenarios[vote.scenario],
                 vote.score,
             )
         )
@@ -128,32 +147,70 @@ def as_arrays(names: Sequence[str], votes: Iterable[Comparison]) -> Comparisons:
         expert=expert,
         scenario=scenario,
         score=table[:, 4].copy(),
+        count=np.ones(len(table), dtype=np.int64),
+    )
+
+
+def chosen(votes: Comparisons, rows: BoolArray | IntArray) -> Comparisons:
+    """Some of the rows, of the same contestants."""
+    columns = {column.name: getattr(votes, column.name)[rows] for column in fields(votes)[1:]}
+    return replace(votes, **columns)
+
+
+def among(votes: Comparisons, members: Sequence[int]) -> Comparisons:
+    """The votes in which only these contestants met, numbered anew in the given order."""
+    if list(members) == list(range(len(votes.names))):
+        return votes
+    number = np.full(len(votes.names), -1, dtype=np.int64)
+    number[list(members)] = np.arange(len(members))
+    inside = chosen(votes, (number[votes.first] >= 0) & (number[votes.second] >= 0))
+    return replace(
+        inside,
+        names=tuple(votes.names[member] for member in members),
+        first=number[inside.first],
+        second=number[inside.second],
     )
 
 
 def count_pairs(votes: Comparisons) -> PairCounts:
     """Count wins, ties and losses of every pair that met."""
     contestants = len(votes.names)
-    low = np.minimum(votes.first, votes.second)
-    high = np.maximum(votes.first, votes.second)
-    code, pair_of = np.unique(low * contestants + high, return_inverse=True)
-    score_of_low = np.where(votes.first == low, votes.score, 1.0 - votes.score)
-    outcome_of = np.rint(2.0 * (1.0 - score_of_low)).astype(np.int64)
-    counted = np.bincount(pair_of * 3 + outcome_of, minlength=3 * len(code))
+    low, high = np.minimum(votes.first, votes.second), np.maximum(votes.first, votes.second)
+    met, pair_of = renumbered(low * contestants + high)
+    outcome_of = (2.0 - 2.0 * votes.score).astype(np.int64)
+    outcome_of = np.where(votes.first == low, outcome_of, 2 - outcome_of)
+    place = pair_of * 3 + outcome_of
+    counted = np.bincount(place, weights=votes.count, minlength=3 * len(met))
     return PairCounts(
-        low=code // max(contestants, 1),
-        high=code % max(contestants, 1),
+        low=met // max(contestants, 1),
+        high=met % max(contestants, 1),
         outcomes=counted.reshape(-1, 3).astype(np.int64),
         pair_of=pair_of,
         outcome_of=outcome_of,
     )
 
 
+def renumbered(codes: IntArray) -> tuple[IntArray, IntArray]:
+    """The different codes, in order, and (R,) the place of each row's code among them.
+
+    What `np.unique` gives, without sorting where the codes (R,), from 0, are not far apart.
+    """
+    below = int(codes.max(initial=-1)) + 1
+    if below > 10 * len(codes) + 10_000:
+        return np.unique(codes, return_inverse=True)
+    occurs = np.zeros(below, dtype=bool)
+    occurs[codes] = True
+    return np.flatnonzero(occurs), (np.cumsum(occurs) - 1)[codes]
+
+
 def tally(votes: Comparisons) -> IntArray:
     """(C, 3) wins, ties and losses of each contestant."""
-    contestants = len(votes.names)
-    counts = np.zeros((contestants, 3), dtype=np.int64)
-    outcome = np.rint(2.0 * (1.0 - votes.score)).astype(np.int64)
-    np.add.at(counts, (votes.first, outcome), 1)
-    np.add.at(counts, (votes.second, 2 - outcome), 1)
-    return counts
+    size = 3 * len(votes.names)
+    outcome = (2.0 - 2.0 * votes.score).astype(np.int64)
+    counted = np.bincount(votes.first * 3 + outcome, weights=votes.count, minlength=size)
+    counted += np.bincount(votes.second * 3 + 2 - outcome, weights=votes.count, minlength=size)
+    return counted.reshape(-1, 3).astype(np.int64)
+
+
+def _numbered(names: Iterable[str]) -> dict[str, int]:
+    return {name: number for number, name in enumerate(sorted(set(names)))}

@@ -1,0 +1,60 @@
+"""Sentences that go with ratings, in English, and what they were made of.
+
+Whoever shows them in another language looks up the text and fills in the values again.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+Value = int | str | tuple[str, ...] | tuple[tuple[str, ...], ...]
+"""A number, a name, a list of names, or groups of names."""
+
+
+class Sentence(str):
+    """An English sentence that remembers its text and values.
+
+    Attributes:
+        text: With a named place, as in `%(number)s`, for every value.
+        values: By the names of their places.
+    """
+
+    text: str
+    values: dict[str, Value]
+
+    def as_document(self) -> dict[str, Any]:
+        """What `read_sentence` makes the sentence of again."""
+        return {"text": self.text, "values": self.values}
+
+
+def sentence(text: str, **values: Value) -> Sentence:
+    """The sentence of a text and its values; the text stands in the catalogue of translations."""
+    made = Sentence(filled(text, values))
+    made.text, made.values = text, values
+    return made
+
+
+def filled(text: str, values: dict[str, Value]) -> str:
+    """The text with its values; names are joined by commas, groups of names by semicolons."""
+    return text % {name: _written(value) for name, value in values.items()}
+
+
+def read_sentence(document: dict[str, Any]) -> Sentence:
+    """The sentence of what `as_document` gave, also after a way through JSON."""
+    return sentence(
+        document["text"], **{name: _read(value) for name, value in document["values"].items()}
+    )
+
+
+def _written(value: Value) -> str:
+    if not isinstance(value, tuple):
+        return str(value)
+    nested = [", ".join(part) if isinstance(part, tuple) else part for part in value]
+    return ("; " if any(isinstance(part, tuple) for part in value) else ", ").join(nested)
+
+
+def _read(value: Any) -> Value:
+    if isinstance(value, list | tuple):
+        return tuple(tuple(part) if isinstance(part, list) else part for part in value)
+    made: int | str = value
+    return made
