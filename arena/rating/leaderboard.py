@@ -1,198 +1,313 @@
-"""The rated table: which contestants, how strong, how sure, which rank. Read this file first."""
+"""The rated table: which contestants, how strong, how sure, which rank. Read this file first.
+
+    votes = as_arrays(names, [Comparison(first="a", second="b", score=1.0, expert="e", ...), ...])
+    board = rate(votes)  # the default: Bradley-Terry, two-way, 10,000 rounds
+    board = rate(votes, unit=Unit.VOTE, rounds=PAPER_ROUNDS)  # the paper's mode
+    board.lines[i].rating, .lower, .upper, .rank  # None where the votes do not determine them
+    board.status, board.explanation, board.warnings  # always shown with the numbers
+
+Votes that were grouped elsewhere go into `Comparisons` directly, with their `count`.
+"""
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
-from enum import StrEnum
+from dataclasses import dataclass, field, replace
+from typing import Any
 
 import numpy as np
 
-from arena.rating import bradley_terry, elo
-from arena.rating.bootstrap import LEVEL, Unit, interval, resample
+from arena.rating import elo
+from arena.rating.bootstrap import Unit
 from arena.rating.comparisons import (
     Comparisons,
     FloatArray,
-    PairCounts,
+    among,
     count_pairs,
+    renumbered,
     tally,
 )
-from arena.rating.connectivity import Diagnosis, Status, determined, diagnose
-from arena.rating.ranking import ranks
+from arena.rating.connectivity import Diagnosis, Status, diagnose
+from arena.rating.parts import Method, Order, Rated, Rules, rate_part
+from arena.rating.ranking import Separation
+from arena.rating.sentences import Sentence, sentence
 
-MOST_DEGENERATE = (1.0 - LEVEL) / 2.0
-"""The largest share of rounds without ratings that still leaves a percentile to read."""
+__all__ = ["Leaderboard", "Line", "Method", "Order", "Unit", "anchored", "rate"]
 
-
-class Method(StrEnum):
-    """How votes become ratings."""
-
-    BRADLEY_TERRY = "bt"
-    ELO = "elo"
+ROUNDS = 10_000
+PAPER_ROUNDS = 1000
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Line:
-    """One contestant; None where the votes do not determine a number, and the note says why."""
+    """One contestant; None where the votes do not determine a number, and the note says why.
+
+    Attributes:
+        rating, lower, upper: Elo points; the mean of those rated together is 1000.
+        rank: As the paper defines it: 1 + the number of others whose lower bound is above `upper`.
+        rank_best, rank_worst: Places that 95 % of the bootstrap rounds lie between.
+        check_lower, check_upper: The interval in closed form (Bradley-Terry only), to compare.
+        part: Who have the same number here are rated together; ratings and ranks of different
+            parts can't be compared.
+    """
 
     name: str
     rating: float | None = None
     lower: float | None = None
     upper: float | None = None
     rank: int | None = None
+    rank_best: int | None = None
+    rank_worst: int | None = None
+    check_lower: float | None = None
+    check_upper: float | None = None
     votes: int = 0
     wins: int = 0
     ties: int = 0
     losses: int = 0
+    part: int = 0
     note: str = ""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Leaderboard:
-    """All contestants, in the order of the comparisons' names.
+    """All contestants, in the order of the comparisons' names, and how they were rated.
 
     Attributes:
-        explanation: Why ratings or intervals are missing, empty if none is.
+        reasons: Why ratings or intervals are missing, none if none is.
+        warnings: What to keep in mind.
+        seed: Of the draws; the same votes, rules and seed give the same board.
+        votes: How many were counted.
+        experts, scenarios: How many there are among the votes.
+        tie_share: Ties among the votes, None without votes.
+        tie_strength: v of Davidson's model, None with other methods.
         degenerate_rounds: Bootstrap rounds whose votes determined no ratings, left out of the
             intervals.
+        covariance: (C, C) of the ratings in squared points, NaN where there is no rating: the
+            sandwich of the unit for Bradley-Terry, that of the rounds for other methods. None
+            without intervals or where details were not asked for.
+        separation: All pairs judged at once, matrices (C, C), NaN for those without votes. None
+            where there are no intervals, several parts, or details were not asked for.
     """
 
     lines: tuple[Line, ...]
     status: Status
-    explanation: str
+    reasons: tuple[Sentence, ...]
+    warnings: tuple[Sentence, ...] = ()
+    method: Method
+    unit: Unit
+    rounds: int
+    seed: int
+    votes: int = 0
+    experts: int = 0
+    scenarios: int = 0
+    tie_share: float | None = None
+    tie_strength: float | None = None
     degenerate_rounds: int = 0
+    covariance: FloatArray | None = field(default=None, compare=False)
+    separation: Separation | None = field(default=None, compare=False)
+
+    @property
+    def explanation(self) -> str:
+        """The reasons in one line, empty if nothing is missing."""
+        return " ".join(self.reasons)
 
 
 def rate(
     votes: Comparisons,
     *,
     method: Method = Method.BRADLEY_TERRY,
-    rounds: int = 1000,
-    unit: Unit = Unit.VOTE,
+    rounds: int = ROUNDS,
+    unit: Unit | None = None,
     seed: int = 0,
+    k: float = elo.K,
+    order: Order = Order.SHUFFLED,
+    details: bool = True,
 ) -> Leaderboard:
     """Rate all contestants that have votes, with 95 % intervals on the Elo scale, mean 1000.
 
+    Where not everybody can be rated together (groups that never met, or that only won or only
+    lost against the rest), those who can are rated among each other and ranked within their part;
+    the status and the explanation say so.
+
     Args:
         votes: What was voted; contestants without votes get a line without a rating.
-        method: Bradley-Terry, or online Elo, whose point is the median over the rounds.
+        method: Bradley-Terry, Davidson's tie model, or online Elo.
         rounds: Of the bootstrap.
-        unit: What it draws; online Elo draws votes only.
+        unit: What it draws: both ways by default, single votes for online Elo, which knows no
+            other.
         seed: Of its draws; the same votes and seed give the same table.
+        k: Points at stake in a vote, online Elo only.
+        order: Online Elo's point: the median over shuffled rounds, or the recorded order.
+        details: Also what costs extra: covariance, cross-check and separation.
 
     Raises:
         ValueError: Fewer than one round, or online Elo with a unit other than votes.
     """
-    if rounds < 1:
-        raise ValueError(f"a bootstrap needs at least 1 round, not {rounds}")
-    if method is Method.ELO and unit is not Unit.VOTE:
-        raise ValueError(f"online Elo resamples single votes only, not by {unit}")
+    if unit is None:
+        unit = Unit.VOTE if method is Method.ELO else Unit.TWO_WAY
+    rules = Rules(
+        method=method, unit=unit, rounds=rounds, seed=seed, k=k, order=order, details=details
+    )
+    return _rate(votes, rules)
+
+
+def _rate(votes: Comparisons, rules: Rules) -> Leaderboard:
     counted = tally(votes)
-    present = counted.sum(axis=1) > 0
-    lines = [
-        Line(
-            name=name,
-            votes=int(row.sum()),
-            wins=int(row[0]),
-            ties=int(row[1]),
-            losses=int(row[2]),
-            note="" if row.any() else "no votes",
+    present = np.flatnonzero(counted.sum(axis=1)).tolist()
+    counting = among(votes, present)
+    diagnosis = _diagnose(votes, counting, rules.method)
+    parts = [part for part in diagnosis.parts if len(part) > 1]
+    rated = [
+        rate_part(
+            among(counting, part),
+            rules,
+            diagnosis.status,
+            is_all=len(parts) == 1 and len(part) == len(present),
         )
-        for name, row in zip(votes.names, counted, strict=True)
+        for part in parts
     ]
-    among = _only(votes, present)
-    counts = count_pairs(among)
-    diagnosis = _diagnose(votes, among, counts, method)
-    if not diagnosis.has_ratings:
-        return Leaderboard(
-            lines=tuple(lines), status=diagnosis.status, explanation=diagnosis.explanation
-        )
-    if method is Method.ELO:
-        samples = elo.resampled(among, rounds=rounds, seed=seed)
-        rating = np.median(samples, axis=0)
-    else:
-        rating, samples = _bradley_terry(among, counts, unit, rounds, seed)
-    return _filled(lines, np.flatnonzero(present), rating, samples, rounds, diagnosis)
+    lines = _lines(votes.names, counted.tolist(), present, diagnosis)
+    for number, (part, found) in enumerate(zip(parts, rated, strict=True)):
+        _fill(lines, [present[member] for member in part], number, found)
+    whole = rated[0] if len(rated) == 1 and len(parts[0]) == len(present) else None
+    return Leaderboard(
+        lines=tuple(lines),
+        status=_status(diagnosis, rated),
+        reasons=_once(diagnosis.explanation, *(found.explanation for found in rated)),
+        warnings=_once(*(found.warnings for found in rated)),
+        method=rules.method,
+        unit=rules.unit,
+        rounds=rules.rounds,
+        seed=rules.seed,
+        votes=votes.votes,
+        experts=len(renumbered(votes.expert)[0]),
+        scenarios=len(renumbered(votes.scenario)[0]),
+        tie_share=float(counted[:, 1].sum() / counted.sum()) if len(votes) else None,
+        tie_strength=whole.tie_strength if whole else None,
+        degenerate_rounds=max((found.degenerate for found in rated), default=0),
+        covariance=_joined(len(lines), present, parts, rated),
+        separation=_widened(whole.separation, len(lines), present) if whole else None,
+    )
 
 
-def _only(votes: Comparisons, present: np.ndarray) -> Comparisons:
-    """The same votes with the contestants numbered without those who have none."""
-    number = np.cumsum(present) - 1
-    names = tuple(name for name, there in zip(votes.names, present, strict=True) if there)
-    return replace(votes, names=names, first=number[votes.first], second=number[votes.second])
+def anchored(board: Leaderboard, *, name: str, at: float) -> Leaderboard:
+    """The same board with a contestant's rating shown as `at`, and all of its part moved alike.
+
+    A shift of what is shown only: intervals keep their widths, and the anchor keeps its own.
+
+    Raises:
+        ValueError: Nobody of that name has a rating.
+    """
+    anchor = next((line for line in board.lines if line.name == name), None)
+    if anchor is None or anchor.rating is None:
+        raise ValueError(f"{name!r} has no rating to anchor the others to")
+    shift = at - anchor.rating
+    return replace(
+        board,
+        lines=tuple(
+            _shifted(line, shift) if line.part == anchor.part else line for line in board.lines
+        ),
+    )
 
 
-def _diagnose(
-    votes: Comparisons, among: Comparisons, counts: PairCounts, method: Method
-) -> Diagnosis:
+def _shifted(line: Line, shift: float) -> Line:
+    columns = ("rating", "lower", "upper", "check_lower", "check_upper")
+    values = {column: getattr(line, column) for column in columns}
+    moved: dict[str, Any] = {
+        column: value + shift for column, value in values.items() if value is not None
+    }
+    return replace(line, **moved)
+
+
+def _diagnose(votes: Comparisons, counting: Comparisons, method: Method) -> Diagnosis:
     if len(votes.names) == 1:
         return Diagnosis(
             status=Status.ONE_CONTESTANT,
-            explanation=f"There is only one contestant, {votes.names[0]}: nobody to compare with.",
+            explanation=(
+                sentence(
+                    "There is only one contestant, %(names)s: nobody to compare with.",
+                    names=votes.names,
+                ),
+            ),
         )
-    found = diagnose(among.names, counts)
-    if method is Method.ELO and found.status is Status.UNBOUNDED:
-        return Diagnosis(status=Status.RATED)  # steps of at most K points stay finite
-    return found
+    # Online Elo's steps of at most K points stay finite whoever wins.
+    return diagnose(counting.names, count_pairs(counting), bounded_anyway=method is Method.ELO)
 
 
-def _bradley_terry(
-    votes: Comparisons, counts: PairCounts, unit: Unit, rounds: int, seed: int
-) -> tuple[FloatArray, FloatArray]:
-    """The ratings (C,) and those of every round that determines any (b, C)."""
-    contestants, low, high = len(votes.names), counts.low, counts.high
-    games, scores = counts.games[None], counts.scores[None]
-    point = bradley_terry.fit(
-        contestants=contestants, low=low, high=high, games=games, scores=scores
-    )[0]
-    samples = [np.empty((0, contestants))]
-    for games, scores in resample(votes, counts, unit=unit, rounds=rounds, seed=seed):
-        fine = determined(contestants=contestants, low=low, high=high, games=games, scores=scores)
-        samples.append(
-            bradley_terry.fit(
-                contestants=contestants,
-                low=low,
-                high=high,
-                games=games[fine],
-                scores=scores[fine],
-                start=point,
-            )
+def _lines(
+    names: tuple[str, ...], counted: list[list[int]], present: list[int], diagnosis: Diagnosis
+) -> list[Line]:
+    """The lines without ratings; whoever is alone in a part keeps the note that says why."""
+    notes = dict(zip(present, diagnosis.notes, strict=False))
+    return [
+        Line(
+            name=name,
+            votes=sum(row),
+            wins=row[0],
+            ties=row[1],
+            losses=row[2],
+            part=-1,
+            note=notes.get(index, "") if any(row) else _NO_VOTES,
         )
-    return bradley_terry.to_elo(point), bradley_terry.to_elo(np.vstack(samples))
+        for index, (name, row) in enumerate(zip(names, counted, strict=True))
+    ]
 
 
-def _filled(
-    lines: list[Line],
-    rated: np.ndarray,
-    rating: FloatArray,
-    samples: FloatArray,
-    rounds: int,
-    diagnosis: Diagnosis,
-) -> Leaderboard:
-    """The lines with ratings, bounds where they mean something, and ranks."""
-    degenerate = rounds - len(samples)
-    explanation = diagnosis.explanation
-    bounded = diagnosis.status is Status.RATED
-    if degenerate > MOST_DEGENERATE * rounds:
-        bounded = False
-        explanation = (
-            f"{explanation} In {degenerate} of {rounds} resamples the votes determined no "
-            "ratings, so intervals can't be given: there are too few votes, or hardly any "
-            "against some contestant."
-        ).strip()
-    lower, upper = np.full(len(rating), -np.inf), np.full(len(rating), np.inf)
-    if bounded:
-        lower, upper = interval(samples)
-    for place, index in enumerate(rated):
-        lines[index] = replace(
-            lines[index],
-            rating=float(rating[place]),
-            lower=float(lower[place]) if bounded else None,
-            upper=float(upper[place]) if bounded else None,
-            rank=int(ranks(lower, upper)[place]),
-        )
-    return Leaderboard(
-        lines=tuple(lines),
-        status=diagnosis.status,
-        explanation=explanation,
-        degenerate_rounds=degenerate,
+def _fill(lines: list[Line], members: list[int], number: int, found: Rated) -> None:
+    """Put the numbers of a part into its lines."""
+    for place, index in enumerate(members):
+        values: dict[str, Any] = {
+            column: values[place].item()
+            for column, values in found.columns().items()
+            if values is not None
+        }
+        lines[index] = replace(lines[index], part=number, **values)
+
+
+_NO_VOTES = sentence("no votes")
+
+
+def _once(*said: tuple[Sentence, ...]) -> tuple[Sentence, ...]:
+    return tuple(dict.fromkeys(one for sentences in said for one in sentences))
+
+
+def _widened(found: Separation | None, contestants: int, present: list[int]) -> Separation | None:
+    """The matrices with rows for those without votes, who are told apart from nobody."""
+    if found is None or len(present) == contestants:
+        return found
+    places = np.ix_(present, present)
+
+    def wide(matrix: FloatArray, fill: float) -> FloatArray:
+        square = np.full((contestants, contestants), fill)
+        square[places] = matrix
+        return square
+
+    return replace(
+        found,
+        above=wide(found.above.astype(np.float64), 0.0) > 0.5,
+        p_value=wide(found.p_value, np.nan),
+        holm=wide(found.holm, np.nan),
+        difference=wide(found.difference, np.nan),
+        error=wide(found.error, np.nan),
     )
+
+
+def _status(diagnosis: Diagnosis, rated: list[Rated]) -> Status:
+    if diagnosis.status is Status.RATED and any(found.rating is None for found in rated):
+        return Status.UNBOUNDED
+    if diagnosis.status is Status.RATED and any(found.lower is None for found in rated):
+        return Status.NO_INTERVALS
+    return diagnosis.status
+
+
+def _joined(
+    contestants: int, present: list[int], parts: list[tuple[int, ...]], rated: list[Rated]
+) -> FloatArray | None:
+    """(C, C) of the parts' covariances, NaN between parts."""
+    if not any(found.covariance is not None for found in rated):
+        return None
+    joined = np.full((contestants, contestants), np.nan)
+    for part, found in zip(parts, rated, strict=True):
+        members = [present[member] for member in part]
+        if found.covariance is not None:
+            joined[np.ix_(members, members)] = found.covariance
+    return joined

@@ -1,11 +1,20 @@
-"""The paper's rank: who can be told apart from whom by their intervals."""
+"""Who can be told apart from whom: the paper's rank, its spread, and all pairs at once.
+
+Notation: C contestants, B rounds.
+"""
 
 from __future__ import annotations
+
+import math
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from arena.rating.comparisons import IntArray
+from arena.rating.bootstrap import LEVEL, interval
+from arena.rating.comparisons import BoolArray, FloatArray, IntArray
+
+_NUMBERS_AT_ONCE = 2_000_000
 
 
 def ranks(lower: ArrayLike, upper: ArrayLike) -> IntArray:
@@ -20,3 +29,101 @@ def ranks(lower: ArrayLike, upper: ArrayLike) -> IntArray:
     """
     above = np.asarray(lower, dtype=float)[None, :] > np.asarray(upper, dtype=float)[:, None]
     return np.asarray(1 + above.sum(axis=1), dtype=np.int64)
+
+
+def rank_interval(samples: FloatArray) -> tuple[IntArray, IntArray]:
+    """(C,), (C,): between which places 95 % of the rounds (C, B) put each contestant.
+
+    A place is one plus the number of others who are rated higher in that round.
+    """
+    order = np.argsort(-samples, axis=0, kind="stable")
+    places = np.empty(samples.shape, dtype=np.int64)
+    np.put_along_axis(places, order, np.arange(1, len(samples) + 1)[:, None], axis=0)
+    lower, upper = interval(places.astype(np.float64))
+    return np.floor(lower).astype(np.int64), np.ceil(upper).astype(np.int64)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Separation:
+    """Which pairs differ, all pairs judged at once: the error is 5 % for the whole table.
+
+    Attributes:
+        above: (C, C) whether the row's contestant is above the column's, by the largest of all
+            standardised differences over the rounds (max-t).
+        p_value: (C, C) adjusted by max-t, symmetric; 1 on the diagonal.
+        holm: (C, C) adjusted by Holm's step-down of the pairs' normal p-values, symmetric.
+        critical: How many standard errors a difference must have under max-t.
+        difference: (C, C) the row's rating minus the column's.
+        error: (C, C) standard error of the difference over the rounds.
+    """
+
+    above: BoolArray
+    p_value: FloatArray
+    holm: FloatArray
+    critical: float
+    difference: FloatArray
+    error: FloatArray
+
+
+def separation(rating: FloatArray, samples: FloatArray) -> Separation:
+    """Judge all pairs at once, from ratings (C,) and those of the rounds (C, B)."""
+    contestants = len(rating)
+    low, high = np.triu_indices(contestants, 1)
+    covariance: FloatArray = np.atleast_2d(np.cov(samples)).astype(np.float64)
+    variance = covariance.diagonal()
+    spread = variance[low] + variance[high] - 2.0 * covariance[low, high]
+    error = np.asarray(np.sqrt(np.maximum(spread, 1e-300)), dtype=np.float64)
+    gap = rating[low] - rating[high]
+    largest = _largest_deviations(samples, low, high, error)
+    critical = float(np.quantile(largest, LEVEL)) if len(largest) else math.inf
+    size = np.abs(gap) / error
+    beyond = len(largest) - np.searchsorted(np.sort(largest), size, side="left")
+    adjusted = ((1.0 + beyond) / (1.0 + len(largest))).astype(np.float64)
+    normal = np.array([math.erfc(value / math.sqrt(2.0)) for value in size])
+    differs = size > critical
+    above = np.zeros((contestants, contestants), dtype=bool)
+    above[low, high] = differs & (gap > 0)
+    above[high, low] = differs & (gap < 0)
+    return Separation(
+        above=above,
+        p_value=_square(contestants, low, high, adjusted, 1.0),
+        holm=_square(contestants, low, high, holm(normal), 1.0),
+        critical=critical,
+        difference=rating[:, None] - rating[None, :],
+        error=_square(contestants, low, high, error, 0.0),
+    )
+
+
+def holm(p_values: FloatArray) -> FloatArray:
+    """Holm's adjusted p-values (1979) of (n,) p-values, in their order."""
+    order = np.argsort(p_values, kind="stable")
+    factors = len(p_values) - np.arange(len(p_values))
+    stepped = np.minimum(np.maximum.accumulate(p_values[order] * factors), 1.0)
+    adjusted = np.empty(len(p_values))
+    adjusted[order] = stepped
+    return adjusted
+
+
+def _largest_deviations(
+    samples: FloatArray, low: IntArray, high: IntArray, error: FloatArray
+) -> FloatArray:
+    """(B,) the largest standardised deviation of a difference from its mean, in each round."""
+    centred = samples - samples.mean(axis=1, keepdims=True)
+    largest = np.zeros(samples.shape[1])
+    at_once = max(1, _NUMBERS_AT_ONCE // max(1, samples.shape[1]))
+    for first in range(0, len(low), at_once):
+        some = slice(first, first + at_once)
+        gaps = centred.take(low[some], axis=0)
+        gaps -= centred.take(high[some], axis=0)
+        gaps /= error[some, None]
+        np.maximum(largest, np.abs(gaps, out=gaps).max(axis=0, initial=0.0), out=largest)
+    return largest
+
+
+def _square(
+    contestants: int, low: IntArray, high: IntArray, values: FloatArray, diagonal: float
+) -> FloatArray:
+    square = np.full((contestants, contestants), diagonal)
+    square[low, high] = values
+    square[high, low] = values
+    return square

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import numpy as np
 import pytest
 
 from arena.rating.bootstrap import Unit
 from arena.rating.comparisons import Comparison, as_arrays
 from arena.rating.connectivity import Status
-from arena.rating.leaderboard import Leaderboard, Method, rate
-from tests.rating.votes import named, versus
+from arena.rating.leaderboard import Leaderboard, Method
+from tests.rating.votes import by_votes, named, versus
 
 
 def unrated(board: Leaderboard) -> bool:
@@ -21,51 +22,71 @@ def unrated(board: Leaderboard) -> bool:
 
 @pytest.mark.parametrize("method", Method)
 def test_no_votes(method: Method) -> None:
-    board = rate(as_arrays(("a", "b"), []), method=method)
+    board = by_votes(as_arrays(("a", "b"), []), method=method)
     assert (board.status, board.explanation) == (Status.NO_VOTES, "There are no votes to rate.")
     assert unrated(board)
     assert [line.note for line in board.lines] == ["no votes", "no votes"]
 
 
 def test_no_contestants() -> None:
-    assert rate(as_arrays((), [])).status is Status.NO_VOTES
+    assert by_votes(as_arrays((), [])).status is Status.NO_VOTES
 
 
 def test_one_contestant() -> None:
-    board = rate(as_arrays(("a",), []))
+    board = by_votes(as_arrays(("a",), []))
     assert board.status is Status.ONE_CONTESTANT
     assert "only one contestant, a" in board.explanation
 
 
-def test_a_contestant_who_lost_everything_has_no_lower_limit() -> None:
-    votes = versus("a", "b", 5, 3, 4) + versus("a", "d", 20, 0, 0) + versus("b", "d", 20, 0, 0)
-    board = rate(named(votes))
+def test_a_contestant_who_lost_everything_has_no_rating_and_the_rest_is_rated_alone() -> None:
+    rest = versus("a", "b", 15, 3, 4)
+    board = by_votes(named(rest + versus("a", "d", 20, 0, 0) + versus("b", "d", 20, 0, 0)))
     assert board.status is Status.UNBOUNDED
     assert board.explanation == (
         "Nobody else scored against a, b: there is no upper limit. "
         "d scored against nobody else: there is no lower limit."
     )
+    *rated, lost = board.lines
+    assert (lost.rating, lost.rank, lost.losses, lost.note) == (None, None, 40, "no lower limit")
+    alone = by_votes(named(rest))
+    assert [line.rating for line in rated] == [line.rating for line in alone.lines]
+    assert [line.lower for line in rated] == [line.lower for line in alone.lines]
+
+
+def test_a_chain_of_winners_rates_nobody_and_says_what_is_missing() -> None:
+    board = by_votes(named(versus("a", "b", 5, 0, 0) + versus("b", "c", 5, 0, 0)))
+    assert board.status is Status.UNBOUNDED
     assert unrated(board)
-    assert [line.losses for line in board.lines] == [4, 5, 40]
+    notes = [line.note for line in board.lines]
+    assert notes == ["no upper limit", "no limits among equals", "no lower limit"]
 
 
 def test_online_elo_rates_what_bradley_terry_cannot() -> None:
-    board = rate(named(versus("a", "b", 5, 0, 0)), method=Method.ELO, rounds=10)
-    assert board.status is Status.RATED
+    board = by_votes(named(versus("a", "b", 5, 0, 0)), method=Method.ELO, rounds=10)
     assert all(line.rating is not None for line in board.lines)
+    # Every resample is five wins again.
+    assert board.status is Status.NO_INTERVALS
+    assert "Every resample by vote gave the same ratings" in board.explanation
 
 
 @pytest.mark.parametrize("method", Method)
-def test_groups_that_never_met_are_named(method: Method) -> None:
-    votes = versus("a", "b", 3, 1, 2) + versus("c", "d", 1, 4, 1)
-    board = rate(named(votes), method=method, rounds=10)
+def test_groups_that_never_met_are_rated_and_ranked_each_by_itself(method: Method) -> None:
+    one, other = versus("a", "b", 30, 10, 12), versus("c", "d", 10, 40, 10)
+    board = by_votes(named(one + other), method=method, rounds=100)
     assert board.status is Status.DISCONNECTED
     assert "compared with each other: a, b; c, d." in board.explanation
-    assert unrated(board)
+    assert [line.part for line in board.lines] == [0, 0, 1, 1]
+    for part, votes in ((board.lines[:2], one), (board.lines[2:], other)):
+        alone = by_votes(named(votes), method=method, rounds=100)
+        assert [line.rating for line in part] == [line.rating for line in alone.lines]
+        assert [line.rank for line in part] == [line.rank for line in alone.lines]
+    assert board.separation is None
+    assert board.covariance is not None
+    assert np.isnan(board.covariance[:2, 2:]).all()
 
 
 def test_all_ties_are_rated_alike_without_an_interval() -> None:
-    board = rate(named(versus("a", "b", 0, 9, 0) + versus("b", "c", 0, 9, 0)))
+    board = by_votes(named(versus("a", "b", 0, 9, 0) + versus("b", "c", 0, 9, 0)))
     assert board.status is Status.ALL_TIES
     assert "Every vote is a tie" in board.explanation
     for line in board.lines:
@@ -73,7 +94,7 @@ def test_all_ties_are_rated_alike_without_an_interval() -> None:
 
 
 def test_a_contestant_without_votes_leaves_the_others_rated() -> None:
-    board = rate(named(versus("a", "b", 30, 20, 15), "a", "b", "z"))
+    board = by_votes(named(versus("a", "b", 30, 20, 15), "a", "b", "z"))
     *rated, absent = board.lines
     assert all(line.rating is not None for line in rated)
     assert (absent.rating, absent.rank, absent.votes, absent.note) == (None, None, 0, "no votes")
@@ -81,7 +102,7 @@ def test_a_contestant_without_votes_leaves_the_others_rated() -> None:
 
 def test_rounds_without_ratings_are_counted_and_take_the_intervals_with_them() -> None:
     """b scored once in twenty votes: more than a third of the resamples miss that vote."""
-    board = rate(named(versus("a", "b", 19, 0, 1)), rounds=1000, seed=1)
+    board = by_votes(named(versus("a", "b", 19, 0, 1)), rounds=1000, seed=1)
     assert 300 < board.degenerate_rounds < 420
     assert f"In {board.degenerate_rounds} of 1000 resamples" in board.explanation
     for line in board.lines:
@@ -90,15 +111,27 @@ def test_rounds_without_ratings_are_counted_and_take_the_intervals_with_them() -
 
 
 def test_a_few_rounds_without_ratings_are_counted_and_left_out() -> None:
-    board = rate(named(versus("a", "b", 60, 0, 5)), rounds=2000, seed=1)
+    board = by_votes(named(versus("a", "b", 60, 0, 5)), rounds=2000, seed=1)
     assert 0 < board.degenerate_rounds < 50
     assert board.explanation == ""
     assert board.lines[0].lower is not None
 
 
 def test_a_single_expert_leaves_nothing_to_resample_by_expert() -> None:
-    board = rate(named(versus("a", "b", 6, 0, 5)), unit=Unit.EXPERT, rounds=50)
-    assert board.lines[0].lower == board.lines[0].upper == board.lines[0].rating
+    board = by_votes(named(versus("a", "b", 6, 0, 5)), unit=Unit.EXPERT, rounds=50)
+    assert board.status is Status.NO_INTERVALS
+    assert "Every resample by expert gave the same ratings" in board.explanation
+    assert [(line.lower, line.upper, line.rank) for line in board.lines] == [(None, None, 1)] * 2
+
+
+@pytest.mark.parametrize("method", Method)
+@pytest.mark.parametrize("score", ["win", "tie"])
+def test_a_single_vote_has_no_interval_of_zero_width(method: Method, score: str) -> None:
+    votes = versus("a", "b", 1, 0, 0) if score == "win" else versus("a", "b", 0, 1, 0)
+    board = by_votes(named(votes), method=method, rounds=50)
+    assert board.status is not Status.RATED
+    assert board.explanation
+    assert all(line.lower is None and line.upper is None for line in board.lines)
 
 
 @pytest.mark.parametrize(
@@ -120,8 +153,8 @@ def test_votes_that_make_no_sense_are_refused_with_their_number(
 def test_rules_that_make_no_sense_are_refused() -> None:
     votes = named(versus("a", "b", 6, 0, 5))
     with pytest.raises(ValueError, match="at least 1 round, not 0"):
-        rate(votes, rounds=0)
+        by_votes(votes, rounds=0)
     with pytest.raises(ValueError, match="single votes only, not by scenario"):
-        rate(votes, method=Method.ELO, unit=Unit.SCENARIO)
+        by_votes(votes, method=Method.ELO, unit=Unit.SCENARIO)
     with pytest.raises(ValueError, match="named twice"):
         as_arrays(("a", "a"), [])

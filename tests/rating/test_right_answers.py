@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 
 from arena.rating import bradley_terry
-from arena.rating.comparisons import Comparisons, FloatArray, count_pairs
-from arena.rating.leaderboard import Method, rate
+from arena.rating.comparisons import Comparisons, FloatArray
+from arena.rating.leaderboard import Method
 from arena.rating.ranking import ranks
-from tests.rating.votes import named, simulated, versus
+from tests.rating.votes import by_votes, fit, named, simulated, versus
 
 HERE = Path(__file__).parent
 TABLES = sorted((HERE / "tables").glob("*.json"))
@@ -19,15 +19,7 @@ PAPER = json.loads((HERE / "paper_table.json").read_text())["rows"]
 
 
 def fitted(votes: Comparisons) -> FloatArray:
-    counts = count_pairs(votes)
-    strengths = bradley_terry.fit(
-        contestants=len(votes.names),
-        low=counts.low,
-        high=counts.high,
-        games=counts.games[None],
-        scores=counts.scores[None],
-    )
-    return bradley_terry.to_elo(strengths[0])
+    return bradley_terry.to_elo(fit(votes))
 
 
 @pytest.mark.parametrize("path", TABLES, ids=[path.stem for path in TABLES])
@@ -75,7 +67,7 @@ def test_the_papers_ranks_follow_from_its_printed_intervals() -> None:
 def test_paper_mode_on_the_papers_ratings_gives_intervals_of_its_size() -> None:
     """Vote resampling, a tie share of about 0.6: half-widths of about 9 to 16 points."""
     votes = simulated([row[2] for row in PAPER], 5760, 1, ties=0.6)
-    board = rate(votes, rounds=1000, seed=1)
+    board = by_votes(votes, rounds=1000, seed=1)
     widths = [(line.upper or 0) - (line.lower or 0) for line in board.lines]
     assert 8.5 < np.mean(widths) / 2 < 12.5
     for line, row in zip(board.lines, PAPER, strict=True):
@@ -83,13 +75,13 @@ def test_paper_mode_on_the_papers_ratings_gives_intervals_of_its_size() -> None:
 
 
 def test_one_elo_vote_moves_half_of_k() -> None:
-    board = rate(named(versus("a", "b", 1, 0, 0)), method=Method.ELO, rounds=5)
+    board = by_votes(named(versus("a", "b", 1, 0, 0)), method=Method.ELO, rounds=5)
     assert [line.rating for line in board.lines] == [1002.0, 998.0]
 
 
 def test_online_elo_and_bradley_terry_agree_on_the_order() -> None:
     votes = simulated([1100, 1050, 1000, 950, 900], 4000, 3)
     for method in Method:
-        ratings = [line.rating or 0 for line in rate(votes, method=method, rounds=100).lines]
+        ratings = [line.rating or 0 for line in by_votes(votes, method=method, rounds=100).lines]
         assert ratings == sorted(ratings, reverse=True)
         assert np.mean(ratings) == pytest.approx(1000, abs=3)

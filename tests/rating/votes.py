@@ -2,10 +2,24 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
+from arena.rating import bradley_terry
+from arena.rating.bootstrap import Unit
 from arena.rating.bradley_terry import ELO_PER_LOGIT
-from arena.rating.comparisons import LOSS, TIE, WIN, Comparison, Comparisons, as_arrays
+from arena.rating.comparisons import (
+    LOSS,
+    TIE,
+    WIN,
+    Comparison,
+    Comparisons,
+    FloatArray,
+    as_arrays,
+    count_pairs,
+)
+from arena.rating.leaderboard import Leaderboard, rate
 
 
 def versus(first: str, second: str, wins: int, ties: int, losses: int) -> list[Comparison]:
@@ -42,6 +56,24 @@ def simulated(
         expert=rng.integers(0, experts, votes),
         scenario=rng.integers(0, scenarios, votes),
     )
+
+
+def by_votes(votes: Comparisons, **rules: Any) -> Leaderboard:
+    """The paper's mode, unless told otherwise."""
+    return rate(votes, **{"unit": Unit.VOTE, "rounds": 1000, **rules})
+
+
+def fit(votes: Comparisons) -> FloatArray:
+    """What Bradley-Terry makes of the votes, in logits."""
+    counts = count_pairs(votes)
+    fitted: FloatArray = bradley_terry.fit(
+        contestants=len(votes.names),
+        low=counts.low,
+        high=counts.high,
+        games=counts.games[None],
+        scores=counts.scores[None],
+    )[0]
+    return fitted
 
 
 def named(votes: list[Comparison], *names: str) -> Comparisons:

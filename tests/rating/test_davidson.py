@@ -1,0 +1,75 @@
+"""Davidson's tie model, and what it changes."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from arena.rating.bootstrap import Unit
+from arena.rating.connectivity import Status
+from arena.rating.leaderboard import Method, anchored, rate
+from tests.rating.votes import by_votes, named, simulated, versus
+
+
+def test_two_contestants_have_the_closed_form() -> None:
+    """Proportions x : v sqrt(x y) : y of 40, 40 and 10 votes: x / y is 4, v is 40 / sqrt(400)."""
+    board = by_votes(named(versus("a", "b", 40, 40, 10)), method=Method.DAVIDSON, rounds=200)
+    high, low = (line.rating or 0.0 for line in board.lines)
+    assert high - low == pytest.approx(400 * math.log10(4.0), abs=1e-6)
+    assert board.tie_strength == pytest.approx(2.0, abs=1e-9)
+    assert board.tie_share == pytest.approx(40 / 90)
+
+
+def test_without_ties_it_is_bradley_terry() -> None:
+    votes = simulated([1060.0, 1000.0, 940.0], 600, 1, ties=0.0)
+    one, other = (by_votes(votes, method=m) for m in (Method.DAVIDSON, Method.BRADLEY_TERRY))
+    assert [line.rating for line in one.lines] == [line.rating for line in other.lines]
+    assert one.tie_strength is None
+
+
+def test_the_order_stays_and_the_spread_grows_with_ties() -> None:
+    votes = simulated([1080.0, 1030.0, 1000.0, 960.0, 930.0], 6000, 2, ties=0.6)
+    half_wins = np.array([line.rating for line in by_votes(votes).lines], dtype=np.float64)
+    davidson = np.array(
+        [line.rating for line in by_votes(votes, method=Method.DAVIDSON, rounds=300).lines],
+        dtype=np.float64,
+    )
+    assert np.argsort(davidson).tolist() == np.argsort(half_wins).tolist()
+    assert np.ptp(davidson) > 1.5 * np.ptp(half_wins)
+
+
+def test_it_has_intervals_by_every_unit() -> None:
+    votes = simulated([1080.0, 1000.0, 920.0], 900, 3, ties=0.4)
+    for unit in Unit:
+        for line in rate(votes, method=Method.DAVIDSON, unit=unit, rounds=300).lines:
+            assert line.lower is not None
+            assert line.upper is not None
+            assert line.rating is not None
+            assert line.lower < line.rating < line.upper
+
+
+def test_an_anchor_moves_what_is_shown_and_no_width() -> None:
+    board = by_votes(simulated([1080.0, 1000.0, 920.0], 900, 3), rounds=300)
+    moved = anchored(board, name="c1", at=1500.0)
+    assert moved.lines[1].rating == 1500.0
+    for before, after in zip(board.lines, moved.lines, strict=True):
+        assert after.rating is not None
+        assert before.rating is not None
+        shift = after.rating - before.rating
+        assert shift == pytest.approx(1500.0 - (board.lines[1].rating or 0.0))
+        assert (after.lower or 0) - (before.lower or 0) == pytest.approx(shift)
+        assert after.rank == before.rank
+    with pytest.raises(ValueError, match="'x' has no rating"):
+        anchored(board, name="x", at=1000.0)
+
+
+def test_scores_by_ties_only_are_no_limit_in_this_model_and_said_to_be_none() -> None:
+    """a : v sqrt(a b) : b of 5, 3 and 0 votes: the last share can only go to zero."""
+    votes = named(versus("a", "b", 5, 3, 0))
+    board = by_votes(votes, method=Method.DAVIDSON, rounds=50)
+    assert board.status is Status.UNBOUNDED
+    assert "no finite ratings" in board.explanation
+    assert all(line.rating is None and line.rank is None for line in board.lines)
+    assert all(line.rating is not None for line in by_votes(votes).lines)

@@ -1,0 +1,74 @@
+"""Online Elo: the plain replay is the paper's formula, and every round is a plain replay."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from arena.rating import elo
+from arena.rating.comparisons import Comparisons, FloatArray, chosen
+from tests.benchmarks.rating_sizes import SIZES, drawn
+from tests.rating.votes import simulated
+
+TRUTH = [1150.0, 1040.0, 1000.0, 980.0, 830.0]
+
+
+def as_worded(votes: Comparisons, k: float) -> FloatArray:
+    """K, base 10, scale 400, initial 1000, a tie half a win."""
+    rating = np.full(len(votes.names), 1000.0)
+    for first, second, score in zip(votes.first, votes.second, votes.score, strict=True):
+        expected = 1.0 / (1.0 + 10.0 ** ((rating[second] - rating[first]) / 400.0))
+        rating[first] += k * (score - expected)
+        rating[second] -= k * (score - expected)
+    return rating
+
+
+@pytest.mark.parametrize("k", [0.5, 4.0, 64.0])
+def test_a_replay_is_the_papers_formula(k: float) -> None:
+    votes = simulated(TRUTH, 2000, 1)
+    assert elo.replay(votes, k=k) == pytest.approx(as_worded(votes, k), abs=1e-9)
+
+
+@pytest.mark.parametrize("k", [0.5, 4.0, 64.0])
+@pytest.mark.parametrize(("size", "rounds"), [(307, 130), (11_003, 3), (5, 1)])
+def test_every_round_is_a_replay_of_votes_drawn_with_replacement(
+    size: int, rounds: int, k: float
+) -> None:
+    """Few votes and many, in one go and in several with a remainder."""
+    votes = simulated(TRUTH, size, 1, ties=0.5)
+    order = np.random.default_rng(5).integers(0, len(votes), size=(len(votes), rounds))
+    replays = [elo.replay(chosen(votes, order[:, number]), k=k) for number in range(rounds)]
+    sampled = elo.resampled(votes, rounds=rounds, seed=5, k=k).T
+    assert sampled == pytest.approx(np.array(replays), abs=1e-9)
+
+
+def test_counted_votes_are_resampled_like_as_many_rows() -> None:
+    counted = drawn(SIZES[0]).counted(clusters=False)
+    single = chosen(counted, np.repeat(np.arange(len(counted)), counted.count))
+    rows = Comparisons(
+        names=single.names,
+        first=single.first,
+        second=single.second,
+        score=single.score,
+        expert=single.expert,
+        scenario=single.scenario,
+    )
+    assert len(counted) < len(rows) == counted.votes
+    of_counted = elo.resampled(counted, rounds=7, seed=2)
+    assert of_counted.tolist() == elo.resampled(rows, rounds=7, seed=2).tolist()
+
+
+def test_one_sided_votes_drive_apart_without_end_and_without_rounding() -> None:
+    """Small gains on large ratings: what single precision would lose."""
+    votes = simulated([1000.0, 1000.0], 30_000, 1, ties=0.0)
+    always = Comparisons(
+        names=votes.names,
+        first=np.zeros_like(votes.first),
+        second=np.ones_like(votes.second),
+        score=np.ones_like(votes.score),
+        expert=votes.expert,
+        scenario=votes.scenario,
+    )
+    assert elo.resampled(always, rounds=2, seed=0)[:, 1] == pytest.approx(
+        as_worded(always, elo.K), abs=1e-6
+    )
