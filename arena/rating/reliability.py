@@ -1,0 +1,155 @@
+"""How well experts agree: Krippendorff's alpha and pairwise percent agreement, with intervals.
+
+A unit is what can be judged twice: two contestants on one scenario. Values are oriented by the
+contestants' numbers, never by the side, or a preference for a side would count as disagreement.
+Intervals resample whole scenarios, because the same pictures come in several units of one.
+
+Notation: B rounds, U units, S scenarios, V votes; the three values are low won, tie, high won.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from enum import StrEnum
+
+import numpy as np
+
+from arena.rating.comparisons import Comparisons, FloatArray, IntArray, count_pairs
+from arena.rating.estimate import LEVEL, Estimate
+
+VALUES = 3
+_TAILS = (50.0 * (1.0 - LEVEL), 50.0 * (1.0 + LEVEL))
+
+
+class Metric(StrEnum):
+    """How far two values are apart: all alike, or a win two steps from a loss."""
+
+    NOMINAL = "nominal"
+    INTERVAL = "interval"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Agreement:
+    """What experts who judged the same units make of each other.
+
+    Attributes:
+        alpha: Krippendorff's, values as names.
+        alpha_interval: The same with a win twice as far from a loss as from a tie.
+        percent: The share of pairs of judgements of one unit that are equal, 0 to 1.
+        units: With two judgements or more.
+        judgements: On those units.
+    """
+
+    alpha: Estimate
+    alpha_interval: Estimate
+    percent: Estimate
+    units: int
+    judgements: int
+
+
+def agreement(votes: Comparisons, *, rounds: int, seed: int) -> Agreement:
+    """Agreement of all experts on the units that several of them judged.
+
+    Args:
+        votes: Without planned repeats: an expert's own second judgement is not another expert's.
+        rounds: Of the bootstrap over scenarios.
+        seed: Of its draws.
+    """
+    table, scenario = unit_table(votes)
+    shared = table.sum(axis=1) >= 2
+    table, scenario = table[shared], scenario[shared]
+    if not len(table):
+        nothing = Estimate(value=None)
+        return Agreement(
+            alpha=nothing, alpha_interval=nothing, percent=nothing, units=0, judgements=0
+        )
+    found, cluster = np.unique(scenario, return_inverse=True)
+    sums = np.zeros((len(found), VALUES * VALUES + 2))
+    np.add.at(sums, cluster, np.hstack([_coincidences(table), _equal_pairs(table)]))
+    rng = np.random.default_rng(seed)
+    chance = np.full(len(found), 1.0 / len(found))
+    drawn = rng.multinomial(len(found), chance, size=rounds) @ sums
+    whole = sums.sum(axis=0)[None]
+    several = len(found) > 1
+    return Agreement(
+        alpha=_estimate(_alpha, Metric.NOMINAL, whole, drawn, several),
+        alpha_interval=_estimate(_alpha, Metric.INTERVAL, whole, drawn, several),
+        percent=_estimate(_percent, Metric.NOMINAL, whole, drawn, several),
+        units=len(table),
+        judgements=int(table.sum()),
+    )
+
+
+def unit_table(votes: Comparisons) -> tuple[IntArray, IntArray]:
+    """(U, 3) how often each value was given to each unit, and (U,) the units' scenarios."""
+    counts = count_pairs(votes)
+    pairs = max(len(counts.low), 1)
+    units, unit_of = np.unique(votes.scenario * pairs + counts.pair_of, return_inverse=True)
+    table = np.bincount(unit_of * VALUES + counts.outcome_of, minlength=VALUES * len(units))
+    return table.reshape(-1, VALUES).astype(np.int64), units // pairs
+
+
+def krippendorff_alpha(table: IntArray, metric: Metric) -> float | None:
+    """Alpha of a table (U, 3) of values by unit; None if all values are alike or none is paired.
+
+    Source: K. Krippendorff, Content Analysis, chapter on reliability: 1 - observed / expected
+    disagreement over the coincidences of values within units.
+    """
+    paired = table[table.sum(axis=1) >= 2]
+    if not len(paired):
+        return None
+    found = float(_alpha(_coincidences(paired).sum(axis=0)[None], metric)[0])
+    return None if np.isnan(found) else found
+
+
+# --- Private -----------------------------------------------------------------------------------
+
+
+def _coincidences(table: IntArray) -> FloatArray:
+    """(U, 9): each unit's pairs of values, every value weighing one in all."""
+    pairs = table[:, :, None] * (table[:, None, :] - np.eye(VALUES, dtype=np.int64))
+    return np.asarray((pairs / (table.sum(axis=1) - 1)[:, None, None]).reshape(len(table), -1))
+
+
+def _equal_pairs(table: IntArray) -> FloatArray:
+    """(U, 2): ordered pairs of equal judgements, and all ordered pairs."""
+    total = table.sum(axis=1)
+    equal = (table * (table - 1)).sum(axis=1)
+    return np.stack([equal, total * (total - 1)], axis=1).astype(np.float64)
+
+
+def _alpha(sums: FloatArray, metric: Metric) -> FloatArray:
+    """(B,) of sums (B, 9 or more); not a number where all values are alike."""
+    seen = sums[:, : VALUES * VALUES].reshape(-1, VALUES, VALUES)
+    place = np.arange(VALUES)
+    gap = place[:, None] - place[None, :]
+    far = (gap != 0).astype(np.float64) if metric is Metric.NOMINAL else gap.astype(float) ** 2
+    totals = seen.sum(axis=2)
+    n = totals.sum(axis=1)
+    observed = (seen * far).sum(axis=(1, 2))
+    expected = np.einsum("bc,bk,ck->b", totals, totals, far)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        return np.asarray(1.0 - (n - 1.0) * observed / expected)
+
+
+def _percent(sums: FloatArray, _: Metric) -> FloatArray:
+    return np.asarray(sums[:, -2] / sums[:, -1])
+
+
+def _estimate(
+    measure: Callable[[FloatArray, Metric], FloatArray],
+    metric: Metric,
+    whole: FloatArray,
+    drawn: FloatArray,
+    several: bool,
+) -> Estimate:
+    value = float(measure(whole, metric)[0])
+    if np.isnan(value):
+        return Estimate(value=None)
+    rounds = measure(drawn, metric)
+    rounds = rounds[~np.isnan(rounds)]
+    if not several or not len(rounds):
+        return Estimate(value=value)
+    lower, upper = np.percentile(rounds, _TAILS)
+    return Estimate(value=value, lower=float(lower), upper=float(upper))

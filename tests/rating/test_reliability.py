@@ -1,0 +1,153 @@
+from __future__ import annotations
+
+import krippendorff
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from arena.rating.comparisons import LOSS, TIE, WIN, Comparison, Comparisons
+from arena.rating.raters import raters
+from arena.rating.reliability import Metric, agreement, krippendorff_alpha
+from arena.rating.repeats import repeat_consistency
+from arena.rating.shares import share, wilson
+from tests.rating.votes import named, simulated
+
+NOBODY = np.full((9, 9), np.nan)
+
+tables = st.lists(
+    st.tuples(*[st.integers(0, 4)] * 3).filter(lambda row: sum(row) >= 2), min_size=2, max_size=12
+)
+
+
+def judged(*rows: tuple[str, str, float], first: str = "a", second: str = "b") -> Comparisons:
+    """(expert, scenario, what a scored) against b."""
+    return named(
+        [
+            Comparison(first=first, second=second, score=score, expert=expert, scenario=scenario)
+            for expert, scenario, score in rows
+        ]
+    )
+
+
+def test_alpha_of_a_table_worked_out_by_hand() -> None:
+    # Two units, two judgements each: win win, win loss. Coincidences: WW 2 of the first unit,
+    # WL and LW 1 each of the second, so W 3 and L 1 of 4. Observed disagreement 2 / 4, expected
+    # 2 x 3 x 1 / (4 x 3): alpha = 1 - 0.5 / 0.5.
+    table = np.array([[2, 0, 0], [1, 0, 1]])
+    assert krippendorff_alpha(table, Metric.NOMINAL) == pytest.approx(0.0)
+
+
+@given(table=tables)
+@pytest.mark.parametrize("metric", Metric)
+def test_alpha_agrees_with_the_package_krippendorff(
+    metric: Metric, table: list[tuple[int, int, int]]
+) -> None:
+    counts = np.array(table)
+    ours = krippendorff_alpha(counts, metric)
+    if ours is None:
+        assert (counts.sum(axis=0) > 0).sum() == 1, "only where all values are alike"
+        return
+    theirs = krippendorff.alpha(
+        value_counts=counts, value_domain=[0, 1, 2], level_of_measurement=metric.value
+    )
+    assert ours == pytest.approx(theirs, abs=1e-9)
+
+
+def test_units_with_one_judgement_do_not_count() -> None:
+    votes = judged(("e", "s1", WIN), ("f", "s1", WIN), ("e", "s2", LOSS), ("f", "s3", TIE))
+    found = agreement(votes, rounds=100, seed=1)
+    assert (found.units, found.judgements) == (1, 2)
+    assert found.percent.value == 1.0
+    assert found.alpha.value is None, "all values are alike"
+    assert found.percent.lower is None, "one scenario says nothing about the spread"
+
+
+def test_sides_do_not_count_as_disagreement() -> None:
+    same = named(
+        [
+            Comparison(first="a", second="b", score=WIN, expert="e", scenario="s1"),
+            Comparison(first="b", second="a", score=LOSS, expert="f", scenario="s1"),
+            Comparison(first="a", second="b", score=LOSS, expert="e", scenario="s2"),
+            Comparison(first="b", second="a", score=WIN, expert="f", scenario="s2"),
+        ]
+    )
+    assert agreement(same, rounds=100, seed=1).alpha.value == pytest.approx(1.0)
+
+
+def test_without_shared_units_agreement_is_unknown() -> None:
+    found = agreement(judged(("e", "s1", WIN), ("f", "s2", WIN)), rounds=10, seed=1)
+    assert (found.alpha.value, found.percent.value, found.units) == (None, None, 0)
+
+
+def test_votes_by_chance_agree_as_chance_does_and_the_interval_covers_it() -> None:
+    found = agreement(simulated([1000.0] * 3, 3000, 1, ties=1 / 3), rounds=500, seed=1)
+    assert found.alpha.value is not None
+    assert found.alpha.lower is not None
+    assert found.alpha.upper is not None
+    assert found.alpha.lower < 0.0 < found.alpha.upper
+    assert found.alpha.upper - found.alpha.lower < 0.1
+
+
+def test_the_same_seed_gives_the_same_interval() -> None:
+    votes = simulated([1020.0, 1000.0, 980.0], 900, 1)
+    assert agreement(votes, rounds=50, seed=3) == agreement(votes, rounds=50, seed=3)
+
+
+# --- Shares ------------------------------------------------------------------------------------
+
+
+def test_wilsons_interval_of_a_textbook() -> None:
+    # 81 of 263, the example of Newcombe (1998): 0.2553 to 0.3662.
+    found = wilson(81, 263)
+    assert (found.lower, found.upper) == pytest.approx((0.2553, 0.3662), abs=5e-5)
+
+
+def test_experts_who_differ_widen_the_interval_of_a_share() -> None:
+    hits = np.array([True] * 50 + [False] * 50)
+    alike = np.tile(np.arange(10), 10)
+    apart = np.repeat(np.arange(10), 10)
+    one, other = share(hits, alike), share(hits, apart)
+    assert one.value == other.value == 0.5
+    assert one.lower is not None
+    assert other.lower is not None
+    assert other.lower < one.lower
+    assert share(hits, np.zeros(100, dtype=np.int64)) == wilson(50, 100)
+    assert share(hits[:0], alike[:0]).value is None
+
+
+# --- One expert and the others -----------------------------------------------------------------
+
+
+def test_the_panel_counts_pace_ties_sides_and_agreement() -> None:
+    votes = judged(
+        ("e", "s1", WIN), ("f", "s1", WIN), ("g", "s1", LOSS),
+        ("e", "s2", TIE), ("f", "s2", TIE), ("e", "s3", WIN),
+    )  # fmt: skip
+    ms = np.array([900.0, np.nan, np.nan, 1500.0, np.nan, 2000.0])
+    first, second, third = raters(votes, ms=ms, without=np.array([[0.5, 0], [0, 0.5], [0, 0]]))
+    assert (first.votes, first.median_ms) == (3, 1500.0)
+    assert first.fast == pytest.approx(1 / 3)
+    assert first.ties == pytest.approx(1 / 3)
+    assert first.left.value == 1.0
+    assert first.shared == 2
+    assert first.agreement.value == pytest.approx(0.75), "1/2 and 1/1"
+    assert (first.decided, first.favourites.value) == (2, 1.0)
+    assert (second.decided, second.favourites.value) == (1, 0.0)
+    assert (second.median_ms, second.fast) == (None, None)
+    assert (third.decided, third.favourites.value) == (0, None), "the others call them equal"
+
+
+def test_an_own_second_judgement_is_not_another_experts() -> None:
+    votes = judged(("e", "s1", WIN), ("e", "s1", LOSS))
+    (only,) = raters(votes, ms=np.full(2, np.nan), without=NOBODY)
+    assert (only.shared, only.agreement.value) == (0, None)
+
+
+def test_repeats_count_what_stayed_and_what_turned() -> None:
+    first, again = np.array([1.0, 1.0, 0.5, 0.0]), np.array([1.0, 0.0, 0.5, 0.5])
+    found = repeat_consistency(first, again, np.array([0, 0, 1, 1]))
+    assert (found.number, found.same.value, found.reversed.value) == (4, 0.5, 0.25)
+    assert found.by_expert == {0: (2, 1), 1: (2, 1)}
+    with pytest.raises(ValueError, match="4 votes, 3 repeats"):
+        repeat_consistency(first, again[:3], np.zeros(4, dtype=np.int64))
