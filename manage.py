@@ -4,8 +4,20 @@
 import os
 import sys
 
-from django.core.management import execute_from_command_line
 
-if __name__ == "__main__":
+def main() -> None:
+    """Run a command. rate_csv needs no Django, and is done before Django would be loaded."""
+    # Many workers share the cores; matrices here are small, and threads would only wait.
+    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+    if sys.argv[1:2] == ["rate_csv"]:
+        from arena.management.rate_csv import main as rate_csv
+
+        sys.exit(rate_csv(sys.argv[2:]))
+    from django.core.management import execute_from_command_line
+
     os.environ.setdefault("DJANGO_SETTINGS_MODULE", "arena.config.settings")
     execute_from_command_line(sys.argv)
+
+
+if __name__ == "__main__":
+    main()

@@ -167,9 +167,10 @@ def test_templates_hold_no_inline_script_style_or_unescaped_text() -> None:
     [
         "import arena.config.wsgi; from django.urls import get_resolver;"
         "get_resolver().url_patterns; import arena.config.urls",
-        "import arena.rating",
+        "import arena.rating.leaderboard",
+        "import arena.management.rate_csv",
     ],
-    ids=["a web worker", "the rating alone"],
+    ids=["a web worker", "the rating alone", "rate_csv"],
 )
 def test_no_heavy_package_is_loaded_at_start(start: str) -> None:
     code = f"import sys; {start}; print(*sorted(n for n in sys.modules if '_' != n[0]))"
@@ -179,12 +180,13 @@ def test_no_heavy_package_is_loaded_at_start(start: str) -> None:
     assert [name for name in loaded if name in HEAVY] == []
 
 
-def test_the_rating_starts_no_framework() -> None:
-    code = "import sys, arena.rating; print(*sys.modules)"
+@pytest.mark.parametrize("module", ["arena.rating.leaderboard", "arena.management.rate_csv"])
+def test_the_rating_starts_no_framework(module: str) -> None:
+    code = f"import sys, {module}; print(*sys.modules)"
     loaded = subprocess.run(
         [sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, check=True
     ).stdout.split()
-    assert {"django", "celery", "redis"} & set(loaded) == set()
+    assert {"django", "celery", "redis", "scipy"} & set(loaded) == set()
 
 
 def test_every_variable_of_the_settings_is_explained() -> None:

@@ -1,0 +1,29 @@
+"""manage.py rate_csv: rate votes from elsewhere."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from django.core.management.base import BaseCommand, CommandError, CommandParser
+
+from arena.management import rate_csv
+
+
+class Command(BaseCommand):
+    """The door for Django to arena.management.rate_csv; manage.py goes there itself."""
+
+    help = rate_csv.HELP
+    requires_system_checks = []
+
+    def add_arguments(self, parser: CommandParser) -> None:
+        """Which file, and how."""
+        rate_csv.add_arguments(parser)
+
+    def handle(self, *args: Any, **options: Any) -> None:
+        """Rate, then print."""
+        names = ("file", "method", "resample", "rounds", "seed", "format")
+        try:
+            said = rate_csv.run(**{name: options[name] for name in names})
+        except rate_csv.CsvNotRated as error:
+            raise CommandError(str(error)) from error
+        self.stdout.write(said, ending="")
