@@ -9,9 +9,11 @@ from django.http import HttpRequest
 
 from arena.models import (
     FaultLabel,
+    Invitation,
     LabellingRound,
     Matchup,
     Person,
+    Report,
     Snapshot,
     Standing,
     Study,
@@ -49,6 +51,16 @@ class PersonAdmin(admin.ModelAdmin):
         return False
 
 
+@admin.register(Invitation)
+class InvitationAdmin(ReadOnly, admin.ModelAdmin):
+    """Links are made and taken back on the page of a study's experts."""
+
+    list_display = ("expert", "study", "invited_by", "made_at", "expires_at", "used_at")
+    list_select_related = ("expert", "study", "invited_by")
+    list_filter = ("study",)
+    exclude = ("token_sha256",)
+
+
 @admin.register(Study)
 class StudyAdmin(ReadOnly, admin.ModelAdmin):
     """A study's rules are fixed when it opens."""
@@ -65,7 +77,7 @@ class MatchupAdmin(ReadOnly, admin.ModelAdmin):
     list_display = ("code", "study", "expert", "position", "scenario", "served_at")
     list_select_related = ("study", "expert", "scenario")
     list_filter = ("study",)
-    exclude = ("left_token", "right_token")
+    exclude = ("left_token", "right_token", "original_token")
 
 
 @admin.register(Vote)
@@ -76,6 +88,15 @@ class VoteAdmin(ReadOnly, admin.ModelAdmin):
     list_select_related = ("expert",)
     list_filter = ("outcome", "is_simulated", "matchup__study")
     date_hierarchy = "at"
+
+
+@admin.register(Report)
+class ReportAdmin(ReadOnly, admin.ModelAdmin):
+    """What experts reported about pairs."""
+
+    list_display = ("matchup", "expert", "reason", "comment", "at")
+    list_select_related = ("matchup", "expert")
+    list_filter = ("reason", "matchup__study")
 
 
 class StandingInline(ReadOnly, admin.TabularInline):

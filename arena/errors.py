@@ -15,6 +15,10 @@ class StudyNotOpen(ArenaError):
     """The study does not take votes: it is a draft or closed."""
 
 
+class LabellingClosed(ArenaError):
+    """The labelling takes no labels any more."""
+
+
 class AlreadyDecided(ArenaError):
     """The matchup has a vote and the new one does not say that it supersedes it.
 
@@ -27,12 +31,45 @@ class AlreadyDecided(ArenaError):
         super().__init__(f"This matchup is decided already: {outcome}.")
 
 
+class TooFast(ArenaError):
+    """More votes came from one account than a person can give; send this one again later.
+
+    Args:
+        retry_after_s: Seconds until it would be taken.
+    """
+
+    def __init__(self, retry_after_s: int) -> None:
+        self.retry_after_s = retry_after_s
+        super().__init__(f"That was too fast. Try again in {retry_after_s} s.")
+
+
+class InvalidVote(ArenaError):
+    """Parts of a vote or report do not go together.
+
+    Args:
+        fields: By field, a sentence on what is wrong with it.
+    """
+
+    def __init__(self, fields: dict[str, str]) -> None:
+        self.fields = fields
+        super().__init__(" ".join(fields.values()))
+
+
+class InvalidPreference(ArenaError):
+    """What somebody chose for themselves can't be kept.
+
+    Args:
+        field: What it is about.
+        sentence: What is wrong with it.
+    """
+
+    def __init__(self, field: str, sentence: str) -> None:
+        self.fields = {field: sentence}
+        super().__init__(sentence)
+
+
 class NothingToPlan(ArenaError):
     """The rules of a study can't be met with the augmentations that exist; the text says why."""
-
-
-class NotRateable(ArenaError):
-    """The votes do not determine a rating; the text says why."""
 
 
 class StudyStillOpen(ArenaError):
@@ -50,9 +87,17 @@ class StudyStillOpen(ArenaError):
         )
 
 
+class VotesUnreadable(ArenaError):
+    """A file of votes is not what it should be; the text has the line and what is allowed."""
+
+
 class NoSnapshot(ArenaError):
     """The study has not been rated yet; rate it first."""
 
 
 class AlreadyLabelled(ArenaError):
     """The expert has labelled this picture otherwise; the first label counts."""
+
+
+class LinkOver(ArenaError):
+    """The invitation lets nobody in: it expired, was taken back or names no expert any more."""

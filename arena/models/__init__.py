@@ -1,0 +1,31 @@
+"""Rows of arena: people, invitations, studies, matchups, votes, ratings and fault labels."""
+
+from __future__ import annotations
+
+from arena.models.invitations import Invitation, token_digest
+from arena.models.labels import FaultLabel, LabellingRound, LabelTask
+from arena.models.people import Person
+from arena.models.ratings import EarlyLook, ImportedVote, Snapshot, Standing, VoteFile
+from arena.models.studies import Matchup, Study
+from arena.models.tokens import fresh_token
+from arena.models.votes import AIDS, Report, Vote
+
+__all__ = [
+    "AIDS",
+    "EarlyLook",
+    "FaultLabel",
+    "ImportedVote",
+    "Invitation",
+    "LabelTask",
+    "LabellingRound",
+    "Matchup",
+    "Person",
+    "Report",
+    "Snapshot",
+    "Standing",
+    "Study",
+    "Vote",
+    "VoteFile",
+    "fresh_token",
+    "token_digest",
+]

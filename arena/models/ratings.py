@@ -1,0 +1,186 @@
+"""Frozen ratings of a study, votes from elsewhere, and who opened results early."""
+
+from __future__ import annotations
+
+import uuid
+
+from django.conf import settings
+from django.db import models
+from django.db.models import F, Q
+
+from arena.models.studies import Study
+from augment.models import Contestant
+
+
+class Snapshot(models.Model):
+    """A frozen rating of a study: which votes, which method, which seed, and what came out.
+
+    Pages and files read what stands here; nothing is computed again. Big ones are computed by a
+    worker: they are `queued`, then `running`, and count as a rating only once they are `ready`.
+    """
+
+    class State(models.TextChoices):
+        QUEUED = "queued", "Waiting"
+        RUNNING = "running", "Running"
+        READY = "ready", "Ready"
+        FAILED = "failed", "Failed"
+
+    code = models.UUIDField(default=uuid.uuid4, unique=True, editable=False)
+    study = models.ForeignKey(Study, on_delete=models.CASCADE, related_name="snapshots")
+    state = models.CharField(max_length=10, choices=State.choices, default=State.READY)
+    progress = models.PositiveSmallIntegerField(default=100, help_text="percent")
+    method = models.CharField(max_length=20, help_text="bt, elo or davidson")
+    rounds = models.PositiveIntegerField()
+    resampling_unit = models.CharField(max_length=20)
+    seed = models.BigIntegerField()
+    filters = models.JSONField(
+        default=dict, help_text="which votes were asked for: types, experts, kinds, automatic_ties"
+    )
+    last_vote = models.BigIntegerField(
+        null=True, blank=True, help_text="no vote after this row counts; null without votes"
+    )
+    votes_sha256 = models.CharField(max_length=64)
+    votes_counted = models.PositiveIntegerField()
+    votes_left_out = models.JSONField(default=dict, help_text="how many votes, by reason")
+    versions = models.JSONField(default=dict)
+    status = models.TextField(blank=True, help_text="why there is no rating, if there is none")
+    degenerate_rounds = models.PositiveIntegerField(
+        default=0, help_text="bootstrap rounds that determined no rating; intervals leave them out"
+    )
+    results = models.JSONField(
+        default=dict, help_text="all statistics beside the standings, as the pages show them"
+    )
+    includes_simulated = models.BooleanField(default=False)
+    is_early = models.BooleanField(default=False, help_text="the study was still open")
+    made_by = models.ForeignKey(
+        settings.AUTH_USER_MODEL,
+        null=True,
+        blank=True,
+        on_delete=models.PROTECT,
+        related_name="snapshots",
+    )
+    made_at = models.DateTimeField(auto_now_add=True)
+
+    class Meta:
+        ordering = ("-made_at", "-pk")
+        constraints = (
+            models.CheckConstraint(
+                name="snapshot_state_is_known",
+                condition=Q(state__in=["queued", "running", "ready", "failed"]),
+            ),
+            models.CheckConstraint(
+                name="snapshot_progress_is_percent", condition=Q(progress__lte=100)
+            ),
+        )
+
+    def __str__(self) -> str:
+        return str(self.code)
+
+
+class Standing(models.Model):
+    """One line of a snapshot. Null ratings mean that the votes do not determine them.
+
+    Names are kept as they were; without a contestant the votes came from elsewhere.
+    """
+
+    snapshot = models.ForeignKey(Snapshot, on_delete=models.CASCADE, related_name="standings")
+    contestant = models.ForeignKey(
+        Contestant, null=True, blank=True, on_delete=models.PROTECT, related_name="standings"
+    )
+    slug = models.CharField(max_length=200)
+    name = models.CharField(max_length=200)
+    variant = models.CharField(max_length=20, blank=True)
+    kind = models.CharField(max_length=20, help_text="as the contestant's, or imported")
+    is_simulated = models.BooleanField(default=False)
+    rank = models.PositiveIntegerField(null=True)
+    rank_best = models.PositiveIntegerField(null=True)
+    rank_worst = models.PositiveIntegerField(null=True)
+    rating = models.FloatField(null=True)
+    lower = models.FloatField(null=True)
+    upper = models.FloatField(null=True)
+    votes = models.PositiveIntegerField()
+    wins = models.PositiveIntegerField()
+    ties = models.PositiveIntegerField()
+    losses = models.PositiveIntegerField()
+    note = models.TextField(blank=True)
+
+    class Meta:
+        ordering = ("rank", "-rating", "slug")
+        constraints = (
+            models.UniqueConstraint(name="one_standing_per_slug", fields=("snapshot", "slug")),
+            models.CheckConstraint(
+                name="standing_counts_add_up",
+                condition=Q(votes=F("wins") + F("ties") + F("losses")),
+            ),
+        )
+
+    def __str__(self) -> str:
+        return f"{self.rank} {self.slug}"
+
+
+class EarlyLook(models.Model):
+    """Somebody opened the results of an open study on purpose; it ends their voting in it."""
+
+    study = models.ForeignKey(Study, on_delete=models.CASCADE, related_name="early_looks")
+    user = models.ForeignKey(
+        settings.AUTH_USER_MODEL, on_delete=models.PROTECT, related_name="early_looks"
+    )
+    at = models.DateTimeField(auto_now_add=True)
+
+    class Meta:
+        ordering = ("at", "pk")
+        constraints = (
+            models.UniqueConstraint(name="one_early_look_each", fields=("study", "user")),
+        )
+
+    def __str__(self) -> str:
+        return f"{self.user_id} on {self.study_id}"
+
+
+class VoteFile(models.Model):
+    """Votes from elsewhere. Their study is closed and has neither matchups nor pictures."""
+
+    study = models.OneToOneField(Study, on_delete=models.CASCADE, related_name="vote_file")
+    name = models.CharField(max_length=200, help_text="of the file")
+    sha256 = models.CharField(max_length=64)
+    made_at = models.DateTimeField(auto_now_add=True)
+
+    class Meta:
+        ordering = ("-made_at", "-pk")
+
+    def __str__(self) -> str:
+        return self.name
+
+
+class ImportedVote(models.Model):
+    """One line of a file: `first` against `second` as the file has them."""
+
+    class Outcome(models.TextChoices):
+        FIRST = "model_a", "first"
+        SECOND = "model_b", "second"
+        TIE = "tie", "tie"
+        BOTH_BAD = "tie (bothbad)", "both bad"
+
+    file = models.ForeignKey(VoteFile, on_delete=models.CASCADE, related_name="votes")
+    line = models.PositiveIntegerField(help_text="of the file, its head is line 1")
+    first = models.CharField(max_length=200)
+    second = models.CharField(max_length=200)
+    outcome = models.CharField(max_length=20, choices=Outcome.choices)
+    judge = models.CharField(max_length=200, blank=True)
+    item = models.CharField(max_length=200, blank=True)
+
+    class Meta:
+        ordering = ("line",)
+        constraints = (
+            models.UniqueConstraint(name="one_vote_per_line", fields=("file", "line")),
+            models.CheckConstraint(
+                name="imported_vote_compares_two", condition=~Q(first=F("second"))
+            ),
+            models.CheckConstraint(
+                name="imported_outcome_is_known",
+                condition=Q(outcome__in=["model_a", "model_b", "tie", "tie (bothbad)"]),
+            ),
+        )
+
+    def __str__(self) -> str:
+        return f"line {self.line}"

@@ -1,0 +1,130 @@
+"""Studies and what they show."""
+
+from __future__ import annotations
+
+import uuid
+
+from django.conf import settings
+from django.db import models
+from django.db.models import F, Q
+
+from arena.models.tokens import fresh_token
+from augment.models import Augmentation, Contestant, Scenario
+
+
+class Study(models.Model):
+    """What experts vote on; its rules are fixed when it opens."""
+
+    class State(models.TextChoices):
+        DRAFT = "draft", "Draft"
+        OPEN = "open", "Open"
+        CLOSED = "closed", "Closed"
+
+    code = models.UUIDField(default=uuid.uuid4, unique=True, editable=False)
+    name = models.CharField(max_length=120, unique=True)
+    state = models.CharField(max_length=10, choices=State.choices, default=State.DRAFT)
+    contestants = models.ManyToManyField(Contestant, related_name="studies")
+    scenarios = models.ManyToManyField(Scenario, related_name="studies")
+    experts = models.ManyToManyField(settings.AUTH_USER_MODEL, related_name="studies")
+    votes_per_expert = models.PositiveIntegerField()
+    seed = models.BigIntegerField()
+    allow_both_miss = models.BooleanField(
+        default=False, help_text="experts may add to Equal that both miss the instruction"
+    )
+    votes_to_plan = models.JSONField(
+        default=dict, help_text="votes that the adaptive part still has to plan, by username"
+    )
+    rules = models.JSONField(
+        default=dict, help_text="the planner's rules, as they were at opening"
+    )
+    allow_simulated = models.BooleanField(
+        default=False, help_text="simulated contestants and votes count; everything then says so"
+    )
+    opened_at = models.DateTimeField(null=True, blank=True)
+    closed_at = models.DateTimeField(null=True, blank=True)
+
+    class Meta:
+        ordering = ("-opened_at", "-pk")
+        verbose_name_plural = "studies"
+        constraints = (
+            models.CheckConstraint(
+                name="study_state_is_known", condition=Q(state__in=["draft", "open", "closed"])
+            ),
+        )
+
+    def __str__(self) -> str:
+        return self.name
+
+
+class Matchup(models.Model):
+    """One planned showing of two augmentations of one scenario to one expert.
+
+    Camera and unchanged picture are kept as they were when it was planned: a scenario that is
+    edited later does not change what was judged.
+    """
+
+    class Kind(models.TextChoices):
+        MAIN = "main", "Main"
+        REPEAT = "repeat", "Hidden repeat"
+        CHECK = "check", "Attention check"
+
+    code = models.UUIDField(default=uuid.uuid4, unique=True, editable=False)
+    study = models.ForeignKey(Study, on_delete=models.CASCADE, related_name="matchups")
+    expert = models.ForeignKey(
+        settings.AUTH_USER_MODEL, on_delete=models.PROTECT, related_name="matchups"
+    )
+    position = models.PositiveIntegerField(help_text="place in the expert's own order, from 1")
+    scenario = models.ForeignKey(Scenario, on_delete=models.PROTECT, related_name="matchups")
+    left = models.ForeignKey(Augmentation, on_delete=models.PROTECT, related_name="shown_left")
+    right = models.ForeignKey(Augmentation, on_delete=models.PROTECT, related_name="shown_right")
+    left_token = models.CharField(max_length=40, unique=True, default=fresh_token)
+    right_token = models.CharField(max_length=40, unique=True, default=fresh_token)
+    original_token = models.CharField(max_length=40, unique=True, default=fresh_token)
+    original_image = models.CharField(
+        max_length=120, blank=True, help_text="name of the picture before any change"
+    )
+    view = models.JSONField(
+        null=True, help_text="where metres lie in its pictures: px_per_m, ego_px, width, height"
+    )
+    kind = models.CharField(max_length=10, choices=Kind.choices, default=Kind.MAIN)
+    repeat_of = models.OneToOneField(
+        "self",
+        null=True,
+        blank=True,
+        on_delete=models.CASCADE,
+        related_name="repeated_by",
+        help_text="the main matchup that this one shows again, sides swapped",
+    )
+    batch = models.PositiveIntegerField(
+        default=0, help_text="0 was planned at the opening; later plannings count up"
+    )
+    draw_probability = models.FloatField(
+        help_text="of this pair and scenario, when it was planned"
+    )
+    served_at = models.DateTimeField(null=True, blank=True)
+
+    class Meta:
+        ordering = ("study", "expert", "position")
+        constraints = (
+            models.UniqueConstraint(
+                name="one_matchup_per_position", fields=("study", "expert", "position")
+            ),
+            models.UniqueConstraint(
+                name="one_matchup_per_pair", fields=("study", "expert", "left", "right")
+            ),
+            models.CheckConstraint(
+                name="matchup_shows_two_augmentations", condition=~Q(left=F("right"))
+            ),
+            models.CheckConstraint(
+                name="draw_probability_is_one",
+                condition=Q(draw_probability__gt=0, draw_probability__lte=1),
+            ),
+            models.CheckConstraint(
+                name="matchup_repeats_only_as_repeat",
+                condition=Q(kind="repeat", repeat_of__isnull=False)
+                | Q(kind__in=["main", "check"], repeat_of=None),
+            ),
+        )
+
+    def __str__(self) -> str:
+        return str(self.code)

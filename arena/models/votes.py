@@ -1,0 +1,142 @@
+"""What experts decide."""
+
+from __future__ import annotations
+
+from itertools import combinations
+
+from django.conf import settings
+from django.db import models
+from django.db.models import F, Q
+from django.utils.translation import gettext_lazy as _
+
+from arena.models.studies import Matchup
+from augment.models import AppendOnly, Augmentation
+
+AIDS = ("zoom", "original", "ruler", "flip")
+"""What an expert may look with; a vote names those that were used."""
+
+_AID_SETS = [
+    " ".join(chosen) for count in range(len(AIDS) + 1) for chosen in combinations(AIDS, count)
+]
+
+
+class Vote(AppendOnly):
+    """What the expert decided. Append-only: a change is a new row that supersedes the old one.
+
+    A skip is a decision as well: it says why there is none, and is never rated.
+
+    What was shown on which side is copied here, so that the database itself can check that the
+    winner was shown.
+    """
+
+    class Outcome(models.TextChoices):
+        LEFT = "left", "A is better"
+        EQUAL = "equal", "Equal"
+        RIGHT = "right", "B is better"
+        SKIP = "skip", "Skipped"
+
+    class SkipReason(models.TextChoices):
+        CANNOT_JUDGE = "cannot_judge", _("I cannot judge this")
+        PICTURE_MISSING = "picture_missing", _("Image does not show")
+        UNCLEAR = "unclear", _("Instruction unclear")
+        RECOGNISED = "recognised", _("I recognise this scene’s author")
+        OTHER = "other", _("Other")
+
+    key = models.UUIDField(unique=True, help_text="made by the browser; the same key is one vote")
+    matchup = models.ForeignKey(Matchup, on_delete=models.PROTECT, related_name="votes")
+    expert = models.ForeignKey(
+        settings.AUTH_USER_MODEL, on_delete=models.PROTECT, related_name="votes"
+    )
+    shown_left = models.ForeignKey(Augmentation, on_delete=models.PROTECT, related_name="+")
+    shown_right = models.ForeignKey(Augmentation, on_delete=models.PROTECT, related_name="+")
+    outcome = models.CharField(max_length=10, choices=Outcome.choices)
+    both_miss = models.BooleanField(
+        default=False, help_text="equal, and both miss the instruction; counts as a tie"
+    )
+    reason = models.CharField(
+        max_length=20, blank=True, choices=SkipReason.choices, help_text="why it was skipped"
+    )
+    comment = models.TextField(blank=True, max_length=1000)
+    aids = models.CharField(
+        max_length=40, blank=True, help_text="aids used, in a fixed order, joined by blanks"
+    )
+    winner = models.ForeignKey(
+        Augmentation, null=True, blank=True, on_delete=models.PROTECT, related_name="wins"
+    )
+    supersedes = models.OneToOneField(
+        "self", null=True, blank=True, on_delete=models.PROTECT, related_name="superseded_by"
+    )
+    is_simulated = models.BooleanField(default=False)
+    ms_visible = models.PositiveIntegerField(
+        null=True, blank=True, help_text="how long the pair was on screen, null if not measured"
+    )
+    at = models.DateTimeField(auto_now_add=True)
+
+    class Meta:
+        ordering = ("at", "pk")
+        constraints = (
+            models.UniqueConstraint(
+                name="one_first_vote_per_matchup",
+                fields=("matchup",),
+                condition=Q(supersedes=None),
+            ),
+            models.CheckConstraint(
+                name="vote_winner_was_shown",
+                condition=Q(outcome="left", winner=F("shown_left"), winner__isnull=False)
+                | Q(outcome="right", winner=F("shown_right"), winner__isnull=False)
+                | Q(outcome__in=["equal", "skip"], winner=None),
+            ),
+            models.CheckConstraint(
+                name="vote_both_miss_only_when_equal",
+                condition=Q(both_miss=False) | Q(outcome="equal"),
+            ),
+            models.CheckConstraint(
+                name="vote_reason_goes_with_skip",
+                condition=(~Q(outcome="skip") & Q(reason=""))
+                | Q(
+                    outcome="skip",
+                    reason__in=[
+                        "cannot_judge",
+                        "picture_missing",
+                        "unclear",
+                        "recognised",
+                        "other",
+                    ],
+                ),
+            ),
+            models.CheckConstraint(name="vote_aids_are_known", condition=Q(aids__in=_AID_SETS)),
+        )
+        indexes = (models.Index(fields=("expert", "at"), name="votes_of_expert_by_time"),)
+
+    def __str__(self) -> str:
+        return str(self.key)
+
+
+class Report(AppendOnly):
+    """What an expert reports about a matchup, whatever the vote. Append-only."""
+
+    class Reason(models.TextChoices):
+        PICTURE_WRONG = "picture_wrong", _("Something is wrong with an image")
+        INSTRUCTION_WRONG = "instruction_wrong", _("Something is wrong with the instruction")
+        OTHER = "other", _("Other")
+
+    key = models.UUIDField(unique=True, help_text="made by the browser; one key is one report")
+    matchup = models.ForeignKey(Matchup, on_delete=models.PROTECT, related_name="reports")
+    expert = models.ForeignKey(
+        settings.AUTH_USER_MODEL, on_delete=models.PROTECT, related_name="reports"
+    )
+    reason = models.CharField(max_length=20, choices=Reason.choices)
+    comment = models.TextField(blank=True, max_length=1000)
+    at = models.DateTimeField(auto_now_add=True)
+
+    class Meta:
+        ordering = ("at", "pk")
+        constraints = (
+            models.CheckConstraint(
+                name="report_reason_is_known",
+                condition=Q(reason__in=["picture_wrong", "instruction_wrong", "other"]),
+            ),
+        )
+
+    def __str__(self) -> str:
+        return str(self.key)
