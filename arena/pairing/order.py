@@ -2,25 +2,135 @@
 
 from __future__ import annotations
 
-import numpy as np
-from numpy.typing import NDArray
+from collections.abc import Sequence
+from dataclasses import dataclass
 
-BoolArray = NDArray[np.bool_]
-IntArray = NDArray[np.int64]
+import numpy as np
+
+from arena.pairing.arrays import BoolArray, IntArray
+
+MAIN, REPEAT, CHECK = "main", "repeat", "check"
+"""What a showing is for; the words of the stored rows."""
+
+TRIES = 20
+"""So many orders are tried until every repeat is far enough from what it shows again."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Slot:
+    """One place in an expert's order.
+
+    Attributes:
+        kind: "main", "repeat" or "check".
+        pair: The row of the pair, -1 for a check.
+        of: For a repeat, the index of the slot that it shows again.
+    """
+
+    kind: str
+    pair: int
+    scenario: int
+    of: int | None = None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Extras:
+    """What an expert sees on top of the chosen units.
+
+    Attributes:
+        repeated: Units (pair, scenario) that come a second time.
+        checks: Scenarios of attention checks.
+    """
+
+    repeated: tuple[tuple[int, int], ...] = ()
+    checks: tuple[int, ...] = ()
 
 
 def put_in_order(
-    chosen: BoolArray, gap: int, rng: np.random.Generator
-) -> tuple[list[list[tuple[int, int]]], int]:
-    """Each expert's units (pair, scenario) in order, and the gap that all orders keep."""
+    chosen: BoolArray,
+    extras: Sequence[Extras],
+    gap: int,
+    distance: int,
+    rng: np.random.Generator,
+) -> tuple[list[list[Slot]], int]:
+    """Each expert's units and extras in order, and the gap that all orders keep.
+
+    Args:
+        chosen: (E, P, S) the units.
+        extras: For every expert, what comes on top.
+        gap: Others wanted between two showings of a scenario.
+        distance: Places wanted between a unit and its repeat.
+        rng: Shuffles.
+    """
     counts = chosen.sum(axis=1)
-    held = min(_largest_gap(row, gap) for row in counts)
-    orders = []
-    for expert, row in enumerate(counts):
-        waiting = [rng.permutation(np.flatnonzero(column)).tolist() for column in chosen[expert].T]
-        sequence = _sequence(row, held, rng)
-        orders.append([(waiting[scenario].pop(), scenario) for scenario in sequence])
-    return orders, held
+    for row, more in zip(counts, extras, strict=True):
+        for scenario in [scenario for _, scenario in more.repeated] + list(more.checks):
+            row[scenario] += 1
+    held = min(largest_gap(row, gap) for row in counts)
+    return [
+        _order(mine, more, row, held, distance, rng)
+        for mine, more, row in zip(chosen, extras, counts, strict=True)
+    ], held
+
+
+def _order(
+    mine: BoolArray,
+    more: Extras,
+    counts: IntArray,
+    gap: int,
+    distance: int,
+    rng: np.random.Generator,
+) -> list[Slot]:
+    """One expert's order; where a repeat comes too early, others are tried and the best kept."""
+    waiting = [
+        [int(pair) for pair in rng.permutation(np.flatnonzero(column))] for column in mine.T
+    ]
+    for pair, scenario in more.repeated:
+        waiting[scenario].remove(pair)
+    best: list[Slot] = []
+    nearest = -1
+    for _ in range(TRIES if more.repeated else 1):
+        slots = _filled(waiting, more, sequence(counts, gap, rng), distance, rng)
+        gaps = [index - slot.of for index, slot in enumerate(slots) if slot.of is not None]
+        if min(gaps, default=distance) > nearest:
+            best, nearest = slots, min(gaps, default=distance)
+        if nearest >= distance:
+            break
+    return best
+
+
+def _filled(
+    waiting: list[list[int]],
+    more: Extras,
+    scenarios: list[int],
+    distance: int,
+    rng: np.random.Generator,
+) -> list[Slot]:
+    """Which unit or extra each place of a scenario gets; repeats far from what they show again."""
+    places: dict[int, list[int]] = {}
+    for index, scenario in enumerate(scenarios):
+        places.setdefault(scenario, []).append(index)
+    slots: dict[int, Slot] = {}
+    for pair, scenario in more.repeated:
+        first, again = _two_places(places[scenario], distance, rng)
+        slots[first] = Slot(kind=MAIN, pair=pair, scenario=scenario)
+        slots[again] = Slot(kind=REPEAT, pair=pair, scenario=scenario, of=first)
+        places[scenario] = [index for index in places[scenario] if index not in (first, again)]
+    for scenario in more.checks:
+        index = places[scenario].pop(int(rng.integers(len(places[scenario]))))
+        slots[index] = Slot(kind=CHECK, pair=-1, scenario=scenario)
+    left = [list(pairs) for pairs in waiting]
+    for index, scenario in enumerate(scenarios):
+        if index not in slots:
+            slots[index] = Slot(kind=MAIN, pair=left[scenario].pop(), scenario=scenario)
+    return [slots[index] for index in range(len(scenarios))]
+
+
+def _two_places(places: list[int], distance: int, rng: np.random.Generator) -> tuple[int, int]:
+    """Two of these places that far apart, by lot; the first and the last where none are."""
+    options = [(first, again) for first in places for again in places if again - first >= distance]
+    if not options:
+        return places[0], places[-1]
+    return options[int(rng.integers(len(options)))]
 
 
 def deal_sides(
@@ -42,7 +152,7 @@ def deal_sides(
     return flipped
 
 
-def _largest_gap(counts: IntArray, gap: int) -> int:
+def largest_gap(counts: IntArray, gap: int) -> int:
     """The most matchups up to `gap` that can lie between two of a scenario.
 
     The fullest scenarios span (most - 1) blocks of gap + 1 and need one more place each.
@@ -54,16 +164,16 @@ def _largest_gap(counts: IntArray, gap: int) -> int:
     return min(gap, (int(counts.sum()) - fullest) // (most - 1) - 1)
 
 
-def _sequence(counts: IntArray, gap: int, rng: np.random.Generator) -> list[int]:
+def sequence(counts: IntArray, gap: int, rng: np.random.Generator) -> list[int]:
     """Scenarios in an order with at least `gap` others in between: always the fullest allowed."""
     left = counts.astype(float)
-    sequence: list[int] = []
+    order: list[int] = []
     for _ in range(int(counts.sum())):
         score = left + rng.random(len(left))
         score[left < 1] = -np.inf
         if gap:
-            score[sequence[-gap:]] = -np.inf
+            score[order[-gap:]] = -np.inf
         scenario = int(np.argmax(score))
-        sequence.append(scenario)
+        order.append(scenario)
         left[scenario] -= 1
-    return sequence
+    return order

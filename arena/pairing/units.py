@@ -9,10 +9,8 @@ import itertools
 from collections import deque
 
 import numpy as np
-from numpy.typing import NDArray
 
-BoolArray = NDArray[np.bool_]
-IntArray = NDArray[np.int64]
+from arena.pairing.arrays import BoolArray, FloatArray, IntArray
 
 
 def choose_units(
@@ -20,8 +18,8 @@ def choose_units(
 ) -> BoolArray:
     """Units per expert, (E, P, S): balanced over scenarios first, then over pairs."""
     pairs, scenarios = showable.shape
-    of_scenario = _quotas(showable.sum(axis=0), experts, votes, rng)
-    of_pair = _quotas(showable.sum(axis=1), experts, votes, rng)
+    of_scenario = quotas(showable.sum(axis=0), experts, votes, rng)
+    of_pair = quotas(showable.sum(axis=1), experts, votes, rng)
     chosen = np.zeros((experts, pairs, scenarios), dtype=bool)
     judges = np.zeros((pairs, scenarios))
     for expert in range(experts):
@@ -34,15 +32,15 @@ def choose_units(
             picked = np.argsort(-score)[: of_scenario[expert, scenario]]
             mine[picked, scenario] = True
             wanted[picked] -= 1
-        _even_out(mine, showable, of_pair[expert])
+        even_out(mine, showable, of_pair[expert])
         judges += mine
     flat = chosen.transpose(1, 0, 2).reshape(pairs, experts * scenarios)
     everywhere = np.tile(showable, (1, experts))
-    _even_out(flat, everywhere, np.zeros(pairs, dtype=np.int64))
+    even_out(flat, everywhere, np.zeros(pairs, dtype=np.int64))
     return flat.reshape(pairs, experts, scenarios).transpose(1, 0, 2)
 
 
-def draw_probability(showable: BoolArray, votes: int) -> NDArray[np.float64]:
+def draw_probability(showable: BoolArray, votes: int) -> FloatArray:
     """How likely each unit (P, S) is a given showing: its pair's share times its scenario's.
 
     Exact where every unit can be shown; else the product of both shares, made to sum to 1.
@@ -53,7 +51,7 @@ def draw_probability(showable: BoolArray, votes: int) -> NDArray[np.float64]:
     return np.asarray(shares / shares.sum())
 
 
-def _quotas(capacity: IntArray, experts: int, votes: int, rng: np.random.Generator) -> IntArray:
+def quotas(capacity: IntArray, experts: int, votes: int, rng: np.random.Generator) -> IntArray:
     """Shares (E, n) of the votes of each expert: equal to +-1 by row and by column total.
 
     A place whose capacity is too small gets its capacity. The odd votes go around in one circle
@@ -72,7 +70,7 @@ def _quotas(capacity: IntArray, experts: int, votes: int, rng: np.random.Generat
     return quotas
 
 
-def _even_out(chosen: BoolArray, showable: BoolArray, aim: IntArray) -> None:
+def even_out(chosen: BoolArray, showable: BoolArray, aim: IntArray) -> None:
     """Exchange units within columns until the rows of `chosen` are as near their aim as can be.
 
     Args:
@@ -96,6 +94,9 @@ def _even_out(chosen: BoolArray, showable: BoolArray, aim: IntArray) -> None:
             chosen[giver, column], chosen[taker, column] = False, True
 
 
+# --- Private -----------------------------------------------------------------------------------
+
+
 def _chain(level: IntArray, can_give: BoolArray) -> list[int] | None:
     """The shortest way by `can_give` (P, P) from a row down to one at least two lower."""
     for source in np.argsort(-level, kind="stable"):
@@ -115,7 +116,7 @@ def _chain(level: IntArray, can_give: BoolArray) -> list[int] | None:
     return None
 
 
-def _level(capacity: IntArray, total: int) -> NDArray[np.float64]:
+def _level(capacity: IntArray, total: int) -> FloatArray:
     """Share a total equally among vessels that hold no more than their capacity each."""
     level = np.zeros(len(capacity))
     left = float(total)
