@@ -10,6 +10,7 @@ import os
 import re
 import secrets
 import tempfile
+from datetime import timedelta
 from pathlib import Path
 
 from csp.constants import NONE, SELF
@@ -45,7 +46,9 @@ SESSION_COOKIE_SECURE = CSRF_COOKIE_SECURE = HTTPS
 SECURE_SSL_REDIRECT = HTTPS
 SECURE_HSTS_SECONDS = 31_536_000 if HTTPS else 0
 SECURE_PROXY_SSL_HEADER = ("HTTP_X_FORWARDED_PROTO", "https") if HTTPS else None
+PROXIES = env.integer("ARENA_PROXIES", default=0, low=0, high=9)
 SESSION_COOKIE_AGE = 30 * 24 * 3600
+SESSION_ENGINE = "arena.config.sessions"
 X_FRAME_OPTIONS = "DENY"
 SECURE_REFERRER_POLICY = "same-origin"
 CONTENT_SECURITY_POLICY = {
@@ -62,6 +65,20 @@ CONTENT_SECURITY_POLICY = {
     }
 }
 
+# Wrong passwords lock an account for the address that sent them, not for the whole world: nobody
+# can lock out somebody else. Kept in the database, so it holds for every web server.
+AXES_LOCKOUT_PARAMETERS = [["username", "ip_address"]]
+AXES_FAILURE_LIMIT = env.integer("ARENA_LOGIN_FAILURES", default=5, low=1, high=100)
+AXES_COOLOFF_TIME = timedelta(
+    minutes=env.integer("ARENA_LOGIN_LOCK_MIN", default=15, low=1, high=1440)
+)
+AXES_RESET_COOL_OFF_ON_FAILURE_DURING_LOCKOUT = False
+AXES_RESET_ON_SUCCESS = True
+AXES_DISABLE_ACCESS_LOG = True
+AXES_VERBOSE = False
+AXES_CLIENT_IP_CALLABLE = "arena.config.client_address.client_address"
+AXES_LOCKOUT_CALLABLE = "arena.web.faults.locked"
+
 # --- What it is made of ------------------------------------------------------------------------
 
 INSTALLED_APPS = [
@@ -72,6 +89,7 @@ INSTALLED_APPS = [
     "django.contrib.messages",
     "whitenoise.runserver_nostatic",
     "django.contrib.staticfiles",
+    "axes",
     "csp",
     "rest_framework",
     "augment",
@@ -82,12 +100,14 @@ MIDDLEWARE = [
     "csp.middleware.CSPMiddleware",
     "whitenoise.middleware.WhiteNoiseMiddleware",
     "django.contrib.sessions.middleware.SessionMiddleware",
+    "django.middleware.locale.LocaleMiddleware",
     "django.middleware.common.CommonMiddleware",
     "django.middleware.csrf.CsrfViewMiddleware",
     "django.contrib.auth.middleware.AuthenticationMiddleware",
     "django.contrib.auth.middleware.LoginRequiredMiddleware",
     "django.contrib.messages.middleware.MessageMiddleware",
     "django.middleware.clickjacking.XFrameOptionsMiddleware",
+    "axes.middleware.AxesMiddleware",
 ]
 ROOT_URLCONF = "arena.config.urls"
 WSGI_APPLICATION = "arena.config.wsgi.application"
@@ -109,11 +129,18 @@ CSRF_FAILURE_VIEW = "arena.web.faults.forged"
 LOGIN_URL = "login"
 LOGIN_REDIRECT_URL = "home"
 LOGOUT_REDIRECT_URL = "login"
+AUTHENTICATION_BACKENDS = [
+    "axes.backends.AxesStandaloneBackend",  # refuses before a password is looked at
+    "arena.queries.accounts.AccountBackend",
+]
 AUTH_PASSWORD_VALIDATORS = [
     {"NAME": "django.contrib.auth.password_validation.MinimumLengthValidator"},
     {"NAME": "django.contrib.auth.password_validation.CommonPasswordValidator"},
 ]
 LANGUAGE_CODE = "en"
+LANGUAGES = [("en", "English"), ("de", "Deutsch")]
+LOCALE_PATHS = [BASE_DIR / "arena" / "locale"]
+FORMAT_MODULE_PATH = ["arena.config.formats"]
 USE_I18N = True
 USE_TZ = True
 TIME_ZONE = "UTC"
@@ -148,8 +175,9 @@ def _database() -> dict[str, object]:
         VAR_DIR.mkdir(parents=True, exist_ok=True)
         Path(str(found["NAME"])).parent.mkdir(parents=True, exist_ok=True)
     else:
-        found["CONN_MAX_AGE"] = 600
         found["CONN_HEALTH_CHECKS"] = True
+    # Opening a connection for every request would cost as much as a vote, on SQLite as well.
+    found["CONN_MAX_AGE"] = 600
     return found
 
 
@@ -160,7 +188,7 @@ STATIC_URL = "static/"
 STATICFILES_DIRS = [BASE_DIR / "static"]
 STORAGES = {
     "default": {"BACKEND": "django.core.files.storage.FileSystemStorage"},
-    "staticfiles": {"BACKEND": "whitenoise.storage.CompressedManifestStaticFilesStorage"},
+    "staticfiles": {"BACKEND": "arena.config.static_files.ModuleStorage"},
 }
 WHITENOISE_KEEP_ONLY_HASHED_FILES = True
 
@@ -194,6 +222,10 @@ RECOVER_EVERY_S = env.integer("ARENA_RECOVER_EVERY_S", default=30, low=1, high=3
 LLM_QUEUE_S = env.integer("ARENA_LLM_QUEUE_S", default=1800, low=1, high=86400)
 LLM_TIMEOUT_S = env.integer("ARENA_LLM_TIMEOUT_S", default=120, low=1, high=3600)
 
+# --- Voting ------------------------------------------------------------------------------------
+
+VOTES_PER_S = env.integer("ARENA_VOTES_PER_S", default=4, low=1, high=1000)
+
 # --- What it says about itself -----------------------------------------------------------------
 
 LOG_LEVEL = env.choice(
@@ -203,7 +235,20 @@ LOGGING = {
     "version": 1,
     "disable_existing_loggers": False,
     "formatters": {"line": {"format": "{asctime} {levelname:7} {name}: {message}", "style": "{"}},
-    "handlers": {"console": {"class": "logging.StreamHandler", "formatter": "line"}},
+    "filters": {"no_keys": {"()": "arena.config.hiding.HideKeys"}},
+    "handlers": {
+        "console": {
+            "class": "logging.StreamHandler",
+            "formatter": "line",
+            "filters": ["no_keys"],
+        }
+    },
     "root": {"handlers": ["console"], "level": LOG_LEVEL},
-    "loggers": {"django.request": {"level": "ERROR"}, "httpx2": {"level": "WARNING"}},
+    "loggers": {
+        "django.request": {"level": "ERROR"},
+        "django.server": {"handlers": ["console"], "propagate": False},
+        "axes": {"level": "WARNING"},
+        "fontTools": {"level": "WARNING"},
+        "httpx2": {"level": "WARNING"},
+    },
 }

@@ -19,6 +19,18 @@ class Theme(StrEnum):
     DARK = "dark"
 
 
+class Language(StrEnum):
+    """A language that the pages have; each is called by its own name."""
+
+    EN = "en"
+    DE = "de"
+
+    @property
+    def label(self) -> str:
+        """What its speakers call it."""
+        return {"en": "English", "de": "Deutsch"}[self.value]
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Profile:
     """Name, role and preferences of somebody who is signed in."""
@@ -39,3 +51,10 @@ def profile_of(user: User | AnonymousUser) -> Profile | None:
         role=role_of(user),
         theme=Theme(stored) if stored in set(Theme) else Theme.AUTO,
     )
+
+
+def language_of(user: User) -> Language | None:
+    """The language that a person chose; None follows the browser."""
+    person = Person.objects.filter(user=user).only("preferences").first()
+    stored = person.preferences.get("language") if person else None
+    return Language(stored) if stored in set(Language) else None

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from datetime import timedelta
+
+from axes.helpers import get_cool_off
 from django.http import HttpRequest, HttpResponse
 from django.shortcuts import render
 from django.template.loader import render_to_string
@@ -25,3 +28,11 @@ def broken(request: HttpRequest) -> HttpResponse:
 def forged(request: HttpRequest, reason: str = "") -> HttpResponse:
     """403 for a form whose token is missing or old; nothing of it was kept."""
     return render(request, "403_csrf.html", status=403)
+
+
+def locked(
+    request: HttpRequest, answer: HttpResponse | None = None, credentials: object = None
+) -> HttpResponse:
+    """429: too many wrong passwords; says for how long, and what to do meanwhile."""
+    minutes = (get_cool_off(request) or timedelta()) // timedelta(minutes=1)
+    return render(request, "locked.html", {"minutes": minutes}, status=429)

@@ -1,0 +1,48 @@
+"""Who is signed in comes with the roles, by one query."""
+
+from __future__ import annotations
+
+import pytest
+from django.contrib.auth.models import Group, User
+from pytest_django import DjangoAssertNumQueries
+
+from arena.queries.accounts import AccountBackend
+from arena.queries.people import role_of
+from arena.services.people import create_person
+
+pytestmark = pytest.mark.django_db
+
+
+@pytest.mark.parametrize("role", ["expert", "analyst"])
+def test_an_account_comes_with_its_role_by_one_query(
+    role: str, django_assert_num_queries: DjangoAssertNumQueries
+) -> None:
+    person = create_person(username="eva", password=None, role=role)
+    with django_assert_num_queries(1):
+        found = AccountBackend().get_user(person.pk)
+        assert found == person
+        assert found is not None
+        assert role_of(found) == role
+
+
+def test_of_several_roles_the_most_powerful_counts() -> None:
+    person = create_person(username="eva", password=None, role="expert")
+    person.groups.add(Group.objects.create(name="analyst"))
+    found = AccountBackend().get_user(person.pk)
+    assert found is not None
+    assert role_of(found) == "analyst"
+
+
+def test_an_account_without_a_role_has_none() -> None:
+    bare = User.objects.create_user("bare")
+    found = AccountBackend().get_user(bare.pk)
+    assert found is not None
+    assert role_of(found) is None
+
+
+def test_an_account_that_is_gone_or_not_active_is_nobody() -> None:
+    person = create_person(username="eva", password=None, role="expert")
+    person.is_active = False
+    person.save()
+    assert AccountBackend().get_user(person.pk) is None
+    assert AccountBackend().get_user(person.pk + 1) is None
