@@ -15,7 +15,7 @@ _PLANNED = Count("matchups", distinct=True)
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class StudyProgress:
-    """A study and how many of its planned matchups have a vote."""
+    """A study and how many of its matchups have a vote; those to be planned later count too."""
 
     study: Study
     planned: int
@@ -29,7 +29,7 @@ class StudyProgress:
 
 def of_studies() -> list[StudyProgress]:
     """Every study, the youngest first."""
-    rows = Study.objects.annotate(planned=_PLANNED, voted=_VOTED)
+    rows = Study.objects.select_related("vote_file").annotate(planned=_PLANNED, voted=_VOTED)
     return [_line(row) for row in rows]
 
 
@@ -44,7 +44,7 @@ def of_expert(expert: User) -> list[StudyProgress]:
             voted=Count("matchups", filter=own & Q(matchups__votes__isnull=False), distinct=True),
         )
     )
-    return [_line(row) for row in rows]
+    return [_line(row, row.votes_to_plan.get(expert.username, 0)) for row in rows]
 
 
 def of_study(study: Study) -> StudyProgress:
@@ -52,5 +52,13 @@ def of_study(study: Study) -> StudyProgress:
     return _line(Study.objects.annotate(planned=_PLANNED, voted=_VOTED).get(pk=study.pk))
 
 
-def _line(row: Study) -> StudyProgress:
-    return StudyProgress(study=row, planned=row.planned, voted=row.voted)  # type: ignore[attr-defined]
+def _line(row: Study, later: int | None = None) -> StudyProgress:
+    """The counts of an annotated row, with the votes that the adaptive part still plans."""
+    if later is None:
+        later = sum(row.votes_to_plan.values())
+    planned: int = row.planned  # type: ignore[attr-defined]
+    return StudyProgress(
+        study=row,
+        planned=planned + later,
+        voted=row.voted,  # type: ignore[attr-defined]
+    )

@@ -2,12 +2,18 @@
 
 from __future__ import annotations
 
+from typing import Any
+
+import numpy as np
 from django.contrib.auth.models import User
 from django.db.models import Q
+from django.urls import reverse
 
 from arena.errors import NotYours
 from arena.models import LabelTask, Matchup
 from arena.queries.people import role_of
+from augment.models import Scenario
+from augment.services.pictures import camera_of
 
 _NOT_SHOWN = "This picture is not shown to you."
 
@@ -18,15 +24,54 @@ def picture_shown(*, user: User, token: str) -> str:
     Raises:
         NotYours: The token is somebody else's or stands for nothing; the text does not say which.
     """
-    rows = Matchup.objects.filter(Q(left_token=token) | Q(right_token=token))
+    rows = Matchup.objects.filter(
+        Q(left_token=token) | Q(right_token=token) | Q(original_token=token)
+    )
     found = rows.select_related("left", "right").defer("left__modification", "right__modification")
-    matchup = found.first()
+    matchup = found.order_by().first()
     if matchup is None:
         return _picture_to_label(user=user, token=token)
     if matchup.expert_id != user.pk and role_of(user) != "admin":
         raise NotYours(_NOT_SHOWN)
+    if matchup.original_token == token:
+        return matchup.original_image
     shown = matchup.left if matchup.left_token == token else matchup.right
     return shown.image
+
+
+def view_of(scenario: Scenario) -> dict[str, Any]:
+    """Where metres lie in the pictures of a scenario: px_per_m, ego_px [x, y], width, height.
+
+    Raises:
+        InvalidDocument: The stored scene can't be read.
+    """
+    camera = camera_of(scenario)
+    ego = camera.to_pixels(np.zeros((1, 2)))[0]
+    return {
+        "px_per_m": camera.px_per_m,
+        "ego_px": [float(ego[0]), float(ego[1])],
+        "width": camera.width_px,
+        "height": camera.height_px,
+    }
+
+
+def view_shown(matchup: Matchup) -> dict[str, Any]:
+    """The view kept with a matchup; matchups planned before it was kept have it worked out."""
+    return view_of(matchup.scenario) if matchup.view is None else matchup.view
+
+
+def as_shown(matchup: Matchup) -> dict[str, Any]:
+    """All that an expert's browser learns of a matchup: tokens, never contestants."""
+    original = matchup.original_token if matchup.original_image else None
+    return {
+        "matchup": str(matchup.code),
+        "position": matchup.position,
+        "instruction": matchup.scenario.instruction,
+        "a": reverse("matchup-image", args=[matchup.left_token]),
+        "b": reverse("matchup-image", args=[matchup.right_token]),
+        "original": reverse("matchup-image", args=[original]) if original else None,
+        **view_shown(matchup),
+    }
 
 
 def _picture_to_label(*, user: User, token: str) -> str:

@@ -6,19 +6,11 @@ from contextlib import suppress
 from uuid import UUID
 
 from django.contrib.auth.models import User
-from django.db.models import Q, QuerySet
+from django.db.models import Q
 
 from arena.errors import NotYours
 from arena.models import Study
-from arena.queries.people import role_of
 from augment.errors import UnknownName
-
-
-def studies_for(user: User) -> QuerySet[Study]:
-    """Analysts and admins see every study, experts those that they vote in."""
-    if role_of(user) in ("admin", "analyst"):
-        return Study.objects.all()
-    return user.studies.exclude(state=Study.State.DRAFT)
 
 
 def voting_study(*, expert: User, code: UUID | str) -> Study:

@@ -3,27 +3,46 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import asdict
+from dataclasses import asdict, dataclass
 from typing import Any
 
 from django.contrib.auth.models import User
 from django.db import IntegrityError, transaction
-from django.db.models import F
 from django.utils import timezone
 
-from arena.errors import NothingToPlan, StudyNotOpen
-from arena.models import Matchup, Study
+from arena.errors import StudyNotOpen
+from arena.models import Study
 from arena.pairing.plan import Entry, Plan, Rules, plan
 from arena.queries.people import experts as expert_accounts
+from arena.services.plans import Cells, check_pictures, latest_pictures, rules_of, store
 from augment.errors import Conflict, UnknownName
-from augment.models import Augmentation, Contestant, Scenario
+from augment.models import Contestant, Scenario
 from augment.services.events import log_event
 from augment.services.texts import one_line
 
-PLANNER = "balanced-1"
+__all__ = ["PlanOptions", "close_study", "open_study", "rules_of"]
+
+PLANNER = "balanced-2"
 """Name and version of the planner, kept with the rules so that a plan can be made again."""
 
-Cells = dict[tuple[str, str], Augmentation]
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PlanOptions:
+    """Rules of a plan beyond who takes part; see arena.pairing.rules for what they mean.
+
+    Attributes:
+        check_share: Without pictures for attention checks there are none, whatever the share.
+    """
+
+    repeat_share: float = 0.0
+    check_share: float = 0.0
+    adaptive_share: float = 0.0
+    appearances: tuple[tuple[str, int], ...] = ()
+    pair_votes: tuple[tuple[str, str, int], ...] = ()
+    allow_both_miss: bool = False
+
+
+_OF_THE_PLAN = ("appearances", "pair_votes", "repeat_share", "check_share", "adaptive_share")
 
 
 @transaction.atomic
@@ -35,6 +54,7 @@ def open_study(
     experts: Sequence[str],
     votes_per_expert: int,
     seed: int,
+    options: PlanOptions | None = None,
     allow_simulated: bool = False,
     actor: User | None = None,
 ) -> Study:
@@ -47,6 +67,7 @@ def open_study(
         experts: Usernames of accounts with the role expert.
         votes_per_expert: How many matchups each expert judges.
         seed: Of the plan; the same seed and rules give the same plan.
+        options: Further rules; without them a balanced plan and nothing on top of it.
         allow_simulated: Let simulated contestants and experts take part; everything then says so.
         actor: Who opens it, for the log.
 
@@ -57,21 +78,26 @@ def open_study(
             unasked.
         NothingToPlan: Pictures are missing, or too few to fill the votes; the text has numbers.
     """
-    name = _free_name(name)
+    name, given = _free_name(name), options or PlanOptions()
     _check_seed(seed)
-    contestant_rows = _contestants(contestants)
-    scenario_rows = _scenarios(scenarios)
+    contestant_rows, scenario_rows = _contestants(contestants), _scenarios(scenarios)
     expert_rows = _experts(experts)
     if not allow_simulated:
         _refuse_simulated(contestant_rows, expert_rows)
-    cells = _latest_pictures(contestant_rows, scenario_rows)
-    rules = _rules(cells, expert_rows, votes_per_expert, seed)
+    checks, broken = check_pictures(scenario_rows) if given.check_share else ((), {})
+    shown = latest_pictures(contestant_rows, scenario_rows)
+    rules = Rules(
+        entries=_entries(shown),
+        experts=tuple(expert.username for expert in expert_rows),
+        votes_per_expert=votes_per_expert,
+        seed=seed,
+        checks=checks,
+        **{name: getattr(given, name) for name in _OF_THE_PLAN},
+    )
     planned = plan(rules)
-    study = _insert(name, rules, planned, allow_simulated)
-    study.contestants.set(contestant_rows)
-    study.scenarios.set(scenario_rows)
-    study.experts.set(expert_rows)
-    _store(study, planned, cells, expert_rows)
+    study = _insert(name, rules, planned, given, allow_simulated)
+    _enrol(study, contestant_rows, scenario_rows, expert_rows)
+    store(study, planned.matchups, broken | shown, expert_rows)
     log_event(
         actor=actor,
         verb="open",
@@ -112,18 +138,6 @@ def close_study(*, study: Study, actor: User | None = None) -> Study:
     return study
 
 
-def rules_of(study: Study) -> Rules:
-    """The rules as they were at opening; planning them again gives the study's matchups."""
-    kept = study.rules
-    return Rules(
-        entries=tuple(Entry(**entry) for entry in kept["entries"]),
-        experts=tuple(kept["experts"]),
-        votes_per_expert=kept["votes_per_expert"],
-        seed=kept["seed"],
-        scenario_gap=kept["scenario_gap"],
-    )
-
-
 # --- Who and what takes part -------------------------------------------------------------------
 
 
@@ -140,7 +154,8 @@ def _check_seed(seed: int) -> None:
 
 
 def _contestants(slugs: Sequence[str]) -> list[Contestant]:
-    known = {row.slug: row for row in Contestant.objects.select_related("endpoint")}
+    rateable = Contestant.objects.exclude(kind=Contestant.Kind.CHECK)
+    known = {row.slug: row for row in rateable.select_related("endpoint")}
     return [_named("contestant", slug, known) for slug in sorted(set(slugs))]
 
 
@@ -170,48 +185,19 @@ def _refuse_simulated(contestants: list[Contestant], experts: list[User]) -> Non
         )
 
 
-def _latest_pictures(contestants: list[Contestant], scenarios: list[Scenario]) -> Cells:
-    """The augmentation that finished last, per scenario and contestant; all must exist."""
-    found = (
-        Augmentation.objects.filter(
-            contestant__in=contestants, scenario__in=scenarios, state__in=Augmentation.SHOWABLE
-        )
-        .exclude(image="")
-        .select_related("scenario", "contestant")
-        .only("image", "scenario__slug", "contestant__slug")
-        .order_by(F("finished_at").asc(nulls_first=True), "pk")
-    )
-    cells = {(row.scenario.slug, row.contestant.slug): row for row in found}
-    missing = [
-        f"{contestant.slug} on {scenario.slug}"
-        for contestant in contestants
-        for scenario in scenarios
-        if (scenario.slug, contestant.slug) not in cells
-    ]
-    if missing:
-        more = f" and {len(missing) - 8} more" if len(missing) > 8 else ""
-        raise NothingToPlan(
-            f"There is no picture yet of {', '.join(missing[:8])}{more}. Generate them first."
-        )
-    return cells
-
-
-def _rules(cells: Cells, experts: list[User], votes_per_expert: int, seed: int) -> Rules:
-    return Rules(
-        entries=tuple(
-            Entry(scenario=scenario, contestant=contestant, picture=cell.image)
-            for (scenario, contestant), cell in sorted(cells.items())
-        ),
-        experts=tuple(expert.username for expert in experts),
-        votes_per_expert=votes_per_expert,
-        seed=seed,
+def _entries(shown: Cells) -> tuple[Entry, ...]:
+    return tuple(
+        Entry(scenario=scenario, contestant=contestant, picture=cell.image)
+        for (scenario, contestant), cell in sorted(shown.items())
     )
 
 
 # --- What is kept ------------------------------------------------------------------------------
 
 
-def _insert(name: str, rules: Rules, planned: Plan, allow_simulated: bool) -> Study:
+def _insert(
+    name: str, rules: Rules, planned: Plan, given: PlanOptions, allow_simulated: bool
+) -> Study:
     try:
         with transaction.atomic():
             return Study.objects.create(
@@ -221,10 +207,22 @@ def _insert(name: str, rules: Rules, planned: Plan, allow_simulated: bool) -> St
                 seed=rules.seed,
                 rules=_frozen_rules(rules, planned),
                 allow_simulated=allow_simulated,
+                allow_both_miss=given.allow_both_miss,
+                votes_to_plan=(
+                    dict.fromkeys(rules.experts, rules.votes_later) if rules.votes_later else {}
+                ),
                 opened_at=timezone.now(),
             )
     except IntegrityError:  # somebody else was faster
         raise _taken(name) from None
+
+
+def _enrol(
+    study: Study, contestants: list[Contestant], scenarios: list[Scenario], experts: list[User]
+) -> None:
+    study.contestants.set(contestants)
+    study.scenarios.set(scenarios)
+    study.experts.set(experts)
 
 
 def _taken(name: str) -> Conflict:
@@ -237,23 +235,3 @@ def _frozen_rules(rules: Rules, planned: Plan) -> dict[str, Any]:
     kept["scenario_gap_kept"] = planned.scenario_gap
     kept["identical"] = [list(triple) for triple in planned.identical]
     return kept
-
-
-def _store(study: Study, planned: Plan, cells: Cells, experts: list[User]) -> None:
-    by_name = {expert.username: expert for expert in experts}
-    rows = []
-    for one in planned.matchups:
-        left = cells[one.scenario, one.left]
-        right = cells[one.scenario, one.right]
-        rows.append(
-            Matchup(
-                study=study,
-                expert=by_name[one.expert],
-                position=one.position,
-                scenario_id=left.scenario_id,
-                left=left,
-                right=right,
-                draw_probability=one.draw_probability,
-            )
-        )
-    Matchup.objects.bulk_create(rows, batch_size=500)

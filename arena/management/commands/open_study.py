@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from typing import Any
 
 from django.core.management.base import BaseCommand, CommandError, CommandParser
 
 from arena.errors import ArenaError
-from arena.services.studies import open_study
+from arena.models import Study
+from arena.pairing.target_lines import read_targets
+from arena.services.studies import PlanOptions, open_study
 from augment.errors import AugmentError
 from augment.services.choosing import chosen_contestants, chosen_scenarios
 
@@ -26,6 +29,36 @@ class Command(BaseCommand):
         parser.add_argument("--votes-per-expert", type=int, required=True, metavar="N")
         parser.add_argument("--seed", type=int, required=True, metavar="S")
         parser.add_argument(
+            "--targets",
+            nargs="+",
+            default=[],
+            metavar="TARGET",
+            help='"SLUG=N": in how many votes a contestant appears; or "SLUG vs SLUG=N": votes '
+            "of a pair; one for each",
+        )
+        parser.add_argument(
+            "--repeats", type=float, default=5.0, metavar="PERCENT", help="hidden repeats"
+        )
+        parser.add_argument(
+            "--checks",
+            type=float,
+            default=2.0,
+            metavar="PERCENT",
+            help="attention checks, where draw_checks has made pictures for them",
+        )
+        parser.add_argument(
+            "--adaptive",
+            type=float,
+            default=0.0,
+            metavar="PERCENT",
+            help="the last share of the votes, planned in batches by the votes before",
+        )
+        parser.add_argument(
+            "--both-miss",
+            action="store_true",
+            help="let experts add to Equal that both miss the instruction",
+        )
+        parser.add_argument(
             "--allow-simulated",
             action="store_true",
             help="let simulated contestants and experts take part; everything then says so",
@@ -34,6 +67,7 @@ class Command(BaseCommand):
     def handle(self, *args: Any, **options: Any) -> None:
         """Open the study and say what was planned."""
         try:
+            appearances, pair_votes = read_targets(options["targets"])
             study = open_study(
                 name=options["name"],
                 contestants=chosen_contestants(options["contestants"]),
@@ -42,13 +76,29 @@ class Command(BaseCommand):
                 votes_per_expert=options["votes_per_expert"],
                 seed=options["seed"],
                 allow_simulated=options["allow_simulated"],
+                options=PlanOptions(
+                    repeat_share=options["repeats"] / 100,
+                    check_share=options["checks"] / 100,
+                    adaptive_share=options["adaptive"] / 100,
+                    appearances=appearances,
+                    pair_votes=pair_votes,
+                    allow_both_miss=options["both_miss"],
+                ),
             )
         except (ArenaError, AugmentError) as error:
             raise CommandError(str(error)) from error
+        self._say(study)
+
+    def _say(self, study: Study) -> None:
         rules = study.rules
         self.stdout.write(
             f"Opened {study.name!r} ({study.code}): {study.matchups.count()} matchups for "
             f"{len(rules['experts'])} experts."
+        )
+        kinds = Counter(study.matchups.values_list("kind", flat=True))
+        self.stdout.write(
+            f"{kinds['main']} votes, {kinds['repeat']} hidden repeats, {kinds['check']} attention "
+            f"checks; {sum(study.votes_to_plan.values())} votes are planned later."
         )
         if rules["scenario_gap_kept"] < rules["scenario_gap"]:
             self.stdout.write(

@@ -1,0 +1,37 @@
+"""manage.py hand_over: let others judge what an expert has not judged."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from django.core.management.base import BaseCommand, CommandError, CommandParser
+
+from arena.errors import ArenaError
+from arena.queries.studies import study_named
+from arena.services.handing_over import hand_over
+from augment.errors import AugmentError
+
+
+class Command(BaseCommand):
+    """The door to arena.services.handing_over."""
+
+    help = "Hand an expert's remaining pairs over to others, re-planned in one go."
+
+    def add_arguments(self, parser: CommandParser) -> None:
+        """Whose pairs, and who takes them."""
+        parser.add_argument("study", help="its name or its code")
+        parser.add_argument("expert", metavar="USERNAME", help="whose pairs are handed over")
+        parser.add_argument("--to", nargs="+", required=True, metavar="USERNAME")
+
+    def handle(self, *args: Any, **options: Any) -> None:
+        """Hand over and say who got how many."""
+        try:
+            taken = hand_over(
+                study=study_named(options["study"]),
+                username=options["expert"],
+                to=options["to"],
+            )
+        except (ArenaError, AugmentError) as error:
+            raise CommandError(str(error)) from error
+        for name, votes in taken.items():
+            self.stdout.write(f"{name} takes {votes} votes.")

@@ -1,0 +1,109 @@
+"""How the plan of a study is spread over its contestants and pairs, and how far it is judged.
+
+Nothing here tells who wins, so it may be seen while the study is open.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from dataclasses import dataclass
+from itertools import combinations
+
+from django.db.models import Count, Exists, OuterRef, QuerySet
+
+from arena.models import Matchup, Report, Study, Vote
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Covered:
+    """Something planned, and how much of it is decided."""
+
+    name: str
+    planned: int
+    decided: int
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Coverage:
+    """The plan of a study.
+
+    Attributes:
+        contestants: In how many main matchups each one is shown.
+        pairs: The main matchups of each pair, the least judged first.
+        kinds: Main matchups, hidden repeats and attention checks, named by their values.
+        identical: Pairs with identical pictures, which nobody is shown.
+    """
+
+    contestants: tuple[Covered, ...]
+    pairs: tuple[Covered, ...]
+    kinds: tuple[Covered, ...]
+    identical: int
+
+    @property
+    def fewest(self) -> Covered | None:
+        """The pair that is judged least."""
+        return self.pairs[0] if self.pairs else None
+
+
+def coverage(study: Study) -> Coverage:
+    """The plan of a study, in two queries."""
+    names = dict(study.contestants.order_by("name").values_list("pk", "name"))
+    shown: Counter[int] = Counter()
+    decided: Counter[int] = Counter()
+    pairs: Counter[frozenset[int]] = Counter()
+    judged: Counter[frozenset[int]] = Counter()
+    kinds: Counter[str] = Counter()
+    done: Counter[str] = Counter()
+    for left, right, kind, has_vote, n in _counts(study):
+        kinds[kind] += n
+        done[kind] += n * has_vote
+        if kind == Matchup.Kind.MAIN:
+            pair = frozenset((left, right))
+            pairs[pair] += n
+            judged[pair] += n * has_vote
+            for contestant in pair:
+                shown[contestant] += n
+                decided[contestant] += n * has_vote
+    lines = (
+        Covered(
+            name=f"{names[one]} / {names[other]}",
+            planned=pairs[frozenset((one, other))],
+            decided=judged[frozenset((one, other))],
+        )
+        for one, other in combinations(names, 2)
+    )
+    return Coverage(
+        contestants=tuple(
+            Covered(name=name, planned=shown[pk], decided=decided[pk])
+            for pk, name in names.items()
+        ),
+        pairs=tuple(sorted(lines, key=lambda line: (line.decided, line.planned, line.name))),
+        kinds=tuple(
+            Covered(name=kind.value, planned=kinds[kind.value], decided=done[kind.value])
+            for kind in Matchup.Kind
+            if kinds[kind.value]
+        ),
+        identical=len(study.rules.get("identical", ())),
+    )
+
+
+def reports_of(study: Study) -> QuerySet[Report]:
+    """What experts reported, the youngest first."""
+    found = Report.objects.filter(matchup__study=study).order_by("-at", "-pk")
+    return found.select_related("expert__person", "matchup__scenario").defer(
+        "matchup__scenario__reference"
+    )
+
+
+# --- Private -----------------------------------------------------------------------------------
+
+
+def _counts(study: Study) -> QuerySet[Matchup, tuple[int, int, str, bool, int]]:
+    has_vote = Exists(Vote.objects.filter(matchup=OuterRef("pk")))
+    return (
+        study.matchups.order_by()
+        .annotate(has_vote=has_vote)
+        .values("left__contestant", "right__contestant", "kind", "has_vote")
+        .annotate(n=Count("pk"))
+        .values_list("left__contestant", "right__contestant", "kind", "has_vote", "n")
+    )

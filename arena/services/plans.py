@@ -1,0 +1,211 @@
+"""Plans as rows: which pictures take part, and how planned showings are stored."""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from collections.abc import Iterable, Sequence
+
+from django.contrib.auth.models import User
+from django.db.models import F, Max, QuerySet
+
+from arena.errors import NothingToPlan
+from arena.models import Matchup, Study
+from arena.pairing.plan import Check, Entry, PlannedMatchup, Rules
+from arena.queries.showings import view_of
+from augment.models import Augmentation, Contestant, Scenario
+
+Cells = dict[tuple[str, str], Augmentation]
+"""By scenario and contestant, the augmentation whose picture is shown."""
+
+SoFar = dict[str, list[PlannedMatchup]]
+"""Every expert's showings as they are stored, by position."""
+
+Kind = Contestant.Kind
+
+
+def rules_of(study: Study) -> Rules:
+    """The rules as they were at opening; planning them again gives the study's matchups."""
+    kept = study.rules
+    return Rules(
+        entries=tuple(Entry(**entry) for entry in kept["entries"]),
+        experts=tuple(kept["experts"]),
+        appearances=tuple((name, votes) for name, votes in kept.get("appearances", ())),
+        pair_votes=tuple((one, other, n) for one, other, n in kept.get("pair_votes", ())),
+        checks=tuple(Check(**check) for check in kept.get("checks", ())),
+        **{name: kept[name] for name in _PLAIN if name in kept},
+    )
+
+
+def latest_pictures(contestants: list[Contestant], scenarios: list[Scenario]) -> Cells:
+    """The augmentation that finished last, per scenario and contestant; all must exist.
+
+    Raises:
+        NothingToPlan: Pictures are missing; the text names them.
+    """
+    found = _showable(scenarios).filter(contestant__in=contestants)
+    cells = _by_cell(found.order_by(F("finished_at").asc(nulls_first=True), "pk"))
+    missing = [
+        f"{contestant.slug} on {scenario.slug}"
+        for contestant in contestants
+        for scenario in scenarios
+        if (scenario.slug, contestant.slug) not in cells
+    ]
+    if missing:
+        more = f" and {len(missing) - 8} more" if len(missing) > 8 else ""
+        raise NothingToPlan(
+            f"There is no picture yet of {', '.join(missing[:8])}{more}. Generate them first."
+        )
+    return cells
+
+
+def check_pictures(scenarios: list[Scenario]) -> tuple[tuple[Check, ...], Cells]:
+    """What attention checks there can be: the latest reference against the latest broken one."""
+    found = _showable(scenarios).filter(
+        contestant__kind__in=[Kind.REFERENCE, Kind.CHECK], state=Augmentation.State.DONE
+    )
+    latest: dict[tuple[str, str], Augmentation] = {}
+    for row in found.order_by(F("finished_at").asc(nulls_first=True), "pk"):
+        latest[row.scenario.slug, row.contestant.kind] = row
+    checks: list[Check] = []
+    cells: Cells = {}
+    for scenario in sorted({slug for slug, _ in latest}):
+        good, broken = latest.get((scenario, Kind.REFERENCE)), latest.get((scenario, Kind.CHECK))
+        if good is None or broken is None or good.image == broken.image:
+            continue
+        names = good.contestant.slug, broken.contestant.slug
+        checks.append(Check(scenario=scenario, good=names[0], broken=names[1]))
+        cells |= {(scenario, names[0]): good, (scenario, names[1]): broken}
+    return tuple(checks), cells
+
+
+def pictures_of(study: Study) -> Cells:
+    """The pictures that the study was opened with; later ones of the same contestants stay out."""
+    rules = rules_of(study)
+    wanted = {(entry.scenario, entry.contestant): entry.picture for entry in rules.entries}
+    scenarios = list(study.scenarios.only("slug"))
+    _, cells = check_pictures(scenarios)
+    rows = _showable(scenarios).filter(contestant__in=study.contestants.all()).order_by("pk")
+    for row in rows:
+        cell = (row.scenario.slug, row.contestant.slug)
+        if wanted.get(cell) == row.image:
+            cells[cell] = row
+    return cells
+
+
+def store(
+    study: Study,
+    planned: Sequence[PlannedMatchup],
+    cells: Cells,
+    experts: Iterable[User],
+    *,
+    batch: int = 0,
+) -> list[Matchup]:
+    """Keep planned showings, each with tokens of its own.
+
+    Args:
+        study: Whose plan it is.
+        planned: At positions that are free.
+        cells: The pictures.
+        experts: Everybody who is named.
+        batch: 0 at the opening; later plannings count up.
+    """
+    by_name = {expert.username: expert for expert in experts}
+    places = _places(planned, cells)
+    views = {slug: view_of(place) for slug, place in places.items()}
+    rows = [
+        Matchup(
+            study=study,
+            expert=by_name[one.expert],
+            position=one.position,
+            scenario=places[one.scenario],
+            left=cells[one.scenario, one.left],
+            right=cells[one.scenario, one.right],
+            original_image=places[one.scenario].original_image,
+            view=views[one.scenario],
+            kind=one.kind,
+            batch=batch,
+            draw_probability=one.draw_probability,
+        )
+        for one in planned
+    ]
+    Matchup.objects.bulk_create([row for row in rows if row.kind != _REPEAT], batch_size=500)
+    again = [(row, one) for row, one in zip(rows, planned, strict=True) if one.repeats is not None]
+    if again:
+        shown = _mains(study, [row.expert_id for row, _ in again])
+        for row, one in again:
+            row.repeat_of_id = shown[row.expert_id, one.repeats or 0]
+        Matchup.objects.bulk_create([row for row, _ in again], batch_size=500)
+    return rows
+
+
+def votes_left(study: Study, expert: User) -> int:
+    """Votes of the expert that the adaptive part still has to plan."""
+    return int(study.votes_to_plan.get(expert.username, 0))
+
+
+def next_batch(study: Study) -> int:
+    """The number of the next planning; hold the study's row."""
+    last = study.matchups.aggregate(last=Max("batch"))["last"]
+    return (last or 0) + 1
+
+
+def planned_so_far(study: Study) -> SoFar:
+    """Every showing that is planned."""
+    rows = study.matchups.order_by("expert__username", "position").values_list(
+        *("expert__username", "position", "scenario__slug", "left__contestant__slug"),
+        *("right__contestant__slug", "draw_probability", "kind", "repeat_of__position"),
+    )
+    found: SoFar = defaultdict(list)
+    for expert, position, scenario, left, right, chance, kind, repeats in rows:
+        found[expert].append(
+            PlannedMatchup(
+                expert=expert,
+                position=position,
+                scenario=scenario,
+                left=left,
+                right=right,
+                draw_probability=chance,
+                kind=kind,
+                repeats=repeats,
+            )
+        )
+    return found
+
+
+# --- Private -----------------------------------------------------------------------------------
+
+_REPEAT = Matchup.Kind.REPEAT
+_PLAIN = (
+    *("votes_per_expert", "seed", "scenario_gap", "repeat_share", "repeat_distance"),
+    *("check_share", "adaptive_share", "uniform_share", "batch_size"),
+)
+"""Rules that are kept as they are; studies opened before a rule existed go without it."""
+
+
+def _showable(scenarios: list[Scenario]) -> QuerySet[Augmentation]:
+    return (
+        Augmentation.objects.filter(scenario__in=scenarios, state__in=Augmentation.SHOWABLE)
+        .exclude(image="")
+        .select_related("scenario", "contestant")
+        .only("image", "scenario__slug", "contestant__slug", "contestant__kind")
+    )
+
+
+def _by_cell(rows: QuerySet[Augmentation]) -> Cells:
+    return {(row.scenario.slug, row.contestant.slug): row for row in rows}
+
+
+def _places(planned: Sequence[PlannedMatchup], cells: Cells) -> dict[str, Scenario]:
+    """The scenarios with what their views are worked out from."""
+    slugs = {one.scenario for one in planned}
+    keys = {cell.scenario_id for (slug, _), cell in cells.items() if slug in slugs}
+    rows = Scenario.objects.filter(pk__in=keys).select_related("base_scene")
+    return {row.slug: row for row in rows.defer("base_scene__recording")}
+
+
+def _mains(study: Study, experts: list[int]) -> dict[tuple[int, int], int]:
+    rows = study.matchups.filter(expert__in=experts, kind=Matchup.Kind.MAIN)
+    return {
+        (expert, position): pk
+        for expert, position, pk in rows.values_list("expert", "position", "pk")
+    }
