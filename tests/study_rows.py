@@ -9,10 +9,13 @@ from django.contrib.auth.models import User
 from django.utils import timezone
 
 from arena.models import Matchup, Study, Vote
+from arena.services.decisions import decision_of
 from arena.services.people import create_person
 from arena.services.studies import open_study
 from arena.services.votes import cast_vote
 from augment.models import Augmentation, BaseScene, Contestant, GenerationJob, Scenario
+from augment.scene.codec import scene_to_document
+from tests.scenes import scene as street
 
 KINDS = Contestant.Kind
 
@@ -31,7 +34,12 @@ def contestant(slug: str, kind: str = KINDS.RULE, name: str | None = None) -> Co
 
 def scenario(slug: str) -> Scenario:
     base, _ = BaseScene.objects.get_or_create(
-        slug="street", defaults={"document": {}, "source": "authored", "provenance": "a test"}
+        slug="street",
+        defaults={
+            "document": scene_to_document(street(name="street")),
+            "source": "authored",
+            "provenance": "a test",
+        },
     )
     return Scenario.objects.create(
         slug=slug, base_scene=base, type=Scenario.Type.NUDGE, instruction=f"Park a car on {slug}."
@@ -102,12 +110,40 @@ def matchups_of(study: Study, username: str) -> list[Matchup]:
     return list(study.matchups.filter(expert__username=username).order_by("position"))
 
 
+def rows_planned(study: Study, **only: object) -> list[tuple[object, ...]]:
+    """The stored plan, by expert and position."""
+    rows = study.matchups.filter(**only).order_by("expert__username", "position")
+    return list(
+        rows.values_list(
+            *("expert__username", "position", "kind", "scenario__slug"),
+            *("left__contestant__slug", "right__contestant__slug"),
+        )
+    )
+
+
+def shown_again(matchup: Matchup) -> Matchup:
+    """A hidden repeat at the end of the expert's order."""
+    last = Matchup.objects.filter(study=matchup.study, expert=matchup.expert).latest("position")
+    return Matchup.objects.create(
+        study=matchup.study,
+        expert=matchup.expert,
+        position=last.position + 1,
+        scenario=matchup.scenario,
+        left=matchup.right,
+        right=matchup.left,
+        view=matchup.view,
+        kind=Matchup.Kind.REPEAT,
+        repeat_of=matchup,
+        draw_probability=1.0,
+    )
+
+
 def vote(matchup: Matchup, outcome: str = "left", **more: object) -> Vote:
     """A vote with a fresh key unless one is given."""
     arguments: dict[str, object] = {"key": uuid.uuid4(), **more}
-    return cast_vote(
-        expert=matchup.expert,
+    decision = decision_of(
         matchup_code=matchup.code,
         outcome=outcome,
         **arguments,  # type: ignore[arg-type]
     )
+    return cast_vote(expert=matchup.expert, decision=decision)

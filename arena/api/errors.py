@@ -18,7 +18,15 @@ from rest_framework.views import APIView
 
 from arena.api.letters import LETTERS
 from arena.api.parsing import SoundJSONParser
-from arena.errors import AlreadyDecided, ArenaError, NotYours, StudyNotOpen
+from arena.errors import (
+    AlreadyDecided,
+    ArenaError,
+    InvalidPreference,
+    InvalidVote,
+    NotYours,
+    StudyNotOpen,
+    TooFast,
+)
 from augment.errors import AugmentError, Conflict
 
 STATUS: tuple[tuple[type[Exception], int, str], ...] = (
@@ -26,6 +34,9 @@ STATUS: tuple[tuple[type[Exception], int, str], ...] = (
     (Http404, 404, "not_found"),
     (StudyNotOpen, 410, "study_not_open"),
     (AlreadyDecided, 409, "already_decided"),
+    (InvalidVote, 422, "invalid"),
+    (InvalidPreference, 422, "invalid"),
+    (TooFast, 429, "too_fast"),
     (Conflict, 409, "conflict"),
     (ArenaError, 400, "refused"),
     (AugmentError, 400, "refused"),
@@ -64,6 +75,8 @@ def _response(exc: Exception) -> Response | None:
             headers = {}
             if status == 401:  # the browser can tell that it only has to sign in again
                 headers["WWW-Authenticate"] = "Session"
+            if isinstance(exc, TooFast):
+                headers["Retry-After"] = str(exc.retry_after_s)
             error = {"code": code, "message": _message(exc), **_extras(exc)}
             return Response({"error": error}, status=status, headers=headers)
     return None
@@ -86,6 +99,8 @@ def _extras(exc: Exception) -> dict[str, Any]:
         return {"outcome": LETTERS[exc.outcome]}
     if isinstance(exc, exceptions.ValidationError):
         return {"fields": exc.detail}
+    if isinstance(exc, (InvalidVote, InvalidPreference)):
+        return {"fields": {name: [sentence] for name, sentence in exc.fields.items()}}
     if isinstance(exc, exceptions.ParseError):
         return {"fields": {"body": [str(exc.detail)]}}
     return {}

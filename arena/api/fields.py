@@ -47,3 +47,23 @@ class CodeField(serializers.UUIDField):
         if not isinstance(data, str):
             self.fail("invalid", value=data)
         return super().to_internal_value(data)
+
+
+class FlagField(serializers.BooleanField):
+    """True or false of JSON: neither a text nor a number stands for one."""
+
+    def to_internal_value(self, data: Any) -> bool:
+        """The flag itself."""
+        if not isinstance(data, bool):
+            self.fail("invalid", input=data)
+        return data
+
+
+class TextField(serializers.CharField):
+    """A text of JSON as it is: no number stands for one, and what is said in it is kept."""
+
+    def to_internal_value(self, data: Any) -> str:
+        """The text itself."""
+        if not isinstance(data, str):
+            self.fail("invalid")
+        return super().to_internal_value(data)

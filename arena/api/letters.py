@@ -2,5 +2,5 @@
 
 from __future__ import annotations
 
-LETTERS = {"left": "A", "equal": "E", "right": "B"}
+LETTERS = {"left": "A", "equal": "E", "right": "B", "skip": "skip"}
 OUTCOMES = {letter: outcome for outcome, letter in LETTERS.items()}

@@ -3,14 +3,17 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from statistics import median
+from datetime import datetime
 from uuid import UUID
 
 from django.contrib.auth.models import User
 from django.db.models import Count, Q, QuerySet
+from django.utils import timezone
 
 from arena.errors import NotYours
 from arena.models import Matchup, Study, Vote
+from arena.queries.people import by_pseudonym
+from arena.queries.voting_path import study_now
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -18,17 +21,37 @@ class VotingProgress:
     """How far an expert is.
 
     Attributes:
-        minutes_left: At the expert's own recent pace, None before there is one.
+        voted: Matchups that are decided, be it by a skip.
+        pace_ms: How long the expert's latest pairs were on screen on average, None before any.
     """
 
     total: int
     voted: int
-    minutes_left: int | None
+    pace_ms: float | None
 
     @property
     def left(self) -> int:
         """Matchups without a vote."""
         return self.total - self.voted
+
+    @property
+    def minutes_left(self) -> int | None:
+        """At the expert's own recent pace, None before there is one."""
+        return None if self.pace_ms is None else round(self.pace_ms * self.left / 60_000)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class VotingState:
+    """What a vote needs to know of its study, read anew.
+
+    Attributes:
+        study: Name, code, state and what it allows; nothing else is loaded.
+        just_now: Votes of the expert's account since the moment that was asked for.
+    """
+
+    study: Study
+    progress: VotingProgress
+    just_now: int
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -43,26 +66,7 @@ class ExpertTally:
     left_wins: int
     ties: int
     right_wins: int
-
-
-def undecided(*, study: Study, expert: User) -> QuerySet[Matchup]:
-    """The expert's matchups without a vote, in their order."""
-    return (
-        Matchup.objects.filter(study=study, expert=expert, votes=None)
-        .select_related("scenario")
-        .defer("scenario__reference")
-        .order_by("position")
-    )
-
-
-def upcoming(*, study: Study, expert: User, n: int) -> list[Matchup]:
-    """The next matchups of this expert, at most n."""
-    return list(undecided(study=study, expert=expert)[:n])
-
-
-def next_matchup(*, study: Study, expert: User) -> Matchup | None:
-    """What the expert judges next, None when all is done."""
-    return undecided(study=study, expert=expert).first()
+    skips: int
 
 
 def matchup_of(*, expert: User, code: UUID | str) -> Matchup:
@@ -79,28 +83,34 @@ def matchup_of(*, expert: User, code: UUID | str) -> Matchup:
 
 
 def current_votes(study: Study) -> QuerySet[Vote]:
-    """The votes that count: those that no later vote supersedes."""
+    """What experts have decided: the votes that no later vote supersedes, of every kind."""
     return Vote.objects.filter(matchup__study=study, superseded_by=None)
 
 
 def recent_votes(*, study: Study, expert: User, n: int = 10) -> list[Vote]:
     """The expert's last current votes, the latest matchup first."""
     found = current_votes(study).filter(expert=expert).select_related("matchup__scenario")
+    found = found.defer("matchup__scenario__reference")
     return list(found.order_by("-matchup__position")[:n])
 
 
 def voting_progress(*, study: Study, expert: User) -> VotingProgress:
-    """How many of the expert's matchups have a vote; two queries."""
-    counts = Matchup.objects.filter(study=study, expert=expert).aggregate(
-        total=Count("pk", distinct=True), voted=Count("votes__matchup", distinct=True)
-    )
-    times = Vote.objects.filter(
-        matchup__study=study, expert=expert, ms_visible__isnull=False
-    ).order_by("-pk")
-    recent = [ms for ms in times.values_list("ms_visible", flat=True)[:20] if ms is not None]
-    left = counts["total"] - counts["voted"]
-    minutes = round(median(recent) * left / 60_000) if recent else None
-    return VotingProgress(total=counts["total"], voted=counts["voted"], minutes_left=minutes)
+    """How many of the expert's matchups are decided; one query."""
+    return voting_state(study_pk=study.pk, expert=expert, since=timezone.now()).progress
+
+
+def voting_state(*, study_pk: int, expert: User, since: datetime) -> VotingState:
+    """The study and how far the expert is in it, as they are now; one query.
+
+    Args:
+        study_pk: Of a study that exists.
+        expert: Whose matchups and votes are counted.
+        since: Votes after this moment count as given just now, of whatever study.
+    """
+    now = study_now(study_pk=study_pk, expert_pk=expert.pk, since=since)
+    total = now.total + now.study.votes_to_plan.get(expert.username, 0)
+    progress = VotingProgress(total=total, voted=now.voted, pace_ms=now.pace_ms)
+    return VotingState(study=now.study, progress=progress, just_now=now.just_now)
 
 
 def tallies(study: Study) -> list[ExpertTally]:
@@ -119,28 +129,25 @@ def tallies(study: Study) -> list[ExpertTally]:
             left_wins=Count("pk", filter=Q(outcome="left")),
             ties=Count("pk", filter=Q(outcome="equal")),
             right_wins=Count("pk", filter=Q(outcome="right")),
+            skips=Count("pk", filter=Q(outcome="skip")),
         )
         .order_by()
-        .values_list("expert", "left_wins", "ties", "right_wins")
+        .values_list("expert", "left_wins", "ties", "right_wins", "skips")
     }
     lines = []
-    for expert in study.experts.select_related("person").order_by("person__pseudonym"):
-        left_wins, ties, right_wins = outcomes.get(expert.pk, (0, 0, 0))
+    for expert in by_pseudonym(study.experts.select_related("person")):
+        counts = outcomes.get(expert.pk, (0, 0, 0, 0))
         lines.append(
             ExpertTally(
                 expert=expert,
                 pseudonym=expert.person.pseudonym,
                 is_simulated=expert.person.is_simulated,
-                total=totals.get(expert.pk, 0),
-                voted=left_wins + ties + right_wins,
-                left_wins=left_wins,
-                ties=ties,
-                right_wins=right_wins,
+                total=totals.get(expert.pk, 0) + study.votes_to_plan.get(expert.username, 0),
+                voted=sum(counts),
+                left_wins=counts[0],
+                ties=counts[1],
+                right_wins=counts[2],
+                skips=counts[3],
             )
         )
     return lines
-
-
-def votes_saved(*, study: Study, expert: User) -> int:
-    """How many of the expert's matchups of this study have a vote."""
-    return Vote.objects.filter(matchup__study=study, expert=expert, supersedes=None).count()

@@ -8,13 +8,16 @@ key, as people do.
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 from typing import Any
 from uuid import uuid5
 
 import numpy as np
 from django.db import transaction
 
-from arena.models import Study, Vote
+from arena.models import Matchup, Study, Vote
+from arena.services.decisions import decision_of
+from arena.services.replanning import plan_batch
 from arena.services.votes import cast_vote
 from augment.errors import Conflict
 from augment.models import Augmentation
@@ -47,21 +50,16 @@ def simulate_votes(*, study: Study, seed: int) -> int:
     if not study.allow_simulated:
         raise Conflict(f"The study {study.name!r} does not allow simulated votes.")
     rng = np.random.default_rng(seed)
-    matchups = (
-        study.matchups.filter(votes=None, expert__person__is_simulated=True)
-        .select_related("expert", "scenario", "left", "right")
-        .order_by("expert__username", "position")
-    )
     cast = 0
-    for matchup in list(matchups):
+    for matchup in _waiting(study):
         reference = matchup.scenario.reference
         advantage = _error_m(reference, matchup.right) - _error_m(reference, matchup.left)
-        cast_vote(
-            expert=matchup.expert,
+        decision = decision_of(
             matchup_code=matchup.code,
             key=uuid5(matchup.code, "simulated"),
             outcome=_judge(advantage, rng),
         )
+        cast_vote(expert=matchup.expert, decision=decision)
         cast += 1
     if cast:
         log_event(
@@ -72,6 +70,20 @@ def simulate_votes(*, study: Study, seed: int) -> int:
             after={"votes": cast, "seed": seed},
         )
     return cast
+
+
+def _waiting(study: Study) -> Iterator[Matchup]:
+    """Everything that simulated experts have not judged; what is planned later comes last."""
+    while True:
+        yield from (
+            study.matchups.filter(votes=None, expert__person__is_simulated=True)
+            .select_related("expert", "scenario", "left", "right")
+            .order_by("expert__username", "position")
+        )
+        experts = study.experts.filter(person__is_simulated=True).order_by("username")
+        study.refresh_from_db(fields=["votes_to_plan"])
+        if not sum(plan_batch(study=study, expert=expert) for expert in experts):
+            return
 
 
 def _judge(advantage_m: float, rng: np.random.Generator) -> str:

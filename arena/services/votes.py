@@ -2,141 +2,223 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from functools import partial
+import math
+from dataclasses import dataclass
+from datetime import timedelta
 from uuid import UUID
 
+from django.conf import settings
 from django.contrib.auth.models import User
 from django.db import IntegrityError, transaction
 from django.db.models import Q
 from django.utils import timezone
 
-from arena.errors import AlreadyDecided, NotYours, StudyNotOpen
+from arena.errors import AlreadyDecided, InvalidVote, NotYours, StudyNotOpen, TooFast
 from arena.models import Matchup, Study, Vote
+from arena.queries.votes import VotingState, voting_state
+from arena.queries.voting_path import HeldMatchup, held_matchup, upcoming
+from arena.services.decisions import Decision
+from arena.services.turns import in_turn
+from arena.services.vote_writes import insert, mark_served
 from augment.errors import Conflict
+from augment.models import Event
+from augment.services.events import log_event
+
+PACE_WINDOW = timedelta(seconds=5)
+FLAG_AGAIN_AFTER = timedelta(minutes=1)
+"""An account that goes on voting too fast is written to the log this often, not for every try."""
 
 
-def cast_vote(
-    *,
-    expert: User,
-    matchup_code: UUID | str,
-    key: UUID | str,
-    outcome: str,
-    supersedes: UUID | str | None = None,
-    ms_visible: int | None = None,
-) -> Vote:
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Received:
+    """What came of a vote.
+
+    Attributes:
+        state: The study and the expert's progress after it.
+        coming: What is planned for the expert next, marked as served; nothing where the study
+            has closed.
+    """
+
+    vote: Vote
+    state: VotingState
+    coming: tuple[Matchup, ...]
+
+
+def cast_vote(*, expert: User, decision: Decision) -> Vote:
     """Store what an expert decided; the same key and content again is the same vote.
 
-    Args:
-        expert: Whose vote it is.
-        matchup_code: What was decided; one of the expert's own matchups.
-        key: Made by the browser, one per decision.
-        outcome: "left", "equal" or "right"; the side is kept apart from who won.
-        supersedes: The key of the matchup's current vote, to change it.
-        ms_visible: How long the pair was on screen.
+    For callers of our own, without a limit on the pace; browsers come in by `receive_vote`.
 
     Raises:
         NotYours: The matchup is somebody else's or does not exist.
         StudyNotOpen: The study takes no votes.
         AlreadyDecided: The matchup has a vote that `supersedes` does not name.
         Conflict: The key belongs to another vote, or `supersedes` names none of this matchup's.
-        ValueError: The outcome is none of the three.
+        InvalidVote: The study does not allow it.
     """
-    cast = partial(
-        _cast,
-        expert=expert,
-        matchup_code=_uuid(matchup_code),
-        key=_uuid(key),
-        outcome=Vote.Outcome(outcome),
-        supersedes=None if supersedes is None else _uuid(supersedes),
-        ms_visible=ms_visible,
-    )
+    return _store(expert, decision, None).vote
+
+
+def receive_vote(*, expert: User, decision: Decision, ahead: int = 0) -> Received:
+    """Store what an expert's browser sent, at a pace that a person can keep.
+
+    The limit (ARENA_VOTES_PER_S over five seconds) counts stored votes, so it holds for any
+    number of web processes. An account that breaks it is flagged in the log.
+
+    Args:
+        expert: Whose vote it is.
+        decision: What was decided.
+        ahead: How many matchups to look ahead, at most.
+
+    Raises:
+        TooFast: The account votes faster than that; nothing was stored.
+        ArenaError: As in `cast_vote`.
+        Conflict: As in `cast_vote`.
+    """
     try:
-        return cast()
+        return _store(expert, decision, ahead)
+    except TooFast:
+        _flag(expert)
+        raise
+
+
+def _check_allowed(decision: Decision, state: VotingState, is_paced: bool) -> None:
+    """Whether the study takes the vote that was just written; raising takes it back."""
+    if state.study.state != Study.State.OPEN:
+        raise _not_open(state.study)
+    if decision.both_miss and not state.study.allow_both_miss:
+        raise InvalidVote({"both_miss": "This study does not ask whether both miss."})
+    if is_paced and state.just_now > settings.VOTES_PER_S * PACE_WINDOW.total_seconds():
+        raise TooFast(math.ceil(PACE_WINDOW.total_seconds() / 2))
+
+
+def _not_open(study: Study) -> StudyNotOpen:
+    return StudyNotOpen(f"The study {study.name!r} takes no votes: it is {study.state}.")
+
+
+def _flag(expert: User) -> None:
+    flags = Event.objects.filter(actor=expert, verb="vote too fast")
+    if not flags.filter(at__gt=timezone.now() - FLAG_AGAIN_AFTER).exists():
+        log_event(
+            actor=expert,
+            verb="vote too fast",
+            object_kind="person",
+            object_code=expert.person.code,
+            after={"votes_per_s": settings.VOTES_PER_S, "over_s": PACE_WINDOW.total_seconds()},
+        )
+
+
+# --- Storing -----------------------------------------------------------------------------------
+
+
+def _store(expert: User, decision: Decision, ahead: int | None) -> Received:
+    """Write at once, as most votes are first ones; look closer only where that fails.
+
+    Without a number of matchups to look ahead the pace has no limit.
+    """
+    with in_turn():
+        return _store_in_turn(expert, decision, ahead)
+
+
+def _store_in_turn(expert: User, decision: Decision, ahead: int | None) -> Received:
+    if decision.supersedes is None:
+        try:
+            return _write(expert, decision, ahead)
+        except IntegrityError:
+            pass  # the matchup has a vote or the key is taken: a replay, or too late
+    try:
+        return _look_and_write(expert, decision, ahead)
     except IntegrityError:
         # Another request stored the same key or decided the same matchup in between. That one
         # counts; looked at again, this one is its replay or too late. Anything else is a fault.
-        return cast()
-
-
-def mark_served(*, matchups: Sequence[Matchup]) -> None:
-    """Remember when matchups went out to their expert for the first time."""
-    fresh = [matchup.pk for matchup in matchups if matchup.served_at is None]
-    if fresh:
-        Matchup.objects.filter(pk__in=fresh, served_at=None).update(served_at=timezone.now())
+        return _look_and_write(expert, decision, ahead)
 
 
 @transaction.atomic
-def _cast(
-    *,
-    expert: User,
-    matchup_code: UUID,
-    key: UUID,
-    outcome: Vote.Outcome,
-    supersedes: UUID | None,
-    ms_visible: int | None,
-) -> Vote:
-    matchup = _lock(expert, matchup_code)
+def _write(expert: User, decision: Decision, ahead: int | None) -> Received:
+    matchup = _lock(expert, decision.matchup)
+    vote = _insert(matchup, expert, decision, None)
+    state = _state(matchup, expert)
+    _check_allowed(decision, state, ahead is not None)
+    return _received(vote, state, expert, ahead)
+
+
+@transaction.atomic
+def _look_and_write(expert: User, decision: Decision, ahead: int | None) -> Received:
+    matchup = _lock(expert, decision.matchup)
     known = list(
-        Vote.objects.filter(Q(key=key) | Q(matchup=matchup))
+        Vote.objects.filter(Q(key=decision.key) | Q(matchup_id=matchup.pk))
         .select_related("supersedes", "superseded_by")
         .order_by("pk")
     )
     for vote in known:
-        if vote.key == key:
-            return _replayed(vote, matchup, outcome, supersedes)
-    _check_open(matchup)
-    old = _superseded(known, supersedes)
-    winner = {
-        Vote.Outcome.LEFT: matchup.left_id,
-        Vote.Outcome.EQUAL: None,
-        Vote.Outcome.RIGHT: matchup.right_id,
-    }[outcome]
-    return Vote.objects.create(
-        key=key,
-        matchup=matchup,
-        expert=expert,
-        shown_left_id=matchup.left_id,
-        shown_right_id=matchup.right_id,
-        outcome=outcome,
-        winner_id=winner,
-        supersedes=old,
-        is_simulated=_is_simulated(matchup.expert),
-        ms_visible=ms_visible,
-    )
+        if vote.key == decision.key:
+            state = _state(matchup, expert)
+            return _received(_replayed(vote, matchup, decision), state, expert, ahead)
+    study = Study.objects.only("name", "state").get(pk=matchup.study_id)
+    if study.state != Study.State.OPEN:
+        raise _not_open(study)
+    vote = _insert(matchup, expert, decision, _superseded(known, decision.supersedes))
+    state = _state(matchup, expert)
+    _check_allowed(decision, state, ahead is not None)
+    return _received(vote, state, expert, ahead)
 
 
-def _lock(expert: User, code: UUID) -> Matchup:
+def _received(vote: Vote, state: VotingState, expert: User, ahead: int | None) -> Received:
+    """In the vote's own transaction: SQLite lets one write at a time, so one has to do."""
+    coming: list[Matchup] = []
+    if ahead and state.study.state == Study.State.OPEN:
+        coming = upcoming(study=state.study, expert=expert, n=ahead)
+        mark_served(matchups=coming)
+    return Received(vote=vote, state=state, coming=tuple(coming))
+
+
+def _lock(expert: User, code: UUID) -> HeldMatchup:
     """The expert's matchup, its row held until the vote is stored.
 
     The lock makes two votes on one matchup wait for each other, and the closing of the study for
-    both. SQLite needs none: its transactions write one after the other.
+    both. Who has opened the study's results votes in it no longer.
     """
-    found = (
-        Matchup.objects.select_for_update(of=("self",))
-        .select_related("expert__person")
-        .filter(code=code, expert=expert)
-        .first()
-    )
+    found = held_matchup(code=code, expert_pk=expert.pk)
     if found is None:
         raise NotYours("This matchup is not yours.")
     return found
 
 
-def _check_open(matchup: Matchup) -> None:
+def _insert(matchup: HeldMatchup, expert: User, decision: Decision, old: Vote | None) -> Vote:
+    winners = {Vote.Outcome.LEFT: matchup.left_id, Vote.Outcome.RIGHT: matchup.right_id}
+    vote = Vote(
+        key=decision.key,
+        matchup_id=matchup.pk,
+        expert=expert,
+        shown_left_id=matchup.left_id,
+        shown_right_id=matchup.right_id,
+        outcome=decision.outcome,
+        winner_id=winners.get(decision.outcome),
+        both_miss=decision.both_miss,
+        reason=decision.reason,
+        comment=decision.comment,
+        aids=decision.aids,
+        supersedes=old,
+        is_simulated=matchup.is_simulated,
+        ms_visible=decision.ms_visible,
+    )
+    return insert(vote)
+
+
+def _state(matchup: HeldMatchup, expert: User) -> VotingState:
     """Read after the lock, so that a study closed while we waited is seen as closed."""
-    study = Study.objects.only("name", "state").get(pk=matchup.study_id)
-    if study.state != Study.State.OPEN:
-        raise StudyNotOpen(f"The study {study.name!r} takes no votes: it is {study.state}.")
+    return voting_state(
+        study_pk=matchup.study_id, expert=expert, since=timezone.now() - PACE_WINDOW
+    )
 
 
-def _replayed(
-    vote: Vote, matchup: Matchup, outcome: Vote.Outcome, supersedes: UUID | None
-) -> Vote:
+def _replayed(vote: Vote, matchup: HeldMatchup, decision: Decision) -> Vote:
     if vote.matchup_id != matchup.pk:
         raise Conflict("This key belongs to another vote; make a new key for every decision.")
     old = None if vote.supersedes is None else vote.supersedes.key
-    if vote.outcome != outcome or old != supersedes:
+    stored = (vote.outcome, vote.both_miss, vote.reason, old)
+    if stored != (decision.outcome, decision.both_miss, decision.reason, decision.supersedes):
         raise AlreadyDecided(vote.outcome)
     return vote
 
@@ -151,11 +233,3 @@ def _superseded(known: list[Vote], supersedes: UUID | None) -> Vote | None:
     if supersedes != current.key:
         raise AlreadyDecided(current.outcome)
     return current
-
-
-def _is_simulated(expert: User) -> bool:
-    return hasattr(expert, "person") and expert.person.is_simulated
-
-
-def _uuid(value: UUID | str) -> UUID:
-    return value if isinstance(value, UUID) else UUID(value)

@@ -1,17 +1,21 @@
 from __future__ import annotations
 
 import uuid
+from typing import Any
 
 import pytest
 from django.db import IntegrityError, transaction
 from pytest_django import DjangoAssertNumQueries
 
-from arena.errors import AlreadyDecided, NotYours, StudyNotOpen
+from arena.errors import AlreadyDecided, InvalidVote, NotYours, StudyNotOpen
 from arena.models import Person, Vote
-from arena.queries.votes import current_votes, next_matchup, recent_votes, tallies, upcoming
+from arena.queries.votes import current_votes, recent_votes, tallies
 from arena.queries.votes import voting_progress as progress_of
+from arena.queries.voting_path import upcoming
+from arena.services.decisions import decision_of
 from arena.services.studies import close_study
-from arena.services.votes import cast_vote, mark_served
+from arena.services.vote_writes import mark_served
+from arena.services.votes import cast_vote
 from augment.errors import Conflict
 from tests.study_rows import a_study, expert, matchups_of, vote
 
@@ -93,8 +97,9 @@ def test_a_first_vote_has_nothing_to_supersede() -> None:
 def test_nobody_votes_on_somebody_elses_matchup() -> None:
     theirs = matchups_of(a_study(), "finn")[0]
     for stranger in (matchups_of(theirs.study, "eva")[0].expert, expert("gus")):
+        decision = decision_of(matchup_code=theirs.code, key=uuid.uuid4(), outcome="left")
         with pytest.raises(NotYours):
-            cast_vote(expert=stranger, matchup_code=theirs.code, key=uuid.uuid4(), outcome="left")
+            cast_vote(expert=stranger, decision=decision)
     assert not Vote.objects.exists()
 
 
@@ -108,6 +113,38 @@ def test_a_closed_study_takes_no_votes_but_knows_the_ones_it_has() -> None:
     with pytest.raises(StudyNotOpen):
         vote(first, "right", supersedes=stored.key)
     assert vote(first, key=stored.key) == stored
+
+
+@pytest.mark.parametrize(
+    ("said", "field"),
+    [
+        ({"outcome": "skip"}, "reason"),
+        ({"outcome": "left", "reason": "unclear"}, "reason"),
+        ({"outcome": "right", "both_miss": True}, "both_miss"),
+        ({"outcome": "equal", "both_miss": True}, "both_miss"),
+        ({"outcome": "left", "comment": "x" * 1001}, "comment"),
+        ({"outcome": "left", "aids": ["zoom", "glasses"]}, "aids"),
+    ],
+)
+def test_parts_that_do_not_go_together_are_refused_by_name(
+    said: dict[str, Any], field: str
+) -> None:
+    with pytest.raises(InvalidVote) as refused:
+        vote(matchups_of(a_study(), "eva")[0], **said)
+    assert list(refused.value.fields) == [field]
+    assert not Vote.objects.exists()
+
+
+def test_a_skip_is_a_decision_that_can_be_taken_back() -> None:
+    study = a_study()
+    first, second, *_ = matchups_of(study, "eva")
+    skip = vote(first, "skip", reason="other", comment="Two cars in one place.")
+    assert skip.winner_id is None
+    assert upcoming(study=study, expert=first.expert, n=1) == [second]
+    again = vote(first, "left", supersedes=skip.key)
+    assert list(current_votes(study)) == [again]
+    with pytest.raises(AlreadyDecided):
+        vote(first, "skip", reason="unclear", key=skip.key)
 
 
 def test_an_unknown_outcome_is_refused() -> None:
@@ -141,7 +178,18 @@ def test_the_database_itself_refuses_two_first_votes_and_a_winner_that_was_not_s
     twice = copy()
     same_key = copy(key=stored.key, matchup=second)
     not_shown = copy(matchup=second, winner=first.right)
-    for bad in (twice, same_key, not_shown):
+    nobody_wins = {"matchup": second, "winner": None}
+    wrong = [
+        copy(**nobody_wins),
+        copy(**nobody_wins, outcome="draw"),
+        copy(**nobody_wins, outcome="skip"),
+        copy(**nobody_wins, outcome="skip", reason="bored"),
+        copy(**nobody_wins, outcome="equal", reason="unclear"),
+        copy(**nobody_wins, outcome="skip", reason="unclear", both_miss=True),
+        copy(**nobody_wins, outcome="equal", aids="zoom glasses"),
+        copy(outcome="skip", reason="unclear", matchup=second),
+    ]
+    for bad in (twice, same_key, not_shown, *wrong):
         with pytest.raises(IntegrityError), transaction.atomic():
             bad.save()
     assert Vote.objects.count() == 1
@@ -158,13 +206,13 @@ def test_the_next_matchups_follow_the_experts_own_order() -> None:
     study = a_study()
     mine = matchups_of(study, "eva")
     eva = mine[0].expert
-    assert next_matchup(study=study, expert=eva) == mine[0]
+    assert upcoming(study=study, expert=eva, n=1) == [mine[0]]
     vote(mine[0])
     vote(mine[2])
     assert upcoming(study=study, expert=eva, n=3) == [mine[1], mine[3], mine[4]]
     for matchup in [mine[1], *mine[3:]]:
         vote(matchup)
-    assert next_matchup(study=study, expert=eva) is None
+    assert upcoming(study=study, expert=eva, n=1) == []
 
 
 def test_progress_counts_matchups_and_foresees_the_end_at_the_experts_pace() -> None:
@@ -182,13 +230,15 @@ def test_progress_counts_matchups_and_foresees_the_end_at_the_experts_pace() -> 
 
 def test_tallies_have_a_line_per_expert() -> None:
     study = a_study()
-    first, second, *_ = matchups_of(study, "eva")
+    first, second, third, *_ = matchups_of(study, "eva")
     changed = vote(first, "left")
     vote(first, "right", supersedes=changed.key)
     vote(second, "equal")
+    vote(third, "skip", reason="unclear")
     lines = {line.expert.username: line for line in tallies(study)}
     eva, finn = lines["eva"], lines["finn"]
-    assert (eva.total, eva.voted, eva.left_wins, eva.ties, eva.right_wins) == (9, 2, 0, 1, 1)
+    assert (eva.total, eva.voted, eva.left_wins, eva.ties, eva.right_wins) == (9, 3, 0, 1, 1)
+    assert eva.skips == 1
     assert (finn.total, finn.voted) == (9, 0)
     assert eva.pseudonym == "Expert 1"
 
@@ -210,8 +260,7 @@ def test_voting_costs_few_queries(django_assert_num_queries: DjangoAssertNumQuer
     matchup = matchups_of(study, "eva")[0]
     eva = matchup.expert
     with django_assert_num_queries(1):
-        next_one = next_matchup(study=study, expert=eva)
-        assert next_one is not None
+        (next_one,) = upcoming(study=study, expert=eva, n=1)
         assert next_one.scenario.instruction
-    with django_assert_num_queries(6):
+    with django_assert_num_queries(5):
         vote(matchup)

@@ -8,9 +8,13 @@ from concurrent.futures import ThreadPoolExecutor
 
 import pytest
 from django.db import connection
+from pytest_django import Settings
 
-from arena.errors import AlreadyDecided
+from arena.errors import AlreadyDecided, TooFast
 from arena.models import Matchup, Vote
+from arena.services.decisions import decision_of
+from arena.services.votes import receive_vote
+from augment.models import Event
 from tests.study_rows import a_study, vote
 
 pytestmark = pytest.mark.django_db(transaction=True)
@@ -61,3 +65,30 @@ def test_one_key_eight_times_is_one_vote() -> None:
     key = uuid.uuid4()
     assert set(at_once([(matchup, key, "right")] * THREADS)) == {"right"}
     assert Vote.objects.count() == 1
+
+
+def test_a_browser_that_floods_gets_no_more_through_than_the_pace_allows(
+    settings: Settings,
+) -> None:
+    settings.VOTES_PER_S = 1  # five in five seconds: a slow machine floods as well
+    study = a_study(scenarios=8, votes_per_expert=24)
+    eva = study.experts.get(username="eva")
+    matchups = list(study.matchups.filter(expert=eva))
+
+    def send(matchup: Matchup) -> bool:
+        decision = decision_of(matchup_code=matchup.code, key=uuid.uuid4(), outcome="left")
+        try:
+            receive_vote(expert=eva, decision=decision)
+        except TooFast:
+            return False
+        finally:
+            connection.close()
+        return True
+
+    with ThreadPoolExecutor(max_workers=THREADS) as pool:
+        stored = sum(pool.map(send, matchups))
+
+    # Each thread sees the stored votes; those under way beside it are all it can overlook.
+    assert 5 <= stored <= 5 + THREADS - 1
+    assert Vote.objects.count() == stored
+    assert Event.objects.filter(verb="vote too fast", actor=eva).exists()
