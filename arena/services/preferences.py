@@ -2,19 +2,80 @@
 
 from __future__ import annotations
 
+from collections import Counter
+from collections.abc import Mapping
+
 from django.contrib.auth.models import User
 from django.db import transaction
 
+from arena.errors import InvalidPreference
 from arena.models import Person
-from arena.queries.profiles import Theme
+from arena.queries.profiles import Language, Theme
+from arena.queries.voting_keys import SWITCHES, USUAL_KEYS, VotingPreferences, read_voting
 
 
 @transaction.atomic
 def choose_theme(*, user: User, theme: Theme) -> Person:
     """Keep how the pages look to this account, which becomes a person if it was none."""
-    person, _ = Person.objects.select_for_update().get_or_create(
-        user=user, defaults={"pseudonym": user.get_username()}
-    )
+    person = _person(user)
     person.preferences = {**person.preferences, "theme": theme.value}
     person.save(update_fields=["preferences"])
     return person
+
+
+@transaction.atomic
+def choose_language(*, user: User, language: Language) -> Person:
+    """Keep the language that this account reads, whatever the browser asks for."""
+    person = _person(user)
+    person.preferences = {**person.preferences, "language": language.value}
+    person.save(update_fields=["preferences"])
+    return person
+
+
+@transaction.atomic
+def keep_voting(
+    *, user: User, switches: Mapping[str, bool], keys: Mapping[str, str] | None = None
+) -> VotingPreferences:
+    """Keep how this account votes; what is not named stays as it was.
+
+    Args:
+        user: Whose preferences they are.
+        switches: Some of SWITCHES -> on or off.
+        keys: Action -> its only single key; actions that are missing get their usual ones, so an
+            empty mapping takes all back. None leaves the keys alone.
+
+    Raises:
+        InvalidPreference: A switch or action is unknown, or keys can't be told apart.
+    """
+    if unknown := sorted(set(switches) - set(SWITCHES)):
+        raise InvalidPreference("switches", f"Unknown: {', '.join(unknown)}.")
+    person = _person(user)
+    voting = {**person.preferences.get("voting", {}), **switches}
+    if keys is not None:
+        voting["keys"] = _chosen(keys)
+    person.preferences = {**person.preferences, "voting": voting}
+    person.save(update_fields=["preferences"])
+    return read_voting(person.preferences)
+
+
+def _person(user: User) -> Person:
+    person, _ = Person.objects.select_for_update().get_or_create(
+        user=user, defaults={"pseudonym": user.get_username()}
+    )
+    return person
+
+
+def _chosen(keys: Mapping[str, str]) -> dict[str, str]:
+    """The keys that are not the usual first ones, in small letters."""
+    if unknown := sorted(set(keys) - set(USUAL_KEYS)):
+        raise InvalidPreference("keys", f"Unknown action: {', '.join(unknown)}.")
+    found = {action: key.lower() for action, key in keys.items()}
+    for action, key in found.items():
+        if len(key) != 1 or not key.isprintable() or key.isspace():
+            raise InvalidPreference("keys", f"{action} needs one character, not {key!r}.")
+    shown = {action: found.get(action, usual[0]) for action, usual in USUAL_KEYS.items()}
+    for key, times in Counter(shown.values()).items():
+        if times > 1:
+            both = ", ".join(action for action, chosen in shown.items() if chosen == key)
+            raise InvalidPreference("keys", f"{key} would do two things: {both}.")
+    return {action: key for action, key in found.items() if key != USUAL_KEYS[action][0]}

@@ -1,0 +1,39 @@
+"""POST /api/v1/reports: something is wrong with a pair."""
+
+from __future__ import annotations
+
+from django.contrib.auth.models import User
+from rest_framework import serializers
+from rest_framework.request import Request
+from rest_framework.response import Response
+
+from arena.api.access import ExpertsOnly
+from arena.api.errors import ApiView
+from arena.api.fields import CodeField, StrictSerializer, TextField
+from arena.models import Report
+from arena.services.decisions import LONGEST_COMMENT
+from arena.services.reports import report
+
+
+class ReportBody(StrictSerializer):
+    """One report of an expert."""
+
+    key = CodeField()
+    matchup = CodeField()
+    reason = serializers.ChoiceField(choices=Report.Reason.choices)
+    comment = TextField(required=False, allow_blank=True, default="", max_length=LONGEST_COMMENT)
+
+
+class ReportsView(ApiView):
+    """Reports of the one who is signed in; they change no vote."""
+
+    permission_classes = (ExpertsOnly,)
+
+    def post(self, request: Request) -> Response:
+        """Keep the report once, however often it arrives."""
+        body = ReportBody(data=request.data)
+        body.is_valid(raise_exception=True)
+        given = dict(body.validated_data)
+        expert: User = request.user  # type: ignore[assignment]
+        report(expert=expert, matchup_code=given.pop("matchup"), **given)
+        return Response({"saved": True})

@@ -1,0 +1,58 @@
+"""Reports of pairs in which something is wrong."""
+
+from __future__ import annotations
+
+import uuid
+
+import pytest
+
+from arena.models import Report, Study, Vote
+from arena.services.studies import close_study
+from tests.api.asking import error_of, signed_in
+from tests.study_rows import matchups_of
+
+pytestmark = [pytest.mark.django_db, pytest.mark.urls("tests.api.urls")]
+
+
+def test_a_report_is_kept_once_and_changes_no_vote(study: Study) -> None:
+    matchup = matchups_of(study, "eva")[0]
+    client = signed_in("eva")
+    body = {
+        "key": str(uuid.uuid4()),
+        "matchup": str(matchup.code),
+        "reason": "picture_wrong",
+        "comment": "The truck is cut off.",
+    }
+    for _ in range(2):
+        answer = client.post("/api/v1/reports", body, content_type="application/json")
+        assert (answer.status_code, answer.json()) == (200, {"saved": True})
+    kept = Report.objects.get()
+    assert (kept.matchup, kept.reason, kept.comment) == (matchup, *list(body.values())[2:])
+    assert not Vote.objects.exists()
+
+
+@pytest.mark.parametrize(
+    ("whose", "changes", "status", "code"),
+    [
+        ("finn", {}, 404, "not_found"),
+        ("eva", {"reason": "dull"}, 422, "invalid"),
+        ("eva", {"comment": "x" * 1001}, 422, "invalid"),
+        ("eva", {"vote": 1}, 422, "invalid"),
+    ],
+)
+def test_a_report_that_can_not_be_kept_says_why(
+    study: Study, whose: str, changes: dict[str, object], status: int, code: str
+) -> None:
+    matchup = matchups_of(study, "eva")[0]
+    body = {"key": str(uuid.uuid4()), "matchup": str(matchup.code), "reason": "other", **changes}
+    answer = signed_in(whose).post("/api/v1/reports", body, content_type="application/json")
+    error_of(answer, status, code)
+    assert not Report.objects.exists()
+
+
+def test_after_the_closing_nothing_more_is_reported(study: Study) -> None:
+    matchup = matchups_of(study, "eva")[0]
+    close_study(study=study)
+    body = {"key": str(uuid.uuid4()), "matchup": str(matchup.code), "reason": "other"}
+    answer = signed_in("eva").post("/api/v1/reports", body, content_type="application/json")
+    error_of(answer, 410, "study_not_open")

@@ -1,0 +1,223 @@
+"""Handing pairs over, and the adaptive part, as rows."""
+
+from __future__ import annotations
+
+import uuid
+from collections import Counter
+
+import pytest
+from django.contrib.auth.models import User
+from django.core.management import CommandError, call_command
+
+from arena.errors import NothingToPlan, NotYours, StudyNotOpen
+from arena.models import Matchup, Study, Vote
+from arena.pairing.order import MAIN
+from arena.queries.progress import of_expert, of_study
+from arena.queries.votes import tallies, voting_progress
+from arena.services.handing_over import hand_over
+from arena.services.replanning import next_pairs, plan_batch
+from arena.services.reports import report
+from arena.services.simulation import simulate_votes
+from arena.services.studies import PlanOptions, close_study, open_study
+from augment.errors import Conflict, UnknownName
+from augment.models import Event
+from tests.study_rows import a_study, cast_of, expert, matchups_of, rows_planned, vote
+
+pytestmark = pytest.mark.django_db
+
+
+def pairs_of(study: Study) -> Counter[frozenset[int]]:
+    rows = study.matchups.filter(kind=MAIN).values_list(
+        "left__contestant_id", "right__contestant_id"
+    )
+    return Counter(frozenset(row) for row in rows)
+
+
+# --- Handing over ------------------------------------------------------------------------------
+
+
+def test_what_one_has_not_judged_goes_to_the_others_with_fresh_tokens() -> None:
+    study = a_study(scenarios=8, experts=("eva", "finn", "gus"), votes_per_expert=9)
+    before, mine = pairs_of(study), matchups_of(study, "eva")
+    for matchup in mine[:3]:
+        vote(matchup)
+    gone = {matchup.left_token for matchup in mine[3:]}
+
+    taken = hand_over(study=study, username="eva", to=["finn", "gus"])
+
+    assert taken == {"finn": 3, "gus": 3}
+    assert pairs_of(study) == before
+    assert [m.position for m in matchups_of(study, "eva")] == [1, 2, 3]
+    assert {m.batch for m in matchups_of(study, "finn")[9:]} == {1}
+    assert not gone & set(study.matchups.values_list("left_token", flat=True))
+    for name in ("finn", "gus"):
+        rows = matchups_of(study, name)
+        assert [m.position for m in rows] == list(range(1, 13))
+        assert len({(m.scenario_id, frozenset((m.left_id, m.right_id))) for m in rows}) == 12
+    event = Event.objects.get(verb="hand over")
+    assert event.before is not None
+    assert event.after == {"batch": 1, "votes": {"finn": 3, "gus": 3}}
+    assert len(event.before["matchups"]) == 6
+
+
+def test_a_vote_on_what_was_handed_over_is_not_taken() -> None:
+    study = a_study()
+    late = matchups_of(study, "eva")[5]
+    hand_over(study=study, username="eva", to=["finn"])
+    with pytest.raises(NotYours):
+        vote(late)
+    assert not Vote.objects.exists()
+
+
+def test_somebody_new_joins_the_study_by_taking_over() -> None:
+    study = a_study(experts=("eva", "finn"))
+    gus = expert("gus")
+    assert hand_over(study=study, username="eva", to=["gus"]) == {"gus": 9}
+    assert study.experts.filter(pk=gus.pk).exists()
+    assert next_pairs(study=study, expert=gus, n=4)[0].position == 1
+
+
+def test_a_pair_that_was_reported_but_not_judged_stays_where_it_is() -> None:
+    study = a_study()
+    first = matchups_of(study, "eva")[0]
+    report(expert=first.expert, matchup_code=first.code, key=uuid.uuid4(), reason="picture_wrong")
+    assert hand_over(study=study, username="eva", to=["finn"]) == {"finn": 8}
+    assert matchups_of(study, "eva") == [first]
+
+
+def test_repeats_are_drawn_anew_for_who_takes_over() -> None:
+    study = open_study(
+        name="Round 1",
+        votes_per_expert=12,
+        seed=1,
+        options=PlanOptions(repeat_share=0.25),
+        **cast_of(scenarios=12),
+    )
+    hand_over(study=study, username="eva", to=["finn"])
+    assert not matchups_of(study, "eva")
+    rows = Counter(study.matchups.values_list("kind", flat=True))
+    assert rows == {"main": 24, "repeat": 6}
+    for row in study.matchups.filter(kind="repeat").select_related("repeat_of"):
+        assert row.repeat_of is not None
+        assert row.repeat_of.left_id == row.right_id
+
+
+@pytest.mark.parametrize(
+    ("giver", "to", "error", "sentence"),
+    [
+        ("eva", [], Conflict, "Name at least one"),
+        ("eva", ["eva"], Conflict, "eva can't take over their own pairs"),
+        ("eva", ["nobody"], UnknownName, "Unknown expert 'nobody'"),
+        ("eva", ["sim"], Conflict, "Simulated: sim"),
+        ("hans", ["finn"], UnknownName, "expert of this study 'hans'. Known: eva, finn"),
+    ],
+)
+def test_a_hand_over_that_makes_no_sense_is_refused(
+    giver: str, to: list[str], error: type[Exception], sentence: str
+) -> None:
+    study = a_study()
+    expert("sim", is_simulated=True)
+    expert("hans")
+    with pytest.raises(error, match=sentence):
+        hand_over(study=study, username=giver, to=to)
+    assert study.matchups.count() == 18
+
+
+def test_nothing_is_handed_over_twice_or_after_the_closing() -> None:
+    study = a_study()
+    hand_over(study=study, username="eva", to=["finn"])
+    with pytest.raises(NothingToPlan, match="eva has nothing left"):
+        hand_over(study=study, username="eva", to=["finn"])
+    with pytest.raises(StudyNotOpen):
+        hand_over(study=close_study(study=study), username="finn", to=["eva"])
+
+
+def test_the_command_hands_over_and_names_its_faults() -> None:
+    study = a_study()
+    call_command("hand_over", "Round 1", "eva", "--to", "finn")
+    assert study.matchups.filter(expert__username="finn").count() == 18
+    with pytest.raises(CommandError, match="nothing left"):
+        call_command("hand_over", "Round 1", "eva", "--to", "finn")
+
+
+# --- The adaptive part -------------------------------------------------------------------------
+
+
+def adaptive(simulated: bool = False) -> Study:
+    """Each expert judges 20, ten of them planned by the votes."""
+    return open_study(
+        name="Round 1",
+        votes_per_expert=20,
+        seed=1,
+        options=PlanOptions(adaptive_share=0.5, repeat_share=0.1),
+        allow_simulated=simulated,
+        **cast_of(scenarios=10, simulated_experts=simulated),
+    )
+
+
+def test_the_last_share_is_planned_when_it_is_needed_and_counts_from_the_start() -> None:
+    study = adaptive()
+    eva = User.objects.get(username="eva")
+    assert study.matchups.filter(expert=eva, kind="main").count() == 10
+    assert study.votes_to_plan == {"eva": 10, "finn": 10}
+    assert voting_progress(study=study, expert=eva).total == 21
+    assert [line.planned for line in of_expert(eva)] == [21]
+    assert (of_study(study).planned, tallies(study)[0].total) == (42, 21)
+
+    for matchup in matchups_of(study, "eva"):
+        vote(matchup)
+    first = next_pairs(study=study, expert=eva, n=4)[0]
+
+    study.refresh_from_db()
+    assert (first.position, first.batch) == (12, 1)
+    assert study.votes_to_plan == {"eva": 0, "finn": 10}
+    assert study.matchups.filter(expert=eva, kind="main").count() == 20
+    assert all(0 < row.draw_probability < 1 for row in matchups_of(study, "eva"))
+    units = [
+        (m.scenario_id, frozenset((m.left_id, m.right_id)))
+        for m in study.matchups.filter(expert=eva, kind="main")
+    ]
+    assert len(set(units)) == 20
+    event = Event.objects.get(verb="plan batch")
+    assert event.after is not None
+    assert (event.after["batch"], event.after["votes"]) == (1, 10)
+    assert event.after["last_vote"] == Vote.objects.latest("pk").pk
+    assert plan_batch(study=study, expert=eva) == 0
+
+
+def test_the_same_votes_give_the_same_batch() -> None:
+    study = adaptive()
+    eva = User.objects.get(username="eva")
+    for matchup in matchups_of(study, "eva"):
+        vote(matchup)
+    plan_batch(study=study, expert=eva)
+    first = rows_planned(study, batch=1)
+    Matchup.objects.filter(batch=1).delete()
+    Study.objects.update(votes_to_plan={"eva": 10, "finn": 10})
+    study.refresh_from_db()
+    plan_batch(study=study, expert=eva)
+    assert rows_planned(study, batch=1) == first
+    assert len(first) >= 10
+
+
+def test_no_batch_is_planned_while_much_is_waiting_or_the_study_is_closed() -> None:
+    study = adaptive()
+    finn = User.objects.get(username="finn")
+    assert plan_batch(study=study, expert=finn) == 11
+    assert plan_batch(study=study, expert=finn) == 0
+    eva = User.objects.get(username="eva")
+    assert next_pairs(study=close_study(study=study), expert=eva, n=4) == []
+
+
+def test_votes_that_are_not_planned_yet_are_handed_over_as_well() -> None:
+    study = adaptive()
+    assert hand_over(study=study, username="eva", to=["finn"]) == {"finn": 20}
+    study.refresh_from_db()
+    assert study.votes_to_plan == {"eva": 0, "finn": 20}
+
+
+def test_simulated_experts_judge_the_adaptive_part_too() -> None:
+    study = adaptive(simulated=True)
+    simulate_votes(study=study, seed=1)
+    assert Counter(study.matchups.values_list("kind", flat=True))["main"] == 40
+    assert not study.matchups.filter(votes=None).exists()
