@@ -1,0 +1,66 @@
+"""`manage.py invite`: links for the experts of a study."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from django.core.management.base import BaseCommand, CommandError, CommandParser
+from django.urls import reverse
+from django.utils import timezone
+
+from arena.errors import ArenaError
+from arena.models import Study
+from arena.queries.invitations import ExpertLine, expert_lines
+from arena.queries.studies import study_named
+from arena.services.invitations import LINK_LIVES, invite
+from augment.errors import AugmentError, UnknownName
+
+
+class Command(BaseCommand):
+    """The door to arena.services.invitations.invite."""
+
+    help = (
+        "Print a link for every expert of a study who has none that works; each is shown once. "
+        "A link for a named expert replaces the one before."
+    )
+
+    def add_arguments(self, parser: CommandParser) -> None:
+        """Which study, whom, and where the pages are served."""
+        parser.add_argument("study", help="name or code")
+        parser.add_argument("--experts", nargs="+", metavar="USERNAME", help="all by default")
+        parser.add_argument(
+            "--address",
+            default="http://127.0.0.1:8000",
+            help="of the pages, as experts reach it (default: %(default)s)",
+        )
+
+    def handle(self, *args: Any, **options: Any) -> None:
+        """Make the links and print them."""
+        try:
+            study = study_named(options["study"])
+            made = [
+                (line, invite(study=study, expert=line.tally.expert))
+                for line in _chosen(study, options["experts"])
+            ]
+        except (ArenaError, AugmentError) as error:
+            raise CommandError(str(error)) from error
+        for line, fresh in made:
+            path = reverse("invitation", args=[fresh.token])
+            name = f"{line.tally.expert.get_username()} ({line.tally.pseudonym})"
+            self.stdout.write(f"{name}: {options['address'].rstrip('/')}{path}")
+        if made:
+            self.stdout.write(f"Each works for {LINK_LIVES.days} days and is not shown again.")
+        else:
+            self.stdout.write("Every expert has a link that works; no link was made.")
+
+
+def _chosen(study: Study, usernames: list[str] | None) -> list[ExpertLine]:
+    lines = {
+        line.tally.expert.get_username(): line for line in expert_lines(study, timezone.now())
+    }
+    if usernames is None:
+        return [line for line in lines.values() if line.may_be_invited and not line.has_live_link]
+    for username in usernames:
+        if username not in lines:
+            raise UnknownName("expert", username, sorted(lines))
+    return [lines[username] for username in usernames]

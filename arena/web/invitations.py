@@ -1,0 +1,141 @@
+"""Inviting experts to a study, and the page on which an invitation is accepted."""
+
+from __future__ import annotations
+
+import uuid
+from typing import cast
+
+from django.contrib import messages
+from django.contrib.auth import login
+from django.contrib.auth.decorators import login_not_required
+from django.contrib.auth.models import User
+from django.http import Http404, HttpRequest, HttpResponse
+from django.shortcuts import get_object_or_404, redirect, render
+from django.urls import reverse
+from django.utils import timezone
+from django.utils.translation import gettext as _
+from django.views.decorators.cache import never_cache
+from django.views.decorators.http import require_http_methods, require_POST, require_safe
+
+from arena.errors import ArenaError, LinkOver, NotYours
+from arena.models import Invitation, Study
+from arena.queries.invitations import expert_lines, invitation_by_token, may_be_let_in
+from arena.services.invitations import SESSION_KEY, FreshLink, accept, invite, revoke
+from arena.web.access import ADMIN, only
+from arena.web.sign_in import with_own_language
+from augment.errors import AugmentError
+
+SESSION_S = 30 * 24 * 3600
+BACKEND = "arena.queries.accounts.AccountBackend"
+GONE = 410
+
+
+@login_not_required
+@never_cache
+@require_http_methods(["GET", "HEAD", "POST"])
+def invitation_page(request: HttpRequest, token: str) -> HttpResponse:
+    """Who invited whom to what. Only the button signs in: mail scanners open links, too."""
+    try:
+        found = invitation_by_token(token)
+    except NotYours as error:
+        raise Http404 from error
+    answer = _let_in(request, token) if request.method == "POST" else _landing(request, found)
+    # The address is the key: no request names it as where it came from, and no search engine keeps
+    # it. (With "no-referrer" browsers hide the origin of the form as well, and it is refused.)
+    answer["Referrer-Policy"] = "strict-origin"
+    answer["X-Robots-Tag"] = "noindex, nofollow"
+    return answer
+
+
+@only(ADMIN)
+@never_cache
+@require_safe
+def experts_page(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
+    """Every expert of a study: progress, pace, quota, last seen and the state of the link."""
+    study = get_object_or_404(Study, code=code)
+    lines = expert_lines(study, timezone.now())
+    context = {
+        "study": study,
+        "lines": lines,
+        "without_link": sum(line.may_be_invited and not line.has_live_link for line in lines),
+    }
+    return render(request, "studies/experts.html", context)
+
+
+@only(ADMIN)
+@never_cache
+@require_POST
+def invite_experts(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
+    """Make links, for one expert or for all without one, and show them this once."""
+    study = get_object_or_404(Study, code=code)
+    lines = expert_lines(study, timezone.now())
+    wanted = request.POST.get("expert")
+    if wanted:
+        chosen = [line for line in lines if str(line.tally.expert.person.code) == wanted]
+    else:
+        chosen = [line for line in lines if line.may_be_invited and not line.has_live_link]
+    if not chosen:
+        messages.info(request, _("Nobody was left to invite; no link was made."))
+        return redirect("experts", code=study.code)
+    try:
+        made = [
+            _shown(
+                request,
+                invite(study=study, expert=line.tally.expert, actor=cast(User, request.user)),
+            )
+            for line in chosen
+        ]
+    except (ArenaError, AugmentError) as error:
+        messages.error(request, str(error))
+        return redirect("experts", code=study.code)
+    return render(request, "studies/links.html", {"study": study, "links": made})
+
+
+@only(ADMIN)
+@require_POST
+def revoke_invitation(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
+    """Take one link back; whoever came in by it is signed out."""
+    invitation = get_object_or_404(Invitation.objects.select_related("study"), code=code)
+    revoke(invitation=invitation, actor=cast(User, request.user))
+    name = invitation.expert.person.pseudonym
+    messages.success(request, _("The link of %(name)s was taken back.") % {"name": name})
+    return redirect("experts", code=invitation.study.code)
+
+
+def _landing(request: HttpRequest, found: Invitation) -> HttpResponse:
+    state = found.state(timezone.now())
+    if state not in Invitation.ALIVE or not may_be_let_in(found.expert):
+        return _over(request, found)
+    return render(request, "invitation.html", {"invitation": found, "host": _host(found)})
+
+
+def _over(request: HttpRequest, found: Invitation) -> HttpResponse:
+    state = found.state(timezone.now())
+    context = {"is_expired": state == Invitation.State.EXPIRED, "host": _host(found)}
+    return render(request, "invitation_over.html", context, status=GONE)
+
+
+def _let_in(request: HttpRequest, token: str) -> HttpResponse:
+    try:
+        found = accept(token=token)
+    except LinkOver:
+        return _over(request, invitation_by_token(token))
+    login(request, found.expert, backend=BACKEND)
+    request.session[SESSION_KEY] = str(found.code)
+    request.session.set_expiry(SESSION_S)
+    is_open = found.study.state == Study.State.OPEN
+    answer = redirect("vote", code=found.study.code) if is_open else redirect("home")
+    return with_own_language(answer, found.expert)
+
+
+def _host(invitation: Invitation) -> str | None:
+    """The name of who invited, None where the command did."""
+    by = invitation.invited_by
+    if by is None:
+        return None
+    return by.get_full_name() or (by.person.pseudonym if hasattr(by, "person") else by.username)
+
+
+def _shown(request: HttpRequest, fresh: FreshLink) -> dict[str, object]:
+    path = reverse("invitation", args=[fresh.token])
+    return {"invitation": fresh.invitation, "address": request.build_absolute_uri(path)}

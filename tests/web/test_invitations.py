@@ -1,0 +1,181 @@
+"""Inviting by pages: the link is shown once, a GET signs nobody in, the button does."""
+
+from __future__ import annotations
+
+import logging
+import re
+
+import pytest
+from django.contrib.auth.models import User
+from django.core.management import CommandError, call_command
+from django.test import Client
+from django.urls import reverse
+from django.utils import timezone
+
+from arena.config.hiding import HideKeys
+from arena.models import Invitation, Study
+from arena.services.invitations import invite
+from arena.services.studies import close_study
+from tests.study_rows import a_study
+from tests.web.cast import people, signed_in
+
+pytestmark = pytest.mark.django_db
+
+
+@pytest.fixture
+def study() -> Study:
+    return a_study()
+
+
+def link(study: Study, username: str = "eva") -> str:
+    fresh = invite(
+        study=study,
+        expert=User.objects.get(username=username),
+        actor=User.objects.filter(is_superuser=True).first(),
+    )
+    return reverse("invitation", args=[fresh.token])
+
+
+def who(client: Client) -> str | None:
+    key = client.session.get("_auth_user_id")
+    return User.objects.get(pk=key).username if key else None
+
+
+def text(page: bytes) -> str:
+    return " ".join(page.decode().split())
+
+
+def test_opening_the_link_says_who_invites_to_what_and_signs_nobody_in(study: Study) -> None:
+    admin = people()["admin"]
+    client, url = Client(), link(study)
+    for answer in (client.get(url), client.head(url)):
+        assert answer.status_code == 200
+        assert answer.headers["Referrer-Policy"] == "strict-origin"
+        assert "no-store" in answer.headers["Cache-Control"]
+    page = text(client.get(url).content)
+    expected = f"{admin.person.pseudonym} invites you to compare edited traffic scenes"
+    assert expected in page
+    assert "“Round 1”" in page
+    assert who(client) is None
+    assert Invitation.objects.get().used_at is None
+
+
+def test_the_button_signs_in_for_thirty_days_and_leads_to_the_first_pair(study: Study) -> None:
+    client = Client()
+    answer = client.post(link(study))
+    assert answer.headers["Location"] == reverse("vote", args=[study.code])
+    assert who(client) == "eva"
+    assert client.session.get_expiry_age() == 30 * 24 * 3600
+    assert Invitation.objects.get().used_at is not None
+
+
+def test_the_button_needs_the_forms_token(study: Study) -> None:
+    client = Client(enforce_csrf_checks=True)
+    assert client.post(link(study)).status_code == 403
+    assert who(client) is None
+
+
+def test_the_link_of_a_closed_study_leads_home(study: Study) -> None:
+    url = link(study)
+    close_study(study=study)
+    assert Client().post(url).headers["Location"] == reverse("home")
+
+
+def test_another_account_on_the_device_is_named_and_signed_out(study: Study) -> None:
+    client = signed_in(people()["analyst"])
+    url = link(study)
+    assert "You are signed in as the-analyst" in text(client.get(url).content)
+    client.post(url)
+    assert who(client) == "eva"
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        ({"expires_at": timezone.now()}, "This link has expired"),
+        ({"revoked_at": timezone.now()}, "This link is no longer in use"),
+    ],
+)
+def test_a_link_that_is_over_says_so(study: Study, change: dict[str, object], words: str) -> None:
+    client, url = Client(), link(study)
+    Invitation.objects.update(**change)
+    for answer in (client.get(url), client.post(url)):
+        assert answer.status_code == 410
+        assert words in text(answer.content)
+        assert answer.headers["Referrer-Policy"] == "strict-origin"
+    assert who(client) is None
+
+
+def test_a_made_up_link_is_404(study: Study) -> None:
+    url = reverse("invitation", args=["guessed"])
+    assert Client().get(url).status_code == 404
+    assert Client().post(url).status_code == 404
+
+
+def test_an_admin_invites_once_for_all_and_sees_each_link_once(study: Study) -> None:
+    admin = signed_in(people()["admin"])
+    page = reverse("experts", args=[study.code])
+    assert "Invite 2 experts without a link" in text(admin.get(page).content)
+    answer = admin.post(reverse("invite", args=[study.code]))
+    assert "no-store" in answer.headers["Cache-Control"]
+    addresses = re.findall(r'value="(http://testserver/invitation/[^"]+)"', text(answer.content))
+    assert len(addresses) == 2
+    expert = Client()
+    expert.post(addresses[0])
+    assert who(expert) == "eva"
+    listed = text(admin.get(page).content)
+    assert "without a link</button>" not in listed
+    assert "/invitation/" not in listed
+    again = admin.post(reverse("invite", args=[study.code]), follow=True)
+    assert "Nobody was left to invite" in text(again.content)
+
+
+def test_one_expert_gets_a_new_link(study: Study) -> None:
+    admin, older = signed_in(people()["admin"]), link(study)
+    eva = User.objects.get(username="eva")
+    admin.post(reverse("invite", args=[study.code]), {"expert": eva.person.code})
+    assert Invitation.objects.filter(revoked_at=None).get().expert == eva
+    assert Client().get(older).status_code == 410
+
+
+def test_taking_a_link_back_signs_out_who_came_in_by_it(study: Study) -> None:
+    came, url = Client(), link(study)
+    came.post(url)
+    by_password = signed_in(User.objects.get(username="eva"))
+    admin = signed_in(people()["admin"])
+    answer = admin.post(reverse("revoke", args=[Invitation.objects.get().code]), follow=True)
+    assert "The link of Expert 1 was taken back." in text(answer.content)
+    vote = reverse("vote", args=[study.code])
+    assert came.get(vote).status_code == 302
+    assert by_password.get(vote).status_code == 200
+    assert Client().post(url).status_code == 410
+
+
+def test_the_command_prints_a_link_for_each_expert_without_one(
+    study: Study, capsys: pytest.CaptureFixture[str]
+) -> None:
+    link(study, "finn")
+    call_command("invite", "Round 1", "--address", "https://arena.example/")
+    said = capsys.readouterr().out
+    found = re.search(r"^eva \(Expert 1\): https://arena\.example(/invitation/\S+)$", said, re.M)
+    assert found
+    assert "finn" not in said
+    assert Client().get(found.group(1)).status_code == 200
+    call_command("invite", "Round 1")
+    assert "no link was made" in capsys.readouterr().out
+    with pytest.raises(CommandError, match="Unknown expert 'ghost'"):
+        call_command("invite", "Round 1", "--experts", "ghost")
+
+
+def test_no_log_line_holds_a_key() -> None:
+    line = logging.LogRecord(
+        "django.server",
+        logging.INFO,
+        "",
+        1,
+        '"%s" %s',
+        ("GET /invitation/aB-c_9/ HTTP/1.1", 200),
+        None,
+    )
+    assert HideKeys().filter(line)
+    assert line.getMessage() == '"GET /invitation/.../ HTTP/1.1" 200'
