@@ -3,12 +3,17 @@
 from __future__ import annotations
 
 from enum import StrEnum
+from uuid import UUID
 
 from django.contrib.auth.models import User
+from django.db.models import Q, QuerySet
 
 from arena.errors import NoSnapshot
-from arena.models import Snapshot, Study
+from arena.models import EarlyLook, Snapshot, Study
 from arena.queries.people import role_of
+from augment.models import Event
+
+STAFF = ("admin", "analyst")
 
 
 class ResultsAccess(StrEnum):
@@ -25,34 +30,68 @@ class ResultsAccess(StrEnum):
     NONE = "none"
 
 
-def results_access(*, user: User, study: Study) -> ResultsAccess:
-    """What the user may see; whoever votes in an open study sees nothing, whatever the role.
+def results_access(*, user: User, study: Study, role: str | None = None) -> ResultsAccess:
+    """What the user may see.
 
-    An expert who still judges the same contestants in another study waits until that one closes.
+    Staff may open the results of an open study on purpose; if they vote in it, that ends their
+    voting. An expert who still judges the same contestants in another study waits until that one
+    closes.
+
+    Args:
+        user: Who asks.
+        study: What for.
+        role: Theirs, where somebody has looked it up already.
     """
-    votes_in_it = study.experts.filter(pk=user.pk).exists()
-    staff = role_of(user) in ("admin", "analyst")
+    staff = (role or role_of(user)) in STAFF
     if study.state == Study.State.CLOSED:
-        reads = staff or (votes_in_it and not _still_judges(user, study))
+        reads = staff or (votes_in(user, study) and not _still_judges(user, study))
         return ResultsAccess.FULL if reads else ResultsAccess.NONE
-    return ResultsAccess.EARLY if staff and not votes_in_it else ResultsAccess.NONE
+    if not staff or study.state != Study.State.OPEN:
+        return ResultsAccess.NONE
+    opened = EarlyLook.objects.filter(study=study, user=user).exists()
+    return ResultsAccess.FULL if opened else ResultsAccess.EARLY
+
+
+def votes_in(user: User, study: Study) -> bool:
+    """Whether somebody is an expert of the study."""
+    return study.experts.filter(pk=user.pk).exists()
 
 
 def latest_snapshot(study: Study) -> Snapshot | None:
     """The study's newest rating, None before the first."""
-    return study.snapshots.order_by("-made_at", "-pk").first()
+    return snapshots_of(study).filter(state=Snapshot.State.READY).first()
 
 
-def snapshot_to_export(study: Study) -> Snapshot:
-    """The newest rating.
+def snapshots_of(study: Study) -> QuerySet[Snapshot]:
+    """All ratings, the newest first."""
+    return study.snapshots.order_by("-made_at", "-pk")
+
+
+def snapshot_coded(study: Study, code: UUID | None) -> Snapshot | None:
+    """The rating with that code if it is ready, the newest one without a code."""
+    if code is None:
+        return latest_snapshot(study)
+    return snapshots_of(study).filter(state=Snapshot.State.READY, code=code).first()
+
+
+def snapshot_to_export(study: Study, code: UUID | None = None) -> Snapshot:
+    """The rating with that code, the newest without one.
 
     Raises:
-        NoSnapshot: The study has not been rated yet.
+        NoSnapshot: The study has not been rated yet, or not by that rating.
     """
-    found = latest_snapshot(study)
+    found = snapshot_coded(study, code)
     if found is None:
-        raise NoSnapshot(f"The study {study.name!r} has no rating yet. Rate it first.")
+        what = "no rating yet" if code is None else f"no rating {code}"
+        raise NoSnapshot(f"The study {study.name!r} has {what}. Rate it first.")
     return found
+
+
+def log_of(study: Study, *, most: int) -> list[Event]:
+    """What was done to a study, the newest first; one query."""
+    about = Q(object_kind="study", object_code=str(study.code))
+    rows = Event.objects.filter(about).select_related("actor__person")
+    return list(rows.order_by("-at", "-pk")[:most])
 
 
 def _still_judges(user: User, study: Study) -> bool:

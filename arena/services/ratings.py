@@ -1,104 +1,145 @@
-"""Freezing a rating of a study: which votes, which method, which seed, and what came out."""
+"""Rating a study: which votes, which method, which seed, now or by a worker."""
 
 from __future__ import annotations
 
-import hashlib
-import json
-import platform
-from collections.abc import Sequence
-from typing import Any
+from typing import TypedDict, Unpack
 
-import numpy
 from django.contrib.auth.models import User
 from django.db import transaction
 
 from arena.errors import StudyStillOpen
-from arena.models import Snapshot, Standing, Study, Vote
-from arena.queries.votes import current_votes
+from arena.models import ImportedVote, Snapshot, Study, Vote
+from arena.queries.judged import is_imported, last_vote_of
+from arena.queries.vote_sets import Filters
 from arena.rating.bootstrap import Unit
-from arena.rating.comparisons import LOSS, TIE, WIN, Comparison, as_arrays
-from arena.rating.leaderboard import Leaderboard, Method
-from arena.rating.leaderboard import rate as rate_votes
+from arena.rating.leaderboard import Method
+from arena.services.snapshots import compute
 from augment.errors import Conflict, UnknownName
-from augment.models import Contestant
 from augment.services.events import log_event
 
+DEFAULT_ROUNDS = 10_000
 MOST_ROUNDS = 100_000
-SCORES = {Vote.Outcome.LEFT: WIN, Vote.Outcome.EQUAL: TIE, Vote.Outcome.RIGHT: LOSS}
+WHILE_WAITING = 20_000
+"""Up to so many votes a person waits for the page; more are a worker's job."""
+
+
+class Choices(TypedDict, total=False):
+    """How to rate; `plan_snapshot` says what each means and what holds where it is left out."""
+
+    method: str
+    rounds: int
+    seed: int
+    unit: str | None
+    filters: Filters | None
+    early: bool
+    actor: User | None
 
 
 @transaction.atomic
-def rate(
+def rate(*, study: Study, **choices: Unpack[Choices]) -> Snapshot:
+    """Rate the contestants of a study by its current votes and keep the result for good.
+
+    The same votes, filters, method, unit, rounds and seed give the same snapshot. Choices and
+    errors are those of `plan_snapshot`.
+    """
+    return compute(plan_snapshot(study=study, **choices), lambda percent: None)
+
+
+@transaction.atomic
+def plan_snapshot(
     *,
     study: Study,
     method: str = "bt",
-    rounds: int = 1000,
+    rounds: int = DEFAULT_ROUNDS,
     seed: int = 0,
-    unit: str = "vote",
+    unit: str | None = None,
+    filters: Filters | None = None,
     early: bool = False,
     actor: User | None = None,
 ) -> Snapshot:
-    """Rate the contestants of a study by its current votes and keep the result for good.
-
-    The same votes, method, unit, rounds and seed give the same standings.
+    """Freeze what is to be rated, for a worker to compute.
 
     Args:
         study: Closed, unless `early`.
-        method: "bt" (Bradley-Terry) or "elo" (online).
+        method: "bt" (Bradley-Terry), "davidson" (its tie model) or "elo" (online).
         rounds: Of the bootstrap.
         seed: Of its draws, 0 or more.
-        unit: What the bootstrap draws: "vote", "scenario", "expert" or "two-way".
+        unit: What the bootstrap draws: "vote", "scenario", "expert" or "two-way"; None for
+            two-way where the votes name experts and scenarios, else votes.
+        filters: Which votes count; None for all main ones.
         early: Rate a study that is still open; the snapshot and the log say so.
         actor: Who rates, for the log.
 
     Raises:
         StudyStillOpen: The study is open and nobody asked to look early.
-        UnknownName: There is no such method or unit.
+        UnknownName: There is no such method or unit, or a filter names what does not occur.
         Conflict: Rounds or seed are out of range, or online Elo is asked for another unit.
     """
     is_early = study.state == Study.State.OPEN
     if is_early and not early:
         raise StudyStillOpen(study.name)
-    chosen, drawn = _method(method), _unit(unit)
+    chosen = _method(method)
+    drawn = _default_unit(study, chosen) if unit is None else _unit(unit)
     _check_draws(chosen, drawn, rounds, seed)
-    votes, left_out = _votes_that_count(study)
-    contestants = list(study.contestants.order_by("slug"))
-    names = [contestant.slug for contestant in contestants]
-    comparisons = as_arrays(names, [_comparison(vote) for vote in votes])
-    board = rate_votes(comparisons, method=chosen, rounds=rounds, unit=drawn, seed=seed)
     snapshot = Snapshot.objects.create(
         study=study,
+        state=Snapshot.State.QUEUED,
+        progress=0,
         method=chosen,
         rounds=rounds,
         resampling_unit=drawn,
         seed=seed,
-        votes_sha256=_digest(votes),
-        votes_counted=len(votes),
-        votes_left_out=left_out,
-        versions={"python": platform.python_version(), "numpy": numpy.__version__},
-        status=board.explanation,
-        degenerate_rounds=board.degenerate_rounds,
-        includes_simulated=_any_simulated(votes, contestants),
+        filters=(filters or Filters()).as_document(),
+        last_vote=last_vote_of(study),
+        votes_counted=0,
         is_early=is_early,
         made_by=actor,
     )
-    _store_lines(snapshot, board, contestants)
-    _log(snapshot)
+    log_event(
+        actor=actor,
+        verb="rate early" if is_early else "rate",
+        object_kind="study",
+        object_code=study.code,
+        after={"snapshot": str(snapshot.code), "method": method, "filters": snapshot.filters},
+    )
     return snapshot
 
 
-def log_early_look(*, study: Study, actor: User | None, what: str) -> None:
-    """Write to the log that somebody looked at results of an open study on purpose."""
-    log_event(
-        actor=actor,
-        verb="look early",
-        object_kind="study",
-        object_code=study.code,
-        after={"what": what},
-    )
+def compute_snapshot(*, snapshot_pk: int) -> Snapshot | None:
+    """Compute a planned snapshot, saying how far it is; twice does no harm.
+
+    What goes wrong with the votes themselves is kept as the snapshot's status.
+
+    Returns:
+        The snapshot, None if it is gone or ready already.
+    """
+    waiting = Snapshot.objects.select_related("study").filter(pk=snapshot_pk)
+    snapshot = waiting.exclude(state=Snapshot.State.READY).first()
+    if snapshot is None:
+        return None
+
+    def report(percent: int) -> None:
+        Snapshot.objects.filter(pk=snapshot_pk).update(
+            state=Snapshot.State.RUNNING, progress=percent
+        )
+
+    try:
+        return compute(snapshot, report)
+    except (UnknownName, Conflict, ArithmeticError) as error:
+        Snapshot.objects.filter(pk=snapshot_pk).update(
+            state=Snapshot.State.FAILED, status=str(error)
+        )
+        return None
 
 
-# --- What was asked for ------------------------------------------------------------------------
+def is_big(study: Study) -> bool:
+    """Whether rating takes longer than a person should wait for a page."""
+    if is_imported(study):
+        return ImportedVote.objects.filter(file__study=study).count() > WHILE_WAITING
+    return Vote.objects.filter(matchup__study=study).count() > WHILE_WAITING
+
+
+# --- Private -----------------------------------------------------------------------------------
 
 
 def _method(name: str) -> Method:
@@ -113,6 +154,16 @@ def _unit(name: str) -> Unit:
     return Unit(name)
 
 
+def _default_unit(study: Study, method: Method) -> Unit:
+    if method is Method.ELO:
+        return Unit.VOTE
+    if not is_imported(study):
+        return Unit.TWO_WAY
+    votes = ImportedVote.objects.filter(file__study=study)
+    unnamed = votes.filter(judge="").exists() or votes.filter(item="").exists()
+    return Unit.VOTE if unnamed else Unit.TWO_WAY
+
+
 def _check_draws(method: Method, unit: Unit, rounds: int, seed: int) -> None:
     if not 1 <= rounds <= MOST_ROUNDS:
         raise Conflict(f"Bootstrap rounds go from 1 to {MOST_ROUNDS}, not {rounds}.")
@@ -120,99 +171,3 @@ def _check_draws(method: Method, unit: Unit, rounds: int, seed: int) -> None:
         raise Conflict(f"A seed goes from 0 to 2^63 - 1, not {seed}.")
     if method is Method.ELO and unit is not Unit.VOTE:
         raise Conflict(f"Online Elo resamples single votes only; {unit.value!r} needs bt.")
-
-
-# --- Which votes count -------------------------------------------------------------------------
-
-
-def _votes_that_count(study: Study) -> tuple[list[Vote], dict[str, int]]:
-    """The current votes in a lasting order, and how many were left out, by reason."""
-    found = list(
-        current_votes(study)
-        .select_related(
-            "expert__person", "matchup__scenario", "shown_left__contestant",
-            "shown_right__contestant",
-        )
-        .only(
-            "outcome", "is_simulated", "expert__username", "expert__person__is_simulated",
-            "matchup__position", "matchup__scenario__slug",
-            "shown_left__contestant__slug", "shown_left__contestant__kind",
-            "shown_right__contestant__slug", "shown_right__contestant__kind",
-        )
-        .order_by("expert__username", "matchup__position")
-    )  # fmt: skip
-    everything = Vote.objects.filter(matchup__study=study).count()
-    counted = [vote for vote in found if study.allow_simulated or not _is_simulated(vote)]
-    left_out = {
-        "superseded": everything - len(found),
-        "simulated": len(found) - len(counted),
-    }
-    return counted, {reason: number for reason, number in left_out.items() if number}
-
-
-def _is_simulated(vote: Vote) -> bool:
-    contestants = (vote.shown_left.contestant, vote.shown_right.contestant)
-    return vote.is_simulated or any(contestant.is_simulated for contestant in contestants)
-
-
-def _any_simulated(votes: Sequence[Vote], contestants: Sequence[Contestant]) -> bool:
-    """Whether something in the table is simulated, be it a line without votes."""
-    rated = any(contestant.is_simulated for contestant in contestants)
-    return rated or any(_is_simulated(vote) for vote in votes)
-
-
-def _comparison(vote: Vote) -> Comparison:
-    return Comparison(
-        first=vote.shown_left.contestant.slug,
-        second=vote.shown_right.contestant.slug,
-        score=SCORES[Vote.Outcome(vote.outcome)],
-        expert=vote.expert.username,
-        scenario=vote.matchup.scenario.slug,
-    )
-
-
-def _digest(votes: Sequence[Vote]) -> str:
-    """SHA-256 over one canonical line a vote: who judged what, and how."""
-    lines: list[list[Any]] = [
-        [
-            vote.expert.username,
-            vote.matchup.position,
-            vote.matchup.scenario.slug,
-            vote.shown_left.contestant.slug,
-            vote.shown_right.contestant.slug,
-            vote.outcome,
-            vote.is_simulated,
-        ]
-        for vote in votes
-    ]
-    text = "\n".join(json.dumps(line, ensure_ascii=True) for line in lines)
-    return hashlib.sha256(text.encode()).hexdigest()
-
-
-def _log(snapshot: Snapshot) -> None:
-    log_event(
-        actor=snapshot.made_by,
-        verb="rate early" if snapshot.is_early else "rate",
-        object_kind="study",
-        object_code=snapshot.study.code,
-        after={"snapshot": str(snapshot.code), "votes": snapshot.votes_counted},
-    )
-
-
-def _store_lines(snapshot: Snapshot, board: Leaderboard, contestants: list[Contestant]) -> None:
-    Standing.objects.bulk_create(
-        Standing(
-            snapshot=snapshot,
-            contestant=contestant,
-            rank=line.rank,
-            rating=line.rating,
-            lower=line.lower,
-            upper=line.upper,
-            votes=line.votes,
-            wins=line.wins,
-            ties=line.ties,
-            losses=line.losses,
-            note=line.note,
-        )
-        for contestant, line in zip(contestants, board.lines, strict=True)
-    )

@@ -5,7 +5,7 @@ from typing import Any
 import pytest
 from pytest_django import DjangoAssertNumQueries
 
-from arena.errors import NoSnapshot, StudyNotOpen, StudyStillOpen
+from arena.errors import NoSnapshot, NotYours, StudyNotOpen, StudyStillOpen
 from arena.models import Snapshot, Study, Vote
 from arena.queries.results import (
     ResultsAccess,
@@ -13,13 +13,17 @@ from arena.queries.results import (
     results_access,
     snapshot_to_export,
 )
+from arena.services.early_looks import open_early
 from arena.services.people import create_person
 from arena.services.ratings import rate
 from arena.services.simulation import simulate_votes
 from arena.services.studies import close_study, open_study
 from augment.errors import Conflict, UnknownName
 from augment.models import Augmentation, Contestant, Event, Scenario
-from tests.study_rows import KINDS, a_study, cast_of, matchups_of, vote
+from augment.scene.codec import modification_to_document
+from augment.scene.modification import Modification
+from tests.scenes import vehicle
+from tests.study_rows import KINDS, a_study, cast_of, matchups_of, shown_again, vote
 
 pytestmark = pytest.mark.django_db
 
@@ -51,8 +55,8 @@ def test_a_snapshot_has_a_line_per_contestant_that_agrees_with_a_count() -> None
     assert snapshot.votes_counted == 36
     assert snapshot.votes_left_out == {}
     assert [line[0] for line in lines(snapshot)] == ["ann", "bob", "cid"]
-    for standing in snapshot.standings.select_related("contestant"):
-        slug = standing.contestant.slug
+    for standing in snapshot.standings.all():
+        slug = standing.slug
         votes = Vote.objects.filter(matchup__study=study)
         wins = votes.filter(winner__contestant__slug=slug).count()
         left = votes.filter(shown_left__contestant__slug=slug)
@@ -65,7 +69,7 @@ def test_a_snapshot_has_a_line_per_contestant_that_agrees_with_a_count() -> None
 
 def test_the_same_votes_and_seed_give_the_same_standings() -> None:
     study = voted_study()
-    one, again, other = (rate(study=study, seed=seed) for seed in (5, 5, 6))
+    one, again, other = (rate(study=study, seed=seed, unit="vote") for seed in (5, 5, 6))
     assert (lines(one), one.votes_sha256) == (lines(again), again.votes_sha256)
     assert lines(one) != lines(other)
     assert one.votes_sha256 == other.votes_sha256
@@ -81,6 +85,21 @@ def test_only_current_votes_count() -> None:
     snapshot = rate(study=close_study(study=study))
     assert snapshot.votes_counted == 2
     assert snapshot.votes_left_out == {"superseded": 1}
+
+
+def test_skips_repeats_and_checks_are_left_out_and_counted_apart() -> None:
+    study = a_study(votes_per_expert=6)
+    counted, skipped, check, *_ = matchups_of(study, "eva")
+    study.matchups.filter(pk=check.pk).update(kind="check")
+    repeat = shown_again(counted)
+    vote(counted, "equal", both_miss=False)
+    vote(skipped, "skip", reason="unclear")
+    for matchup in (check, repeat):
+        vote(matchup, "left")
+    snapshot = rate(study=close_study(study=study))
+    assert snapshot.votes_counted == 1
+    assert snapshot.votes_left_out == {"check": 1, "repeat": 1, "skip": 1}
+    assert sum(line.ties for line in snapshot.standings.all()) == 2
 
 
 def test_votes_that_determine_nothing_leave_empty_ratings_and_a_reason() -> None:
@@ -113,7 +132,7 @@ def test_simulated_votes_stay_out_of_a_study_that_does_not_allow_them() -> None:
 @pytest.mark.parametrize(
     ("options", "error", "sentence"),
     [
-        ({"method": "glicko"}, UnknownName, "'glicko'. Known: bt, elo"),
+        ({"method": "glicko"}, UnknownName, "'glicko'. Known: bt, davidson, elo"),
         ({"unit": "pair"}, UnknownName, "'pair'. Known: vote, scenario, expert, two-way"),
         ({"rounds": 0}, Conflict, "from 1 to 100000, not 0"),
         ({"seed": -1}, Conflict, "not -1"),
@@ -138,7 +157,7 @@ def test_every_method_and_unit_rates() -> None:
 
 def test_rating_costs_few_queries(django_assert_max_num_queries: DjangoAssertNumQueries) -> None:
     study = voted_study()
-    with django_assert_max_num_queries(10):
+    with django_assert_max_num_queries(28):
         rate(study=study, rounds=10)
 
 
@@ -156,9 +175,26 @@ def test_who_may_see_results() -> None:
     none, early, full = ResultsAccess.NONE, ResultsAccess.EARLY, ResultsAccess.FULL
     assert access() == [none, none, early, early]
     study.experts.add(adi)
-    assert access() == [none, none, early, none], "who votes does not look, whatever the role"
+    assert access() == [none, none, early, early]
+    open_early(study=study, actor=ana)
+    assert access() == [none, none, full, early], "for whom it was opened"
     study = close_study(study=study)
     assert access() == [full, none, full, full]
+
+
+def test_opening_results_early_is_logged_once_and_ends_voting() -> None:
+    study = a_study()
+    matchup = matchups_of(study, "eva")[0]
+    vote(matchup)
+    for _ in range(2):
+        open_early(study=study, actor=matchup.expert)
+    logged = Event.objects.get(verb="look early")
+    assert logged.after == {"what": "results", "ends_voting": True}
+    with pytest.raises(NotYours):
+        vote(matchups_of(study, "eva")[1])
+    vote(matchups_of(study, "finn")[0])
+    with pytest.raises(Conflict, match="is closed: nothing is opened early"):
+        open_early(study=close_study(study=study), actor=matchup.expert)
 
 
 def test_a_study_without_a_rating_has_nothing_to_export() -> None:
@@ -169,8 +205,8 @@ def test_a_study_without_a_rating_has_nothing_to_export() -> None:
 # --- Simulated votes ---------------------------------------------------------------------------
 
 
-def change(x_m: float, kind: str = "VEHICLE") -> dict[str, Any]:
-    return {"add": [{"type": kind, "x_m": x_m, "y_m": 0.0}], "move": [], "remove": []}
+def change(x_m: float) -> dict[str, Any]:
+    return modification_to_document(Modification(added=(vehicle("Agent2", x_m, 0.0),)))
 
 
 def simulated_study(scenarios: int = 12) -> Study:

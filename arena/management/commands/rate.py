@@ -10,7 +10,7 @@ from arena.errors import ArenaError
 from arena.exports.tables import leaderboard_table
 from arena.exports.writers import plain_text
 from arena.queries.studies import study_named
-from arena.services.ratings import rate
+from arena.services.ratings import DEFAULT_ROUNDS, rate
 from augment.errors import AugmentError
 
 
@@ -22,11 +22,13 @@ class Command(BaseCommand):
     def add_arguments(self, parser: CommandParser) -> None:
         """Which study, and how."""
         parser.add_argument("study", help="its name or its code")
-        parser.add_argument("--method", default="bt", help="bt (Bradley-Terry) or elo")
-        parser.add_argument("--rounds", type=int, default=1000, help="of the bootstrap")
+        parser.add_argument("--method", default="bt", help="bt (Bradley-Terry), davidson or elo")
+        parser.add_argument("--rounds", type=int, default=DEFAULT_ROUNDS, help="of the bootstrap")
         parser.add_argument("--seed", type=int, default=0)
         parser.add_argument(
-            "--unit", default="vote", help="what is resampled: vote, scenario, expert or two-way"
+            "--unit",
+            help="what is resampled: vote (the paper's), scenario, expert or two-way; two-way "
+            "where votes name experts and scenarios, unless given",
         )
         parser.add_argument(
             "--early", action="store_true", help="rate an open study; this is logged"

@@ -1,0 +1,167 @@
+"""The votes that a rating is made of: which count, and which do not and why."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import dataclass
+from enum import StrEnum
+from typing import Any
+
+from arena.models import Study, Vote
+from arena.queries.judged import (
+    AUTOMATIC,
+    CHECK,
+    MAIN,
+    REPEAT,
+    Entrant,
+    Judged,
+    automatic_ties,
+    entrants_of,
+    references,
+    votes_up_to,
+)
+from augment.errors import UnknownName
+from augment.models import Scenario
+
+KINDS = (MAIN, REPEAT)
+"""What may be rated: planned showings, and on demand the hidden repeats of them."""
+
+
+class LeftOut(StrEnum):
+    """Why a vote is no part of a rating. The first reason that fits is the one that is said."""
+
+    SUPERSEDED = "superseded"
+    CHECK = "check"
+    REPEAT = "repeat"
+    SKIP = "skip"
+    SIMULATED = "simulated"
+    FILTERED = "filtered"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Filters:
+    """Which votes are asked for.
+
+    Attributes:
+        types: Of scenarios; empty is all.
+        experts: Codes of judges; empty is all.
+        kinds: Of matchups.
+        automatic_ties: Whether pairs of identical pictures, which nobody sees, count as a tie.
+    """
+
+    types: tuple[str, ...] = ()
+    experts: tuple[str, ...] = ()
+    kinds: tuple[str, ...] = (MAIN,)
+    automatic_ties: bool = False
+
+    def as_document(self) -> dict[str, Any]:
+        """As a snapshot keeps it."""
+        return {
+            "types": list(self.types),
+            "experts": list(self.experts),
+            "kinds": list(self.kinds),
+            "automatic_ties": self.automatic_ties,
+        }
+
+    @classmethod
+    def of_document(cls, document: dict[str, Any]) -> Filters:
+        """What `as_document` wrote; older snapshots have none."""
+        return cls(
+            types=tuple(document.get("types", ())),
+            experts=tuple(document.get("experts", ())),
+            kinds=tuple(document.get("kinds", (MAIN,))),
+            automatic_ties=bool(document.get("automatic_ties", False)),
+        )
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class VoteSet:
+    """What is rated, in the order in which it was decided.
+
+    Attributes:
+        entrants: By slug.
+        counted: The votes that count.
+        repeats: Decided hidden repeats, whether they count or not.
+        checks: Votes on attention checks, and `references` who should win them.
+        left_out: How many votes do not count, by reason.
+    """
+
+    entrants: tuple[Entrant, ...]
+    counted: tuple[Judged, ...]
+    repeats: tuple[Judged, ...]
+    checks: tuple[Judged, ...]
+    references: frozenset[str]
+    left_out: dict[str, int]
+
+
+def vote_set(study: Study, *, filters: Filters, last: int | None) -> VoteSet:
+    """The votes of a study up to a row.
+
+    Args:
+        study: A study of matchups, or one of votes from elsewhere.
+        filters: Which of its votes count.
+        last: See `judged.last_vote_of`; None for none at all.
+
+    Raises:
+        UnknownName: A filter names a type, a judge or a kind that does not occur.
+    """
+    for kind in filters.kinds:
+        if kind not in KINDS:
+            raise UnknownName("kind of vote", kind, list(KINDS))
+    lines, superseded = votes_up_to(study, last)
+    entrants = entrants_of(study, lines)
+    automatic = automatic_ties(study) if filters.automatic_ties else []
+    _check(filters, [*lines, *automatic])
+    simulated = {one.slug for one in entrants if one.is_simulated}
+    judged = [
+        (line, _why_not(line, filters, simulated, study.allow_simulated))
+        for line in [*lines, *automatic]
+    ]
+    left_out = Counter(reason.value for _, reason in judged if reason is not None)
+    left_out[LeftOut.SUPERSEDED.value] = superseded
+    checks = tuple(line for line, reason in judged if reason is LeftOut.CHECK)
+    return VoteSet(
+        entrants=entrants,
+        counted=tuple(line for line, reason in judged if reason is None),
+        repeats=tuple(
+            line for line, _ in judged if line.kind == REPEAT and line.outcome in _RATED
+        ),
+        checks=checks,
+        references=references() if checks else frozenset(),
+        left_out={reason: number for reason, number in sorted(left_out.items()) if number},
+    )
+
+
+# --- Which count -------------------------------------------------------------------------------
+
+_RATED = (Vote.Outcome.LEFT.value, Vote.Outcome.EQUAL.value, Vote.Outcome.RIGHT.value)
+
+
+def _why_not(
+    line: Judged, filters: Filters, simulated: set[str], allow_simulated: bool
+) -> LeftOut | None:
+    """Why a vote does not count, None if it does."""
+    made_up = line.is_simulated or line.left in simulated or line.right in simulated
+    other_type = bool(filters.types) and line.type not in filters.types
+    other_expert = bool(filters.experts) and line.judge not in filters.experts
+    reasons = (
+        (LeftOut.CHECK, line.kind == CHECK),
+        (LeftOut.REPEAT, line.kind == REPEAT and REPEAT not in filters.kinds),
+        (LeftOut.SKIP, line.outcome not in _RATED),
+        (LeftOut.SIMULATED, made_up and not allow_simulated),
+        (LeftOut.FILTERED, other_type or (other_expert and line.kind != AUTOMATIC)),
+        (LeftOut.FILTERED, line.kind == MAIN and MAIN not in filters.kinds),
+    )
+    return next((reason for reason, holds in reasons if holds), None)
+
+
+def _check(filters: Filters, lines: Sequence[Judged]) -> None:
+    known_types = {*Scenario.Type.values, *(line.type for line in lines)}
+    for name in filters.types:
+        if name not in known_types:
+            raise UnknownName("scenario type", name, sorted(known_types))
+    judges = {line.judge for line in lines}
+    for name in filters.experts:
+        if name not in judges:
+            raise UnknownName("expert", name, sorted(judges))

@@ -1,0 +1,153 @@
+"""What a snapshot keeps: computing it from its votes, and reading those votes again."""
+
+from __future__ import annotations
+
+import platform
+from collections.abc import Callable
+
+import numpy
+import scipy
+from django.db import transaction
+
+from arena.models import Snapshot, Standing
+from arena.queries.judged import Entrant, Judged, is_imported
+from arena.queries.vote_sets import Filters, VoteSet, vote_set
+from arena.rating.bootstrap import Unit
+from arena.rating.leaderboard import Leaderboard, Method, rate
+from arena.services import breakdowns
+from arena.services.trust import board_document, claims, trust
+from arena.services.vote_arrays import VoteArrays, vote_arrays
+from arena.services.vote_rows import digest_of, vote_rows, votes_csv
+from augment.errors import Conflict
+
+RESULTS_VERSION = 1
+
+Report = Callable[[int], None]
+
+
+def compute(snapshot: Snapshot, report: Report) -> Snapshot:
+    """Rate the votes that a planned snapshot names, and keep what comes out.
+
+    Args:
+        snapshot: A planned one.
+        report: Is told how far it is, in percent.
+    """
+    report(5)
+    votes = _vote_set(snapshot)
+    arrays = vote_arrays([one.slug for one in votes.entrants], votes.counted)
+    report(20)
+    board = rate(
+        arrays.comparisons,
+        method=Method(snapshot.method),
+        rounds=snapshot.rounds,
+        unit=Unit(snapshot.resampling_unit),
+        seed=snapshot.seed,
+    )
+    report(60)
+    judges = {vote.judge: vote.judge_name for vote in votes.counted}
+    snapshot.results = _results(snapshot, votes, arrays, board) | {"judges": judges}
+    report(90)
+    snapshot.state = Snapshot.State.READY
+    snapshot.progress = 100
+    snapshot.votes_sha256 = digest_of(votes_csv(vote_rows(votes.counted, judges)))
+    snapshot.votes_counted = len(votes.counted)
+    snapshot.votes_left_out = votes.left_out
+    snapshot.versions = {
+        "python": platform.python_version(),
+        "numpy": numpy.__version__,
+        "scipy": scipy.__version__,
+        "results": RESULTS_VERSION,
+    }
+    snapshot.status = board.explanation
+    snapshot.degenerate_rounds = board.degenerate_rounds
+    snapshot.includes_simulated = _any_simulated(votes.counted, votes.entrants)
+    with transaction.atomic():
+        snapshot.standings.all().delete()
+        snapshot.save()
+        _store_lines(snapshot, board, votes.entrants)
+    return snapshot
+
+
+def votes_of(snapshot: Snapshot) -> VoteSet:
+    """The votes that a snapshot is made of, read again.
+
+    Raises:
+        Conflict: They are not what they were: somebody changed rows by hand.
+    """
+    votes = _vote_set(snapshot)
+    rows = vote_rows(votes.counted, judges_of(snapshot))
+    if digest_of(votes_csv(rows)) != snapshot.votes_sha256:
+        raise Conflict(
+            f"The votes of {snapshot.study.name!r} are not those of this rating any more. Rate "
+            "again."
+        )
+    return votes
+
+
+def judges_of(snapshot: Snapshot) -> dict[str, str]:
+    """The judges' pseudonyms by their codes, as they were."""
+    found: dict[str, str] = snapshot.results.get("judges", {})
+    return found
+
+
+# --- Private -----------------------------------------------------------------------------------
+
+
+def _vote_set(snapshot: Snapshot) -> VoteSet:
+    filters = Filters.of_document(snapshot.filters)
+    return vote_set(snapshot.study, filters=filters, last=snapshot.last_vote)
+
+
+def _results(
+    snapshot: Snapshot, votes: VoteSet, arrays: VoteArrays, board: Leaderboard
+) -> dict[str, object]:
+    study, seed = snapshot.study, snapshot.seed
+    method, unit = Method(snapshot.method), Unit(snapshot.resampling_unit)
+    from_file = is_imported(study)
+    planned = breakdowns.planned_pairs(study, Filters.of_document(snapshot.filters))
+    return {
+        "version": RESULTS_VERSION,
+        "board": board_document(board),
+        "trust": trust(arrays, votes, board, seed=seed),
+        "claims": claims(arrays, board, unit=unit, seed=seed),
+        "pairs": breakdowns.pairs(arrays.comparisons, votes.counted, planned),
+        "types": breakdowns.by_type(
+            arrays, method=method, unit=unit, rounds=snapshot.rounds, seed=seed
+        ),
+        "displacement": [] if from_file else breakdowns.displacement(study),
+        "cost": [] if from_file else breakdowns.cost(study, votes.entrants),
+        "models": {
+            one.slug: one.contestant.model for one in votes.entrants if one.contestant is not None
+        },
+    }
+
+
+def _any_simulated(votes: tuple[Judged, ...], entrants: tuple[Entrant, ...]) -> bool:
+    """Whether something in the table is simulated, be it a line without votes."""
+    return any(one.is_simulated for one in entrants) or any(vote.is_simulated for vote in votes)
+
+
+def _store_lines(snapshot: Snapshot, board: Leaderboard, entrants: tuple[Entrant, ...]) -> None:
+    Standing.objects.bulk_create(
+        Standing(
+            snapshot=snapshot,
+            contestant=one.contestant,
+            slug=one.slug,
+            name=one.name,
+            variant=one.variant,
+            kind=one.kind,
+            is_simulated=one.is_simulated,
+            rank=line.rank,
+            rank_best=line.rank_best,
+            rank_worst=line.rank_worst,
+            rating=line.rating,
+            lower=line.lower,
+            upper=line.upper,
+            votes=line.votes,
+            wins=line.wins,
+            ties=line.ties,
+            losses=line.losses,
+            note=line.note,
+        )
+        for one, line in zip(entrants, board.lines, strict=True)
+    )

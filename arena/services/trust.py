@@ -1,0 +1,234 @@
+"""How far a rating can be trusted, as the document that a snapshot keeps."""
+
+from __future__ import annotations
+
+from dataclasses import asdict, replace
+from typing import Any
+
+import numpy as np
+
+from arena.queries.vote_sets import VoteSet
+from arena.rating import elo
+from arena.rating.bootstrap import Unit
+from arena.rating.bradley_terry import ELO_PER_LOGIT, MEAN_ELO
+from arena.rating.comparisons import Comparisons, FloatArray
+from arena.rating.fit_test import fit_test
+from arena.rating.influence import (
+    fewest_votes_to_change_first,
+    rank_changes,
+    without_each_expert,
+)
+from arena.rating.leaderboard import Leaderboard, Line, Method, rate
+from arena.rating.planning import design_effect, votes_until
+from arena.rating.position import side_bias
+from arena.rating.raters import raters
+from arena.rating.reliability import agreement
+from arena.rating.repeats import Repeats, repeat_consistency
+from arena.services.vote_arrays import SCORES, VoteArrays, only_those_with_votes
+
+Document = dict[str, Any]
+
+AGREEMENT_ROUNDS = 1000
+FIT_ROUNDS = 200
+ELO_ROUNDS = 200
+CLAIM_ROUNDS = 1000
+WANTED = (20.0, 15.0, 10.0, 5.0)
+"""Half-widths of intervals that the page says the necessary votes of."""
+
+
+def trust(arrays: VoteArrays, votes: VoteSet, board: Leaderboard, *, seed: int) -> Document:
+    """All statistics about the votes themselves; parts that the votes do not determine are None.
+
+    Args:
+        arrays: The votes that count.
+        votes: The same with hidden repeats and checks.
+        board: Their rating.
+        seed: Of every draw.
+    """
+    inner, _ = only_those_with_votes(arrays.comparisons)
+    strengths = _strengths(inner, board)
+    if set(arrays.items) == {""}:  # nobody knows what was shown twice
+        inner = replace(inner, scenario=np.arange(len(inner), dtype=np.int64))
+    first = _repeats(arrays, votes)
+    document: Document = {
+        "tie_share": _tie_share(inner),
+        "agreement": asdict(agreement(inner, rounds=AGREEMENT_ROUNDS, seed=seed)),
+        "side": asdict(side_bias(inner)) if len(inner) else None,
+        "repeats": asdict(first) if first.number else None,
+        "raters": _panel(arrays, inner, strengths, votes, first),
+        "removal": None,
+        "elo_order": None,
+        "fit": None,
+    }
+    if strengths is not None:
+        names = inner.names
+        removal = fewest_votes_to_change_first(inner, strengths)
+        if removal is not None:
+            document["removal"] = asdict(removal) | {"rival": names[removal.rival]}
+        document["elo_order"] = _elo_order(inner, strengths, seed)
+        document["fit"] = asdict(fit_test(inner, strengths, rounds=FIT_ROUNDS, seed=seed))
+    return document
+
+
+def board_document(board: Leaderboard) -> Document:
+    """What a rating says beside its lines.
+
+    `reasons` and `warnings` are sentences as `read_sentence` takes them; `check` are the intervals
+    in closed form, `above` the pairs that differ with all of them judged at once, both by slug.
+    """
+    names = [line.name for line in board.lines]
+    found = board.separation
+    return {
+        "reasons": [one.as_document() for one in board.reasons],
+        "warnings": [one.as_document() for one in board.warnings],
+        "tie_strength": board.tie_strength,
+        "experts": board.experts,
+        "scenarios": board.scenarios,
+        "check": {
+            line.name: [line.check_lower, line.check_upper]
+            for line in board.lines
+            if line.check_lower is not None
+        },
+        "parts": {line.name: line.part for line in board.lines if line.part >= 0},
+        "above": None
+        if found is None
+        else [[names[i], names[j]] for i, j in np.argwhere(found.above).tolist()],
+    }
+
+
+def claims(arrays: VoteArrays, board: Leaderboard, *, unit: Unit, seed: int) -> Document:
+    """What intervals would say if votes were independent, and how many votes the real ones need.
+
+    Args:
+        arrays: The votes that count.
+        board: Their rating, its intervals by `unit`.
+        unit: What was resampled for them.
+        seed: Of the draws of single votes.
+    """
+    alone = board
+    if unit is not Unit.VOTE:
+        alone = rate(
+            arrays.comparisons,
+            method=Method.BRADLEY_TERRY,
+            rounds=CLAIM_ROUNDS,
+            unit=Unit.VOTE,
+            seed=seed,
+            details=False,
+        )
+    lines = zip(board.lines, alone.lines, strict=True)
+    widths = [(_half(line), _half(other)) for line, other in lines]
+    effects = [
+        effect
+        for wide, narrow in widths
+        if wide is not None and narrow is not None
+        for effect in [design_effect(wide, narrow)]
+        if effect is not None
+    ]
+    known = [wide for wide, _ in widths if wide]
+    typical = float(np.median(known)) if known else None
+    votes = len(arrays.comparisons)
+    return {
+        "half_width": typical,
+        "independent": {
+            line.name: [line.lower, line.upper] for line in alone.lines if line.lower is not None
+        },
+        "design_effect": float(np.median(effects)) if effects else None,
+        "planning": []
+        if typical is None
+        else [
+            {
+                "half_width": wanted,
+                "votes": votes_until(votes=votes, half_width=typical, wanted=wanted),
+            }
+            for wanted in WANTED
+        ],
+    }
+
+
+# --- Private -----------------------------------------------------------------------------------
+
+
+def _strengths(votes: Comparisons, board: Leaderboard) -> FloatArray | None:
+    """(C,) by Bradley-Terry, whatever the method of the board; None where not all are rated."""
+    if board.method is not Method.BRADLEY_TERRY and len(votes):
+        board = rate(votes, rounds=1, unit=Unit.VOTE, details=False)
+    lines = [line for line in board.lines if line.votes]
+    ratings = [line.rating for line in lines if line.rating is not None]
+    if len(ratings) < max(len(lines), 2) or len({line.part for line in lines}) > 1:
+        return None
+    return np.asarray((np.array(ratings, dtype=np.float64) - MEAN_ELO) / ELO_PER_LOGIT)
+
+
+def _half(line: Line) -> float | None:
+    if line.lower is None or line.upper is None:
+        return None
+    return float(line.upper - line.lower) / 2.0
+
+
+def _tie_share(votes: Comparisons) -> float | None:
+    return float((votes.score == 0.5).mean()) if len(votes) else None
+
+
+def _repeats(arrays: VoteArrays, votes: VoteSet) -> Repeats:
+    """Each hidden repeat beside the first showing, from the same contestant's point of view."""
+    first = {vote.matchup: vote for vote in votes.counted}
+    number = {judge: index for index, judge in enumerate(arrays.judges)}
+    rows = []
+    for again in votes.repeats:
+        before = first.get(again.repeat_of)
+        if before is None or again.judge not in number:
+            continue
+        score = SCORES[again.outcome]
+        rows.append(
+            (
+                SCORES[before.outcome],
+                score if again.left == before.left else 1.0 - score,
+                number[again.judge],
+            )
+        )
+    table = np.array(rows, dtype=np.float64).reshape(-1, 3)
+    return repeat_consistency(table[:, 0], table[:, 1], table[:, 2].astype(np.int64))
+
+
+def _panel(
+    arrays: VoteArrays,
+    inner: Comparisons,
+    strengths: FloatArray | None,
+    votes: VoteSet,
+    repeats: Repeats,
+) -> list[Document]:
+    experts = len(arrays.judges)
+    without = np.full((experts, len(inner.names)), np.nan)
+    changes: list[int | None] = [None] * experts
+    if strengths is not None and experts > 1:
+        without = without_each_expert(inner, strengths)
+        changes = rank_changes(strengths, without)
+    names = {vote.judge: vote.judge_name for vote in votes.counted}
+    return [
+        asdict(line)
+        | {
+            "judge": arrays.judges[line.expert],
+            "name": names[arrays.judges[line.expert]],
+            "moves": changes[line.expert],
+            "repeats": list(repeats.by_expert.get(line.expert, (0, 0))),
+            "checks": _checks(votes, arrays.judges[line.expert]),
+        }
+        for line in raters(inner, ms=arrays.ms, without=without)
+    ]
+
+
+def _checks(votes: VoteSet, judge: str) -> list[int]:
+    """How many attention checks were answered, and how many of them for the reference."""
+    own = [vote for vote in votes.checks if vote.judge == judge]
+    return [len(own), sum(vote.winner in votes.references for vote in own)]
+
+
+def _elo_order(votes: Comparisons, strengths: FloatArray, seed: int) -> list[Document]:
+    """Contestants by Bradley-Terry, with what online Elo makes of them."""
+    online = np.median(elo.resampled(votes, rounds=ELO_ROUNDS, seed=seed), axis=1)
+    places = np.argsort(np.argsort(-online, kind="stable"))
+    order = np.argsort(-strengths, kind="stable")
+    return [
+        {"slug": votes.names[index], "elo": float(online[index]), "place": int(places[index]) + 1}
+        for index in order.tolist()
+    ]

@@ -1,0 +1,110 @@
+"""Votes as the arrays that ratings are computed from."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import partial
+
+import numpy as np
+
+from arena.models import Vote
+from arena.queries.judged import Judged
+from arena.rating.comparisons import (
+    LOSS,
+    TIE,
+    WIN,
+    BoolArray,
+    Comparisons,
+    FloatArray,
+    IntArray,
+)
+
+SCORES = {
+    Vote.Outcome.LEFT.value: WIN,
+    Vote.Outcome.EQUAL.value: TIE,
+    Vote.Outcome.RIGHT.value: LOSS,
+}
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class VoteArrays:
+    """V votes as numbers.
+
+    Attributes:
+        comparisons: `first` was shown on the left.
+        judges, items, types: Names by their numbers.
+        type_of: (V,) the type of each vote's scenario.
+        ms: (V,) how long each pair was on screen, not a number where unknown.
+    """
+
+    comparisons: Comparisons
+    judges: tuple[str, ...]
+    items: tuple[str, ...]
+    types: tuple[str, ...]
+    type_of: IntArray
+    ms: FloatArray
+
+
+def vote_arrays(names: Sequence[str], votes: Sequence[Judged]) -> VoteArrays:
+    """Number everything, in the order in which it occurs.
+
+    Args:
+        names: Slugs of the contestants, also of those without votes.
+        votes: Each compares two of them.
+    """
+    number = {name: index for index, name in enumerate(names)}
+    judges: dict[str, int] = {}
+    items: dict[str, int] = {}
+    types: dict[str, int] = {}
+    whole = partial(np.array, dtype=np.int64)
+    type_of = whole([types.setdefault(vote.type, len(types)) for vote in votes])
+    comparisons = Comparisons(
+        names=tuple(names),
+        first=whole([number[vote.left] for vote in votes]),
+        second=whole([number[vote.right] for vote in votes]),
+        score=np.array([SCORES[vote.outcome] for vote in votes], dtype=np.float64),
+        expert=whole([judges.setdefault(vote.judge, len(judges)) for vote in votes]),
+        scenario=whole([items.setdefault(vote.item, len(items)) for vote in votes]),
+    )
+    return VoteArrays(
+        comparisons=comparisons,
+        judges=tuple(judges),
+        items=tuple(items),
+        types=tuple(types),
+        type_of=type_of,
+        ms=np.array(
+            [np.nan if vote.ms_visible is None else vote.ms_visible for vote in votes],
+            dtype=np.float64,
+        ),
+    )
+
+
+def some(votes: Comparisons, rows: BoolArray) -> Comparisons:
+    """The chosen votes, their experts and scenarios numbered without gaps."""
+    _, expert = np.unique(votes.expert[rows], return_inverse=True)
+    _, scenario = np.unique(votes.scenario[rows], return_inverse=True)
+    return Comparisons(
+        names=votes.names,
+        first=votes.first[rows],
+        second=votes.second[rows],
+        score=votes.score[rows],
+        expert=expert.astype(np.int64),
+        scenario=scenario.astype(np.int64),
+    )
+
+
+def only_those_with_votes(votes: Comparisons) -> tuple[Comparisons, IntArray]:
+    """The same votes without contestants that have none, and (C,) which are kept."""
+    kept = np.unique(np.concatenate([votes.first, votes.second]))
+    place = np.zeros(len(votes.names), dtype=np.int64)
+    place[kept] = np.arange(len(kept))
+    found = Comparisons(
+        names=tuple(votes.names[index] for index in kept.tolist()),
+        first=place[votes.first],
+        second=place[votes.second],
+        score=votes.score.copy(),
+        expert=votes.expert.copy(),
+        scenario=votes.scenario.copy(),
+    )
+    return found, kept

@@ -1,0 +1,77 @@
+"""Votes as the rows of a table that other rating packages read, and the hash of a vote set.
+
+The hash is that of the CSV file with these rows, so whoever has the file can check it.
+"""
+
+from __future__ import annotations
+
+import csv
+import hashlib
+import io
+from collections.abc import Iterable, Iterator, Mapping
+
+from arena.models import Vote
+from arena.queries.judged import Judged
+from arena.services.cells import cell
+
+COLUMNS = (
+    "model_a", "model_b", "winner", "judge", "item", "type", "kind", "side", "ms_visible",
+    "simulated",
+)  # fmt: skip
+"""The first three are Chatbot Arena's; `model_a` was on the left, `side` is the winner's."""
+
+Row = tuple[str, str, str, str, str, str, str, str, int | None, bool]
+
+_WINNERS = {
+    Vote.Outcome.LEFT.value: "model_a",
+    Vote.Outcome.EQUAL.value: "tie",
+    Vote.Outcome.RIGHT.value: "model_b",
+}
+BOTH_BAD = "tie (bothbad)"
+
+
+def vote_rows(votes: Iterable[Judged], names: Mapping[str, str]) -> Iterator[Row]:
+    """One row a vote.
+
+    Args:
+        votes: In their order.
+        names: The judges' pseudonyms by their codes, as they were when the votes were frozen.
+    """
+    for vote in votes:
+        yield (
+            vote.left,
+            vote.right,
+            BOTH_BAD if vote.both_miss else _WINNERS[vote.outcome],
+            names.get(vote.judge, vote.judge),
+            vote.item,
+            vote.type,
+            vote.kind,
+            vote.outcome if vote.outcome != Vote.Outcome.EQUAL.value else "",
+            vote.ms_visible,
+            vote.is_simulated,
+        )
+
+
+def votes_csv(rows: Iterable[Row]) -> bytes:
+    """The rows with their head; no cell is a formula."""
+    sheet = io.StringIO()
+    writer = csv.writer(sheet, lineterminator="\n")
+    writer.writerow(COLUMNS)
+    guarded = _Guarded()
+    writer.writerows(
+        (*(guarded[text] for text in row[:8]), row[8], "yes" if row[9] else "no") for row in rows
+    )
+    return sheet.getvalue().encode()
+
+
+class _Guarded(dict[str, str]):
+    """The same few names come again and again: each is guarded once."""
+
+    def __missing__(self, text: str) -> str:
+        self[text] = guarded = cell(text)
+        return guarded
+
+
+def digest_of(content: bytes) -> str:
+    """SHA-256 of a file, in hexadecimal digits."""
+    return hashlib.sha256(content).hexdigest()

@@ -1,0 +1,47 @@
+"""Big ratings are a worker's job: the task, and what happens without a queue."""
+
+from __future__ import annotations
+
+import pytest
+from django.urls import reverse
+
+from arena import tasks
+from arena.models import Snapshot
+from arena.services.ratings import is_big, plan_snapshot
+from arena.services.studies import close_study
+from augment.errors import QueueUnreachable
+from tests.study_rows import a_study, vote
+from tests.web.cast import people, signed_in
+
+pytestmark = pytest.mark.django_db
+
+
+def planned() -> Snapshot:
+    study = a_study(votes_per_expert=3)
+    for matchup in study.matchups.all():
+        vote(matchup)
+    return plan_snapshot(study=close_study(study=study), rounds=10)
+
+
+def test_the_task_computes_what_was_planned_and_a_second_message_changes_nothing() -> None:
+    snapshot = planned()
+    assert not is_big(snapshot.study)
+    for _ in range(2):
+        tasks.compute_snapshot(snapshot.pk)
+    snapshot.refresh_from_db()
+    assert (snapshot.state, snapshot.votes_counted) == (Snapshot.State.READY, 6)
+    assert snapshot.standings.count() == 3
+    tasks.compute_snapshot(0)  # a row that is gone is no fault
+
+
+def test_without_a_queue_the_rating_waits_and_says_why() -> None:
+    snapshot = planned()
+    with pytest.raises(QueueUnreachable):
+        tasks.send_snapshot(snapshot.pk)
+    analyst = signed_in(people()["analyst"])
+    again = reverse("rating-again", args=[snapshot.study.code, snapshot.code])
+    shown = analyst.post(again, follow=True).content.decode()
+    assert "is being computed: 0 %" in shown
+    assert "queue" in shown.lower()
+    snapshot.refresh_from_db()
+    assert snapshot.state == Snapshot.State.QUEUED

@@ -1,0 +1,154 @@
+"""Which votes a rating is made of, and what it keeps of them."""
+
+from __future__ import annotations
+
+import csv
+import io
+
+import pytest
+
+from arena.models import Matchup, Snapshot, Study, Vote
+from arena.queries.judged import last_vote_of
+from arena.queries.vote_sets import Filters, vote_set
+from arena.services.ratings import compute_snapshot, plan_snapshot, rate
+from arena.services.snapshots import judges_of, votes_of
+from arena.services.studies import close_study
+from arena.services.vote_rows import COLUMNS, vote_rows, votes_csv
+from augment.errors import Conflict, UnknownName
+from augment.models import Scenario
+from tests.study_rows import a_study, matchups_of, vote
+
+pytestmark = pytest.mark.django_db
+
+
+def counted(study: Study, **filters: object) -> list[str]:
+    found = vote_set(study, filters=Filters(**filters), last=last_vote_of(study))  # type: ignore[arg-type]
+    return [f"{one.item} {one.left} {one.right} {one.outcome}" for one in found.counted]
+
+
+def test_filters_choose_by_type_and_expert_and_count_what_they_leave_out() -> None:
+    study = a_study(votes_per_expert=6)
+    Scenario.objects.filter(slug="place-0").update(type=Scenario.Type.OVERTAKE)
+    for matchup in study.matchups.all():
+        vote(matchup)
+    eva = matchups_of(study, "eva")[0].expert.person
+    wanted = study.matchups.filter(scenario__slug="place-0").count()
+    assert len(counted(study)) == 12
+    assert len(counted(study, types=(Scenario.Type.OVERTAKE.value,))) == wanted > 0
+    assert len(counted(study, experts=(str(eva.code),))) == 6
+    found = vote_set(study, filters=Filters(experts=(str(eva.code),)), last=last_vote_of(study))
+    assert found.left_out == {"filtered": 6}
+
+
+@pytest.mark.parametrize(
+    ("filters", "sentence"),
+    [
+        ({"types": ("parade",)}, "scenario type 'parade'"),
+        ({"experts": ("nobody",)}, "expert 'nobody'"),
+        ({"kinds": ("check",)}, "Known: main, repeat"),
+    ],
+)
+def test_a_filter_that_names_nothing_is_refused(
+    filters: dict[str, tuple[str, ...]], sentence: str
+) -> None:
+    study = a_study(votes_per_expert=1)
+    with pytest.raises(UnknownName, match=sentence):
+        counted(study, **filters)
+
+
+def test_skips_repeats_and_checks_are_counted_but_not_rated() -> None:
+    study = a_study(votes_per_expert=4)
+    first, second, third, fourth = matchups_of(study, "eva")
+    Matchup.objects.filter(pk=second.pk).update(kind="repeat", repeat_of=first)
+    Matchup.objects.filter(pk=third.pk).update(kind="check")
+    for matchup in (first, second, third):
+        vote(matchup)
+    vote(fourth, "skip", reason="unclear")
+    found = vote_set(study, filters=Filters(), last=last_vote_of(study))
+    assert len(found.counted) == 1
+    assert found.left_out == {"check": 1, "repeat": 1, "skip": 1}
+    assert (len(found.repeats), len(found.checks)) == (1, 1)
+    assert len(counted(study, kinds=("main", "repeat"))) == 2
+
+
+def test_votes_after_the_frozen_one_do_not_count_nor_supersede() -> None:
+    study = a_study(votes_per_expert=2)
+    first, second = matchups_of(study, "eva")
+    old = vote(first, "left")
+    last = last_vote_of(study)
+    vote(first, "right", supersedes=old.key)
+    vote(second, "left")
+    found = vote_set(study, filters=Filters(), last=last)
+    assert [one.outcome for one in found.counted] == ["left"]
+    assert found.left_out == {}
+
+
+def test_identical_pictures_are_a_tie_only_on_demand() -> None:
+    study = a_study(votes_per_expert=2)
+    study.rules["identical"] = [["place-0", "ann", "bob"]]
+    study.save()
+    assert counted(study) == []
+    assert counted(study, automatic_ties=True) == ["place-0 ann bob equal"]
+
+
+def test_a_snapshot_keeps_its_filters_and_judges_and_finds_its_votes_again() -> None:
+    study = a_study(votes_per_expert=3)
+    for matchup in study.matchups.all():
+        vote(matchup)
+    snapshot = rate(
+        study=close_study(study=study),
+        rounds=10,
+        filters=Filters(types=(Scenario.Type.NUDGE.value,)),
+    )
+    assert snapshot.filters["types"] == [Scenario.Type.NUDGE.value]
+    person = matchups_of(study, "eva")[0].expert.person
+    assert judges_of(snapshot)[str(person.code)] == person.pseudonym
+    person.pseudonym = "Somebody else"
+    person.save()
+    assert len(votes_of(snapshot).counted) == 6, "the name of then counts"
+    Vote.objects.filter(pk=snapshot.last_vote or 0).update(ms_visible=1)
+    with pytest.raises(Conflict, match="not those of this rating any more"):
+        votes_of(snapshot)
+
+
+def test_rows_have_the_columns_of_other_packages_and_no_formulas() -> None:
+    study = a_study(votes_per_expert=4)
+    first, second, third, _ = matchups_of(study, "eva")
+    vote(first, "left", ms_visible=1200)
+    vote(second, "right")
+    study.allow_both_miss = True
+    study.save()
+    vote(third, "equal", both_miss=True)
+    found = vote_set(study, filters=Filters(), last=last_vote_of(study))
+    names = {found.counted[0].judge: "=cmd|calc"}
+    lines = list(csv.DictReader(io.StringIO(votes_csv(vote_rows(found.counted, names)).decode())))
+    assert tuple(lines[0]) == COLUMNS
+    assert [line["winner"] for line in lines] == ["model_a", "model_b", "tie (bothbad)"]
+    assert [line["side"] for line in lines] == ["left", "right", ""]
+    assert lines[0]["model_a"] == first.left.contestant.slug
+    assert (lines[0]["ms_visible"], lines[1]["ms_visible"]) == ("1200", "")
+    assert {line["judge"] for line in lines} == {"'=cmd|calc"}
+
+
+def test_a_planned_snapshot_counts_only_once_it_is_computed_and_once() -> None:
+    study = a_study(votes_per_expert=3)
+    for matchup in study.matchups.all():
+        vote(matchup)
+    study = close_study(study=study)
+    snapshot = plan_snapshot(study=study, rounds=10)
+    assert (snapshot.state, snapshot.progress) == (Snapshot.State.QUEUED, 0)
+    computed = compute_snapshot(snapshot_pk=snapshot.pk)
+    assert computed is not None
+    assert (computed.state, computed.progress, computed.votes_counted) == ("ready", 100, 6)
+    assert compute_snapshot(snapshot_pk=snapshot.pk) is None
+    again = rate(study=study, rounds=10)
+    assert again.results == Snapshot.objects.get(pk=snapshot.pk).results
+
+
+def test_a_planned_snapshot_that_names_what_is_gone_says_so() -> None:
+    study = close_study(study=a_study(votes_per_expert=1))
+    snapshot = plan_snapshot(study=study, rounds=10, filters=Filters(experts=("nobody",)))
+    assert compute_snapshot(snapshot_pk=snapshot.pk) is None
+    snapshot.refresh_from_db()
+    assert snapshot.state == "failed"
+    assert "nobody" in snapshot.status
