@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+
+from django.utils.translation import gettext as _
 
 from arena.queries.inventory import Inventory
 
@@ -25,76 +27,76 @@ class Step:
 
 def steps(found: Inventory) -> list[Step]:
     """The way through the house, with what is done and what comes next."""
-    way = [
+    return _with_next([*_preparing(found), *_studying(found)])
+
+
+def _preparing(found: Inventory) -> list[Step]:
+    return [
         Step(
-            title="Load the catalogue",
-            detail=f"{found.scenarios} scenarios are here."
+            title=_("Load the catalogue"),
+            detail=_("%(n)s scenarios are here.") % {"n": found.scenarios}
             if found.scenarios
-            else "No scenario yet. Run: manage.py load_catalogue",
+            else _("No scenario yet. Run: manage.py load_catalogue"),
             done=found.scenarios > 0,
             link="scenarios",
-            action="Scenarios",
+            action=_("Scenarios"),
         ),
         Step(
-            title="Have at least two contestants",
-            detail=f"{found.contestants} contestants are registered."
+            title=_("Have at least two contestants"),
+            detail=_("%(n)s contestants are registered.") % {"n": found.contestants}
             if found.contestants
-            else "None yet. Run: manage.py add_contestant",
+            else _("None yet. Run: manage.py add_contestant"),
             done=found.contestants >= 2,
             link="",
             action="",
         ),
         Step(
-            title="Run a job",
-            detail=f"{found.done} augmentations are done."
+            title=_("Run a job"),
+            detail=_("%(n)s augmentations are done.") % {"n": found.done}
             if found.done
-            else "A job lets contestants carry out the instructions of scenarios.",
+            else _("A job lets contestants carry out the instructions of scenarios."),
             done=found.done > 0,
             link="job-new",
-            action="New job",
-        ),
-        Step(
-            title="Open a study",
-            detail=f"{found.studies} so far, {found.studies_open} open now."
-            if found.studies
-            else "Experts compare two results of a scenario without knowing whose they are.",
-            done=found.studies > 0,
-            link="studies",
-            action="Studies",
-        ),
-        Step(
-            title="Let the experts vote",
-            detail=f"{found.votes:,} votes are saved; studies open: {found.studies_open}."
-            if found.votes
-            else "No vote yet.",
-            done=found.votes > 0 and found.studies_open == 0,
-            link="studies",
-            action="Progress",
-        ),
-        Step(
-            title="Close and read the results",
-            detail=f"{found.studies_closed} closed."
-            if found.studies_closed
-            else "Results show once a study is closed.",
-            done=found.studies_closed > 0,
-            link="studies",
-            action="Results",
+            action=_("New job"),
         ),
     ]
-    return _with_next(way)
+
+
+def _studying(found: Inventory) -> list[Step]:
+    return [
+        Step(
+            title=_("Open a study"),
+            detail=_("%(n)s so far, %(open)s open now.")
+            % {"n": found.studies, "open": found.studies_open}
+            if found.studies
+            else _("Experts compare two results of a scenario without knowing whose they are."),
+            done=found.studies > 0,
+            link="studies",
+            action=_("Studies"),
+        ),
+        Step(
+            title=_("Let the experts vote"),
+            detail=_("%(n)s votes are saved; studies open: %(open)s.")
+            % {"n": f"{found.votes:,}", "open": found.studies_open}
+            if found.votes
+            else _("No vote yet."),
+            done=found.votes > 0 and found.studies_open == 0,
+            link="studies",
+            action=_("Progress"),
+        ),
+        Step(
+            title=_("Close and read the results"),
+            detail=_("%(n)s closed.") % {"n": found.studies_closed}
+            if found.studies_closed
+            else _("Results show once a study is closed."),
+            done=found.studies_closed > 0,
+            link="studies",
+            action=_("Results"),
+        ),
+    ]
 
 
 def _with_next(way: list[Step]) -> list[Step]:
     """The same steps, the first open one marked."""
     position = next((n for n, step in enumerate(way) if not step.done), None)
-    return [
-        Step(
-            title=step.title,
-            detail=step.detail,
-            done=step.done,
-            link=step.link,
-            action=step.action,
-            is_next=n == position,
-        )
-        for n, step in enumerate(way)
-    ]
+    return [replace(step, is_next=n == position) for n, step in enumerate(way)]

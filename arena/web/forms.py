@@ -2,16 +2,22 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import Any
 
 from django import forms
 from django.contrib.auth.models import User
+from django.utils.translation import gettext_lazy as _
 
-from arena.queries.profiles import Theme
+from arena.models import Report, Vote
+from arena.queries.profiles import Language, Theme
 from arena.queries.scenarios import TypeGroup
+from arena.services.decisions import LONGEST_COMMENT, Decision, decision_of
 from augment.models import Contestant
 from augment.services.caps import Caps
+from augment.services.estimates import Estimate, estimate
 from augment.services.fault_guess import FaultClass
+from augment.services.feasible import keys_missing, obstacle
 
 
 class ThemeForm(forms.Form):
@@ -24,6 +30,29 @@ class ThemeForm(forms.Form):
         return Theme(self.cleaned_data["theme"])
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Offer:
+    """A contestant to choose, or why it can't be.
+
+    Attributes:
+        keys_missing: Environment variables that its workers need and this process lacks.
+    """
+
+    row: Contestant
+    obstacle: str = ""
+    keys_missing: tuple[str, ...] = ()
+
+
+class LanguageForm(forms.Form):
+    """The other switch in the account menu."""
+
+    language = forms.ChoiceField(choices=[(one.value, one.label) for one in Language])
+
+    def language_value(self) -> Language:
+        """What was chosen, once the form is valid."""
+        return Language(self.cleaned_data["language"])
+
+
 class ChoiceForm(forms.Form):
     """Contestants x scenarios, under a name.
 
@@ -32,7 +61,7 @@ class ChoiceForm(forms.Form):
 
     name = forms.CharField(max_length=120, strip=True)
     contestants = forms.MultipleChoiceField(
-        error_messages={"required": "Choose at least one contestant."}
+        error_messages={"required": _("Choose at least one contestant.")}
     )
     types = forms.MultipleChoiceField(required=False)
     scenarios = forms.MultipleChoiceField(required=False)
@@ -48,6 +77,11 @@ class ChoiceForm(forms.Form):
         slugs = [row.slug for group in groups for row in group.scenarios]
         self._offer("scenarios", [(slug, slug) for slug in slugs])
 
+    @property
+    def offers(self) -> list[Offer]:
+        """For the template: whom there is to choose."""
+        return [Offer(row=row) for row in self.offered]
+
     def clean(self) -> dict[str, Any]:
         """Whole types become their scenarios."""
         cleaned = super().clean() or {}
@@ -60,7 +94,7 @@ class ChoiceForm(forms.Form):
             if group.type in types or row.slug in chosen
         ]
         if not cleaned["scenarios"]:
-            self.add_error("scenarios", "Choose at least one scenario.")
+            self.add_error("scenarios", _("Choose at least one scenario."))
         return cleaned
 
     def chosen(self, field: str) -> list[str]:
@@ -103,45 +137,76 @@ class CapsForm(forms.Form):
         )
 
 
+def _offer(row: Contestant) -> Offer:
+    why_not = obstacle(row)
+    missing = () if why_not else tuple(keys_missing(row))
+    return Offer(row=row, obstacle=why_not, keys_missing=missing)
+
+
 class LaunchForm(ChoiceForm, CapsForm):
     """A new job."""
 
     is_fresh = forms.BooleanField(required=False)
 
-
-class StudyForm(ChoiceForm):
-    """A new study; its rules are fixed from the moment it opens."""
-
-    experts = forms.MultipleChoiceField(error_messages={"required": "Choose at least one expert."})
-    votes_per_expert = forms.IntegerField(min_value=1, max_value=10_000, initial=40)
-    seed = forms.IntegerField(initial=1)
-    allow_simulated = forms.BooleanField(required=False)
-
-    def __init__(self, *args: Any, experts: list[User], **kwargs: Any) -> None:
-        super().__init__(*args, **kwargs)
-        self.accounts = experts
-        self._offer("experts", [(user.get_username(), user.get_username()) for user in experts])
-
     @property
-    def chosen_experts(self) -> list[str]:
-        """For the template."""
-        return self.chosen("experts")
+    def offers(self) -> list[Offer]:
+        """Contestants that no job can run say why."""
+        return [_offer(row) for row in self.offered]
 
-    def rules(self) -> dict[str, Any]:
-        """What the study is opened with, once the form is valid."""
-        names = ("name", "contestants", "scenarios", "experts", "votes_per_expert", "seed")
-        return {name: self.cleaned_data[name] for name in (*names, "allow_simulated")}
+    def estimated(self) -> Estimate | None:
+        """What the job would use, as far as it is chosen; nothing has to be named or capped."""
+        self.is_valid()
+        chosen = [self.cleaned_data.get(name, []) for name in ("contestants", "scenarios")]
+        for name in ("name", "contestants", "scenarios"):
+            self.errors.pop(name, None)
+        return estimate(*chosen) if all(chosen) else None
 
 
 class VoteForm(forms.Form):
-    """One press of one of the three buttons."""
+    """One press of one button: an answer, or a reason to skip."""
 
     key = forms.UUIDField()
     matchup = forms.UUIDField()
     outcome = forms.ChoiceField(
-        choices=[("left", "A is better"), ("equal", "Equal"), ("right", "B is better")]
+        required=False, choices=[(name, name) for name in ("left", "equal", "both_miss", "right")]
     )
-    ms_visible = forms.IntegerField(required=False, min_value=0, max_value=86_400_000)
+    skip = forms.ChoiceField(required=False, choices=Vote.SkipReason.choices)
+    supersedes = forms.UUIDField(required=False)
+    comment = forms.CharField(required=False, max_length=LONGEST_COMMENT)
+
+    def clean(self) -> dict[str, Any]:
+        """Exactly one of answer and skip."""
+        cleaned = super().clean() or {}
+        if bool(cleaned.get("outcome")) == bool(cleaned.get("skip")):
+            raise forms.ValidationError(_("One answer is needed."))
+        return cleaned
+
+    def decision(self) -> Decision:
+        """What was decided, once the form is valid.
+
+        Raises:
+            InvalidVote: Parts do not go together.
+        """
+        given = self.cleaned_data
+        both_miss = given["outcome"] == "both_miss"
+        return decision_of(
+            matchup_code=given["matchup"],
+            key=given["key"],
+            outcome="equal" if both_miss else given["outcome"] or "skip",
+            both_miss=both_miss,
+            reason=given["skip"],
+            comment=given["comment"],
+            supersedes=given["supersedes"],
+        )
+
+
+class ReportForm(forms.Form):
+    """What is wrong with a pair."""
+
+    key = forms.UUIDField()
+    matchup = forms.UUIDField()
+    report = forms.ChoiceField(choices=Report.Reason.choices)
+    report_comment = forms.CharField(required=False, max_length=LONGEST_COMMENT)
 
 
 class LabelForm(forms.Form):
@@ -162,7 +227,9 @@ class LabellingForm(forms.Form):
     """A new labelling of a job."""
 
     name = forms.CharField(max_length=120, strip=True)
-    experts = forms.MultipleChoiceField(error_messages={"required": "Choose at least one expert."})
+    experts = forms.MultipleChoiceField(
+        error_messages={"required": _("Choose at least one expert.")}
+    )
     seed = forms.IntegerField(initial=1, min_value=0, max_value=2**63 - 1)
 
     def __init__(self, *args: Any, experts: list[User], **kwargs: Any) -> None:

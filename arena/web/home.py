@@ -14,9 +14,10 @@ from arena.models import Study
 from arena.queries import faults, inventory, jobs, progress
 from arena.queries.people import role_of
 from arena.queries.results import ResultsAccess, results_access
-from arena.services.preferences import choose_theme
+from arena.services.preferences import choose_language, choose_theme
 from arena.web.checklist import steps
-from arena.web.forms import ThemeForm
+from arena.web.forms import LanguageForm, ThemeForm
+from arena.web.sign_in import keep_language
 
 LATEST_JOBS = 5
 
@@ -41,6 +42,23 @@ def theme(request: HttpRequest) -> HttpResponse:
     form = ThemeForm(request.POST)
     if form.is_valid():
         choose_theme(user=cast(User, request.user), theme=form.theme_value())
+    return _back(request)
+
+
+@require_POST
+def language(request: HttpRequest) -> HttpResponse:
+    """Keep the language with the account, and in this browser for the pages before the login."""
+    form = LanguageForm(request.POST)
+    answer = _back(request)
+    if form.is_valid():
+        chosen = form.language_value()
+        choose_language(user=cast(User, request.user), language=chosen)
+        keep_language(answer, chosen)
+    return answer
+
+
+def _back(request: HttpRequest) -> HttpResponse:
+    """To where the switch was pressed, if that is a page of ours."""
     back = request.POST.get("next", "")
     if not url_has_allowed_host_and_scheme(back, {request.get_host()}, request.is_secure()):
         back = "home"

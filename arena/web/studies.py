@@ -3,23 +3,27 @@
 from __future__ import annotations
 
 import uuid
-from typing import cast
+from typing import Any, cast
 
 from django.contrib import messages
 from django.contrib.auth.models import User
 from django.http import HttpRequest, HttpResponse
 from django.shortcuts import get_object_or_404, redirect, render
+from django.utils.translation import gettext as _
 from django.views.decorators.http import require_http_methods, require_POST, require_safe
 
 from arena.errors import ArenaError
 from arena.models import Study
 from arena.queries import progress, scenarios
-from arena.queries.people import experts
+from arena.queries.coverage import coverage, reports_of
+from arena.queries.judged import is_imported
+from arena.queries.people import by_pseudonym, experts
 from arena.queries.results import latest_snapshot
 from arena.queries.votes import tallies
-from arena.services.studies import close_study, open_study
+from arena.services.handing_over import hand_over
+from arena.services.studies import close_study, open_study, rules_of
 from arena.web.access import ADMIN, STAFF, only
-from arena.web.forms import StudyForm
+from arena.web.study_forms import HandOverForm, StudyForm
 from augment.errors import AugmentError
 from augment.models import Contestant
 
@@ -37,9 +41,13 @@ def new_study_page(request: HttpRequest) -> HttpResponse:
     """Who competes on what, and who judges; opening plans every matchup."""
     form = StudyForm(
         request.POST or None,
-        contestants=list(Contestant.objects.select_related("endpoint").order_by("name")),
+        contestants=list(
+            Contestant.objects.exclude(kind=Contestant.Kind.CHECK)
+            .select_related("endpoint")
+            .order_by("name")
+        ),
         groups=scenarios.by_type(),
-        experts=list(experts().order_by("person__pseudonym")),
+        experts=by_pseudonym(experts()),
     )
     if request.method == "POST" and form.is_valid():
         try:
@@ -47,7 +55,9 @@ def new_study_page(request: HttpRequest) -> HttpResponse:
         except (ArenaError, AugmentError) as error:
             form.add_error(None, str(error))
         else:
-            messages.success(request, f"“{study.name}” is open; its experts can vote now.")
+            messages.success(
+                request, _("“%(name)s” is open; its experts can vote now.") % {"name": study.name}
+            )
             return redirect("study", code=study.code)
     return render(request, "studies/new.html", {"form": form}, status=422 if form.errors else 200)
 
@@ -56,15 +66,46 @@ def new_study_page(request: HttpRequest) -> HttpResponse:
 @require_safe
 def study_page(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
     """The rules, and how far each expert is."""
-    study = get_object_or_404(Study, code=code)
+    study = get_object_or_404(Study.objects.select_related("vote_file"), code=code)
+    if is_imported(study):
+        return redirect("results", code=code)
     context = {
         "line": progress.of_study(study),
         "tallies": tallies(study),
         "contestants": list(study.contestants.all()),
         "scenario_count": study.scenarios.count(),
         "snapshot": latest_snapshot(study),
+        "rules": _shown_rules(study),
+        "coverage": coverage(study),
+        "reports": list(reports_of(study)),
+        "accounts": by_pseudonym(experts()),
     }
     return render(request, "studies/study.html", context)
+
+
+@only(ADMIN)
+@require_POST
+def hand_over_pairs(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
+    """Let others judge what an expert has not judged."""
+    study = get_object_or_404(Study, code=code)
+    form = HandOverForm(
+        request.POST,
+        givers=list(study.experts.values_list("username", flat=True)),
+        takers=[user.username for user in experts()],
+    )
+    if not form.is_valid():
+        for problems in form.errors.values():
+            messages.error(request, " ".join(map(str, problems)))
+        return redirect("study", code=code)
+    giver, takers = form.cleaned_data["giver"], form.cleaned_data["takers"]
+    try:
+        taken = hand_over(study=study, username=giver, to=takers, actor=cast(User, request.user))
+    except (ArenaError, AugmentError) as error:
+        messages.error(request, str(error))
+    else:
+        shares = ", ".join(f"{name} {votes}" for name, votes in taken.items())
+        messages.success(request, _("Handed over: %(shares)s.") % {"shares": shares})
+    return redirect("study", code=code)
 
 
 @only(ADMIN)
@@ -77,5 +118,20 @@ def close(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
     except ArenaError as error:
         messages.error(request, str(error))
     else:
-        messages.success(request, "Closed. Its results can be read now.")
+        messages.success(request, _("Closed. Its results can be read now."))
     return redirect("study", code=code)
+
+
+def _shown_rules(study: Study) -> dict[str, Any] | None:
+    """The rules of the plan for the page, None for votes from a file, which nobody planned."""
+    if "entries" not in study.rules:
+        return None
+    rules = rules_of(study)
+    return {
+        "by_contestant": bool(rules.appearances),
+        "by_pair": bool(rules.pair_votes),
+        "repeats": 100 * rules.repeat_share,
+        "checks": 100 * rules.check_share if rules.checks else 0,
+        "adaptive": 100 * rules.adaptive_share,
+        "gap": study.rules["scenario_gap_kept"],
+    }

@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+import uuid
+
 import pytest
+from django.contrib.auth.models import User
 from django.urls import reverse
 
 from arena.models import Study
+from arena.services.reports import report
 from tests import study_rows
 from tests.web.cast import people, signed_in
 
@@ -56,3 +60,74 @@ def test_closing_is_for_admins_and_leads_to_the_results() -> None:
     assert reverse("results", args=[study.code]) in answer.content.decode()
     study.refresh_from_db()
     assert study.state == "closed"
+
+
+def opened(**rules: object) -> tuple[int, str]:
+    """What posting the form with these rules answers."""
+    sent = {"name": "Round 1", **study_rows.cast_of(), "votes_per_expert": 12, "seed": 4}
+    answer = signed_in(people()["admin"]).post(reverse("study-new"), {**sent, **rules})
+    return answer.status_code, " ".join(answer.content.decode().split())
+
+
+def test_a_study_is_opened_with_all_its_rules() -> None:
+    targets = "ann 20\nbob = 15\n\ncid: 13"
+    opened(repeats="25", checks="2", adaptive="", targets=targets, allow_both_miss="on")
+    study = Study.objects.get()
+    assert study.allow_both_miss
+    kinds = study.matchups.values_list("kind", flat=True)
+    assert (list(kinds).count("main"), list(kinds).count("repeat")) == (24, 6)
+    assert study.rules["appearances"] == [["ann", 20], ["bob", 15], ["cid", 13]]
+
+
+@pytest.mark.parametrize(
+    ("rules", "sentence"),
+    [
+        ({"targets": "ann lots"}, "is no target: write CONTESTANT NUMBER"),
+        ({"targets": "ann 20"}, "Each contestant of the study needs one target: bob, cid."),
+        ({"targets": "ann vs bob 9"}, "The targets add up to 9 votes"),
+        ({"repeats": "80"}, "less than or equal to 50"),
+        ({"adaptive": "50", "targets": "ann vs bob 24"}, "none are left for an adaptive part"),
+    ],
+)
+def test_rules_that_make_no_sense_are_said_on_the_form(
+    rules: dict[str, str], sentence: str
+) -> None:
+    status, shown = opened(**rules)
+    assert (status, sentence in shown) == (422, True), shown
+    assert not Study.objects.exists()
+
+
+def test_the_page_shows_rules_coverage_and_reports() -> None:
+    study = study_rows.a_study()
+    first, second, *_ = study_rows.matchups_of(study, "eva")
+    study_rows.vote(first)
+    report(
+        expert=first.expert,
+        matchup_code=second.code,
+        key=uuid.uuid4(),
+        reason="picture_wrong",
+        comment="The truck is cut off.",
+    )
+    shown = (
+        signed_in(people()["analyst"]).get(reverse("study", args=[study.code])).content.decode()
+    )
+    assert "none, balanced" in shown
+    assert "Votes: 1 of 18." in shown
+    assert "The truck is cut off." in shown
+    assert "Hand over" not in shown, "that is for admins"
+
+
+def test_an_admin_hands_over_what_an_expert_has_not_judged() -> None:
+    study = study_rows.a_study(experts=("eva", "finn", "gus"))
+    admin = signed_in(people()["admin"])
+    url = reverse("study-hand-over", args=[study.code])
+    said = admin.post(url, {"giver": "eva", "takers": ["finn", "gus"]}, follow=True)
+    assert "Handed over: finn 5, gus 4." in said.content.decode() or (
+        "Handed over: finn 4, gus 5." in said.content.decode()
+    )
+    assert not study.matchups.filter(expert__username="eva").exists()
+    again = admin.post(url, {"giver": "eva", "takers": ["finn"]}, follow=True)
+    assert "eva has nothing left to hand over." in again.content.decode()
+    nobody = admin.post(url, {"giver": "finn"}, follow=True)
+    assert "Choose who takes over." in nobody.content.decode()
+    assert signed_in(User.objects.get(username="the-analyst")).post(url).status_code == 403
