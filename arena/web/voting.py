@@ -9,18 +9,20 @@ from django.contrib import messages
 from django.contrib.auth.models import User
 from django.http import Http404, HttpRequest, HttpResponse, HttpResponseBase
 from django.shortcuts import redirect, render
+from django.utils.translation import gettext as _
 from django.views.decorators.cache import never_cache
-from django.views.decorators.http import require_http_methods, require_safe
+from django.views.decorators.http import require_http_methods, require_POST, require_safe
 
-from arena.errors import AlreadyDecided, NotYours, StudyNotOpen
+from arena.errors import AlreadyDecided, InvalidVote, NotYours, StudyNotOpen, TooFast
 from arena.models import Study
 from arena.queries.showings import picture_shown
 from arena.queries.studies import voting_study
-from arena.queries.votes import next_matchup, voting_progress
-from arena.services.votes import cast_vote, mark_served
+from arena.services.reports import report
+from arena.services.votes import receive_vote
 from arena.web.access import ADMIN, EXPERT, only
-from arena.web.forms import VoteForm
+from arena.web.forms import ReportForm, VoteForm
 from arena.web.pictures import picture_response
+from arena.web.screen import over_context, vote_context
 from augment.errors import Conflict
 
 
@@ -28,15 +30,50 @@ from augment.errors import Conflict
 @never_cache
 @require_http_methods(["GET", "HEAD", "POST"])
 def vote_page(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
-    """The next pair; a vote is saved and followed by a redirect, so back and reload are safe."""
-    expert = cast(User, request.user)
+    """The next pair, or with `change` one that was decided.
+
+    A vote that comes by the form is saved and followed by a redirect, so that back and reload
+    are safe; with a script votes go to the wire instead.
+    """
+    study = _study_of(request, code)
+    if request.method == "POST":
+        return _save(request, study)
+    return _show(request, study)
+
+
+@only(EXPERT)
+@require_safe
+def help_page(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
+    """How to vote, for those without a script; with one it is a panel of the voting page."""
+    study = _study_of(request, code)
+    return render(request, "vote/help.html", over_context(study, cast(User, request.user)))
+
+
+@require_POST
+@only(EXPERT)
+def report_pair(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
+    """Keep what is wrong with a pair, then show it again."""
+    study = _study_of(request, code)
+    form = ReportForm(request.POST)
+    if not form.is_valid():
+        messages.error(request, _("That could not be read; nothing was reported."))
+        return redirect("vote", code=study.code)
+    given = form.cleaned_data
     try:
-        study = voting_study(expert=expert, code=code)
+        report(
+            expert=cast(User, request.user),
+            matchup_code=given["matchup"],
+            key=given["key"],
+            reason=given["report"],
+            comment=given["report_comment"],
+        )
     except NotYours as error:
         raise Http404 from error
-    if request.method == "POST":
-        return _save(request, study, expert)
-    return _show(request, study, expert)
+    except StudyNotOpen:
+        pass  # the page that follows says that the study is closed
+    else:
+        messages.success(request, _("Reported, thank you."))
+    return redirect("vote", code=study.code)
 
 
 @only(EXPERT, ADMIN)
@@ -50,38 +87,46 @@ def matchup_image(request: HttpRequest, token: str) -> HttpResponseBase:
     return picture_response(name)
 
 
-def _show(request: HttpRequest, study: Study, expert: User, status: int = 200) -> HttpResponse:
-    """The next pair, or why there is none."""
-    context = {"study": study, "progress": voting_progress(study=study, expert=expert)}
-    if study.state == Study.State.CLOSED:
-        return render(request, "vote/closed.html", context)
+# Private
+
+
+def _study_of(request: HttpRequest, code: uuid.UUID) -> Study:
+    try:
+        study = voting_study(expert=cast(User, request.user), code=code)
+    except NotYours as error:
+        raise Http404 from error
     if study.state == Study.State.DRAFT:
         raise Http404
-    matchup = next_matchup(study=study, expert=expert)
-    if matchup is None:
-        return render(request, "vote/done.html", context)
-    mark_served(matchups=[matchup])
-    context |= {"matchup": matchup, "key": uuid.uuid4()}
+    return study
+
+
+def _show(request: HttpRequest, study: Study, status: int = 200) -> HttpResponse:
+    """A pair, or why there is none."""
+    expert = cast(User, request.user)
+    if study.state == Study.State.CLOSED:
+        return render(request, "vote/closed.html", over_context(study, expert))
+    context = vote_context(study, expert, change=request.GET.get("change", ""))
+    if context is None:
+        return render(request, "vote/done.html", over_context(study, expert))
     return render(request, "vote/vote.html", context, status=status)
 
 
-def _save(request: HttpRequest, study: Study, expert: User) -> HttpResponse:
+def _save(request: HttpRequest, study: Study) -> HttpResponse:
     form = VoteForm(request.POST)
-    if not form.is_valid():
-        messages.error(request, "That was not one of the three answers; nothing was saved.")
-        return _show(request, study, expert, status=422)
     try:
-        cast_vote(
-            expert=expert,
-            matchup_code=form.cleaned_data["matchup"],
-            key=form.cleaned_data["key"],
-            outcome=form.cleaned_data["outcome"],
-            ms_visible=form.cleaned_data["ms_visible"],
-        )
+        if not form.is_valid():
+            raise InvalidVote({"outcome": "It is none of the answers."})
+        receive_vote(expert=cast(User, request.user), decision=form.decision())
     except NotYours as error:
         raise Http404 from error
+    except InvalidVote:
+        messages.error(request, _("That was not one of the answers; nothing was saved."))
+        return _show(request, study, status=422)
+    except TooFast:
+        messages.error(request, _("That was too fast to be read; nothing was saved."))
+        return _show(request, study, status=429)
     except (AlreadyDecided, Conflict):
-        messages.info(request, "You had decided that pair before; your first vote counts.")
+        messages.info(request, _("You had decided that pair before; your first vote counts."))
     except StudyNotOpen:
         pass  # the page that follows says that the study is closed
     return redirect("vote", code=study.code)

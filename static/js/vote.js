@@ -1,47 +1,297 @@
-// Keys 1, 2 and 3 press the buttons; a pair counts only when both pictures are there.
-const BOUNCE_MS = 200; // the second half of a double click must not judge the next pair
-const form = document.getElementById("vote");
-const buttons = [...form.querySelectorAll("button")];
-const pictures = [...document.querySelectorAll(".panel img")];
-let shownAt = null;
-let isSent = false;
+// The voting loop: pairs are decoded ahead; a vote is written down in the browser, the next pair
+// is painted, and the vote goes out in the background.
+import { actionOf } from "./vote-keys.js";
+import { Lens } from "./vote-lens.js";
+import { ask, Outbox } from "./vote-outbox.js";
+import * as page from "./vote-page.js";
+import { Pairs } from "./vote-pairs.js";
+import { hold } from "./vote-tabs.js";
 
-function show(now) {
-  shownAt = now;
-  setTimeout(() => { form.inert = false; }, BOUNCE_MS);
-}
+const BOUNCE_MS = 200; // the second half of a double press must not judge the next pair
+const UNDOABLE = 10;
+const ARROWS = { ArrowUp: [0, 1], ArrowDown: [0, -1], ArrowLeft: [-1, 0], ArrowRight: [1, 0] };
 
-function refuse() {
-  document.getElementById("no-picture").hidden = false;
-  for (const button of buttons) button.disabled = true;
-}
+const { at, given, text } = page;
+const { preferences, urls } = given;
+const form = at("vote");
+const field = form.elements.comment;
+let votes = given.last; // the latest first: {key, position, outcome, both_miss, comment, shown, pair}
+let review = null; // the one of them that is on the screen again
+let onScreen = null; // the pair whose pictures are painted
+let paintedAt = Infinity;
+let hiddenMs = 0;
+let isLeaving = false;
 
-form.inert = true;
-Promise.all(pictures.map((picture) => picture.decode())).then(
-  () => requestAnimationFrame(show),
-  refuse,
-);
+const pairs = new Pairs(given.alts, fetchPairs, draw);
+const lens = new Lens([...document.querySelectorAll(".panel")], text, page.drawLens);
+const outbox = new Outbox(given.outbox, urls, {
+  wanted: () => Math.min(12, pairs.depth + outbox.entries.length),
+  changed: () => page.drawSaved(outbox.entries.length),
+  saved,
+  refused,
+  stopped,
+});
 
-form.addEventListener("submit", (event) => {
-  if (isSent || shownAt === null) {
-    event.preventDefault();
+// --- Painting ------------------------------------------------------------------------------------
+
+function draw() {
+  const pair = review ? review.pair : pairs.open;
+  const { state = "loading" } = pair ?? {};
+  if (pair) at("place").textContent = pair.shown.position;
+  const isReady = state === "ready";
+  at("main").classList.toggle("is-waiting", !isReady);
+  at("answers").inert = !isReady;
+  form.inert = state === "loading";
+  if (isReady) {
+    if (pair !== onScreen) paint(pair);
     return;
   }
-  isSent = true;
-  form.elements.ms_visible.value = Math.round(performance.now() - shownAt);
-});
+  onScreen = form.inert ? null : pair; // what does not show can be skipped
+  at("veil-text").textContent = text(state);
+  at("again").hidden = form.inert;
+  if (!pair) finish();
+}
+
+function paint(pair) {
+  onScreen = pair;
+  paintedAt = Infinity;
+  lens.show(pair, preferences.keep_zoom);
+  page.drawPair(pair.shown);
+  form.elements.matchup.value = pair.shown.matchup;
+  page.drawReview(review);
+  field.value = (review ? review.comment : pair.draft) ?? "";
+  page.drawComment(field.value);
+  requestAnimationFrame(() => {
+    paintedAt = performance.now();
+    hiddenMs = 0;
+    setTimeout(afterwards);
+  });
+}
+
+// What need not be in the same frame.
+function afterwards() {
+  page.replay(at("ask"));
+  page.drawLast(votes);
+  pairs.list[review ? 0 : 1]?.warm();
+}
+
+// --- Deciding ------------------------------------------------------------------------------------
+
+function decide(outcome, more = {}) {
+  if (!onScreen || (outcome !== "skip" && onScreen.state !== "ready")) return;
+  const now = performance.now();
+  if (!(now - paintedAt >= BOUNCE_MS)) return page.replay(at("saved"));
+  const { shown } = onScreen;
+  const [key, comment] = [page.freshKey(), field.value.trim()];
+  const body = { key, matchup: shown.matchup, outcome, ...more, comment, aids: [...lens.aids] };
+  body.ms_visible = Math.round(now - paintedAt - hiddenMs);
+  const vote = voteOf({ body, shown }, onScreen);
+  page.note("");
+  page.closePop();
+  if (review) {
+    const isSame = ["outcome", "both_miss", "comment"].every((name) => vote[name] === review[name]);
+    if (isSame && outcome !== "skip") return leave();
+    body.supersedes = review.key;
+    Object.assign(review, vote);
+    review = null;
+  } else {
+    votes = [vote, ...votes].slice(0, UNDOABLE);
+    pairs.decide(shown.matchup);
+  }
+  outbox.add("votes", body, shown);
+  draw();
+}
+
+function voteOf({ body, shown }, pair) {
+  const { key, outcome, comment, both_miss = false } = body;
+  return { key, outcome, comment, both_miss, position: shown.position, shown, pair };
+}
+
+function undo(vote = votes[review ? votes.indexOf(review) + 1 : 0]) {
+  if (!vote) return page.note(text("no-more"));
+  if (onScreen && !review) onScreen.draft = field.value;
+  page.closePop();
+  if (vote.pair?.state !== "ready") vote.pair = pairs.make(vote.shown);
+  review = vote;
+  onScreen = null;
+  draw();
+}
+
+function leave() {
+  lens.flip(false);
+  if (!review) return;
+  review = onScreen = null;
+  page.drawReview(null);
+  draw();
+}
+
+function report(reason) {
+  const { report_comment: told } = form.elements;
+  const { matchup } = onScreen.shown;
+  outbox.add("reports", { key: page.freshKey(), matchup, reason, comment: told.value.trim() });
+  told.value = "";
+  page.closePop();
+}
+
+// --- What the server says ------------------------------------------------------------------------
+
+function saved({ to }, body) {
+  page.unblock();
+  if (to === "reports") return page.note(text("reported"));
+  page.drawProgress(body);
+  pairs.take(body.next);
+  if (onScreen && !review && !outbox.entries.length) {
+    page.say(text("spoken", onScreen.shown.position, given.total, onScreen.shown.instruction));
+  }
+}
+
+function refused({ to, body: vote }, status, answer) {
+  if (to === "reports") return page.note(text("report-refused"));
+  const stored = answer?.error?.outcome;
+  if (stored === vote.outcome) return;
+  if (stored) page.note(text("first-counts", text(stored)));
+  else page.note(text(status === 404 ? "taken-back" : "not-accepted"));
+  if (!stored && status !== 404) pairs.reopen(vote.matchup);
+  if (review?.key === vote.key) leave();
+  votes = votes.filter(({ key }) => key !== vote.key);
+  page.drawLast(votes);
+  pairs.fill();
+}
+
+function stopped(status) {
+  page.block(status, outbox.entries.length, () => {
+    isLeaving = true;
+    if (status !== 410) return;
+    outbox.clear();
+    location.replace(urls.page);
+  });
+}
+
+async function fetchPairs(n) {
+  const { status, body } = await ask(`${urls.matchups}&n=${n}`);
+  if (outbox.isHalted) return null;
+  if ([401, 403, 410].includes(status)) stopped(status);
+  if (status !== 200) return null;
+  page.unblock();
+  return body;
+}
+
+// No pair is left here; the server knows whether that is all.
+async function finish() {
+  if (outbox.entries.length || isLeaving) return;
+  const found = await pairs.fill();
+  if (found?.length !== 0 || pairs.open || review || outbox.entries.length) return;
+  isLeaving = true;
+  location.replace(urls.page);
+}
+
+// --- Keys, clicks, tabs --------------------------------------------------------------------------
+
+const actions = {
+  a: () => decide("A"),
+  e: () => decide("E"),
+  b: () => decide("B"),
+  both_miss: () => given.allow_both_miss && decide("E", { both_miss: true }),
+  undo: () => undo(),
+  skip: () => page.showPop("skip"),
+  report: () => page.showPop("report"),
+  comment: () => page.showPop("comment"),
+  leave,
+  original: () => lens.flip(true),
+  pin: () => lens.flip(!lens.isFlipped, true),
+  zoom: () => lens.toggleZoom(),
+  reset: () => lens.reset(),
+  ruler: () => lens.rule(true),
+  legend: () => ask(urls.preferences, { legend: page.toggleLegend() }),
+  help: () => import("./vote-help.js").then(({ showHelp }) => showHelp(), () => open(at("help-link").href)),
+  again: () => pairs.fill(),
+  close: page.closePop,
+};
+const always = new Set(["undo", "leave", "legend", "help", "again"]); // without a pair as well
+const held = new Map(); // key code -> what its release ends
+
+function arrow({ key, shiftKey }) {
+  const [ahead, left] = ARROWS[key] ?? [];
+  if (ahead === undefined || !onScreen) return false;
+  if (lens.isRuling) lens.step(ahead, left);
+  else if (shiftKey && lens.isZoomed) lens.pan(-ahead / 4, left / 4);
+  else return false;
+  return true;
+}
 
 addEventListener("keydown", (event) => {
-  const isModified = event.ctrlKey || event.altKey || event.metaKey || event.shiftKey;
-  if (event.repeat || event.isComposing || isModified || form.inert) return;
-  const button = buttons["123".indexOf(event.key)];
-  if (button && !button.disabled) {
-    event.preventDefault();
-    form.requestSubmit(button);
-  }
+  const { target, repeat, code } = event;
+  if (document.querySelector("dialog[open]")) return;
+  if (page.openPop()) return page.keyInPop(event);
+  if (arrow(event)) return event.preventDefault();
+  const action = actionOf(event, preferences);
+  // Enter, held on a button, would click on and on.
+  if (action || (repeat && target.closest("button"))) event.preventDefault();
+  if (!action || repeat || (!onScreen && !always.has(action))) return;
+  actions[action]();
+  if (action === "original") held.set(code, () => lens.isPinned || lens.flip(false));
+  if (action === "ruler") held.set(code, () => lens.rule(false));
 });
 
-// A page that comes back from the browser's memory may show a pair that is decided already.
-addEventListener("pageshow", (event) => {
-  if (event.persisted) location.reload();
+function release(code) {
+  held.get(code)?.();
+  held.delete(code);
+}
+
+addEventListener("keyup", ({ code }) => release(code));
+addEventListener("blur", () => [...held.keys()].forEach(release));
+
+form.addEventListener("submit", (event) => {
+  event.preventDefault();
+  const { name, value } = event.submitter ?? {};
+  if (name === "skip") decide("skip", { reason: value });
+  else if (name === "report") report(value);
+  else actions[page.ACTIONS[value]]?.();
 });
+form.addEventListener("input", () => page.drawComment(field.value));
+
+document.addEventListener("click", (event) => {
+  const pressed = event.target.closest("[data-do], [data-vote]");
+  if (!pressed) return;
+  event.preventDefault();
+  const { do: action, vote: key } = pressed.dataset;
+  if (key) undo(votes.find((vote) => vote.key === key));
+  else if (action === "ruler") lens.rule(!lens.isRuling);
+  else actions[action === "original" ? "pin" : action]();
+});
+
+document.addEventListener("visibilitychange", () => {
+  hiddenMs += document.hidden ? -performance.now() : performance.now();
+});
+addEventListener("beforeunload", (event) => {
+  if (outbox.entries.length && !isLeaving) event.preventDefault();
+});
+// A page that comes back from the browser's memory may show a pair that is decided already.
+addEventListener("pageshow", ({ persisted }) => persisted && location.reload());
+
+function elsewhere() {
+  outbox.halt();
+  isLeaving = true; // the other tab sends what is kept
+  page.block("elsewhere", 0, async () => {
+    await hold(given.outbox, () => {}, { steal: true });
+    location.reload();
+  });
+}
+
+async function start() {
+  form.inert = true;
+  page.drawKeys();
+  document.body.classList.add("is-live");
+  if (!(await hold(given.outbox, elsewhere))) return elsewhere();
+  const waiting = outbox.entries.filter(({ to }) => to === "votes").map((entry) => voteOf(entry));
+  const byMatchup = new Map([...votes.reverse(), ...waiting].map((vote) => [vote.shown.matchup, vote]));
+  votes = [...byMatchup.values()].reverse().slice(0, UNDOABLE);
+  for (const matchup of byMatchup.keys()) pairs.decide(matchup);
+  page.drawSaved(outbox.entries.length);
+  page.drawLast(votes);
+  pairs.take(given.pairs);
+  outbox.start();
+  if (given.change) undo(votes.find(({ key }) => key === given.change));
+}
+
+start();

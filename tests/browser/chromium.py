@@ -18,6 +18,8 @@ FLAGS = [
     "--disable-sync",
     "--no-first-run",
 ]
+PATIENCE_MS = 60_000
+"""How long a page may take for anything: a busy machine is slow, but not broken."""
 
 
 @contextmanager
@@ -25,7 +27,9 @@ def chromium() -> Iterator[Browser]:
     """The system's Chromium, else the one that Playwright downloaded; one for each thread."""
     path = os.environ.get("CHROMIUM") or next(filter(None, map(shutil.which, NAMES)), None)
     with sync_playwright() as playwright:
-        browser = playwright.chromium.launch(executable_path=path, args=FLAGS)
+        browser = playwright.chromium.launch(
+            executable_path=path, args=FLAGS, timeout=2 * PATIENCE_MS
+        )
         try:
             yield browser
         finally:

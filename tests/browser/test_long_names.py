@@ -6,21 +6,20 @@ from pathlib import Path
 
 import pytest
 from django.conf import settings
-from playwright.sync_api import ViewportSize
+from playwright.sync_api import Browser
 
-from tests.browser.chromium import chromium
+from tests.browser.booth import PHONE
 
 pytestmark = pytest.mark.browser
-PHONE = ViewportSize(width=390, height=844)
 SHEETS = ("tokens", "base", "components")
 
 
 @pytest.mark.parametrize("element", ["h1", "h2", "h3", "p"])
-def test_a_long_name_breaks_instead_of_widening_the_page(element: str) -> None:
+def test_a_long_name_breaks_instead_of_widening_the_page(browser: Browser, element: str) -> None:
     folder = Path(settings.BASE_DIR) / "static" / "css"
     styles = "".join((folder / f"{name}.css").read_text() for name in SHEETS)
     card = f"<div class='card'><{element}>{'n' * 120}</{element}></div>"
-    with chromium() as browser:
-        page = browser.new_page(viewport=PHONE)
-        page.set_content(f"<style>{styles}</style><main>{card}</main>")
-        assert page.evaluate("document.documentElement.scrollWidth") == PHONE["width"]
+    page = browser.new_page(viewport=PHONE)
+    page.set_content(f"<style>{styles}</style><main>{card}</main>")
+    assert page.evaluate("document.documentElement.scrollWidth") == PHONE["width"]
+    page.close()

@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 import csv
+import re
 from collections import Counter
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import pytest
-from playwright.sync_api import Page
+from playwright.sync_api import Page, expect
 
-from tests.browser.chromium import chromium
+from tests.browser.booth import DESK, ready
+from tests.browser.chromium import PATIENCE_MS, chromium
 from tests.stack import Home
 
 pytestmark = [
@@ -18,56 +20,54 @@ pytestmark = [
     pytest.mark.redis,
     pytest.mark.slow,
     pytest.mark.timeout(600),
-    pytest.mark.xdist_group("demo"),
 ]
 STUDY = "Two at once"
 VOTES = 12
-PASSWORD = "a password to vote with"
 
 
-def sign_in(page: Page, address: str, username: str) -> None:
+def sign_in(page: Page, address: str, username: str, password: str) -> None:
     page.goto(f"{address}/login/")
     page.fill("input[name=username]", username)
-    page.fill("input[name=password]", PASSWORD)
+    page.fill("input[name=password]", password)
     page.click("form[action*=login] button, main form button")
     page.wait_for_url(f"{address}/")
 
 
-def vote_all(address: str, username: str, *, by_key: bool) -> list[str]:
+def vote_all(address: str, username: str, password: str, *, by_key: bool) -> list[str]:
     """Vote on every pair, by keys or by clicks; returns the answers in order."""
     answers = []
     with chromium() as browser:
-        page = browser.new_page(viewport={"width": 1280, "height": 720})
-        sign_in(page, address, username)
+        page = browser.new_page(viewport=DESK)
+        page.set_default_timeout(PATIENCE_MS)
+        sign_in(page, address, username, password)
         page.click("a[href*='/vote/']")
         for number in range(VOTES):
-            # Both pictures are decoded when the form takes answers.
-            page.wait_for_selector("form#vote:not([inert])")
+            expect(page.locator("#place")).to_have_text(str(number + 1))
+            ready(page)
             answer = ("left", "equal", "right")[(number + len(username)) % 3]
-            here = page.input_value("input[name=matchup]")
             if by_key:
                 page.keyboard.press(str(("left", "equal", "right").index(answer) + 1))
             else:
                 page.click(f"button[name=outcome][value={answer}]")
-            page.locator(f"input[name=matchup][value='{here}']").wait_for(state="detached")
             answers.append(answer)
-        assert "You are done" in page.inner_text("main")
+        page.get_by_role("heading", name="You are done.").wait_for()
     return answers
 
 
-@pytest.fixture(scope="module")
-def home(demo_home: Home, tmp_path_factory: pytest.TempPathFactory) -> Home:
-    home = demo_home.copy(tmp_path_factory.mktemp("two") / "h")
-    for username in ("ada", "grace"):
-        printed = home.must("add_person", username, "--role", "expert")
-        assert "Password (shown once)" in printed
-        set_password(home, username)
-    home.must(
-        *("open_study", STUDY, "--contestants", "reference", "rule-placer", "sim-careless-otm"),
-        *("--scenarios", *augmented(home), "--experts", "ada", "grace"),
-        *("--votes-per-expert", str(VOTES), "--seed", "3", "--allow-simulated"),
+def with_experts(home: Home) -> dict[str, str]:
+    """Open the study to two new experts; returns their passwords."""
+    names = ("ada", "grace")
+    printed = home.must_all(
+        *(("add_person", name, "--role", "expert") for name in names),
+        (
+            *("open_study", STUDY, "--contestants"),
+            *("reference", "rule-placer", "sim-careless-otm"),
+            *("--scenarios", *augmented(home), "--experts", *names),
+            *("--votes-per-expert", str(VOTES), "--repeats", "0", "--seed", "3"),
+            "--allow-simulated",
+        ),
     )
-    return home
+    return dict(zip(names, re.findall(r"Password \(shown once\): (\S+)", printed), strict=True))
 
 
 def augmented(home: Home) -> list[str]:
@@ -81,28 +81,24 @@ def augmented(home: Home) -> list[str]:
     ]
 
 
-def set_password(home: Home, username: str) -> None:
-    code = (
-        "from django.contrib.auth.models import User;"
-        f"u = User.objects.get(username={username!r}); u.set_password({PASSWORD!r}); u.save()"
-    )
-    home.must("shell", "-c", code)
-
-
-def test_two_browsers_vote_at_once_and_the_export_agrees(home: Home, tmp_path: Path) -> None:
+def test_two_browsers_vote_at_once_and_the_export_agrees(demo_home: Home, tmp_path: Path) -> None:
+    home = demo_home.copy(tmp_path / "h")
+    passwords = with_experts(home)
     with home.serving() as address, ThreadPoolExecutor(2) as pool:
-        by_keys = pool.submit(vote_all, address, "ada", by_key=True)
-        by_clicks = pool.submit(vote_all, address, "grace", by_key=False)
+        by_keys = pool.submit(vote_all, address, "ada", passwords["ada"], by_key=True)
+        by_clicks = pool.submit(vote_all, address, "grace", passwords["grace"], by_key=False)
         cast = by_keys.result() + by_clicks.result()
     rows = votes(home)
     assert len(rows) == 2 * VOTES
     assert len({row["matchup"] for row in rows}) == 2 * VOTES
     assert Counter(row["outcome"] for row in rows) == Counter(cast)
 
-    home.must("close_study", STUDY)
-    home.must("rate", STUDY)
     file = tmp_path / "table.csv"
-    home.must("export", "leaderboard", STUDY, "--format", "csv", "--out", str(file))
+    home.must_all(
+        ("close_study", STUDY),
+        ("rate", STUDY),
+        ("export", "leaderboard", STUDY, "--format", "csv", "--out", str(file)),
+    )
     with file.open(newline="") as table:
         exported = {row["slug"]: row for row in csv.DictReader(table)}
     for slug, counted in count_by_hand(rows).items():

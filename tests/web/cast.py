@@ -29,15 +29,15 @@ class World:
     expert: User
 
 
-def png(shade: int = 0) -> bytes:
-    """The smallest picture there is, one grey pixel."""
+def png(shade: int = 0, *, width: int = 1, height: int = 1) -> bytes:
+    """A grey picture, of one pixel unless told otherwise."""
 
     def chunk(kind: bytes, data: bytes) -> bytes:
         check = zlib.crc32(kind + data)
         return struct.pack(">I", len(data)) + kind + data + struct.pack(">I", check)
 
-    head = struct.pack(">IIBBBBB", 1, 1, 8, 0, 0, 0, 0)
-    body = zlib.compress(bytes([0, shade]))
+    head = struct.pack(">IIBBBBB", width, height, 8, 0, 0, 0, 0)
+    body = zlib.compress((b"\0" + bytes([shade]) * width) * height, 1)
     return b"\x89PNG\r\n\x1a\n" + chunk(b"IHDR", head) + chunk(b"IDAT", body) + chunk(b"IEND", b"")
 
 

@@ -1,0 +1,213 @@
+"""What the voting page shows and what its script is given."""
+
+from __future__ import annotations
+
+import uuid
+from dataclasses import dataclass
+from typing import Any
+from uuid import UUID
+
+from django.contrib.auth.models import User
+from django.urls import reverse
+from django.utils.translation import gettext as _
+from django.utils.translation import pgettext
+
+from arena.models import Report, Study, Vote
+from arena.queries.showings import as_shown
+from arena.queries.votes import VotingProgress, recent_votes, voting_progress
+from arena.queries.voting_keys import USUAL_KEYS, voting_preferences
+from arena.services.replanning import next_pairs
+
+AHEAD = 5
+"""The pair on the screen and four that are decoded ahead."""
+
+UNDOABLE = 10
+
+MODULES = tuple(
+    f"js/vote-{name}.js" for name in ("outbox", "page", "pairs", "lens", "keys", "tabs")
+)
+"""What vote.js imports, named in the page so that all of it loads at once."""
+
+_LETTERS = {"left": "A", "equal": "E", "right": "B", "skip": "skip"}
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class LastVote:
+    """A vote that can still be changed.
+
+    Attributes:
+        word: What was decided, short, for a button.
+        shown: The pair as the wire shows it.
+    """
+
+    key: UUID
+    position: int
+    outcome: str
+    both_miss: bool
+    comment: str
+    word: str
+    shown: dict[str, Any]
+
+    @property
+    def is_left(self) -> bool:
+        """For the buttons of the form."""
+        return self.outcome == "left"
+
+    @property
+    def is_equal(self) -> bool:
+        """For the buttons of the form."""
+        return self.outcome == "equal" and not self.both_miss
+
+    @property
+    def is_right(self) -> bool:
+        """For the buttons of the form."""
+        return self.outcome == "right"
+
+    def as_json(self) -> dict[str, Any]:
+        """For the page's script."""
+        return {
+            "key": str(self.key),
+            "position": self.position,
+            "outcome": _LETTERS[self.outcome],
+            "both_miss": self.both_miss,
+            "comment": self.comment,
+            "shown": self.shown,
+        }
+
+
+def vote_context(study: Study, expert: User, *, change: str) -> dict[str, Any] | None:
+    """The pair to judge and all around it, None when every pair is decided.
+
+    Args:
+        study: An open one.
+        expert: Who votes in it.
+        change: The key of one of the expert's last votes, to show its pair again; anything else
+            shows the next pair.
+    """
+    matchups = next_pairs(study=study, expert=expert, n=AHEAD)
+    pairs = [as_shown(matchup) for matchup in matchups]
+    context = over_context(study, expert)
+    last = context["last"]
+    changed = next((vote for vote in last if str(vote.key) == change), None)
+    if not pairs and changed is None:
+        return None
+    preferences = voting_preferences(expert)
+    context |= {
+        "shown": changed.shown if changed else pairs[0],
+        "change": changed,
+        "key": uuid.uuid4(),
+        "alts": _alts(),
+        "modules": MODULES,
+        "legend": preferences.switches["legend"],
+        "skip_reasons": Vote.SkipReason.choices,
+        "report_reasons": Report.Reason.choices,
+        "looks": _looks(),
+        "key_labels": _key_labels(),
+    }
+    context["given"] = {
+        "study": str(study.code),
+        "outbox": f"arena votes {expert.person.code} {study.code}",
+        "urls": _urls(study),
+        "alts": _alts(),
+        "pairs": pairs,
+        "last": [vote.as_json() for vote in last],
+        "change": str(changed.key) if changed else None,
+        "allow_both_miss": study.allow_both_miss,
+        "preferences": preferences.as_json(),
+        **_counts(context["progress"]),
+    }
+    return context
+
+
+def over_context(study: Study, expert: User) -> dict[str, Any]:
+    """What the pages without a pair show."""
+    is_open = study.state == Study.State.OPEN
+    return {
+        "study": study,
+        "progress": voting_progress(study=study, expert=expert),
+        "last": _last_votes(study, expert) if is_open else [],
+    }
+
+
+# Private
+
+
+def _last_votes(study: Study, expert: User) -> list[LastVote]:
+    return [
+        LastVote(
+            key=vote.key,
+            position=vote.matchup.position,
+            outcome=vote.outcome,
+            both_miss=vote.both_miss,
+            comment=vote.comment,
+            word=_word(vote),
+            shown=as_shown(vote.matchup),
+        )
+        for vote in recent_votes(study=study, expert=expert, n=UNDOABLE)
+    ]
+
+
+def _word(vote: Vote) -> str:
+    if vote.both_miss:
+        return pgettext("a vote", "Miss")
+    words = {
+        "left": pgettext("a vote", "A"),
+        "equal": _("Equal"),
+        "right": pgettext("a vote", "B"),
+        "skip": pgettext("a vote", "Skip"),
+    }
+    return words[vote.outcome]
+
+
+def _counts(progress: VotingProgress) -> dict[str, Any]:
+    return {
+        "saved": progress.voted,
+        "total": progress.total,
+        "minutes_left": progress.minutes_left,
+    }
+
+
+def _urls(study: Study) -> dict[str, str]:
+    return {
+        "page": reverse("vote", args=[study.code]),
+        "votes": reverse("api-votes"),
+        "matchups": f"{reverse('api-matchups')}?study={study.code}",
+        "reports": reverse("api-reports"),
+        "preferences": reverse("api-preferences"),
+    }
+
+
+def _alts() -> dict[str, str]:
+    return {
+        "a": _("Image A, edited scene"),
+        "b": _("Image B, edited scene"),
+        "original": _("The scene before the edit"),
+    }
+
+
+def _looks() -> list[tuple[str, str]]:
+    return [
+        ("original", _("Original")),
+        ("zoom", _("Zoom")),
+        ("ruler", _("Ruler")),
+        ("legend", _("Legend")),
+    ]
+
+
+def _key_labels() -> list[tuple[str, str]]:
+    labels = {
+        "a": _("A is better"),
+        "e": _("Equal"),
+        "b": _("B is better"),
+        "undo": _("Undo"),
+        "skip": _("Skip"),
+        "report": _("Report"),
+        "comment": _("Comment"),
+        "original": _("Original"),
+        "zoom": _("Zoom"),
+        "reset": _("Zoom back"),
+        "ruler": _("Ruler"),
+        "legend": _("Legend"),
+        "help": _("Help"),
+    }
+    return [(action, labels[action]) for action in USUAL_KEYS]

@@ -1,0 +1,183 @@
+// Looking closely: zoom, pan, pointer, ruler and the original scene, always in both pictures.
+const STEP = 2.5;
+const MOST = 8;
+const SVG = "http://www.w3.org/2000/svg";
+const between = (low, value, high) => Math.min(high, Math.max(low, value));
+
+// Two paths over a picture, in its pixels: the ruler and the pointer.
+function overlay({ width, height }) {
+  const svg = document.createElementNS(SVG, "svg");
+  svg.setAttribute("class", "marks");
+  svg.setAttribute("aria-hidden", "true");
+  svg.setAttribute("viewBox", `0 0 ${width} ${height}`);
+  svg.append(document.createElementNS(SVG, "path"), document.createElementNS(SVG, "path"));
+  return svg;
+}
+
+export class Lens {
+  #scale = 1;
+  #x = 0; // of the picture's left edge, in widths of the panel
+  #y = 0;
+  #at = null; // the pointer, in pixels of the picture
+  #from = null; // where the ruler starts; null: at the ego
+  #drag = null;
+  #pair = null;
+  aids = new Set();
+  isRuling = false;
+  isFlipped = false;
+  isPinned = false;
+
+  constructor(panels, text, changed) {
+    Object.assign(this, { panels, text, changed, scenes: panels.map((panel) => panel.firstElementChild) });
+    panels.forEach((panel, place) => this.#listen(panel, this.scenes[place]));
+  }
+
+  get isZoomed() {
+    return this.#scale > 1;
+  }
+
+  // Puts the pictures of a pair on the page.
+  show(pair, keepsZoom) {
+    this.#pair = pair;
+    this.#at = this.#from = null;
+    this.isFlipped = this.isPinned = this.isRuling = false;
+    this.aids.clear();
+    this.scenes.forEach((scene, place) => scene.replaceChildren(pair.images[place], overlay(pair.shown)));
+    if (keepsZoom && this.isZoomed) this.aids.add("zoom");
+    else this.reset();
+    this.changed(this);
+  }
+
+  reset() {
+    [this.#scale, this.#x, this.#y] = [1, 0, 0];
+    this.#place();
+  }
+
+  // To 2.5 times at the pointer, or back.
+  toggleZoom() {
+    const { width, height } = this.#pair.shown;
+    const [x, y] = this.#at ?? [width / 2, height / 2];
+    if (this.isZoomed) this.reset();
+    else this.#zoom(STEP, x / width, y / height);
+  }
+
+  pan(dx, dy) {
+    this.#x += dx;
+    this.#y += dy;
+    this.#place();
+  }
+
+  flip(isFlipped, isPinned = false) {
+    const { originals, images } = this.#pair;
+    if (!originals || isFlipped === this.isFlipped) return;
+    [this.isFlipped, this.isPinned] = [isFlipped, isPinned];
+    this.scenes.forEach((scene, place) => scene.firstChild.replaceWith((isFlipped ? originals : images)[place]));
+    if (isFlipped) this.aids.add(isPinned ? "original" : "flip");
+    this.changed(this);
+  }
+
+  rule(isOn) {
+    this.isRuling = isOn;
+    this.#from = null;
+    if (isOn) this.aids.add("ruler");
+    if (isOn) this.#at ??= this.#pair.shown.ego_px;
+    this.#draw();
+    this.changed(this);
+  }
+
+  // Moves the ruler's end by metres ahead and to the left, for those without a pointer.
+  step(ahead_m, left_m) {
+    const { px_per_m: scale, width, height } = this.#pair.shown;
+    const [x, y] = this.#at;
+    this.#at = [between(0, x + ahead_m * scale, width), between(0, y - left_m * scale, height)];
+    this.#draw();
+  }
+
+  // What the ruler says, "" without one. The ego looks to the right of the picture.
+  get reading() {
+    if (!this.isRuling) return "";
+    const { px_per_m: scale } = this.#pair.shown;
+    const [[x0, y0], [x, y]] = [this.#start, this.#at];
+    const [ahead, left] = [(x - x0) / scale, (y0 - y) / scale];
+    const say = (name, metres) => this.text(name, Math.abs(metres).toFixed(1));
+    const parts = [say(ahead < 0 ? "behind" : "ahead", ahead), say(left < 0 ? "right" : "left", left)];
+    return `${parts.join(", ")} (${say("metres", Math.hypot(ahead, left))})`;
+  }
+
+  get #start() {
+    return this.#from ?? this.#pair.shown.ego_px;
+  }
+
+  #zoom(scale, u, v) {
+    const next = between(1, scale, MOST);
+    this.#x += u * (this.#scale - next);
+    this.#y += v * (this.#scale - next);
+    this.#scale = next;
+    if (next > 1) this.aids.add("zoom");
+    this.#place();
+  }
+
+  #place() {
+    this.#x = between(1 - this.#scale, this.#x, 0);
+    this.#y = between(1 - this.#scale, this.#y, 0);
+    const moved = `translate(${this.#x * 100}%, ${this.#y * 100}%) scale(${this.#scale})`;
+    for (const scene of this.scenes) scene.style.transform = this.isZoomed ? moved : "";
+    for (const panel of this.panels) panel.classList.toggle("is-zoomed", this.isZoomed);
+    this.changed(this);
+  }
+
+  // The ruler in both pictures, the pointer in the one that it isn't in.
+  #draw(over) {
+    const [x, y] = this.#at ?? [];
+    const r = this.#pair.shown.width / 90 / this.#scale;
+    const cross = this.#at ? `M${x - r} ${y}H${x + r}M${x} ${y - r}V${y + r}` : "";
+    for (const { lastChild: svg } of this.scenes) {
+      const [ruler, pointer] = svg.children;
+      svg.style.strokeWidth = r / 4;
+      ruler.setAttribute("d", this.isRuling ? `M${this.#start}L${this.#at}${cross}` : "");
+      pointer.setAttribute("d", over && svg.parentNode !== over ? cross : "");
+    }
+    if (this.isRuling) this.changed(this);
+  }
+
+  #listen(panel, scene) {
+    const on = (name, react, options) => panel.addEventListener(name, (event) => this.#pair && react(event), options);
+    const fraction = ({ clientX, clientY }) => {
+      const { left, top, width, height } = scene.getBoundingClientRect();
+      return [(clientX - left) / width, (clientY - top) / height];
+    };
+    const follow = (event) => {
+      const [u, v] = fraction(event);
+      this.#at = [u * this.#pair.shown.width, v * this.#pair.shown.height];
+      this.#draw(scene);
+    };
+    on("pointermove", (event) => {
+      if (this.#drag) {
+        const [x, y] = this.#drag;
+        this.pan((event.clientX - x) / panel.clientWidth, (event.clientY - y) / panel.clientHeight);
+        this.#drag = [event.clientX, event.clientY];
+      }
+      follow(event);
+    });
+    on("pointerdown", (event) => {
+      follow(event);
+      if (this.isRuling) this.#from = this.#at;
+      else if (this.isZoomed && event.button === 0) {
+        this.#drag = [event.clientX, event.clientY];
+        panel.setPointerCapture(event.pointerId);
+      }
+    });
+    on("lostpointercapture", () => { this.#drag = null; });
+    on("pointerleave", () => {
+      if (this.isRuling) return;
+      this.#at = null;
+      this.#draw();
+    });
+    on("wheel", (event) => {
+      const root = document.documentElement;
+      if (event.ctrlKey || root.scrollHeight > root.clientHeight) return; // the wheel is the page's
+      event.preventDefault();
+      this.#zoom(this.#scale * Math.exp(-event.deltaY / 500), ...fraction(event));
+    }, { passive: false });
+  }
+}

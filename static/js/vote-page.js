@@ -1,0 +1,163 @@
+// The page around the pictures: what it says, panels that open over the tools, dialogs.
+export const at = (id) => document.getElementById(id);
+export const given = JSON.parse(at("given").textContent);
+
+// What the buttons of the form do.
+export const ACTIONS = { left: "a", equal: "e", right: "b", both_miss: "both_miss" };
+
+const LATE_MS = 400; // a vote that waits for less needs no words
+const LAST = 5;
+const { preferences } = given;
+const { body } = document;
+const all = (which) => document.querySelectorAll(which);
+
+// A text of the page, its {} filled in order.
+export function text(name, ...values) {
+  const said = at("texts").content.querySelector(`[data-text="${name}"]`).textContent;
+  return said.replaceAll("{}", () => values.shift());
+}
+
+const counted = (name, n) => text(`${name}-${n === 1 ? "one" : "many"}`, n);
+const wordOf = ({ outcome, both_miss }) => text(both_miss ? "both_miss" : outcome);
+
+// crypto.randomUUID is missing on plain http to another machine; this is as random.
+export const freshKey = () => URL.createObjectURL(new Blob()).slice(-36);
+
+// The polite region of those who hear the page.
+export function say(what) {
+  at("said").textContent = what;
+}
+
+// What somebody should notice, until the next vote.
+export function note(what) {
+  at("note").textContent = what;
+  if (what) say(what);
+}
+
+// Lets a short tint of the style sheet run again; it has none where less motion is wanted.
+export function replay(element) {
+  for (const tint of element.getAnimations()) {
+    tint.cancel();
+    tint.play();
+  }
+}
+
+export function drawPair({ instruction, position }) {
+  at("instruction").textContent = instruction;
+  at("ask").classList.toggle("is-long", instruction.length > 160);
+  document.title = document.title.replace(/\d+/, position);
+}
+
+export function drawReview(vote) {
+  at("question").textContent = vote ? text("changing", vote.position, wordOf(vote)) : text("question");
+  at("leave").hidden = !vote;
+  const pressed = vote?.both_miss ? "both_miss" : vote?.outcome.toLowerCase();
+  for (const button of all(".answers button")) button.ariaPressed = vote ? pressed === ACTIONS[button.value] : null;
+}
+
+export function drawComment(comment) {
+  at("comment").classList.toggle("is-written", comment.trim() !== "");
+}
+
+export function drawLens(lens) {
+  const states = { original: lens.isFlipped, zoom: lens.isZoomed, ruler: lens.isRuling };
+  for (const [name, isOn] of Object.entries(states)) at(name).ariaPressed = isOn;
+  const said = lens.isFlipped ? text("original") : lens.reading;
+  for (const reading of all(".reading")) reading.textContent = said;
+}
+
+export function drawLast(votes) {
+  const items = votes.slice(0, LAST).map((vote) => {
+    const item = at("last-one").content.cloneNode(true);
+    const [link] = item.querySelectorAll("a");
+    link.dataset.vote = vote.key;
+    link.ariaLabel = text("change", vote.position, wordOf(vote));
+    link.children[0].textContent = vote.position;
+    link.children[1].textContent = wordOf(vote);
+    return item;
+  });
+  at("last").replaceChildren(...items);
+}
+
+let late = 0;
+
+export function drawSaved(waiting) {
+  const line = at("saved");
+  const tell = () => {
+    line.textContent = waiting ? counted("waiting", waiting) : text("saved", given.saved);
+    line.classList.toggle("is-late", waiting > 0);
+  };
+  clearTimeout(late);
+  if (!waiting || line.classList.contains("is-late")) tell();
+  else late = setTimeout(tell, LATE_MS);
+}
+
+export function drawProgress({ saved, total, minutes_left: minutes }) {
+  Object.assign(given, { saved, total });
+  at("bar").value = saved;
+  at("minutes").textContent = minutes === null ? "" : text("minutes", Math.max(1, minutes));
+  if (!at("saved").classList.contains("is-late")) drawSaved(0);
+}
+
+export function drawKeys() {
+  body.classList.toggle("has-keys", preferences.single_keys);
+  for (const hint of all("kbd[data-key]")) {
+    hint.textContent = preferences.keys[hint.dataset.key][0].toUpperCase();
+  }
+}
+
+export function toggleLegend() {
+  const isShown = at("legend").classList.toggle("is-hidden") === false;
+  at("legend-switch").ariaPressed = isShown;
+  return isShown;
+}
+
+// --- Panels: skip, report, comment, the account's menu ------------------------------------------
+
+let before = null;
+
+export const openPop = () => document.querySelector("details[open]");
+
+export function closePop() {
+  const pop = openPop();
+  if (!pop) return;
+  const hadFocus = pop.contains(document.activeElement);
+  pop.open = false;
+  if (hadFocus) before?.focus();
+}
+
+export function showPop(name) {
+  before = document.activeElement;
+  at(name).open = true;
+  at(name).querySelector("[data-first]").focus();
+}
+
+// Digits choose, Esc and Ctrl+Enter leave; nothing votes.
+export function keyInPop(event) {
+  const isDone = event.key === "Escape" || (event.key === "Enter" && (event.ctrlKey || event.metaKey));
+  const isTyping = event.target.matches("textarea");
+  const chosen = isTyping ? null : openPop().querySelectorAll("[data-choice]")[event.key - 1];
+  if (isDone) closePop();
+  else if (!event.repeat) chosen?.click();
+  if (isDone || chosen) event.preventDefault();
+}
+
+addEventListener("pointerdown", ({ target }) => target.closest("details[open]") || closePop());
+
+// --- What has to be answered before voting goes on ----------------------------------------------
+
+const gate = at("gate");
+gate.addEventListener("cancel", (event) => event.preventDefault());
+
+// Why: "elsewhere", or the status that the server answered with.
+export function block(why, waiting, onward) {
+  if (gate.open && gate.dataset.why === String(why)) return;
+  gate.replaceChildren(at(`gate-${why}`).content.cloneNode(true));
+  gate.dataset.why = why;
+  const kept = gate.querySelector("[data-kept]");
+  if (kept) kept.textContent = waiting ? counted(kept.dataset.kept, waiting) : "";
+  gate.querySelector(".button").addEventListener("click", onward);
+  if (!gate.open) gate.showModal();
+}
+
+export const unblock = () => gate.close();

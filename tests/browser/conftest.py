@@ -1,0 +1,42 @@
+"""One browser, and a booth: a study with pictures, its expert, and pages to vote on.
+
+The product runs in this process, so that a test can look into its rows.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import pytest
+from django.conf import settings
+from playwright.sync_api import Browser, expect
+from pytest_django.live_server_helper import LiveServer
+
+from tests.browser.booth import Booth, furnish
+from tests.browser.chromium import PATIENCE_MS, chromium
+
+
+@pytest.fixture(scope="session", autouse=True)
+def _static_folder() -> None:
+    """What a fresh checkout lacks until something is collected; the server warns without it."""
+    settings.STATIC_ROOT.mkdir(parents=True, exist_ok=True)
+
+
+@pytest.fixture(scope="session", autouse=True)
+def _patience() -> None:
+    expect.set_options(timeout=PATIENCE_MS)
+
+
+@pytest.fixture(scope="package")
+def browser() -> Iterator[Browser]:
+    with pytest.MonkeyPatch.context() as patch, chromium() as started:
+        # Playwright keeps an event loop in this thread, where Django would refuse to read rows.
+        patch.setenv("DJANGO_ALLOW_ASYNC_UNSAFE", "true")
+        yield started
+
+
+@pytest.fixture
+def booth(live_server: LiveServer, browser: Browser) -> Iterator[Booth]:
+    made = Booth(address=live_server.url, browser=browser, study=furnish())
+    yield made
+    made.leave()

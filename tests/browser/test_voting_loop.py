@@ -1,0 +1,127 @@
+"""Votes are cast as fast as a person can and kept once, whatever the network does."""
+
+from __future__ import annotations
+
+import pytest
+from playwright.sync_api import Browser, Page, expect
+from pytest_django import Settings
+from pytest_django.live_server_helper import LiveServer
+
+from arena.models import Vote
+from tests import study_rows
+from tests.browser.booth import BOUNCE_MS, Booth, all_sent, furnish, press, ready
+
+pytestmark = [pytest.mark.browser, pytest.mark.django_db(transaction=True)]
+
+ANSWERS = {"1": "left", "2": "equal", "3": "right"}
+
+
+@pytest.mark.slow
+def test_fifty_votes_with_the_network_cut_twice_are_fifty_rows(
+    live_server: LiveServer, browser: Browser, settings: Settings
+) -> None:
+    settings.VOTES_PER_S = 100  # nobody holds the test back
+    booth = Booth(address=live_server.url, browser=browser, study=furnish(scenarios=20, votes=50))
+    page = booth.enter()
+    given = []
+    for number in range(50):
+        if number in (12, 31):
+            all_sent(page, number)
+            booth.look_ahead(page)
+            page.context.set_offline(True)
+        if number in (16, 35):  # the four that were ready are voted; nothing is lost
+            assert Vote.objects.count() == number - 4
+            page.context.set_offline(False)
+        key = "123"[number % 3]
+        given.append(ANSWERS[key])
+        if number < 49:
+            press(page, key)
+        else:
+            page.keyboard.press(key)
+    expect(page.get_by_role("heading", name="You are done.")).to_be_visible()
+    assert Vote.objects.count() == 50
+    assert booth.outcomes() == given
+    assert len({vote.matchup_id for vote in booth.votes()}) == 50
+    booth.leave()
+
+
+def test_a_held_key_is_one_vote(booth: Booth) -> None:
+    page = booth.enter()
+    booth.look_ahead(page, pairs=2)
+    hold_down(page, "1")
+    all_sent(page, 1)
+    assert booth.outcomes() == ["left"]
+
+
+def test_enter_held_on_a_button_is_one_vote(booth: Booth) -> None:
+    page = booth.enter()
+    booth.look_ahead(page, pairs=2)
+    page.get_by_role("button", name="B is better").focus()
+    hold_down(page, "Enter")
+    all_sent(page, 1)
+    assert booth.outcomes() == ["right"]
+
+
+def hold_down(page: Page, key: str) -> None:
+    """Until the next pair takes an answer, and on; from the second on the presses are repeats."""
+    page.keyboard.down(key)
+    expect(page.locator("#place")).to_have_text("2")
+    ready(page)
+    for _ in range(3):
+        page.keyboard.down(key)
+    page.keyboard.up(key)
+    assert page.inner_text("#place") == "2"
+
+
+def test_the_second_half_of_a_double_click_judges_nothing(booth: Booth) -> None:
+    page = booth.enter()
+    booth.look_ahead(page, pairs=3)
+    page.clock.install()  # from here on the page's time passes as the test says
+    page.clock.pause_at(page.evaluate("Date.now() / 1000 + 3600"))
+    button = page.get_by_role("button", name="Equal")
+    button.click()
+    page.clock.run_for(BOUNCE_MS - 30)  # of which the next pair was painted for less
+    button.click()
+    assert page.inner_text("#place") == "2"
+    page.clock.run_for(BOUNCE_MS)
+    button.click()
+    expect(page.locator("#place")).to_have_text("3")
+    page.clock.resume()
+    all_sent(page, 2)
+    assert booth.outcomes() == ["equal"] * 2
+
+
+def test_the_next_four_pairs_are_there_before_they_are_needed(booth: Booth) -> None:
+    page = booth.enter()
+    booth.look_ahead(page)
+    page.context.set_offline(True)
+    for _ in range(4):
+        press(page, "1")
+    expect(page.locator("#saved")).to_have_text("4 answers are waiting to be sent.")
+    page.context.set_offline(False)
+    all_sent(page, 4)
+
+
+def test_the_end_is_the_page_of_thanks_and_the_last_vote_can_still_be_changed(
+    booth: Booth,
+) -> None:
+    for matchup in study_rows.matchups_of(booth.study, "eva")[:8]:
+        study_rows.vote(matchup)
+    page = booth.enter()
+    page.keyboard.press("3")
+    expect(page.get_by_role("heading", name="You are done.")).to_be_visible()
+    page.get_by_role("link", name="Change pair 9: B").click()
+    ready(page)
+    expect(page.locator("#question")).to_contain_text("Your vote on pair 9 was: B.")
+    page.keyboard.press("1")
+    expect(page.get_by_role("heading", name="You are done.")).to_be_visible()
+    assert booth.outcomes()[-1] == "left"
+    assert Vote.objects.count() == 10
+
+
+def test_the_first_vote_counts_where_the_pair_was_decided_elsewhere(booth: Booth) -> None:
+    page = booth.enter()
+    study_rows.vote(study_rows.matchups_of(booth.study, "eva")[0], "right")
+    press(page, "1")
+    expect(page.locator("#note")).to_contain_text("your first vote counts: B.")
+    assert booth.outcomes() == ["right"]

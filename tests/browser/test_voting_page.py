@@ -1,0 +1,145 @@
+"""The voting page as it looks: fixed geometry, both themes, phones, and without a script."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import pytest
+from axe_playwright_python.sync_playwright import Axe
+from playwright.sync_api import Page, expect
+
+from arena.models import Report
+from arena.services.studies import close_study
+from tests import study_rows
+from tests.browser.booth import PHONE, Booth, press, ready
+
+pytestmark = [pytest.mark.browser, pytest.mark.django_db(transaction=True)]
+RULES = {
+    "runOnly": ["wcag2a", "wcag2aa", "wcag21a", "wcag21aa", "wcag22aa", "best-practice"],
+    "resultTypes": ["violations"],
+}
+
+
+def faults(page: Page) -> list[str]:
+    """What axe-core finds, as rule: element."""
+    found: list[dict[str, Any]] = Axe().run(page, options=RULES).response["violations"]
+    return [f"{rule['id']}: {node['html'][:120]}" for rule in found for node in rule["nodes"]]
+
+
+@pytest.mark.parametrize("theme", ["light", "dark"])
+def test_axe_finds_nothing_on_any_page_of_voting(booth: Booth, theme: str) -> None:
+    booth.study.allow_both_miss = True
+    booth.study.save()
+    study_rows.vote(study_rows.matchups_of(booth.study, "eva")[0])
+    page = booth.enter(color_scheme=theme, bypass_csp=True)
+    assert faults(page) == []
+    page.keyboard.press("u")
+    ready(page)
+    assert faults(page) == [], "a former pair"
+    for key, opened in (("s", "#skip"), ("r", "#report"), ("c", "#comment")):
+        page.keyboard.press(key)
+        expect(page.locator(f"{opened}[open]")).to_be_visible()
+        assert faults(page) == [], opened
+        page.keyboard.press("Escape")
+    page.keyboard.press("h")
+    expect(page.locator("#help[open]")).to_be_visible()
+    assert faults(page) == [], "help"
+    page.goto(f"{booth.path}help/")
+    assert faults(page) == [], "help without a script"
+    for matchup in study_rows.matchups_of(booth.study, "eva")[1:]:
+        study_rows.vote(matchup)
+    page.goto(booth.path)
+    assert faults(page) == [], "done"
+    close_study(study=booth.study)
+    page.goto(booth.path)
+    assert faults(page) == [], "closed"
+
+
+@pytest.mark.parametrize("size", [(1280, 720), (1366, 650), (1920, 1080)])
+def test_nothing_scrolls_or_moves_and_the_pictures_are_as_large_as_can_be(
+    booth: Booth, size: tuple[int, int]
+) -> None:
+    long = "Add a car. " * 22  # as long as the longest of the catalogue
+    scenario = study_rows.matchups_of(booth.study, "eva")[2].scenario
+    scenario.instruction = long
+    scenario.save()
+    page = booth.enter(viewport={"width": size[0], "height": size[1]})
+    places = []
+    for _ in range(3):
+        places.append([panel.bounding_box() for panel in page.locator(".panel").all()])
+        assert page.evaluate(
+            "document.documentElement.scrollHeight <= innerHeight"
+            " && document.documentElement.scrollWidth <= innerWidth"
+        )
+        assert page.locator("#ask h1").evaluate("h => h.scrollHeight <= h.clientHeight + 1")
+        press(page, "1")
+    assert all(place == places[0] for place in places)
+    first = places[0][0]
+    assert first is not None
+    assert first["width"] / first["height"] == pytest.approx(1.5, abs=0.01)
+    # Half the window but for the gaps, or what the height leaves.
+    widest = (size[0] - 36) / 2
+    assert first["width"] >= min(widest, 1.5 * (size[1] - 306)) - 1
+    for button in page.locator(".voting .button:visible").all():
+        box = button.bounding_box()
+        assert box is not None
+        assert min(box["height"], box["width"]) >= 44, button.inner_text()
+
+
+def test_a_phone_shows_one_above_the_other_and_a_bar_to_tap(booth: Booth) -> None:
+    page = booth.enter(viewport=PHONE, has_touch=True, is_mobile=True)
+    first, second = (panel.bounding_box() for panel in page.locator(".panel").all())
+    assert first is not None
+    assert second is not None
+    assert second["y"] > first["y"] + first["height"]
+    assert first["width"] > 0.9 * PHONE["width"]
+    assert page.evaluate("document.documentElement.scrollWidth") == PHONE["width"]
+    bar = page.get_by_role("button", name="A is better").bounding_box()
+    assert bar is not None
+    assert bar["height"] >= 56
+    assert bar["y"] + bar["height"] <= PHONE["height"]
+    page.get_by_role("button", name="B is better").tap()
+    expect(page.locator("#place")).to_have_text("2")
+    ready(page)
+    page.locator("#skip > summary").tap()
+    page.get_by_role("button", name="Instruction unclear").tap()
+    expect(page.locator("#saved")).to_have_text("Saved 2. Nothing waiting.")
+    assert booth.outcomes() == ["right", "skip"]
+
+
+def test_everything_but_looking_closely_goes_without_a_script(booth: Booth) -> None:
+    booth.study.allow_both_miss = True
+    booth.study.save()
+    page = booth.enter(java_script_enabled=False)
+    assert page.locator("kbd:visible").count() == 0
+    page.locator("#comment > summary").click()
+    page.get_by_role("textbox", name="Comment").fill("so so")
+    page.get_by_role("button", name="A is better").click()
+    page.get_by_role("button", name="Both miss it").click()
+    page.locator("#report > summary").click()
+    page.get_by_role("textbox", name="What is wrong, in your words").fill("a car floats")
+    page.get_by_role("button", name="Something is wrong with an image").click()
+    page.locator("#skip > summary").click()
+    page.get_by_role("button", name="Instruction unclear").click()
+    page.get_by_role("link", name="Undo").click()
+    page.get_by_role("button", name="B is better").click()
+    page.get_by_role("link", name="Change pair 1: A").click()
+    page.get_by_role("link", name="Back").click()
+    assert page.inner_text("#place") == "4"
+    page.get_by_role("link", name="Help").click()
+    assert page.get_by_role("heading", name="How to vote").is_visible()
+    votes = booth.votes()
+    assert [vote.outcome for vote in votes] == ["left", "equal", "right"]
+    assert votes[0].comment == "so so"
+    assert votes[1].both_miss
+    assert Report.objects.get().comment == "a car floats"
+
+
+def test_colours_of_the_system_still_show_what_is_pressed(booth: Booth) -> None:
+    study_rows.vote(study_rows.matchups_of(booth.study, "eva")[0])
+    page = booth.enter(forced_colors="active", reduced_motion="reduce")
+    assert page.locator("#ask").evaluate("e => getComputedStyle(e).animationName") == "none"
+    page.keyboard.press("u")
+    pressed = page.get_by_role("button", name="A is better")
+    expect(pressed).to_have_attribute("aria-pressed", "true")
+    assert pressed.evaluate("e => getComputedStyle(e).outlineStyle") == "solid"

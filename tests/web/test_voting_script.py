@@ -1,0 +1,65 @@
+"""What the voting page gives its script."""
+
+from __future__ import annotations
+
+import json
+import re
+from pathlib import Path
+from typing import Any
+
+import pytest
+from django.conf import settings
+
+from tests import study_rows
+from tests.web.ballots import page
+from tests.web.cast import World, signed_in, world
+
+pytestmark = pytest.mark.django_db
+BASE = Path(settings.BASE_DIR)
+NUMBERS = ("one", "many")
+
+
+def given_to_the_script(here: World) -> dict[str, Any]:
+    shown = signed_in(here.expert).get(page(here)).content.decode()
+    found = re.search(r'<script id="given" [^>]*>(.*?)</script>', shown)
+    assert found is not None
+    given: dict[str, Any] = json.loads(found.group(1))
+    return given
+
+
+def test_the_script_gets_the_pair_on_the_page_and_four_more() -> None:
+    here = world()
+    given = given_to_the_script(here)
+    mine = study_rows.matchups_of(here.study, "eva")[:5]
+    assert [pair["matchup"] for pair in given["pairs"]] == [str(one.code) for one in mine]
+    assert (given["saved"], given["total"], given["last"]) == (0, 9, [])
+
+
+def test_the_script_gets_the_last_ten_votes_the_latest_first() -> None:
+    here = world()
+    for matchup in study_rows.matchups_of(here.study, "eva")[:3]:
+        study_rows.vote(matchup, "equal")
+    given = given_to_the_script(here)
+    assert [vote["position"] for vote in given["last"]] == [3, 2, 1]
+    assert {vote["outcome"] for vote in given["last"]} == {"E"}
+    assert given["last"][0]["shown"]["matchup"] in {
+        str(one.code) for one in study_rows.matchups_of(here.study, "eva")
+    }
+
+
+def test_the_outbox_of_two_people_or_studies_is_never_the_same() -> None:
+    here = world()
+    given = given_to_the_script(here)
+    assert str(here.study.code) in given["outbox"]
+    assert str(here.expert.person.code) in given["outbox"]
+
+
+def test_every_text_that_the_script_says_is_on_the_page() -> None:
+    here = world()
+    shown = signed_in(here.expert).get(page(here)).content.decode()
+    offered = set(re.findall(r'data-text="([\w-]+)"', shown))
+    scripts = "".join(path.read_text() for path in (BASE / "static/js").glob("vote*.js"))
+    said = set(re.findall(r'(?<!\.)\b(?:text|note|say)\("([\w-]+)"', scripts))
+    said |= {f"{name}-{n}" for name in re.findall(r'counted\("(\w+)"', scripts) for n in NUMBERS}
+    said |= {f"{name}-{n}" for name in re.findall(r'data-kept="(\w+)"', shown) for n in NUMBERS}
+    assert said <= offered

@@ -1,0 +1,55 @@
+"""What a browser loads with the voting page, and how it is made small."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import pytest
+from django.conf import settings
+from django.urls import reverse
+
+from arena.config.static_files import lean
+from tests.web.cast import signed_in, world
+
+STATIC = Path(settings.BASE_DIR) / "static"
+MOST_BYTES = 40 * 1024
+OURS = sorted([*STATIC.rglob("*.js"), *STATIC.rglob("*.css")])
+
+
+@pytest.mark.django_db
+def test_scripts_and_styles_of_the_voting_page_weigh_at_most_40_kb() -> None:
+    here = world()
+    shown = signed_in(here.expert).get(reverse("vote", args=[here.study.code])).content.decode()
+    loaded = set(re.findall(r'(?:src|href)="/static/([^"]+\.(?:js|css))"', shown))
+    assert {"js/vote.js", "css/vote.css"} <= loaded
+    sizes = {name: len(lean((STATIC / name).read_text()).encode()) for name in sorted(loaded)}
+    assert sum(sizes.values()) <= MOST_BYTES, sizes
+
+
+@pytest.mark.django_db
+def test_the_page_names_every_module_that_its_script_imports() -> None:
+    here = world()
+    shown = signed_in(here.expert).get(reverse("vote", args=[here.study.code])).content.decode()
+    named = set(re.findall(r'modulepreload" href="/static/js/([\w-]+\.js)"', shown))
+    imported: set[str] = set()
+    for script in ("vote.js", *named):
+        text = (STATIC / "js" / script).read_text()
+        imported |= set(re.findall(r'from "\./([\w-]+\.js)"', text))
+    assert named == imported
+
+
+def test_comments_and_indentation_are_not_served() -> None:
+    script = '// why\nconst a = {\n  b: "// no comment",\n};\n\n  // more\na.b;\n'
+    assert lean(script) == 'const a = {\nb: "// no comment",\n};\na.b;\n'
+    assert (
+        lean("/* About. */\na { b: c; } /* kept */\n  /* gone */\n") == "a { b: c; } /* kept */\n"
+    )
+
+
+@pytest.mark.parametrize("path", OURS, ids=lambda path: path.name)
+def test_no_text_of_ours_spans_lines(path: Path) -> None:
+    # Else taking away the indentation would change it.
+    text = path.read_text()
+    assert all(line.count("`") % 2 == 0 for line in text.splitlines())
+    assert all(line.count("/*") == line.count("*/") for line in text.splitlines())
