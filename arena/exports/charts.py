@@ -1,15 +1,20 @@
-"""Charts for papers, drawn by matplotlib; the pages draw their own."""
+"""Ratings with their intervals, for papers, drawn by matplotlib; the pages draw their own."""
 
 from __future__ import annotations
 
-from arena.exports.drawing import GRID, INK, MARK, drawn, house_style
+from typing import TYPE_CHECKING
+
+from arena.exports.drawing import GRID, INK, MARK, SIMULATED, drawn, house_style
 from arena.exports.tables import LeaderboardTable
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
 
 _ROW_IN = 0.34
 
 
 def interval_chart(table: LeaderboardTable, *, file_format: str) -> bytes:
-    """The ratings as dots with their intervals as bars, best on top.
+    """The ratings as dots with their intervals as bars, best on top; diamonds are simulated.
 
     Args:
         table: Contestants without a rating keep their line, without a dot.
@@ -21,21 +26,45 @@ def interval_chart(table: LeaderboardTable, *, file_format: str) -> bytes:
         figure = Figure(figsize=(6.4, 1.1 + _ROW_IN * len(table.rows)), layout="constrained")
         axes = figure.add_subplot()
         for place, row in enumerate(table.rows):
-            if row.elo is None:
-                continue
-            if row.lower is not None and row.upper is not None:
-                axes.plot([row.lower, row.upper], [place, place], color=MARK, linewidth=1.6)
-            axes.plot([row.elo], [place], marker="o", markersize=5, color=MARK)
+            draw_interval(axes, place, (row.lower, row.elo, row.upper), simulated=row.simulated)
         axes.set_yticks(range(len(table.rows)), [row.model for row in table.rows])
-        axes.set_ylim(len(table.rows) - 0.5, -0.5)
+        for label, row in zip(axes.get_yticklabels(), table.rows, strict=True):
+            label.set_color(SIMULATED if row.simulated else INK)
         axes.set_xlabel(_label(table), color=INK)
-        axes.grid(axis="x", color=GRID, linewidth=0.6)
-        axes.set_axisbelow(True)
-        axes.spines[["top", "right", "left"]].set_visible(False)
-        axes.tick_params(axis="y", length=0, colors=INK)
+        rating_axis(axes, len(table.rows))
         return drawn(figure, file_format)
+
+
+def draw_interval(
+    axes: Axes,
+    place: int,
+    interval: tuple[float | None, float | None, float | None],
+    *,
+    simulated: bool,
+) -> None:
+    """One line: nothing without a rating, a mark alone without an interval."""
+    lower, middle, upper = interval
+    if middle is None:
+        return
+    colour, shape = (SIMULATED, "D") if simulated else (MARK, "o")
+    if lower is not None and upper is not None:
+        axes.plot([lower, upper], [place, place], color=colour, linewidth=1.6)
+    axes.plot([middle], [place], marker=shape, markersize=5, color=colour)
+
+
+def rating_axis(axes: Axes, rows: int) -> None:
+    """Ratings across, lines from top to bottom."""
+    axes.set_ylim(rows - 0.5, -0.5)
+    axes.grid(axis="x", color=GRID, linewidth=0.6)
+    axes.set_axisbelow(True)
+    axes.spines[["top", "right", "left"]].set_visible(False)
+    axes.tick_params(axis="y", length=0)
 
 
 def _label(table: LeaderboardTable) -> str:
     marks = [word for word, so in (("simulated", table.simulated), ("early", table.early)) if so]
-    return "Elo with 95 % intervals" + (f" ({', '.join(marks)})" if marks else "")
+    has_intervals = any(row.lower is not None for row in table.rows)
+    text = "Elo with 95 % intervals" if has_intervals else "Elo, without intervals"
+    if table.has_parts:
+        marks.append("only within groups comparable")
+    return text + (f" ({', '.join(marks)})" if marks else "")

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 from arena.exports.displacement_table import DisplacementTable, marked
 from arena.exports.drawing import GRID, INK, MARK, SIMULATED, SOFT, drawn, house_style
 from arena.exports.published import SOURCE, PublishedBox
-from augment.services.displacement import SPELLING, By, Group
+from augment.services.displacement import VARIANTS, By, Group
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -79,7 +79,7 @@ def _lines(table: DisplacementTable) -> Iterator[Line]:
         return
     published = {name: list(boxes) for name, boxes in groupby(table.published, _variant)}
     found = {name: list(some) for name, some in groupby(table.groups, _heading)}
-    names = [*(name for name in SPELLING.values() if name in published or name in found)]
+    names = [*(name for name in VARIANTS if name in published or name in found)]
     names += [name for name in found if name not in names]
     for name in names:
         yield Line(label=name, is_heading=True)
@@ -210,6 +210,7 @@ def _caption(table: DisplacementTable) -> str:
     if is_far(list(_lines(table))):
         lines[0] += "; logarithmic beyond 1 m"
     lines.append(table.types_text)
+    lines.append("Boxes: quartiles around the median; whiskers: up to 1.5 boxes; diamonds: means")
     if table.published:
         lines.append(f"Grey, hatched: {SOURCE}, without its outliers")
     return "\n".join(lines)

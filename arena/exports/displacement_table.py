@@ -8,6 +8,7 @@ from dataclasses import dataclass
 
 from arena.exports.published import BY_VARIANT, PublishedBox
 from arena.exports.tables import SIMULATED
+from arena.rating.sentences import sentence
 from augment.models import GenerationJob, Scenario
 from augment.services.displacement import (
     PLACED_EXACTLY,
@@ -47,30 +48,47 @@ class DisplacementTable:
     def types_text(self) -> str:
         """Which scenario types count, in words."""
         if len(self.types) == len(Scenario.Type.values):
-            return "All five scenario types"
-        labels = [str(Scenario.Type(one).label) for one in self.types]
-        return "Scenario types: " + ", ".join(labels)
+            return sentence("All five scenario types")
+        labels = tuple(str(Scenario.Type(one).label) for one in self.types)
+        return sentence("Scenario types: %(types)s", types=labels)
 
     @property
     def notes(self) -> tuple[str, ...]:
         """Sentences that belong beneath every form of it."""
-        said = [
-            f"{self.types_text}.",
-            "Distances between centres, in metres, of objects matched within their class so that "
-            "their sum is smallest; each matched object counts once.",
-            "Missing and surplus objects are counted and have no distance; an unreadable or "
-            "refused answer misses all.",
+        return (f"{self.types_text}.", *self.remarks)
+
+    @property
+    def remarks(self) -> tuple[str, ...]:
+        """The same but for the scenario types."""
+        said: list[str] = [
+            sentence(
+                "Distances between centres, in metres, of objects matched within their class so "
+                "that their sum is smallest; each matched object counts once."
+            ),
+            sentence(
+                "Missing and surplus objects are counted and have no distance; an unreadable or "
+                "refused answer misses all."
+            ),
         ]
         if self.by is By.VARIANT and self.is_papers_choice:
             said.append(
-                "As in the paper, construction zone and accident site are left out: their "
-                "objects can lie in many places that all follow the instruction."
+                sentence(
+                    "As in the paper, construction zone and accident site are left out: their "
+                    "objects can lie in many places that all follow the instruction."
+                )
             )
-        if self.left_out:
-            reasons = ", ".join(f"{number} ({why})" for why, number in self.left_out.items())
-            said.append(f"Augmentations not measured: {reasons}.")
+        for why, number in self.left_out.items():
+            said.append(
+                sentence(
+                    "Augmentations not measured: %(number)s (%(reasons)s).",
+                    number=number,
+                    reasons=(why,),
+                )
+            )
         if self.simulated:
-            said.append("Simulated contestants are marked; they say nothing about a real one.")
+            said.append(
+                sentence("Simulated contestants are marked; they say nothing about a real one.")
+            )
         return tuple(said)
 
     @property

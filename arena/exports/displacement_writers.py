@@ -2,17 +2,15 @@
 
 from __future__ import annotations
 
-import csv
-import io
 import json
-from functools import partial
+from collections.abc import Sequence
 from typing import Any
 
 from arena.exports.displacement_chart import box_plot
 from arena.exports.displacement_table import DisplacementTable, marked
-from arena.exports.formats import Format, cell, rounded
+from arena.exports.formats import Format, drawings, formats, rounded
 from arena.exports.published import SOURCE, PublishedBox
-from augment.errors import UnknownName
+from arena.services.cells import csv_text
 from augment.services.displacement import Box, Group, Measured
 
 COLUMNS = (
@@ -25,29 +23,18 @@ MEASURED = "measured"
 
 def csv_bytes(table: DisplacementTable) -> bytes:
     """One line a group, then one a published box; what is unknown is empty."""
-    sheet = io.StringIO()
-    writer = csv.writer(sheet, lineterminator="\n")
-    writer.writerow(COLUMNS)
     types = " ".join(table.types)
+    rows: list[Sequence[object]] = []
     for group in table.groups:
         found = group.summary
-        writer.writerow(
-            [
-                *(cell(value) for value in _who(group)),
-                *(cell(n) for n in (found.augmentations, found.n, found.missing, found.surplus)),
-                *_numbers(found.box),
-                MEASURED,
-                types,
-            ]
-        )
+        counts = (found.augmentations, found.n, found.missing, found.surplus)
+        rows.append((*_who(group), *counts, *_numbers(found.box), MEASURED, types))
     for box in table.published:
         numbers = [f"{one:.1f}" for one in (box.median_m, box.q1_m, box.q3_m)]
         named = [box.variant, f"{box.model} {box.variant} (paper)", "", box.model, box.variant]
-        counts = ["no", "", "", "", ""]
-        writer.writerow(
-            [*named, *counts, *numbers, "", "", f"{box.high_m:.1f}", "", SOURCE, types]
-        )
-    return sheet.getvalue().encode()
+        unknown = ["no", "", "", "", ""]
+        rows.append([*named, *unknown, *numbers, "", "", f"{box.high_m:.1f}", "", SOURCE, types])
+    return csv_text(COLUMNS, rows).encode()
 
 
 def json_bytes(table: DisplacementTable) -> bytes:
@@ -68,41 +55,9 @@ def json_bytes(table: DisplacementTable) -> bytes:
     return (json.dumps(document, indent=2, ensure_ascii=False) + "\n").encode()
 
 
-FORMATS: dict[str, Format[DisplacementTable]] = {
-    "csv": Format(
-        suffix="csv", content_type="text/csv; charset=utf-8", is_text=True, write=csv_bytes
-    ),
-    "json": Format(suffix="json", content_type="application/json", is_text=True, write=json_bytes),
-    "svg": Format(
-        suffix="svg",
-        content_type="image/svg+xml",
-        is_text=True,
-        write=partial(box_plot, file_format="svg"),
-    ),
-    "pdf": Format(
-        suffix="pdf",
-        content_type="application/pdf",
-        is_text=False,
-        write=partial(box_plot, file_format="pdf"),
-    ),
-    "png": Format(
-        suffix="png",
-        content_type="image/png",
-        is_text=False,
-        write=partial(box_plot, file_format="png"),
-    ),
-}
-
-
-def format_named(name: str) -> Format[DisplacementTable]:
-    """How to write that format.
-
-    Raises:
-        UnknownName: Nobody knows it.
-    """
-    if name not in FORMATS:
-        raise UnknownName("format", name, list(FORMATS))
-    return FORMATS[name]
+FORMATS: dict[str, Format[DisplacementTable]] = formats(
+    csv=csv_bytes, json=json_bytes, **drawings(box_plot)
+)
 
 
 # Private

@@ -27,9 +27,17 @@ def house_style() -> AbstractContextManager[None]:
     settings: dict[Any, Any] = {
         "svg.hashsalt": "scenario-arena",
         "svg.fonttype": "none",
+        "pdf.fonttype": 42,  # publishers refuse Type 3, matplotlib's usual form
         "text.parse_math": False,  # a dollar sign in a name is a dollar sign
     }
     return matplotlib.rc_context(settings)
+
+
+def width_in(text: str, size_pt: float) -> float:
+    """How many inches a text takes; call it within `house_style`."""
+    from matplotlib.textpath import TextPath
+
+    return float(TextPath((0.0, 0.0), text, size=size_pt).get_extents().width) / 72.0
 
 
 def drawn(figure: Figure, file_format: str) -> bytes:

@@ -2,19 +2,21 @@
 
 from __future__ import annotations
 
-import csv
-import io
 from collections import defaultdict
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from arena.exports.formats import Format, cell
+import numpy as np
+from numpy.typing import NDArray
+
+from arena.exports.formats import Format, formats
 from arena.exports.latex import escape
 from arena.exports.tables import SIMULATED
 from arena.models import FaultLabel
 from arena.queries.faults import labels_of
 from arena.rating.agreement import cohens_kappa
-from augment.errors import UnknownName
+from arena.rating.reliability import Metric, krippendorff_alpha
+from arena.services.cells import csv_text
 from augment.models import Augmentation, Contestant, GenerationJob
 from augment.services.fault_guess import FaultClass
 
@@ -71,16 +73,21 @@ class FaultLine:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Agreement:
-    """The checks' first guess against the experts, for one class of faults.
+    """How well the labels of one class of faults agree.
 
     Attributes:
-        kappa: None where it is not defined.
+        kappa: Cohen's, of the checks' first guess and the experts; None where it is not defined.
         n: Labels with a guess beside them.
+        alpha: Krippendorff's, nominal, of the experts among themselves; None where it is not
+            defined.
+        pictures: Augmentations that at least two experts have labelled.
     """
 
     fault: str
     kappa: float | None
     n: int
+    alpha: float | None
+    pictures: int
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -115,31 +122,33 @@ def fault_table(job: GenerationJob) -> FaultTable:
     return FaultTable(
         job=job.name,
         lines=tuple(_line(who, own, found) for who, own in by_contestant.items()),
-        agreement=tuple(_agreement(fault, labels) for fault in FaultClass),
+        agreement=tuple(_agreement(fault, labels, found) for fault in FaultClass),
     )
 
 
 def csv_bytes(table: FaultTable) -> bytes:
     """One line a contestant."""
-    sheet = io.StringIO()
-    writer = csv.writer(sheet, lineterminator="\n")
-    writer.writerow(COLUMNS)
-    for line in table.lines:
-        values = (
+    rows = (
+        (
             line.marked, line.slug, line.is_simulated, line.all, line.position, line.heading,
             line.logic, line.labelled, line.labels, line.without_modification,
-        )  # fmt: skip
-        writer.writerow([cell(value) for value in values])
-    return sheet.getvalue().encode()
+        )
+        for line in table.lines
+    )  # fmt: skip
+    return csv_text(COLUMNS, rows).encode()
 
 
 def latex(table: FaultTable) -> str:
     """The paper's table "Error Count per Category": needs booktabs and xcolor with `table`."""
-    kappas = ", ".join(f"{one.fault} {_kappa(one)} (n={one.n})" for one in table.agreement)
+    kappas = ", ".join(f"{one.fault} {_said(one.kappa)} (n={one.n})" for one in table.agreement)
+    alphas = ", ".join(
+        f"{one.fault} {_said(one.alpha)} (pictures={one.pictures})" for one in table.agreement
+    )
     lines = [
         r"% \usepackage{booktabs} and \usepackage[table]{xcolor}",
         f"% {' '.join(table.job.split())}: {table.labels} labels",
         f"% Cohen's kappa of the checks' first guess and the experts: {kappas}",
+        f"% Krippendorff's alpha of the experts among themselves: {alphas}",
         r"\providecolor{llm_blue}{RGB}{105, 156, 219}",
         r"\begin{table}",
         r"    \centering",
@@ -163,28 +172,9 @@ def latex(table: FaultTable) -> str:
     return "\n".join(lines) + "\n"
 
 
-FORMATS: dict[str, Format[FaultTable]] = {
-    "csv": Format(
-        suffix="csv", content_type="text/csv; charset=utf-8", is_text=True, write=csv_bytes
-    ),
-    "latex": Format(
-        suffix="tex",
-        content_type="application/x-tex; charset=utf-8",
-        is_text=True,
-        write=lambda table: latex(table).encode(),
-    ),
-}
-
-
-def format_named(name: str) -> Format[FaultTable]:
-    """How to write that format.
-
-    Raises:
-        UnknownName: Nobody knows it.
-    """
-    if name not in FORMATS:
-        raise UnknownName("format", name, list(FORMATS))
-    return FORMATS[name]
+FORMATS: dict[str, Format[FaultTable]] = formats(
+    csv=csv_bytes, latex=lambda table: latex(table).encode()
+)
 
 
 # Private
@@ -213,15 +203,31 @@ def _is_seen(fault: FaultClass, labels: Sequence[FaultLabel]) -> bool:
     return 2 * seen > len(labels)
 
 
-def _agreement(fault: FaultClass, labels: Sequence[FaultLabel]) -> Agreement:
+def _agreement(
+    fault: FaultClass, labels: Sequence[FaultLabel], found: dict[int, list[FaultLabel]]
+) -> Agreement:
     pairs = [
         (getattr(label, f"guessed_{fault.value}"), getattr(label, fault.value))
         for label in labels
         if label.guessed_position is not None
     ]
     kappa = cohens_kappa([one for one, _ in pairs], [other for _, other in pairs])
-    return Agreement(fault=fault.value, kappa=kappa, n=len(pairs))
+    several = [own for own in found.values() if len(own) > 1]
+    return Agreement(
+        fault=fault.value,
+        kappa=kappa,
+        n=len(pairs),
+        alpha=krippendorff_alpha(_table(fault, several), Metric.NOMINAL) if several else None,
+        pictures=len(several),
+    )
 
 
-def _kappa(one: Agreement) -> str:
-    return "undefined" if one.kappa is None else f"{one.kappa:.2f}"
+def _table(fault: FaultClass, several: Sequence[Sequence[FaultLabel]]) -> NDArray[np.int64]:
+    """(U, 3): how often "no", nothing and "yes" was said of each augmentation."""
+    seen = np.array([sum(getattr(one, fault.value) for one in own) for own in several])
+    labels = np.array([len(own) for own in several])
+    return np.column_stack([labels - seen, np.zeros_like(seen), seen]).astype(np.int64)
+
+
+def _said(value: float | None) -> str:
+    return "undefined" if value is None else f"{value:.2f}"

@@ -1,12 +1,16 @@
-"""What all writers share: what a format is, and how a value stands in a cell."""
+"""What all writers share: what formats there are, and how a value is written."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import Generic, TypeVar
+from functools import partial
+from typing import Generic, Protocol, TypeVar
+
+from augment.errors import UnknownName
 
 Table = TypeVar("Table")
+Drawn = TypeVar("Drawn", contravariant=True)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -24,17 +28,47 @@ class Format(Generic[Table]):
     write: Callable[[Table], bytes]
 
 
-def cell(value: object) -> str:
-    """A cell that no spreadsheet takes for a formula."""
-    if value is None:
-        return ""
-    if isinstance(value, bool):
-        return "yes" if value else "no"
-    if isinstance(value, float):
-        return f"{value:.2f}"
-    text = str(value)
-    guard = "'" if text.startswith(("=", "+", "-", "@", "\t", "\r", "\n")) else ""
-    return guard + text.replace("\r", " ").replace("\n", " ")
+_KINDS = {
+    "csv": ("csv", "text/csv; charset=utf-8", True),
+    "json": ("json", "application/json", True),
+    "parquet": ("parquet", "application/vnd.apache.parquet", False),
+    "latex": ("tex", "application/x-tex; charset=utf-8", True),
+    "svg": ("svg", "image/svg+xml", True),
+    "pdf": ("pdf", "application/pdf", False),
+    "png": ("png", "image/png", False),
+}
+"""Suffix, content type and whether it is text, by the name of the format."""
+
+
+def formats(**writers: Callable[[Table], bytes]) -> dict[str, Format[Table]]:
+    """How a table can be written: a writer for each name, in the order in which they are shown."""
+    made = {}
+    for name, write in writers.items():
+        suffix, content_type, is_text = _KINDS[name]
+        made[name] = Format(suffix=suffix, content_type=content_type, is_text=is_text, write=write)
+    return made
+
+
+def format_named(known: Mapping[str, Format[Table]], name: str) -> Format[Table]:
+    """How to write that format.
+
+    Raises:
+        UnknownName: It is none of the known ones.
+    """
+    if name not in known:
+        raise UnknownName("format", name, list(known))
+    return known[name]
+
+
+class _Drawing(Protocol[Drawn]):
+    """A chart as a file of that format: svg, pdf or png."""
+
+    def __call__(self, table: Drawn, /, *, file_format: str) -> bytes: ...
+
+
+def drawings(chart: _Drawing[Table]) -> dict[str, Callable[[Table], bytes]]:
+    """The writers of a chart."""
+    return {name: partial(chart, file_format=name) for name in ("svg", "pdf", "png")}
 
 
 def rounded(value: float | None) -> float | None:

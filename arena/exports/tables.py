@@ -2,21 +2,32 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 from django.db.models import F
 
 from arena.models import Snapshot, Standing
+from arena.rating.printed import interval_text, rank_text, rating_text
+from arena.rating.sentences import read_sentence, sentence
 
-METHODS = {"bt": "Bradley-Terry on the Elo scale", "elo": "online Elo, median over resamples"}
+METHODS = {
+    "bt": "Bradley-Terry on the Elo scale",
+    "davidson": "Davidson's tie model on the Elo scale",
+    "elo": "online Elo, median over resamples",
+}
 UNITS = {
     "vote": "votes",
     "scenario": "scenarios",
     "expert": "experts",
     "two-way": "experts and scenarios",
 }
-UNKNOWN = "--"
 SIMULATED = " (simulated)"
+SIMULATED_TABLE = "Simulated: votes or contestants of this table are made by the machine."
+EARLY_LOOK = sentence("Early look: the study was still open.")
+APART = -1
+"""The part of those who are rated with nobody."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -27,6 +38,7 @@ class Row:
         model: The name people know, with "(simulated)" where that is so.
         variant: The recipe's name as it ends the model's name, empty without.
         rank, elo, lower, upper: None where the votes do not determine them.
+        part: Ratings and ranks compare only those with the same number here.
     """
 
     model: str
@@ -43,6 +55,9 @@ class Row:
     ties: int
     losses: int
     note: str
+    rank_best: int | None = None
+    rank_worst: int | None = None
+    part: int = 0
 
     @property
     def name(self) -> str:
@@ -50,22 +65,24 @@ class Row:
         return self.model.removesuffix(SIMULATED)
 
     @property
+    def score_percent(self) -> int:
+        """The mean score of a vote in percent, a tie half; 0 without votes."""
+        return round(100 * (self.wins + self.ties / 2) / self.votes) if self.votes else 0
+
+    @property
     def rank_text(self) -> str:
         """The rank, or two hyphens without one."""
-        return UNKNOWN if self.rank is None else str(self.rank)
+        return rank_text(self.rank)
 
     @property
     def elo_text(self) -> str:
         """The rating as a whole number."""
-        return UNKNOWN if self.elo is None else str(round(self.elo))
+        return rating_text(self.elo)
 
     @property
     def interval_text(self) -> str:
         """The interval as the paper prints it: -9/+11 around the printed rating."""
-        if self.elo is None or self.lower is None or self.upper is None:
-            return UNKNOWN
-        elo = round(self.elo)
-        return f"-{elo - round(self.lower)}/+{round(self.upper) - elo}"
+        return interval_text(self.elo, self.lower, self.upper)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -73,8 +90,9 @@ class LeaderboardTable:
     """A snapshot's lines in order, and all that must be said with them.
 
     Attributes:
-        status: Why ratings or intervals are missing, empty if none is.
+        reasons: Why ratings or intervals are missing, none if none is.
         early: The study was still open.
+        notes: What else the method has to say about these votes.
         left_out: Votes that do not count, by reason.
     """
 
@@ -88,9 +106,15 @@ class LeaderboardTable:
     votes: int
     left_out: dict[str, int]
     votes_sha256: str
-    status: str
+    reasons: tuple[str, ...] = ()
     simulated: bool
     early: bool
+    notes: tuple[str, ...] = ()
+
+    @property
+    def status(self) -> str:
+        """The reasons in one line, empty if nothing is missing."""
+        return " ".join(self.reasons)
 
     @property
     def method_text(self) -> str:
@@ -102,30 +126,31 @@ class LeaderboardTable:
 
     @property
     def warnings(self) -> tuple[str, ...]:
-        """Sentences that no reader may miss."""
-        said = []
-        if self.simulated:
-            said.append("Simulated: votes or contestants of this table are made by the machine.")
-        if self.early:
-            said.append("Early look: the study was still open.")
-        if self.status:
-            said.append(self.status)
-        if self.degenerate_rounds:
-            said.append(
-                f"{self.degenerate_rounds} of {self.rounds} resamples determined no ratings and "
-                "are left out of the intervals."
-            )
-        return tuple(said)
+        """Sentences that no reader may miss, for files."""
+        marks = ((SIMULATED_TABLE, self.simulated), (EARLY_LOOK, self.early))
+        said = [mark for mark, so in marks if so]
+        return (*said, *((self.status,) if self.status else ()), *self.notes)
+
+    @property
+    def has_parts(self) -> bool:
+        """Whether there are groups that can't be compared with each other."""
+        return len({row.part for row in self.rows if row.elo is not None}) > 1
 
 
 def leaderboard_table(snapshot: Snapshot) -> LeaderboardTable:
-    """The table of a snapshot, best first; two queries."""
-    standings = snapshot.standings.select_related("contestant").order_by(
-        F("rating").desc(nulls_last=True), "contestant__slug"
-    )
+    """The table of a snapshot, best first; one query."""
+    standings = list(snapshot.standings.order_by(F("rating").desc(nulls_last=True), "slug"))
+    board = snapshot.results.get("board") or {}
+    names = {standing.slug: standing.name for standing in standings}
+    parts: dict[str, int] = board.get("parts") or {}
+    last = len(standings)
+    standings.sort(key=lambda standing: parts.get(standing.slug, last))
     return LeaderboardTable(
         study=snapshot.study.name,
-        rows=tuple(_row(standing) for standing in standings),
+        rows=tuple(
+            _row(standing, parts.get(standing.slug, APART) if parts else 0)
+            for standing in standings
+        ),
         method=snapshot.method,
         rounds=snapshot.rounds,
         unit=snapshot.resampling_unit,
@@ -134,22 +159,41 @@ def leaderboard_table(snapshot: Snapshot) -> LeaderboardTable:
         votes=snapshot.votes_counted,
         left_out=dict(sorted(snapshot.votes_left_out.items())),
         votes_sha256=snapshot.votes_sha256,
-        status=snapshot.status,
+        reasons=sentences_of(board.get("reasons", [snapshot.status]), names),
         simulated=snapshot.includes_simulated,
         early=snapshot.is_early,
+        notes=sentences_of(board.get("warnings", ()), names),
     )
 
 
-def _row(standing: Standing) -> Row:
-    contestant = standing.contestant
-    name, variant = contestant.name, contestant.variant
+def sentences_of(kept: Sequence[Any], names: Mapping[str, str]) -> tuple[str, ...]:
+    """Sentences that a snapshot keeps, with names instead of slugs; older ones are plain text."""
+    found = []
+    for one in filter(None, kept):
+        if isinstance(one, str):
+            found.append(one)
+            continue
+        values = {key: _named(value, names) for key, value in one["values"].items()}
+        found.append(read_sentence({"text": one["text"], "values": values}))
+    return tuple(found)
+
+
+def _named(value: Any, names: Mapping[str, str]) -> Any:
+    """Lists are of slugs, or of lists of them."""
+    if not isinstance(value, list):
+        return value
+    return [_named(one, names) if isinstance(one, list) else names.get(one, one) for one in value]
+
+
+def _row(standing: Standing, part: int) -> Row:
+    name, variant = standing.name, standing.variant
     last_word = name.rpartition(" ")[2]
     return Row(
-        model=f"{name}{SIMULATED}" if contestant.is_simulated else name,
+        model=f"{name}{SIMULATED}" if standing.is_simulated else name,
         variant=last_word if variant and last_word.lower() == variant.lower() else "",
-        slug=contestant.slug,
-        kind=contestant.kind,
-        simulated=contestant.is_simulated,
+        slug=standing.slug,
+        kind=standing.kind,
+        simulated=standing.is_simulated,
         rank=standing.rank,
         elo=standing.rating,
         lower=standing.lower,
@@ -159,4 +203,7 @@ def _row(standing: Standing) -> Row:
         ties=standing.ties,
         losses=standing.losses,
         note=standing.note,
+        rank_best=standing.rank_best,
+        rank_worst=standing.rank_worst,
+        part=part,
     )

@@ -2,32 +2,34 @@
 
 from __future__ import annotations
 
-import csv
-import io
 import json
-from functools import partial
 from typing import Any
 
 from arena.exports.charts import interval_chart
-from arena.exports.formats import Format, cell, rounded
+from arena.exports.formats import Format, drawings, formats, rounded
 from arena.exports.latex import latex
+from arena.exports.parquet import NUMBER, TEXT, WHOLE, YES_NO, parquet_bytes
 from arena.exports.tables import LeaderboardTable, Row
-from augment.errors import UnknownName
+from arena.services.cells import csv_text
 
 COLUMNS = (
     "rank", "model", "elo", "lower", "upper", "votes", "wins", "ties", "losses",
     "slug", "kind", "simulated", "note", "study", "method", "study_simulated", "early",
 )  # fmt: skip
 
+_KINDS = {
+    name: {
+        "rank": WHOLE, "elo": NUMBER, "lower": NUMBER, "upper": NUMBER, "votes": WHOLE,
+        "wins": WHOLE, "ties": WHOLE, "losses": WHOLE, "simulated": YES_NO,
+        "study_simulated": YES_NO, "early": YES_NO,
+    }.get(name, TEXT)
+    for name in COLUMNS
+}  # fmt: skip
+
 
 def csv_bytes(table: LeaderboardTable) -> bytes:
     """One line a contestant; what is unknown is empty, numbers have two decimals."""
-    sheet = io.StringIO()
-    writer = csv.writer(sheet, lineterminator="\n")
-    writer.writerow(COLUMNS)
-    for row in table.rows:
-        writer.writerow([cell(value) for value in _values(table, row)])
-    return sheet.getvalue().encode()
+    return csv_text(COLUMNS, (_values(table, row) for row in table.rows)).encode()
 
 
 def json_bytes(table: LeaderboardTable) -> bytes:
@@ -52,26 +54,14 @@ def json_bytes(table: LeaderboardTable) -> bytes:
             "sha256": table.votes_sha256,
         },
         "status": table.status,
-        "standings": [
-            {
-                "model": row.model,
-                "slug": row.slug,
-                "kind": row.kind,
-                "simulated": row.simulated,
-                "rank": row.rank,
-                "rating": rounded(row.elo),
-                "lower": rounded(row.lower),
-                "upper": rounded(row.upper),
-                "votes": row.votes,
-                "wins": row.wins,
-                "ties": row.ties,
-                "losses": row.losses,
-                "note": row.note,
-            }
-            for row in table.rows
-        ],
+        "standings": [_standing(table, row) for row in table.rows],
     }
     return (json.dumps(document, indent=2, ensure_ascii=False) + "\n").encode()
+
+
+def parquet_of(table: LeaderboardTable) -> bytes:
+    """The columns of the CSV file, typed; numbers as they are."""
+    return parquet_bytes(_KINDS, [_values(table, row) for row in table.rows])
 
 
 def plain_text(table: LeaderboardTable) -> str:
@@ -96,47 +86,32 @@ def plain_text(table: LeaderboardTable) -> str:
     return "\n".join([*lines, *table.warnings])
 
 
-FORMATS: dict[str, Format[LeaderboardTable]] = {
-    "csv": Format(
-        suffix="csv", content_type="text/csv; charset=utf-8", is_text=True, write=csv_bytes
-    ),
-    "json": Format(suffix="json", content_type="application/json", is_text=True, write=json_bytes),
-    "latex": Format(
-        suffix="tex",
-        content_type="application/x-tex; charset=utf-8",
-        is_text=True,
-        write=lambda table: latex(table).encode(),
-    ),
-    "svg": Format(
-        suffix="svg",
-        content_type="image/svg+xml",
-        is_text=True,
-        write=partial(interval_chart, file_format="svg"),
-    ),
-    "pdf": Format(
-        suffix="pdf",
-        content_type="application/pdf",
-        is_text=False,
-        write=partial(interval_chart, file_format="pdf"),
-    ),
-    "png": Format(
-        suffix="png",
-        content_type="image/png",
-        is_text=False,
-        write=partial(interval_chart, file_format="png"),
-    ),
-}
+FORMATS: dict[str, Format[LeaderboardTable]] = formats(
+    csv=csv_bytes,
+    json=json_bytes,
+    parquet=parquet_of,
+    latex=lambda table: latex(table).encode(),
+    **drawings(interval_chart),
+)
 
 
-def format_named(name: str) -> Format[LeaderboardTable]:
-    """How to write that format.
-
-    Raises:
-        UnknownName: Nobody knows it.
-    """
-    if name not in FORMATS:
-        raise UnknownName("format", name, list(FORMATS))
-    return FORMATS[name]
+def _standing(table: LeaderboardTable, row: Row) -> dict[str, Any]:
+    part = {"part": row.part} if table.has_parts else {}
+    return {
+        "model": row.model,
+        "slug": row.slug,
+        "kind": row.kind,
+        "simulated": row.simulated,
+        "rank": row.rank,
+        "rating": rounded(row.elo),
+        "lower": rounded(row.lower),
+        "upper": rounded(row.upper),
+        "votes": row.votes,
+        "wins": row.wins,
+        "ties": row.ties,
+        "losses": row.losses,
+        "note": row.note,
+    } | part
 
 
 def _values(table: LeaderboardTable, row: Row) -> tuple[object, ...]:

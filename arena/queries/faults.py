@@ -23,8 +23,8 @@ class LabellingProgress:
 
     @property
     def left(self) -> int:
-        """What still waits for a label."""
-        return self.planned - self.labelled
+        """What still waits for a label: nothing in a closed labelling."""
+        return 0 if self.labelling.closed_at else self.planned - self.labelled
 
 
 def of_expert(expert: User) -> list[LabellingProgress]:
@@ -51,7 +51,9 @@ def labelling_of(*, expert: User, code: UUID) -> LabellingProgress:
 
 
 def next_task(*, labelling: LabellingRound, expert: User) -> LabelTask | None:
-    """What the expert labels next, None when all is done."""
+    """What the expert labels next, None when all is done or the labelling is closed."""
+    if labelling.closed_at is not None:
+        return None
     waiting = labelling.tasks.filter(expert=expert, label=None)
     return (
         waiting.select_related("augmentation__scenario")

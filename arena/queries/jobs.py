@@ -3,13 +3,10 @@
 from __future__ import annotations
 
 from collections import Counter, defaultdict
-from contextlib import suppress
 from dataclasses import dataclass
-from uuid import UUID
 
-from django.db.models import Count, Q
+from django.db.models import Count
 
-from augment.errors import Conflict, UnknownName
 from augment.models import Augmentation, Contestant, GenerationJob, Scenario
 
 State = Augmentation.State
@@ -73,26 +70,6 @@ class FailureGroup:
     state: State
     reason: str
     augmentations: list[Augmentation]
-
-
-def job_named(name_or_code: str) -> GenerationJob:
-    """A job by its name or its code.
-
-    Raises:
-        UnknownName: There is none.
-        Conflict: Several have that name.
-    """
-    wanted = Q(name=name_or_code)
-    with suppress(ValueError):  # most names are not codes
-        wanted |= Q(code=UUID(name_or_code))
-    found = list(GenerationJob.objects.filter(wanted))
-    if not found:
-        names = GenerationJob.objects.values_list("name", flat=True)
-        raise UnknownName("job", name_or_code, sorted(set(names)))
-    if len(found) > 1:
-        codes = ", ".join(str(job.code) for job in found)
-        raise Conflict(f"{len(found)} jobs are called {name_or_code!r}; name one code: {codes}.")
-    return found[0]
 
 
 def every() -> list[JobCounts]:

@@ -150,6 +150,12 @@ def test_outliers_far_beyond_the_whiskers_turn_the_axis_logarithmic() -> None:
     assert "logarithmic beyond 1 m" in box_plot(wide, file_format="svg").decode()
 
 
+def test_a_pdf_embeds_fonts_that_publishers_take() -> None:
+    made = box_plot(table(), file_format="pdf")
+    assert b"/FontFile2" in made
+    assert b"/Type3" not in made
+
+
 def test_a_job_of_which_nothing_is_measured_still_has_a_chart() -> None:
     job = GenerationJob.objects.create(name="Empty")
     assert b"Displacement error" in box_plot(

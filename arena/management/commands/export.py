@@ -2,24 +2,31 @@
 
 from __future__ import annotations
 
+from argparse import ArgumentParser
 from pathlib import Path
 from typing import Any
+from uuid import UUID
 
 from django.core.management.base import BaseCommand, CommandError, CommandParser
 
 from arena.errors import ArenaError, StudyStillOpen
 from arena.exports import displacement_writers, faults
+from arena.exports.bundle import ZIP, bundle
 from arena.exports.displacement_table import displacement_table
 from arena.exports.files import write_whole
+from arena.exports.formats import format_named
+from arena.exports.rating_charts import CONTENT_TYPES, chart_bytes
 from arena.exports.samples import SHEET_FORMATS, sheet_bytes, sheet_of
 from arena.exports.tables import leaderboard_table
-from arena.exports.writers import FORMATS, format_named
-from arena.models import Study
-from arena.queries.jobs import grid, job_named
+from arena.exports.votes import VOTE_FORMATS, rows_of
+from arena.exports.writers import FORMATS
+from arena.models import Snapshot, Study
+from arena.queries.jobs import grid
 from arena.queries.results import snapshot_to_export
 from arena.queries.studies import study_named
-from arena.services.ratings import log_early_look
+from arena.services.early_looks import log_early_look
 from augment.errors import AugmentError, UnknownName
+from augment.services.choosing import job_named
 from augment.services.displacement import By, types_named
 from augment.services.interplan import job_as_interplan
 
@@ -37,46 +44,15 @@ class Command(BaseCommand):
     def add_arguments(self, parser: CommandParser) -> None:
         """What to export, of which study or job, where to."""
         kinds = parser.add_subparsers(dest="what", required=True, metavar="WHAT")
-        leaderboard = kinds.add_parser("leaderboard", help="the newest rating of a study")
-        leaderboard.add_argument("study", help="its name or its code")
-        leaderboard.add_argument("--format", default="csv", help=f"one of {', '.join(FORMATS)}")
-        leaderboard.add_argument(
-            "--early", action="store_true", help="export from an open study; this is logged"
-        )
-        displacement = kinds.add_parser("displacement", help="how far from the references")
-        displacement.add_argument("job", help="its name or its code")
-        displacement.add_argument("--by", default="type", help=f"one of {', '.join(By)}")
-        displacement.add_argument(
-            "--types",
-            nargs="+",
-            help="scenario types, or all; by variant only those with definite places unless given",
-        )
-        displacement.add_argument(
-            "--format", default="csv", help=f"one of {', '.join(displacement_writers.FORMATS)}"
-        )
-        samples = kinds.add_parser("samples", help="a sheet of pictures with captions")
-        samples.add_argument("job", help="its name or its code")
-        samples.add_argument("--scenarios", nargs="+", required=True, help="slugs, top to bottom")
-        samples.add_argument("--contestants", nargs="+", required=True, help="left to right")
-        samples.add_argument(
-            "--format", help=f"one of {', '.join(SHEET_FORMATS)}; else the file's ending says it"
-        )
-        modifications = kinds.add_parser("modifications", help="what a job's contestants made")
-        modifications.add_argument("job", help="its name or its code")
-        modifications.add_argument(
-            "--format", default="interplan", help=f"one of {', '.join(MODIFICATION_FORMATS)}"
-        )
-        modifications.add_argument("--contestant", help="the slug of one; all unless given")
-        labels = kinds.add_parser("faults", help="how often experts saw which fault")
-        labels.add_argument("job", help="its name or its code")
-        labels.add_argument("--format", default="csv", help=f"one of {', '.join(faults.FORMATS)}")
-        for kind in (leaderboard, displacement, samples, modifications, labels):
+        for kind in (*_kinds_of_studies(kinds), *_kinds_of_jobs(kinds)):
             kind.add_argument("--out", required=True, help="a file; - for standard output")
 
     def handle(self, *args: Any, **options: Any) -> None:
         """Write the file."""
         write = {
             "leaderboard": self._leaderboard,
+            "votes": self._votes,
+            "chart": self._chart,
             "displacement": self._displacement,
             "samples": self._samples,
             "modifications": self._modifications,
@@ -89,17 +65,36 @@ class Command(BaseCommand):
         self._deliver(content, options["out"], suffix, is_text)
 
     def _leaderboard(self, options: dict[str, Any]) -> Written:
+        form = options["format"]
+        chosen = None if form == ZIP else format_named(FORMATS, form)
+        snapshot = self._snapshot(options)
+        if chosen is None:
+            return bundle(snapshot), ZIP, False
+        return chosen.write(leaderboard_table(snapshot)), chosen.suffix, chosen.is_text
+
+    def _votes(self, options: dict[str, Any]) -> Written:
+        chosen = format_named(VOTE_FORMATS, options["format"])
+        return chosen.write(rows_of(self._snapshot(options))), chosen.suffix, chosen.is_text
+
+    def _chart(self, options: dict[str, Any]) -> Written:
+        form = options["format"]
+        snapshot = self._snapshot(options)
+        content = chart_bytes(snapshot, name=options["chart"], file_format=form)
+        return content, form, form == "svg"
+
+    def _snapshot(self, options: dict[str, Any]) -> Snapshot:
+        """The rating that is asked for; looking into an open study is written to the log."""
         study = study_named(options["study"])
-        chosen = format_named(options["format"])
-        snapshot = snapshot_to_export(study)
+        snapshot = snapshot_to_export(study, options["rating"])
         if study.state == Study.State.OPEN:
             if not options["early"]:
                 raise StudyStillOpen(study.name)
-            log_early_look(study=study, actor=None, what=f"leaderboard as {options['format']}")
-        return chosen.write(leaderboard_table(snapshot)), chosen.suffix, chosen.is_text
+            what = f"{options['what']} as {options['format']}"
+            log_early_look(study=study, actor=None, what=what)
+        return snapshot
 
     def _displacement(self, options: dict[str, Any]) -> Written:
-        chosen = displacement_writers.format_named(options["format"])
+        chosen = format_named(displacement_writers.FORMATS, options["format"])
         if options["by"] not in set(By):
             raise UnknownName("grouping", options["by"], list(By))
         types = None if options["types"] is None else types_named(options["types"])
@@ -107,7 +102,7 @@ class Command(BaseCommand):
         return chosen.write(table), chosen.suffix, chosen.is_text
 
     def _faults(self, options: dict[str, Any]) -> Written:
-        chosen = faults.format_named(options["format"])
+        chosen = format_named(faults.FORMATS, options["format"])
         table = faults.fault_table(job_named(options["job"]))
         return chosen.write(table), chosen.suffix, chosen.is_text
 
@@ -146,3 +141,56 @@ class Command(BaseCommand):
         except OSError as error:
             raise CommandError(f"{out} can't be written: {error.strerror}.") from error
         self.stderr.write(f"Wrote {out}.")
+
+
+def _kinds_of_studies(kinds: Any) -> list[ArgumentParser]:
+    leaderboard = kinds.add_parser("leaderboard", help="the newest rating of a study")
+    leaderboard.add_argument("study", help="its name or its code")
+    formats = ", ".join([*FORMATS, ZIP])
+    leaderboard.add_argument("--format", default="csv", help=f"one of {formats}")
+    votes = kinds.add_parser("votes", help="the votes of the newest rating, with pseudonyms")
+    votes.add_argument("study", help="its name or its code")
+    votes.add_argument("--format", default="csv", help=f"one of {', '.join(VOTE_FORMATS)}")
+    chart = kinds.add_parser("chart", help="a chart of the newest rating beside the table's")
+    chart.add_argument("study", help="its name or its code")
+    chart.add_argument(
+        "--chart", required=True, help="pairs, types, width, displacement, elo-usd, ..."
+    )
+    chart.add_argument("--format", default="svg", help=f"one of {', '.join(CONTENT_TYPES)}")
+    for kind in (leaderboard, votes, chart):
+        kind.add_argument("--rating", type=UUID, help="the code of an older rating")
+        kind.add_argument(
+            "--early", action="store_true", help="export from an open study; this is logged"
+        )
+    return [leaderboard, votes, chart]
+
+
+def _kinds_of_jobs(kinds: Any) -> list[ArgumentParser]:
+    displacement = kinds.add_parser("displacement", help="how far from the references")
+    displacement.add_argument("job", help="its name or its code")
+    displacement.add_argument("--by", default="type", help=f"one of {', '.join(By)}")
+    displacement.add_argument(
+        "--types",
+        nargs="+",
+        help="scenario types, or all; by variant only those with definite places unless given",
+    )
+    displacement.add_argument(
+        "--format", default="csv", help=f"one of {', '.join(displacement_writers.FORMATS)}"
+    )
+    samples = kinds.add_parser("samples", help="a sheet of pictures with captions")
+    samples.add_argument("job", help="its name or its code")
+    samples.add_argument("--scenarios", nargs="+", required=True, help="slugs, top to bottom")
+    samples.add_argument("--contestants", nargs="+", required=True, help="left to right")
+    samples.add_argument(
+        "--format", help=f"one of {', '.join(SHEET_FORMATS)}; else the file's ending says it"
+    )
+    modifications = kinds.add_parser("modifications", help="what a job's contestants made")
+    modifications.add_argument("job", help="its name or its code")
+    modifications.add_argument(
+        "--format", default="interplan", help=f"one of {', '.join(MODIFICATION_FORMATS)}"
+    )
+    modifications.add_argument("--contestant", help="the slug of one; all unless given")
+    labels = kinds.add_parser("faults", help="how often experts saw which fault")
+    labels.add_argument("job", help="its name or its code")
+    labels.add_argument("--format", default="csv", help=f"one of {', '.join(faults.FORMATS)}")
+    return [displacement, samples, modifications, labels]

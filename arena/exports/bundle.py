@@ -1,0 +1,165 @@
+"""Everything about a rating in one zip; the same rating always gives the same bytes."""
+
+from __future__ import annotations
+
+import io
+import json
+import zipfile
+from collections.abc import Iterable, Sequence
+from typing import Any
+
+from arena.exports.rating_charts import CONTENT_TYPES as CHART_FORMATS
+from arena.exports.rating_charts import charts
+from arena.exports.tables import leaderboard_table
+from arena.exports.votes import VOTE_FORMATS, rows_of
+from arena.exports.writers import FORMATS
+from arena.models import Snapshot
+from arena.services.cells import csv_text
+from arena.services.vote_rows import digest_of
+
+ZIP = "zip"
+CONTENT_TYPE = "application/zip"
+MANIFEST = "manifest.json"
+
+_EPOCH = (1980, 1, 1, 0, 0, 0)
+"""The earliest time that a zip can name: the rating's own time stands in the manifest."""
+
+_READABLE = 0o100644 << 16
+_UNIX = 3
+
+
+def bundle(snapshot: Snapshot) -> bytes:
+    """The zip with its manifest.
+
+    Raises:
+        Conflict: The votes are not what they were when they were rated.
+    """
+    files = _files(snapshot)
+    files[MANIFEST] = _manifest(snapshot, files)
+    packed = io.BytesIO()
+    with zipfile.ZipFile(packed, "w") as archive:
+        for name in sorted(files):
+            entry = zipfile.ZipInfo(name, date_time=_EPOCH)
+            entry.compress_type = zipfile.ZIP_DEFLATED
+            entry.external_attr = _READABLE
+            entry.create_system = _UNIX
+            archive.writestr(entry, files[name])
+    return packed.getvalue()
+
+
+# --- Private -----------------------------------------------------------------------------------
+
+
+def _files(snapshot: Snapshot) -> dict[str, bytes]:
+    table = leaderboard_table(snapshot)
+    results = snapshot.results
+    votes = rows_of(snapshot)
+    files = {f"leaderboard.{chosen.suffix}": chosen.write(table) for chosen in FORMATS.values()}
+    files |= {f"votes.{chosen.suffix}": chosen.write(votes) for chosen in VOTE_FORMATS.values()}
+    files |= {
+        f"{name}.{form}": chart(file_format=form)
+        for name, chart in charts(snapshot).items()
+        for form in CHART_FORMATS
+    }
+    files["pairs.csv"] = _pairs(results)
+    files["types.csv"] = _types(results)
+    files["raters.csv"] = _raters(results)
+    files["statistics.json"] = _json(_public(results))
+    return files
+
+
+def _manifest(snapshot: Snapshot, files: dict[str, bytes]) -> bytes:
+    table = leaderboard_table(snapshot)
+    return _json(
+        {
+            "format": "scenario-arena/rating",
+            "version": 1,
+            "study": table.study,
+            "rating": str(snapshot.code),
+            "rated_at": snapshot.made_at.isoformat(),
+            "simulated": table.simulated,
+            "early": table.early,
+            "warnings": list(table.warnings),
+            "method": {
+                "name": table.method,
+                "text": table.method_text,
+                "resampling_unit": table.unit,
+                "rounds": table.rounds,
+                "seed": table.seed,
+            },
+            "filters": snapshot.filters,
+            "votes": {
+                "counted": table.votes,
+                "left_out": table.left_out,
+                "sha256": table.votes_sha256,
+                "file": "votes.csv",
+            },
+            "versions": dict(sorted(snapshot.versions.items())),
+            "files": {
+                name: {"sha256": digest_of(content), "bytes": len(content)}
+                for name, content in sorted(files.items())
+            },
+        }
+    )
+
+
+def _public(results: dict[str, Any]) -> dict[str, Any]:
+    """The statistics without the codes of people; pseudonyms stay."""
+    judges: dict[str, str] = results.get("judges", {})
+    document = {key: value for key, value in results.items() if key != "judges"}
+    trust = dict(document.get("trust") or {})
+    trust["raters"] = [
+        {key: value for key, value in line.items() if key not in ("judge", "expert")}
+        for line in trust.get("raters") or []
+    ]
+    if trust.get("repeats"):
+        trust["repeats"] = {k: v for k, v in trust["repeats"].items() if k != "by_expert"}
+    return document | {"trust": trust, "judges": sorted(judges.values())}
+
+
+def _json(document: object) -> bytes:
+    # Sorted, because PostgreSQL keeps the keys of stored documents in an order of its own.
+    text = json.dumps(document, indent=2, ensure_ascii=False, sort_keys=True)
+    return (text + "\n").encode()
+
+
+def _csv(head: Sequence[str], rows: Iterable[Sequence[object]]) -> bytes:
+    return csv_text(head, rows).encode()
+
+
+def _pairs(results: dict[str, Any]) -> bytes:
+    head = ("a", "b", "wins", "ties", "losses", "both_miss", "planned")
+    return _csv(head, ([pair[name] for name in head] for pair in results.get("pairs", [])))
+
+
+def _types(results: dict[str, Any]) -> bytes:
+    head = ("type", "contestant", "rank", "elo", "lower", "upper", "votes", "too_few")
+    keys = ("slug", "rank", "rating", "lower", "upper", "votes", "few")
+    return _csv(
+        head,
+        (
+            [part["type"], *(line[key] for key in keys)]
+            for part in results.get("types", [])
+            for line in part["lines"]
+        ),
+    )
+
+
+def _raters(results: dict[str, Any]) -> bytes:
+    head = (
+        "judge", "votes", "median_ms", "under_1_s", "ties", "left", "agreement", "shared",
+        "favourites", "decided", "repeats", "repeats_same", "checks", "checks_passed", "moves",
+    )  # fmt: skip
+    lines = (results.get("trust") or {}).get("raters") or []
+    return _csv(
+        head,
+        (
+            [
+                line["name"], line["votes"], line["median_ms"], line["fast"], line["ties"],
+                line["left"]["value"], line["agreement"]["value"], line["shared"],
+                line["favourites"]["value"], line["decided"], *line["repeats"], *line["checks"],
+                line["moves"],
+            ]
+            for line in lines
+        ),
+    )  # fmt: skip

@@ -1,0 +1,168 @@
+"""The scatter charts of a rating as numbers: pages and files draw the same points."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from arena.exports.tables import LeaderboardTable, Row
+from arena.models import Snapshot
+from arena.rating.sentences import Sentence, sentence
+
+ELO = sentence("Elo with 95 %% interval")
+METRES = sentence("Median displacement (m)")
+USD = sentence("USD per scenario")
+TOKENS = sentence("Tokens per scenario")
+VOTES = sentence("Votes")
+HALF_WIDTH = sentence("Half-width of the interval (Elo)")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Given:
+    """What is to be drawn; points of the same group look the same.
+
+    Attributes:
+        number: Of the point, its place in the table.
+        lower, upper: The ends of the interval in y, None without one.
+    """
+
+    number: int
+    name: str
+    x: float
+    y: float
+    lower: float | None = None
+    upper: float | None = None
+    group: str = ""
+    is_simulated: bool = False
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Plot:
+    """A chart of one thing against another.
+
+    Attributes:
+        across, up: What the axes say.
+        unit: After a number across, where it is named alone.
+        is_log: Whether the axis across is logarithmic.
+        from_zero: Whether the axes begin at zero, a logarithmic one excepted.
+        falls: Draws the curve `falls` / sqrt(x) behind the points, None without one.
+    """
+
+    across: Sentence
+    up: Sentence
+    points: Sequence[Given]
+    unit: str = ""
+    is_log: bool = False
+    from_zero: bool = False
+    falls: float | None = None
+
+    @property
+    def curve(self) -> Callable[[float], float] | None:
+        """Y by x, of what falls with the square root of x."""
+        constant = self.falls
+        return None if constant is None else lambda x: constant / math.sqrt(x)
+
+
+def plots(snapshot: Snapshot, table: LeaderboardTable) -> dict[str, Plot]:
+    """Every chart that has points, by the name that files and pages know it by."""
+    found = {
+        "width": _width(table),
+        "displacement": _displacement(snapshot, table),
+        **_cost(snapshot, table),
+    }
+    return {name: plot for name, plot in found.items() if plot.points}
+
+
+# --- Private -----------------------------------------------------------------------------------
+
+
+def _width(table: LeaderboardTable) -> Plot:
+    """Half-widths against votes, with the curve that falls with the votes' square root."""
+    points = [
+        _given(n, row, x=float(row.votes), y=(row.upper - row.lower) / 2)
+        for n, row in enumerate(table.rows, start=1)
+        if row.lower is not None and row.upper is not None
+    ]
+    constants = sorted(point.y * point.x**0.5 for point in points)
+    return Plot(
+        across=VOTES,
+        up=HALF_WIDTH,
+        points=points,
+        from_zero=True,
+        falls=constants[len(constants) // 2] if constants else None,
+    )
+
+
+def _displacement(snapshot: Snapshot, table: LeaderboardTable) -> Plot:
+    metres = _by_slug(snapshot, "displacement", "median_m")
+    points = [
+        _rated(n, row, metres[row.slug])
+        for n, row in enumerate(table.rows, start=1)
+        if row.elo is not None and metres.get(row.slug) is not None
+    ]
+    return Plot(across=METRES, up=ELO, points=points, unit=" m")
+
+
+def _cost(snapshot: Snapshot, table: LeaderboardTable) -> dict[str, Plot]:
+    metres = _by_slug(snapshot, "displacement", "median_m")
+    groups = _by_slug(snapshot, "cost", "model_class")
+    found = {}
+    for what, label, unit in (("usd", USD, " USD"), ("tokens", TOKENS, "")):
+        spent = _by_slug(snapshot, "cost", what)
+        rows = [
+            (n, row, spent[row.slug], groups[row.slug] or "")
+            for n, row in enumerate(table.rows, start=1)
+            if spent.get(row.slug)
+        ]
+        found[f"elo-{what}"] = Plot(
+            across=label,
+            up=ELO,
+            points=[_rated(n, row, x, group) for n, row, x, group in rows if row.elo is not None],
+            unit=unit,
+            is_log=True,
+        )
+        found[f"displacement-{what}"] = Plot(
+            across=label,
+            up=METRES,
+            points=[
+                _given(n, row, x=x, y=metres[row.slug], group=group)
+                for n, row, x, group in rows
+                if metres.get(row.slug) is not None
+            ],
+            unit=unit,
+            is_log=True,
+            from_zero=True,
+        )
+    return found
+
+
+def _by_slug(snapshot: Snapshot, what: str, value: str) -> dict[str, Any]:
+    return {line["slug"]: line[value] for line in snapshot.results.get(what) or []}
+
+
+def _rated(number: int, row: Row, x: float, group: str = "") -> Given:
+    assert row.elo is not None
+    return _given(number, row, x=x, y=row.elo, interval=(row.lower, row.upper), group=group)
+
+
+def _given(
+    number: int,
+    row: Row,
+    *,
+    x: float,
+    y: float,
+    interval: tuple[float | None, float | None] = (None, None),
+    group: str = "",
+) -> Given:
+    return Given(
+        number=number,
+        name=row.name,
+        x=x,
+        y=y,
+        lower=interval[0],
+        upper=interval[1],
+        group=group,
+        is_simulated=row.simulated,
+    )

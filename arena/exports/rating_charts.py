@@ -1,0 +1,52 @@
+"""The charts of a rating as files, by name. The same rating always gives the same bytes."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from functools import partial
+from typing import Protocol
+
+from arena.exports.heat_chart import heat_chart
+from arena.exports.plots import plots
+from arena.exports.scatter_chart import scatter_chart
+from arena.exports.tables import leaderboard_table
+from arena.exports.type_charts import type_charts
+from arena.models import Snapshot
+from augment.errors import UnknownName
+
+CONTENT_TYPES = {"svg": "image/svg+xml", "pdf": "application/pdf", "png": "image/png"}
+
+
+class Chart(Protocol):
+    """A chart that can be drawn."""
+
+    def __call__(self, *, file_format: str) -> bytes:
+        """The bytes of an "svg", "pdf" or "png" file."""
+
+
+def charts(snapshot: Snapshot) -> Mapping[str, Chart]:
+    """Every chart beside the table's own that a rating has, by name."""
+    table = leaderboard_table(snapshot)
+    found: dict[str, Chart] = {}
+    pairs = snapshot.results.get("pairs") or []
+    if pairs:
+        found["pairs"] = partial(heat_chart, table.rows, pairs)
+    if snapshot.results.get("types"):
+        found["types"] = partial(type_charts, snapshot.results["types"], table)
+    for name, plot in plots(snapshot, table).items():
+        found[name] = partial(scatter_chart, plot)
+    return found
+
+
+def chart_bytes(snapshot: Snapshot, *, name: str, file_format: str) -> bytes:
+    """A chart of a rating as a file.
+
+    Raises:
+        UnknownName: The rating has no such chart, or there is no such format.
+    """
+    if file_format not in CONTENT_TYPES:
+        raise UnknownName("format", file_format, list(CONTENT_TYPES))
+    known = charts(snapshot)
+    if name not in known:
+        raise UnknownName("chart of this rating", name, list(known))
+    return known[name](file_format=file_format)

@@ -1,0 +1,135 @@
+"""A rating as files: everything in one zip, votes for other packages, charts."""
+
+from __future__ import annotations
+
+import csv
+import hashlib
+import io
+import json
+import zipfile
+from pathlib import Path
+
+import pytest
+from django.core.management import CommandError, call_command
+from pyarrow import parquet
+
+from arena.exports.bundle import bundle
+from arena.exports.formats import format_named
+from arena.exports.heat_chart import heat_chart
+from arena.exports.parquet import NUMBER, TEXT, WHOLE, YES_NO, parquet_bytes
+from arena.exports.tables import leaderboard_table
+from arena.exports.votes import VOTE_FORMATS, rows_of
+from arena.exports.writers import FORMATS
+from arena.models import Snapshot, Study
+from arena.services.ratings import rate
+from augment.errors import UnknownName
+from augment.models import Event
+from tests.full_study import Size, full_study
+from tests.study_rows import a_study, vote
+
+pytestmark = pytest.mark.django_db
+
+SMALL = Size(scenarios=5, experts=3, votes_per_expert=60)
+
+
+@pytest.fixture
+def snapshot() -> Snapshot:
+    return rate(study=full_study(size=SMALL), rounds=300, unit="vote", seed=4)
+
+
+def test_the_zip_is_the_same_twice_its_manifest_true_and_no_account_named(
+    snapshot: Snapshot,
+) -> None:
+    packed = bundle(Snapshot.objects.get(pk=snapshot.pk))
+    digests = [hashlib.sha256(one).hexdigest() for one in (packed, bundle(snapshot))]
+    assert digests[0] == digests[1]  # of bytes a difference would take minutes to show
+    with zipfile.ZipFile(io.BytesIO(packed)) as archive:
+        files = {name: archive.read(name) for name in archive.namelist()}
+        assert {entry.date_time for entry in archive.infolist()} == {(1980, 1, 1, 0, 0, 0)}
+    manifest = json.loads(files.pop("manifest.json"))
+    assert set(manifest["files"]) == set(files)
+    for name, content in files.items():
+        assert manifest["files"][name] == {
+            "sha256": hashlib.sha256(content).hexdigest(),
+            "bytes": len(content),
+        }
+    assert manifest["votes"]["sha256"] == hashlib.sha256(files["votes.csv"]).hexdigest()
+    assert (manifest["method"]["seed"], manifest["method"]["rounds"]) == (4, 300)
+    assert manifest["filters"]["kinds"] == ["main"]
+    assert set(manifest["versions"]) == {"python", "numpy", "scipy", "results"}
+    wanted = ("csv", "json", "parquet", "tex", "svg", "pdf", "png")
+    assert {f"leaderboard.{suffix}" for suffix in wanted} < set(files)
+    person = snapshot.study.experts.order_by("pk")[0].person
+    texts = b"".join(files[name] for name in files if not name.endswith(".pdf"))
+    assert person.pseudonym.encode() in texts
+    for secret in (person.user.username, str(person.code)):
+        assert secret.encode() not in texts
+
+
+def test_votes_read_back_from_both_formats_are_the_same(snapshot: Snapshot) -> None:
+    rows = rows_of(snapshot)
+    text = csv.DictReader(io.StringIO(VOTE_FORMATS["csv"].write(rows).decode()))
+    table = parquet.read_table(io.BytesIO(VOTE_FORMATS["parquet"].write(rows))).to_pylist()
+    assert len(table) == snapshot.votes_counted == 180
+    for one, other in zip(text, table, strict=True):
+        assert one["model_a"] == other["model_a"]
+        assert one["winner"] == other["winner"]
+        assert int(one["ms_visible"]) == other["ms_visible"]
+    with pytest.raises(UnknownName, match=r"'xls'. Known: csv, parquet"):
+        format_named(VOTE_FORMATS, "xls")
+
+
+def test_the_table_reads_back_from_parquet(snapshot: Snapshot) -> None:
+    table = leaderboard_table(snapshot)
+    content = FORMATS["parquet"].write(table)
+    assert content == FORMATS["parquet"].write(table)
+    first = parquet.read_table(io.BytesIO(content)).to_pylist()[0]
+    assert (first["model"], first["rank"], first["elo"]) == (
+        table.rows[0].model,
+        table.rows[0].rank,
+        table.rows[0].elo,
+    )
+
+
+def test_an_empty_table_keeps_its_columns_and_unknown_is_null() -> None:
+    columns = {"a": TEXT, "b": WHOLE, "c": NUMBER, "d": YES_NO}
+    assert parquet.read_table(io.BytesIO(parquet_bytes(columns, []))).column_names == [*"abcd"]
+    row = parquet.read_table(io.BytesIO(parquet_bytes(columns, [("x", None, None, True)])))
+    assert row.to_pylist() == [{"a": "x", "b": None, "c": None, "d": True}]
+
+
+def test_the_heat_chart_names_everybody_and_is_the_same_twice(snapshot: Snapshot) -> None:
+    table, pairs = leaderboard_table(snapshot), snapshot.results["pairs"]
+    picture = heat_chart(table.rows, pairs, file_format="svg")
+    assert picture == heat_chart(table.rows, pairs, file_format="svg")
+    for row in table.rows:
+        assert row.model in picture.decode()
+
+
+# --- The command -------------------------------------------------------------------------------
+
+
+def test_the_command_writes_votes_and_the_zip(snapshot: Snapshot, tmp_path: Path) -> None:
+    name = snapshot.study.name
+    for what, form in (("votes", "csv"), ("votes", "parquet"), ("leaderboard", "zip")):
+        out = tmp_path / f"{what}.{form}"
+        call_command("export", what, name, "--format", form, "--out", str(out))
+        assert out.stat().st_size > 100
+    with zipfile.ZipFile(tmp_path / "leaderboard.zip") as archive:
+        assert json.loads(archive.read("manifest.json"))["rating"] == str(snapshot.code)
+    rate(study=snapshot.study, rounds=20, unit="vote")
+    out = tmp_path / "older.csv"
+    call_command("export", "leaderboard", name, "--rating", str(snapshot.code), "--out", str(out))
+    assert b"300 resamples" in out.read_bytes()
+
+
+def test_votes_of_an_open_study_are_exported_only_on_purpose(tmp_path: Path) -> None:
+    study: Study = a_study(votes_per_expert=3)
+    for matchup in study.matchups.all():
+        vote(matchup)
+    rate(study=study, rounds=10, early=True)
+    asked = ("export", "votes", study.name, "--out", str(tmp_path / "votes.csv"))
+    with pytest.raises(CommandError, match="still open"):
+        call_command(*asked)
+    call_command(*asked, "--early")
+    assert Event.objects.get(verb="look early").after == {"what": "votes as csv"}
