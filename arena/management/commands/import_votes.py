@@ -1,0 +1,45 @@
+"""manage.py import_votes: keep votes from elsewhere as a study that can be rated."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+from django.core.management.base import BaseCommand, CommandError, CommandParser
+
+from arena.errors import ArenaError
+from arena.services.vote_imports import import_votes
+from augment.errors import AugmentError
+
+
+class Command(BaseCommand):
+    """The door to arena.services.vote_imports.import_votes."""
+
+    help = (
+        "Import votes from a CSV file with the columns model_a, model_b, winner (model_a, "
+        "model_b, tie or tie (bothbad)), and maybe judge and item."
+    )
+
+    def add_arguments(self, parser: CommandParser) -> None:
+        """Which file, and what its study is called."""
+        parser.add_argument("file", type=Path)
+        parser.add_argument("--name", help="of the study; that of the file without its ending")
+        parser.add_argument(
+            "--simulated", action="store_true", help="the votes are made up; everything says so"
+        )
+
+    def handle(self, *args: Any, **options: Any) -> None:
+        """Import the file and say what it held."""
+        path: Path = options["file"]
+        try:
+            found = import_votes(
+                path=path,
+                name=options["name"] or path.stem,
+                is_simulated=options["simulated"],
+            )
+        except (ArenaError, AugmentError) as error:
+            raise CommandError(str(error)) from error
+        self.stdout.write(
+            f"Imported {found.votes} votes on {found.contestants} contestants as "
+            f"{found.study.name!r} ({found.study.code})."
+        )

@@ -1,0 +1,132 @@
+"""Votes from elsewhere: kept whole or not at all, then rated and written like any other."""
+
+from __future__ import annotations
+
+import csv
+import io
+from pathlib import Path
+
+import pytest
+from django.core.management import CommandError, call_command
+from django.urls import reverse
+
+from arena.exports.tables import leaderboard_table
+from arena.exports.votes import VOTE_FORMATS, rows_of
+from arena.models import ImportedVote, Study, VoteFile
+from arena.services.ratings import rate
+from arena.services.vote_imports import import_votes
+from augment.models import Event
+from tests.web.cast import people, signed_in
+
+pytestmark = pytest.mark.django_db
+
+HEAD = "model_a,model_b,winner,judge,item"
+
+
+def written(folder: Path, *lines: str, head: str = HEAD) -> Path:
+    path = folder / "arena.csv"
+    path.write_text("\n".join([head, *lines]) + "\n")
+    return path
+
+
+def lines(votes: int = 36) -> list[str]:
+    """x beats y and z mostly, y beats z mostly; three judges, four items."""
+    pairs = (("x", "y"), ("y", "z"), ("z", "x"))
+    found = []
+    for number in range(votes):
+        one, other = pairs[number % 3]
+        better = "model_a" if (one, other) != ("z", "x") else "model_b"
+        worse = "model_b" if better == "model_a" else "model_a"
+        winner = (better, better, "tie", worse, "tie (bothbad)")[number // 3 % 5]
+        found.append(f"{one},{other},{winner},j{number % 4},i{number // 3 % 5}")
+    return found
+
+
+def test_a_file_becomes_a_closed_study_that_is_rated(tmp_path: Path) -> None:
+    found = import_votes(path=written(tmp_path, *lines()), name="Elsewhere")
+    assert (found.votes, found.contestants) == (36, 3)
+    study = Study.objects.get(name="Elsewhere")
+    assert study.state == "closed"
+    assert Event.objects.filter(verb="import votes").count() == 1
+    snapshot = rate(study=study, rounds=200)
+    assert snapshot.resampling_unit == "two-way"
+    assert [row.slug for row in leaderboard_table(snapshot).rows] == ["x", "y", "z"]
+    assert {row.kind for row in leaderboard_table(snapshot).rows} == {"imported"}
+    assert snapshot.votes_counted == 36
+
+
+def test_without_judges_votes_are_resampled(tmp_path: Path) -> None:
+    cut = [",".join(line.split(",")[:3]) for line in lines()]
+    path = written(tmp_path, *cut, head="model_a,model_b,winner")
+    study = import_votes(path=path, name="Elsewhere").study
+    snapshot = rate(study=study, rounds=200)
+    assert snapshot.resampling_unit == "vote"
+    assert snapshot.results["trust"]["agreement"]["units"] == 0, "nobody knows what was shown"
+
+
+@pytest.mark.parametrize(
+    ("faulty", "sentence"),
+    [
+        ("x,y,left,j0,i0", r"line 38: .*model_a.*tie \(bothbad\)"),
+        ("x,y,,j0,i0", "line 38: winner is empty"),
+        ("x,x,tie,j0,i0", "line 38"),
+        ("x,y,tie", "line 38: there are 3 cells"),
+        (f"{'x' * 201},y,tie,j0,i0", "line 38: model_a has 201 signs, 200 are allowed"),
+    ],
+)
+def test_a_fault_is_named_with_its_line_and_nothing_is_kept(
+    tmp_path: Path, faulty: str, sentence: str
+) -> None:
+    path = written(tmp_path, *lines(), faulty)
+    with pytest.raises(CommandError, match=sentence):
+        call_command("import_votes", str(path))
+    assert not Study.objects.exists()
+    assert not VoteFile.objects.exists()
+    assert not ImportedVote.objects.exists()
+
+
+def test_a_missing_column_and_a_taken_name_are_refused(tmp_path: Path) -> None:
+    path = written(tmp_path, "x,y", head="model_a,model_b")
+    with pytest.raises(CommandError, match="no column 'winner'"):
+        call_command("import_votes", str(path))
+    with pytest.raises(CommandError, match="can't be read"):
+        call_command("import_votes", str(tmp_path / "nowhere.csv"))
+    path = written(tmp_path, *lines())
+    call_command("import_votes", str(path), name="Elsewhere")
+    with pytest.raises(CommandError, match="a study named 'Elsewhere' already"):
+        call_command("import_votes", str(path), name="Elsewhere")
+
+
+def test_what_was_exported_can_be_imported_and_gives_the_same_table(tmp_path: Path) -> None:
+    study = import_votes(path=written(tmp_path, *lines()), name="First").study
+    first = rate(study=study, rounds=100, seed=3)
+    again = tmp_path / "again.csv"
+    again.write_bytes(VOTE_FORMATS["csv"].write(rows_of(first)))
+    second = rate(study=import_votes(path=again, name="Second").study, rounds=100, seed=3)
+    one, other = (leaderboard_table(snapshot).rows for snapshot in (first, second))
+    assert one == other
+
+
+def test_made_up_votes_say_so_wherever_they_go(tmp_path: Path) -> None:
+    head = f"{HEAD},simulated"
+    marked = [f"{line},yes" for line in lines()]
+    study = import_votes(path=written(tmp_path, *marked, head=head), name="Elsewhere").study
+    snapshot = rate(study=study, rounds=50)
+    assert snapshot.includes_simulated
+    table = csv.DictReader(io.StringIO(VOTE_FORMATS["csv"].write(rows_of(snapshot)).decode()))
+    assert {line["simulated"] for line in table} == {"yes"}
+
+
+def test_the_same_pages_show_imported_votes(tmp_path: Path) -> None:
+    study = import_votes(path=written(tmp_path, *lines()), name="Elsewhere").study
+    rate(study=study, rounds=50)
+    analyst = signed_in(people()["analyst"])
+    assert "Imported votes" in analyst.get(reverse("studies")).content.decode()
+    assert analyst.get(reverse("study", args=[study.code])).status_code == 302
+    page = analyst.get(reverse("results", args=[study.code])).content.decode()
+    assert "votes from the file arena.csv" in page
+    for tab in ("pairs", "types", "raters", "coverage", "displacement", "cost", "log"):
+        answer = analyst.get(reverse("results-tab", args=[study.code, tab]))
+        assert answer.status_code == 200, tab
+    cell = analyst.get(reverse("results-votes", args=[study.code]), {"a": "x", "b": "y"})
+    assert cell.content.decode().count("<tr>") == 13, "a head and twelve votes"
