@@ -9,8 +9,9 @@ from uuid import UUID
 
 from django.contrib.auth.models import User
 from django.db import IntegrityError, transaction
+from django.utils import timezone
 
-from arena.errors import AlreadyLabelled, NothingToPlan, NotYours
+from arena.errors import AlreadyLabelled, LabellingClosed, NothingToPlan, NotYours
 from arena.models import FaultLabel, LabellingRound, LabelTask
 from arena.queries.people import experts as expert_accounts
 from augment.errors import Conflict, UnknownName
@@ -73,6 +74,27 @@ def open_labelling(
     return labelling
 
 
+@transaction.atomic
+def close_labelling(*, labelling: LabellingRound, actor: User | None = None) -> LabellingRound:
+    """Take no more labels; those that are there stay, and what is left is nobody's duty.
+
+    Raises:
+        LabellingClosed: It is closed already.
+    """
+    now = timezone.now()
+    if not LabellingRound.objects.filter(pk=labelling.pk, closed_at=None).update(closed_at=now):
+        raise LabellingClosed(f"The labelling {labelling.name!r} is closed already.")
+    labelling.closed_at = now
+    log_event(
+        actor=actor,
+        verb="close",
+        object_kind="labelling",
+        object_code=labelling.code,
+        after={"labels": FaultLabel.objects.filter(task__labelling=labelling).count()},
+    )
+    return labelling
+
+
 def save_label(
     *, expert: User, task_code: UUID, faults: frozenset[FaultClass], note: str = ""
 ) -> FaultLabel:
@@ -81,6 +103,7 @@ def save_label(
     Raises:
         NotYours: The task is somebody else's or does not exist.
         AlreadyLabelled: It has another label.
+        LabellingClosed: It has no label, and its labelling takes none any more.
     """
     save = partial(_save, expert=expert, task_code=task_code, faults=faults, note=note)
     try:
@@ -121,7 +144,7 @@ def _save(
     *, expert: User, task_code: UUID, faults: frozenset[FaultClass], note: str
 ) -> FaultLabel:
     task = (
-        LabelTask.objects.select_related("augmentation__scenario__base_scene")
+        LabelTask.objects.select_related("labelling", "augmentation__scenario__base_scene")
         .filter(code=task_code, expert=expert)
         .first()
     )
@@ -134,6 +157,8 @@ def _save(
         if any(getattr(known, name) != value for name, value in said.items()):
             raise AlreadyLabelled
         return known
+    if task.labelling.closed_at is not None:
+        raise LabellingClosed(f"The labelling {task.labelling.name!r} is closed.")
     guessed = guess(task.augmentation)
     return FaultLabel.objects.create(
         augmentation=task.augmentation,

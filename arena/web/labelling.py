@@ -10,15 +10,17 @@ from django.contrib.auth.models import User
 from django.http import Http404, HttpRequest, HttpResponse
 from django.shortcuts import get_object_or_404, redirect, render
 from django.utils.text import slugify
+from django.utils.translation import gettext as _
 from django.views.decorators.cache import never_cache
-from django.views.decorators.http import require_http_methods, require_safe
+from django.views.decorators.http import require_http_methods, require_POST, require_safe
 
-from arena.errors import AlreadyLabelled, ArenaError, NotYours
-from arena.exports.faults import fault_table, format_named
-from arena.models import FaultLabel
+from arena.errors import AlreadyLabelled, ArenaError, LabellingClosed, NotYours
+from arena.exports.faults import FORMATS, fault_table
+from arena.exports.formats import format_named
+from arena.models import FaultLabel, LabellingRound
 from arena.queries import faults
-from arena.queries.people import experts, role_of
-from arena.services.faults import open_labelling, save_label
+from arena.queries.people import by_pseudonym, experts, role_of
+from arena.services.faults import close_labelling, open_labelling, save_label
 from arena.web.access import ADMIN, EXPERT, STAFF, only
 from arena.web.forms import LabelForm, LabellingForm
 from augment.errors import AugmentError, UnknownName
@@ -48,9 +50,7 @@ def label_page(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
 def faults_page(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
     """What was labelled in a job, and the form that opens a labelling."""
     job = get_object_or_404(GenerationJob, code=code)
-    form = LabellingForm(
-        request.POST or None, experts=list(experts().order_by("person__pseudonym"))
-    )
+    form = LabellingForm(request.POST or None, experts=by_pseudonym(experts()))
     if request.method == "POST":
         if role_of(request.user) != ADMIN:
             return HttpResponse(status=403)
@@ -71,7 +71,7 @@ def export(request: HttpRequest, code: uuid.UUID, form: str) -> HttpResponse:
     """The faults of a job as a file."""
     job = get_object_or_404(GenerationJob, code=code)
     try:
-        chosen = format_named(form)
+        chosen = format_named(FORMATS, form)
     except UnknownName as error:
         raise Http404 from error
     name = f"{slugify(job.name) or 'job'}-faults.{chosen.suffix}"
@@ -82,13 +82,29 @@ def export(request: HttpRequest, code: uuid.UUID, form: str) -> HttpResponse:
     )
 
 
+@only(ADMIN)
+@require_POST
+def close(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
+    """Take no more labels."""
+    labelling = get_object_or_404(LabellingRound.objects.select_related("job"), code=code)
+    try:
+        close_labelling(labelling=labelling, actor=cast(User, request.user))
+    except ArenaError as error:
+        messages.error(request, str(error))
+    else:
+        messages.success(
+            request, _("“%(name)s” is closed; its labels stay.") % {"name": labelling.name}
+        )
+    return redirect("faults", code=labelling.job.code)
+
+
 # Private
 
 
 def _save(request: HttpRequest, expert: User, code: uuid.UUID) -> HttpResponse:
     form = LabelForm(request.POST)
     if not form.is_valid():
-        messages.error(request, "That could not be read; nothing was saved.")
+        messages.error(request, _("That could not be read; nothing was saved."))
         return redirect("label", code=code)
     try:
         label = save_label(
@@ -98,18 +114,26 @@ def _save(request: HttpRequest, expert: User, code: uuid.UUID) -> HttpResponse:
             note=form.cleaned_data["note"],
         )
     except AlreadyLabelled:
-        messages.info(request, "You had labelled that picture before; your first label counts.")
+        messages.info(request, _("You had labelled that picture before; your first label counts."))
+    except LabellingClosed as error:
+        messages.error(request, str(error))
     else:
-        messages.success(request, f"Saved. {_guess(label)}")
+        messages.success(request, " ".join((_("Saved."), _guess(label))))
     return redirect("label", code=code)
 
 
 def _guess(label: FaultLabel) -> str:
     """What the checks had guessed, told only now."""
     if label.guessed_position is None:
-        return "The automatic checks could not look at that picture."
-    seen = [fault.value for fault in FaultClass if getattr(label, f"guessed_{fault.value}")]
-    return f"The automatic checks had guessed: {', '.join(seen) or 'no fault'}."
+        return _("The automatic checks could not look at that picture.")
+    names = {
+        FaultClass.POSITION: _("position"),
+        FaultClass.HEADING: _("heading"),
+        FaultClass.LOGIC: _("logic"),
+    }
+    seen = [name for fault, name in names.items() if getattr(label, f"guessed_{fault.value}")]
+    faults = ", ".join(seen) or _("no fault")
+    return _("The automatic checks had guessed: %(faults)s.") % {"faults": faults}
 
 
 def _open(request: HttpRequest, job: GenerationJob, form: LabellingForm) -> bool:
@@ -124,5 +148,7 @@ def _open(request: HttpRequest, job: GenerationJob, form: LabellingForm) -> bool
     except (ArenaError, AugmentError) as error:
         form.add_error(None, str(error))
         return False
-    messages.success(request, f"“{labelling.name}” is open; its experts can label now.")
+    messages.success(
+        request, _("“%(name)s” is open; its experts can label now.") % {"name": labelling.name}
+    )
     return True

@@ -10,13 +10,13 @@ from django.contrib.auth.models import User
 from django.core.management import call_command
 from django.db import IntegrityError, transaction
 
-from arena.errors import AlreadyLabelled, NothingToPlan, NotYours
+from arena.errors import AlreadyLabelled, LabellingClosed, NothingToPlan, NotYours
 from arena.exports.faults import csv_bytes, fault_table, latex
 from arena.models import FaultLabel, LabellingRound, LabelTask
 from arena.queries.faults import labelling_of, next_task, of_expert
-from arena.services.faults import open_labelling, save_label
+from arena.services.faults import close_labelling, open_labelling, save_label
 from augment.errors import Conflict, UnknownName
-from augment.models import GenerationJob
+from augment.models import Event, GenerationJob
 from augment.services.fault_guess import FaultClass
 from tests.exports.test_displacement import a_job
 from tests.study_rows import expert
@@ -154,6 +154,41 @@ def test_agreement_compares_guess_and_label(job: GenerationJob, eva: User) -> No
     position, heading, _ = fault_table(job).agreement
     assert (position.kappa, position.n) == (1.0, 2)
     assert heading.n == 2
+
+
+def test_the_experts_are_compared_where_two_have_labelled(job: GenerationJob, eva: User) -> None:
+    finn = expert("finn")
+    labelling = opened(job, "eva", "finn")
+    by_eva, by_finn = tasks_of(labelling, eva), tasks_of(labelling, finn)
+    by_finn.sort(key=lambda task: task.augmentation_id != by_eva[0].augmentation_id)
+    save(by_eva[0], P)
+    save(by_finn[0], P, L)
+    assert [one.pictures for one in fault_table(job).agreement] == [1, 1, 1]
+    save(by_eva[1], L)
+    save(by_finn[1])
+    position, heading, logic = fault_table(job).agreement
+    assert (position.alpha, position.pictures) == (1.0, 2)
+    assert heading.alpha is None  # nobody saw any
+    assert logic.alpha == pytest.approx(-0.5)  # 1 - 3 * 4 / (2 * 2 * 2), by hand
+    assert "position 1.00 (pictures=2), heading undefined (pictures=2)" in latex(fault_table(job))
+
+
+def test_a_closed_labelling_takes_no_more_and_asks_for_nothing(
+    job: GenerationJob, eva: User
+) -> None:
+    labelling = opened(job, "eva")
+    first, second = tasks_of(labelling, eva)
+    label = save(first, P)
+    close_labelling(labelling=labelling)
+    with pytest.raises(LabellingClosed):
+        save(second)
+    assert save(first, P) == label, "a replay of what was saved in time is no new label"
+    assert next_task(labelling=labelling, expert=eva) is None
+    assert labelling_of(expert=eva, code=labelling.code).left == 0
+    with pytest.raises(LabellingClosed):
+        close_labelling(labelling=labelling)
+    event = Event.objects.get(verb="close", object_kind="labelling")
+    assert event.after == {"labels": 1}
 
 
 def test_the_files_have_the_papers_columns(job: GenerationJob, eva: User) -> None:
