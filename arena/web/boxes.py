@@ -6,14 +6,14 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from itertools import groupby
 
+from django.utils.translation import gettext_noop
+
 from arena.exports.displacement_table import DisplacementTable
 from arena.exports.published import PublishedBox
 from augment.services.displacement import Box, Group, Summary
 
 LEFT, RIGHT = 6.0, 226.0
 """Where the axis begins and ends; the picture is 240 wide. Beyond stands what is farther out."""
-
-BEYOND = 234.0
 
 Scale = Callable[[float], float]
 
@@ -96,7 +96,9 @@ def box_sheet(table: DisplacementTable) -> BoxSheet | None:
     ]
     if table.published:
         published = [_from_paper(box, at) for box in table.published]
-        parts.append(BoxPart(heading="Read from the paper’s figure", lines=published))
+        parts.append(
+            BoxPart(heading=gettext_noop("Read from the paper’s figure"), lines=published)
+        )
     return BoxSheet(parts=parts, end_m=end_m)
 
 

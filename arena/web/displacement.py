@@ -7,17 +7,23 @@ import uuid
 from django.http import Http404, HttpRequest, HttpResponse
 from django.shortcuts import get_object_or_404
 from django.utils.text import slugify
+from django.utils.translation import gettext_lazy as _
 from django.views.decorators.http import require_safe
 
 from arena.exports.displacement_table import displacement_table
-from arena.exports.displacement_writers import format_named
+from arena.exports.displacement_writers import FORMATS
+from arena.exports.formats import format_named
 from arena.web.access import STAFF, only
 from arena.web.boxes import box_sheet
 from augment.errors import UnknownName
 from augment.models import GenerationJob
-from augment.services.displacement import By
+from augment.services.displacement import By, types_named
 
-LABELS = {By.CONTESTANT: "Contestant", By.TYPE: "Scenario type", By.VARIANT: "Variant"}
+LABELS = {
+    By.CONTESTANT: _("Contestant"),
+    By.TYPE: _("Scenario type"),
+    By.VARIANT: _("Variant"),
+}
 
 
 @only(*STAFF)
@@ -25,27 +31,43 @@ LABELS = {By.CONTESTANT: "Contestant", By.TYPE: "Scenario type", By.VARIANT: "Va
 def export(request: HttpRequest, code: uuid.UUID, form: str) -> HttpResponse:
     """The displacement errors of a job as a file; `by` as on the page."""
     job = get_object_or_404(GenerationJob, code=code)
-    by = asked(request)
+    by, types = asked(request), types_asked(request)
     try:
-        chosen = format_named(form)
+        chosen = format_named(FORMATS, form)
     except UnknownName as error:
         raise Http404 from error
-    name = f"{slugify(job.name) or 'job'}-displacement-by-{by}.{chosen.suffix}"
+    name = f"{slugify(job.name) or 'job'}-displacement-by-{by}"
+    if types is not None:
+        name += "-all-types"
     return HttpResponse(
-        chosen.write(displacement_table(job, by=by)),
+        chosen.write(displacement_table(job, by=by, types=types)),
         content_type=chosen.content_type,
-        headers={"Content-Disposition": f'attachment; filename="{name}"'},
+        headers={"Content-Disposition": f'attachment; filename="{name}.{chosen.suffix}"'},
     )
 
 
 def section(request: HttpRequest, job: GenerationJob) -> dict[str, object]:
     """What the part of the job's page shows."""
-    by = asked(request)
-    table = displacement_table(job, by=by)
-    return {"table": table, "sheet": box_sheet(table), "by": by, "labels": LABELS}
+    by, types = asked(request), types_asked(request)
+    table = displacement_table(job, by=by, types=types)
+    return {
+        "table": table,
+        "sheet": box_sheet(table),
+        "by": by,
+        "labels": LABELS,
+        "forms": FORMATS,
+        "query": f"by={by}" + ("&types=all" if types is not None else ""),
+        "has_choice": by is By.VARIANT,
+        "is_all": types is not None,
+    }
 
 
 def asked(request: HttpRequest) -> By:
     """What the address asks to group by: contestants, unless it says otherwise."""
     wanted = request.GET.get("by", By.CONTESTANT)
     return By(wanted) if wanted in set(By) else By.CONTESTANT
+
+
+def types_asked(request: HttpRequest) -> tuple[str, ...] | None:
+    """All five scenario types where the address asks for them, else the paper's choice."""
+    return types_named(["all"]) if request.GET.get("types") == "all" else None

@@ -11,6 +11,7 @@ from django.contrib.auth.models import User
 from django.db import transaction
 from django.http import HttpRequest, HttpResponse
 from django.shortcuts import get_object_or_404, redirect, render
+from django.utils.translation import gettext as _
 from django.views.decorators.http import require_http_methods, require_POST, require_safe
 
 from arena.queries import jobs, scenarios
@@ -43,13 +44,15 @@ def new_job_page(request: HttpRequest) -> HttpResponse:
         contestants=list(Contestant.objects.select_related("endpoint").order_by("name")),
         groups=scenarios.by_type(),
     )
+    if "estimate" in request.POST:
+        return _estimated(request, form)
     if request.method == "POST" and form.is_valid():
         try:
             job = _launch(request, form)
         except AugmentError as error:
             form.add_error(None, str(error))
         else:
-            messages.success(request, f"“{job.name}” is launched.")
+            messages.success(request, _("“%(name)s” is launched.") % {"name": job.name})
             return redirect("job", code=job.code)
     return render(request, "jobs/new.html", {"form": form}, status=422 if form.errors else 200)
 
@@ -83,7 +86,7 @@ def retry_job(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
     except AugmentError as error:
         messages.error(request, str(error))
     else:
-        messages.success(request, "What failed is queued again.")
+        messages.success(request, _("What failed is queued again."))
     return redirect("job", code=code)
 
 
@@ -97,7 +100,7 @@ def cancel_job(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
     except AugmentError as error:
         messages.error(request, str(error))
     else:
-        messages.success(request, "Cancelled. What is done stays.")
+        messages.success(request, _("Cancelled. What is done stays."))
     return redirect("job", code=code)
 
 
@@ -108,7 +111,7 @@ def resume_job(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
     job = get_object_or_404(GenerationJob, code=code)
     form = CapsForm(request.POST)
     if not form.is_valid():
-        messages.error(request, "A cap is a number; nothing was changed.")
+        messages.error(request, _("A cap is a number; nothing was changed."))
         return redirect("job", code=code)
     try:
         with transaction.atomic():
@@ -120,8 +123,23 @@ def resume_job(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
     except AugmentError as error:
         messages.error(request, str(error))
     else:
-        messages.success(request, "What is left is queued again.")
+        messages.success(request, _("What is left is queued again."))
     return redirect("job", code=code)
+
+
+def _estimated(request: HttpRequest, form: LaunchForm) -> HttpResponse:
+    """The page as it came in, with what the job would use; nothing is launched."""
+    context: dict[str, object] = {"form": form}
+    try:
+        found = form.estimated()
+    except AugmentError as error:
+        form.add_error(None, str(error))
+    else:
+        cap = form.cleaned_data.get("cap_usd")
+        context |= {"estimate": found, "cap_usd": cap}
+        if found is not None and cap is not None:
+            context["rows_within"] = found.rows_within(cap)
+    return render(request, "jobs/new.html", context)
 
 
 def _launch(request: HttpRequest, form: LaunchForm) -> GenerationJob:

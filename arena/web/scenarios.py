@@ -4,7 +4,10 @@ from __future__ import annotations
 
 import re
 import uuid
+from functools import partial
 
+from django.contrib import messages
+from django.db import transaction
 from django.http import Http404, HttpRequest, HttpResponse, HttpResponseBase, JsonResponse
 from django.shortcuts import get_object_or_404, render
 from django.views.decorators.http import require_safe
@@ -13,12 +16,17 @@ from arena.queries import scenarios
 from arena.queries.modifications import modification_lines
 from arena.web.access import STAFF, only
 from arena.web.pictures import picture_response
+from augment.errors import QueueUnreachable
 from augment.models import Augmentation, Scenario
 from augment.services.displacement import of_augmentation
-from augment.services.findings import checked
+from augment.services.findings import Checked, checked
 from augment.services.transcript_export import transcript_of
 from augment.services.transcript_steps import totals_of, tries_of
 from augment.services.transcripts import IMAGES
+from augment.tasks import enqueue_marks
+
+LOOKS = tuple(str(number) for number in range(6))
+"""So often the page of an augmentation looks again for a picture that is being drawn."""
 
 
 @only(*STAFF)
@@ -49,11 +57,13 @@ def augmentation_page(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
     """One augmentation with everything that led to it."""
     augmentation = _augmentation(code)
     tries = tries_of(augmentation)
+    measured = checked(augmentation)
     context = {
         "augmentation": augmentation,
         "lines": modification_lines(augmentation.modification),
         "measured": of_augmentation(augmentation),
-        "checked": checked(augmentation),
+        "checked": measured,
+        "drawing": _drawing(request, augmentation, measured),
         "tries": tries,
         "totals": totals_of(tries),
     }
@@ -88,9 +98,30 @@ def picture(request: HttpRequest, kind: str, code: uuid.UUID) -> HttpResponseBas
         name = get_object_or_404(Scenario.objects.only("original_image"), code=code).original_image
     elif kind == "augmentation":
         name = get_object_or_404(Augmentation.objects.only("image"), code=code).image
+    elif kind == "marked":
+        found = checked(_augmentation(code))
+        name = "" if found is None else found.picture
     else:
         raise Http404
     return picture_response(name)
+
+
+def _drawing(request: HttpRequest, augmentation: Augmentation, found: Checked | None) -> int:
+    """Have the marked picture drawn; how often the page has looked for it, 0 to look no more."""
+    if found is None or not found.picture or found.is_drawn:
+        return 0
+    looked = request.GET.get("drawing", "0")
+    number = int(looked) if looked in LOOKS else 0
+    if number == 0:
+        transaction.on_commit(partial(_send_marks, request, augmentation.pk))
+    return (number + 1) % len(LOOKS)
+
+
+def _send_marks(request: HttpRequest, augmentation_pk: int) -> None:
+    try:
+        enqueue_marks(augmentation_pk)
+    except QueueUnreachable as error:
+        messages.warning(request, str(error))
 
 
 def _augmentation(code: uuid.UUID) -> Augmentation:

@@ -23,6 +23,30 @@ function refresh() {
   sum.querySelector("[data-total]").textContent = contestants * scenarios;
 }
 
+// The estimate of a new job comes with the page that its button would bring.
+const estimate = form.querySelector("[data-estimate]");
+let asked = 0;
+
+async function askEstimate() {
+  const mine = ++asked;
+  const sent = new FormData(form);
+  sent.set("estimate", "1");
+  const answer = await fetch(form.action, { method: "POST", body: sent });
+  if (!answer.ok || mine !== asked) return;
+  const page = new DOMParser().parseFromString(await answer.text(), "text/html");
+  const found = page.querySelector("[data-estimate]");
+  if (found && mine === asked) estimate.replaceChildren(...found.childNodes);
+}
+
+if (estimate) {
+  let timer = 0;
+  form.querySelector("[data-ask]").hidden = true;
+  form.addEventListener("change", () => {
+    clearTimeout(timer);
+    timer = setTimeout(() => askEstimate().catch(() => estimate.replaceChildren()), 300);
+  });
+}
+
 form.addEventListener("change", (event) => {
   if (event.target.matches("[data-all]")) {
     for (const box of members(event.target.closest("[data-group]"))) {

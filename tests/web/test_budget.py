@@ -6,14 +6,15 @@ from decimal import Decimal
 
 import pytest
 from django.urls import reverse
+from django.utils.translation import override
 
-from arena.templatetags.money import usd
+from arena.templatetags.money import grouped, usd
 from augment.llm.messages import Reply
-from augment.models import GenerationJob
+from augment.models import Contestant, Endpoint, GenerationJob
 from augment.services import runner
 from augment.services.caps import Caps
 from tests.jobs.models import Model, add_llama, llama_job
-from tests.jobs.rows import add_scenario, only_row
+from tests.jobs.rows import add_kind, add_scenario, only_row
 from tests.variants.answers import GOOD
 from tests.web.cast import people, signed_in
 
@@ -114,4 +115,42 @@ def test_an_analyst_sees_that_a_job_stopped_and_has_no_button() -> None:
     ],
 )
 def test_an_amount_is_short_and_honest(amount: Decimal | None, shown: str) -> None:
-    assert usd(amount) == shown
+    with override("en"):
+        assert usd(amount) == shown
+
+
+def test_numbers_and_unknown_amounts_are_written_in_the_language_of_the_page() -> None:
+    with override("en"):
+        assert [grouped(n) for n in (None, 7, 176917)] == ["", "7", "176,917"]
+    with override("de"):
+        assert grouped(176917) == "176\u202f917"
+        assert usd(None) == "unbekannt"
+
+
+def test_an_estimate_launches_nothing_and_asks_for_no_name() -> None:
+    add_llama(price="1")
+    add_scenario("street")
+    sent = {"contestants": ["llama"], "scenarios": ["street"], "estimate": "1"}
+    admin = signed_in(people()["admin"])
+    for cap, sentence in (
+        ("", "1–2"),
+        ("0.000001", "the job may stop early, after about 0 of 1 runs"),
+        ("0.02", "but not the worst case"),
+        ("100", "The cap covers the worst case."),
+    ):
+        answer = admin.post(reverse("job-new"), sent | {"cap_usd": cap})
+        assert answer.status_code == 200
+        shown = " ".join(answer.content.decode().split())
+        assert sentence in shown
+        assert "This field is required" not in shown
+    assert not GenerationJob.objects.exists()
+
+
+def test_a_contestant_that_can_not_run_is_offered_with_its_reason() -> None:
+    add_kind("by-hand", Contestant.Kind.HUMAN)
+    add_llama()
+    Endpoint.objects.update(key_variable="NO_SUCH_KEY")
+    shown = signed_in(people()["admin"]).get(reverse("job-new")).content.decode()
+    assert 'value="by-hand" disabled' in shown
+    assert "made by people or by an outside program" in shown
+    assert "Key not set here: NO_SUCH_KEY." in shown

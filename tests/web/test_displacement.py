@@ -60,6 +60,20 @@ def test_by_variant_it_says_which_types_are_left_out_and_where_the_papers_boxes_
     assert "construction zone and accident site are left out" in shown
 
 
+def test_by_variant_all_five_types_are_one_click_away_and_go_into_the_files() -> None:
+    job = a_job()
+    analyst = signed_in(people()["analyst"])
+    shown = analyst.get(reverse("job", args=[job.code]) + "?by=variant&types=all")
+    text = shown.content.decode()
+    assert "Read from the paper" not in text
+    assert "All five scenario types." in text
+    assert "Only the three types of the paper" in text
+    url = reverse("displacement-export", args=[job.code, "csv"])
+    assert f"{url}?by=variant&amp;types=all" in text
+    answer = analyst.get(url, {"by": "variant", "types": "all"})
+    assert 'round-1-displacement-by-variant-all-types.csv"' in answer["Content-Disposition"]
+
+
 def test_an_unknown_grouping_in_the_address_shows_contestants() -> None:
     assert "Displacement error by contestant" in page(a_job(), "?by=month")
 

@@ -78,7 +78,7 @@ def test_the_page_groups_failures_by_their_reason_and_retries_them() -> None:
         claims.settle(held=rows.claimed(row), settlement=rows.failed(), now=rows.NOON)
     admin, url = signed_in(people()["admin"]), reverse("job", args=[job.code])
     shown = admin.get(url).content.decode()
-    assert shown.count("the wire broke") == 1
+    assert shown.count("The wire broke") == 1
     assert "Retry 3 failed" in shown
     admin.post(reverse("job-retry", args=[job.code]))
     assert job.augmentations.filter(state=Augmentation.State.QUEUED).count() == 3

@@ -37,7 +37,7 @@ def page_of(row: Augmentation) -> str:
 def test_the_page_shows_role_tokens_cost_and_the_answer() -> None:
     shown = page_of(ran(only_row(llama_job(price="2"))))
     assert "Call 1, modifier" in shown
-    assert "2900 tokens in, 120 out" in shown
+    assert "2,900 tokens in, 120 out" in shown
     assert "$0.0060" in shown
     assert "A parked car ahead." in shown
     assert "llama3.1-2407" in shown
@@ -67,7 +67,7 @@ def test_rounds_reviews_and_pictures_are_on_the_page() -> None:
     row = only_row(llama_job())
     assert row.contestant.endpoint is not None
     transcript = RowTranscript(claimed(row, now=timezone.now()), row, row.contestant.endpoint)
-    transcript.note(NoteKind.ROUND, {"round": 7})
+    transcript.note(NoteKind.ROUND, {"round": 7, "changes": "Added:\n{}"})
     message = Message(speaker=Speaker.USER, text=EVIL, images=(png(),))
     transcript.asked(ModelRole.VIEWER, Request(model="m", messages=(message,)), "p1")
     transcript.note(NoteKind.REVIEW, {"mean": 4.25, "said": EVIL})
@@ -76,7 +76,7 @@ def test_rounds_reviews_and_pictures_are_on_the_page() -> None:
     digest = hashlib.sha256(png()).hexdigest()
     image = reverse("asked-image", args=[digest])
     assert image in shown
-    assert "Round" in shown
+    assert "round: 7\nchanges:\n  Added:\n  {}" in shown
     assert "4.25" in shown
     assert EVIL not in shown
     assert b"".join(staff.get(image)) == png()

@@ -1,0 +1,96 @@
+"""What the checks found, numbered in a picture of its own, for staff alone."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+from django.conf import LazySettings
+from django.core.files.storage import default_storage
+from django.urls import reverse
+
+from augment.models import Augmentation
+from augment.services import claims
+from augment.services.findings import checked
+from augment.services.marked_pictures import draw_marked
+from tests.jobs import rows
+from tests.web.cast import people, signed_in
+
+pytestmark = pytest.mark.django_db
+
+OnCommit = Callable[..., object]
+FAR = "Place a parked car 40 m ahead of the ego."
+
+
+@pytest.fixture(autouse=True)
+def _media(settings: LazySettings, tmp_path: Path) -> None:
+    settings.MEDIA_ROOT = tmp_path
+
+
+@pytest.fixture
+def row() -> Augmentation:
+    """Two cones where a parked car is asked for."""
+    found = rows.only_row(rows.launch())
+    claims.settle(held=rows.claimed(found), settlement=rows.done(), now=rows.NOON)
+    found.scenario.instruction = FAR
+    found.scenario.save(update_fields=["instruction"])
+    return Augmentation.objects.select_related("contestant", "scenario__base_scene").get()
+
+
+def test_the_page_has_the_picture_drawn_and_shows_it_with_the_same_numbers(
+    row: Augmentation, django_capture_on_commit_callbacks: OnCommit
+) -> None:
+    analyst, url = signed_in(people()["analyst"]), reverse("augmentation", args=[row.code])
+    with django_capture_on_commit_callbacks() as waiting:  # type: ignore[attr-defined]
+        before = analyst.get(url).content.decode()
+    assert len(waiting) == 1
+    assert "A worker is drawing the marks." in before
+    assert 'content="2; url=?drawing=1"' in before
+    name = draw_marked(augmentation_pk=row.pk)
+    assert default_storage.exists(name)
+    with django_capture_on_commit_callbacks() as waiting:  # type: ignore[attr-defined]
+        after = analyst.get(url).content.decode()
+    assert not waiting
+    picture = reverse("picture", args=["marked", row.code])
+    assert picture in after
+    assert "http-equiv" not in after
+    found = checked(row)
+    assert found is not None
+    assert after.count('class="number ') == len(found.faults) >= 2
+    assert [line.kind for line in found.faults][:2] == ["asked count", "asked type"]
+    shown = analyst.get(picture)
+    assert shown.getvalue()[:4] == b"\x89PNG"
+    shown.close()
+
+
+def test_the_page_does_not_ask_for_ever(row: Augmentation) -> None:
+    analyst, url = signed_in(people()["analyst"]), reverse("augmentation", args=[row.code])
+    last = analyst.get(url, {"drawing": "5"}).content.decode()
+    assert "http-equiv" not in last
+    assert "load this page again" in last
+    assert analyst.get(url, {"drawing": "x"}).status_code == 200
+
+
+def test_no_expert_sees_it(row: Augmentation) -> None:
+    draw_marked(augmentation_pk=row.pk)
+    expert = signed_in(people()["expert"])
+    assert expert.get(reverse("picture", args=["marked", row.code])).status_code == 403
+
+
+def test_other_findings_are_another_picture(row: Augmentation) -> None:
+    first = draw_marked(augmentation_pk=row.pk)
+    assert draw_marked(augmentation_pk=row.pk) == first
+    row.scenario.instruction = "Place a parked car 20 m ahead of the ego."
+    row.scenario.save(update_fields=["instruction"])
+    assert draw_marked(augmentation_pk=row.pk) != first
+
+
+def test_without_a_fault_there_is_no_picture(row: Augmentation) -> None:
+    row.scenario.instruction = "Surprise me."  # nothing can be held against that
+    row.scenario.save(update_fields=["instruction"])
+    assert draw_marked(augmentation_pk=row.pk) == ""
+    analyst = signed_in(people()["analyst"])
+    page = analyst.get(reverse("augmentation", args=[row.code])).content.decode()
+    assert "The checks find nothing wrong or doubtful." in page
+    assert analyst.get(reverse("picture", args=["marked", row.code])).status_code == 404
