@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+from arena.exports.plot_axes import ticks
 from arena.exports.tables import Row
 
 WIDTH = 760.0
@@ -13,8 +13,10 @@ LEFT, RIGHT = 210.0, 676.0
 """Where the plot begins and ends; names stand to its left, values to its right."""
 
 TOP, ROW = 16.0, 34.0
-MOST_TICKS = 7
 LONGEST_NAME = 30
+
+BAR_LEFT, BAR_RIGHT = 6.0, 254.0
+"""The same for an interval inside a table's cell, 260 units wide."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -33,7 +35,7 @@ class IntervalRow:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Tick:
-    """A line of the axis."""
+    """A line of an axis; `x` is how far along the picture it is."""
 
     x: float
     label: str
@@ -50,8 +52,34 @@ class IntervalChart:
     ticks: list[Tick]
 
 
-def interval_chart(table: Sequence[Row]) -> IntervalChart | None:
-    """The chart of all lines with a rating and an interval, None if no line has both."""
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Bar:
+    """An interval inside a table's cell; the middle is a dot."""
+
+    low_x: float
+    x: float
+    high_x: float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Bars:
+    """The bars of a table's lines by their keys, on one axis from `first` to `last`."""
+
+    first: float
+    last: float
+    by_key: dict[str, Bar]
+
+
+Span = tuple[float, float]
+
+
+def interval_chart(table: Sequence[Row], span: Span | None = None) -> IntervalChart | None:
+    """The chart of all lines with a rating and an interval, None if no line has both.
+
+    Args:
+        table: Lines from top to bottom.
+        span: What the axis has to cover beside them, so that several charts have the same.
+    """
     rated = [
         (line, line.lower, line.elo, line.upper)
         for line in table
@@ -59,11 +87,12 @@ def interval_chart(table: Sequence[Row]) -> IntervalChart | None:
     ]
     if not rated:
         return None
-    marks = _ticks(min(low for _, low, _, _ in rated), max(high for *_, high in rated))
-    first, span = marks[0], marks[-1] - marks[0]
+    ends = [*(low for _, low, _, _ in rated), *(high for *_, high in rated), *(span or ())]
+    marks = ticks(min(ends), max(ends))
+    first, extent = marks[0], marks[-1] - marks[0]
 
     def at(value: float) -> float:
-        return round(LEFT + (RIGHT - LEFT) * (value - first) / span, 1)
+        return round(LEFT + (RIGHT - LEFT) * (value - first) / extent, 1)
 
     bottom = TOP + ROW * len(rated)
     return IntervalChart(
@@ -87,13 +116,34 @@ def interval_chart(table: Sequence[Row]) -> IntervalChart | None:
     )
 
 
-def _ticks(low: float, high: float) -> list[float]:
-    """Round numbers that enclose low..high, at most MOST_TICKS steps apart."""
-    span = max(high - low, 1.0)
-    power = 10.0 ** math.floor(math.log10(span / MOST_TICKS))
-    step = next(power * f for f in (1, 2, 5, 10) if span / (power * f) <= MOST_TICKS)
-    first, last = math.floor(low / step), math.ceil(high / step)
-    return [step * n for n in range(first, max(last, first + 1) + 1)]
+def bars(
+    values: Sequence[tuple[str, float | None, float | None, float | None]],
+    span: Span | None = None,
+) -> Bars | None:
+    """Bars for a table's cells, None if no line has an interval.
+
+    Args:
+        values: Key, lower end, middle and upper end of each line.
+        span: The axis; round numbers around the lines unless given.
+    """
+    known = [
+        (key, low, middle, high)
+        for key, low, middle, high in values
+        if low is not None and middle is not None and high is not None
+    ]
+    if not known:
+        return None
+    if span is None:
+        marks = ticks(min(low for _, low, _, _ in known), max(high for *_, high in known))
+        span = marks[0], marks[-1]
+    first, last = span
+
+    def at(value: float) -> float:
+        share = (min(max(value, first), last) - first) / (last - first)
+        return round(BAR_LEFT + (BAR_RIGHT - BAR_LEFT) * share, 1)
+
+    found = {key: Bar(low_x=at(low), x=at(mid), high_x=at(high)) for key, low, mid, high in known}
+    return Bars(first=first, last=last, by_key=found)
 
 
 def _short(name: str) -> str:

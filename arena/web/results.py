@@ -1,79 +1,189 @@
-"""The results of a closed study."""
+"""The results of a study: its tabs, its files, a new rating, and opening them early."""
 
 from __future__ import annotations
 
 import uuid
+from functools import partial
 from typing import cast
 
 from django.contrib import messages
 from django.contrib.auth.models import User
 from django.core.exceptions import PermissionDenied
+from django.db import transaction
 from django.http import Http404, HttpRequest, HttpResponse
 from django.shortcuts import get_object_or_404, redirect, render
-from django.utils.text import slugify
+from django.urls import reverse
+from django.utils.translation import gettext as _
 from django.views.decorators.http import require_POST, require_safe
 
-from arena.errors import ArenaError, NoSnapshot
-from arena.exports.tables import leaderboard_table
-from arena.exports.writers import format_named
-from arena.models import Study
+from arena import tasks
+from arena.errors import ArenaError
+from arena.exports.tables import EARLY_LOOK, leaderboard_table
+from arena.models import Snapshot, Study
+from arena.queries.judged import is_imported
+from arena.queries.people import role_of
+from arena.queries.results import (
+    STAFF as STAFF_ROLES,
+)
 from arena.queries.results import (
     ResultsAccess,
-    latest_snapshot,
     results_access,
-    snapshot_to_export,
+    snapshots_of,
+    votes_in,
 )
-from arena.services.ratings import rate
+from arena.services.early_looks import open_early
+from arena.services.ratings import is_big, plan_snapshot, rate
 from arena.web.access import ADMIN, ANALYST, EXPERT, STAFF, only
-from arena.web.charts import interval_chart
-from augment.errors import AugmentError, UnknownName
+from arena.web.rating_form import RatingForm
+from arena.web.results_tabs import TABS, Tab
+from augment.errors import AugmentError
+
+SHOWN = 12
+"""So many ratings can be chosen on the page; the log lists all."""
 
 
 @only(ADMIN, ANALYST, EXPERT)
 @require_safe
-def results_page(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
-    """Table and chart of the newest rating; refused until the study is closed."""
-    study = _readable(request, code)
-    snapshot = latest_snapshot(study)
-    context: dict[str, object] = {"study": study, "snapshot": snapshot}
+def results_page(request: HttpRequest, code: uuid.UUID, tab: str = "table") -> HttpResponse:
+    """One tab of a rating; of an open study only for staff who opened its results."""
+    study = get_object_or_404(Study.objects.select_related("vote_file"), code=code)
+    user = cast(User, request.user)
+    role = role_of(user)
+    access = results_access(user=user, study=study, role=role)
+    if access is ResultsAccess.NONE:
+        raise PermissionDenied
+    if access is ResultsAccess.EARLY:
+        context = {"study": study, "is_expert": votes_in(user, study)}
+        return render(request, "results/gate.html", context)
+    is_staff = role in STAFF_ROLES
+    chosen = _tab(tab, is_staff=is_staff)
+    ratings = list(snapshots_of(study).defer("results")[:SHOWN])
+    snapshot = _chosen(request, study, ratings)
+    context = {
+        "study": study,
+        "imported": is_imported(study),
+        "snapshot": snapshot,
+        "ratings": ratings,
+        "under_way": [one for one in ratings if one.state != Snapshot.State.READY],
+        "tab": chosen,
+        "tabs": [one for one in TABS if is_staff or not one.staff],
+        "is_staff": is_staff,
+        "query": f"?rating={snapshot.code}" if snapshot and request.GET.get("rating") else "",
+    }
+    if is_staff:
+        context["form"] = RatingForm(snapshot=snapshot)
     if snapshot is not None:
         table = leaderboard_table(snapshot)
-        context |= {"table": table, "chart": interval_chart(table.rows)}
-    return render(request, "studies/results.html", context)
-
-
-@only(*STAFF)
-@require_safe
-def export(request: HttpRequest, code: uuid.UUID, form: str) -> HttpResponse:
-    """The newest rating as a file; the same rating always gives the same bytes."""
-    study = _readable(request, code)
-    try:
-        chosen = format_named(form)
-        snapshot = snapshot_to_export(study)
-    except (UnknownName, NoSnapshot) as error:
-        raise Http404 from error
-    name = f"{slugify(study.name) or 'study'}-leaderboard.{chosen.suffix}"
-    return HttpResponse(
-        chosen.write(leaderboard_table(snapshot)),
-        content_type=chosen.content_type,
-        headers={"Content-Disposition": f'attachment; filename="{name}"'},
-    )
+        context |= {"table": table, "is_old": not snapshot.results, "early_look": EARLY_LOOK}
+        context |= chosen.fill(snapshot, table)
+    return render(request, "results/page.html", context)
 
 
 @only(*STAFF)
 @require_POST
 def rate_study(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
-    """Compute a new rating from the votes as they are now, and keep it."""
-    study = _readable(request, code)
+    """Freeze a new rating of the votes as they are now; a big one is left to a worker."""
+    study = readable(request, code)
+    form = RatingForm(request.POST)
+    if not form.is_valid():
+        for faults in form.errors.values():
+            messages.error(request, " ".join(str(fault) for fault in faults))
+        return redirect("results", code=code)
+    wanted = {
+        **form.wanted(),
+        "early": study.state == Study.State.OPEN,
+        "actor": cast(User, request.user),
+    }
     try:
-        rate(study=study, actor=cast(User, request.user))
+        if is_big(study):
+            with transaction.atomic():
+                planned = plan_snapshot(study=study, **wanted)
+                transaction.on_commit(partial(tasks.send_snapshot, planned.pk))
+            messages.success(request, _("The rating is being computed."))
+        else:
+            rate(study=study, **wanted)
     except (ArenaError, AugmentError) as error:
         messages.error(request, str(error))
     return redirect("results", code=code)
 
 
-def _readable(request: HttpRequest, code: uuid.UUID) -> Study:
+@only(*STAFF)
+@require_POST
+def compute_again(request: HttpRequest, code: uuid.UUID, rating: uuid.UUID) -> HttpResponse:
+    """Send a rating that waits or failed to the workers once more; twice does no harm."""
+    study = readable(request, code)
+    snapshot = get_object_or_404(Snapshot, study=study, code=rating)
+    try:
+        tasks.send_snapshot(snapshot.pk)
+    except AugmentError as error:
+        messages.error(request, str(error))
+    return redirect("results", code=code)
+
+
+@only(*STAFF)
+@require_POST
+def open_results_early(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
+    """The explicit, logged act; who votes in the study votes no longer."""
     study = get_object_or_404(Study, code=code)
+    try:
+        open_early(study=study, actor=cast(User, request.user))
+    except AugmentError as error:
+        messages.error(request, str(error))
+    return redirect("results", code=code)
+
+
+def readable(request: HttpRequest, code: uuid.UUID) -> Study:
+    """The study if whoever asks may read its results.
+
+    Raises:
+        PermissionDenied: They may not, or not without opening them early first.
+    """
+    study = get_object_or_404(Study.objects.select_related("vote_file"), code=code)
     if results_access(user=cast(User, request.user), study=study) is not ResultsAccess.FULL:
         raise PermissionDenied
     return study
+
+
+def asked_rating(request: HttpRequest) -> uuid.UUID | None:
+    """The code of the rating in the address, None for the newest.
+
+    Raises:
+        Http404: It is no code.
+    """
+    wanted = request.GET.get("rating")
+    try:
+        return uuid.UUID(wanted) if wanted else None
+    except ValueError:
+        raise Http404 from None
+
+
+def address_of(study: Study, snapshot: Snapshot, tab: str) -> str:
+    """The permanent address of a tab of a rating."""
+    return f"{reverse('results-tab', args=[study.code, tab])}?rating={snapshot.code}"
+
+
+# --- Private -----------------------------------------------------------------------------------
+
+
+def _tab(name: str, *, is_staff: bool) -> Tab:
+    found = next((tab for tab in TABS if tab.name == name), None)
+    if found is None:
+        raise Http404
+    if found.staff and not is_staff:
+        raise PermissionDenied
+    return found
+
+
+def _chosen(request: HttpRequest, study: Study, ratings: list[Snapshot]) -> Snapshot | None:
+    """The rating that the address names, else the newest one that is ready; with its results."""
+    code = asked_rating(request)
+    if code is None:
+        ready = [one for one in ratings if one.state == Snapshot.State.READY]
+        code = ready[0].code if ready else None
+    if code is None:
+        return None
+    rows = Snapshot.objects.select_related("study", "made_by__person")
+    found = rows.filter(study=study, code=code, state=Snapshot.State.READY).first()
+    if found is None:
+        raise Http404
+    return found

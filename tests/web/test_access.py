@@ -8,6 +8,7 @@ import pytest
 from django.test import Client
 from django.urls import reverse
 
+from arena.services.invitations import invite
 from arena.services.studies import close_study
 from arena.web.urls import urlpatterns
 from tests.web.cast import World, people, signed_in, status, world
@@ -35,20 +36,34 @@ PAGES: dict[str, tuple[int, int, int]] = {
     "studies": (200, 200, 403),
     "study-new": (200, 403, 403),
     "study": (200, 200, 403),
-    "results": (403, 403, 403),
+    "experts": (200, 403, 403),
+    "results": (200, 200, 403),  # a page that asks whether to look early
+    "results-tab": (200, 200, 403),
+    "results-votes": (403, 403, 403),
+    "results-votes-export": (403, 403, 403),
     "results-export": (403, 403, 403),
+    "results-chart": (403, 403, 403),
     "vote": (403, 403, 404),
+    "vote-help": (403, 403, 404),
     "matchup-image": (200, 403, 404),
 }
 ACTIONS: dict[str, tuple[int, int, int]] = {
     "job-retry": (302, 403, 403),
+    "invite": (200, 403, 403),
+    "revoke": (302, 403, 403),
     "job-cancel": (302, 403, 403),
     "job-resume": (302, 403, 403),
     "study-rate": (403, 403, 403),
+    "rating-again": (403, 403, 403),
+    "results-open": (302, 302, 403),
     "study-close": (302, 403, 403),
+    "study-hand-over": (302, 403, 403),
+    "labelling-close": (404, 403, 403),
     "theme": (302, 302, 302),
+    "language": (302, 302, 302),
+    "vote-report": (403, 403, 404),
 }
-OPEN_TO_THE_WORLD = {"login", "logout"}
+OPEN_TO_THE_WORLD = {"login", "logout", "invitation"}
 
 
 def address(name: str, here: World) -> str:
@@ -63,16 +78,26 @@ def address(name: str, here: World) -> str:
         "faults": {"code": here.job.code},
         "faults-export": {"code": here.job.code, "form": "csv"},
         "label": {"code": here.job.code},
+        "labelling-close": {"code": here.job.code},
         "augmentation": {"code": here.augmentation.code},
         "transcript": {"code": here.augmentation.code},
         "asked-image": {"digest": "0" * 64},
         "scenario": {"code": here.augmentation.scenario.code},
         "picture": {"kind": "augmentation", "code": shown.left.code},
         "results-export": {"code": here.study.code, "form": "csv"},
+        "results-chart": {"code": here.study.code, "name": "pairs", "form": "svg"},
+        "results-votes-export": {"code": here.study.code, "form": "csv"},
+        "results-tab": {"code": here.study.code, "tab": "pairs"},
+        "rating-again": {"code": here.study.code, "rating": STRANGER},
         "matchup-image": {"token": shown.left_token},
     }
-    with_study = ("study", "study-close", "study-rate", "results", "vote")
-    found = {"code": here.study.code} if name in with_study else arguments.get(name, {})
+    if name == "revoke":
+        made = invite(study=here.study, expert=here.expert)
+        arguments["revoke"] = {"code": made.invitation.code}
+    own = ("study", "experts", "invite", "study-close", "study-hand-over", "study-rate")
+    results = ("results", "results-votes", "results-open")
+    is_of_study = name in own + results or name.startswith("vote")
+    found = {"code": here.study.code} if is_of_study else arguments.get(name, {})
     return reverse(name, kwargs=found)
 
 

@@ -5,11 +5,16 @@ from __future__ import annotations
 import csv
 import io
 import json
+from itertools import groupby
+from pathlib import Path
 
 import pytest
 from django.contrib.auth.models import User
+from django.core.management import call_command
 from django.urls import reverse
 
+from arena.exports.tables import LeaderboardTable, leaderboard_table
+from arena.exports.writers import FORMATS
 from arena.models import Study
 from arena.services.ratings import rate
 from arena.services.studies import close_study, open_study
@@ -50,7 +55,7 @@ def test_the_table_says_rank_rating_interval_and_votes_with_the_method_beneath()
     page = shown(study)
     order = [page.index(f'<th scope="row">{name}') for name in ("Ann", "Bob", "Cid")]
     assert order == sorted(order)
-    for said in ("Bradley-Terry on the Elo scale", "50 rounds", "seed 0", "SHA-256", "one more"):
+    for said in ("Bradley-Terry on the Elo scale", "50 rounds", "seed 0", "SHA-256", "one plus"):
         assert said in page
 
 
@@ -59,10 +64,9 @@ def test_one_vote_each_way_is_drawn_with_its_interval() -> None:
     for n, matchup in enumerate(study.matchups.all()):
         study_rows.vote(matchup, ("left", "equal", "right")[n % 3])
     study = close_study(study=study)
-    rate(study=study, rounds=50)
+    rate(study=study, rounds=50, unit="vote")
     page = shown(study)
-    assert 'class="intervals"' in page
-    assert page.count('class="whisker"') == 3
+    assert page.count('class="range"') == page.count('class="whisker"') == 3
 
 
 def test_files_carry_the_numbers_of_the_page() -> None:
@@ -120,4 +124,45 @@ def test_a_study_without_votes_is_explained_rather_than_rated() -> None:
     page = shown(study)
     assert snapshot.status
     assert snapshot.status.split(".")[0] in page.replace("&#x27;", "'")
-    assert 'class="intervals"' not in page
+    assert 'class="range"' not in page
+
+
+def german(study: Study, tab: str = "table") -> str:
+    analyst = signed_in(people()["analyst"])
+    analyst.post(reverse("language"), {"language": "de"})
+    answer = analyst.get(reverse("results-tab", args=[study.code, tab]))
+    return answer.content.decode().replace("&#x27;", "'")
+
+
+def test_what_the_rating_says_is_said_in_the_readers_language() -> None:
+    study = judged()
+    snapshot = rate(study=study, rounds=50)
+    english = [*leaderboard_table(snapshot).reasons, *leaderboard_table(snapshot).notes]
+    page = german(study)
+    assert "Niemand sonst punktete gegen Ann: Es gibt keine obere Grenze." in page
+    assert "keine untere Grenze" in page
+    assert english
+    assert [one for one in english if one in page] == []
+    assert "no upper limit" not in page
+
+
+def test_groups_that_never_met_stand_apart_in_page_and_files(tmp_path: Path) -> None:
+    votes = tmp_path / "votes.csv"
+    lines = ["x,y,model_a", "x,y,model_b", "p,q,tie", "q,p,model_a", "p,q,model_a", "z,x,model_a"]
+    votes.write_text("model_a,model_b,winner\n" + "\n".join(lines) + "\n")
+    call_command("import_votes", str(votes), "--name", "Apart", stdout=io.StringIO())
+    study = Study.objects.get(name="Apart")
+    table = leaderboard_table(rate(study=study, rounds=50))
+    assert [sorted(group) for group in groups_of(table)] == [["p", "q"], ["x", "y"], ["z"]]
+    assert table.has_parts
+    document = json.loads(FORMATS["json"].write(table))
+    assert {one["model"]: one["part"] for one in document["standings"]} == {
+        "p": 0, "q": 0, "x": 1, "y": 1, "z": -1,
+    }  # fmt: skip
+    page = shown(study)
+    places = [page.index(text) for text in ("Group 1, rated", "Group 2, rated", "Not rated")]
+    assert places == sorted(places)
+
+
+def groups_of(table: LeaderboardTable) -> list[list[str]]:
+    return [[row.slug for row in rows] for _, rows in groupby(table.rows, lambda row: row.part)]

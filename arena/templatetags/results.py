@@ -1,0 +1,187 @@
+"""Numbers and names of the results page as a person reads them."""
+
+from __future__ import annotations
+
+import json
+from typing import Any
+
+from django import template
+from django.utils.functional import Promise
+from django.utils.translation import gettext as _
+from django.utils.translation import gettext_lazy, gettext_noop
+
+from arena.rating.sentences import Sentence, filled
+from augment.models import Scenario
+
+register = template.Library()
+
+ONLINE_ELO = gettext_noop(
+    "Online Elo follows the latest votes: its interval does not shrink with more votes, and the "
+    "order of the votes matters."
+)
+"""What arena.rating.elo says of its intervals: marked here, as it stands there in a constant."""
+
+
+_FORMS = {
+    "csv": "CSV", "json": "JSON", "parquet": "Parquet", "latex": "LaTeX", "svg": "SVG",
+    "pdf": "PDF", "png": "PNG",
+}  # fmt: skip
+_LEFT_OUT: dict[str, str | Promise] = {
+    "superseded": gettext_lazy("changed later"),
+    "check": gettext_lazy("attention checks"),
+    "repeat": gettext_lazy("hidden repeats"),
+    "skip": gettext_lazy("skipped"),
+    "simulated": gettext_lazy("simulated"),
+    "filtered": gettext_lazy("not asked for"),
+}
+_WORDS = ("types", "reasons")
+"""Values of sentences that are words of ours, not names."""
+
+UNMEASURED = (
+    gettext_noop("waits, runs, failed or was cancelled"),
+    gettext_noop("its scenario has no reference that can be read"),
+    gettext_noop("its stored modification can't be read"),
+    gettext_noop("Without a variant"),
+)
+"""Words of arena.exports and augment: marked here, as they stand there in constants."""
+
+_VERBS: dict[str, str | Promise] = {
+    "open": gettext_lazy("opened"),
+    "close": gettext_lazy("closed"),
+    "rate": gettext_lazy("rated"),
+    "rate early": gettext_lazy("rated early"),
+    "look early": gettext_lazy("looked at results early"),
+    "hand over": gettext_lazy("handed over"),
+    "plan batch": gettext_lazy("planned a batch"),
+    "simulate votes": gettext_lazy("simulated votes"),
+    "import votes": gettext_lazy("imported votes"),
+}
+_METHODS: dict[str, str | Promise] = {
+    "bt": gettext_lazy("Bradley-Terry on the Elo scale, a tie half a win for both"),
+    "davidson": gettext_lazy("Davidson’s Bradley-Terry with ties, on the Elo scale"),
+    "elo": gettext_lazy(
+        "online Elo, the median over resamples; its interval does not shrink with votes"
+    ),
+}
+_UNITS: dict[str, str | Promise] = {
+    "vote": gettext_lazy("single votes"),
+    "scenario": gettext_lazy("scenarios"),
+    "expert": gettext_lazy("experts"),
+    "two-way": gettext_lazy("experts and scenarios"),
+}
+
+
+@register.filter
+def forms(names: str) -> list[str]:
+    """The formats of a menu, named in one string."""
+    return names.split()
+
+
+@register.filter
+def form_label(name: str) -> str:
+    """How a format is spelled."""
+    return _FORMS[name]
+
+
+@register.filter
+def left_out(reason: str) -> str:
+    """Why votes do not count; an older rating's own words stay."""
+    return str(_LEFT_OUT.get(reason, reason))
+
+
+@register.filter
+def said(sentence: str) -> str:
+    """A sentence or note of a rating in the language of whoever reads it."""
+    if isinstance(sentence, Sentence):
+        values = {
+            name: tuple(_(str(word)) for word in value)
+            if name in _WORDS and isinstance(value, tuple)
+            else value
+            for name, value in sentence.values.items()
+        }
+        return filled(_(sentence.text), values)
+    return _(sentence) if sentence else ""
+
+
+@register.filter
+def verb_label(verb: str) -> str:
+    """What a line of the log is about."""
+    return str(_VERBS.get(verb, verb))
+
+
+@register.filter
+def type_label(name: str) -> str:
+    """The name of a scenario type."""
+    return _(str(dict(Scenario.Type.choices).get(name, name)))
+
+
+@register.filter
+def method_label(name: str) -> str:
+    """What "Elo" means in this rating."""
+    return str(_METHODS.get(name, name))
+
+
+@register.filter
+def unit_label(name: str) -> str:
+    """What was resampled."""
+    return str(_UNITS.get(name, name))
+
+
+@register.filter
+def percent(share: float | None) -> str:
+    """A share from 0 to 1 in whole percent."""
+    return "–" if share is None else f"{100 * share:.0f} %"
+
+
+@register.filter
+def p_value(value: float) -> str:
+    """Two digits; below a hundredth only that."""
+    return "< 0.01" if value < 0.01 else f"= {value:.2f}"
+
+
+@register.filter
+def seconds(milliseconds: float) -> str:
+    """One digit after the point."""
+    return f"{milliseconds / 1000:.1f}"
+
+
+@register.filter
+def dollars(amount: float) -> str:
+    """Four digits after the point, more where there would be none but zeros."""
+    if 0 < amount < 0.0001:
+        return _("less than $0.0001")
+    return f"${amount:,.4f}" if amount < 1 else f"${amount:,.2f}"
+
+
+@register.filter
+def estimate(found: dict[str, Any] | None) -> str:
+    """A number with its interval: 0.31 (0.28 to 0.34)."""
+    return _with_interval(found, "{:.2f}".format)
+
+
+@register.filter
+def estimate_percent(found: dict[str, Any] | None) -> str:
+    """The same in percent."""
+    return _with_interval(found, lambda value: f"{100 * value:.0f} %")
+
+
+@register.filter
+def estimate_points(found: dict[str, Any] | None) -> str:
+    """The same in points, with its sign."""
+    return _with_interval(found, lambda value: f"{value:+.0f}" if round(value) else "0")
+
+
+@register.filter
+def json_line(document: dict[str, Any] | None) -> str:
+    """What a line of the log says, on one line."""
+    return "" if document is None else json.dumps(document, ensure_ascii=False)
+
+
+def _with_interval(found: dict[str, Any] | None, written: Any) -> str:
+    if found is None or found.get("value") is None:
+        return _("unknown")
+    text = str(written(found["value"]))
+    if found.get("lower") is None:
+        return text
+    low, high = written(found["lower"]), written(found["upper"])
+    return _("%(value)s (%(low)s to %(high)s)") % {"value": text, "low": low, "high": high}

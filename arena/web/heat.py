@@ -1,0 +1,81 @@
+"""Who scored what against whom, as the cells of a table."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from arena.exports.heat_chart import STRONG
+from arena.exports.tables import Row
+
+STEPS = 10
+FEW = 30
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Cell:
+    """One contestant against another.
+
+    Attributes:
+        percent: The row's mean score, a tie half; None without votes.
+        step: How far towards the row it is, 0 to 10; the colour.
+        planned: How often the pair was to be judged, None where nothing was planned.
+    """
+
+    other: Row
+    percent: int | None
+    step: int
+    votes: int
+    planned: int | None
+    is_few: bool
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Line:
+    """A row of the table; the cell against itself is None."""
+
+    number: int
+    row: Row
+    cells: list[Cell | None]
+
+
+def heat_map(pairs: Sequence[dict[str, Any]], rows: Sequence[Row]) -> list[Line]:
+    """The table, contestants in the given order both ways.
+
+    Args:
+        pairs: As a snapshot keeps them: wins, ties and losses of `a` against `b`.
+        rows: The contestants.
+    """
+    found: dict[tuple[str, str], tuple[float, int, int | None]] = {}
+    for pair in pairs:
+        votes = pair["wins"] + pair["ties"] + pair["losses"]
+        score = pair["wins"] + pair["ties"] / 2
+        found[pair["a"], pair["b"]] = (score, votes, pair["planned"])
+        found[pair["b"], pair["a"]] = (votes - score, votes, pair["planned"])
+    return [
+        Line(number=n, row=row, cells=[_cell(row, other, found) for other in rows])
+        for n, row in enumerate(rows, start=1)
+    ]
+
+
+def _step(share: float) -> int:
+    towards = (share - 0.5) / STRONG
+    return round(STEPS * (min(max(towards, -1.0), 1.0) + 1.0) / 2.0)
+
+
+def _cell(
+    row: Row, other: Row, found: dict[tuple[str, str], tuple[float, int, int | None]]
+) -> Cell | None:
+    if row.slug == other.slug:
+        return None
+    score, votes, planned = found.get((row.slug, other.slug), (0.0, 0, None))
+    share = score / votes if votes else 0.5
+    return Cell(
+        other=other,
+        percent=round(100 * share) if votes else None,
+        step=_step(share),
+        votes=votes,
+        planned=planned,
+        is_few=votes < FEW,
+    )

@@ -1,0 +1,86 @@
+"""How a new rating is asked for."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from django import forms
+from django.utils.translation import gettext_lazy as _
+
+from arena.models import Snapshot
+from arena.queries.judged import MAIN, REPEAT
+from arena.queries.vote_sets import Filters
+from arena.rating.bootstrap import Unit
+from arena.rating.leaderboard import Method
+from arena.services.ratings import DEFAULT_ROUNDS, MOST_ROUNDS
+from arena.services.snapshots import judges_of
+from augment.models import Scenario
+
+METHOD_LABELS = {
+    "bt": _("Bradley-Terry"),
+    "davidson": _("Davidson (ties)"),
+    "elo": _("Online Elo"),
+}
+UNIT_LABELS = {
+    "": _("as the votes allow"),
+    "two-way": _("experts and scenarios"),
+    "scenario": _("scenarios"),
+    "expert": _("experts"),
+    "vote": _("votes, as in the paper"),
+}
+
+
+class AnyOf(forms.MultipleChoiceField):
+    """Codes of experts; rating itself refuses those that do not occur."""
+
+    def valid_value(self, value: Any) -> bool:
+        """Whatever was ticked."""
+        return True
+
+
+class RatingForm(forms.Form):
+    """Method, resampling and which votes count; experts are offered as a rating names them."""
+
+    method = forms.ChoiceField(
+        choices=[(one.value, METHOD_LABELS[one.value]) for one in Method],
+        initial=Method.BRADLEY_TERRY.value,
+        required=False,
+    )
+    unit = forms.ChoiceField(
+        choices=[("", UNIT_LABELS[""]), *((one.value, UNIT_LABELS[one.value]) for one in Unit)],
+        required=False,
+    )
+    rounds = forms.IntegerField(
+        min_value=1, max_value=MOST_ROUNDS, initial=DEFAULT_ROUNDS, required=False
+    )
+    seed = forms.IntegerField(min_value=0, max_value=2**63 - 1, initial=0, required=False)
+    types = forms.MultipleChoiceField(choices=Scenario.Type.choices, required=False)
+    experts = AnyOf(required=False)
+    with_repeats = forms.BooleanField(required=False)
+    automatic_ties = forms.BooleanField(required=False)
+
+    def __init__(
+        self, data: dict[str, Any] | None = None, *, snapshot: Snapshot | None = None
+    ) -> None:
+        super().__init__(data)
+        for name in ("method", "unit", "rounds", "seed"):
+            self.fields[name].widget.attrs["class"] = "input"
+        named = judges_of(snapshot) if snapshot is not None else {}
+        self.judges = sorted(named.items(), key=lambda item: item[1])
+
+    def wanted(self) -> dict[str, Any]:
+        """As `rate` takes it; what was not filled in is the default."""
+        asked = self.cleaned_data
+        kinds = (MAIN, REPEAT) if asked["with_repeats"] else (MAIN,)
+        return {
+            "method": asked["method"] or Method.BRADLEY_TERRY.value,
+            "unit": asked["unit"] or None,
+            "rounds": asked["rounds"] or DEFAULT_ROUNDS,
+            "seed": asked["seed"] or 0,
+            "filters": Filters(
+                types=tuple(asked["types"]),
+                experts=tuple(asked["experts"]),
+                kinds=kinds,
+                automatic_ties=asked["automatic_ties"],
+            ),
+        }

@@ -1,0 +1,55 @@
+"""What the tabs show that set ratings against distances, money and tokens."""
+
+from __future__ import annotations
+
+from django.utils.translation import gettext_lazy as _
+from django.utils.translation import gettext_noop
+
+from arena.exports.plots import plots
+from arena.exports.tables import LeaderboardTable
+from arena.models import Snapshot
+from arena.web.results_ratings import Context
+from arena.web.scatter import NARROW, scatter
+from augment.models import EndpointModel
+
+_CLASSES = (gettext_noop("Frontier"), gettext_noop("Utility"), gettext_noop("Open weight"))
+"""What models call their classes."""
+
+
+def displacement(snapshot: Snapshot, table: LeaderboardTable) -> Context:
+    """Elo against the distance from the references."""
+    found = {line["slug"]: line for line in snapshot.results.get("displacement") or []}
+    lines = [
+        {"number": n, "row": row} | found[row.slug]
+        for n, row in enumerate(table.rows, start=1)
+        if row.slug in found
+    ]
+    return {"lines": lines, "chart": scatter(plots(snapshot, table).get("displacement"))}
+
+
+def cost(snapshot: Snapshot, table: LeaderboardTable) -> Context:
+    """Elo and displacement against money and tokens, by class of model."""
+    spent = {line["slug"]: line for line in snapshot.results.get("cost") or []}
+    metres = {line["slug"]: line for line in snapshot.results.get("displacement") or []}
+    labels = {value: _(str(label)) for value, label in EndpointModel.ModelClass.choices}
+    lines = [
+        {
+            "number": n,
+            "row": row,
+            "class_label": labels.get(spent[row.slug]["model_class"], ""),
+            "median_m": metres.get(row.slug, {}).get("median_m"),
+        }
+        | spent[row.slug]
+        for n, row in enumerate(table.rows, start=1)
+        if row.slug in spent
+    ]
+    found = plots(snapshot, table)
+    return {
+        "lines": lines,
+        "metres_by_money": scatter(found.get("displacement-usd"), width=NARROW),
+        "metres_by_tokens": scatter(found.get("displacement-tokens"), width=NARROW),
+        "by_money": scatter(found.get("elo-usd"), width=NARROW),
+        "by_tokens": scatter(found.get("elo-tokens"), width=NARROW),
+        "groups": sorted({line["model_class"] for line in lines}),
+        "labels": labels,
+    }

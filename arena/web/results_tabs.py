@@ -1,0 +1,59 @@
+"""The tabs of the results page, each made of a snapshot alone."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+from django.utils.translation import gettext_lazy as _
+
+from arena.exports.tables import LeaderboardTable
+from arena.models import Snapshot
+from arena.queries.results import log_of, snapshots_of
+from arena.web.results_cost import cost, displacement
+from arena.web.results_ratings import Context, pairs, standings, types
+from arena.web.results_trust import coverage, raters
+
+LOG_LINES = 200
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Tab:
+    """A tab of the page.
+
+    Attributes:
+        staff: Whether only analysts and admins see it.
+        fill: Makes what its template needs.
+    """
+
+    name: str
+    label: Any
+    staff: bool
+    fill: Callable[[Snapshot, LeaderboardTable], Context]
+
+    @property
+    def template(self) -> str:
+        """Where it is written."""
+        return f"results/{self.name}.html"
+
+
+def log(snapshot: Snapshot, table: LeaderboardTable) -> Context:
+    """What was done to the study, and every rating of it."""
+    study = snapshot.study
+    return {
+        "events": log_of(study, most=LOG_LINES),
+        "ratings": list(snapshots_of(study).defer("results").select_related("made_by__person")),
+    }
+
+
+TABS = (
+    Tab(name="table", label=_("Table"), staff=False, fill=standings),
+    Tab(name="pairs", label=_("Pairs"), staff=False, fill=pairs),
+    Tab(name="types", label=_("Types"), staff=False, fill=types),
+    Tab(name="raters", label=_("Raters"), staff=True, fill=raters),
+    Tab(name="coverage", label=_("Coverage"), staff=True, fill=coverage),
+    Tab(name="displacement", label=_("Displacement"), staff=True, fill=displacement),
+    Tab(name="cost", label=_("Cost"), staff=True, fill=cost),
+    Tab(name="log", label=_("Log"), staff=True, fill=log),
+)

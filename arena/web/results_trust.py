@@ -1,0 +1,40 @@
+"""What the tabs of the votes behind a rating show: who gave them, and how many there are."""
+
+from __future__ import annotations
+
+from arena.exports.plots import plots
+from arena.exports.tables import LeaderboardTable
+from arena.models import Snapshot
+from arena.queries.people import natural
+from arena.web.charts import bars
+from arena.web.heat import heat_map
+from arena.web.results_ratings import Context
+from arena.web.scatter import scatter
+
+
+def raters(snapshot: Snapshot, table: LeaderboardTable) -> Context:
+    """Agreement, repeats, sides, and the panel of experts."""
+    trust = snapshot.results.get("trust") or {}
+    lines = trust.get("raters") or []
+    left = [
+        (line["judge"], line["left"]["lower"], line["left"]["value"], line["left"]["upper"])
+        for line in lines
+    ]
+    return {
+        "trust": trust,
+        "panel": sorted(lines, key=lambda line: natural(line["name"])),
+        "left_bars": bars(left, span=(0.0, 1.0)),
+    }
+
+
+def coverage(snapshot: Snapshot, table: LeaderboardTable) -> Context:
+    """Votes against the plan, widths against votes, and how many votes narrower ones need."""
+    claims = snapshot.results.get("claims") or {}
+    plot = plots(snapshot, table).get("width")
+    return {
+        "claims": claims,
+        "chart": scatter(plot),
+        "points": plot.points if plot else (),
+        "heat": heat_map(snapshot.results.get("pairs") or [], table.rows),
+        "planned": sum(pair["planned"] or 0 for pair in snapshot.results.get("pairs") or []),
+    }

@@ -1,0 +1,189 @@
+"""The tabs of the results: what each shows, to whom, and that a page only reads."""
+
+from __future__ import annotations
+
+import pytest
+from django.contrib.auth.models import User
+from django.test import Client
+from django.urls import reverse
+from pytest_django import DjangoAssertNumQueries
+
+from arena.models import EarlyLook, Matchup, Snapshot, Study
+from arena.queries.vote_sets import Filters
+from arena.services.ratings import plan_snapshot, rate
+from arena.services.studies import close_study
+from arena.web.results_tabs import TABS
+from augment.models import Scenario
+from tests import study_rows
+from tests.full_study import Size, full_study
+from tests.web.cast import people, signed_in
+
+pytestmark = pytest.mark.django_db
+
+SIZE = Size(scenarios=10, experts=4, votes_per_expert=90)
+
+
+def page(client: Client, study: Study, tab: str = "table", **query: str) -> str:
+    answer = client.get(reverse("results-tab", args=[study.code, tab]), query)
+    assert answer.status_code == 200, tab
+    return " ".join(answer.content.decode().split())
+
+
+@pytest.fixture
+def study() -> Study:
+    found = full_study(size=SIZE)
+    rate(study=found, rounds=400, seed=2)
+    return found
+
+
+@pytest.fixture
+def analyst() -> Client:
+    return signed_in(people()["analyst"])
+
+
+def test_every_tab_reads_the_snapshot_with_few_queries(
+    study: Study, analyst: Client, django_assert_max_num_queries: DjangoAssertNumQueries
+) -> None:
+    for tab in TABS:
+        page(analyst, study, tab.name)  # templates are compiled once
+        with django_assert_max_num_queries(12):
+            page(analyst, study, tab.name)
+
+
+def test_beneath_the_table_stands_how_far_to_trust_it(study: Study, analyst: Client) -> None:
+    shown = page(analyst, study)
+    for said in (
+        "lower bound is above its own upper bound",
+        "Counted 360 votes.",
+        "of the votes are ties",
+        "Method check:",
+        "Leaving one expert out",
+        "would put",
+        "If votes were independent",
+        "Cross-check:",
+        "Test of fit:",
+    ):
+        assert said in shown, said
+
+
+def test_the_heat_map_leads_to_the_votes_with_both_pictures(study: Study, analyst: Client) -> None:
+    shown = page(analyst, study, "pairs")
+    assert shown.count('class="h') >= 72
+    snapshot = study.snapshots.get()
+    query = {"rating": str(snapshot.code), "a": "interplan", "b": "llama-otm"}
+    assert f"?rating={snapshot.code}&amp;a=interplan&amp;b=llama-otm" in shown
+    cell = analyst.get(reverse("results-votes", args=[study.code]), query).content.decode()
+    pair = next(
+        p for p in snapshot.results["pairs"] if {p["a"], p["b"]} == {"interplan", "llama-otm"}
+    )
+    assert cell.count("<img") == 2 * (pair["wins"] + pair["ties"] + pair["losses"])
+    for wrong in ({"a": "interplan", "b": "interplan"}, {"a": "interplan", "b": "nobody"}):
+        missing = analyst.get(reverse("results-votes", args=[study.code]), wrong)
+        assert missing.status_code == 404
+
+
+def test_types_stand_on_one_axis_with_a_warning_where_votes_are_few(
+    study: Study, analyst: Client
+) -> None:
+    shown = page(analyst, study, "types")
+    for label in Scenario.Type.labels:
+        assert str(label) in shown
+    assert "Too few votes: lines marked with * have fewer than 30." in shown
+
+
+def test_raters_are_pseudonyms_with_repeats_and_checks(analyst: Client) -> None:
+    study = study_rows.a_study(votes_per_expert=9)
+    first, second, third, *rest = study_rows.matchups_of(study, "eva")
+    Matchup.objects.filter(pk=second.pk).update(
+        kind="repeat", repeat_of=first, left=first.right, right=first.left,
+        scenario=first.scenario,
+    )  # fmt: skip
+    Matchup.objects.filter(pk=third.pk).update(kind="check")
+    second.refresh_from_db()
+    for matchup in (first, second, third, *rest, *study_rows.matchups_of(study, "finn")):
+        study_rows.vote(matchup, "left")
+    study = close_study(study=study)
+    snapshot = rate(study=study, rounds=50)
+    repeats = snapshot.results["trust"]["repeats"]
+    assert (repeats["number"], repeats["same"]["value"]) == (1, 0.0), "left both times"
+    shown = page(analyst, study, "raters")
+    assert first.expert.person.pseudonym in shown
+    assert "eva" not in shown
+    assert "of 1 hidden repeat answered alike" in shown
+    assert "0 / 1" in shown
+
+
+def test_experts_read_the_table_but_nothing_about_each_other(study: Study) -> None:
+    expert = signed_in(User.objects.get(username="expert-1"))
+    shown = page(expert, study)
+    assert "Raters" not in shown
+    assert "Export" not in shown
+    assert "?rating=" not in page(expert, study, "pairs")
+    for tab in TABS:
+        status = expert.get(reverse("results-tab", args=[study.code, tab.name])).status_code
+        assert status == (403 if tab.staff else 200), tab.name
+    for name, form in (("results-export", "zip"), ("results-votes-export", "csv")):
+        assert expert.get(reverse(name, args=[study.code, form])).status_code == 403
+
+
+def test_a_permanent_address_shows_that_rating_and_its_filters(
+    study: Study, analyst: Client
+) -> None:
+    older = study.snapshots.get()
+    kind = Scenario.Type.NUDGE.value
+    rate(study=study, rounds=50, filters=Filters(types=(kind,)))
+    assert "Only these types: Nudge" in page(analyst, study)
+    shown = page(analyst, study, rating=str(older.code))
+    assert "Only these types" not in shown
+    assert f"{reverse('results-tab', args=[study.code, 'pairs'])}?rating={older.code}" in shown
+    address = reverse("results", args=[study.code])
+    assert analyst.get(address, {"rating": "nonsense"}).status_code == 404
+    assert analyst.get(address, {"rating": str(study.code)}).status_code == 404
+    assert analyst.get(reverse("results-tab", args=[study.code, "gossip"])).status_code == 404
+
+
+def test_a_new_rating_is_asked_for_with_method_and_filters(study: Study, analyst: Client) -> None:
+    person = study.experts.order_by("pk")[0].person
+    sent = {
+        "method": "bt", "unit": "vote", "rounds": "60", "seed": "9",
+        "types": [Scenario.Type.NUDGE.value], "experts": [str(person.code)],
+    }  # fmt: skip
+    analyst.post(reverse("study-rate", args=[study.code]), sent)
+    made = study.snapshots.order_by("-pk")[0]
+    assert (made.rounds, made.seed, made.resampling_unit) == (60, 9, "vote")
+    assert made.filters["experts"] == [str(person.code)]
+    assert 0 < made.votes_counted < 90
+    analyst.post(reverse("study-rate", args=[study.code]), {"rounds": "0"})
+    assert study.snapshots.count() == 2
+
+
+def test_an_open_study_shows_a_gate_then_its_results_to_who_opened_them() -> None:
+    study = study_rows.a_study()
+    for matchup in study.matchups.all():
+        study_rows.vote(matchup)
+    made = people()
+    analyst, admin = signed_in(made["analyst"]), signed_in(made["admin"])
+    study.experts.add(made["admin"])
+    address = reverse("results", args=[study.code])
+    assert "Opening results ends your voting" not in analyst.get(address).content.decode()
+    assert "Opening results ends your voting" in admin.get(address).content.decode()
+    assert analyst.post(reverse("study-rate", args=[study.code])).status_code == 403
+    analyst.post(reverse("results-open", args=[study.code]))
+    assert EarlyLook.objects.get().user == made["analyst"]
+    analyst.post(reverse("study-rate", args=[study.code]))
+    shown = analyst.get(address).content.decode()
+    assert "you opened its results early" in shown
+    assert "Early look: the study was still open." in shown
+    assert "still open" in admin.get(address).content.decode(), "each opens for themselves"
+
+
+def test_a_rating_under_way_shows_its_progress_beside_the_one_before(
+    study: Study, analyst: Client
+) -> None:
+    waiting = plan_snapshot(study=study, rounds=50)
+    Snapshot.objects.filter(pk=waiting.pk).update(progress=60, state="running")
+    shown = page(analyst, study)
+    assert "is being computed: 60 %" in shown
+    assert "Counted 360 votes." in shown
+    Snapshot.objects.filter(pk=waiting.pk).update(state="failed", status="Nobody voted.")
+    assert "could not be computed: Nobody voted." in page(analyst, study)
