@@ -1,27 +1,44 @@
-"""An expert who follows every link and tries every address learns nothing of the contestants."""
+"""An expert who follows every link and tries every address learns nothing of the contestants.
+
+Channel by channel: addresses, pages, replies, headers, the chunks and sizes of pictures, tokens,
+sides and order, results, and what other roles know.
+"""
 
 from __future__ import annotations
 
 import re
-from html import unescape
-from urllib.parse import urldefrag, urljoin, urlsplit
+import uuid
+from urllib.parse import urlsplit
 
+import numpy as np
 import pytest
-from django.contrib.auth.models import User
-from django.core.files.base import ContentFile
-from django.core.files.storage import default_storage
+from django.conf import LazySettings
+from django.contrib.auth.models import Group, User
 from django.test import Client
 from django.urls import URLPattern, URLResolver, get_resolver
+from scipy import stats
 
-from arena.models import LabellingRound, Study
+from arena.models import LabellingRound, Matchup, Study
 from arena.services.faults import open_labelling
+from arena.services.studies import close_study
 from augment.models import Augmentation, Contestant, Endpoint, GenerationJob
+from augment.services.pictures import store
+from tests.journeys import planted
+from tests.journeys.blindness import (
+    Answer,
+    Seen,
+    answer_of,
+    crawl,
+    leaks,
+    vote_through,
+    word_leaks,
+)
 from tests.study_rows import a_study
 
 pytestmark = pytest.mark.django_db
 
 SECRETS = ("zanzibar", "xylophone", "quixotic")
-LINK = re.compile(rb"""(?:href|src|action|srcset)=["']([^"'#][^"']*)["']""")
+TOKENS = [field.name for field in Matchup._meta.fields if field.name.endswith("_token")]
 
 
 @pytest.fixture
@@ -36,8 +53,8 @@ def study() -> Study:
         model="llama-3.1-70b",
         endpoint=endpoint,
     )
-    for row in Augmentation.objects.all():
-        default_storage.save(row.image, ContentFile(b"\x89PNG\r\n\x1a\n" + row.image.encode()))
+    for number, row in enumerate(Augmentation.objects.order_by("pk")):
+        Augmentation.objects.filter(pk=row.pk).update(image=store(planted.drawn(number)))
     job = GenerationJob.objects.filter(augmentations__contestant__slug="zanzibar").first()
     assert job is not None
     open_labelling(name="Faults", job=job, experts=["eva"], seed=1)
@@ -50,35 +67,8 @@ def eva(client: Client, study: Study) -> Client:
     return client
 
 
-def secrets_of(study: Study) -> list[str]:
-    """Everything that tells who made a picture."""
-    told = [*SECRETS, "llama", "otm", "hosted"]
-    told += [str(contestant.code) for contestant in study.contestants.all()]
-    for row in Augmentation.objects.select_related("job"):
-        told += [str(row.code), str(row.job.code), row.image]
-    return told
-
-
-def crawl(client: Client, starts: list[str]) -> dict[str, tuple[int, bytes, str]]:
-    """Every address that can be reached by links from the starts: status, body, headers."""
-    seen: dict[str, tuple[int, bytes, str]] = {}
-    waiting = list(starts)
-    while waiting:
-        address = waiting.pop()
-        if address in seen or address.startswith(("/logout", "/static/")):
-            continue
-        response = client.get(address)
-        body = b"".join(response) if response.streaming else response.content
-        headers = "\n".join(f"{name}: {value}" for name, value in response.items())
-        seen[address] = (response.status_code, body, headers)
-        found = [unescape(link.decode()) for link in LINK.findall(body)]
-        if response.status_code in {301, 302}:
-            found.append(response["Location"])
-        for link in found:
-            target = urldefrag(urljoin(address, link)).url
-            if not urlsplit(target).netloc:
-                waiting.append(target)
-    return seen
+def matchups_page(study: Study) -> str:
+    return f"/api/v1/matchups?study={study.code}&n=4"
 
 
 def every_address(study: Study) -> list[str]:
@@ -87,23 +77,23 @@ def every_address(study: Study) -> list[str]:
     assert row is not None
     matchup = study.matchups.first()
     assert matchup is not None
-    values = {
-        "study": study.code,
-        "job": row.job.code,
-        "augmentation": row.code,
-        "scenario": row.scenario.code,
-        "contestant": row.contestant.code,
-        "labelling": LabellingRound.objects.get().code,
+    codes = {
+        *(study.code, row.job.code, row.code, row.scenario.code, row.contestant.code),
+        LabellingRound.objects.get().code,
     }
     found = []
     for pattern in patterns(get_resolver().url_patterns):
         if pattern.startswith("admin/"):
             continue
-        for code in values.values():
+        for code in codes:
             filled = re.sub(r"<uuid:\w+>", str(code), pattern)
             filled = re.sub(r"<str:token>", matchup.left_token, filled)
+            filled = re.sub(r"<slug:name>.<slug:form>", "width.svg", filled)
             filled = re.sub(r"<slug:form>", "csv", filled)
             filled = re.sub(r"<slug:kind>", "augmentation", filled)
+            filled = re.sub(r"<slug:tab>", "pairs", filled)
+            filled = re.sub(r"<slug:digest>", "0" * 64, filled)
+            assert "<" not in filled, f"say here what fills {pattern}"
             found.append("/" + filled)
     return [*sorted(set(found)), "/admin/", "/admin/augment/contestant/"]
 
@@ -116,27 +106,13 @@ def patterns(entries: list[URLPattern | URLResolver], before: str = "") -> list[
     return found
 
 
-def leaks(
-    study: Study, seen: dict[str, tuple[int, bytes, str]], *, guessed: bool = False
-) -> list[str]:
-    """What was told. A guessed address is the guesser's own: that it comes back tells nothing."""
-    found = []
-    for address, (_, body, headers) in seen.items():
-        if address.startswith("/i/"):  # our stand-in pictures hold their own name
-            continue
-        told = (body + headers.encode() + (b"" if guessed else address.encode())).lower()
-        for secret in secrets_of(study):
-            word = rb"(?<![a-z0-9])" + re.escape(secret.lower().encode()) + rb"(?![a-z0-9])"
-            if re.search(word, told) and not (guessed and secret in address):
-                found.append(f"{address} tells {secret!r}")
-    return found
+# --- What comes back ---------------------------------------------------------------------------
 
 
 def test_following_every_link_tells_nothing(eva: Client, study: Study) -> None:
-    seen = crawl(eva, ["/", f"/api/v1/matchups?study={study.code}&n=4"])
-    assert any(address.startswith("/i/") for address in seen), "the crawl saw no picture"
-    assert any("/vote/" in address for address in seen), "the crawl saw no voting page"
-    assert any("/label/" in address for address in seen), "the crawl saw no labelling page"
+    seen = crawl(eva, ["/", matchups_page(study)])
+    for part, what in (("/i/", "picture"), ("/vote/", "voting page"), ("/label/", "labelling")):
+        assert any(part in address for address in seen), f"the crawl saw no {what}"
     assert leaks(study, seen) == []
 
 
@@ -145,26 +121,108 @@ def test_trying_every_address_tells_nothing(eva: Client, study: Study) -> None:
     assert leaks(study, crawl(eva, addresses), guessed=True) == []
 
 
-def test_the_results_of_an_open_study_are_closed_to_its_experts(eva: Client, study: Study) -> None:
-    assert eva.get(f"/studies/{study.code}/results/").status_code in {403, 404}
-    assert eva.get(f"/studies/{study.code}/results.csv").status_code in {403, 404}
+def test_voting_to_the_end_tells_nothing(eva: Client, study: Study) -> None:
+    seen = vote_through(eva, study)
+    assert sum(address.startswith("/api/v1/votes#") for address in seen) == 9
+    seen |= crawl(eva, ["/", f"/studies/{study.code}/vote/", f"/api/v1/votes?study={study.code}"])
+    assert leaks(study, seen) == []
 
 
-def test_a_picture_comes_without_traces_and_only_to_its_expert(eva: Client, study: Study) -> None:
-    mine = study.matchups.filter(expert__username="eva").first()
-    hers = study.matchups.filter(expert__username="finn").first()
-    assert mine is not None
-    assert hers is not None
-    answer = eva.get(f"/i/{mine.left_token}")
-    assert answer.getvalue().startswith(b"\x89PNG")
-    assert answer.status_code == 200
-    assert {"ETag", "Last-Modified"} & set(answer.headers) == set()
-    assert answer.headers.get("Content-Disposition", "inline") == "inline"
-    assert {"private", "immutable"} <= set(
-        answer.headers["Cache-Control"].replace(",", "").split()
+def test_the_page_after_a_label_tells_nothing_either(eva: Client, study: Study) -> None:
+    labelling = LabellingRound.objects.get()
+    page = f"/label/{labelling.code}/"
+    eva.post(page, {"task": labelling.tasks.all()[0].code, "position": "on"})
+    seen = crawl(eva, [page])
+    assert b"The automatic checks" in seen[page].body
+    assert leaks(study, seen) == []
+
+
+# --- Pictures and their tokens -----------------------------------------------------------------
+
+
+def test_every_showing_has_tokens_of_its_own(study: Study) -> None:
+    rows = list(Matchup.objects.filter(study=study))
+    tokens = [getattr(row, name) for row in rows for name in TOKENS]
+    assert len(tokens) == len(set(tokens)) == len(rows) * len(TOKENS)
+    pictures = {row.left.image for row in rows} | {row.right.image for row in rows}
+    assert len(tokens) > len(pictures), "no picture was shown twice: nothing was proved"
+    assert all(len(token) >= 32 for token in tokens)
+
+
+def test_somebody_elses_tokens_are_404(eva: Client, study: Study) -> None:
+    others = Matchup.objects.filter(study=study).exclude(expert__username="eva")
+    tokens = [getattr(row, name) for row in others for name in TOKENS]
+    assert tokens
+    assert {eva.get(f"/i/{token}").status_code for token in [*tokens, "not-a-token"]} == {404}
+
+
+# --- Sides and order ---------------------------------------------------------------------------
+
+
+def side_p_value(rows: list[Matchup]) -> float:
+    """How likely contestants are on the left so unevenly often by chance (chi-square)."""
+    names = sorted({row.left.contestant_id for row in rows})
+    left = np.array([sum(row.left.contestant_id == name for row in rows) for name in names])
+    right = np.array([sum(row.right.contestant_id == name for row in rows) for name in names])
+    expected = (left + right) / 2
+    statistic = float(((left - expected) ** 2 / (expected / 2)).sum())
+    return float(stats.chi2.sf(statistic, df=len(names) - 1))
+
+
+def order_p_value(rows: list[Matchup]) -> float:
+    """How likely the places of a contestant's showings are so uneven (Kruskal-Wallis)."""
+    names = sorted({row.left.contestant_id for row in rows})
+    places = [
+        [r.position for r in rows if name in (r.left.contestant_id, r.right.contestant_id)]
+        for name in names
+    ]
+    return float(stats.kruskal(*places).pvalue)
+
+
+def test_neither_side_nor_order_tells_contestants_apart() -> None:
+    study = a_study(
+        contestants=("ann", "bob", "cid", "dora"),
+        scenarios=10,
+        experts=("eva", "finn", "greta"),
+        votes_per_expert=40,
     )
-    assert eva.get(f"/i/{hers.left_token}").status_code == 404
-    assert eva.get("/i/not-a-token").status_code == 404
+    rows = list(study.matchups.select_related("left", "right"))
+    assert side_p_value(rows) > 0.01
+    assert order_p_value(rows) > 0.01
+    for row in rows:  # planted: the same pairs, the sides by name, the first contestant first
+        if row.left.contestant_id > row.right.contestant_id:
+            row.left, row.right = row.right, row.left
+    assert side_p_value(rows) < 1e-6
+    rows.sort(key=lambda row: row.left.contestant_id)
+    for position, row in enumerate(rows):
+        row.position = position
+    assert order_p_value(rows) < 1e-6
+
+
+# --- Results and roles -------------------------------------------------------------------------
+
+
+def test_results_stay_closed_to_experts_while_the_study_is_open(eva: Client, study: Study) -> None:
+    pages = [a for a in every_address(study) if f"/{study.code}/results" in a or "/snap" in a]
+    assert len(pages) >= 2
+    assert {eva.get(page).status_code for page in pages} <= {403, 404}
+    close_study(study=study)
+    assert eva.get(f"/studies/{study.code}/results/").status_code == 200
+
+
+@pytest.mark.parametrize("role", ["analyst", "admin"])
+def test_who_may_know_more_can_neither_vote_nor_look(eva: Client, study: Study, role: str) -> None:
+    """An expert who was made more than that in the middle of a study."""
+    given = eva.get(matchups_page(study)).json()[0]
+    User.objects.get(username="eva").groups.add(Group.objects.get_or_create(name=role)[0])
+    vote = {"key": str(uuid.uuid4()), "matchup": given["matchup"], "outcome": "A"}
+    assert eva.get(f"/studies/{study.code}/vote/").status_code == 403
+    assert eva.get(matchups_page(study)).status_code == 403
+    sent = eva.post("/api/v1/votes", vote, content_type="application/json")
+    assert sent.status_code == 403
+    gate = eva.get(f"/studies/{study.code}/results/")
+    assert b"Opening results ends your voting in this study." in gate.content
+    assert word_leaks(study, {"gate": answer_of(gate)}) == []
 
 
 def test_nobody_else_sees_anything_but_the_login(client: Client, study: Study) -> None:
@@ -175,16 +233,49 @@ def test_nobody_else_sees_anything_but_the_login(client: Client, study: Study) -
             assert urlsplit(answer["Location"]).path in {"/login/", "/admin/login/"}, address
 
 
-def test_a_planted_leak_is_found(eva: Client, study: Study) -> None:
-    study.name = "Zanzibar against the rest"
-    study.save()
-    assert leaks(study, crawl(eva, ["/"])) != []
+# --- The suite itself: a planted leak turns it red ----------------------------------------------
 
 
-def test_the_page_after_a_label_tells_nothing_either(eva: Client, study: Study) -> None:
-    labelling = LabellingRound.objects.get()
-    page = f"/label/{labelling.code}/"
-    eva.post(page, {"task": labelling.tasks.all()[0].code, "position": "on"})
-    seen = crawl(eva, [page])
-    assert b"The automatic checks" in seen[page][1]
-    assert leaks(study, seen) == []
+def test_a_name_on_a_page_is_found(eva: Client, study: Study) -> None:
+    Study.objects.update(name="Zanzibar against the rest")
+    assert any("tells 'zanzibar'" in leak for leak in leaks(study, crawl(eva, ["/"])))
+
+
+@pytest.mark.parametrize(
+    ("plant", "found"),
+    [
+        ("file_name", "names a file"),
+        ("etag", "has a header ETag"),
+        ("last_modified", "has a header Last-Modified"),
+        ("shared_cache", "may be kept by others than the browser"),
+        ("json_field", "has a field 'batch'"),
+    ],
+)
+def test_a_planted_header_or_field_is_found(
+    eva: Client, study: Study, settings: LazySettings, plant: str, found: str
+) -> None:
+    settings.MIDDLEWARE = [*settings.MIDDLEWARE, f"{planted.__name__}.{plant}"]
+    client = Client()
+    client.cookies = eva.cookies
+    assert any(found in leak for leak in leaks(study, crawl(client, [matchups_page(study)])))
+
+
+@pytest.mark.parametrize(
+    ("picture", "found"),
+    [
+        (planted.png_with_text(), "has a chunk tEXt"),
+        (planted.drawn(200) + b"made by hand", "goes on after its end"),
+        (planted.drawn(200, width=600, height=400), "sizes that differ"),
+    ],
+    ids=["a text chunk", "bytes after the end", "another size"],
+)
+def test_a_planted_picture_is_found(eva: Client, study: Study, picture: bytes, found: str) -> None:
+    first = study.matchups.get(expert__username="eva", position=1)
+    Augmentation.objects.filter(pk=first.left_id).update(image=store(picture))
+    assert any(found in leak for leak in leaks(study, crawl(eva, [matchups_page(study)])))
+
+
+def test_a_file_name_as_an_address_is_found(eva: Client, study: Study) -> None:
+    row = study.matchups.filter(expert__username="eva")[0]
+    seen: Seen = {f"/media/{row.left.image}": Answer(status=200, headers={}, body=b"")}
+    assert leaks(study, seen) != []
