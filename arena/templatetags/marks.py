@@ -7,6 +7,8 @@ from dataclasses import dataclass
 from django import template
 from django.utils.html import format_html
 from django.utils.safestring import SafeString
+from django.utils.translation import gettext, gettext_lazy
+from django.utils.translation import gettext_noop as _
 
 from arena.models import Study
 from augment.models import Augmentation, GenerationJob
@@ -26,6 +28,33 @@ _TONES = {
     "draft": "quiet",
     "open": "busy",
     "closed": "good",
+}
+_WORDS = (
+    *(_("Waiting"), _("Running"), _("Done"), _("Unreadable answer"), _("Refused"), _("Failed")),
+    *(_("Cancelled"), _("Finished"), _("Stopped at cap"), _("Ready")),
+    *(_("Draft"), _("Open"), _("Closed")),
+    *(
+        _("Jaywalker"),
+        _("Nudge around parked vehicle"),
+        _("Overtake parked vehicle"),
+        _("Construction zone"),
+        _("Accident site"),
+    ),
+    *(_("Reference"), _("Human"), _("Language model"), _("Rules"), _("Baseline")),
+    *(_("Simulated"), _("Attention check")),
+    *(_("added"), _("moved"), _("removed")),
+    *(_("vehicle"), _("bus"), _("bicycle"), _("pedestrian"), _("traffic cone"), _("barrier")),
+    *(_("construction sign"), _("generic object")),
+    *(_("modifier"), _("reviewer"), _("engineer"), _("viewer")),
+    *(_("Lost"), _("Released"), _("Unreadable")),
+    *(_("wrong"), _("doubtful"), _("position"), _("heading"), _("logic")),
+)
+"""What rows call their states, types, kinds and roles. Files and commands keep the English words;
+pages say them in the language of whoever looks."""
+_MATCHUPS = {
+    "main": gettext_lazy("Votes"),
+    "repeat": gettext_lazy("Hidden repeats"),
+    "check": gettext_lazy("Attention checks"),
 }
 _ICONS = {"finished": "done", "stopped_at_cap": "stop"}
 
@@ -54,6 +83,12 @@ class Segment:
 def mark(row: Augmentation | GenerationJob | Study) -> Mark:
     """The mark of a row with a state."""
     return _mark(row.state, row.get_state_display())
+
+
+@register.filter
+def matchups_label(kind: str) -> str:
+    """What matchups of a kind are called."""
+    return str(_MATCHUPS[kind])
 
 
 @register.filter
@@ -93,4 +128,6 @@ def percent(part: int, whole: int) -> SafeString:
 
 
 def _mark(state: str, label: str) -> Mark:
-    return Mark(tone=_TONES[state], icon=f"icons/{_ICONS.get(state, state)}.svg", label=label)
+    return Mark(
+        tone=_TONES[state], icon=f"icons/{_ICONS.get(state, state)}.svg", label=gettext(label)
+    )

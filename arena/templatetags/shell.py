@@ -8,6 +8,8 @@ from django import template
 from django.http import HttpRequest
 from django.template.context import Context
 from django.urls import reverse
+from django.utils.functional import Promise
+from django.utils.translation import gettext_lazy as _
 
 from arena.queries.profiles import Profile, profile_of
 
@@ -31,11 +33,14 @@ class Shell:
     links: list[Link]
 
 
-_SECTIONS: dict[str, tuple[str, frozenset[str]]] = {
-    "home": ("Home", frozenset({"home"})),
-    "scenarios": ("Scenarios", frozenset({"scenarios", "scenario"})),
-    "jobs": ("Jobs", frozenset({"jobs", "job-new", "job", "faults", "augmentation"})),
-    "studies": ("Studies", frozenset({"studies", "study-new", "study", "results"})),
+_SECTIONS: dict[str, tuple[Promise, frozenset[str]]] = {
+    "home": (_("Home"), frozenset({"home"})),
+    "scenarios": (_("Scenarios"), frozenset({"scenarios", "scenario"})),
+    "jobs": (_("Jobs"), frozenset({"jobs", "job-new", "job", "faults", "augmentation"})),
+    "studies": (
+        _("Studies"),
+        frozenset({"studies", "study-new", "study", "results", "experts", "invite"}),
+    ),
 }
 _MENU = {
     "expert": ("home",),
@@ -58,7 +63,9 @@ def shell(context: Context) -> Shell:
         profile=profile,
         links=[
             Link(
-                label=_SECTIONS[name][0], url=reverse(name), is_current=here in _SECTIONS[name][1]
+                label=str(_SECTIONS[name][0]),
+                url=reverse(name),
+                is_current=here in _SECTIONS[name][1],
             )
             for name in _MENU[profile.role]
         ],

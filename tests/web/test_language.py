@@ -1,0 +1,87 @@
+"""English or German: by the browser's wish, by the switch, and remembered with the account."""
+
+from __future__ import annotations
+
+import pytest
+from django.test import Client
+from django.urls import reverse
+
+from arena.models import Person
+from arena.services.invitations import invite
+from arena.services.ratings import rate
+from arena.services.studies import close_study
+from tests.study_rows import a_study, vote
+from tests.web.cast import people, signed_in
+
+pytestmark = pytest.mark.django_db
+
+GERMAN = {"HTTP_ACCEPT_LANGUAGE": "de-AT,de;q=0.9,en;q=0.8"}
+
+
+def login_page(client: Client, **headers: str) -> str:
+    return client.get(reverse("login"), **headers).content.decode()  # type: ignore[arg-type]
+
+
+def test_the_browser_decides_before_anybody_has_chosen() -> None:
+    assert '<html lang="de"' in login_page(Client(), **GERMAN)
+    assert "Anmelden" in login_page(Client(), **GERMAN)
+    for other in ("en", "fr"):
+        assert "Sign in" in login_page(Client(), HTTP_ACCEPT_LANGUAGE=other)
+
+
+def test_the_switch_is_kept_with_the_person_and_leads_back() -> None:
+    expert = people()["expert"]
+    client = signed_in(expert)
+    answer = client.post(reverse("language"), {"language": "de", "next": "/?here"})
+    assert answer.headers["Location"] == "/?here"
+    assert Person.objects.get(user=expert).preferences == {"language": "de"}
+    assert "Gerade ist nichts zu tun" in client.get("/").content.decode()
+    client.post(reverse("language"), {"language": "en"})
+    assert "Nothing to do right now" in client.get("/", **GERMAN).content.decode()  # type: ignore[arg-type]
+
+
+def test_a_made_up_language_changes_nothing() -> None:
+    expert = people()["expert"]
+    client = signed_in(expert)
+    client.post(reverse("language"), {"language": "tlh"})
+    assert Person.objects.get(user=expert).preferences == {}
+    assert "django_language" not in client.cookies
+
+
+def test_the_account_brings_its_language_to_another_device() -> None:
+    expert = people()["expert"]
+    signed_in(expert).post(reverse("language"), {"language": "de"})
+    other = Client()
+    other.post(reverse("login"), {"username": "the-expert", "password": "a password"})
+    assert '<html lang="de"' in other.get("/").content.decode()
+
+
+def test_an_invitation_brings_it_too() -> None:
+    study = a_study()
+    eva = study.experts.get(username="eva")
+    signed_in(eva).post(reverse("language"), {"language": "de"})
+    other = Client()
+    other.post(reverse("invitation", args=[invite(study=study, expert=eva).token]))
+    assert '<html lang="de"' in other.get("/").content.decode()
+
+
+def test_files_are_the_same_in_every_language() -> None:
+    study = a_study()
+    for matchup in study.matchups.all():
+        vote(matchup)
+    rate(study=close_study(study=study), rounds=20)
+    reader = signed_in(people()["analyst"])
+    for form in ("csv", "json", "latex"):
+        address = reverse("results-export", args=[study.code, form])
+        english, german = (
+            reader.get(address, HTTP_ACCEPT_LANGUAGE=wish).getvalue() for wish in ("en", "de")
+        )
+        assert english == german
+        assert english
+
+
+@pytest.mark.parametrize("address", ["/nothing-here/", "/jobs/"])
+def test_pages_of_faults_speak_german(address: str) -> None:
+    answer = signed_in(people()["expert"]).get(address, **GERMAN)  # type: ignore[arg-type]
+    assert '<html lang="de"' in answer.content.decode()
+    assert "Zu meiner Startseite" in answer.content.decode()
