@@ -14,6 +14,8 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 
 KEPT_LINES = 20
+READER_S = 5.0
+"""How long its last lines are waited for; what it started may keep its output open."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -47,7 +49,7 @@ class Child:
 
     def __init__(self, program: Program, say: Callable[[str, str], None]) -> None:
         self.program = program
-        self.last_lines: deque[str] = deque(maxlen=KEPT_LINES)
+        self._last_lines: deque[str] = deque(maxlen=KEPT_LINES)
         self.started_at = time.monotonic()
         self._say = say
         leash = (sys.executable, "-m", "arena.serving.leash", str(os.getpid()), "--")
@@ -78,6 +80,12 @@ class Child:
         """None while it runs."""
         return self._process.poll()
 
+    def last_words(self) -> list[str]:
+        """Its last lines; of one that has ended everything that it still had to say."""
+        if self.exit_code is not None:
+            self._reader.join(timeout=READER_S)
+        return list(self._last_lines)
+
     def ask_to_stop(self) -> None:
         """Send SIGTERM, if it still runs."""
         if self.exit_code is None:
@@ -94,11 +102,11 @@ class Child:
         with contextlib.suppress(ProcessLookupError):  # nobody of the group is left: as wanted
             os.killpg(self.pid, signal.SIGKILL)
         self._process.wait()
-        self._reader.join(timeout=5.0)
+        self._reader.join(timeout=READER_S)
 
     def _read(self) -> None:
         assert self._process.stdout is not None
         with self._process.stdout as lines:
             for line in lines:
-                self.last_lines.append(line.rstrip())
+                self._last_lines.append(line.rstrip())
                 self._say(self.program.name, line.rstrip())

@@ -26,16 +26,27 @@ from arena.services.studies import close_study, open_study
 from augment.models import Augmentation, BaseScene, Contestant, Endpoint, GenerationJob, Scenario
 from augment.services.catalogue import load_catalogue
 from augment.services.choosing import ALL, chosen_contestants
-from augment.services.contestants import add_contestant, ensure_builtin, ensure_endpoint
+from augment.services.contestants import (
+    REFERENCE,
+    RULE_PLACER,
+    add_contestant,
+    ensure_builtin,
+    ensure_endpoint,
+)
 from augment.services.jobs import launch, progress
 from augment.tasks import enqueue_job
 
 PASSWORD = "arena-demo"  # for the demo's own accounts on this computer
 STAND_IN = "stand-in"
 SIMULATED = (
-    ("sim-good-otm", "fake-good", "Simulated good OTM"),
-    ("sim-careless-otm", "fake-careless", "Simulated careless OTM"),
+    ("sim-good-otm", "otm", "fake-good", "Simulated good OTM"),
+    ("sim-careless-otm", "otm", "fake-careless", "Simulated careless OTM"),
+    ("sim-careless-fc", "fc", "fake-careless", "Simulated careless FC"),
+    ("sim-careless-tqa", "tqa", "fake-careless", "Simulated careless tQA"),
 )
+RATED = (REFERENCE, RULE_PLACER, "sim-good-otm", "sim-careless-otm")
+"""Who is voted on: with more, so few votes would leave no intervals."""
+
 SIMULATED_EXPERTS = tuple(f"sim-expert-{number}" for number in range(1, 6))
 PEOPLE = (("admin", "admin"), ("analyst", "analyst"), ("expert", "expert"))
 JOB = "Demo: the catalogue"
@@ -66,8 +77,8 @@ def prepare(say: Callable[[str], None]) -> None:
     say(f"Catalogue: {count} scenarios on {BaseScene.objects.count()} scenes")
     ensure_builtin()
     ensure_endpoint(label=STAND_IN, base_url=_stand_in_address(), is_simulated=True)
-    for slug, model, name in SIMULATED:
-        add_contestant(slug=slug, variant="otm", endpoint=STAND_IN, model=model, name=name)
+    for slug, variant, model, name in SIMULATED:
+        add_contestant(slug=slug, variant=variant, endpoint=STAND_IN, model=model, name=name)
     names = ", ".join(Contestant.objects.values_list("slug", flat=True))
     say(f"Contestants: {names}")
     for username, role in PEOPLE:
@@ -126,7 +137,7 @@ def vote_and_rate(scenarios: list[str], say: Callable[[str], None], folder: Path
     if study is None:
         study = open_study(
             name=SIMULATED_STUDY,
-            contestants=chosen_contestants([ALL]),
+            contestants=RATED,
             scenarios=scenarios,
             experts=SIMULATED_EXPERTS,
             votes_per_expert=SIMULATED_VOTES_EACH,
@@ -135,11 +146,11 @@ def vote_and_rate(scenarios: list[str], say: Callable[[str], None], folder: Path
         )
         simulate_votes(study=study, seed=SEED)
         study = close_study(study=study)
-        rate(study=study, rounds=1000, seed=SEED)
+        rate(study=study, seed=SEED)
     if not Study.objects.filter(name=OPEN_STUDY).exists():
         open_study(
             name=OPEN_STUDY,
-            contestants=chosen_contestants([ALL]),
+            contestants=RATED,
             scenarios=scenarios,
             experts=["expert"],
             votes_per_expert=YOUR_VOTES,

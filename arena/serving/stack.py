@@ -9,17 +9,12 @@ from urllib.parse import urlsplit
 import redis
 from django.conf import settings
 
-from arena.errors import ArenaError
 from arena.serving.child import Program
-from arena.serving.probes import port_answers, redis_answers, require_free_port
+from arena.serving.probes import port_answers, require_free_port
 from arena.serving.redis_server import private_redis
 from augment.models import Endpoint
 
 MANAGE = (sys.executable, str(settings.BASE_DIR / "manage.py"))
-
-
-class AlreadyRunning(ArenaError):
-    """Another `manage.py serve` of the same folder is up."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -42,16 +37,10 @@ def background(*, concurrency: int) -> list[Program]:
     """Redis where it is the private one, the stand-in models that are missing, and a worker.
 
     Raises:
-        AlreadyRunning: The private Redis answers already.
         NoRedisServer: It is needed and not here.
     """
     programs: list[Program] = []
     if settings.REDIS_IS_PRIVATE:
-        if redis_answers(settings.PRIVATE_REDIS_SOCKET):
-            raise AlreadyRunning(
-                "Scenario Arena runs in this folder already (its private Redis answers on "
-                f"{settings.PRIVATE_REDIS_SOCKET}). Stop it first."
-            )
         settings.VAR_DIR.mkdir(parents=True, exist_ok=True)
         programs.append(private_redis(settings.PRIVATE_REDIS_SOCKET))
     programs.extend(_missing_stand_ins())

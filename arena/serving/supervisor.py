@@ -141,5 +141,7 @@ class Supervisor:
 
     @staticmethod
     def _failure(child: Child, what: str) -> ChildFailed:
-        lines = "\n".join(f"    {line}" for line in child.last_lines) or "    (it printed nothing)"
+        lines = (
+            "\n".join(f"    {line}" for line in child.last_words()) or "    (it printed nothing)"
+        )
         return ChildFailed(f"{child.program.name} {what}. Its last lines:\n{lines}")

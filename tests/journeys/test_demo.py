@@ -12,14 +12,13 @@ from pathlib import Path
 
 import pytest
 
-from tests.processes import ROOT, wait_until
+from tests.processes import ROOT, copy_database, wait_until
 from tests.stack import SMALL_DEMO, Home
 
 pytestmark = [
     pytest.mark.redis,
     pytest.mark.slow,
     pytest.mark.timeout(600),
-    pytest.mark.xdist_group("demo"),
 ]
 
 
@@ -64,7 +63,8 @@ def test_a_second_run_uses_what_is_there(demo_home: Home, tmp_path: Path) -> Non
     assert (again.folder / "var" / "demo" / "leaderboard.csv").read_bytes() == before
 
 
-def test_ctrl_c_in_the_middle_ends_it_at_once(tmp_path: Path) -> None:
+def test_ctrl_c_in_the_middle_ends_it_at_once(migrated: Path, tmp_path: Path) -> None:
+    copy_database(migrated, tmp_path / "db.sqlite3")
     log = tmp_path / "demo.log"
     with log.open("w") as file:
         demo = subprocess.Popen(
@@ -76,7 +76,7 @@ def test_ctrl_c_in_the_middle_ends_it_at_once(tmp_path: Path) -> None:
         )
     wait_until(lambda: "0 of " in log.read_text(), what="the job is under way")
     demo.send_signal(signal.SIGINT)
-    assert demo.wait(timeout=20) == 130
+    assert demo.wait(timeout=120) == 130
     assert "The demo was stopped before it was done" in log.read_text()
     assert "Traceback" not in log.read_text()
     assert "Augmentations:" not in log.read_text()

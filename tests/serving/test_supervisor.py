@@ -5,7 +5,6 @@ import signal
 import subprocess
 import sys
 import threading
-import time
 from collections.abc import Callable
 from pathlib import Path
 
@@ -14,8 +13,9 @@ import pytest
 
 from arena.serving.child import Program
 from arena.serving.supervisor import ChildFailed, Supervisor
+from tests.processes import wait_until
 
-SLEEP = "import time; print('up', flush=True); time.sleep(60)"
+SLEEP = "import time; print('up', flush=True); time.sleep(600)"
 
 
 class Said:
@@ -29,7 +29,7 @@ class Said:
 
 
 def program(
-    name: str, code: str, *, is_ready: Callable[[], bool] = lambda: True, within_s: float = 10.0
+    name: str, code: str, *, is_ready: Callable[[], bool] = lambda: True, within_s: float = 60.0
 ) -> Program:
     return Program(
         name=name,
@@ -41,18 +41,14 @@ def program(
 
 
 def living(pids: list[int]) -> list[int]:
-    return [
-        pid
-        for pid in pids
-        if psutil.pid_exists(pid) and psutil.Process(pid).status() != psutil.STATUS_ZOMBIE
-    ]
+    return [pid for pid in pids if is_living(pid)]
 
 
-def wait_until(condition: Callable[[], bool], within_s: float = 10.0) -> None:
-    deadline = time.monotonic() + within_s
-    while not condition():
-        assert time.monotonic() < deadline, "it did not happen in time"
-        time.sleep(0.05)
+def is_living(pid: int) -> bool:
+    try:
+        return bool(psutil.Process(pid).status() != psutil.STATUS_ZOMBIE)
+    except psutil.NoSuchProcess:
+        return False
 
 
 def test_programs_start_in_order_and_stop_together() -> None:
@@ -60,7 +56,7 @@ def test_programs_start_in_order_and_stop_together() -> None:
     supervisor = Supervisor([program("one", SLEEP), program("two", SLEEP)], said)
     supervisor.start()
     children = [child.pid for child in supervisor._children]
-    wait_until(lambda: ("two", "up") in said.lines)
+    wait_until(lambda: ("two", "up") in said.lines, what="the second one is up")
     supervisor.stop()
     assert living(children) == []
 
@@ -89,14 +85,14 @@ def test_a_crashed_program_is_started_again() -> None:
     supervisor = Supervisor([program("worker", SLEEP)], said)
     supervisor.start()
     first = supervisor._children[0].pid
-    wait_until(lambda: ("worker", "up") in said.lines)
+    wait_until(lambda: ("worker", "up") in said.lines, what="the worker is up")
     watcher = threading.Thread(target=supervisor.watch, daemon=True)
     watcher.start()
     os.kill(first, signal.SIGKILL)
-    wait_until(lambda: said.lines.count(("worker", "up")) == 2)
+    wait_until(lambda: said.lines.count(("worker", "up")) == 2, what="it is up again")
     assert supervisor._children[0].pid != first
     supervisor.ask_to_stop()
-    watcher.join(timeout=5.0)
+    watcher.join()
     supervisor.stop()
 
 
@@ -116,16 +112,16 @@ def test_a_program_that_does_not_listen_is_killed_with_everything_it_started() -
     stubborn = (
         "import signal, subprocess, sys, time;"
         "signal.signal(signal.SIGTERM, signal.SIG_IGN);"
-        "child = subprocess.Popen([sys.executable, '-c', 'import time; time.sleep(60)']);"
-        "print(child.pid, flush=True); time.sleep(60)"
+        "child = subprocess.Popen([sys.executable, '-c', 'import time; time.sleep(600)']);"
+        "print(child.pid, flush=True); time.sleep(600)"
     )
     said = Said()
     supervisor = Supervisor([program("stubborn", stubborn)], said)
     supervisor.start()
-    wait_until(lambda: bool(said.lines))
+    wait_until(lambda: bool(said.lines), what="it says whom it started")
     grandchild = int(said.lines[0][1])
     supervisor.stop()
-    wait_until(lambda: living([grandchild]) == [])
+    wait_until(lambda: living([grandchild]) == [], what="the grandchild is gone")
 
 
 def test_nothing_outlives_a_killed_supervisor(tmp_path: Path) -> None:
@@ -133,15 +129,19 @@ def test_nothing_outlives_a_killed_supervisor(tmp_path: Path) -> None:
     code = f"""
 import sys, time
 from arena.serving.child import Child, Program
-child = Child(Program(name="one", arguments=(sys.executable, "-c", "import time; time.sleep(60)"),
+sleep = (sys.executable, "-c", "import time; time.sleep(600)")
+child = Child(Program(name="one", arguments=sleep,
                       is_ready=lambda: True), print)
 open({str(pids)!r}, "w").write(str(child.pid))
-time.sleep(60)
+time.sleep(600)
 """
     outer = subprocess.Popen([sys.executable, "-c", code])
-    wait_until(lambda: pids.exists() and pids.read_text() != "")
+    wait_until(lambda: pids.exists() and pids.read_text() != "", what="the child has an id")
     child = int(pids.read_text())
-    wait_until(lambda: "time.sleep" in " ".join(psutil.Process(child).cmdline()))
+    wait_until(
+        lambda: "arena.serving.leash" not in psutil.Process(child).cmdline(),
+        what="the leash has given way to the program",
+    )
     outer.kill()
     outer.wait()
-    wait_until(lambda: living([child]) == [])
+    wait_until(lambda: living([child]) == [], what="the child is gone")

@@ -14,6 +14,7 @@ from django.core.management.base import BaseCommand, CommandError, CommandParser
 from arena.errors import ArenaError
 from arena.management.commands.serve import INTERRUPTED
 from arena.serving import demo
+from arena.serving.hold import held_alone
 from arena.serving.stack import Web, background, web_server
 from arena.serving.supervisor import Supervisor
 from augment.errors import AugmentError
@@ -40,30 +41,33 @@ class Command(BaseCommand):
 
     def handle(self, *args: Any, **options: Any) -> None:
         """Run the demo; a fault of any step ends it with a sentence."""
-        started = time.monotonic()
         web = Web(host=options["host"], port=options["port"])
         try:
-            server = [] if options["no_serve"] else [web_server(web)]
-            call_command("prepare", verbosity=0)
-            demo.prepare(self.stdout.write)
-            scenarios = demo.scenarios_of(options["per_type"])
-            supervisor = Supervisor([*background(concurrency=2), *server], self._keep)
-            with supervisor.signals():
-                try:
-                    supervisor.start()
-                    demo.generate(scenarios, self.stdout.write, partial(_look_at, supervisor))
-                    board = demo.vote_and_rate(
-                        scenarios, self.stdout.write, settings.VAR_DIR / "demo"
-                    )
-                    self._show(board, web, time.monotonic() - started, serve=bool(server))
-                    if server and not supervisor.is_stopping:
-                        supervisor.watch()
-                finally:
-                    supervisor.stop()
+            with held_alone():
+                self._run(web, options["per_type"], serve=not options["no_serve"])
         except (ArenaError, AugmentError) as error:
             raise CommandError(str(error)) from error
         except KeyboardInterrupt:
             raise CommandError(STOPPED, returncode=INTERRUPTED) from None
+
+    def _run(self, web: Web, per_type: int | None, *, serve: bool) -> None:
+        started = time.monotonic()
+        server = [web_server(web)] if serve else []
+        call_command("prepare", verbosity=0)
+        demo.prepare(self.stdout.write)
+        scenarios = demo.scenarios_of(per_type)
+        supervisor = Supervisor([*background(concurrency=2), *server], self._keep)
+        with supervisor.signals():
+            try:
+                supervisor.start()
+                demo.generate(scenarios, self.stdout.write, partial(_look_at, supervisor))
+                folder = settings.VAR_DIR / "demo"
+                board = demo.vote_and_rate(scenarios, self.stdout.write, folder)
+                self._show(board, web, time.monotonic() - started, serve=serve)
+                if serve and not supervisor.is_stopping:
+                    supervisor.watch()
+            finally:
+                supervisor.stop()
 
     def _show(self, board: demo.Leaderboard, web: Web, took_s: float, *, serve: bool) -> None:
         lines = [

@@ -9,6 +9,7 @@ from django.core.management import call_command
 from django.core.management.base import BaseCommand, CommandError, CommandParser
 
 from arena.errors import ArenaError
+from arena.serving.hold import held_alone
 from arena.serving.stack import Web, background, web_server
 from arena.serving.supervisor import Supervisor
 
@@ -39,23 +40,26 @@ class Command(BaseCommand):
         """Run until somebody asks to stop."""
         web = Web(host=options["host"], port=options["port"], workers=options["web_workers"])
         try:
-            server = web_server(web)
-            call_command("prepare", verbosity=0)
-            programs = [*background(concurrency=options["concurrency"]), server]
-            supervisor = Supervisor(programs, self._say)
-            with supervisor.signals():
-                try:
-                    supervisor.start()
-                    self.stdout.write(f"\nScenario Arena is at {web.address}  (Ctrl-C stops it)\n")
-                    supervisor.watch()
-                finally:
-                    self.stdout.write("Stopping ...")
-                    supervisor.stop()
+            with held_alone():
+                self._serve(web, options["concurrency"])
         except ArenaError as error:
             raise CommandError(str(error)) from error
         except KeyboardInterrupt:  # before anything was started
             raise CommandError("Stopped before anything ran.", returncode=INTERRUPTED) from None
         self.stdout.write("Everything is stopped.")
+
+    def _serve(self, web: Web, concurrency: int) -> None:
+        server = web_server(web)
+        call_command("prepare", verbosity=0)
+        supervisor = Supervisor([*background(concurrency=concurrency), server], self._say)
+        with supervisor.signals():
+            try:
+                supervisor.start()
+                self.stdout.write(f"\nScenario Arena is at {web.address}  (Ctrl-C stops it)\n")
+                supervisor.watch()
+            finally:
+                self.stdout.write("Stopping ...")
+                supervisor.stop()
 
     def _say(self, name: str, line: str) -> None:
         self.stdout.write(f"{name:8} | {line}")

@@ -1,0 +1,43 @@
+"""Only one supervisor runs in a folder."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+from django.conf import settings
+from django.test import override_settings
+
+from arena.serving.hold import AlreadyRunning, held_alone
+
+
+@pytest.fixture(autouse=True)
+def _folder(tmp_path: Path) -> Iterator[None]:
+    folder = tmp_path / "var"
+    with override_settings(
+        VAR_DIR=folder, PRIVATE_REDIS_SOCKET=folder / "redis.sock", REDIS_IS_PRIVATE=True
+    ):
+        yield
+
+
+def test_a_second_supervisor_is_kept_out_while_the_first_is_there() -> None:
+    with (
+        held_alone(),
+        pytest.raises(AlreadyRunning, match=r"serving\.lock is held"),
+        held_alone(),
+    ):
+        pytest.fail("two hold the same folder")
+
+
+def test_the_folder_is_free_again_when_the_first_has_ended() -> None:
+    with held_alone():
+        pass
+    with held_alone():
+        pass
+
+
+@override_settings(REDIS_IS_PRIVATE=False)
+def test_with_a_redis_of_their_own_several_may_run() -> None:
+    with held_alone(), held_alone():
+        assert not settings.VAR_DIR.exists()
