@@ -9,8 +9,10 @@ PYTHON ?= $(shell for name in python3 python3.12 python3.11; do \
 	&& echo $$name && exit; done; echo python3)
 PORT ?= 8000
 SERVE ?= 1
+# Compiled once, not by each of the many processes that the tests start.
+export PYTHONDONTWRITEBYTECODE :=
 
-.PHONY: demo serve test lint check fast postgres chromium lock clean
+.PHONY: demo serve test lint check fast postgres chromium bench lock clean
 
 demo: $(VENV)/.runtime ## Run the main job on the catalogue, then serve it (SERVE=0: don't)
 	$(BIN)/python manage.py demo --port $(PORT) $(if $(filter 0,$(SERVE)),--no-serve)
@@ -35,6 +37,10 @@ lint: $(VENV)/.test ## Format, style, floors and types
 	$(BIN)/mypy
 	$(BIN)/python manage.py makemigrations --check --dry-run
 
+bench: chromium ## Ours beside other products, each in its own environment; writes docs/benchmarks.md
+	$(BIN)/python -m tests.benchmarks.rivals.voting
+	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m tests.benchmarks.rating_speed
+
 chromium: $(VENV)/.test
 	@bash tests/browser/get_chromium.sh $(BIN)/python
 
@@ -44,7 +50,7 @@ lock: $(VENV)/.test ## Write the lock files anew from the *.in files
 	$(BIN)/uv pip compile --universal --python-version 3.11 --generate-hashes --no-emit-index-url -q requirements-test.in -o requirements-test.txt
 
 clean: ## Remove the environment and everything that a run leaves behind
-	rm -rf $(VENV) var media
+	rm -rf $(VENV) .bench var media
 
 $(VENV)/.made:
 	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11) and "Python 3.11 or later is needed, this is " + sys.version)'
