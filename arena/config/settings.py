@@ -16,6 +16,7 @@ from pathlib import Path
 from csp.constants import NONE, SELF
 
 from arena.config import env
+from arena.exports.files import write_once
 
 BASE_DIR = Path(__file__).resolve().parents[2]
 VAR_DIR = env.folder("ARENA_VAR_DIR", default=BASE_DIR / "var")
@@ -36,8 +37,8 @@ def _secret_key() -> str:
         return given
     if not kept.exists():
         VAR_DIR.mkdir(parents=True, exist_ok=True)
-        kept.touch(mode=0o600)
-        kept.write_text(secrets.token_urlsafe(50))
+        # The server and its workers start at once: the first key made is the key of all.
+        write_once(kept, secrets.token_urlsafe(50).encode())
     return kept.read_text()
 
 
@@ -187,7 +188,7 @@ STATIC_ROOT = VAR_DIR / "static"
 STATIC_URL = "static/"
 STATICFILES_DIRS = [BASE_DIR / "static"]
 STORAGES = {
-    "default": {"BACKEND": "django.core.files.storage.FileSystemStorage"},
+    "default": {"BACKEND": "arena.config.storage.WholeFiles"},
     "staticfiles": {"BACKEND": "arena.config.static_files.ModuleStorage"},
 }
 WHITENOISE_KEEP_ONLY_HASHED_FILES = True

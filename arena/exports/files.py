@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import os
 import tempfile
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
 from pathlib import Path
 
 
@@ -13,14 +15,30 @@ def write_whole(path: Path, content: bytes) -> None:
     Raises:
         OSError: The folder does not exist or can't be written to; the old file stays.
     """
+    with _beside(path, content) as written:
+        written.chmod(0o644)
+        written.replace(path)
+
+
+def write_once(path: Path, content: bytes) -> None:
+    """Write a file that only its owner reads, unless it is there: the first of several wins.
+
+    Raises:
+        OSError: The folder does not exist or can't be written to.
+    """
+    with _beside(path, content) as written, suppress(FileExistsError):
+        os.link(written, path)
+
+
+@contextmanager
+def _beside(path: Path, content: bytes) -> Iterator[Path]:
+    """A file of this content in the folder of path, for its owner only; gone afterwards."""
     handle, name = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.")
     try:
         with os.fdopen(handle, "wb") as file:
             file.write(content)
             file.flush()
             os.fsync(file.fileno())
-        os.chmod(name, 0o644)
-        os.replace(name, path)
-    except OSError:
+        yield Path(name)
+    finally:
         Path(name).unlink(missing_ok=True)
-        raise

@@ -64,13 +64,10 @@ def store(png: bytes, *, folder: str = "bev") -> str:
 
 
 def store_as(name: str, png: bytes) -> None:
-    """Keep these bytes under a name that belongs to them alone; written only if absent."""
-    if default_storage.exists(name):
-        if default_storage.size(name) == len(png):
-            return
-        # A worker was killed in the middle of writing it.
-        default_storage.delete(name)
-    written = default_storage.save(name, ContentFile(png))
-    if written != name:
-        # Another worker was faster with the same bytes, and the storage made up a second name.
-        default_storage.delete(written)
+    """Keep these bytes under a name that belongs to them alone; written if absent or cut off.
+
+    Several workers may do so at once: what is kept is whole at every moment, and always the same.
+    """
+    if default_storage.exists(name) and default_storage.size(name) == len(png):
+        return
+    default_storage.save(name, ContentFile(png))

@@ -5,10 +5,13 @@ from __future__ import annotations
 import os
 import subprocess
 import sys
+import threading
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import pytest
 
+from arena.exports.files import write_once
 from tests.house.source import ROOT
 
 
@@ -59,6 +62,20 @@ def test_the_secret_key_is_made_once_and_kept_private(tmp_path: Path) -> None:
     assert kept.stat().st_mode & 0o077 == 0
     assert start(**environment).returncode == 0
     assert kept.read_text() == first
+
+
+def test_processes_that_start_at_once_share_the_key_of_the_first(tmp_path: Path) -> None:
+    kept = tmp_path / "secret_key"
+    together = threading.Barrier(8)
+
+    def make(number: int) -> str:
+        together.wait()
+        write_once(kept, f"key {number}".encode())
+        return kept.read_text()
+
+    with ThreadPoolExecutor(8) as pool:
+        assert len(set(pool.map(make, range(8)))) == 1
+    assert list(tmp_path.iterdir()) == [kept]
 
 
 def test_a_folder_may_have_signs_that_mean_something_in_addresses(tmp_path: Path) -> None:

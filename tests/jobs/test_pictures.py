@@ -1,6 +1,8 @@
 from __future__ import annotations
 
 import hashlib
+import threading
+from concurrent.futures import ThreadPoolExecutor
 
 import pytest
 from django.core.files.base import ContentFile
@@ -12,6 +14,7 @@ from augment.services.scenes import scene_of
 from tests.jobs.rows import TWO_CONES, add_scenario
 
 NAME = f"bev/{hashlib.sha256(b'png').hexdigest()}.png"
+WORKERS = 4
 
 
 def read(name: str) -> bytes:
@@ -33,6 +36,22 @@ def test_a_picture_that_was_cut_off_is_written_again() -> None:
     default_storage.save(NAME, ContentFile(b"p"))
     assert store(b"png") == NAME
     assert read(NAME) == b"png"
+
+
+def test_workers_with_the_same_picture_never_meet_half_of_it() -> None:
+    for number in range(20):
+        png = bytes([number]) * 3_000_000
+        together = threading.Barrier(WORKERS)
+
+        def store_and_read(
+            _: int, png: bytes = png, together: threading.Barrier = together
+        ) -> bool:
+            together.wait()
+            return read(store(png)) == png
+
+        with ThreadPoolExecutor(WORKERS) as pool:
+            assert all(pool.map(store_and_read, range(WORKERS)))
+    assert len(default_storage.listdir("bev")[1]) == 20, "nothing else is left behind"
 
 
 @pytest.mark.django_db

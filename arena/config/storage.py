@@ -1,0 +1,28 @@
+"""Where pictures are kept: a folder in which every file is whole."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from django.core.files.base import File
+from django.core.files.storage import FileSystemStorage
+
+from arena.exports.files import write_whole
+
+
+class WholeFiles(FileSystemStorage):
+    """Files of this machine that are there whole or not at all; the last writer wins.
+
+    Django's own storage makes an empty file and fills it: another worker with the same picture
+    would meet half of it, and a worker that is killed would leave that half behind.
+    """
+
+    def __init__(self, location: str | Path | None = None, base_url: str | None = None) -> None:
+        """Take the folder and the address from the settings unless they are given."""
+        super().__init__(location=location, base_url=base_url, allow_overwrite=True)
+
+    def _save(self, name: str, content: File[bytes]) -> str:
+        path = Path(self.path(name))
+        path.parent.mkdir(parents=True, exist_ok=True)
+        write_whole(path, content.read())
+        return name
