@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import io
-from contextlib import AbstractContextManager
+from collections.abc import Iterator
+from contextlib import contextmanager
+from threading import Lock
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
@@ -19,9 +21,16 @@ _METADATA: dict[str, dict[str, Any]] = {
     "png": {"Software": None},
 }
 
+_ONE_AT_A_TIME = Lock()
 
-def house_style() -> AbstractContextManager[None]:
-    """The settings of matplotlib under which every chart is drawn."""
+
+@contextmanager
+def house_style() -> Iterator[None]:
+    """The settings of matplotlib under which every chart is drawn.
+
+    They belong to the whole process: a chart that ends would take them away from one that another
+    thread of the web server is drawing. So charts wait for each other.
+    """
     import matplotlib
 
     settings: dict[Any, Any] = {
@@ -30,7 +39,8 @@ def house_style() -> AbstractContextManager[None]:
         "pdf.fonttype": 42,  # publishers refuse Type 3, matplotlib's usual form
         "text.parse_math": False,  # a dollar sign in a name is a dollar sign
     }
-    return matplotlib.rc_context(settings)
+    with _ONE_AT_A_TIME, matplotlib.rc_context(settings):
+        yield
 
 
 def width_in(text: str, size_pt: float) -> float:

@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+import threading
 import xml.etree.ElementTree as ET
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import pytest
 from django.core.management import CommandError, call_command
 from django.urls import reverse
 
+from arena.exports.charts import interval_chart
 from arena.exports.rating_charts import CONTENT_TYPES, chart_bytes, charts
 from arena.exports.tables import leaderboard_table
 from arena.models import Snapshot
@@ -20,6 +23,7 @@ from tests.web.cast import people, signed_in
 pytestmark = pytest.mark.django_db
 
 SMALL = Size(scenarios=5, experts=3, votes_per_expert=60)
+THREADS = 4
 BEGINS = {"svg": b"<?xml", "pdf": b"%PDF-", "png": b"\x89PNG"}
 
 
@@ -105,3 +109,18 @@ def test_the_page_and_the_command_give_the_same_bytes_to_staff(
     assert signed_in(who["analyst"]).get(nothing).status_code == 404
     with pytest.raises(CommandError, match=r"'nothing'\. Known: pairs"):
         call_command("export", "chart", snapshot.study.name, "--chart", "nothing", "--out", "-")
+
+
+def test_charts_that_are_drawn_at_once_are_those_that_are_drawn_alone(snapshot: Snapshot) -> None:
+    # Whoever reads rows in a thread of its own needs another connection than this test's.
+    table = leaderboard_table(snapshot)
+    alone = interval_chart(table, file_format="svg")
+    together = threading.Barrier(THREADS)
+
+    def draw(_: int) -> list[bytes]:
+        together.wait()
+        return [interval_chart(table, file_format="svg") for _ in range(2)]
+
+    with ThreadPoolExecutor(THREADS) as pool:
+        drawn = [one for several in pool.map(draw, range(THREADS)) for one in several]
+    assert all(one == alone for one in drawn)
