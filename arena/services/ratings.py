@@ -13,7 +13,7 @@ from arena.queries.judged import is_imported, last_vote_of
 from arena.queries.vote_sets import Filters
 from arena.rating.bootstrap import Unit
 from arena.rating.leaderboard import Method
-from arena.services.snapshots import compute
+from arena.services.snapshots import compute, note_progress
 from augment.errors import Conflict, UnknownName
 from augment.services.events import log_event
 
@@ -113,22 +113,16 @@ def compute_snapshot(*, snapshot_pk: int) -> Snapshot | None:
     Returns:
         The snapshot, None if it is gone or ready already.
     """
-    waiting = Snapshot.objects.select_related("study").filter(pk=snapshot_pk)
-    snapshot = waiting.exclude(state=Snapshot.State.READY).first()
+    unready = Snapshot.objects.filter(pk=snapshot_pk).exclude(state=Snapshot.State.READY)
+    snapshot = unready.select_related("study").first()
     if snapshot is None:
         return None
-
-    def report(percent: int) -> None:
-        Snapshot.objects.filter(pk=snapshot_pk).update(
-            state=Snapshot.State.RUNNING, progress=percent
-        )
-
     try:
-        return compute(snapshot, report)
-    except (UnknownName, Conflict, ArithmeticError) as error:
-        Snapshot.objects.filter(pk=snapshot_pk).update(
-            state=Snapshot.State.FAILED, status=str(error)
+        return compute(
+            snapshot, lambda percent: note_progress(snapshot_pk=snapshot_pk, percent=percent)
         )
+    except (UnknownName, Conflict, ArithmeticError) as error:
+        unready.update(state=Snapshot.State.FAILED, status=str(error))
         return None
 
 

@@ -25,8 +25,17 @@ RESULTS_VERSION = 1
 Report = Callable[[int], None]
 
 
+def note_progress(*, snapshot_pk: int, percent: int) -> None:
+    """Say how far a rating is; one that another worker has brought to its end stays ready."""
+    unready = Snapshot.objects.exclude(state=Snapshot.State.READY)
+    unready.filter(pk=snapshot_pk).update(state=Snapshot.State.RUNNING, progress=percent)
+
+
 def compute(snapshot: Snapshot, report: Report) -> Snapshot:
     """Rate the votes that a planned snapshot names, and keep what comes out.
+
+    Of two workers that were sent the same snapshot the first to end keeps its result, which is
+    that of the other as well.
 
     Args:
         snapshot: A planned one.
@@ -62,6 +71,9 @@ def compute(snapshot: Snapshot, report: Report) -> Snapshot:
     snapshot.degenerate_rounds = board.degenerate_rounds
     snapshot.includes_simulated = _any_simulated(votes.counted, votes.entrants)
     with transaction.atomic():
+        held = Snapshot.objects.select_for_update().get(pk=snapshot.pk)
+        if held.state == Snapshot.State.READY:
+            return held
         snapshot.standings.all().delete()
         snapshot.save()
         _store_lines(snapshot, board, votes.entrants)

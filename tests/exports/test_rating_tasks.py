@@ -8,6 +8,7 @@ from django.urls import reverse
 from arena import tasks
 from arena.models import Snapshot
 from arena.services.ratings import is_big, plan_snapshot
+from arena.services.snapshots import compute, note_progress
 from arena.services.studies import close_study
 from augment.errors import QueueUnreachable
 from tests.study_rows import a_study, vote
@@ -32,6 +33,24 @@ def test_the_task_computes_what_was_planned_and_a_second_message_changes_nothing
     assert (snapshot.state, snapshot.votes_counted) == (Snapshot.State.READY, 6)
     assert snapshot.standings.count() == 3
     tasks.compute_snapshot(0)  # a row that is gone is no fault
+
+
+def test_of_two_workers_with_the_same_message_the_first_to_end_counts() -> None:
+    snapshot = planned()
+    kept: list[int] = []
+
+    def other_worker(percent: int) -> None:
+        """Brings it to its end while this one has hardly begun."""
+        if not kept:
+            tasks.compute_snapshot(snapshot.pk)
+            kept.extend(snapshot.standings.order_by("pk").values_list("pk", flat=True))
+        note_progress(snapshot_pk=snapshot.pk, percent=percent)
+        assert Snapshot.objects.get(pk=snapshot.pk).state == Snapshot.State.READY
+
+    second = compute(Snapshot.objects.get(pk=snapshot.pk), other_worker)
+    assert second.state == Snapshot.State.READY
+    assert list(snapshot.standings.order_by("pk").values_list("pk", flat=True)) == kept
+    assert len(kept) == 3
 
 
 def test_without_a_queue_the_rating_waits_and_says_why() -> None:
