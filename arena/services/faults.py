@@ -50,9 +50,11 @@ def open_labelling(
     """
     name = one_line("name", name, what="labelling")
     if LabellingRound.objects.filter(name=name).exists():
-        raise Conflict(f"There is a labelling called {name!r} already; choose another name.")
+        raise _taken(name)
     people = _experts(experts)
-    labelling = LabellingRound.objects.create(name=name, job=job, seed=seed)
+    # Held, so that of two that are opened at once the second sees what the first has planned.
+    GenerationJob.objects.select_for_update(no_key=True).get(pk=job.pk)
+    labelling = _insert(name, job, seed)
     labelling.experts.set(people)
     tasks = [task for expert in people for task in _planned(labelling, expert)]
     if not tasks:
@@ -114,6 +116,18 @@ def save_label(
 
 
 # Private
+
+
+def _insert(name: str, job: GenerationJob, seed: int) -> LabellingRound:
+    try:
+        with transaction.atomic():
+            return LabellingRound.objects.create(name=name, job=job, seed=seed)
+    except IntegrityError:  # somebody else was faster
+        raise _taken(name) from None
+
+
+def _taken(name: str) -> Conflict:
+    return Conflict(f"There is a labelling called {name!r} already; choose another name.")
 
 
 def _experts(usernames: Sequence[str]) -> list[User]:

@@ -51,6 +51,8 @@ def invite(*, study: Study, expert: User, actor: User | None = None) -> FreshLin
             f"{expert.get_username()} can't be invited by a link: links are for active experts "
             "who are neither simulated nor analysts or admins."
         )
+    # Held, so that of two links made at once the second one sees the first, which it replaces.
+    Study.objects.select_for_update(no_key=True).get(pk=study.pk)
     now = timezone.now()
     older = Invitation.objects.select_for_update().filter(
         study=study, expert=expert, revoked_at=None

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from django.contrib.auth.models import Group, User
 from django.core.exceptions import ValidationError
-from django.db import transaction
+from django.db import IntegrityError, transaction
 
 from arena.models import Person
 from arena.queries.people import ROLES
@@ -50,11 +50,20 @@ def create_person(
     elif Person.objects.filter(pseudonym=pseudonym).exists():
         raise Conflict(f"The pseudonym {pseudonym!r} is taken.")
     is_admin = role == "admin"
-    user = User.objects.create_user(
-        username, password=password, is_staff=is_admin, is_superuser=is_admin
-    )
+    try:
+        with transaction.atomic():
+            user = User.objects.create_user(
+                username, password=password, is_staff=is_admin, is_superuser=is_admin
+            )
+            person = Person.objects.create(
+                user=user, pseudonym=pseudonym, is_simulated=is_simulated
+            )
+    except IntegrityError:  # somebody else was faster
+        raise Conflict(
+            f"The username {username!r} or the pseudonym {pseudonym!r} was taken just now; try "
+            "again."
+        ) from None
     user.groups.add(Group.objects.get_or_create(name=role)[0])
-    person = Person.objects.create(user=user, pseudonym=pseudonym, is_simulated=is_simulated)
     log_event(
         actor=actor,
         verb="add",

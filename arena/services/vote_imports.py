@@ -10,7 +10,7 @@ from itertools import islice
 from pathlib import Path
 
 from django.contrib.auth.models import User
-from django.db import transaction
+from django.db import IntegrityError, transaction
 from django.utils import timezone
 
 from arena.errors import VotesUnreadable
@@ -56,7 +56,7 @@ def import_votes(
     """
     name = one_line("name", name, what="study")
     if Study.objects.filter(name=name).exists():
-        raise Conflict(f"There is a study named {name!r} already.")
+        raise _taken(name)
     try:
         columns = columns_of(path)
         contestants = len(read_votes(path, clusters=columns).comparisons.names)
@@ -65,16 +65,7 @@ def import_votes(
         raise VotesUnreadable(str(error)) from error
     except OSError as error:
         raise VotesUnreadable(f"{path} can't be read: {error.strerror}.") from error
-    now = timezone.now()
-    study = Study.objects.create(
-        name=name,
-        state=Study.State.CLOSED,
-        votes_per_expert=0,
-        seed=0,
-        allow_simulated=is_simulated,
-        opened_at=now,
-        closed_at=now,
-    )
+    study = _insert(name, is_simulated)
     file = VoteFile.objects.create(study=study, name=path.name[:200], sha256=digest)
     votes = 0
     waiting = _rows(path, file, study)
@@ -94,6 +85,27 @@ def import_votes(
 
 
 # --- Private -----------------------------------------------------------------------------------
+
+
+def _insert(name: str, is_simulated: bool) -> Study:
+    now = timezone.now()
+    try:
+        with transaction.atomic():
+            return Study.objects.create(
+                name=name,
+                state=Study.State.CLOSED,
+                votes_per_expert=0,
+                seed=0,
+                allow_simulated=is_simulated,
+                opened_at=now,
+                closed_at=now,
+            )
+    except IntegrityError:  # somebody else was faster
+        raise _taken(name) from None
+
+
+def _taken(name: str) -> Conflict:
+    return Conflict(f"There is a study named {name!r} already.")
 
 
 def _rows(path: Path, file: VoteFile, study: Study) -> Iterator[ImportedVote]:

@@ -1,0 +1,127 @@
+"""Somebody else takes the name between the look and the writing, or does the same at once."""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Callable, Iterator
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import contextmanager
+from pathlib import Path
+
+import pytest
+from django.contrib.auth.models import User
+from django.db import connection
+from django.db.models import Model
+from django.db.models.signals import pre_save
+
+from arena.errors import NothingToPlan
+from arena.models import Invitation, LabellingRound, Person, Study
+from arena.services.faults import open_labelling
+from arena.services.invitations import FreshLink, invite
+from arena.services.people import create_person
+from arena.services.vote_imports import import_votes
+from augment.errors import Conflict
+from augment.models import GenerationJob
+from tests.exports.test_displacement import a_job
+from tests.study_rows import a_study, expert
+
+THREADS = 4
+
+
+@contextmanager
+def faster(model: type[Model], store: Callable[[], object]) -> Iterator[None]:
+    """Somebody stores their row right before ours of that model."""
+
+    def first(sender: object, **_: object) -> None:
+        store()
+
+    pre_save.connect(first, sender=model)
+    try:
+        yield
+    finally:
+        pre_save.disconnect(first, sender=model)
+
+
+@pytest.mark.django_db
+def test_a_labelling_whose_name_is_just_taken_is_refused() -> None:
+    job = a_job()
+    expert("eva")
+    other = GenerationJob.objects.create(name="another")
+    taken = [LabellingRound(name="Faults", job=other, seed=2)]
+    with (
+        faster(LabellingRound, lambda: LabellingRound.objects.bulk_create(taken)),
+        pytest.raises(Conflict, match="called 'Faults' already"),
+    ):
+        open_labelling(name="Faults", job=job, experts=["eva"], seed=1)
+
+
+@pytest.mark.django_db
+def test_imported_votes_whose_name_is_just_taken_are_refused(tmp_path: Path) -> None:
+    path = tmp_path / "votes.csv"
+    path.write_text("model_a,model_b,winner\na,b,model_a\n")
+    taken = [Study(name="Elsewhere", votes_per_expert=1, seed=1)]
+    with (
+        faster(Study, lambda: Study.objects.bulk_create(taken)),
+        pytest.raises(Conflict, match="a study named 'Elsewhere' already"),
+    ):
+        import_votes(path=path, name="Elsewhere")
+
+
+@pytest.mark.django_db
+def test_an_account_whose_name_or_pseudonym_is_just_taken_is_refused() -> None:
+    with (
+        faster(User, lambda: User.objects.bulk_create([User(username="eva")])),
+        pytest.raises(Conflict, match="'eva' or the pseudonym 'Expert 1' was taken"),
+    ):
+        create_person(username="eva", password=None, role="expert")
+    finn = expert("finn")  # as Expert 1
+
+    def becomes_expert_2() -> None:
+        Person.objects.filter(user=finn).update(pseudonym="Expert 2")
+
+    with (
+        faster(User, becomes_expert_2),
+        pytest.raises(Conflict, match="'eva' or the pseudonym 'Expert 2' was taken"),
+    ):
+        create_person(username="eva", password=None, role="expert")
+
+
+@pytest.mark.django_db(transaction=True)
+def test_of_links_that_are_made_at_once_each_replaces_the_one_before() -> None:
+    study = a_study()
+    eva = User.objects.get(username="eva")
+    together = threading.Barrier(THREADS)
+
+    def make(_: int) -> FreshLink:
+        together.wait()
+        try:
+            return invite(study=study, expert=eva)
+        finally:
+            connection.close()
+
+    with ThreadPoolExecutor(THREADS) as pool:
+        made = [link.invitation.pk for link in pool.map(make, range(THREADS))]
+    alive = Invitation.objects.get(revoked_at=None)
+    assert len(made) == Invitation.objects.count() == THREADS
+    assert alive.pk == max(made)
+
+
+@pytest.mark.django_db(transaction=True)
+def test_of_labellings_that_are_opened_at_once_none_plans_what_another_has() -> None:
+    job = a_job()
+    expert("eva")
+    together = threading.Barrier(THREADS)
+
+    def opened(number: int) -> bool:
+        together.wait()
+        try:
+            open_labelling(name=f"Faults {number}", job=job, experts=["eva"], seed=number)
+        except NothingToPlan:
+            return False
+        finally:
+            connection.close()
+        return True
+
+    with ThreadPoolExecutor(THREADS) as pool:
+        assert sorted(pool.map(opened, range(THREADS))) == [False] * (THREADS - 1) + [True]
+    assert LabellingRound.objects.count() == 1
