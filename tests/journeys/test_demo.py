@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import json
+import re
 import signal
 import struct
 import subprocess
@@ -74,7 +75,8 @@ def test_ctrl_c_in_the_middle_ends_it_at_once(migrated: Path, tmp_path: Path) ->
             stdout=file,
             stderr=subprocess.STDOUT,
         )
-    wait_until(lambda: "0 of " in log.read_text(), what="the job is under way")
+    under_way = re.compile(r"\d+ of \d+ augmentations")
+    wait_until(lambda: bool(under_way.search(log.read_text())), what="the job is under way")
     demo.send_signal(signal.SIGINT)
     assert demo.wait(timeout=120) == 130
     assert "The demo was stopped before it was done" in log.read_text()
