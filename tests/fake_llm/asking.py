@@ -21,7 +21,7 @@ def outcome(
     *,
     transcript: MemoryTranscript | None = None,
     key: str | None = None,
-    timeout_s: float = 10.0,
+    timeout_s: float = 60.0,
 ) -> Outcome:
     with OpenAIWire(base_url=server.url, api_key=key, timeout_s=timeout_s) as client:
         return run(

@@ -70,7 +70,7 @@ class Asking:
         )
 
     def ask(self, request: Request = ASKED) -> str:
-        wire = OpenAIWire(base_url=self.endpoint.base_url, api_key=None, timeout_s=5.0)
+        wire = OpenAIWire(base_url=self.endpoint.base_url, api_key=None, timeout_s=60.0)
         with EndpointClient(wire, self.endpoint, Queue(longest_s=0.0)) as client:
             conversation = Conversation(
                 client=client,

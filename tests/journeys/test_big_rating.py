@@ -10,7 +10,7 @@ import pytest
 from arena.services.ratings import WHILE_WAITING
 from tests.processes import machine
 
-pytestmark = [pytest.mark.redis, pytest.mark.slow, pytest.mark.timeout(300)]
+pytestmark = [pytest.mark.redis, pytest.mark.slow, pytest.mark.timeout(600)]
 
 VOTES = (
     *("a,b,model_a", "b,a,model_b", "b,a,model_a"),
@@ -48,8 +48,10 @@ def votes_file(folder: Path) -> Path:
     return file
 
 
-def test_a_rating_of_many_votes_is_computed_by_a_worker_and_shown_when_it_is_done() -> None:
-    with machine() as place:
+def test_a_rating_of_many_votes_is_computed_by_a_worker_and_shown_when_it_is_done(
+    migrated: Path,
+) -> None:
+    with machine(database=migrated) as place:
         place.must("prepare", "--verbosity", "0")
         redis = place.redis()
         worker = place.worker(concurrency=1)

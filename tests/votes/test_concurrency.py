@@ -13,7 +13,7 @@ from pytest_django import Settings
 from arena.errors import AlreadyDecided, TooFast
 from arena.models import Matchup, Vote
 from arena.services.decisions import decision_of
-from arena.services.votes import receive_vote
+from arena.services.votes import PACE_WINDOW, receive_vote
 from augment.models import Event
 from tests.study_rows import a_study, vote
 
@@ -88,7 +88,10 @@ def test_a_browser_that_floods_gets_no_more_through_than_the_pace_allows(
     with ThreadPoolExecutor(max_workers=THREADS) as pool:
         stored = sum(pool.map(send, matchups))
 
-    # Each thread sees the stored votes; those under way beside it are all it can overlook.
-    assert 5 <= stored <= 5 + THREADS - 1
-    assert Vote.objects.count() == stored
+    # Each thread sees the stored votes; those under way beside it are all it can overlook. On a
+    # machine that takes longer than the five seconds more may follow.
+    times = list(Vote.objects.order_by("at").values_list("at", flat=True))
+    spans = (times[-1] - times[0]) // PACE_WINDOW + 1
+    assert 5 <= stored <= (5 + THREADS - 1) * spans
+    assert len(times) == stored
     assert Event.objects.filter(verb="vote too fast", actor=eva).exists()
