@@ -13,6 +13,7 @@ from augment.errors import Conflict
 from augment.llm.costs import nano_usd_of
 from augment.models import Augmentation, Contestant, GenerationJob
 from augment.services.budget import limit_of
+from augment.services.claims import change_all
 from augment.services.events import log_event
 from augment.services.prices import unpriced
 
@@ -113,14 +114,14 @@ def resume(job: GenerationJob, *, actor: User | None = None) -> GenerationJob:
         Conflict: The job is not stopped.
     """
     stopped = GenerationJob.objects.filter(pk=job.pk, state=State.STOPPED_AT_CAP)
+    waiting = Augmentation.objects.filter(job=job.pk, state=Augmentation.State.QUEUED)
+    again = change_all(waiting, sent_at=None)
     if not stopped.update(state=State.RUNNING):
         job.refresh_from_db()
         raise Conflict(
             f"Job {job.name!r} is {job.get_state_display().lower()}; only one that stopped at its "
             "cap can be resumed."
         )
-    waiting = Augmentation.objects.filter(job=job.pk, state=Augmentation.State.QUEUED)
-    again = waiting.update(sent_at=None)
     log_event(
         actor=actor,
         verb="resume",

@@ -187,7 +187,7 @@ def requeue_stale(*, now: datetime, older_than: timedelta) -> list[int]:
     orphans = Augmentation.objects.filter(
         state=Augmentation.State.QUEUED, job__in=_cancelled_jobs()
     )
-    orphans.update(state=Augmentation.State.CANCELLED, finished_at=now)
+    change_all(orphans, state=Augmentation.State.CANCELLED, finished_at=now)
     return taken_back
 
 
@@ -207,7 +207,20 @@ def unsent(*, now: datetime, older_than: timedelta, job_pk: int | None = None) -
 
 def mark_sent(*, ids: Iterable[int], now: datetime) -> None:
     """Remember when the messages of these rows were sent."""
-    Augmentation.objects.filter(pk__in=list(ids)).update(sent_at=now)
+    change_all(Augmentation.objects.filter(pk__in=list(ids)), sent_at=now)
+
+
+@transaction.atomic
+def change_all(rows: QuerySet[Augmentation], **changes: Any) -> int:
+    """Write the same into many rows; how many there were.
+
+    Held in the order of their numbers, so that of two who change the same rows none waits for the
+    other in a circle: an UPDATE takes them as they lie. Who also changes their job does that
+    afterwards, as those do who settle a single row.
+    """
+    held = rows.order_by("pk").select_for_update(no_key=True)
+    list(held.values_list("pk", flat=True))
+    return rows.update(**changes)
 
 
 # --- Private -----------------------------------------------------------------------------------

@@ -16,6 +16,7 @@ from augment.errors import Conflict, UnknownName
 from augment.models import Augmentation, Contestant, GenerationJob, Scenario
 from augment.services.budget import limit_of
 from augment.services.caps import Caps, check_caps
+from augment.services.claims import change_all
 from augment.services.events import log_event
 from augment.services.feasible import refuse_impossible
 from augment.services.texts import one_line
@@ -129,11 +130,11 @@ def cancel(job: GenerationJob, actor: User | None = None) -> GenerationJob:
     still_open = GenerationJob.objects.filter(pk=job.pk, state__in=OPEN)
     before = still_open.values_list("state", flat=True).first()
     now = timezone.now()
+    waiting = Augmentation.objects.filter(job=job, state=State.QUEUED)
+    stopped = change_all(waiting, state=State.CANCELLED, finished_at=now)
     if not still_open.update(state=GenerationJob.State.CANCELLED, finished_at=now):
         job.refresh_from_db()
         raise Conflict(f"Job {job.name!r} is {job.get_state_display().lower()} already.")
-    waiting = Augmentation.objects.filter(job=job, state=State.QUEUED)
-    stopped = waiting.update(state=State.CANCELLED, finished_at=now)
     log_event(
         actor=actor,
         verb="cancel",

@@ -1,0 +1,65 @@
+"""Who changes rows and their job takes the rows first, so that nobody waits in a circle."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import pytest
+from django.db import connection
+from django.test.utils import CaptureQueriesContext
+from django.utils import timezone
+
+from augment.errors import Conflict
+from augment.models import GenerationJob
+from augment.services import caps, claims, jobs, runner
+from augment.services.caps import Caps
+from tests.jobs.models import Model, llama_job
+from tests.jobs.rows import launch
+
+pytestmark = pytest.mark.django_db
+
+ROWS, JOB = "augment_augmentation", "augment_generationjob"
+
+
+def held(act: Callable[[], object]) -> list[str]:
+    """Of which of the two tables rows are changed first, and of which then."""
+    with CaptureQueriesContext(connection) as captured:
+        act()
+    changes = [query["sql"].split('"')[1] for query in captured if query["sql"][:6] == "UPDATE"]
+    return [table for table in dict.fromkeys(changes) if table in (ROWS, JOB)]
+
+
+def test_a_worker_holds_its_row_before_the_job() -> None:
+    job = llama_job()
+    pk = job.augmentations.get().pk
+    assert held(lambda: runner.work_on(augmentation_pk=pk, connect=Model())) == [ROWS, JOB]
+
+
+def test_who_cancels_a_job_holds_what_waits_before_the_job() -> None:
+    job = launch(scenarios=2)
+    assert held(lambda: jobs.cancel(job)) == [ROWS, JOB]
+
+
+def test_who_resumes_a_job_holds_what_waits_before_the_job() -> None:
+    job = llama_job(caps=Caps(tokens=5))
+    runner.work_on(augmentation_pk=job.augmentations.get().pk, connect=Model())
+    assert held(lambda: caps.resume(job)) == [ROWS, JOB]
+
+
+def test_of_many_rows_the_first_is_held_first() -> None:
+    job = launch(scenarios=3)
+    pks = list(job.augmentations.values_list("pk", flat=True))
+    with CaptureQueriesContext(connection) as captured:
+        claims.mark_sent(ids=pks, now=timezone.now())
+    looked, changed = (query["sql"] for query in captured if ROWS in query["sql"])
+    assert " ORDER BY 1 ASC" in looked
+    assert ("FOR NO KEY UPDATE" in looked) is (connection.vendor == "postgresql")
+    assert changed.startswith(f'UPDATE "{ROWS}"')
+
+
+def test_a_job_that_is_over_keeps_what_waits() -> None:
+    job = launch()
+    GenerationJob.objects.update(state=GenerationJob.State.FINISHED)
+    with pytest.raises(Conflict):
+        jobs.cancel(job)
+    assert jobs.progress(job).queued == 1
