@@ -9,6 +9,7 @@ from django.conf import settings
 from playwright.sync_api import Browser
 
 from tests.browser.booth import PHONE
+from tests.browser.chromium import PATIENCE_MS
 
 pytestmark = pytest.mark.browser
 SHEETS = ("tokens", "base", "components")
@@ -20,6 +21,7 @@ def test_a_long_name_breaks_instead_of_widening_the_page(browser: Browser, eleme
     styles = "".join((folder / f"{name}.css").read_text() for name in SHEETS)
     card = f"<div class='card'><{element}>{'n' * 120}</{element}></div>"
     page = browser.new_page(viewport=PHONE)
+    page.set_default_timeout(PATIENCE_MS)
     page.set_content(f"<style>{styles}</style><main>{card}</main>")
     assert page.evaluate("document.documentElement.scrollWidth") == PHONE["width"]
     page.close()

@@ -125,9 +125,9 @@ def test_everything_but_looking_closely_goes_without_a_script(booth: Booth) -> N
     page.get_by_role("button", name="B is better").click()
     page.get_by_role("link", name="Change pair 1: A").click()
     page.get_by_role("link", name="Back").click()
-    assert page.inner_text("#place") == "4"
+    expect(page.locator("#place")).to_have_text("4")
     page.get_by_role("link", name="Help").click()
-    assert page.get_by_role("heading", name="How to vote").is_visible()
+    expect(page.get_by_role("heading", name="How to vote")).to_be_visible()
     votes = booth.votes()
     assert [vote.outcome for vote in votes] == ["left", "equal", "right"]
     assert votes[0].comment == "so so"
