@@ -9,6 +9,7 @@ import numpy as np
 
 from arena.queries.vote_sets import VoteSet
 from arena.rating import elo
+from arena.rating.bets import bets, limit
 from arena.rating.bootstrap import Unit
 from arena.rating.bradley_terry import ELO_PER_LOGIT, MEAN_ELO
 from arena.rating.comparisons import Comparisons, FloatArray
@@ -204,6 +205,7 @@ def _panel(
         without = without_each_expert(inner, strengths)
         changes = rank_changes(strengths, without)
     names = {vote.judge: vote.judge_name for vote in votes.counted}
+    against = bets(inner)
     return [
         asdict(line)
         | {
@@ -212,6 +214,9 @@ def _panel(
             "moves": changes[line.expert],
             "repeats": list(repeats.by_expert.get(line.expert, (0, 0))),
             "checks": _checks(votes, arrays.judges[line.expert]),
+            "bet": asdict(against[line.expert]) | {"limit": limit(len(against))}
+            if line.expert in against
+            else None,
         }
         for line in raters(inner, ms=arrays.ms, without=without)
     ]

@@ -134,6 +134,14 @@ def percent(share: float | None) -> str:
 
 
 @register.filter
+def e_value(value: float) -> str:
+    """One digit behind the point below ten; far up only how far."""
+    if value >= 1000.0:
+        return _("over 1,000")
+    return f"{value:.1f}" if value < 10.0 else f"{value:.0f}"
+
+
+@register.filter
 def p_value(value: float) -> str:
     """Two digits; below a hundredth only that."""
     return "< 0.01" if value < 0.01 else f"= {value:.2f}"

@@ -23,6 +23,7 @@ def raters(snapshot: Snapshot, table: LeaderboardTable) -> Context:
     return {
         "trust": trust,
         "panel": sorted(lines, key=lambda line: natural(line["name"])),
+        "limit": next((bet["limit"] for line in lines if (bet := line.get("bet"))), None),
         "left_bars": bars(left, span=(0.0, 1.0)),
     }
 

@@ -113,6 +113,26 @@ def test_raters_are_pseudonyms_with_repeats_and_checks(analyst: Client) -> None:
     assert "0 / 1" in shown
 
 
+@pytest.mark.parametrize(
+    ("bet", "said"),
+    [
+        ({"e_value": 3.14159, "manner": "blind", "votes": 20, "limit": 40.0}, ">3.1</td>"),
+        ({"e_value": 39.9, "manner": "blind", "votes": 20, "limit": 40.0}, ">40</td>"),
+        ({"e_value": 45.0, "manner": "blind", "votes": 20, "limit": 40.0}, "as if not looking"),
+        ({"e_value": 1e12, "manner": "swapped", "votes": 20, "limit": 40.0}, ">over 1,000 <"),
+        ({"e_value": 1e12, "manner": "swapped", "votes": 20, "limit": 40.0}, "keys were swapped"),
+        (None, "–</td></tr>"),
+    ],
+)
+def test_who_votes_as_if_without_looking_is_pointed_out(
+    study: Study, analyst: Client, bet: dict[str, object] | None, said: str
+) -> None:
+    snapshot = Snapshot.objects.get(study=study)
+    snapshot.results["trust"]["raters"][0]["bet"] = bet
+    Snapshot.objects.filter(pk=snapshot.pk).update(results=snapshot.results)
+    assert said in page(analyst, study, "raters")
+
+
 def test_experts_read_the_table_but_nothing_about_each_other(study: Study) -> None:
     expert = signed_in(User.objects.get(username="expert-1"))
     shown = page(expert, study)
