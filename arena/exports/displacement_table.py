@@ -8,8 +8,8 @@ from dataclasses import dataclass
 
 from arena.exports.published import BY_VARIANT, PublishedBox
 from arena.exports.tables import SIMULATED
-from arena.rating.sentences import sentence
 from augment.models import GenerationJob, Scenario
+from augment.sentences import sentence
 from augment.services.displacement import (
     PLACED_EXACTLY,
     By,

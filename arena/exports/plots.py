@@ -9,7 +9,7 @@ from typing import Any
 
 from arena.exports.tables import LeaderboardTable, Row
 from arena.models import Snapshot
-from arena.rating.sentences import Sentence, sentence
+from augment.sentences import Sentence, sentence
 
 ELO = sentence("Elo with 95 %% interval")
 METRES = sentence("Median displacement (m)")

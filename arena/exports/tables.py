@@ -10,7 +10,7 @@ from django.db.models import F
 
 from arena.models import Snapshot, Standing
 from arena.rating.printed import interval_text, rank_text, rating_text
-from arena.rating.sentences import read_sentence, sentence
+from augment.sentences import read_sentence, sentence
 
 METHODS = {
     "bt": "Bradley-Terry on the Elo scale",

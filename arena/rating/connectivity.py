@@ -14,7 +14,7 @@ from enum import StrEnum
 import numpy as np
 
 from arena.rating.comparisons import BoolArray, FloatArray, IntArray, PairCounts
-from arena.rating.sentences import Sentence, sentence
+from augment.sentences import Sentence, sentence
 
 _NUMBERS_AT_ONCE = 4_000_000
 

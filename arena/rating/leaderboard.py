@@ -29,7 +29,7 @@ from arena.rating.comparisons import (
 from arena.rating.connectivity import Diagnosis, Status, diagnose
 from arena.rating.parts import Method, Order, Rated, Rules, rate_part
 from arena.rating.ranking import Separation
-from arena.rating.sentences import Sentence, sentence
+from augment.sentences import Sentence, sentence
 
 __all__ = ["Leaderboard", "Line", "Method", "Order", "Unit", "anchored", "rate"]
 

@@ -23,7 +23,7 @@ from arena.rating.comparisons import (
 )
 from arena.rating.connectivity import Determined, Status
 from arena.rating.ranking import Separation, rank_interval, ranks, separation
-from arena.rating.sentences import Sentence
+from augment.sentences import Sentence
 
 
 class Method(StrEnum):

@@ -7,7 +7,7 @@ import numpy as np
 from arena.rating import elo, sandwich
 from arena.rating.bootstrap import LEVEL, Unit
 from arena.rating.comparisons import Comparisons, FloatArray, renumbered
-from arena.rating.sentences import Sentence, sentence
+from augment.sentences import Sentence, sentence
 
 MOST_DEGENERATE = (1.0 - LEVEL) / 2.0
 """The largest share of rounds without ratings that still leaves a percentile to read."""

@@ -10,8 +10,8 @@ from django.utils.functional import Promise
 from django.utils.translation import gettext as _
 from django.utils.translation import gettext_lazy, gettext_noop
 
-from arena.rating.sentences import Sentence, filled
 from augment.models import Scenario
+from augment.services.wording import said
 
 register = template.Library()
 
@@ -34,9 +34,6 @@ _LEFT_OUT: dict[str, str | Promise] = {
     "simulated": gettext_lazy("simulated"),
     "filtered": gettext_lazy("not asked for"),
 }
-_WORDS = ("types", "reasons")
-"""Values of sentences that are words of ours, not names."""
-
 UNMEASURED = (
     gettext_noop("waits, runs, failed or was cancelled"),
     gettext_noop("its scenario has no reference that can be read"),
@@ -89,18 +86,7 @@ def left_out(reason: str) -> str:
     return str(_LEFT_OUT.get(reason, reason))
 
 
-@register.filter
-def said(sentence: str) -> str:
-    """A sentence or note of a rating in the language of whoever reads it."""
-    if isinstance(sentence, Sentence):
-        values = {
-            name: tuple(_(str(word)) for word in value)
-            if name in _WORDS and isinstance(value, tuple)
-            else value
-            for name, value in sentence.values.items()
-        }
-        return filled(_(sentence.text), values)
-    return _(sentence) if sentence else ""
+register.filter("said", said)
 
 
 @register.filter

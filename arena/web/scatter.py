@@ -12,8 +12,8 @@ from dataclasses import dataclass
 from arena.exports.badges import badge_places
 from arena.exports.plot_axes import axes
 from arena.exports.plots import Plot
-from arena.rating.sentences import Sentence
 from arena.web.charts import Tick
+from augment.sentences import Sentence
 
 HEIGHT = 404.0
 LEFT, TOP, BOTTOM = 82.0, 14.0, 342.0

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 
-from arena.rating.sentences import Sentence, filled, read_sentence, sentence
+from augment.sentences import Sentence, filled, read_sentence, sentence
 from tests.rating.votes import by_votes, named, versus
 
 

@@ -1,6 +1,7 @@
-"""Sentences that go with ratings, in English, and what they were made of.
+"""Sentences for people, in English, and what they were made of: no language is chosen here.
 
-Whoever shows them in another language looks up the text and fills in the values again.
+Whoever shows them in another language looks up the text and fills in the values again. What is
+stored, logged or printed is the English sentence.
 """
 
 from __future__ import annotations
@@ -8,7 +9,7 @@ from __future__ import annotations
 from typing import Any
 
 Value = int | str | tuple[str, ...] | tuple[tuple[str, ...], ...]
-"""A number, a name, a list of names, or groups of names."""
+"""A number, a name, a list of names, or groups of names; a sentence is looked up as well."""
 
 
 class Sentence(str):
@@ -23,15 +24,26 @@ class Sentence(str):
     values: dict[str, Value]
 
     def as_document(self) -> dict[str, Any]:
-        """What `read_sentence` makes the sentence of again."""
+        """What `read_sentence` makes the sentence of again; sentences within become names."""
         return {"text": self.text, "values": self.values}
 
 
-def sentence(text: str, **values: Value) -> Sentence:
+def sentence(text: str, /, **values: Value) -> Sentence:
     """The sentence of a text and its values; the text stands in the catalogue of translations."""
     made = Sentence(filled(text, values))
     made.text, made.values = text, values
     return made
+
+
+def word(text: str) -> Sentence:
+    """A word of ours as a value, to be looked up with its sentence; `sentence` takes names."""
+    return sentence(text.replace("%", "%%"))
+
+
+def sentence_of(error: Exception) -> str:
+    """What an error says: the sentence that it was raised with, else its plain text."""
+    first = error.args[0] if error.args else ""
+    return first if isinstance(first, Sentence) else str(error)
 
 
 def filled(text: str, values: dict[str, Value]) -> str:

@@ -1,0 +1,30 @@
+"""Sentences in the language of whoever reads them; only doors ask for this, no service does."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from django.utils.translation import gettext as _
+
+from augment.sentences import Sentence, filled, sentence_of
+
+_WORDS = ("types", "reasons")
+"""Values of ratings' sentences that are words of ours, not names."""
+
+
+def said(sentence: str | Exception) -> str:
+    """A sentence, a note or what an error says; what is not in the catalogue stays English."""
+    text = sentence_of(sentence) if isinstance(sentence, Exception) else sentence
+    if isinstance(text, Sentence):
+        values = {
+            name: _said_value(value, is_ours=name in _WORDS) for name, value in text.values.items()
+        }
+        return filled(_(text.text), values)
+    return _(text) if text else ""
+
+
+def _said_value(value: Any, *, is_ours: bool) -> Any:
+    """Names stay as they are; sentences among them, and words of ours, are said."""
+    if isinstance(value, tuple):
+        return tuple(_said_value(part, is_ours=is_ours) for part in value)
+    return said(value) if isinstance(value, Sentence) or is_ours else value
