@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from augment.sentences import sentence
+
 
 class ArenaError(Exception):
     """The root of arena's own errors: its text is a sentence for the person who caused it."""
@@ -82,8 +84,11 @@ class StudyStillOpen(ArenaError):
     def __init__(self, name: str) -> None:
         self.name = name
         super().__init__(
-            f"The study {name!r} is still open. Close it first, or look early on purpose: that "
-            "is written to the log."
+            sentence(
+                "The study '%(name)s' is still open. Close it first, or look early on purpose: "
+                "that is written to the log.",
+                name=name,
+            )
         )
 
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from augment.sentences import Sentence, sentence, word
+
 
 class AugmentError(Exception):
     """The root of augment's own errors: its text is a sentence for the person who caused it."""
@@ -18,9 +20,22 @@ class InvalidDocument(AugmentError):
     def __init__(self, what: str, problems: list[tuple[str, str]]) -> None:
         self.what = what
         self.problems = problems
-        shown = "; ".join(f"{path or '(document)'}: {text}" for path, text in problems[:8])
-        more = f" (and {len(problems) - 8} more)" if len(problems) > 8 else ""
-        super().__init__(f"This {what} can't be read: {shown}{more}")
+        shown = tuple((_problem(path, text),) for path, text in problems[:8])
+        super().__init__(
+            sentence("This %(what)s can't be read: %(problems)s", what=word(what), problems=shown)
+            if len(problems) <= 8
+            else sentence(
+                "This %(what)s can't be read: %(problems)s (and %(number)s more)",
+                what=word(what),
+                problems=shown,
+                number=len(problems) - 8,
+            )
+        )
+
+
+def _problem(path: str, text: str) -> Sentence:
+    plain = "%(path)s: %(text)s"
+    return sentence(plain, path=word(path or "(document)"), text=text)
 
 
 class InvalidModification(AugmentError):
@@ -40,8 +55,18 @@ class UnknownName(AugmentError):
         self.kind = kind
         self.name = name
         self.allowed = allowed
-        known = ", ".join(allowed) if allowed else "none yet"
-        super().__init__(f"Unknown {kind} {name!r}. Known: {known}.")
+        super().__init__(
+            sentence(
+                "Unknown %(kind)s '%(name)s'. Known: %(known)s.",
+                kind=word(kind),
+                name=name,
+                known=tuple(allowed),
+            )
+            if allowed
+            else sentence(
+                "Unknown %(kind)s '%(name)s'. Known: none yet.", kind=word(kind), name=name
+            )
+        )
 
 
 class Conflict(AugmentError):
@@ -195,8 +220,11 @@ class QueueUnreachable(AugmentError):
     def __init__(self, address: str) -> None:
         self.address = address
         super().__init__(
-            f"No Redis at {address}: start `manage.py serve` or set REDIS_URL. "
-            "What was queued is kept and runs as soon as a worker starts."
+            sentence(
+                "No Redis at %(address)s: start `manage.py serve` or set REDIS_URL. "
+                "What was queued is kept and runs as soon as a worker starts.",
+                address=address,
+            )
         )
 
 

@@ -19,6 +19,7 @@ from __future__ import annotations
 import numpy as np
 
 from arena.pairing.arrays import BoolArray, FloatArray
+from arena.pairing.demands import check_rules, pair_totals
 from arena.pairing.order import CHECK, MAIN, REPEAT, Extras, Slot, deal_sides, put_in_order
 from arena.pairing.rules import (
     Check,
@@ -27,9 +28,7 @@ from arena.pairing.rules import (
     Plan,
     PlannedMatchup,
     Rules,
-    check_rules,
     grid_of,
-    pair_totals,
 )
 from arena.pairing.targets import choose_wanted, share_out
 from arena.pairing.units import choose_units, draw_probability

@@ -6,6 +6,7 @@ import re
 from collections.abc import Iterable
 
 from arena.errors import NothingToPlan
+from augment.sentences import sentence
 
 _OF_ONE = re.compile(r"([a-z0-9-]+)\s*[=:\s]\s*(\d+)")
 _OF_TWO = re.compile(r"([a-z0-9-]+)\s+(?:vs\.?|against)\s+([a-z0-9-]+)\s*[=:\s]\s*(\d+)")
@@ -31,7 +32,10 @@ def read_targets(lines: Iterable[str]) -> tuple[Appearances, PairVotes]:
             of_one.append((found[1], int(found[2])))
         else:
             raise NothingToPlan(
-                f"{text!r} is no target: write CONTESTANT NUMBER, or CONTESTANT vs CONTESTANT "
-                "NUMBER."
+                sentence(
+                    "'%(text)s' is no target: write CONTESTANT NUMBER, or CONTESTANT vs "
+                    "CONTESTANT NUMBER.",
+                    text=text,
+                )
             )
     return tuple(of_one), tuple(of_two)

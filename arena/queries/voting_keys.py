@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from django.contrib.auth.models import User
+from django.utils.translation import gettext_noop
 
 from arena.models import Person
 
@@ -25,6 +26,23 @@ USUAL_KEYS: dict[str, tuple[str, ...]] = {
     "help": ("h", "?"),
 }
 """Action -> the single keys that do it, the one that is shown first."""
+
+KEY_LABELS = {
+    "a": gettext_noop("A is better"),
+    "e": gettext_noop("Equal"),
+    "b": gettext_noop("B is better"),
+    "undo": gettext_noop("Undo"),
+    "skip": gettext_noop("Skip"),
+    "report": gettext_noop("Report"),
+    "comment": gettext_noop("Comment"),
+    "original": gettext_noop("Original"),
+    "zoom": gettext_noop("Zoom"),
+    "reset": gettext_noop("Zoom back"),
+    "ruler": gettext_noop("Ruler"),
+    "legend": gettext_noop("Legend"),
+    "help": gettext_noop("Help"),
+}
+"""Action -> what the page calls it, in English."""
 
 SWITCHES: dict[str, bool] = {"single_keys": True, "legend": True, "keep_zoom": False}
 """What can be on or off, and how it is at first."""

@@ -7,6 +7,7 @@ from django.db import transaction
 
 from arena.models import EarlyLook, Study
 from augment.errors import Conflict
+from augment.sentences import sentence, word
 from augment.services.events import log_event
 
 
@@ -18,7 +19,13 @@ def open_early(*, study: Study, actor: User) -> None:
         Conflict: The study is not open: there is nothing to open early.
     """
     if study.state != Study.State.OPEN:
-        raise Conflict(f"The study {study.name!r} is {study.state}: nothing is opened early.")
+        raise Conflict(
+            sentence(
+                "The study '%(name)s' is %(state)s: nothing is opened early.",
+                name=study.name,
+                state=word(study.state),
+            )
+        )
     _, is_new = EarlyLook.objects.get_or_create(study=study, user=actor)
     if is_new:
         ends_voting = study.experts.filter(pk=actor.pk).exists()

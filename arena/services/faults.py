@@ -16,6 +16,7 @@ from arena.models import FaultLabel, LabellingRound, LabelTask
 from arena.queries.people import experts as expert_accounts
 from augment.errors import Conflict, UnknownName
 from augment.models import Augmentation, GenerationJob
+from augment.sentences import sentence
 from augment.services.events import log_event
 from augment.services.fault_guess import FaultClass, guess
 from augment.services.texts import one_line, storable
@@ -58,7 +59,7 @@ def open_labelling(
     labelling.experts.set(people)
     tasks = [task for expert in people for task in _planned(labelling, expert)]
     if not tasks:
-        raise NothingToPlan("These experts have nothing left to label in this job.")
+        raise NothingToPlan(sentence("These experts have nothing left to label in this job."))
     LabelTask.objects.bulk_create(tasks)
     log_event(
         actor=actor,
@@ -85,7 +86,9 @@ def close_labelling(*, labelling: LabellingRound, actor: User | None = None) -> 
     """
     now = timezone.now()
     if not LabellingRound.objects.filter(pk=labelling.pk, closed_at=None).update(closed_at=now):
-        raise LabellingClosed(f"The labelling {labelling.name!r} is closed already.")
+        raise LabellingClosed(
+            sentence("The labelling '%(name)s' is closed already.", name=labelling.name)
+        )
     labelling.closed_at = now
     log_event(
         actor=actor,
@@ -127,7 +130,9 @@ def _insert(name: str, job: GenerationJob, seed: int) -> LabellingRound:
 
 
 def _taken(name: str) -> Conflict:
-    return Conflict(f"There is a labelling called {name!r} already; choose another name.")
+    return Conflict(
+        sentence("There is a labelling called '%(name)s' already; choose another name.", name=name)
+    )
 
 
 def _experts(usernames: Sequence[str]) -> list[User]:
@@ -138,7 +143,9 @@ def _experts(usernames: Sequence[str]) -> list[User]:
     found = [known[username] for username in sorted(set(usernames))]
     simulated = [user.username for user in found if user.person.is_simulated]
     if simulated:
-        raise Conflict(f"Simulated experts label nothing: {', '.join(simulated)}.")
+        raise Conflict(
+            sentence("Simulated experts label nothing: %(names)s.", names=tuple(simulated))
+        )
     return found
 
 
@@ -172,7 +179,9 @@ def _save(
             raise AlreadyLabelled
         return known
     if task.labelling.closed_at is not None:
-        raise LabellingClosed(f"The labelling {task.labelling.name!r} is closed.")
+        raise LabellingClosed(
+            sentence("The labelling '%(name)s' is closed.", name=task.labelling.name)
+        )
     guessed = guess(task.augmentation)
     return FaultLabel.objects.create(
         augmentation=task.augmentation,

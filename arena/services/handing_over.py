@@ -23,6 +23,7 @@ from arena.services.plans import (
     votes_left,
 )
 from augment.errors import Conflict, UnknownName
+from augment.sentences import sentence, word
 from augment.services.events import log_event
 
 
@@ -54,7 +55,7 @@ def hand_over(
     """
     study = Study.objects.select_for_update().get(pk=study.pk)
     if study.state != Study.State.OPEN:
-        raise StudyNotOpen(f"The study {study.name!r} is {study.state}: nothing is handed over.")
+        raise _not_open(study)
     giver, takers = _giver(study, username), _takers(study, username, to)
     rules, number = rules_of(study), next_batch(study)
     grid, cells, known = grid_of(rules.entries), pictures_of(study), planned_so_far(study)
@@ -64,7 +65,7 @@ def hand_over(
     units = units_of(grid, [_as_planned(row) for row in open_rows])
     later = _shares(votes_left(study, giver), names)
     if not units and not any(later.values()):
-        raise NothingToPlan(f"{username} has nothing left to hand over.")
+        raise NothingToPlan(sentence("%(name)s has nothing left to hand over.", name=username))
     dealt = deal(grid, known, names, units, rng)
     planned = [
         one
@@ -90,6 +91,16 @@ def hand_over(
 # --- Who ---------------------------------------------------------------------------------------
 
 
+def _not_open(study: Study) -> StudyNotOpen:
+    return StudyNotOpen(
+        sentence(
+            "The study '%(name)s' is %(state)s: nothing is handed over.",
+            name=study.name,
+            state=word(study.state),
+        )
+    )
+
+
 def _giver(study: Study, username: str) -> User:
     found = study.experts.filter(username=username).first()
     if found is None:
@@ -101,16 +112,20 @@ def _giver(study: Study, username: str) -> User:
 def _takers(study: Study, username: str, to: Sequence[str]) -> list[User]:
     known = {user.username: user for user in expert_accounts()}
     if not to:
-        raise Conflict("Name at least one expert who takes over.")
+        raise Conflict(sentence("Name at least one expert who takes over."))
     if username in to:
-        raise Conflict(f"{username} can't take over their own pairs.")
+        raise Conflict(sentence("%(name)s can't take over their own pairs.", name=username))
     for name in to:
         if name not in known:
             raise UnknownName("expert", name, sorted(known))
     takers = [known[name] for name in sorted(set(to))]
     simulated = [user.username for user in takers if user.person.is_simulated]
     if simulated and not study.allow_simulated:
-        raise Conflict(f"Simulated: {', '.join(simulated)}. This study does not allow them.")
+        raise Conflict(
+            sentence(
+                "Simulated: %(names)s. This study does not allow them.", names=tuple(simulated)
+            )
+        )
     return takers
 
 

@@ -15,6 +15,7 @@ from arena.errors import LinkOver, NotYours
 from arena.models import Invitation, Study, token_digest
 from arena.queries.invitations import invitation_by_token, may_be_let_in
 from augment.errors import Conflict
+from augment.sentences import sentence
 from augment.services.events import log_event
 
 LINK_LIVES = timedelta(days=14)
@@ -43,13 +44,24 @@ def invite(*, study: Study, expert: User, actor: User | None = None) -> FreshLin
             inactive, or more than an expert.
     """
     if not study.experts.filter(pk=expert.pk).exists():
-        raise NotYours(f"{expert.get_username()} does not take part in {study.name!r}.")
+        raise NotYours(
+            sentence(
+                "%(expert)s does not take part in '%(study)s'.",
+                expert=expert.get_username(),
+                study=study.name,
+            )
+        )
     if study.state == Study.State.DRAFT:
-        raise Conflict(f"The study {study.name!r} is a draft; open it first.")
+        raise Conflict(
+            sentence("The study '%(name)s' is a draft; open it first.", name=study.name)
+        )
     if not may_be_let_in(expert):
         raise Conflict(
-            f"{expert.get_username()} can't be invited by a link: links are for active experts "
-            "who are neither simulated nor analysts or admins."
+            sentence(
+                "%(name)s can't be invited by a link: links are for active experts who are "
+                "neither simulated nor analysts or admins.",
+                name=expert.get_username(),
+            )
         )
     # Held, so that of two links made at once the second one sees the first, which it replaces.
     Study.objects.select_for_update(no_key=True).get(pk=study.pk)

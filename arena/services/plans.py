@@ -13,6 +13,7 @@ from arena.models import Matchup, Study
 from arena.pairing.plan import Check, Entry, PlannedMatchup, Rules
 from arena.queries.showings import view_of
 from augment.models import Augmentation, Contestant, Scenario
+from augment.sentences import Sentence, sentence
 
 Cells = dict[tuple[str, str], Augmentation]
 """By scenario and contestant, the augmentation whose picture is shown."""
@@ -21,6 +22,9 @@ SoFar = dict[str, list[PlannedMatchup]]
 """Every expert's showings as they are stored, by position."""
 
 Kind = Contestant.Kind
+
+MOST_NAMED = 8
+"""So many missing pictures are named, the others counted."""
 
 
 def rules_of(study: Study) -> Rules:
@@ -45,16 +49,15 @@ def latest_pictures(contestants: list[Contestant], scenarios: list[Scenario]) ->
     found = _showable(scenarios).filter(contestant__in=contestants)
     cells = _by_cell(found.order_by(F("finished_at").asc(nulls_first=True), "pk"))
     missing = [
-        f"{contestant.slug} on {scenario.slug}"
+        sentence(
+            "%(contestant)s on %(scenario)s", contestant=contestant.slug, scenario=scenario.slug
+        )
         for contestant in contestants
         for scenario in scenarios
         if (scenario.slug, contestant.slug) not in cells
     ]
     if missing:
-        more = f" and {len(missing) - 8} more" if len(missing) > 8 else ""
-        raise NothingToPlan(
-            f"There is no picture yet of {', '.join(missing[:8])}{more}. Generate them first."
-        )
+        raise NothingToPlan(_no_pictures(missing))
     return cells
 
 
@@ -209,3 +212,15 @@ def _mains(study: Study, experts: list[int]) -> dict[tuple[int, int], int]:
         (expert, position): pk
         for expert, position, pk in rows.values_list("expert", "position", "pk")
     }
+
+
+def _no_pictures(missing: list[Sentence]) -> Sentence:
+    if len(missing) <= MOST_NAMED:
+        return sentence(
+            "There is no picture yet of %(cells)s. Generate them first.", cells=tuple(missing)
+        )
+    return sentence(
+        "There is no picture yet of %(cells)s and %(number)s more. Generate them first.",
+        cells=tuple(missing[:MOST_NAMED]),
+        number=len(missing) - MOST_NAMED,
+    )

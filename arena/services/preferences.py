@@ -11,7 +11,14 @@ from django.db import transaction
 from arena.errors import InvalidPreference
 from arena.models import Person
 from arena.queries.profiles import Language, Theme
-from arena.queries.voting_keys import SWITCHES, USUAL_KEYS, VotingPreferences, read_voting
+from arena.queries.voting_keys import (
+    KEY_LABELS,
+    SWITCHES,
+    USUAL_KEYS,
+    VotingPreferences,
+    read_voting,
+)
+from augment.sentences import sentence, word
 
 
 @transaction.atomic
@@ -72,10 +79,21 @@ def _chosen(keys: Mapping[str, str]) -> dict[str, str]:
     found = {action: key.lower() for action, key in keys.items()}
     for action, key in found.items():
         if len(key) != 1 or not key.isprintable() or key.isspace():
-            raise InvalidPreference("keys", f"{action} needs one character, not {key!r}.")
+            raise InvalidPreference(
+                "keys",
+                sentence(
+                    "“%(action)s” needs one character, not '%(key)s'.",
+                    action=word(KEY_LABELS[action]),
+                    key=key,
+                ),
+            )
     shown = {action: found.get(action, usual[0]) for action, usual in USUAL_KEYS.items()}
     for key, times in Counter(shown.values()).items():
         if times > 1:
-            both = ", ".join(action for action, chosen in shown.items() if chosen == key)
-            raise InvalidPreference("keys", f"{key} would do two things: {both}.")
+            both = tuple(
+                word(KEY_LABELS[action]) for action, chosen in shown.items() if chosen == key
+            )
+            raise InvalidPreference(
+                "keys", sentence("'%(key)s' would do two things: %(both)s.", key=key, both=both)
+            )
     return {action: key for action, key in found.items() if key != USUAL_KEYS[action][0]}

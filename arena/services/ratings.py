@@ -15,6 +15,7 @@ from arena.rating.bootstrap import Unit
 from arena.rating.leaderboard import Method
 from arena.services.snapshots import compute, note_progress
 from augment.errors import Conflict, UnknownName
+from augment.sentences import sentence
 from augment.services.events import log_event
 
 DEFAULT_ROUNDS = 10_000
@@ -160,8 +161,18 @@ def _default_unit(study: Study, method: Method) -> Unit:
 
 def _check_draws(method: Method, unit: Unit, rounds: int, seed: int) -> None:
     if not 1 <= rounds <= MOST_ROUNDS:
-        raise Conflict(f"Bootstrap rounds go from 1 to {MOST_ROUNDS}, not {rounds}.")
+        raise Conflict(
+            sentence(
+                "Bootstrap rounds go from 1 to %(most)s, not %(rounds)s.",
+                most=MOST_ROUNDS,
+                rounds=rounds,
+            )
+        )
     if not 0 <= seed < 2**63:
-        raise Conflict(f"A seed goes from 0 to 2^63 - 1, not {seed}.")
+        raise Conflict(sentence("A seed goes from 0 to 2^63 - 1, not %(seed)s.", seed=seed))
     if method is Method.ELO and unit is not Unit.VOTE:
-        raise Conflict(f"Online Elo resamples single votes only; {unit.value!r} needs bt.")
+        raise Conflict(
+            sentence(
+                "Online Elo resamples single votes only; '%(unit)s' needs bt.", unit=unit.value
+            )
+        )

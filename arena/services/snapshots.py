@@ -19,6 +19,7 @@ from arena.services.trust import board_document, claims, trust
 from arena.services.vote_arrays import VoteArrays, vote_arrays
 from arena.services.vote_rows import digest_of, vote_rows, votes_csv
 from augment.errors import Conflict
+from augment.sentences import sentence
 
 RESULTS_VERSION = 1
 
@@ -90,8 +91,10 @@ def votes_of(snapshot: Snapshot) -> VoteSet:
     rows = vote_rows(votes.counted, judges_of(snapshot))
     if digest_of(votes_csv(rows)) != snapshot.votes_sha256:
         raise Conflict(
-            f"The votes of {snapshot.study.name!r} are not those of this rating any more. Rate "
-            "again."
+            sentence(
+                "The votes of '%(name)s' are not those of this rating any more. Rate again.",
+                name=snapshot.study.name,
+            )
         )
     return votes
 

@@ -17,6 +17,7 @@ from arena.queries.people import experts as expert_accounts
 from arena.services.plans import Cells, check_pictures, latest_pictures, rules_of, store
 from augment.errors import Conflict, UnknownName
 from augment.models import Contestant, Scenario
+from augment.sentences import sentence
 from augment.services.events import log_event
 from augment.services.texts import one_line
 
@@ -121,7 +122,11 @@ def close_study(*, study: Study, actor: User | None = None) -> Study:
     if study.state == Study.State.CLOSED:
         return study
     if study.state != Study.State.OPEN:
-        raise StudyNotOpen(f"The study {study.name!r} is a draft: there is nothing to close.")
+        raise StudyNotOpen(
+            sentence(
+                "The study '%(name)s' is a draft: there is nothing to close.", name=study.name
+            )
+        )
     # A vote holds its matchup's row until it is stored; see arena.services.votes.
     list(study.matchups.select_for_update().order_by("pk").values_list("pk", flat=True))
     study.state = Study.State.CLOSED
@@ -150,7 +155,7 @@ def _free_name(name: str) -> str:
 
 def _check_seed(seed: int) -> None:
     if not 0 <= seed < 2**63:
-        raise Conflict(f"A seed goes from 0 to 2^63 - 1, not {seed}.")
+        raise Conflict(sentence("A seed goes from 0 to 2^63 - 1, not %(seed)s.", seed=seed))
 
 
 def _contestants(slugs: Sequence[str]) -> list[Contestant]:
@@ -176,12 +181,20 @@ def _named(kind: str, name: str, known: dict[str, Any]) -> Any:
 
 
 def _refuse_simulated(contestants: list[Contestant], experts: list[User]) -> None:
-    simulated = [f"contestant {row.slug}" for row in contestants if row.is_simulated]
-    simulated += [f"expert {user.username}" for user in experts if user.person.is_simulated]
+    simulated = [
+        sentence("contestant %(name)s", name=row.slug) for row in contestants if row.is_simulated
+    ] + [
+        sentence("expert %(name)s", name=user.username)
+        for user in experts
+        if user.person.is_simulated
+    ]
     if simulated:
         raise Conflict(
-            f"Simulated: {', '.join(simulated)}. They never mix into a rating unless the study "
-            "allows simulated contestants and votes."
+            sentence(
+                "Simulated: %(names)s. They never mix into a rating unless the study allows "
+                "simulated contestants and votes.",
+                names=tuple(simulated),
+            )
         )
 
 
@@ -226,7 +239,7 @@ def _enrol(
 
 
 def _taken(name: str) -> Conflict:
-    return Conflict(f"There is a study named {name!r} already.")
+    return Conflict(sentence("There is a study named '%(name)s' already.", name=name))
 
 
 def _frozen_rules(rules: Rules, planned: Plan) -> dict[str, Any]:

@@ -15,7 +15,7 @@ from django.utils.translation import pgettext
 from arena.models import Report, Study, Vote
 from arena.queries.showings import as_shown
 from arena.queries.votes import VotingProgress, recent_votes, voting_progress
-from arena.queries.voting_keys import USUAL_KEYS, voting_preferences
+from arena.queries.voting_keys import KEY_LABELS, USUAL_KEYS, voting_preferences
 from arena.services.replanning import next_pairs
 
 AHEAD = 5
@@ -195,19 +195,4 @@ def _looks() -> list[tuple[str, str]]:
 
 
 def _key_labels() -> list[tuple[str, str]]:
-    labels = {
-        "a": _("A is better"),
-        "e": _("Equal"),
-        "b": _("B is better"),
-        "undo": _("Undo"),
-        "skip": _("Skip"),
-        "report": _("Report"),
-        "comment": _("Comment"),
-        "original": _("Original"),
-        "zoom": _("Zoom"),
-        "reset": _("Zoom back"),
-        "ruler": _("Ruler"),
-        "legend": _("Legend"),
-        "help": _("Help"),
-    }
-    return [(action, labels[action]) for action in USUAL_KEYS]
+    return [(action, _(KEY_LABELS[action])) for action in USUAL_KEYS]

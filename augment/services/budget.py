@@ -21,6 +21,7 @@ from augment.errors import Conflict, ModelFault, NotSent
 from augment.llm.costs import Price, WorstCase, usd_of
 from augment.llm.messages import Reply
 from augment.models import GenerationJob, ModelCall
+from augment.sentences import Sentence, sentence
 from augment.services.events import log_event
 
 State = GenerationJob.State
@@ -183,15 +184,21 @@ def used_by_fault(fault: ModelFault, *, worst: WorstCase, price: Price | None) -
 
 
 def limit_of(job: GenerationJob) -> str:
-    """The caps of a job as a person reads them."""
+    """The caps of a job as a person reads them, in English."""
+    return ", ".join(limits_of(job))
+
+
+def limits_of(job: GenerationJob) -> tuple[Sentence, ...]:
+    """Each cap of a job, to be said in any language."""
     parts = []
     if job.cap_nano_usd is not None:
-        parts.append(f"{usd_of(job.cap_nano_usd).normalize():f} USD")
+        usd = f"{usd_of(job.cap_nano_usd).normalize():f}"
+        parts.append(sentence("%(usd)s USD", usd=usd))
     if job.cap_calls is not None:
-        parts.append(f"{job.cap_calls} calls")
+        parts.append(sentence("%(calls)s calls", calls=job.cap_calls))
     if job.cap_tokens is not None:
-        parts.append(f"{job.cap_tokens} tokens")
-    return ", ".join(parts) or "nothing"
+        parts.append(sentence("%(tokens)s tokens", tokens=job.cap_tokens))
+    return tuple(parts) or (sentence("nothing"),)
 
 
 # --- Private -----------------------------------------------------------------------------------

@@ -12,7 +12,8 @@ from django.db import transaction
 from augment.errors import Conflict
 from augment.llm.costs import nano_usd_of
 from augment.models import Augmentation, Contestant, GenerationJob
-from augment.services.budget import limit_of
+from augment.sentences import Sentence, sentence, word
+from augment.services.budget import limit_of, limits_of
 from augment.services.claims import change_all
 from augment.services.events import log_event
 from augment.services.prices import unpriced
@@ -41,16 +42,27 @@ class Caps:
         given: dict[str, int] = {}
         if self.usd is not None:
             if not (self.usd.is_finite() and Decimal(0) < self.usd <= HIGHEST_USD):
-                raise Conflict(f"A cap in USD is more than 0 and at most {HIGHEST_USD}.")
+                raise Conflict(
+                    sentence(
+                        "A cap in USD is more than 0 and at most %(highest)s.",
+                        highest=str(HIGHEST_USD),
+                    )
+                )
             given["cap_nano_usd"] = nano_usd_of(self.usd)
         for name, value, highest in (
-            ("calls", self.calls, HIGHEST_CALLS),
-            ("tokens", self.tokens, HIGHEST_TOKENS),
+            (sentence("calls"), self.calls, HIGHEST_CALLS),
+            (sentence("tokens"), self.tokens, HIGHEST_TOKENS),
         ):
             if value is None:
                 continue
             if not 0 < value <= highest:
-                raise Conflict(f"A cap in {name} is more than 0 and at most {highest}.")
+                raise Conflict(
+                    sentence(
+                        "A cap in %(unit)s is more than 0 and at most %(highest)s.",
+                        unit=name,
+                        highest=highest,
+                    )
+                )
             given[f"cap_{name}"] = value
         return given
 
@@ -65,10 +77,19 @@ def check_caps(caps: Caps, contestants: Sequence[Contestant]) -> dict[str, int]:
     unknown = unpriced(contestants) if caps.usd is not None else []
     if unknown:
         raise Conflict(
-            f"A cap in USD needs prices, and nobody knows that of {', '.join(unknown)}: cap the "
-            "job by calls or tokens instead, or enter the price at the endpoint."
+            sentence(
+                "A cap in USD needs prices, and nobody knows that of %(models)s: cap the job by "
+                "calls or tokens instead, or enter the price at the endpoint.",
+                models=tuple(unknown),
+            )
         )
     return columns
+
+
+def over_already(job: GenerationJob) -> Sentence:
+    """Why nothing can be changed at a job that has ended."""
+    state = word(job.get_state_display().lower())
+    return sentence("Job '%(name)s' is %(state)s already.", name=job.name, state=state)
 
 
 @transaction.atomic
@@ -80,17 +101,25 @@ def raise_cap(job: GenerationJob, *, caps: Caps, actor: User | None = None) -> G
     """
     columns = caps.columns()
     if not columns:
-        raise Conflict("Say which cap to raise, and to what.")
+        raise Conflict(sentence("Say which cap to raise, and to what."))
     job = GenerationJob.objects.select_for_update().get(pk=job.pk)
     if job.state not in (State.RUNNING, State.STOPPED_AT_CAP):
-        raise Conflict(f"Job {job.name!r} is {job.get_state_display().lower()} already.")
-    before = limit_of(job)
+        raise Conflict(over_already(job))
+    before, limits = limit_of(job), limits_of(job)
     for name, value in columns.items():
         held = getattr(job, name)
         if held is None:
-            raise Conflict(f"Job {job.name!r} has no such cap; its cap is {before}.")
+            raise Conflict(
+                sentence(
+                    "Job '%(name)s' has no such cap; its cap is %(limits)s.",
+                    name=job.name,
+                    limits=limits,
+                )
+            )
         if value <= held:
-            raise Conflict(f"The new cap must be higher than the one of {before}.")
+            raise Conflict(
+                sentence("The new cap must be higher than the one of %(limits)s.", limits=limits)
+            )
         setattr(job, name, value)
     job.save(update_fields=list(columns))
     log_event(
@@ -119,8 +148,11 @@ def resume(job: GenerationJob, *, actor: User | None = None) -> GenerationJob:
     if not stopped.update(state=State.RUNNING):
         job.refresh_from_db()
         raise Conflict(
-            f"Job {job.name!r} is {job.get_state_display().lower()}; only one that stopped at its "
-            "cap can be resumed."
+            sentence(
+                "Job '%(name)s' is %(state)s; only one that stopped at its cap can be resumed.",
+                name=job.name,
+                state=word(job.get_state_display().lower()),
+            )
         )
     log_event(
         actor=actor,

@@ -9,6 +9,7 @@ from django.db.models import Q
 from augment.baselines.quantised import BIN_M
 from augment.errors import AugmentError, Conflict, KeyMissing
 from augment.models import Contestant, Scenario
+from augment.sentences import sentence, sentence_of
 from augment.services.contestants import key_of
 from augment.services.roles import blind_viewers, seats_of
 
@@ -27,15 +28,18 @@ def is_runnable(contestant: Contestant) -> bool:
 
 
 def obstacle(contestant: Contestant) -> str:
-    """Why no job can run a contestant, whatever the scenarios; empty where one can."""
+    """Why no job can run a contestant, whatever the scenarios; empty where one can.
+
+    To be said by a door in the language of whoever reads it.
+    """
     if not is_runnable(contestant):
-        return "made by people or by an outside program, and imported"
+        return sentence("made by people or by an outside program, and imported")
     try:
         seats_of(contestant)
     except AugmentError as error:
-        return str(error)
+        return sentence_of(error)
     if blind_viewers([contestant]):
-        return "its viewer sees text alone; visual QA needs vision"
+        return sentence("its viewer sees text alone; visual QA needs vision")
     return ""
 
 
@@ -60,20 +64,25 @@ def refuse_impossible(who: Sequence[Contestant], where: Sequence[Scenario]) -> N
         Conflict: Nothing is chosen, or a contestant can't run, or not on these scenarios.
     """
     if not who:
-        raise Conflict("Choose at least one contestant.")
+        raise Conflict(sentence("Choose at least one contestant."))
     if not where:
-        raise Conflict("Choose at least one scenario.")
+        raise Conflict(sentence("Choose at least one scenario."))
     strangers = [row.slug for row in who if not is_runnable(row)]
     if strangers:
         raise Conflict(
-            f"A job can't run {', '.join(strangers)}: what humans or outside programs made is "
-            "imported."
+            sentence(
+                "A job can't run %(names)s: what humans or outside programs made is imported.",
+                names=tuple(strangers),
+            )
         )
     blind = blind_viewers(who)
     if blind:
         raise Conflict(
-            f"Visual QA needs a viewer that sees, and these see text alone: {', '.join(blind)}. "
-            "Give the contestant another viewer or another variant."
+            sentence(
+                "Visual QA needs a viewer that sees, and these see text alone: %(names)s. "
+                "Give the contestant another viewer or another variant.",
+                names=tuple(blind),
+            )
         )
     references = [
         row.slug for row in who if row.kind == Kind.REFERENCE or row.error_rates is not None
@@ -81,6 +90,10 @@ def refuse_impossible(who: Sequence[Contestant], where: Sequence[Scenario]) -> N
     without = [row.slug for row in where if row.reference is None]
     if references and without:
         raise Conflict(
-            f"{references[0]} can't run on scenarios without a reference modification: "
-            f"{', '.join(without)}."
+            sentence(
+                "%(contestant)s can't run on scenarios without a reference modification: "
+                "%(scenarios)s.",
+                contestant=references[0],
+                scenarios=tuple(without),
+            )
         )

@@ -14,8 +14,9 @@ from django.utils import timezone
 
 from augment.errors import Conflict, UnknownName
 from augment.models import Augmentation, Contestant, GenerationJob, Scenario
+from augment.sentences import sentence
 from augment.services.budget import limit_of
-from augment.services.caps import Caps, check_caps
+from augment.services.caps import Caps, check_caps, over_already
 from augment.services.claims import change_all
 from augment.services.events import log_event
 from augment.services.feasible import refuse_impossible
@@ -134,7 +135,7 @@ def cancel(job: GenerationJob, actor: User | None = None) -> GenerationJob:
     stopped = change_all(waiting, state=State.CANCELLED, finished_at=now)
     if not still_open.update(state=GenerationJob.State.CANCELLED, finished_at=now):
         job.refresh_from_db()
-        raise Conflict(f"Job {job.name!r} is {job.get_state_display().lower()} already.")
+        raise Conflict(over_already(job))
     log_event(
         actor=actor,
         verb="cancel",
@@ -160,11 +161,17 @@ def retry_failed(job: GenerationJob, actor: User | None = None) -> GenerationJob
     kept = Case(When(state=states.STOPPED_AT_CAP, then=F("state")), default=Value(states.RUNNING))
     open_again = GenerationJob.objects.filter(pk=job.pk).exclude(state=states.CANCELLED)
     if not open_again.update(state=kept, finished_at=None):
-        raise Conflict(f"Job {job.name!r} was cancelled; launch a new one instead.")
+        raise Conflict(
+            sentence("Job '%(name)s' was cancelled; launch a new one instead.", name=job.name)
+        )
     failed = Augmentation.objects.filter(job=job, state=State.FAILED)
     again = failed.update(state=State.QUEUED, reason="", finished_at=None, sent_at=None)
     if not again:
-        raise Conflict(f"Nothing in job {job.name!r} failed; there is nothing to try again.")
+        raise Conflict(
+            sentence(
+                "Nothing in job '%(name)s' failed; there is nothing to try again.", name=job.name
+            )
+        )
     log_event(
         actor=actor,
         verb="retry",

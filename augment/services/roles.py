@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 from augment.errors import Conflict, InvalidDocument
 from augment.models import Contestant, Endpoint, EndpointModel
+from augment.sentences import sentence, word
 from augment.variants.recipes import Recipe, recipe
 from augment.variants.showing import roles_of
 from augment.variants.transcript import ModelRole
@@ -56,8 +57,13 @@ def seats_of(contestant: Contestant) -> dict[ModelRole, Seat]:
         endpoint = Endpoint.objects.filter(label=chosen["endpoint"]).first()
         if endpoint is None:
             raise Conflict(
-                f"The {name} of {contestant.slug} sits at endpoint {chosen['endpoint']!r}, which "
-                "does not exist any more."
+                sentence(
+                    "The %(role)s of %(contestant)s sits at endpoint '%(endpoint)s', which does "
+                    "not exist any more.",
+                    role=word(name),
+                    contestant=contestant.slug,
+                    endpoint=chosen["endpoint"],
+                )
             )
         seats[ModelRole(name)] = Seat(endpoint=endpoint, model=chosen["model"])
     return seats

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from augment.errors import InvalidDocument
+from augment.sentences import sentence
 
 
 def storable(text: str) -> str:
@@ -37,7 +38,7 @@ def one_line(field: str, value: str, *, what: str, longest: int = 120) -> str:
     """
     value = value.strip()
     if not value or len(value) > longest or not value.isprintable():
-        rule = f"1 to {longest} printable characters are needed"
+        rule = sentence("1 to %(most)s printable characters are needed", most=longest)
         raise InvalidDocument(what, [(field, rule)])
     return value
 

@@ -5,11 +5,23 @@ from __future__ import annotations
 from typing import Any
 
 from django.utils.translation import gettext as _
+from django.utils.translation import gettext_noop
 
 from augment.sentences import Sentence, filled, sentence_of
 
 _WORDS = ("types", "reasons")
 """Values of ratings' sentences that are words of ours, not names."""
+
+MARKED = (
+    *(gettext_noop("contestant"), gettext_noop("scenario"), gettext_noop("expert")),
+    *(gettext_noop("expert of this study"), gettext_noop("scenario type"), gettext_noop("method")),
+    *(gettext_noop("resampling unit"), gettext_noop("variant"), gettext_noop("study")),
+    *(gettext_noop("job"), gettext_noop("labelling"), gettext_noop("name")),
+    *(gettext_noop("draft"), gettext_noop("open"), gettext_noop("closed")),
+    *(gettext_noop("running"), gettext_noop("finished"), gettext_noop("cancelled")),
+    *(gettext_noop("stopped at cap"),),
+)
+"""What errors call things and states: marked here, as it stands there in values."""
 
 
 def said(sentence: str | Exception) -> str:

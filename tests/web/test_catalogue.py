@@ -15,6 +15,7 @@ ON_EXPERT_PAGES = (
     "templates/label/",
     "templates/home/expert",
     "arena/web/screen",
+    "arena/queries/voting_keys",
 )
 TELLING = re.compile(r"\b(Modell\w*|LLM|generier\w*|KI|GPT)\b")
 HELD = re.compile(r"%\(\w+\)s|\{\}|%%|</?\w+[^>]*>")

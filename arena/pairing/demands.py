@@ -1,0 +1,185 @@
+"""Whether the rules of a plan can be met, and how many votes each pair gets where they say it."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from arena.errors import NothingToPlan
+from arena.pairing.arrays import IntArray
+from arena.pairing.rules import Grid, Rules
+from arena.pairing.targets import votes_by_appearances
+from augment.sentences import Sentence, sentence
+
+
+def check_rules(rules: Rules, grid: Grid) -> None:
+    """Whether the rules make sense.
+
+    Raises:
+        NothingToPlan: They do not; the text has the numbers.
+    """
+    if rules.seed < 0:
+        raise NothingToPlan(sentence("The seed must be 0 or more, not %(seed)s.", seed=rules.seed))
+    if rules.votes_per_expert < 1:
+        raise NothingToPlan(
+            sentence(
+                "Votes per expert must be 1 or more, not %(votes)s.", votes=rules.votes_per_expert
+            )
+        )
+    if not rules.experts:
+        raise NothingToPlan(sentence("There is nobody to vote: name at least one expert."))
+    if len(set(rules.experts)) < len(rules.experts):
+        raise NothingToPlan(sentence("An expert is named twice."))
+    if not grid.pairs:
+        contestants = len({entry.contestant for entry in rules.entries})
+        raise NothingToPlan(
+            sentence(
+                "A comparison needs two contestants with pictures, not %(number)s.",
+                number=contestants,
+            )
+        )
+    _check_extras(rules, grid)
+    units = int(grid.showable.sum())
+    if units < rules.votes_per_expert:
+        raise NothingToPlan(_too_few(rules, grid, units))
+
+
+def pair_totals(rules: Rules, grid: Grid) -> IntArray:
+    """Votes of every pair (P,) over all experts, where the rules say how often.
+
+    Raises:
+        NothingToPlan: The wanted numbers can't be met; the text has them.
+    """
+    experts, votes = len(rules.experts), len(rules.experts) * rules.votes_per_expert
+    capacity = experts * grid.showable.sum(axis=1)
+    totals = (
+        _by_pair(rules, grid, votes)
+        if rules.pair_votes
+        else _by_contestant(rules, grid, votes, capacity)
+    )
+    for pair, wanted, most in zip(grid.pairs, totals, capacity, strict=True):
+        if wanted > most:
+            raise NothingToPlan(
+                sentence(
+                    "%(first)s against %(second)s is to get %(wanted)s votes, but %(experts)s "
+                    "experts on %(scenarios)s scenarios can give %(most)s.",
+                    first=pair[0],
+                    second=pair[1],
+                    wanted=int(wanted),
+                    experts=experts,
+                    scenarios=int(most) // experts,
+                    most=int(most),
+                )
+            )
+    return totals
+
+
+# --- Private -----------------------------------------------------------------------------------
+
+
+def _too_few(rules: Rules, grid: Grid, units: int) -> Sentence:
+    values = {"scenarios": len(grid.scenarios), "pairs": units, "votes": rules.votes_per_expert}
+    if not grid.identical:
+        return sentence(
+            "Nobody sees the same pair of a scenario twice: %(scenarios)s scenarios have "
+            "%(pairs)s different pairs to show, but each expert is to judge %(votes)s.",
+            **values,
+        )
+    return sentence(
+        "Nobody sees the same pair of a scenario twice: %(scenarios)s scenarios have %(pairs)s "
+        "different pairs to show (and %(same)s with identical pictures), but each expert is to "
+        "judge %(votes)s.",
+        same=len(grid.identical),
+        **values,
+    )
+
+
+def _check_shares(rules: Rules) -> None:
+    shares = (
+        (sentence("repeats"), rules.repeat_share, 0.5),
+        (sentence("attention checks"), rules.check_share, 0.5),
+        (sentence("the adaptive part"), rules.adaptive_share, 0.9),
+    )
+    for part, share, most in shares:
+        if not 0 <= share <= most:
+            raise NothingToPlan(
+                sentence(
+                    "The share of %(part)s goes from 0 to %(most)s, not %(share)s.",
+                    part=part,
+                    most=f"{most:.0%}",
+                    share=f"{share:.1%}",
+                )
+            )
+    if not 0.2 <= rules.uniform_share <= 1:
+        raise NothingToPlan(
+            sentence(
+                "At least 20 %% of the adaptive draws are uniform, else no vote could be "
+                "weighted; not %(share)s.",
+                share=f"{rules.uniform_share:.0%}",
+            )
+        )
+
+
+def _check_extras(rules: Rules, grid: Grid) -> None:
+    _check_shares(rules)
+    if rules.appearances and rules.pair_votes:
+        raise NothingToPlan(sentence("Targets are given by contestant or by pair, not both."))
+    if rules.adaptive_share and (rules.appearances or rules.pair_votes):
+        raise NothingToPlan(
+            sentence("Targets fix every vote, so none are left for an adaptive part.")
+        )
+    places = [given.scenario for given in rules.checks]
+    if set(places) - set(grid.scenarios) or len(set(places)) < len(places):
+        raise NothingToPlan(
+            sentence("Each check is on a scenario of its own out of those of the study.")
+        )
+
+
+def _by_pair(rules: Rules, grid: Grid, votes: int) -> IntArray:
+    totals = np.zeros(len(grid.pairs), dtype=np.int64)
+    places = {pair: row for row, pair in enumerate(grid.pairs)}
+    for first, second, wanted in rules.pair_votes:
+        row = places.get((first, second), places.get((second, first)))
+        if row is None:
+            raise NothingToPlan(
+                sentence(
+                    "%(first)s against %(second)s is no pair of this study.",
+                    first=first,
+                    second=second,
+                )
+            )
+        totals[row] += wanted
+    if totals.sum() != votes:
+        raise NothingToPlan(
+            sentence(
+                "The targets add up to %(given)s votes, but the experts' quotas to %(needed)s.",
+                given=f"{totals.sum():,}",
+                needed=f"{votes:,}",
+            )
+        )
+    return totals
+
+
+def _by_contestant(rules: Rules, grid: Grid, votes: int, capacity: IntArray) -> IntArray:
+    names = sorted({name for pair in grid.pairs for name in pair})
+    wanted = dict(rules.appearances)
+    if set(wanted) != set(names) or len(wanted) < len(rules.appearances):
+        odd = tuple(sorted(set(wanted) ^ set(names))) or (sentence("one is named twice"),)
+        raise NothingToPlan(
+            sentence("Each contestant of the study needs one target: %(odd)s.", odd=odd)
+        )
+    given = sum(wanted.values())
+    if given != 2 * votes:
+        raise NothingToPlan(
+            sentence(
+                "The targets add up to %(given)s appearances, but the experts' quotas to "
+                "%(needed)s.",
+                given=f"{given:,}",
+                needed=f"{2 * votes:,}",
+            )
+        )
+    most = np.zeros((len(names), len(names)), dtype=np.int64)
+    rows, columns = np.triu_indices(len(names), 1)  # in the order of the pairs
+    most[rows, columns] = most[columns, rows] = capacity
+    sums = np.array([wanted[name] for name in names], dtype=np.int64)
+    found: IntArray = votes_by_appearances(names, sums, most)[rows, columns]
+    return found
