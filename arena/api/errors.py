@@ -3,7 +3,8 @@
     {"error": {"code": "already_decided", "message": "...", "outcome": "A"}}
 
 `message` is a sentence for a person. `fields` (per field a list of sentences) comes with 422,
-`outcome` (the stored one) with a matchup that is decided already.
+`outcome` (the stored one) with a matchup that is decided already. What pages show of them is in
+the language of whoever asks.
 """
 
 from __future__ import annotations
@@ -28,6 +29,7 @@ from arena.errors import (
     TooFast,
 )
 from augment.errors import AugmentError, Conflict
+from augment.services.wording import said
 
 STATUS: tuple[tuple[type[Exception], int, str], ...] = (
     (NotYours, 404, "not_found"),
@@ -91,7 +93,7 @@ def _message(exc: Exception) -> str:
         return "The request is too large to be read."
     if isinstance(exc, exceptions.APIException):
         return str(exc.detail)
-    return str(exc)
+    return said(exc)
 
 
 def _extras(exc: Exception) -> dict[str, Any]:
@@ -100,7 +102,7 @@ def _extras(exc: Exception) -> dict[str, Any]:
     if isinstance(exc, exceptions.ValidationError):
         return {"fields": exc.detail}
     if isinstance(exc, (InvalidVote, InvalidPreference)):
-        return {"fields": {name: [sentence] for name, sentence in exc.fields.items()}}
+        return {"fields": {name: [said(sentence)] for name, sentence in exc.fields.items()}}
     if isinstance(exc, exceptions.ParseError):
         return {"fields": {"body": [str(exc.detail)]}}
     return {}

@@ -18,6 +18,7 @@ from augment.services.caps import Caps
 from augment.services.estimates import Estimate, estimate
 from augment.services.fault_guess import FaultClass
 from augment.services.feasible import keys_missing, obstacle
+from augment.services.wording import said
 
 
 class ThemeForm(forms.Form):
@@ -140,7 +141,7 @@ class CapsForm(forms.Form):
 def _offer(row: Contestant) -> Offer:
     why_not = obstacle(row)
     missing = () if why_not else tuple(keys_missing(row))
-    return Offer(row=row, obstacle=why_not, keys_missing=missing)
+    return Offer(row=row, obstacle=said(why_not), keys_missing=missing)
 
 
 class LaunchForm(ChoiceForm, CapsForm):

@@ -24,6 +24,7 @@ from arena.services.invitations import SESSION_KEY, FreshLink, accept, invite, r
 from arena.web.access import ADMIN, only
 from arena.web.sign_in import with_own_language
 from augment.errors import AugmentError
+from augment.services.wording import said
 
 SESSION_S = 30 * 24 * 3600
 BACKEND = "arena.queries.accounts.AccountBackend"
@@ -86,7 +87,7 @@ def invite_experts(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
             for line in chosen
         ]
     except (ArenaError, AugmentError) as error:
-        messages.error(request, str(error))
+        messages.error(request, said(error))
         return redirect("experts", code=study.code)
     return render(request, "studies/links.html", {"study": study, "links": made})
 

@@ -24,6 +24,7 @@ from augment.services import caps, contestants
 from augment.services import jobs as service
 from augment.services.caps import Caps
 from augment.services.job_costs import costs_of
+from augment.services.wording import said
 from augment.tasks import enqueue_job
 
 
@@ -50,7 +51,7 @@ def new_job_page(request: HttpRequest) -> HttpResponse:
         try:
             job = _launch(request, form)
         except AugmentError as error:
-            form.add_error(None, str(error))
+            form.add_error(None, said(error))
         else:
             messages.success(request, _("“%(name)s” is launched.") % {"name": job.name})
             return redirect("job", code=job.code)
@@ -84,7 +85,7 @@ def retry_job(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
             service.retry_failed(job=job, actor=cast(User, request.user))
             transaction.on_commit(partial(_send, request, job.pk))
     except AugmentError as error:
-        messages.error(request, str(error))
+        messages.error(request, said(error))
     else:
         messages.success(request, _("What failed is queued again."))
     return redirect("job", code=code)
@@ -98,7 +99,7 @@ def cancel_job(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
     try:
         service.cancel(job=job, actor=cast(User, request.user))
     except AugmentError as error:
-        messages.error(request, str(error))
+        messages.error(request, said(error))
     else:
         messages.success(request, _("Cancelled. What is done stays."))
     return redirect("job", code=code)
@@ -121,7 +122,7 @@ def resume_job(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
             caps.resume(job, actor=actor)
             transaction.on_commit(partial(_send, request, job.pk))
     except AugmentError as error:
-        messages.error(request, str(error))
+        messages.error(request, said(error))
     else:
         messages.success(request, _("What is left is queued again."))
     return redirect("job", code=code)
@@ -133,7 +134,7 @@ def _estimated(request: HttpRequest, form: LaunchForm) -> HttpResponse:
     try:
         found = form.estimated()
     except AugmentError as error:
-        form.add_error(None, str(error))
+        form.add_error(None, said(error))
     else:
         cap = form.cleaned_data.get("cap_usd")
         context |= {"estimate": found, "cap_usd": cap}
@@ -161,4 +162,4 @@ def _send(request: HttpRequest, job_pk: int) -> None:
     try:
         enqueue_job(job_pk)
     except QueueUnreachable as error:
-        messages.warning(request, str(error))
+        messages.warning(request, said(error))

@@ -26,6 +26,7 @@ from arena.web.forms import LabelForm, LabellingForm
 from augment.errors import AugmentError, UnknownName
 from augment.models import GenerationJob
 from augment.services.fault_guess import FaultClass
+from augment.services.wording import said
 
 
 @only(EXPERT)
@@ -90,7 +91,7 @@ def close(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
     try:
         close_labelling(labelling=labelling, actor=cast(User, request.user))
     except ArenaError as error:
-        messages.error(request, str(error))
+        messages.error(request, said(error))
     else:
         messages.success(
             request, _("“%(name)s” is closed; its labels stay.") % {"name": labelling.name}
@@ -116,7 +117,7 @@ def _save(request: HttpRequest, expert: User, code: uuid.UUID) -> HttpResponse:
     except AlreadyLabelled:
         messages.info(request, _("You had labelled that picture before; your first label counts."))
     except LabellingClosed as error:
-        messages.error(request, str(error))
+        messages.error(request, said(error))
     else:
         messages.success(request, " ".join((_("Saved."), _guess(label))))
     return redirect("label", code=code)
@@ -146,7 +147,7 @@ def _open(request: HttpRequest, job: GenerationJob, form: LabellingForm) -> bool
             actor=cast(User, request.user),
         )
     except (ArenaError, AugmentError) as error:
-        form.add_error(None, str(error))
+        form.add_error(None, said(error))
         return False
     messages.success(
         request, _("“%(name)s” is open; its experts can label now.") % {"name": labelling.name}

@@ -37,6 +37,7 @@ from arena.web.access import ADMIN, ANALYST, EXPERT, STAFF, only
 from arena.web.rating_form import RatingForm
 from arena.web.results_tabs import TABS, Tab
 from augment.errors import AugmentError
+from augment.services.wording import said
 
 SHOWN = 12
 """So many ratings can be chosen on the page; the log lists all."""
@@ -103,7 +104,7 @@ def rate_study(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
         else:
             rate(study=study, **wanted)
     except (ArenaError, AugmentError) as error:
-        messages.error(request, str(error))
+        messages.error(request, said(error))
     return redirect("results", code=code)
 
 
@@ -116,7 +117,7 @@ def compute_again(request: HttpRequest, code: uuid.UUID, rating: uuid.UUID) -> H
     try:
         tasks.send_snapshot(snapshot.pk)
     except AugmentError as error:
-        messages.error(request, str(error))
+        messages.error(request, said(error))
     return redirect("results", code=code)
 
 
@@ -128,7 +129,7 @@ def open_results_early(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
     try:
         open_early(study=study, actor=cast(User, request.user))
     except AugmentError as error:
-        messages.error(request, str(error))
+        messages.error(request, said(error))
     return redirect("results", code=code)
 
 

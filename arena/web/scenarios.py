@@ -23,6 +23,7 @@ from augment.services.findings import Checked, checked
 from augment.services.transcript_export import transcript_of
 from augment.services.transcript_steps import totals_of, tries_of
 from augment.services.transcripts import IMAGES
+from augment.services.wording import said
 from augment.tasks import enqueue_marks
 
 LOOKS = tuple(str(number) for number in range(6))
@@ -121,7 +122,7 @@ def _send_marks(request: HttpRequest, augmentation_pk: int) -> None:
     try:
         enqueue_marks(augmentation_pk)
     except QueueUnreachable as error:
-        messages.warning(request, str(error))
+        messages.warning(request, said(error))
 
 
 def _augmentation(code: uuid.UUID) -> Augmentation:

@@ -26,6 +26,7 @@ from arena.web.access import ADMIN, STAFF, only
 from arena.web.study_forms import HandOverForm, StudyForm
 from augment.errors import AugmentError
 from augment.models import Contestant
+from augment.services.wording import said
 
 
 @only(*STAFF)
@@ -53,7 +54,7 @@ def new_study_page(request: HttpRequest) -> HttpResponse:
         try:
             study = open_study(**form.rules(), actor=cast(User, request.user))
         except (ArenaError, AugmentError) as error:
-            form.add_error(None, str(error))
+            form.add_error(None, said(error))
         else:
             messages.success(
                 request, _("“%(name)s” is open; its experts can vote now.") % {"name": study.name}
@@ -101,7 +102,7 @@ def hand_over_pairs(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
     try:
         taken = hand_over(study=study, username=giver, to=takers, actor=cast(User, request.user))
     except (ArenaError, AugmentError) as error:
-        messages.error(request, str(error))
+        messages.error(request, said(error))
     else:
         shares = ", ".join(f"{name} {votes}" for name, votes in taken.items())
         messages.success(request, _("Handed over: %(shares)s.") % {"shares": shares})
@@ -116,7 +117,7 @@ def close(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
     try:
         close_study(study=study, actor=cast(User, request.user))
     except ArenaError as error:
-        messages.error(request, str(error))
+        messages.error(request, said(error))
     else:
         messages.success(request, _("Closed. Its results can be read now."))
     return redirect("study", code=code)
