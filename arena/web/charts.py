@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+from django.utils.translation import gettext as _
+
 from arena.exports.plot_axes import ticks
 from arena.exports.tables import Row
 
@@ -107,7 +109,13 @@ def interval_chart(table: Sequence[Row], span: Span | None = None) -> IntervalCh
                 x=at(rating),
                 high_x=at(high),
                 rating=rating,
-                title=f"{line.model}: {rating:.0f}, 95 % from {low:.0f} to {high:.0f}",
+                title=_("%(name)s: %(rating)s, 95 %% from %(low)s to %(high)s")
+                % {
+                    "name": line.model,
+                    "rating": f"{rating:.0f}",
+                    "low": f"{low:.0f}",
+                    "high": f"{high:.0f}",
+                },
                 is_simulated=line.simulated,
             )
             for n, (line, low, rating, high) in enumerate(rated)

@@ -35,9 +35,10 @@ async function ask() {
   if (!isFirst || progress.is_over) await showAnew();
   if (progress.is_over) {
     const isStopped = progress.settled < progress.total;
-    document.getElementById("said").textContent = isStopped
-      ? `Stopped at its cap: ${progress.settled} of ${progress.total} are settled.`
-      : `All ${progress.total} are settled.`;
+    const said = document.getElementById("said");
+    said.textContent = isStopped
+      ? said.dataset.stopped.replace("{}", progress.settled)
+      : said.dataset.all;
   }
   return progress.is_over;
 }

@@ -10,6 +10,7 @@ from arena.models import Person
 from arena.services.invitations import invite
 from arena.services.ratings import rate
 from arena.services.studies import close_study
+from tests.jobs import rows
 from tests.study_rows import a_study, vote
 from tests.web.cast import people, signed_in
 
@@ -85,3 +86,14 @@ def test_pages_of_faults_speak_german(address: str) -> None:
     answer = signed_in(people()["expert"]).get(address, **GERMAN)  # type: ignore[arg-type]
     assert '<html lang="de"' in answer.content.decode()
     assert "Zu meiner Startseite" in answer.content.decode()
+
+
+def test_a_job_and_its_script_speak_german() -> None:
+    job = rows.launch(scenarios=2)
+    address = reverse("job", args=[job.code])
+    answer = signed_in(people()["analyst"]).get(address, **GERMAN)  # type: ignore[arg-type]
+    shown = answer.content.decode()
+    assert 'aria-label="0 von 2 erledigt"' in shown
+    assert 'data-all="Alle 2 sind erledigt."' in shown
+    assert 'data-stopped="An der Grenze angehalten: {} von 2 sind erledigt."' in shown
+    assert '<th scope="col">Szenario</th>' in shown
