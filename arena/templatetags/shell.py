@@ -39,7 +39,12 @@ _SECTIONS: dict[str, tuple[Promise, frozenset[str]]] = {
     "jobs": (_("Jobs"), frozenset({"jobs", "job-new", "job", "faults", "augmentation"})),
     "studies": (
         _("Studies"),
-        frozenset({"studies", "study-new", "study", "results", "experts", "invite"}),
+        frozenset(
+            {
+                *("studies", "study-new", "study", "experts", "invite"),
+                *("results", "results-tab", "results-votes", "results-open"),
+            }
+        ),
     ),
 }
 _MENU = {
