@@ -133,6 +133,8 @@ def _key(axes: Axes, plot: Plot, wide_in: float) -> None:
         )  # fmt: skip
     for line, group in enumerate(_groups(plot), start=len(plot.points) + 1):
         colour, shape, word = _LOOKS[group]
+        if all(point.is_simulated for point in plot.points if point.group == group):
+            colour = SIMULATED
         y = 1.0 - (line + 0.4) * step
         axes.plot(
             [left + 0.04 / wide_in], [y], marker=shape, markersize=5, color=colour,

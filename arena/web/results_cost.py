@@ -50,6 +50,10 @@ def cost(snapshot: Snapshot, table: LeaderboardTable) -> Context:
         "metres_by_tokens": scatter(found.get("displacement-tokens"), width=NARROW),
         "by_money": scatter(found.get("elo-usd"), width=NARROW),
         "by_tokens": scatter(found.get("elo-tokens"), width=NARROW),
-        "groups": sorted({line["model_class"] for line in lines}),
-        "labels": labels,
+        "keys": [
+            {"group": group, "is_simulated": simulated, "label": labels.get(group, "")}
+            for group, simulated in sorted(
+                {(line["model_class"], line["row"].simulated) for line in lines}
+            )
+        ],
     }
