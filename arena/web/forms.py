@@ -117,6 +117,13 @@ class ChoiceForm(forms.Form):
         """For the template."""
         return self.chosen("scenarios")
 
+    @property
+    def opened_types(self) -> list[str]:
+        """For the template: types of which some scenarios are ticked, so that one sees which."""
+        chosen = set(self.chosen_scenarios)
+        ticked = {g.type: [row.slug in chosen for row in g.scenarios] for g in self.groups}
+        return [one for one, marks in ticked.items() if any(marks) and not all(marks)]
+
     def _offer(self, field: str, choices: list[tuple[str, str]]) -> None:
         found = self.fields[field]
         assert isinstance(found, forms.ChoiceField)
