@@ -8,7 +8,9 @@ from itertools import combinations
 import pytest
 
 from arena.exports.badges import badge_places
+from arena.exports.drawing import SIMULATED
 from arena.exports.plots import ELO, VOTES, Given, Plot
+from arena.exports.scatter_chart import scatter_chart
 from arena.exports.tables import Row
 from arena.web.charts import BAR_LEFT, BAR_RIGHT, bars
 from arena.web.heat import heat_map
@@ -108,3 +110,13 @@ def test_the_heat_map_mirrors_scores_and_marks_what_is_few() -> None:
     lonely = third.cells[0]
     assert lonely is not None
     assert (lonely.percent, lonely.votes, lonely.is_few) == (None, 0, True)
+
+
+@pytest.mark.parametrize("is_simulated", [True, False])
+def test_the_key_of_a_file_has_the_colour_of_its_points(is_simulated: bool) -> None:
+    given = [
+        Given(number=n, name="x", x=x, y=1.0, group="utility", is_simulated=is_simulated)
+        for n, x in enumerate((1.0, 2.0), start=1)
+    ]
+    drawing = scatter_chart(plot(given), file_format="svg").decode()
+    assert (SIMULATED in drawing, "#2c7a4b" in drawing) == (is_simulated, not is_simulated)
