@@ -102,7 +102,7 @@ def test_the_last_vote_leads_to_the_thanks() -> None:
         study_rows.vote(matchup)
     shown = signed_in(here.expert).get(page(here)).content.decode()
     assert "You are done." in shown
-    assert "9 votes saved" in shown
+    assert "9 answers saved" in shown
 
 
 def test_the_page_works_without_a_script_and_says_where_one_is() -> None:
