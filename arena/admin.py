@@ -8,6 +8,7 @@ from django.contrib import admin
 from django.http import HttpRequest
 
 from arena.models import (
+    Authorship,
     FaultLabel,
     Invitation,
     LabellingRound,
@@ -59,6 +60,15 @@ class InvitationAdmin(ReadOnly, admin.ModelAdmin):
     list_select_related = ("expert", "study", "invited_by")
     list_filter = ("study",)
     exclude = ("token_sha256",)
+
+
+@admin.register(Authorship)
+class AuthorshipAdmin(ReadOnly, admin.ModelAdmin):
+    """Authors are marked and taken back on the page of a study's experts."""
+
+    list_display = ("expert", "contestant", "study", "marked_by", "marked_at")
+    list_select_related = ("expert", "contestant", "study", "marked_by")
+    list_filter = ("study",)
 
 
 @admin.register(Study)

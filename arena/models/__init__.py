@@ -1,7 +1,8 @@
-"""Rows of arena: people, invitations, studies, matchups, votes, ratings and fault labels."""
+"""Rows of arena: people, invitations, studies, authors, matchups, votes, ratings, fault labels."""
 
 from __future__ import annotations
 
+from arena.models.authorships import Authorship
 from arena.models.invitations import Invitation, token_digest
 from arena.models.labels import FaultLabel, LabellingRound, LabelTask
 from arena.models.people import Person
@@ -12,6 +13,7 @@ from arena.models.votes import AIDS, Report, Vote
 
 __all__ = [
     "AIDS",
+    "Authorship",
     "EarlyLook",
     "FaultLabel",
     "ImportedVote",
