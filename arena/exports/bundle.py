@@ -87,7 +87,7 @@ def _manifest(snapshot: Snapshot, files: dict[str, bytes]) -> bytes:
                 "rounds": table.rounds,
                 "seed": table.seed,
             },
-            "filters": snapshot.filters,
+            "filters": _filters(snapshot),
             "votes": {
                 "counted": table.votes,
                 "left_out": table.left_out,
@@ -103,6 +103,12 @@ def _manifest(snapshot: Snapshot, files: dict[str, bytes]) -> bytes:
     )
 
 
+def _filters(snapshot: Snapshot) -> dict[str, Any]:
+    """Which votes were asked for; of authors only the number, since votes have pseudonyms."""
+    filters: dict[str, Any] = snapshot.filters
+    return filters | {"authors": len(filters["authors"])} if "authors" in filters else filters
+
+
 def _public(results: dict[str, Any]) -> dict[str, Any]:
     """The statistics without the codes of people; pseudonyms stay."""
     judges: dict[str, str] = results.get("judges", {})
@@ -114,6 +120,9 @@ def _public(results: dict[str, Any]) -> dict[str, Any]:
     ]
     if trust.get("repeats"):
         trust["repeats"] = {k: v for k, v in trust["repeats"].items() if k != "by_expert"}
+    if document.get("own_votes"):
+        own = document["own_votes"]
+        document["own_votes"] = {k: v for k, v in own.items() if k != "by_judge"}
     return document | {"trust": trust, "judges": sorted(judges.values())}
 
 

@@ -55,6 +55,9 @@ def _voted(snapshot: Snapshot, first: str, second: str) -> QuerySet[Vote]:
         rows = rows.filter(matchup__scenario__type__in=filters.types)
     if filters.experts:
         rows = rows.filter(expert__person__code__in=filters.experts)
+    if filters.leave_out_own:
+        authors = {judge for judge, slug in filters.authors if slug in (first, second)}
+        rows = rows.exclude(expert__person__code__in=authors)
     if not snapshot.study.allow_simulated:
         rows = rows.filter(is_simulated=False)
     return (

@@ -37,6 +37,7 @@ class LeftOut(StrEnum):
     SKIP = "skip"
     SIMULATED = "simulated"
     FILTERED = "filtered"
+    OWN = "own"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -48,12 +49,21 @@ class Filters:
         experts: Codes of judges; empty is all.
         kinds: Of matchups.
         automatic_ties: Whether pairs of identical pictures, which nobody sees, count as a tie.
+        leave_out_own: Whether votes of authors on their own contestants do not count.
+        authors: Who was marked author of what when the votes were frozen, codes of judges with
+            slugs of contestants. They are known also where their votes count.
     """
 
     types: tuple[str, ...] = ()
     experts: tuple[str, ...] = ()
     kinds: tuple[str, ...] = (MAIN,)
     automatic_ties: bool = False
+    leave_out_own: bool = False
+    authors: frozenset[tuple[str, str]] = frozenset()
+
+    def is_own(self, judge: str, left: str, right: str) -> bool:
+        """Whether a judge is marked author of one of the two."""
+        return (judge, left) in self.authors or (judge, right) in self.authors
 
     def as_document(self) -> dict[str, Any]:
         """As a snapshot keeps it."""
@@ -62,6 +72,8 @@ class Filters:
             "experts": list(self.experts),
             "kinds": list(self.kinds),
             "automatic_ties": self.automatic_ties,
+            "leave_out_own": self.leave_out_own,
+            "authors": [list(pair) for pair in sorted(self.authors)],
         }
 
     @classmethod
@@ -72,6 +84,8 @@ class Filters:
             experts=tuple(document.get("experts", ())),
             kinds=tuple(document.get("kinds", (MAIN,))),
             automatic_ties=bool(document.get("automatic_ties", False)),
+            leave_out_own=bool(document.get("leave_out_own", False)),
+            authors=frozenset((judge, slug) for judge, slug in document.get("authors", ())),
         )
 
 
@@ -82,6 +96,8 @@ class VoteSet:
     Attributes:
         entrants: By slug.
         counted: The votes that count.
+        with_own: The same and, where they are left out for that alone, those of authors on their
+            own contestants.
         repeats: Decided hidden repeats, whether they count or not.
         checks: Votes on attention checks, and `references` who should win them.
         left_out: How many votes do not count, by reason.
@@ -89,6 +105,7 @@ class VoteSet:
 
     entrants: tuple[Entrant, ...]
     counted: tuple[Judged, ...]
+    with_own: tuple[Judged, ...]
     repeats: tuple[Judged, ...]
     checks: tuple[Judged, ...]
     references: frozenset[str]
@@ -124,6 +141,7 @@ def vote_set(study: Study, *, filters: Filters, last: int | None) -> VoteSet:
     return VoteSet(
         entrants=entrants,
         counted=tuple(line for line, reason in judged if reason is None),
+        with_own=tuple(line for line, reason in judged if reason in (None, LeftOut.OWN)),
         repeats=tuple(
             line for line, _ in judged if line.kind == REPEAT and line.outcome in _RATED
         ),
@@ -152,6 +170,7 @@ def _why_not(
         (LeftOut.SIMULATED, made_up and not allow_simulated),
         (LeftOut.FILTERED, other_type or (other_expert and line.kind != AUTOMATIC)),
         (LeftOut.FILTERED, line.kind == MAIN and MAIN not in filters.kinds),
+        (LeftOut.OWN, filters.leave_out_own and filters.is_own(line.judge, line.left, line.right)),
     )
     return next((reason for reason, holds in reasons if holds), None)
 

@@ -62,10 +62,11 @@ def planned_pairs(study: Study, filters: Filters) -> Counter[frozenset[str]]:
     if filters.experts:
         rows = rows.filter(expert__person__code__in=filters.experts)
     planned: Counter[frozenset[str]] = Counter()
-    for left, right in rows.order_by().values_list(
-        "left__contestant__slug", "right__contestant__slug"
+    for judge, left, right in rows.order_by().values_list(
+        "expert__person__code", "left__contestant__slug", "right__contestant__slug"
     ):
-        planned[frozenset((left, right))] += 1
+        if not (filters.leave_out_own and filters.is_own(str(judge), left, right)):
+            planned[frozenset((left, right))] += 1
     return planned
 
 

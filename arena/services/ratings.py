@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import TypedDict, Unpack
 
 from django.contrib.auth.models import User
@@ -9,6 +10,7 @@ from django.db import transaction
 
 from arena.errors import StudyStillOpen
 from arena.models import ImportedVote, Snapshot, Study, Vote
+from arena.queries.authorships import authors_of
 from arena.queries.judged import is_imported, last_vote_of
 from arena.queries.vote_sets import Filters
 from arena.rating.bootstrap import Unit
@@ -67,7 +69,8 @@ def plan_snapshot(
         seed: Of its draws, 0 or more.
         unit: What the bootstrap draws: "vote", "scenario", "expert" or "two-way"; None for
             two-way where the votes name experts and scenarios, else votes.
-        filters: Which votes count; None for all main ones.
+        filters: Which votes count; None for all main ones. Who is author of what is added to them
+            here, so that later marks do not change the rating.
         early: Rate a study that is still open; the snapshot and the log say so.
         actor: Who rates, for the log.
 
@@ -90,7 +93,7 @@ def plan_snapshot(
         rounds=rounds,
         resampling_unit=drawn,
         seed=seed,
-        filters=(filters or Filters()).as_document(),
+        filters=replace(filters or Filters(), authors=authors_of(study)).as_document(),
         last_vote=last_vote_of(study),
         votes_counted=0,
         is_early=is_early,

@@ -15,6 +15,7 @@ from arena.queries.vote_sets import Filters, VoteSet, vote_set
 from arena.rating.bootstrap import Unit
 from arena.rating.leaderboard import Leaderboard, Method, rate
 from arena.services import breakdowns
+from arena.services.own_votes import with_and_without
 from arena.services.trust import board_document, claims, trust
 from arena.services.vote_arrays import VoteArrays, vote_arrays
 from arena.services.vote_rows import digest_of, vote_rows, votes_csv
@@ -119,12 +120,14 @@ def _results(
     study, seed = snapshot.study, snapshot.seed
     method, unit = Method(snapshot.method), Unit(snapshot.resampling_unit)
     from_file = is_imported(study)
-    planned = breakdowns.planned_pairs(study, Filters.of_document(snapshot.filters))
+    filters = Filters.of_document(snapshot.filters)
+    planned = breakdowns.planned_pairs(study, filters)
     return {
         "version": RESULTS_VERSION,
         "board": board_document(board),
         "trust": trust(arrays, votes, board, seed=seed),
         "claims": claims(arrays, board, unit=unit, seed=seed),
+        "own_votes": with_and_without(votes, filters, board),
         "pairs": breakdowns.pairs(arrays.comparisons, votes.counted, planned),
         "types": breakdowns.by_type(
             arrays, method=method, unit=unit, rounds=snapshot.rounds, seed=seed

@@ -10,6 +10,7 @@ from arena.errors import ArenaError
 from arena.exports.tables import leaderboard_table
 from arena.exports.writers import plain_text
 from arena.queries.studies import study_named
+from arena.queries.vote_sets import Filters
 from arena.services.ratings import DEFAULT_ROUNDS, rate
 from augment.errors import AugmentError
 
@@ -31,6 +32,11 @@ class Command(BaseCommand):
             "where votes name experts and scenarios, unless given",
         )
         parser.add_argument(
+            "--leave-out-own",
+            action="store_true",
+            help="votes of authors on their own contestants do not count",
+        )
+        parser.add_argument(
             "--early", action="store_true", help="rate an open study; this is logged"
         )
 
@@ -43,6 +49,7 @@ class Command(BaseCommand):
                 rounds=options["rounds"],
                 seed=options["seed"],
                 unit=options["unit"],
+                filters=Filters(leave_out_own=options["leave_out_own"]),
                 early=options["early"],
             )
         except (ArenaError, AugmentError) as error:

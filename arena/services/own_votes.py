@@ -1,0 +1,91 @@
+"""A rating with and without the votes of authors on their own contestants, side by side.
+
+The table counts them or leaves them out; the other version is computed here once, and kept in the
+snapshot like everything else.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from typing import Any
+
+from arena.queries.judged import Judged
+from arena.queries.vote_sets import Filters, VoteSet
+from arena.rating.leaderboard import Leaderboard, Line, rate
+from arena.services.vote_arrays import vote_arrays
+
+Document = dict[str, Any]
+
+OTHER_ROUNDS = 2000
+"""Of the version that the table does not show: its ranks need intervals, nobody reads those."""
+
+
+def with_and_without(votes: VoteSet, filters: Filters, board: Leaderboard) -> Document | None:
+    """Rank and rating of everybody in both versions; None where no vote makes a difference.
+
+    `largest` says by how many ranks somebody moves at most, and who; `reasons` are sentences about
+    the version that the table does not show; `by_judge` is for the raters' panel alone.
+
+    Args:
+        votes: What is rated, and the votes of authors on their own contestants beside it.
+        filters: They say who is author of what, and which version the table is.
+        board: The table's rating.
+    """
+    own = [vote for vote in votes.with_own if _is_own(vote, filters)]
+    if not own:
+        return None
+    others = [vote for vote in votes.with_own if not _is_own(vote, filters)]
+    rest = votes.with_own if filters.leave_out_own else others
+    other = rate(
+        vote_arrays([one.slug for one in votes.entrants], rest).comparisons,
+        method=board.method,
+        rounds=min(board.rounds, OTHER_ROUNDS),
+        unit=board.unit,
+        seed=board.seed,
+        details=False,
+    )
+    full, fewer = (other, board) if filters.leave_out_own else (board, other)
+    lines = [_line(*both) for both in zip(full.lines, fewer.lines, strict=True)]
+    by_judge = Counter(vote.judge for vote in own)
+    return {
+        "left_out": filters.leave_out_own,
+        "votes": len(own),
+        "experts": len(by_judge),
+        "of_experts": len({vote.judge for vote in votes.with_own}),
+        "rounds": other.rounds,
+        "reasons": [one.as_document() for one in other.reasons],
+        "largest": _largest(lines),
+        "lines": lines,
+        "by_judge": dict(by_judge),
+    }
+
+
+# --- Private -----------------------------------------------------------------------------------
+
+
+def _is_own(vote: Judged, filters: Filters) -> bool:
+    return filters.is_own(vote.judge, vote.left, vote.right)
+
+
+def _line(full: Line, fewer: Line) -> Document:
+    return {
+        "slug": full.name,
+        "rank_with": full.rank,
+        "rating_with": full.rating,
+        "rank_without": fewer.rank,
+        "rating_without": fewer.rating,
+    }
+
+
+def _largest(lines: list[Document]) -> Document | None:
+    """None where nobody has a rank in both versions."""
+    moves = {
+        line["slug"]: abs(line["rank_with"] - line["rank_without"])
+        for line in lines
+        if line["rank_with"] is not None and line["rank_without"] is not None
+    }
+    if not moves:
+        return None
+    places = max(moves.values())
+    who = [slug for slug, moved in moves.items() if moved == places] if places else []
+    return {"places": places, "slugs": who}

@@ -1,0 +1,274 @@
+"""Votes of authors on their own contestants: left out on demand, and always shown both ways."""
+
+from __future__ import annotations
+
+import io
+import json
+import zipfile
+from typing import Any
+
+import pytest
+from django.contrib.auth.models import User
+from django.core.management import call_command
+from hypothesis import given
+from hypothesis import strategies as st
+
+from arena.exports.bundle import bundle
+from arena.models import Snapshot, Study
+from arena.queries.judged import MAIN, Entrant, Judged, last_vote_of
+from arena.queries.result_votes import votes_on_pair
+from arena.queries.vote_sets import Filters, VoteSet, vote_set
+from arena.rating.leaderboard import rate as rate_votes
+from arena.services.authorships import mark_author, take_back_author
+from arena.services.own_votes import OTHER_ROUNDS, with_and_without
+from arena.services.ratings import compute_snapshot, plan_snapshot, rate
+from arena.services.snapshots import votes_of
+from arena.services.vote_arrays import vote_arrays
+from augment.models import Scenario
+from tests.full_study import Size, full_study
+from tests.study_rows import a_study, matchups_of, shown_again, vote
+
+pytestmark = pytest.mark.django_db
+
+SIZE = Size(scenarios=8, experts=4, votes_per_expert=90)
+AUTHOR, OWN = "expert-1", "gpt-4o-otm"
+WITHOUT = Filters(leave_out_own=True)
+
+
+@pytest.fixture
+def study() -> Study:
+    return full_study(size=SIZE)
+
+
+def mark(study: Study, username: str = AUTHOR, slug: str = OWN) -> None:
+    mark_author(study=study, expert=User.objects.get(username=username), contestant=slug)
+
+
+def code_of(username: str) -> str:
+    return str(User.objects.get(username=username).person.code)
+
+
+def table_of(snapshot: Snapshot) -> dict[str, tuple[Any, ...]]:
+    return {row.slug: (row.rank, row.rating, row.votes) for row in snapshot.standings.all()}
+
+
+def shown(snapshot: Snapshot, version: str) -> dict[str, tuple[Any, ...]]:
+    lines = snapshot.results["own_votes"]["lines"]
+    return {line["slug"]: (line[f"rank_{version}"], line[f"rating_{version}"]) for line in lines}
+
+
+def zipped(snapshot: Snapshot) -> dict[str, bytes]:
+    with zipfile.ZipFile(io.BytesIO(bundle(snapshot))) as archive:
+        return {name: archive.read(name) for name in archive.namelist()}
+
+
+def test_they_count_unless_a_rating_leaves_them_out_and_are_counted_by_reason(
+    study: Study,
+) -> None:
+    plain = rate(study=study, rounds=50)
+    mark(study)
+    counted = rate(study=study, rounds=50)
+    assert (counted.votes_sha256, table_of(counted)) == (plain.votes_sha256, table_of(plain))
+    left = rate(study=study, rounds=50, filters=WITHOUT)
+    own = left.votes_left_out["own"]
+    assert own > 0
+    assert left.votes_counted == counted.votes_counted - own
+    assert left.votes_sha256 != counted.votes_sha256
+    assert not any(
+        vote.judge == code_of(AUTHOR) and OWN in (vote.left, vote.right)
+        for vote in votes_of(left).counted
+    )
+    assert any(vote.judge == code_of(AUTHOR) for vote in votes_of(left).counted)
+
+
+def test_both_versions_are_those_of_the_two_ratings_themselves(study: Study) -> None:
+    mark(study)
+    mark(study, "expert-2", "llama-fc")
+    counted, left = (rate(study=study, rounds=200, seed=3, filters=f) for f in (None, WITHOUT))
+    for version, snapshot in (("with", counted), ("without", left)):
+        itself = {slug: line[:2] for slug, line in table_of(snapshot).items()}
+        assert shown(counted, version) == itself == shown(left, version)
+    found = counted.results["own_votes"]
+    assert (found["left_out"], left.results["own_votes"]["left_out"]) == (False, True)
+    assert found["votes"] == left.votes_left_out["own"] == sum(found["by_judge"].values())
+    assert (found["experts"], found["of_experts"]) == (2, 4)
+    moves = {slug: abs(rank - shown(left, "without")[slug][0]) for slug, (rank, _) in
+             shown(counted, "with").items()}  # fmt: skip
+    assert found["largest"]["places"] == max(moves.values())
+
+
+def test_a_rating_knows_the_authors_of_its_own_time(study: Study) -> None:
+    mark(study)
+    counted, left = (rate(study=study, rounds=20, filters=f) for f in (None, WITHOUT))
+    take_back_author(authorship=study.authorships.get())
+    mark(study, "expert-2", "llama-fc")
+    assert len(votes_of(left).counted) == left.votes_counted
+    assert counted.results["own_votes"]["by_judge"].keys() == {code_of(AUTHOR)}
+    planned = plan_snapshot(study=study, rounds=20, filters=WITHOUT)
+    take_back_author(authorship=study.authorships.get())
+    later = compute_snapshot(snapshot_pk=planned.pk)
+    assert later is not None
+    assert later.results["own_votes"]["by_judge"].keys() == {code_of("expert-2")}
+
+
+def test_without_authors_or_without_own_votes_there_is_nothing_to_compare(study: Study) -> None:
+    assert rate(study=study, rounds=10).results["own_votes"] is None
+    mark(study)
+    others = tuple(code_of(f"expert-{number}") for number in (2, 3, 4))
+    snapshot = rate(study=study, rounds=10, filters=Filters(experts=others))
+    assert snapshot.results["own_votes"] is None
+
+
+def test_the_other_version_says_why_it_rates_nobody() -> None:
+    study = a_study(votes_per_expert=6, experts=("eva",))
+    for number, matchup in enumerate(matchups_of(study, "eva")):
+        vote(matchup, "left" if number % 2 else "right")
+    for slug in ("ann", "bob", "cid"):
+        mark(study, "eva", slug)
+    found = rate(study=study, rounds=10, early=True).results["own_votes"]
+    assert found["largest"] is None
+    assert [one["text"] for one in found["reasons"]] == ["There are no votes to rate."]
+
+
+def test_other_reasons_are_said_before_this_one_and_repeats_follow_the_same_rule() -> None:
+    study = a_study(votes_per_expert=9)
+    mark(study, "eva", "ann")
+    first = next(
+        one for one in matchups_of(study, "eva")
+        if "ann" in (one.left.contestant.slug, one.right.contestant.slug)
+    )  # fmt: skip
+    for matchup in (first, shown_again(first)):
+        vote(matchup)
+    authors = frozenset({(code_of("eva"), "ann")})
+
+    def left_out(**more: Any) -> dict[str, int]:
+        filters = Filters(leave_out_own=True, authors=authors, **more)
+        return vote_set(study, filters=filters, last=last_vote_of(study)).left_out
+
+    assert left_out() == {"own": 1, "repeat": 1}
+    assert left_out(kinds=("main", "repeat")) == {"own": 2}
+    assert left_out(types=(Scenario.Type.OVERTAKE.value,)) == {"filtered": 1, "repeat": 1}
+
+
+def test_pairs_their_plan_and_their_cells_leave_them_out_alike(study: Study) -> None:
+    mark(study)
+    snapshot = rate(study=study, rounds=10, filters=WITHOUT)
+    for pair in snapshot.results["pairs"]:
+        votes = pair["wins"] + pair["ties"] + pair["losses"]
+        cell = votes_on_pair(snapshot, first=pair["a"], second=pair["b"], page=1, imported=False)
+        assert cell.page.paginator.count == votes == pair["planned"], pair
+
+
+def test_the_zip_has_both_versions_but_never_who_is_author(study: Study) -> None:
+    mark(study)
+    snapshot = rate(study=study, rounds=20, filters=WITHOUT)
+    files = zipped(Snapshot.objects.get(pk=snapshot.pk))
+    manifest, statistics = (json.loads(files[f"{n}.json"]) for n in ("manifest", "statistics"))
+    assert manifest["filters"]["leave_out_own"] is True
+    assert manifest["filters"]["authors"] == 1
+    assert manifest["votes"]["left_out"] == snapshot.votes_left_out
+    assert statistics["own_votes"]["votes"] == snapshot.votes_left_out["own"]
+    assert len(statistics["own_votes"]["lines"]) == 9
+    assert "by_judge" not in statistics["own_votes"]
+    texts = b"".join(files[name] for name in files if not name.endswith(".pdf"))
+    assert code_of(AUTHOR).encode() not in texts
+
+
+def test_a_snapshot_of_before_still_opens_and_packs(study: Study) -> None:
+    snapshot = rate(study=study, rounds=20)
+    for name in ("leave_out_own", "authors"):
+        del snapshot.filters[name]
+    del snapshot.results["own_votes"]
+    snapshot.save()
+    assert Filters.of_document(snapshot.filters) == Filters()
+    files = zipped(snapshot)
+    assert json.loads(files["manifest.json"])["filters"] == snapshot.filters
+    assert "own_votes" not in json.loads(files["statistics.json"])
+
+
+def test_the_command_leaves_them_out_too(study: Study, capsys: pytest.CaptureFixture[str]) -> None:
+    mark(study)
+    call_command("rate", study.name, "--rounds", "20", "--leave-out-own")
+    assert f"{study.snapshots.get().votes_left_out['own']} own." in capsys.readouterr().out
+
+
+# --- Properties --------------------------------------------------------------------------------
+
+SLUGS, JUDGES = "abc", "xyz"
+PAIRS = [(left, right) for left in SLUGS for right in SLUGS if left != right]
+
+
+@st.composite
+def judged(draw: st.DrawFn) -> tuple[Judged, ...]:
+    cells = draw(
+        st.lists(
+            st.tuples(
+                st.sampled_from(PAIRS), st.sampled_from(JUDGES), st.sampled_from("12"),
+                st.sampled_from(("left", "equal", "right")),
+            ),
+            min_size=1,
+            max_size=25,
+        )
+    )  # fmt: skip
+    return tuple(
+        Judged(
+            judge=judge, judge_name=judge, item=item, type="nudge", kind=MAIN, left=left,
+            right=right, outcome=outcome, both_miss=False, is_simulated=False, ms_visible=None,
+            matchup=number, repeat_of=None,
+        )
+        for number, ((left, right), judge, item, outcome) in enumerate(cells)
+    )  # fmt: skip
+
+
+AUTHORS = st.frozensets(st.tuples(st.sampled_from(JUDGES), st.sampled_from(SLUGS)), max_size=4)
+
+
+def a_vote_set(votes: tuple[Judged, ...], filters: Filters) -> VoteSet:
+    counted = tuple(
+        one
+        for one in votes
+        if not (filters.leave_out_own and filters.is_own(one.judge, one.left, one.right))
+    )
+    return VoteSet(
+        entrants=tuple(
+            Entrant(slug=s, name=s, variant="", kind="rule", is_simulated=False, contestant=None)
+            for s in SLUGS
+        ),
+        counted=counted, with_own=votes, repeats=(), checks=(), references=frozenset(),
+        left_out={},
+    )  # fmt: skip
+
+
+def compared(votes: tuple[Judged, ...], filters: Filters) -> dict[str, Any] | None:
+    found = a_vote_set(votes, filters)
+    board = rate_votes(vote_arrays(SLUGS, found.counted).comparisons, rounds=30, seed=1)
+    return with_and_without(found, filters, board)
+
+
+@given(votes=judged(), authors=AUTHORS)
+def test_leaving_out_no_one_changes_nothing(
+    votes: tuple[Judged, ...], authors: frozenset[tuple[str, str]]
+) -> None:
+    strangers = frozenset((f"not {judge}", slug) for judge, slug in authors)
+    for pairs in (frozenset[tuple[str, str]](), strangers):
+        for leave_out in (False, True):
+            filters = Filters(leave_out_own=leave_out, authors=pairs)
+            assert compared(votes, filters) is None
+            assert a_vote_set(votes, filters).counted == votes
+
+
+@given(votes=judged(), authors=AUTHORS)
+def test_both_ratings_say_the_same_of_both_versions(
+    votes: tuple[Judged, ...], authors: frozenset[tuple[str, str]]
+) -> None:
+    one, other = (
+        compared(votes, Filters(leave_out_own=leave_out, authors=authors))
+        for leave_out in (False, True)
+    )
+    if one is None or other is None:
+        assert one is other
+        return
+    assert one["lines"] == other["lines"]
+    assert one["largest"] == other["largest"]
+    assert one["rounds"] == min(30, OTHER_ROUNDS)
+    assert 0 < one["votes"] <= len(votes)
