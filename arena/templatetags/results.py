@@ -33,6 +33,7 @@ _LEFT_OUT: dict[str, str | Promise] = {
     "skip": gettext_lazy("skipped"),
     "simulated": gettext_lazy("simulated"),
     "filtered": gettext_lazy("not asked for"),
+    "own": gettext_lazy("by authors on their own contestants"),
 }
 UNMEASURED = (
     gettext_noop("waits, runs, failed or was cancelled"),
@@ -52,6 +53,8 @@ _VERBS: dict[str, str | Promise] = {
     "plan batch": gettext_lazy("planned a batch"),
     "simulate votes": gettext_lazy("simulated votes"),
     "import votes": gettext_lazy("imported votes"),
+    "mark author": gettext_lazy("marked an author"),
+    "take back author": gettext_lazy("took the mark of an author back"),
 }
 _METHODS: dict[str, str | Promise] = {
     "bt": gettext_lazy("Bradley-Terry on the Elo scale, a tie half a win for both"),

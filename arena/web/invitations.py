@@ -19,9 +19,11 @@ from django.views.decorators.http import require_http_methods, require_POST, req
 
 from arena.errors import ArenaError, LinkOver, NotYours
 from arena.models import Invitation, Study
+from arena.queries.authorships import authorships_of
 from arena.queries.invitations import expert_lines, invitation_by_token, may_be_let_in
 from arena.services.invitations import SESSION_KEY, FreshLink, accept, invite, revoke
 from arena.web.access import ADMIN, only
+from arena.web.authorships import AuthorForm
 from arena.web.sign_in import with_own_language
 from augment.errors import AugmentError
 from augment.services.wording import said
@@ -52,13 +54,15 @@ def invitation_page(request: HttpRequest, token: str) -> HttpResponse:
 @never_cache
 @require_safe
 def experts_page(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
-    """Every expert of a study: progress, pace, quota, last seen and the state of the link."""
+    """Every expert of a study: progress, pace, quota, last seen, link, and who is an author."""
     study = get_object_or_404(Study, code=code)
     lines = expert_lines(study, timezone.now())
     context = {
         "study": study,
         "lines": lines,
         "without_link": sum(line.may_be_invited and not line.has_live_link for line in lines),
+        "authorships": authorships_of(study),
+        "author_form": AuthorForm(study=study),
     }
     return render(request, "studies/experts.html", context)
 

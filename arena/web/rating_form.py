@@ -58,6 +58,7 @@ class RatingForm(forms.Form):
     experts = AnyOf(required=False)
     with_repeats = forms.BooleanField(required=False)
     automatic_ties = forms.BooleanField(required=False)
+    leave_out_own = forms.BooleanField(required=False)
 
     def __init__(
         self, data: dict[str, Any] | None = None, *, snapshot: Snapshot | None = None
@@ -82,5 +83,6 @@ class RatingForm(forms.Form):
                 experts=tuple(asked["experts"]),
                 kinds=kinds,
                 automatic_ties=asked["automatic_ties"],
+                leave_out_own=asked["leave_out_own"],
             ),
         }

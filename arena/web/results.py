@@ -35,6 +35,7 @@ from arena.services.early_looks import open_early
 from arena.services.ratings import is_big, plan_snapshot, rate
 from arena.web.access import ADMIN, ANALYST, EXPERT, STAFF, only
 from arena.web.rating_form import RatingForm
+from arena.web.results_authors import both_versions, for_experts
 from arena.web.results_tabs import TABS, Tab
 from augment.errors import AugmentError
 from augment.services.wording import said
@@ -75,6 +76,10 @@ def results_page(request: HttpRequest, code: uuid.UUID, tab: str = "table") -> H
         context["form"] = RatingForm(snapshot=snapshot)
     if snapshot is not None:
         table = leaderboard_table(snapshot)
+        if is_staff:
+            context["own_votes"] = both_versions(snapshot, table)
+        else:
+            table = for_experts(table)
         context |= {"table": table, "is_old": not snapshot.results, "early_look": EARLY_LOOK}
         context |= chosen.fill(snapshot, table)
     return render(request, "results/page.html", context)

@@ -8,6 +8,7 @@ from arena.models import Snapshot
 from arena.queries.people import natural
 from arena.web.charts import bars
 from arena.web.heat import heat_map
+from arena.web.results_authors import with_authors
 from arena.web.results_ratings import Context
 from arena.web.scatter import scatter
 
@@ -22,7 +23,7 @@ def raters(snapshot: Snapshot, table: LeaderboardTable) -> Context:
     ]
     return {
         "trust": trust,
-        "panel": sorted(lines, key=lambda line: natural(line["name"])),
+        "panel": sorted(with_authors(snapshot, lines), key=lambda line: natural(line["name"])),
         "limit": next((bet["limit"] for line in lines if (bet := line.get("bet"))), None),
         "left_bars": bars(left, span=(0.0, 1.0)),
     }

@@ -6,6 +6,7 @@ from django.contrib.auth import views as auth
 from django.urls import URLPattern, path
 
 from arena.web import (
+    authorships,
     displacement,
     home,
     invitations,
@@ -54,6 +55,8 @@ urlpatterns: list[URLPattern] = [
     path("studies/<uuid:code>/experts/", invitations.experts_page, name="experts"),
     path("studies/<uuid:code>/experts/invite/", invitations.invite_experts, name="invite"),
     path("invitations/<uuid:code>/revoke/", invitations.revoke_invitation, name="revoke"),
+    path("studies/<uuid:code>/experts/authors/", authorships.mark, name="author"),
+    path("authorships/<uuid:code>/take-back/", authorships.take_back, name="author-back"),
     path("studies/<uuid:code>/close/", studies.close, name="study-close"),
     path("studies/<uuid:code>/hand-over/", studies.hand_over_pairs, name="study-hand-over"),
     path("studies/<uuid:code>/vote/", voting.vote_page, name="vote"),

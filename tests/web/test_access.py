@@ -8,6 +8,7 @@ import pytest
 from django.test import Client
 from django.urls import reverse
 
+from arena.services.authorships import mark_author
 from arena.services.invitations import invite
 from arena.services.studies import close_study
 from arena.web.urls import urlpatterns
@@ -51,6 +52,8 @@ ACTIONS: dict[str, tuple[int, int, int]] = {
     "job-retry": (302, 403, 403),
     "invite": (200, 403, 403),
     "revoke": (302, 403, 403),
+    "author": (302, 403, 403),
+    "author-back": (302, 403, 403),
     "job-cancel": (302, 403, 403),
     "job-resume": (302, 403, 403),
     "study-rate": (403, 403, 403),
@@ -94,7 +97,10 @@ def address(name: str, here: World) -> str:
     if name == "revoke":
         made = invite(study=here.study, expert=here.expert)
         arguments["revoke"] = {"code": made.invitation.code}
-    own = ("study", "experts", "invite", "study-close", "study-hand-over", "study-rate")
+    if name == "author-back":
+        marked = mark_author(study=here.study, expert=here.expert, contestant="ann")
+        arguments["author-back"] = {"code": marked.code}
+    own = ("study", "experts", "invite", "author", "study-close", "study-hand-over", "study-rate")
     results = ("results", "results-votes", "results-open")
     is_of_study = name in own + results or name.startswith("vote")
     found = {"code": here.study.code} if is_of_study else arguments.get(name, {})

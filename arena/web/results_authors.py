@@ -1,0 +1,61 @@
+"""What the results say of authors: to staff both versions of the table, to experts nothing."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from arena.exports.tables import LeaderboardTable, Row, sentences_of
+from arena.models import Snapshot
+from arena.queries.vote_sets import Filters, LeftOut
+from arena.rating.printed import rating_text
+from arena.web.results_ratings import Context
+
+
+def both_versions(snapshot: Snapshot, table: LeaderboardTable) -> Context | None:
+    """The table with and without the votes of authors on their own contestants.
+
+    None where there are no such votes, or an older rating never looked.
+    """
+    found: Context | None = snapshot.results.get("own_votes")
+    if not found:
+        return None
+    lines = {line["slug"]: line for line in found["lines"]}
+    names = {row.slug: row.name for row in table.rows}
+    largest = found["largest"] or {"places": None, "slugs": []}
+    return found | {
+        "lines": [_both_ways(lines[row.slug], row) for row in table.rows],
+        "reasons": sentences_of(found["reasons"], names),
+        "places": largest["places"],
+        "who": [names[slug] for slug in largest["slugs"]],
+    }
+
+
+def with_authors(snapshot: Snapshot, panel: list[Context]) -> list[Context]:
+    """The experts' panel with who was author then, and the number of votes on their own."""
+    authors = {judge for judge, _ in Filters.of_document(snapshot.filters).authors}
+    own: dict[str, int] = (snapshot.results.get("own_votes") or {}).get("by_judge", {})
+    return [
+        line | {"is_author": line["judge"] in authors, "own_votes": own.get(line["judge"], 0)}
+        for line in panel
+    ]
+
+
+def for_experts(table: LeaderboardTable) -> LeaderboardTable:
+    """The same table without a word of authors: what is left out for that was not asked for."""
+    left_out = dict(table.left_out)
+    own = left_out.pop(LeftOut.OWN.value, 0)
+    if own:
+        left_out[LeftOut.FILTERED.value] = left_out.get(LeftOut.FILTERED.value, 0) + own
+    return replace(table, left_out=left_out)
+
+
+def _both_ways(line: Context, row: Row) -> Context:
+    """A contestant's line of both versions, and whether its rank differs."""
+    first, second = line["rank_with"], line["rank_without"]
+    return line | {
+        "name": row.name,
+        "simulated": row.simulated,
+        "elo_with": rating_text(line["rating_with"]),
+        "elo_without": rating_text(line["rating_without"]),
+        "moves": first is not None and second is not None and first != second,
+    }

@@ -1,0 +1,241 @@
+"""Authors on the pages: admins mark them, results say what it changes, experts see none of it."""
+
+from __future__ import annotations
+
+import re
+from datetime import UTC, datetime
+
+import pytest
+from django.contrib.auth.models import User
+from django.test import Client
+from django.urls import reverse
+from pytest_django import DjangoAssertNumQueries
+
+from arena.models import Authorship, Snapshot, Study
+from arena.queries.vote_sets import Filters
+from arena.services.authorships import mark_author
+from arena.services.ratings import rate
+from arena.services.studies import close_study
+from augment.models import Event
+from tests.full_study import Size, full_study
+from tests.study_rows import a_study, matchups_of, vote
+from tests.web.cast import people, signed_in
+
+pytestmark = pytest.mark.django_db
+
+SIZE = Size(scenarios=8, experts=4, votes_per_expert=90)
+SAID = re.compile(r"author|own contestant|by_judge", re.I)
+FRESH = re.compile(r'name="(csrfmiddlewaretoken|key)" value="[^"]+"')
+"""What is another one on every page."""
+HEADING = "With and without votes of authors on their own contestants"
+
+
+@pytest.fixture
+def study() -> Study:
+    return a_study()
+
+
+@pytest.fixture
+def admin() -> Client:
+    return signed_in(people()["admin"])
+
+
+def page(client: Client, study: Study, name: str = "experts", tab: str = "") -> str:
+    answer = client.get(reverse(name, args=[study.code, tab] if tab else [study.code]))
+    assert answer.status_code == 200
+    return " ".join(answer.content.decode().split())
+
+
+def rated(study: Study, **more: object) -> Snapshot:
+    """Rated at a time that is always the same, so that pages can be compared."""
+    snapshot = rate(study=study, rounds=100, seed=2, **more)  # type: ignore[arg-type]
+    study.snapshots.exclude(pk=snapshot.pk).delete()
+    Snapshot.objects.update(made_at=datetime(2026, 11, 22, tzinfo=UTC))
+    return snapshot
+
+
+def mark(study: Study, username: str, slug: str) -> None:
+    mark_author(study=study, expert=User.objects.get(username=username), contestant=slug)
+
+
+# --- The page of the experts -------------------------------------------------------------------
+
+
+def test_an_admin_marks_an_author_and_takes_it_back_by_plain_forms(
+    study: Study, admin: Client
+) -> None:
+    eva = User.objects.get(username="eva")
+    shown = page(admin, study)
+    assert f'<option value="{eva.person.code}">Expert 1 (eva)</option>' in shown
+    assert '<option value="ann">Ann</option>' in shown
+    wanted = {"expert": str(eva.person.code), "contestant": "ann"}
+    url = reverse("author", args=[study.code])
+    for _ in range(2):
+        answer = admin.post(url, wanted, follow=True)
+        assert "Expert 1 is marked as author of Ann." in answer.content.decode()
+    row = Authorship.objects.get()
+    assert row.marked_by is not None
+    assert row.marked_by.username == "the-admin"
+    back = reverse("author-back", args=[row.code])
+    assert f'action="{back}"' in page(admin, study)
+    answer = admin.post(back, follow=True)
+    assert "Expert 1 is not marked as author of Ann any more." in answer.content.decode()
+    assert admin.post(back).status_code == 404
+    assert not Authorship.objects.exists()
+    acts = Event.objects.filter(object_code=str(study.code)).order_by("pk")
+    assert [one.verb for one in acts][-2:] == ["mark author", "take back author"]
+
+
+@pytest.mark.parametrize(
+    ("sent", "sentence"),
+    [
+        ({}, "Choose an expert. Choose a contestant."),
+        ({"expert": "", "contestant": "ann"}, "Choose an expert."),
+        ({"expert": "nobody", "contestant": "ann"}, "nobody is not one of the available choices"),
+        ({"contestant": "zoe"}, "zoe is not one of the available choices"),
+    ],
+)
+def test_what_the_page_does_not_offer_is_refused(
+    study: Study, admin: Client, sent: dict[str, str], sentence: str
+) -> None:
+    answer = admin.post(reverse("author", args=[study.code]), sent, follow=True)
+    said = re.sub(r"<[^>]+>", " ", answer.content.decode())
+    assert sentence in " ".join(said.split())
+    assert not Authorship.objects.exists()
+
+
+def test_the_page_costs_as_many_queries_with_many_marks(
+    study: Study, admin: Client, django_assert_max_num_queries: DjangoAssertNumQueries
+) -> None:
+    page(admin, study)
+    for username in ("eva", "finn"):
+        for slug in ("ann", "bob", "cid"):
+            mark(study, username, slug)
+    with django_assert_max_num_queries(22):
+        assert page(admin, study).count('value="') >= 6
+
+
+# --- Results -----------------------------------------------------------------------------------
+
+
+def test_staff_read_both_versions_of_the_table_and_who_is_an_author() -> None:
+    study = full_study(size=SIZE)
+    analyst = signed_in(people()["analyst"])
+    snapshot = rated(study)
+    assert HEADING not in page(analyst, study, "results")
+    mark(study, "expert-1", "gpt-4o-otm")
+    snapshot = rated(study)
+    own = snapshot.results["own_votes"]
+    shown = page(analyst, study, "results")
+    assert HEADING in shown
+    assert (
+        f"{own['votes']} votes, by 1 of 4 experts, are by authors on contestants of their own."
+    ) in shown
+    assert "The table above counts them." in shown
+    assert "computed with 100 resamples" in shown
+    table = shown[shown.index("With these votes") : shown.index("How to read this")]
+    for line in own["lines"]:
+        assert f'<td class="num">{round(line["rating_without"])}</td>' in table
+    raters = page(analyst, study, "results-tab", "raters")
+    assert raters.count(">Author</span>") == 1
+    assert f"{own['votes']} votes on their own" in raters
+    assert "expert-1" not in raters
+    assert "marked an author" in page(analyst, study, "results-tab", "log")
+
+
+def test_a_rating_without_them_is_asked_for_by_a_box_and_says_so() -> None:
+    study = full_study(size=SIZE)
+    analyst = signed_in(people()["analyst"])
+    mark(study, "expert-1", "gpt-4o-otm")
+    rated(study)
+    assert "Leave out votes of authors on their own contestants" in page(analyst, study, "results")
+    sent = {"rounds": "50", "leave_out_own": "on"}
+    shown = analyst.post(reverse("study-rate", args=[study.code]), sent, follow=True)
+    said = " ".join(shown.content.decode().split())
+    own = study.snapshots.latest("pk").votes_left_out["own"]
+    assert f"Left out: {own} by authors on their own contestants." in said
+    assert "Votes of authors on their own contestants are left out." in said
+    assert "The table above leaves them out." in said
+    log = page(analyst, study, "results-tab", "log")
+    assert "Votes of authors on their own contestants are left out." in log
+
+
+def test_a_rating_of_before_opens_on_every_tab() -> None:
+    study = full_study(size=SIZE)
+    analyst = signed_in(people()["analyst"])
+    snapshot = rated(study)
+    for name in ("leave_out_own", "authors"):
+        del snapshot.filters[name]
+    del snapshot.results["own_votes"]
+    snapshot.save()
+    for tab in ("table", "pairs", "raters", "coverage", "log"):
+        shown = page(analyst, study, "results-tab", tab)
+        assert HEADING not in shown
+        assert ">Author</span>" not in shown
+
+
+# --- Experts -----------------------------------------------------------------------------------
+
+
+def test_while_voting_an_expert_sees_the_same_pages_as_without_a_mark(study: Study) -> None:
+    eva = signed_in(User.objects.get(username="eva"))
+    for matchup in matchups_of(study, "eva")[:2]:
+        vote(matchup)
+    addresses = (
+        "/", f"/studies/{study.code}/vote/", f"/api/v1/matchups?study={study.code}&n=4",
+        f"/api/v1/votes?study={study.code}",
+    )  # fmt: skip
+
+    def seen() -> list[str]:
+        return [FRESH.sub("", eva.get(address).content.decode()) for address in addresses]
+
+    seen()  # the first showing is noted
+    before = seen()
+    for slug in ("ann", "bob"):
+        mark(study, "eva", slug)
+    assert seen() == before
+
+
+def test_after_closing_an_expert_reads_the_same_table_as_without_a_mark() -> None:
+    study = full_study(size=SIZE)
+    expert = signed_in(User.objects.get(username="expert-1"))
+    tabs = ("table", "pairs", "types")
+
+    def seen() -> list[str]:
+        return [FRESH.sub("", page(expert, study, "results-tab", tab)) for tab in tabs]
+
+    rated(study)
+    before = seen()
+    mark(study, "expert-1", "gpt-4o-otm")
+    rated(study)
+    assert seen() == before
+
+
+def test_where_they_are_left_out_an_expert_reads_that_they_were_not_asked_for() -> None:
+    study = full_study(size=SIZE)
+    expert = signed_in(User.objects.get(username="expert-1"))
+    mark(study, "expert-1", "gpt-4o-otm")
+    snapshot = rated(study, filters=Filters(leave_out_own=True))
+    shown = page(expert, study, "results")
+    assert f"Left out: {snapshot.votes_left_out['own']} not asked for." in shown
+    assert not SAID.search(shown)
+
+
+@pytest.mark.parametrize("role", ["analyst", "expert"])
+def test_nobody_but_an_admin_marks_or_takes_back(study: Study, role: str) -> None:
+    mark(study, "eva", "ann")
+    other = signed_in(
+        people()["analyst"] if role == "analyst" else User.objects.get(username="eva")
+    )
+    sent = {"expert": str(User.objects.get(username="finn").person.code), "contestant": "bob"}
+    for url in (
+        reverse("author", args=[study.code]),
+        reverse("author-back", args=[Authorship.objects.get().code]),
+    ):
+        assert other.post(url, sent).status_code == 403
+    assert other.get(reverse("experts", args=[study.code])).status_code == 403
+    assert Authorship.objects.get().contestant.slug == "ann"
+    close_study(study=study)
+    assert other.get(reverse("results-tab", args=[study.code, "log"])).status_code == (
+        403 if role == "expert" else 200
+    )
