@@ -8,6 +8,7 @@ from django.db import transaction
 from arena.errors import NotYours
 from arena.models import Authorship, Study
 from augment.errors import UnknownName
+from augment.sentences import sentence
 from augment.services.events import log_event
 
 
@@ -30,7 +31,13 @@ def mark_author(
         UnknownName: The study has no such contestant.
     """
     if not study.experts.filter(pk=expert.pk).exists():
-        raise NotYours(f"{expert.get_username()} does not take part in {study.name!r}.")
+        raise NotYours(
+            sentence(
+                "%(expert)s does not take part in '%(study)s'.",
+                expert=expert.get_username(),
+                study=study.name,
+            )
+        )
     made = study.contestants.filter(slug=contestant).first()
     if made is None:
         known = study.contestants.order_by("slug").values_list("slug", flat=True)

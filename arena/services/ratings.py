@@ -104,7 +104,7 @@ def plan_snapshot(
         verb="rate early" if is_early else "rate",
         object_kind="study",
         object_code=study.code,
-        after={"snapshot": str(snapshot.code), "method": method, "filters": snapshot.filters},
+        after={"snapshot": str(snapshot.code), "method": method, "filters": _asked(snapshot)},
     )
     return snapshot
 
@@ -138,6 +138,11 @@ def is_big(study: Study) -> bool:
 
 
 # --- Private -----------------------------------------------------------------------------------
+
+
+def _asked(snapshot: Snapshot) -> dict[str, object]:
+    """The filters for the log, where each mark of an author has a line of its own already."""
+    return {name: value for name, value in snapshot.filters.items() if name != "authors"}
 
 
 def _method(name: str) -> Method:

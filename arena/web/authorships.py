@@ -20,6 +20,7 @@ from arena.queries.people import by_pseudonym
 from arena.services.authorships import mark_author, take_back_author
 from arena.web.access import ADMIN, only
 from augment.errors import AugmentError
+from augment.services.wording import said
 
 
 class AuthorForm(forms.Form):
@@ -66,7 +67,7 @@ def mark(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
             actor=cast(User, request.user),
         )
     except (ArenaError, AugmentError) as error:
-        messages.error(request, str(error))
+        messages.error(request, said(error))
     else:
         named = {"name": row.expert.person.pseudonym, "contestant": row.contestant.name}
         said = _("%(name)s is marked as author of %(contestant)s.") % named

@@ -24,7 +24,7 @@ from arena.services.own_votes import OTHER_ROUNDS, with_and_without
 from arena.services.ratings import compute_snapshot, plan_snapshot, rate
 from arena.services.snapshots import votes_of
 from arena.services.vote_arrays import vote_arrays
-from augment.models import Scenario
+from augment.models import Event, Scenario
 from tests.full_study import Size, full_study
 from tests.study_rows import a_study, matchups_of, shown_again, vote
 
@@ -68,6 +68,7 @@ def test_they_count_unless_a_rating_leaves_them_out_and_are_counted_by_reason(
     plain = rate(study=study, rounds=50)
     mark(study)
     counted = rate(study=study, rounds=50)
+    assert "authors" not in str(Event.objects.filter(verb="rate").latest("pk").after)
     assert (counted.votes_sha256, table_of(counted)) == (plain.votes_sha256, table_of(plain))
     left = rate(study=study, rounds=50, filters=WITHOUT)
     own = left.votes_left_out["own"]

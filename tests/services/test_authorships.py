@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import pytest
 from django.contrib.auth.models import User
+from django.core.management import CommandError, call_command
 from django.db import IntegrityError
 
 from arena.errors import NotYours
@@ -100,3 +101,23 @@ def test_an_open_study_goes_on_as_before_and_a_closed_one_can_be_marked_too(
     assert vote(matchups_of(study, "eva")[1]).outcome == "left"
     mark_author(study=close_study(study=study), expert=eva, contestant="bob")
     assert len(authorships_of(study)) == 2
+
+
+def test_the_command_marks_and_takes_back(
+    study: Study, eva: User, capsys: pytest.CaptureFixture[str]
+) -> None:
+    call_command("mark_author", study.name, "eva", "ann")
+    assert authors_of(study) == {(str(eva.person.code), "ann")}
+    call_command("mark_author", study.name, "eva", "ann", "--take-back")
+    assert authors_of(study) == frozenset()
+    assert capsys.readouterr().out.splitlines() == [
+        "eva is marked as author of ann.",
+        "eva is not marked as author of ann.",
+    ]
+    assert [line.actor for line in Event.objects.filter(verb__in=ACTS)] == [None, None]
+    for names, sentence in (
+        (("ghost", "ann"), "Unknown expert 'ghost'. Known: eva, finn."),
+        (("eva", "zoe"), "Unknown contestant 'zoe'"),
+    ):
+        with pytest.raises(CommandError, match=sentence):
+            call_command("mark_author", study.name, *names)

@@ -133,12 +133,12 @@ def test_staff_read_both_versions_of_the_table_and_who_is_an_author() -> None:
     ) in shown
     assert "The table above counts them." in shown
     assert "computed with 100 resamples" in shown
-    table = shown[shown.index("With these votes") : shown.index("How to read this")]
+    table = shown[shown.index(HEADING) : shown.index("How to read this")]
     for line in own["lines"]:
         assert f'<td class="num">{round(line["rating_without"])}</td>' in table
     raters = page(analyst, study, "results-tab", "raters")
     assert raters.count(">Author</span>") == 1
-    assert f"{own['votes']} votes on their own" in raters
+    assert f"n {own['votes']}<" in raters
     assert "expert-1" not in raters
     assert "marked an author" in page(analyst, study, "results-tab", "log")
 

@@ -1,0 +1,53 @@
+"""manage.py mark_author: say who made which contestant of a study."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from django.contrib.auth.models import User
+from django.core.management.base import BaseCommand, CommandError, CommandParser
+
+from arena.errors import ArenaError
+from arena.models import Study
+from arena.queries.studies import study_named
+from arena.services.authorships import mark_author, take_back_author
+from augment.errors import AugmentError, UnknownName
+
+
+class Command(BaseCommand):
+    """The door to arena.services.authorships."""
+
+    help = "Mark an expert of a study as author of a contestant; experts see nothing of it."
+
+    def add_arguments(self, parser: CommandParser) -> None:
+        """Who made what, in which study."""
+        parser.add_argument("study", help="its name or its code")
+        parser.add_argument("expert", metavar="USERNAME")
+        parser.add_argument("contestant", metavar="SLUG")
+        parser.add_argument(
+            "--take-back", action="store_true", help="forget it again; the log keeps both"
+        )
+
+    def handle(self, *args: Any, **options: Any) -> None:
+        """Mark or take back, and say so."""
+        username, slug = options["expert"], options["contestant"]
+        try:
+            study = study_named(options["study"])
+            expert = _expert(study, username)
+            if options["take_back"]:
+                for row in study.authorships.filter(expert=expert, contestant__slug=slug):
+                    take_back_author(authorship=row)
+            else:
+                mark_author(study=study, expert=expert, contestant=slug)
+        except (ArenaError, AugmentError) as error:
+            raise CommandError(str(error)) from error
+        state = "not marked" if options["take_back"] else "marked"
+        self.stdout.write(f"{username} is {state} as author of {slug}.")
+
+
+def _expert(study: Study, username: str) -> User:
+    found = study.experts.filter(username=username).first()
+    if found is None:
+        known = study.experts.order_by("username").values_list("username", flat=True)
+        raise UnknownName("expert", username, list(known))
+    return found
