@@ -70,8 +70,8 @@ def mark(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
         messages.error(request, said(error))
     else:
         named = {"name": row.expert.person.pseudonym, "contestant": row.contestant.name}
-        said = _("%(name)s is marked as author of %(contestant)s.") % named
-        messages.success(request, said)
+        done = _("%(name)s is marked as author of %(contestant)s.") % named
+        messages.success(request, done)
     return redirect("experts", code=code)
 
 
@@ -83,6 +83,6 @@ def take_back(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
     row = get_object_or_404(rows, code=code)
     named = {"name": row.expert.person.pseudonym, "contestant": row.contestant.name}
     take_back_author(authorship=row, actor=cast(User, request.user))
-    said = _("%(name)s is not marked as author of %(contestant)s any more.") % named
-    messages.success(request, said)
+    done = _("%(name)s is not marked as author of %(contestant)s any more.") % named
+    messages.success(request, done)
     return redirect("experts", code=row.study.code)
