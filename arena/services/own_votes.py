@@ -17,9 +17,9 @@ from arena.services.vote_arrays import vote_arrays
 Document = dict[str, Any]
 
 OTHER_ROUNDS = 10_000
-"""At most so many for the version that the table does not show, so that a rating of the default
-costs a fifth more. With as many rounds as the table has and the same seed, ranks differ by the
-votes and hardly by the draws."""
+"""At most so many for the version that the table does not show: about a tenth more than a rating
+costs. With as many rounds as the table has and the same seed, ranks differ by the votes and hardly
+by the draws."""
 
 
 def with_and_without(votes: VoteSet, filters: Filters, board: Leaderboard) -> Document | None:
