@@ -104,9 +104,19 @@ def _manifest(snapshot: Snapshot, files: dict[str, bytes]) -> bytes:
 
 
 def _filters(snapshot: Snapshot) -> dict[str, Any]:
-    """Which votes were asked for; of authors only the number, since votes have pseudonyms."""
-    filters: dict[str, Any] = snapshot.filters
-    return filters | {"authors": len(filters["authors"])} if "authors" in filters else filters
+    """Which votes were asked for: experts by pseudonym, as votes are, of authors only the number.
+
+    An expert who was asked for without having a vote that counts has no name here.
+    """
+    judges: dict[str, str] = snapshot.results.get("judges", {})
+    filters: dict[str, Any] = dict(snapshot.filters)
+    if "experts" in filters:
+        filters["experts"] = sorted(
+            judges.get(code, "without votes") for code in filters["experts"]
+        )
+    if "authors" in filters:
+        filters["authors"] = len(filters["authors"])
+    return filters
 
 
 def _public(results: dict[str, Any]) -> dict[str, Any]:

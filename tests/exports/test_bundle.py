@@ -21,6 +21,7 @@ from arena.exports.tables import leaderboard_table
 from arena.exports.votes import VOTE_FORMATS, rows_of
 from arena.exports.writers import FORMATS
 from arena.models import Snapshot, Study
+from arena.queries.vote_sets import Filters
 from arena.services.ratings import rate
 from augment.errors import UnknownName
 from augment.models import Event
@@ -64,6 +65,16 @@ def test_the_zip_is_the_same_twice_its_manifest_true_and_no_account_named(
     assert person.pseudonym.encode() in texts
     for secret in (person.user.username, str(person.code)):
         assert secret.encode() not in texts
+
+
+def test_a_rating_by_chosen_experts_names_them_by_pseudonym(snapshot: Snapshot) -> None:
+    person = snapshot.study.experts.order_by("pk")[0].person
+    chosen = Filters(experts=(str(person.code),))
+    rated = rate(study=snapshot.study, rounds=50, unit="vote", filters=chosen)
+    with zipfile.ZipFile(io.BytesIO(bundle(rated))) as archive:
+        manifest = json.loads(archive.read("manifest.json"))
+    assert manifest["filters"]["experts"] == [person.pseudonym]
+    assert str(person.code) not in json.dumps(manifest)
 
 
 def test_votes_read_back_from_both_formats_are_the_same(snapshot: Snapshot) -> None:
