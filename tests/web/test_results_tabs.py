@@ -119,7 +119,7 @@ def test_raters_are_pseudonyms_with_repeats_and_checks(analyst: Client) -> None:
         ({"e_value": 3.14159, "manner": "blind", "votes": 20, "limit": 40.0}, ">3.1</td>"),
         ({"e_value": 39.9, "manner": "blind", "votes": 20, "limit": 40.0}, ">40</td>"),
         ({"e_value": 45.0, "manner": "blind", "votes": 20, "limit": 40.0}, "as if not looking"),
-        ({"e_value": 1e12, "manner": "swapped", "votes": 20, "limit": 40.0}, ">over 1,000 <"),
+        ({"e_value": 1e12, "manner": "swapped", "votes": 20, "limit": 40.0}, ">over 1,000</td>"),
         ({"e_value": 1e12, "manner": "swapped", "votes": 20, "limit": 40.0}, "keys were swapped"),
         (None, "–</td></tr>"),
     ],
