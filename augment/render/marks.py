@@ -20,6 +20,7 @@ from augment.scene.entities import AgentType, TrafficAgent
 
 # A speed below which nothing is drawn as moving.
 _STANDING_MPS = 0.3
+_LEAST_WALK_M = 0.1
 # More than the half size of any mark that is drawn larger than it is.
 _LEAST_MARK_PX = 16.0
 # The tick at the nose of what moves is the way of this time.
@@ -34,6 +35,17 @@ def draw_way(ground: Ground, agent: TrafficAgent, style: MarkStyle) -> None:
         _walk(ground, agent, style)
     else:
         _motion(ground, agent, style)
+
+
+def is_walking(agent: TrafficAgent) -> bool:
+    """Whether an arrow shows where its walk ends; one of no length is not drawn."""
+    end = agent.walk_to_m
+    return end is not None and math.dist((agent.x_m, agent.y_m), end) >= _LEAST_WALK_M
+
+
+def stands(agent: TrafficAgent) -> bool:
+    """Whether no arrow shows a motion."""
+    return agent.walk_to_m is not None or abs(agent.speed_mps) < _STANDING_MPS
 
 
 def draw_mark(ground: Ground, agent: TrafficAgent, style: MarkStyle) -> None:
@@ -171,7 +183,7 @@ def _generic(ground: Ground, agent: TrafficAgent, style: MarkStyle) -> None:
 
 def _motion(ground: Ground, agent: TrafficAgent, style: MarkStyle) -> None:
     """From the nose as far as the agent gets in a second; nothing for what stands."""
-    if abs(agent.speed_mps) < _STANDING_MPS:
+    if stands(agent):
         return
     way_m = agent.speed_mps * _TICK_S
     start_m = math.copysign(agent.length_m / 2.0, way_m)
@@ -182,9 +194,9 @@ def _motion(ground: Ground, agent: TrafficAgent, style: MarkStyle) -> None:
 
 def _walk(ground: Ground, agent: TrafficAgent, style: MarkStyle) -> None:
     """A dashed arrow to where a walk ends."""
-    line = np.array([[agent.x_m, agent.y_m], agent.walk_to_m], dtype=np.float64)
-    if math.dist(line[0], line[1]) < 0.1:
+    if not is_walking(agent):
         return
+    line = np.array([[agent.x_m, agent.y_m], agent.walk_to_m], dtype=np.float64)
     ground.canvas.dashed(ground.camera.to_pixels(line), style.fill, 2.5, 8.0, 5.0)
     _arrow_head(ground, line, style, 7.0)
 

@@ -1,0 +1,180 @@
+"""The text description: right answers, and that it tells no more than the picture."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from augment.render.bev import draw
+from augment.render.camera import camera_for
+from augment.render.description import CHANGED, GONE, Line, describe
+from augment.scene.entities import AgentType, TrafficAgent
+from augment.scene.modification import Modification
+from tests.scenes import cone, pedestrian, scene, vehicle
+
+STREET = scene(agents=(vehicle("Agent2", 20.04, -3.46), vehicle("Agent3", -12.0, 3.5, math.pi)))
+
+
+def line_of(agent: TrafficAgent) -> Line:
+    (line,) = describe(STREET, Modification(added=(agent,)))
+    return line
+
+
+def test_nothing_changed_is_an_empty_list() -> None:
+    assert describe(STREET, Modification()) == []
+
+
+@pytest.mark.parametrize(
+    ("x_m", "y_m", "ahead_m", "left_m"),
+    [
+        (21.44, -1.96, 21.4, -2.0),
+        (-8.26, 3.5, -8.3, 3.5),
+        (0.04, -0.04, 0.0, 0.0),
+        (150.0, 40.0, 150.0, 40.0),  # outside the picture
+    ],
+)
+def test_places_are_metres_ahead_and_left_to_one_decimal(
+    x_m: float, y_m: float, ahead_m: float, left_m: float
+) -> None:
+    line = line_of(vehicle("new", x_m, y_m))
+    assert (line.ahead_m, line.left_m) == (ahead_m, left_m)
+    assert "-0.0" not in (str(line.ahead_m), str(line.left_m))
+
+
+@pytest.mark.parametrize(
+    ("degrees", "told"),
+    [(0, 0), (2.4, 0), (-2.4, 0), (2.6, 5), (31, 30), (-90, -90), (178, 180), (-178, 180)],
+)
+def test_headings_are_told_in_steps_of_five_degrees(degrees: float, told: int) -> None:
+    assert line_of(vehicle("new", 10.0, 0.0, math.radians(degrees))).heading_deg == told
+    assert line_of(vehicle("new", 10.0, 0.0, math.radians(degrees + 360))).heading_deg == told
+
+
+def test_what_moves_has_its_speed_and_what_stands_has_none() -> None:
+    assert line_of(replace(vehicle("new", 10.0, 0.0), speed_mps=8.34)).speed_mps == 8.3
+    assert line_of(replace(vehicle("new", 10.0, 0.0), speed_mps=0.29)).speed_mps == 0.0
+    assert line_of(cone("new", 10.0, 0.0)).speed_mps is None
+
+
+def test_who_walks_has_the_end_of_the_walk_in_place_of_a_speed() -> None:
+    walker = pedestrian("new", 12.0, 5.0, walk_to_m=(12.04, -4.96))
+    line = line_of(replace(walker, speed_mps=1.4))
+    assert (line.walk_to_m, line.speed_mps, line.heading_deg) == ((12.0, -5.0), None, -90)
+    still = line_of(pedestrian("new", 12.0, 5.0, walk_to_m=(12.05, 5.0)))
+    assert (still.walk_to_m, still.speed_mps) == (None, 0.0)
+
+
+def test_a_thing_without_a_front_has_no_heading() -> None:
+    turned = replace(cone("new", 10.0, 0.0), heading_rad=1.0)
+    assert (line_of(turned).heading_deg, line_of(turned).along_deg) == (None, None)
+    for degrees, along in ((0, 0), (180, 0), (90, 90), (-90, 90), (150, -30)):
+        bar = replace(turned, type=AgentType.BARRIER, heading_rad=math.radians(degrees))
+        assert (line_of(bar).heading_deg, line_of(bar).along_deg) == (None, along)
+
+
+def test_the_nearest_come_first_then_the_kinds_then_what_is_gone() -> None:
+    bus = replace(vehicle("a", 6.0, 8.0), type=AgentType.BUS)
+    change = Modification(
+        added=(vehicle("z", 10.0, 0.0), bus, cone("m", -3.0, 0.0)), removed=("Agent2", "Agent3")
+    )
+    told = [(line.change, line.kind, line.ahead_m) for line in describe(STREET, change)]
+    assert told == [
+        (CHANGED, "TRAFFIC_CONE", -3.0),
+        (CHANGED, "BUS", 6.0),
+        (CHANGED, "VEHICLE", 10.0),
+        (GONE, "VEHICLE", -12.0),
+        (GONE, "VEHICLE", 20.0),
+    ]
+
+
+def test_moving_an_agent_is_told_like_taking_it_away_and_adding_another() -> None:
+    """Their pictures are the same, so their texts are."""
+    moved = Modification(moved=(vehicle("Agent2", 30.0, 0.0),))
+    replaced = Modification(added=(vehicle("new", 30.0, 0.0),), removed=("Agent2",))
+    assert describe(STREET, moved) == describe(STREET, replaced)
+    camera = camera_for(STREET, None)
+    assert draw(STREET, moved, camera) == draw(STREET, replaced, camera)
+
+
+def test_an_id_that_the_scene_no_longer_has_is_passed_over() -> None:
+    assert describe(STREET, Modification(removed=("Agent99",))) == []
+
+
+# --- Properties --------------------------------------------------------------------------------
+
+METRES = st.floats(-60.0, 60.0)
+AGENTS = st.lists(
+    st.builds(
+        TrafficAgent,
+        id=st.just("any"),
+        type=st.sampled_from([kind for kind in AgentType if kind is not AgentType.EGO_VEHICLE]),
+        x_m=METRES,
+        y_m=METRES,
+        heading_rad=st.floats(-3.1, 3.1),
+        width_m=st.just(1.0),
+        length_m=st.just(2.0),
+        speed_mps=st.floats(0.0, 20.0),
+        walk_to_m=st.none() | st.tuples(METRES, METRES),
+    ),
+    max_size=6,
+)
+
+
+def changed(agents: list[TrafficAgent], names: str = "abcdef") -> Modification:
+    named = zip(agents, names, strict=False)
+    return Modification(added=tuple(replace(agent, id=name) for agent, name in named))
+
+
+@settings(max_examples=60, deadline=None)
+@given(AGENTS, st.randoms(use_true_random=False))
+def test_neither_ids_nor_their_order_leave_a_trace(
+    agents: list[TrafficAgent], rng: object
+) -> None:
+    shuffled = list(agents)
+    rng.shuffle(shuffled)  # type: ignore[attr-defined]
+    told = describe(STREET, changed(agents))
+    assert describe(STREET, changed(shuffled, "zyxwvu")) == told
+
+
+@settings(max_examples=60, deadline=None)
+@given(AGENTS)
+def test_in_a_mirror_left_and_right_change_places_and_nothing_else(
+    agents: list[TrafficAgent],
+) -> None:
+    told = describe(STREET, changed(agents))
+    mirrored = describe(STREET, changed([in_a_mirror(agent) for agent in agents]))
+    assert key(mirrored) == key([other_hand(line) for line in told])
+
+
+def in_a_mirror(agent: TrafficAgent) -> TrafficAgent:
+    end = agent.walk_to_m
+    return replace(
+        agent,
+        y_m=-agent.y_m,
+        heading_rad=-agent.heading_rad,
+        walk_to_m=None if end is None else (end[0], -end[1]),
+    )
+
+
+def other_hand(line: Line) -> Line:
+    end = line.walk_to_m
+    return replace(
+        line,
+        left_m=0.0 - line.left_m,
+        heading_deg=turned(line.heading_deg, either=180),
+        along_deg=turned(line.along_deg, either=90),
+        walk_to_m=None if end is None else (end[0], 0.0 - end[1]),
+    )
+
+
+def turned(degrees: int | None, *, either: int) -> int | None:
+    """The same angle to the other side; one is the same on both."""
+    return degrees if degrees in (None, either) else -degrees
+
+
+def key(lines: list[Line]) -> list[str]:
+    return sorted(map(repr, lines))
