@@ -31,6 +31,9 @@ class Study(models.Model):
     allow_both_miss = models.BooleanField(
         default=False, help_text="experts may add to Equal that both miss the instruction"
     )
+    allow_text = models.BooleanField(
+        default=False, help_text="experts may read what was changed, beside looking at it"
+    )
     votes_to_plan = models.JSONField(
         default=dict, help_text="votes that the adaptive part still has to plan, by username"
     )
@@ -59,8 +62,8 @@ class Study(models.Model):
 class Matchup(models.Model):
     """One planned showing of two augmentations of one scenario to one expert.
 
-    Camera and unchanged picture are kept as they were when it was planned: a scenario that is
-    edited later does not change what was judged.
+    Camera, unchanged picture and descriptions are kept as they were when it was planned: a
+    scenario that is edited later does not change what was judged.
     """
 
     class Kind(models.TextChoices):
@@ -85,6 +88,11 @@ class Matchup(models.Model):
     )
     view = models.JSONField(
         null=True, help_text="where metres lie in its pictures: px_per_m, ego_px, width, height"
+    )
+    descriptions = models.JSONField(
+        null=True,
+        help_text="what its pictures show, left and right, as augment.render.description gives "
+        "it; null where the study has no text description",
     )
     kind = models.CharField(max_length=10, choices=Kind.choices, default=Kind.MAIN)
     repeat_of = models.OneToOneField(

@@ -11,6 +11,7 @@ from django.urls import reverse
 
 from arena.errors import NotYours
 from arena.models import LabelTask, Matchup
+from arena.queries.descriptions import told
 from arena.queries.people import role_of
 from augment.models import Scenario
 from augment.services.pictures import camera_of
@@ -27,7 +28,8 @@ def picture_shown(*, user: User, token: str) -> str:
     rows = Matchup.objects.filter(
         Q(left_token=token) | Q(right_token=token) | Q(original_token=token)
     )
-    found = rows.select_related("left", "right").defer("left__modification", "right__modification")
+    unread = ("left__modification", "right__modification", "descriptions")
+    found = rows.select_related("left", "right").defer(*unread)
     matchup = found.order_by().first()
     if matchup is None:
         return _picture_to_label(user=user, token=token)
@@ -63,7 +65,7 @@ def view_shown(matchup: Matchup) -> dict[str, Any]:
 def as_shown(matchup: Matchup) -> dict[str, Any]:
     """All that an expert's browser learns of a matchup: tokens, never contestants."""
     original = matchup.original_token if matchup.original_image else None
-    return {
+    shown = {
         "matchup": str(matchup.code),
         "position": matchup.position,
         "instruction": matchup.scenario.instruction,
@@ -72,6 +74,10 @@ def as_shown(matchup: Matchup) -> dict[str, Any]:
         "original": reverse("matchup-image", args=[original]) if original else None,
         **view_shown(matchup),
     }
+    if matchup.descriptions is not None:
+        left, right = matchup.descriptions
+        shown["text"] = {"a": told(left), "b": told(right)}
+    return shown
 
 
 def _picture_to_label(*, user: User, token: str) -> str:

@@ -22,6 +22,7 @@ USUAL_KEYS: dict[str, tuple[str, ...]] = {
     "zoom": ("z",),
     "reset": ("0",),
     "ruler": ("m",),
+    "text": ("t",),
     "legend": ("l",),
     "help": ("h", "?"),
 }
@@ -39,10 +40,14 @@ KEY_LABELS = {
     "zoom": gettext_noop("Zoom"),
     "reset": gettext_noop("Zoom back"),
     "ruler": gettext_noop("Ruler"),
+    "text": gettext_noop("Text description"),
     "legend": gettext_noop("Legend"),
     "help": gettext_noop("Help"),
 }
 """Action -> what the page calls it, in English."""
+
+SOMETIMES = ("text",)
+"""Actions that only some studies have: their usual key gives way to one that was chosen."""
 
 SWITCHES: dict[str, bool] = {"single_keys": True, "legend": True, "keep_zoom": False}
 """What can be on or off, and how it is at first."""
@@ -62,7 +67,10 @@ class VotingPreferences:
 
     @property
     def keys(self) -> dict[str, list[str]]:
-        """Action -> the keys that do it. A chosen key does nothing else any more."""
+        """Action -> the keys that do it. A chosen key does nothing else any more.
+
+        One of `SOMETIMES` has none where its usual key was chosen for something else.
+        """
         taken = set(self.own_keys.values())
         return {
             action: [self.own_keys[action]]

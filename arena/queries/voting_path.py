@@ -35,9 +35,10 @@ WHERE matchup.code = %(code)s AND matchup.expert_id = %(expert)s
   )
 """
 
-_STUDY = ("id", "code", "name", "state", "allow_both_miss", "votes_to_plan")
+_STUDY = ("id", "code", "name", "state", "allow_both_miss", "allow_text", "votes_to_plan")
 _STATE = """
-SELECT study.id, study.code, study.name, study.state, study.allow_both_miss, study.votes_to_plan,
+SELECT study.id, study.code, study.name, study.state, study.allow_both_miss, study.allow_text,
+       study.votes_to_plan,
        (SELECT COUNT(*) FROM arena_matchup matchup
         WHERE matchup.study_id = study.id AND matchup.expert_id = %(expert)s) AS total,
        (SELECT COUNT(*) FROM arena_vote vote
@@ -60,11 +61,12 @@ WHERE study.id = %(study)s
 _MATCHUP = (
     *("id", "code", "study_id", "expert_id", "scenario_id", "position", "kind", "view"),
     *("served_at", "left_token", "right_token", "original_token", "original_image"),
+    "descriptions",
 )
 _COMING = """
 SELECT matchup.id, matchup.code, matchup.study_id, matchup.expert_id, matchup.scenario_id,
        matchup.position, matchup.kind, matchup.view, matchup.served_at, matchup.left_token,
-       matchup.right_token, matchup.original_token, matchup.original_image,
+       matchup.right_token, matchup.original_token, matchup.original_image, matchup.descriptions,
        scenario.instruction
 FROM arena_matchup matchup
 JOIN augment_scenario scenario ON scenario.id = matchup.scenario_id

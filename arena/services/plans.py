@@ -14,6 +14,7 @@ from arena.pairing.plan import Check, Entry, PlannedMatchup, Rules
 from arena.queries.showings import view_of
 from augment.models import Augmentation, Contestant, Scenario
 from augment.sentences import Sentence, sentence
+from augment.services.descriptions import Description, descriptions
 
 Cells = dict[tuple[str, str], Augmentation]
 """By scenario and contestant, the augmentation whose picture is shown."""
@@ -115,21 +116,24 @@ def store(
     by_name = {expert.username: expert for expert in experts}
     places = _places(planned, cells)
     views = {slug: view_of(place) for slug, place in places.items()}
+    texts = _descriptions(study, planned, cells, places)
     rows = [
         Matchup(
             study=study,
             expert=by_name[one.expert],
             position=one.position,
             scenario=places[one.scenario],
-            left=cells[one.scenario, one.left],
-            right=cells[one.scenario, one.right],
+            left=left,
+            right=right,
             original_image=places[one.scenario].original_image,
             view=views[one.scenario],
+            descriptions=None if texts is None else [texts[left.pk], texts[right.pk]],
             kind=one.kind,
             batch=batch,
             draw_probability=one.draw_probability,
         )
         for one in planned
+        for left, right in [_sides(one, cells)]
     ]
     Matchup.objects.bulk_create([row for row in rows if row.kind != _REPEAT], batch_size=500)
     again = [(row, one) for row, one in zip(rows, planned, strict=True) if one.repeats is not None]
@@ -204,6 +208,22 @@ def _places(planned: Sequence[PlannedMatchup], cells: Cells) -> dict[str, Scenar
     keys = {cell.scenario_id for (slug, _), cell in cells.items() if slug in slugs}
     rows = Scenario.objects.filter(pk__in=keys).select_related("base_scene")
     return {row.slug: row for row in rows.defer("base_scene__recording")}
+
+
+def _descriptions(
+    study: Study, planned: Sequence[PlannedMatchup], cells: Cells, places: dict[str, Scenario]
+) -> dict[int, Description] | None:
+    """What every picture shows, by the key of its augmentation; None where nobody may read it."""
+    if not study.allow_text:
+        return None
+    shown = {cell.pk for one in planned for cell in _sides(one, cells)}
+    return descriptions(
+        augmentations=shown, scenarios={place.pk: place for place in places.values()}
+    )
+
+
+def _sides(one: PlannedMatchup, cells: Cells) -> tuple[Augmentation, Augmentation]:
+    return cells[one.scenario, one.left], cells[one.scenario, one.right]
 
 
 def _mains(study: Study, experts: list[int]) -> dict[tuple[int, int], int]:

@@ -13,6 +13,7 @@ from arena.models import Person
 from arena.queries.profiles import Language, Theme
 from arena.queries.voting_keys import (
     KEY_LABELS,
+    SOMETIMES,
     SWITCHES,
     USUAL_KEYS,
     VotingPreferences,
@@ -87,7 +88,11 @@ def _chosen(keys: Mapping[str, str]) -> dict[str, str]:
                     key=key,
                 ),
             )
-    shown = {action: found.get(action, usual[0]) for action, usual in USUAL_KEYS.items()}
+    shown = {
+        action: found.get(action, usual[0])
+        for action, usual in USUAL_KEYS.items()
+        if action in found or action not in SOMETIMES
+    }
     for key, times in Counter(shown.values()).items():
         if times > 1:
             both = tuple(

@@ -41,6 +41,7 @@ class PlanOptions:
     appearances: tuple[tuple[str, int], ...] = ()
     pair_votes: tuple[tuple[str, str, int], ...] = ()
     allow_both_miss: bool = False
+    allow_text: bool = False
 
 
 _OF_THE_PLAN = ("appearances", "pair_votes", "repeat_share", "check_share", "adaptive_share")
@@ -221,6 +222,7 @@ def _insert(
                 rules=_frozen_rules(rules, planned),
                 allow_simulated=allow_simulated,
                 allow_both_miss=given.allow_both_miss,
+                allow_text=given.allow_text,
                 votes_to_plan=(
                     dict.fromkeys(rules.experts, rules.votes_later) if rules.votes_later else {}
                 ),

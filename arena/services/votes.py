@@ -88,6 +88,8 @@ def _check_allowed(decision: Decision, state: VotingState, is_paced: bool) -> No
         raise _not_open(state.study)
     if decision.both_miss and not state.study.allow_both_miss:
         raise InvalidVote({"both_miss": "This study does not ask whether both miss."})
+    if "text" in decision.aids.split() and not state.study.allow_text:
+        raise InvalidVote({"aids": "This study has no text description."})
     if is_paced and state.just_now > settings.VOTES_PER_S * PACE_WINDOW.total_seconds():
         raise TooFast(math.ceil(PACE_WINDOW.total_seconds() / 2))
 

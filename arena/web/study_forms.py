@@ -33,6 +33,7 @@ class StudyForm(ChoiceForm):
     adaptive = _percent(initial=0, most=90)
     targets = forms.CharField(required=False, max_length=20_000)
     allow_both_miss = forms.BooleanField(required=False)
+    allow_text = forms.BooleanField(required=False)
     allow_simulated = forms.BooleanField(required=False)
 
     def __init__(self, *args: Any, experts: list[User], **kwargs: Any) -> None:
@@ -64,6 +65,7 @@ class StudyForm(ChoiceForm):
             appearances=appearances,
             pair_votes=pair_votes,
             allow_both_miss=entered["allow_both_miss"],
+            allow_text=entered["allow_text"],
         )
         given = {name: entered[name] for name in (*names, "allow_simulated")}
         return given | {"options": options}

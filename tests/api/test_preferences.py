@@ -54,6 +54,16 @@ def test_a_key_of_ones_own_replaces_the_usual_ones_and_nothing_else_has_it(eva: 
     assert voting_preferences(eva).keys == keys
 
 
+def test_the_key_of_what_only_some_studies_have_gives_way_to_a_chosen_one(eva: User) -> None:
+    keys = post(eva, {"keys": {"zoom": "t"}}).json()["keys"]
+    assert (keys["zoom"], keys["text"]) == (["t"], [])
+    keys = post(eva, {"keys": {"zoom": "t", "text": "x"}}).json()["keys"]
+    assert (keys["zoom"], keys["text"]) == (["t"], ["x"])
+    refused = post(eva, {"keys": {"zoom": "t", "text": "t"}})
+    assert refused.status_code == 422
+    assert "t would do two things: zoom, text." in refused.json()["error"]["fields"]["keys"]
+
+
 def test_the_usual_keys_come_back(eva: User) -> None:
     post(eva, {"keys": {"a": "j"}})
     assert post(eva, {"keys": {}}).json()["keys"]["a"] == ["1", "a"]

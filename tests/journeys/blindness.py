@@ -28,9 +28,9 @@ CHUNKS = {"IHDR", "PLTE", "tRNS", "IDAT", "IEND"}
 TELLING_HEADERS = ("ETag", "Last-Modified", "Content-Disposition")
 MATCHUP = {
     *("matchup", "position", "instruction", "a", "b", "original"),
-    *("px_per_m", "ego_px", "width", "height"),
+    *("px_per_m", "ego_px", "width", "height", "text"),
 }
-"""All that a matchup may say on the wire."""
+"""All that a matchup may say on the wire; its text has the fields a and b."""
 REPLY = {
     *("saved", "total", "minutes_left", "next"),
     *("key", "outcome", "both_miss", "reason", "comment"),
@@ -111,6 +111,7 @@ def secrets_of(study: Study) -> list[str]:
         told += [contestant.slug, str(contestant.code)]
     for row in Augmentation.objects.select_related("job"):
         told += [str(row.code), str(row.job.code), row.image, row.image.split("/")[-1]]
+        told += [agent["id"] for agent in (row.modification or {}).get("add", ())]
     return [secret for secret in told if secret]
 
 

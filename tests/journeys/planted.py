@@ -52,6 +52,21 @@ def json_field(get_response: Next) -> Next:
     return answer
 
 
+def text_with_ids(get_response: Next) -> Next:
+    """The text description names agents as their modifications do."""
+
+    def answer(request: HttpRequest) -> HttpResponseBase:
+        response = get_response(request)
+        if request.path == "/api/v1/matchups":
+            given = json.loads(response.getvalue())
+            for one in given:
+                one["text"]["a"] = [f"zanzibar1: {line}" for line in one["text"]["a"]]
+            response.content = json.dumps(given)  # type: ignore[attr-defined]
+        return response
+
+    return answer
+
+
 def drawn(shade: int, *, width: int = 1200, height: int = 800) -> bytes:
     """A picture as large as the renderer's."""
     return png(shade, width=width, height=height)

@@ -23,6 +23,7 @@ from arena.services.faults import open_labelling
 from arena.services.studies import close_study
 from augment.models import Augmentation, Contestant, Endpoint, GenerationJob
 from augment.services.pictures import store
+from tests.described import a_described_study
 from tests.journeys import planted
 from tests.journeys.blindness import (
     Answer,
@@ -43,8 +44,11 @@ TOKENS = [field.name for field in Matchup._meta.fields if field.name.endswith("_
 
 @pytest.fixture
 def study() -> Study:
-    """An open study whose contestants have telling names, models and variants."""
-    study = a_study(contestants=SECRETS)
+    """An open study whose contestants have telling names, models, variants and agents.
+
+    Its experts may read the text description.
+    """
+    study = a_described_study(contestants=SECRETS)
     endpoint = Endpoint.objects.create(label="hosted-llama", base_url="https://llama.example/v1")
     Contestant.objects.filter(slug="zanzibar").update(
         name="Zanzibar OTM",
@@ -111,6 +115,8 @@ def patterns(entries: list[URLPattern | URLResolver], before: str = "") -> list[
 
 def test_following_every_link_tells_nothing(eva: Client, study: Study) -> None:
     seen = crawl(eva, ["/", matchups_page(study)])
+    assert b"Vehicle, " in seen[matchups_page(study)].body, "the crawl read no text description"
+    assert b"<li>Vehicle, " in seen[f"/studies/{study.code}/vote/"].body
     for part, what in (("/i/", "picture"), ("/vote/", "voting page"), ("/label/", "labelling")):
         assert any(part in address for address in seen), f"the crawl saw no {what}"
     assert leaks(study, seen) == []
@@ -135,6 +141,19 @@ def test_the_page_after_a_label_tells_nothing_either(eva: Client, study: Study) 
     seen = crawl(eva, [page])
     assert b"The automatic checks" in seen[page].body
     assert leaks(study, seen) == []
+
+
+def test_the_text_tells_of_places_and_nothing_that_is_the_contestants_own(
+    eva: Client, study: Study
+) -> None:
+    """Both sides are described alike: no id, and no place of the modification's own order."""
+    pattern = re.compile(
+        r"Vehicle, \d+\.\d m ahead, 1\.5 m right, facing as the ego does, standing"
+    )
+    for pair in eva.get(matchups_page(study)).json():
+        assert set(pair["text"]) == {"a", "b"}
+        for lines in pair["text"].values():
+            assert [bool(pattern.fullmatch(line)) for line in lines] == [True]
 
 
 # --- Pictures and their tokens -----------------------------------------------------------------
@@ -249,6 +268,7 @@ def test_a_name_on_a_page_is_found(eva: Client, study: Study) -> None:
         ("last_modified", "has a header Last-Modified"),
         ("shared_cache", "may be kept by others than the browser"),
         ("json_field", "has a field 'batch'"),
+        ("text_with_ids", "tells 'zanzibar1'"),
     ],
 )
 def test_a_planted_header_or_field_is_found(

@@ -155,5 +155,6 @@ def test_the_command_opens_a_study_with_its_rules_and_says_what_it_planned() -> 
     said = "24 votes, 6 hidden repeats, 2 attention checks; 0 votes are planned later."
     assert said in out.getvalue()
     assert Study.objects.get().allow_both_miss
+    assert not Study.objects.get().allow_text
     with pytest.raises(CommandError, match="is no target"):
         call_command(*given, "--targets", "ann lots")

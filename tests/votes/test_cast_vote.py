@@ -124,6 +124,7 @@ def test_a_closed_study_takes_no_votes_but_knows_the_ones_it_has() -> None:
         ({"outcome": "equal", "both_miss": True}, "both_miss"),
         ({"outcome": "left", "comment": "x" * 1001}, "comment"),
         ({"outcome": "left", "aids": ["zoom", "glasses"]}, "aids"),
+        ({"outcome": "left", "aids": ["text"]}, "aids"),
     ],
 )
 def test_parts_that_do_not_go_together_are_refused_by_name(

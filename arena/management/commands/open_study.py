@@ -59,6 +59,11 @@ class Command(BaseCommand):
             help="let experts add to Equal that both miss the instruction",
         )
         parser.add_argument(
+            "--text",
+            action="store_true",
+            help="let experts read a text description of what was changed",
+        )
+        parser.add_argument(
             "--allow-simulated",
             action="store_true",
             help="let simulated contestants and experts take part; everything then says so",
@@ -83,6 +88,7 @@ class Command(BaseCommand):
                     appearances=appearances,
                     pair_votes=pair_votes,
                     allow_both_miss=options["both_miss"],
+                    allow_text=options["text"],
                 ),
             )
         except (ArenaError, AugmentError) as error:

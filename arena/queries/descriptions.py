@@ -1,0 +1,84 @@
+"""The text description in words: what augment.render.description gives as values."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from functools import cache
+from typing import Any
+
+from django.utils.translation import get_language, gettext
+from django.utils.translation import gettext_noop as _
+
+_KINDS = {
+    "EGO_VEHICLE": _("Vehicle"),
+    "VEHICLE": _("Vehicle"),
+    "BUS": _("Bus"),
+    "BICYCLE": _("Bicycle"),
+    "PEDESTRIAN": _("Pedestrian"),
+    "TRAFFIC_CONE": _("Traffic cone"),
+    "BARRIER": _("Barrier"),
+    "CONSTRUCTION_SIGN": _("Construction sign"),
+    "GENERIC_OBJECT": _("Object"),
+}
+_HEADINGS = {
+    0: _("facing as the ego does"),
+    90: _("facing left"),
+    -90: _("facing right"),
+    180: _("facing the opposite way"),
+}
+_ALONG = {0: _("lying lengthways"), 90: _("lying across")}
+_FACING = (_("facing {}° to the left"), _("facing {}° to the right"))
+_TURNED = (_("turned {}° to the left"), _("turned {}° to the right"))
+_AHEAD = (_("{} m ahead"), _("{} m behind"))
+_LEFT = (_("{} m left"), _("{} m right"))
+_NOTHING, _GONE = _("Nothing was changed."), _("No longer there: {}")
+_STANDS, _MOVES, _WALKS = _("standing"), _("moving at {} m/s"), _("walking to {}")
+_ALL = (
+    *(*_KINDS.values(), *_HEADINGS.values(), *_ALONG.values()),
+    *(*_FACING, *_TURNED, *_AHEAD, *_LEFT, _NOTHING, _GONE, _STANDS, _MOVES, _WALKS),
+)
+
+Words = Mapping[str, str]
+
+
+def told(lines: Sequence[Mapping[str, Any]]) -> list[str]:
+    """One sentence for each line, in the language of whoever reads."""
+    words = _words(get_language())
+    return [_sentence(line, words) for line in lines] or [words[_NOTHING]]
+
+
+# Private
+
+
+@cache
+def _words(language: str | None) -> Words:
+    """All words at once: the catalogue takes longer over one than a whole pair may take."""
+    return {text: gettext(text) for text in _ALL}
+
+
+def _sentence(line: Mapping[str, Any], words: Words) -> str:
+    parts = [words[_KINDS[line["kind"]]], _place(line["ahead_m"], line["left_m"], words)]
+    if line["heading_deg"] is not None:
+        parts.append(_angle(line["heading_deg"], _HEADINGS, _FACING, words))
+    if line["along_deg"] is not None:
+        parts.append(_angle(line["along_deg"], _ALONG, _TURNED, words))
+    if line["walk_to_m"]:
+        ahead_m, left_m = line["walk_to_m"]
+        parts.append(words[_WALKS].format(_place(ahead_m, left_m, words)))
+    elif line["speed_mps"]:
+        parts.append(words[_MOVES].format(f"{line['speed_mps']:.1f}"))
+    elif line["speed_mps"] is not None:
+        parts.append(words[_STANDS])
+    said = ", ".join(parts)
+    return words[_GONE].format(said) if line["change"] == "gone" else said
+
+
+def _place(ahead_m: float, left_m: float, words: Words) -> str:
+    ahead, left = words[_AHEAD[ahead_m < 0]], words[_LEFT[left_m < 0]]
+    return f"{ahead.format(f'{abs(ahead_m):.1f}')}, {left.format(f'{abs(left_m):.1f}')}"
+
+
+def _angle(degrees: int, named: Mapping[int, str], turns: tuple[str, str], words: Words) -> str:
+    if degrees in named:
+        return words[named[degrees]]
+    return words[turns[degrees < 0]].format(abs(degrees))

@@ -1,0 +1,163 @@
+"""What the text description of a study holds, from its opening on."""
+
+from __future__ import annotations
+
+from io import StringIO
+
+import pytest
+from django.core.management import call_command
+from django.utils.translation import override
+
+from arena.models import Study
+from arena.queries.descriptions import told
+from arena.queries.showings import as_shown
+from arena.services.handing_over import hand_over
+from arena.services.replanning import plan_batch
+from augment.models import Augmentation
+from tests.described import a_described_study, draw_changes, said_of, with_text
+from tests.study_rows import a_study, cast_of, matchups_of, vote
+
+pytestmark = pytest.mark.django_db
+
+
+def read_by(study: Study, username: str) -> list[tuple[list[str], list[str]]]:
+    return [
+        (shown["text"]["a"], shown["text"]["b"])
+        for shown in map(as_shown, matchups_of(study, username))
+    ]
+
+
+def right_for(study: Study, username: str) -> list[tuple[list[str], list[str]]]:
+    return [(said_of(row.left), said_of(row.right)) for row in matchups_of(study, username)]
+
+
+def test_without_being_asked_for_there_is_none() -> None:
+    study = a_study()
+    assert not study.allow_text
+    assert not study.matchups.exclude(descriptions=None).exists()
+    assert all("text" not in as_shown(matchup) for matchup in matchups_of(study, "eva"))
+
+
+def test_every_showing_keeps_what_its_two_pictures_show() -> None:
+    study = a_described_study()
+    assert read_by(study, "eva") == right_for(study, "eva")
+    assert read_by(study, "finn") == right_for(study, "finn")
+
+
+def test_a_repeat_has_the_same_texts_on_the_other_sides() -> None:
+    made = cast_of()
+    draw_changes()
+    study = with_text(made, votes=12, repeat_share=0.25)
+    for row in study.matchups.filter(kind="repeat"):
+        assert row.repeat_of is not None
+        first, again = as_shown(row.repeat_of)["text"], as_shown(row)["text"]
+        assert (again["a"], again["b"]) == (first["b"], first["a"])
+
+
+def test_pairs_that_are_handed_over_or_planned_later_have_theirs() -> None:
+    made = cast_of(experts=("eva", "finn"), scenarios=12)
+    draw_changes()
+    study = with_text(made, votes=10, adaptive_share=0.5)
+    hand_over(study=study, username="finn", to=["eva"])
+    for matchup in matchups_of(study, "eva"):
+        vote(matchup)
+    assert plan_batch(study=study, expert=matchups_of(study, "eva")[0].expert)
+    assert study.matchups.filter(batch__gt=0).exists()
+    assert read_by(study, "eva") == right_for(study, "eva")
+
+
+def test_what_is_edited_later_does_not_change_what_was_read() -> None:
+    study = a_described_study()
+    before = read_by(study, "eva")
+    Augmentation.objects.update(modification={})
+    assert read_by(study, "eva") == before
+
+
+def test_an_unreadable_answer_reads_like_its_picture_the_unchanged_scene() -> None:
+    made = cast_of()
+    draw_changes()
+    Augmentation.objects.filter(contestant__slug="ann").update(
+        state=Augmentation.State.UNREADABLE, modification=None
+    )
+    study = with_text(made)
+    for row in study.matchups.select_related("left__contestant"):
+        if row.left.contestant.slug == "ann":
+            assert as_shown(row)["text"]["a"] == ["Nothing was changed."]
+
+
+def test_the_command_opens_it_too() -> None:
+    given = ["open_study", "Round 1", "--votes-per-expert", "9", "--seed", "1", "--text"]
+    made = cast_of()
+    draw_changes()
+    for option, names in made.items():
+        given += [f"--{option}", *names]  # type: ignore[misc]
+    call_command(*given, stdout=StringIO())
+    assert Study.objects.get().allow_text
+
+
+# --- The words ---------------------------------------------------------------------------------
+
+LINE = {
+    **{"change": "changed", "kind": "VEHICLE", "ahead_m": 12.0, "left_m": -1.5},
+    **{"heading_deg": 0, "along_deg": None, "speed_mps": 0.0, "walk_to_m": None},
+}
+WALK = {"kind": "PEDESTRIAN", "heading_deg": -90, "speed_mps": None, "walk_to_m": [12.0, -5.0]}
+BAR = {"kind": "BARRIER", "heading_deg": None, "speed_mps": None}
+
+
+@pytest.mark.parametrize(
+    ("changes", "english", "german"),
+    [
+        (
+            {},
+            "Vehicle, 12.0 m ahead, 1.5 m right, facing as the ego does, standing",
+            "Fahrzeug, 12.0 m voraus, 1.5 m rechts, gleich gerichtet wie das Ego-Fahrzeug, steht",
+        ),
+        (
+            {"ahead_m": -3.2, "left_m": 2.0, "heading_deg": 180, "speed_mps": 8.3, "kind": "BUS"},
+            "Bus, 3.2 m behind, 2.0 m left, facing the opposite way, moving at 8.3 m/s",
+            "Bus, 3.2 m dahinter, 2.0 m links, entgegengesetzt gerichtet, fährt mit 8.3 m/s",
+        ),
+        (
+            {"heading_deg": 30, "kind": "BICYCLE"},
+            "Bicycle, 12.0 m ahead, 1.5 m right, facing 30° to the left, standing",
+            "Fahrrad, 12.0 m voraus, 1.5 m rechts, 30° nach links gerichtet, steht",
+        ),
+        (
+            WALK,
+            "Pedestrian, 12.0 m ahead, 1.5 m right, facing right, "
+            "walking to 12.0 m ahead, 5.0 m right",
+            "Person zu Fuß, 12.0 m voraus, 1.5 m rechts, nach rechts gerichtet, "
+            "geht bis 12.0 m voraus, 5.0 m rechts",
+        ),
+        (
+            BAR | {"along_deg": 90},
+            "Barrier, 12.0 m ahead, 1.5 m right, lying across",
+            "Absperrung, 12.0 m voraus, 1.5 m rechts, quer liegend",
+        ),
+        (
+            BAR | {"along_deg": -30, "change": "gone"},
+            "No longer there: Barrier, 12.0 m ahead, 1.5 m right, turned 30° to the right",
+            "Nicht mehr da: Absperrung, 12.0 m voraus, 1.5 m rechts, 30° nach rechts gedreht",
+        ),
+        (
+            BAR | {"kind": "TRAFFIC_CONE"},
+            "Traffic cone, 12.0 m ahead, 1.5 m right",
+            "Leitkegel, 12.0 m voraus, 1.5 m rechts",
+        ),
+    ],
+)
+def test_a_line_is_said_in_both_languages(
+    changes: dict[str, object], english: str, german: str
+) -> None:
+    with override("en"):
+        assert told([LINE | changes]) == [english]
+    with override("de"):
+        assert told([LINE | changes]) == [german]
+
+
+def test_nothing_is_said_in_both_languages() -> None:
+    with override("en"):
+        assert told([]) == ["Nothing was changed."]
+    with override("de"):
+        assert told([]) == ["Nichts wurde geändert."]
