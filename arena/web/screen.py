@@ -15,7 +15,12 @@ from django.utils.translation import pgettext
 from arena.models import Report, Study, Vote
 from arena.queries.showings import as_shown
 from arena.queries.votes import VotingProgress, recent_votes, voting_progress
-from arena.queries.voting_keys import KEY_LABELS, USUAL_KEYS, voting_preferences
+from arena.queries.voting_keys import (
+    KEY_LABELS,
+    USUAL_KEYS,
+    VotingPreferences,
+    voting_preferences,
+)
 from arena.services.replanning import next_pairs
 
 AHEAD = 5
@@ -101,8 +106,8 @@ def vote_context(study: Study, expert: User, *, change: str) -> dict[str, Any] |
         "legend": preferences.switches["legend"],
         "skip_reasons": Vote.SkipReason.choices,
         "report_reasons": Report.Reason.choices,
-        "looks": _looks(),
-        "key_labels": _key_labels(),
+        "looks": _looks(study),
+        "key_labels": _key_labels(study),
     }
     context["given"] = {
         "study": str(study.code),
@@ -113,7 +118,7 @@ def vote_context(study: Study, expert: User, *, change: str) -> dict[str, Any] |
         "last": [vote.as_json() for vote in last],
         "change": str(changed.key) if changed else None,
         "allow_both_miss": study.allow_both_miss,
-        "preferences": preferences.as_json(),
+        "preferences": _preferences(study, preferences),
         **_counts(context["progress"]),
     }
     return context
@@ -185,14 +190,26 @@ def _alts() -> dict[str, str]:
     }
 
 
-def _looks() -> list[tuple[str, str]]:
-    return [
-        ("original", _("Original")),
-        ("zoom", _("Zoom")),
-        ("ruler", _("Ruler")),
-        ("legend", _("Legend")),
-    ]
+def _preferences(study: Study, kept: VotingPreferences) -> dict[str, Any]:
+    given = kept.as_json()
+    return given | {"keys": {name: given["keys"][name] for name in _actions(study)}}
 
 
-def _key_labels() -> list[tuple[str, str]]:
-    return [(action, _(KEY_LABELS[action])) for action in USUAL_KEYS]
+def _actions(study: Study) -> list[str]:
+    """What keys do here: nothing tells of a text description where there is none."""
+    return [name for name in USUAL_KEYS if name != "text" or study.allow_text]
+
+
+def _looks(study: Study) -> list[tuple[str, str]]:
+    labels = {
+        "original": _("Original"),
+        "zoom": _("Zoom"),
+        "ruler": _("Ruler"),
+        "text": pgettext("a way to look", "Text"),
+        "legend": _("Legend"),
+    }
+    return [(name, labels[name]) for name in _actions(study) if name in labels]
+
+
+def _key_labels(study: Study) -> list[tuple[str, str]]:
+    return [(action, _(KEY_LABELS[action])) for action in _actions(study)]

@@ -10,7 +10,7 @@ const told = at("keys-told");
 export function showHelp() {
   for (const field of form.elements) {
     if (field.type === "checkbox") field.checked = preferences[field.name];
-    else if (field.name) field.value = preferences.keys[field.name][0];
+    else if (field.name) field.value = preferences.keys[field.name][0] ?? "";
   }
   told.textContent = "";
   if (!help.open) help.showModal();

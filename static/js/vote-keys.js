@@ -16,7 +16,8 @@ export function actionOf(event, { keys, single_keys: areOn }) {
     if (keys.original.includes(key)) return "pin";
     if (/^[\p{L}\p{N}]$/u.test(key)) return undefined;
   }
-  const digit = event.shiftKey ? "" : event.code.match(/^Digit(\d)$/)?.[1]; // where digits need Shift
+  // For keyboards on which digits need Shift.
+  const digit = event.shiftKey ? "" : event.code.match(/^Digit(\d)$/)?.[1];
   const named = (pressed) => Object.keys(keys).find((action) => keys[action].includes(pressed));
   return named(key) ?? named(digit);
 }

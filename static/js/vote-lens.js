@@ -16,10 +16,13 @@ function overlay({ width, height }) {
 
 export class Lens {
   #scale = 1;
-  #x = 0; // of the picture's left edge, in widths of the panel
+  // The picture's upper left corner, in widths and heights of the panel.
+  #x = 0;
   #y = 0;
-  #at = null; // the pointer, in pixels of the picture
-  #from = null; // where the ruler starts; null: at the ego
+  // The pointer, in pixels of the picture.
+  #at = null;
+  // Where the ruler starts; null: at the ego.
+  #from = null;
   #drag = null;
   #pair = null;
   aids = new Set();
@@ -175,7 +178,8 @@ export class Lens {
     });
     on("wheel", (event) => {
       const root = document.documentElement;
-      if (event.ctrlKey || root.scrollHeight > root.clientHeight) return; // the wheel is the page's
+      // The wheel is the page's.
+      if (event.ctrlKey || root.scrollHeight > root.clientHeight) return;
       event.preventDefault();
       this.#zoom(this.#scale * Math.exp(-event.deltaY / 500), ...fraction(event));
     }, { passive: false });

@@ -79,7 +79,8 @@ export class Outbox {
       if (entries.length) localStorage.setItem(this.name, JSON.stringify(entries));
       else localStorage.removeItem(this.name);
     } catch {
-      this.#isKept = false; // a browser that stores nothing: they live as long as the page
+      // A browser that stores nothing: they live as long as the page.
+      this.#isKept = false;
     }
     this.told.changed();
   }

@@ -5,7 +5,8 @@ export const given = JSON.parse(at("given").textContent);
 // What the buttons of the form do.
 export const ACTIONS = { left: "a", equal: "e", right: "b", both_miss: "both_miss" };
 
-const LATE_MS = 400; // a vote that waits for less needs no words
+// A vote that waits for less needs no words.
+const LATE_MS = 400;
 const LAST = 5;
 const { preferences } = given;
 const { body } = document;
@@ -42,10 +43,13 @@ export function replay(element) {
   }
 }
 
-export function drawPair({ instruction, position }) {
+const item = (line) => Object.assign(document.createElement("li"), { textContent: line });
+
+export function drawPair({ instruction, position, text: lists }) {
   at("instruction").textContent = instruction;
   at("ask").classList.toggle("is-long", instruction.length > 160);
   document.title = document.title.replace(/\d+/, position);
+  for (const side in lists) at(`text-${side}`).replaceChildren(...lists[side].map(item));
 }
 
 export function drawReview(vote) {
@@ -102,21 +106,27 @@ export function drawProgress({ saved, total, minutes_left: minutes }) {
 export function drawKeys() {
   body.classList.toggle("has-keys", preferences.single_keys);
   for (const hint of all("kbd[data-key]")) {
-    hint.textContent = preferences.keys[hint.dataset.key][0].toUpperCase();
+    // An action of only some studies has no key where its usual one was chosen for another.
+    hint.textContent = preferences.keys[hint.dataset.key][0]?.toUpperCase();
   }
 }
 
-export function toggleLegend() {
-  const isShown = at("legend").classList.toggle("is-hidden") === false;
-  at("legend-switch").ariaPressed = isShown;
-  return isShown;
+function press(name, isOn) {
+  at(`${name}-switch`).ariaPressed = isOn;
+  return isOn;
 }
+
+export const toggleLegend = () => press("legend", !at("legend").classList.toggle("is-hidden"));
+export const toggleText = () => press("text", at("text").toggleAttribute("open"));
 
 // --- Panels: skip, report, comment, the account's menu ------------------------------------------
 
 let before = null;
 
-export const openPop = () => document.querySelector("details[open]");
+// The lists of the text description stay open beside everything else.
+const POP = "details[open]:not(.text)";
+
+export const openPop = () => document.querySelector(POP);
 
 export function closePop() {
   const pop = openPop();
@@ -142,7 +152,7 @@ export function keyInPop(event) {
   if (isDone || chosen) event.preventDefault();
 }
 
-addEventListener("pointerdown", ({ target }) => target.closest("details[open]") || closePop());
+addEventListener("pointerdown", ({ target }) => target.closest(POP) || closePop());
 
 // --- What has to be answered before voting goes on ----------------------------------------------
 

@@ -3,7 +3,8 @@ const AGAIN_S = [1, 2, 4, 8, 16, 30];
 
 function picture(url, alt) {
   const image = new Image();
-  image.decoding = "sync"; // painted in the same frame as the text that belongs to it
+  // Painted in the same frame as the text that belongs to it.
+  image.decoding = "sync";
   image.draggable = false;
   image.alt = alt;
   image.src = url;

@@ -1,6 +1,7 @@
 // One tab votes at a time. Without Web Locks (plain http to another machine) nothing is held: the
 // server keeps two tabs apart in any case.
-const PATIENCE_MS = 600; // a page that is being left may still hold it
+// A page that is being left may still hold it.
+const PATIENCE_MS = 600;
 
 // Whether this tab may vote now; lost() is called when another tab takes over.
 export function hold(name, lost, { steal = false } = {}) {

@@ -7,17 +7,23 @@ import * as page from "./vote-page.js";
 import { Pairs } from "./vote-pairs.js";
 import { hold } from "./vote-tabs.js";
 
-const BOUNCE_MS = 200; // the second half of a double press must not judge the next pair
+// The second half of a double press must not judge the next pair.
+const BOUNCE_MS = 200;
 const UNDOABLE = 10;
 const ARROWS = { ArrowUp: [0, 1], ArrowDown: [0, -1], ArrowLeft: [-1, 0], ArrowRight: [1, 0] };
 
 const { at, given, text } = page;
 const { preferences, urls } = given;
 const form = at("vote");
+// What was changed, in words; null where the study has no text.
+const lists = at("text");
 const field = form.elements.comment;
-let votes = given.last; // the latest first: {key, position, outcome, both_miss, comment, shown, pair}
-let review = null; // the one of them that is on the screen again
-let onScreen = null; // the pair whose pictures are painted
+// The latest first: {key, position, outcome, both_miss, comment, shown, pair}.
+let votes = given.last;
+// The vote whose pair is on the screen again.
+let review = null;
+// The pair whose pictures are painted.
+let onScreen = null;
 let paintedAt = Infinity;
 let hiddenMs = 0;
 let isLeaving = false;
@@ -46,7 +52,8 @@ function draw() {
     if (pair !== onScreen) paint(pair);
     return;
   }
-  onScreen = form.inert ? null : pair; // what does not show can be skipped
+  // What does not show can be skipped.
+  onScreen = form.inert ? null : pair;
   at("veil-text").textContent = text(state);
   at("again").hidden = form.inert;
   if (!pair) finish();
@@ -56,6 +63,7 @@ function paint(pair) {
   onScreen = pair;
   paintedAt = Infinity;
   lens.show(pair, preferences.keep_zoom);
+  if (lists?.open) lens.aids.add("text");
   page.drawPair(pair.shown);
   form.elements.matchup.value = pair.shown.matchup;
   page.drawReview(review);
@@ -202,13 +210,16 @@ const actions = {
   zoom: () => lens.toggleZoom(),
   reset: () => lens.reset(),
   ruler: () => lens.rule(true),
+  text: () => lists && page.toggleText() && lens.aids.add("text"),
   legend: () => ask(urls.preferences, { legend: page.toggleLegend() }),
   help: () => import("./vote-help.js").then(({ showHelp }) => showHelp(), () => open(at("help-link").href)),
   again: () => pairs.fill(),
   close: page.closePop,
 };
-const always = new Set(["undo", "leave", "legend", "help", "again"]); // without a pair as well
-const held = new Map(); // key code -> what its release ends
+// Actions that go without a pair as well.
+const always = new Set(["undo", "leave", "legend", "help", "again"]);
+// Key code -> what its release ends.
+const held = new Map();
 
 function arrow({ key, shiftKey }) {
   const [ahead, left] = ARROWS[key] ?? [];
@@ -271,7 +282,8 @@ addEventListener("pageshow", ({ persisted }) => persisted && location.reload());
 
 function elsewhere() {
   outbox.halt();
-  isLeaving = true; // the other tab sends what is kept
+  // The other tab sends what is kept.
+  isLeaving = true;
   page.block("elsewhere", 0, async () => {
     await hold(given.outbox, () => {}, { steal: true });
     location.reload();
