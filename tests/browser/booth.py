@@ -31,7 +31,11 @@ HAS_LOADED = """tokens => {
 
 def furnish(*, scenarios: int = 6, votes: int = 9) -> Study:
     """An open study of three contestants with one expert, eva."""
-    study = study_rows.a_study(scenarios=scenarios, votes_per_expert=votes, experts=("eva",))
+    return hang(study_rows.a_study(scenarios=scenarios, votes_per_expert=votes, experts=("eva",)))
+
+
+def hang(study: Study) -> Study:
+    """Pictures of one pixel for all of a study."""
     for number, augmentation in enumerate(Augmentation.objects.order_by("pk")):
         augmentation.image = store(png(number % 256))
         augmentation.save(update_fields=["image"])
