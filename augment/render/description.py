@@ -1,8 +1,8 @@
 """What a picture of a change shows, as a short list of values: the text description.
 
-It tells what the picture tells and nothing else. Whatever is drawn in the changed colour is
-"changed", be it added or moved; whatever stood there before and no longer does is "gone". Ids,
-sizes and the order of a modification leave no trace, and every number is rounded.
+It tells what the picture tells, and of what lies outside of it as well. Whatever is drawn in the
+changed colour is "changed", be it added or moved; whatever stood there before and no longer does
+is "gone". Ids, sizes and the order of a modification leave no trace, and numbers are rounded.
 """
 
 from __future__ import annotations
