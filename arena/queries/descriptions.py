@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from functools import cache
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
-from django.utils.translation import get_language, gettext
 from django.utils.translation import gettext_noop as _
 
 _KINDS = {
@@ -39,21 +37,22 @@ _ALL = (
 )
 
 Words = Mapping[str, str]
+Wording = Callable[[tuple[str, ...]], Words]
 
 
-def told(lines: Sequence[Mapping[str, Any]]) -> list[str]:
-    """One sentence for each line, in the language of whoever reads."""
-    words = _words(get_language())
+def told(lines: Sequence[Mapping[str, Any]], wording: Wording) -> list[str]:
+    """One sentence for each line.
+
+    Args:
+        lines: As they are kept with a matchup.
+        wording: Gives our texts in the language of whoever reads; doors have it from
+            augment.services.wording.
+    """
+    words = wording(_ALL)
     return [_sentence(line, words) for line in lines] or [words[_NOTHING]]
 
 
 # Private
-
-
-@cache
-def _words(language: str | None) -> Words:
-    """All words at once: the catalogue takes longer over one than a whole pair may take."""
-    return {text: gettext(text) for text in _ALL}
 
 
 def _sentence(line: Mapping[str, Any], words: Words) -> str:

@@ -11,7 +11,7 @@ from django.urls import reverse
 
 from arena.errors import NotYours
 from arena.models import LabelTask, Matchup
-from arena.queries.descriptions import told
+from arena.queries.descriptions import Wording, told
 from arena.queries.people import role_of
 from augment.models import Scenario
 from augment.services.pictures import camera_of
@@ -62,8 +62,13 @@ def view_shown(matchup: Matchup) -> dict[str, Any]:
     return view_of(matchup.scenario) if matchup.view is None else matchup.view
 
 
-def as_shown(matchup: Matchup) -> dict[str, Any]:
-    """All that an expert's browser learns of a matchup: tokens, never contestants."""
+def as_shown(matchup: Matchup, wording: Wording) -> dict[str, Any]:
+    """All that an expert's browser learns of a matchup: tokens, never contestants.
+
+    Args:
+        matchup: With its scenario.
+        wording: For the text description, where the study has one.
+    """
     original = matchup.original_token if matchup.original_image else None
     shown = {
         "matchup": str(matchup.code),
@@ -76,7 +81,7 @@ def as_shown(matchup: Matchup) -> dict[str, Any]:
     }
     if matchup.descriptions is not None:
         left, right = matchup.descriptions
-        shown["text"] = {"a": told(left), "b": told(right)}
+        shown["text"] = {"a": told(left, wording), "b": told(right, wording)}
     return shown
 
 

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from functools import cache
 from typing import Any
 
+from django.utils.translation import get_language, gettext_noop
 from django.utils.translation import gettext as _
-from django.utils.translation import gettext_noop
 
 from augment.sentences import Sentence, filled, sentence_of
 
@@ -33,6 +35,19 @@ def said(sentence: str | Exception) -> str:
         }
         return filled(_(text.text), values)
     return _(text) if text else ""
+
+
+def in_words(texts: tuple[str, ...]) -> Mapping[str, str]:
+    """Marked texts and what they are in the reader's language.
+
+    For what is said many times in one answer: the catalogue takes long over a single text.
+    """
+    return _in_words(texts, get_language())
+
+
+@cache
+def _in_words(texts: tuple[str, ...], language: str | None) -> Mapping[str, str]:
+    return {text: _(text) for text in texts}
 
 
 def _said_value(value: Any, *, is_ours: bool) -> Any:

@@ -61,7 +61,8 @@ def test_the_key_of_what_only_some_studies_have_gives_way_to_a_chosen_one(eva: U
     assert (keys["zoom"], keys["text"]) == (["t"], ["x"])
     refused = post(eva, {"keys": {"zoom": "t", "text": "t"}})
     assert refused.status_code == 422
-    assert "t would do two things: zoom, text." in refused.json()["error"]["fields"]["keys"]
+    said = refused.json()["error"]["fields"]["keys"]
+    assert "'t' would do two things: Zoom, Text description." in said
 
 
 def test_the_usual_keys_come_back(eva: User) -> None:

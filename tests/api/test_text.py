@@ -10,6 +10,7 @@ from django.test.utils import CaptureQueriesContext
 
 from arena.models import Study, Vote
 from arena.queries.showings import as_shown
+from augment.services.wording import in_words
 from tests.api.asking import body_for, error_of, post, signed_in
 from tests.described import a_described_study, said_of
 from tests.study_rows import a_study, matchups_of
@@ -87,6 +88,6 @@ def test_putting_a_pair_into_words_takes_less_than_a_millisecond(described: Stud
     taken = []
     for _ in range(50):
         start = time.perf_counter()
-        as_shown(matchup)
+        as_shown(matchup, in_words)
         taken.append(time.perf_counter() - start)
     assert min(taken) < 0.001
