@@ -234,6 +234,8 @@ addEventListener("keydown", (event) => {
   const { target, repeat, code } = event;
   if (document.querySelector("dialog[open]")) return;
   if (page.openPop()) return page.keyInPop(event);
+  // Where the lists have the focus, arrows scroll them.
+  if (lists?.contains(target) && code.startsWith("Arrow")) return;
   if (arrow(event)) return event.preventDefault();
   const action = actionOf(event, preferences);
   // Enter, held on a button, would click on and on.

@@ -80,6 +80,21 @@ def test_with_other_aids_it_keeps_its_place_in_the_list(told: Booth) -> None:
     assert Vote.objects.get().aids == "zoom text"
 
 
+def test_arrows_scroll_the_lists_that_have_the_focus_and_do_not_vote(told: Booth) -> None:
+    first = study_rows.matchups_of(told.study, "eva")[0]
+    first.descriptions = [side * 40 for side in first.descriptions or []]
+    first.save()
+    page = told.enter()
+    page.keyboard.press("t")
+    panel = page.get_by_role("region", name="Text description")
+    panel.focus()
+    page.keyboard.press("ArrowDown")
+    page.wait_for_function("document.querySelector('#text > div').scrollTop > 0")
+    assert page.inner_text("#place") == "1"
+    press(page, "2")
+    all_sent(page, 1)
+
+
 @pytest.mark.parametrize("size", [(1280, 720), (1366, 650), (1920, 1080)])
 def test_open_or_closed_nothing_scrolls_or_moves_and_every_button_is_free(
     told: Booth, size: tuple[int, int]
