@@ -18,11 +18,10 @@ const form = at("vote");
 // What was changed, in words; null where the study has no text.
 const lists = at("text");
 const field = form.elements.comment;
-// The latest first: {key, position, outcome, both_miss, comment, shown, pair}.
+// The votes, the latest first: {key, position, outcome, both_miss, comment, shown, pair}; the one
+// of them whose pair is on the screen again; the pair whose pictures are painted.
 let votes = given.last;
-// The vote whose pair is on the screen again.
 let review = null;
-// The pair whose pictures are painted.
 let onScreen = null;
 let paintedAt = Infinity;
 let hiddenMs = 0;
@@ -216,9 +215,8 @@ const actions = {
   again: () => pairs.fill(),
   close: page.closePop,
 };
-// Actions that go without a pair as well.
+// Actions that go without a pair as well; key codes and what their release ends.
 const always = new Set(["undo", "leave", "legend", "help", "again"]);
-// Key code -> what its release ends.
 const held = new Map();
 
 function arrow({ key, shiftKey }) {

@@ -89,7 +89,7 @@ def test_arrows_scroll_the_lists_that_have_the_focus_and_do_not_vote(told: Booth
     panel = page.get_by_role("region", name="Text description")
     panel.focus()
     page.keyboard.press("ArrowDown")
-    page.wait_for_function("document.querySelector('#text > div').scrollTop > 0")
+    page.wait_for_function("() => document.querySelector('#text > div').scrollTop > 0")
     assert page.inner_text("#place") == "1"
     press(page, "2")
     all_sent(page, 1)

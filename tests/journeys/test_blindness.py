@@ -146,7 +146,6 @@ def test_the_page_after_a_label_tells_nothing_either(eva: Client, study: Study) 
 def test_the_text_tells_of_places_and_nothing_that_is_the_contestants_own(
     eva: Client, study: Study
 ) -> None:
-    """Both sides are described alike: no id, and no place of the modification's own order."""
     pattern = re.compile(
         r"Vehicle, \d+\.\d m ahead, 1\.5 m right, facing as the ego does, standing"
     )
