@@ -50,7 +50,8 @@ def keep_voting(
         user: Whose preferences they are.
         switches: Some of SWITCHES -> on or off.
         keys: Action -> its only single key; actions that are missing get their usual ones, so an
-            empty mapping takes all back. None leaves the keys alone.
+            empty mapping takes all back. None leaves the keys alone. One of `SOMETIMES` that is
+            missing among others keeps its key: the page that was filled in had no such action.
 
     Raises:
         InvalidPreference: A switch or action is unknown, or keys can't be told apart.
@@ -60,7 +61,8 @@ def keep_voting(
     person = _person(user)
     voting = {**person.preferences.get("voting", {}), **switches}
     if keys is not None:
-        voting["keys"] = _chosen(keys)
+        chosen = _chosen(keys)
+        voting["keys"] = chosen | _unseen(voting.get("keys", {}), keys, chosen)
     person.preferences = {**person.preferences, "voting": voting}
     person.save(update_fields=["preferences"])
     return read_voting(person.preferences)
@@ -71,6 +73,17 @@ def _person(user: User) -> Person:
         user=user, defaults={"pseudonym": user.get_username()}
     )
     return person
+
+
+def _unseen(
+    before: Mapping[str, str], keys: Mapping[str, str], chosen: Mapping[str, str]
+) -> dict[str, str]:
+    """The kept keys of actions that the page did not show, unless they are another's now."""
+    if not keys:
+        return {}
+    unseen = [action for action in SOMETIMES if action in before and action not in keys]
+    used = {chosen.get(action, usual[0]) for action, usual in USUAL_KEYS.items()}
+    return {action: before[action] for action in unseen if before[action] not in used}
 
 
 def _chosen(keys: Mapping[str, str]) -> dict[str, str]:
