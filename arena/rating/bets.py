@@ -23,6 +23,7 @@ from enum import StrEnum
 from math import pi, sqrt, tanh
 
 import numpy as np
+from scipy.special import expit
 
 from arena.rating.bradley_terry import ELO_PER_LOGIT, Meetings, inverse_curvature, newton
 from arena.rating.comparisons import (
@@ -133,11 +134,11 @@ def _bet(votes: Comparisons, strengths: FloatArray, unknown: FloatArray) -> Bet:
     """The bet against one expert's decided votes, in their order."""
     votes = chosen(votes, np.arange(min(len(votes), _MOST_VOTES)))
     left = votes.score == WIN
-    claimed = np.log(_foreseen(votes, strengths, unknown))
+    claimed = np.log(_with_slips(_learnt(votes, strengths, unknown)))
     lefts = np.cumsum(left) - left
     share = (lefts + 0.5) / (np.arange(len(left)) + 1.0)
     blind = np.cumsum(np.log(np.where(left, share, 1.0 - share)) - claimed)
-    swapped = np.cumsum(np.log(_foreseen(votes, -strengths, unknown, learns=False)) - claimed)
+    swapped = np.cumsum(np.log(_with_slips(_at_first(votes, -strengths, unknown))) - claimed)
     wealth = np.logaddexp(blind, swapped) - np.log(2.0)
     best = int(np.argmax(wealth))
     return Bet(
@@ -147,17 +148,20 @@ def _bet(votes: Comparisons, strengths: FloatArray, unknown: FloatArray) -> Bet:
     )
 
 
-def _foreseen(
-    votes: Comparisons, strengths: FloatArray, unknown: FloatArray, *, learns: bool = True
-) -> FloatArray:
-    """(n,) the chance of each vote as it was given, by what is known before it.
+def _with_slips(chance: FloatArray) -> FloatArray:
+    return np.asarray((1.0 - _SLIPS) * chance + _SLIPS / 2.0)
 
-    Args:
-        votes: All decided.
-        strengths: (C,) what is known before the first.
-        unknown: (C, C) covariance of what is not.
-        learns: Whether every vote changes what is foreseen of the next.
-    """
+
+def _at_first(votes: Comparisons, strengths: FloatArray, unknown: FloatArray) -> FloatArray:
+    """(n,) the chance of each decided vote as it was given, by what is known before the first."""
+    first, second = votes.first, votes.second
+    variance = unknown[first, first] + unknown[second, second] - 2.0 * unknown[first, second]
+    gap = (strengths[first] - strengths[second]) / np.sqrt(1.0 + pi / 8.0 * variance)
+    return np.asarray(expit(np.where(votes.score == WIN, gap, -gap)))
+
+
+def _learnt(votes: Comparisons, strengths: FloatArray, unknown: FloatArray) -> FloatArray:
+    """(n,) the same by what is known before each vote, which its forerunners have changed."""
     mean, covariance = strengths.copy(), unknown.copy()
     found = np.empty(len(votes))
     rows = zip(votes.first.tolist(), votes.second.tolist(), votes.score.tolist(), strict=True)
@@ -167,14 +171,12 @@ def _foreseen(
         gap = float(mean[first] - mean[second])
         chance = _logistic(gap / sqrt(1.0 + pi / 8.0 * variance))
         found[row] = chance if score == WIN else 1.0 - chance
-        if not learns:
-            continue
         expected = _logistic(gap)
         curvature = expected * (1.0 - expected)
         shrinks = 1.0 + curvature * variance
         mean += gain * ((score - expected) / shrinks)
-        covariance -= np.outer(gain, gain * (curvature / shrinks))
-    return np.asarray((1.0 - _SLIPS) * found + _SLIPS / 2.0)
+        covariance -= gain[:, None] * (gain * (curvature / shrinks))
+    return found
 
 
 def _logistic(x: float) -> float:

@@ -23,7 +23,7 @@ LEVEL = 0.95
 _NUMBERS_AT_ONCE = 500_000
 """How many numbers a block of rounds may hold; more only costs memory."""
 _LARGEST_TABLE = 2_000_000
-_NUMBERS_OF_TABLES = 12_000_000
+_NUMBERS_OF_TABLES = 8_000_000
 _EMPTIEST = 500
 """A table with more places than this for each row takes longer than going row by row."""
 

@@ -100,11 +100,13 @@ def _play(halves: FloatArray, places: IntArray, gains: FloatArray, step: float) 
     size, _, rounds = places.shape
     values = np.empty((2, rounds))
     first, second, both = values[0], values[1], values.reshape(-1)
-    moved, signed = np.empty(rounds), np.array([[step], [-step]])
+    moved = np.empty(rounds)
     for place, gain in zip(places.reshape(size, -1), gains, strict=True):
         halves.take(place, out=both, mode="clip")
         np.subtract(second, first, moved)
         np.tanh(moved, moved)
         np.add(moved, gain, moved)
-        np.multiply(signed, moved, values)
-        np.add.at(halves, place, both)
+        np.multiply(moved, step, moved)
+        np.add(first, moved, first)
+        np.subtract(second, moved, second)
+        halves[place] = both  # two contestants of each round: no place is there twice

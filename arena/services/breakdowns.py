@@ -9,6 +9,8 @@ from collections import Counter
 from collections.abc import Sequence
 from typing import Any
 
+from django.db.models import Count
+
 from arena.models import Matchup, Study
 from arena.queries.costs import model_classes, shown_augmentations, spent_on
 from arena.queries.judged import Entrant, Judged, is_imported
@@ -62,11 +64,10 @@ def planned_pairs(study: Study, filters: Filters) -> Counter[frozenset[str]]:
     if filters.experts:
         rows = rows.filter(expert__person__code__in=filters.experts)
     planned: Counter[frozenset[str]] = Counter()
-    for judge, left, right in rows.order_by().values_list(
-        "expert__person__code", "left__contestant__slug", "right__contestant__slug"
-    ):
+    who = "expert__person__code", "left__contestant__slug", "right__contestant__slug"
+    for judge, left, right, number in rows.order_by().values_list(*who).annotate(n=Count("pk")):
         if not (filters.leave_out_own and filters.is_own(str(judge), left, right)):
-            planned[frozenset((left, right))] += 1
+            planned[frozenset((left, right))] += number
     return planned
 
 
