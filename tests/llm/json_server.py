@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import json
 import threading
+from abc import ABC, abstractmethod
 from collections.abc import Iterator
 from contextlib import contextmanager
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from typing import Any, TypeVar
 
 
-class JsonServer(ThreadingHTTPServer):
+class JsonServer(ThreadingHTTPServer, ABC):
     """Listens at a free port of this computer.
 
     Args:
@@ -30,9 +31,9 @@ class JsonServer(ThreadingHTTPServer):
     def hear(self, headers: dict[str, str]) -> None:
         """Is told the headers of every request, named in small letters."""
 
+    @abstractmethod
     def answer(self, body: dict[str, Any]) -> tuple[int, object]:
         """Status and document for a request."""
-        raise NotImplementedError
 
 
 class _Handler(BaseHTTPRequestHandler):
