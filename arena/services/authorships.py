@@ -5,10 +5,9 @@ from __future__ import annotations
 from django.contrib.auth.models import User
 from django.db import transaction
 
-from arena.errors import NotYours
 from arena.models import Authorship, Study
+from arena.services.people import must_take_part
 from augment.errors import UnknownName
-from augment.sentences import sentence
 from augment.services.events import log_event
 
 
@@ -30,14 +29,7 @@ def mark_author(
         NotYours: The account does not take part in the study.
         UnknownName: The study has no such contestant.
     """
-    if not study.experts.filter(pk=expert.pk).exists():
-        raise NotYours(
-            sentence(
-                "%(expert)s does not take part in '%(study)s'.",
-                expert=expert.get_username(),
-                study=study.name,
-            )
-        )
+    must_take_part(study=study, expert=expert)
     made = study.contestants.filter(slug=contestant).first()
     if made is None:
         known = study.contestants.order_by("slug").values_list("slug", flat=True)

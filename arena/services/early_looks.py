@@ -6,6 +6,7 @@ from django.contrib.auth.models import User
 from django.db import transaction
 
 from arena.models import EarlyLook, Study
+from arena.queries.results import votes_in
 from augment.errors import Conflict
 from augment.sentences import sentence, word
 from augment.services.events import log_event
@@ -28,7 +29,7 @@ def open_early(*, study: Study, actor: User) -> None:
         )
     _, is_new = EarlyLook.objects.get_or_create(study=study, user=actor)
     if is_new:
-        ends_voting = study.experts.filter(pk=actor.pk).exists()
+        ends_voting = votes_in(actor, study)
         _log(study, actor, what="results", ends_voting=ends_voting)
 
 

@@ -11,9 +11,10 @@ from django.contrib.sessions.models import Session
 from django.db import transaction
 from django.utils import timezone
 
-from arena.errors import LinkOver, NotYours
+from arena.errors import LinkOver
 from arena.models import Invitation, Study, token_digest
 from arena.queries.invitations import invitation_by_token, may_be_let_in
+from arena.services.people import must_take_part
 from augment.errors import Conflict
 from augment.sentences import sentence
 from augment.services.events import log_event
@@ -43,14 +44,7 @@ def invite(*, study: Study, expert: User, actor: User | None = None) -> FreshLin
         Conflict: The study is a draft, or the account can't be let in by a link: it is simulated,
             inactive, or more than an expert.
     """
-    if not study.experts.filter(pk=expert.pk).exists():
-        raise NotYours(
-            sentence(
-                "%(expert)s does not take part in '%(study)s'.",
-                expert=expert.get_username(),
-                study=study.name,
-            )
-        )
+    must_take_part(study=study, expert=expert)
     if study.state == Study.State.DRAFT:
         raise Conflict(
             sentence("The study '%(name)s' is a draft; open it first.", name=study.name)

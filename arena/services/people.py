@@ -6,9 +6,12 @@ from django.contrib.auth.models import Group, User
 from django.core.exceptions import ValidationError
 from django.db import IntegrityError, transaction
 
-from arena.models import Person
+from arena.errors import NotYours
+from arena.models import Person, Study
 from arena.queries.people import ROLES
+from arena.queries.results import votes_in
 from augment.errors import Conflict, InvalidDocument, UnknownName
+from augment.sentences import sentence
 from augment.services.events import log_event
 from augment.services.texts import one_line
 
@@ -72,6 +75,22 @@ def create_person(
         after={"role": role, "is_simulated": is_simulated},
     )
     return user
+
+
+def must_take_part(*, study: Study, expert: User) -> None:
+    """Refuse an account that is no expert of the study.
+
+    Raises:
+        NotYours: It does not take part.
+    """
+    if not votes_in(expert, study):
+        raise NotYours(
+            sentence(
+                "%(expert)s does not take part in '%(study)s'.",
+                expert=expert.get_username(),
+                study=study.name,
+            )
+        )
 
 
 def _check_username(username: str) -> None:

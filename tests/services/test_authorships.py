@@ -14,21 +14,11 @@ from arena.services.authorships import mark_author, take_back_author
 from arena.services.studies import close_study
 from augment.errors import UnknownName
 from augment.models import Contestant, Event
-from tests.study_rows import a_study, contestant, expert, matchups_of, rows_planned, vote
+from tests.study_rows import contestant, expert, matchups_of, rows_planned, vote
 
 pytestmark = pytest.mark.django_db
 
 ACTS = ("mark author", "take back author")
-
-
-@pytest.fixture
-def study() -> Study:
-    return a_study()
-
-
-@pytest.fixture
-def eva(study: Study) -> User:
-    return User.objects.get(username="eva")
 
 
 def test_a_mark_says_who_made_it_and_when_and_so_does_the_log(study: Study, eva: User) -> None:

@@ -15,19 +15,9 @@ from arena.queries.invitations import expert_lines
 from arena.services.invitations import accept, invite, revoke
 from augment.errors import Conflict
 from augment.models import Event
-from tests.study_rows import a_study, expert, matchups_of, vote
+from tests.study_rows import expert, matchups_of, vote
 
 pytestmark = pytest.mark.django_db
-
-
-@pytest.fixture
-def study() -> Study:
-    return a_study()
-
-
-@pytest.fixture
-def eva(study: Study) -> User:
-    return User.objects.get(username="eva")
 
 
 def test_a_link_works_for_fourteen_days_and_is_kept_as_a_hash(study: Study, eva: User) -> None:
