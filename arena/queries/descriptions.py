@@ -29,11 +29,12 @@ _FACING = (_("facing {}° to the left"), _("facing {}° to the right"))
 _TURNED = (_("turned {}° to the left"), _("turned {}° to the right"))
 _AHEAD = (_("{} m ahead"), _("{} m behind"))
 _LEFT = (_("{} m left"), _("{} m right"))
+_IN_LINE = _("in line with the ego")
 _NOTHING, _GONE = _("Nothing was changed."), _("No longer there: {}")
 _STANDS, _MOVES, _WALKS = _("standing"), _("moving at {} m/s"), _("walking to {}")
 _ALL = (
     *(*_KINDS.values(), *_HEADINGS.values(), *_ALONG.values()),
-    *(*_FACING, *_TURNED, *_AHEAD, *_LEFT, _NOTHING, _GONE, _STANDS, _MOVES, _WALKS),
+    *(*_FACING, *_TURNED, *_AHEAD, *_LEFT, _IN_LINE, _NOTHING, _GONE, _STANDS, _MOVES, _WALKS),
 )
 
 Words = Mapping[str, str]
@@ -73,8 +74,9 @@ def _sentence(line: Mapping[str, Any], words: Words) -> str:
 
 
 def _place(ahead_m: float, left_m: float, words: Words) -> str:
-    ahead, left = words[_AHEAD[ahead_m < 0]], words[_LEFT[left_m < 0]]
-    return f"{ahead.format(f'{abs(ahead_m):.1f}')}, {left.format(f'{abs(left_m):.1f}')}"
+    ahead = words[_AHEAD[ahead_m < 0]].format(f"{abs(ahead_m):.1f}")
+    side = words[_LEFT[left_m < 0] if left_m else _IN_LINE].format(f"{abs(left_m):.1f}")
+    return f"{ahead}, {side}"
 
 
 def _angle(degrees: int, named: Mapping[int, str], turns: tuple[str, str], words: Words) -> str:

@@ -120,6 +120,12 @@ BAR = {"kind": "BARRIER", "heading_deg": None, "speed_mps": None}
             "Bus, 3.2 m dahinter, 2.0 m links, entgegengesetzt gerichtet, fährt mit 8.3 m/s",
         ),
         (
+            {"left_m": 0.0},
+            "Vehicle, 12.0 m ahead, in line with the ego, facing as the ego does, standing",
+            "Fahrzeug, 12.0 m voraus, in einer Linie mit dem Ego-Fahrzeug, "
+            "gleich gerichtet wie das Ego-Fahrzeug, steht",
+        ),
+        (
             {"heading_deg": 30, "kind": "BICYCLE"},
             "Bicycle, 12.0 m ahead, 1.5 m right, facing 30° to the left, standing",
             "Fahrrad, 12.0 m voraus, 1.5 m rechts, 30° nach links gerichtet, steht",
