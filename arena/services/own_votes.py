@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections import Counter
 from typing import Any
 
-from arena.queries.judged import Judged
+from arena.queries.judged import AUTOMATIC, Judged
 from arena.queries.vote_sets import Filters, VoteSet
 from arena.rating.leaderboard import Leaderboard, Line, rate
 from arena.services.vote_arrays import vote_arrays
@@ -53,7 +53,7 @@ def with_and_without(votes: VoteSet, filters: Filters, board: Leaderboard) -> Do
         "left_out": filters.leave_out_own,
         "votes": len(own),
         "experts": len(by_judge),
-        "of_experts": len({vote.judge for vote in votes.with_own}),
+        "of_experts": len({vote.judge for vote in votes.with_own if vote.kind != AUTOMATIC}),
         "rounds": other.rounds,
         "reasons": [one.as_document() for one in other.reasons],
         "largest": _largest(lines),

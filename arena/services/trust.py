@@ -7,12 +7,13 @@ from typing import Any
 
 import numpy as np
 
+from arena.queries.judged import REPEAT
 from arena.queries.vote_sets import VoteSet
 from arena.rating import elo
 from arena.rating.bets import bets, limit
 from arena.rating.bootstrap import Unit
 from arena.rating.bradley_terry import ELO_PER_LOGIT, MEAN_ELO
-from arena.rating.comparisons import Comparisons, FloatArray
+from arena.rating.comparisons import Comparisons, FloatArray, chosen
 from arena.rating.fit_test import fit_test
 from arena.rating.influence import (
     fewest_votes_to_change_first,
@@ -205,7 +206,9 @@ def _panel(
         without = without_each_expert(inner, strengths)
         changes = rank_changes(strengths, without)
     names = {vote.judge: vote.judge_name for vote in votes.counted}
-    against = bets(inner)
+    # To say the same of the same pictures again is no new evidence.
+    fresh = np.array([vote.kind != REPEAT for vote in votes.counted], dtype=bool)
+    against = bets(chosen(inner, fresh))
     return [
         asdict(line)
         | {

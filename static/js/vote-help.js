@@ -33,7 +33,7 @@ form.addEventListener("submit", (event) => {
   const changes = { keys };
   for (const field of form.elements) {
     if (field.type === "checkbox") changes[field.name] = field.checked;
-    else if (field.name) keys[field.name] = field.value;
+    else if (field.value) keys[field.name] = field.value;
   }
   keep(changes);
 });

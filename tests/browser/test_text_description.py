@@ -5,10 +5,12 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 import pytest
+from django.contrib.auth.models import User
 from playwright.sync_api import Browser, Page, expect
 from pytest_django.live_server_helper import LiveServer
 
 from arena.models import Study, Vote
+from arena.services.preferences import keep_voting
 from tests import study_rows
 from tests.browser.booth import PHONE, Booth, all_sent, hang, press, ready
 from tests.browser.test_voting_page import faults
@@ -69,6 +71,16 @@ def test_t_shows_and_hides_the_lists_and_pairs_bring_their_own(told: Booth) -> N
     press(page, "1")
     all_sent(page, 4)
     assert told.votes()[3].aids == ""
+
+
+def test_where_its_key_was_given_away_the_keys_can_still_be_saved(told: Booth) -> None:
+    keep_voting(user=User.objects.get(username="eva"), switches={}, keys={"zoom": "t"})
+    page = told.enter()
+    page.keyboard.press("h")
+    own = page.locator("#keys")
+    expect(own.get_by_label("Text description")).to_have_value("")
+    own.get_by_role("button", name="Save").click()
+    expect(page.locator("#keys-told")).to_have_text("Saved.")
 
 
 def test_with_other_aids_it_keeps_its_place_in_the_list(told: Booth) -> None:

@@ -109,5 +109,6 @@ def test_the_command_marks_and_takes_back(
         (("ghost", "ann"), "Unknown expert 'ghost'. Known: eva, finn."),
         (("eva", "zoe"), "Unknown contestant 'zoe'"),
     ):
-        with pytest.raises(CommandError, match=sentence):
-            call_command("mark_author", study.name, *names)
+        for more in ((), ("--take-back",)):
+            with pytest.raises(CommandError, match=sentence):
+                call_command("mark_author", study.name, *names, *more)

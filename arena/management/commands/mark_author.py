@@ -35,6 +35,7 @@ class Command(BaseCommand):
             study = study_named(options["study"])
             expert = _expert(study, username)
             if options["take_back"]:
+                _check_contestant(study, slug)
                 for row in study.authorships.filter(expert=expert, contestant__slug=slug):
                     take_back_author(authorship=row)
             else:
@@ -43,6 +44,12 @@ class Command(BaseCommand):
             raise CommandError(str(error)) from error
         state = "not marked" if options["take_back"] else "marked"
         self.stdout.write(f"{username} is {state} as author of {slug}.")
+
+
+def _check_contestant(study: Study, slug: str) -> None:
+    known = list(study.contestants.order_by("slug").values_list("slug", flat=True))
+    if slug not in known:
+        raise UnknownName("contestant", slug, known)
 
 
 def _expert(study: Study, username: str) -> User:
