@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from ipaddress import ip_address
+from ipaddress import IPv6Address, ip_address, ip_network
 
 from django.conf import settings
 from django.http import HttpRequest
@@ -13,6 +13,8 @@ def client_address(request: HttpRequest) -> str | None:
 
     A header is believed only as far as our own proxies wrote it: with N of them in front, the Nth
     entry from the right is what the outermost of ours saw. Everything further left may be made up.
+    Of IPv6 the first 64 bits count, the rest being whoever's own to change as they like; an IPv4
+    address written as IPv6 is that IPv4 address.
     """
     seen = str(request.META.get("REMOTE_ADDR", ""))
     if settings.PROXIES:
@@ -20,6 +22,11 @@ def client_address(request: HttpRequest) -> str | None:
         if len(parts) >= settings.PROXIES:
             seen = parts[-settings.PROXIES].strip()
     try:
-        return str(ip_address(seen))
+        found = ip_address(seen)
     except ValueError:
         return None
+    if isinstance(found, IPv6Address):
+        if found.ipv4_mapped is not None:
+            return str(found.ipv4_mapped)
+        return str(ip_network((found.packed, 64), strict=False).network_address)
+    return str(found)

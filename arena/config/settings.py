@@ -67,7 +67,12 @@ CONTENT_SECURITY_POLICY = {
 }
 
 # Wrong passwords lock an account for the address that sent them, not for the whole world: nobody
-# can lock out somebody else. Kept in the database, so it holds for every web server.
+# can lock out somebody else. Far more of them, whatever the accounts, lock the address.
+# Kept in the database, so it holds for every web server.
+AXES_HANDLER = "arena.config.login_limit.LoginLimit"
+ADDRESS_FAILURE_LIMIT = env.integer(
+    "ARENA_LOGIN_FAILURES_ADDRESS", default=50, low=1, high=100_000
+)
 AXES_LOCKOUT_PARAMETERS = [["username", "ip_address"]]
 AXES_FAILURE_LIMIT = env.integer("ARENA_LOGIN_FAILURES", default=5, low=1, high=100)
 AXES_COOLOFF_TIME = timedelta(
@@ -97,6 +102,7 @@ INSTALLED_APPS = [
     "arena",
 ]
 MIDDLEWARE = [
+    "arena.config.headers.HeaderMiddleware",
     "django.middleware.security.SecurityMiddleware",
     "csp.middleware.CSPMiddleware",
     "whitenoise.middleware.WhiteNoiseMiddleware",

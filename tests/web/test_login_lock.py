@@ -44,6 +44,28 @@ def test_a_right_password_wipes_the_count() -> None:
         assert attempt("a password").status_code == 302
 
 
+def test_an_address_that_tries_one_account_after_the_other_is_locked_as_a_whole(
+    settings: LazySettings,
+) -> None:
+    people()
+    settings.ADDRESS_FAILURE_LIMIT = 6
+    tried = [attempt("wrong", f"name-{number}").status_code for number in range(6)]
+    assert tried == [200] * 5 + [429]
+    assert attempt("a password").status_code == 429
+    assert attempt("a password", REMOTE_ADDR="192.0.2.7").status_code == 302
+
+
+def test_an_account_of_ones_own_does_not_wipe_the_count_of_the_address(
+    settings: LazySettings,
+) -> None:
+    people()
+    settings.ADDRESS_FAILURE_LIMIT = 6
+    for number in range(5):
+        assert attempt("wrong", f"name-{number}").status_code == 200
+        assert attempt("a password").status_code == 302
+    assert attempt("wrong", "name-5").status_code == 429
+
+
 def test_a_made_up_header_does_not_open_the_lock() -> None:
     people()
     for number in range(5):
@@ -60,7 +82,8 @@ def test_a_made_up_header_does_not_open_the_lock() -> None:
         (2, "192.0.2.7", "127.0.0.1"),
         (1, "", None),
         (1, "unknown", None),
-        (1, "2001:db8::1", "2001:db8::1"),
+        (1, "2001:db8:1:2:3:4:5:6", "2001:db8:1:2::"),
+        (1, "::ffff:192.0.2.7", "192.0.2.7"),
     ],
 )
 def test_the_address_is_the_one_that_our_own_proxies_saw(

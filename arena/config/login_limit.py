@@ -1,0 +1,39 @@
+"""How many wrong passwords are too many: for an account at an address, and for an address."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from axes.attempts import get_cool_off_threshold
+from axes.handlers.database import AxesDatabaseHandler
+from axes.helpers import get_failure_limit
+from axes.models import AccessAttempt
+from django.conf import settings
+from django.db.models import Sum
+from django.http import HttpRequest
+
+
+class LoginLimit(AxesDatabaseHandler):  # type: ignore[misc] # untyped
+    """Also counts an address as a whole, so that one can't try every account a few times.
+
+    A right password wipes the count of its own account alone: whoever has an account can't use
+    it to go on with the others.
+    """
+
+    def get_failures(self, request: HttpRequest, credentials: dict[str, Any] | None = None) -> int:
+        """Failures of the account at this address; at the limit too once the address is there."""
+        failures = int(super().get_failures(request, credentials))
+        if _of_address(request) < settings.ADDRESS_FAILURE_LIMIT:
+            return failures
+        return max(failures, int(get_failure_limit(request, credentials)))
+
+
+def _of_address(request: HttpRequest) -> int:
+    """Failures from there within the time of a lock, 0 where no address is known."""
+    address = getattr(request, "axes_ip_address", None)
+    if address is None:
+        return 0
+    recent = AccessAttempt.objects.filter(
+        ip_address=address, attempt_time__gt=get_cool_off_threshold(request)
+    )
+    return int(recent.aggregate(total=Sum("failures_since_start"))["total"] or 0)
