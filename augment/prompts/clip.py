@@ -39,17 +39,20 @@ def boundary_within(boundary_m: FloatArray, radius_m: float) -> FloatArray:
 
 
 def simplified(boundary_m: FloatArray, tolerance_m: float) -> FloatArray:
-    """The boundary (P, 2) without points that lie on the line between their neighbours.
+    """The boundary (P, 2) with fewer of its points, nowhere further off than the tolerance.
 
-    A point goes where it is within the tolerance of the line from the last kept point to the
-    next one; what is left is at least a triangle.
+    Douglas and Peucker's algorithm (1973) with distances to segments: every point left out is
+    within the tolerance of the edge that replaces it and, since the piece left out runs from one
+    end of that edge to the other, every point of the edge is within the tolerance of that piece.
+    A boundary that would be less than a triangle stays as it is.
     """
-    kept = [boundary_m[0]]
-    for index in range(1, len(boundary_m)):
-        following = boundary_m[(index + 1) % len(boundary_m)]
-        if _off_line(boundary_m[index], kept[-1], following) > tolerance_m:
-            kept.append(boundary_m[index])
-    return np.array(kept) if len(kept) >= 3 else boundary_m
+    import shapely
+
+    closed = shapely.LineString([*boundary_m, boundary_m[0]])
+    kept = shapely.get_coordinates(shapely.simplify(closed, tolerance_m, preserve_topology=False))[
+        :-1
+    ]
+    return kept if len(kept) >= 3 else boundary_m
 
 
 def _cut(points: FloatArray, outside_m: FloatArray) -> FloatArray:
@@ -63,12 +66,3 @@ def _cut(points: FloatArray, outside_m: FloatArray) -> FloatArray:
         if here <= 0.0:
             kept.append(points[index])
     return np.array(kept).reshape(-1, 2)
-
-
-def _off_line(point: FloatArray, start: FloatArray, end: FloatArray) -> float:
-    along = end - start
-    length = float(np.hypot(*along))
-    offset = point - start
-    if length < 1e-9:
-        return float(np.hypot(*offset))
-    return abs(float(along[0] * offset[1] - along[1] * offset[0])) / length

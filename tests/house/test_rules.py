@@ -14,7 +14,10 @@ from tests.house.source import ROOT, dotted, functions, imported, modules
 HEAVY = {
     "openai": ("augment.llm.openai_wire",),
     "genai_prices": ("augment.services.price_list",),
-    "shapely": ("augment.checks", "augment.scene", "augment.simulation", "augment.formats"),
+    "shapely": (
+        *("augment.checks", "augment.scene", "augment.simulation", "augment.formats"),
+        "augment.prompts.clip",
+    ),
     "pandas": ("augment.formats", "arena.exports"),
     "pyarrow": ("augment.formats", "arena.exports"),
     "matplotlib": ("arena.exports",),

@@ -5,6 +5,9 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from numpy.typing import NDArray
 
 from augment.geometry.polyline import Polyline
 from augment.prompts.clip import boundary_within, line_within, simplified
@@ -19,7 +22,10 @@ from augment.prompts.vectors import (
     scene_text,
 )
 from augment.scene.entities import Lane
+from tests.fixtures.shelf import SLUGS, entry, whole_scene
 from tests.scenes import curve, junction, scene, vehicle
+
+FloatArray = NDArray[np.float64]
 
 
 def test_an_agent_is_type_centre_heading_width_length_velocity_lane() -> None:
@@ -152,3 +158,66 @@ def test_a_boundary_is_cut_and_loses_points_that_say_nothing() -> None:
     assert boundary_within(square + 100.0, 10.0).shape == (0, 2)
     dotted = np.array([[0, 0], [5, 0.05], [10, 0], [10, 10], [0, 10]], dtype=float)
     assert simplified(dotted, 0.1).tolist() == [[0, 0], [10, 0], [10, 10], [0, 10]]
+
+
+def distances_m(points: FloatArray, ring: FloatArray) -> FloatArray:
+    """How far each point (P, 2) is from a closed ring (R, 2), by every edge of it."""
+    starts, edges = ring, np.roll(ring, -1, axis=0) - ring
+    squares = np.maximum((edges**2).sum(axis=1), 1e-300)
+    from_start = points[:, None, :] - starts
+    shares = np.clip((from_start * edges).sum(axis=2) / squares, 0.0, 1.0)
+    return np.asarray(np.linalg.norm(from_start - shares[:, :, None] * edges, axis=2).min(axis=1))
+
+
+def dense(ring: FloatArray, pieces: int = 20) -> FloatArray:
+    """Many points on each edge of a closed ring."""
+    shares = np.arange(pieces)[:, None, None] / pieces
+    return (ring + shares * (np.roll(ring, -1, axis=0) - ring)).reshape(-1, 2)
+
+
+def assert_within(given: FloatArray, kept: FloatArray, tolerance_m: float) -> None:
+    """Neither strays from the other by more than the tolerance."""
+    assert distances_m(dense(given), kept).max() <= tolerance_m + 1e-9
+    assert distances_m(dense(kept), given).max() <= tolerance_m + 1e-9
+    assert {tuple(point) for point in kept} <= {tuple(point) for point in given}
+
+
+@pytest.mark.parametrize("radius_m", [5.0, 30.0, 200.0, 2000.0])
+def test_an_arc_keeps_its_tolerance_however_long_it_is(radius_m: float) -> None:
+    # Each point is within the tolerance of its neighbours' line, all of them together are not.
+    angles = np.linspace(0.0, np.pi, 400)
+    arc = radius_m * np.column_stack([np.cos(angles), np.sin(angles)])
+    kept = simplified(arc, 0.1)
+    assert_within(arc, kept, 0.1)
+    # A chord with the sagitta e spans the angle 2 acos(1 - e / r): fewer can't do.
+    fewest = np.pi / (2.0 * np.arccos(1.0 - 0.1 / radius_m))
+    assert fewest <= len(kept) <= min(3.0 * fewest + 3, 400)
+
+
+@given(
+    st.lists(
+        st.tuples(st.floats(-3.0, 3.0), st.floats(-3.0, 3.0)), min_size=3, max_size=40, unique=True
+    ),
+    st.floats(0.01, 2.0),
+    st.booleans(),
+)
+def test_a_simplified_boundary_strays_nowhere_beyond_the_tolerance(
+    points: list[tuple[float, float]], tolerance_m: float, is_walked: bool
+) -> None:
+    ring = np.array(points)
+    ring = np.cumsum(ring * 0.2, axis=0) if is_walked else ring
+    assert_within(ring, simplified(ring, tolerance_m), tolerance_m)
+
+
+@pytest.mark.parametrize("slug", sorted({entry(slug).scene for slug in SLUGS}))
+def test_the_areas_of_every_prompt_keep_ten_centimetres(slug: str) -> None:
+    shown = whole_scene(slug)
+    names = short_names(shown)
+    written = area_vectors(shown, names, 80.0)
+    for area in shown.areas:
+        cut = boundary_within(np.array(area.boundary_m), 80.0)
+        if len(cut) >= 3:
+            _, points = written[names.areas[area.id]]
+            # Rounded to a centimetre, each point moves by 0.007 m at most.
+            assert distances_m(dense(cut), np.array(points)).max() <= 0.1 + 0.0075
+            assert distances_m(dense(np.array(points)), cut).max() <= 0.1 + 0.0075
