@@ -168,14 +168,15 @@ def _database() -> dict[str, object]:
 
     Django's defaults lose 38 to 61 % of concurrent votes to "database is locked": a deferred
     transaction that turns into a writer can't wait. IMMEDIATE ones queue up instead, and WAL lets
-    readers go on meanwhile.
+    readers go on meanwhile. FULL: what is confirmed is on the disk, also after a power cut; it
+    costs a vote 0.3 ms.
     """
     found = env.database("DATABASE_URL", default=VAR_DIR / "arena.sqlite3")
     if found["ENGINE"] == "django.db.backends.sqlite3":
         found["OPTIONS"] = {
             "timeout": 20,
             "transaction_mode": "IMMEDIATE",
-            "init_command": "PRAGMA journal_mode=WAL; PRAGMA synchronous=NORMAL;",
+            "init_command": "PRAGMA journal_mode=WAL; PRAGMA synchronous=FULL;",
         }
         # Tests run on a file as well: threads that vote at once need what a memory database lacks.
         found["TEST"] = {"NAME": str(VAR_DIR / "test.sqlite3")}
