@@ -13,6 +13,7 @@ from typing import Any
 
 from django.core.exceptions import PermissionDenied, RequestDataTooBig
 from django.http import Http404
+from django.utils.translation import gettext as _
 from rest_framework import exceptions
 from rest_framework.response import Response
 from rest_framework.views import APIView
@@ -93,6 +94,10 @@ def _message(exc: Exception) -> str:
         return "The request is too large to be read."
     if isinstance(exc, exceptions.APIException):
         return str(exc.detail)
+    if isinstance(exc, Http404):  # its own text names tables
+        return _("There is nothing at this address.")
+    if isinstance(exc, PermissionDenied):
+        return _("Your account may not do this.")
     return said(exc)
 
 

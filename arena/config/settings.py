@@ -132,7 +132,7 @@ TEMPLATES = [
         },
     }
 ]
-CSRF_FAILURE_VIEW = "arena.web.faults.forged"
+CSRF_FAILURE_VIEW = "arena.config.faults.forged"
 LOGIN_URL = "login"
 LOGIN_REDIRECT_URL = "home"
 LOGOUT_REDIRECT_URL = "login"

@@ -11,6 +11,7 @@ urlpatterns = [
     path("", include("arena.web.urls")),
 ]
 
-handler403 = "arena.web.faults.refused"
-handler404 = "arena.web.faults.missing"
-handler500 = "arena.web.faults.broken"
+handler400 = "arena.config.faults.unreadable"
+handler403 = "arena.config.faults.refused"
+handler404 = "arena.config.faults.missing"
+handler500 = "arena.config.faults.broken"

@@ -24,9 +24,8 @@ urlpatterns = [
     path("broken/", csrf_exempt(broken)),
     path("", include("arena.config.urls")),
 ]
-handler403 = "arena.web.faults.refused"
-handler404 = "arena.web.faults.missing"
-handler500 = "arena.web.faults.broken"
+handler404 = "arena.config.faults.missing"
+handler500 = "arena.config.faults.broken"
 
 
 @pytest.mark.parametrize(
