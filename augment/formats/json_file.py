@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import json
+from collections import Counter
 from pathlib import Path
 from typing import Any
 
 from augment.errors import InvalidDocument
 
 MAX_BYTES = 64 * 1024 * 1024
+_MOST_NAMED = 5
+_LONGEST_NAMED = 40
 
 
 def read_json(file: Path, *, what: str) -> object:
@@ -41,9 +44,12 @@ def read_json(file: Path, *, what: str) -> object:
 def _object(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
     made = dict(pairs)
     if len(made) < len(pairs):
-        names = [name for name, _ in pairs]
-        doubled = sorted({name for name in names if names.count(name) > 1})
-        raise ValueError(f"named twice in one object: {', '.join(doubled)}")
+        times = Counter(name for name, _ in pairs)
+        doubled = sorted(name for name, count in times.items() if count > 1)
+        shown = ", ".join(ascii(name[:_LONGEST_NAMED]) for name in doubled[:_MOST_NAMED])
+        more = len(doubled) - _MOST_NAMED
+        rest = f" and {more} more" if more > 0 else ""
+        raise ValueError(f"named twice in one object: {shown}{rest}")
     return made
 
 

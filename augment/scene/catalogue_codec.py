@@ -51,7 +51,7 @@ class ClaimDocument(Document):
 
     kind: Annotated[ClaimKind, Strict(False)]
     value: float
-    agents: list[Text] = []
+    agents: Annotated[list[Text], Field(fail_fast=True)] = []
     type: Annotated[AgentType, Strict(False)] | None = None
 
 
@@ -67,7 +67,7 @@ class EntryDocument(Document):
     keep_traffic: bool
     provenance: Text
     notes: str = ""
-    claims: list[ClaimDocument] = []
+    claims: Annotated[list[ClaimDocument], Field(fail_fast=True)] = []
     reference: dict[str, Any]
 
 

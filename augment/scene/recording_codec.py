@@ -24,6 +24,7 @@ from augment.scene.schema import (
     read,
 )
 
+MOST_TRACKS = 50_000
 COLUMNS = ["x_m", "y_m", "heading_rad", "speed_mps"]
 
 Number = Annotated[float, Field(ge=-1e6, le=1e6)]
@@ -37,7 +38,7 @@ class TrackDocument(Document):
     type: AgentTypeText
     length_m: Size
     width_m: Size
-    states: list[State | None]
+    states: Annotated[list[State | None], Field(fail_fast=True)]
 
 
 class RecordingDocument(Document):
@@ -49,9 +50,9 @@ class RecordingDocument(Document):
         list[Literal["x_m", "y_m", "heading_rad", "speed_mps"]],
         Field(min_length=4, max_length=4),
     ]
-    times_s: Annotated[list[Number], Field(min_length=1)]
-    ego: list[State]
-    tracks: list[TrackDocument] = []
+    times_s: Annotated[list[Number], Field(fail_fast=True, min_length=1)]
+    ego: Annotated[list[State], Field(fail_fast=True)]
+    tracks: Annotated[list[TrackDocument], Field(max_length=MOST_TRACKS)] = []
 
 
 def recording_to_document(recording: Recording) -> dict[str, Any]:

@@ -29,8 +29,13 @@ Size = Annotated[float, Field(gt=0.0, le=100.0)]
 Speed = Annotated[float, Field(ge=0.0, le=100.0)]
 Limit = Annotated[float, Field(gt=0.0, le=100.0)]
 PointPair = Annotated[list[Metres], Field(min_length=2, max_length=2)]
-Line = Annotated[list[PointPair], Field(min_length=2)]
-Ring = Annotated[list[PointPair], Field(min_length=3)]
+# The first fault of a line is told, and lists have an end: a broken file of some megabytes is
+# refused as fast as it is read.
+MOST_POINTS = 100_000
+MOST_AGENTS = 5_000
+MOST_WAYS = 50_000
+Line = Annotated[list[PointPair], Field(fail_fast=True, min_length=2, max_length=MOST_POINTS)]
+Ring = Annotated[list[PointPair], Field(fail_fast=True, min_length=3, max_length=MOST_POINTS)]
 # Strict mode would ask for the enum itself; in JSON a member is its text.
 AgentTypeText = Annotated[AgentType, Strict(False)]
 AreaKindText = Annotated[AreaKind, Strict(False)]
@@ -60,6 +65,9 @@ class AgentDocument(Document):
     walk_to_m: PointPair | None = None
 
 
+Agents = Annotated[list[AgentDocument], Field(max_length=MOST_AGENTS)]
+
+
 class LaneDocument(Document):
     """A `Lane`."""
 
@@ -71,7 +79,7 @@ class LaneDocument(Document):
     right_boundary_m: Line | None = None
     left_neighbor: Id | None = None
     right_neighbor: Id | None = None
-    successors: list[Id] = []
+    successors: Annotated[list[Id], Field(fail_fast=True, max_length=MOST_WAYS)] = []
 
 
 class ConnectorDocument(Document):
@@ -116,10 +124,10 @@ class SceneDocument(Document):
     traffic_side: SideText
     origin: OriginDocument
     ego: AgentDocument
-    agents: list[AgentDocument] = []
-    lanes: list[LaneDocument] = []
-    connectors: list[ConnectorDocument] = []
-    areas: list[AreaDocument] = []
+    agents: Agents = []
+    lanes: Annotated[list[LaneDocument], Field(max_length=MOST_WAYS)] = []
+    connectors: Annotated[list[ConnectorDocument], Field(max_length=MOST_WAYS)] = []
+    areas: Annotated[list[AreaDocument], Field(max_length=MOST_WAYS)] = []
 
 
 class ModificationDocument(Document):
@@ -127,9 +135,9 @@ class ModificationDocument(Document):
 
     format: str
     version: int
-    add: list[AgentDocument] = []
-    move: list[AgentDocument] = []
-    remove: list[Id] = []
+    add: Agents = []
+    move: Agents = []
+    remove: Annotated[list[Id], Field(fail_fast=True, max_length=MOST_AGENTS)] = []
 
 
 Read = TypeVar("Read", bound=Document)
@@ -164,7 +172,7 @@ def read(document: object, model: type[Read], *, what: str, format_name: str) ->
 
 def problems_of(fault: ValidationError) -> list[tuple[str, str]]:
     """Each fault that pydantic found, as its path and a sentence."""
-    return [(path(*one["loc"]), _sentence(one)) for one in fault.errors()]
+    return [(path(*one["loc"]), _sentence(one)) for one in fault.errors(include_url=False)]
 
 
 def path(*steps: int | str) -> str:

@@ -13,7 +13,8 @@ from augment.formats.json_file import read_json
     [
         ("{", "is not JSON"),
         ("", "is not JSON"),
-        ('{"a": 1, "b": 2, "a": 3}', "named twice in one object: a"),
+        ('{"a": 1, "b": 2, "a": 3}', "named twice in one object: 'a'"),
+        ('{"a": 1, "\\u001b[2J": 2, "\\u001b[2J": 3}', r"in one object: '\\x1b\[2J'"),
         ("[" * 100_000, "is nested too deeply"),
         ('{"a": ' + "9" * 5000 + "}", "is not JSON"),
     ],
@@ -36,3 +37,13 @@ def test_bytes_that_are_no_text_are_refused(tmp_path: Path) -> None:
     file.write_bytes(b"\xff\xfe\x00")
     with pytest.raises(InvalidDocument, match="is not JSON"):
         read_json(file, what="scene")
+
+
+def test_many_doubled_names_are_found_in_one_pass_and_not_all_listed(tmp_path: Path) -> None:
+    # A megabyte; counting each name among all took 133 s, so a hung test is the failure.
+    file = tmp_path / "scene.json"
+    pairs = [f'"{number % 40_000:05}": 1' for number in range(80_000)]
+    file.write_text("{" + ",".join(pairs) + "}")
+    with pytest.raises(InvalidDocument, match=r"'00000', '00001', .* and 39995 more") as caught:
+        read_json(file, what="scene")
+    assert len(str(caught.value)) < 200

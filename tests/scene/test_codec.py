@@ -222,6 +222,28 @@ def test_all_faults_are_named_at_once() -> None:
     assert [place for place, _ in caught.value.problems] == ["ego.width_m", "agents[0].x_m"]
 
 
+def test_a_line_tells_its_first_fault_and_no_list_is_endless() -> None:
+    made = put(document(), ["lanes", 0, "centerline_m"], [["x", "y"]] * 1000)
+    made["agents"] = [{}] * 5_001
+    with pytest.raises(InvalidDocument) as caught:
+        scene_from_document(made)
+    assert [place for place, _ in caught.value.problems] == [
+        "agents", "lanes[0].centerline_m[0][0]", "lanes[0].centerline_m[0][1]",
+    ]  # fmt: skip
+    assert "at most 5000" in str(caught.value)
+
+
+@pytest.mark.parametrize(("number", "is_read"), [(5_000, True), (5_001, False)])
+def test_a_modification_has_at_most_5000_agents(number: int, is_read: bool) -> None:
+    one = modification_to_document(Modification(added=(cone("Agent2", 1.0, 0.0),)))
+    made = one | {"add": [one["add"][0] | {"id": f"Agent{n}"} for n in range(number)]}
+    if is_read:
+        assert len(modification_from_document(made).added) == number
+    else:
+        with pytest.raises(InvalidDocument, match="add: List should have at most 5000 items"):
+            modification_from_document(made)
+
+
 def test_what_could_not_be_read_is_not_written() -> None:
     with pytest.raises(InvalidDocument, match=r"agents\[0\]\.x_m"):
         scene_to_document(scene(agents=(vehicle("Agent2", math.nan, 0.0),)))

@@ -26,7 +26,7 @@ class MapPoint(MapPart):
     y: float
 
 
-Points = Annotated[list[MapPoint], Field(min_length=2)]
+Points = Annotated[list[MapPoint], Field(fail_fast=True, min_length=2)]
 
 
 class MapSegment(MapPart):
@@ -53,7 +53,7 @@ class MapCrossing(MapPart):
 class MapDrivable(MapPart):
     """A polygon that can be driven on."""
 
-    area_boundary: Annotated[list[MapPoint], Field(min_length=3)]
+    area_boundary: Annotated[list[MapPoint], Field(fail_fast=True, min_length=3)]
 
 
 class MapFile(MapPart):
