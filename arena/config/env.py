@@ -11,6 +11,8 @@ from urllib.parse import urlsplit
 import dj_database_url
 from django.core.exceptions import ImproperlyConfigured
 
+from arena.config import private
+
 T = TypeVar("T")
 
 _TRUE, _FALSE = {"1", "true", "yes", "on"}, {"0", "false", "no", "off", ""}
@@ -135,6 +137,22 @@ def database(name: str, *, default: Path) -> dict[str, object]:
         "NAME": str(default),
     }
     return read(name, standard, parse, allowed)
+
+
+def sqlite_file(name: str, path: Path) -> None:
+    """Make an SQLite file that only its owner reads, or mend one that others could read.
+
+    Raises:
+        ImproperlyConfigured: There can't be a file at that place.
+    """
+    try:
+        private.make_folder(path.parent)
+        private.make_database(path)
+    except OSError as error:
+        raise ImproperlyConfigured(
+            f"{name}: {path} can't be used: {error.strerror}. A file is needed that can be "
+            "written to."
+        ) from error
 
 
 def redis(name: str, *, default: str) -> str:

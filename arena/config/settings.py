@@ -15,11 +15,13 @@ from pathlib import Path
 
 from csp.constants import NONE, SELF
 
-from arena.config import env
+from arena.config import env, private
 from arena.exports.files import write_once
 
 BASE_DIR = Path(__file__).resolve().parents[2]
 VAR_DIR = env.folder("ARENA_VAR_DIR", default=BASE_DIR / "var")
+private.make_folder(VAR_DIR)
+private.mend_folder(VAR_DIR, around=BASE_DIR)
 
 # --- Who may reach it --------------------------------------------------------------------------
 
@@ -35,8 +37,8 @@ def _secret_key() -> str:
     given = env.read("ARENA_SECRET_KEY", "", str, "any long random text")
     if given:
         return given
+    private.mend_file(kept)
     if not kept.exists():
-        VAR_DIR.mkdir(parents=True, exist_ok=True)
         # The server and its workers start at once: the first key made is the key of all.
         write_once(kept, secrets.token_urlsafe(50).encode())
     return kept.read_text()
@@ -180,8 +182,7 @@ def _database() -> dict[str, object]:
         }
         # Tests run on a file as well: threads that vote at once need what a memory database lacks.
         found["TEST"] = {"NAME": str(VAR_DIR / "test.sqlite3")}
-        VAR_DIR.mkdir(parents=True, exist_ok=True)
-        Path(str(found["NAME"])).parent.mkdir(parents=True, exist_ok=True)
+        env.sqlite_file("DATABASE_URL", Path(str(found["NAME"])))
     else:
         found["CONN_HEALTH_CHECKS"] = True
     # Opening a connection for every request would cost as much as a vote, on SQLite as well.
@@ -191,6 +192,7 @@ def _database() -> dict[str, object]:
 
 DATABASES = {"default": _database()}
 MEDIA_ROOT = env.folder("ARENA_MEDIA_DIR", default=BASE_DIR / "media")
+private.mend_folder(MEDIA_ROOT, around=BASE_DIR)
 STATIC_ROOT = VAR_DIR / "static"
 STATIC_URL = "static/"
 STATICFILES_DIRS = [BASE_DIR / "static"]

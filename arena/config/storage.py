@@ -7,11 +7,14 @@ from pathlib import Path
 from django.core.files.base import File
 from django.core.files.storage import FileSystemStorage
 
+from arena.config import private
 from arena.exports.files import write_whole
 
 
 class WholeFiles(FileSystemStorage):
     """Files of this machine that are there whole or not at all; the last writer wins.
+
+    Only their owner reads them: what contestants made is nobody's until a study shows it.
 
     Django's own storage makes an empty file and fills it: another worker with the same picture
     would meet half of it, and a worker that is killed would leave that half behind.
@@ -23,6 +26,6 @@ class WholeFiles(FileSystemStorage):
 
     def _save(self, name: str, content: File[bytes]) -> str:
         path = Path(self.path(name))
-        path.parent.mkdir(parents=True, exist_ok=True)
-        write_whole(path, content.read())
+        private.make_folder(path.parent)
+        write_whole(path, content.read(), mode=private.FILE)
         return name

@@ -9,14 +9,19 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 
 
-def write_whole(path: Path, content: bytes) -> None:
+def write_whole(path: Path, content: bytes, *, mode: int = 0o644) -> None:
     """Write beside the place and rename: a reader never sees half a file.
+
+    Args:
+        path: Where it is to be.
+        content: All of it.
+        mode: Who may read and write it.
 
     Raises:
         OSError: The folder does not exist or can't be written to; the old file stays.
     """
     with _beside(path, content) as written:
-        written.chmod(0o644)
+        written.chmod(mode)
         written.replace(path)
 
 

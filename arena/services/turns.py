@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import fcntl
+import os
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -26,6 +27,10 @@ def in_turn() -> Iterator[None]:
         yield  # who holds SQLite's lock already must not wait for somebody who waits for it
         return
     path = Path(str(connection.settings_dict["NAME"]) + SUFFIX)
-    with path.open("ab") as turn:  # closed, it is free again, whatever happens
+    with open(path, "ab", opener=_private) as turn:  # closed, it is free again, whatever happens
         fcntl.flock(turn, fcntl.LOCK_EX)
         yield
+
+
+def _private(path: str, flags: int) -> int:
+    return os.open(path, flags, 0o600)

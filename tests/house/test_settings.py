@@ -3,23 +3,31 @@
 from __future__ import annotations
 
 import os
+import sqlite3
 import subprocess
 import sys
 import threading
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import closing
 from pathlib import Path
 
 import pytest
+from django.core.files.base import ContentFile
 
+from arena.config import private
+from arena.config.storage import WholeFiles
 from arena.exports.files import write_once
 from tests.house.source import ROOT
 
 
-def start(**environment: str) -> subprocess.CompletedProcess[str]:
+def start(
+    *, without: tuple[str, ...] = (), **environment: str
+) -> subprocess.CompletedProcess[str]:
+    kept = {name: value for name, value in os.environ.items() if name not in without}
     return subprocess.run(
         [sys.executable, "manage.py", "diffsettings"],
         cwd=ROOT,
-        env={**os.environ, **environment},
+        env={**kept, **environment},
         capture_output=True,
         text=True,
     )
@@ -35,6 +43,8 @@ def start(**environment: str) -> subprocess.CompletedProcess[str]:
         ("REDIS_URL", "redis://localhost:99999/0", "redis://HOST:PORT/N"),
         ("REDIS_URL", "redis://localhost:6379/first", "redis://HOST:PORT/N"),
         ("REDIS_URL", "redis://", "redis://HOST:PORT/N"),
+        ("DATABASE_URL", f"sqlite:///{ROOT}", "A file is needed"),
+        ("DATABASE_URL", f"sqlite:///{ROOT / 'manage.py' / 'below'}", "A file is needed"),
         ("ARENA_HOSTS", " , ", "names separated by commas"),
         ("ARENA_ORIGINS", "arena.example.org", "https://NAME"),
         ("ARENA_HEARTBEAT_S", "60", "at least twice as long"),
@@ -62,6 +72,56 @@ def test_the_secret_key_is_made_once_and_kept_private(tmp_path: Path) -> None:
     assert kept.stat().st_mode & 0o077 == 0
     assert start(**environment).returncode == 0
     assert kept.read_text() == first
+
+
+def modes(folder: Path) -> dict[str, int]:
+    return {
+        str(path.relative_to(folder)): path.stat().st_mode & 0o777 for path in folder.rglob("*")
+    }
+
+
+def test_what_is_kept_is_readable_by_its_owner_alone(tmp_path: Path) -> None:
+    var, elsewhere = tmp_path / "var", tmp_path / "rows" / "db.sqlite3"
+    at = {"ARENA_VAR_DIR": str(var), "DATABASE_URL": f"sqlite:///{elsewhere}"}
+    assert start(**at).returncode == 0
+    with closing(sqlite3.connect(elsewhere)) as rows:
+        rows.execute("PRAGMA journal_mode=WAL")
+        rows.execute("CREATE TABLE votes (outcome TEXT)")
+        assert modes(tmp_path) == {
+            **{"var": 0o700, "var/secret_key": 0o600, "rows": 0o700},
+            **{f"rows/db.sqlite3{more}": 0o600 for more in ("", "-wal", "-shm")},
+        }
+
+
+def test_what_stood_open_is_closed_at_the_next_start(tmp_path: Path) -> None:
+    var, media = tmp_path / "var", tmp_path / "media"
+    files = ["arena.sqlite3", "arena.sqlite3-wal", "arena.sqlite3-shm", "secret_key"]
+    for folder in (var, media):
+        folder.mkdir(mode=0o755)
+    for name in files:
+        (var / name).write_text("a key" if name == "secret_key" else "")
+        (var / name).chmod(0o644)
+    at = {"ARENA_VAR_DIR": str(var), "ARENA_MEDIA_DIR": str(media)}
+    assert start(**at, without=("DATABASE_URL",)).returncode == 0
+    assert modes(tmp_path) == {
+        **{"var": 0o700, "media": 0o700},
+        **{f"var/{name}": 0o600 for name in files},
+    }
+
+
+def test_a_folder_that_is_not_ours_alone_stays_open(tmp_path: Path) -> None:
+    for_all, above = tmp_path / "tmp", tmp_path / "home"
+    for_all.mkdir()
+    for_all.chmod(0o1777)
+    above.mkdir(mode=0o755)
+    private.mend_folder(for_all, around=tmp_path / "program")
+    private.mend_folder(above, around=above / "program")
+    assert modes(tmp_path) == {"tmp": 0o777, "home": 0o755}
+
+
+def test_pictures_are_readable_by_their_owner_alone(tmp_path: Path) -> None:
+    WholeFiles(location=tmp_path).save("bev/ab/picture.png", ContentFile(b"..."))
+    assert modes(tmp_path) == {"bev": 0o700, "bev/ab": 0o700, "bev/ab/picture.png": 0o600}
 
 
 def test_processes_that_start_at_once_share_the_key_of_the_first(tmp_path: Path) -> None:
