@@ -18,6 +18,7 @@ from arena.rating.leaderboard import Leaderboard, Line, Method, rate
 from arena.rating.printed import escape, interval_text, latex_table, rank_text, rating_text
 from arena.rating.votes_file import VotesFile, VotesFileUnreadable, columns_of, read_votes
 from arena.services.cells import csv_text
+from augment.sentences import escaped
 
 HELP = "Rate votes from a CSV file: columns model_a, model_b, winner, and maybe judge and item."
 RESAMPLES = {
@@ -77,9 +78,9 @@ def main(arguments: Sequence[str]) -> int:
     try:
         said = run(**options)
     except CsvNotRated as error:
-        print(f"CommandError: {error}", file=sys.stderr)
+        print(escaped(f"CommandError: {error}"), file=sys.stderr)
         return 1
-    sys.stdout.write(said)
+    sys.stdout.write(escaped(said) if sys.stdout.isatty() else said)
     return 0
 
 
@@ -192,7 +193,7 @@ def _cells(rated: RatedCsv) -> Iterator[tuple[str, str, str, str, str]]:
 
 def _table(rated: RatedCsv) -> str:
     rows = [("Model", "Rank", "Elo", "95% CI", "Votes"), *_cells(rated)]
-    rows = [(" ".join(row[0].split()), *row[1:]) for row in rows]
+    rows = [(escaped(" ".join(row[0].split())), *row[1:]) for row in rows]
     widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
     lines = [
         "  ".join(
@@ -209,7 +210,7 @@ def _table(rated: RatedCsv) -> str:
 def _csv(rated: RatedCsv) -> str:
     """One line a model; what is unknown is empty. Notes go to the other formats."""
     for note in rated.notes:
-        print(note, file=sys.stderr)
+        print(escaped(note), file=sys.stderr)
     return csv_text(
         ("model", "rank", "rating", "lower", "upper", "votes"),
         (

@@ -41,6 +41,18 @@ def heavy_of(name: str) -> str | None:
     return next((heavy for heavy in HEAVY if within(name, (heavy,))), None)
 
 
+def test_every_command_escapes_what_it_prints() -> None:
+    commands = {
+        name: [dotted(base) for base in node.bases]
+        for name, tree in modules()
+        if ".management.commands." in name
+        for node in tree.body
+        if isinstance(node, ast.ClassDef) and node.name == "Command"
+    }
+    assert len(commands) >= 26
+    assert {name: bases for name, bases in commands.items() if bases != ["TerminalCommand"]} == {}
+
+
 def test_randomness_is_an_argument() -> None:
     # `random.Random` and `default_rng` make generators with a seed of their own; the functions of
     # the modules share one.

@@ -7,14 +7,15 @@ import secrets
 import sys
 from typing import Any
 
-from django.core.management.base import BaseCommand, CommandError, CommandParser
+from django.core.management.base import CommandError, CommandParser
 
 from arena.errors import ArenaError
 from arena.services.people import create_person
 from augment.errors import AugmentError
+from augment.services.terminal import TerminalCommand
 
 
-class Command(BaseCommand):
+class Command(TerminalCommand):
     """Make an expert, an analyst or an admin."""
 
     help = (

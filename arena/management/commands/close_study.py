@@ -4,15 +4,16 @@ from __future__ import annotations
 
 from typing import Any
 
-from django.core.management.base import BaseCommand, CommandError, CommandParser
+from django.core.management.base import CommandError, CommandParser
 
 from arena.errors import ArenaError
 from arena.queries.studies import study_named
 from arena.services.studies import close_study
 from augment.errors import AugmentError
+from augment.services.terminal import TerminalCommand
 
 
-class Command(BaseCommand):
+class Command(TerminalCommand):
     """The door to arena.services.studies.close_study."""
 
     help = "Close a study: it takes no more votes, and its results may be seen."

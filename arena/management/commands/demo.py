@@ -9,7 +9,7 @@ from typing import Any
 
 from django.conf import settings
 from django.core.management import call_command
-from django.core.management.base import BaseCommand, CommandError, CommandParser
+from django.core.management.base import CommandError, CommandParser
 
 from arena.errors import ArenaError
 from arena.management.commands.serve import INTERRUPTED
@@ -18,11 +18,12 @@ from arena.serving.hold import held_alone
 from arena.serving.stack import Web, background, web_server
 from arena.serving.supervisor import Supervisor
 from augment.errors import AugmentError
+from augment.services.terminal import TerminalCommand
 
 STOPPED = "The demo was stopped before it was done; started again, it goes on from there."
 
 
-class Command(BaseCommand):
+class Command(TerminalCommand):
     """Do the whole job with simulated contestants and votes, and say where everything is."""
 
     help = (

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 from uuid import UUID
 
-from django.core.management.base import BaseCommand, CommandError, CommandParser
+from django.core.management.base import CommandError, CommandParser
 
 from arena.errors import ArenaError, StudyStillOpen
 from arena.exports import displacement_writers, faults
@@ -29,6 +29,7 @@ from augment.errors import AugmentError, UnknownName
 from augment.services.choosing import job_named
 from augment.services.displacement import By, types_named
 from augment.services.interplan import job_as_interplan
+from augment.services.terminal import TerminalCommand
 
 MODIFICATION_FORMATS = ("interplan",)
 
@@ -36,7 +37,7 @@ Written = tuple[bytes, str, bool]
 """A file's bytes, its ending, and whether it is text."""
 
 
-class Command(BaseCommand):
+class Command(TerminalCommand):
     """One subcommand per kind of result."""
 
     help = "Write results to files; the same snapshot or job always gives the same bytes."
@@ -134,7 +135,7 @@ class Command(BaseCommand):
         if out == "-":
             if not is_text:
                 raise CommandError(f"A {suffix} file can't go to a terminal: name a file.")
-            self.stdout.write(content.decode(), ending="")
+            self.stdout.write_data(content.decode())
             return
         try:
             write_whole(Path(out), content)

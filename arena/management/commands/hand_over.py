@@ -4,15 +4,16 @@ from __future__ import annotations
 
 from typing import Any
 
-from django.core.management.base import BaseCommand, CommandError, CommandParser
+from django.core.management.base import CommandError, CommandParser
 
 from arena.errors import ArenaError
 from arena.queries.studies import study_named
 from arena.services.handing_over import hand_over
 from augment.errors import AugmentError
+from augment.services.terminal import TerminalCommand
 
 
-class Command(BaseCommand):
+class Command(TerminalCommand):
     """The door to arena.services.handing_over."""
 
     help = "Hand an expert's remaining pairs over to others, re-planned in one go."

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from django.core.management.base import BaseCommand, CommandError, CommandParser
+from django.core.management.base import CommandError, CommandParser
 from django.urls import reverse
 from django.utils import timezone
 
@@ -14,9 +14,10 @@ from arena.queries.invitations import ExpertLine, expert_lines
 from arena.queries.studies import study_named
 from arena.services.invitations import LINK_LIVES, invite
 from augment.errors import AugmentError, UnknownName
+from augment.services.terminal import TerminalCommand
 
 
-class Command(BaseCommand):
+class Command(TerminalCommand):
     """The door to arena.services.invitations.invite."""
 
     help = (

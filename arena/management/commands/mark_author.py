@@ -5,16 +5,17 @@ from __future__ import annotations
 from typing import Any
 
 from django.contrib.auth.models import User
-from django.core.management.base import BaseCommand, CommandError, CommandParser
+from django.core.management.base import CommandError, CommandParser
 
 from arena.errors import ArenaError
 from arena.models import Study
 from arena.queries.studies import study_named
 from arena.services.authorships import mark_author, take_back_author
 from augment.errors import AugmentError, UnknownName
+from augment.services.terminal import TerminalCommand
 
 
-class Command(BaseCommand):
+class Command(TerminalCommand):
     """The door to arena.services.authorships."""
 
     help = "Mark an expert of a study as author of a contestant; experts see nothing of it."

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections import Counter
 from typing import Any
 
-from django.core.management.base import BaseCommand, CommandError, CommandParser
+from django.core.management.base import CommandError, CommandParser
 
 from arena.errors import ArenaError
 from arena.models import Study
@@ -13,9 +13,10 @@ from arena.pairing.target_lines import read_targets
 from arena.services.studies import PlanOptions, open_study
 from augment.errors import AugmentError
 from augment.services.choosing import chosen_contestants, chosen_scenarios
+from augment.services.terminal import TerminalCommand
 
 
-class Command(BaseCommand):
+class Command(TerminalCommand):
     """The door to arena.services.studies.open_study."""
 
     help = "Plan blind, balanced matchups for experts and open the study."

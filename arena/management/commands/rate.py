@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from django.core.management.base import BaseCommand, CommandError, CommandParser
+from django.core.management.base import CommandError, CommandParser
 
 from arena.errors import ArenaError
 from arena.exports.tables import leaderboard_table
@@ -13,9 +13,10 @@ from arena.queries.studies import study_named
 from arena.queries.vote_sets import Filters
 from arena.services.ratings import DEFAULT_ROUNDS, rate
 from augment.errors import AugmentError
+from augment.services.terminal import TerminalCommand
 
 
-class Command(BaseCommand):
+class Command(TerminalCommand):
     """The door to arena.services.ratings.rate."""
 
     help = "Rate the contestants of a study by its votes and keep the result."

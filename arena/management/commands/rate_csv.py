@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from typing import Any
 
-from django.core.management.base import BaseCommand, CommandError, CommandParser
+from django.core.management.base import CommandError, CommandParser
 
 from arena.management import rate_csv
+from augment.services.terminal import TerminalCommand
 
 
-class Command(BaseCommand):
+class Command(TerminalCommand):
     """The door for Django to arena.management.rate_csv; manage.py goes there itself."""
 
     help = rate_csv.HELP
@@ -26,4 +27,4 @@ class Command(BaseCommand):
             said = rate_csv.run(**{name: options[name] for name in names})
         except rate_csv.CsvNotRated as error:
             raise CommandError(str(error)) from error
-        self.stdout.write(said, ending="")
+        self.stdout.write_data(said)

@@ -6,18 +6,19 @@ from argparse import ArgumentTypeError
 from typing import Any
 
 from django.core.management import call_command
-from django.core.management.base import BaseCommand, CommandError, CommandParser
+from django.core.management.base import CommandError, CommandParser
 
 from arena.errors import ArenaError
 from arena.serving.hold import held_alone
 from arena.serving.stack import Web, background, web_server
 from arena.serving.supervisor import Supervisor
+from augment.services.terminal import TerminalCommand
 
 INTERRUPTED = 130
 """The exit code of what Ctrl-C ended before it was done, as shells have it."""
 
 
-class Command(BaseCommand):
+class Command(TerminalCommand):
     """Start what is missing, serve the pages, stop all of it together."""
 
     help = (

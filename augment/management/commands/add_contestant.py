@@ -5,7 +5,7 @@ from __future__ import annotations
 from argparse import ArgumentParser
 from typing import Any
 
-from django.core.management.base import BaseCommand, CommandError
+from django.core.management.base import CommandError
 from django.db import transaction
 
 from augment.baselines.simulated import PRESETS, Rates, rates_of
@@ -17,6 +17,7 @@ from augment.services.contestants import (
     ensure_builtin,
     ensure_endpoint,
 )
+from augment.services.terminal import TerminalCommand
 from augment.variants.transcript import ModelRole
 
 ROLES = (ModelRole.REVIEWER, ModelRole.ENGINEER, ModelRole.VIEWER)
@@ -27,7 +28,7 @@ _OF_MODELS = (
 )
 
 
-class Command(BaseCommand):
+class Command(TerminalCommand):
     """add_contestant SLUG --variant V --endpoint E --model M [--reviewer M[@E]] ..."""
 
     help = (

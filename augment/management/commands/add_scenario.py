@@ -6,16 +6,17 @@ from argparse import ArgumentParser
 from pathlib import Path
 from typing import Any
 
-from django.core.management.base import BaseCommand, CommandError
+from django.core.management.base import CommandError
 
 from augment.errors import AugmentError
 from augment.formats.json_file import read_json
 from augment.scene.catalogue import ScenarioType
 from augment.scene.codec import modification_from_document, modification_to_document
 from augment.services.scenes import add_scenario
+from augment.services.terminal import TerminalCommand
 
 
-class Command(BaseCommand):
+class Command(TerminalCommand):
     """`manage.py add_scenario --scene SLUG --type TYPE --instruction TEXT`."""
 
     help = "Add a scenario: a scene, its type, an instruction and, if given, a reference."

@@ -5,14 +5,15 @@ from __future__ import annotations
 from argparse import ArgumentParser
 from typing import Any
 
-from django.core.management.base import BaseCommand, CommandError
+from django.core.management.base import CommandError
 
 from augment.errors import AugmentError
 from augment.management.arguments import add_folder_argument
 from augment.services.catalogue_check import CatalogueCheck, ScenarioCheck, check_catalogue
+from augment.services.terminal import TerminalCommand
 
 
-class Command(BaseCommand):
+class Command(TerminalCommand):
     """check_catalogue [--folder FOLDER]."""
 
     help = (

@@ -4,14 +4,15 @@ from __future__ import annotations
 
 from typing import Any
 
-from django.core.management.base import BaseCommand, CommandError, CommandParser
+from django.core.management.base import CommandError, CommandParser
 
 from augment.errors import AugmentError
 from augment.services.attention import draw_checks
 from augment.services.choosing import chosen_scenarios
+from augment.services.terminal import TerminalCommand
 
 
-class Command(BaseCommand):
+class Command(TerminalCommand):
     """The door to augment.services.attention.draw_checks."""
 
     help = (

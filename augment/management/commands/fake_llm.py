@@ -8,15 +8,16 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import Any
 
-from django.core.management.base import BaseCommand, CommandError, CommandParser
+from django.core.management.base import CommandError, CommandParser
 
 from augment.fake_llm.models import MODELS
 from augment.fake_llm.server import running
+from augment.services.terminal import TerminalCommand
 
 _STOP = (signal.SIGINT, signal.SIGTERM)
 
 
-class Command(BaseCommand):
+class Command(TerminalCommand):
     """Serves /v1/chat/completions without a model, until it is interrupted."""
 
     help = (

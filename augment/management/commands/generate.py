@@ -6,7 +6,7 @@ import time
 from argparse import ArgumentParser
 from typing import Any
 
-from django.core.management.base import BaseCommand, CommandError
+from django.core.management.base import CommandError
 from django.db import transaction
 from django.utils import timezone
 
@@ -19,6 +19,7 @@ from augment.services.choosing import chosen_contestants, chosen_scenarios
 from augment.services.contestants import ensure_builtin
 from augment.services.estimates import estimate
 from augment.services.job_summary import contestant_lines, failure_groups
+from augment.services.terminal import TerminalCommand
 from augment.tasks import check_broker, enqueue_job
 
 POLL_S = 0.5
@@ -28,7 +29,7 @@ STOPPED = 3
 """Exit code of a wait that a cap has ended."""
 
 
-class Command(BaseCommand):
+class Command(TerminalCommand):
     """generate --contestants A B --scenarios X Y [--cap USD] [--wait]."""
 
     help = "Run contestants on scenarios; workers do it, `manage.py serve` starts them."
@@ -142,7 +143,7 @@ class Command(BaseCommand):
             if self.stdout.isatty():
                 cells = BAR_CELLS * counts.ended // counts.total
                 bar = "#" * cells + "." * (BAR_CELLS - cells)
-                self.stdout.write(f"\r[{bar}] {text}   ", ending="")
+                self.stdout.write(f"[{bar}] {text}   ", ending="\r")
                 self.stdout.flush()
             else:
                 self.stdout.write(text)

@@ -6,13 +6,14 @@ from argparse import ArgumentParser
 from pathlib import Path
 from typing import Any
 
-from django.core.management.base import BaseCommand, CommandError
+from django.core.management.base import CommandError
 
 from augment.errors import AugmentError
 from augment.services.scenes import SOURCES, import_scene
+from augment.services.terminal import TerminalCommand
 
 
-class Command(BaseCommand):
+class Command(TerminalCommand):
     """`manage.py import_scene av2 PATH --frame N --slug S`."""
 
     help = "Import a scene: a frame of an Argoverse 2 Sensor log, or a scene in the own JSON."

@@ -5,17 +5,18 @@ from __future__ import annotations
 from argparse import ArgumentParser
 from typing import Any
 
-from django.core.management.base import BaseCommand, CommandError
+from django.core.management.base import CommandError
 
 from augment.errors import AugmentError, UnknownName
 from augment.llm.questions import Ability
 from augment.models import Endpoint
 from augment.services.probe import Finding, ProbeReport, probe
+from augment.services.terminal import TerminalCommand
 
 _WORDS = {True: "yes", False: "no", None: "unknown"}
 
 
-class Command(BaseCommand):
+class Command(TerminalCommand):
     """probe_endpoint LABEL --model M."""
 
     help = (

@@ -6,16 +6,17 @@ from argparse import ArgumentParser
 from pathlib import Path
 from typing import Any
 
-from django.core.management.base import BaseCommand, CommandError
+from django.core.management.base import CommandError
 
 from augment.errors import AugmentError
 from augment.prompts.texts import prompt_version
 from augment.services.prompts import prompt_of
+from augment.services.terminal import TerminalCommand
 from augment.variants.showing import Shown
 from augment.variants.transcript import ModelRole
 
 
-class Command(BaseCommand):
+class Command(TerminalCommand):
     """prompt SCENARIO VARIANT [--role R] [--native-tools] [--picture FILE]."""
 
     help = (

@@ -7,14 +7,15 @@ from argparse import ArgumentParser
 from pathlib import Path
 from typing import Any
 
-from django.core.management.base import BaseCommand, CommandError
+from django.core.management.base import CommandError
 
 from augment.errors import AugmentError
 from augment.scene.codec import modification_to_document
 from augment.services.interplan import references_from_interplan
+from augment.services.terminal import TerminalCommand
 
 
-class Command(BaseCommand):
+class Command(TerminalCommand):
     """read_interplan FILE --out FOLDER [--scene TOKEN=SLUG ...]."""
 
     help = (

@@ -5,7 +5,7 @@ from __future__ import annotations
 from argparse import ArgumentParser
 from typing import Any
 
-from django.core.management.base import BaseCommand, CommandError
+from django.core.management.base import CommandError
 from django.db import transaction
 
 from augment.errors import AugmentError
@@ -13,10 +13,11 @@ from augment.management.arguments import add_cap_arguments, caps_of
 from augment.services import caps, jobs
 from augment.services.budget import limit_of
 from augment.services.choosing import job_named
+from augment.services.terminal import TerminalCommand
 from augment.tasks import check_broker, enqueue_job
 
 
-class Command(BaseCommand):
+class Command(TerminalCommand):
     """resume_job JOB [--cap USD] [--cap-calls N] [--cap-tokens N]."""
 
     help = (

@@ -8,13 +8,14 @@ from argparse import ArgumentParser
 from pathlib import Path
 from typing import Any
 
-from django.core.management.base import BaseCommand, CommandError
+from django.core.management.base import CommandError
 
 from augment.models import Augmentation
+from augment.services.terminal import TerminalCommand
 from augment.services.transcript_export import transcript_of
 
 
-class Command(BaseCommand):
+class Command(TerminalCommand):
     """transcript CODE [--out FILE]."""
 
     help = "Write an augmentation's transcript: every request, answer, token and cent, as JSON."
@@ -32,7 +33,7 @@ class Command(BaseCommand):
             raise CommandError(f"There is no augmentation {options['code']}.")
         text = json.dumps(transcript_of(row), indent=2, ensure_ascii=False)
         if options["out"] == "-":
-            self.stdout.write(text)
+            self.stdout.write_data(text + "\n")
             return
         try:
             Path(options["out"]).write_text(text + "\n", encoding="utf-8")

@@ -1,0 +1,65 @@
+"""What every command of ours is made of: it prints nothing that steers a terminal.
+
+Names come out of files and rows, and answers out of models; a control character in one of them
+would move the cursor, recolour or rewrite what stands on the screen. So each text is escaped on
+its way out, whoever wrote the command.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+from django.core.management.base import BaseCommand, OutputWrapper
+
+from augment.sentences import escaped
+
+
+class TerminalOutput(OutputWrapper):
+    """Standard output or error as a person reads it."""
+
+    def write(  # type: ignore[override]
+        self,
+        msg: str = "",
+        style_func: Callable[[str], str] | None = None,
+        ending: str | None = None,
+    ) -> None:
+        """Write the text, escaped; what stands behind it is the command's own."""
+        super().write(escaped(msg), style_func, ending)
+
+    def write_data(self, text: str) -> None:
+        """Write a file's content: to the byte into a file or a pipe, escaped to a terminal."""
+        if self.isatty():
+            self.write(text, ending="")
+        else:
+            super().write(text, ending="")
+
+
+class TerminalCommand(BaseCommand):
+    """A command whose output and errors are safe to look at."""
+
+    # Django sets both again when it is called with streams of its own.
+
+    @property  # type: ignore[override]
+    def stdout(self) -> TerminalOutput:
+        """Standard output."""
+        return self._stdout
+
+    @stdout.setter
+    def stdout(self, given: Any) -> None:
+        self._stdout = _wrapped(given)
+
+    @property  # type: ignore[override]
+    def stderr(self) -> TerminalOutput:
+        """Standard error."""
+        return self._stderr
+
+    @stderr.setter
+    def stderr(self, given: Any) -> None:
+        self._stderr = _wrapped(given)
+
+
+def _wrapped(given: OutputWrapper) -> TerminalOutput:
+    made = TerminalOutput(given._out, ending=given.ending)  # type: ignore[arg-type]
+    made.style_func = given.style_func
+    return made

@@ -1,0 +1,80 @@
+from __future__ import annotations
+
+import unicodedata
+from io import StringIO
+from pathlib import Path
+
+import pytest
+from django.core.management import call_command
+from hypothesis import given
+from hypothesis import strategies as st
+
+from arena.management.commands.rate_csv import Command as RateCsv
+from arena.management.rate_csv import main as rate_csv
+from augment.sentences import escaped
+from augment.services.terminal import TerminalOutput
+
+CLEAR = "\x1b[2J"
+TITLE = "\x1b]0;owned\x07"
+
+
+@pytest.mark.parametrize(
+    ("text", "printed"),
+    [
+        (CLEAR, r"\x1b[2J"),
+        (TITLE, r"\x1b]0;owned\x07"),
+        ("\x9b31m", r"\x9b31m"),
+        ("done\rfailed", r"done\rfailed"),
+        ("\b\x7f\0", r"\x08\x7f\x00"),
+        ("a\u202etxt.exe", r"a\u202etxt.exe"),
+        ("\u2066x\u2069\u200b", r"\u2066x\u2069\u200b"),
+        ("a\u2028b", r"a\u2028b"),
+        ("\ud800", r"\ud800"),
+        ("a\tb\nc", "a\tb\nc"),
+        ("Straße 5 · 10 m² → α", "Straße 5 · 10 m² → α"),
+    ],
+)
+def test_what_steers_a_terminal_is_spelt_out(text: str, printed: str) -> None:
+    assert escaped(text) == printed
+
+
+@given(st.text())
+def test_no_text_steers_a_terminal(text: str) -> None:
+    steering = {unicodedata.category(one) for one in escaped(text) if one not in "\n\t"}
+    assert steering.isdisjoint({"Cc", "Cf", "Cs", "Zl", "Zp"})
+
+
+@pytest.mark.parametrize("is_django", [True, False])
+def test_a_name_in_an_error_of_a_command_is_escaped(
+    is_django: bool, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    file = str(tmp_path / f"{CLEAR}.csv")
+    if is_django:
+        with pytest.raises(SystemExit):
+            RateCsv().run_from_argv(["manage.py", "rate_csv", file])
+    else:
+        assert rate_csv([file]) == 1
+    printed = capsys.readouterr().err
+    assert r"\x1b[2J.csv: No such file" in printed
+    assert CLEAR not in printed
+
+
+def test_a_name_out_of_a_file_is_escaped_in_what_a_command_prints(tmp_path: Path) -> None:
+    file = tmp_path / "votes.csv"
+    rows = [f"{CLEAR},b,model_a", f"b,{CLEAR},model_a"] * 5
+    file.write_text("\n".join(["model_a,model_b,winner", *rows]))
+    out = StringIO()
+    call_command("rate_csv", str(file), rounds=10, stdout=out)
+    assert r"\x1b[2J" in out.getvalue()
+    assert "\x1b" not in out.getvalue()
+
+
+class Terminal(StringIO):
+    def isatty(self) -> bool:
+        return True
+
+
+@pytest.mark.parametrize(("stream", "written"), [(StringIO(), CLEAR), (Terminal(), r"\x1b[2J")])
+def test_the_content_of_a_file_is_exact_but_on_a_terminal(stream: StringIO, written: str) -> None:
+    TerminalOutput(stream).write_data(CLEAR)
+    assert stream.getvalue() == written
