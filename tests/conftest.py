@@ -13,6 +13,7 @@ from hypothesis import settings as hypothesis_settings
 from pytest_django import Settings
 from xdist.scheduler import LoadScopeScheduling
 
+from tests.append_only import empty_with_triggers
 from tests.on_postgres import FOLDERS
 from tests.processes import copy_database, machine
 from tests.stack import SMALL_DEMO, Home
@@ -94,6 +95,7 @@ def _own_files(settings: Settings, tmp_path: Path) -> None:
 @pytest.fixture(scope="session")
 def django_db_setup(django_db_setup: None, tmp_path_factory: pytest.TempPathFactory) -> None:
     """The database of the tests; on SQLite a copy is kept of what it is before any test."""
+    empty_with_triggers()
     database = connection.settings_dict
     is_made = database["NAME"] == database["TEST"]["NAME"]  # only where some test asks for it
     if is_made and connection.vendor == "sqlite":

@@ -178,7 +178,9 @@ def _database() -> dict[str, object]:
         found["OPTIONS"] = {
             "timeout": 20,
             "transaction_mode": "IMMEDIATE",
-            "init_command": "PRAGMA journal_mode=WAL; PRAGMA synchronous=FULL;",
+            # Else INSERT OR REPLACE would pass by the triggers that refuse to delete.
+            "init_command": "PRAGMA journal_mode=WAL; PRAGMA synchronous=FULL; "
+            "PRAGMA recursive_triggers=ON;",
         }
         # Tests run on a file as well: threads that vote at once need what a memory database lacks.
         found["TEST"] = {"NAME": str(VAR_DIR / "test.sqlite3")}

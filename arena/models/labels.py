@@ -9,7 +9,7 @@ from django.db import models
 from django.db.models import Q
 
 from arena.models.tokens import fresh_token
-from augment.models import Augmentation, GenerationJob
+from augment.models import AppendOnly, Augmentation, GenerationJob
 
 
 class LabellingRound(models.Model):
@@ -63,8 +63,8 @@ class LabelTask(models.Model):
         return str(self.code)
 
 
-class FaultLabel(models.Model):
-    """Which faults an expert sees in one augmentation: any of three, or none.
+class FaultLabel(AppendOnly):
+    """Which faults an expert sees in one augmentation: any of three, or none. Append-only.
 
     What the checks guessed is kept as it was when the label was saved; null where they could
     not be run.

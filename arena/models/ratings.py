@@ -9,7 +9,7 @@ from django.db import models
 from django.db.models import F, Q
 
 from arena.models.studies import Study
-from augment.models import Contestant
+from augment.models import AppendOnly, Contestant
 
 
 class Snapshot(models.Model):
@@ -118,7 +118,7 @@ class Standing(models.Model):
         return f"{self.rank} {self.slug}"
 
 
-class EarlyLook(models.Model):
+class EarlyLook(AppendOnly):
     """Somebody opened the results of an open study on purpose; it ends their voting in it."""
 
     study = models.ForeignKey(Study, on_delete=models.CASCADE, related_name="early_looks")

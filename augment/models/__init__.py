@@ -11,6 +11,7 @@ from augment.models.endpoints import CallLease, Endpoint, EndpointModel
 from augment.models.events import Event
 from augment.models.jobs import Attempt, Augmentation, GenerationJob
 from augment.models.scenes import SLUG_HELP, BaseScene, Scenario
+from augment.models.triggers import after_migrations, before_migrations
 
 __all__ = [
     "SLUG_HELP",
@@ -27,4 +28,6 @@ __all__ = [
     "ModelCall",
     "Scenario",
     "TranscriptNote",
+    "after_migrations",
+    "before_migrations",
 ]

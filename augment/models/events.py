@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 from django.conf import settings
 from django.db import models
 
@@ -34,11 +32,3 @@ class Event(AppendOnly):
 
     def __str__(self) -> str:
         return f"{self.verb} {self.object_kind} {self.object_code}"
-
-    def delete(self, *args: Any, **kwargs: Any) -> tuple[int, dict[str, int]]:
-        """Never.
-
-        Raises:
-            TypeError: Always; the log is append-only.
-        """
-        raise TypeError("the event log is append-only; a line can't be deleted")

@@ -20,14 +20,13 @@ from arena.exports.files import write_once
 from tests.house.source import ROOT
 
 
-def start(
-    *, without: tuple[str, ...] = (), **environment: str
-) -> subprocess.CompletedProcess[str]:
-    kept = {name: value for name, value in os.environ.items() if name not in without}
+def start(**environment: str | None) -> subprocess.CompletedProcess[str]:
+    """With these variables; None leaves one out."""
+    wanted = {**os.environ, **environment}
     return subprocess.run(
         [sys.executable, "manage.py", "diffsettings"],
         cwd=ROOT,
-        env={**kept, **environment},
+        env={name: value for name, value in wanted.items() if value is not None},
         capture_output=True,
         text=True,
     )
@@ -102,7 +101,7 @@ def test_what_stood_open_is_closed_at_the_next_start(tmp_path: Path) -> None:
         (var / name).write_text("a key" if name == "secret_key" else "")
         (var / name).chmod(0o644)
     at = {"ARENA_VAR_DIR": str(var), "ARENA_MEDIA_DIR": str(media)}
-    assert start(**at, without=("DATABASE_URL",)).returncode == 0
+    assert start(**at, DATABASE_URL=None).returncode == 0
     assert modes(tmp_path) == {
         **{"var": 0o700, "media": 0o700},
         **{f"var/{name}": 0o600 for name in files},

@@ -18,6 +18,7 @@ from arena.services.faults import close_labelling, open_labelling, save_label
 from augment.errors import Conflict, UnknownName
 from augment.models import Event, GenerationJob
 from augment.services.fault_guess import FaultClass
+from tests.append_only import rewriting
 from tests.exports.test_displacement import a_job
 from tests.study_rows import expert
 
@@ -122,12 +123,14 @@ def test_the_next_one_comes_until_all_are_labelled(job: GenerationJob, eva: User
 def test_the_database_takes_one_label_per_expert_and_a_whole_guess(
     job: GenerationJob, eva: User
 ) -> None:
-    label = save(tasks_of(opened(job, "eva"), eva)[0])
-    for changes in ({"guessed_logic": None}, {"pk": None}):
+    first, second = tasks_of(opened(job, "eva"), eva)[:2]
+    label = save(first)
+    half = {"task": second, "augmentation": second.augmentation, "guessed_logic": None}
+    for changes in (half, {"task": second}):
         again = FaultLabel.objects.get(pk=label.pk)
         for name, value in changes.items():
             setattr(again, name, value)
-        again._state.adding = again.pk is None
+        again.pk, again._state.adding = None, True
         with pytest.raises(IntegrityError), transaction.atomic():
             again.save()
 
@@ -149,8 +152,9 @@ def test_agreement_compares_guess_and_label(job: GenerationJob, eva: User) -> No
     first, second = tasks_of(opened(job, "eva"), eva)
     save(first, P)
     save(second)
-    FaultLabel.objects.filter(task=first).update(guessed_position=True)
-    FaultLabel.objects.filter(task=second).update(guessed_position=False)
+    with rewriting(FaultLabel):
+        FaultLabel.objects.filter(task=first).update(guessed_position=True)
+        FaultLabel.objects.filter(task=second).update(guessed_position=False)
     position, heading, _ = fault_table(job).agreement
     assert (position.kappa, position.n) == (1.0, 2)
     assert heading.n == 2

@@ -1,0 +1,115 @@
+"""What is append-only can't be changed, also by somebody who has the database open."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import pytest
+from django.apps import apps
+from django.core.management import call_command
+from django.db import IntegrityError, connection, transaction
+from django.db.models import Model
+
+from arena.models import EarlyLook, FaultLabel, Report, Vote
+from augment.models import AppendOnly, Event, before_migrations
+from augment.services.events import log_event
+from tests.append_only import rewriting
+from tests.study_rows import a_study, matchups_of, vote
+
+TABLES = {model for model in apps.get_models() if issubclass(model, AppendOnly)}
+
+
+def execute(statement: str) -> None:
+    connection.check_constraints()  # PostgreSQL empties no table with checks that still wait
+    with transaction.atomic(), connection.cursor() as cursor:
+        cursor.execute(statement)
+
+
+def triggers() -> set[str]:
+    kept = "SELECT name FROM sqlite_master WHERE type = 'trigger'"
+    if connection.vendor == "postgresql":
+        kept = "SELECT tgname FROM pg_trigger WHERE NOT tgisinternal"
+    with connection.cursor() as cursor:
+        cursor.execute(kept)
+        return {name for (name,) in cursor.fetchall()}
+
+
+def test_votes_reports_labels_looks_and_the_log_are_append_only() -> None:
+    assert {Vote, Report, FaultLabel, EarlyLook, Event} <= TABLES
+
+
+@pytest.mark.django_db
+def test_every_table_that_is_append_only_has_its_triggers() -> None:
+    for model in TABLES:
+        for what in ("update", "delete"):
+            assert f"{model._meta.db_table}_refuses_{what}" in triggers()
+
+
+def a_vote() -> Model:
+    return vote(matchups_of(a_study(), "eva")[0])
+
+
+def a_line() -> Model:
+    return log_event(actor=None, verb="close", object_kind="study", object_code=7)
+
+
+@pytest.mark.django_db
+@pytest.mark.parametrize("made", [a_vote, a_line])
+def test_a_stored_row_can_be_neither_changed_nor_deleted(made: Callable[[], Model]) -> None:
+    row = made()
+    model, table = type(row), row._meta.db_table
+    stored = model._default_manager.filter(pk=row.pk)
+    before = stored.values().get()
+    statements = [
+        f"UPDATE {table} SET at = at WHERE id = {row.pk}",
+        f"DELETE FROM {table} WHERE id = {row.pk}",
+        f"DELETE FROM {table}",
+        f"INSERT OR REPLACE INTO {table} SELECT * FROM {table}"
+        if connection.vendor == "sqlite"
+        else f"TRUNCATE {table} CASCADE",
+    ]
+    for statement in statements:
+        with pytest.raises(IntegrityError, match=f"{table} is append-only"):
+            execute(statement)
+    with pytest.raises(IntegrityError, match="append-only"), transaction.atomic():
+        stored.update(at=None)
+    with pytest.raises(IntegrityError, match="append-only"), transaction.atomic():
+        stored.delete()
+    with pytest.raises(TypeError, match="can't be changed"):
+        row.save()
+    with pytest.raises(TypeError, match="can't be deleted"):
+        row.delete()
+    assert stored.values().get() == before
+
+
+@pytest.mark.django_db(transaction=True)
+def test_a_migration_may_change_rows_and_leaves_the_triggers_as_they_were() -> None:
+    """SQLite makes a table anew to alter it, and its triggers go with the old one."""
+    a_line()
+    before = triggers()
+    assert before
+    augment = apps.get_app_config("augment")
+    before_migrations(augment, using=connection.alias, plan=["something"])
+    execute("UPDATE augment_event SET verb = 'mended'")
+    assert triggers() < before
+    call_command("migrate", verbosity=0)
+    assert triggers() == before
+    with pytest.raises(IntegrityError):
+        execute("UPDATE augment_event SET verb = 'forged'")
+
+
+@pytest.mark.django_db(transaction=True)
+def test_nothing_to_migrate_leaves_the_triggers_alone() -> None:
+    before_migrations(apps.get_app_config("arena"), using=connection.alias, plan=[])
+    with pytest.raises(IntegrityError):
+        a_vote().__class__._default_manager.all().delete()
+
+
+@pytest.mark.django_db
+def test_tests_can_still_make_a_forged_row() -> None:
+    row = a_line()
+    with rewriting(Event):
+        Event.objects.update(verb="forged")
+    assert Event.objects.get(pk=row.pk).verb == "forged"
+    with pytest.raises(IntegrityError), transaction.atomic():
+        Event.objects.update(verb="again")
