@@ -46,6 +46,19 @@ class MadeElsewhere:
         """Never by hand."""
         return False
 
+    def has_delete_permission(self, request: HttpRequest, obj: Any = None) -> bool:
+        """One by one, as long as nothing hangs on it.
+
+        Else the page that refuses would list what hangs on it, a rank or a vote among it.
+        """
+        if obj is None:
+            return False
+        is_used = any(
+            one.related_model._default_manager.filter(**{one.field.name: obj}).exists()
+            for one in obj._meta.related_objects
+        )
+        return not is_used and super().has_delete_permission(request, obj)  # type: ignore[misc]
+
 
 @admin.register(BaseScene)
 class BaseSceneAdmin(MadeElsewhere, admin.ModelAdmin):

@@ -90,7 +90,7 @@ AXES_LOCKOUT_CALLABLE = "arena.web.faults.locked"
 # --- What it is made of ------------------------------------------------------------------------
 
 INSTALLED_APPS = [
-    "django.contrib.admin",
+    "arena.config.admin_site.SiteConfig",
     "django.contrib.auth",
     "django.contrib.contenttypes",
     "django.contrib.sessions",

@@ -1,11 +1,14 @@
-"""Who has an account."""
+"""Who has an account. Every account has a person, however it was made."""
 
 from __future__ import annotations
 
 import uuid
+from typing import Any
 
 from django.conf import settings
 from django.db import models
+from django.db.models.signals import post_save
+from django.dispatch import receiver
 
 
 class Person(models.Model):
@@ -27,3 +30,18 @@ class Person(models.Model):
 
     def __str__(self) -> str:
         return self.pseudonym
+
+
+@receiver(post_save, sender=settings.AUTH_USER_MODEL)
+def give_person(instance: Any, created: bool, raw: bool, using: str, **_: Any) -> None:
+    """Give a new account its person: Django's admin and createsuperuser know of none.
+
+    Rows of a fixture are taken as they are.
+    """
+    if created and not raw:
+        people = Person.objects.using(using)
+        code = uuid.uuid4()
+        name = f"Person {instance.pk}"
+        is_taken = people.filter(pseudonym=name).exists()
+        pseudonym = f"{name} {code.hex[:8]}" if is_taken else name
+        people.create(user=instance, code=code, pseudonym=pseudonym)

@@ -33,7 +33,7 @@ def experts() -> QuerySet[User]:
     """
     more = ("admin", "analyst")
     found = User.objects.filter(is_active=True, is_superuser=False, groups__name="expert")
-    return found.exclude(groups__name__in=more).select_related("person")
+    return found.exclude(groups__name__in=more).exclude(person=None).select_related("person")
 
 
 def by_pseudonym(found: QuerySet[User]) -> list[User]:

@@ -58,9 +58,9 @@ def create_person(
             user = User.objects.create_user(
                 username, password=password, is_staff=is_admin, is_superuser=is_admin
             )
-            person = Person.objects.create(
-                user=user, pseudonym=pseudonym, is_simulated=is_simulated
-            )
+            person = user.person
+            person.pseudonym, person.is_simulated = pseudonym, is_simulated
+            person.save(update_fields=["pseudonym", "is_simulated"])
     except IntegrityError:  # somebody else was faster
         raise Conflict(
             f"The username {username!r} or the pseudonym {pseudonym!r} was taken just now; try "

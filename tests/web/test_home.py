@@ -75,10 +75,11 @@ def test_a_made_up_theme_or_a_foreign_address_changes_nothing() -> None:
     assert Person.objects.get(user=expert).preferences == {}
 
 
-def test_an_account_without_a_person_still_has_a_home() -> None:
-    bare = User.objects.create_user("bare", password="a password")
-    bare.groups.add(Group.objects.get_or_create(name="analyst")[0])
-    assert "bare" in home(bare)
+def test_an_account_that_no_service_made_is_a_person_and_has_a_home() -> None:
+    Person.objects.filter(user=people()["expert"]).update(pseudonym="Person 4")
+    bare = User.objects.create_user("bare", password="a password", id=4)
+    bare.groups.add(Group.objects.get(name="analyst"))
+    assert f"Person 4 {bare.person.code.hex[:8]}" in home(bare)
     signed_in(bare).post(reverse("theme"), {"theme": "light"})
     assert 'data-theme="light"' in home(bare)
 

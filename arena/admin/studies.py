@@ -1,11 +1,16 @@
-"""Django's admin of arena, for rare edits. What was voted and rated can only be read."""
+"""Studies and what came of them in Django's admin, to be read alone.
+
+What an open study has brought so far is shown to those alone who opened its results early on its
+own page, which the log keeps: see arena.services.early_looks.
+"""
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, ClassVar
 
-from django.contrib import admin
-from django.http import HttpRequest
+from django.contrib import admin, messages
+from django.contrib.auth.models import User
+from django.http import HttpRequest, HttpResponse
 
 from arena.models import (
     Authorship,
@@ -13,13 +18,13 @@ from arena.models import (
     Invitation,
     LabellingRound,
     Matchup,
-    Person,
     Report,
     Snapshot,
     Standing,
     Study,
     Vote,
 )
+from arena.queries.results import unread_studies
 
 
 class ReadOnly:
@@ -38,18 +43,32 @@ class ReadOnly:
         return False
 
 
-@admin.register(Person)
-class PersonAdmin(admin.ModelAdmin):
-    """Pseudonyms may be mended; who is simulated is fixed when the account is made."""
+class OfReadStudies(ReadOnly):
+    """Rows that tell how a study goes: while it is open, only for who opened its results early."""
 
-    list_display = ("pseudonym", "user", "is_simulated")
-    list_select_related = ("user",)
-    search_fields = ("pseudonym", "user__username")
-    readonly_fields = ("user", "code", "is_simulated")
+    study_path: ClassVar[str] = "study"
 
-    def has_add_permission(self, request: HttpRequest) -> bool:
-        """Accounts are made with their role by the service."""
-        return False
+    def get_queryset(self, request: HttpRequest) -> Any:
+        """Without what must not be seen yet, whatever page, filter or search asks for it."""
+        rows = super().get_queryset(request)  # type: ignore[misc]
+        unread = unread_studies(_account(request))
+        return rows.exclude(**{f"{self.study_path}__in": unread})
+
+    def changelist_view(self, request: HttpRequest, extra_context: Any = None) -> HttpResponse:
+        """The list, which says what it leaves out."""
+        names = list(unread_studies(_account(request)).values_list("name", flat=True))
+        if names:
+            text = (
+                f"Not shown here: what belongs to {', '.join(names)}. A study that is open shows "
+                "its results on its own page, to those who open them early; the log keeps who did."
+            )
+            messages.info(request, text)
+        return super().changelist_view(request, extra_context)  # type: ignore[misc,no-any-return]
+
+
+def _account(request: HttpRequest) -> User:
+    assert isinstance(request.user, User)
+    return request.user
 
 
 @admin.register(Invitation)
@@ -81,8 +100,8 @@ class StudyAdmin(ReadOnly, admin.ModelAdmin):
 
 
 @admin.register(Matchup)
-class MatchupAdmin(ReadOnly, admin.ModelAdmin):
-    """The plan."""
+class MatchupAdmin(OfReadStudies, admin.ModelAdmin):
+    """The plan: what is shown how often tells, in an adaptive part, how it stands."""
 
     list_display = ("code", "study", "expert", "position", "scenario", "served_at")
     list_select_related = ("study", "expert", "scenario")
@@ -91,8 +110,10 @@ class MatchupAdmin(ReadOnly, admin.ModelAdmin):
 
 
 @admin.register(Vote)
-class VoteAdmin(ReadOnly, admin.ModelAdmin):
+class VoteAdmin(OfReadStudies, admin.ModelAdmin):
     """Append-only."""
+
+    study_path = "matchup__study"
 
     list_display = ("key", "expert", "outcome", "is_simulated", "at")
     list_select_related = ("expert",)
@@ -117,7 +138,7 @@ class StandingInline(ReadOnly, admin.TabularInline):
 
 
 @admin.register(Snapshot)
-class SnapshotAdmin(ReadOnly, admin.ModelAdmin):
+class SnapshotAdmin(OfReadStudies, admin.ModelAdmin):
     """Frozen."""
 
     list_display = ("study", "method", "resampling_unit", "votes_counted", "made_at")
