@@ -10,4 +10,4 @@ RUN mkdir -p /data/var /data/media && chown -R arena /data
 USER arena
 ENV ARENA_VAR_DIR=/data/var ARENA_MEDIA_DIR=/data/media
 EXPOSE 8000
-CMD ["sh", "-c", "python manage.py prepare && exec gunicorn arena.config.wsgi --bind 0.0.0.0:8000 --workers 2 --threads 4"]
+CMD ["sh", "-c", "python manage.py prepare && exec gunicorn arena.config.wsgi --worker-class arena.serving.web_worker.BufferingWorker --bind 0.0.0.0:8000 --workers 2 --threads 4"]

@@ -58,6 +58,7 @@ def web_server(web: Web) -> Program:
     arguments = (
         *(sys.executable, "-m", "gunicorn", "arena.config.wsgi"),
         *("--bind", f"[{web.host}]:{web.port}" if ":" in web.host else f"{web.host}:{web.port}"),
+        *("--worker-class", "arena.serving.web_worker.BufferingWorker"),
         *("--workers", str(web.workers), "--threads", str(web.threads)),
         *("--worker-tmp-dir", str(settings.VAR_DIR)),
         "--no-control-socket",

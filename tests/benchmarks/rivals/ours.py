@@ -54,6 +54,7 @@ def arena(folder: Path, *, port: int, clients: int, votes: int, database: str) -
     made = json.loads(_must([*seed, str(voters), str(each)], environment).splitlines()[-1])
     gunicorn = [
         *(sys.executable, "-m", "gunicorn", "arena.config.wsgi"),
+        *("--worker-class", "arena.serving.web_worker.BufferingWorker"),
         *("--bind", f"127.0.0.1:{port}", "--workers", "2", "--threads", "4"),
         *("--worker-tmp-dir", str(folder), "--no-control-socket"),
     ]
