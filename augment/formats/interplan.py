@@ -16,6 +16,7 @@ import yaml
 from augment.scene.catalogue import ScenarioType
 from augment.scene.entities import Scene
 from augment.scene.modification import Modification
+from augment.sentences import escaped
 
 STANDING_WALK_M: Final = 1.5
 """A walk up to here is a worker's: interPlan's construction workers step 1.0 m."""
@@ -47,10 +48,16 @@ class Cell:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Loss:
-    """Something that the format can't say, or that had to be made up."""
+    """Something that the format can't say, or that had to be made up.
+
+    Attributes:
+        changes_scene: Whether other things stand in interPlan's scene than in ours, or do
+            something else; not so for sizes and the pace of a walk.
+    """
 
     cell: str
     text: str
+    changes_scene: bool = False
 
     def __str__(self) -> str:
         return f"{self.cell}: {self.text}"
@@ -69,6 +76,21 @@ class ReadEntry:
     scene: str
     type: ScenarioType
     modification: Modification
+    left_out: tuple[str, ...]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ReadFile:
+    """What a file holds.
+
+    Attributes:
+        entries: The special scenarios whose scenes are known, in the file's order.
+        passed_over: The base tokens without a scene, with the number of their special scenarios.
+        left_out: What stands besides special scenarios and says nothing here.
+    """
+
+    entries: tuple[ReadEntry, ...]
+    passed_over: Mapping[str, int]
     left_out: tuple[str, ...]
 
 
@@ -99,7 +121,7 @@ def yaml_text(by_token: Mapping[str, dict[str, Any]], comments: list[str]) -> st
         },
     }
     body = yaml.dump(document, Dumper=_Dumper, sort_keys=False, allow_unicode=True, width=99)
-    head = "".join(f"# {' '.join(line.split())}\n" for line in comments)
+    head = "".join(f"# {escaped(' '.join(line.split()))}\n" for line in comments)
     return head + body
 
 

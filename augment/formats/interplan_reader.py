@@ -7,54 +7,38 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from typing import Annotated, Any
+from typing import Any
 
 import numpy as np
-import yaml
-from pydantic import BaseModel, ConfigDict, Field, Strict, ValidationError
 
 from augment.checks.ground import Ground
 from augment.errors import InvalidDocument
-from augment.formats.interplan import STANDING_WALK_M, WALK_S, ReadEntry
+from augment.formats.interplan import STANDING_WALK_M, WALK_S, ReadEntry, ReadFile
+from augment.formats.interplan_schema import (
+    WHAT,
+    Entry,
+    file_of,
+    left_out_of_details,
+    left_out_of_file,
+    place_of,
+)
+from augment.formats.yaml_file import read_yaml
 from augment.geometry.angles import wrap
 from augment.geometry.frames import Pose
-from augment.scene.catalogue import ScenarioType
 from augment.scene.entities import AgentType, Scene, TrafficAgent
 from augment.scene.modification import Modification
 from augment.scene.sizes import LENGTH_WIDTH_M
 
-WHAT = "interPlan file"
+Place = tuple[str, int]
+"""A key of a special scenario and the number of a row under it."""
 
-Number = Annotated[float, Field(allow_inf_nan=False)]
-
-
-class _Entry(BaseModel):
-    """One special scenario; keys that say nothing about objects are allowed and left out."""
-
-    model_config = ConfigDict(extra="allow")
-
-    type: Annotated[ScenarioType, Strict(False)]
-    config: str | None = None
-    stopped_vehicle: list[tuple[Number, Number, Number]] = []
-    stopped_bus: list[tuple[Number, Number, Number]] = []
-    cones: list[tuple[Number, Number]] = []
-    pedestrian: list[tuple[Number, Number, Number, Number, int | None]] = []
+FURTHEST_FROM_EGO_M = 1_000.0
+"""What lies further from its scene's ego is in another frame, or another scene is meant."""
+_STANDS_M = 0.01
 
 
-class _Details(BaseModel):
-    model_config = ConfigDict(extra="allow")
-
-    special_scenario: dict[str | int, _Entry] = {}
-
-
-class _File(BaseModel):
-    model_config = ConfigDict(extra="allow")
-
-    modification_details_dictionary: dict[str, _Details]
-
-
-def read(text: str, scenes: Mapping[str, Scene]) -> tuple[ReadEntry, ...]:
-    """Every special scenario of the tokens that have a scene; other tokens are passed over.
+def read(text: str, scenes: Mapping[str, Scene]) -> ReadFile:
+    """Every special scenario of the tokens that have a scene, and what else there is.
 
     Objects come in the file's order of keys: vehicles, buses, cones, pedestrians. Boxes get our
     own usual sizes, cones the direction of the ego's way.
@@ -64,44 +48,67 @@ def read(text: str, scenes: Mapping[str, Scene]) -> tuple[ReadEntry, ...]:
         scenes: By base token, without the traffic that interPlan removes.
 
     Raises:
-        InvalidDocument: It is no YAML, or its keys don't hold what interPlan's do.
+        InvalidDocument: It is no plain YAML, its keys don't hold what interPlan's do, there is
+            no special scenario in it, or an object is nowhere near its scene.
     """
-    try:
-        given = _File.model_validate(yaml.safe_load(text))
-    except yaml.YAMLError as fault:
-        raise InvalidDocument(WHAT, [("", f"is no YAML: {fault}")]) from None
-    except ValidationError as fault:
-        problems = [
-            (".".join(str(part) for part in error["loc"]), error["msg"])
-            for error in fault.errors()
-        ]
-        raise InvalidDocument(WHAT, problems) from None
-    return tuple(
-        _read_entry(f"{token}-s{index}", entry, scenes[token])
-        for token, one in given.modification_details_dictionary.items()
-        if token in scenes
-        for index, entry in one.special_scenario.items()
+    return read_document(read_yaml(text, what=WHAT), scenes)
+
+
+def read_document(document: object, scenes: Mapping[str, Scene]) -> ReadFile:
+    """The same of what the YAML holds.
+
+    Raises:
+        InvalidDocument: As above.
+    """
+    file = file_of(document)
+    by_token = file.modification_details_dictionary
+    special = {token: one.special_scenario or {} for token, one in by_token.items()}
+    if not any(special.values()):
+        raise InvalidDocument(WHAT, [("", "holds no special scenario")])
+    left_out = [
+        *left_out_of_file(file),
+        *(
+            f"{token}: {part}"
+            for token, one in by_token.items()
+            if token in scenes
+            for part in left_out_of_details(one)
+        ),
+    ]
+    return ReadFile(
+        entries=tuple(
+            _read_entry(token, index, entry, scenes[token])
+            for token, entries in special.items()
+            if token in scenes
+            for index, entry in entries.items()
+        ),
+        passed_over={
+            token: len(entries) for token, entries in special.items() if token not in scenes
+        },
+        left_out=tuple(left_out),
     )
 
 
-def _read_entry(name: str, entry: _Entry, scene: Scene) -> ReadEntry:
-    placer = _Placer(scene)
-    for kind, rows in (
-        (AgentType.VEHICLE, entry.stopped_vehicle),
-        (AgentType.BUS, entry.stopped_bus),
+def _read_entry(token: str, index: str | int, entry: Entry, scene: Scene) -> ReadEntry:
+    placer = _Placer(scene, token, index)
+    for kind, key, rows in (
+        (AgentType.VEHICLE, "stopped_vehicle", entry.stopped_vehicle),
+        (AgentType.BUS, "stopped_bus", entry.stopped_bus),
     ):
-        for row in rows:
-            placer.add(kind, *row)
-    for x_m, y_m in entry.cones:
-        placer.add_cone(x_m, y_m)
+        for number, row in enumerate(rows):
+            placer.add(kind, *row, place=(key, number))
+    for number, cone in enumerate(entry.cones):
+        placer.add_cone(*cone, place=("cones", number))
     left_out = [f"config {entry.config}"] if entry.config else []
     for number, (x_m, y_m, end_x_m, end_y_m, iteration) in enumerate(entry.pedestrian):
-        placer.add_walker((x_m, y_m), (end_x_m, end_y_m))
+        place = ("pedestrian", number)
+        walk_m = placer.add_walker((x_m, y_m), (end_x_m, end_y_m), place=place)
+        if walk_m < _STANDS_M:
+            left_out.append(f"pedestrian {number} walks 0 m, which gives it no direction")
         if iteration is not None:
             left_out.append(f"pedestrian {number} starts at iteration {iteration}")
     left_out += [f"key {key}" for key in entry.model_extra or {}]
     return ReadEntry(
-        id=name,
+        id=f"{token}-s{index}",
         scene=scene.name,
         type=entry.type,
         modification=Modification(added=tuple(placer.added)),
@@ -112,29 +119,36 @@ def _read_entry(name: str, entry: _Entry, scene: Scene) -> ReadEntry:
 class _Placer:
     """Puts what the file names into one scene's ego frame."""
 
-    def __init__(self, scene: Scene) -> None:
+    def __init__(self, scene: Scene, token: str, index: str | int) -> None:
         self._scene = scene
+        self._entry = (token, index)
         self._ground = Ground.of(scene)
         self._next = len(scene.everyone) + 1
         self.added: list[TrafficAgent] = []
 
-    def add(self, kind: AgentType, x_m: float, y_m: float, yaw_rad: float) -> None:
+    def add(
+        self, kind: AgentType, x_m: float, y_m: float, yaw_rad: float, *, place: Place
+    ) -> None:
         """Something that stands, by its pose in the global frame."""
-        pose = Pose(x_m=x_m, y_m=y_m, heading_rad=yaw_rad)
+        self._local(x_m, y_m, place)
+        pose = Pose(x_m=x_m, y_m=y_m, heading_rad=wrap(yaw_rad))
         self._put(kind, self._scene.origin.pose.pose_to_local(pose))
 
-    def add_cone(self, x_m: float, y_m: float) -> None:
+    def add_cone(self, x_m: float, y_m: float, *, place: Place) -> None:
         """A cone, which has no direction in the file."""
-        x_m, y_m = self._local(x_m, y_m)
+        x_m, y_m = self._local(x_m, y_m, place)
         route = self._ground.route
         heading_rad = 0.0
         if route is not None:
             heading_rad = route[0].heading_at(route[0].project(x_m, y_m).s_m)
         self._put(AgentType.TRAFFIC_CONE, Pose(x_m=x_m, y_m=y_m, heading_rad=heading_rad))
 
-    def add_walker(self, start_m: tuple[float, float], end_m: tuple[float, float]) -> None:
-        """A pedestrian who walks, or stands where the walk is a worker's step."""
-        (x_m, y_m), (end_x_m, end_y_m) = self._local(*start_m), self._local(*end_m)
+    def add_walker(
+        self, start_m: tuple[float, float], end_m: tuple[float, float], *, place: Place
+    ) -> float:
+        """A pedestrian who walks, or stands where the walk is a worker's step; its length."""
+        x_m, y_m = self._local(*start_m, place)
+        end_x_m, end_y_m = self._local(*end_m, place)
         walk_m = math.hypot(end_x_m - x_m, end_y_m - y_m)
         pose = Pose(x_m=x_m, y_m=y_m, heading_rad=wrap(math.atan2(end_y_m - y_m, end_x_m - x_m)))
         if walk_m <= STANDING_WALK_M:
@@ -146,9 +160,17 @@ class _Placer:
                 speed_mps=round(walk_m / WALK_S, 2),
                 walk_to_m=(end_x_m, end_y_m),
             )
+        return walk_m
 
-    def _local(self, x_m: float, y_m: float) -> tuple[float, float]:
+    def _local(self, x_m: float, y_m: float, place: Place) -> tuple[float, float]:
         x_m, y_m = self._scene.origin.pose.to_local(np.array([[x_m, y_m]]))[0]
+        away_m = math.hypot(x_m, y_m)
+        if away_m > FURTHEST_FROM_EGO_M:
+            problem = (
+                f"is {away_m:.0f} m from the ego of scene {self._scene.name}; more than "
+                f"{FURTHEST_FROM_EGO_M:.0f} m means another scene or another frame"
+            )
+            raise InvalidDocument(WHAT, [(place_of(*self._entry, *place), problem)])
         return float(x_m), float(y_m)
 
     def _put(self, kind: AgentType, pose: Pose, **more: Any) -> None:

@@ -17,15 +17,17 @@ from augment.checks.ground import Ground
 from augment.errors import Conflict
 from augment.formats.interplan import (
     MOST_ENTRIES,
+    WALK_S,
     Cell,
     Loss,
     details,
     token_of,
     yaml_text,
 )
-from augment.geometry.angles import wrap
+from augment.geometry.angles import difference, wrap
 from augment.scene.catalogue import ScenarioType
 from augment.scene.entities import AgentType, Point, Scene, TrafficAgent
+from augment.scene.sizes import LENGTH_WIDTH_M
 
 BUS_LENGTH_M = 7.0
 """A vehicle from here on is written as a bus: clearly longer than any car."""
@@ -35,8 +37,14 @@ SHORTEST_WALK_M, LONGEST_WALK_M = 7.0, 29.0
 METRE_DECIMALS, RADIAN_DECIMALS = 4, 6
 
 _STEP_M = 0.5
-_KEPT_TRAFFIC = "a1"
-"""interPlan's suffix for keeping all recorded vehicles."""
+_SAME_SIZE_M = 0.01
+_SAME_PACE_MPS = 0.02
+_SAME_WAY_RAD = 0.02
+_NO_WALK_M = 0.01
+_MADE_UP = (
+    "The base tokens are made from the scenes' names and are none of nuPlan's. Places are in "
+    "the frame of each scene's origin."
+)
 
 
 def write(cells: Iterable[Cell]) -> tuple[str, tuple[Loss, ...]]:
@@ -52,7 +60,7 @@ def write(cells: Iterable[Cell]) -> tuple[str, tuple[Loss, ...]]:
         Conflict: More than a hundred for one scene, which two digits can't number.
     """
     by_token: dict[str, dict[str, dict[str, Any]]] = defaultdict(dict)
-    comments, losses = [], []
+    comments, losses = [_MADE_UP], []
     for cell in cells:
         token = token_of(cell.scene.name)
         index = str(len(by_token[token]))
@@ -65,6 +73,7 @@ def write(cells: Iterable[Cell]) -> tuple[str, tuple[Loss, ...]]:
         by_token[token][index] = entry.written()
         losses += entry.losses
         comments.append(f"{token}-s{index} {cell.scene.name}: {cell.name}")
+        comments += [f"  lost: {loss.text}" for loss in entry.losses]
     documents = {token: details(entries) for token, entries in by_token.items()}
     return yaml_text(documents, comments), tuple(losses)
 
@@ -82,21 +91,25 @@ class _Entry:
         for agent in self.cell.modification.added:
             for key, row in self._row(agent):
                 lists[key].append(row)
-        self._report_changes()
-        entry: dict[str, Any] = {"type": self.cell.type.value}
+        self._report_scene()
+        return {"type": self.cell.type.value, **lists}
+
+    def _lose(self, text: str, *, changes_scene: bool = True) -> None:
+        self.losses.append(Loss(cell=self.cell.name, text=text, changes_scene=changes_scene))
+
+    def _report_scene(self) -> None:
+        """What becomes of the recorded traffic, and of changes to it."""
+        kept = len(self.cell.scene.agents)
         if self.cell.keeps_traffic:
-            entry["config"] = _KEPT_TRAFFIC
-            self._lose("recorded pedestrians, bicycles and objects go, only vehicles stay")
-        return {**entry, **lists}
-
-    def _lose(self, text: str) -> None:
-        self.losses.append(Loss(cell=self.cell.name, text=text))
-
-    def _report_changes(self) -> None:
+            # Also with interPlan's "a1": without density traffic it deletes all vehicles twice.
+            self._lose(
+                f"the recorded traffic, which this scenario keeps ({kept} agents), is gone: "
+                "interPlan removes all of it from every special scenario"
+            )
         for agent in self.cell.modification.moved:
             self._lose(f"{agent.id} is moved; interPlan can only add")
         for name in self.cell.modification.removed:
-            self._lose(f"{name} is removed; interPlan removes all recorded vehicles or none")
+            self._lose(f"{name} is removed; interPlan removes all recorded traffic")
 
     def _row(self, agent: TrafficAgent) -> Iterator[tuple[str, list[float | None]]]:
         x_m, y_m = self._global((agent.x_m, agent.y_m))
@@ -105,31 +118,72 @@ class _Entry:
                 self._lose(f"{agent.id} moves at {agent.speed_mps:g} m/s; there it stands")
             yield self._vehicle_key(agent), [x_m, y_m, self._yaw(agent)]
         elif agent.type is AgentType.TRAFFIC_CONE:
+            self._report_size(agent, AgentType.TRAFFIC_CONE)
             yield "cones", [x_m, y_m]
         elif agent.type is AgentType.PEDESTRIAN:
+            self._report_size(agent, AgentType.PEDESTRIAN)
             yield "pedestrian", [x_m, y_m, *self._global(self._walk_end(agent)), None]
         else:
             self._lose(f"{agent.id} is left out: there is no key for {agent.type}")
 
     def _vehicle_key(self, agent: TrafficAgent) -> str:
-        if agent.type is AgentType.BUS:
-            return "stopped_bus"
-        if agent.length_m >= BUS_LENGTH_M:
+        is_long = agent.length_m >= BUS_LENGTH_M
+        if agent.type is AgentType.VEHICLE and is_long:
             self._lose(f"{agent.id} is {agent.length_m:g} m long and becomes a bus")
+        if agent.type is AgentType.BUS or is_long:
+            self._report_size(agent, AgentType.BUS)
             return "stopped_bus"
+        self._lose(
+            f"{agent.id}: its box of {_box(agent)} m is not kept; it gets that of a removed "
+            "vehicle, or the ego's",
+            changes_scene=False,
+        )
         return "stopped_vehicle"
 
+    def _report_size(self, agent: TrafficAgent, becomes: AgentType) -> None:
+        length_m, width_m = LENGTH_WIDTH_M[becomes]
+        off_m = max(abs(agent.length_m - length_m), abs(agent.width_m - width_m))
+        if off_m > _SAME_SIZE_M:
+            self._lose(
+                f"{agent.id}: its box of {_box(agent)} m becomes {length_m:g} x {width_m:g} m",
+                changes_scene=False,
+            )
+
     def _walk_end(self, agent: TrafficAgent) -> Point:
-        if agent.walk_to_m is not None:
-            return agent.walk_to_m
-        length_m = WORKER_STEP_M
-        if self.cell.type is not ScenarioType.CONSTRUCTION_ZONE:
-            length_m = _walk_m(self.cell.scene, agent)
-            self._lose(f"{agent.id} has no end point; {length_m:g} m along its heading is taken")
-        return (
-            agent.x_m + length_m * math.cos(agent.heading_rad),
-            agent.y_m + length_m * math.sin(agent.heading_rad),
-        )
+        if agent.walk_to_m is None:
+            length_m = WORKER_STEP_M
+            if self.cell.type is not ScenarioType.CONSTRUCTION_ZONE:
+                length_m = _walk_m(self.cell.scene, agent)
+                self._lose(
+                    f"{agent.id} has no end point; {length_m:g} m along its heading is taken"
+                )
+            return _ahead(agent, length_m)
+        east_m, north_m = agent.walk_to_m[0] - agent.x_m, agent.walk_to_m[1] - agent.y_m
+        walk_m = math.hypot(east_m, north_m)
+        if walk_m < _NO_WALK_M:
+            self._lose(
+                f"{agent.id} walks 0 m, which has no direction; a step of {WORKER_STEP_M:g} m "
+                "along its heading is taken"
+            )
+            return _ahead(agent, WORKER_STEP_M)
+        self._report_walk(agent, walk_m, math.atan2(north_m, east_m))
+        return agent.walk_to_m
+
+    def _report_walk(self, agent: TrafficAgent, walk_m: float, way_rad: float) -> None:
+        turned_rad = abs(difference(agent.heading_rad, way_rad))
+        if turned_rad > _SAME_WAY_RAD:
+            self._lose(
+                f"{agent.id} looks {math.degrees(turned_rad):.0f} degrees away from its walk; "
+                "there it looks along it",
+                changes_scene=False,
+            )
+        there_mps = walk_m / WALK_S
+        if abs(agent.speed_mps - there_mps) > _SAME_PACE_MPS:
+            self._lose(
+                f"{agent.id} walks {walk_m:.1f} m at {agent.speed_mps:g} m/s; there it takes "
+                f"{WALK_S:g} s, {there_mps:.2f} m/s",
+                changes_scene=False,
+            )
 
     def _global(self, point: Point) -> tuple[float, float]:
         x_m, y_m = self.cell.scene.origin.pose.to_parent(np.array([point]))[0]
@@ -138,6 +192,17 @@ class _Entry:
     def _yaw(self, agent: TrafficAgent) -> float:
         yaw_rad = wrap(agent.heading_rad + self.cell.scene.origin.pose.heading_rad)
         return round(yaw_rad, RADIAN_DECIMALS)
+
+
+def _ahead(agent: TrafficAgent, distance_m: float) -> Point:
+    return (
+        agent.x_m + distance_m * math.cos(agent.heading_rad),
+        agent.y_m + distance_m * math.sin(agent.heading_rad),
+    )
+
+
+def _box(agent: TrafficAgent) -> str:
+    return f"{agent.length_m:g} x {agent.width_m:g}"
 
 
 def _walk_m(scene: Scene, agent: TrafficAgent) -> float:

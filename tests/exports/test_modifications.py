@@ -77,6 +77,7 @@ def test_a_job_goes_to_a_file_and_back(job: GenerationJob, tmp_path: Path) -> No
 def test_one_contestant_can_be_chosen(job: GenerationJob) -> None:
     text, said = export("--contestant", "rule", "--out", "-")
     assert yaml.safe_load(text)["modification_details_dictionary"] == {}
+    assert all(f"{slug} by rule: there is no modification" in said for slug in SLUGS)
     assert "3 things could not be said" in said
 
 
@@ -86,7 +87,9 @@ def test_scenes_can_be_named_for_foreign_tokens(job: GenerationJob, tmp_path: Pa
     file.write_text(text.replace(token_of("ferry-road"), "00000000000000ab"))
     out = StringIO()
     arguments = ("--scene", "00000000000000ab=ferry-road", "--out", str(tmp_path))
-    call_command("read_interplan", str(file), *arguments, stdout=out)
+    err = StringIO()
+    call_command("read_interplan", str(file), *arguments, stdout=out, stderr=err)
+    assert f"Passed over: {token_of('mill-junction')}, 2 special scenarios" in err.getvalue()
     assert "1 special scenarios read" in out.getvalue()
     assert (tmp_path / "00000000000000ab-s0.json").exists()
 
@@ -104,6 +107,63 @@ def test_a_wrong_wish_is_a_sentence(
     with pytest.raises(CommandError) as fault:
         export(*options, "--out", "-")
     assert sentence in str(fault.value)
+
+
+def test_kept_traffic_is_said_when_it_is_lost_and_refused_when_strict(
+    job: GenerationJob, tmp_path: Path
+) -> None:
+    kept = Scenario.objects.get(slug="jaywalker-terrace-row")
+    assert kept.keep_traffic
+    Augmentation.objects.create(
+        job=job,
+        scenario=kept,
+        contestant=Contestant.objects.get(slug="reference"),
+        state="done",
+        modification=kept.reference,
+        image=store(png()),
+    )
+    file = tmp_path / "strict.yaml"
+    _, said = export("--contestant", "reference", "--out", str(file))
+    sentence = "jaywalker-terrace-row by reference: the recorded traffic, which this scenario"
+    assert f"Lost: {sentence}" in said
+    file.unlink()
+    with pytest.raises(CommandError, match="nothing was written") as fault:
+        export("--contestant", "reference", "--strict", "--out", str(file))
+    assert sentence in str(fault.value)
+    assert not file.exists()
+    kept.augmentations.all().delete()
+    export("--contestant", "reference", "--strict", "--out", str(file))
+    assert file.exists()
+
+
+@pytest.mark.parametrize(
+    ("text", "options", "sentence"),
+    [
+        ("colour: red", (), "modification_details_dictionary: is missing"),
+        ("modification_details_dictionary: {}", (), "holds no special scenario"),
+        (None, (), "none of its 1 base tokens has a scene here: 00000000000000ab; name"),
+        (
+            None,
+            ("--scene", "00000000000000cd=ferry-road"),
+            "Unknown base token '00000000000000cd'. Known: 00000000000000ab",
+        ),
+    ],
+)
+def test_a_file_of_something_else_is_an_error_and_not_nothing_read(
+    text: str | None,
+    options: tuple[str, ...],
+    sentence: str,
+    job: GenerationJob,
+    tmp_path: Path,
+) -> None:
+    file = tmp_path / "other.yaml"
+    entry = '{"0": {type: avoid_crashed_cars}}'
+    foreign = f'{{"00000000000000ab": {{special_scenario: {entry}}}}}'
+    file.write_text(text or f"modification_details_dictionary: {foreign}")
+    with pytest.raises(CommandError) as fault:
+        call_command("read_interplan", str(file), "--out", str(tmp_path / "read"), *options)
+    assert sentence in str(fault.value)
+    assert not (tmp_path / "read").exists()
 
 
 def test_a_file_that_is_not_there_and_a_scene_nobody_has_are_named(tmp_path: Path) -> None:

@@ -2,11 +2,12 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
+from typing import Any
 
 import pytest
 import yaml
 
-from augment.errors import Conflict, InvalidDocument
+from augment.errors import Conflict
 from augment.formats.interplan import Cell, ReadEntry, token_of
 from augment.formats.interplan_reader import read
 from augment.formats.interplan_writer import write
@@ -32,7 +33,7 @@ def cell(slug: str, *added: TrafficAgent) -> Cell:
 def read_again(one: Cell) -> ReadEntry:
     text, _ = write([one])
     scene = without_traffic(one.scene)
-    (found,) = read(text, {token_of(scene.name): scene})
+    (found,) = read(text, {token_of(scene.name): scene}).entries
     return found
 
 
@@ -58,7 +59,7 @@ def test_a_reference_comes_back_within_a_centimetre_and_a_milliradian(slug: str)
 
 def test_plain_yaml_shows_interplans_keys() -> None:
     slug = "roadworks-mill-junction"
-    text, losses = write([cell(slug), cell("jaywalker-terrace-row")])
+    text, _ = write([cell(slug), cell("jaywalker-terrace-row")])
     document = yaml.safe_load(text)
     assert list(document) == [
         "accel_max", "decel_max", "scenario_specifics", "modification_details_dictionary",
@@ -78,11 +79,35 @@ def test_plain_yaml_shows_interplans_keys() -> None:
     (worker,) = zone["pedestrian"]
     assert math.dist(worker[:2], worker[2:4]) == pytest.approx(1.0, abs=0.001)
     assert worker[4] is None
+    # interPlan's facts: a special scenario without density loses every recorded vehicle, with
+    # "config: a1" too, so nothing is promised.
     kept = by_token[token_of("terrace-row")]["special_scenario"]["0"]
-    assert kept["config"] == "a1"
-    assert [str(loss) for loss in losses] == [
-        "jaywalker-terrace-row: recorded pedestrians, bicycles and objects go, only vehicles stay"
-    ]
+    assert list(kept) == ["type", "pedestrian"]
+
+
+KEEPING = sorted(slug for slug in SLUGS if entry(slug).keep_traffic)
+
+
+@pytest.mark.parametrize("slug", SLUGS)
+def test_kept_traffic_that_interplan_removes_is_said_in_report_and_file(slug: str) -> None:
+    one = cell(slug)
+    text, losses = write([one])
+    said = [loss.text for loss in losses if loss.changes_scene]
+    if slug in KEEPING:
+        number = len(one.scene.agents)
+        assert number > 0
+        assert said == [
+            f"the recorded traffic, which this scenario keeps ({number} agents), is gone: "
+            "interPlan removes all of it from every special scenario"
+        ]
+        assert f"#   lost: {said[0]}\n" in text.replace("# lost", "#   lost")
+    else:
+        assert said == []
+    assert "config" not in text.partition("accel_max")[2]
+
+
+def test_eight_of_the_fifty_keep_their_traffic() -> None:
+    assert len(KEEPING) == 8
 
 
 def test_places_are_in_the_frame_of_the_scenes_origin() -> None:
@@ -123,13 +148,18 @@ def test_what_the_format_can_not_say_is_reported() -> None:
             )
         ]
     )
-    said = [loss.text for loss in losses]
-    assert said[:3] == [
-        "Agent2 moves at 3 m/s; there it stands",
-        "Agent3 is 9 m long and becomes a bus",
-        "Agent4 is left out: there is no key for BARRIER",
+    assert [(loss.text, loss.changes_scene) for loss in losses] == [
+        ("Agent2 moves at 3 m/s; there it stands", True),
+        (
+            "Agent2: its box of 4.8 x 2 m is not kept; it gets that of a removed vehicle, or "
+            "the ego's",
+            False,
+        ),
+        ("Agent3 is 9 m long and becomes a bus", True),
+        ("Agent3: its box of 9 x 2 m becomes 7.456 x 2.079 m", False),
+        ("Agent4 is left out: there is no key for BARRIER", True),
+        ("Agent5 has no end point; 11.5 m along its heading is taken", True),
     ]
-    assert said[3].startswith("Agent5 has no end point")
     details = yaml.safe_load(text)["modification_details_dictionary"]
     special = details[token_of("plane-tree-street")]["special_scenario"]["0"]
     ((x0, y0, x1, y1, _),) = special["pedestrian"]
@@ -137,40 +167,112 @@ def test_what_the_format_can_not_say_is_reported() -> None:
     assert math.dist((x0, y0), (x1, y1)) == pytest.approx(11.5, abs=0.6)
 
 
+def walker(**changes: Any) -> TrafficAgent:
+    """Crosses the road over 10.7 m, at the pace that interPlan gives it."""
+    given = first("jaywalker-plane-tree-street")
+    end_m = (given.x_m, given.y_m + 10.7)
+    own: dict[str, Any] = {
+        "heading_rad": math.pi / 2,
+        "walk_to_m": end_m,
+        "speed_mps": 10.7 / 15.0,
+    }
+    return replace(given, **{**own, "length_m": 0.9, "width_m": 0.791, **changes})
+
+
 @pytest.mark.parametrize(
-    ("text", "said"),
+    ("change", "said"),
     [
-        ("a: [", "is no YAML"),
-        ("a: 1", "modification_details_dictionary"),
-        (
-            "modification_details_dictionary: {'ab': {special_scenario: {'0': {type: parade}}}}",
-            "type",
-        ),
-        (
-            "modification_details_dictionary: "
-            "{'ab': {special_scenario: {'0': {type: jaywalking_pedestrian, cones: [[1]]}}}}",
-            "cones.0",
-        ),
+        ({}, []),
+        ({"length_m": 0.909}, []),
+        ({"length_m": 0.911}, ["its box of 0.911 x 0.791 m becomes 0.9 x 0.791 m"]),
+        ({"width_m": 0.5}, ["its box of 0.9 x 0.5 m becomes 0.9 x 0.791 m"]),
+        ({"speed_mps": 10.7 / 15.0 + 0.019}, []),
+        ({"speed_mps": 1.4}, ["walks 10.7 m at 1.4 m/s; there it takes 15 s, 0.71 m/s"]),
+        ({"heading_rad": math.pi / 2 + 0.019}, []),
+        ({"heading_rad": math.pi}, ["looks 90 degrees away from its walk"]),
     ],
 )
-def test_a_file_that_breaks_the_format_says_where(text: str, said: str) -> None:
-    with pytest.raises(InvalidDocument, match=said):
-        read(text, {})
+def test_what_a_walk_loses_is_reported(change: dict[str, Any], said: list[str]) -> None:
+    _, losses = write([cell("jaywalker-plane-tree-street", walker(**change))])
+    assert len(losses) == len(said)
+    for loss, part in zip(losses, said, strict=True):
+        assert part in loss.text
+        assert not loss.changes_scene
+
+
+def test_a_walk_of_no_length_becomes_a_step_along_the_heading_and_is_reported() -> None:
+    given = walker()
+    still = replace(given, walk_to_m=(given.x_m, given.y_m), speed_mps=0.0)
+    one = cell("jaywalker-plane-tree-street", still)
+    text, (loss,) = write([one])
+    assert "walks 0 m, which has no direction; a step of 1 m" in loss.text
+    assert loss.changes_scene
+    details = yaml.safe_load(text)["modification_details_dictionary"]
+    special = details[token_of("plane-tree-street")]["special_scenario"]["0"]
+    ((x0, y0, x1, y1, _),) = special["pedestrian"]
+    assert math.dist((x0, y0), (x1, y1)) == pytest.approx(1.0, abs=0.001)
+    back = read_again(one).modification.added[0]
+    assert abs(difference(back.heading_rad, still.heading_rad)) < 0.001
+    assert back.walk_to_m is None
+
+
+def test_the_size_of_a_cone_that_is_not_interplans_is_reported() -> None:
+    given = first("roadworks-mill-junction")
+    small = replace(given, length_m=0.3, width_m=0.3)
+    _, losses = write([cell("roadworks-mill-junction", given, replace(small, id="Agent9"))])
+    assert [loss.text for loss in losses] == ["Agent9: its box of 0.3 x 0.3 m becomes 0.5 x 0.5 m"]
+
+
+def test_a_name_with_control_characters_leaves_a_file_that_can_be_read() -> None:
+    text, _ = write([replace(cell("nudge-plane-tree-street"), name="a\x1b[2J\nb: c")])
+    assert "\x1b" not in text
+    assert yaml.safe_load(text)["accel_max"] == 1.0
+
+
+AB, CD = "00000000000000ab", "00000000000000cd"
 
 
 def test_what_a_modification_can_not_say_is_named() -> None:
     scene = without_traffic(whole_scene("plane-tree-street"))
-    text = (
-        "modification_details_dictionary: {'ab': {special_scenario: {0: {"
-        "type: jaywalking_pedestrian, config: dh, roadblock_locations_to_spawn_agents: [], "
-        "pedestrian: [[0, 0, 8, 0, 12]]}}}, 'cd': {}}"
-    )
-    (found,) = read(text, {"ab": scene})
-    assert found.id == "ab-s0"
+    x_m, y_m = scene.origin.pose.x_m, scene.origin.pose.y_m
+    text = f"""
+scenario_specifics: {{}}
+colour: red
+modification_details_dictionary:
+  "{AB}":
+    extra_agents_to_spawn: [[0, 0, 3], [0, 5, 3]]
+    roadblock_locations_to_spawn_agents: [[0, 0]]
+    goal: {{left: null, right: "1, 2", straight: null}}
+    spawn_in_intersection: true
+    weather: rain
+    special_scenario:
+      0:
+        type: jaywalking_pedestrian
+        config: dh
+        roadblock_locations_to_spawn_agents: []
+        pedestrian:
+        - [{x_m}, {y_m}, {x_m + 8}, {y_m}, 12]
+        - [{x_m}, {y_m}, {x_m}, {y_m}, null]
+  "{CD}": {{special_scenario: {{"7": {{type: avoid_crashed_cars}}}}, goal: {{left: "1, 2"}}}}
+"""
+    given = read(text, {AB: scene})
+    (found,) = given.entries
+    assert found.id == f"{AB}-s0"
     assert found.type is ScenarioType.JAYWALKER
     assert found.left_out == (
         "config dh",
         "pedestrian 0 starts at iteration 12",
+        "pedestrian 1 walks 0 m, which gives it no direction",
         "key roadblock_locations_to_spawn_agents",
     )
     assert found.modification.added[0].speed_mps == pytest.approx(8.0 / 15.0, abs=0.01)
+    assert given.left_out == (
+        "key colour",
+        "scenario_specifics",
+        f"{AB}: extra_agents_to_spawn (2)",
+        f"{AB}: roadblock_locations_to_spawn_agents (1)",
+        f"{AB}: goal (right 1, 2)",
+        f"{AB}: spawn_in_intersection",
+        f"{AB}: key weather",
+    )
+    assert given.passed_over == {CD: 1}

@@ -124,7 +124,9 @@ class Command(TerminalCommand):
         if options["format"] not in MODIFICATION_FORMATS:
             raise UnknownName("format", options["format"], list(MODIFICATION_FORMATS))
         text, losses = job_as_interplan(
-            job_named(options["job"]), contestant=options["contestant"]
+            job_named(options["job"]),
+            contestant=options["contestant"],
+            strict=options["strict"],
         )
         for loss in losses:
             self.stderr.write(f"Lost: {loss}.")
@@ -191,6 +193,11 @@ def _kinds_of_jobs(kinds: Any) -> list[ArgumentParser]:
         "--format", default="interplan", help=f"one of {', '.join(MODIFICATION_FORMATS)}"
     )
     modifications.add_argument("--contestant", help="the slug of one; all unless given")
+    modifications.add_argument(
+        "--strict",
+        action="store_true",
+        help="write nothing if a scenario would not be the same there (kept traffic, motion, ...)",
+    )
     labels = kinds.add_parser("faults", help="how often experts saw which fault")
     labels.add_argument("job", help="its name or its code")
     labels.add_argument("--format", default="csv", help=f"one of {', '.join(faults.FORMATS)}")

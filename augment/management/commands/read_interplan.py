@@ -39,7 +39,7 @@ class Command(TerminalCommand):
         try:
             found = references_from_interplan(options["file"], scenes=_scenes(options["scene"]))
             options["out"].mkdir(parents=True, exist_ok=True)
-            for one in found:
+            for one in found.entries:
                 document = modification_to_document(one.modification)
                 file = options["out"] / f"{one.id}.json"
                 file.write_text(json.dumps(document, indent=2) + "\n", encoding="utf-8")
@@ -49,7 +49,14 @@ class Command(TerminalCommand):
             raise CommandError(str(error)) from error
         except OSError as error:
             raise CommandError(f"{options['out']} can't be written: {error.strerror}.") from error
-        self.stdout.write(f"{len(found)} special scenarios read.")
+        for left_out in found.left_out:
+            self.stderr.write(f"Left out: {left_out}.")
+        for token, number in found.passed_over.items():
+            self.stderr.write(
+                f"Passed over: {token}, {number} special scenarios of a scene "
+                "that is not here; --scene TOKEN=SLUG names it."
+            )
+        self.stdout.write(f"{len(found.entries)} special scenarios read.")
 
 
 def _scenes(given: list[str] | None) -> dict[str, str] | None:

@@ -1,0 +1,175 @@
+"""interPlan's files as somebody with a grudge writes them: each is our own error, with a place."""
+
+from __future__ import annotations
+
+import math
+from functools import cache
+from pathlib import Path
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from augment.errors import InvalidDocument
+from augment.formats.interplan_reader import FURTHEST_FROM_EGO_M, read
+from augment.formats.yaml_file import (
+    DEEPEST,
+    LONGEST_TEXT,
+    MAX_CHARACTERS,
+    MOST_VALUES,
+    read_yaml,
+    read_yaml_file,
+)
+from augment.scene.entities import Scene
+from augment.scene.modification import without_traffic
+from tests.fixtures.shelf import whole_scene
+
+TOKEN = "00000000000000ab"
+TOP = "modification_details_dictionary"
+LAUGHS = "a0: &a0 [1]\n" + "".join(
+    f"a{n}: &a{n} [{', '.join([f'*a{n - 1}'] * 10)}]\n" for n in range(1, 10)
+)
+
+
+@cache
+def scene() -> Scene:
+    return without_traffic(whole_scene("plane-tree-street"))
+
+
+def special(body: str, index: str = '"0"') -> str:
+    """A file with one special scenario, whose keys but the type are given."""
+    more = f", {body}" if body else ""
+    entry = f"{{type: jaywalking_pedestrian{more}}}"
+    return f'{TOP}: {{"{TOKEN}": {{special_scenario: {{{index}: {entry}}}}}}}'
+
+
+HOSTILE = [
+    ("", "expected a mapping with interPlan's keys, got NoneType"),
+    ("- 1", "expected a mapping with interPlan's keys, got list"),
+    ("just text", "expected a mapping with interPlan's keys, got str"),
+    ("a: [\n", "line 2, column 1: is no YAML"),
+    ("a: 1\n--- \nb: 2", "line 2, column 1: is no YAML"),
+    ("a: \x1b[2J", "is no YAML: unacceptable character"),
+    ("accel_max: 1.0", f"{TOP}: is missing"),
+    (f"{TOP}: ", f"{TOP}: Input should be a valid dictionary"),
+    (f"{TOP}: {{}}", "holds no special scenario"),
+    (f'{TOP}: {{"{TOKEN}": {{}}}}', "holds no special scenario"),
+    (f"{TOP}: {{12345678: {{}}}}", "should be a valid string"),
+    (f"{TOP}: {{1234567e: {{}}}}", "should match pattern"),
+    (f'{TOP}: {{"../../etc/passwd": {{}}}}', "should match pattern"),
+    (special("", index='"../0"'), "should match pattern"),
+    (special("", index="100"), "less than or equal to 99"),
+    (special("", index="true"), "valid"),
+    (special("").replace("jaywalking_pedestrian", "parade"), "Input should be 'approaching"),
+    (special("cones: [[1]]"), "cones[0][1]: is missing"),
+    (special("cones: [[1, 2, 3]]"), "cones[0]"),
+    (special("cones: {a: 1}"), "cones: Input should be a valid list"),
+    (special("cones: null"), "cones: Input should be a valid list"),
+    (special('cones: [["1", 2]]'), "cones[0][0]: Input should be a valid number, got '1'"),
+    (special("cones: [[true, 2]]"), "cones[0][0]: Input should be a valid number, got True"),
+    (special("cones: [[.nan, 2]]"), "cones[0][0]: Input should be a finite number, got nan"),
+    (special("cones: [[.inf, 2]]"), "cones[0][0]: Input should be a finite number, got inf"),
+    (special("cones: [[1.0e+300, 2]]"), "cones[0][0]: Input should be less than"),
+    (special(f"cones: [[{'9' * 400}, 2]]"), "cones[0][0]: "),
+    (special(f"cones: [[{'9' * 5000}, 2]]"), "a text of 5000 characters"),
+    (special("stopped_vehicle: [[0, 0, 1.0e+9]]"), "stopped_vehicle[0][2]: Input should be less"),
+    (special("pedestrian: [[0, 0, 1, 1, 2.5]]"), "pedestrian[0][4]"),
+    (special("pedestrian: [[0, 0, 1, 1, -1]]"), "pedestrian[0][4]"),
+    (special(f"cones: [{', '.join(['[0, 0]'] * 1001)}]"), "cones: List should have at most 1000"),
+    (special("cones: [[0, 9000]]"), "cones[0]: is "),
+    (special("type: avoid_crashed_cars"), "the key 'type' stands twice"),
+    (f"{TOP}: {{}}\n{TOP}: {{}}", "line 2, column 1: the key"),
+    ("1: a\n0x1: b", "two keys mean the same number"),
+    ("? [a, b]\n: 1", "line 1, column 3: a key is a text"),
+    (LAUGHS, "line 1, column 5: anchors and aliases"),
+    ("a: &b {c: *b}", "anchors and aliases"),
+    ("a: {b: 1}\nc: {<<: *a}", "anchors and aliases"),
+    ("a: !!python/object/apply:os.system [ls]", "line 1, column 4: tags (!) are not read"),
+    ("a: !!binary aGk=", "tags (!) are not read"),
+    ("[" * 100_000, "nested more than"),
+    ("{a: " * 100_000, "nested more than"),
+    ("- " * 100_000, "nested more than"),
+    (f"a: [{'1,' * (MOST_VALUES + 1)}]", f"has more than {MOST_VALUES} values"),
+    ("#" * (MAX_CHARACTERS + 1), "characters; at most"),
+    ("a: \ud800", ""),
+]
+
+
+@pytest.mark.parametrize(("text", "said"), HOSTILE, ids=range(len(HOSTILE)))
+def test_a_hostile_file_is_our_own_error_and_says_where(text: str, said: str) -> None:
+    with pytest.raises(InvalidDocument) as caught:
+        read(text, {TOKEN: scene()})
+    assert said in str(caught.value)
+    assert len(str(caught.value)) < 2_000
+
+
+@given(
+    st.lists(
+        st.sampled_from(
+            [
+                *"[]{}&*!|>?:-,#%@`\"' \n",
+                "a",
+                "1",
+                ".nan",
+                "<<: ",
+                TOP,
+                "0x",
+                "2020-99-99",
+                "1:1:1",
+            ]
+        )
+    ).map("".join)
+)
+def test_no_text_breaks_the_reader(text: str) -> None:
+    try:
+        read_yaml(text, what="interPlan file")
+    except InvalidDocument:
+        return
+
+
+@pytest.mark.parametrize(
+    ("text", "value"),
+    [
+        ("a: 2020-01-01", {"a": "2020-01-01"}),
+        ("a: 2020-99-99", {"a": "2020-99-99"}),
+        ("a: {<<: 1}", {"a": {"<<": 1}}),
+        ("a: 1.5e-3", {"a": 0.0015}),
+        ("a: [1, -2.5, null, true, text]", {"a": [1, -2.5, None, True, "text"]}),
+    ],
+)
+def test_plain_values_are_read_and_nothing_is_made_a_date(text: str, value: object) -> None:
+    assert read_yaml(text, what="file") == value
+
+
+def test_depth_and_length_have_a_last_value_that_is_read() -> None:
+    deepest = "[" * DEEPEST + "]" * DEEPEST
+    assert read_yaml(deepest, what="file") is not None
+    assert read_yaml("x" * LONGEST_TEXT, what="file") == "x" * LONGEST_TEXT
+    for text in (f"[{deepest}]", "x" * (LONGEST_TEXT + 1)):
+        with pytest.raises(InvalidDocument):
+            read_yaml(text, what="file")
+
+
+@pytest.mark.parametrize(("away_m", "is_read"), [(-0.5, True), (0.5, False)])
+def test_what_is_nowhere_near_its_scene_is_refused(away_m: float, is_read: bool) -> None:
+    pose = scene().origin.pose
+    x_m = pose.x_m + FURTHEST_FROM_EGO_M + away_m
+    text = special(f"cones: [[{pose.x_m}, {pose.y_m}], [{x_m}, {pose.y_m}]]")
+    if is_read:
+        (entry,) = read(text, {TOKEN: scene()}).entries
+        far = entry.modification.added[1]
+        assert math.hypot(far.x_m, far.y_m) == pytest.approx(999.5)
+    else:
+        with pytest.raises(InvalidDocument, match=r"cones\[1\]: is 100[01] m from the ego"):
+            read(text, {TOKEN: scene()})
+
+
+def test_a_large_file_is_refused_unread(tmp_path: Path) -> None:
+    file = tmp_path / "large.yaml"
+    with file.open("wb") as out:
+        out.truncate(MAX_CHARACTERS + 1)
+    with pytest.raises(InvalidDocument, match=r"large\.yaml: 4194305 bytes; at most 4194304"):
+        read_yaml_file(file, what="interPlan file")
+    file.write_bytes(b"\xff\xfe")
+    with pytest.raises(InvalidDocument, match=r"large\.yaml: is not UTF-8"):
+        read_yaml_file(file, what="interPlan file")
