@@ -7,10 +7,14 @@ from uuid import UUID
 
 from django.contrib.auth.models import User
 from django.db.models import Q
+from django.db.models.functions import Length
 
 from arena.errors import NotYours
 from arena.models import Study
 from augment.errors import UnknownName
+
+LONGEST = 3
+"""How many: which of them takes most lines depends on words and fonts."""
 
 
 def voting_study(*, expert: User, code: UUID | str) -> Study:
@@ -23,6 +27,12 @@ def voting_study(*, expert: User, code: UUID | str) -> Study:
     if found is None:
         raise NotYours("You do not take part in this study.")
     return found
+
+
+def longest_instructions(study: Study) -> list[str]:
+    """The longest few things that a study asks for: each pair gets the room that they need."""
+    by_length = study.scenarios.order_by(Length("instruction").desc(), "pk")
+    return list(by_length.values_list("instruction", flat=True)[:LONGEST])
 
 
 def study_named(name_or_code: str) -> Study:

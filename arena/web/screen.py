@@ -14,6 +14,7 @@ from django.utils.translation import pgettext
 
 from arena.models import Report, Study, Vote
 from arena.queries.showings import as_shown
+from arena.queries.studies import longest_instructions
 from arena.queries.votes import VotingProgress, recent_votes, voting_progress
 from arena.queries.voting_keys import (
     KEY_LABELS,
@@ -100,6 +101,7 @@ def vote_context(study: Study, expert: User, *, change: str) -> dict[str, Any] |
     preferences = voting_preferences(expert)
     context |= {
         "shown": changed.shown if changed else pairs[0],
+        "longest": longest_instructions(study),
         "change": changed,
         "key": uuid.uuid4(),
         "alts": _alts(),

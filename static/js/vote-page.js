@@ -47,7 +47,6 @@ const item = (line) => Object.assign(document.createElement("li"), { textContent
 
 export function drawPair({ instruction, position, text: lists }) {
   at("instruction").textContent = instruction;
-  at("ask").classList.toggle("is-long", instruction.length > 160);
   document.title = document.title.replace(/\d+/, position);
   for (const side in lists) at(`text-${side}`).replaceChildren(...lists[side].map(item));
 }

@@ -23,6 +23,9 @@ PHONE = ViewportSize(width=390, height=844)
 BOUNCE_MS = 210
 """A press sooner than this after a pair appeared is ignored, as the second of a double one."""
 
+HERE = {"locale": "en-GB", "timezone_id": "UTC"}
+"""Where the browser says that it is."""
+
 HAS_LOADED = """tokens => {
     const loaded = performance.getEntriesByType("resource").map(({ name }) => name);
     return tokens.every((token) => loaded.some((name) => name.endsWith(`/i/${token}`)));
@@ -54,7 +57,9 @@ class Booth:
 
     def enter(self, **how: Any) -> Page:
         """A page of a browser that is signed in, a pair on it; `how` goes to the browser."""
-        context = self.browser.new_context(base_url=self.address, **{"viewport": DESK, **how})
+        context = self.browser.new_context(
+            base_url=self.address, **{"viewport": DESK, **HERE, **how}
+        )
         context.set_default_timeout(PATIENCE_MS)
         self.contexts.append(context)
         client = Client()

@@ -6,8 +6,12 @@ import os
 import shutil
 from collections.abc import Iterator
 from contextlib import contextmanager
+from pathlib import Path
+from tempfile import TemporaryDirectory
 
 from playwright.sync_api import Browser, sync_playwright
+
+from tests.browser.fonts import DEJAVU, FontFamily
 
 NAMES = ("chromium", "chromium-browser", "google-chrome", "google-chrome-stable")
 FLAGS = [
@@ -23,12 +27,19 @@ PATIENCE_MS = 60_000
 
 
 @contextmanager
-def chromium() -> Iterator[Browser]:
-    """The system's Chromium, else the one that Playwright downloaded; one for each thread."""
+def chromium(family: FontFamily = DEJAVU) -> Iterator[Browser]:
+    """The system's Chromium, else the one that Playwright downloaded; one for each thread.
+
+    Args:
+        family: The only fonts that it finds.
+    """
     path = os.environ.get("CHROMIUM") or next(filter(None, map(shutil.which, NAMES)), None)
-    with sync_playwright() as playwright:
+    with TemporaryDirectory(prefix="arena-fonts-") as folder, sync_playwright() as playwright:
         browser = playwright.chromium.launch(
-            executable_path=path, args=FLAGS, timeout=2 * PATIENCE_MS
+            executable_path=path,
+            args=FLAGS,
+            timeout=2 * PATIENCE_MS,
+            env=dict(os.environ) | family.configure(Path(folder)),
         )
         try:
             yield browser

@@ -14,6 +14,7 @@ from pytest_django.live_server_helper import LiveServer
 
 from tests.browser.booth import Booth, furnish
 from tests.browser.chromium import PATIENCE_MS, chromium
+from tests.browser.fonts import DEJAVU, LIBERATION
 
 
 @pytest.fixture(scope="session", autouse=True)
@@ -27,9 +28,10 @@ def _patience() -> None:
     expect.set_options(timeout=PATIENCE_MS)
 
 
-@pytest.fixture(scope="package")
-def browser() -> Iterator[Browser]:
-    with pytest.MonkeyPatch.context() as patch, chromium() as started:
+@pytest.fixture(scope="package", params=[DEJAVU, LIBERATION], ids=lambda family: family.name)
+def browser(request: pytest.FixtureRequest) -> Iterator[Browser]:
+    """Every test runs once with each family: the widest, and the one with the widths of Arial."""
+    with pytest.MonkeyPatch.context() as patch, chromium(request.param) as started:
         # Playwright keeps an event loop in this thread, where Django would refuse to read rows.
         patch.setenv("DJANGO_ALLOW_ASYNC_UNSAFE", "true")
         yield started

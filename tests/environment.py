@@ -1,0 +1,50 @@
+"""What the tests take from the machine, all of it named here; whatever else is set does not count.
+
+A pytest plugin (pyproject.toml loads it), so that it runs before Django reads its settings. What
+the tests start inherits it: a home of its own, English, UTC, one thread for linear algebra (its
+sums depend on how many there are). Fonts are named in tests/browser/fonts.py.
+"""
+
+from __future__ import annotations
+
+import atexit
+import os
+import shutil
+import tempfile
+from pathlib import Path
+
+KEPT = {
+    "PATH": "where Python, a Chromium, a redis-server and PostgreSQL's programs are found",
+    "TMPDIR": "where temporary folders lie",
+    "LD_LIBRARY_PATH": "where programs of wheels find their libraries",
+    "CI": "whether a part that can't run fails instead of being skipped",
+    "REALDATA_DIR": "where the recorded scenes lie",
+    "CHROMIUM": "a Chromium that is not on the PATH",
+    "PLAYWRIGHT_BROWSERS_PATH": "where Playwright has put a Chromium",
+    "DATABASE_URL": "the PostgreSQL of tests.on_postgres",
+    "HYPOTHESIS_STORAGE_DIRECTORY": "where examples that failed are kept",
+}
+FIXED = {"LC_ALL": "C.UTF-8", "TZ": "UTC", "OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1"}
+STARTED = "ARENA_TESTS_HOME"
+"""Tells a worker of xdist that its home has been made."""
+
+
+def fix_environment() -> None:
+    """Leave what is named, set what is fixed, and make an empty home."""
+    if STARTED in os.environ:
+        return
+    kept = {
+        name: value
+        for name, value in os.environ.items()
+        if name in KEPT or name.startswith(("PYTEST_", "PYTHON", "COVERAGE_"))
+    }
+    browsers = Path(os.environ.get("HOME", "/nonexistent")) / ".cache" / "ms-playwright"
+    home = tempfile.mkdtemp(prefix="arena-tests-home-")
+    atexit.register(shutil.rmtree, home, ignore_errors=True)
+    os.environ.clear()
+    os.environ.update(
+        {"PLAYWRIGHT_BROWSERS_PATH": str(browsers)} | kept | FIXED | {"HOME": home, STARTED: home}
+    )
+
+
+fix_environment()
