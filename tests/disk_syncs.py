@@ -22,7 +22,7 @@ _METHODS = {1: 12, 2: 16, 3: 18}
 _SYNC_PLACE = 5
 """Where xSync stands in it, behind the version, xClose, xRead, xWrite and xTruncate."""
 
-_OPEN = CFUNCTYPE(c_int, c_void_p, c_char_p, POINTER(c_void_p), c_int, c_void_p)
+_OPEN = CFUNCTYPE(c_int, c_void_p, c_void_p, POINTER(c_void_p), c_int, c_void_p)
 _SYNC = CFUNCTYPE(c_int, c_void_p, c_int)
 
 
@@ -79,13 +79,16 @@ def counted_syncs() -> Iterator[Counter[str]]:
         table[_SYNC_PLACE] = cast(counted, c_void_p).value
         kept[methods] = (table, counted)
 
-    def open_file(_: int, path: bytes, file: Any, flags: int, out: int) -> int:
+    # SQLite keeps the address of the path, so that is what is passed on, never a copy.
+    def open_file(_: int, path: int | None, file: Any, flags: int, out: int) -> int:
         result = int(open_plainly(cast(plain, c_void_p), path, file, flags, out))
         methods = file[0]
         if methods:
             if methods not in kept:
                 counting(methods)
-            paths[cast(file, c_void_p).value or 0] = (path or b"").decode()
+            paths[cast(file, c_void_p).value or 0] = (
+                ctypes.string_at(path).decode() if path else ""
+            )
             file[0] = ctypes.addressof(kept[methods][0])
         return result
 
