@@ -7,6 +7,8 @@ from dataclasses import dataclass
 from arena.models import Study, Vote
 from augment.models import Augmentation, Contestant, GenerationJob, Scenario
 
+CHECK_PERCENT = 2
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Inventory:
@@ -41,3 +43,9 @@ def take() -> Inventory:
         studies_closed=Study.objects.filter(state=Study.State.CLOSED).count(),
         votes=Vote.objects.filter(supersedes=None).count(),
     )
+
+
+def usual_checks() -> int:
+    """Attention checks in percent where nobody says how many: none before any are drawn."""
+    is_drawn = Augmentation.objects.filter(contestant__kind=Contestant.Kind.CHECK).exists()
+    return CHECK_PERCENT if is_drawn else 0

@@ -82,6 +82,45 @@ def check_pictures(scenarios: list[Scenario]) -> tuple[tuple[Check, ...], Cells]
     return tuple(checks), cells
 
 
+def must_have_checks(*, checks: Sequence[Check], wanted: int, scenarios: list[Scenario]) -> None:
+    """Refuse a study that asks for more attention checks than there are pictures for.
+
+    Args:
+        checks: What there can be; an expert sees each once.
+        wanted: How many each expert is to see.
+        scenarios: Of the study.
+
+    Raises:
+        NothingToPlan: There are too few; the text says what to do.
+    """
+    if len(checks) >= wanted:
+        return
+    ready = {check.scenario for check in checks}
+    with_reference = Scenario.objects.filter(
+        pk__in=[row.pk for row in scenarios], reference__isnull=False
+    )
+    missing = [row.slug for row in with_reference if row.slug not in ready]
+    if len(ready) + len(missing) >= wanted:
+        raise NothingToPlan(
+            sentence(
+                "Attention checks wanted for each expert: %(wanted)s; scenarios with pictures for "
+                "one: %(found)s. Generate the contestant reference and run “manage.py draw_checks "
+                "all”, which draws the broken pictures, then open the study; or ask for 0 %%.",
+                wanted=wanted,
+                found=len(checks),
+            )
+        )
+    raise NothingToPlan(
+        sentence(
+            "Attention checks wanted for each expert: %(wanted)s; each needs a scenario of its "
+            "own with a reference, and the study has %(most)s. Ask for fewer, or choose more "
+            "scenarios.",
+            wanted=wanted,
+            most=len(ready) + len(missing),
+        )
+    )
+
+
 def pictures_of(study: Study) -> Cells:
     """The pictures that the study was opened with; later ones of the same contestants stay out."""
     rules = rules_of(study)

@@ -14,7 +14,14 @@ from arena.errors import StudyNotOpen
 from arena.models import Study
 from arena.pairing.plan import Entry, Plan, Rules, plan
 from arena.queries.people import experts as expert_accounts
-from arena.services.plans import Cells, check_pictures, latest_pictures, rules_of, store
+from arena.services.plans import (
+    Cells,
+    check_pictures,
+    latest_pictures,
+    must_have_checks,
+    rules_of,
+    store,
+)
 from augment.errors import Conflict, UnknownName
 from augment.models import Contestant, Scenario
 from augment.sentences import sentence
@@ -32,7 +39,8 @@ class PlanOptions:
     """Rules of a plan beyond who takes part; see arena.pairing.rules for what they mean.
 
     Attributes:
-        check_share: Without pictures for attention checks there are none, whatever the share.
+        check_share: Needs as many scenarios with pictures for an attention check; see
+            `must_have_checks`.
     """
 
     repeat_share: float = 0.0
@@ -78,7 +86,8 @@ def open_study(
         UnknownName: A contestant, scenario or expert does not exist.
         Conflict: The name is taken, the seed is out of range, or something simulated takes part
             unasked.
-        NothingToPlan: Pictures are missing, or too few to fill the votes; the text has numbers.
+        NothingToPlan: Pictures are missing, also of attention checks, or too few to fill the
+            votes; the text has numbers.
     """
     name, given = _free_name(name), options or PlanOptions()
     _check_seed(seed)
@@ -87,6 +96,8 @@ def open_study(
     if not allow_simulated:
         _refuse_simulated(contestant_rows, expert_rows)
     checks, broken = check_pictures(scenario_rows) if given.check_share else ((), {})
+    wanted = round(given.check_share * votes_per_expert)
+    must_have_checks(checks=checks, wanted=wanted, scenarios=scenario_rows)
     shown = latest_pictures(contestant_rows, scenario_rows)
     rules = Rules(
         entries=_entries(shown),

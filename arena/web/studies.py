@@ -16,6 +16,7 @@ from arena.errors import ArenaError
 from arena.models import Study
 from arena.queries import progress, scenarios
 from arena.queries.coverage import coverage, reports_of
+from arena.queries.inventory import usual_checks
 from arena.queries.judged import is_imported
 from arena.queries.people import by_pseudonym, experts
 from arena.queries.results import latest_snapshot
@@ -49,6 +50,7 @@ def new_study_page(request: HttpRequest) -> HttpResponse:
         ),
         groups=scenarios.by_type(),
         experts=by_pseudonym(experts()),
+        initial={"checks": usual_checks()},
     )
     if request.method == "POST" and form.is_valid():
         try:

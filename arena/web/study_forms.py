@@ -29,7 +29,7 @@ class StudyForm(ChoiceForm):
     votes_per_expert = forms.IntegerField(min_value=1, max_value=10_000, initial=40)
     seed = forms.IntegerField(initial=1)
     repeats = _percent(initial=5, most=50)
-    checks = _percent(initial=2, most=50)
+    checks = _percent(initial=0, most=50)
     adaptive = _percent(initial=0, most=90)
     targets = forms.CharField(required=False, max_length=20_000)
     allow_both_miss = forms.BooleanField(required=False)

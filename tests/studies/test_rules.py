@@ -71,10 +71,44 @@ def test_checks_show_the_reference_against_a_broken_one() -> None:
     assert study.matchups.exclude(kind="check").filter(left__contestant__kind="check").count() == 0
 
 
-def test_without_pictures_for_checks_there_are_none() -> None:
-    study = opened(cast_of(), check_share=0.25)
-    assert not study.matchups.filter(kind="check").exists()
-    assert not study.rules["checks"]
+def test_a_study_whose_checks_nobody_has_drawn_is_not_opened() -> None:
+    cast = with_checks(6)
+    Augmentation.objects.filter(contestant__kind="check").delete()
+    with pytest.raises(NothingToPlan, match=r"each expert: 3; .* for one: 0.*draw_checks all"):
+        opened(cast, check_share=0.25)
+    assert not Study.objects.exists()
+    assert not opened(cast).matchups.filter(kind="check").exists()
+
+
+@pytest.mark.parametrize(("scenarios", "opens"), [(2, False), (3, True)])
+def test_each_check_needs_a_scenario_of_its_own(scenarios: int, opens: bool) -> None:
+    cast = with_checks(6)
+    Scenario.objects.filter(slug__in=cast["scenarios"][scenarios:]).update(reference=None)
+    kind = {"contestant__kind": "check"}
+    Augmentation.objects.filter(scenario__slug__in=cast["scenarios"][scenarios:], **kind).delete()
+    if opens:
+        study = opened(cast, check_share=0.25)
+        assert study.matchups.filter(kind="check").count() == 3 * 2
+        return
+    with pytest.raises(NothingToPlan, match=r"each expert: 3; .* the study has 2\. Ask for fewer"):
+        opened(cast, check_share=0.25)
+
+
+def test_checks_that_the_adaptive_part_will_show_are_asked_for_at_once() -> None:
+    cast = with_checks(2)
+    with pytest.raises(NothingToPlan, match="each expert: 3"):
+        opened(cast, votes=6, check_share=0.5, adaptive_share=0.5)
+
+
+def test_the_command_says_that_there_are_no_checks_where_nobody_asked_for_any() -> None:
+    cast, told = cast_of(), StringIO()
+    words = ["open_study", "Round 1", "--contestants", *cast["contestants"]]
+    words += ["--scenarios", *cast["scenarios"], "--experts", *cast["experts"]]
+    words += ["--votes-per-expert", "12", "--seed", "7"]
+    with pytest.raises(CommandError, match="Ask for fewer"):
+        call_command(*words, "--checks", "25")
+    call_command(*words, stdout=told)
+    assert "No attention checks: nobody has drawn pictures" in told.getvalue()
 
 
 def test_check_pictures_are_drawn_once_by_a_command() -> None:

@@ -10,6 +10,7 @@ from django.core.management.base import CommandError, CommandParser
 from arena.errors import ArenaError
 from arena.models import Study
 from arena.pairing.target_lines import read_targets
+from arena.queries.inventory import CHECK_PERCENT, usual_checks
 from arena.services.studies import PlanOptions, open_study
 from augment.errors import AugmentError
 from augment.services.choosing import chosen_contestants, chosen_scenarios
@@ -43,9 +44,10 @@ class Command(TerminalCommand):
         parser.add_argument(
             "--checks",
             type=float,
-            default=2.0,
+            default=None,
             metavar="PERCENT",
-            help="attention checks, where draw_checks has made pictures for them",
+            help="attention checks, with pictures that draw_checks has drawn (default: "
+            f"{CHECK_PERCENT} where it has drawn any, else 0)",
         )
         parser.add_argument(
             "--adaptive",
@@ -84,7 +86,7 @@ class Command(TerminalCommand):
                 allow_simulated=options["allow_simulated"],
                 options=PlanOptions(
                     repeat_share=options["repeats"] / 100,
-                    check_share=options["checks"] / 100,
+                    check_share=self._checks(options["checks"]) / 100,
                     adaptive_share=options["adaptive"] / 100,
                     appearances=appearances,
                     pair_votes=pair_votes,
@@ -95,6 +97,17 @@ class Command(TerminalCommand):
         except (ArenaError, AugmentError) as error:
             raise CommandError(str(error)) from error
         self._say(study)
+
+    def _checks(self, asked: float | None) -> float:
+        """The percentage; without one it depends on what was drawn, and that is said."""
+        if asked is not None:
+            return asked
+        usual = usual_checks()
+        if not usual:
+            self.stdout.write(
+                "No attention checks: nobody has drawn pictures for them (manage.py draw_checks)."
+            )
+        return usual
 
     def _say(self, study: Study) -> None:
         rules = study.rules
