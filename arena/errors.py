@@ -45,6 +45,21 @@ class TooFast(ArenaError):
         super().__init__(f"That was too fast. Try again in {retry_after_s} s.")
 
 
+class DatabaseBusy(ArenaError):
+    """Something long keeps the database to itself. Nothing was written; send it again later."""
+
+    retry_after_s = 2
+
+    def __init__(self) -> None:
+        super().__init__(
+            sentence(
+                "Something long is being written just now, so nothing was saved. Try again in "
+                "%(seconds)s s.",
+                seconds=self.retry_after_s,
+            )
+        )
+
+
 class InvalidVote(ArenaError):
     """Parts of a vote or report do not go together.
 

@@ -23,6 +23,7 @@ from arena.api.parsing import SoundJSONParser
 from arena.errors import (
     AlreadyDecided,
     ArenaError,
+    DatabaseBusy,
     InvalidPreference,
     InvalidVote,
     NotYours,
@@ -40,6 +41,7 @@ STATUS: tuple[tuple[type[Exception], int, str], ...] = (
     (InvalidVote, 422, "invalid"),
     (InvalidPreference, 422, "invalid"),
     (TooFast, 429, "too_fast"),
+    (DatabaseBusy, 503, "busy"),
     (Conflict, 409, "conflict"),
     (ArenaError, 400, "refused"),
     (AugmentError, 400, "refused"),
@@ -78,7 +80,7 @@ def _response(exc: Exception) -> Response | None:
             headers = {}
             if status == 401:  # the browser can tell that it only has to sign in again
                 headers["WWW-Authenticate"] = "Session"
-            if isinstance(exc, TooFast):
+            if isinstance(exc, (TooFast, DatabaseBusy)):
                 headers["Retry-After"] = str(exc.retry_after_s)
             error = {"code": code, "message": _message(exc), **_extras(exc)}
             return Response({"error": error}, status=status, headers=headers)

@@ -8,6 +8,9 @@ from __future__ import annotations
 from django.http import HttpRequest, JsonResponse
 from django.utils.translation import gettext as _
 
+from arena.errors import DatabaseBusy
+from augment.services.wording import said
+
 
 def unreadable(request: HttpRequest, exception: Exception | None = None) -> JsonResponse:
     """400: the request itself can't be trusted, by its host name for example."""
@@ -32,6 +35,11 @@ def missing(request: HttpRequest, exception: Exception | None = None) -> JsonRes
 def broken(request: HttpRequest) -> JsonResponse:
     """500: a fault of ours, in the log."""
     return _fault(500, "broken", _("Something broke on our side; it was written to the log."))
+
+
+def busy(request: HttpRequest) -> JsonResponse:
+    """503: something long keeps the database to itself; nothing was written."""
+    return _fault(503, "busy", said(DatabaseBusy()))
 
 
 def _fault(status: int, code: str, message: str) -> JsonResponse:

@@ -6,6 +6,7 @@ from django.http import HttpRequest, HttpResponse
 from django.views.defaults import bad_request
 
 from arena.api import faults as wire
+from arena.errors import DatabaseBusy
 from arena.web import faults as pages
 
 
@@ -36,6 +37,13 @@ def missing(request: HttpRequest, exception: Exception | None = None) -> HttpRes
 def broken(request: HttpRequest) -> HttpResponse:
     """500."""
     return wire.broken(request) if _is_of_the_wire(request) else pages.broken(request)
+
+
+def busy(request: HttpRequest) -> HttpResponse:
+    """503."""
+    answer = wire.busy(request) if _is_of_the_wire(request) else pages.busy(request)
+    answer.headers["Retry-After"] = str(DatabaseBusy.retry_after_s)
+    return answer
 
 
 def _is_of_the_wire(request: HttpRequest) -> bool:

@@ -117,6 +117,7 @@ MIDDLEWARE = [
     "django.contrib.messages.middleware.MessageMiddleware",
     "django.middleware.clickjacking.XFrameOptionsMiddleware",
     "axes.middleware.AxesMiddleware",
+    "arena.config.busy.BusyMiddleware",
 ]
 ROOT_URLCONF = "arena.config.urls"
 WSGI_APPLICATION = "arena.config.wsgi.application"
@@ -236,6 +237,7 @@ LLM_TIMEOUT_S = env.integer("ARENA_LLM_TIMEOUT_S", default=120, low=1, high=3600
 
 # --- Voting ------------------------------------------------------------------------------------
 
+VOTE_WAIT_S = env.integer("ARENA_VOTE_WAIT_S", default=5, low=1, high=60)
 VOTES_PER_S = env.integer("ARENA_VOTES_PER_S", default=4, low=1, high=1000)
 
 # --- What it says about itself -----------------------------------------------------------------

@@ -1,35 +1,172 @@
-"""Writers of SQLite one after the other, in the order in which they came."""
+"""Writers of SQLite one after the other, in the order in which they came, and not for ever."""
 
 from __future__ import annotations
 
 import fcntl
+import math
 import os
+import threading
+import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from typing import IO
 
-from django.db import connection
+from django.db import OperationalError, connection
+from django.db.backends.base.base import BaseDatabaseWrapper
+
+from arena.errors import DatabaseBusy
 
 SUFFIX = "-turn"
 """What the file that writers queue at adds to the database's name."""
 
+STUCK_S = 1.0
+"""Where a writer is not through after so long, something long keeps the database to itself."""
+
+LOOK_EVERY_S = 0.001
+"""How often a thread looks whether another process has left; one thread a process does."""
+
+_SQLITE_LOCKED = {5, 6}
+_POSTGRESQL_LOCKED = {"55P03", "40P01"}
+
 
 @contextmanager
-def in_turn() -> Iterator[None]:
-    """Wait for a turn to write; nothing to wait for where the database queues writers itself.
+def in_turn(*, within_s: float | None = None) -> Iterator[None]:
+    """Wait for a turn to write; nothing to queue for where the database queues writers itself.
 
     Who finds SQLite locked sleeps for up to 100 ms, looks again and may be overtaken by any number
-    of others: with eight voters one vote in twenty took five times as long as the median. The
-    system wakes who waits for a file lock at once. Writers that come another way still meet
-    SQLite's own lock.
+    of others: with eight voters one vote in twenty took five times as long as the median. Who
+    waits here is woken at once. Writers that come another way still meet SQLite's own lock.
+
+    With a limit, a process that gets no further lets two of its threads wait until the limit and
+    turns all others away after a second, so that its pages go on.
+
+    Args:
+        within_s: How long to wait at most for the turn and the database's locks together; None
+            for as long as it takes.
+
+    Raises:
+        DatabaseBusy: It took longer; nothing was written.
     """
-    if connection.vendor != "sqlite" or connection.in_atomic_block:
+    if connection.in_atomic_block:
         yield  # who holds SQLite's lock already must not wait for somebody who waits for it
         return
+    limit = None if within_s is None else time.monotonic() + within_s
+    try:
+        if connection.vendor == "sqlite":
+            with _DOOR.held(limit), _turn(limit), _patience_until(limit):
+                yield
+        else:
+            yield  # web servers limit the waiting of their connections: arena.config.wsgi
+    except OperationalError as error:
+        if limit is not None and is_lock_fault(error):
+            raise DatabaseBusy from error
+        raise
+
+
+def is_lock_fault(error: BaseException) -> bool:
+    """Whether somebody else kept a lock for longer than one may wait for it."""
+    cause = error.__cause__
+    code = getattr(cause, "sqlite_errorcode", None)
+    if code is not None:
+        return (code & 0xFF) in _SQLITE_LOCKED
+    return getattr(cause, "sqlstate", None) in _POSTGRESQL_LOCKED
+
+
+def limit_waiting(connection: BaseDatabaseWrapper, within_s: float) -> None:
+    """Have all that a connection does wait for a lock no longer than that."""
+    with connection.cursor() as cursor:
+        if connection.vendor == "sqlite":
+            cursor.execute(f"PRAGMA busy_timeout = {_ms(within_s)}")
+        else:
+            cursor.execute(f"SET lock_timeout = {max(1, _ms(within_s))}")  # 0 is no limit
+
+
+# --- Private -----------------------------------------------------------------------------------
+
+
+class _Door:
+    """Where the threads of this process wait for each other."""
+
+    def __init__(self) -> None:
+        self._lock = threading.Lock()
+        self._patient = threading.Lock()
+        self._since = math.inf
+
+    @contextmanager
+    def held(self, limit: float | None) -> Iterator[None]:
+        """Keep the others out.
+
+        Raises:
+            DatabaseBusy: The limit came first, or one who is patient waits already.
+        """
+        if not self._lock.acquire(blocking=False):
+            self._wait(limit)
+        self._since = time.monotonic()
+        try:
+            yield
+        finally:
+            self._since = math.inf
+            self._lock.release()
+
+    def _wait(self, limit: float | None) -> None:
+        if limit is None:
+            self._lock.acquire()
+            return
+        is_patient = self._patient.acquire(blocking=False)
+        try:
+            while not self._lock.acquire(timeout=min(0.1, max(0.0, limit - time.monotonic()))):
+                now = time.monotonic()
+                if now >= limit or (not is_patient and now - self._since > STUCK_S):
+                    raise DatabaseBusy
+        finally:
+            if is_patient:
+                self._patient.release()
+
+
+_DOOR = _Door()
+
+
+@contextmanager
+def _turn(limit: float | None) -> Iterator[None]:
+    """Keep other processes out."""
     path = Path(str(connection.settings_dict["NAME"]) + SUFFIX)
     with open(path, "ab", opener=_private) as turn:  # closed, it is free again, whatever happens
-        fcntl.flock(turn, fcntl.LOCK_EX)
+        if limit is None:
+            fcntl.flock(turn, fcntl.LOCK_EX)
+        while limit is not None and not _locked(turn):
+            if time.monotonic() >= limit:
+                raise DatabaseBusy
+            time.sleep(LOOK_EVERY_S)
         yield
+
+
+def _locked(turn: IO[bytes]) -> bool:
+    try:
+        fcntl.flock(turn, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except BlockingIOError:
+        return False
+    return True
+
+
+@contextmanager
+def _patience_until(limit: float | None) -> Iterator[None]:
+    """What is left of the time goes to SQLite's own lock; then all is as it was."""
+    if limit is None:
+        yield
+        return
+    with connection.cursor() as cursor:
+        cursor.execute("PRAGMA busy_timeout")
+        (before_ms,) = cursor.fetchone()
+    limit_waiting(connection, limit - time.monotonic())
+    try:
+        yield
+    finally:
+        limit_waiting(connection, before_ms / 1000)
+
+
+def _ms(seconds: float) -> int:
+    return max(0, round(seconds * 1000))
 
 
 def _private(path: str, flags: int) -> int:

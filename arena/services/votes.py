@@ -72,6 +72,7 @@ def receive_vote(*, expert: User, decision: Decision, ahead: int = 0) -> Receive
 
     Raises:
         TooFast: The account votes faster than that; nothing was stored.
+        DatabaseBusy: It could not be written within ARENA_VOTE_WAIT_S; nothing was stored.
         ArenaError: As in `cast_vote`.
         Conflict: As in `cast_vote`.
     """
@@ -118,7 +119,7 @@ def _store(expert: User, decision: Decision, ahead: int | None) -> Received:
 
     Without a number of matchups to look ahead the pace has no limit.
     """
-    with in_turn():
+    with in_turn(within_s=None if ahead is None else settings.VOTE_WAIT_S):
         return _store_in_turn(expert, decision, ahead)
 
 

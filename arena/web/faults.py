@@ -25,6 +25,11 @@ def broken(request: HttpRequest) -> HttpResponse:
     return HttpResponse(render_to_string("500.html"), status=500)
 
 
+def busy(request: HttpRequest) -> HttpResponse:
+    """503: something long keeps the database to itself, so nothing is asked of it here."""
+    return HttpResponse(render_to_string("503.html"), status=503)
+
+
 def forged(request: HttpRequest, reason: str = "") -> HttpResponse:
     """403 for a form whose token is missing or old; nothing of it was kept."""
     return render(request, "403_csrf.html", status=403)

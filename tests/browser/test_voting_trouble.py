@@ -4,12 +4,15 @@ from __future__ import annotations
 
 import pytest
 from django.contrib.sessions.models import Session
+from django.db import connection
 from playwright.sync_api import BrowserContext, Dialog, Page, Route, expect
+from pytest_django import Settings
 
 from arena.models import Vote
 from arena.services.studies import close_study
 from tests import study_rows
 from tests.browser.booth import Booth, all_sent, let_bounce, press, ready
+from tests.held_lock import kept_busy
 
 pytestmark = [pytest.mark.browser, pytest.mark.django_db(transaction=True)]
 VOTES = "**/api/v1/votes"
@@ -190,6 +193,27 @@ def test_a_vote_that_came_too_fast_is_sent_again_later(booth: Booth) -> None:
     press(page, "1")
     all_sent(page, 1)
     assert told == [1]
+    assert booth.outcomes() == ["left"]
+
+
+def test_a_vote_behind_a_long_writer_waits_in_the_browser_and_is_sent_again(
+    booth: Booth, settings: Settings
+) -> None:
+    if connection.vendor == "postgresql":
+        pytest.skip("there the limit is that of the web server's connections")
+    settings.VOTE_WAIT_S = 0.1
+    page = booth.enter()
+    booth.look_ahead(page)
+    with kept_busy():
+        with page.expect_response(VOTES) as refused:
+            page.keyboard.press("1")
+        assert refused.value.status == 503
+        assert refused.value.headers["retry-after"] == "2"
+        expect(page.locator("#place")).to_have_text("2")  # voting goes on
+        expect(page.locator("#saved")).to_contain_text("1 answer is waiting")
+        assert len(kept(page)) == 1
+        assert not Vote.objects.exists()
+    all_sent(page, 1)
     assert booth.outcomes() == ["left"]
 
 

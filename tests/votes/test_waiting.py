@@ -1,0 +1,176 @@
+"""A vote that can't be written in time is given back, and the web server goes on meanwhile."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+import threading
+from concurrent.futures import Future, ThreadPoolExecutor, as_completed
+from pathlib import Path
+
+import pytest
+from django.contrib.auth.models import User
+from django.db import OperationalError, connection
+from django.urls import reverse
+from pytest_django import Settings
+
+from arena.errors import DatabaseBusy
+from arena.models import Matchup, Vote
+from arena.services import turns
+from arena.services.decisions import decision_of
+from arena.services.votes import receive_vote
+from tests.api.asking import body_for, error_of, post, signed_in
+from tests.held_lock import kept_busy
+from tests.house.source import ROOT
+from tests.study_rows import a_study, matchups_of
+
+pytestmark = pytest.mark.django_db(transaction=True)
+
+SHORT_S = 0.2
+only_sqlite = pytest.mark.skipif(
+    connection.vendor != "sqlite", reason="PostgreSQL lets votes on different pairs pass by"
+)
+
+
+@pytest.fixture(autouse=True)
+def _impatient(settings: Settings) -> None:
+    settings.VOTE_WAIT_S = SHORT_S
+    if connection.vendor == "postgresql":
+        turns.limit_waiting(connection, SHORT_S)
+
+
+def test_a_vote_behind_a_long_writer_is_given_back_and_taken_later() -> None:
+    matchup = matchups_of(a_study(), "eva")[0]
+    client, body = signed_in("eva"), body_for(matchup)
+    with kept_busy():
+        refused = post(client, body)
+    error_of(refused, 503, "busy")
+    assert refused["Retry-After"] == "2"
+    assert not Vote.objects.exists()
+    assert post(client, body).status_code == 200
+    assert Vote.objects.count() == 1
+
+
+def test_a_form_behind_a_long_writer_gets_a_page_that_says_so() -> None:
+    study = a_study()
+    matchup = matchups_of(study, "eva")[0]
+    client = signed_in("eva")
+    form = {"key": body_for(matchup)["key"], "matchup": matchup.code, "outcome": "left"}
+    with kept_busy():
+        refused = client.post(reverse("vote", args=[study.code]), form)
+    assert (refused.status_code, refused["Retry-After"]) == (503, "2")
+    assert "Busy for a moment" in refused.content.decode()
+    assert client.post(reverse("vote", args=[study.code]), form).status_code == 302
+    assert Vote.objects.count() == 1
+
+
+@only_sqlite
+def test_a_report_behind_a_long_writer_is_given_back_in_the_same_shape() -> None:
+    matchup = matchups_of(a_study(), "eva")[0]
+    body = {"key": body_for(matchup)["key"], "matchup": str(matchup.code), "reason": "other"}
+    client = signed_in("eva")
+    turns.limit_waiting(connection, SHORT_S)  # as web servers do: see the last test
+    with kept_busy():
+        refused = client.post("/api/v1/reports", body, content_type="application/json")
+    error_of(refused, 503, "busy")
+    assert refused["Retry-After"] == "2"
+    connection.close()
+
+
+@only_sqlite
+def test_two_threads_wait_for_a_long_writer_and_the_others_are_free(
+    settings: Settings, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    settings.VOTE_WAIT_S = 60
+    monkeypatch.setattr(turns, "STUCK_S", 0.05)
+    study = a_study()
+    eva = User.objects.get(username="eva")
+    jobs = matchups_of(study, "eva")[:6]
+
+    def send(matchup: Matchup) -> str:
+        decision = decision_of(matchup_code=matchup.code, key=str(matchup.code), outcome="left")
+        try:
+            receive_vote(expert=eva, decision=decision)
+        except DatabaseBusy:
+            return "given back"
+        finally:
+            connection.close()
+        return "stored"
+
+    became: list[str] = []
+    with ThreadPoolExecutor(len(jobs)) as pool:
+        with kept_busy():
+            sent: list[Future[str]] = [pool.submit(send, job) for job in jobs]
+            for done in as_completed(sent):
+                became.append(done.result())
+                if len(became) == 4:
+                    break
+            assert became == ["given back"] * 4
+            assert sum(not job.done() for job in sent) == 2
+        assert sorted(job.result() for job in sent) == ["given back"] * 4 + ["stored"] * 2
+    assert Vote.objects.count() == 2
+
+
+@only_sqlite
+def test_who_waits_for_another_process_waits_no_longer_than_the_limit() -> None:
+    arrived, leave = threading.Event(), threading.Event()
+
+    def elsewhere() -> None:
+        with turns._turn(None):  # another opened file is as another process
+            arrived.set()
+            leave.wait(60)
+
+    with ThreadPoolExecutor(1) as pool:
+        held = pool.submit(elsewhere)
+        arrived.wait(60)
+        with pytest.raises(DatabaseBusy), turns.in_turn(within_s=SHORT_S):
+            pytest.fail("it is the other's turn")
+        leave.set()
+        held.result()
+    with turns.in_turn(within_s=SHORT_S):
+        pass
+
+
+@only_sqlite
+def test_a_connection_is_as_patient_after_a_vote_as_before() -> None:
+    def patience_ms() -> int:
+        with connection.cursor() as cursor:
+            cursor.execute("PRAGMA busy_timeout")
+            return int(cursor.fetchone()[0])
+
+    before = patience_ms()
+    assert before == 20_000
+    with turns.in_turn(within_s=SHORT_S):
+        assert patience_ms() <= SHORT_S * 1000
+    assert patience_ms() == before
+    with kept_busy(), pytest.raises(DatabaseBusy), turns.in_turn(within_s=SHORT_S):
+        Vote.objects.all()._raw_delete(using="default")
+    assert patience_ms() == before
+
+
+def test_other_faults_of_the_database_are_not_called_busy() -> None:
+    with (
+        pytest.raises(OperationalError if connection.vendor == "sqlite" else Exception),
+        turns.in_turn(within_s=SHORT_S),
+        connection.cursor() as cursor,
+    ):
+        cursor.execute("SELECT nothing FROM nowhere")
+
+
+@only_sqlite
+def test_every_connection_of_a_web_server_waits_no_longer_than_a_vote(tmp_path: Path) -> None:
+    program = (
+        "from arena.config import wsgi; from django.db import connection;"
+        "cursor = connection.cursor(); cursor.execute('PRAGMA busy_timeout');"
+        "print(cursor.fetchone()[0])"
+    )
+    said = subprocess.run(
+        [sys.executable, "-c", program],
+        cwd=ROOT,
+        env={**os.environ, "ARENA_VAR_DIR": str(tmp_path), "ARENA_VOTE_WAIT_S": "3"},
+        capture_output=True,
+        text=True,
+        check=True,
+    ).stdout
+    assert said == "3000\n"
