@@ -10,7 +10,7 @@ import logging
 import os
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
-from datetime import datetime, timedelta
+from datetime import timedelta
 from threading import Event, Thread
 from typing import Any
 
@@ -18,10 +18,10 @@ from celery import current_app, shared_task
 from celery.signals import worker_ready, worker_shutting_down
 from django.conf import settings
 from django.db import Error, connection
-from django.utils import timezone
 
 from augment.errors import QueueUnreachable
 from augment.services import claims, jobs, marked_pictures, runner
+from augment.services.clock import DATABASE_TIME, Moment
 
 logger = logging.getLogger(__name__)
 
@@ -74,7 +74,7 @@ def enqueue(ids: Iterable[int]) -> int:
             batch = waiting[start : start + BATCH]
             for pk in batch:
                 run_augmentation.apply_async((pk,), connection=broker, retry=False)
-            claims.mark_sent(ids=batch, now=timezone.now())
+            claims.mark_sent(ids=batch)
     return len(waiting)
 
 
@@ -84,7 +84,7 @@ def enqueue_job(job_pk: int) -> int:
     Raises:
         QueueUnreachable: No broker; the rows wait on and are sent by recover later.
     """
-    return enqueue(claims.unsent(now=timezone.now(), older_than=RESEND_AFTER, job_pk=job_pk))
+    return enqueue(claims.unsent(older_than=RESEND_AFTER, job_pk=job_pk))
 
 
 def check_broker() -> None:
@@ -93,11 +93,11 @@ def check_broker() -> None:
         pass
 
 
-def recover(*, now: datetime, at_start: bool = False) -> None:
+def recover(*, now: Moment = DATABASE_TIME, at_start: bool = False) -> None:
     """Take back what dead workers held, finish what is over and send what has no message.
 
     Args:
-        now: The time.
+        now: The time; the database's, for no worker's clock may take work away.
         at_start: Whether every waiting row gets a message, however new its last one: the broker
             may have been started anew together with this worker.
 
@@ -138,7 +138,7 @@ def _recover_until_stopped() -> None:
     at_start = True
     while not _stopping.is_set():
         try:
-            recover(now=timezone.now(), at_start=at_start)
+            recover(at_start=at_start)
             at_start = False
         except (QueueUnreachable, Error) as error:
             logger.warning("Could not recover, will try again: %s", error)

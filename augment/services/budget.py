@@ -10,7 +10,6 @@ saw the end of counts with its worst case if it was sent, and for nothing if it 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from datetime import datetime
 from enum import StrEnum
 from typing import Any
 
@@ -22,6 +21,7 @@ from augment.llm.costs import Price, WorstCase, usd_of
 from augment.llm.messages import Reply
 from augment.models import GenerationJob, ModelCall
 from augment.sentences import Sentence, sentence
+from augment.services.clock import Moment
 from augment.services.events import log_event
 
 State = GenerationJob.State
@@ -94,9 +94,7 @@ def reserve(*, job_pk: int, worst: WorstCase, price: Price | None) -> Room:
 
 
 @transaction.atomic(savepoint=False)
-def settle(
-    *, call_pk: int, used: Used, now: datetime, answer: dict[str, Any] | None = None
-) -> None:
+def settle(*, call_pk: int, used: Used, now: Moment, answer: dict[str, Any] | None = None) -> None:
     """Turn a call's reservation into what it used, and store the columns of its answer with it.
 
     A call that was settled because its worker was thought dead is corrected.
@@ -130,9 +128,7 @@ def settle(
 
 
 @transaction.atomic
-def settle_unseen(
-    *, now: datetime, attempt_pk: int | None = None, row_pk: int | None = None
-) -> int:
+def settle_unseen(*, now: Moment, attempt_pk: int | None = None, row_pk: int | None = None) -> int:
     """Settle the calls in flight of an attempt, or of a row, that nobody will see the end of.
 
     What was sent may have been answered and billed, so its worst case counts. What still waited

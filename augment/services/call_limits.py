@@ -18,10 +18,10 @@ from datetime import datetime, timedelta
 
 from django.db import Error, connection, transaction
 from django.db.models import Q
-from django.utils import timezone
 
 from augment.errors import EndpointBusy
 from augment.models import CallLease, Endpoint
+from augment.services.clock import database_now
 from augment.services.holding import repeating
 
 logger = logging.getLogger(__name__)
@@ -42,7 +42,7 @@ class Queue:
     Attributes:
         longest_s: Who has waited that long gives up.
         still_wanted: Asked at every look; raises where nobody needs the call any more.
-        clock: What time it is.
+        clock: What time it is, the same for every worker.
         sleep: Waits for that many seconds.
         rng: Where the jitter comes from, so that those who wait do not look in step.
         minute: Within which starts are counted.
@@ -51,7 +51,7 @@ class Queue:
 
     longest_s: float
     still_wanted: Callable[[], None] = lambda: None
-    clock: Callable[[], datetime] = timezone.now
+    clock: Callable[[], datetime] = database_now
     sleep: Callable[[float], None] = time.sleep
     rng: random.Random = field(default_factory=random.Random)
     minute: timedelta = MINUTE

@@ -1,7 +1,8 @@
 """Who works on which augmentation: one conditional UPDATE decides, never a message.
 
 A message may come twice or never. A row is claimed by exactly one worker, which keeps the claim
-alive by a heartbeat; a claim without one is taken back and the row waits again.
+alive by a heartbeat; a claim without one is taken back and the row waits again. What time it is
+says the database, so that workers whose clocks differ judge a claim alike.
 """
 
 from __future__ import annotations
@@ -10,7 +11,7 @@ import logging
 import uuid
 from collections.abc import Iterable
 from dataclasses import dataclass
-from datetime import datetime, timedelta
+from datetime import timedelta
 from enum import StrEnum
 from typing import Any
 
@@ -19,6 +20,7 @@ from django.db.models import Max, Q, QuerySet
 
 from augment.models import Attempt, Augmentation, GenerationJob
 from augment.services import budget
+from augment.services.clock import DATABASE_TIME, Moment
 from augment.services.texts import storable, storable_document
 
 logger = logging.getLogger(__name__)
@@ -63,7 +65,7 @@ class TryEnd(StrEnum):
 
 
 @transaction.atomic
-def claim(*, augmentation_pk: int, now: datetime, worker: str = "") -> Claim | None:
+def claim(*, augmentation_pk: int, now: Moment = DATABASE_TIME, worker: str = "") -> Claim | None:
     """Take a waiting row and open its next attempt.
 
     Returns:
@@ -91,7 +93,7 @@ def claim(*, augmentation_pk: int, now: datetime, worker: str = "") -> Claim | N
     )
 
 
-def beat(*, held: Claim, now: datetime) -> bool:
+def beat(*, held: Claim, now: Moment = DATABASE_TIME) -> bool:
     """Say that the holder is alive; False when the claim is lost."""
     return bool(_row_of(held).update(heartbeat_at=now))
 
@@ -121,7 +123,7 @@ def note_injected(*, held: Claim, injected: dict[str, str]) -> bool:
 
 
 @transaction.atomic
-def settle(*, held: Claim, settlement: Settlement, now: datetime) -> bool:
+def settle(*, held: Claim, settlement: Settlement, now: Moment = DATABASE_TIME) -> bool:
     """Write the outcome and close the attempt.
 
     Returns:
@@ -156,7 +158,7 @@ def settle(*, held: Claim, settlement: Settlement, now: datetime) -> bool:
 
 @transaction.atomic
 def release(
-    *, held: Claim, now: datetime, end: TryEnd = TryEnd.RELEASED, reason: str = ""
+    *, held: Claim, now: Moment = DATABASE_TIME, end: TryEnd = TryEnd.RELEASED, reason: str = ""
 ) -> bool:
     """Give an unfinished row back to the queue; False when the claim is lost already."""
     if not _row_of(held).update(
@@ -170,7 +172,7 @@ def release(
     return True
 
 
-def requeue_stale(*, now: datetime, older_than: timedelta) -> list[int]:
+def requeue_stale(*, now: Moment = DATABASE_TIME, older_than: timedelta) -> list[int]:
     """Take back every claim whose last heartbeat is older than that.
 
     Rows of cancelled jobs become cancelled, also those that wait again since, because a worker
@@ -180,10 +182,11 @@ def requeue_stale(*, now: datetime, older_than: timedelta) -> list[int]:
     Returns:
         Primary keys of the rows that wait again and need a message.
     """
-    stale = Augmentation.objects.filter(
-        state=Augmentation.State.RUNNING, heartbeat_at__lt=now - older_than
-    )
-    taken_back = [row.pk for row in stale if _take_back(row, now=now)]
+    taken_back = [
+        row.pk
+        for row in _silent(now=now, older_than=older_than)
+        if _take_back(row, now=now, older_than=older_than)
+    ]
     orphans = Augmentation.objects.filter(
         state=Augmentation.State.QUEUED, job__in=_cancelled_jobs()
     )
@@ -191,7 +194,9 @@ def requeue_stale(*, now: datetime, older_than: timedelta) -> list[int]:
     return taken_back
 
 
-def unsent(*, now: datetime, older_than: timedelta, job_pk: int | None = None) -> list[int]:
+def unsent(
+    *, now: Moment = DATABASE_TIME, older_than: timedelta, job_pk: int | None = None
+) -> list[int]:
     """Waiting rows, of one job or of all, without a message or with one that old.
 
     What waits in a job that stopped at its cap waits for somebody to raise it.
@@ -205,7 +210,7 @@ def unsent(*, now: datetime, older_than: timedelta, job_pk: int | None = None) -
     return list(waiting.filter(lost).order_by("pk").values_list("pk", flat=True))
 
 
-def mark_sent(*, ids: Iterable[int], now: datetime) -> None:
+def mark_sent(*, ids: Iterable[int], now: Moment = DATABASE_TIME) -> None:
     """Remember when the messages of these rows were sent."""
     change_all(Augmentation.objects.filter(pk__in=list(ids)), sent_at=now)
 
@@ -243,8 +248,15 @@ def _closed_jobs() -> QuerySet[GenerationJob]:
     return GenerationJob.objects.filter(state__in=[states.CANCELLED, states.STOPPED_AT_CAP])
 
 
+def _silent(*, now: Moment, older_than: timedelta) -> QuerySet[Augmentation]:
+    """Rows whose holders have not been heard for so long."""
+    return Augmentation.objects.filter(
+        state=Augmentation.State.RUNNING, heartbeat_at__lt=now - older_than
+    )
+
+
 @transaction.atomic
-def _take_back(seen: Augmentation, *, now: datetime) -> bool:
+def _take_back(seen: Augmentation, *, now: Moment, older_than: timedelta) -> bool:
     """End a stale claim, unless its holder was heard since; True when the row waits again."""
     lost = _lost_in_a_row(seen.pk) + 1
     changes: dict[str, Any] = {"state": Augmentation.State.QUEUED, "sent_at": None}
@@ -253,7 +265,7 @@ def _take_back(seen: Augmentation, *, now: datetime) -> bool:
     elif lost >= LOST_LIMIT:
         reason = f"Lost {lost} workers in a row at this one; look for the cause, then retry."
         changes = {"state": Augmentation.State.FAILED, "finished_at": now, "reason": reason}
-    row = Augmentation.objects.filter(pk=seen.pk, claim=seen.claim, heartbeat_at=seen.heartbeat_at)
+    row = _silent(now=now, older_than=older_than).filter(pk=seen.pk, claim=seen.claim)
     if not row.update(claim=None, heartbeat_at=None, **changes):
         return False
     budget.settle_unseen(row_pk=seen.pk, now=now)

@@ -9,7 +9,6 @@ from threading import Event, Thread
 from types import TracebackType
 
 from django.db import Error, connection
-from django.utils import timezone
 
 from augment.errors import BudgetSpent, ClaimLost
 from augment.models import Augmentation
@@ -62,21 +61,20 @@ class OutcomeOnCrash:
         error: BaseException | None,
         traceback: TracebackType | None,
     ) -> bool:
-        now = timezone.now()
         if isinstance(error, ClaimLost):
             logger.warning(
                 "Stopped work on augmentation %d: %s", self._held.augmentation_pk, error
             )
             return True
         if isinstance(error, BudgetSpent):
-            claims.release(held=self._held, now=now, end=claims.TryEnd.STOPPED, reason=str(error))
+            claims.release(held=self._held, end=claims.TryEnd.STOPPED, reason=str(error))
             return True
         if isinstance(error, Exception):
             reason = f"unexpected: {type(error).__name__}: {error}"
             failed = claims.Settlement(state=Augmentation.State.FAILED, reason=reason)
-            claims.settle(held=self._held, settlement=failed, now=now)
+            claims.settle(held=self._held, settlement=failed)
         elif error is not None:
-            claims.release(held=self._held, now=now)
+            claims.release(held=self._held)
         return False
 
 
@@ -93,7 +91,7 @@ def _beat_until(beat: Callable[[], bool], every_s: float, stop: Event) -> None:
 def _beat(held: claims.Claim) -> bool:
     """One beat; a database that can't take it now gets the next one."""
     try:
-        is_ours = claims.beat(held=held, now=timezone.now())
+        is_ours = claims.beat(held=held)
     except Error as error:
         logger.warning("No heartbeat for augmentation %d: %s", held.augmentation_pk, error)
         connection.close()

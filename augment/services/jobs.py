@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from datetime import datetime
 from typing import Any, TypeVar
 
 from django.contrib.auth.models import User
@@ -18,6 +17,7 @@ from augment.sentences import sentence
 from augment.services.budget import limit_of
 from augment.services.caps import Caps, check_caps, over_already
 from augment.services.claims import change_all
+from augment.services.clock import DATABASE_TIME, Moment
 from augment.services.events import log_event
 from augment.services.feasible import refuse_impossible
 from augment.services.texts import one_line
@@ -183,7 +183,7 @@ def retry_failed(job: GenerationJob, actor: User | None = None) -> GenerationJob
     return job
 
 
-def finish_if_over(*, now: datetime, job_pk: int | None = None) -> int:
+def finish_if_over(*, now: Moment = DATABASE_TIME, job_pk: int | None = None) -> int:
     """Finish the job, or every running job, in which nothing is under way.
 
     To be called after an outcome is committed, never in its transaction: two workers that end
@@ -202,7 +202,7 @@ def finish_if_over(*, now: datetime, job_pk: int | None = None) -> int:
 
 
 @transaction.atomic
-def _finish(job_pk: int, now: datetime) -> int:
+def _finish(job_pk: int, now: Moment) -> int:
     """Finish one job if it is over; 1 when this call did.
 
     The lock comes first: a retry that is about to commit has changed the job's row, and its rows

@@ -9,7 +9,6 @@ from dataclasses import dataclass
 from functools import partial
 
 from django.conf import settings
-from django.utils import timezone
 
 from augment.baselines import quantised, rule_placer, simulated
 from augment.errors import (
@@ -86,16 +85,16 @@ def work_on(*, augmentation_pk: int, worker: str = "", connect: Connect | None =
     Returns:
         Whether the row was claimed.
     """
-    held = claims.claim(augmentation_pk=augmentation_pk, worker=worker, now=timezone.now())
+    held = claims.claim(augmentation_pk=augmentation_pk, worker=worker)
     if held is None:
         return False
     row = _row(held)
     try:
         with heartbeat(held, every_s=settings.HEARTBEAT_S), OutcomeOnCrash(held):
             settlement = run(row, held=held, connect=connect)
-            claims.settle(held=held, settlement=settlement, now=timezone.now())
+            claims.settle(held=held, settlement=settlement)
     finally:
-        jobs.finish_if_over(job_pk=row.job_id, now=timezone.now())
+        jobs.finish_if_over(job_pk=row.job_id)
     return True
 
 

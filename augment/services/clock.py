@@ -1,0 +1,35 @@
+"""What time it is for whatever several workers judge: the database's time, never their own.
+
+Workers on different machines may be tens of seconds apart. Times that one of them writes and
+another one compares (claims, signs of life, places at an endpoint) are therefore both written and
+compared by the database; on SQLite that is the clock of its only machine.
+"""
+
+from __future__ import annotations
+
+from datetime import UTC, datetime
+
+from django.db import connection
+from django.db.models import Expression
+from django.db.models.functions import Now
+from django.db.models.sql import Query
+from django.utils.dateparse import parse_datetime
+
+Moment = datetime | Expression
+"""A time that is known, or one that the database finds when it runs the statement."""
+
+DATABASE_TIME = Now()
+"""When the statement that it is part of begins to run; the same expression on every database."""
+
+
+def database_now() -> datetime:
+    """The database's time, aware, to be reckoned with here; a query of its own."""
+    text, parameters = Query(None).get_compiler(connection=connection).compile(DATABASE_TIME)
+    with connection.cursor() as cursor:
+        cursor.execute(f"SELECT {text}", parameters)
+        found = cursor.fetchone()[0]
+    if isinstance(found, datetime):
+        return found
+    read = parse_datetime(found)  # SQLite has texts
+    assert read is not None
+    return read.replace(tzinfo=UTC)

@@ -1,0 +1,129 @@
+"""Workers whose clocks are wrong: what they judge is the database's time, on every database."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from datetime import UTC, datetime, timedelta
+
+import pytest
+from django.db import connection
+from django.utils import timezone
+
+from augment import tasks
+from augment.models import Augmentation, CallLease
+from augment.services import call_limits, claims
+from augment.services.clock import DATABASE_TIME, database_now
+from tests.jobs.models import add_llama
+from tests.jobs.rows import STALE, launch, only_row
+
+pytestmark = pytest.mark.django_db
+State = Augmentation.State
+Skew = Callable[[float], None]
+
+
+@pytest.fixture
+def skew(monkeypatch: pytest.MonkeyPatch) -> Skew:
+    """Sets the clock of this worker wrong by so many seconds."""
+    right = timezone.now
+
+    def put(seconds: float) -> None:
+        monkeypatch.setattr(timezone, "now", lambda: right() + timedelta(seconds=seconds))
+
+    return put
+
+
+@pytest.fixture(autouse=True)
+def _broker() -> Iterator[None]:
+    with memory_broker():
+        yield
+
+
+@contextmanager
+def memory_broker() -> Iterator[None]:
+    before = tasks.current_app.conf.broker_url
+    tasks.current_app.conf.broker_url = "memory://"
+    yield
+    tasks.current_app.conf.broker_url = before
+
+
+def taken() -> tuple[Augmentation, claims.Claim]:
+    row = only_row(launch())
+    held = claims.claim(augmentation_pk=row.pk, worker="here")
+    assert held is not None
+    return row, held
+
+
+def silent_for(row: Augmentation, seconds: float) -> None:
+    """As if the holder had last been heard so long ago, on the database's clock."""
+    Augmentation.objects.filter(pk=row.pk).update(
+        heartbeat_at=DATABASE_TIME - timedelta(seconds=seconds)
+    )
+
+
+def test_the_database_and_this_machine_agree_where_they_are_one() -> None:
+    before = datetime.now(UTC)
+    found = database_now()
+    after = datetime.now(UTC)
+    assert before - timedelta(milliseconds=1) <= found <= after  # SQLite has milliseconds
+
+
+@pytest.mark.parametrize("seconds", [-40.0, 40.0])
+@pytest.mark.parametrize("worker", ["holder", "other"])
+def test_40_s_of_skew_take_no_living_claim_back(skew: Skew, seconds: float, worker: str) -> None:
+    if worker == "holder":
+        skew(seconds)
+    row, held = taken()
+    assert claims.beat(held=held)
+    skew(seconds if worker == "other" else 0.0)
+    tasks.recover()
+    assert claims.is_held(held=held)
+    row.refresh_from_db()
+    assert row.state == State.RUNNING
+
+
+@pytest.mark.parametrize("seconds", [-40.0, 0.0, 40.0])
+@pytest.mark.parametrize(("silent_s", "state"), [(10.0, State.RUNNING), (25.0, State.QUEUED)])
+def test_a_dead_claim_is_taken_back_whatever_the_clock_of_who_looks(
+    skew: Skew, seconds: float, silent_s: float, state: State
+) -> None:
+    row, _ = taken()
+    silent_for(row, silent_s)
+    skew(seconds)
+    claims.requeue_stale(older_than=STALE)
+    row.refresh_from_db()
+    assert row.state == state
+
+
+@pytest.mark.parametrize("seconds", [-700.0, 700.0])
+def test_a_message_on_its_way_is_not_sent_again_by_a_wrong_clock(
+    skew: Skew, seconds: float
+) -> None:
+    job = launch()
+    skew(seconds)
+    tasks.enqueue_job(job.pk)
+    skew(0.0)
+    assert tasks.enqueue_job(job.pk) == 0
+
+
+@pytest.mark.parametrize("seconds", [-70.0, 70.0])
+def test_a_wrong_clock_takes_no_place_that_is_taken(skew: Skew, seconds: float) -> None:
+    endpoint = add_llama().endpoint
+    assert endpoint is not None
+    endpoint.max_concurrency = 1
+    endpoint.save()
+    clock = call_limits.Queue(longest_s=0.0).clock
+    skew(seconds)
+    assert not isinstance(call_limits.admit(endpoint_pk=endpoint.pk, clock=clock), float)
+    skew(-seconds)
+    assert call_limits.admit(endpoint_pk=endpoint.pk, clock=clock) == 0.0
+    assert CallLease.objects.get().started_at <= database_now()
+
+
+def test_times_are_kept_alike_on_every_database() -> None:
+    row, _ = taken()
+    row.refresh_from_db()
+    assert row.heartbeat_at is not None
+    assert row.heartbeat_at.tzinfo is UTC
+    found = Augmentation.objects.filter(heartbeat_at__lte=DATABASE_TIME, pk=row.pk)
+    assert found.exists(), connection.vendor
