@@ -4,9 +4,11 @@ from __future__ import annotations
 
 from typing import Any
 
+from django import forms
 from django.contrib import admin
 from django.http import HttpRequest
 
+from augment.errors import InvalidDocument
 from augment.models import (
     Attempt,
     Augmentation,
@@ -21,6 +23,7 @@ from augment.models import (
 )
 from augment.services.endpoints import facts_of
 from augment.services.events import log_event
+from augment.services.keys import check_key_variable, log_move, move_of
 
 
 class ReadOnly:
@@ -112,10 +115,53 @@ class EndpointModelInline(admin.StackedInline):
     )
 
 
+class EndpointForm(forms.ModelForm):
+    """An endpoint; what its key variable holds goes to no other server without being asked."""
+
+    move_key = forms.BooleanField(
+        required=False,
+        label="Move the key",
+        help_text="the key may go to another server than so far; asked for where it would",
+    )
+
+    def clean_key_variable(self) -> str:
+        """A variable that is meant for keys, or none.
+
+        Raises:
+            ValidationError: It is another.
+        """
+        variable = str(self.cleaned_data["key_variable"])
+        try:
+            check_key_variable(variable)
+        except InvalidDocument as error:
+            raise forms.ValidationError([problem for _, problem in error.problems]) from error
+        return variable
+
+    def clean(self) -> dict[str, Any]:
+        """Ask once more where the key would go to another server."""
+        cleaned: dict[str, Any] = super().clean() or self.cleaned_data
+        self.move = None
+        if self.instance.pk and "base_url" in cleaned and "key_variable" in cleaned:
+            self.move = move_of(
+                endpoint=Endpoint.objects.get(pk=self.instance.pk),
+                base_url=cleaned["base_url"],
+                key_variable=cleaned["key_variable"],
+            )
+        if self.move is not None and not cleaned.get("move_key"):
+            before, after = self.move
+            problem = (
+                f"The key in {cleaned['key_variable']} went to {before} and would go to {after}. "
+                "Tick this box if that is meant."
+            )
+            self.add_error("move_key", problem)
+        return cleaned
+
+
 @admin.register(Endpoint)
 class EndpointAdmin(admin.ModelAdmin):
     """Endpoints; every change is logged, and who is simulated stays so."""
 
+    form = EndpointForm
     list_display = ("label", "base_url", "key_variable", "is_simulated", "max_concurrency")
     list_filter = ("is_simulated",)
     inlines = (EndpointModelInline,)
@@ -140,6 +186,7 @@ class EndpointAdmin(admin.ModelAdmin):
             before=form.before,
             after=facts_of(form.instance),
         )
+        log_move(form.move, endpoint=form.instance, actor=request.user)  # type: ignore[arg-type]
 
 
 @admin.register(Contestant)

@@ -228,8 +228,31 @@ class QueueUnreachable(AugmentError):
         )
 
 
-class ClaimLost(AugmentError):
+class Unwanted(AugmentError):
+    """Nobody needs the answer of a call any more. Ask nothing further; give up what is asked."""
+
+
+class ClaimLost(Unwanted):
     """Somebody else works on this row now. Drop the result; the new holder brings its own."""
+
+
+class JobCancelled(Unwanted):
+    """The job was cancelled while one of its rows was worked on. The row is cancelled with it."""
+
+    def __init__(self) -> None:
+        super().__init__("The job was cancelled.")
+
+
+class Abandoned(ModelFault):
+    """A call in flight was given up, because nobody needs its answer; it may be billed.
+
+    Args:
+        why: Who does not need it.
+    """
+
+    def __init__(self, why: Unwanted) -> None:
+        self.why = why
+        super().__init__(f"given up before there was an answer: {why}", retryable=False)
 
 
 class KeyMissing(AugmentError):
@@ -247,6 +270,35 @@ class KeyMissing(AugmentError):
             f"The environment variable {variable}, which holds the key of endpoint "
             f"{endpoint!r}, is not set where the worker runs."
         )
+
+
+class KeyNotAllowed(AugmentError):
+    """An endpoint names an environment variable that is not meant for keys. Nothing was read.
+
+    Args:
+        variable: Its name.
+        endpoint: The label of the endpoint that names it.
+        rule: Which may be named.
+    """
+
+    def __init__(self, variable: str, endpoint: str, rule: str) -> None:
+        self.variable = variable
+        self.endpoint = endpoint
+        super().__init__(
+            f"Endpoint {endpoint!r} names the environment variable {variable}, which may not be "
+            f"sent to an endpoint: {rule} is needed."
+        )
+
+
+class DatabaseLocked(AugmentError):
+    """The database took nothing for longer than anybody waits. Try again when it is less busy.
+
+    Args:
+        what: What could not be stored or read.
+    """
+
+    def __init__(self, what: str) -> None:
+        super().__init__(f"The database was locked for too long: {what}.")
 
 
 class BudgetSpent(AugmentError):

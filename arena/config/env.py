@@ -15,6 +15,9 @@ from arena.config import private
 
 T = TypeVar("T")
 
+_OWN = ("DATABASE_URL", "REDIS_URL")
+"""Secrets of the product itself, beside those called ARENA_..."""
+
 _TRUE, _FALSE = {"1", "true", "yes", "on"}, {"0", "false", "no", "off", ""}
 
 
@@ -81,6 +84,32 @@ def origins(name: str) -> list[str]:
         return found
 
     return read(name, [], parse, "use https://NAME, more than one separated by commas")
+
+
+def proxy(name: str) -> str:
+    """The address of an HTTP proxy; none by default."""
+
+    def parse(raw: str) -> str:
+        address = urlsplit(raw)
+        if raw and (address.scheme != "http" or not address.hostname or not address.port):
+            raise ValueError(raw)
+        return raw
+
+    return read(name, "", parse, "use http://HOST:PORT")
+
+
+def key_variables(name: str) -> list[str]:
+    """Names of environment variables with keys of language models, separated by commas."""
+
+    def parse(raw: str) -> list[str]:
+        found = [part.strip() for part in raw.split(",") if part.strip()]
+        for part in found:
+            if not part.isidentifier() or part.startswith("ARENA_") or part in _OWN:
+                raise ValueError(part)
+        return found
+
+    own = ", ".join(_OWN)
+    return read(name, [], parse, f"names are needed, none of ARENA_*, {own}, separated by commas")
 
 
 def at_least_twice(longer: str, longer_s: int, shorter: str, shorter_s: int) -> None:

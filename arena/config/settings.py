@@ -234,6 +234,9 @@ RECOVER_EVERY_S = env.integer("ARENA_RECOVER_EVERY_S", default=30, low=1, high=3
 
 LLM_QUEUE_S = env.integer("ARENA_LLM_QUEUE_S", default=1800, low=1, high=86400)
 LLM_TIMEOUT_S = env.integer("ARENA_LLM_TIMEOUT_S", default=120, low=1, high=3600)
+LLM_ANSWER_MB = env.integer("ARENA_LLM_ANSWER_MB", default=8, low=1, high=256)
+LLM_PROXY = env.proxy("ARENA_LLM_PROXY")
+KEY_VARIABLES = env.key_variables("ARENA_KEY_VARIABLES")
 
 # --- Voting ------------------------------------------------------------------------------------
 

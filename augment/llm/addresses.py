@@ -1,14 +1,16 @@
 """Which addresses an endpoint may have: anything but the doors to a cloud's own secrets.
 
 Whoever may add a contestant decides where the server sends requests. This computer and the local
-network stay allowed, because own model servers live there.
+network stay allowed, because own model servers live there. An IPv6 address that stands for an
+IPv4 one (mapped, translated, tunnelled) is refused whatever it stands for: no model is served from
+it, and where it leads is decided by whoever translates.
 """
 
 from __future__ import annotations
 
 import socket
 from collections.abc import Callable
-from ipaddress import IPv4Address, IPv6Address, ip_address
+from ipaddress import IPv4Address, IPv6Address, IPv6Network, ip_address
 from typing import Any
 from urllib.parse import SplitResult, urlsplit
 
@@ -23,16 +25,30 @@ _METADATA_NAMES = frozenset(
 )
 _METADATA_ADDRESSES = frozenset(
     ip_address(text)
-    for text in ("100.100.100.200", "192.0.0.192", "168.63.129.16", "fd00:ec2::254")
+    for text in (
+        # Beside those of 169.254.0.0/16, which are link-local: Alibaba, Oracle, Azure; AWS,
+        # its pods, Google, Scaleway.
+        *("100.100.100.200", "192.0.0.192", "168.63.129.16"),
+        *("fd00:ec2::254", "fd00:ec2::23", "fd20:ce::254", "fd00:42::42"),
+    )
 )
+_STAND_FOR_IPV4 = tuple(
+    IPv6Network(text)
+    for text in (
+        *("::/96", "::ffff:0:0/96", "::ffff:0:0:0/96"),  # compatible, mapped, translated
+        *("64:ff9b::/96", "64:ff9b:1::/48"),  # NAT64
+        *("2001::/32", "2002::/16"),  # Teredo, 6to4
+    )
+)
+_LOOPBACK = IPv6Address("::1")
 
 
 def check_base_url(base_url: str) -> str:
     """The address without a slash at its end.
 
     Raises:
-        InvalidDocument: It is no http(s) address, it carries a password or a query, or it leads
-            to a link-local or metadata address.
+        InvalidDocument: It is no http(s) address, it carries a password or a query, or it is a
+            link-local, metadata or translated address.
     """
     problem = _problem(base_url)
     if problem:
@@ -43,25 +59,45 @@ def check_base_url(base_url: str) -> str:
 def check_resolved(base_url: str, *, resolve: Resolve = socket.getaddrinfo) -> None:
     """Look where the name leads today; a name that nobody knows leads nowhere and passes.
 
-    Whoever owns a name can still change it between this look and the call.
+    Whoever owns a name can change it after this look: who connects asks `addresses_of`.
 
     Raises:
-        InvalidDocument: One of its addresses is link-local or metadata.
+        InvalidDocument: One of its addresses is forbidden.
     """
     parts = _split(base_url)
-    host = (parts.hostname if parts else None) or ""
     try:
-        found = {entry[4][0] for entry in resolve(host, None, type=socket.SOCK_STREAM)}
+        addresses_of((parts.hostname if parts else None) or "", resolve=resolve)
     except (OSError, UnicodeError):
         return
-    for text in sorted(map(str, found)):
+
+
+def addresses_of(
+    host: str, *, resolve: Resolve = socket.getaddrinfo, checks: bool = True
+) -> list[str]:
+    """The addresses of a host as numbers, in the order in which they are to be tried.
+
+    Args:
+        host: A name or a number.
+        resolve: From a name to addresses.
+        checks: Whether they are held against the rule.
+
+    Raises:
+        InvalidDocument: One of its addresses is forbidden.
+        OSError, UnicodeError: Nobody knows the name.
+    """
+    entries = resolve(host, None, type=socket.SOCK_STREAM)
+    found = list(dict.fromkeys(str(entry[4][0]) for entry in entries))
+    for text in found if checks else ():
         address = _address(text)
-        if address is not None and _is_forbidden(address):
-            problem = f"{host} leads to {text}, a link-local or metadata address"
+        if address is None or _is_forbidden(address):
+            problem = f"{host} leads to {text}, {_FORBIDDEN}"
             raise InvalidDocument("endpoint", [("base_url", problem)])
+    return found
 
 
 # --- Private -----------------------------------------------------------------------------------
+
+_FORBIDDEN = "a link-local or metadata address, or one that stands for another"
 
 
 def _problem(base_url: str) -> str | None:
@@ -74,7 +110,7 @@ def _problem(base_url: str) -> str | None:
     host = parts.hostname.rstrip(".").lower()
     address = _address(host)
     if host in _METADATA_NAMES or (address is not None and _is_forbidden(address)):
-        return f"{host} is a link-local or metadata address, which no model is served from"
+        return f"{host} is {_FORBIDDEN}; no model is served from there"
     return None
 
 
@@ -97,14 +133,18 @@ def _address(host: str) -> IPv4Address | IPv6Address | None:
             return IPv4Address(socket.inet_aton(host))
         except OSError:
             return None
-    if isinstance(found, IPv6Address) and found.ipv4_mapped:
-        return found.ipv4_mapped
     return found
 
 
 def _is_forbidden(address: IPv4Address | IPv6Address) -> bool:
+    stands_for_another = (
+        isinstance(address, IPv6Address)
+        and address != _LOOPBACK
+        and any(address in network for network in _STAND_FOR_IPV4)
+    )
     return (
-        address.is_link_local
+        stands_for_another
+        or address.is_link_local
         or address.is_multicast
         or address.is_unspecified
         or address in _METADATA_ADDRESSES

@@ -39,6 +39,7 @@ class ChatClient(Protocol):
             ParameterRefused: The endpoint does not take a parameter; `fitted` knows it from now
                 on, if it can do without.
             ModelFault: The wire or the endpoint broke before there was an answer.
-            ClaimLost: Nobody needs the answer any more; nothing was sent.
+            Abandoned: Nobody needs the answer any more; the request was sent.
+            Unwanted: Nobody needs the answer any more; nothing was sent.
         """
         ...

@@ -196,6 +196,7 @@ class Reply:
         finish_reason: Why the model stopped ("stop", "length", ...), empty where unknown.
         refusal: What the model said when it declined, None where it did not.
         tool_calls: What the model wants called natively.
+        calls_left_out: So many more calls than anybody reads came after those.
         latency_s: From sending the request to the whole answer.
     """
 
@@ -207,6 +208,7 @@ class Reply:
     completion_tokens: int | None = None
     latency_s: float | None = None
     tool_calls: tuple[ToolCall, ...] = ()
+    calls_left_out: int = 0
 
     @property
     def is_cut_off(self) -> bool:

@@ -7,9 +7,11 @@ import re
 import time
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass
+from datetime import UTC
 from email.utils import parsedate_to_datetime
 
 from augment.errors import ModelFault, ParameterRefused
+from augment.llm.cutting import cut
 from augment.llm.messages import LengthName
 
 _PASSING = frozenset({408, 409, 425, 429})
@@ -24,7 +26,9 @@ _SAYS_UNKNOWN = re.compile(
     r"extra (inputs|fields)|cannot find field",
     re.IGNORECASE,
 )
-_LONGEST_TEXT = 300
+LONGEST_MESSAGE = 300
+LONGEST_CODE = 80
+"""Of what an error body says, in characters."""
 
 
 @dataclass(frozen=True, slots=True, repr=False)
@@ -60,8 +64,8 @@ def fault_of_status(
     """
     message, code, param = _message_code_and_param(body)
     passing = (status in _PASSING or status >= 500) and code not in _SPENT
-    shown = message if len(message) <= _LONGEST_TEXT else message[:_LONGEST_TEXT] + "..."
-    text = f"the endpoint answered {status}" + (f" ({code})" if code else "")
+    shown = cut(message, LONGEST_MESSAGE)
+    text = f"the endpoint answered {status}" + (f" ({cut(code, LONGEST_CODE)})" if code else "")
     text = f"{text}: {shown}" if shown else text
     refused = _refused(message, code, param, sent) if status in _ABOUT_THE_REQUEST else None
     if refused:
@@ -83,11 +87,19 @@ def retry_after_s(headers: Mapping[str, str]) -> float | None:
         seconds = _number(value)
         if seconds is not None:
             return max(0.0, seconds * unit_s)
-        try:
-            return max(0.0, parsedate_to_datetime(value).timestamp() - time.time())
-        except ValueError:
-            continue
+        at_s = _date_s(value)
+        if at_s is not None:
+            return max(0.0, at_s - time.time())
     return None
+
+
+def _date_s(value: str) -> float | None:
+    """The time that an HTTP date stands for; one that names no zone is in UTC, as all are."""
+    try:
+        at = parsedate_to_datetime(value)
+        return (at if at.tzinfo is not None else at.replace(tzinfo=UTC)).timestamp()
+    except (ValueError, OverflowError, TypeError, IndexError):
+        return None
 
 
 def _number(value: str) -> float | None:

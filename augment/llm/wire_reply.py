@@ -1,7 +1,9 @@
 """From whatever the `openai` package returns for a 200 to a Reply.
 
 The package does not check what a server sent: an answer may be a plain `str`, have no choices,
-or lack any field. So nothing here is taken on trust.
+or lack any field. So nothing here is taken on trust. What is no answer to be read as a whole (a
+refusal, calls of tools) is cut here, at the border, so that a run and its replay from the store
+see the same.
 """
 
 from __future__ import annotations
@@ -9,8 +11,23 @@ from __future__ import annotations
 import json
 
 from augment.errors import ModelFault
+from augment.llm.cutting import cut
 from augment.llm.messages import Reply, ToolCall
 from augment.llm.wire_faults import Secret
+
+LONGEST_REFUSAL = 4_000
+LONGEST_NAME = 200
+LONGEST_ARGUMENTS = 10_000
+"""Of one call, in characters."""
+
+LONGEST_EXTRA = 100_000
+"""What hangs on a call goes back as it came, so it can't be cut: longer ones are left out."""
+
+MOST_CALLS = 64
+"""Of one answer."""
+
+MOST_TOKENS = 100_000_000
+"""A count beyond is none: no model reads or writes so much at once."""
 
 
 def reply_of(answer: object, *, latency_s: float, secret: Secret) -> Reply:
@@ -38,15 +55,17 @@ def reply_of(answer: object, *, latency_s: float, secret: Secret) -> Reply:
         raise ModelFault("the endpoint answered without a message", retryable=True, status=200)
     usage = getattr(answer, "usage", None)
     refusal = getattr(message, "refusal", None)
+    calls = _tool_calls(getattr(message, "tool_calls", None), secret)
     return Reply(
         text=secret.out_of(_text(getattr(message, "content", None))),
-        model=secret.out_of(_text(getattr(answer, "model", None)))[:120],
-        finish_reason=secret.out_of(_text(getattr(choices[0], "finish_reason", None)))[:40],
-        refusal=secret.out_of(refusal) if isinstance(refusal, str) and refusal else None,
+        model=cut(secret.out_of(_text(getattr(answer, "model", None))), 120),
+        finish_reason=cut(secret.out_of(_text(getattr(choices[0], "finish_reason", None))), 40),
+        refusal=cut(secret.out_of(_text(refusal)), LONGEST_REFUSAL) or None,
         prompt_tokens=_count(getattr(usage, "prompt_tokens", None)),
         completion_tokens=_count(getattr(usage, "completion_tokens", None)),
         latency_s=latency_s,
-        tool_calls=_tool_calls(getattr(message, "tool_calls", None), secret),
+        tool_calls=calls[:MOST_CALLS],
+        calls_left_out=len(calls[MOST_CALLS:]),
     )
 
 
@@ -56,18 +75,27 @@ def _tool_calls(calls: object, secret: Secret) -> tuple[ToolCall, ...]:
     for number, call in enumerate(calls if isinstance(calls, list) else [], start=1):
         function = getattr(call, "function", None)
         name = _text(getattr(function, "name", None))
-        extra = getattr(call, "model_extra", None)
         if name:
             made.append(
                 ToolCall(
                     # Some servers number no calls; the answer to one must name it.
-                    id=secret.out_of(_text(getattr(call, "id", None))) or f"call_{number}",
-                    name=secret.out_of(name),
-                    arguments=secret.out_of(_text(getattr(function, "arguments", None))),
-                    extra=secret.out_of(json.dumps(extra, sort_keys=True)) if extra else "",
+                    id=cut(secret.out_of(_text(getattr(call, "id", None))), LONGEST_NAME)
+                    or f"call_{number}",
+                    name=cut(secret.out_of(name), LONGEST_NAME),
+                    arguments=cut(
+                        secret.out_of(_text(getattr(function, "arguments", None))),
+                        LONGEST_ARGUMENTS,
+                    ),
+                    extra=_extra(getattr(call, "model_extra", None), secret),
                 )
             )
     return tuple(made)
+
+
+def _extra(extra: object, secret: Secret) -> str:
+    """What else hangs on a call, as JSON; empty where there is nothing, or too much."""
+    text = secret.out_of(json.dumps(extra, sort_keys=True)) if extra else ""
+    return text if len(text) <= LONGEST_EXTRA else ""
 
 
 def _text(value: object) -> str:
@@ -75,5 +103,9 @@ def _text(value: object) -> str:
 
 
 def _count(value: object) -> int | None:
-    known = isinstance(value, int) and not isinstance(value, bool) and value >= 0
-    return value if known and isinstance(value, int) else None
+    """A count of tokens, None where it can't be one; some servers write whole numbers as 12.0."""
+    if isinstance(value, float) and value.is_integer():
+        value = int(value)
+    if isinstance(value, bool) or not isinstance(value, int):
+        return None
+    return value if 0 <= value <= MOST_TOKENS else None

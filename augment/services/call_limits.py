@@ -16,7 +16,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass, field
 from datetime import datetime, timedelta
 
-from django.db import Error, connection, transaction
+from django.db import Error, OperationalError, connection, transaction
 from django.db.models import Q
 
 from augment.errors import EndpointBusy
@@ -73,7 +73,7 @@ def place_at(endpoint: Endpoint, queue: Queue) -> Iterator[None]:
         with renewing:
             yield
     finally:
-        CallLease.objects.filter(token=token).update(finished_at=queue.clock())
+        _give_back(token, queue.clock)
 
 
 @transaction.atomic
@@ -142,6 +142,16 @@ def _look(endpoint: Endpoint, queue: Queue) -> uuid.UUID | float:
         if wait_s is not None:
             return wait_s
     return admit(endpoint_pk=endpoint.pk, clock=queue.clock, minute=queue.minute)
+
+
+def _give_back(token: uuid.UUID, clock: Callable[[], datetime]) -> None:
+    """Free the place; where the database can't take it now it runs out, and no answer is lost."""
+    try:
+        CallLease.objects.filter(token=token).update(finished_at=clock())
+    except OperationalError as error:
+        logger.warning("A call's place was not given back and runs out by itself: %s", error)
+        if not connection.in_atomic_block:
+            connection.close_if_unusable_or_obsolete()
 
 
 def _renewed(token: uuid.UUID, clock: Callable[[], datetime]) -> bool:

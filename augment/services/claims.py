@@ -106,6 +106,11 @@ def is_held(*, held: Claim, lock: bool = False) -> bool:
     return row.exists()
 
 
+def is_cancelled(*, held: Claim) -> bool:
+    """Whether the row's job was cancelled while it was worked on."""
+    return _cancelled_jobs().filter(augmentations=held.augmentation_pk).exists()
+
+
 def keep_modification(*, held: Claim, modification: dict[str, Any], notes: str) -> bool:
     """Store what was understood before it is drawn, so that a second try only has to draw.
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import re
 from collections.abc import Mapping
 from dataclasses import asdict
 
@@ -12,11 +11,12 @@ from django.db import transaction
 
 from augment.baselines.quantised import BIN_M
 from augment.baselines.simulated import Rates
-from augment.errors import Conflict, InvalidDocument, KeyMissing, UnknownName
+from augment.errors import Conflict, UnknownName
 from augment.llm.addresses import check_base_url
 from augment.models import Contestant, Endpoint
 from augment.services.endpoints import model_at
 from augment.services.events import log_event
+from augment.services.keys import check_key_variable, log_move, move_of
 from augment.services.roles import Seat, check_roles, documents_of
 from augment.services.scenes import check_slug
 from augment.services.texts import one_line
@@ -57,6 +57,7 @@ def ensure_endpoint(
     base_url: str,
     key_variable: str = "",
     is_simulated: bool = False,
+    may_move_key: bool = False,
     actor: User | None = None,
 ) -> Endpoint:
     """The endpoint of that label, made or moved to that address.
@@ -67,17 +68,16 @@ def ensure_endpoint(
         key_variable: The environment variable that holds the key where the worker runs; empty
             where none is needed.
         is_simulated: Whether what it answers counts as simulated.
+        may_move_key: Whether the key of an endpoint that exists may go to another server.
         actor: Who wants it.
 
     Raises:
-        InvalidDocument: The label, the address or the variable's name can't be used.
-        Conflict: The endpoint exists and is simulated where this one is not, or the reverse.
+        InvalidDocument: The label, the address or the variable can't be used.
+        Conflict: The endpoint exists and is simulated where this one is not, or the reverse; or
+            its key would go to another server, and nobody said that it may.
     """
     check_slug(label, what="endpoint")
-    if key_variable and not re.fullmatch(r"[A-Za-z_][A-Za-z0-9_]{0,79}", key_variable):
-        # The value is not repeated: somebody may have given the key itself.
-        problem = "the name of an environment variable is needed, not the key"
-        raise InvalidDocument("endpoint", [("key_variable", problem)])
+    check_key_variable(key_variable)
     wanted = {"base_url": check_base_url(base_url), "key_variable": key_variable}
     endpoint, made = Endpoint.objects.get_or_create(
         label=label, defaults=wanted | {"is_simulated": is_simulated}
@@ -86,6 +86,12 @@ def ensure_endpoint(
         word = "simulated" if endpoint.is_simulated else "not simulated"
         raise Conflict(f"Endpoint {label!r} is {word}, and stays so; choose another label.")
     before = {"base_url": endpoint.base_url, "key_variable": endpoint.key_variable}
+    move = move_of(endpoint=endpoint, base_url=wanted["base_url"], key_variable=key_variable)
+    if move is not None and not may_move_key:
+        raise Conflict(
+            f"The key in {key_variable} of endpoint {label!r} went to {move[0]} and would go to "
+            f"{move[1]}; say so with --move-key if that is meant, or choose another label."
+        )
     if made or before != wanted:
         endpoint.base_url, endpoint.key_variable = wanted["base_url"], key_variable
         endpoint.save(update_fields=["base_url", "key_variable"])
@@ -97,6 +103,7 @@ def ensure_endpoint(
             before=None if made else before,
             after={"label": label, "is_simulated": is_simulated} | wanted,
         )
+        log_move(move, endpoint=endpoint, actor=actor)
     return endpoint
 
 
@@ -199,20 +206,6 @@ def add_simulated(
     else:
         _refuse_another(contestant, wanted, named=name is not None)
     return contestant
-
-
-def key_of(endpoint: Endpoint) -> str | None:
-    """The endpoint's key, read from the environment at the moment of the call.
-
-    Raises:
-        KeyMissing: The variable is not set; the sentence names it.
-    """
-    if not endpoint.key_variable:
-        return None
-    key = os.environ.get(endpoint.key_variable, "").strip()
-    if not key:
-        raise KeyMissing(endpoint.key_variable, endpoint.label)
-    return key
 
 
 # --- Private -----------------------------------------------------------------------------------

@@ -7,10 +7,10 @@ from collections.abc import Sequence
 from django.db.models import Q
 
 from augment.baselines.quantised import BIN_M
-from augment.errors import AugmentError, Conflict, KeyMissing
+from augment.errors import AugmentError, Conflict, KeyMissing, KeyNotAllowed
 from augment.models import Contestant, Scenario
 from augment.sentences import sentence, sentence_of
-from augment.services.contestants import key_of
+from augment.services.keys import key_of, may_hold_key
 from augment.services.roles import blind_viewers, seats_of
 
 Kind = Contestant.Kind
@@ -38,6 +38,13 @@ def obstacle(contestant: Contestant) -> str:
         seats_of(contestant)
     except AugmentError as error:
         return sentence_of(error)
+    forbidden = _forbidden_keys(contestant)
+    if forbidden:
+        return sentence(
+            "the variable %(names)s may not hold a key; its name has to end in _API_KEY, or "
+            "ARENA_KEY_VARIABLES has to list it",
+            names=forbidden,
+        )
     if blind_viewers([contestant]):
         return sentence("its viewer sees text alone; visual QA needs vision")
     return ""
@@ -54,7 +61,15 @@ def keys_missing(contestant: Contestant) -> list[str]:
             key_of(seat.endpoint)
         except KeyMissing as error:
             missing.add(error.variable)
+        except KeyNotAllowed:
+            continue  # an obstacle, see there
     return sorted(missing)
+
+
+def _forbidden_keys(contestant: Contestant) -> tuple[str, ...]:
+    """Variables that a contestant's endpoints name and that no endpoint may be sent."""
+    named = {seat.endpoint.key_variable for seat in seats_of(contestant).values()} - {""}
+    return tuple(sorted(name for name in named if not may_hold_key(name)))
 
 
 def refuse_impossible(who: Sequence[Contestant], where: Sequence[Scenario]) -> None:
@@ -75,6 +90,18 @@ def refuse_impossible(who: Sequence[Contestant], where: Sequence[Scenario]) -> N
                 names=tuple(strangers),
             )
         )
+    for row in who:
+        forbidden = _forbidden_keys(row)
+        if forbidden:
+            raise Conflict(
+                sentence(
+                    "The endpoint of %(contestant)s names %(names)s, which may not hold a key: a "
+                    "variable is needed whose name ends in _API_KEY or that ARENA_KEY_VARIABLES "
+                    "lists.",
+                    contestant=row.slug,
+                    names=forbidden,
+                )
+            )
     blind = blind_viewers(who)
     if blind:
         raise Conflict(

@@ -10,7 +10,7 @@ from types import TracebackType
 
 from django.db import Error, connection
 
-from augment.errors import BudgetSpent, ClaimLost
+from augment.errors import BudgetSpent, ClaimLost, JobCancelled
 from augment.models import Augmentation
 from augment.services import claims
 
@@ -45,8 +45,8 @@ class OutcomeOnCrash:
 
     An exception that nobody foresaw fails the row with its class and text. A worker that is told
     to stop (SystemExit, KeyboardInterrupt) gives the row back. So does one whose job has no room
-    for the next call, and ends quietly. A lost claim ends quietly as well: the new holder brings
-    the outcome.
+    for the next call, and ends quietly. A row whose job was cancelled is cancelled. A lost claim
+    ends quietly as well: the new holder brings the outcome.
     """
 
     def __init__(self, held: claims.Claim) -> None:
@@ -65,6 +65,10 @@ class OutcomeOnCrash:
             logger.warning(
                 "Stopped work on augmentation %d: %s", self._held.augmentation_pk, error
             )
+            return True
+        if isinstance(error, JobCancelled):
+            cancelled = claims.Settlement(state=Augmentation.State.CANCELLED, reason=str(error))
+            claims.settle(held=self._held, settlement=cancelled)
             return True
         if isinstance(error, BudgetSpent):
             claims.release(held=self._held, end=claims.TryEnd.STOPPED, reason=str(error))

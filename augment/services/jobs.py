@@ -123,7 +123,9 @@ def progress(job: GenerationJob) -> JobProgress:
 
 @transaction.atomic
 def cancel(job: GenerationJob, actor: User | None = None) -> GenerationJob:
-    """Cancel what waits; what runs may end and keeps its result.
+    """Cancel what waits, and what waits for a language model: its calls in flight are given up.
+
+    What is beyond its last call may end and keeps its result.
 
     Raises:
         Conflict: The job is over already.

@@ -18,19 +18,19 @@ from django.utils import timezone
 from augment.errors import ModelFault, ParameterRefused
 from augment.llm.client import ChatClient
 from augment.llm.costs import Price, usd_of
+from augment.llm.cutting import cut
 from augment.llm.messages import Reply, Request
-from augment.llm.openai_wire import OpenAIWire
 from augment.llm.patience import Patience
 from augment.llm.profile import Profile
 from augment.llm.questions import Ability, Question, questions_for
 from augment.llm.window import cut_of
 from augment.models import Endpoint, EndpointModel
 from augment.services.call_limits import Queue, place_at
-from augment.services.contestants import key_of
 from augment.services.endpoints import model_at
 from augment.services.events import log_event
 from augment.services.prices import price_of
 from augment.services.texts import storable_document
+from augment.services.wires import wire_to
 
 _REFUSALS = frozenset({400, 404, 415, 422})
 """With these an endpoint answers to what it can't do; with others to how it is today."""
@@ -107,15 +107,12 @@ def probe(
 
     Raises:
         Endpoint.DoesNotExist: There is no endpoint of that label.
-        KeyMissing: The key's variable is not set here.
+        KeyNotAllowed, KeyMissing: The key's variable is not meant for keys, or not set here.
         ModelFault: The wire can't be opened.
     """
     endpoint = Endpoint.objects.get(label=label)
     row = model_at(endpoint=endpoint, model=model)
-    wire = OpenAIWire(
-        base_url=endpoint.base_url, api_key=key_of(endpoint), timeout_s=settings.LLM_TIMEOUT_S
-    )
-    with wire:
+    with wire_to(endpoint) as wire:
         prober = _Prober(
             client=wire,
             endpoint=endpoint,
@@ -217,7 +214,7 @@ def _called(reply: Reply) -> str:
 
 def _short(text: str) -> str:
     line = " ".join(text.split())
-    return line if len(line) <= _LONGEST_NOTE else line[:_LONGEST_NOTE] + "..."
+    return cut(line, _LONGEST_NOTE)
 
 
 @transaction.atomic

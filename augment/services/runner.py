@@ -9,25 +9,27 @@ from dataclasses import dataclass
 from functools import partial
 
 from django.conf import settings
+from django.db import Error, OperationalError
 
 from augment.baselines import quantised, rule_placer, simulated
 from augment.errors import (
     AugmentError,
     BudgetSpent,
     ClaimLost,
+    DatabaseLocked,
     InstructionNotUnderstood,
     InvalidModification,
+    JobCancelled,
     ModelFault,
+    Unwanted,
 )
 from augment.llm.client import ChatClient
-from augment.llm.openai_wire import OpenAIWire
 from augment.models import Augmentation, Contestant, Endpoint
 from augment.scene.codec import modification_from_document, modification_to_document
 from augment.scene.entities import Scene
 from augment.scene.modification import Modification
 from augment.services import claims, jobs
 from augment.services.call_limits import Queue
-from augment.services.contestants import key_of
 from augment.services.endpoint_client import EndpointClient
 from augment.services.holding import OutcomeOnCrash, heartbeat
 from augment.services.pictures import original_picture, picture_of
@@ -35,6 +37,7 @@ from augment.services.roles import seats_of
 from augment.services.scenes import reference_of, scene_of
 from augment.services.seeds import seed_of
 from augment.services.transcripts import RowTranscript, sentence_of
+from augment.services.wires import wire_to
 from augment.variants import pipeline
 from augment.variants.cast import Player
 from augment.variants.recipes import recipe
@@ -61,17 +64,18 @@ class Answer:
 def open_wire(endpoint: Endpoint, held: claims.Claim) -> AbstractContextManager[ChatClient]:
     """A client for the endpoint, with the key that its variable holds right now.
 
-    Its calls wait for a place at the endpoint as long as the claim is held.
+    Its calls wait for a place at the endpoint, and for their answer, as long as the claim is
+    held and the job not cancelled.
 
     Raises:
+        KeyNotAllowed: The variable is not meant for keys.
         KeyMissing: The variable is not set here.
-        ModelFault: The key can't be sent.
+        ModelFault: The key can't be sent, or the address is forbidden.
     """
-    wire = OpenAIWire(
-        base_url=endpoint.base_url, api_key=key_of(endpoint), timeout_s=settings.LLM_TIMEOUT_S
-    )
     queue = Queue(longest_s=settings.LLM_QUEUE_S, still_wanted=lambda: _insist(held))
-    return EndpointClient(wire, endpoint, queue)
+    return EndpointClient(
+        wire_to(endpoint, still_wanted=lambda: _insist_if_told(held)), endpoint, queue
+    )
 
 
 def work_on(*, augmentation_pk: int, worker: str = "", connect: Connect | None = None) -> bool:
@@ -104,7 +108,7 @@ def run(
     """How the row ends. Every foreseen fault is a failed outcome with a sentence.
 
     Raises:
-        ClaimLost: The row was taken back meanwhile.
+        Unwanted: The row was taken back, or its job cancelled, meanwhile.
         BudgetSpent: The job has no room for the next call.
     """
     try:
@@ -116,7 +120,7 @@ def run(
         _keep(held, answer)
         image = picture_of(row.scenario, scene, answer.modification)
         return _settlement(answer, image=image)
-    except (ClaimLost, BudgetSpent):
+    except (Unwanted, BudgetSpent):
         raise
     except ModelFault as fault:
         return _failed(sentence_of(fault))
@@ -124,6 +128,9 @@ def run(
         return _failed(f"The modification does not fit the scene: {error}")
     except AugmentError as error:
         return _failed(str(error))
+    except OperationalError as error:
+        # What was answered is in its rows: a second try pays for none of it.
+        return _failed(str(DatabaseLocked(str(error))))
 
 
 # --- Private -----------------------------------------------------------------------------------
@@ -132,6 +139,16 @@ def run(
 def _insist(held: claims.Claim) -> None:
     if not claims.is_held(held=held):
         raise ClaimLost(f"attempt {held.attempt_number} has lost its row")
+    if claims.is_cancelled(held=held):
+        raise JobCancelled
+
+
+def _insist_if_told(held: claims.Claim) -> None:
+    """The same while a call is in flight: a database that can't say ends no call that is paid."""
+    try:
+        _insist(held)
+    except Error as error:
+        logger.warning("Nobody could say whether a call is still wanted: %s", error)
 
 
 def _row(held: claims.Claim) -> Augmentation:

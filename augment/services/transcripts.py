@@ -6,15 +6,23 @@ is read, each in a transaction of its own: a crash in between loses nothing that
 
 from __future__ import annotations
 
+import logging
 import time
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from django.db import transaction
+from django.db import OperationalError, connection, transaction
 from django.utils import timezone
 
-from augment.errors import BudgetSpent, ClaimLost, ModelFault, NotSent
+from augment.errors import (
+    BudgetSpent,
+    ClaimLost,
+    DatabaseLocked,
+    JobCancelled,
+    ModelFault,
+    NotSent,
+)
 from augment.llm.costs import Price, WorstCase, worst_case
 from augment.llm.fingerprint import image_reference, request_hash
 from augment.llm.messages import Reply, Request
@@ -29,7 +37,12 @@ IMAGES = "asked"
 """The folder in the media storage of the images that models are shown."""
 
 FIRST_WAIT_S, LONGEST_WAIT_S = 0.05, 1.0
-"""Between looks at a budget whose room is held by calls in flight."""
+"""Between looks at a budget whose room is held by calls in flight, and at a locked database."""
+
+STORE_WITHIN_S = 600.0
+"""For so many seconds of such waits an answer that was paid for is held until it is stored."""
+
+logger = logging.getLogger(__name__)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -107,6 +120,7 @@ class RowTranscript:
 
         Raises:
             ClaimLost: The row is somebody else's now.
+            JobCancelled: Its job is cancelled.
             BudgetSpent: The job has no room for the call, and is stopped.
             Conflict: The job is capped in USD and the price is unknown.
         """
@@ -148,7 +162,7 @@ class RowTranscript:
         answer = answers.columns_of(reply)
         # Also where there is none: the worker may have been thought dead meanwhile.
         answer["fault"] = "" if fault is None else storable(sentence_of(fault))
-        budget.settle(call_pk=call.pk, used=used, now=timezone.now(), answer=answer)
+        self._settle(call, used, answer)
 
     def broke(self, number: int, fault: ModelFault) -> None:
         """Store why there was no answer to that call, and what it may have used."""
@@ -157,7 +171,7 @@ class RowTranscript:
         broken: dict[str, Any] = {"fault": storable(sentence_of(fault))}
         if isinstance(fault, NotSent):
             broken["sent_at"] = None
-        budget.settle(call_pk=call.pk, used=used, now=timezone.now(), answer=broken)
+        self._settle(call, used, broken)
 
     def note(self, kind: NoteKind, document: dict[str, object]) -> None:
         """Store what happened since the last call."""
@@ -169,6 +183,27 @@ class RowTranscript:
             kind=kind,
             document=storable_document(document),
         )
+
+    def _settle(self, call: _Open, used: budget.Used, answer: dict[str, Any]) -> None:
+        """Store how a call ended. It was paid for, so a locked database is waited out.
+
+        Raises:
+            DatabaseLocked: It never took it.
+        """
+        wait_s, waited_s = FIRST_WAIT_S, 0.0
+        while True:
+            try:
+                budget.settle(call_pk=call.pk, used=used, now=timezone.now(), answer=answer)
+                return
+            except OperationalError as error:
+                if waited_s >= STORE_WITHIN_S:
+                    raise DatabaseLocked(f"the end of a call was not stored ({error})") from error
+                logger.warning("The end of a call is not stored yet, trying again: %s", error)
+                if not connection.in_atomic_block:
+                    connection.close_if_unusable_or_obsolete()
+            self._sleep(wait_s)
+            waited_s += wait_s
+            wait_s = min(1.5 * wait_s, LONGEST_WAIT_S)
 
     def _columns(self, role: ModelRole, request: Request, version: str) -> dict[str, Any]:
         """What a call's row says about the request, whoever answers it.
@@ -211,6 +246,8 @@ class RowTranscript:
     def _insist_on_claim(self) -> None:
         if not claims.is_held(held=self._held, lock=True):
             raise ClaimLost(f"attempt {self._held.attempt_number} has lost its row")
+        if claims.is_cancelled(held=self._held):
+            raise JobCancelled
 
     def _at(self, role: ModelRole) -> Endpoint:
         return self._others.get(role, self._endpoint)

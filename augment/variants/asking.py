@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from functools import partial
 
-from augment.errors import ClaimLost, ModelFault, NotSent, ParameterRefused
+from augment.errors import Abandoned, ModelFault, NotSent, ParameterRefused, Unwanted
 from augment.llm.client import ChatClient
 from augment.llm.messages import Reply, Request
 from augment.llm.patience import Patience
@@ -32,7 +32,7 @@ class Conversation:
             ContextTruncated: There is an answer, but to a part of the prompt.
             ModelFault: The last attempt broke, or the fault is one that does not pass.
             BudgetSpent: The transcript's budget has no room for the next attempt.
-            ClaimLost: Nobody needs the reply any more.
+            Unwanted: Nobody needs the reply any more.
         """
         while True:
             sent = self.client.fitted(request)
@@ -53,9 +53,12 @@ class Conversation:
             try:
                 sending = partial(self.transcript.sending, number)
                 reply = self.client.complete(request, sending=sending)
-            except ClaimLost as lost:
-                self.transcript.broke(number, NotSent(f"not sent: {lost}"))
+            except Unwanted as why:
+                self.transcript.broke(number, NotSent(f"not sent: {why}"))
                 raise
+            except Abandoned as fault:
+                self.transcript.broke(number, fault)
+                raise fault.why from None
             except ModelFault as fault:
                 self.transcript.broke(number, fault)
                 wait_s = self.patience.wait_s(fault, attempt=attempt)

@@ -7,7 +7,7 @@ from django.core.management import CommandError, call_command
 
 from augment.errors import Conflict, InvalidDocument, KeyMissing, UnknownName
 from augment.models import Contestant, Endpoint, Event
-from augment.services import contestants
+from augment.services import contestants, keys
 
 pytestmark = pytest.mark.django_db
 LOCAL = "http://127.0.0.1:11434/v1"
@@ -100,7 +100,7 @@ def test_openai_can_be_named_where_its_key_is_set(monkeypatch: pytest.MonkeyPatc
     assert made.endpoint is not None
     assert made.endpoint.base_url == "https://api.openai.com/v1"
     assert made.endpoint.key_variable == "OPENAI_API_KEY"
-    assert contestants.key_of(made.endpoint) == "sk-very-secret"
+    assert keys.key_of(made.endpoint) == "sk-very-secret"
     assert "sk-very-secret" not in str(list(Endpoint.objects.values()))
     assert "sk-very-secret" not in str(list(Event.objects.values()))
 
@@ -113,14 +113,14 @@ def test_a_model_id_that_can_not_be_one_is_refused(model: str) -> None:
 
 
 def test_a_missing_key_names_the_variable(monkeypatch: pytest.MonkeyPatch) -> None:
-    endpoint = local(key_variable="LOCAL_KEY")
-    monkeypatch.setenv("LOCAL_KEY", " ")
-    with pytest.raises(KeyMissing, match=r"LOCAL_KEY.*'local'"):
-        contestants.key_of(endpoint)
+    endpoint = local(key_variable="LOCAL_API_KEY")
+    monkeypatch.setenv("LOCAL_API_KEY", " ")
+    with pytest.raises(KeyMissing, match=r"LOCAL_API_KEY.*'local'"):
+        keys.key_of(endpoint)
 
 
 def test_an_endpoint_without_a_key_needs_none() -> None:
-    assert contestants.key_of(local()) is None
+    assert keys.key_of(local()) is None
 
 
 def test_a_key_in_place_of_its_variable_is_refused_and_not_repeated() -> None:
@@ -198,7 +198,7 @@ def test_the_command_says_what_is_known() -> None:
 
 def test_the_command_needs_an_address_for_a_key() -> None:
     facts = ("--variant", "otm", "--endpoint", "local", "--model", "m", "--key-variable", "K")
-    with pytest.raises(CommandError, match="need --base-url"):
+    with pytest.raises(CommandError, match="--key-variable need --base-url"):
         call_command("add_contestant", "fake", *facts)
 
 

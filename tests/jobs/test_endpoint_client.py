@@ -167,7 +167,7 @@ def test_a_worker_goes_through_the_limits_and_the_profile() -> None:
 
 def test_a_missing_key_is_found_before_a_place_is_taken() -> None:
     endpoint = Endpoint.objects.create(
-        label="local", base_url="http://127.0.0.1:1/v1", key_variable="NOT_SET_HERE"
+        label="local", base_url="http://127.0.0.1:1/v1", key_variable="NOT_SET_API_KEY"
     )
     row_claim: Any = None
     with pytest.raises(KeyMissing):

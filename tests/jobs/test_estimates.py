@@ -88,11 +88,11 @@ def test_contestants_that_no_job_can_run_say_why() -> None:
 
 
 def test_a_key_that_is_missing_here_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
-    ensure_endpoint(label="here", base_url="http://127.0.0.1:1/v1", key_variable="SOME_KEY")
+    ensure_endpoint(label="here", base_url="http://127.0.0.1:1/v1", key_variable="SOME_API_KEY")
     keyed = add_contestant(slug="keyed", variant="otm", endpoint="here", model=MODEL)
-    monkeypatch.delenv("SOME_KEY", raising=False)
-    assert keys_missing(keyed) == ["SOME_KEY"]
-    monkeypatch.setenv("SOME_KEY", "sk-secret")
+    monkeypatch.delenv("SOME_API_KEY", raising=False)
+    assert keys_missing(keyed) == ["SOME_API_KEY"]
+    monkeypatch.setenv("SOME_API_KEY", "sk-secret")
     assert keys_missing(keyed) == []
     assert obstacle(keyed) == ""
 

@@ -49,11 +49,11 @@ def every_stored_value() -> Iterator[str]:
 def test_a_planted_key_is_found_nowhere(
     monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture, status: int, body: object
 ) -> None:
-    monkeypatch.setenv("PLANTED_KEY", KEY)
+    monkeypatch.setenv("PLANTED_API_KEY", KEY)
     caplog.set_level(logging.DEBUG)
     row = only_row(llama_job())
     with recorder(status, body) as server:
-        Endpoint.objects.update(base_url=server.url, key_variable="PLANTED_KEY")
+        Endpoint.objects.update(base_url=server.url, key_variable="PLANTED_API_KEY")
         runner.work_on(augmentation_pk=row.pk, worker="w")
         assert server.heard[0]["authorization"] == f"Bearer {KEY}", "it was planted"
     row.refresh_from_db()

@@ -147,10 +147,10 @@ def test_a_parameter_beside_the_question_is_gone_without() -> None:
 def test_a_server_that_does_not_answer_is_asked_once_and_forgets_nothing(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    monkeypatch.setenv("LOCAL_KEY", KEY)
+    monkeypatch.setenv("LOCAL_API_KEY", KEY)
     with candidate(status=401):
         endpoint = Endpoint.objects.get()
-        Endpoint.objects.update(key_variable="LOCAL_KEY")
+        Endpoint.objects.update(key_variable="LOCAL_API_KEY")
         EndpointModel.objects.create(endpoint=endpoint, model="m", vision=True)
         report = asked()
     assert (report.calls, report.has(Ability.ANSWERS)) == (1, False)

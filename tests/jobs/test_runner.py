@@ -141,11 +141,11 @@ def test_a_broken_wire_fails_with_the_status_and_leaves_the_call() -> None:
 
 
 def test_a_missing_key_fails_and_names_the_variable() -> None:
-    row = model_job(key_variable="NO_SUCH_KEY_HERE")
+    row = model_job(key_variable="NO_SUCH_API_KEY")
     assert runner.work_on(augmentation_pk=row.pk)
     row.refresh_from_db()
     assert row.state == State.FAILED
-    assert "NO_SUCH_KEY_HERE" in row.reason
+    assert "NO_SUCH_API_KEY" in row.reason
 
 
 def test_a_failed_row_is_tried_again_on_request() -> None:

@@ -162,7 +162,7 @@ def test_a_failure_ends_the_command_with_1_and_its_reason(
     redis = place.redis()
     worker = place.worker()
     facts = ("--variant", "otm", "--endpoint", "cloud", "--model", "m")
-    address = ("--base-url", model.base_url, "--key-variable", "NO_SUCH_KEY")
+    address = ("--base-url", model.base_url, "--key-variable", "NO_SUCH_API_KEY")
     try:
         place.must("add_contestant", "cloudy", *facts, *address)
         chosen = ("--contestants", "cloudy", "--scenarios", "street-1", "street-2", "--wait")
@@ -171,7 +171,7 @@ def test_a_failure_ends_the_command_with_1_and_its_reason(
         worker.stop()
         redis.stop()
     assert ended.returncode == 1
-    assert "failed 2 times: The environment variable NO_SUCH_KEY" in ended.stdout
+    assert "failed 2 times: The environment variable NO_SUCH_API_KEY" in ended.stdout
     assert "2 failed" in ended.stderr
     assert model.asked == 0
 

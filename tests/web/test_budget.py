@@ -149,8 +149,8 @@ def test_an_estimate_launches_nothing_and_asks_for_no_name() -> None:
 def test_a_contestant_that_can_not_run_is_offered_with_its_reason() -> None:
     add_kind("by-hand", Contestant.Kind.HUMAN)
     add_llama()
-    Endpoint.objects.update(key_variable="NO_SUCH_KEY")
+    Endpoint.objects.update(key_variable="NO_SUCH_API_KEY")
     shown = signed_in(people()["admin"]).get(reverse("job-new")).content.decode()
     assert 'value="by-hand" disabled' in shown
     assert "made by people or by an outside program" in shown
-    assert "Key not set here: NO_SUCH_KEY." in shown
+    assert "Key not set here: NO_SUCH_API_KEY." in shown

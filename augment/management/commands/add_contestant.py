@@ -24,7 +24,7 @@ ROLES = (ModelRole.REVIEWER, ModelRole.ENGINEER, ModelRole.VIEWER)
 
 _OF_MODELS = (
     *("variant", "endpoint", "model", *(role.value for role in ROLES)),
-    *("base_url", "key_variable", "simulated"),
+    *("base_url", "key_variable", "simulated", "move_key"),
 )
 
 
@@ -67,6 +67,11 @@ class Command(TerminalCommand):
             action="store_true",
             help="the endpoint is a stand-in; its contestants count as simulated",
         )
+        new.add_argument(
+            "--move-key",
+            action="store_true",
+            help="the endpoint exists, and its key may go to another server than so far",
+        )
 
     def handle(self, *args: Any, **options: Any) -> None:
         """Make the endpoint if an address is given, then the contestant."""
@@ -78,8 +83,11 @@ class Command(TerminalCommand):
             raise CommandError(
                 f"--errors asks no language model, so it goes without {_flags(given)}."
             )
-        if not options["base_url"] and (options["key_variable"] or options["simulated"]):
-            raise CommandError("--key-variable and --simulated need --base-url.")
+        of_endpoints = [
+            name for name in ("key_variable", "simulated", "move_key") if options[name]
+        ]
+        if not options["base_url"] and of_endpoints:
+            raise CommandError(f"{_flags(of_endpoints)} need --base-url.")
         try:
             contestant = self._add(options)
         except AugmentError as error:
@@ -99,6 +107,7 @@ class Command(TerminalCommand):
                 base_url=options["base_url"],
                 key_variable=options["key_variable"],
                 is_simulated=options["simulated"],
+                may_move_key=options["move_key"],
             )
         return add_contestant(
             slug=options["slug"],

@@ -1,0 +1,165 @@
+"""A cancelled job frees the places of its calls in flight; what was paid for is counted, kept."""
+
+from __future__ import annotations
+
+from datetime import timedelta
+from typing import Any
+
+import pytest
+from django.db import OperationalError
+from django.utils import timezone
+
+from augment.errors import JobCancelled
+from augment.llm.messages import Message, Request, Speaker
+from augment.llm.openai_wire import OpenAIWire
+from augment.models import Augmentation, CallLease, Endpoint, GenerationJob, ModelCall
+from augment.services import budget, claims, jobs, runner
+from augment.services.call_limits import Queue, place_at
+from tests.jobs.models import Model, llama_job, reply
+from tests.jobs.rows import only_row
+from tests.jobs.running import Wire, ran
+from tests.llm.raw_server import drip, head, speaking
+from tests.variants.answers import GOOD
+
+pytestmark = pytest.mark.django_db
+State = Augmentation.State
+ASKED = Request(model="m", messages=(Message(speaker=Speaker.USER, text="Hello"),))
+
+
+def cancel() -> None:
+    jobs.cancel(GenerationJob.objects.get())
+
+
+def test_a_call_in_flight_ends_with_its_job_and_gives_its_place_back(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    job = llama_job(price="2")
+    looks: list[int] = []
+
+    def wire_to(endpoint: Endpoint, *, still_wanted: Any) -> Any:
+        def look() -> None:
+            looks.append(1)
+            if len(looks) == 3:
+                assert CallLease.objects.filter(finished_at=None).count() == 1
+                cancel()
+            still_wanted()
+
+        return OpenAIWire(
+            base_url=endpoint.base_url,
+            api_key=None,
+            timeout_s=60.0,
+            still_wanted=look,
+            look_every_s=0.01,
+        )
+
+    monkeypatch.setattr(runner, "wire_to", wire_to)
+    with speaking(drip(head("Content-Length: 100000"), b" ")) as server:
+        Endpoint.objects.update(base_url=server.url)
+        row = only_row(job)
+        assert runner.work_on(augmentation_pk=row.pk)
+    row.refresh_from_db()
+    job.refresh_from_db()
+    assert (row.state, row.reason) == (State.CANCELLED, "The job was cancelled.")
+    assert row.attempts.get().outcome == "cancelled"
+    assert CallLease.objects.get().finished_at is not None
+    call = ModelCall.objects.get()
+    assert call.fault == "given up before there was an answer: The job was cancelled."
+    assert call.sent_at is not None
+    assert (call.spent_tokens, call.is_cost_estimated) == (call.reserved_tokens, True)
+    assert (job.reserved_calls, job.spent_calls, job.reserved_nano_usd) == (0, 1, 0)
+
+
+def test_a_row_asks_nothing_more_after_its_job_was_cancelled() -> None:
+    job = llama_job()
+    model = Model(
+        lambda request: reply("Sorry?"),
+        looking_on=cancel,
+    )
+    row = only_row(job)
+    assert runner.work_on(augmentation_pk=row.pk, connect=model)
+    row.refresh_from_db()
+    assert (row.state, len(model.requests)) == (State.CANCELLED, 1)
+    assert ModelCall.objects.get().answer == "Sorry?", "what was answered is kept"
+
+
+def test_a_call_that_waits_when_its_job_is_cancelled_is_not_sent() -> None:
+    job = llama_job()
+    row = only_row(job)
+    held = claims.claim(augmentation_pk=row.pk)
+    assert held is not None
+    endpoint = Endpoint.objects.get()
+    Endpoint.objects.update(max_concurrency=1)
+    client = runner.open_wire(endpoint, held)
+    jobs.cancel(job)
+    with (
+        place_at(endpoint, Queue(longest_s=0.0)),
+        client as opened,
+        pytest.raises(JobCancelled),
+    ):
+        opened.complete(ASKED)
+    assert CallLease.objects.count() == 1
+
+
+def test_a_row_beyond_its_last_call_keeps_its_result() -> None:
+    job = llama_job()
+    model = Model(looking_on=cancel)
+    row = only_row(job)
+    runner.work_on(augmentation_pk=row.pk, connect=model)
+    row.refresh_from_db()
+    assert row.state == State.DONE
+
+
+# --- A locked database -------------------------------------------------------------------------
+
+
+def locked(times: int, function: Any) -> Any:
+    """The function, that finds the database locked so many times first."""
+    left = [times]
+
+    def called(**arguments: Any) -> Any:
+        if left[0] > 0:
+            left[0] -= 1
+            raise OperationalError("database is locked")
+        return function(**arguments)
+
+    return called
+
+
+def test_an_answer_waits_for_a_locked_database_and_is_kept(
+    monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    monkeypatch.setattr(budget, "settle", locked(3, budget.settle))
+    row = ran(only_row(llama_job()), Wire(reply(GOOD)))
+    assert row.state == State.DONE
+    assert ModelCall.objects.get().answer == GOOD
+    assert caplog.text.count("database is locked") == 3
+
+
+def test_a_place_that_can_not_be_given_back_costs_no_answer(
+    monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    llama_job()
+    endpoint = Endpoint.objects.get()
+    calls: list[int] = []
+
+    def clock() -> Any:
+        calls.append(1)
+        if len(calls) > 1:
+            raise OperationalError("database is locked")
+        return timezone.now()
+
+    with place_at(endpoint, Queue(longest_s=0.0, clock=clock, renew_every_s=60.0)):
+        answer = "Hi"
+    assert answer == "Hi"
+    assert "runs out by itself" in caplog.text
+    lease = CallLease.objects.get()
+    assert lease.finished_at is None
+    assert lease.expires_at < timezone.now() + timedelta(seconds=61)
+
+
+def test_a_database_that_stays_locked_is_a_named_outcome(monkeypatch: pytest.MonkeyPatch) -> None:
+    job = llama_job()
+    monkeypatch.setattr(budget, "reserve", locked(1, budget.reserve))
+    row = ran(only_row(job), Wire(GOOD))
+    assert row.state == State.FAILED
+    assert row.reason == "The database was locked for too long: database is locked."

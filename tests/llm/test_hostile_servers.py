@@ -1,0 +1,397 @@
+"""The wire to servers that drip, swell, nest, lie and hang up: each ends in a named fault."""
+
+from __future__ import annotations
+
+import gzip
+import json
+import socket
+import time
+import tracemalloc
+import zlib
+from typing import Any
+
+import pytest
+
+from augment.errors import Abandoned, JobCancelled, ModelFault, NotSent, Unwanted
+from augment.llm.messages import Message, Reply, Request, Speaker
+from augment.llm.openai_wire import OpenAIWire
+from augment.llm.wire_reply import (
+    LONGEST_ARGUMENTS,
+    LONGEST_EXTRA,
+    LONGEST_REFUSAL,
+    MOST_CALLS,
+    MOST_TOKENS,
+)
+from augment.llm.wire_transport import BadPacking, unpacked
+from augment.llm.wire_watch import OutOfTime, TooLong, Watch
+from tests.llm.raw_server import Say, drip, head, speaking, whole
+from tests.llm.recorder import GOOD
+
+ASKED = Request(model="m", messages=(Message(speaker=Speaker.USER, text="Hello"),))
+BODY = json.dumps(GOOD).encode()
+LIMIT_S = 0.25
+
+PACKED = (
+    head("Transfer-Encoding: chunked", "Content-Encoding: gzip")
+    + b"a\r\n\x1f\x8b\x08\0\0\0\0\0\0\0\r\n"
+)
+EMPTY_BLOCK = b"5\r\n\0\0\0\xff\xff\r\n"
+"""The beginning of a packed answer, and a piece that unpacks to nothing."""
+
+
+def ask(say: Say, *, reads: bool = True, asked: Request = ASKED, **settings: Any) -> Reply:
+    settings = {"timeout_s": 20.0, "api_key": None} | settings
+    with (
+        speaking(say, reads=reads) as server,
+        OpenAIWire(base_url=server.url, **settings) as client,
+    ):
+        return client.complete(asked)
+
+
+def fault(say: Say, **settings: Any) -> ModelFault:
+    with pytest.raises(ModelFault) as raised:
+        ask(say, **settings)
+    return raised.value
+
+
+def answered(body: object) -> Reply:
+    return ask(whole(json.dumps(body).encode()))
+
+
+def message(**parts: object) -> dict[str, object]:
+    said = {"role": "assistant", "content": "Hi"} | parts
+    return GOOD | {"choices": [{"index": 0, "finish_reason": "stop", "message": said}]}
+
+
+def test_the_raw_server_can_say_a_good_answer() -> None:
+    assert ask(whole(BODY)).text == "Hi"
+
+
+# --- Time --------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    "say",
+    [
+        drip(b"", b"H"),
+        drip(b"HTTP/1.1 200 OK\r\n", b"X: y\r\n"),
+        drip(b"", b"HTTP/1.1 100 Continue\r\n\r\n"),
+        drip(head("Content-Length: 100000"), b" "),
+        drip(head("Transfer-Encoding: chunked"), b"1\r\n \r\n"),
+        drip(PACKED, EMPTY_BLOCK),
+        drip(head("Connection: close"), b"\n"),
+    ],
+    ids=["status", "headers", "continue", "body", "chunks", "packed", "until closed"],
+)
+def test_a_call_has_a_total_time_however_the_answer_drips(say: Say) -> None:
+    started = time.monotonic()
+    broken = fault(say, timeout_s=LIMIT_S)
+    assert time.monotonic() - started < 20 * LIMIT_S
+    assert broken.retryable
+    assert "HTTP" not in str(broken)
+    assert "took too long" in str(broken) or "connection failed" in str(broken)
+
+
+def test_a_server_that_reads_nothing_is_given_up_too() -> None:
+    long = Request(model="m", messages=(Message(speaker=Speaker.USER, text="x" * 6_000_000),))
+    broken = fault(drip(b"", b""), reads=False, asked=long, timeout_s=1.0)
+    assert "took too long to answer: more than 1 s" in str(broken)
+    assert not isinstance(broken, NotSent), "a part of it was sent"
+
+
+def test_an_error_that_drips_is_still_that_error() -> None:
+    say = drip(head("Content-Length: 100000", status="503 Busy"), b" ")
+    broken = fault(say, timeout_s=LIMIT_S)
+    assert (broken.status, broken.retryable) == (503, True)
+
+
+@pytest.mark.parametrize(("now_s", "is_over"), [(9.99, False), (10.0, True), (10.01, True)])
+def test_the_last_moment_of_a_call(now_s: float, is_over: bool) -> None:
+    clock = [0.0]
+    watch = Watch(
+        longest_s=10.0,
+        most_bytes=1,
+        still_wanted=lambda: None,
+        look_every_s=99.0,
+        clock=lambda: clock[0],
+    )
+    clock[0] = now_s
+    if is_over:
+        with pytest.raises(OutOfTime):
+            watch.wait_s()
+    else:
+        assert watch.wait_s() == pytest.approx(10.0 - now_s)
+
+
+# --- Whether anybody wants it ------------------------------------------------------------------
+
+
+def test_a_call_in_flight_that_nobody_wants_any_more_is_given_up_at_the_next_look() -> None:
+    looks = iter([True, True, False])
+
+    def still_wanted() -> None:
+        if not next(looks):
+            raise JobCancelled
+
+    broken = fault(
+        drip(head("Content-Length: 100000"), b" "),
+        still_wanted=still_wanted,
+        look_every_s=0.03,
+        timeout_s=60.0,
+    )
+    assert isinstance(broken, Abandoned)
+    assert isinstance(broken.why, JobCancelled)
+    assert not broken.retryable
+
+
+def test_a_call_that_nobody_wants_before_it_is_sent_is_not_sent() -> None:
+    def unwanted() -> None:
+        raise JobCancelled
+
+    with pytest.raises(Unwanted) as raised:
+        ask(whole(BODY), still_wanted=unwanted, look_every_s=0.0)
+    assert isinstance(raised.value, JobCancelled)
+
+
+# --- Size --------------------------------------------------------------------------------------
+
+MOST = 20_000
+
+
+@pytest.mark.parametrize("packing", ["gzip", "deflate", "identity"])
+@pytest.mark.parametrize(("beyond", "fits"), [(0, True), (1, False)])
+def test_an_answer_may_be_as_long_as_the_limit_and_no_longer(
+    packing: str, beyond: int, fits: bool
+) -> None:
+    body = BODY + b" " * (MOST - len(BODY) + beyond)
+    packed = {"gzip": gzip.compress(body), "deflate": zlib.compress(body)}.get(packing, body)
+    say = whole(packed, f"Content-Encoding: {packing}")
+    if fits:
+        assert ask(say, most_bytes=MOST).text == "Hi"
+    else:
+        broken = fault(say, most_bytes=MOST)
+        assert (broken.status, broken.retryable) == (200, False)
+        assert "longer than 0.02 MB" in str(broken)
+
+
+@pytest.mark.parametrize("packing", ["gzip", "deflate"])
+def test_a_small_answer_that_unpacks_to_a_large_one_is_never_held(packing: str) -> None:
+    wbits = {"gzip": 31, "deflate": 15}[packing]
+    packer = zlib.compressobj(9, zlib.DEFLATED, wbits)
+    bomb = packer.compress(bytes(40_000_000)) + packer.flush()
+    tracemalloc.start()
+    try:
+        broken = fault(whole(bomb, f"Content-Encoding: {packing}"), most_bytes=100_000)
+        _, peak = tracemalloc.get_traced_memory()
+    finally:
+        tracemalloc.stop()
+    assert "longer than 0.1 MB" in str(broken)
+    assert peak < 4_000_000
+
+
+@pytest.mark.parametrize(
+    "say",
+    [
+        drip(head("Transfer-Encoding: chunked"), b"8000\r\n" + b"x" * 0x8000 + b"\r\n", every_s=0),
+        drip(head("Connection: close"), b"x" * 0x8000, every_s=0),
+        drip(b"", b"HTTP/1.1 100 Continue\r\n\r\n" * 1000, every_s=0),
+        drip(PACKED, EMPTY_BLOCK * 1000, every_s=0),
+    ],
+    ids=["chunks", "until closed", "continue", "packed"],
+)
+def test_an_answer_without_end_stops_at_the_limit(say: Say) -> None:
+    broken = fault(say, most_bytes=200_000)
+    assert "longer than 0.2 MB" in str(broken)
+
+
+@pytest.mark.parametrize(
+    "say",
+    [
+        drip(b"HTTP/1.1 200 OK\r\n", b"X: " + b"y" * 30_000 + b"\r\n", every_s=0),
+        drip(b"HTTP/1.1 200 OK\r\nX: ", b"y" * 30_000, every_s=0),
+    ],
+)
+def test_headers_without_end_are_a_broken_connection(say: Say) -> None:
+    assert "the connection failed" in str(fault(say))
+
+
+@pytest.mark.parametrize("packing", ["br", "zstd", "gzip, gzip", "deflate, gzip", "compress"])
+def test_a_packing_that_nobody_asked_for_is_named(packing: str) -> None:
+    broken = fault(whole(BODY, f"Content-Encoding: {packing}"))
+    assert f"can't be unpacked: {packing}" in str(broken)
+
+
+def test_what_is_asked_for_can_be_unpacked_within_a_limit() -> None:
+    with (
+        speaking(whole(BODY)) as server,
+        OpenAIWire(base_url=server.url, api_key=None) as client,
+    ):
+        client.complete(ASKED)
+    heard = server.heard[0].lower()
+    assert b"accept-encoding: gzip, deflate\r\n" in heard
+
+
+def test_deflate_without_its_wrapping_is_read() -> None:
+    packer = zlib.compressobj(9, zlib.DEFLATED, -15)
+    packed = packer.compress(BODY) + packer.flush()
+    assert ask(whole(packed, "Content-Encoding: deflate")).text == "Hi"
+
+
+@pytest.mark.parametrize("packed", [gzip.compress(BODY)[:-12], b"nonsense", b""])
+def test_a_packed_answer_that_is_broken_is_named(packed: bytes) -> None:
+    assert "can't be unpacked: gzip" in str(fault(whole(packed, "Content-Encoding: gzip")))
+
+
+def test_chunks_are_unpacked_one_after_the_other() -> None:
+    packed = gzip.compress(bytes(range(256)) * 40)
+    chunks = [packed[at : at + 7] for at in range(0, len(packed), 7)]
+    assert unpacked(chunks, ["gzip"], most_bytes=10_240) == bytes(range(256)) * 40
+    with pytest.raises(TooLong):
+        unpacked(chunks, ["gzip"], most_bytes=10_239)
+    with pytest.raises(BadPacking):
+        unpacked(chunks[:-2], ["gzip"], most_bytes=20_000)
+
+
+def test_an_error_page_of_any_size_is_that_error() -> None:
+    broken = fault(whole(b"x" * 100_000, status="500 Sorry"), most_bytes=1000)
+    assert (broken.status, broken.retryable) == (500, True)
+
+
+# --- What it says ------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("deep", ["[" * 100_000, '{"a":' * 100_000, "[" * 90_000 + "]" * 90_000])
+def test_json_that_nests_without_end_is_a_fault(deep: str) -> None:
+    broken = fault(whole(deep.encode()))
+    assert broken.retryable
+    assert "nested too deeply" in str(broken) or "not valid JSON" in str(broken)
+
+
+def test_a_call_with_extras_that_nest_as_deep_as_can_be_read_is_an_answer() -> None:
+    deep = json.loads("[" * 300 + "]" * 300)
+    call = {"id": "1", "function": {"name": "f", "arguments": "{}"}, "x": deep}
+    assert [made.name for made in answered(message(tool_calls=[call])).tool_calls] == ["f"]
+
+
+@pytest.mark.parametrize(
+    ("said", "wait_s"),
+    [
+        ("0", 0.0),
+        ("-5", 0.0),
+        ("1e3", 1000.0),
+        ("99999999999999999999", 1e20),
+        ("inf", None),
+        ("1e400", None),
+        ("-inf", None),
+        ("9" * 5000, None),
+        ("Wed, 21 Oct 2015 07:28:00 -0000", 0.0),
+        ("Wed, 21 Oct 99999 07:28:00 GMT", None),
+        ("Wed, 21 Oct 999999999999999999999999 07:28:00 GMT", None),
+        ("Mon, 01 Jan 0001 00:00:00 +2359", 0.0),
+        ("Wed, 21 Oct 2015 07:28:00 +999999999999999", None),
+        (",", None),
+    ],
+)
+def test_a_wait_that_no_clock_knows_is_none(said: str, wait_s: float | None) -> None:
+    broken = fault(whole(b"{}", f"Retry-After: {said}", status="429 Too Many"))
+    assert (broken.status, broken.retryable) == (429, True)
+    assert broken.retry_after_s == wait_s
+
+
+@pytest.mark.parametrize(
+    ("written", "count"),
+    [
+        ("0", 0),
+        ("7", 7),
+        ("7.0", 7),
+        ("7.5", None),
+        ("-1", None),
+        ("true", None),
+        ('"7"', None),
+        ("null", None),
+        ("[7]", None),
+        (str(MOST_TOKENS), MOST_TOKENS),
+        (str(MOST_TOKENS + 1), None),
+        ("9" * 400, None),
+        ("1e300", None),
+        ("1e999", None),
+        ("NaN", None),
+    ],
+)
+def test_a_count_of_tokens_that_can_not_be_is_unknown(written: str, count: int | None) -> None:
+    body = json.dumps(GOOD | {"usage": {"prompt_tokens": "HERE", "completion_tokens": "HERE"}})
+    reply = ask(whole(body.replace('"HERE"', written).encode()))
+    assert (reply.text, reply.prompt_tokens, reply.completion_tokens) == ("Hi", count, count)
+
+
+def test_a_number_of_five_thousand_digits_is_no_json() -> None:
+    body = json.dumps(GOOD | {"usage": {"prompt_tokens": "HERE"}}).replace('"HERE"', "9" * 5000)
+    assert "not valid JSON" in str(fault(whole(body.encode())))
+
+
+@pytest.mark.parametrize("code", ["c" * 80, "c" * 81, "c" * 1_000_000])
+def test_what_an_error_says_is_cut_with_a_mark(code: str) -> None:
+    body = json.dumps({"error": {"message": "m" * 1_000_000, "code": code}}).encode()
+    said = str(fault(whole(body, status="400 Bad")))
+    assert len(said) < 500
+    assert "m… [cut: 1000000 characters]" in said
+    assert (f"c… [cut: {len(code)} characters]" in said) == (len(code) > 80)
+
+
+def test_a_long_refusal_is_cut_with_a_mark() -> None:
+    refusal = answered(message(content=None, refusal="no " * 1_000_000)).refusal
+    assert refusal is not None
+    assert len(refusal) == LONGEST_REFUSAL
+    assert refusal.endswith("… [cut: 3000000 characters]")
+    assert answered(message(refusal="n" * LONGEST_REFUSAL)).refusal == "n" * LONGEST_REFUSAL
+
+
+def test_calls_of_tools_are_bounded_in_number_and_length() -> None:
+    call = {"id": "i" * 9000, "function": {"name": "n" * 9000, "arguments": "a" * 90_000}}
+    kept = {"x": "y" * (LONGEST_EXTRA - 9)}
+    assert len(json.dumps(kept)) == LONGEST_EXTRA
+    calls = [call | {"x": "y" * LONGEST_EXTRA}, call | kept] + [call] * MOST_CALLS
+    reply = answered(message(tool_calls=calls))
+    assert (len(reply.tool_calls), reply.calls_left_out) == (MOST_CALLS, 2)
+    first, second, *_ = reply.tool_calls
+    assert len(first.arguments) == LONGEST_ARGUMENTS
+    assert first.arguments.endswith("… [cut: 90000 characters]")
+    assert (len(first.name), len(first.id)) == (200, 200)
+    assert (first.extra, len(second.extra)) == ("", LONGEST_EXTRA)
+
+
+# --- Hanging up --------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    "said",
+    [
+        b"",
+        b"HTTP/1.1 20",
+        head("Content-Length: 500") + BODY[:40],
+        b"\x00\x01\x02 nonsense\r\n\r\n",
+    ],
+)
+def test_a_connection_that_is_closed_midway_may_be_billed_and_may_pass(said: bytes) -> None:
+    broken = fault(lambda connection: connection.sendall(said))
+    assert broken.retryable
+    assert "the connection failed" in str(broken)
+    assert not isinstance(broken, NotSent)
+
+
+def test_a_connection_that_is_reset_midway_is_named() -> None:
+    def reset(connection: socket.socket) -> None:
+        connection.sendall(head("Content-Length: 500"))
+        linger = b"\x01\x00\x00\x00\x00\x00\x00\x00"
+        connection.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, linger)
+
+    assert "the connection failed" in str(fault(reset))
+
+
+@pytest.mark.parametrize("status", ["301 Moved", "302 Found", "303 See", "307 Moved", "308 Moved"])
+def test_no_redirect_is_followed_not_even_to_this_computer(status: str) -> None:
+    with speaking(whole(BODY)) as other:
+        say = whole(b"", f"Location: {other.url}/chat/completions", status=status)
+        broken = fault(say, api_key="sk-planted-4f7a9c0d1e2b3a")
+    assert broken.status == int(status[:3])
+    assert other.heard == []
