@@ -15,7 +15,8 @@ from arena.queries.judged import is_imported, last_vote_of
 from arena.queries.vote_sets import Filters
 from arena.rating.bootstrap import Unit
 from arena.rating.leaderboard import Method
-from arena.services.snapshots import compute, note_progress
+from arena.services.snapshots import compute, keep, note_progress
+from arena.services.turns import in_turn
 from augment.errors import Conflict, UnknownName
 from augment.sentences import sentence
 from augment.services.events import log_event
@@ -38,28 +39,23 @@ class Choices(TypedDict, total=False):
     actor: User | None
 
 
-@transaction.atomic
 def rate(*, study: Study, **choices: Unpack[Choices]) -> Snapshot:
     """Rate the contestants of a study by its current votes and keep the result for good.
 
     The same votes, filters, method, unit, rounds and seed give the same snapshot. Choices and
-    errors are those of `plan_snapshot`.
+    errors are those of `plan_snapshot`; after an error nothing is kept. Nothing is written before
+    all is computed, so that votes come in meanwhile.
     """
-    return compute(plan_snapshot(study=study, **choices), lambda percent: None)
+    snapshot = _planned(study=study, **choices)
+    computed = compute(snapshot, lambda percent: None)
+    with in_turn(), transaction.atomic():
+        snapshot.save()
+        _log(snapshot)
+        return keep(snapshot, computed)
 
 
 @transaction.atomic
-def plan_snapshot(
-    *,
-    study: Study,
-    method: str = "bt",
-    rounds: int = DEFAULT_ROUNDS,
-    seed: int = 0,
-    unit: str | None = None,
-    filters: Filters | None = None,
-    early: bool = False,
-    actor: User | None = None,
-) -> Snapshot:
+def plan_snapshot(*, study: Study, **choices: Unpack[Choices]) -> Snapshot:
     """Freeze what is to be rated, for a worker to compute.
 
     Args:
@@ -79,33 +75,9 @@ def plan_snapshot(
         UnknownName: There is no such method or unit, or a filter names what does not occur.
         Conflict: Rounds or seed are out of range, or online Elo is asked for another unit.
     """
-    is_early = study.state == Study.State.OPEN
-    if is_early and not early:
-        raise StudyStillOpen(study.name)
-    chosen = _method(method)
-    drawn = _default_unit(study, chosen) if unit is None else _unit(unit)
-    _check_draws(chosen, drawn, rounds, seed)
-    snapshot = Snapshot.objects.create(
-        study=study,
-        state=Snapshot.State.QUEUED,
-        progress=0,
-        method=chosen,
-        rounds=rounds,
-        resampling_unit=drawn,
-        seed=seed,
-        filters=replace(filters or Filters(), authors=authors_of(study)).as_document(),
-        last_vote=last_vote_of(study),
-        votes_counted=0,
-        is_early=is_early,
-        made_by=actor,
-    )
-    log_event(
-        actor=actor,
-        verb="rate early" if is_early else "rate",
-        object_kind="study",
-        object_code=study.code,
-        after={"snapshot": str(snapshot.code), "method": method, "filters": _asked(snapshot)},
-    )
+    snapshot = _planned(study=study, **choices)
+    snapshot.save()
+    _log(snapshot)
     return snapshot
 
 
@@ -122,9 +94,10 @@ def compute_snapshot(*, snapshot_pk: int) -> Snapshot | None:
     if snapshot is None:
         return None
     try:
-        return compute(
+        computed = compute(
             snapshot, lambda percent: note_progress(snapshot_pk=snapshot_pk, percent=percent)
         )
+        return keep(snapshot, computed)
     except (UnknownName, Conflict, ArithmeticError) as error:
         unready.update(state=Snapshot.State.FAILED, status=str(error))
         return None
@@ -138,6 +111,53 @@ def is_big(study: Study) -> bool:
 
 
 # --- Private -----------------------------------------------------------------------------------
+
+
+def _planned(
+    *,
+    study: Study,
+    method: str = "bt",
+    rounds: int = DEFAULT_ROUNDS,
+    seed: int = 0,
+    unit: str | None = None,
+    filters: Filters | None = None,
+    early: bool = False,
+    actor: User | None = None,
+) -> Snapshot:
+    is_early = study.state == Study.State.OPEN
+    if is_early and not early:
+        raise StudyStillOpen(study.name)
+    chosen = _method(method)
+    drawn = _default_unit(study, chosen) if unit is None else _unit(unit)
+    _check_draws(chosen, drawn, rounds, seed)
+    return Snapshot(
+        study=study,
+        state=Snapshot.State.QUEUED,
+        progress=0,
+        method=chosen,
+        rounds=rounds,
+        resampling_unit=drawn,
+        seed=seed,
+        filters=replace(filters or Filters(), authors=authors_of(study)).as_document(),
+        last_vote=last_vote_of(study),
+        votes_counted=0,
+        is_early=is_early,
+        made_by=actor,
+    )
+
+
+def _log(snapshot: Snapshot) -> None:
+    log_event(
+        actor=snapshot.made_by,
+        verb="rate early" if snapshot.is_early else "rate",
+        object_kind="study",
+        object_code=snapshot.study.code,
+        after={
+            "snapshot": str(snapshot.code),
+            "method": snapshot.method,
+            "filters": _asked(snapshot),
+        },
+    )
 
 
 def _asked(snapshot: Snapshot) -> dict[str, object]:

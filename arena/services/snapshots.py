@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import platform
 from collections.abc import Callable
+from dataclasses import dataclass
 
 import numpy
 import scipy
@@ -33,14 +34,19 @@ def note_progress(*, snapshot_pk: int, percent: int) -> None:
     unready.filter(pk=snapshot_pk).update(state=Snapshot.State.RUNNING, progress=percent)
 
 
-def compute(snapshot: Snapshot, report: Report) -> Snapshot:
-    """Rate the votes that a planned snapshot names, and keep what comes out.
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Computed:
+    """What came out beside that which the snapshot itself has: its lines."""
 
-    Of two workers that were sent the same snapshot the first to end keeps its result, which is
-    that of the other as well.
+    board: Leaderboard
+    entrants: tuple[Entrant, ...]
+
+
+def compute(snapshot: Snapshot, report: Report) -> Computed:
+    """Rate the votes that a planned snapshot names, into the snapshot; nothing is stored.
 
     Args:
-        snapshot: A planned one.
+        snapshot: A planned one, stored or not.
         report: Is told how far it is, in percent.
     """
     report(5)
@@ -58,8 +64,6 @@ def compute(snapshot: Snapshot, report: Report) -> Snapshot:
     judges = {vote.judge: vote.judge_name for vote in votes.counted}
     snapshot.results = _results(snapshot, votes, arrays, board) | {"judges": judges}
     report(90)
-    snapshot.state = Snapshot.State.READY
-    snapshot.progress = 100
     snapshot.votes_sha256 = digest_of(votes_csv(vote_rows(votes.counted, judges)))
     snapshot.votes_counted = len(votes.counted)
     snapshot.votes_left_out = votes.left_out
@@ -72,13 +76,24 @@ def compute(snapshot: Snapshot, report: Report) -> Snapshot:
     snapshot.status = board.explanation
     snapshot.degenerate_rounds = board.degenerate_rounds
     snapshot.includes_simulated = _any_simulated(votes.counted, votes.entrants)
+    return Computed(board=board, entrants=votes.entrants)
+
+
+def keep(snapshot: Snapshot, computed: Computed) -> Snapshot:
+    """Store what was computed.
+
+    Of two workers that were sent the same snapshot the first to end keeps its result, which is
+    that of the other as well.
+    """
     with transaction.atomic():
         held = Snapshot.objects.select_for_update().get(pk=snapshot.pk)
         if held.state == Snapshot.State.READY:
             return held
         snapshot.standings.all().delete()
+        snapshot.state = Snapshot.State.READY
+        snapshot.progress = 100
         snapshot.save()
-        _store_lines(snapshot, board, votes.entrants)
+        _store_lines(snapshot, computed.board, computed.entrants)
     return snapshot
 
 

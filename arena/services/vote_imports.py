@@ -1,4 +1,9 @@
-"""Votes from elsewhere, as a study that is rated, shown and exported like any other."""
+"""Votes from elsewhere, as a study that is rated, shown and exported like any other.
+
+They are written in short batches, so that votes come in meanwhile. Until the last one is in, no
+study has them: nobody sees half of an import. What an import that died leaves behind is removed
+by the next one.
+"""
 
 from __future__ import annotations
 
@@ -6,6 +11,7 @@ import csv
 import hashlib
 from collections.abc import Iterator
 from dataclasses import dataclass
+from datetime import timedelta
 from itertools import islice
 from pathlib import Path
 
@@ -16,12 +22,18 @@ from django.utils import timezone
 from arena.errors import VotesUnreadable
 from arena.models import ImportedVote, Study, VoteFile
 from arena.rating.votes_file import VotesFileUnreadable, columns_of, read_votes
+from arena.services.turns import in_turn
 from augment.errors import Conflict
 from augment.services.events import log_event
 from augment.services.texts import one_line
 
 LONGEST_CELL = 200
-AT_ONCE = 5000
+AT_ONCE = 2000
+"""So many rows are written at once: about 50 ms on SQLite, in which no vote gets in."""
+
+DEAD_AFTER = timedelta(minutes=10)
+"""An import that has written nothing for so long is over: its process was ended."""
+
 SIMULATED = "simulated"
 """A column that our own files have; a yes in it marks the whole study."""
 
@@ -35,7 +47,6 @@ class Imported:
     contestants: int
 
 
-@transaction.atomic
 def import_votes(
     *, path: Path, name: str, is_simulated: bool = False, actor: User | None = None
 ) -> Imported:
@@ -51,65 +62,127 @@ def import_votes(
     Raises:
         VotesUnreadable: A column is missing, a winner is unknown, a cell is empty or too long, or
             the file can't be read; the text has the line and what is allowed.
-        Conflict: There is a study of that name.
+        Conflict: There is a study of that name, or another import took this one for dead.
         InvalidDocument: The name is empty, too long or not one line.
     """
     name = one_line("name", name, what="study")
     if Study.objects.filter(name=name).exists():
         raise _taken(name)
+    contestants, digest = _checked(path)
+    remove_dead()
+    file = VoteFile.objects.create(name=path.name[:200], sha256=digest)
     try:
-        columns = columns_of(path)
-        contestants = len(read_votes(path, clusters=columns).comparisons.names)
-        digest = _sha256(path)
-    except VotesFileUnreadable as error:
-        raise VotesUnreadable(str(error)) from error
-    except OSError as error:
-        raise VotesUnreadable(f"{path} can't be read: {error.strerror}.") from error
-    study = _insert(name, is_simulated)
-    file = VoteFile.objects.create(study=study, name=path.name[:200], sha256=digest)
-    votes = 0
-    waiting = _rows(path, file, study)
-    while rows := list(islice(waiting, AT_ONCE)):
-        ImportedVote.objects.bulk_create(rows)
-        votes += len(rows)
-    if study.allow_simulated:
-        study.save(update_fields=["allow_simulated"])
-    log_event(
-        actor=actor,
-        verb="import votes",
-        object_kind="study",
-        object_code=study.code,
-        after={"file": file.name, "sha256": digest, "votes": votes},
-    )
+        votes, any_simulated = _write(path, file)
+        study = _publish(file, name, votes, is_simulated or any_simulated, actor)
+    except BaseException:  # also Ctrl-C; after a kill the next import does it
+        _remove(file)
+        raise
     return Imported(study=study, votes=votes, contestants=contestants)
+
+
+def remove_dead() -> int:
+    """Remove what imports left behind that were ended before they were done.
+
+    Returns:
+        How many there were.
+    """
+    dead = VoteFile.objects.filter(study=None, written_at__lt=timezone.now() - DEAD_AFTER)
+    found = list(dead)
+    for file in found:
+        _remove(file)
+    return len(found)
 
 
 # --- Private -----------------------------------------------------------------------------------
 
 
-def _insert(name: str, is_simulated: bool) -> Study:
-    now = timezone.now()
+def _checked(path: Path) -> tuple[int, str]:
+    """How many contestants a sound file has, and its SHA-256."""
     try:
-        with transaction.atomic():
-            return Study.objects.create(
-                name=name,
-                state=Study.State.CLOSED,
-                votes_per_expert=0,
-                seed=0,
-                allow_simulated=is_simulated,
-                opened_at=now,
-                closed_at=now,
-            )
-    except IntegrityError:  # somebody else was faster
-        raise _taken(name) from None
+        columns = columns_of(path)
+        return len(read_votes(path, clusters=columns).comparisons.names), _sha256(path)
+    except VotesFileUnreadable as error:
+        raise VotesUnreadable(str(error)) from error
+    except OSError as error:
+        raise VotesUnreadable(f"{path} can't be read: {error.strerror}.") from error
+
+
+def _write(path: Path, file: VoteFile) -> tuple[int, bool]:
+    """Store the rows; how many, and whether one of them is marked as simulated."""
+    votes, any_simulated = 0, False
+    waiting = _rows(path, file)
+    while batch := list(islice(waiting, AT_ONCE)):
+        with in_turn(), transaction.atomic():
+            _hold(file)
+            ImportedVote.objects.bulk_create(row for row, _ in batch)
+        votes += len(batch)
+        any_simulated = any_simulated or any(is_marked for _, is_marked in batch)
+    return votes, any_simulated
+
+
+def _hold(file: VoteFile) -> None:
+    """Say that the import goes on, and keep its file until the transaction ends.
+
+    Raises:
+        Conflict: Somebody has removed it.
+    """
+    if not VoteFile.objects.filter(pk=file.pk).update(written_at=timezone.now()):
+        raise Conflict(
+            f"The import of {file.name} stood still for more than "
+            f"{DEAD_AFTER // timedelta(minutes=1)} minutes and was taken for dead; nothing is "
+            "kept of it. Import the file again."
+        )
+
+
+def _publish(
+    file: VoteFile, name: str, votes: int, is_simulated: bool, actor: User | None
+) -> Study:
+    """Make the study that has the votes of the file; from here on they can be seen."""
+    now = timezone.now()
+    with in_turn(), transaction.atomic():
+        _hold(file)
+        try:
+            with transaction.atomic():
+                study = Study.objects.create(
+                    name=name,
+                    state=Study.State.CLOSED,
+                    votes_per_expert=0,
+                    seed=0,
+                    allow_simulated=is_simulated,
+                    opened_at=now,
+                    closed_at=now,
+                )
+        except IntegrityError:  # somebody else was faster
+            raise _taken(name) from None
+        file.study = study
+        file.save(update_fields=["study"])
+        log_event(
+            actor=actor,
+            verb="import votes",
+            object_kind="study",
+            object_code=study.code,
+            after={"file": file.name, "sha256": file.sha256, "votes": votes},
+        )
+    return study
+
+
+def _remove(file: VoteFile) -> None:
+    """Delete the rows of an import that did not come to its end, and the import itself."""
+    rows = ImportedVote.objects.filter(file=file.pk, file__study=None).order_by("pk")
+    while first := list(rows.values_list("pk", flat=True)[:AT_ONCE]):
+        with in_turn():
+            batch = ImportedVote.objects.filter(file=file.pk, pk__range=(first[0], first[-1]))
+            batch._raw_delete(using=batch.db)
+    with in_turn():
+        VoteFile.objects.filter(pk=file.pk, study=None).delete()
 
 
 def _taken(name: str) -> Conflict:
     return Conflict(f"There is a study named {name!r} already.")
 
 
-def _rows(path: Path, file: VoteFile, study: Study) -> Iterator[ImportedVote]:
-    """One row a line; the file has been checked before."""
+def _rows(path: Path, file: VoteFile) -> Iterator[tuple[ImportedVote, bool]]:
+    """One row a line, and whether it is marked as simulated; the file has been checked before."""
     with path.open(encoding="utf-8-sig", newline="") as lines:
         reader = csv.reader(lines, strict=True)
         place = {column.strip(): index for index, column in enumerate(next(reader))}
@@ -126,9 +199,7 @@ def _rows(path: Path, file: VoteFile, study: Study) -> Iterator[ImportedVote]:
                         f"line {reader.line_num}: {column} has {len(cell)} signs, "
                         f"{LONGEST_CELL} are allowed"
                     )
-            if found[SIMULATED] == "yes":
-                study.allow_simulated = True
-            yield ImportedVote(
+            row = ImportedVote(
                 file=file,
                 line=reader.line_num,
                 first=found["model_a"],
@@ -137,6 +208,7 @@ def _rows(path: Path, file: VoteFile, study: Study) -> Iterator[ImportedVote]:
                 judge=found["judge"],
                 item=found["item"],
             )
+            yield row, found[SIMULATED] == "yes"
 
 
 def _sha256(path: Path) -> str:
