@@ -25,8 +25,11 @@ class Sentence(str):
     values: dict[str, Value]
 
     def as_document(self) -> dict[str, Any]:
-        """What `read_sentence` makes the sentence of again; sentences within become names."""
-        return {"text": self.text, "values": self.values}
+        """What `read_sentence` makes the sentence of again, as JSON would give it back.
+
+        Sentences within become names.
+        """
+        return {"text": self.text, "values": {k: _plain(v) for k, v in self.values.items()}}
 
 
 def sentence(text: str, /, **values: Value) -> Sentence:
@@ -83,6 +86,11 @@ def _written(value: Value) -> str:
         return str(value)
     nested = [", ".join(part) if isinstance(part, tuple) else part for part in value]
     return ("; " if any(isinstance(part, tuple) for part in value) else ", ").join(nested)
+
+
+def _plain(value: Any) -> Any:
+    """Tuples as lists."""
+    return [_plain(part) for part in value] if isinstance(value, tuple) else value
 
 
 def _read(value: Any) -> Value:

@@ -16,6 +16,7 @@ from arena.exports.writers import FORMATS
 from arena.models import Snapshot
 from arena.services.cells import csv_text
 from arena.services.vote_rows import digest_of
+from augment.sentences import read_sentence
 
 ZIP = "zip"
 CONTENT_TYPE = "application/zip"
@@ -152,16 +153,20 @@ def _pairs(results: dict[str, Any]) -> bytes:
 
 
 def _types(results: dict[str, Any]) -> bytes:
-    head = ("type", "contestant", "rank", "elo", "lower", "upper", "votes", "too_few")
+    head = ("type", "contestant", "rank", "elo", "lower", "upper", "votes", "too_few", "note")
     keys = ("slug", "rank", "rating", "lower", "upper", "votes", "few")
     return _csv(
         head,
         (
-            [part["type"], *(line[key] for key in keys)]
+            [part["type"], *(line[key] for key in keys), _said(line.get("note"))]
             for part in results.get("types", [])
             for line in part["lines"]
         ),
     )
+
+
+def _said(note: dict[str, Any] | None) -> str:
+    return "" if note is None else str(read_sentence(note))
 
 
 def _raters(results: dict[str, Any]) -> bytes:

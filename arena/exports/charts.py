@@ -42,14 +42,30 @@ def draw_interval(
     *,
     simulated: bool,
 ) -> None:
-    """One line: nothing without a rating, a mark alone without an interval."""
+    """One line: a mark at the rating, a bar over the interval, an arrow to where it is open.
+
+    Nothing without a rating and bounds, a mark alone without an interval; a bound alone begins
+    with a stroke.
+    """
     lower, middle, upper = interval
-    if middle is None:
-        return
     colour, shape = (SIMULATED, "D") if simulated else (MARK, "o")
-    if lower is not None and upper is not None:
-        axes.plot([lower, upper], [place, place], color=colour, linewidth=1.6)
-    axes.plot([middle], [place], marker=shape, markersize=5, color=colour)
+    known = [one for one in (lower, middle, upper) if one is not None]
+    if not known:
+        return
+    if len(known) > 1:
+        axes.plot([known[0], known[-1]], [place, place], color=colour, linewidth=1.6)
+    if middle is None:
+        axes.plot(known, [place], marker="|", markersize=9, markeredgewidth=1.6, color=colour)
+    else:
+        axes.plot([middle], [place], marker=shape, markersize=5, color=colour)
+    if (lower is None) != (upper is None):
+        start, edge = (known[0], 0.0) if lower is None else (known[-1], 1.0)
+        axes.annotate(
+            "", (edge, place), (start, place), axes.get_yaxis_transform(), "data",
+            arrowprops={
+                "arrowstyle": "->", "color": colour, "linewidth": 1.6, "shrinkA": 0, "shrinkB": 0,
+            },
+        )  # fmt: skip
 
 
 def rating_axis(axes: Axes, rows: int) -> None:
@@ -63,7 +79,7 @@ def rating_axis(axes: Axes, rows: int) -> None:
 
 def _label(table: LeaderboardTable) -> str:
     marks = [word for word, so in (("simulated", table.simulated), ("early", table.early)) if so]
-    has_intervals = any(row.lower is not None for row in table.rows)
+    has_intervals = any(row.has_bound for row in table.rows)
     text = "Elo with 95 % intervals" if has_intervals else "Elo, without intervals"
     if table.has_parts:
         marks.append("only within groups comparable")

@@ -21,6 +21,7 @@ def latex(table: LeaderboardTable) -> str:
             f"votes sha256 {table.votes_sha256}",
             *table.warnings,
         ),
+        notes=table.missing,
         caption=f"{CAPTION} ({', '.join(marks)})" if marks else CAPTION,
     )
 

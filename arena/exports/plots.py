@@ -25,7 +25,7 @@ class Given:
 
     Attributes:
         number: Of the point, its place in the table.
-        lower, upper: The ends of the interval in y, None without one.
+        lower, upper: The ends of the interval in y; one alone is open on the other side.
     """
 
     number: int
@@ -36,6 +36,11 @@ class Given:
     upper: float | None = None
     group: str = ""
     is_simulated: bool = False
+
+    @property
+    def has_bound(self) -> bool:
+        """Whether there is an interval, be it open on one side."""
+        return self.lower is not None or self.upper is not None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

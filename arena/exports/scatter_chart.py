@@ -96,8 +96,8 @@ def _points(axes: Axes, plot: Plot, size_in: Place) -> None:
     badges = badge_places(places, radius=_RADIUS_IN, box=(0.0, size_in[0], 0.0, size_in[1]))
     for point, place, badge in zip(plot.points, places, badges, strict=True):
         colour, shape = _look(point)
-        if point.lower is not None and point.upper is not None:
-            axes.plot([point.x] * 2, [point.lower, point.upper], color=colour, linewidth=1.2)
+        if point.has_bound:
+            _interval(axes, point, colour)
         ends = [(x / size_in[0], y / size_in[1]) for x, y in (place, badge)]
         if badge != place:
             axes.plot(
@@ -113,6 +113,18 @@ def _points(axes: Axes, plot: Plot, size_in: Place) -> None:
             *ends[1], str(point.number), transform=axes.transAxes, ha="center",
             va="center_baseline", fontsize=7, fontweight="bold", color="white", zorder=6,
         )  # fmt: skip
+
+
+def _interval(axes: Axes, point: Given, colour: str) -> None:
+    """From end to end; where one is open, to the edge with an arrowhead."""
+    bottom, top = axes.get_ylim()
+    low = bottom if point.lower is None else point.lower
+    high = top if point.upper is None else point.upper
+    axes.plot([point.x] * 2, [low, high], color=colour, linewidth=1.2)
+    if point.lower is None:
+        axes.plot([point.x], [low], marker="v", markersize=5, color=colour, clip_on=False)
+    if point.upper is None:
+        axes.plot([point.x], [high], marker="^", markersize=5, color=colour, clip_on=False)
 
 
 def _key(axes: Axes, plot: Plot, wide_in: float) -> None:

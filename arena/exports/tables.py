@@ -9,7 +9,7 @@ from typing import Any
 from django.db.models import F
 
 from arena.models import Snapshot, Standing
-from arena.rating.printed import interval_text, rank_text, rating_text
+from arena.rating.printed import interval_text, notes_by_reason, rank_text, rating_text
 from augment.sentences import read_sentence, sentence
 
 METHODS = {
@@ -37,7 +37,9 @@ class Row:
     Attributes:
         model: The name people know, with "(simulated)" where that is so.
         variant: The recipe's name as it ends the model's name, empty without.
-        rank, elo, lower, upper: None where the votes do not determine them.
+        rank, elo, lower, upper: None where the votes do not determine them; each bound can stand
+            without the other one and without a rating.
+        note: Why one of these is missing.
         part: Ratings and ranks compare only those with the same number here.
     """
 
@@ -83,6 +85,11 @@ class Row:
     def interval_text(self) -> str:
         """The interval as the paper prints it: -9/+11 around the printed rating."""
         return interval_text(self.elo, self.lower, self.upper)
+
+    @property
+    def has_bound(self) -> bool:
+        """Whether there is an interval, be it open on one side."""
+        return self.lower is not None or self.upper is not None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -132,6 +139,11 @@ class LeaderboardTable:
         return (*said, *((self.status,) if self.status else ()), *self.notes)
 
     @property
+    def missing(self) -> list[str]:
+        """What is missing in which lines and why, for files."""
+        return notes_by_reason((row.model, row.note) for row in self.rows)
+
+    @property
     def has_parts(self) -> bool:
         """Whether there are groups that can't be compared with each other."""
         return len({row.part for row in self.rows if row.elo is not None}) > 1
@@ -145,6 +157,8 @@ def leaderboard_table(snapshot: Snapshot) -> LeaderboardTable:
     parts: dict[str, int] = board.get("parts") or {}
     last = len(standings)
     standings.sort(key=lambda standing: parts.get(standing.slug, last))
+    if board.get("order"):
+        standings.sort(key=lambda standing: board["order"].index(standing.slug))
     return LeaderboardTable(
         study=snapshot.study.name,
         rows=tuple(

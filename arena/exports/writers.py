@@ -80,7 +80,7 @@ def plain_text(table: LeaderboardTable) -> str:
         for line in (head, *body)
     ]
     left_out = ", ".join(f"{number} {reason}" for reason, number in table.left_out.items())
-    lines.append("")
+    lines += ["", *(f"{line}." for line in table.missing)]
     lines.append(f"{table.votes} votes counted; left out: {left_out or 'none'}.")
     lines.append(f"{table.method_text}.")
     return "\n".join([*lines, *table.warnings])

@@ -15,7 +15,14 @@ from typing import Any
 
 from arena.rating.bootstrap import Unit
 from arena.rating.leaderboard import Leaderboard, Line, Method, rate
-from arena.rating.printed import escape, interval_text, latex_table, rank_text, rating_text
+from arena.rating.printed import (
+    escape,
+    interval_text,
+    latex_table,
+    notes_by_reason,
+    rank_text,
+    rating_text,
+)
 from arena.rating.votes_file import VotesFile, VotesFileUnreadable, columns_of, read_votes
 from arena.services.cells import csv_text
 from augment.sentences import escaped
@@ -48,16 +55,13 @@ class RatedCsv:
 
     @property
     def standings(self) -> list[Line]:
-        """Best first within each part; who has no rating comes last."""
-        return sorted(
-            self.board.lines,
-            key=lambda line: (
-                line.rating is None,
-                line.part,
-                -(line.rating or 0.0),
-                line.name,
-            ),
-        )
+        """Best first within each part; who has neither rating nor rank comes last."""
+        return list(self.board.standings)
+
+    @property
+    def missing(self) -> list[str]:
+        """What is missing in which lines, and why."""
+        return notes_by_reason((line.name, line.note) for line in self.board.standings)
 
     @property
     def method_text(self) -> str:
@@ -204,7 +208,8 @@ def _table(rated: RatedCsv) -> str:
     ]
     ties = rated.board.tie_share
     said = [] if ties is None else [f"{rated.method_text}; {ties:.1%} ties."]
-    return "\n".join([*lines, "", *said, *rated.notes]) + "\n"
+    missing = [" ".join(f"{line}.".split()) for line in rated.missing]
+    return "\n".join([*lines, "", *missing, *said, *rated.notes]) + "\n"
 
 
 def _csv(rated: RatedCsv) -> str:
@@ -212,9 +217,9 @@ def _csv(rated: RatedCsv) -> str:
     for note in rated.notes:
         print(escaped(note), file=sys.stderr)
     return csv_text(
-        ("model", "rank", "rating", "lower", "upper", "votes"),
+        ("model", "rank", "rating", "lower", "upper", "votes", "note"),
         (
-            (line.name, line.rank, line.rating, line.lower, line.upper, line.votes)
+            (line.name, line.rank, line.rating, line.lower, line.upper, line.votes, line.note)
             for line in rated.standings
         ),
     )
@@ -241,6 +246,7 @@ def _json(rated: RatedCsv) -> str:
                 "lower": _rounded(line.lower),
                 "upper": _rounded(line.upper),
                 "votes": line.votes,
+                "note": line.note,
             }
             | ({"part": line.part} if len(parts) > 1 else {})
             for line in rated.standings
@@ -251,7 +257,8 @@ def _json(rated: RatedCsv) -> str:
 
 def _latex(rated: RatedCsv) -> str:
     rows = ((escape(name), *rest) for name, *rest in _cells(rated))
-    return latex_table(rows, comments=(rated.method_text, *rated.notes))
+    comments = (rated.method_text, *rated.notes)
+    return latex_table(rows, comments=comments, notes=rated.missing)
 
 
 def _rounded(value: float | None) -> float | None:

@@ -9,16 +9,23 @@ Notation: R rows, P pairs, K cells (expert x scenario), B rounds, which are the 
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import StrEnum
+from typing import Self
 
 import numpy as np
 from numpy.typing import NDArray
 
-from arena.rating.comparisons import Comparisons, FloatArray, IntArray, PairCounts, renumbered
+from arena.rating.comparisons import (
+    BoolArray,
+    Comparisons,
+    FloatArray,
+    IntArray,
+    PairCounts,
+    renumbered,
+)
 from arena.rating.draws import Multinomial
-
-LEVEL = 0.95
+from arena.rating.estimate import LEVEL
 
 _NUMBERS_AT_ONCE = 500_000
 """How many numbers a block of rounds may hold; more only costs memory."""
@@ -50,6 +57,19 @@ class Rounds:
     games: FloatArray
     scores: FloatArray
     ties: FloatArray
+
+    def chosen(self, rounds: IntArray) -> Self:
+        """Some of the rounds, by their numbers."""
+        return replace(
+            self,
+            games=self.games[:, rounds],
+            scores=self.scores[:, rounds],
+            ties=self.ties[rounds],
+        )
+
+    def limited_to(self, inside: BoolArray) -> Self:
+        """Without the comparisons of pairs that are not `inside` (P, B); none of them may tie."""
+        return replace(self, games=self.games * inside, scores=self.scores * inside)
 
 
 def resample(

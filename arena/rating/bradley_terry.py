@@ -13,7 +13,7 @@ import math
 
 import numpy as np
 
-from arena.rating.comparisons import FloatArray, IntArray
+from arena.rating.comparisons import BoolArray, FloatArray, IntArray
 
 ELO_PER_LOGIT = 400.0 / math.log(10.0)
 """Points per unit of strength: 400 points are odds of 10 to 1."""
@@ -104,7 +104,12 @@ def fit(
 
 
 def newton(
-    met: Meetings, games: FloatArray, scores: FloatArray, *, start: FloatArray | None = None
+    met: Meetings,
+    games: FloatArray,
+    scores: FloatArray,
+    *,
+    start: FloatArray | None = None,
+    together: BoolArray | None = None,
 ) -> FloatArray:
     """The most likely strengths (C, B), each round's mean zero, by Newton's method to 1e-9.
 
@@ -115,6 +120,8 @@ def newton(
         games: (P, B) comparisons of the pair, not negative.
         scores: (P, B) what `low` scored in them.
         start: (C, B) where to begin, zero by default; the answer does not depend on it.
+        together: (B, C, C) who are in one component, for rounds without comparisons between
+            components: then strengths can be compared within a component only.
 
     Raises:
         DidNotConverge: After 200 steps a strength still moved by more than 1e-9.
@@ -125,7 +132,13 @@ def newton(
     at_once = max(1, _NUMBERS_AT_ONCE // max(1, met.contestants**2))
     for first in range(0, games.shape[1], at_once):
         block = slice(first, first + at_once)
-        strengths[:, block] = _newton(met, games[:, block], scores[:, block], strengths[:, block])
+        strengths[:, block] = _newton(
+            met,
+            games[:, block],
+            scores[:, block],
+            strengths[:, block],
+            None if together is None else together[block],
+        )
     return strengths
 
 
@@ -195,7 +208,13 @@ def inverse_curvature(met: Meetings, games: FloatArray, strengths: FloatArray) -
     return np.asarray(inverse - 1.0 / (filling * contestants**2))
 
 
-def _newton(met: Meetings, games: FloatArray, scores: FloatArray, start: FloatArray) -> FloatArray:
+def _newton(
+    met: Meetings,
+    games: FloatArray,
+    scores: FloatArray,
+    start: FloatArray,
+    together: BoolArray | None,
+) -> FloatArray:
     strengths = start.copy()
     scored = met.sums(scores, games - scores)
     moving = np.arange(games.shape[1])
@@ -205,7 +224,8 @@ def _newton(met: Meetings, games: FloatArray, scores: FloatArray, start: FloatAr
         of_low = games[:, moving] * expected
         slope = scored[:, moving] - met.sums(of_low, games[:, moving] - of_low)
         curvature = _curvature(met, weight)
-        curvature += _filling(curvature)[:, None, None]
+        filling = _filling(curvature)[:, None, None]
+        curvature += filling if together is None else filling * together[moving]
         step = np.linalg.solve(curvature, slope.T[:, :, None])[:, :, 0].T
         longest = np.abs(step).max(axis=0, initial=0.0)
         step *= np.minimum(1.0, _LONGEST_STEP / np.maximum(longest, 1e-300))
@@ -235,7 +255,8 @@ def _filling(curvature: FloatArray) -> FloatArray:
     """(B,) what to add to every entry.
 
     The curvature is zero along the shift of all strengths only. Filling that one direction, by the
-    size of the rest, makes it invertible and leaves steps of mean zero as they are.
+    size of the rest, makes it invertible and leaves steps of mean zero as they are. With several
+    components that holds for each of them.
     """
     size = curvature.diagonal(axis1=1, axis2=2).mean(axis=1)
-    return np.asarray(size / curvature.shape[1])
+    return np.asarray(np.where(size > 0.0, size, 1.0) / curvature.shape[1])

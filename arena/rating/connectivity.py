@@ -8,8 +8,10 @@ Notation: C contestants, P pairs, B rounds, which are the last axis.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Iterator
+from dataclasses import dataclass, field
 from enum import StrEnum
+from typing import TypeVar
 
 import numpy as np
 
@@ -17,6 +19,17 @@ from arena.rating.comparisons import BoolArray, FloatArray, IntArray, PairCounts
 from augment.sentences import Sentence, sentence
 
 _NUMBERS_AT_ONCE = 4_000_000
+
+
+_Named = TypeVar("_Named")
+
+NAMED = 3
+"""A sentence names so many contestants at most."""
+
+
+def few_of(names: tuple[_Named, ...], *, mark: _Named) -> tuple[_Named, ...]:
+    """The first names, and a mark where there are more."""
+    return names if len(names) <= NAMED else (*names[:NAMED], mark)
 
 
 class Status(StrEnum):
@@ -29,6 +42,7 @@ class Status(StrEnum):
     UNBOUNDED = "unbounded"
     ALL_TIES = "all ties"
     NO_INTERVALS = "no intervals"
+    OPEN_INTERVALS = "open intervals"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -39,12 +53,17 @@ class Diagnosis:
         explanation: The sentences on the status, none where nothing is amiss.
         parts: Those who can be rated among each other, numbers as in the counts, in order of their
             first member; a part of one has no rating.
+        groups: Those who met, directly or through others, in the same order.
+        reached: (C, C) whether the row's contestant scored against the column's, or through a
+            chain.
         notes: Why each contestant has no rating; empty for who has one.
     """
 
     status: Status
     explanation: tuple[Sentence, ...] = ()
     parts: tuple[tuple[int, ...], ...] = ()
+    groups: tuple[tuple[int, ...], ...] = ()
+    reached: BoolArray = field(default_factory=lambda: np.zeros((0, 0), dtype=bool), compare=False)
     notes: tuple[Sentence | str, ...] = ()
 
 
@@ -66,6 +85,7 @@ def diagnose(
     apart = _groups(_closure(scored | scored.transpose(0, 2, 1))[0])
     reached = _closure(scored)[0]
     parts = tuple(map(tuple, apart if bounded_anyway else _groups(reached)))
+    groups = tuple(map(tuple, apart))
     if len(parts) > 1:
         explanation = [_who_is_apart(names, apart)] if len(apart) > 1 else []
         if not bounded_anyway:
@@ -74,6 +94,8 @@ def diagnose(
             status=Status.DISCONNECTED if len(apart) > 1 else Status.UNBOUNDED,
             explanation=tuple(explanation),
             parts=parts,
+            groups=groups,
+            reached=reached,
             notes=_notes(parts, scored[0]),
         )
     if not (counts.outcomes[:, 0].any() or counts.outcomes[:, 2].any()):
@@ -86,8 +108,10 @@ def diagnose(
                 ),
             ),
             parts=parts,
+            groups=groups,
+            reached=reached,
         )
-    return Diagnosis(status=Status.RATED, parts=parts)
+    return Diagnosis(status=Status.RATED, parts=parts, groups=groups, reached=reached)
 
 
 class Determined:
@@ -126,14 +150,24 @@ class Determined:
         else:
             fine = np.zeros(games.shape[1], dtype=np.bool_)
         unclear = np.flatnonzero(~fine)
+        for some, reached in self.chains(games, scores, unclear):
+            fine[some] = reached.all(axis=(1, 2))
+        return fine
+
+    def chains(
+        self, games: FloatArray, scores: FloatArray, chosen: IntArray
+    ) -> Iterator[tuple[IntArray, BoolArray]]:
+        """Some of the chosen rounds (n,) of (P, B) at a time, and (n, C, C) who reached whom.
+
+        The row's contestant reached the column's by a score against them, or through a chain.
+        """
         at_once = max(1, _NUMBERS_AT_ONCE // max(1, self._contestants**2))
-        for first in range(0, len(unclear), at_once):
-            some = unclear[first : first + at_once]
+        for first in range(0, len(chosen), at_once):
+            some = chosen[first : first + at_once]
             scored = _scored(
                 self._contestants, self._low, self._high, games[:, some], scores[:, some]
             )
-            fine[some] = _closure(scored).all(axis=(1, 2))
-        return fine
+            yield some, _closure(scored)
 
 
 def determined(
@@ -207,7 +241,7 @@ def _who_is_apart(names: tuple[str, ...], groups: list[list[int]]) -> Sentence:
     return sentence(
         "These groups were never compared with each other: %(groups)s. Each is rated by itself; "
         "ratings across them have no meaning.",
-        groups=tuple(_listed(names, group) for group in groups),
+        groups=few_of(tuple(_listed(names, group) for group in groups), mark=("…",)),
     )
 
 
@@ -235,30 +269,39 @@ _LIMITS = {
 
 def _who_is_unbounded(names: tuple[str, ...], reached: BoolArray) -> list[Sentence]:
     """Sentences about those who won or lost everything against the rest that they met."""
-    sentences = []
+    unbeaten, scoreless = [], []
     met = _closure((reached | reached.T)[None])[0]
     for group in _groups(reached):
         inside = np.zeros(len(names), dtype=bool)
         inside[group] = True
         rest = met[group[0]] & ~inside
-        if not rest.any():
-            continue
-        if not reached[np.ix_(rest, inside)].any():
-            sentences.append(
-                sentence(
-                    "Nobody else scored against %(names)s: there is no upper limit.",
-                    names=_listed(names, group),
-                )
+        if rest.any() and not reached[np.ix_(rest, inside)].any():
+            unbeaten.append(_listed(names, group))
+        if rest.any() and not reached[np.ix_(inside, rest)].any():
+            scoreless.append(_listed(names, group))
+    sentences = []
+    if unbeaten:
+        sentences.append(
+            sentence(
+                "Nobody else scored against %(names)s: there is no upper limit.",
+                names=_groups_or_one(unbeaten),
             )
-        if not reached[np.ix_(inside, rest)].any():
-            sentences.append(
-                sentence(
-                    "%(names)s scored against nobody else: there is no lower limit.",
-                    names=_listed(names, group),
-                )
+        )
+    if scoreless:
+        sentences.append(
+            sentence(
+                "%(names)s scored against nobody else: there is no lower limit.",
+                names=_groups_or_one(scoreless),
             )
+        )
     return sentences
 
 
+def _groups_or_one(
+    groups: list[tuple[str, ...]],
+) -> tuple[str, ...] | tuple[tuple[str, ...], ...]:
+    return groups[0] if len(groups) == 1 else few_of(tuple(groups), mark=("…",))
+
+
 def _listed(names: tuple[str, ...], group: list[int]) -> tuple[str, ...]:
-    return tuple(names[index] for index in group)
+    return few_of(tuple(names[index] for index in group), mark="…")

@@ -15,7 +15,7 @@ from __future__ import annotations
 import numpy as np
 
 from arena.rating.bradley_terry import Meetings
-from arena.rating.comparisons import FloatArray
+from arena.rating.comparisons import BoolArray, FloatArray
 
 _TOLERANCE = 1e-9
 _MOST_STEPS = 200
@@ -32,6 +32,7 @@ def fit(
     ties: FloatArray,
     *,
     start: FloatArray | None = None,
+    together: BoolArray | None = None,
 ) -> FloatArray:
     """The most likely strengths, each round's mean zero, and the logarithm of v: (C + 1, B).
 
@@ -44,6 +45,8 @@ def fit(
         scores: (P, B) what `low` scored in them, a tie half.
         ties: (B,) ties of all pairs together.
         start: (C + 1,) where to begin, zero by default.
+        together: (B, C, C) who are in one component, for rounds without comparisons between
+            components: then strengths can be compared within a component only.
     """
     rounds = games.shape[1]
     answer = np.zeros((met.contestants + 1, rounds))
@@ -53,19 +56,32 @@ def fit(
     for first in range(0, rounds, at_once):
         block = slice(first, first + at_once)
         answer[:, block] = _newton(
-            met, games[:, block], scores[:, block], ties[block], answer[:, block]
+            met,
+            games[:, block],
+            scores[:, block],
+            ties[block],
+            answer[:, block],
+            None if together is None else together[block],
         )
     return answer
 
 
 def _newton(
-    met: Meetings, games: FloatArray, scores: FloatArray, ties: FloatArray, start: FloatArray
+    met: Meetings,
+    games: FloatArray,
+    scores: FloatArray,
+    ties: FloatArray,
+    start: FloatArray,
+    together: BoolArray | None,
 ) -> FloatArray:
     answer = start.copy()
     scored = met.sums(scores, games - scores)
     moving = np.arange(games.shape[1])
     for _ in range(_MOST_STEPS):
-        step = _step(met, games[:, moving], scored[:, moving], ties[moving], answer[:, moving])
+        linked = np.ones((1, 1, 1)) if together is None else together[moving]
+        step = _step(
+            met, games[:, moving], scored[:, moving], ties[moving], answer[:, moving], linked
+        )
         longest = np.abs(step).max(axis=0, initial=0.0)
         step *= np.minimum(1.0, _LONGEST_STEP / np.maximum(longest, 1e-300))
         answer[:, moving] += step
@@ -80,7 +96,12 @@ def _newton(
 
 
 def _step(
-    met: Meetings, games: FloatArray, scored: FloatArray, ties: FloatArray, answer: FloatArray
+    met: Meetings,
+    games: FloatArray,
+    scored: FloatArray,
+    ties: FloatArray,
+    answer: FloatArray,
+    together: FloatArray | BoolArray,
 ) -> FloatArray:
     """(C + 1, B) Newton's step; that of the strengths has mean zero."""
     half_gap = 0.5 * (answer[:-1][met.low] - answer[:-1][met.high])
@@ -96,7 +117,7 @@ def _step(
             (ties - (games * tied).sum(axis=0))[None, :],
         ]
     )
-    curvature = _curvature(met, games, expected, tied)
+    curvature = _curvature(met, games, expected, tied, together)
     # Where there is no top it flattens out; a trace of steepness changes steps, no answer.
     diagonal = np.arange(curvature.shape[1])
     curvature[:, diagonal, diagonal] += 1e-12 * (1.0 + games.sum(axis=0))[:, None]
@@ -104,7 +125,11 @@ def _step(
 
 
 def _curvature(
-    met: Meetings, games: FloatArray, expected: FloatArray, tied: FloatArray
+    met: Meetings,
+    games: FloatArray,
+    expected: FloatArray,
+    tied: FloatArray,
+    together: FloatArray | BoolArray,
 ) -> FloatArray:
     """(B, C + 1, C + 1), the direction of a common shift filled as for Bradley-Terry."""
     last = met.contestants
@@ -116,7 +141,7 @@ def _curvature(
     diagonal = np.arange(last)
     of_contestants = met.totals(weight).T
     found[:, diagonal, diagonal] = of_contestants
-    found[:, :last, :last] += of_contestants.mean(axis=1)[:, None, None] / last
+    found[:, :last, :last] += of_contestants.mean(axis=1)[:, None, None] / last * together
     found[:, :last, last] = found[:, last, :last] = met.sums(both, -both).T
     found[:, last, last] = (games * tied * (1.0 - tied)).sum(axis=0)
     return found

@@ -27,8 +27,11 @@ from arena.rating.comparisons import (
     tally,
 )
 from arena.rating.connectivity import Diagnosis, Status, diagnose
-from arena.rating.parts import Method, Order, Rated, Rules, rate_part
+from arena.rating.lines import Line, blank_lines, fill, rank_across
+from arena.rating.parts import Rated, rate_part
 from arena.rating.ranking import Separation
+from arena.rating.rules import Method, Order, Rules
+from arena.rating.tiers import standing_order, tiers
 from augment.sentences import Sentence, sentence
 
 __all__ = ["Leaderboard", "Line", "Method", "Order", "Unit", "anchored", "rate"]
@@ -38,40 +41,11 @@ PAPER_ROUNDS = 1000
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Line:
-    """One contestant; None where the votes do not determine a number, and the note says why.
-
-    Attributes:
-        rating, lower, upper: Elo points; the mean of those rated together is 1000.
-        rank: As the paper defines it: 1 + the number of others whose lower bound is above `upper`.
-        rank_best, rank_worst: Places that 95 % of the bootstrap rounds lie between.
-        check_lower, check_upper: The interval in closed form (Bradley-Terry only), to compare.
-        part: Who have the same number here are rated together; ratings and ranks of different
-            parts can't be compared.
-    """
-
-    name: str
-    rating: float | None = None
-    lower: float | None = None
-    upper: float | None = None
-    rank: int | None = None
-    rank_best: int | None = None
-    rank_worst: int | None = None
-    check_lower: float | None = None
-    check_upper: float | None = None
-    votes: int = 0
-    wins: int = 0
-    ties: int = 0
-    losses: int = 0
-    part: int = 0
-    note: str = ""
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
 class Leaderboard:
     """All contestants, in the order of the comparisons' names, and how they were rated.
 
     Attributes:
+        order: The numbers of the lines, best first; who has no votes comes last.
         reasons: Why ratings or intervals are missing, none if none is.
         warnings: What to keep in mind.
         seed: Of the draws; the same votes, rules and seed give the same board.
@@ -79,8 +53,7 @@ class Leaderboard:
         experts, scenarios: How many there are among the votes.
         tie_share: Ties among the votes, None without votes.
         tie_strength: v of Davidson's model, None with other methods.
-        degenerate_rounds: Bootstrap rounds whose votes determined no ratings, left out of the
-            intervals.
+        degenerate_rounds: Bootstrap rounds whose votes did not determine everybody's rating.
         covariance: (C, C) of the ratings in squared points, NaN where there is no rating: the
             sandwich of the unit for Bradley-Terry, that of the rounds for other methods. None
             without intervals or where details were not asked for.
@@ -89,6 +62,7 @@ class Leaderboard:
     """
 
     lines: tuple[Line, ...]
+    order: tuple[int, ...]
     status: Status
     reasons: tuple[Sentence, ...]
     warnings: tuple[Sentence, ...] = ()
@@ -104,6 +78,11 @@ class Leaderboard:
     degenerate_rounds: int = 0
     covariance: FloatArray | None = field(default=None, compare=False)
     separation: Separation | None = field(default=None, compare=False)
+
+    @property
+    def standings(self) -> tuple[Line, ...]:
+        """The lines, best first."""
+        return tuple(self.lines[index] for index in self.order)
 
     @property
     def explanation(self) -> str:
@@ -124,9 +103,10 @@ def rate(
 ) -> Leaderboard:
     """Rate all contestants that have votes, with 95 % intervals on the Elo scale, mean 1000.
 
-    Where not everybody can be rated together (groups that never met, or that only won or only
-    lost against the rest), those who can are rated among each other and ranked within their part;
-    the status and the explanation say so.
+    Where not everybody can be rated together, those who can are rated among each other. Ranks
+    then count those who only won against the rest as above it and those who only lost as below,
+    as far as their number of votes shows it; groups that never met are ranked each by itself. The
+    status and the explanation say so.
 
     Args:
         votes: What was voted; contestants without votes get a line without a rating.
@@ -155,22 +135,26 @@ def _rate(votes: Comparisons, rules: Rules) -> Leaderboard:
     present = np.flatnonzero(counted.sum(axis=1)).tolist()
     counting = among(votes, present)
     diagnosis = _diagnose(votes, counting, rules.method)
-    parts = [part for part in diagnosis.parts if len(part) > 1]
-    rated = [
-        rate_part(
-            among(counting, part),
-            rules,
-            diagnosis.status,
-            is_all=len(parts) == 1 and len(part) == len(present),
-        )
-        for part in parts
-    ]
-    lines = _lines(votes.names, counted.tolist(), present, diagnosis)
+    across = tiers(counting, diagnosis, rules.unit)
+    parts = sorted(
+        (part for part in diagnosis.parts if len(part) > 1),
+        key=lambda part: (
+            across.group_of[part[0]],
+            np.delete(across.reached[:, part[0]], part).sum(),
+            part,
+        ),
+    )
+    rated = [rate_part(among(counting, part), rules, diagnosis.status) for part in parts]
+    lines = blank_lines(votes.names, counted.tolist(), present, diagnosis)
     for number, (part, found) in enumerate(zip(parts, rated, strict=True)):
-        _fill(lines, [present[member] for member in part], number, found)
+        fill(lines, [present[member] for member in part], number, found)
+    if len(diagnosis.parts) > len(diagnosis.groups):
+        rank_across(lines, present, across, rules)
+    order = standing_order(across, [lines[index] for index in present])
     whole = rated[0] if len(rated) == 1 and len(parts[0]) == len(present) else None
     return Leaderboard(
         lines=tuple(lines),
+        order=(*(present[one] for one in order), *sorted(set(range(len(lines))) - set(present))),
         status=_status(diagnosis, rated),
         reasons=_once(diagnosis.explanation, *(found.explanation for found in rated)),
         warnings=_once(*(found.warnings for found in rated)),
@@ -185,7 +169,9 @@ def _rate(votes: Comparisons, rules: Rules) -> Leaderboard:
         tie_strength=whole.tie_strength if whole else None,
         degenerate_rounds=max((found.degenerate for found in rated), default=0),
         covariance=_joined(len(lines), present, parts, rated),
-        separation=_widened(whole.separation, len(lines), present) if whole else None,
+        separation=whole.separation.among(np.array(present), len(lines))
+        if whole and whole.separation
+        else None,
     )
 
 
@@ -233,62 +219,8 @@ def _diagnose(votes: Comparisons, counting: Comparisons, method: Method) -> Diag
     return diagnose(counting.names, count_pairs(counting), bounded_anyway=method is Method.ELO)
 
 
-def _lines(
-    names: tuple[str, ...], counted: list[list[int]], present: list[int], diagnosis: Diagnosis
-) -> list[Line]:
-    """The lines without ratings; whoever is alone in a part keeps the note that says why."""
-    notes = dict(zip(present, diagnosis.notes, strict=False))
-    return [
-        Line(
-            name=name,
-            votes=sum(row),
-            wins=row[0],
-            ties=row[1],
-            losses=row[2],
-            part=-1,
-            note=notes.get(index, "") if any(row) else _NO_VOTES,
-        )
-        for index, (name, row) in enumerate(zip(names, counted, strict=True))
-    ]
-
-
-def _fill(lines: list[Line], members: list[int], number: int, found: Rated) -> None:
-    """Put the numbers of a part into its lines."""
-    for place, index in enumerate(members):
-        values: dict[str, Any] = {
-            column: values[place].item()
-            for column, values in found.columns().items()
-            if values is not None
-        }
-        lines[index] = replace(lines[index], part=number, **values)
-
-
-_NO_VOTES = sentence("no votes")
-
-
 def _once(*said: tuple[Sentence, ...]) -> tuple[Sentence, ...]:
     return tuple(dict.fromkeys(one for sentences in said for one in sentences))
-
-
-def _widened(found: Separation | None, contestants: int, present: list[int]) -> Separation | None:
-    """The matrices with rows for those without votes, who are told apart from nobody."""
-    if found is None or len(present) == contestants:
-        return found
-    places = np.ix_(present, present)
-
-    def wide(matrix: FloatArray, fill: float) -> FloatArray:
-        square = np.full((contestants, contestants), fill)
-        square[places] = matrix
-        return square
-
-    return replace(
-        found,
-        above=wide(found.above.astype(np.float64), 0.0) > 0.5,
-        p_value=wide(found.p_value, np.nan),
-        holm=wide(found.holm, np.nan),
-        difference=wide(found.difference, np.nan),
-        error=wide(found.error, np.nan),
-    )
 
 
 def _status(diagnosis: Diagnosis, rated: list[Rated]) -> Status:
@@ -296,6 +228,8 @@ def _status(diagnosis: Diagnosis, rated: list[Rated]) -> Status:
         return Status.UNBOUNDED
     if diagnosis.status is Status.RATED and any(found.lower is None for found in rated):
         return Status.NO_INTERVALS
+    if diagnosis.status is Status.RATED and any(found.is_open for found in rated):
+        return Status.OPEN_INTERVALS
     return diagnosis.status
 
 

@@ -5,64 +5,34 @@ Notation: C contestants, B rounds.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import dataclass
-from enum import StrEnum
 
 import numpy as np
 
-from arena.rating import bradley_terry, davidson, elo, remarks, sandwich
-from arena.rating.bootstrap import Rounds, Unit, interval, resample
-from arena.rating.bradley_terry import Meetings, to_elo
-from arena.rating.comparisons import (
-    BoolArray,
-    Comparisons,
-    FloatArray,
-    PairCounts,
-    count_pairs,
-)
-from arena.rating.connectivity import Determined, Status
-from arena.rating.ranking import Separation, rank_interval, ranks, separation
+from arena.rating import remarks, sandwich
+from arena.rating.bootstrap import Unit, interval
+from arena.rating.comparisons import Comparisons, FloatArray, PairCounts, count_pairs
+from arena.rating.components import Placed, open_interval, placed
+from arena.rating.connectivity import Status
+from arena.rating.fits import Fitted, fitted
+from arena.rating.ranking import Separation, rank_interval, separation, shown_ranks
+from arena.rating.rules import Method, Rules
 from augment.sentences import Sentence
 
-
-class Method(StrEnum):
-    """How votes become ratings."""
-
-    BRADLEY_TERRY = "bt"
-    DAVIDSON = "davidson"
-    ELO = "elo"
-
-
-class Order(StrEnum):
-    """What online Elo shows as its point; its rounds are always shuffled."""
-
-    SHUFFLED = "shuffled"
-    RECORDED = "recorded"
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Rules:
-    """How to rate."""
-
-    method: Method
-    unit: Unit
-    rounds: int
-    seed: int
-    k: float
-    order: Order
-    details: bool
-
-    def __post_init__(self) -> None:
-        if self.rounds < 1:
-            raise ValueError(f"a bootstrap needs at least 1 round, not {self.rounds}")
-        if self.method is Method.ELO and self.unit is not Unit.VOTE:
-            raise ValueError(f"online Elo resamples single votes only, not by {self.unit}")
+_SAME = 1e-6
+"""Points. Rounds that all lie within this say nothing about the spread."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Rated:
-    """What came out for contestants rated together; arrays are (C,), None where undetermined."""
+    """What came out for contestants rated together; arrays are (C,), None where undetermined.
+
+    Attributes:
+        lower, upper: NaN where the votes set no such bound.
+        rank: 0 where it is withheld.
+        notes: Why bounds or ranks are missing; empty for who has all.
+        degenerate: Rounds that did not determine everybody.
+    """
 
     rating: FloatArray | None = None
     lower: FloatArray | None = None
@@ -76,8 +46,14 @@ class Rated:
     separation: Separation | None = None
     tie_strength: float | None = None
     degenerate: int = 0
+    notes: tuple[Sentence | str, ...] = ()
     explanation: tuple[Sentence, ...] = ()
     warnings: tuple[Sentence, ...] = ()
+
+    @property
+    def is_open(self) -> bool:
+        """Whether somebody has an interval without one of its ends, or none beside others'."""
+        return self.lower is not None and any(self.notes)
 
     def columns(self) -> dict[str, np.ndarray | None]:
         """What goes into the lines of the table, by the name that it has there."""
@@ -86,146 +62,119 @@ class Rated:
         return {name: getattr(self, name) for name in names + checks}
 
 
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class _Fitted:
-    """Ratings of the data (C,) and of the rounds that determine any (C, b)."""
-
-    rating: FloatArray
-    samples: FloatArray
-    strengths: FloatArray | None = None
-    tie_strength: float | None = None
-
-
-def rate_part(votes: Comparisons, rules: Rules, status: Status, *, is_all: bool = True) -> Rated:
+def rate_part(votes: Comparisons, rules: Rules, status: Status) -> Rated:
     """Rate contestants who have votes and can all be rated among each other.
 
     Args:
         votes: In which only they met.
         rules: How.
         status: Of the data; where every vote is a tie there are no intervals.
-        is_all: Whether there is nobody else, so that sentences need not say whom they are about.
     """
     counts = count_pairs(votes)
-    if rules.method is Method.ELO:
-        fitted = _elo(votes, rules)
-    elif rules.method is Method.DAVIDSON and 0 < counts.outcomes[:, 1].sum() < votes.votes:
-        found = _davidson(votes, counts, rules)
-        if found is None:
-            return Rated(explanation=(remarks.NO_DAVIDSON,))
-        fitted = found
-    else:
-        fitted = _bradley_terry(votes, counts, rules)
-    degenerate = rules.rounds - fitted.samples.shape[1]
-    among = () if is_all else votes.names
-    missing = remarks.why_no_interval(
-        fitted.samples, rounds=rules.rounds, unit=rules.unit, among=among
-    )
-    if missing or status is Status.ALL_TIES:
-        return Rated(
-            rating=fitted.rating,
-            rank=np.ones(len(fitted.rating), dtype=np.int64),
-            tie_strength=fitted.tie_strength,
-            degenerate=degenerate,
-            explanation=() if status is Status.ALL_TIES else missing,
-            warnings=_notes_on_method(rules),
+    found = fitted(votes, counts, rules)
+    if found is None:
+        notes = (remarks.NOT_RATED,) * len(votes.names)
+        return Rated(explanation=(remarks.NO_DAVIDSON,), notes=notes)
+    if status is Status.ALL_TIES:
+        return _without_intervals(found, rules, remarks.ONLY_TIES, ())
+    everywhere = placed(found.rating, found.samples, found.loose)
+    if _are_all_the_same(everywhere.values):
+        return _without_intervals(
+            found, rules, remarks.NO_SPREAD, (remarks.ALL_THE_SAME[rules.unit],)
         )
-    return _with_intervals(votes, counts, rules, fitted, degenerate)
+    if everywhere.are_finite:
+        bounds = interval(everywhere.values)
+    else:
+        bounds = open_interval(everywhere.values)
+    if np.isnan(bounds).all():
+        lost = found.loose.values.shape[1]
+        said = remarks.why_no_interval(votes.names, lost=lost, rounds=rules.rounds)
+        return _without_intervals(found, rules, remarks.TOO_FEW, said)
+    return _with_intervals(votes, counts, rules, found, everywhere, bounds)
+
+
+def _are_all_the_same(values: FloatArray) -> bool:
+    """Whether no finite rating (C, B) differs from another one of the same contestant."""
+    highest = np.where(np.isfinite(values), values, -np.inf).max(axis=1, initial=-np.inf)
+    lowest = np.where(np.isfinite(values), values, np.inf).min(axis=1, initial=np.inf)
+    known = np.isfinite(highest)
+    return bool(known.any()) and bool((highest - lowest)[known].max() < _SAME)
+
+
+def _without_intervals(
+    fit: Fitted, rules: Rules, note: Sentence, explanation: tuple[Sentence, ...]
+) -> Rated:
+    return Rated(
+        rating=fit.rating,
+        tie_strength=fit.tie_strength,
+        degenerate=fit.loose.values.shape[1],
+        notes=(note,) * len(fit.rating),
+        explanation=explanation,
+        warnings=_notes_on_method(rules),
+    )
 
 
 def _with_intervals(
-    votes: Comparisons, counts: PairCounts, rules: Rules, fitted: _Fitted, degenerate: int
+    votes: Comparisons,
+    counts: PairCounts,
+    rules: Rules,
+    fit: Fitted,
+    everywhere: Placed,
+    bounds: tuple[FloatArray, FloatArray],
 ) -> Rated:
     few = remarks.few_clusters(votes, rules.unit)
-    lower, upper = interval(fitted.samples)
+    lower, upper = bounds
     if few and rules.unit is not Unit.TWO_WAY:
         wider = sandwich.factor(few) / sandwich.NORMAL
-        lower = fitted.rating + wider * (lower - fitted.rating)
-        upper = fitted.rating + wider * (upper - fitted.rating)
-    best, worst = rank_interval(fitted.samples)
+        lower = fit.rating + wider * (lower - fit.rating)
+        upper = fit.rating + wider * (upper - fit.rating)
+    best, worst = rank_interval(everywhere.values)
+    unbounded = np.isnan(lower) & np.isnan(upper)
+    best[unbounded] = worst[unbounded] = 0
+    reference = everywhere.reference
+    rank = shown_ranks(lower, upper, average=float(fit.rating[reference].mean()))
     covariance = check = None
-    if rules.details and fitted.strengths is not None:
-        covariance = sandwich.covariance(votes, counts, fitted.strengths, rules.unit)
-        check = sandwich.factor(few) * np.sqrt(covariance.diagonal())
-    elif rules.details:
-        covariance = np.cov(fitted.samples)
+    if rules.details and fit.strengths is not None:
+        covariance = sandwich.covariance(votes, counts, fit.strengths, rules.unit)
+        spread = sandwich.relative_to(covariance, reference)
+        check = sandwich.factor(few) * np.sqrt(spread.diagonal())
+        check[np.isnan(lower) | np.isnan(upper)] = np.nan
+    elif rules.details and fit.samples.shape[1] > 1:
+        covariance = np.cov(fit.samples)
+    degenerate = fit.loose.values.shape[1]
+    notes = remarks.notes_on_bounds(lower, upper, rank)
     return Rated(
-        rating=fitted.rating,
+        rating=fit.rating,
         lower=lower,
         upper=upper,
-        rank=ranks(lower, upper),
+        rank=rank,
         rank_best=best,
         rank_worst=worst,
-        check_lower=None if check is None else fitted.rating - check,
-        check_upper=None if check is None else fitted.rating + check,
+        check_lower=None if check is None else fit.rating - check,
+        check_upper=None if check is None else fit.rating + check,
         covariance=covariance,
-        separation=separation(fitted.rating, fitted.samples) if rules.details else None,
-        tie_strength=fitted.tie_strength,
+        separation=_separation(fit.rating, everywhere) if rules.details else None,
+        tie_strength=fit.tie_strength,
         degenerate=degenerate,
+        notes=notes,
+        explanation=remarks.who_is_open(votes.names, notes),
         warnings=_notes_on_method(rules)
         + remarks.warnings(votes, unit=rules.unit, rounds=rules.rounds, degenerate=degenerate),
     )
 
 
+def _separation(rating: FloatArray, everywhere: Placed) -> Separation | None:
+    """All pairs of the reference, judged by the rounds that determine all of it."""
+    members = np.flatnonzero(everywhere.reference)
+    samples = everywhere.values[members]
+    if not everywhere.are_finite:
+        fine = np.asarray(np.isfinite(samples).all(axis=0))
+        if 2 * fine.sum() < len(fine):
+            return None
+        samples = samples[:, fine]
+    found = separation(rating[members], samples)
+    return found.among(members, len(rating))
+
+
 def _notes_on_method(rules: Rules) -> tuple[Sentence, ...]:
     return (remarks.ELO_NOTE,) if rules.method is Method.ELO else ()
-
-
-# --- The methods ---------------------------------------------------------------------------------
-
-
-def _elo(votes: Comparisons, rules: Rules) -> _Fitted:
-    samples = elo.resampled(votes, rounds=rules.rounds, seed=rules.seed, k=rules.k)
-    if rules.order is Order.RECORDED:
-        return _Fitted(rating=elo.replay(votes, k=rules.k), samples=samples)
-    return _Fitted(rating=np.median(samples, axis=1), samples=samples)
-
-
-def _bradley_terry(votes: Comparisons, counts: PairCounts, rules: Rules) -> _Fitted:
-    met = Meetings(contestants=len(votes.names), low=counts.low, high=counts.high)
-    point = bradley_terry.newton(met, counts.games[:, None], counts.scores[:, None])[:, 0]
-    inverse = bradley_terry.inverse_curvature(met, counts.games, point) * counts.games.sum()
-    rating = to_elo(point)
-    samples = [np.empty((len(rating), 0))]
-    for drawn, fine in _rounds(votes, counts, rules):
-        games, scores = drawn.games, drawn.scores
-        if not fine.all():
-            games, scores = games[:, fine], scores[:, fine]
-        strengths = bradley_terry.fit_rounds(met, games, scores, start=point, inverse=inverse)
-        samples.append(to_elo(strengths))
-    return _Fitted(rating=rating, samples=np.hstack(samples), strengths=point)
-
-
-def _davidson(votes: Comparisons, counts: PairCounts, rules: Rules) -> _Fitted | None:
-    """None where the votes determine no ratings in this model."""
-    met = Meetings(contestants=len(votes.names), low=counts.low, high=counts.high)
-    ties = counts.outcomes[:, 1].sum(keepdims=True).astype(np.float64)
-    point = davidson.fit(met, counts.games[:, None], counts.scores[:, None], ties)[:, 0]
-    if np.isnan(point).any():
-        return None
-    samples = [np.empty((len(votes.names), 0))]
-    for drawn, fine in _rounds(votes, counts, rules):
-        fine = fine & (drawn.ties > 0) & (drawn.ties < drawn.games.sum(axis=0))
-        games, scores, ties = drawn.games[:, fine], drawn.scores[:, fine], drawn.ties[fine]
-        answers = davidson.fit(met, games, scores, ties, start=point)[:-1]
-        samples.append(to_elo(answers[:, ~np.isnan(answers[0])]))
-    return _Fitted(
-        rating=to_elo(point[:-1]),
-        samples=np.hstack(samples),
-        tie_strength=float(np.exp(point[-1])),
-    )
-
-
-def _rounds(
-    votes: Comparisons, counts: PairCounts, rules: Rules
-) -> Iterator[tuple[Rounds, BoolArray]]:
-    """Blocks of rounds, and which of each block determine ratings."""
-    determined = Determined(
-        contestants=len(votes.names),
-        low=counts.low,
-        high=counts.high,
-        games=counts.games,
-        scores=counts.scores,
-    )
-    drawn = resample(votes, counts, unit=rules.unit, rounds=rules.rounds, seed=rules.seed)
-    for block in drawn:
-        yield block, determined.among(block.games, block.scores)

@@ -45,38 +45,74 @@ def rank_text(rank: int | None) -> str:
 def interval_text(rating: float | None, lower: float | None, upper: float | None) -> str:
     """The interval as the paper prints it: -9/+11 around the printed rating.
 
-    Where a side would round to nothing, both have a decimal: no interval has the width zero.
+    Where a side would round to nothing, both have a decimal: no interval has the width zero. A
+    side without a bound is infinite, and a bound without a rating stands as it is: ≥ 1118.
     """
-    if rating is None or lower is None or upper is None:
+    if lower is None and upper is None:
         return UNKNOWN
-    below, above = round(lower) - round(rating), round(upper) - round(rating)
-    if below and above:
-        return f"{below:+d}/{above:+d}"
+    if rating is None:
+        return f"≤ {upper:.0f}" if lower is None else f"≥ {lower:.0f}"
+    if lower is None or upper is None:
+        below = "-∞" if lower is None else f"{min(round(lower) - round(rating), -1):+d}"
+        above = "+∞" if upper is None else f"{max(round(upper) - round(rating), 1):+d}"
+        return f"{below}/{above}"
+    down, up = round(lower) - round(rating), round(upper) - round(rating)
+    if down and up:
+        return f"{down:+d}/{up:+d}"
     return f"-{max(rating - lower, 0.1):.1f}/+{max(upper - rating, 0.1):.1f}"
 
 
+def notes_by_reason(notes: Iterable[tuple[str, str]]) -> list[str]:
+    """What is missing in lines, those of one reason together: "a, b: too few votes".
+
+    Args:
+        notes: Names and what is missing in their lines, empty where nothing is.
+    """
+    found: dict[str, list[str]] = {}
+    for name, note in notes:
+        if note:
+            found.setdefault(note, []).append(name)
+    return [f"{', '.join(names)}: {note}" for note, names in found.items()]
+
+
 def latex_table(
-    rows: Iterable[Sequence[str]], *, comments: Iterable[str], caption: str = CAPTION
+    rows: Iterable[Sequence[str]],
+    *,
+    comments: Iterable[str],
+    notes: Iterable[str] = (),
+    caption: str = CAPTION,
 ) -> str:
     """The paper's table; it needs booktabs and xcolor with the option `table`.
 
     Args:
-        rows: Model, rank, rating, interval and votes, as TeX.
+        rows: Model as TeX, then rank, rating, interval and votes as they are printed.
         comments: Lines to put before it, as plain text.
+        notes: Lines to put beneath it, as plain text.
         caption: As TeX.
     """
     lines = [
         r"% \usepackage{booktabs} and \usepackage[table]{xcolor}",
         *(f"% {one_line(comment)}" for comment in comments),
         _HEAD,
-        *("    " + " & ".join(row) + r"\\" for row in rows),
+        *("    " + " & ".join([model, *map(_in_tex, rest)]) + r"\\" for model, *rest in rows),
         r"    \bottomrule",
+        *(
+            rf"    \multicolumn{{5}}{{p{{0.8\linewidth}}}}{{\footnotesize {escape(note)}}}\\"
+            for note in notes
+        ),
         r"    \end{tabular}",
         rf"    \caption{{{caption}}}",
         r"    \label{tab:elo}",
         r"\end{table}",
     ]
     return "\n".join(lines) + "\n"
+
+
+def _in_tex(number: str) -> str:
+    """A printed number; the signs of open intervals are mathematics."""
+    for sign, command in (("∞", r"$\infty$"), ("≤", r"$\leq$"), ("≥", r"$\geq$")):
+        number = number.replace(sign, command)
+    return number
 
 
 def escape(text: str) -> str:

@@ -6,13 +6,15 @@ Notation: C contestants, B rounds.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from typing import Self
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from arena.rating.bootstrap import LEVEL, interval
+from arena.rating.bootstrap import interval
 from arena.rating.comparisons import BoolArray, FloatArray, IntArray
+from arena.rating.estimate import LEVEL
 
 _NUMBERS_AT_ONCE = 2_000_000
 
@@ -31,16 +33,46 @@ def ranks(lower: ArrayLike, upper: ArrayLike) -> IntArray:
     return np.asarray(1 + above.sum(axis=1), dtype=np.int64)
 
 
+def shown_ranks(lower: FloatArray, upper: FloatArray, *, average: float) -> IntArray:
+    """Ranks by the bounds that there are; 0 where these do not decide one.
+
+    Nobody is first for want of bounds. Without an upper bound the first rank takes a lower bound
+    above the average, without a lower one it is withheld; all other ranks rest on somebody's
+    lower bound above the own upper one.
+
+    Args:
+        lower: (C,) bounds, NaN where there is none.
+        upper: (C,) bounds, NaN where there is none.
+        average: The rating of an average contestant.
+    """
+    no_lower, no_upper = np.isnan(lower), np.isnan(upper)
+    found = ranks(np.where(no_lower, -np.inf, lower), np.where(no_upper, np.inf, upper))
+    is_above = ~no_lower & (np.where(no_lower, -np.inf, lower) > average)
+    decided = (found > 1) | ~(no_lower | no_upper) | (no_upper & is_above)
+    return np.where(decided, found, 0)
+
+
 def rank_interval(samples: FloatArray) -> tuple[IntArray, IntArray]:
     """(C,), (C,): between which places 95 % of the rounds (C, B) put each contestant.
 
-    A place is one plus the number of others who are rated higher in that round.
+    A place is one plus the number of others who are rated higher in that round. Where somebody's
+    rating is unknown (NaN) the best place takes them for the first and the worst for the last.
     """
-    order = np.argsort(-samples, axis=0, kind="stable")
-    places = np.empty(samples.shape, dtype=np.int64)
-    np.put_along_axis(places, order, np.arange(1, len(samples) + 1)[:, None], axis=0)
-    lower, upper = interval(places.astype(np.float64))
+    unknown = np.isnan(samples)
+    if not unknown.any():
+        lower, upper = interval(_places(samples))
+    else:
+        lower, _ = interval(_places(np.where(unknown, np.inf, samples)))
+        _, upper = interval(_places(np.where(unknown, -np.inf, samples)))
     return np.floor(lower).astype(np.int64), np.ceil(upper).astype(np.int64)
+
+
+def _places(samples: FloatArray) -> FloatArray:
+    """(C, B)."""
+    order = np.argsort(-samples, axis=0, kind="stable")
+    places = np.empty(samples.shape)
+    np.put_along_axis(places, order, np.arange(1.0, len(samples) + 1.0)[:, None], axis=0)
+    return places
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -63,6 +95,28 @@ class Separation:
     critical: float
     difference: FloatArray
     error: FloatArray
+
+    def among(self, members: IntArray, contestants: int) -> Self:
+        """The same with rows for all: these members' stay, the others differ from nobody."""
+        if len(members) == contestants:
+            return self
+        places = np.ix_(members, members)
+
+        def wide(matrix: FloatArray) -> FloatArray:
+            square = np.full((contestants, contestants), np.nan)
+            square[places] = matrix
+            return square
+
+        above = np.zeros((contestants, contestants), dtype=bool)
+        above[places] = self.above
+        return replace(
+            self,
+            above=above,
+            p_value=wide(self.p_value),
+            holm=wide(self.holm),
+            difference=wide(self.difference),
+            error=wide(self.error),
+        )
 
 
 def separation(rating: FloatArray, samples: FloatArray) -> Separation:

@@ -5,15 +5,10 @@ from __future__ import annotations
 import numpy as np
 
 from arena.rating import elo, sandwich
-from arena.rating.bootstrap import LEVEL, Unit
-from arena.rating.comparisons import Comparisons, FloatArray, renumbered
+from arena.rating.bootstrap import Unit
+from arena.rating.comparisons import Comparisons, FloatArray, IntArray, renumbered
+from arena.rating.connectivity import few_of
 from augment.sentences import Sentence, sentence
-
-MOST_DEGENERATE = (1.0 - LEVEL) / 2.0
-"""The largest share of rounds without ratings that still leaves a percentile to read."""
-
-_SAME = 1e-6
-"""Points. Rounds that all lie within this say nothing about the spread."""
 
 
 def _clusters(votes: Comparisons, unit: Unit) -> dict[str, int]:
@@ -33,42 +28,59 @@ def few_clusters(votes: Comparisons, unit: Unit) -> int | None:
     return smallest if smallest < sandwich.FEW_CLUSTERS else None
 
 
-def why_no_interval(
-    samples: FloatArray, *, rounds: int, unit: Unit, among: tuple[str, ...]
-) -> tuple[Sentence, ...]:
-    """Why rounds (C, b) of those that determined ratings have no percentiles; nothing if they do.
+def why_no_interval(names: tuple[str, ...], *, lost: int, rounds: int) -> tuple[Sentence, ...]:
+    """Why nobody of a part has a bound.
 
     Args:
-        samples: Ratings in the rounds that determined any.
+        names: Of the part.
+        lost: Rounds that did not determine everybody.
         rounds: How many were drawn.
-        unit: What was drawn.
-        among: Whom it is about, nobody where it is about all.
     """
-    degenerate = rounds - samples.shape[1]
-    if degenerate > MOST_DEGENERATE * rounds:
-        if among:
-            return (
-                sentence(
-                    "Among %(names)s the votes determined no ratings in %(lost)s of %(rounds)s "
-                    "resamples, so intervals can't be given: there are too few votes, or hardly "
-                    "any against some contestant.",
-                    names=among,
-                    lost=degenerate,
-                    rounds=rounds,
-                ),
-            )
+    return (
+        sentence(
+            "Among %(names)s the votes determined no ratings in %(lost)s of %(rounds)s "
+            "resamples, so intervals can't be given: there are too few votes, or hardly "
+            "any against some contestant.",
+            names=few_of(names, mark="…"),
+            lost=lost,
+            rounds=rounds,
+        ),
+    )
+
+
+def notes_on_bounds(
+    lower: FloatArray, upper: FloatArray, rank: IntArray
+) -> tuple[Sentence | str, ...]:
+    """(C,) which bounds or ranks are missing and why; bounds NaN and ranks 0 are missing."""
+    return tuple(
+        _MISSING[no_lower, no_upper, no_rank]
+        for no_lower, no_upper, no_rank in zip(
+            np.isnan(lower).tolist(), np.isnan(upper).tolist(), (rank == 0).tolist(), strict=True
+        )
+    )
+
+
+def who_is_open(names: tuple[str, ...], notes: tuple[Sentence | str, ...]) -> tuple[Sentence, ...]:
+    """That some lack bounds, and who; nothing if nobody does."""
+    lacking = tuple(name for name, note in zip(names, notes, strict=True) if note)
+    if not lacking:
+        return ()
+    if len(lacking) == len(names):
+        names = few_of(names, mark="…")
         return (
             sentence(
-                "In %(lost)s of %(rounds)s resamples the votes determined no ratings, so "
-                "intervals can't be given: there are too few votes, or hardly any against some "
-                "contestant.",
-                lost=degenerate,
-                rounds=rounds,
+                "The votes set no two bounds for %(names)s: too few votes, or hardly any score on "
+                "one side. The lines say what is missing.",
+                names=names,
             ),
         )
-    if np.ptp(samples, axis=1).max() < _SAME:
-        return (_ALL_THE_SAME[unit],)
-    return ()
+    return (
+        sentence(
+            "The votes set no two bounds for %(names)s: too few votes, or hardly any score on "
+            "one side. The lines say what is missing; the others' intervals do not rest on them.",
+            names=few_of(lacking, mark="…"),
+        ),
+    )
 
 
 def warnings(
@@ -88,8 +100,8 @@ def warnings(
     if degenerate:
         said.append(
             sentence(
-                "In %(lost)s of %(rounds)s resamples the votes determined no ratings; these are "
-                "left out of the intervals.",
+                "In %(lost)s of %(rounds)s resamples the votes did not determine everybody's "
+                "rating; there it counts as far above or below the others, as the votes say.",
                 lost=degenerate,
                 rounds=rounds,
             )
@@ -121,7 +133,7 @@ NO_DAVIDSON = sentence(
     "Bradley-Terry rates them."
 )
 
-_ALL_THE_SAME = {
+ALL_THE_SAME = {
     Unit.VOTE: sentence(
         "Every resample by vote gave the same ratings, so intervals can't be given: there is too "
         "little that could have come out otherwise."
@@ -138,6 +150,47 @@ _ALL_THE_SAME = {
         "Every resample by expert and scenario gave the same ratings, so intervals can't be "
         "given: there is too little that could have come out otherwise."
     ),
+}
+
+
+def note_with_rank(note: Sentence | str, rank: int | None) -> Sentence | str:
+    """The note of a line whose rank over all parts is decided, or None, unlike within its part."""
+    if rank is None:
+        return _UNRANKED.get(note, note or _NO_RANK_ACROSS)
+    return _RANKED.get(note, note)
+
+
+NO_SPREAD = sentence("no interval and no rank: every resample gave the same rating")
+ONLY_TIES = sentence("no interval and no rank: every vote is a tie")
+TOO_FEW = sentence("no interval and no rank: too few votes")
+NOT_RATED = sentence("no rating by this model")
+_NO_RANK_ACROSS = sentence("no rank: too few votes against those above")
+
+_UNRANKED: dict[str, Sentence] = {
+    "no upper limit": sentence("no upper limit; no rank: too few votes say that it is above"),
+    "no lower limit": sentence("no lower limit; no rank: too few votes say that it is below"),
+    "no limits among equals": sentence("no limits among equals; no rank"),
+}
+"""Notes of those without a rating, where the votes decide no rank either."""
+
+_MISSING: dict[tuple[bool, bool, bool], Sentence | str] = {
+    (False, False, False): "",
+    (True, False, False): sentence("no lower bound: hardly any score"),
+    (False, True, False): sentence("no upper bound: hardly anybody scored"),
+    (True, False, True): sentence(
+        "no lower bound: hardly any score; no rank, because the upper bound tells it from nobody"
+    ),
+    (False, True, True): sentence(
+        "no upper bound: hardly anybody scored; no rank, because the lower bound is not above "
+        "the average"
+    ),
+    (True, True, True): TOO_FEW,
+}
+"""By whether the lower bound, the upper bound and the rank are missing."""
+
+_RANKED = {
+    str(_MISSING[lower, upper, True]): _MISSING[lower, upper, False]
+    for lower, upper in ((True, False), (False, True))
 }
 
 _ONLY_ONE = {

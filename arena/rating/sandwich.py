@@ -17,7 +17,14 @@ import numpy as np
 
 from arena.rating.bootstrap import Unit
 from arena.rating.bradley_terry import ELO_PER_LOGIT, Meetings, inverse_curvature
-from arena.rating.comparisons import Comparisons, FloatArray, IntArray, PairCounts, renumbered
+from arena.rating.comparisons import (
+    BoolArray,
+    Comparisons,
+    FloatArray,
+    IntArray,
+    PairCounts,
+    renumbered,
+)
 
 FEW_CLUSTERS = 20
 NORMAL = 1.959963984540054
@@ -56,6 +63,14 @@ def covariance(
             - _of_clusters(votes, surprise, cell_of, len(cells))
         )
     return _without_negative_parts(ELO_PER_LOGIT**2 * inverse @ spread @ inverse)
+
+
+def relative_to(found: FloatArray, reference: BoolArray) -> FloatArray:
+    """(C, C) of ratings relative to the mean of a reference (C,) instead of everybody's."""
+    if reference.all():
+        return found
+    of_mean = found[:, reference].mean(axis=1)
+    return np.asarray(found - of_mean[:, None] - of_mean[None, :] + of_mean[reference].mean())
 
 
 def factor(clusters: int | None) -> float:

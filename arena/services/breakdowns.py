@@ -21,6 +21,7 @@ from arena.rating.leaderboard import Method, rate
 from arena.rating.win_rates import win_rates
 from arena.services.vote_arrays import VoteArrays, some
 from augment.models import Contestant, Scenario
+from augment.sentences import Sentence
 from augment.services.displacement import of_rows, summarise
 
 Document = dict[str, Any]
@@ -159,9 +160,10 @@ def _one_type(
                 "lower": line.lower,
                 "upper": line.upper,
                 "rank": line.rank,
+                "note": line.note.as_document() if isinstance(line.note, Sentence) else None,
                 "votes": line.votes,
                 "few": line.votes < FEW_VOTES,
             }
-            for line in board.lines
+            for line in board.standings
         ],
     }

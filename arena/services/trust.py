@@ -76,7 +76,8 @@ def board_document(board: Leaderboard) -> Document:
     """What a rating says beside its lines.
 
     `reasons` and `warnings` are sentences as `read_sentence` takes them; `check` are the intervals
-    in closed form, `above` the pairs that differ with all of them judged at once, both by slug.
+    in closed form, `above` the pairs that differ with all of them judged at once, both by slug;
+    `order` are the slugs, best first.
     """
     names = [line.name for line in board.lines]
     found = board.separation
@@ -91,6 +92,7 @@ def board_document(board: Leaderboard) -> Document:
             for line in board.lines
             if line.check_lower is not None
         },
+        "order": [line.name for line in board.standings],
         "parts": {line.name: line.part for line in board.lines if line.part >= 0},
         "above": None
         if found is None
@@ -132,7 +134,9 @@ def claims(arrays: VoteArrays, board: Leaderboard, *, unit: Unit, seed: int) -> 
     return {
         "half_width": typical,
         "independent": {
-            line.name: [line.lower, line.upper] for line in alone.lines if line.lower is not None
+            line.name: [line.lower, line.upper]
+            for line in alone.lines
+            if line.lower is not None and line.upper is not None
         },
         "design_effect": float(np.median(effects)) if effects else None,
         "planning": []

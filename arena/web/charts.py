@@ -23,14 +23,20 @@ BAR_LEFT, BAR_RIGHT = 6.0, 254.0
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class IntervalRow:
-    """One contestant: a dot at the rating, a line over its interval."""
+    """One contestant: a dot at the rating if there is one, a line over its interval.
+
+    Attributes:
+        is_open_low, is_open_high: There is no such bound; the line goes on to the edge.
+    """
 
     name: str
     y: float
     low_x: float
-    x: float
+    x: float | None
     high_x: float
-    rating: float
+    is_open_low: bool
+    is_open_high: bool
+    value: str
     title: str
     is_simulated: bool
 
@@ -56,11 +62,13 @@ class IntervalChart:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Bar:
-    """An interval inside a table's cell; the middle is a dot."""
+    """An interval inside a table's cell; the middle is a dot, an open end goes on to the edge."""
 
     low_x: float
-    x: float
+    x: float | None
     high_x: float
+    is_open_low: bool
+    is_open_high: bool
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -76,27 +84,24 @@ Span = tuple[float, float]
 
 
 def interval_chart(table: Sequence[Row], span: Span | None = None) -> IntervalChart | None:
-    """The chart of all lines with a rating and an interval, None if no line has both.
+    """The chart of all lines with an interval, be it open on one side; None without any.
 
     Args:
         table: Lines from top to bottom.
         span: What the axis has to cover beside them, so that several charts have the same.
     """
-    rated = [
-        (line, line.lower, line.elo, line.upper)
-        for line in table
-        if line.lower is not None and line.elo is not None and line.upper is not None
-    ]
-    if not rated:
+    drawn = [line for line in table if _numbers(line.lower, line.elo, line.upper)]
+    if not drawn:
         return None
-    ends = [*(low for _, low, _, _ in rated), *(high for *_, high in rated), *(span or ())]
+    ends = [one for line in drawn for one in _numbers(line.lower, line.elo, line.upper)]
+    ends += span or ()
     marks = ticks(min(ends), max(ends))
     first, extent = marks[0], marks[-1] - marks[0]
 
     def at(value: float) -> float:
         return round(LEFT + (RIGHT - LEFT) * (value - first) / extent, 1)
 
-    bottom = TOP + ROW * len(rated)
+    bottom = TOP + ROW * len(drawn)
     return IntervalChart(
         width=WIDTH,
         height=bottom + 26.0,
@@ -105,20 +110,16 @@ def interval_chart(table: Sequence[Row], span: Span | None = None) -> IntervalCh
             IntervalRow(
                 name=_short(line.name),
                 y=TOP + ROW * (n + 0.5),
-                low_x=at(low),
-                x=at(rating),
-                high_x=at(high),
-                rating=rating,
-                title=_("%(name)s: %(rating)s, 95 %% from %(low)s to %(high)s")
-                % {
-                    "name": line.model,
-                    "rating": f"{rating:.0f}",
-                    "low": f"{low:.0f}",
-                    "high": f"{high:.0f}",
-                },
+                low_x=LEFT if line.lower is None else at(line.lower),
+                x=None if line.elo is None else at(line.elo),
+                high_x=RIGHT if line.upper is None else at(line.upper),
+                is_open_low=line.lower is None,
+                is_open_high=line.upper is None,
+                value=line.interval_text if line.elo is None else line.elo_text,
+                title=_title(line),
                 is_simulated=line.simulated,
             )
-            for n, (line, low, rating, high) in enumerate(rated)
+            for n, line in enumerate(drawn)
         ],
         ticks=[Tick(x=at(mark), label=f"{mark:g}") for mark in marks],
     )
@@ -131,18 +132,20 @@ def bars(
     """Bars for a table's cells, None if no line has an interval.
 
     Args:
-        values: Key, lower end, middle and upper end of each line.
+        values: Key, lower end, middle and upper end of each line; with one end alone the bar goes
+            on to the edge.
         span: The axis; round numbers around the lines unless given.
     """
     known = [
         (key, low, middle, high)
         for key, low, middle, high in values
-        if low is not None and middle is not None and high is not None
+        if _numbers(low, middle, high)
     ]
     if not known:
         return None
     if span is None:
-        marks = ticks(min(low for _, low, _, _ in known), max(high for *_, high in known))
+        ends = [one for _, low, middle, high in known for one in _numbers(low, middle, high)]
+        marks = ticks(min(ends), max(ends))
         span = marks[0], marks[-1]
     first, last = span
 
@@ -150,8 +153,36 @@ def bars(
         share = (min(max(value, first), last) - first) / (last - first)
         return round(BAR_LEFT + (BAR_RIGHT - BAR_LEFT) * share, 1)
 
-    found = {key: Bar(low_x=at(low), x=at(mid), high_x=at(high)) for key, low, mid, high in known}
+    found = {
+        key: Bar(
+            low_x=BAR_LEFT if low is None else at(low),
+            x=None if middle is None else at(middle),
+            high_x=BAR_RIGHT if high is None else at(high),
+            is_open_low=low is None,
+            is_open_high=high is None,
+        )
+        for key, low, middle, high in known
+    }
     return Bars(first=first, last=last, by_key=found)
+
+
+def _numbers(lower: float | None, middle: float | None, upper: float | None) -> list[float]:
+    """What of an interval there is; nothing without any bound."""
+    if lower is None and upper is None:
+        return []
+    return [one for one in (lower, middle, upper) if one is not None]
+
+
+def _title(line: Row) -> str:
+    """What the chart says of a line when asked."""
+    if line.elo is None or line.lower is None or line.upper is None:
+        return f"{line.model}: {line.elo_text} ({line.interval_text})"
+    return _("%(name)s: %(rating)s, 95 %% from %(low)s to %(high)s") % {
+        "name": line.model,
+        "rating": f"{line.elo:.0f}",
+        "low": f"{line.lower:.0f}",
+        "high": f"{line.upper:.0f}",
+    }
 
 
 def _short(name: str) -> str:

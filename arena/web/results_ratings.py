@@ -10,6 +10,7 @@ from arena.exports.tables import LeaderboardTable, Row, sentences_of
 from arena.models import Snapshot
 from arena.web.charts import bars, interval_chart
 from arena.web.heat import heat_map
+from augment.sentences import read_sentence
 
 Context = dict[str, Any]
 """What a tab's template needs."""
@@ -60,15 +61,16 @@ def types(snapshot: Snapshot, table: LeaderboardTable) -> Context:
         end
         for part in found
         for line in part["lines"]
-        if line["lower"] is not None
         for end in (line["lower"], line["upper"])
+        if end is not None
     ]
     span = (min(ends), max(ends)) if ends else None
     by_name = {row.slug: row.name for row in table.rows}
     parts = []
     for part in found:
         rows = [_row(line, names[line["slug"]]) for line in part["lines"] if line["votes"]]
-        rows.sort(key=lambda row: (row.elo is None, -(row.elo or 0.0), row.slug))
+        if any("note" not in line for line in part["lines"]):  # of an earlier version
+            rows.sort(key=lambda row: (row.elo is None, -(row.elo or 0.0), row.slug))
         few = any(row.votes < FEW for row in rows)
         chart = interval_chart(rows, span)
         reasons = sentences_of(part.get("reasons", [part["status"]]), by_name)
@@ -122,7 +124,7 @@ def _row(line: Context, row: Row) -> Row:
         wins=0,
         ties=0,
         losses=0,
-        note="",
+        note=read_sentence(line["note"]) if line.get("note") else "",
     )
 
 

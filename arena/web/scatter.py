@@ -30,6 +30,7 @@ class Point:
     """A point in units of the picture.
 
     Attributes:
+        is_open_low, is_open_high: The interval has no such bound and goes on to the edge.
         badge_x, badge_y: Where its number stands; beside it where another one is in the way.
     """
 
@@ -41,6 +42,8 @@ class Point:
     badge_y: float
     low_y: float | None
     high_y: float | None
+    is_open_low: bool
+    is_open_high: bool
     group: str
     is_simulated: bool
 
@@ -123,8 +126,10 @@ def scatter(plot: Plot | None, *, width: float = WIDE) -> Scatter | None:
                 y=y_of(one.y),
                 badge_x=badge[0],
                 badge_y=badge[1],
-                low_y=None if one.lower is None else y_of(one.lower),
-                high_y=None if one.upper is None else y_of(one.upper),
+                low_y=y_of(up[0] if one.lower is None else one.lower) if one.has_bound else None,
+                high_y=y_of(up[-1] if one.upper is None else one.upper) if one.has_bound else None,
+                is_open_low=one.has_bound and one.lower is None,
+                is_open_high=one.has_bound and one.upper is None,
                 group=one.group,
                 is_simulated=one.is_simulated,
             )

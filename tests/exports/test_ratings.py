@@ -43,7 +43,7 @@ def voted_study() -> Study:
 
 def lines(snapshot: Snapshot) -> list[tuple[Any, ...]]:
     return list(
-        snapshot.standings.values_list(
+        snapshot.standings.order_by("-rating", "slug").values_list(
             "contestant__slug", "rank", "rating", "lower", "upper", "votes", "wins", "ties"
         )
     )

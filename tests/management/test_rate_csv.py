@@ -60,7 +60,7 @@ WITH_CLUSTERS = f"{HEAD},judge,item"
 def test_json_has_standings_best_first(votes: Any) -> None:
     found = document(votes(*PLAIN))
     assert [list(row) for row in found["standings"]] == [
-        ["model", "rank", "rating", "lower", "upper", "votes"]
+        ["model", "rank", "rating", "lower", "upper", "votes", "note"]
     ] * 3
     ratings = [row["rating"] for row in found["standings"]]
     assert ratings == sorted(ratings, reverse=True)
@@ -125,7 +125,7 @@ def test_csv_cells_are_no_formulas(votes: Any, capsys: pytest.CaptureFixture[str
     lines = [line.replace("a,", "=1+1,").replace(",a,", ",=1+1,") for line in PLAIN]
     said = run(file=votes(*lines), rounds=100, format="csv")
     rows = list(csv.DictReader(io.StringIO(said)))
-    assert list(rows[0]) == ["model", "rank", "rating", "lower", "upper", "votes"]
+    assert list(rows[0]) == ["model", "rank", "rating", "lower", "upper", "votes", "note"]
     assert {row["model"] for row in rows} >= {"'=1+1"}
     assert "does not name both" in capsys.readouterr().err
 

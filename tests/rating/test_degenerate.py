@@ -47,7 +47,7 @@ def test_a_contestant_who_lost_everything_has_no_rating_and_the_rest_is_rated_al
         "d scored against nobody else: there is no lower limit."
     )
     *rated, lost = board.lines
-    assert (lost.rating, lost.rank, lost.losses, lost.note) == (None, None, 40, "no lower limit")
+    assert (lost.rating, lost.rank, lost.losses, lost.note) == (None, 3, 40, "no lower limit")
     alone = by_votes(named(rest))
     assert [line.rating for line in rated] == [line.rating for line in alone.lines]
     assert [line.lower for line in rated] == [line.lower for line in alone.lines]
@@ -56,9 +56,11 @@ def test_a_contestant_who_lost_everything_has_no_rating_and_the_rest_is_rated_al
 def test_a_chain_of_winners_rates_nobody_and_says_what_is_missing() -> None:
     board = by_votes(named(versus("a", "b", 5, 0, 0) + versus("b", "c", 5, 0, 0)))
     assert board.status is Status.UNBOUNDED
-    assert unrated(board)
-    notes = [line.note for line in board.lines]
-    assert notes == ["no upper limit", "no limits among equals", "no lower limit"]
+    assert [(line.rating, line.rank) for line in board.lines] == [(None, None)] * 3
+    assert [line.name for line in board.standings] == ["a", "b", "c"]
+    for line, limit in zip(board.lines, ("upper limit", "limits", "lower limit"), strict=True):
+        assert line.note.startswith(f"no {limit}")
+        assert "no rank" in line.note
 
 
 def test_online_elo_rates_what_bradley_terry_cannot() -> None:
@@ -90,7 +92,8 @@ def test_all_ties_are_rated_alike_without_an_interval() -> None:
     assert board.status is Status.ALL_TIES
     assert "Every vote is a tie" in board.explanation
     for line in board.lines:
-        assert (line.rating, line.lower, line.upper, line.rank) == (1000.0, None, None, 1)
+        assert (line.rating, line.lower, line.upper, line.rank) == (1000.0, None, None, None)
+        assert line.note == "no interval and no rank: every vote is a tie"
 
 
 def test_a_contestant_without_votes_leaves_the_others_rated() -> None:
@@ -100,20 +103,10 @@ def test_a_contestant_without_votes_leaves_the_others_rated() -> None:
     assert (absent.rating, absent.rank, absent.votes, absent.note) == (None, None, 0, "no votes")
 
 
-def test_rounds_without_ratings_are_counted_and_take_the_intervals_with_them() -> None:
-    """b scored once in twenty votes: more than a third of the resamples miss that vote."""
-    board = by_votes(named(versus("a", "b", 19, 0, 1)), rounds=1000, seed=1)
-    assert 300 < board.degenerate_rounds < 420
-    assert f"In {board.degenerate_rounds} of 1000 resamples" in board.explanation
-    for line in board.lines:
-        assert line.rating is not None
-        assert (line.lower, line.upper, line.rank) == (None, None, 1)
-
-
-def test_a_few_rounds_without_ratings_are_counted_and_left_out() -> None:
+def test_a_few_rounds_without_ratings_are_counted_and_leave_both_bounds() -> None:
     board = by_votes(named(versus("a", "b", 60, 0, 5)), rounds=2000, seed=1)
     assert 0 < board.degenerate_rounds < 50
-    assert board.explanation == ""
+    assert (board.status, board.explanation) == (Status.RATED, "")
     assert board.lines[0].lower is not None
 
 
@@ -121,7 +114,10 @@ def test_a_single_expert_leaves_nothing_to_resample_by_expert() -> None:
     board = by_votes(named(versus("a", "b", 6, 0, 5)), unit=Unit.EXPERT, rounds=50)
     assert board.status is Status.NO_INTERVALS
     assert "Every resample by expert gave the same ratings" in board.explanation
-    assert [(line.lower, line.upper, line.rank) for line in board.lines] == [(None, None, 1)] * 2
+    assert [(line.lower, line.upper, line.rank) for line in board.lines] == [
+        (None, None, None)
+    ] * 2
+    assert "no interval and no rank" in board.lines[0].note
 
 
 @pytest.mark.parametrize("method", Method)
@@ -131,7 +127,8 @@ def test_a_single_vote_has_no_interval_of_zero_width(method: Method, score: str)
     board = by_votes(named(votes), method=method, rounds=50)
     assert board.status is not Status.RATED
     assert board.explanation
-    assert all(line.lower is None and line.upper is None for line in board.lines)
+    assert all(line.lower is None or line.upper is None for line in board.lines)
+    assert all(line.rank is None for line in board.lines)
 
 
 @pytest.mark.parametrize(

@@ -45,12 +45,14 @@ def test_every_line_has_finite_numbers_or_a_reason(method: Method, unit: Unit) -
         board = rate(few_votes(seed), method=method, unit=unit, rounds=60, seed=seed)
         assert board.status is Status.RATED or board.explanation
         for line in board.lines:
-            assert (line.rating is None) == (line.rank is None)
-            assert (line.lower is None) == (line.upper is None)
-            if line.rating is None:
-                assert line.note or board.explanation
-            elif line.lower is not None and line.upper is not None:
-                assert math.isfinite(line.rating)
-                assert -math.inf < line.lower < line.upper < math.inf
-            else:
+            bounds = [line.lower, line.upper]
+            assert all(math.isfinite(one) for one in (line.rating, *bounds) if one is not None)
+            if None in (line.rating, line.rank, *bounds):
+                assert line.note
                 assert board.explanation
+            if line.lower is not None and line.upper is not None:
+                assert line.lower < line.upper
+            if line.rank == 1 and line.upper is None:
+                assert line.lower is not None or method is Method.DAVIDSON
+            if line.lower is None and line.upper is None and method is not Method.DAVIDSON:
+                assert line.rank != 1

@@ -1,0 +1,286 @@
+"""Votes that bound some contestants on one side only, or not at all: the others keep theirs."""
+
+from __future__ import annotations
+
+from itertools import combinations
+
+import numpy as np
+import pytest
+from scipy.optimize import brentq
+from scipy.special import expit
+
+from arena.rating.bootstrap import Unit
+from arena.rating.comparisons import Comparison, Comparisons, as_arrays
+from arena.rating.components import open_interval
+from arena.rating.connectivity import Status
+from arena.rating.leaderboard import Leaderboard, Line, Method, rate
+from arena.rating.ranking import ranks, shown_ranks
+from tests.rating.votes import by_votes, named, versus
+
+NINE = tuple("abcdefghi")
+POINTS = 400.0 / np.log(10.0)
+
+
+def nine_of(wins: int, ties: int, losses: int) -> list[Comparison]:
+    """Nine contestants, each a bit better than the next one."""
+    return [
+        vote
+        for place, (one, other) in enumerate(combinations(NINE, 2))
+        for vote in versus(one, other, wins + place % 3, ties, losses)
+    ]
+
+
+def spread(votes: list[Comparison], *, experts: int = 9, scenarios: int = 40) -> Comparisons:
+    """The votes over experts and scenarios in turn."""
+    names = sorted({name for vote in votes for name in (vote.first, vote.second)})
+    return as_arrays(
+        names,
+        [
+            Comparison(
+                first=vote.first,
+                second=vote.second,
+                score=vote.score,
+                expert=f"e{number % experts}",
+                scenario=f"s{number * 7 % scenarios}",
+            )
+            for number, vote in enumerate(votes)
+        ],
+    )
+
+
+def line_of(board: Leaderboard, name: str) -> Line:
+    return next(line for line in board.lines if line.name == name)
+
+
+@pytest.mark.parametrize("unit", Unit)
+def test_one_contestant_with_six_votes_takes_nothing_from_nine_others(unit: Unit) -> None:
+    rest = nine_of(12, 6, 7)
+    few = versus("x", "a", 1, 0, 0) + versus("x", "e", 1, 0, 1) + versus("x", "i", 2, 0, 1)
+    alone = rate(spread(rest), unit=unit, rounds=2000, seed=1)
+    board = rate(spread(rest + few), unit=unit, rounds=2000, seed=1)
+    assert board.degenerate_rounds > 0.025 * 2000
+    assert board.status is Status.OPEN_INTERVALS
+    assert {line.rank for line in alone.lines} != {1}
+    shift = np.mean([line.rating or 0.0 for line in board.lines if line.name != "x"]) - 1000.0
+    for before in alone.lines:
+        now = line_of(board, before.name)
+        assert now.rank == before.rank
+        assert before.lower is not None
+        assert before.upper is not None
+        assert now.lower == pytest.approx(before.lower + shift, abs=4.0)
+        assert now.upper == pytest.approx(before.upper + shift, abs=4.0)
+        assert now.note == ""
+    newcomer = line_of(board, "x")
+    assert (newcomer.rank, newcomer.upper) == (None, None)
+    assert newcomer.note
+    assert "for x:" in board.explanation
+
+
+def test_a_weak_contestant_has_an_upper_bound_and_stands_third() -> None:
+    """300 votes at 80 : 20, 297 : 3 and 300 : 0; no vote of the weak one matters to the others."""
+    votes = (
+        versus("strong", "mid", 240, 0, 60)
+        + versus("mid", "weak", 297, 0, 3)
+        + versus("strong", "weak", 300, 0, 0)
+    )
+    board = by_votes(named(votes), rounds=4000)
+    assert board.degenerate_rounds > 0.025 * 4000
+    strong, mid, weak = board.standings
+    assert [line.rank for line in board.standings] == [1, 2, 3]
+    assert [line.name for line in board.standings] == ["strong", "mid", "weak"]
+    # Between the two: half the interval of a logit, 1.96 sqrt(1 / 240 + 1 / 60).
+    half = POINTS * 1.96 * np.sqrt(1 / 240 + 1 / 60) / 2
+    for line in (strong, mid):
+        assert line.rating is not None
+        assert line.lower == pytest.approx(line.rating - half, abs=3.0)
+        assert line.upper == pytest.approx(line.rating + half, abs=3.0)
+    assert weak.lower is None
+    assert weak.upper is not None
+    assert mid.lower is not None
+    assert weak.upper < mid.lower
+    assert weak.note == "no lower bound: hardly any score"
+
+
+def test_who_beat_everybody_stands_first_with_the_exact_lower_bound() -> None:
+    beaten = [vote for name in NINE for vote in versus("x", name, 20, 0, 0)]
+    board = by_votes(named(nine_of(12, 6, 7) + beaten), rounds=500)
+    first, *others = board.standings
+    assert (first.name, first.rank, first.rating, first.upper) == ("x", 1, None, None)
+    assert first.note == "no upper limit"
+    assert min(line.rank or 0 for line in others) == 2
+    rated = [line.rating for line in others if line.rating is not None]
+
+    def chance_to_win_all(x: float) -> float:
+        return float(sum(20 * np.log(expit((x - one) / POINTS)) for one in rated))
+
+    exact = brentq(lambda x: chance_to_win_all(x) - np.log(0.025), 1000.0, 3000.0)
+    assert first.lower == pytest.approx(exact, abs=3.0)
+
+
+def test_who_lost_to_everybody_stands_last_with_an_upper_bound() -> None:
+    lost = [vote for name in NINE for vote in versus("x", name, 0, 0, 20)]
+    board = by_votes(named(nine_of(12, 6, 7) + lost), rounds=500)
+    *others, last = board.standings
+    assert (last.name, last.rank, last.lower, last.note) == ("x", 10, None, "no lower limit")
+    assert last.upper is not None
+    assert last.upper < min(line.lower or 0.0 for line in others)
+
+
+@pytest.mark.parametrize(("votes", "ranks_"), [(5, [None, None]), (6, [1, 2])])
+def test_six_wins_of_six_tell_two_apart_and_five_do_not(
+    votes: int, ranks_: list[int | None]
+) -> None:
+    """A fair coin falls six times alike in 1.6 % of cases, five times in 3.1 %."""
+    board = by_votes(named(versus("a", "b", votes, 0, 0)))
+    assert [line.rank for line in board.standings] == ranks_
+    winner, loser = board.standings
+    # The smallest share of wins that still gives so many in a row with 2.5 %.
+    share = 0.025 ** (1.0 / votes)
+    bound = POINTS * np.log(share / (1.0 - share)) / 2.0
+    assert winner.lower == pytest.approx(1000.0 + bound, abs=1e-6)
+    assert loser.upper == pytest.approx(1000.0 - bound, abs=1e-6)
+    assert (winner.upper, loser.lower) == (None, None)
+
+
+@pytest.mark.parametrize(("experts", "rank"), [(5, None), (6, 1)])
+def test_votes_of_few_experts_count_as_few(experts: int, rank: int | None) -> None:
+    votes = spread(versus("a", "b", 300, 0, 0), experts=experts)
+    assert rate(votes, unit=Unit.TWO_WAY, rounds=50).standings[0].rank == rank
+    assert by_votes(votes, rounds=50).standings[0].rank == 1
+
+
+def test_losers_of_a_lower_group_are_not_first() -> None:
+    upper, lower = versus("a", "b", 30, 10, 12), versus("c", "d", 40, 10, 10)
+    between = versus("a", "c", 30, 0, 0) + versus("b", "d", 30, 0, 0)
+    board = by_votes(named(upper + lower + between))
+    assert [(line.name, line.rank) for line in board.standings] == [
+        ("a", 1), ("b", 2), ("c", 3), ("d", 4)
+    ]  # fmt: skip
+
+
+def test_one_lucky_win_over_the_best_takes_nobody_s_rank() -> None:
+    board = by_votes(named(nine_of(12, 6, 7) + versus("x", "a", 1, 0, 0)), rounds=300)
+    assert (board.standings[-1].name, board.standings[-1].rank) == ("x", None)
+    assert "no rank" in board.standings[-1].note
+    assert board.standings[0].rank == 1
+
+
+def test_a_pair_at_nineteen_to_one_has_an_open_bound_each() -> None:
+    """More than a third of the resamples miss the one vote: there the gap has no limit."""
+    board = by_votes(named(versus("a", "b", 19, 0, 1)), rounds=2000, seed=1)
+    assert 600 < board.degenerate_rounds < 840
+    one, other = board.standings
+    assert [line.rank for line in board.standings] == [1, 2]
+    assert (one.upper, other.lower) == (None, None)
+    # Of binomial(20, 0.05) 1.6 % are four or more, 7.5 % three or more: the bound is 17 : 3.
+    assert one.lower == pytest.approx(1000.0 + POINTS * np.log(17 / 3) / 2.0, abs=1e-3)
+
+
+@pytest.mark.parametrize("method", [Method.BRADLEY_TERRY, Method.DAVIDSON])
+def test_groups_within_a_round_are_rated_as_if_alone(method: Method) -> None:
+    """c's only win is missing from a third of the rounds; a and b are told apart all the same."""
+    votes = versus("a", "b", 70, 20, 30) + versus("b", "c", 59, 0, 1) + versus("a", "c", 60, 0, 0)
+    board = by_votes(named(votes), method=method, rounds=2000)
+    alone = by_votes(named(versus("a", "b", 70, 20, 30)), method=method, rounds=2000)
+    for name in ("a", "b"):
+        found, before = line_of(board, name), line_of(alone, name)
+        assert found.upper is not None
+        assert found.lower is not None
+        width = (before.upper or 0.0) - (before.lower or 0.0)
+        assert found.upper - found.lower == pytest.approx(width, rel=0.12)
+        assert found.rank == before.rank
+    assert line_of(board, "c").lower is None
+
+
+def test_a_message_names_three_contestants_at_most() -> None:
+    weak = [v for n in range(12) for v in versus("z", f"w{n:02}", 5, 0, 1)]
+    for votes in (
+        weak,
+        weak + versus("y", "z", 0, 0, 5) + versus("x", "z", 0, 1, 2),
+        [v for n in range(12) for v in versus(f"p{n:02}", f"q{n:02}", 5, 1, 1)],
+        [v for n in range(12) for v in versus("z", f"w{n:02}", 5, 0, 0)],
+        [v for n in range(12) for v in versus("z", f"w{n:02}", 0, 0, 5)],
+    ):
+        reasons = by_votes(named(votes), rounds=100).reasons
+        assert reasons
+        for reason in reasons:
+            assert sum(f"{kind}{n:02}" in reason for kind in "wpq" for n in range(12)) <= 6
+
+
+# --- The pieces ----------------------------------------------------------------------------------
+
+
+def test_bounds_that_touch_do_not_tell_two_apart() -> None:
+    assert ranks([5.0, 2.0], [7.0, 5.0]).tolist() == [1, 1]
+    assert ranks([np.nextafter(5.0, 6.0), 2.0], [7.0, 5.0]).tolist() == [1, 2]
+
+
+@pytest.mark.parametrize(
+    ("lower", "upper", "expected"),
+    [
+        ([10.0, -10.0], [20.0, 0.0], [1, 2]),
+        ([10.0, -10.0], [np.nan, 0.0], [1, 2]),
+        ([0.0, -10.0], [np.nan, 5.0], [0, 1]),  # a lower bound at the average is not above it
+        ([0.1, -10.0], [np.nan, 5.0], [1, 1]),
+        ([10.0, np.nan], [20.0, 9.0], [1, 2]),
+        ([10.0, np.nan], [20.0, 10.0], [1, 0]),
+        ([10.0, np.nan], [20.0, np.nan], [1, 0]),
+        ([np.nan, np.nan], [np.nan, np.nan], [0, 0]),
+    ],
+)
+def test_a_rank_needs_bounds_that_decide_it(
+    lower: list[float], upper: list[float], expected: list[int]
+) -> None:
+    assert shown_ranks(np.array(lower), np.array(upper), average=0.0).tolist() == expected
+
+
+@pytest.mark.parametrize(
+    ("below", "unknown", "above", "has_lower", "has_upper"),
+    [
+        (0, 0, 0, True, True),
+        (25, 0, 25, True, True),
+        (26, 0, 0, False, True),
+        (0, 0, 26, True, False),
+        (0, 26, 0, False, False),
+        (13, 13, 0, False, True),
+        (13, 12, 13, True, True),
+    ],
+)
+def test_a_bound_is_finite_only_if_it_is_whatever_is_unknown(
+    below: int, unknown: int, above: int, has_lower: bool, has_upper: bool
+) -> None:
+    """Of 1001 rounds the 26th from either end is the bound."""
+    known = np.linspace(-1.0, 1.0, 1001 - below - unknown - above)
+    ends = [np.full(below, -np.inf), np.full(unknown, np.nan), np.full(above, np.inf)]
+    values = np.random.default_rng(1).permutation(np.concatenate([known, *ends]))[None]
+    lower, upper = open_interval(values)
+    assert (np.isfinite(lower[0]), np.isfinite(upper[0])) == (has_lower, has_upper)
+    if has_lower:
+        assert lower[0] == known[25 - below - unknown]
+    if has_upper:
+        assert upper[0] == known[::-1][25 - above - unknown]
+
+
+def test_two_way_intervals_are_those_of_the_rounds_and_not_widened() -> None:
+    """Drawn by hand: 6 experts, 8 scenarios; by Student's t they would be 1.3 times as wide."""
+    rng = np.random.default_rng(3)
+    cells = [(e, s) for e in range(6) for s in range(8)]
+    wins = {cell: int(rng.binomial(4, 0.5 + 0.06 * (cell[0] % 3))) for cell in cells}
+    votes = [
+        Comparison(
+            first="a", second="b", score=float(k < wins[e, s]), expert=f"{e}", scenario=f"{s}"
+        )
+        for e, s in cells
+        for k in range(4)
+    ]
+    line = rate(as_arrays(("a", "b"), votes), unit=Unit.TWO_WAY, rounds=8000, seed=5).lines[0]
+    table = np.array([[wins[e, s] for s in range(8)] for e in range(6)], dtype=float)
+    drawn = []
+    for _ in range(8000):
+        some = table[rng.integers(0, 6, 6)][:, rng.integers(0, 8, 8)]
+        drawn.append(some.sum() / (4.0 * some.size))
+    share = np.percentile(drawn, [2.5, 97.5])
+    low, high = 1000.0 + POINTS * np.log(share / (1.0 - share)) / 2.0
+    assert line.lower is not None
+    assert line.upper is not None
+    assert line.upper - line.lower == pytest.approx(high - low, rel=0.05)
