@@ -11,7 +11,7 @@ from typing import Any
 from arena.exports.rating_charts import CONTENT_TYPES as CHART_FORMATS
 from arena.exports.rating_charts import charts
 from arena.exports.tables import leaderboard_table
-from arena.exports.votes import VOTE_FORMATS, rows_of
+from arena.exports.votes import VOTE_FORMATS, vote_table
 from arena.exports.writers import FORMATS
 from arena.models import Snapshot
 from arena.services.cells import csv_text
@@ -54,7 +54,7 @@ def bundle(snapshot: Snapshot) -> bytes:
 def _files(snapshot: Snapshot) -> dict[str, bytes]:
     table = leaderboard_table(snapshot)
     results = snapshot.results
-    votes = rows_of(snapshot)
+    votes = vote_table(snapshot)
     files = {f"leaderboard.{chosen.suffix}": chosen.write(table) for chosen in FORMATS.values()}
     files |= {f"votes.{chosen.suffix}": chosen.write(votes) for chosen in VOTE_FORMATS.values()}
     files |= {

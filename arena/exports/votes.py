@@ -2,29 +2,48 @@
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 from arena.exports.formats import Format, formats
 from arena.exports.parquet import TEXT, WHOLE, YES_NO, parquet_bytes
 from arena.models import Snapshot
-from arena.services.snapshots import judges_of, votes_of
-from arena.services.vote_rows import COLUMNS, Row, vote_rows, votes_csv
+from arena.services.snapshots import judges_of, votes_of, votes_version_of
+from arena.services.vote_rows import COLUMNS, Row, columns_of, vote_rows, votes_csv
 
-Rows = list[Row]
+_KINDS = dict.fromkeys(COLUMNS, TEXT) | {
+    "ms_visible": WHOLE,
+    "simulated": YES_NO,
+    "position": WHOLE,
+}
 
-_KINDS = dict.fromkeys(COLUMNS, TEXT) | {"ms_visible": WHOLE, "simulated": YES_NO}
+
+class VoteTable(NamedTuple):
+    """Votes in the order in which they came, and the version of the columns to write."""
+
+    version: int
+    rows: list[Row]
 
 
-def rows_of(snapshot: Snapshot) -> Rows:
-    """The votes that the rating is made of, in the order in which they came.
+def vote_table(snapshot: Snapshot) -> VoteTable:
+    """The votes that the rating is made of.
 
     Raises:
         Conflict: They are not what they were.
     """
-    return list(vote_rows(votes_of(snapshot).counted, judges_of(snapshot)))
+    rows = vote_rows(votes_of(snapshot).counted, judges_of(snapshot))
+    return VoteTable(version=votes_version_of(snapshot), rows=list(rows))
 
 
-def parquet_of(rows: Rows) -> bytes:
+def csv_of(table: VoteTable) -> bytes:
+    """The file whose hash the snapshot keeps."""
+    return votes_csv(table.rows, table.version)
+
+
+def parquet_of(table: VoteTable) -> bytes:
     """The same columns, typed; nothing is guarded, as no spreadsheet reads it."""
-    return parquet_bytes(_KINDS, rows)
+    names = columns_of(table.version)
+    rows = (row[: len(names)] for row in table.rows)
+    return parquet_bytes({name: _KINDS[name] for name in names}, rows)
 
 
-VOTE_FORMATS: dict[str, Format[Rows]] = formats(csv=votes_csv, parquet=parquet_of)
+VOTE_FORMATS: dict[str, Format[VoteTable]] = formats(csv=csv_of, parquet=parquet_of)

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass
+from datetime import UTC
 from typing import NamedTuple
 
 from django.db.models import Max, Q
@@ -29,6 +30,10 @@ class Judged(NamedTuple):
         left, right: Slugs of contestants.
         outcome: left, equal or right.
         matchup: Its row, and `repeat_of` the row of the matchup that it shows again.
+        at: When it was given, in UTC as ISO 8601; empty where nobody knows, as in all below.
+        position: Of the matchup in the expert's own order, from 1.
+        aids: What the expert looked with, joined by blanks.
+        left_code, right_code: The augmentations that were shown.
     """
 
     judge: str
@@ -44,6 +49,12 @@ class Judged(NamedTuple):
     ms_visible: int | None
     matchup: int | None
     repeat_of: int | None
+    at: str = ""
+    position: int | None = None
+    aids: str = ""
+    comment: str = ""
+    left_code: str = ""
+    right_code: str = ""
 
     @property
     def winner(self) -> str | None:
@@ -152,16 +163,20 @@ def _voted(study: Study, last: int | None) -> list[Judged]:
         .values_list(
             "expert", "matchup__scenario", "matchup__kind", "shown_left__contestant",
             "shown_right__contestant", "outcome", "both_miss", "is_simulated", "ms_visible",
-            "matchup", "matchup__repeat_of",
+            "matchup", "matchup__repeat_of", "at", "matchup__position", "aids", "comment",
+            "shown_left__code", "shown_right__code",
         )
     )  # fmt: skip
     return [
         Judged(
             *people[expert], *places[place], kind, slugs[left], slugs[right],
             outcome, both_miss, simulated, ms, matchup, repeat_of,
+            at.astimezone(UTC).isoformat(timespec="milliseconds"), position, aids, comment,
+            str(left_code), str(right_code),
         )
         for (
-            expert, place, kind, left, right, outcome, both_miss, simulated, ms, matchup, repeat_of
+            expert, place, kind, left, right, outcome, both_miss, simulated, ms, matchup,
+            repeat_of, at, position, aids, comment, left_code, right_code
         ) in rows.iterator(chunk_size=5000)
     ]  # fmt: skip
 

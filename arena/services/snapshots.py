@@ -19,6 +19,7 @@ from arena.services import breakdowns
 from arena.services.own_votes import with_and_without
 from arena.services.trust import board_document, claims, trust
 from arena.services.vote_arrays import VoteArrays, vote_arrays
+from arena.services.vote_rows import VERSION as VOTES_VERSION
 from arena.services.vote_rows import digest_of, vote_rows, votes_csv
 from augment.errors import Conflict
 from augment.sentences import sentence
@@ -72,6 +73,7 @@ def compute(snapshot: Snapshot, report: Report) -> Computed:
         "numpy": numpy.__version__,
         "scipy": scipy.__version__,
         "results": RESULTS_VERSION,
+        "votes": VOTES_VERSION,
     }
     snapshot.status = board.explanation
     snapshot.degenerate_rounds = board.degenerate_rounds
@@ -105,7 +107,7 @@ def votes_of(snapshot: Snapshot) -> VoteSet:
     """
     votes = _vote_set(snapshot)
     rows = vote_rows(votes.counted, judges_of(snapshot))
-    if digest_of(votes_csv(rows)) != snapshot.votes_sha256:
+    if digest_of(votes_csv(rows, votes_version_of(snapshot))) != snapshot.votes_sha256:
         raise Conflict(
             sentence(
                 "The votes of '%(name)s' are not those of this rating any more. Rate again.",
@@ -113,6 +115,11 @@ def votes_of(snapshot: Snapshot) -> VoteSet:
             )
         )
     return votes
+
+
+def votes_version_of(snapshot: Snapshot) -> int:
+    """The version of the columns that its file of votes has; older ones had no word for it."""
+    return int(snapshot.versions.get("votes", 1))
 
 
 def judges_of(snapshot: Snapshot) -> dict[str, str]:

@@ -16,11 +16,18 @@ from arena.services.cells import cell
 
 COLUMNS = (
     "model_a", "model_b", "winner", "judge", "item", "type", "kind", "side", "ms_visible",
-    "simulated",
+    "simulated", "at", "position", "aids", "comment", "augmentation_a", "augmentation_b",
 )  # fmt: skip
-"""The first three are Chatbot Arena's; `model_a` was on the left, `side` is the winner's."""
+"""The first three are Chatbot Arena's; `model_a` was on the left, `side` is the winner's.
+`augmentation_a` is the code of what `model_a` made."""
 
-Row = tuple[str, str, str, str, str, str, str, str, int | None, bool]
+VERSION = 2
+"""Of the columns, kept with a snapshot: its file and the hash of it stay as they were."""
+
+_WIDTHS = {1: 10, VERSION: len(COLUMNS)}
+"""So many columns, the first ones, by version."""
+
+Row = tuple[str | int | bool | None, ...]
 
 _WINNERS = {
     Vote.Outcome.LEFT.value: "model_a",
@@ -30,8 +37,13 @@ _WINNERS = {
 BOTH_BAD = "tie (bothbad)"
 
 
+def columns_of(version: int) -> tuple[str, ...]:
+    """The columns of a version."""
+    return COLUMNS[: _WIDTHS[version]]
+
+
 def vote_rows(votes: Iterable[Judged], names: Mapping[str, str]) -> Iterator[Row]:
-    """One row a vote.
+    """One row a vote, in the order of COLUMNS.
 
     Args:
         votes: In their order.
@@ -49,19 +61,32 @@ def vote_rows(votes: Iterable[Judged], names: Mapping[str, str]) -> Iterator[Row
             vote.outcome if vote.outcome != Vote.Outcome.EQUAL.value else "",
             vote.ms_visible,
             vote.is_simulated,
+            vote.at,
+            vote.position,
+            vote.aids,
+            vote.comment,
+            vote.left_code,
+            vote.right_code,
         )
 
 
-def votes_csv(rows: Iterable[Row]) -> bytes:
+def votes_csv(rows: Iterable[Row], version: int = VERSION) -> bytes:
     """The rows with their head; no cell is a formula."""
     sheet = io.StringIO()
     writer = csv.writer(sheet, lineterminator="\n")
-    writer.writerow(COLUMNS)
-    guarded = _Guarded()
+    writer.writerow(columns_of(version))
+    width, guarded = _WIDTHS[version], _Guarded()
     writer.writerows(
-        (*(guarded[text] for text in row[:8]), row[8], "yes" if row[9] else "no") for row in rows
+        tuple(_written(value, guarded) if value is not None else None for value in row[:width])
+        for row in rows
     )
     return sheet.getvalue().encode()
+
+
+def _written(value: str | int | bool, guarded: _Guarded) -> object:
+    if isinstance(value, str):
+        return guarded[value]
+    return value if not isinstance(value, bool) else "yes" if value else "no"
 
 
 class _Guarded(dict[str, str]):

@@ -15,7 +15,7 @@ from arena.exports.bundle import CONTENT_TYPE, ZIP, bundle
 from arena.exports.formats import format_named
 from arena.exports.rating_charts import CONTENT_TYPES, chart_bytes
 from arena.exports.tables import leaderboard_table
-from arena.exports.votes import VOTE_FORMATS, rows_of
+from arena.exports.votes import VOTE_FORMATS, vote_table
 from arena.exports.writers import FORMATS
 from arena.models import Snapshot, Study
 from arena.queries.results import snapshot_to_export
@@ -67,7 +67,7 @@ def export_votes(request: HttpRequest, code: uuid.UUID, form: str) -> HttpRespon
     snapshot = _snapshot(request, study)
     try:
         chosen = format_named(VOTE_FORMATS, form)
-        rows = rows_of(snapshot)
+        rows = vote_table(snapshot)
     except UnknownName as error:
         raise Http404 from error
     except Conflict as error:

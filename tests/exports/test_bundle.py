@@ -18,7 +18,7 @@ from arena.exports.formats import format_named
 from arena.exports.heat_chart import heat_chart
 from arena.exports.parquet import NUMBER, TEXT, WHOLE, YES_NO, parquet_bytes
 from arena.exports.tables import leaderboard_table
-from arena.exports.votes import VOTE_FORMATS, rows_of
+from arena.exports.votes import VOTE_FORMATS, vote_table
 from arena.exports.writers import FORMATS
 from arena.models import Snapshot, Study
 from arena.queries.vote_sets import Filters
@@ -57,7 +57,7 @@ def test_the_zip_is_the_same_twice_its_manifest_true_and_no_account_named(
     assert manifest["votes"]["sha256"] == hashlib.sha256(files["votes.csv"]).hexdigest()
     assert (manifest["method"]["seed"], manifest["method"]["rounds"]) == (4, 300)
     assert manifest["filters"]["kinds"] == ["main"]
-    assert set(manifest["versions"]) == {"python", "numpy", "scipy", "results"}
+    assert set(manifest["versions"]) == {"python", "numpy", "scipy", "results", "votes"}
     wanted = ("csv", "json", "parquet", "tex", "svg", "pdf", "png")
     assert {f"leaderboard.{suffix}" for suffix in wanted} < set(files)
     person = snapshot.study.experts.order_by("pk")[0].person
@@ -78,7 +78,7 @@ def test_a_rating_by_chosen_experts_names_them_by_pseudonym(snapshot: Snapshot) 
 
 
 def test_votes_read_back_from_both_formats_are_the_same(snapshot: Snapshot) -> None:
-    rows = rows_of(snapshot)
+    rows = vote_table(snapshot)
     text = csv.DictReader(io.StringIO(VOTE_FORMATS["csv"].write(rows).decode()))
     table = parquet.read_table(io.BytesIO(VOTE_FORMATS["parquet"].write(rows))).to_pylist()
     assert len(table) == snapshot.votes_counted == 180
@@ -86,6 +86,7 @@ def test_votes_read_back_from_both_formats_are_the_same(snapshot: Snapshot) -> N
         assert one["model_a"] == other["model_a"]
         assert one["winner"] == other["winner"]
         assert int(one["ms_visible"]) == other["ms_visible"]
+        assert (one["at"], int(one["position"])) == (other["at"], other["position"])
     with pytest.raises(UnknownName, match=r"'xls'. Known: csv, parquet"):
         format_named(VOTE_FORMATS, "xls")
 

@@ -11,7 +11,7 @@ from django.core.management import CommandError, call_command
 from django.urls import reverse
 
 from arena.exports.tables import leaderboard_table
-from arena.exports.votes import VOTE_FORMATS, rows_of
+from arena.exports.votes import VOTE_FORMATS, vote_table
 from arena.models import ImportedVote, Study, VoteFile
 from arena.services.ratings import rate
 from arena.services.vote_imports import import_votes
@@ -101,7 +101,7 @@ def test_what_was_exported_can_be_imported_and_gives_the_same_table(tmp_path: Pa
     study = import_votes(path=written(tmp_path, *lines()), name="First").study
     first = rate(study=study, rounds=100, seed=3)
     again = tmp_path / "again.csv"
-    again.write_bytes(VOTE_FORMATS["csv"].write(rows_of(first)))
+    again.write_bytes(VOTE_FORMATS["csv"].write(vote_table(first)))
     second = rate(study=import_votes(path=again, name="Second").study, rounds=100, seed=3)
     one, other = (leaderboard_table(snapshot).rows for snapshot in (first, second))
     assert one == other
@@ -113,7 +113,7 @@ def test_made_up_votes_say_so_wherever_they_go(tmp_path: Path) -> None:
     study = import_votes(path=written(tmp_path, *marked, head=head), name="Elsewhere").study
     snapshot = rate(study=study, rounds=50)
     assert snapshot.includes_simulated
-    table = csv.DictReader(io.StringIO(VOTE_FORMATS["csv"].write(rows_of(snapshot)).decode()))
+    table = csv.DictReader(io.StringIO(VOTE_FORMATS["csv"].write(vote_table(snapshot)).decode()))
     assert {line["simulated"] for line in table} == {"yes"}
 
 

@@ -4,16 +4,19 @@ from __future__ import annotations
 
 import csv
 import io
+from datetime import datetime
 
 import pytest
+from pyarrow import parquet
 
+from arena.exports.votes import VOTE_FORMATS, vote_table
 from arena.models import Matchup, Snapshot, Study, Vote
 from arena.queries.judged import last_vote_of
 from arena.queries.vote_sets import Filters, vote_set
 from arena.services.ratings import compute_snapshot, plan_snapshot, rate
 from arena.services.snapshots import judges_of, votes_of
 from arena.services.studies import close_study
-from arena.services.vote_rows import COLUMNS, vote_rows, votes_csv
+from arena.services.vote_rows import COLUMNS, digest_of, vote_rows, votes_csv
 from augment.errors import Conflict, UnknownName
 from augment.models import Scenario
 from tests.append_only import rewriting
@@ -130,6 +133,44 @@ def test_rows_have_the_columns_of_other_packages_and_no_formulas() -> None:
     assert lines[0]["model_a"] == first.left.contestant.slug
     assert (lines[0]["ms_visible"], lines[1]["ms_visible"]) == ("1200", "")
     assert {line["judge"] for line in lines} == {"'=cmd|calc"}
+
+
+def test_a_vote_is_exported_with_all_that_was_kept_of_it() -> None:
+    study = a_study(votes_per_expert=4)
+    first, second, *_ = matchups_of(study, "eva")
+    kept = vote(first, "left", comment="=both\nturn", aids=("zoom", "ruler"))
+    vote(second, "skip", reason="unclear", comment="never in the file")
+    snapshot = rate(study=close_study(study=study), rounds=10)
+    (line,) = csv.DictReader(io.StringIO(VOTE_FORMATS["csv"].write(vote_table(snapshot)).decode()))
+    assert datetime.fromisoformat(line["at"]) == kept.at.replace(
+        microsecond=kept.at.microsecond // 1000 * 1000
+    )
+    assert (line["position"], line["aids"]) == (str(first.position), "zoom ruler")
+    assert line["comment"] == "'=both turn", "no formula, one line"
+    assert (line["augmentation_a"], line["augmentation_b"]) == (
+        str(first.left.code),
+        str(first.right.code),
+    )
+    (row,) = parquet.read_table(
+        io.BytesIO(VOTE_FORMATS["parquet"].write(vote_table(snapshot)))
+    ).to_pylist()
+    assert (row["position"], row["comment"]) == (first.position, "=both\nturn")
+    assert row["augmentation_b"] == str(first.right.code)
+
+
+def test_a_snapshot_of_before_keeps_its_file_and_the_hash_of_it() -> None:
+    study = a_study(votes_per_expert=4)
+    vote(matchups_of(study, "eva")[0], "left")
+    snapshot = rate(study=close_study(study=study), rounds=10)
+    content = VOTE_FORMATS["csv"].write(vote_table(snapshot))
+    assert digest_of(content) == snapshot.votes_sha256
+    old = [",".join(line.split(",")[:10]) for line in content.decode().splitlines()]
+    before = "".join(f"{line}\n" for line in old).encode()
+    snapshot.votes_sha256 = digest_of(before)
+    snapshot.versions = {"results": 1}
+    assert VOTE_FORMATS["csv"].write(vote_table(snapshot)) == before
+    table = parquet.read_table(io.BytesIO(VOTE_FORMATS["parquet"].write(vote_table(snapshot))))
+    assert tuple(table.column_names) == COLUMNS[:10]
 
 
 def test_a_planned_snapshot_counts_only_once_it_is_computed_and_once() -> None:

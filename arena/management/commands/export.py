@@ -18,7 +18,7 @@ from arena.exports.formats import format_named
 from arena.exports.rating_charts import CONTENT_TYPES, chart_bytes
 from arena.exports.samples import SHEET_FORMATS, sheet_bytes, sheet_of
 from arena.exports.tables import leaderboard_table
-from arena.exports.votes import VOTE_FORMATS, rows_of
+from arena.exports.votes import VOTE_FORMATS, vote_table
 from arena.exports.writers import FORMATS
 from arena.models import Snapshot, Study
 from arena.queries.jobs import grid
@@ -75,7 +75,7 @@ class Command(TerminalCommand):
 
     def _votes(self, options: dict[str, Any]) -> Written:
         chosen = format_named(VOTE_FORMATS, options["format"])
-        return chosen.write(rows_of(self._snapshot(options))), chosen.suffix, chosen.is_text
+        return chosen.write(vote_table(self._snapshot(options))), chosen.suffix, chosen.is_text
 
     def _chart(self, options: dict[str, Any]) -> Written:
         form = options["format"]
