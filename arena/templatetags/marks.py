@@ -7,10 +7,11 @@ from dataclasses import dataclass
 from django import template
 from django.utils.html import format_html
 from django.utils.safestring import SafeString
-from django.utils.translation import gettext, gettext_lazy
+from django.utils.translation import gettext, gettext_lazy, ngettext
 from django.utils.translation import gettext_noop as _
 
 from arena.models import Study
+from arena.queries.jobs import JobCounts
 from augment.models import Augmentation, GenerationJob
 
 register = template.Library()
@@ -83,6 +84,21 @@ class Segment:
 def mark(row: Augmentation | GenerationJob | Study) -> Mark:
     """The mark of a row with a state."""
     return _mark(row.state, row.get_state_display())
+
+
+@register.filter
+def job_mark(counts: JobCounts) -> Mark:
+    """The mark of a job: what broke is not green, what was cancelled may still run."""
+    states, job = GenerationJob.State, counts.job
+    if job.state == states.FINISHED and counts.failed:
+        if counts.failed == counts.total:
+            return Mark(tone="bad", icon="icons/failed.svg", label=gettext("Failed"))
+        return Mark(tone="warn", icon="icons/failed.svg", label=gettext("Finished in part"))
+    running = counts.by_state[Augmentation.State.RUNNING]
+    if job.state == states.CANCELLED and running:
+        label = ngettext("Cancelled, %(n)s still runs", "Cancelled, %(n)s still run", running)
+        return Mark(tone="busy", icon="icons/cancelled.svg", label=label % {"n": running})
+    return mark(job)
 
 
 @register.filter

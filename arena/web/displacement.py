@@ -10,6 +10,7 @@ from django.utils.text import slugify
 from django.utils.translation import gettext_lazy as _
 from django.views.decorators.http import require_safe
 
+from arena.exports.displacement_objects import BY_OBJECT, OBJECT_FORMATS, object_rows
 from arena.exports.displacement_table import displacement_table
 from arena.exports.displacement_writers import FORMATS
 from arena.exports.formats import format_named
@@ -31,6 +32,8 @@ LABELS = {
 def export(request: HttpRequest, code: uuid.UUID, form: str) -> HttpResponse:
     """The displacement errors of a job as a file; `by` as on the page."""
     job = get_object_or_404(GenerationJob, code=code)
+    if request.GET.get("by") == BY_OBJECT:
+        return _objects(job, form)
     by, types = asked(request), types_asked(request)
     try:
         chosen = format_named(FORMATS, form)
@@ -46,6 +49,20 @@ def export(request: HttpRequest, code: uuid.UUID, form: str) -> HttpResponse:
     )
 
 
+def _objects(job: GenerationJob, form: str) -> HttpResponse:
+    """One row an object, of all five types."""
+    try:
+        chosen = format_named(OBJECT_FORMATS, form)
+    except UnknownName as error:
+        raise Http404 from error
+    name = f"{slugify(job.name) or 'job'}-displacement-objects.{chosen.suffix}"
+    return HttpResponse(
+        chosen.write(object_rows(job)),
+        content_type=chosen.content_type,
+        headers={"Content-Disposition": f'attachment; filename="{name}"'},
+    )
+
+
 def section(request: HttpRequest, job: GenerationJob) -> dict[str, object]:
     """What the part of the job's page shows."""
     by, types = asked(request), types_asked(request)
@@ -56,6 +73,7 @@ def section(request: HttpRequest, job: GenerationJob) -> dict[str, object]:
         "by": by,
         "labels": LABELS,
         "forms": FORMATS,
+        "object_forms": OBJECT_FORMATS,
         "query": f"by={by}" + ("&types=all" if types is not None else ""),
         "has_choice": by is By.VARIANT,
         "is_all": types is not None,

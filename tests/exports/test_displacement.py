@@ -8,8 +8,10 @@ from pathlib import Path
 
 import pytest
 from django.core.management import CommandError, call_command
+from pyarrow import parquet
 
 from arena.exports.displacement_chart import box_plot
+from arena.exports.displacement_objects import OBJECT_FORMATS, object_rows
 from arena.exports.displacement_table import DisplacementTable, displacement_table
 from arena.exports.displacement_writers import COLUMNS, FORMATS, csv_bytes, json_bytes
 from arena.exports.published import BY_VARIANT, SOURCE
@@ -114,6 +116,50 @@ def test_json_holds_every_single_distance() -> None:
         }
     ]
     assert single["missing"] == ["Agent3"]
+
+
+def test_by_object_there_is_a_row_for_each_object_with_both_places() -> None:
+    job = a_job(aside_m=-2.0)
+    spare = Modification(
+        added=(cone("Agent2", 20.0, -1.5), cone("Agent9", 30.0, 0.0), cone("x", 1, 1))
+    )
+    job.augmentations.filter(contestant__slug="ann", scenario__slug="works").update(
+        modification=modification_to_document(spare)
+    )
+    found = lines_of(run("displacement", "Round 1", "--by", "object", "--out", "-").encode())
+    works = [line for line in found if line["scenario"] == "works"]
+    assert [(line["contestant"], line["object"], line["generated"]) for line in works] == [
+        ("ann", "matched", "Agent2"),
+        ("ann", "matched", "Agent9"),
+        ("ann", "surplus", "x"),
+        ("sim", "missing", ""),
+        ("sim", "missing", ""),
+    ]
+    first = works[0]
+    assert (first["reference_y_m"], first["y_m"], first["distance_m"]) == (
+        *("0.5000", "-1.5000", "2.0000"),
+    )
+    assert (first["class"], first["simulated"], works[-1]["simulated"]) == (
+        *("traffic cone", "no", "yes"),
+    )
+    assert (works[-1]["state"], works[-1]["distance_m"]) == ("unreadable", "")
+    row = job.augmentations.get(contestant__slug="ann", scenario__slug="works")
+    assert first["augmentation"] == str(row.code)
+    assert len(found) == 5 + 4
+
+
+def test_the_formats_by_object_say_the_same_and_agree_with_the_summary(tmp_path: Path) -> None:
+    job = a_job()
+    objects = object_rows(job)
+    document = json.loads(OBJECT_FORMATS["json"].write(objects))["objects"]
+    table = parquet.read_table(io.BytesIO(OBJECT_FORMATS["parquet"].write(objects))).to_pylist()
+    assert document == table
+    shown = displacement_table(job, by=By.CONTESTANT)
+    for name, count in (("matched", "n"), ("missing", "missing"), ("surplus", "surplus")):
+        summed = sum(getattr(group.summary, count) for group in shown.groups)
+        assert sum(one["object"] == name for one in table) == summed
+    with pytest.raises(CommandError, match=r"'pdf'. Known: csv, json, parquet"):
+        run("displacement", "Round 1", "--by", "object", "--format", "pdf", "--out", "-")
 
 
 def test_what_was_not_measured_is_said() -> None:

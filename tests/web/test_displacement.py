@@ -151,3 +151,17 @@ def test_an_answer_without_a_modification_has_no_findings() -> None:
     row.refresh_from_db()
     assert checked(row) is None
     assert "No object could be matched" in page_of(row)
+
+
+def test_the_page_offers_one_row_an_object_and_its_files_open() -> None:
+    job = a_job()
+    analyst = signed_in(people()["analyst"])
+    shown = analyst.get(reverse("job", args=[job.code])).content.decode()
+    for form, kind in (("csv", "text/csv"), ("json", "application/json"), ("parquet", "parquet")):
+        url = reverse("displacement-export", args=[job.code, form]) + "?by=object"
+        assert url in shown
+        answer = analyst.get(url)
+        assert kind in answer["Content-Type"]
+        assert f"displacement-objects.{form}" in answer["Content-Disposition"]
+    missing = reverse("displacement-export", args=[job.code, "pdf"]) + "?by=object"
+    assert analyst.get(missing).status_code == 404

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import pytest
 
-from arena.templatetags.marks import percent, segments
-from augment.models import Augmentation
+from arena.queries.jobs import JobCounts
+from arena.templatetags.marks import job_mark, percent, segments
+from augment.models import Augmentation, GenerationJob
 
 State = Augmentation.State
 
@@ -24,3 +25,27 @@ def test_parts_follow_each_other_and_what_runs_comes_last() -> None:
 def test_all_but_one_is_not_yet_a_hundred_percent() -> None:
     assert percent(999, 1000) == "99&nbsp;%"
     assert percent(0, 0) == "0&nbsp;%"
+
+
+@pytest.mark.parametrize(
+    ("job_state", "cells", "tone", "label"),
+    [
+        ("finished", {"done": 3}, "good", "Finished"),
+        ("finished", {"unreadable": 3}, "good", "Finished"),
+        ("finished", {"done": 2, "failed": 1}, "warn", "Finished in part"),
+        ("finished", {"unreadable": 1, "failed": 2}, "warn", "Finished in part"),
+        ("finished", {"failed": 3}, "bad", "Failed"),
+        ("running", {"failed": 3}, "busy", "Running"),
+        ("cancelled", {"cancelled": 3}, "quiet", "Cancelled"),
+        ("cancelled", {"cancelled": 2, "running": 1}, "busy", "Cancelled, 1 still runs"),
+        ("cancelled", {"cancelled": 1, "running": 2}, "busy", "Cancelled, 2 still run"),
+        ("stopped_at_cap", {"failed": 3}, "warn", "Stopped at cap"),
+    ],
+)
+def test_a_job_is_marked_by_what_became_of_its_rows(
+    job_state: str, cells: dict[str, int], tone: str, label: str
+) -> None:
+    by_state = {state: cells.get(state.value, 0) for state in Augmentation.State}
+    job = GenerationJob(name="a job", state=job_state)
+    found = job_mark(JobCounts(job=job, by_state=by_state))
+    assert (found.tone, found.label) == (tone, label)

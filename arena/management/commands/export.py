@@ -12,6 +12,7 @@ from django.core.management.base import CommandError, CommandParser
 from arena.errors import ArenaError, StudyStillOpen
 from arena.exports import displacement_writers, faults
 from arena.exports.bundle import ZIP, bundle
+from arena.exports.displacement_objects import BY_OBJECT, OBJECT_FORMATS, object_rows
 from arena.exports.displacement_table import displacement_table
 from arena.exports.files import write_whole
 from arena.exports.formats import format_named
@@ -95,9 +96,14 @@ class Command(TerminalCommand):
         return snapshot
 
     def _displacement(self, options: dict[str, Any]) -> Written:
+        if options["by"] == BY_OBJECT:
+            one = format_named(OBJECT_FORMATS, options["format"])
+            types = None if options["types"] is None else types_named(options["types"])
+            rows = object_rows(job_named(options["job"]), types=types)
+            return one.write(rows), one.suffix, one.is_text
         chosen = format_named(displacement_writers.FORMATS, options["format"])
         if options["by"] not in set(By):
-            raise UnknownName("grouping", options["by"], list(By))
+            raise UnknownName("grouping", options["by"], [*By, BY_OBJECT])
         types = None if options["types"] is None else types_named(options["types"])
         table = displacement_table(job_named(options["job"]), by=By(options["by"]), types=types)
         return chosen.write(table), chosen.suffix, chosen.is_text
@@ -171,7 +177,12 @@ def _kinds_of_studies(kinds: Any) -> list[ArgumentParser]:
 def _kinds_of_jobs(kinds: Any) -> list[ArgumentParser]:
     displacement = kinds.add_parser("displacement", help="how far from the references")
     displacement.add_argument("job", help="its name or its code")
-    displacement.add_argument("--by", default="type", help=f"one of {', '.join(By)}")
+    displacement.add_argument(
+        "--by",
+        default="type",
+        help=f"one of {', '.join(By)}; or {BY_OBJECT}, for one row an object "
+        f"({', '.join(OBJECT_FORMATS)})",
+    )
     displacement.add_argument(
         "--types",
         nargs="+",
