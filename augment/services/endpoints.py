@@ -6,6 +6,7 @@ import json
 from datetime import datetime
 from typing import Any
 
+from django.contrib.auth.models import User
 from django.core.serializers.json import DjangoJSONEncoder
 from django.db import transaction
 from django.utils import timezone
@@ -68,6 +69,22 @@ def remember_refusal(*, endpoint: Endpoint, model: str, parameter: str) -> Profi
             after={"endpoint": endpoint.label, "model": model, "refuses": parameter},
         )
     return after
+
+
+@transaction.atomic
+def tell_sight(*, endpoint: Endpoint, model: str, sees: bool, actor: User | None = None) -> None:
+    """Note what somebody knows of a model without asking it: whether it sees pictures."""
+    row = model_at(endpoint=endpoint, model=model)
+    before, row.vision = row.vision, sees
+    row.save(update_fields=["vision"])
+    log_event(
+        actor=actor,
+        verb="tell",
+        object_kind="model",
+        object_code=row.code,
+        before={"vision": before},
+        after={"endpoint": endpoint.label, "model": model, "vision": sees},
+    )
 
 
 def facts_of(endpoint: Endpoint) -> dict[str, Any]:

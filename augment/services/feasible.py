@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 from collections.abc import Sequence
 
 from django.db.models import Q
@@ -11,7 +12,7 @@ from augment.errors import AugmentError, Conflict, KeyMissing, KeyNotAllowed
 from augment.models import Contestant, Scenario
 from augment.sentences import sentence, sentence_of
 from augment.services.keys import key_of, may_hold_key
-from augment.services.roles import blind_viewers, seats_of
+from augment.services.roles import Seat, seats_of, sight_of, viewer_of
 
 Kind = Contestant.Kind
 
@@ -45,8 +46,15 @@ def obstacle(contestant: Contestant) -> str:
             "ARENA_KEY_VARIABLES has to list it",
             names=forbidden,
         )
-    if blind_viewers([contestant]):
+    viewer = viewer_of(contestant)
+    if viewer is not None and sight_of(viewer) is False:
         return sentence("its viewer sees text alone; visual QA needs vision")
+    if viewer is not None and sight_of(viewer) is None:
+        return sentence(
+            "nobody knows whether its viewer sees pictures, which visual QA needs: %(probe)s "
+            "finds out, and with --sees yes (or at the endpoint) you say so",
+            probe=_probe(viewer),
+        )
     return ""
 
 
@@ -64,12 +72,6 @@ def keys_missing(contestant: Contestant) -> list[str]:
         except KeyNotAllowed:
             continue  # an obstacle, see there
     return sorted(missing)
-
-
-def _forbidden_keys(contestant: Contestant) -> tuple[str, ...]:
-    """Variables that a contestant's endpoints name and that no endpoint may be sent."""
-    named = {seat.endpoint.key_variable for seat in seats_of(contestant).values()} - {""}
-    return tuple(sorted(name for name in named if not may_hold_key(name)))
 
 
 def refuse_impossible(who: Sequence[Contestant], where: Sequence[Scenario]) -> None:
@@ -90,27 +92,8 @@ def refuse_impossible(who: Sequence[Contestant], where: Sequence[Scenario]) -> N
                 names=tuple(strangers),
             )
         )
-    for row in who:
-        forbidden = _forbidden_keys(row)
-        if forbidden:
-            raise Conflict(
-                sentence(
-                    "The endpoint of %(contestant)s names %(names)s, which may not hold a key: a "
-                    "variable is needed whose name ends in _API_KEY or that ARENA_KEY_VARIABLES "
-                    "lists.",
-                    contestant=row.slug,
-                    names=forbidden,
-                )
-            )
-    blind = blind_viewers(who)
-    if blind:
-        raise Conflict(
-            sentence(
-                "Visual QA needs a viewer that sees, and these see text alone: %(names)s. "
-                "Give the contestant another viewer or another variant.",
-                names=tuple(blind),
-            )
-        )
+    _refuse_forbidden_keys(who)
+    _refuse_without_sight(who)
     references = [
         row.slug for row in who if row.kind == Kind.REFERENCE or row.error_rates is not None
     ]
@@ -124,3 +107,59 @@ def refuse_impossible(who: Sequence[Contestant], where: Sequence[Scenario]) -> N
                 scenarios=tuple(without),
             )
         )
+
+
+# --- Private -----------------------------------------------------------------------------------
+
+
+def _forbidden_keys(contestant: Contestant) -> tuple[str, ...]:
+    """Variables that a contestant's endpoints name and that no endpoint may be sent."""
+    named = {seat.endpoint.key_variable for seat in seats_of(contestant).values()} - {""}
+    return tuple(sorted(name for name in named if not may_hold_key(name)))
+
+
+def _refuse_forbidden_keys(who: Sequence[Contestant]) -> None:
+    for row in who:
+        forbidden = _forbidden_keys(row)
+        if forbidden:
+            raise Conflict(
+                sentence(
+                    "The endpoint of %(contestant)s names %(names)s, which may not hold a key: a "
+                    "variable is needed whose name ends in _API_KEY or that ARENA_KEY_VARIABLES "
+                    "lists.",
+                    contestant=row.slug,
+                    names=forbidden,
+                )
+            )
+
+
+def _refuse_without_sight(who: Sequence[Contestant]) -> None:
+    """Two calls of every augmentation would be paid for before its viewer fails."""
+    viewers = {row.slug: viewer_of(row) for row in who}
+    lacking: dict[bool | None, list[tuple[str, Seat]]] = {True: [], False: [], None: []}
+    for slug, seat in viewers.items():
+        if seat is not None:
+            lacking[sight_of(seat)].append((slug, seat))
+    if lacking[False]:
+        raise Conflict(
+            sentence(
+                "Visual QA needs a viewer that sees, and these see text alone: %(names)s. "
+                "Give the contestant another viewer or another variant.",
+                names=tuple(f"{slug} ({seat})" for slug, seat in lacking[False]),
+            )
+        )
+    if lacking[None]:
+        raise Conflict(
+            sentence(
+                "Visual QA needs a viewer that sees, and of these nobody knows whether they do: "
+                "%(names)s. Probe the model (%(probe)s), or say what you know: the same with "
+                "--sees yes, or at the endpoint.",
+                names=tuple(f"{slug} ({seat})" for slug, seat in lacking[None]),
+                probe=_probe(lacking[None][0][1]),
+            )
+        )
+
+
+def _probe(seat: Seat) -> str:
+    """The command that asks what a model can do."""
+    return f"manage.py probe_endpoint {seat.endpoint.label} --model {shlex.quote(seat.model)}"

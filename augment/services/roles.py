@@ -77,15 +77,12 @@ def documents_of(seats: Mapping[ModelRole, Seat]) -> dict[str, dict[str, str]]:
     }
 
 
-def blind_viewers(contestants: Iterable[Contestant]) -> list[str]:
-    """Contestants whose viewer is known to see nothing, each as "slug (model at endpoint)".
+def viewer_of(contestant: Contestant) -> Seat | None:
+    """Who looks at pictures for a contestant, None where its variant shows none."""
+    return seats_of(contestant).get(ModelRole.VIEWER)
 
-    Who is not known to be blind may try.
-    """
-    found = []
-    for contestant in contestants:
-        seat = seats_of(contestant).get(ModelRole.VIEWER)
-        known = None if seat is None else seat.known
-        if known is not None and known.vision is False:
-            found.append(f"{contestant.slug} ({seat})")
-    return found
+
+def sight_of(seat: Seat) -> bool | None:
+    """Whether a model sees pictures, None where nobody probed it or said so."""
+    known = seat.known
+    return None if known is None else known.vision

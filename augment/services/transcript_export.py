@@ -10,11 +10,10 @@ from typing import Any
 from django.core.files.storage import default_storage
 
 from augment.models import Augmentation, Contestant, ModelCall
-from augment.services.seeds import seed_of
 from augment.services.transcript_steps import Step, Try, images_in, totals_of, tries_of
 from augment.services.transcripts import IMAGES
 
-FORMAT, VERSION = "scenario-arena/transcript", 1
+FORMAT, VERSION = "scenario-arena/transcript", 2
 
 
 def transcript_of(augmentation: Augmentation) -> dict[str, Any]:
@@ -31,7 +30,6 @@ def transcript_of(augmentation: Augmentation) -> dict[str, Any]:
             "notes": augmentation.notes,
             "modification": _same_order(augmentation.modification),
             "injected": _same_order(augmentation.injected),
-            "seed": seed_of(scenario.slug),
             "created_at": _time(augmentation.created_at),
             "finished_at": _time(augmentation.finished_at),
         },

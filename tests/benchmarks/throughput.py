@@ -130,6 +130,7 @@ def _add_contestants(made: Machine, base_url: str) -> None:
                 *("add_contestant", slug, "--variant", variant),
                 *("--endpoint", "bench", "--model", MODEL, *new),
             )
+    made.must("probe_endpoint", "bench", "--model", MODEL, "--sees", "yes")
     # More places than the worker can ask for: the queue at the endpoint is not what is measured.
     made.must("shell", "-c", _WIDE)
 

@@ -14,9 +14,18 @@ from augment.errors import Conflict, InvalidDocument, UnknownName
 from augment.fake_llm.server import FakeServer, running
 from augment.llm.client import ChatClient
 from augment.llm.openai_wire import OpenAIWire
-from augment.models import Augmentation, Contestant, Endpoint, EndpointModel, ModelCall
+from augment.models import (
+    Augmentation,
+    Contestant,
+    Endpoint,
+    EndpointModel,
+    Event,
+    GenerationJob,
+    ModelCall,
+)
 from augment.services import contestants, jobs, runner
 from augment.services.caps import Caps
+from augment.services.feasible import obstacle
 from augment.variants.transcript import ModelRole
 from tests.jobs.rows import add_scenario, only_row
 
@@ -100,12 +109,48 @@ def test_visual_qa_with_a_viewer_known_to_be_blind_is_refused_at_launch() -> Non
         jobs.launch(name="J", contestants=["one"], scenarios=["street-1"])
 
 
-@pytest.mark.parametrize("vision", [True, None])
-def test_another_viewer_lets_a_blind_model_do_visual_qa(vision: bool | None) -> None:
+def test_another_viewer_lets_a_blind_model_do_visual_qa() -> None:
     add("vqa", viewer=("there", "eyes"))
     add_scenario("street-1")
     sees("text-model", "here", vision=False)
-    sees("eyes", "there", vision=vision)
+    sees("eyes", "there", vision=True)
+    jobs.launch(name="J", contestants=["one"], scenarios=["street-1"])
+
+
+def test_visual_qa_waits_until_the_viewer_is_probed_or_somebody_tells() -> None:
+    add("vqa", viewer=("there", "eyes"))
+    add_scenario("street-1")
+    sees("text-model", "here", vision=True)
+    with pytest.raises(Conflict) as raised:
+        jobs.launch(name="J", contestants=["one"], scenarios=["street-1"])
+    assert "nobody knows whether they do: one (eyes at there)" in str(raised.value)
+    assert "manage.py probe_endpoint there --model eyes" in str(raised.value)
+    assert "--sees yes" in str(raised.value)
+    assert "probe_endpoint there --model eyes finds out" in obstacle(Contestant.objects.get())
+    assert not GenerationJob.objects.exists()
+    out = io.StringIO()
+    call_command("probe_endpoint", "there", "--model", "eyes", "--sees", "yes", stdout=out)
+    assert "as you say" in out.getvalue()
+    assert Event.objects.get(verb="tell").after == {
+        "endpoint": "there",
+        "model": "eyes",
+        "vision": True,
+    }
+    assert obstacle(Contestant.objects.get()) == ""
+    jobs.launch(name="J", contestants=["one"], scenarios=["street-1"])
+
+
+def test_what_is_told_can_be_told_otherwise() -> None:
+    add("vqa")
+    for word, known in (("no", False), ("yes", True)):
+        call_command("probe_endpoint", "here", "--model", "text-model", "--sees", word)
+        assert EndpointModel.objects.get(model="text-model").vision is known
+
+
+@pytest.mark.parametrize("variant", ["otm", "fc", "tqa", "geo"])
+def test_a_variant_that_shows_no_picture_needs_no_sight(variant: str) -> None:
+    add(variant)
+    add_scenario("street-1")
     jobs.launch(name="J", contestants=["one"], scenarios=["street-1"])
 
 
@@ -135,6 +180,7 @@ def test_each_role_is_asked_at_its_own_endpoint(server: FakeServer) -> None:
         )
         add_scenario("street-1")
         EndpointModel.objects.filter(model="fake-qa-low").update(native_tools=True)
+        EndpointModel.objects.filter(model="fake-careless").update(vision=True)
         job = jobs.launch(name="J", contestants=["two"], scenarios=["street-1"])
         row = only_row(job)
         runner.work_on(augmentation_pk=row.pk, connect=opened)

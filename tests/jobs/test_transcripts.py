@@ -12,12 +12,13 @@ from uuid import uuid4
 
 import pytest
 from django.core.management import CommandError, call_command
+from django.urls import reverse
 from django.utils import timezone
 
 from augment.errors import ModelFault
 from augment.llm.fingerprint import request_hash
 from augment.llm.messages import Message, Reply, Request, Speaker
-from augment.models import Augmentation, ModelCall, TranscriptNote
+from augment.models import Augmentation, Endpoint, ModelCall, TranscriptNote
 from augment.services import caps, jobs, runner
 from augment.services.caps import Caps
 from augment.services.transcript_export import transcript_of
@@ -26,7 +27,10 @@ from augment.services.transcripts import RowTranscript
 from augment.variants.transcript import ModelRole, NoteKind
 from tests.jobs.models import Model, after_a_second_look, llama_job, reply
 from tests.jobs.rows import INSTRUCTION, claimed, only_row
+from tests.llm.raw_server import speaking, whole
+from tests.llm.recorder import GOOD as HEARD
 from tests.variants.answers import GOOD
+from tests.web.cast import people, signed_in
 
 pytestmark = pytest.mark.django_db
 
@@ -48,7 +52,7 @@ def test_the_document_holds_the_whole_record() -> None:
     assert (document["format"], document["version"]) == ("scenario-arena/transcript", 1)
     assert document["augmentation"]["state"] == "done"
     assert document["augmentation"]["modification"] == row.modification
-    assert document["augmentation"]["seed"] > 0
+    assert "seed" not in document["augmentation"]
     assert INSTRUCTION in document["scenario"]["instruction"]
     assert document["contestant"]["model"] == "llama3.1"
     assert document["contestant"]["endpoint"]["base_url"] == "http://127.0.0.1:9/v1"
@@ -72,6 +76,22 @@ def test_the_document_holds_the_whole_record() -> None:
         "cost_usd": "0.01208",
         "is_cost_estimated": False,
     }
+
+
+def test_a_request_in_it_is_what_the_server_was_sent_and_nothing_else() -> None:
+    row = only_row(llama_job())
+    with speaking(whole(json.dumps(HEARD).encode())) as server:
+        Endpoint.objects.update(base_url=server.url)
+        runner.work_on(augmentation_pk=row.pk)
+    document = json.loads(json.dumps(transcript_of(row)))
+    calls = [step for step in document["attempts"][0]["steps"] if step["kind"] == "call"]
+    sent = [json.loads(heard.partition(b"\r\n\r\n")[2]) for heard in server.heard]
+    assert [call["request"] for call in calls] == sent
+    assert sorted(sent[0]) == ["max_completion_tokens", "messages", "model"]
+    for name in ("seed", "temperature"):
+        assert f'"{name}"' not in json.dumps(document)
+        page = signed_in(people()["admin"]).get(reverse("augmentation", args=[row.code]))
+        assert f"<dt>{name}</dt>" not in page.content.decode().lower()
 
 
 def test_what_is_unknown_is_null_and_not_zero() -> None:

@@ -10,14 +10,16 @@ from django.core.management.base import CommandError
 from augment.errors import AugmentError, UnknownName
 from augment.llm.questions import Ability
 from augment.models import Endpoint
+from augment.services.endpoints import tell_sight
 from augment.services.probe import Finding, ProbeReport, probe
 from augment.services.terminal import TerminalCommand
+from augment.services.texts import one_line
 
 _WORDS = {True: "yes", False: "no", None: "unknown"}
 
 
 class Command(TerminalCommand):
-    """probe_endpoint LABEL --model M."""
+    """probe_endpoint LABEL --model M [--sees yes|no]."""
 
     help = (
         "Ask an endpoint about six tiny questions (some 8,000 tokens in all) and store what its "
@@ -29,6 +31,11 @@ class Command(TerminalCommand):
         """Who is asked."""
         parser.add_argument("label", help="the label of an endpoint")
         parser.add_argument("--model", required=True, help="the model id on the endpoint")
+        parser.add_argument(
+            "--sees",
+            choices=("yes", "no"),
+            help="ask nothing; note that the model sees pictures, or that it does not",
+        )
 
     def handle(self, *args: Any, **options: Any) -> None:
         """Ask, print a table and fail where nobody answers."""
@@ -37,6 +44,9 @@ class Command(TerminalCommand):
             if not Endpoint.objects.filter(label=label).exists():
                 known = list(Endpoint.objects.values_list("label", flat=True))
                 raise UnknownName("endpoint", label, known)
+            if options["sees"]:
+                self._tell(label, options["model"], sees=options["sees"] == "yes")
+                return
             report = probe(label=label, model=options["model"])
         except AugmentError as error:
             raise CommandError(str(error)) from error
@@ -45,6 +55,11 @@ class Command(TerminalCommand):
         self._sum_up(report)
         if not report.has(Ability.ANSWERS):
             raise CommandError(f"{options['model']} at endpoint {label} does not answer.")
+
+    def _tell(self, label: str, model: str, *, sees: bool) -> None:
+        endpoint = Endpoint.objects.get(label=label)
+        tell_sight(endpoint=endpoint, model=one_line("model", model, what="endpoint"), sees=sees)
+        self.stdout.write(f"{'vision':14}{_WORDS[sees]:9}as you say")
 
     def _sum_up(self, report: ProbeReport) -> None:
         self.stdout.write(f"{'usage':14}{_WORDS[report.counts_tokens]}")
