@@ -7,11 +7,18 @@ from __future__ import annotations
 
 import json
 import re
+from collections.abc import Callable
+from typing import TypeVar
 
 from augment.errors import ReplyUnreadable
+from augment.prompts.loose import LONGEST_VALUE
+
+_Loaded = TypeVar("_Loaded")
 
 LONGEST_ANSWER = 200_000
 """Characters; a longer answer is not looked at."""
+
+_CHANGES = re.compile(r"""["'](?:add|move|remove)["']\s*:""")
 
 FENCE = re.compile(r"^[ \t]*```[^\n`]*\n(.*?)(?:^[ \t]*```|\Z)", re.DOTALL | re.MULTILINE)
 
@@ -48,6 +55,25 @@ def strict_json(written: str) -> object:
         return _strict(written)
     except _Broken as broken:
         raise ReplyUnreadable([str(broken)]) from None
+
+
+def strict_json_at(text: str, start: int) -> tuple[object, int]:
+    """The JSON value that begins there, strictly read, and where it ends.
+
+    Raises:
+        ReplyUnreadable: There is none; lines and columns are counted from there.
+    """
+    piece = text[start : start + LONGEST_VALUE]
+    try:
+        found, length = _loading(lambda: _DECODER.raw_decode(piece))
+    except _Broken as broken:
+        raise ReplyUnreadable([str(broken)]) from None
+    return found, start + length
+
+
+def names_changes(answer: str) -> bool:
+    """Whether the answer holds a key of a block of changes, however broken the block is."""
+    return _CHANGES.search(answer) is not None
 
 
 def without_thoughts(answer: str) -> str:
@@ -98,8 +124,12 @@ class _Broken(Exception):
 
 
 def _strict(block: str) -> object:
+    return _loading(lambda: _DECODER.decode(block))
+
+
+def _loading(load: Callable[[], _Loaded]) -> _Loaded:
     try:
-        return json.loads(block, parse_constant=_refuse, object_pairs_hook=_once)
+        return load()
     except json.JSONDecodeError as error:
         place = f"line {error.lineno}, column {error.colno}"
         raise _Broken(f"the JSON block breaks at {place}: {error.msg}") from None
@@ -121,6 +151,8 @@ def _once(pairs: list[tuple[str, object]]) -> dict[str, object]:
         found[key] = value
     return found
 
+
+_DECODER = json.JSONDecoder(parse_constant=_refuse, object_pairs_hook=_once)
 
 # Each of the pieces matches wherever it begins, closed or not: the time that a hostile answer
 # takes grows no faster than its length.

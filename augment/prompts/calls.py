@@ -1,20 +1,46 @@
-"""Calls of a tool that a model wrote into its answer: lines that are exactly one JSON object.
+"""Calls of a tool that a model wrote into its answer.
+
+The form that was asked for is a line that is exactly one JSON object. It counts wherever it
+stands: an answer with such a call is no final answer, since it was written without the result.
+Models write other forms as well: within a sentence or a list, over several lines, with other
+keys, other quotes, or as Python. These count where the answer holds no block of changes, so that
+nobody who tells in a final answer what was called before is taken to call again.
 
 Whatever the text, nothing is raised: a call that can't be read is a call with a problem, which
-goes back to the model. An answer with a call is no final answer, whatever else stands in it: that
-was written without the result.
+goes back to the model.
 """
 
 from __future__ import annotations
 
 import re
-from dataclasses import dataclass
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
 
 from augment.errors import ReplyUnreadable
-from augment.prompts.blocks import FENCE, LONGEST_ANSWER, strict_json, without_thoughts
+from augment.prompts.blocks import (
+    LONGEST_ANSWER,
+    names_changes,
+    strict_json,
+    strict_json_at,
+    without_thoughts,
+)
+from augment.prompts.loose import Unreadable, arguments_at, value_at
 
-_BEGINS = re.compile(r'\{\s*"call"\s*:')
+TOOL = "pose_on_lane"
+PARAMETERS = ("lane", "start", "distance_m", "lateral_m")
+"""In the order in which the prompt names them."""
+MOST_LOOKED_AT = 64
+
 _FORM = '{"call": "pose_on_lane", "arguments": {...}}'
+_NAMES = ("call", "name", "function", "tool", "tool_name", "function_name")
+_ARGUMENTS = ("arguments", "parameters", "args", "kwargs", "input")
+_ASIDE = frozenset({"id", "type"})
+_OBJECT = rf"""\{{\s*["'](?P<key>{"|".join((*_NAMES, *_ARGUMENTS, TOOL))})["']\s*:"""
+_PYTHON = r"(?<![\w.])(?P<name>\w{0,40}?(?:pose_|_pose)\w{0,40})[ \t]{0,3}\("
+_OPENING = re.compile(f"{_OBJECT}|{_PYTHON}")
+_EXACT = re.compile(r'\{\s*"call"\s*:')
+_ALONE_BEFORE = re.compile(r"(?:^|\n)[ \t`]*\Z")
+_ALONE_BEHIND = re.compile(r"[ \t`]*(?:\n|\Z)")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -25,50 +51,142 @@ class WrittenCall:
         name: Of the tool, empty where it can't be read.
         arguments: Read from JSON, None where they can't be.
         problem: What is wrong with the call itself, empty where nothing is.
+        mended: Whether it was understood although it is not in the form that was asked for.
     """
 
     name: str = ""
     arguments: object = None
     problem: str = ""
+    mended: bool = False
 
 
-def calls_in(answer: str) -> tuple[WrittenCall, ...]:
-    """The calls of an answer in order; thoughts of models that think aloud hold none."""
+def calls_in(answer: str, *, is_cut_off: bool = False) -> tuple[WrittenCall, ...]:
+    """The calls of an answer in order; thoughts of models that think aloud hold none.
+
+    An answer that speaks of the tool and holds neither a call nor a block of changes is a call
+    with a problem.
+
+    Args:
+        answer: The raw text of the model.
+        is_cut_off: Whether it hit its length limit: the block of changes may be missing, so
+            only the form that was asked for counts.
+    """
     if len(answer) > LONGEST_ANSWER:
         return ()
-    lines = FENCE.sub(_on_one_line, without_thoughts(answer)).splitlines()
-    bare = (line.strip().strip("`").strip() for line in lines)
-    return tuple(_call(line) for line in bare if _BEGINS.match(line))
+    text = without_thoughts(answer)
+    is_final = is_cut_off or names_changes(text)
+    calls = tuple(_calls(text, exact_alone=is_final))
+    if not calls and not is_final and TOOL in text:
+        problem = f"{TOOL} is named and not called; a call is one line of the form {_FORM}"
+        return (WrittenCall(problem=problem),)
+    return calls
 
 
 def read_arguments(written: str) -> WrittenCall:
     """The arguments of a native call, a JSON text of their own."""
+    if len(written) > LONGEST_ANSWER:
+        return WrittenCall(problem=f"the arguments are longer than {LONGEST_ANSWER} characters")
     try:
         return WrittenCall(arguments=strict_json(written))
     except ReplyUnreadable as broken:
         return WrittenCall(problem=f"the arguments are not JSON: {broken.problems[0]}")
 
 
-def _on_one_line(fence: re.Match[str]) -> str:
-    """A fenced call that runs over several lines on one; every other block as it was."""
-    body = fence.group(1).strip()
-    if not _BEGINS.match(body) or "\n" not in body:
-        return fence.group(0)
-    try:
-        strict_json(body)
-    except ReplyUnreadable:
-        return fence.group(0)
-    return "\n" + " ".join(body.split("\n")) + "\n"
+# Private
 
 
-def _call(line: str) -> WrittenCall:
+def _calls(text: str, *, exact_alone: bool) -> Iterator[WrittenCall]:
+    """Each call of the text that counts."""
+    end = looked_at = 0
+    for opening in _OPENING.finditer(text):
+        start = opening.start()
+        is_exact = _EXACT.match(text, start) is not None and _begins_line(text, start)
+        if start < end or (exact_alone and not is_exact):
+            continue
+        looked_at += 1
+        if looked_at > MOST_LOOKED_AT:
+            return
+        read = _python if opening["name"] is not None else _object
+        call, end = read(text, opening)
+        if call is not None:
+            yield call
+
+
+def _begins_line(text: str, start: int) -> bool:
+    line = text.rfind("\n", 0, start) + 1
+    return not text[line:start].strip(" \t`")
+
+
+def _object(text: str, opening: re.Match[str]) -> tuple[WrittenCall | None, int]:
+    """A call written as an object, None where it is some other object, and where it ends."""
+    start = opening.start()
+    strict = ""
     try:
-        found = strict_json(line)
+        found, end = strict_json_at(text, start)
     except ReplyUnreadable as broken:
-        reason = broken.problems[0].replace("the JSON block", "the line")
-        return WrittenCall(problem=f"a call is one line of the form {_FORM}; {reason}")
-    if not isinstance(found, dict) or found.keys() != {"call", "arguments"}:
+        strict = broken.problems[0].replace("the JSON block", "the line")
+        try:
+            found, end = value_at(text, start)
+        except Unreadable:
+            problem = f"a call is one line of the form {_FORM}; {strict}"
+            return WrittenCall(problem=problem), _end_of_line(text, start)
+    call = _call_of(found)
+    is_alone = _begins_line(text, start) and _ALONE_BEHIND.match(text, end) is not None
+    has_form = isinstance(found, dict) and found.keys() == {"call", "arguments"}
+    if call is None or call.problem or (is_alone and has_form and not strict):
+        return call, end
+    return replace(call, mended=True), end
+
+
+def _call_of(found: object) -> WrittenCall | None:
+    """What an object calls, None where it is something else."""
+    if not isinstance(found, dict):
+        return None
+    inner = found.get("function")
+    body: dict[str, object] = inner if isinstance(inner, dict) else found
+    if body.keys() == {TOOL}:
+        return _with_arguments(TOOL, body[TOOL])
+    name_key = next((key for key in _NAMES if key in body), None)
+    arguments_key = next((key for key in _ARGUMENTS if key in body), None)
+    name = None if name_key is None else body[name_key]
+    rest = {key: value for key, value in body.items() if key not in {name_key, arguments_key}}
+    if not isinstance(name, str):
+        is_call = name_key == "call" or arguments_key is not None
+        return WrittenCall(problem=f"a call has the form {_FORM}") if is_call else None
+    if arguments_key is not None and rest.keys() <= _ASIDE:
+        return _with_arguments(name, body[arguments_key])
+    if arguments_key is None and name == TOOL and rest.keys() & set(PARAMETERS):
+        return _with_arguments(name, rest)
+    if name == TOOL or name_key == "call":
         return WrittenCall(problem=f"a call has the form {_FORM} and no other keys")
-    if not isinstance(found["call"], str):
-        return WrittenCall(problem=f"a call has the form {_FORM}")
-    return WrittenCall(name=found["call"], arguments=found["arguments"])
+    return None
+
+
+def _with_arguments(name: str, arguments: object) -> WrittenCall:
+    if isinstance(arguments, str):
+        return replace(read_arguments(arguments), name=name)
+    return WrittenCall(name=name, arguments=arguments)
+
+
+def _python(text: str, opening: re.Match[str]) -> tuple[WrittenCall | None, int]:
+    """A call written as Python, None where the tool is only named, and where it ends."""
+    start, name = opening.end(), opening["name"]
+    try:
+        placed, named, end = arguments_at(text, start)
+    except Unreadable as broken:
+        if not re.match(r"[^)\n]*[=\"'0-9]", text[start : start + 200]):
+            return None, start  # a signature
+        near = text[broken.at : broken.at + 20].split("\n")[0]
+        problem = f"a call is one line of the form {_FORM}; {broken} at {near!a}"
+        return WrittenCall(problem=problem), max(broken.at, start)
+    if not placed and not named:
+        return None, end
+    by_place = dict(zip(PARAMETERS, placed, strict=False))
+    if len(placed) > len(PARAMETERS) or by_place.keys() & named.keys():
+        return WrittenCall(problem=f"a call has the form {_FORM}"), end
+    return WrittenCall(name=name, arguments=by_place | named, mended=True), end
+
+
+def _end_of_line(text: str, start: int) -> int:
+    end = text.find("\n", start)
+    return len(text) if end < 0 else end

@@ -13,6 +13,8 @@ from enum import StrEnum
 from functools import cache
 
 from augment.llm.messages import Message, Speaker, Tool
+from augment.prompts.blocks import names_changes
+from augment.prompts.calls import calls_in
 from augment.prompts.texts import (
     QUOTE,
     filled,
@@ -69,8 +71,13 @@ def modifier_messages(
 def re_ask_messages(
     messages: tuple[Message, ...], answer: str, problems: Sequence[str]
 ) -> tuple[Message, ...]:
-    """The conversation so far, the answer that can't be read, and what is wrong with it."""
-    asked = filled("re_ask.md", problems=_listed(problems))
+    """The conversation so far, the answer that can't be read, and what is wrong with it.
+
+    Only an answer that holds a block is told to keep its placement.
+    """
+    told = [*problems, text("re_ask_calls.md")] if calls_in(answer) else problems
+    keep = text("re_ask_keep.md") if names_changes(answer) else ""
+    asked = filled("re_ask.md", problems=_listed(told), keep=keep)
     return (*messages, said_by_model(answer), said_by_user(asked))
 
 

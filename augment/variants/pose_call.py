@@ -8,15 +8,13 @@ from dataclasses import dataclass
 
 from augment.errors import ToolError
 from augment.geometry.bezier import CubicBezier
+from augment.prompts.calls import PARAMETERS, TOOL
 
-TOOL = "pose_on_lane"
 LANE_START = "lane"
 """The start that means the beginning of the lane; any other start is an agent's id."""
 
 FURTHEST_M = 1000.0
 WIDEST_M = 30.0
-
-_ARGUMENTS = ("lane", "start", "distance_m", "lateral_m")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -73,13 +71,13 @@ def read_call(arguments: object) -> PoseCall:
         ToolError: They are not; the sentence names the argument and what is allowed.
     """
     if not isinstance(arguments, Mapping):
-        raise ToolError(TOOL, f"the arguments must be one JSON object with {_listed(_ARGUMENTS)}")
-    unknown = [str(name)[:40] for name in arguments if name not in _ARGUMENTS]
+        raise ToolError(TOOL, f"the arguments must be one JSON object with {_listed(PARAMETERS)}")
+    unknown = [str(name)[:40] for name in arguments if name not in PARAMETERS]
     if unknown:
         raise ToolError(
-            TOOL, f"there is no argument {unknown[0]!r}; there are {_listed(_ARGUMENTS)}"
+            TOOL, f"there is no argument {unknown[0]!r}; there are {_listed(PARAMETERS)}"
         )
-    missing = [name for name in _ARGUMENTS[:3] if name not in arguments]
+    missing = [name for name in PARAMETERS[:3] if name not in arguments]
     if missing:
         raise ToolError(TOOL, f"{_listed(missing)} must be given")
     start = arguments["start"]

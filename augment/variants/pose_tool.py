@@ -20,12 +20,13 @@ import numpy as np
 from augment.errors import ToolError
 from augment.geometry.bezier import CubicBezier, FitError
 from augment.geometry.frames import Pose
+from augment.prompts.calls import TOOL
 from augment.prompts.lane_curves import LaneCurve, lane_curves
 from augment.prompts.names import ShortNames, short_names
 from augment.prompts.vectors import DEFAULT_RADIUS_M
 from augment.scene.bezier_lanes import BezierLane, LanePiece
 from augment.scene.entities import Scene, TrafficAgent
-from augment.variants.pose_call import LANE_START, TOOL, PoseCall, read_call
+from augment.variants.pose_call import LANE_START, PoseCall, read_call
 
 COPIED_WITHIN_M = 0.05
 """Control points this near to those of a piece are that piece: the prompt rounds to 0.01 m."""

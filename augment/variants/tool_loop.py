@@ -13,11 +13,11 @@ from dataclasses import dataclass, field
 from augment.errors import ToolError
 from augment.llm.messages import Message, Reply, Speaker, ToolCall, ToolChoice
 from augment.prompts import fill
-from augment.prompts.calls import WrittenCall, calls_in, read_arguments
+from augment.prompts.calls import TOOL, WrittenCall, calls_in, read_arguments
 from augment.prompts.fill import Calling
 from augment.prompts.texts import said_by_model, said_by_user
 from augment.variants.cast import Cast, Messages
-from augment.variants.pose_call import TOOL, CallLimits
+from augment.variants.pose_call import CallLimits
 from augment.variants.pose_tool import PoseTool
 from augment.variants.transcript import ModelRole, NoteKind, Transcript
 
@@ -46,6 +46,8 @@ class ToolDesk:
             {
                 "tool": call.name[:_LONGEST_NOTED],
                 "arguments": json.dumps(call.arguments)[:_LONGEST_NOTED],
+                "understood": not call.problem,
+                "mended": call.mended,
                 "result": result,
             },
         )
@@ -101,7 +103,8 @@ def ask_with_tool(
         )
         if desk.is_over:
             return messages, reply
-        more = _native_turns(reply, desk) if native else _written_turns(reply, desk)
+        # Models that are offered native calls write them into their answers as well.
+        more = (native and _native_turns(reply, desk)) or _written_turns(reply, desk)
         if not more:
             return messages, reply
         messages += more
@@ -109,7 +112,7 @@ def ask_with_tool(
 
 def _written_turns(reply: Reply, desk: ToolDesk) -> Messages:
     """The answer with its calls and the program's message, empty where it calls nothing."""
-    calls = calls_in(reply.text)
+    calls = calls_in(reply.text, is_cut_off=reply.is_cut_off)
     results: list[str] = []
     for call in calls:
         results.append(desk.answer(call))

@@ -6,7 +6,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from augment.prompts.calls import WrittenCall, calls_in, read_arguments
+from augment.prompts.calls import MOST_LOOKED_AT, WrittenCall, calls_in, read_arguments
+from tests.variants.answers import GOOD
 
 ONE = '{"call": "pose_on_lane", "arguments": {"lane": "Lane1"}}'
 READ = WrittenCall(name="pose_on_lane", arguments={"lane": "Lane1"})
@@ -18,6 +19,7 @@ READ = WrittenCall(name="pose_on_lane", arguments={"lane": "Lane1"})
         ONE,
         f"I look it up:\n\n  {ONE}  \n\nThen I wait.",
         f"`{ONE}`",
+        '{"arguments": {"lane": "Lane1"}, "call": "pose_on_lane"}',
         f"```json\n{ONE}\n```",
         "```json\n" + json.dumps(json.loads(ONE), indent=2) + "\n```",
         f"<think>{ONE}\n{ONE}\n</think>\n{ONE}",
@@ -27,19 +29,148 @@ def test_a_call_is_a_line_or_a_block_of_its_own(answer: str) -> None:
     assert calls_in(answer) == (READ,)
 
 
+D = '{"lane": "Lane1", "start": "Agent1", "distance_m": 21.4}'
+ARGUMENTS = {"lane": "Lane1", "start": "Agent1", "distance_m": 21.4}
+ONE_OF_THEM = WrittenCall(name="pose_on_lane", arguments=ARGUMENTS, mended=True)
+
+FORMS = {
+    "in a sentence": f'I will call {{"call": "pose_on_lane", "arguments": {D}}} to find it.',
+    "before other words": f'{{"call": "pose_on_lane", "arguments": {D}}} and go on',
+    "bullet": f'- {{"call": "pose_on_lane", "arguments": {D}}}',
+    "star": f'* `{{"call": "pose_on_lane", "arguments": {D}}}`',
+    "numbered": f'1. {{"call": "pose_on_lane", "arguments": {D}}}',
+    "numbered with a bracket": f'2) {{"call": "pose_on_lane", "arguments": {D}}}',
+    "array": f'[{{"call": "pose_on_lane", "arguments": {D}}}]',
+    "object of calls": f'{{"calls": [{{"call": "pose_on_lane", "arguments": {D}}}]}}',
+    "name": f'{{"name": "pose_on_lane", "arguments": {D}}}',
+    "name and parameters": f'{{"name": "pose_on_lane", "parameters": {D}}}',
+    "function and args": f'{{"function": "pose_on_lane", "args": {D}}}',
+    "tool": f'{{"tool": "pose_on_lane", "arguments": {D}}}',
+    "arguments as text": json.dumps({"name": "pose_on_lane", "arguments": D}),
+    "the wire's form": json.dumps(
+        {"id": "c1", "type": "function", "function": {"name": "pose_on_lane", "arguments": D}}
+    ),
+    "tags": f'<tool_call>\n{{"name": "pose_on_lane", "arguments": {D}}}\n</tool_call>',
+    "flat": '{"call": "pose_on_lane", ' + D[1:],
+    "by its name": f'{{"pose_on_lane": {D}}}',
+    "single quotes": f'{{"call": "pose_on_lane", "arguments": {D}}}'.replace('"', "'"),
+    "trailing comma": f'{{"call": "pose_on_lane", "arguments": {D[:-1]},}},}}',
+    "Python": 'pose_on_lane(lane="Lane1", start="Agent1", distance_m=21.4)',
+    "Python in single quotes": "pose_on_lane(lane='Lane1', start='Agent1', distance_m=21.4)",
+    "Python in order": 'pose_on_lane("Lane1", "Agent1", 21.4)',
+    "Python, partly in order": 'pose_on_lane("Lane1", start="Agent1", distance_m=+21.4)',
+    "Python without quotes": "pose_on_lane(lane=Lane1, start=Agent1, distance_m=21.4)",
+    "Python over lines": (
+        '```python\npose = pose_on_lane(\n    lane="Lane1",\n    start="Agent1",\n'
+        "    distance_m=21.4,\n)\n```"
+    ),
+    "Python in a sentence": (
+        'So I use `pose_on_lane(lane="Lane1", start="Agent1", distance_m=21.4)` here.'
+    ),
+}
+
+
+@pytest.mark.parametrize("written", FORMS.values(), ids=FORMS)
+@pytest.mark.parametrize("around", ["{}", "First I look it up.\n\n{}\n\nThen I'll wait {{}}."])
+def test_a_call_in_another_form_is_understood_and_counts_as_mended(
+    written: str, around: str
+) -> None:
+    assert calls_in(around.format(written)) == (ONE_OF_THEM,)
+
+
+def test_a_call_over_several_lines_without_a_fence_is_one_call() -> None:
+    written = json.dumps({"call": "pose_on_lane", "arguments": ARGUMENTS}, indent=2)
+    (call,) = calls_in(f"I look it up:\n{written}\n")
+    assert (call.arguments, call.problem) == (ARGUMENTS, "")
+
+
+def test_many_calls_come_in_the_order_in_which_they_were_written() -> None:
+    lines = [
+        '{"call": "pose_on_lane", "arguments": {"distance_m": 1}}',
+        '- {"name": "pose_on_lane", "arguments": {"distance_m": 2}}',
+        "pose_on_lane(distance_m=3), then pose_on_lane(distance_m=4)",
+        '[{"call": "pose_on_lane", "arguments": {"distance_m": 5}},',
+        ' {"call": "pose_on_lane", "arguments": {"distance_m": 6}}]',
+    ]
+    calls = calls_in("\n".join(lines))
+    assert [call.arguments for call in calls] == [{"distance_m": n} for n in range(1, 7)]
+    assert [call.mended for call in calls] == [False, *[True] * 5]
+
+
+@pytest.mark.parametrize(
+    ("answer", "problem"),
+    [
+        ('I call {"call": "pose_on_lane", "arguments": {"lane": "Lane1"', "one line of the form"),
+        ('{"arguments": {}, "call": "pose_on_lane"', "one line of the form"),
+        ('{"call": "pose_on_lane", "arguments": {}, "why": 1}', "no other keys"),
+        ('- {"call": "pose_on_lane"}', "no other keys"),
+        ('{"name": "pose_on_lane", "why": 1, "arguments": {}}', "no other keys"),
+        ('{"call": {"lane": "Lane1"}, "arguments": {}}', "has the form"),
+        ('{"name": "pose_on_lane", "arguments": "{lane: 1}"}', "the arguments are not JSON"),
+        ("{'call': 'pose_on_lane', 'arguments': {'distance_m': NaN}}", "one line of the form"),
+        ("pose_on_lane(lane='Lane1', distance_m=21.4 m)", "expected a comma or ) at 'm)'"),
+        ("pose_on_lane(lane='Lane1', distance_m=20+1.4)", "expected a comma or ) at '+1.4)'"),
+        ("pose_on_lane(lane='Lane1', lane='Lane2')", "lane stands twice"),
+        ("pose_on_lane('Lane1', lane='Lane2')", "has the form"),
+        ("pose_on_lane(1, 2, 3, 4, 5)", "has the form"),
+        ("I need pose_on_lane(lane, start, distance_m) for this.", "is named and not called"),
+        ("I would ask pose_on_lane for the pose.", "is named and not called"),
+    ],
+)
+def test_a_call_that_can_not_be_understood_says_what_is_wrong(answer: str, problem: str) -> None:
+    (call,) = calls_in(answer)
+    assert problem in call.problem
+    assert not call.mended
+
+
+def test_another_function_by_its_name_is_a_call_of_something_that_there_is_not() -> None:
+    (call,) = calls_in('retrieve_suitable_pose(lane="Lane1", agent="Agent1", dist=21.4)')
+    assert call.name == "retrieve_suitable_pose"
+    assert call.arguments == {"lane": "Lane1", "agent": "Agent1", "dist": 21.4}
+
+
 @pytest.mark.parametrize(
     "answer",
     [
         "",
-        f"I would write {ONE} here.",
-        f"{ONE} and go on",
-        '{"add": [], "move": [], "remove": []}',
-        '{"arguments": {}, "call": "pose_on_lane"',
         "x" * 300_000,
+        '{"add": [], "move": [], "remove": []}',
+        '{"name": "Agent2", "type": "VEHICLE"}',
+        'Modification Dict: {"Action": "add", "Modified_Agent": "Agent2"}',
+        "The pose (x=1, y=2) is purpose(ful).",
+        "I compute pose(s) by hand.",
     ],
 )
-def test_what_only_looks_like_a_call_is_none_or_has_a_problem(answer: str) -> None:
-    assert all(call.problem for call in calls_in(answer))
+def test_what_only_looks_like_a_call_is_none(answer: str) -> None:
+    assert calls_in(answer) == ()
+
+
+@pytest.mark.parametrize("written", FORMS.values(), ids=FORMS)
+def test_a_final_answer_that_tells_of_its_calls_stays_one(written: str) -> None:
+    told = GOOD.replace("Step 1:", f"Step 1: I called {written} and got x 21.4.\nStep 2:")
+    assert calls_in(told) == ()
+    assert calls_in(f"Step 1: I called {written}, so", is_cut_off=True) == ()
+
+
+def test_a_line_in_the_form_that_was_asked_for_counts_beside_a_block_and_when_cut_off() -> None:
+    assert calls_in(f"{ONE}\n{GOOD}") == (READ,)
+    assert calls_in(f"{ONE}\nand then", is_cut_off=True) == (READ,)
+
+
+@given(st.text(alphabet="{}[]()'\"\\:,=. \npose_on_lane1Lcarguments"), st.data())
+def test_no_text_breaks_the_reader_of_calls(text: str, data: st.DataObject) -> None:
+    form = data.draw(st.sampled_from(sorted(FORMS.values())))
+    at = data.draw(st.integers(0, len(form)))
+    for call in calls_in(form[:at] + text + form[at:]):
+        assert call.problem or call.name
+
+
+@pytest.mark.parametrize(
+    "piece", ["{'call':", '{"name": "', "pose_on_lane(", "pose_on_lane(a=[", "pose_"]
+)
+def test_the_time_for_a_hostile_answer_is_bounded(piece: str) -> None:
+    # Of a limited number of places each is read over a limited number of characters.
+    assert len(calls_in(piece * (199_000 // len(piece)))) <= MOST_LOOKED_AT
 
 
 @given(st.lists(st.sampled_from([ONE, '{"call":', "```", "\n", "}", "{", '"', "NaN", " ", "a"])))

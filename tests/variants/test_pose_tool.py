@@ -13,9 +13,10 @@ from hypothesis import strategies as st
 from augment.errors import ToolError
 from augment.geometry.bezier import CubicBezier
 from augment.geometry.polyline import Polyline
+from augment.prompts.calls import TOOL
 from augment.prompts.lane_curves import control_points
 from augment.scene.entities import Lane
-from augment.variants.pose_call import FURTHEST_M, TOOL, WIDEST_M, CallLimits
+from augment.variants.pose_call import FURTHEST_M, WIDEST_M, CallLimits
 from augment.variants.pose_tool import PoseTool
 from tests.scenes import curve, junction, scene, vehicle
 

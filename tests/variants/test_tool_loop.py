@@ -8,6 +8,7 @@ import pytest
 
 from augment.llm.messages import Message, Reply, Speaker, ToolChoice
 from augment.variants.pipeline import OutcomeStatus
+from tests.prompts.test_calls import FORMS
 from tests.variants.playing import Play, call, car, native, rating
 
 POSE = '{"lane": "Lane1", "start": "Agent1", "distance_m": 21.4, "lateral_m": 0.5}'
@@ -46,7 +47,7 @@ def test_a_model_may_answer_without_a_call() -> None:
     [
         ('{"call": "pose_on_lane", "arguments": {"lane": "Lane1"', "one line of the form"),
         ('{"call": "pose_on_lane"}', "no other keys"),
-        ('{"call": "pose_on_lane", "arguments": {}, "id": 1}', "no other keys"),
+        ('{"call": "pose_on_lane", "arguments": {}, "why": 1}', "no other keys"),
         ('{"call": 3, "arguments": {}}', "has the form"),
         (call("nearest_lane"), "there is no function 'nearest_lane'; there is pose_on_lane"),
         (call(lane="Lane9"), "there is no lane 'Lane9'"),
@@ -60,6 +61,67 @@ def test_what_is_wrong_with_a_call_goes_back_as_text(line: str, said: str) -> No
     (result,) = results(play.client.requests[1].messages[-1])
     assert said in str(result["error"])
     assert play.outcome.status is OutcomeStatus.DONE
+
+
+@pytest.mark.parametrize("form", FORMS.values(), ids=FORMS)
+@pytest.mark.parametrize("native", [False, True])
+def test_a_call_in_another_form_is_answered_and_recorded_as_mended(
+    form: str, native: bool
+) -> None:
+    play = Play("fc", [f"I look it up.\n\n{form}\n", car(21.4)], native=native)
+    assert (play.roles, play.x_m) == ("mm", 21.4)
+    told = play.client.requests[1].messages[-1]
+    assert told.speaker is Speaker.USER
+    (result,) = results(told)
+    assert result["x_m"] == 21.4
+    assert "placement" not in told.text
+    (note,) = play.notes("tool_call")
+    assert (note["tool"], note["understood"], note["mended"]) == ("pose_on_lane", True, True)
+
+
+@pytest.mark.parametrize(
+    ("answer", "said"),
+    [
+        ("- {'call': 'pose_on_lane', 'arguments': {'lane': Lane1}}", "one line of the form"),
+        ("pose_on_lane(lane='Lane1', distance_m=20 + 1.4)", "expected a comma"),
+        ("I would call pose_on_lane from Agent1.", "is named and not called"),
+        ("x = retrieve_suitable_pose('Lane1', 'Agent1', 21.4)", "no function 'retrieve_suit"),
+    ],
+)
+def test_a_call_that_is_not_understood_is_told_so_and_never_to_keep_a_placement(
+    answer: str, said: str
+) -> None:
+    play = Play("fc", [answer, car(21.4)])
+    told = play.client.requests[1].messages[-1].text
+    assert said in told
+    assert "placement" not in told
+    assert told.endswith("or give your answer in the five sections.")
+    assert (play.roles, play.x_m) == ("mm", 21.4)
+    (note,) = play.notes("tool_call")
+    assert note["mended"] is (said == "no function 'retrieve_suit")
+
+
+def test_only_an_answer_with_a_block_is_told_to_keep_its_placement() -> None:
+    broken = car(21.4).replace("21.4", "21.4 m")
+    keep = "Keep your placement unless one of these points is about it."
+    assert keep in Play("otm", [broken, car(21.4)]).client.requests[1].messages[-1].text
+    assert keep not in Play("otm", ["There.", car(21.4)]).client.requests[1].messages[-1].text
+
+
+def test_who_calls_when_no_call_is_left_is_told_so_when_asked_again() -> None:
+    play = Play("fc", [call()] * 5 + [car(21.4)])
+    told = play.client.requests[5].messages[-1].text
+    assert "no function call is answered any more" in told
+    assert "placement" not in told
+    assert (play.roles, play.x_m) == ("m" * 6, 21.4)
+
+
+def test_a_cut_off_answer_that_tells_of_a_call_is_asked_again_with_more_room() -> None:
+    recap = f"Step 1: I called {FORMS['Python']} and got"
+    play = Play("fc", [call(), Reply(text=recap, finish_reason="length"), car(21.4)])
+    first, last = play.client.requests[1:]
+    assert last.max_tokens == 2 * first.max_tokens
+    assert len(play.notes("tool_call")) == 1
 
 
 def test_after_eight_calls_none_is_answered_and_an_answer_is_due() -> None:
