@@ -34,7 +34,7 @@ class FaultLine:
         counts: Augmentations by class of fault; an augmentation with two counts in both.
         labelled: Augmentations with a label.
         labels: Labels on them, over all experts.
-        without_modification: Unreadable and refused answers, which nobody labels.
+        without_modification: Unreadable and refused answers: nobody labels them, each is a miss.
     """
 
     name: str
@@ -47,8 +47,13 @@ class FaultLine:
 
     @property
     def all(self) -> int:
-        """The sum over the classes, as the paper has it."""
-        return sum(self.counts.values())
+        """The sum over the classes, as the paper has it, and one for each answer that is none."""
+        return sum(self.counts.values()) + self.without_modification
+
+    @property
+    def counted(self) -> int:
+        """Augmentations that are judged: labelled, or without anything to label."""
+        return self.labelled + self.without_modification
 
     @property
     def position(self) -> int:
@@ -103,6 +108,11 @@ class FaultTable:
         """Over all contestants."""
         return sum(line.labels for line in self.lines)
 
+    @property
+    def counted(self) -> int:
+        """Augmentations that are judged, over all contestants."""
+        return sum(line.counted for line in self.lines)
+
 
 def fault_table(job: GenerationJob) -> FaultTable:
     """The table of a job; two queries.
@@ -139,7 +149,10 @@ def csv_bytes(table: FaultTable) -> bytes:
 
 
 def latex(table: FaultTable) -> str:
-    """The paper's table "Error Count per Category": needs booktabs and xcolor with `table`."""
+    """The paper's table "Error Count per Category": needs booktabs and xcolor with `table`.
+
+    Beside the paper's columns stand unreadable and refused answers, and how many were judged.
+    """
     kappas = ", ".join(f"{one.fault} {_said(one.kappa)} (n={one.n})" for one in table.agreement)
     alphas = ", ".join(
         f"{one.fault} {_said(one.alpha)} (pictures={one.pictures})" for one in table.agreement
@@ -152,16 +165,17 @@ def latex(table: FaultTable) -> str:
         r"\providecolor{llm_blue}{RGB}{105, 156, 219}",
         r"\begin{table}",
         r"    \centering",
-        r"    \begin{tabular}{l>{\columncolor{llm_blue!20}}rrrr}",
+        r"    \begin{tabular}{l>{\columncolor{llm_blue!20}}rrrrrr}",
         r"    \toprule",
         r"    \textbf{Model} & \textbf{All}~$\downarrow$ & \textbf{Position}~$\downarrow$"
-        r" & \textbf{Heading}~$\downarrow$ & \textbf{Logic}~$\downarrow$ \\",
+        r" & \textbf{Heading}~$\downarrow$ & \textbf{Logic}~$\downarrow$"
+        r" & \textbf{No answer}~$\downarrow$ & \textbf{n} \\",
         r"    \midrule",
         *(
             f"    {escape(line.marked)} & {line.all} & {line.position} & {line.heading} "
-            rf"& {line.logic}\\"
+            rf"& {line.logic} & {line.without_modification} & {line.counted}\\"
             for line in table.lines
-            if line.labelled
+            if line.counted
         ),
         r"    \bottomrule",
         r"    \end{tabular}",

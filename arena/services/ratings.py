@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 from dataclasses import replace
 from typing import TypedDict, Unpack
 
@@ -18,11 +19,14 @@ from arena.rating.leaderboard import Method
 from arena.services.snapshots import compute, keep, note_progress
 from arena.services.turns import in_turn
 from augment.errors import Conflict, UnknownName
-from augment.sentences import sentence
+from augment.sentences import sentence, sentence_of
 from augment.services.events import log_event
+
+logger = logging.getLogger(__name__)
 
 DEFAULT_ROUNDS = 10_000
 MOST_ROUNDS = 100_000
+LONGEST_REASON = 500
 WHILE_WAITING = 20_000
 """Up to so many votes a person waits for the page; more are a worker's job."""
 
@@ -84,10 +88,11 @@ def plan_snapshot(*, study: Study, **choices: Unpack[Choices]) -> Snapshot:
 def compute_snapshot(*, snapshot_pk: int) -> Snapshot | None:
     """Compute a planned snapshot, saying how far it is; twice does no harm.
 
-    What goes wrong with the votes themselves is kept as the snapshot's status.
+    Whatever goes wrong is kept as the snapshot's status and logged: none stays under way for
+    ever, and asking for it again computes it anew.
 
     Returns:
-        The snapshot, None if it is gone or ready already.
+        The snapshot, None if it is gone, ready already or could not be computed.
     """
     unready = Snapshot.objects.filter(pk=snapshot_pk).exclude(state=Snapshot.State.READY)
     snapshot = unready.select_related("study").first()
@@ -99,8 +104,12 @@ def compute_snapshot(*, snapshot_pk: int) -> Snapshot | None:
         )
         return keep(snapshot, computed)
     except (UnknownName, Conflict, ArithmeticError) as error:
-        unready.update(state=Snapshot.State.FAILED, status=str(error))
-        return None
+        _fail(snapshot, sentence_of(error))
+    except Exception as error:
+        # Unforeseen: the message is done with, so nobody else would ever say so.
+        logger.exception("rating %s of study %s", snapshot.code, snapshot.study.code)
+        _fail(snapshot, f"{type(error).__name__}: {error}")
+    return None
 
 
 def is_big(study: Study) -> bool:
@@ -111,6 +120,21 @@ def is_big(study: Study) -> bool:
 
 
 # --- Private -----------------------------------------------------------------------------------
+
+
+def _fail(snapshot: Snapshot, why: str) -> None:
+    """Say on the row and in the log why there is no rating; one that is ready stays so."""
+    with transaction.atomic():
+        unready = Snapshot.objects.filter(pk=snapshot.pk).exclude(state=Snapshot.State.READY)
+        if not unready.update(state=Snapshot.State.FAILED, status=why[:LONGEST_REASON]):
+            return
+        log_event(
+            actor=snapshot.made_by,
+            verb="rating failed",
+            object_kind="study",
+            object_code=snapshot.study.code,
+            after={"snapshot": str(snapshot.code), "why": why[:LONGEST_REASON]},
+        )
 
 
 def _planned(

@@ -48,6 +48,7 @@ _VERBS: dict[str, str | Promise] = {
     "close": gettext_lazy("closed"),
     "rate": gettext_lazy("rated"),
     "rate early": gettext_lazy("rated early"),
+    "rating failed": gettext_lazy("a rating failed"),
     "look early": gettext_lazy("looked at results early"),
     "hand over": gettext_lazy("handed over"),
     "plan batch": gettext_lazy("planned a batch"),

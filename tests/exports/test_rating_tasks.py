@@ -11,6 +11,7 @@ from arena.services.ratings import is_big, plan_snapshot
 from arena.services.snapshots import compute, keep, note_progress
 from arena.services.studies import close_study
 from augment.errors import QueueUnreachable
+from augment.models import Event
 from tests.study_rows import a_study, vote
 from tests.web.cast import people, signed_in
 
@@ -52,6 +53,30 @@ def test_of_two_workers_with_the_same_message_the_first_to_end_counts() -> None:
     assert second.state == Snapshot.State.READY
     assert list(snapshot.standings.order_by("pk").values_list("pk", flat=True)) == kept
     assert len(kept) == 3
+
+
+def test_a_rating_that_breaks_in_an_unforeseen_way_says_so_and_can_be_asked_for_again(
+    caplog: pytest.LogCaptureFixture,
+) -> None:
+    snapshot = planned()
+    kept = snapshot.filters
+    Snapshot.objects.filter(pk=snapshot.pk).update(filters={"kinds": 7})  # no list: a TypeError
+    tasks.compute_snapshot(snapshot.pk)
+    snapshot.refresh_from_db()
+    assert snapshot.state == Snapshot.State.FAILED
+    assert snapshot.status.startswith("TypeError: ")
+    assert str(snapshot.code) in caplog.text
+    assert "Traceback" in caplog.text
+    event = Event.objects.get(verb="rating failed")
+    assert event.after == {"snapshot": str(snapshot.code), "why": snapshot.status}
+    analyst = signed_in(people()["analyst"])
+    page = analyst.get(reverse("results", args=[snapshot.study.code])).content.decode()
+    assert "could not be computed: TypeError" in page
+    assert reverse("rating-again", args=[snapshot.study.code, snapshot.code]) in page
+    Snapshot.objects.filter(pk=snapshot.pk).update(filters=kept)
+    tasks.compute_snapshot(snapshot.pk)
+    snapshot.refresh_from_db()
+    assert (snapshot.state, snapshot.status != "", snapshot.progress) == ("ready", True, 100)
 
 
 def test_without_a_queue_the_rating_waits_and_says_why() -> None:

@@ -201,11 +201,12 @@ def test_the_files_have_the_papers_columns(job: GenerationJob, eva: User) -> Non
     lines = list(csv.DictReader(io.StringIO(csv_bytes(table).decode())))
     assert [(line["contestant"], line["all"]) for line in lines] == [
         ("ann", "1"),
-        ("sim (simulated)", "0"),
+        ("sim (simulated)", "2"),
     ]
     text = latex(table)
-    assert r"    ann & 1 & 1 & 0 & 0\\" in text
-    assert "sim" not in text.partition("midrule")[2]  # nobody labelled it
+    assert r"    ann & 1 & 1 & 0 & 0 & 0 & 1\\" in text
+    # Two unreadable answers and nothing to label: two misses, of two.
+    assert r"    sim (simulated) & 2 & 0 & 0 & 0 & 2 & 2\\" in text
     out = io.StringIO()
     call_command("export", "faults", "Round 1", "--format", "latex", "--out", "-", stdout=out)
     assert out.getvalue() == text
