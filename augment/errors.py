@@ -73,6 +73,10 @@ class Conflict(AugmentError):
     """The request contradicts what is stored already (a taken slug, a finished job)."""
 
 
+class CannotDrive(AugmentError):
+    """A scene or a planner does not allow a drive. Mend what the sentence names."""
+
+
 class InstructionNotUnderstood(AugmentError):
     """The rule-based contestants refuse rather than guess. An outcome, never retried.
 

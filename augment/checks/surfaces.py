@@ -41,11 +41,11 @@ class Surface:
         Ways go by their boundaries where the map has both, else by their width. An area that
         crosses itself is taken as the ground that it encloses.
         """
-        return cls(np.concatenate([_strips(list(ways)), _rings(list(areas))]))
+        return cls(np.concatenate([strips(list(ways)), rings(list(areas))]))
 
     def with_areas(self, areas: Iterable[Area]) -> Surface:
         """This ground and more areas."""
-        return Surface(np.concatenate([self._pieces, _rings(list(areas))]))
+        return Surface(np.concatenate([self._pieces, rings(list(areas))]))
 
     @property
     def is_empty(self) -> bool:
@@ -101,7 +101,7 @@ def gaps_m(boxes_m: FloatArray) -> FloatArray:
 # Private
 
 
-def _strips(ways: Sequence[Way]) -> NDArray[np.object_]:
+def strips(ways: Sequence[Way]) -> NDArray[np.object_]:
     """One polygon a way."""
     import shapely
 
@@ -123,7 +123,7 @@ def _outline(way: Way) -> FloatArray | None:
     return np.concatenate([way.left_boundary.points_m, way.right_boundary.points_m[::-1]])
 
 
-def _rings(areas: Sequence[Area]) -> NDArray[np.object_]:
+def rings(areas: Sequence[Area]) -> NDArray[np.object_]:
     """One geometry an area."""
     import shapely
 

@@ -1,0 +1,117 @@
+"""The drive itself: plan, track, let traffic answer, 150 times."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from augment.errors import CannotDrive
+from augment.sentences import sentence
+from augment.simulation.objects import Objects
+from augment.simulation.planning import Plan, Planner, Situation
+from augment.simulation.road import Road
+from augment.simulation.setting import Setting
+from augment.simulation.states import STEP_S, EgoBody, FloatArray, X, Y, start_state
+from augment.simulation.tracker import drive_steps
+from augment.simulation.traffic import Traffic
+
+DURATION_STEPS = 150
+
+
+@dataclass(slots=True, kw_only=True, eq=False)
+class Drive:
+    """What happened. T moments, one more than steps were driven.
+
+    Attributes:
+        states: (T, 6) of the ego's rear axle.
+        objects: T rows of who was there.
+        plans: T - 1 plans, one a step.
+        at_map_end: Whether the drive ended early because the road did.
+    """
+
+    road: Road
+    body: EgoBody
+    states: FloatArray
+    objects: list[Objects]
+    plans: list[Plan] = field(default_factory=list)
+    at_map_end: bool = False
+
+    @property
+    def duration_s(self) -> float:
+        """How long was driven."""
+        return (len(self.states) - 1) * STEP_S
+
+    @property
+    def boxes(self) -> FloatArray:
+        """The ego's boxes (T, 5)."""
+        return self.body.boxes(self.states)
+
+
+def run(
+    setting: Setting,
+    planner: Planner,
+    *,
+    road: Road | None = None,
+    steps: int = DURATION_STEPS,
+    after_step: Callable[[int], None] | None = None,
+) -> Drive:
+    """Drive a setting with a planner.
+
+    Args:
+        setting: The scene and its change.
+        planner: Replanned every 0.1 s.
+        road: The scene's map where it is laid out already.
+        steps: How many at most; fewer where the map ends.
+        after_step: Told the number of steps done, for heartbeats; it may raise to stop.
+
+    Raises:
+        CannotDrive: The ego is on no lane, or the planner's answer has another shape.
+    """
+    road = road or Road(setting.scene, setting.recording)
+    body = EgoBody.of(setting.scene.ego)
+    state = start_state(setting.scene.ego, body)
+    traffic = Traffic(setting, road, body, state)
+    planner.start(road, body)
+    made = Drive(
+        road=road, body=body, states=np.empty(0), objects=[traffic.objects()], at_map_end=False
+    )
+    states = [state]
+    for step in range(steps):
+        if _at_end(road, body, state):
+            made.at_map_end = True
+            break
+        objects = made.objects[-1]
+        plan = planner.plan(Situation(step=step, ego=state, objects=objects))
+        following = drive_steps(_poses(plan)[None], state, body, 1)[0, 1]
+        traffic.step(state, objects)
+        state = following
+        states.append(state)
+        made.objects.append(traffic.objects())
+        made.plans.append(plan)
+        if after_step is not None:
+            after_step(step + 1)
+    made.states = np.array(states)
+    return made
+
+
+def _at_end(road: Road, body: EgoBody, state: FloatArray) -> bool:
+    """Whether the front bumper has come to the end of the map."""
+    if road.end_m >= road.centreline.length_m:
+        return False
+    rear_axle_m = float(road.centreline.beside(state[None, [X, Y]])[0][0])
+    return rear_axle_m + body.front_m >= road.end_m
+
+
+def _poses(plan: Plan) -> FloatArray:
+    poses = np.asarray(plan.poses, dtype=np.float64)
+    if poses.ndim != 2 or poses.shape[1] != 3 or len(poses) < 2 or not np.isfinite(poses).all():
+        raise CannotDrive(
+            sentence(
+                "The planner's poses have the shape %(shape)s; they must be (T, 3), T at least 2,"
+                " and finite.",
+                shape=str(poses.shape),
+            )
+        )
+    return poses

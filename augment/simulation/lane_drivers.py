@@ -1,0 +1,217 @@
+"""Traffic that follows its lanes by the IDM and answers to whoever is ahead, the ego included.
+
+All drivers move at once. A driver looks along its own path: the samples of the path ahead are
+held against the boxes of the others, widened by half its own width; the first that lies in a box
+names the leader. D drivers, A objects, M samples ahead.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from augment.scene.entities import AgentType, TrafficAgent
+from augment.simulation.idm import TRAFFIC_IDM, Idm
+from augment.simulation.objects import Objects
+from augment.simulation.overlap import corners, meet, radii
+from augment.simulation.path import Path, dense
+from augment.simulation.road import Road
+from augment.simulation.states import STEP_S, FloatArray, IntArray
+from augment.simulation.walkers import objects_of
+
+FALLBACK_MPS = 10.0
+"""The wished speed where the map has no limit: nuPlan's."""
+SWEEP_S = 1.5
+"""A driver takes up the road that it covers in this time, so that gaps are measured from there."""
+PATH_M = 400.0
+_LOOK_M = 80.0
+_KEPT_WAYS = 5
+"""nuPlan keeps this many ways of a driver's route; the limit of the last one is its wish."""
+
+
+class LaneDrivers:
+    """D drivers on their lanes.
+
+    Args:
+        agents: Moving, each on a lane; who starts in a collision is dropped.
+        road: The map.
+        ego_box: (5,) at the start.
+        standing: Boxes (A, 5) of what never moves.
+        idm: Their wishes.
+        sweep_s: How much road ahead of itself a driver takes up, in seconds of its speed, from
+            the second step on (nuPlan's traffic does); 0 for the plain law.
+    """
+
+    def __init__(
+        self,
+        agents: Sequence[TrafficAgent],
+        road: Road,
+        ego_box: FloatArray,
+        standing: FloatArray,
+        *,
+        idm: Idm = TRAFFIC_IDM,
+        sweep_s: float = SWEEP_S,
+    ) -> None:
+        self._idm, self._sweep_s, self._first = idm, sweep_s, True
+        self._agents = _free(agents, np.vstack([ego_box[None], standing]))
+        made = [_Lane(road, agent) for agent in self._agents]
+        self._lanes = made
+        self._base = objects_of(self._agents, speeds=True)
+        self.stations = np.array([lane.start_m for lane in made], dtype=np.float64)
+        self.speeds = self._base.speeds_mps.copy()
+        self._ends = np.array([lane.path.length_m for lane in made], dtype=np.float64)
+        self._samples = _stacked([lane.path for lane in made])
+
+    def objects(self) -> Objects:
+        """Those who are still on the map."""
+        boxes = self._base.boxes.copy()
+        for row, lane in enumerate(self._lanes):
+            boxes[row, :3] = lane.path.poses(self.stations[row : row + 1])[0]
+        now = Objects(
+            ids=self._base.ids, kinds=self._base.kinds, boxes=boxes, speeds_mps=self.speeds.copy()
+        )
+        return now.chosen(self.stations < self._ends)
+
+    def step(self, everybody: Objects) -> None:
+        """One step on, given all objects of this moment with the ego among them."""
+        if not self._agents:
+            return
+        gap, leader_speed = self._leaders(everybody)
+        targets = np.array(
+            [lane.wish_mps(s) for lane, s in zip(self._lanes, self.stations, strict=True)]
+        )
+        pull = self._idm.clipped(self.speeds, targets, gap, leader_speed)
+        self.stations = self.stations + self.speeds * STEP_S
+        self.speeds = np.maximum(self.speeds + pull * STEP_S, 0.0)
+        self._first = False
+
+    def _leaders(self, everybody: Objects) -> tuple[FloatArray, FloatArray]:
+        """Gap and speed along the path of each driver's leader, (D,) each; inf without one."""
+        half = self._base.boxes[:, 3] / 2.0
+        front = self.stations + half + (0.0 if self._first else self._sweep_s) * self.speeds
+        gap, speed = np.full(len(front), np.inf), np.zeros(len(front))
+        for row, lane in enumerate(self._lanes):
+            stop = lane.red_ahead(self.stations[row] + half[row])
+            gap[row] = stop - front[row]
+        driver, other, hit = self._hits(everybody, half)
+        if len(driver):
+            pose = self._samples[driver, hit]
+            tangent = np.stack([np.cos(pose[:, 2]), np.sin(pose[:, 2])], axis=1)
+            offset = corners(everybody.boxes[other]) - pose[:, None, :2]
+            near = hit + (offset * tangent[:, None, :]).sum(axis=-1).min(axis=1)
+            found = near - front[driver]
+            turn = everybody.boxes[other, 2] - pose[:, 2]
+            along = everybody.speeds_mps[other] * np.cos(turn)
+            for row in np.argsort(-found, kind="stable"):  # the nearest is written last
+                if found[row] < gap[driver[row]]:
+                    gap[driver[row]], speed[driver[row]] = found[row], along[row]
+        return gap, speed
+
+    def _hits(self, everybody: Objects, half: FloatArray) -> tuple[IntArray, IntArray, IntArray]:
+        """Driver, object, and the first sample of the driver's path inside the object, (K,)."""
+        none = np.zeros(0, dtype=np.int64)
+        places = {name: number for number, name in enumerate(everybody.ids)}
+        present = [row for row, name in enumerate(self._base.ids) if name in places]
+        if not present:
+            return none, none, none
+        rows = np.array(present, dtype=np.int64)
+        mine = np.array([places[self._base.ids[row]] for row in present], dtype=np.int64)
+        here = everybody.boxes[mine]
+        look = np.minimum(_LOOK_M, 10.0 + self.speeds[rows] * (self._sweep_s + 4.0))
+        offset = everybody.boxes[None, :, :2] - here[:, None, :2]
+        reach = look[:, None] + radii(everybody.boxes)[None]
+        near = (offset**2).sum(axis=-1) < reach**2
+        ahead = offset[..., 0] * np.cos(here[:, None, 2]) + offset[..., 1] * np.sin(
+            here[:, None, 2]
+        )
+        near &= ahead > -radii(everybody.boxes)[None]
+        near[np.arange(len(mine)), mine] = False
+        driver, other = np.nonzero(near)
+        if not len(driver):
+            return none, none, none
+        return self._first_inside(rows[driver], other, everybody, half)
+
+    def _first_inside(
+        self, driver: IntArray, other: IntArray, everybody: Objects, half: FloatArray
+    ) -> tuple[IntArray, IntArray, IntArray]:
+        count = int(_LOOK_M)
+        start = np.floor(self.stations[driver] + half[driver]).astype(np.int64)
+        at = np.minimum(start[:, None] + np.arange(count), self._samples.shape[1] - 1)
+        points = self._samples[driver[:, None], at]
+        box = everybody.boxes[other]
+        dx, dy = points[..., 0] - box[:, None, 0], points[..., 1] - box[:, None, 1]
+        cos, sin = np.cos(box[:, None, 2]), np.sin(box[:, None, 2])
+        margin = self._base.boxes[driver, 4] / 2.0
+        inside = np.abs(dx * cos + dy * sin) <= (box[:, 3] / 2.0 + margin)[:, None]
+        inside &= np.abs(dy * cos - dx * sin) <= (box[:, 4] / 2.0 + margin)[:, None]
+        hit = inside.any(axis=1)
+        first = at[np.arange(len(at)), inside.argmax(axis=1)]
+        return driver[hit], other[hit], first[hit]
+
+
+# Private
+
+
+class _Lane:
+    """One driver's path along the lanes from where it starts, its limits and its red lights."""
+
+    def __init__(self, road: Road, agent: TrafficAgent) -> None:
+        name = lane_under(road, agent)
+        if name is None:
+            raise ValueError(f"{agent.id} is on no lane")
+        graph = road.graph
+        place = graph.ways[name].centerline.project(agent.x_m, agent.y_m)
+        route = graph.route(name, place.s_m + PATH_M)
+        lines = [graph.ways[way].centerline.points_m for way in route]
+        whole = np.vstack(lines)
+        self.path = Path(dense(whole, 1.0))
+        self.start_m = float(self.path.beside(np.array([[agent.x_m, agent.y_m]]))[0][0])
+        lengths = np.cumsum([graph.ways[way].centerline.length_m for way in route])
+        self._ends = lengths
+        limits = road.limits_mps[[road.index[way] for way in route]]
+        self._limits = np.where(np.isnan(limits), FALLBACK_MPS, limits)
+        if agent.type is AgentType.BICYCLE:
+            self._limits = np.full(len(route), agent.speed_mps)
+        red = [number for number, way in enumerate(route) if way in road.red]
+        self._stops = [float(lengths[number - 1]) if number else 0.0 for number in red]
+
+    def wish_mps(self, s_m: float) -> float:
+        """The speed that the driver wishes at s."""
+        here = int(np.searchsorted(self._ends, s_m, side="right"))
+        return float(self._limits[min(here + _KEPT_WAYS - 1, len(self._limits) - 1)])
+
+    def red_ahead(self, front_m: float) -> float:
+        """Where the next red stop line is, inf without one."""
+        return min((stop for stop in self._stops if stop >= front_m), default=np.inf)
+
+
+def lane_under(road: Road, agent: TrafficAgent) -> str | None:
+    """The way under an agent that leads where the agent heads, None off every such way."""
+    name = road.graph.under(agent.x_m, agent.y_m, agent.heading_rad)
+    if name is None:
+        return None
+    line = road.graph.ways[name].centerline
+    heading = line.heading_at(line.project(agent.x_m, agent.y_m).s_m)
+    return name if np.cos(heading - agent.heading_rad) > 0.0 else None
+
+
+def _free(agents: Sequence[TrafficAgent], taken: FloatArray) -> tuple[TrafficAgent, ...]:
+    """Those who touch nobody that is there already, in the order given."""
+    kept: list[TrafficAgent] = []
+    boxes = list(taken)
+    for agent in agents:
+        box = objects_of([agent], speeds=True).boxes
+        if not meet(np.array(boxes), box).any():
+            kept.append(agent)
+            boxes.append(box[0])
+    return tuple(kept)
+
+
+def _stacked(paths: Sequence[Path]) -> FloatArray:
+    """Poses (D, M, 3) at every whole metre, the last of each path repeated."""
+    longest = max((int(path.length_m) + 2 for path in paths), default=0)
+    made = np.empty((len(paths), longest, 3))
+    for row, path in enumerate(paths):
+        made[row] = path.poses(np.arange(longest, dtype=np.float64))
+    return made

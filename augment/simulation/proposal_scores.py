@@ -1,0 +1,195 @@
+"""PDM-Closed's judgement of its simulated proposals.
+
+B proposals, T moments every 0.1 s, A objects, F slices every 0.2 s. A moment takes the slice at or
+before it. Source: the facts on PDM-Closed in docs/simulation.md.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from augment.simulation.comfort import PROPOSAL, comfort_signals, comfortable
+from augment.simulation.contact import AHEAD_RAD, BEHIND_RAD, at_fault, bearings, classify
+from augment.simulation.forecast import STEPS_A_SLICE, Forecast
+from augment.simulation.objects import Kind
+from augment.simulation.overlap import corners, meet, radii
+from augment.simulation.road import Road
+from augment.simulation.states import (
+    HEADING,
+    SPEED,
+    STEP_S,
+    BoolArray,
+    EgoBody,
+    FloatArray,
+    IntArray,
+)
+
+STILL_MPS = 5e-3
+TTC_STEPS = (0, 3, 6, 9)
+PROGRESS_WEIGHT, TTC_WEIGHT, COMFORT_WEIGHT = 5.0, 5.0, 2.0
+LITTLE_PROGRESS_M = 0.1
+STATIC_HIT = 0.5
+ONCOMING_FREE_M, ONCOMING_HALF_M = 2.0, 6.0
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class ProposalScores:
+    """How good each of B proposals is.
+
+    Attributes:
+        scores: (B,) 0 to 1.
+        fault_s: (B,) when the first collision at fault comes; inf without one.
+        parts: Each (B,): collision, drivable, direction, progress, ttc, comfort.
+    """
+
+    scores: FloatArray
+    fault_s: FloatArray
+    parts: dict[str, FloatArray]
+
+
+def score_proposals(
+    states: FloatArray, forecast: Forecast, road: Road, body: EgoBody
+) -> ProposalScores:
+    """Judge simulated states (B, T, 6)."""
+    look = _Look(states, forecast, road, body)
+    collision, fault_s = _collisions(look)
+    drivable = np.where(look.off_road.any(axis=1), 0.0, 1.0)
+    direction = _direction(look)
+    valid = collision * drivable * direction
+    progress = _progress(look, valid)
+    ttc = _time_to_collision(look)
+    calm = comfortable(comfort_signals(states, body, PROPOSAL))
+    comfort = np.where(np.logical_and.reduce(calm, axis=1), 1.0, 0.0)
+    weighted = PROGRESS_WEIGHT * progress + TTC_WEIGHT * ttc + COMFORT_WEIGHT * comfort
+    total = PROGRESS_WEIGHT + TTC_WEIGHT + COMFORT_WEIGHT
+    return ProposalScores(
+        scores=valid * weighted / total,
+        fault_s=fault_s,
+        parts={
+            "collision": collision,
+            "drivable": drivable,
+            "direction": direction,
+            "progress": progress,
+            "ttc": ttc,
+            "comfort": comfort,
+        },
+    )
+
+
+# Private
+
+
+class _Look:
+    """The states with what several judgements need of them."""
+
+    def __init__(self, states: FloatArray, forecast: Forecast, road: Road, body: EgoBody) -> None:
+        self.states, self.road, self.body = states, road, body
+        self.boxes = body.boxes(states)
+        self.corners = corners(self.boxes)
+        inside = road.drivable.contains(self.corners)
+        self.off_road: BoolArray = ~np.logical_and.reduce(inside, axis=-1)
+        self.objects = forecast.objects
+        self.moving_boxes = forecast.boxes
+        self.sizes = radii(forecast.boxes[0])
+        self.first_hit = np.full((len(states), len(forecast.objects)), 10**6)
+
+    def contacts(self, boxes: FloatArray, later: int) -> tuple[IntArray, IntArray, IntArray]:
+        """Proposal, moment and object (K,) where boxes (B, T, 5), `later` steps on, meet."""
+        moments = (np.arange(boxes.shape[1]) + later) // STEPS_A_SLICE
+        others = self.moving_boxes[np.minimum(moments, len(self.moving_boxes) - 1)]
+        reach = (self.sizes + radii(boxes[0, 0])) ** 2
+        dx = boxes[..., None, 0] - others[None, ..., 0]
+        dy = boxes[..., None, 1] - others[None, ..., 1]
+        proposal, moment, thing = np.nonzero(dx * dx + dy * dy <= reach)
+        hit = meet(boxes[proposal, moment], others[moment, thing])
+        return proposal[hit], moment[hit], thing[hit]
+
+    def astray(self, proposal: IntArray, moment: IntArray) -> BoolArray:
+        """Whether the ego (K,) is off the road or not on one way; each place is asked once."""
+        keys, back = np.unique(proposal * self.states.shape[1] + moment, return_inverse=True)
+        rows, times = np.divmod(keys, self.states.shape[1])
+        wrong = self.off_road[rows, times] | ~self.road.on_one_way(self.corners[rows, times])
+        return np.asarray(wrong[back], dtype=np.bool_)
+
+    def in_intersection(self, proposal: IntArray, moment: IntArray) -> BoolArray:
+        """Whether the ego's centre (K,) is in an intersection."""
+        return self.road.intersections.contains(self.boxes[proposal, moment, :2])
+
+
+def _collisions(look: _Look) -> tuple[FloatArray, FloatArray]:
+    """The multiplier (B,) and the first fault (B,) in s; notes each pair's first contact."""
+    count = len(look.states)
+    multiplier, fault_s = np.ones(count), np.full(count, np.inf)
+    proposal, moment, thing = look.contacts(look.boxes, 0)
+    if not len(proposal):
+        return multiplier, fault_s
+    np.minimum.at(look.first_hit, (proposal, thing), moment)
+    proposal, thing = np.nonzero(look.first_hit < 10**6)
+    moment = look.first_hit[proposal, thing]
+    states = look.states[proposal, moment]
+    contacts = classify(
+        states,
+        states[:, SPEED],
+        look.moving_boxes[moment // STEPS_A_SLICE, thing],
+        look.objects.speeds_mps[thing],
+        look.objects.kinds[thing],
+        look.body,
+        still_mps=STILL_MPS,
+    )
+    guilty = at_fault(contacts, look.astray(proposal, moment))
+    static = look.objects.kinds[thing] == Kind.STATIC
+    np.minimum.at(multiplier, proposal[guilty], np.where(static[guilty], STATIC_HIT, 0.0))
+    np.minimum.at(fault_s, proposal[guilty], moment[guilty] * STEP_S)
+    return multiplier, fault_s
+
+
+def _direction(look: _Look) -> FloatArray:
+    """1, 0.5 or 0 (B,) by the way travelled while the centre is on no way of the route."""
+    centres = look.boxes[..., :2]
+    against = ~look.road.on_route.contains(centres)
+    if not against.any():
+        return np.ones(len(centres))
+    steps = np.hypot(*np.moveaxis(np.diff(centres, axis=1), -1, 0))
+    travelled = (steps * against[:, 1:]).sum(axis=1)
+    return np.where(
+        travelled < ONCOMING_FREE_M, 1.0, np.where(travelled < ONCOMING_HALF_M, 0.5, 0.0)
+    )
+
+
+def _progress(look: _Look, valid: FloatArray) -> FloatArray:
+    """The advance along the centreline (B,) as a share of the best valid one."""
+    line = look.road.centreline
+    start, _ = line.beside(look.boxes[:1, 0, :2])
+    end, _ = line.beside(look.boxes[:, -1, :2])
+    advance = np.maximum(end - start, 0.0) * valid
+    best = advance.max()
+    if best > LITTLE_PROGRESS_M:
+        return np.asarray(advance / best, dtype=np.float64)
+    return (valid > 0.0).astype(np.float64)
+
+
+def _time_to_collision(look: _Look) -> FloatArray:
+    """1, or 0 (B,) where going on as now would hit somebody within 0.9 s of some moment."""
+    made = np.ones(len(look.states))
+    heading, speed = look.states[..., HEADING], look.states[..., SPEED]
+    for later in TTC_STEPS:
+        boxes = look.boxes.copy()
+        way = speed * (later * STEP_S)
+        boxes[..., 0] += way * np.cos(heading)
+        boxes[..., 1] += way * np.sin(heading)
+        proposal, moment, thing = look.contacts(boxes, later)
+        fresh = moment < look.first_hit[proposal, thing]
+        fresh &= (speed[proposal, moment] > STILL_MPS) & (made[proposal] > 0.0)
+        proposal, moment, thing = proposal[fresh], moment[fresh], thing[fresh]
+        moments = np.minimum((moment + later) // STEPS_A_SLICE, len(look.moving_boxes) - 1)
+        places = look.moving_boxes[moments, thing, :2]
+        bearing = bearings(look.states[proposal, moment], places)
+        made[proposal[bearing < AHEAD_RAD]] = 0.0
+        beside = (bearing >= AHEAD_RAD) & (bearing <= BEHIND_RAD) & (made[proposal] > 0.0)
+        proposal, moment = proposal[beside], moment[beside]
+        if len(proposal):
+            loose = look.in_intersection(proposal, moment) | look.astray(proposal, moment)
+            made[proposal[loose]] = 0.0
+    return made

@@ -1,0 +1,238 @@
+"""The ground of a drive: ways as polygons, what may be driven on, the route and its centreline.
+
+Where the map ends on the route, the road is carried on straight for `RUN_OUT_M`, so that a
+planner need not brake for the edge of the map; a drive ends as soon as the ego comes to
+`end_m`, the true end.
+"""
+
+from __future__ import annotations
+
+from functools import cached_property
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from augment.checks.surfaces import rings, strips
+from augment.scene.entities import AreaKind, LaneConnector, Scene, TrafficLight
+from augment.scene.lane_graph import LaneGraph, Way
+from augment.scene.recording import Recording
+from augment.simulation.path import Path, dense
+from augment.simulation.region import Region
+from augment.simulation.route import beside_route, find_route
+from augment.simulation.states import BoolArray, FloatArray, IntArray
+
+if TYPE_CHECKING:
+    from shapely.geometry.base import BaseGeometry
+
+RUN_OUT_M = 300.0
+_DRIVABLE = (AreaKind.DRIVABLE, AreaKind.CARPARK, AreaKind.INTERSECTION)
+_JOINT_M = 3.0
+"""Ends of following ways that are further apart than this are not joined by ground."""
+
+
+class Road:
+    """One scene's map, laid out for driving.
+
+    Attributes:
+        graph: The lanes and connectors.
+        names: Ids of the ways (W,), in the order of every array over ways.
+        route: Ids of the ways that the ego is to take.
+        centreline: Their centrelines in one, with the run-out.
+        end_m: Where on it the map ends; beyond reach where it goes on.
+        red: Ids of the connectors whose light is red; nobody knows when it will change.
+        limits_mps: The speed limit of each way (W,), NaN where the map does not say.
+    """
+
+    def __init__(self, scene: Scene, recording: Recording | None = None) -> None:
+        self.scene = scene
+        self.graph = LaneGraph(scene)
+        self.names = tuple(self.graph.ways)
+        self.ways: list[Way] = [self.graph.ways[name] for name in self.names]
+        self.index = {name: number for number, name in enumerate(self.names)}
+        self.route = find_route(scene, self.graph, recording)
+        self.beside = beside_route(scene, self.graph, self.route)
+        self.red = frozenset(
+            one.id for one in scene.connectors if one.traffic_light is TrafficLight.RED
+        )
+        self.limits_mps = self._limits()
+        line = np.vstack([self.graph.ways[name].centerline.points_m for name in self.route])
+        ends = not self.graph.successors(self.route[-1])
+        map_end_m = Path(dense(line)).length_m
+        if ends:
+            line = np.vstack([line, _straight_on(line, RUN_OUT_M)])  # repeats are dropped below
+        self.centreline = Path(dense(line))
+        self.end_m = map_end_m if ends else self.centreline.length_m
+        self._route_ends = self._stations()
+        self._paths: dict[int, Path] = {}
+
+    @cached_property
+    def strips(self) -> NDArray[np.object_]:
+        """The polygon of each way (W,)."""
+        return strips(self.ways)
+
+    @cached_property
+    def drivable(self) -> Region:
+        """Lanes, connectors, and areas that cars may use; no tolerance."""
+        areas = [area for area in self.scene.areas if area.kind in _DRIVABLE]
+        pieces = [self.strips, self._joints(self.names), rings(areas), self._aprons()]
+        return Region(_union(np.concatenate(pieces)))
+
+    @cached_property
+    def on_route(self) -> Region:
+        """The route's ways and their neighbours of the same direction."""
+        chosen = [self.index[name] for name in self.names if name in self.beside]
+        joints = self._joints(tuple(self.names[number] for number in chosen))
+        return Region(_union(np.concatenate([self.strips[chosen], joints, self._aprons()])))
+
+    @cached_property
+    def intersections(self) -> Region:
+        """The areas of intersections; connectors where the map draws none."""
+        areas = [area for area in self.scene.areas if area.kind is AreaKind.INTERSECTION]
+        turning = [n for n, way in enumerate(self.ways) if isinstance(way, LaneConnector)]
+        return Region(_union(rings(areas) if areas else self.strips[turning]))
+
+    @cached_property
+    def red_stations_m(self) -> FloatArray:
+        """Where on the centreline the route enters connectors whose light is red (R,)."""
+        starts = np.concatenate([[0.0], self._route_ends[:-1]])
+        return starts[np.array([name in self.red for name in self.route], dtype=np.bool_)]
+
+    def limit_at(self, s_m: float) -> float:
+        """The speed limit of the route's way there, NaN where the map does not say."""
+        last = len(self.route) - 1
+        number = min(int(np.searchsorted(self._route_ends, s_m, side="right")), last)
+        return float(self.limits_mps[self.index[self.route[number]]])
+
+    def covering(self, points_m: FloatArray) -> BoolArray:
+        """Which ways (W,) lie under which points (N, 2): (N, W); an edge counts as outside."""
+        import shapely
+
+        found = np.zeros((len(points_m), len(self.names)), dtype=np.bool_)
+        points, ways = self._tree.query(shapely.points(points_m), predicate="within")
+        found[points, ways] = True
+        return found
+
+    def on_one_way(self, corners_m: FloatArray) -> BoolArray:
+        """Which boxes (N, 4, 2) lie on one way, or on one and what follows it, (N,)."""
+        if not len(corners_m):
+            return np.zeros(0, dtype=np.bool_)
+        inside = self.covering(corners_m.reshape(-1, 2)).reshape(len(corners_m), 4, -1)
+        first, second = self._follows
+        both = inside[:, :, first] | inside[:, :, second]
+
+        def somewhere(found: BoolArray) -> BoolArray:
+            return np.asarray(np.logical_and.reduce(found, axis=1).any(axis=-1), dtype=np.bool_)
+
+        return np.asarray(somewhere(inside) | somewhere(both), dtype=np.bool_)
+
+    def way_path(self, number: int) -> Path:
+        """The centreline of one way, dense."""
+        if number not in self._paths:
+            self._paths[number] = Path(dense(self.ways[number].centerline.points_m))
+        return self._paths[number]
+
+    @cached_property
+    def _tree(self):  # type: ignore[no-untyped-def]  # shapely is loaded by who needs it
+        import shapely
+
+        return shapely.STRtree(self.strips)
+
+    @cached_property
+    def _follows(self) -> tuple[IntArray, IntArray]:
+        """The pairs of following ways, as two rows of indices (E,)."""
+        pairs = [
+            (self.index[before], self.index[after])
+            for before in self.names
+            for after in self.graph.successors(before)
+        ]
+        made = np.array(pairs, dtype=np.int64).reshape(-1, 2)
+        return made[:, 0], made[:, 1]
+
+    def _limits(self) -> FloatArray:
+        """A connector without a limit has the highest of the lanes that it joins."""
+        made = []
+        for way in self.ways:
+            limit = way.speed_limit_mps
+            if limit is None and isinstance(way, LaneConnector):
+                joined = [self.graph.ways.get(name or "") for name in (way.from_lane, way.to_lane)]
+                known = [one.speed_limit_mps for one in joined if one is not None]
+                limit = max((value for value in known if value is not None), default=None)
+            made.append(np.nan if limit is None else limit)
+        return np.array(made, dtype=np.float64)
+
+    def _stations(self) -> FloatArray:
+        """Where on the centreline each way of the route ends (K,)."""
+        ends = [self.graph.ways[name].centerline.points_m[-1] for name in self.route]
+        stations, _ = self.centreline.beside(np.array(ends))
+        return np.maximum.accumulate(stations)
+
+    def _joints(self, names: tuple[str, ...]) -> NDArray[np.object_]:
+        """The wedges between ways that follow each other in a bend."""
+        import shapely
+
+        wedges = []
+        for before in names:
+            for after in self.graph.successors(before):
+                if after in names:
+                    rim = np.vstack(
+                        [_rim(self.graph.ways[before], -1), _rim(self.graph.ways[after], 0)]
+                    )
+                    if np.ptp(rim, axis=0).max() < _JOINT_M + self.graph.ways[before].width_m:
+                        wedges.append(shapely.MultiPoint(rim).convex_hull.buffer(1e-3))
+        return np.array(wedges, dtype=object)
+
+    def _aprons(self) -> NDArray[np.object_]:
+        """The run-out of the route's last way and of its neighbours."""
+        import shapely
+
+        if self.graph.successors(self.route[-1]):
+            return np.empty(0, dtype=object)
+        last = {self.route[-1], *_of_same_direction(self.graph.ways[self.route[-1]], self)}
+        made = []
+        for name in sorted(last):
+            way = self.graph.ways[name]
+            line = way.centerline.points_m
+            onward = np.vstack([line[-1:], _straight_on(line, RUN_OUT_M)])
+            half_m = way.width_m / 2.0
+            made.append(shapely.LineString(onward).buffer(half_m, cap_style="square"))
+        return np.array(made, dtype=object)
+
+
+# Private
+
+
+def _straight_on(line: FloatArray, length_m: float) -> FloatArray:
+    """The point (1, 2) so far beyond the end of a line (P, 2)."""
+    step = line[-1] - line[-2]
+    return np.asarray(line[-1:] + length_m * step / np.hypot(step[0], step[1]), dtype=np.float64)
+
+
+def _rim(way: Way, end: int) -> FloatArray:
+    """The left and the right corner (2, 2) of a way's first (0) or last (-1) edge."""
+    if way.left_boundary is not None and way.right_boundary is not None:
+        return np.array([way.left_boundary.points_m[end], way.right_boundary.points_m[end]])
+    line = way.centerline
+    s_m = line.length_m if end else 0.0
+    half_m = way.width_m / 2.0
+    return np.array([line.position(s_m, half_m), line.position(s_m, -half_m)])
+
+
+def _of_same_direction(way: Way, road: Road) -> set[str]:
+    """Neighbours of a lane that end where it ends and lead nowhere either."""
+    found: set[str] = set()
+    waiting = [way]
+    while waiting:
+        lane = waiting.pop()
+        for name in (getattr(lane, "left_neighbor", None), getattr(lane, "right_neighbor", None)):
+            if name in road.graph.ways and name not in found and not road.graph.successors(name):
+                found.add(name)
+                waiting.append(road.graph.ways[name])
+    return found
+
+
+def _union(pieces: NDArray[np.object_]) -> BaseGeometry:
+    import shapely
+
+    made: BaseGeometry = shapely.union_all(pieces[~shapely.is_empty(pieces)])
+    return made

@@ -1,0 +1,108 @@
+"""Which ways the ego is to take: given by where a recording went, else the straightest."""
+
+from __future__ import annotations
+
+import math
+from collections import Counter
+
+import numpy as np
+
+from augment.errors import CannotDrive
+from augment.geometry.angles import difference
+from augment.scene.entities import Lane, Scene
+from augment.scene.lane_graph import LaneGraph
+from augment.scene.recording import Recording
+from augment.sentences import sentence
+
+ROUTE_M = 600.0
+"""Collected ahead of the ego, as far as the map goes: 15 s at 20 m/s, and what a planner sees."""
+_NEAR_M = 3.0
+_ALIGNED_RAD = math.radians(60.0)
+
+
+def find_route(scene: Scene, graph: LaneGraph, recording: Recording | None) -> tuple[str, ...]:
+    """Ids of the ways from the one under the ego on; one way before it where the map has one.
+
+    Raises:
+        CannotDrive: There is no way under the ego or within 3 m of it.
+    """
+    start = _start(scene, graph)
+    seen = Counter[str]() if recording is None else _driven(graph, recording)
+    route = [start]
+    length_m = graph.way(start).centerline.length_m
+    while length_m < ROUTE_M:
+        options = [name for name in graph.successors(route[-1]) if name not in route]
+        if not options:
+            break
+        # Of equally driven ones the first: successors come straightest first.
+        route.append(max(options, key=lambda name: _support(graph, seen, name)))
+        length_m += graph.way(route[-1]).centerline.length_m
+    before = [name for name in graph.predecessors(start) if name not in route]
+    return (*before[:1], *route)
+
+
+def beside_route(scene: Scene, graph: LaneGraph, route: tuple[str, ...]) -> frozenset[str]:
+    """Ids of the route's ways, their neighbours of the same direction, and what joins these."""
+    lanes = {lane.id: lane for lane in scene.lanes}
+    found = set(route)
+    waiting = [lanes[name] for name in route if name in lanes]
+    while waiting:
+        for name in _neighbours(waiting.pop()):
+            if name in lanes and name not in found:
+                found.add(name)
+                waiting.append(lanes[name])
+    joining = {
+        one.id for one in scene.connectors if one.from_lane in found and one.to_lane in found
+    }
+    return frozenset(found | joining)
+
+
+# Private
+
+
+def _start(scene: Scene, graph: LaneGraph) -> str:
+    ego = scene.ego
+    under = graph.under(ego.x_m, ego.y_m, ego.heading_rad)
+    if under is not None:
+        return under
+    aligned = [
+        name
+        for name, way in graph.ways.items()
+        for place in [way.centerline.project(ego.x_m, ego.y_m)]
+        if place.distance_m <= _NEAR_M
+        and abs(difference(way.centerline.heading_at(place.s_m), ego.heading_rad)) < _ALIGNED_RAD
+    ]
+    nearest = graph.nearest(ego.x_m, ego.y_m, among=aligned)
+    if nearest is None:
+        raise CannotDrive(
+            sentence(
+                "Scene %(scene)s can't be driven: no lane leads the ego's way within %(metres)s m"
+                " of it.",
+                scene=scene.name,
+                metres=f"{_NEAR_M:g}",
+            )
+        )
+    return nearest[0]
+
+
+def _driven(graph: LaneGraph, recording: Recording) -> Counter[str]:
+    """How many moments of the recorded ego lie on each way, in its direction."""
+    counts = Counter[str]()
+    states = recording.ego[~np.isnan(recording.ego).any(axis=1)]
+    for way_id, way in graph.ways.items():
+        for x_m, y_m, heading_rad, _ in states:
+            place = way.centerline.project(float(x_m), float(y_m))
+            turn = difference(way.centerline.heading_at(place.s_m), float(heading_rad))
+            if place.distance_m <= way.width_m / 2.0 and abs(turn) < _ALIGNED_RAD:
+                counts[way_id] += 1
+    return counts
+
+
+def _support(graph: LaneGraph, seen: Counter[str], way_id: str) -> int:
+    """How much of the recorded drive lies on a way and, at best, on one that follows it."""
+    after = graph.successors(way_id)
+    return seen[way_id] + max((seen[name] for name in after), default=0)
+
+
+def _neighbours(lane: Lane) -> list[str]:
+    return [name for name in (lane.left_neighbor, lane.right_neighbor) if name is not None]

@@ -1,0 +1,101 @@
+"""What the ego's state is, and the body that carries it.
+
+A state is a row of `WIDTH` numbers about the rear axle: x_m, y_m, heading_rad, speed_mps,
+acceleration_mps2 and steering_rad (angle of the front wheels), in this order.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from augment.scene.entities import TrafficAgent
+
+FloatArray = NDArray[np.float64]
+BoolArray = NDArray[np.bool_]
+IntArray = NDArray[np.int64]
+
+STEP_S = 0.1
+X, Y, HEADING, SPEED, ACCELERATION, STEERING = range(6)
+WIDTH = 6
+
+# nuPlan's body "pacifica"; another ego's axles lie in the same proportion of its length.
+_LENGTH_M, _WHEELBASE_M, _REAR_AXLE_TO_CENTRE_M = 5.176, 3.089, 1.461
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class EgoBody:
+    """The ego's box and axles; the box's centre lies `centre_m` ahead of the rear axle."""
+
+    length_m: float = _LENGTH_M
+    width_m: float = 2.297
+    wheelbase_m: float = _WHEELBASE_M
+    centre_m: float = _REAR_AXLE_TO_CENTRE_M
+
+    @classmethod
+    def of(cls, ego: TrafficAgent) -> EgoBody:
+        """The body of a scene's ego: its own box, its axles in nuPlan's proportion."""
+        scale = ego.length_m / _LENGTH_M
+        return cls(
+            length_m=ego.length_m,
+            width_m=ego.width_m,
+            wheelbase_m=_WHEELBASE_M * scale,
+            centre_m=_REAR_AXLE_TO_CENTRE_M * scale,
+        )
+
+    @property
+    def front_m(self) -> float:
+        """From the rear axle to the front bumper."""
+        return self.centre_m + self.length_m / 2.0
+
+    def centre(self, states: FloatArray) -> FloatArray:
+        """The box centres (..., 2) of states or rear-axle poses (..., 3 or more)."""
+        heading = states[..., HEADING]
+        return np.stack(
+            [
+                states[..., X] + self.centre_m * np.cos(heading),
+                states[..., Y] + self.centre_m * np.sin(heading),
+            ],
+            axis=-1,
+        )
+
+    def boxes(self, states: FloatArray) -> FloatArray:
+        """Boxes (..., 5) of states (..., 3 or more): centre x, y, heading, length, width."""
+        made = np.empty((*states.shape[:-1], 5))
+        made[..., :2] = self.centre(states)
+        made[..., 2] = states[..., HEADING]
+        made[..., 3] = self.length_m
+        made[..., 4] = self.width_m
+        return made
+
+
+def start_state(ego: TrafficAgent, body: EgoBody) -> FloatArray:
+    """The ego of a scene at t0 as a state (6,): nothing is known of its pedals and its wheel."""
+    state = np.zeros(WIDTH)
+    state[X] = ego.x_m - body.centre_m * np.cos(ego.heading_rad)
+    state[Y] = ego.y_m - body.centre_m * np.sin(ego.heading_rad)
+    state[HEADING] = ego.heading_rad
+    state[SPEED] = ego.speed_mps
+    return state
+
+
+def state_of(start: ArrayLike) -> FloatArray:
+    """A whole state (6,) of (x, y, heading, speed), with pedals and wheel at rest."""
+    given = np.asarray(start, dtype=np.float64)
+    if given.shape not in ((4,), (WIDTH,)):
+        raise ValueError(f"a start is (x, y, heading, speed), not of shape {given.shape}")
+    return np.concatenate([given, np.zeros(WIDTH - len(given))])
+
+
+def wrapped(angle_rad: FloatArray) -> FloatArray:
+    """The same directions in [-pi, pi], whatever the shape."""
+    return np.asarray(angle_rad - 2.0 * np.pi * np.round(angle_rad / (2.0 * np.pi)))
+
+
+def yaw_rates(states: FloatArray, body: EgoBody) -> FloatArray:
+    """The turning (...,) in rad/s that speed and steering of states (..., 6) make."""
+    return np.asarray(
+        states[..., SPEED] * np.tan(states[..., STEERING]) / body.wheelbase_m, dtype=np.float64
+    )

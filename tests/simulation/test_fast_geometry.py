@@ -1,0 +1,98 @@
+"""The quick tests of many things at once, held against shapely and scipy."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+import shapely
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy.signal import savgol_filter
+
+from augment.simulation.overlap import corners, meet
+from augment.simulation.path import Path, dense
+from augment.simulation.region import Region
+from augment.simulation.smoothing import filter_matrix
+
+metres = st.floats(-8.0, 8.0)
+angles = st.floats(-math.pi, math.pi)
+sizes = st.floats(0.2, 6.0)
+boxes = st.tuples(metres, metres, angles, sizes, sizes)
+
+
+@settings(max_examples=25)
+@given(st.lists(st.tuples(boxes, boxes), min_size=1, max_size=20))
+def test_boxes_meet_where_their_polygons_do(pairs: list[tuple[tuple[float, ...], ...]]) -> None:
+    first, second = (np.array([pair[side] for pair in pairs]) for side in (0, 1))
+    a, b = shapely.polygons(corners(first)), shapely.polygons(corners(second))
+    clear = np.abs(shapely.distance(a, b) - 1e-9) > 1e-9  # nobody argues about rounding
+    clear |= shapely.area(shapely.intersection(a, b)) > 1e-9
+    assert (meet(first, second) == shapely.intersects(a, b))[clear].all()
+
+
+@settings(max_examples=25)
+@given(st.integers(0, 2**32 - 1))
+def test_a_region_answers_as_its_polygon_does(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    rings = [rng.uniform(-20.0, 20.0, (3, 2)) for _ in range(4)]
+    ground = shapely.union_all([shapely.Polygon(ring) for ring in rings])
+    points = rng.uniform(-25.0, 25.0, (40, 10, 2))
+    found = Region(ground).contains(points)
+    assert (found == shapely.contains_xy(ground, points[..., 0], points[..., 1])).all()
+
+
+def test_a_region_of_nothing_holds_nothing() -> None:
+    empty = Region(shapely.Polygon())
+    points = np.array([[0.0, 0.0]])
+    assert not empty.contains(points).any()
+    assert empty.distance_m(points)[0] == np.inf
+
+
+@settings(max_examples=25)
+@given(st.integers(0, 2**32 - 1))
+def test_places_beside_a_path_are_those_of_the_whole_line(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    turn = np.cumsum(rng.uniform(-0.02, 0.02, 200))
+    line = dense(np.cumsum(np.stack([np.cos(turn), np.sin(turn)], axis=1), axis=0))
+    path = Path(line)
+    inside = rng.uniform(5.0, path.length_m - 5.0, 50)
+    aside = rng.uniform(-5.0, 5.0, 50)
+    poses = path.poses(inside)
+    points = poses[:, :2] + aside[:, None] * np.stack(
+        [-np.sin(poses[:, 2]), np.cos(poses[:, 2])], axis=1
+    )
+    s_m, d_m = path.beside(points)
+    whole = shapely.LineString(line)
+    assert np.abs(d_m) == pytest.approx(shapely.distance(shapely.points(points), whole), abs=1e-9)
+    assert s_m == pytest.approx(shapely.line_locate_point(whole, shapely.points(points)), abs=1e-6)
+    assert (np.sign(d_m) == np.sign(aside))[np.abs(aside) > 0.05].all()
+
+
+def test_a_path_goes_straight_on_beyond_its_ends() -> None:
+    path = Path(dense(np.array([[0.0, 0.0], [10.0, 0.0]])))
+    assert path.poses(np.array([-2.0, 12.5])).tolist() == [[-2.0, 0.0, 0.0], [12.5, 0.0, 0.0]]
+    s_m, d_m = path.beside(np.array([[-3.0, 1.0], [15.0, -2.0]]))
+    assert s_m.tolist() == [-3.0, 15.0]
+    assert d_m.tolist() == [1.0, -2.0]
+
+
+def test_a_parallel_of_a_circle_is_a_circle() -> None:
+    angle = np.linspace(0.0, 2.0, 400)
+    path = Path(dense(20.0 * np.stack([np.sin(angle), 1.0 - np.cos(angle)], axis=1)))
+    inner = path.offset(4.0)
+    assert np.hypot(*(inner.points_m - [0.0, 20.0]).T) == pytest.approx(16.0, abs=0.01)
+    assert inner.length_m == pytest.approx(32.0, abs=0.3)
+
+
+@pytest.mark.parametrize("count", [20, 41, 151])
+@pytest.mark.parametrize(
+    ("window", "order", "derivative"),
+    [(8, 2, 0), (15, 2, 1), (5, 2, 1), (5, 3, 2), (20, 2, 0), (41, 2, 1)],
+)
+def test_smoothing_is_scipys(count: int, window: int, order: int, derivative: int) -> None:
+    samples = np.random.default_rng(7).normal(size=count)
+    wanted = savgol_filter(samples, min(window, count), order, deriv=derivative, delta=0.1)
+    found = filter_matrix(count, window, order, derivative) @ samples
+    assert found == pytest.approx(wanted, abs=1e-9)

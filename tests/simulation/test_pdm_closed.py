@@ -1,0 +1,183 @@
+"""PDM-Closed: what it proposes, how it judges, when it brakes."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from augment.scene.entities import TrafficAgent
+from augment.simulation.braking import brake, must_brake
+from augment.simulation.pdm_closed import PdmClosed
+from augment.simulation.planning import Plan, Situation
+from augment.simulation.proposals import ORIGINAL_OFFSETS_M, Quirks
+from augment.simulation.road import Road
+from augment.simulation.states import FloatArray, start_state
+from augment.simulation.walkers import objects_of
+from tests.scenes import cone, pedestrian, vehicle
+from tests.simulation.worlds import BODY, states_along, street
+
+
+def planner(**options: object) -> PdmClosed:
+    made = PdmClosed(**options)  # type: ignore[arg-type]
+    made.start(Road(street()), BODY)
+    return made
+
+
+def planned(agents: list[TrafficAgent], *, speed_mps: float = 8.0, **options: object) -> Plan:
+    ego = start_state(street(speed_mps=speed_mps).ego, BODY)
+    situation = Situation(step=0, ego=ego, objects=objects_of(agents, speeds=True))
+    return planner(**options).plan(situation)
+
+
+def test_fifteen_proposals_by_default_of_the_release_and_45_of_the_paper() -> None:
+    assert planned([], offsets_m=ORIGINAL_OFFSETS_M).proposals is not None
+    for offsets, count in [(ORIGINAL_OFFSETS_M, 15), (None, 45)]:
+        plan = planned([]) if offsets is None else planned([], offsets_m=offsets)
+        assert plan.proposals is not None
+        assert plan.proposals.states.shape == (count, 41, 6)
+        assert plan.poses.shape == (81, 3)
+
+
+def test_on_a_free_road_it_keeps_to_the_centreline_at_the_limit() -> None:
+    plan = planned([])
+    assert plan.proposals is not None
+    assert plan.proposals.chosen == 4 * 5 + 4
+    assert plan.poses[:, 1] == pytest.approx(np.zeros(81), abs=1e-9)
+
+
+def test_it_starts_where_the_rear_axle_is_and_accelerates_by_the_idm() -> None:
+    # Exponent 10, target 10 m/s: 1.5 (1 - 0.8^10) in the first step.
+    steps = np.diff(planned([]).poses[:, 0])
+    assert planned([]).poses[0, 0] == pytest.approx(-BODY.centre_m)
+    assert steps[0] == pytest.approx(0.8)
+    assert steps[1] - steps[0] == pytest.approx(
+        0.01 * 1.5 * (1.0 - 0.8**10), rel=0.01
+    )  # something stands at the far end of the path
+
+
+def test_the_first_step_brake_of_the_released_code_can_be_switched_on() -> None:
+    steps = np.diff(planned([], quirks=Quirks(first_step_brake=True)).poses[:, 0])
+    assert steps[1] - steps[0] == pytest.approx(0.01 * -3.0)
+
+
+def test_a_stale_leader_changes_what_slow_policies_see() -> None:
+    # A comes from the right behind the fastest policy and before the slower ones.
+    agents = [
+        replace(vehicle("A", 4.6, -9.0, math.pi / 2.0), speed_mps=4.0),
+        replace(vehicle("B", 30.0, 0.0), speed_mps=5.0),
+    ]
+    plain, stale = (
+        planned(agents, speed_mps=3.0, quirks=Quirks(stale_leader=on)) for on in (False, True)
+    )
+    assert plain.proposals is not None
+    assert stale.proposals is not None
+    changed = np.abs(plain.proposals.states - stale.proposals.states).max(axis=(1, 2)) > 1e-6
+    assert not changed.reshape(9, 5)[:, -1].any()
+    assert changed.any()
+
+
+def test_it_goes_round_a_parked_car_that_leaves_room() -> None:
+    plan = planned([vehicle("A", 25.0, -1.4)])
+    assert plan.proposals is not None
+    assert divmod(plan.proposals.chosen, 5)[0] - 4 >= 1  # to the left
+
+
+@pytest.mark.parametrize(
+    ("what", "agents", "collision"),
+    [
+        ("nobody", [], 1.0),
+        ("a parked car", [vehicle("A", 20.0, 0.0)], 0.0),
+        ("a person", [pedestrian("A", 20.0, 0.0)], 0.0),
+        ("a cone", [cone("A", 20.0, 0.0)], 0.5),
+        ("a car from behind", [replace(vehicle("A", -10.0, 0.0), speed_mps=12.0)], 1.0),
+    ],
+)
+def test_collisions_multiply(what: str, agents: list[TrafficAgent], collision: float) -> None:
+    judged = planner().judge(states_along(np.full(41, 8.0))[None], objects_of(agents, speeds=True))
+    assert judged.parts["collision"].tolist() == [collision], what
+
+
+@pytest.mark.parametrize(
+    ("y_m", "drivable", "direction"),
+    [(0.0, 1.0, 1.0), (-0.59, 1.0, 1.0), (-0.61, 0.0, 1.0), (3.5, 1.0, 0.0)],
+)
+def test_no_corner_leaves_the_road_and_the_centre_stays_on_the_route(
+    y_m: float, drivable: float, direction: float
+) -> None:
+    judged = planner().judge(
+        states_along(np.full(41, 8.0), y_m=y_m)[None], objects_of([], speeds=True)
+    )
+    assert judged.parts["drivable"].tolist() == [drivable]
+    assert judged.parts["direction"].tolist() == [direction]
+
+
+@pytest.mark.parametrize(
+    ("speed", "direction"), [(0.49, 1.0), (0.51, 0.5), (1.49, 0.5), (1.51, 0.0)]
+)
+def test_the_wrong_way_counts_by_2_and_6_m_in_4_s(speed: float, direction: float) -> None:
+    judged = planner().judge(
+        states_along(np.full(41, speed), y_m=3.5)[None], objects_of([], speeds=True)
+    )
+    assert judged.parts["direction"].tolist() == [direction]
+
+
+def test_progress_is_a_share_of_the_best_valid_one() -> None:
+    states = np.stack([states_along(np.full(41, speed)) for speed in (2.0, 4.0, 8.0)])
+    parked = objects_of([vehicle("A", 30.0, 0.0)], speeds=True)  # 32 m are too far
+    judged = planner().judge(states, parked)
+    assert judged.parts["collision"].tolist() == [1.0, 1.0, 0.0]
+    assert judged.parts["progress"].tolist() == pytest.approx([0.5, 1.0, 0.0])
+
+
+@pytest.mark.parametrize(("gap_m", "ttc"), [(0.9 * 5.0 + 0.05, 1.0), (0.9 * 5.0 - 0.05, 0.0)])
+def test_time_to_collision_looks_0_9_s_ahead_of_every_state(gap_m: float, ttc: float) -> None:
+    states = states_along(np.full(41, 5.0))
+    end_m = 20.0 + 2.588
+    parked = objects_of([vehicle("A", end_m + gap_m + 2.4, 0.0)], speeds=True)
+    assert planner().judge(states[None], parked).parts["ttc"].tolist() == [ttc]
+
+
+def test_it_brakes_only_slowly_driven_and_soon_hit() -> None:
+    assert must_brake(2.0, 5.0)
+    assert not must_brake(2.1, 5.0)
+    assert not must_brake(2.0, 5.01)
+
+
+def test_the_brakes_command() -> None:
+    def commanded(ego: FloatArray) -> float:
+        poses = brake(ego, BODY)
+        assert poses[0, 0] == pytest.approx(BODY.centre_m)
+        return float((poses[1, 0] - poses[0, 0]) / 0.1)
+
+    ego = np.zeros(6)
+    for speed, wanted in [(5.0, 1.1 * 0.95), (0.3, 1.1 * (0.3 - 3.0)), (0.2, 0.2 - 0.8)]:
+        ego[3] = speed
+        assert commanded(ego) == pytest.approx(wanted)
+
+
+def test_a_wall_of_people_before_it_makes_it_brake() -> None:
+    wall = [pedestrian(f"P{n}", 6.5, y) for n, y in enumerate(np.arange(-5.0, 9.0, 0.8))]
+    plan = planned(wall, speed_mps=4.5)
+    assert plan.braking
+    assert np.diff(plan.poses[:, 0])[0] < 0.45
+
+
+def test_who_touches_the_ego_is_left_out_from_then_on() -> None:
+    touching = vehicle("A", 4.5, 0.0)
+    assert planned([touching], speed_mps=2.0).poses[:, 0] == pytest.approx(
+        planned([], speed_mps=2.0).poses[:, 0]
+    )
+
+
+def test_equal_scores_take_the_lowest_number() -> None:
+    one = planned([vehicle("A", 12.0, 0.0)], speed_mps=0.0)
+    two = planned([vehicle("A", 12.0, 0.0)], speed_mps=0.0)
+    assert one.proposals is not None
+    assert two.proposals is not None
+    best = one.proposals.scores.max()
+    assert one.proposals.chosen == int(np.flatnonzero(one.proposals.scores > best - 1e-9)[0])
+    assert np.array_equal(one.poses, two.poses)
+    assert math.isfinite(best)

@@ -1,0 +1,302 @@
+"""Each metric of the score in a world whose answer can be worked out by hand."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from augment.geometry.polyline import Polyline
+from augment.scene.catalogue import ScenarioType
+from augment.scene.entities import LaneConnector, Scene, TrafficAgent, TrafficLight
+from augment.scene.modification import Modification
+from augment.simulation.comfort import LIMITS, comfort_signals, comfortable
+from augment.simulation.criticality import criticality
+from augment.simulation.drive import Drive
+from augment.simulation.encounters import collisions
+from augment.simulation.expert import Expert, ExpertKind
+from augment.simulation.metric import Metric, combine
+from augment.simulation.score import Score, ScoreKind, score_drive
+from augment.simulation.states import FloatArray
+from tests.scenes import cone, pedestrian, vehicle
+from tests.simulation.worlds import BODY, driven, rows, states_along, street
+
+STEADY = np.full(151, 8.0)
+FAR = Expert(kind=ExpertKind.IDM, start_m=50.0, end_m=170.0)
+"""120 m, what 8 m/s make in 15 s."""
+CALM = Expert(kind=ExpertKind.IDM, start_m=50.0, end_m=52.0)
+
+
+def moving(agent: TrafficAgent, speed_mps: float) -> TrafficAgent:
+    return replace(agent, speed_mps=speed_mps)
+
+
+def scored(
+    speeds: Sequence[float] | FloatArray = STEADY,
+    agents: Sequence[TrafficAgent] = (),
+    *,
+    expert: Expert = FAR,
+    y_m: float = 0.0,
+    heading_rad: float = 0.0,
+    on: Scene | None = None,
+) -> Score:
+    states = states_along(speeds, y_m=y_m, heading_rad=heading_rad)
+    return score_drive(driven(states, agents, on=on), expert)
+
+
+def value(score: Score, name: str) -> float | None:
+    return next(metric.value for metric in score.metrics if metric.name == name)
+
+
+def test_a_plain_drive_is_perfect() -> None:
+    score = scored()
+    assert score.value == pytest.approx(1.0)
+    assert {metric.value for metric in score.metrics} == {1.0}
+
+
+@pytest.mark.parametrize(
+    ("who", "agents", "expected"),
+    [
+        ("nobody", [], 1.0),
+        ("a parked car ahead", [vehicle("A", 30.0, 0.0)], 0.0),
+        ("one cone", [cone("A", 30.0, 0.0)], 0.5),
+        ("two cones", [cone("A", 30.0, 0.0), cone("B", 40.0, 0.0)], 0.0),
+        ("a person that stands", [pedestrian("A", 30.0, 0.0)], 0.0),
+        ("a cone and a person", [cone("A", 20.0, 0.0), pedestrian("B", 30.0, 0.0)], 0.0),
+        ("a faster car from behind", [moving(vehicle("A", -12.0, 0.0), 9.0)], 1.0),
+        ("a slower car ahead", [moving(vehicle("A", 20.0, 0.0), 4.0)], 0.0),
+        ("who touched the ego at the start", [vehicle("A", 4.0, 0.0)], 1.0),
+        ("a car from the side into the ego's flank", [], 1.0),
+    ],
+)
+def test_collisions(who: str, agents: list[TrafficAgent], expected: float) -> None:
+    if who == "a car from the side into the ego's flank":
+        # Its nose meets the ego's side between the axles at 5 s, at x = 40 m.
+        agents = [moving(vehicle("A", 39.5, 22.0, -math.pi / 2.0), 3.8)]
+        assert [
+            str(one.contact.name) for one in collisions(driven(states_along(STEADY), agents))
+        ] == ["LATERAL"]
+    assert value(scored(agents=agents), "no_ego_at_fault_collisions") == expected
+
+
+def test_who_stands_is_not_at_fault() -> None:
+    score = scored(np.zeros(151), [moving(vehicle("A", 20.0, 0.0, math.pi), 5.0)], expert=CALM)
+    assert [one.contact.name for one in score.collisions] == ["STOPPED_EGO"]
+    assert score.value == 1.0
+
+
+@pytest.mark.parametrize(
+    ("y_m", "expected"),
+    # The lane's right edge is at y = -1.75, half the ego's width 1.1485: the corner is outside
+    # from y = -0.6015 on, and 0.3 m outside at y = -0.9015.
+    [(0.0, 1.0), (-0.7, 1.0), (-0.9, 1.0), (-0.903, 0.0), (-3.0, 0.0), (3.5, 1.0)],
+)
+def test_the_drivable_area_allows_less_than_30_cm(y_m: float, expected: float) -> None:
+    assert value(scored(y_m=y_m), "drivable_area_compliance") == expected
+
+
+@pytest.mark.parametrize(
+    ("speed", "ratio", "enough"),
+    [
+        (8.0, 1.0, 1.0),
+        (4.0, 0.5, 1.0),
+        (1.61, 0.20125, 1.0),
+        (1.59, 0.19875, 0.0),
+        (9.0, 1.0, 1.0),
+    ],
+)
+def test_progress_is_a_share_of_the_experts(speed: float, ratio: float, enough: float) -> None:
+    score = scored(np.full(151, speed))
+    assert value(score, "ego_progress_along_expert_route") == pytest.approx(ratio)
+    assert value(score, "ego_is_making_progress") == enough
+
+
+def test_an_expert_that_stands_counts_as_2_m() -> None:
+    score = scored(np.zeros(151), expert=replace(CALM, end_m=50.0))
+    assert value(score, "ego_progress_along_expert_route") == 1.0
+
+
+@pytest.mark.parametrize(
+    ("speed", "expected"),
+    # 11 increments of 0.1 s: 1.1 * speed against the lane's direction.
+    [(1.8, 1.0), (1.83, 0.5), (5.4, 0.5), (5.5, 0.0)],
+)
+def test_the_wrong_way_counts_by_the_metres_of_1_1_s(speed: float, expected: float) -> None:
+    score = scored(np.full(151, speed), y_m=3.5, expert=CALM)
+    assert value(score, "driving_direction_compliance") == expected
+
+
+@pytest.mark.parametrize(
+    ("gap_m", "expected"),
+    # Closing at 8 m/s on what stands: 0.95 s are 7.6 m, and the steps are whole tenths.
+    [(8.1, 1.0), (7.0, 0.0)],
+)
+def test_time_to_collision_is_bounded_by_0_95_s(gap_m: float, expected: float) -> None:
+    # Four moments only, so that the last gap is what counts.
+    start = gap_m + 3 * 0.8
+    speeds = np.full(4, 8.0)
+    score = scored(speeds, [vehicle("A", start + 2.588 + 2.4, 0.0)], expert=CALM)
+    assert value(score, "time_to_collision_within_bound") == expected
+
+
+def test_who_is_beside_an_ego_in_its_lane_does_not_count_as_a_coming_collision() -> None:
+    cutting_in = moving(vehicle("A", 1.0, -3.2, math.radians(30.0)), 8.0)
+    in_lane = scored(np.full(3, 8.0), [cutting_in], expert=CALM)
+    assert value(in_lane, "time_to_collision_within_bound") == 1.0
+    across = scored(np.full(3, 8.0), [replace(cutting_in, y_m=-1.6)], y_m=1.6, expert=CALM)
+    assert value(across, "time_to_collision_within_bound") == 0.0
+
+
+@pytest.mark.parametrize(
+    ("limit", "speed", "expected"),
+    [
+        (10.0, 10.0, 1.0),
+        (10.0, 11.115, 1.0 - 151 / 150 * 0.5),
+        (10.0, 13.0, 0.0),
+        (None, 30.0, None),
+    ],
+)
+def test_overspeed_is_integrated(
+    limit: float | None, speed: float, expected: float | None
+) -> None:
+    score = scored(np.full(151, speed), on=street(600.0, limit_mps=limit))
+    assert value(score, "speed_limit_compliance") == (
+        None if expected is None else pytest.approx(expected)
+    )
+
+
+@pytest.mark.parametrize(("pull", "expected"), [(2.3, 1.0), (2.5, 0.0), (-4.0, 1.0), (-4.1, 0.0)])
+def test_comfort_is_all_or_nothing(pull: float, expected: float) -> None:
+    states = states_along(np.maximum(0.0, 20.0 + pull * 0.1 * np.arange(40)))
+    states[:, 4] = pull
+    assert value(score_drive(driven(states), CALM), "ego_is_comfortable") == expected
+
+
+def test_comfort_signals_of_a_steady_turn() -> None:
+    # 5 m/s on a circle of 20 m: 0.25 rad/s, and nothing else.
+    steering = math.atan(BODY.wheelbase_m / 20.0)
+    turn = 0.25 * 0.1 * np.arange(60)
+    states = np.zeros((60, 6))
+    states[:, 2] = np.angle(np.exp(1j * turn))
+    states[:, 3], states[:, 5] = 5.0, steering
+    signals = comfort_signals(states, BODY)
+    assert set(signals) == set(LIMITS)
+    assert signals["yaw_rate_radps"] == pytest.approx(np.full(60, 0.25))
+    assert signals["yaw_acceleration_radps2"] == pytest.approx(np.zeros(60), abs=1e-9)
+    # nuPlan adds d w^2 along the car.
+    centre = signals["longitudinal_acceleration_mps2"]
+    assert centre == pytest.approx(np.full(60, 1.461 * 0.25**2))
+    assert comfortable(signals).all()
+
+
+def test_multipliers_multiply_and_what_is_unknown_does_not_count() -> None:
+    metrics = (
+        Metric(name="a", value=0.5),
+        Metric(name="b", value=None),
+        Metric(name="c", value=0.4, weight=5.0),
+        Metric(name="d", value=1.0, weight=1.0),
+        Metric(name="e", value=None, weight=100.0),
+    )
+    assert combine(metrics) == pytest.approx(0.5 * (5.0 * 0.4 + 1.0) / 6.0)
+
+
+def test_nuplans_weights() -> None:
+    weights = {metric.name: metric.weight for metric in scored().metrics}
+    assert weights == {
+        "no_ego_at_fault_collisions": None,
+        "drivable_area_compliance": None,
+        "ego_is_making_progress": None,
+        "driving_direction_compliance": None,
+        "ego_progress_along_expert_route": 5.0,
+        "time_to_collision_within_bound": 5.0,
+        "speed_limit_compliance": 4.0,
+        "ego_is_comfortable": 2.0,
+    }
+
+
+@pytest.mark.parametrize("scenario_type", list(ScenarioType))
+def test_interplan_lets_four_types_use_the_other_lane(scenario_type: ScenarioType) -> None:
+    parked = Modification(added=(vehicle("A", 60.0, 0.0),))
+    score = score_drive(
+        driven(states_along(STEADY, y_m=3.5)),
+        FAR,
+        kind=ScoreKind.INTERPLAN,
+        scenario_type=scenario_type,
+        modification=parked,
+    )
+    weights = {metric.name: metric.weight for metric in score.metrics}
+    if scenario_type is ScenarioType.JAYWALKER:
+        assert weights["driving_direction_compliance"] is None
+        assert score.value == 0.0
+    else:
+        assert weights["driving_direction_compliance"] == 1.0
+        # Undefined start (0.2607): it starts in the other lane; direction 0.
+        wanted = (5 + 5 + 4 + 2 + 4 * 0.2607 + 0) / (5 + 5 + 4 + 2 + 4 + 1)
+        assert score.value == pytest.approx(wanted)
+
+
+@pytest.mark.parametrize(("speed", "expected"), [(8.0, 1.0), (4.1, 1.0), (3.9, 0.0)])
+def test_interplan_wants_the_furthest_obstacle_passed(speed: float, expected: float) -> None:
+    # 60 of the expert's 120 m: half of its way.
+    parked = Modification(added=(vehicle("A", 60.0, 5.0), cone("B", 20.0, 5.0)))
+    score = score_drive(
+        driven(states_along(np.full(151, speed))),
+        FAR,
+        kind=ScoreKind.INTERPLAN,
+        scenario_type=ScenarioType.NUDGE,
+        modification=parked,
+    )
+    assert value(score, "ego_passed_obstacles") == expected
+
+
+@pytest.mark.parametrize("state", [TrafficLight.RED, TrafficLight.GREEN])
+def test_red_lights_count_only_where_asked_for(state: TrafficLight) -> None:
+    plain = street(60.0)
+    crossing = LaneConnector(
+        id="Connector1",
+        from_lane="Lane1",
+        to_lane=None,
+        centerline=Polyline([(60.0, 0.0), (400.0, 0.0)]),
+        width_m=3.5,
+        traffic_light=state,
+        speed_limit_mps=10.0,
+    )
+    drive = driven(states_along(STEADY), on=replace(plain, connectors=(crossing,)))
+    assert score_drive(drive, FAR).value == 1.0
+    wanted = 0.0 if state is TrafficLight.RED else 1.0
+    assert score_drive(drive, FAR, with_red_lights=True).value == wanted
+
+
+def test_criticality_of_a_drive_towards_a_parked_car() -> None:
+    # 8 m/s for 2 s from a bumper gap of 40 m: 24 m remain, 3 s, 64 / 48 m/s2.
+    drive = driven(states_along(np.full(21, 8.0)), [vehicle("A", 40.0 + 2.588 + 2.4, 0.0)])
+    found = criticality(drive, ())
+    assert found.least_distance_m == pytest.approx(24.0)
+    assert found.most_deceleration_mps2 == pytest.approx(64.0 / 48.0)
+    assert found.least_ttc_s is None  # 3 s is the horizon
+    assert found.least_pet_s is None
+
+
+def test_post_encroachment_time_of_a_crossing() -> None:
+    # Its path crosses at x = 40 m: its box leaves the ego's lane strip after 1.1485 + 2.4 m.
+    crossing = moving(vehicle("A", 40.0, -8.0, math.pi / 2.0), 4.0)
+    drive = driven(states_along(STEADY), [crossing])
+    found = criticality(drive, ())
+    # Left at (8 + 1.1485 + 2.4) / 4 = 2.887 s, reached at (40 - 1 - 2.588) / 8 = 4.5515 s.
+    assert found.least_pet_s == pytest.approx(4.5515 - 2.887, abs=0.15)
+
+
+def test_nobody_around_is_not_critical() -> None:
+    found = criticality(driven(states_along(STEADY)), ())
+    assert (found.least_ttc_s, found.least_pet_s) == (None, None)
+    assert (found.most_deceleration_mps2, found.least_distance_m) == (None, None)
+
+
+def test_the_series_have_an_entry_for_every_moment() -> None:
+    drive: Drive = driven(states_along(STEADY), [vehicle("A", 200.0, 0.0)])
+    assert len(rows([vehicle("A", 200.0, 0.0)], 151)) == 151
+    for metric in score_drive(drive, FAR).metrics:
+        assert all(len(series) == 151 for series in metric.series.values()), metric.name

@@ -1,0 +1,69 @@
+"""Long streets and drives made by hand, whose right answers can be seen by eye."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from augment.geometry.polyline import Polyline
+from augment.scene.entities import Lane, Scene, TrafficAgent
+from augment.simulation.drive import Drive
+from augment.simulation.objects import NOBODY, Objects
+from augment.simulation.road import Road
+from augment.simulation.states import HEADING, SPEED, EgoBody, FloatArray, X, Y
+from augment.simulation.walkers import objects_of
+from tests.scenes import EGO, scene
+
+BODY = EgoBody()
+LIMIT_MPS = 10.0
+
+
+def street(
+    length_m: float = 400.0, *, speed_mps: float = 8.0, limit_mps: float | None = LIMIT_MPS
+) -> Scene:
+    """Lane1 along y = 0 from x = -50 m on, Lane2 towards it along y = 3.5 m, nothing else."""
+    made = scene(ego=replace(EGO, speed_mps=speed_mps), areas=())
+    lines = [[(-50.0, 0.0), (length_m, 0.0)], [(length_m, 3.5), (-50.0, 3.5)]]
+    lanes = tuple(
+        Lane(id=f"Lane{n + 1}", centerline=Polyline(line), width_m=3.5, speed_limit_mps=limit_mps)
+        for n, line in enumerate(lines)
+    )
+    return replace(made, lanes=lanes)
+
+
+def states_along(
+    speeds_mps: Sequence[float] | FloatArray, *, y_m: float = 0.0, heading_rad: float = 0.0
+) -> FloatArray:
+    """Rear-axle states (T, 6) of a centre that starts at (0, y) and goes straight."""
+    speeds = np.asarray(speeds_mps, dtype=np.float64)
+    made = np.zeros((len(speeds), 6))
+    gone = np.concatenate([[0.0], np.cumsum(speeds[:-1]) * 0.1])
+    made[:, X] = gone * np.cos(heading_rad) - BODY.centre_m * np.cos(heading_rad)
+    made[:, Y] = y_m + gone * np.sin(heading_rad) - BODY.centre_m * np.sin(heading_rad)
+    made[:, HEADING] = heading_rad
+    made[:, SPEED] = speeds
+    made[1:, 4] = np.diff(speeds) / 0.1
+    return made
+
+
+def driven(
+    states: FloatArray, agents: Sequence[TrafficAgent] = (), *, on: Scene | None = None
+) -> Drive:
+    """A drive that went through these states, among agents that go on as they start."""
+    road = Road(on or street())
+    return Drive(road=road, body=BODY, states=states, objects=rows(agents, len(states)))
+
+
+def rows(agents: Sequence[TrafficAgent], count: int) -> list[Objects]:
+    if not agents:
+        return [NOBODY] * count
+    start = objects_of(agents, speeds=True)
+    made = []
+    for moment in range(count):
+        boxes = start.boxes.copy()
+        boxes[:, 0] += 0.1 * moment * start.speeds_mps * np.cos(boxes[:, 2])
+        boxes[:, 1] += 0.1 * moment * start.speeds_mps * np.sin(boxes[:, 2])
+        made.append(replace(start, boxes=boxes))
+    return made
