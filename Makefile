@@ -12,7 +12,7 @@ SERVE ?= 1
 # Compiled once, not by each of the many processes that the tests start.
 export PYTHONDONTWRITEBYTECODE :=
 
-.PHONY: demo serve test lint check fast postgres chromium bench lock clean
+.PHONY: demo serve test lint check fast postgres chromium bench mutants lock clean
 
 demo: $(VENV)/.runtime ## Run the main job on the catalogue, then serve it (SERVE=0: don't)
 	$(BIN)/python manage.py demo --port $(PORT) $(if $(filter 0,$(SERVE)),--no-serve)
@@ -40,6 +40,9 @@ lint: $(VENV)/.test ## Format, style, floors and types
 bench: chromium ## Ours beside other products, each in its own environment; writes docs/benchmarks.md
 	$(BIN)/python -m tests.benchmarks.rivals.voting
 	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m tests.benchmarks.rating_speed
+
+mutants: $(VENV)/.test ## Whether the tests notice small mutations of what matters; writes docs/mutants.md
+	$(BIN)/python -m tests.mutants
 
 chromium: $(VENV)/.test
 	@bash tests/browser/get_chromium.sh $(BIN)/python

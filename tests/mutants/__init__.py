@@ -1,0 +1,1 @@
+"""Small mutations of what matters most, each with the tests that must notice it."""
