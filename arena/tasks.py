@@ -6,10 +6,10 @@ page of a rating that waits offers to send it once more).
 
 from __future__ import annotations
 
-from celery import current_app, shared_task
+from celery import shared_task
 
 from arena.services import ratings
-from augment.errors import QueueUnreachable
+from augment.tasks import open_broker
 
 
 @shared_task(name="arena.compute_snapshot", acks_late=True, ignore_result=True)
@@ -22,11 +22,7 @@ def send_snapshot(snapshot_pk: int) -> None:
     """Ask a worker to compute a planned rating; for transaction.on_commit.
 
     Raises:
-        QueueUnreachable: No broker; the rating waits until it is sent again.
+        QueueFault: No broker, or it refuses; the rating waits until it is sent again.
     """
-    with current_app.connection_for_write() as broker:
-        try:
-            broker.ensure_connection(max_retries=1, interval_start=0, timeout=5)
-            compute_snapshot.apply_async((snapshot_pk,), connection=broker, retry=False)
-        except compute_snapshot.OperationalError as error:
-            raise QueueUnreachable(broker.as_uri()) from error
+    with open_broker() as broker:
+        compute_snapshot.apply_async((snapshot_pk,), connection=broker, retry=False)

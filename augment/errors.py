@@ -214,7 +214,32 @@ class ReviewUnusable(AugmentError):
         super().__init__(f"The review is unusable: {reason}")
 
 
-class QueueUnreachable(AugmentError):
+class QueueFault(AugmentError):
+    """No message can be sent. The rows wait and are sent by a worker as soon as it can."""
+
+
+class QueueRefused(QueueFault):
+    """There is a broker and it takes no messages: its memory is full, it is read only.
+
+    Args:
+        address: Where it is, free of passwords.
+        said: What it answered.
+    """
+
+    def __init__(self, address: str, said: str) -> None:
+        self.address = address
+        self.said = said
+        super().__init__(
+            sentence(
+                "Redis at %(address)s takes no messages: %(said)s. "
+                "What was queued is kept and runs as soon as Redis takes messages again.",
+                address=address,
+                said=said.rstrip("."),
+            )
+        )
+
+
+class QueueUnreachable(QueueFault):
     """No broker takes messages. The rows wait and are sent by the next worker that starts.
 
     Args:
@@ -234,6 +259,10 @@ class QueueUnreachable(AugmentError):
 
 class Unwanted(AugmentError):
     """Nobody needs the answer of a call any more. Ask nothing further; give up what is asked."""
+
+
+class WorkerStopping(Unwanted):
+    """This worker was told to stop and asks nobody any more. The row goes back to the queue."""
 
 
 class ClaimLost(Unwanted):

@@ -14,13 +14,15 @@ from datetime import timedelta
 from threading import Event, Thread
 from typing import Any
 
+import redis
 from celery import current_app, shared_task
-from celery.signals import worker_ready, worker_shutting_down
+from celery.exceptions import Reject
+from celery.signals import worker_ready, worker_shutdown, worker_shutting_down
 from django.conf import settings
-from django.db import Error, connection
+from django.db import connection
 
-from augment.errors import QueueUnreachable
-from augment.services import claims, jobs, marked_pictures, runner
+from augment.errors import QueueFault, QueueRefused, QueueUnreachable
+from augment.services import claims, jobs, marked_pictures, runner, stopping, workers
 from augment.services.clock import DATABASE_TIME, Moment
 
 logger = logging.getLogger(__name__)
@@ -31,12 +33,15 @@ RESEND_AFTER = timedelta(minutes=10)
 BATCH = 100
 """So many messages are sent before the rows say so; a crash between sends them twice."""
 
-_stopping = Event()
+REFUSALS = (redis.ResponseError, redis.AuthenticationError, redis.BusyLoadingError)
+"""What a Redis says that is there and takes no messages: full, read only, loading, locked."""
 
 
 @shared_task(name="augment.run_augmentation", bind=True, acks_late=True, ignore_result=True)
 def run_augmentation(self: Any, augmentation_pk: int) -> None:
     """Run one row, unless somebody else has it or it has an outcome."""
+    if stopping.is_told():
+        raise Reject("this worker stops", requeue=True)
     worker = f"{self.request.hostname or 'here'} {os.getpid()}"
     runner.work_on(augmentation_pk=augmentation_pk, worker=worker[:120])
 
@@ -51,9 +56,9 @@ def enqueue_marks(augmentation_pk: int) -> None:
     """Have a row's faults drawn; for transaction.on_commit.
 
     Raises:
-        QueueUnreachable: No broker.
+        QueueFault: No broker, or it refuses.
     """
-    with _broker() as broker:
+    with open_broker() as broker:
         draw_marks.apply_async((augmentation_pk,), connection=broker, retry=False)
 
 
@@ -64,12 +69,12 @@ def enqueue(ids: Iterable[int]) -> int:
         How many were sent.
 
     Raises:
-        QueueUnreachable: No broker; the rows wait on and are sent by recover later.
+        QueueFault: No broker, or it refuses; the rows wait on and are sent by recover later.
     """
     waiting = list(ids)
     if not waiting:
         return 0
-    with _broker() as broker:
+    with open_broker() as broker:
         for start in range(0, len(waiting), BATCH):
             batch = waiting[start : start + BATCH]
             for pk in batch:
@@ -82,15 +87,31 @@ def enqueue_job(job_pk: int) -> int:
     """Send the messages of a job's rows that have none yet; for transaction.on_commit.
 
     Raises:
-        QueueUnreachable: No broker; the rows wait on and are sent by recover later.
+        QueueFault: No broker, or it refuses; the rows wait on and are sent by recover later.
     """
     return enqueue(claims.unsent(older_than=RESEND_AFTER, job_pk=job_pk))
 
 
 def check_broker() -> None:
-    """Raise QueueUnreachable unless a broker takes messages."""
-    with _broker():
+    """Raise QueueFault unless a broker can be reached."""
+    with open_broker():
         pass
+
+
+@contextmanager
+def open_broker() -> Iterator[Any]:
+    """A connection that works, tried once; what breaks inside the block is named as well.
+
+    Raises:
+        QueueUnreachable: No broker.
+        QueueRefused: It takes no messages.
+    """
+    with current_app.connection_for_write() as broker:
+        try:
+            broker.ensure_connection(max_retries=1, interval_start=0, timeout=5)
+            yield broker
+        except (run_augmentation.OperationalError, redis.RedisError) as error:
+            raise _fault(broker, error) from error
 
 
 def recover(*, now: Moment = DATABASE_TIME, at_start: bool = False) -> None:
@@ -102,7 +123,7 @@ def recover(*, now: Moment = DATABASE_TIME, at_start: bool = False) -> None:
             may have been started anew together with this worker.
 
     Raises:
-        QueueUnreachable: No broker.
+        QueueFault: No broker, or it refuses.
     """
     stale_after = timedelta(seconds=settings.STALE_AFTER_S)
     claims.requeue_stale(now=now, older_than=stale_after)
@@ -118,50 +139,68 @@ def recover(*, now: Moment = DATABASE_TIME, at_start: bool = False) -> None:
 
 
 @worker_ready.connect
-def start_recovering(**_: object) -> None:
-    """Recover now and again and again, in a thread of the worker's main process."""
-    _stopping.clear()
-    Thread(target=_recover_until_stopped, name="recover", daemon=True).start()
+def start_recovering(sender: Any = None, **_: object) -> None:
+    """Show that this worker lives and recover again and again, in threads of its main process."""
+    stopping.forget()
+    presence = workers.Presence(f"{getattr(sender, 'hostname', None) or 'here'} {os.getpid()}")
+    Thread(target=_be_present, args=(presence,), name="presence", daemon=True).start()
+    Thread(target=_recover_until_stopped, args=(presence,), name="recover", daemon=True).start()
 
 
 @worker_shutting_down.connect
 def stop_recovering(**_: object) -> None:
-    """Let the thread end; a worker that shuts down takes nothing on."""
-    _stopping.set()
+    """Begin nothing new; what is under way may end."""
+    stopping.tell()
 
 
 # --- Private -----------------------------------------------------------------------------------
 
 
-def _recover_until_stopped() -> None:
-    """One round at the start, then one every RECOVER_EVERY_S; no fault ends it."""
-    at_start = True
-    while not _stopping.is_set():
-        try:
-            recover(at_start=at_start)
-            at_start = False
-        except (QueueUnreachable, Error) as error:
-            logger.warning("Could not recover, will try again: %s", error)
-        finally:
+def _recover_until_stopped(presence: workers.Presence) -> None:
+    """One round at the start, then one every RECOVER_EVERY_S."""
+    rounds = workers.Rounds(lambda at_start: recover(at_start=at_start), presence)
+    while not stopping.is_told():
+        rounds.go_on()
+        connection.close()
+        stopping.wait(settings.RECOVER_EVERY_S)
+
+
+def _be_present(presence: workers.Presence) -> None:
+    """A sign of life at once and every HEARTBEAT_S, until the process ends and says so."""
+    ended = Event()
+
+    def end(**_: object) -> None:
+        ended.set()
+        with workers.Survived() as ending:
+            presence.end()
+        if ending.fault is not None:
+            logger.warning("The end of this worker was not stored: %s", ending.fault)
+
+    worker_shutdown.connect(end, weak=False)
+    while not ended.is_set():
+        with workers.Survived() as beat:
+            presence.beat()
+        if beat.fault is not None:
+            logger.warning("No sign of life of this worker: %s", beat.fault)
             connection.close()
-        _stopping.wait(settings.RECOVER_EVERY_S)
+        ended.wait(settings.HEARTBEAT_S)
+    connection.close()
 
 
-@contextmanager
-def _broker() -> Iterator[Any]:
-    """A connection that works, tried once; what breaks inside the block is named as well."""
-    with current_app.connection_for_write() as broker:
-        try:
-            broker.ensure_connection(max_retries=1, interval_start=0, timeout=5)
-            yield broker
-        except run_augmentation.OperationalError as error:
-            # The password is masked, and the mask is shown even where there is none.
-            address = broker.as_uri() if broker.password else broker.as_uri().replace(":**@", "")
-            raise QueueUnreachable(address) from error
+def _fault(broker: Any, error: Exception) -> QueueFault:
+    """What a failed message means: nobody there, or somebody who refuses."""
+    # The password is masked, and the mask is shown even where there is none.
+    address = broker.as_uri() if broker.password else broker.as_uri().replace(":**@", "")
+    first: BaseException | None = error
+    while first is not None:
+        if isinstance(first, REFUSALS):
+            return QueueRefused(address, str(first))
+        first = first.__cause__
+    return QueueUnreachable(address)
 
 
 def _messages_waiting() -> int:
     """How many messages no worker has taken yet."""
-    with _broker() as broker:
+    with open_broker() as broker:
         queue = current_app.conf.task_default_queue
         return int(broker.default_channel.queue_declare(queue=queue).message_count)

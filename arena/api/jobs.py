@@ -14,6 +14,7 @@ from arena.api.access import StaffOnly
 from arena.api.errors import ApiView
 from arena.queries import jobs
 from augment.models import GenerationJob
+from augment.services.workers import workforce
 
 
 class JobProgressView(ApiView):
@@ -22,7 +23,7 @@ class JobProgressView(ApiView):
     permission_classes = (StaffOnly,)
 
     def get(self, request: Request, code: uuid.UUID) -> Response:
-        """State, counts by state, and whether anything is still under way."""
+        """State, counts by state, whether it is under way and whether anybody works on it."""
         found = jobs.counts(get_object_or_404(GenerationJob, code=code))
         body = {
             "state": found.job.state,
@@ -31,6 +32,7 @@ class JobProgressView(ApiView):
             "by_state": {state.value: number for state, number in found.by_state.items()},
             "calls": found.job.spent_calls,
             "is_over": not found.is_moving,
+            "is_worked_on": found.is_moving and workforce().works,
         }
         digest = hashlib.sha256(json.dumps(body, sort_keys=True).encode()).hexdigest()[:32]
         headers = {"ETag": f'"{digest}"', "Cache-Control": "private, no-cache"}

@@ -18,13 +18,14 @@ from arena.queries import jobs, scenarios
 from arena.web.access import ADMIN, STAFF, only
 from arena.web.displacement import section
 from arena.web.forms import CapsForm, LaunchForm
-from augment.errors import AugmentError, QueueUnreachable
+from augment.errors import AugmentError, QueueFault
 from augment.models import Contestant, GenerationJob
 from augment.services import caps, contestants
 from augment.services import jobs as service
 from augment.services.caps import Caps
 from augment.services.job_costs import costs_of
 from augment.services.wording import said
+from augment.services.workers import workforce
 from augment.tasks import enqueue_job
 
 
@@ -32,7 +33,11 @@ from augment.tasks import enqueue_job
 @require_safe
 def jobs_page(request: HttpRequest) -> HttpResponse:
     """Every job with its bar."""
-    return render(request, "jobs/list.html", {"jobs": jobs.every()})
+    found = jobs.every()
+    context: dict[str, object] = {"jobs": found}
+    if any(counts.is_moving for counts in found):
+        context["workforce"] = workforce()
+    return render(request, "jobs/list.html", context)
 
 
 @only(ADMIN)
@@ -70,7 +75,9 @@ def job_page(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
         "grid": jobs.grid(job),
         "failures": jobs.failures(job),
     }
-    if not found.is_moving:  # a page that shows itself anew every two seconds measures nothing
+    if found.is_moving:
+        context["workforce"] = workforce()
+    else:  # a page that shows itself anew every two seconds measures nothing
         context["displacement"] = section(request, job)
     return render(request, "jobs/job.html", context)
 
@@ -161,5 +168,5 @@ def _send(request: HttpRequest, job_pk: int) -> None:
     """Put the job's rows on the queue; without a queue they wait, and the person is told."""
     try:
         enqueue_job(job_pk)
-    except QueueUnreachable as error:
+    except QueueFault as error:
         messages.warning(request, said(error))

@@ -16,7 +16,7 @@ from arena.queries import scenarios
 from arena.queries.modifications import modification_lines
 from arena.web.access import STAFF, only
 from arena.web.pictures import picture_response
-from augment.errors import QueueUnreachable
+from augment.errors import QueueFault
 from augment.models import Augmentation, Scenario
 from augment.services.displacement import of_augmentation
 from augment.services.findings import Checked, checked
@@ -121,7 +121,7 @@ def _drawing(request: HttpRequest, augmentation: Augmentation, found: Checked | 
 def _send_marks(request: HttpRequest, augmentation_pk: int) -> None:
     try:
         enqueue_marks(augmentation_pk)
-    except QueueUnreachable as error:
+    except QueueFault as error:
         messages.warning(request, said(error))
 
 

@@ -12,6 +12,7 @@ from augment.models.events import Event
 from augment.models.jobs import Attempt, Augmentation, GenerationJob
 from augment.models.scenes import SLUG_HELP, BaseScene, Scenario
 from augment.models.triggers import after_migrations, before_migrations
+from augment.models.workers import Worker
 
 __all__ = [
     "SLUG_HELP",
@@ -28,6 +29,7 @@ __all__ = [
     "ModelCall",
     "Scenario",
     "TranscriptNote",
+    "Worker",
     "after_migrations",
     "before_migrations",
 ]

@@ -10,7 +10,7 @@ from types import TracebackType
 
 from django.db import Error, connection
 
-from augment.errors import BudgetSpent, ClaimLost, JobCancelled
+from augment.errors import BudgetSpent, ClaimLost, JobCancelled, WorkerStopping
 from augment.models import Augmentation
 from augment.services import claims
 
@@ -44,9 +44,9 @@ class OutcomeOnCrash:
     """Leaves no row hanging when its worker breaks; what broke still travels on, loudly.
 
     An exception that nobody foresaw fails the row with its class and text. A worker that is told
-    to stop (SystemExit, KeyboardInterrupt) gives the row back. So does one whose job has no room
-    for the next call, and ends quietly. A row whose job was cancelled is cancelled. A lost claim
-    ends quietly as well: the new holder brings the outcome.
+    to stop (WorkerStopping, SystemExit, KeyboardInterrupt) gives the row back, quietly where it
+    foresaw that. So does one whose job has no room for the next call. A row whose job was
+    cancelled is cancelled. A lost claim ends quietly as well: the new holder brings the outcome.
     """
 
     def __init__(self, held: claims.Claim) -> None:
@@ -69,6 +69,10 @@ class OutcomeOnCrash:
         if isinstance(error, JobCancelled):
             cancelled = claims.Settlement(state=Augmentation.State.CANCELLED, reason=str(error))
             claims.settle(held=self._held, settlement=cancelled)
+            return True
+        if isinstance(error, WorkerStopping):
+            logger.info("Gave augmentation %d back: %s.", self._held.augmentation_pk, error)
+            claims.release(held=self._held, reason=str(error))
             return True
         if isinstance(error, BudgetSpent):
             claims.release(held=self._held, end=claims.TryEnd.STOPPED, reason=str(error))

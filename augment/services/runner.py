@@ -28,7 +28,7 @@ from augment.models import Augmentation, Contestant, Endpoint
 from augment.scene.codec import modification_from_document, modification_to_document
 from augment.scene.entities import Scene
 from augment.scene.modification import Modification
-from augment.services import claims, jobs
+from augment.services import claims, jobs, stopping
 from augment.services.call_limits import Queue
 from augment.services.endpoint_client import EndpointClient
 from augment.services.holding import OutcomeOnCrash, heartbeat
@@ -72,7 +72,9 @@ def open_wire(endpoint: Endpoint, held: claims.Claim) -> AbstractContextManager[
         KeyMissing: The variable is not set here.
         ModelFault: The key can't be sent, or the address is forbidden.
     """
-    queue = Queue(longest_s=settings.LLM_QUEUE_S, still_wanted=lambda: _insist(held))
+    queue = Queue(
+        longest_s=settings.LLM_QUEUE_S, still_wanted=lambda: _insist_before_sending(held)
+    )
     return EndpointClient(
         wire_to(endpoint, still_wanted=lambda: _insist_if_told(held)), endpoint, queue
     )
@@ -108,7 +110,7 @@ def run(
     """How the row ends. Every foreseen fault is a failed outcome with a sentence.
 
     Raises:
-        Unwanted: The row was taken back, or its job cancelled, meanwhile.
+        Unwanted: The row was taken back or its job cancelled meanwhile, or this worker stops.
         BudgetSpent: The job has no room for the next call.
     """
     try:
@@ -141,6 +143,12 @@ def _insist(held: claims.Claim) -> None:
         raise ClaimLost(f"attempt {held.attempt_number} has lost its row")
     if claims.is_cancelled(held=held):
         raise JobCancelled
+
+
+def _insist_before_sending(held: claims.Claim) -> None:
+    """A worker that is to stop sends nothing more; what it has sent it waits for."""
+    stopping.insist_on_going_on()
+    _insist(held)
 
 
 def _insist_if_told(held: claims.Claim) -> None:

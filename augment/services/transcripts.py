@@ -27,7 +27,7 @@ from augment.llm.costs import Price, WorstCase, worst_case
 from augment.llm.fingerprint import image_reference, request_hash
 from augment.llm.messages import Reply, Request
 from augment.models import Augmentation, Endpoint, GenerationJob, ModelCall, TranscriptNote
-from augment.services import answers, budget, claims
+from augment.services import answers, budget, claims, stopping
 from augment.services.pictures import store
 from augment.services.prices import price_of
 from augment.services.texts import storable, storable_document
@@ -122,6 +122,7 @@ class RowTranscript:
             ClaimLost: The row is somebody else's now.
             JobCancelled: Its job is cancelled.
             BudgetSpent: The job has no room for the call, and is stopped.
+            WorkerStopping: This worker is to stop; what it was answered so far is kept.
             Conflict: The job is capped in USD and the price is unknown.
         """
         columns = self._columns(role, request, prompt_version)
@@ -131,6 +132,7 @@ class RowTranscript:
         worst, price = worst_case(request), self._price_of(self._at(role), request.model)
         wait_s = FIRST_WAIT_S
         while True:
+            stopping.insist_on_going_on()
             room, pk = self._try(columns, worst, price)
             if room == budget.Room.TAKEN:
                 self._numbers += 1
@@ -147,7 +149,9 @@ class RowTranscript:
 
         Raises:
             ClaimLost: Somebody took the row over and settled the call as one that never was.
+            WorkerStopping: It waited for its place for so long that this worker is to stop.
         """
+        stopping.insist_on_going_on()
         call = ModelCall.objects.filter(pk=self._open[number].pk, settled_at=None)
         if not call.update(sent_at=timezone.now()):
             raise ClaimLost(f"attempt {self._held.attempt_number} has lost its row")

@@ -5,10 +5,12 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import pytest
+from django.test import Client
 from django.urls import reverse
 
-from augment.models import Augmentation, GenerationJob
-from augment.services import claims
+from augment.models import Augmentation, GenerationJob, Worker
+from augment.services import claims, jobs
+from augment.services.workers import Presence
 from tests.jobs import rows
 from tests.web.cast import people, signed_in
 
@@ -127,5 +129,62 @@ def test_the_job_page_asks_the_database_a_fixed_number_of_questions(
 ) -> None:
     job = rows.launch(scenarios=8, contestants=("reference",))
     admin = signed_in(people()["admin"])
-    with django_assert_max_num_queries(10):  # type: ignore[attr-defined]
+    with django_assert_max_num_queries(11):  # type: ignore[attr-defined]
         admin.get(reverse("job", args=[job.code]))
+
+
+# --- Whether anybody works -----------------------------------------------------------------------
+
+
+@pytest.fixture
+def staff() -> dict[str, Client]:
+    made = people()
+    return {name: signed_in(made[name]) for name in ("admin", "analyst")}
+
+
+def page(staff: dict[str, Client], name: str, job: GenerationJob) -> str:
+    address = reverse(name, args=[job.code] if name == "job" else [])
+    return staff["analyst"].get(address).content.decode()
+
+
+def is_worked_on(staff: dict[str, Client], job: GenerationJob) -> bool:
+    found = staff["admin"].get(reverse("job-progress", args=[job.code]))
+    return bool(found.json()["is_worked_on"])
+
+
+@pytest.mark.parametrize("name", ["job", "jobs"])
+def test_a_page_with_waiting_work_says_since_when_no_worker_runs(
+    staff: dict[str, Client], name: str
+) -> None:
+    job = rows.launch()
+    assert "No worker has been running yet." in page(staff, name, job)
+    Presence("here 1").beat()
+    Worker.objects.update(seen_at=rows.NOON)
+    found = page(staff, name, job)
+    assert "No worker is running since 20 November 2026, 12:00." in found
+    assert "goes on as soon as one starts" in found
+    assert not is_worked_on(staff, job)
+
+
+@pytest.mark.parametrize("name", ["job", "jobs"])
+def test_a_page_says_since_when_and_why_lost_work_is_not_brought_back(
+    staff: dict[str, Client], name: str
+) -> None:
+    job = rows.launch()
+    presence = Presence("here 1")
+    presence.recovered()
+    assert 'id="workforce"' not in page(staff, name, job)
+    assert is_worked_on(staff, job)
+    Worker.objects.update(recovered_at=rows.NOON)
+    presence.failed("Redis takes no messages: OOM <b>")
+    found = page(staff, name, job)
+    assert "not been brought back since 20 November 2026, 12:00." in found
+    assert "The reason: Redis takes no messages: OOM &lt;b&gt;" in found
+    assert not is_worked_on(staff, job)
+
+
+def test_where_nothing_waits_nobody_is_missed(staff: dict[str, Client]) -> None:
+    job = rows.launch()
+    claims.settle(held=rows.claimed(rows.only_row(job)), settlement=rows.done(), now=rows.NOON)
+    jobs.finish_if_over()
+    assert all('id="workforce"' not in page(staff, name, job) for name in ("job", "jobs"))

@@ -1,0 +1,189 @@
+"""Which workers live, and since when nobody has brought lost work back."""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Callable
+from dataclasses import dataclass
+from datetime import datetime, timedelta
+from types import TracebackType
+from typing import Self
+
+from django.conf import settings
+
+from augment.models import Worker
+from augment.services.clock import DATABASE_TIME, database_now
+from augment.services.texts import storable
+
+logger = logging.getLogger(__name__)
+
+KEPT = timedelta(days=7)
+"""Workers that have been silent for so long are forgotten, but for the last one."""
+
+FAULT_LENGTH = 300
+MOST_HEARD = 200
+"""So many of the last heard are looked at; crashed ones leave a row each."""
+
+LATE_ROUNDS = 4
+"""Whose last round is so many rounds ago brings nothing back, whatever it does instead."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Workforce:
+    """What is known of the workers.
+
+    Attributes:
+        living: How many were heard a moment ago.
+        silent_since: Where none lives: when the last one ended or was last heard, None where
+            there has been none.
+        not_recovered_since: Where workers live and none brings lost work back: since when.
+        fault: Why they can't, as far as they said so.
+    """
+
+    living: int
+    silent_since: datetime | None = None
+    not_recovered_since: datetime | None = None
+    fault: str = ""
+
+    @property
+    def works(self) -> bool:
+        """Whether somebody lives, and what is lost is brought back."""
+        return self.living > 0 and self.not_recovered_since is None
+
+
+class Survived:
+    """A block that may break in any way without ending who goes on; `fault` says how it did.
+
+    For loops that must outlive what nobody foresaw; whoever uses it tells the fault.
+    """
+
+    def __init__(self) -> None:
+        self.fault: Exception | None = None
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        traceback: TracebackType | None,
+    ) -> bool:
+        self.fault = error if isinstance(error, Exception) else None
+        return self.fault is not None
+
+
+class Presence:
+    """One worker's row: made when it is first heard, made anew when somebody deleted it.
+
+    Args:
+        name: Host and process.
+    """
+
+    def __init__(self, name: str) -> None:
+        self._name = name[:120]
+        self._pk: int | None = None
+
+    def beat(self) -> None:
+        """Say that it lives."""
+        if self._pk is None or not self._update(seen_at=DATABASE_TIME):
+            _forget_old()
+            made = Worker.objects.create(
+                name=self._name, started_at=DATABASE_TIME, seen_at=DATABASE_TIME
+            )
+            self._pk = made.pk
+
+    def recovered(self) -> None:
+        """Say that it has brought back what was lost."""
+        self.beat()
+        self._update(recovered_at=DATABASE_TIME, fault="")
+
+    def failed(self, fault: str) -> None:
+        """Say why it could not."""
+        self.beat()
+        self._update(fault=storable(fault)[:FAULT_LENGTH] or "unknown")
+
+    def end(self) -> None:
+        """Say that it ends in order."""
+        self._update(seen_at=DATABASE_TIME, ended_at=DATABASE_TIME)
+
+    def _update(self, **changes: object) -> bool:
+        return bool(Worker.objects.filter(pk=self._pk).update(**changes))
+
+
+class Rounds:
+    """Brings lost work back, round after round; no fault ends it.
+
+    Args:
+        recover: One round; told whether it is the first that works.
+        presence: Where it is kept when a round last worked.
+    """
+
+    def __init__(self, recover: Callable[[bool], None], presence: Presence) -> None:
+        self._recover = recover
+        self._presence = presence
+        self._at_start = True
+        self._failed = 0
+        self._worked_at: datetime | None = None
+
+    def go_on(self) -> bool:
+        """One round; whether it worked. What went wrong is logged and kept for the pages."""
+        with Survived() as round_:
+            self._recover(self._at_start)
+            self._presence.recovered()
+            now = database_now()
+        if round_.fault is not None:
+            self._failed += 1
+            self._tell(round_.fault)
+            return False
+        if self._failed:
+            logger.info("Lost work is brought back again, after %d failed rounds.", self._failed)
+        self._at_start, self._failed, self._worked_at = False, 0, now
+        return True
+
+    def _tell(self, error: Exception) -> None:
+        since = f"{self._worked_at:%Y-%m-%d %H:%M:%S} UTC" if self._worked_at else "the start"
+        fault = str(error) or type(error).__name__
+        # A fault that stays is told in full once.
+        logger.warning(
+            "Could not bring lost work back since %s (%d rounds), will try again: %s: %s",
+            since,
+            self._failed,
+            type(error).__name__,
+            fault,
+            exc_info=error if self._failed == 1 else None,
+        )
+        with Survived() as storing:
+            self._presence.failed(fault)
+        if storing.fault is not None:
+            logger.warning("This could not be stored for the pages: %s", storing.fault)
+
+
+def workforce() -> Workforce:
+    """Who lives now, on the database's clock; one query."""
+    heard = list(Worker.objects.annotate(now=DATABASE_TIME)[:MOST_HEARD])
+    if not heard:
+        return Workforce(living=0)
+    now: datetime = heard[0].now
+    silent_for = timedelta(seconds=settings.STALE_AFTER_S)
+    living = [found for found in heard if not found.ended_at and now - found.seen_at <= silent_for]
+    if not living:
+        return Workforce(living=0, silent_since=heard[0].seen_at)
+    late = now - timedelta(seconds=LATE_ROUNDS * settings.RECOVER_EVERY_S)
+    if any(not worker.fault and _worked_at(worker) >= late for worker in living):
+        return Workforce(living=len(living))
+    last = max(living, key=_worked_at)
+    return Workforce(living=len(living), not_recovered_since=_worked_at(last), fault=last.fault)
+
+
+# --- Private -----------------------------------------------------------------------------------
+
+
+def _worked_at(worker: Worker) -> datetime:
+    """When its last round worked; a new one is still at its first."""
+    return worker.recovered_at or worker.started_at
+
+
+def _forget_old() -> None:
+    last = Worker.objects.values_list("pk", flat=True).first()
+    Worker.objects.filter(seen_at__lt=DATABASE_TIME - KEPT).exclude(pk=last).delete()

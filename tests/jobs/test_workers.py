@@ -1,0 +1,216 @@
+"""Signs of life of workers, and what brings lost work back whatever happens."""
+
+from __future__ import annotations
+
+import logging
+import shutil
+import tempfile
+from collections.abc import Iterator
+from datetime import UTC, datetime, timedelta
+from pathlib import Path
+
+import pytest
+import redis
+from celery import current_app
+from django.db import OperationalError
+
+from arena.serving.probes import redis_answers
+from arena.serving.redis_server import find_redis_server
+from augment import tasks
+from augment.errors import QueueRefused, QueueUnreachable
+from augment.models import Worker
+from augment.services.clock import DATABASE_TIME
+from augment.services.workers import FAULT_LENGTH, Presence, Rounds, Workforce, workforce
+from tests.jobs.rows import launch, only_row
+from tests.processes import Process, wait_until
+
+pytestmark = pytest.mark.django_db
+
+
+def living(name: str = "here 1") -> Worker:
+    presence = Presence(name)
+    presence.recovered()
+    return Worker.objects.get(name=name)
+
+
+def long_ago(worker: Worker, column: str, seconds: float) -> None:
+    when = DATABASE_TIME - timedelta(seconds=seconds)
+    Worker.objects.filter(pk=worker.pk).update(**{column: when})
+    worker.refresh_from_db()
+
+
+# --- Who lives -----------------------------------------------------------------------------------
+
+
+def test_before_the_first_worker_nothing_is_known() -> None:
+    found = workforce()
+    assert (found.living, found.silent_since) == (0, None)
+
+
+@pytest.mark.parametrize(("silent_s", "count"), [(0, 1), (15, 1), (25, 0)])
+def test_a_worker_that_is_silent_too_long_is_dead_since_its_last_word(
+    silent_s: float, count: int
+) -> None:
+    worker = living()
+    long_ago(worker, "seen_at", silent_s)
+    found = workforce()
+    assert found.living == count
+    assert found.silent_since == (None if count else worker.seen_at)
+
+
+def test_a_worker_that_ended_in_order_is_gone_at_once() -> None:
+    presence = Presence("here 1")
+    presence.beat()
+    presence.end()
+    assert workforce().living == 0
+    assert workforce().silent_since == Worker.objects.get().ended_at
+
+
+def test_one_that_lives_is_enough() -> None:
+    long_ago(living("here 1"), "seen_at", 500)
+    living("here 2")
+    assert workforce() == Workforce(living=1)
+
+
+def test_old_workers_are_forgotten_but_for_the_last() -> None:
+    for name, days in (("old", 9), ("last", 8)):
+        long_ago(living(name), "seen_at", days * 86_400)
+    Presence("new").beat()
+    assert set(Worker.objects.values_list("name", flat=True)) == {"last", "new"}
+
+
+def test_a_row_that_somebody_deleted_is_made_anew() -> None:
+    presence = Presence("here 1")
+    presence.beat()
+    Worker.objects.all().delete()
+    presence.beat()
+    assert workforce().living == 1
+
+
+# --- Bringing lost work back ---------------------------------------------------------------------
+
+
+class Round:
+    """Does what it is told to in each round."""
+
+    def __init__(self, *outcomes: Exception | None) -> None:
+        self._outcomes = list(outcomes)
+        self.first: list[bool] = []
+
+    def __call__(self, at_start: bool) -> None:
+        self.first.append(at_start)
+        outcome = self._outcomes.pop(0)
+        if outcome is not None:
+            raise outcome
+
+
+@pytest.mark.parametrize(
+    "fault",
+    [
+        QueueRefused("redis://here/0", "OOM command not allowed"),
+        OperationalError("database is locked"),
+        KeyError("nobody foresaw this"),
+        MemoryError(),
+        RecursionError("too deep"),
+    ],
+)
+def test_no_fault_ends_the_rounds_and_all_of_them_are_told(
+    fault: Exception, caplog: pytest.LogCaptureFixture
+) -> None:
+    round_ = Round(None, fault, fault, None)
+    rounds = Rounds(round_, Presence("here 1"))
+    with caplog.at_level(logging.INFO, logger="augment"):
+        assert [rounds.go_on() for _ in range(4)] == [True, False, False, True]
+    worked = f"{datetime.now(UTC):%Y-%m-%d}"
+    failures = [line for line in caplog.messages if "Could not bring lost work back" in line]
+    assert len(failures) == 2
+    assert f"since {worked}" in failures[0]
+    assert "(2 rounds)" in failures[1]
+    assert "again, after 2 failed rounds" in caplog.messages[-1]
+
+
+def test_the_first_round_that_works_sends_what_waits() -> None:
+    round_ = Round(KeyError("x"), None, None)
+    rounds = Rounds(round_, Presence("here 1"))
+    for _ in range(3):
+        rounds.go_on()
+    assert round_.first == [True, True, False]
+
+
+def test_a_fault_is_kept_for_the_pages_until_a_round_works() -> None:
+    rounds = Rounds(Round(None, KeyError("x" * 1000), None), Presence("here 1"))
+    rounds.go_on()
+    worked_at = Worker.objects.get().recovered_at
+    rounds.go_on()
+    found = workforce()
+    assert (found.living, found.not_recovered_since) == (1, worked_at)
+    assert found.fault.startswith("'xxx")
+    assert len(found.fault) == FAULT_LENGTH
+    rounds.go_on()
+    assert workforce().not_recovered_since is None
+
+
+def test_a_worker_that_hangs_in_a_round_is_noticed() -> None:
+    worker = living()
+    long_ago(worker, "recovered_at", 119)
+    assert workforce().not_recovered_since is None
+    long_ago(worker, "recovered_at", 125)
+    assert workforce().not_recovered_since == worker.recovered_at
+
+
+def test_one_that_brings_work_back_is_enough() -> None:
+    Presence("here 1").failed("no Redis")
+    living("here 2")
+    assert workforce().not_recovered_since is None
+
+
+# --- A Redis that is there and refuses -----------------------------------------------------------
+
+
+@pytest.fixture
+def refusing(request: pytest.FixtureRequest) -> Iterator[str]:
+    """A Redis that takes nothing any more: its memory is full, or it is a replica."""
+    folder = Path(tempfile.mkdtemp(prefix="arena-"))  # a socket's path has 108 bytes
+    socket = folder / "redis.sock"
+    process = Process(
+        [
+            *(str(find_redis_server()), "--port", "0", "--unixsocket", str(socket)),
+            *("--save", "", "--dir", str(folder)),
+        ],
+        environment={},
+        log=folder / "redis.log",
+    )
+    before = current_app.conf.broker_url
+    try:
+        wait_until(lambda: redis_answers(socket), what=process.said() or "Redis answers")
+        client = redis.Redis(unix_socket_path=str(socket))
+        client.execute_command(*request.param)
+        client.close()
+        current_app.conf.broker_url = f"redis+socket://{socket}"
+        yield str(socket)
+    finally:
+        current_app.conf.broker_url = before
+        process.stop()
+        shutil.rmtree(folder)
+
+
+FULL = ("CONFIG", "SET", "maxmemory", "1")
+READ_ONLY = ("REPLICAOF", "127.0.0.1", "1")
+
+
+@pytest.mark.redis
+@pytest.mark.parametrize(
+    ("refusing", "says"),
+    [(FULL, "command not allowed"), (READ_ONLY, "read only replica")],
+    indirect=["refusing"],
+)
+def test_a_redis_that_refuses_is_not_called_missing(refusing: str, says: str) -> None:
+    job = launch()
+    with pytest.raises(QueueRefused, match=rf"Redis at .* takes no messages: .*{says}") as caught:
+        tasks.enqueue_job(job.pk)
+    assert not isinstance(caught.value, QueueUnreachable)
+    assert "No Redis" not in str(caught.value)
+    assert only_row(job).sent_at is None
+    rounds = Rounds(lambda at_start: tasks.recover(at_start=at_start), Presence("here 1"))
+    assert rounds.go_on() is False
+    assert says in workforce().fault
