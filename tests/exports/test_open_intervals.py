@@ -1,0 +1,129 @@
+"""A rating with open intervals and withheld ranks, in every format that a reader can meet."""
+
+from __future__ import annotations
+
+import csv
+import io
+import json
+import zipfile
+from itertools import combinations
+from pathlib import Path
+
+import pytest
+from django.core.management import call_command
+from pyarrow import parquet
+
+from arena.exports.bundle import bundle
+from arena.exports.rating_charts import charts
+from arena.exports.tables import leaderboard_table
+from arena.exports.writers import FORMATS, plain_text
+from arena.management.rate_csv import run
+from arena.models import Snapshot, Study
+from arena.services.ratings import rate
+from tests.web.test_results import german, judged
+
+pytestmark = pytest.mark.django_db
+
+ORDER = ["best", "few", "a", "b", "c", "d", "weak"]
+RANKS = [1, None, 2, 2, 2, 2, 7]
+FEW = (
+    "no upper bound: hardly anybody scored; no rank, because the lower bound is not above the "
+    "average"
+)
+
+
+@pytest.fixture
+def file(tmp_path: Path) -> Path:
+    """Best won all, weak lost nearly all, few has six votes; four are close to each other."""
+    lines = ["model_a,model_b,winner"]
+    for one, other in combinations("abcd", 2):
+        lines += [f"{one},{other},model_a"] * 40 + [f"{one},{other},model_b"] * 38
+    lines += [f"best,{one},model_a" for one in "abcd" for _ in range(30)]
+    lines += [f"{one},weak,model_a" for one in "abcd" for _ in range(60)] + ["a,weak,model_b"]
+    lines += ["few,a,model_a", "few,a,model_a", "few,a,model_b"] * 2
+    path = tmp_path / "votes.csv"
+    path.write_text("\n".join(lines) + "\n")
+    return path
+
+
+@pytest.fixture
+def snapshot(file: Path) -> Snapshot:
+    call_command("import_votes", str(file), "--name", "Open", stdout=io.StringIO())
+    return rate(study=Study.objects.get(name="Open"), rounds=1000)
+
+
+def test_tables_of_every_format_have_the_same_order_bounds_and_reasons(
+    snapshot: Snapshot,
+) -> None:
+    table = leaderboard_table(snapshot)
+    assert [row.slug for row in table.rows] == ORDER
+    assert [row.rank for row in table.rows] == RANKS
+    document = json.loads(FORMATS["json"].write(table))["standings"]
+    lines = list(csv.DictReader(io.StringIO(FORMATS["csv"].write(table).decode())))
+    stored = parquet.read_table(io.BytesIO(FORMATS["parquet"].write(table))).to_pylist()
+    for rows in (document, stored):
+        assert [row["rank"] for row in rows] == RANKS
+        assert [row["upper"] is None for row in rows] == [True, True, *[False] * 5]
+        assert [row["lower"] is None for row in rows] == [*[False] * 6, True]
+    assert [line["rank"] for line in lines] == [str(rank or "") for rank in RANKS]
+    for rows in (document, stored, lines):
+        notes = {row["slug"]: row["note"] for row in rows if row["note"]}
+        assert notes == {
+            "best": "no upper limit",
+            "few": FEW,
+            "weak": "no lower bound: hardly any score",
+        }
+
+
+def test_latex_and_terminal_print_open_ends_and_the_reasons_beneath(snapshot: Snapshot) -> None:
+    table = leaderboard_table(snapshot)
+    latex = FORMATS["latex"].write(table).decode()
+    rows = [line.strip() for line in latex.splitlines() if " & " in line and "textbf" not in line]
+    assert [row.split(" & ")[1] for row in rows] == ["1", "--", "2", "2", "2", "2", "7"]
+    assert rows[0].startswith(r"best & 1 & -- & $\geq$ ")
+    assert r"/+$\infty$ & 6\\" in rows[1]
+    assert r" & -$\infty$/+" in rows[-1]
+    assert rf"\footnotesize few: {FEW}}}\\" in latex
+    text = plain_text(table)
+    assert f"few: {FEW}." in text
+    assert "+∞" in text
+
+
+def test_the_command_for_files_says_the_same(file: Path) -> None:
+    found = json.loads(run(file=str(file), rounds=1000, format="json"))
+    assert [line["model"] for line in found["standings"]] == ORDER
+    assert [line["rank"] for line in found["standings"]] == RANKS
+    assert found["standings"][1]["note"] == FEW
+    for form in ("table", "latex", "csv"):
+        assert FEW in run(file=str(file), rounds=1000, format=form)
+
+
+def test_the_page_draws_open_bars_and_says_why_in_the_readers_language(
+    snapshot: Snapshot,
+) -> None:
+    page = german(snapshot.study)
+    assert page.count("11m6-5-6 5 6 5") == 1  # one arrow to the left, two to the right
+    assert page.count("11m-6-5 6 5-6 5") == 2
+    assert "≥ " in page
+    assert FEW not in page
+    assert "kein Rang, weil die untere Grenze nicht über dem Durchschnitt liegt" in page
+
+
+def test_charts_are_drawn_with_open_ends(snapshot: Snapshot) -> None:
+    drawn = FORMATS["svg"].write(leaderboard_table(snapshot)).decode()
+    assert drawn.count("<path") > 7
+    for chart in charts(snapshot).values():
+        assert chart(file_format="svg").startswith(b"<?xml")
+
+
+def test_a_type_with_too_few_votes_has_no_ranks_in_page_and_files() -> None:
+    snapshot = rate(study=judged(), rounds=50)
+    lines = [line for part in snapshot.results["types"] for line in part["lines"]]
+    assert {line["rank"] for line in lines} == {None}
+    assert all(line["note"] for line in lines if line["votes"])
+    assert "kein Rang" in german(snapshot.study, "types")
+    assert b"no rank" in _of_zip(bundle(snapshot), "types.csv")
+
+
+def _of_zip(packed: bytes, name: str) -> bytes:
+    return zipfile.ZipFile(io.BytesIO(packed)).read(name)
