@@ -199,7 +199,7 @@ class ContestantAdmin(MadeElsewhere, admin.ModelAdmin):
     search_fields = ("slug", "name", "model")
     readonly_fields = (
         *("code", "slug", "kind", "variant", "endpoint", "model", "roles", "error_rates"),
-        "created_at",
+        *("sends", "created_at"),
     )
 
 

@@ -42,6 +42,12 @@ class Contestant(models.Model):
         blank=True,
         help_text='of simulated errors: {"position": 0.1, ...}; null for all others',
     )
+    sends = models.JSONField(
+        null=True,
+        blank=True,
+        editable=False,
+        help_text="by role, what its models were known to take when it first ran; null before",
+    )
     created_at = models.DateTimeField(auto_now_add=True)
 
     class Meta:

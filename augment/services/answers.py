@@ -82,4 +82,6 @@ def _extras_of(reply: Reply) -> dict[str, Any] | None:
     if not reply.tool_calls:
         return None
     extras: dict[str, Any] = {"tool_calls": [asdict(made) for made in reply.tool_calls]}
+    if reply.calls_left_out:
+        extras["calls_left_out"] = reply.calls_left_out
     return dict(storable_document(extras))

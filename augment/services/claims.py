@@ -18,10 +18,16 @@ from typing import Any
 from django.db import transaction
 from django.db.models import Max, Q, QuerySet
 
+from augment.llm.cutting import cut
 from augment.models import Attempt, Augmentation, GenerationJob
 from augment.services import budget
 from augment.services.clock import DATABASE_TIME, Moment
-from augment.services.texts import storable, storable_document
+from augment.services.texts import (
+    LONGEST_NOTES,
+    LONGEST_REASON,
+    storable,
+    storable_document,
+)
 
 logger = logging.getLogger(__name__)
 
@@ -118,7 +124,9 @@ def keep_modification(*, held: Claim, modification: dict[str, Any], notes: str) 
         False when the claim is lost; nothing was written then.
     """
     return bool(
-        _row_of(held).update(modification=storable_document(modification), notes=storable(notes))
+        _row_of(held).update(
+            modification=storable_document(modification), notes=cut(storable(notes), LONGEST_NOTES)
+        )
     )
 
 
@@ -134,7 +142,7 @@ def settle(*, held: Claim, settlement: Settlement, now: Moment = DATABASE_TIME) 
     Returns:
         False when the claim is lost: the result is dropped, because the row is somebody else's.
     """
-    reason = storable(settlement.reason)
+    reason = cut(storable(settlement.reason), LONGEST_REASON)
     changes: dict[str, Any] = {
         "state": settlement.state,
         "reason": reason,
@@ -146,7 +154,7 @@ def settle(*, held: Claim, settlement: Settlement, now: Moment = DATABASE_TIME) 
     if settlement.modification is not None:
         changes |= {"modification": storable_document(settlement.modification)}
     if settlement.notes:
-        changes |= {"notes": storable(settlement.notes)}
+        changes |= {"notes": cut(storable(settlement.notes), LONGEST_NOTES)}
     if not _row_of(held).update(**changes):
         logger.warning(
             "Dropped the result of attempt %d at augmentation %d: its claim was taken back.",
@@ -172,7 +180,7 @@ def release(
         return False
     budget.settle_unseen(attempt_pk=held.attempt_pk, now=now)
     Attempt.objects.filter(pk=held.attempt_pk).update(
-        finished_at=now, outcome=end, reason=storable(reason)
+        finished_at=now, outcome=end, reason=cut(storable(reason), LONGEST_REASON)
     )
     return True
 

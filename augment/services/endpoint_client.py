@@ -14,6 +14,7 @@ from augment.llm.profile import Profile
 from augment.models import Endpoint
 from augment.services.call_limits import Queue, place_at
 from augment.services.endpoints import profile_of, remember_refusal
+from augment.services.treatments import Treatment
 
 logger = logging.getLogger(__name__)
 
@@ -25,13 +26,22 @@ class EndpointClient:
         wire: Makes the calls; it is closed with this client.
         endpoint: Whose limits and models count.
         queue: How calls wait for their place.
+        treatment: What the contestant that asks has sent since its first run; None where nobody
+            in particular asks, and what is known now counts.
     """
 
-    def __init__(self, wire: OpenAIWire, endpoint: Endpoint, queue: Queue) -> None:
+    def __init__(
+        self,
+        wire: OpenAIWire,
+        endpoint: Endpoint,
+        queue: Queue,
+        treatment: Treatment | None = None,
+    ) -> None:
         self._wire = wire
         self._endpoint = endpoint
         self._queue = queue
-        self._profiles: dict[str, Profile] = {}
+        self._treatment = treatment
+        self._profiles = {} if treatment is None else treatment.at(endpoint)
 
     def fitted(self, request: Request) -> Request:
         """The request with what the model is known to take.
@@ -46,6 +56,7 @@ class EndpointClient:
 
         Raises:
             ParameterRefused: A parameter is not taken; it is left out from now on.
+            ModelFault: A parameter is not taken any more that earlier answers were made with.
             EndpointBusy: There was no place.
             ModelFault: There was no answer.
             ClaimLost: Nobody needs the answer any more; nothing was sent.
@@ -81,6 +92,7 @@ class EndpointClient:
             refused.parameter,
             refused,
         )
-        self._profiles[model] = remember_refusal(
-            endpoint=self._endpoint, model=model, parameter=refused.parameter
-        )
+        known = remember_refusal(endpoint=self._endpoint, model=model, parameter=refused.parameter)
+        if self._treatment is not None:
+            known = self._treatment.without(refused, endpoint=self._endpoint, model=model)
+        self._profiles[model] = known

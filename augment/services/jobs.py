@@ -21,6 +21,7 @@ from augment.services.clock import DATABASE_TIME, Moment
 from augment.services.events import log_event
 from augment.services.feasible import refuse_impossible
 from augment.services.texts import one_line
+from augment.services.treatments import loosen_unanswered
 
 State = Augmentation.State
 
@@ -87,6 +88,7 @@ def launch(
     who = _contestants(contestants)
     where = _scenarios(scenarios)
     refuse_impossible(who, where)
+    loosen_unanswered(who)
     job = GenerationJob.objects.create(
         name=name,
         launched_by_id=actor.pk if actor else None,
@@ -166,6 +168,7 @@ def retry_failed(job: GenerationJob, actor: User | None = None) -> GenerationJob
         raise Conflict(
             sentence("Job '%(name)s' was cancelled; launch a new one instead.", name=job.name)
         )
+    loosen_unanswered(job.contestants.all())
     failed = Augmentation.objects.filter(job=job, state=State.FAILED)
     again = failed.update(state=State.QUEUED, reason="", finished_at=None, sent_at=None)
     if not again:

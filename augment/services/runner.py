@@ -37,6 +37,7 @@ from augment.services.roles import seats_of
 from augment.services.scenes import reference_of, scene_of
 from augment.services.seeds import seed_of
 from augment.services.transcripts import RowTranscript, sentence_of
+from augment.services.treatments import Treatment, treatment_of
 from augment.services.wires import wire_to
 from augment.variants import pipeline
 from augment.variants.cast import Player
@@ -61,7 +62,9 @@ class Answer:
     reason: str = ""
 
 
-def open_wire(endpoint: Endpoint, held: claims.Claim) -> AbstractContextManager[ChatClient]:
+def open_wire(
+    endpoint: Endpoint, held: claims.Claim, treatment: Treatment | None = None
+) -> AbstractContextManager[ChatClient]:
     """A client for the endpoint, with the key that its variable holds right now.
 
     Its calls wait for a place at the endpoint, and for their answer, as long as the claim is
@@ -76,7 +79,7 @@ def open_wire(endpoint: Endpoint, held: claims.Claim) -> AbstractContextManager[
         longest_s=settings.LLM_QUEUE_S, still_wanted=lambda: _insist_before_sending(held)
     )
     return EndpointClient(
-        wire_to(endpoint, still_wanted=lambda: _insist_if_told(held)), endpoint, queue
+        wire_to(endpoint, still_wanted=lambda: _insist_if_told(held)), endpoint, queue, treatment
     )
 
 
@@ -258,10 +261,13 @@ def _from_model(
     connect: Connect | None,
 ) -> Answer:
     seats = seats_of(row.contestant)
+    treatment = treatment_of(row.contestant, seats)
     sites = {seat.endpoint.pk: seat.endpoint for seat in seats.values()}
     with ExitStack() as opened:
         clients = {
-            pk: opened.enter_context(open_wire(site, held) if connect is None else connect(site))
+            pk: opened.enter_context(
+                open_wire(site, held, treatment) if connect is None else connect(site)
+            )
             for pk, site in sites.items()
         }
         others: dict[ModelRole, Player] = {
@@ -269,7 +275,6 @@ def _from_model(
             for role, seat in seats.items()
             if role is not ModelRole.MODIFIER
         }
-        known = seats[ModelRole.MODIFIER].known
         outcome = pipeline.run(
             recipe(row.contestant.variant),
             scene=scene,
@@ -279,7 +284,7 @@ def _from_model(
             transcript=RowTranscript(
                 held, row, endpoint, others={role: seats[role].endpoint for role in others}
             ),
-            native_tools=known is not None and known.native_tools is True,
+            native_tools=treatment.profiles[ModelRole.MODIFIER].native_tools is True,
             others=others,
         )
     return Answer(

@@ -24,6 +24,13 @@ def storable_document(value: Any) -> Any:
     return value
 
 
+LONGEST_REASON = 2_000
+"""Of why there is no modification, in characters; the whole of what was said is in the calls."""
+
+LONGEST_NOTES = 20_000
+"""Of what a contestant said about its own work."""
+
+
 def one_line(field: str, value: str, *, what: str, longest: int = 120) -> str:
     """A name that people read, without blanks around it.
 

@@ -58,6 +58,7 @@ def _contestant(contestant: Contestant) -> dict[str, Any]:
         "variant": contestant.variant or None,
         "model": contestant.model or None,
         "roles": _same_order(contestant.roles),
+        "sends": _same_order(contestant.sends),
         "endpoint": None
         if endpoint is None
         else {

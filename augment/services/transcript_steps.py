@@ -11,8 +11,12 @@ from typing import Any
 
 from django.db.models import Prefetch
 
+from augment.llm.cutting import cut
 from augment.llm.fingerprint import IMAGE_SCHEME
 from augment.models import Attempt, Augmentation, ModelCall, TranscriptNote
+
+LONGEST_SHOWN = 100_000
+"""Of one text of a record on a page, in characters; the document has all of it."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -22,17 +26,14 @@ class SaidMessage:
     Attributes:
         images: SHA-256 of each.
         rest: Whatever else it carries (calls of tools, the id of one), as JSON; empty mostly.
+        length: Of the whole text, in characters.
     """
 
     role: str
     text: str
     images: tuple[str, ...]
     rest: str
-
-    @property
-    def length(self) -> int:
-        """In characters."""
-        return len(self.text)
+    length: int
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -54,16 +55,25 @@ class Step:
         return {name: value for name, value in asked.items() if name not in ("messages", "model")}
 
     @property
+    def answer_text(self) -> str | None:
+        """The answer as a page shows it, None where there is none."""
+        if self.call is None or self.call.answer is None:
+            return None
+        return cut(self.call.answer, LONGEST_SHOWN)
+
+    @property
     def extras_text(self) -> str:
         """What else the answer carried, such as native calls of tools."""
-        return _pretty(self.call.extras) if self.call and self.call.extras else ""
+        shown = _pretty(self.call.extras) if self.call and self.call.extras else ""
+        return cut(shown, LONGEST_SHOWN)
 
     @property
     def note_text(self) -> str:
         """The note's document, to be read: a line for each part, texts as they are."""
         if self.note is None:
             return ""
-        return "\n".join(_line(name, part) for name, part in self.note.document.items())
+        lines = (_line(name, part) for name, part in self.note.document.items())
+        return cut("\n".join(lines), LONGEST_SHOWN)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -150,11 +160,13 @@ def _message(message: dict[str, Any]) -> SaidMessage:
     texts = [part["text"] for part in parts if part.get("type") == "text"]
     urls = [part["image_url"]["url"] for part in parts if part.get("type") == "image_url"]
     rest = {name: value for name, value in message.items() if name not in ("role", "content")}
+    text = "\n".join(texts)
     return SaidMessage(
         role=str(message.get("role", "")),
-        text="\n".join(texts),
+        text=cut(text, LONGEST_SHOWN),
         images=tuple(url.removeprefix(IMAGE_SCHEME) for url in urls),
-        rest=_pretty(rest) if rest else "",
+        rest=cut(_pretty(rest), LONGEST_SHOWN) if rest else "",
+        length=len(text),
     )
 
 

@@ -21,6 +21,7 @@ from augment.llm.messages import Message, Reply, Request, Speaker
 from augment.models import Augmentation, Endpoint, ModelCall, TranscriptNote
 from augment.services import caps, jobs, runner
 from augment.services.caps import Caps
+from augment.services.texts import LONGEST_REASON
 from augment.services.transcript_export import transcript_of
 from augment.services.transcript_steps import messages_of, totals_of, tries_of
 from augment.services.transcripts import RowTranscript
@@ -49,7 +50,7 @@ def looking(row: Augmentation) -> RowTranscript:
 def test_the_document_holds_the_whole_record() -> None:
     row = ran(only_row(llama_job(price="2")), Model(after_a_second_look))
     document = json.loads(json.dumps(transcript_of(row)))
-    assert (document["format"], document["version"]) == ("scenario-arena/transcript", 1)
+    assert (document["format"], document["version"]) == ("scenario-arena/transcript", 2)
     assert document["augmentation"]["state"] == "done"
     assert document["augmentation"]["modification"] == row.modification
     assert "seed" not in document["augmentation"]
@@ -88,10 +89,11 @@ def test_a_request_in_it_is_what_the_server_was_sent_and_nothing_else() -> None:
     sent = [json.loads(heard.partition(b"\r\n\r\n")[2]) for heard in server.heard]
     assert [call["request"] for call in calls] == sent
     assert sorted(sent[0]) == ["max_completion_tokens", "messages", "model"]
+    page = signed_in(people()["admin"]).get(reverse("augmentation", args=[row.code]))
     for name in ("seed", "temperature"):
-        assert f'"{name}"' not in json.dumps(document)
-        page = signed_in(people()["admin"]).get(reverse("augmentation", args=[row.code]))
         assert f"<dt>{name}</dt>" not in page.content.decode().lower()
+    assert '"seed"' not in json.dumps(document)
+    assert '"temperature"' not in json.dumps(document)
 
 
 def test_what_is_unknown_is_null_and_not_zero() -> None:
@@ -201,3 +203,27 @@ def test_the_command_says_what_it_can_not_do(tmp_path: Path) -> None:
         call_command("transcript", str(uuid4()))
     with pytest.raises(CommandError, match="Can't write"):
         call_command("transcript", str(row.code), "--out", str(tmp_path))
+
+
+def test_long_texts_are_cut_with_a_mark_in_rows_and_on_the_page_and_answers_are_kept() -> None:
+    answer = "no " * 60_000
+    row = only_row(llama_job())
+    ran(row, Model(lambda request: reply(answer)))
+    call = ModelCall.objects.order_by("pk")[0]
+    assert call.answer == answer
+    shown = signed_in(people()["admin"]).get(reverse("augmentation", args=[row.code]))
+    page = shown.content.decode()
+    assert page.count("… [cut: 180000 characters]") >= 2
+    assert len(page) < 800_000
+    steps = transcript_of(row)["attempts"][0]["steps"]
+    assert steps[0]["answer"] == answer
+
+
+def test_a_long_refusal_is_a_reason_of_a_stated_length() -> None:
+    row = only_row(llama_job())
+    refusal = "n" * 3000
+    ran(row, Model(lambda request: Reply(text="", refusal=refusal)))
+    assert len(row.reason) == LONGEST_REASON
+    assert row.reason.endswith("… [cut: 3000 characters]")
+    assert row.attempts.get().reason == row.reason
+    assert ModelCall.objects.get().refusal == refusal

@@ -1,0 +1,249 @@
+"""What a contestant sends is fixed when it first runs."""
+
+from __future__ import annotations
+
+import importlib
+import json
+from dataclasses import replace
+from typing import Any
+
+import pytest
+from django.apps import apps
+
+from augment.errors import ParameterRefused
+from augment.llm.profile import Profile
+from augment.models import Augmentation, Contestant, Endpoint, EndpointModel, Event, ModelCall
+from augment.services import contestants, jobs, probe, runner
+from augment.services.roles import seats_of
+from augment.services.transcript_export import transcript_of
+from augment.services.treatments import document_of, profile_from_document, treatment_of
+from augment.variants.transcript import ModelRole
+from tests.jobs.rows import add_scenario
+from tests.llm.json_server import JsonServer, serving
+
+pytestmark = pytest.mark.django_db
+REFUSED = {"error": {"message": "Unsupported parameter", "code": "unsupported_parameter"}}
+
+
+class Model(JsonServer):
+    """Answers nothing readable, remembers what it was sent, and refuses what it is told to."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.refuses: set[str] = set()
+        self.bodies: list[dict[str, Any]] = []
+
+    def answer(self, body: dict[str, Any]) -> tuple[int, dict[str, Any]]:
+        for name in sorted(self.refuses & body.keys()):
+            return 400, {"error": REFUSED["error"] | {"param": name}}
+        self.bodies.append(body)
+        message = {"role": "assistant", "content": "Sorry?"}
+        choice = {"index": 0, "finish_reason": "stop", "message": message}
+        made = {"id": "1", "object": "chat.completion", "created": 0, "model": body["model"]}
+        return 200, made | {"choices": [choice]}
+
+
+def job_at(server: Model, variant: str = "fc") -> None:
+    contestants.ensure_endpoint(label="here", base_url=server.url)
+    contestants.add_contestant(slug="one", variant=variant, endpoint="here", model="m")
+    add_scenario("first")
+    add_scenario("second")
+    jobs.launch(name="J", contestants=["one"], scenarios=["first", "second"], is_fresh=True)
+
+
+def run(scenario: str) -> Augmentation:
+    row = Augmentation.objects.get(scenario__slug=scenario)
+    runner.work_on(augmentation_pk=row.pk)
+    row.refresh_from_db()
+    return row
+
+
+def learn(**known: object) -> None:
+    EndpointModel.objects.filter(model="m").update(**known)
+
+
+def shapes(server: Model) -> set[tuple[str, ...]]:
+    """The names of all that was sent, and what stood beside the messages."""
+    return {
+        tuple(f"{name}={body[name]}" for name in sorted(body) if name != "messages")
+        for body in server.bodies
+    }
+
+
+@pytest.mark.parametrize(
+    "later",
+    [
+        {"native_tools": True},
+        {"refused_parameters": ["max_completion_tokens"]},
+        {"refused_parameters": ["reasoning_effort"], "reasoning_effort": "low"},
+        {"reasoning_effort": "low"},
+        {"max_output_tokens": 64},
+        {"vision": False, "json_schema": False, "temperature": False},
+    ],
+    ids=lambda later: "+".join(later),
+)
+def test_what_is_learnt_after_the_first_run_changes_nothing_that_is_sent(
+    later: dict[str, object],
+) -> None:
+    with serving(Model()) as server:
+        job_at(server)
+        run("first")
+        before = shapes(server)
+        learn(**later)
+        server.bodies.clear()
+        run("second")
+        assert shapes(server) == before
+        # Another contestant of the same model sends what is known now.
+        contestants.add_contestant(slug="two", variant="fc", endpoint="here", model="m", name="2")
+        jobs.launch(name="K", contestants=["two"], scenarios=["first"], is_fresh=True)
+        server.bodies.clear()
+        runner.work_on(augmentation_pk=Augmentation.objects.get(contestant__slug="two").pk)
+        is_sent = not later.keys() <= {"vision", "json_schema", "temperature"}
+        is_sent = is_sent and later != {
+            "refused_parameters": ["reasoning_effort"],
+            "reasoning_effort": "low",
+        }
+        assert (shapes(server) != before) is is_sent
+
+
+def test_a_probe_between_two_rows_does_not_mix_ways_of_calling() -> None:
+    with serving(Model()) as server:
+        job_at(server)
+        run("first")
+        assert "tools" not in server.bodies[0]
+        probe.probe(label="here", model="m")
+        learn(native_tools=True)
+        server.bodies.clear()
+        run("second")
+        assert all("tools" not in body for body in server.bodies)
+
+
+def test_what_was_known_before_the_first_run_is_sent_and_shown() -> None:
+    with serving(Model()) as server:
+        job_at(server)
+        learn(native_tools=True, reasoning_effort="none", max_output_tokens=500)
+        row = run("first")
+        assert all("tools" in body for body in server.bodies)
+        assert server.bodies[0]["reasoning_effort"] == "none"
+        assert server.bodies[0]["max_completion_tokens"] == 500
+    contestant = Contestant.objects.get()
+    assert contestant.sends is not None
+    assert contestant.sends["modifier"] == document_of(
+        Profile(native_tools=True, reasoning_effort="none", max_output_tokens=500)
+    )
+    assert transcript_of(row)["contestant"]["sends"] == contestant.sends
+    event = Event.objects.get(verb="fix")
+    assert event.after == {"slug": "one", "sends": contestant.sends}
+
+
+def test_a_parameter_that_is_refused_before_any_answer_is_left_out_for_good() -> None:
+    with serving(Model()) as server:
+        server.refuses = {"reasoning_effort", "max_completion_tokens"}
+        job_at(server)
+        learn(reasoning_effort="low")
+        run("first")
+        server.refuses = set()
+        learn(refused_parameters=[])
+        run("second")
+        assert shapes(server) == {("max_tokens=8192", "model=m")}
+
+
+def test_a_parameter_that_is_refused_after_answers_with_it_is_a_fault_and_no_mixture() -> None:
+    with serving(Model()) as server:
+        job_at(server)
+        learn(reasoning_effort="low")
+        run("first")
+        server.bodies.clear()
+        server.refuses = {"reasoning_effort"}
+        row = run("second")
+        assert server.bodies == []
+    assert row.state == Augmentation.State.FAILED
+    assert "does not take 'reasoning_effort' any more" in row.reason
+    assert "add another contestant" in row.reason
+
+
+def test_another_name_for_the_limit_of_the_answer_is_no_other_treatment() -> None:
+    with serving(Model()) as server:
+        job_at(server)
+        run("first")
+        server.refuses = {"max_completion_tokens"}
+        assert run("second").state == Augmentation.State.UNREADABLE
+
+
+def test_who_never_had_an_answer_is_fixed_anew_when_it_is_tried_again() -> None:
+    with serving(Model()) as server:
+        job_at(server)
+        Endpoint.objects.update(base_url="http://127.0.0.1:1/v1", key_variable="NOT_SET_API_KEY")
+        assert run("first").state == Augmentation.State.FAILED
+        learn(native_tools=True)
+        Endpoint.objects.update(base_url=server.url, key_variable="")
+        jobs.retry_failed(Augmentation.objects.all()[0].job)
+        run("first")
+        assert all("tools" in body for body in server.bodies)
+        # And never again: there are answers now.
+        learn(native_tools=False)
+        jobs.launch(name="K", contestants=["one"], scenarios=["first"])
+        server.bodies.clear()
+        run("second")
+        assert all("tools" in body for body in server.bodies)
+
+
+def test_a_profile_comes_back_from_its_document() -> None:
+    profile = Profile(
+        native_tools=False,
+        vision=True,
+        refused=frozenset({"reasoning_effort", "max_tokens"}),
+        reasoning_effort="high",
+        max_output_tokens=9,
+    )
+    assert profile_from_document(json.loads(json.dumps(document_of(profile)))) == profile
+    unsent = replace(profile, temperature=False, json_schema=True, refused=frozenset({"seed"}))
+    assert document_of(unsent) == document_of(profile) | {"refused": []}
+
+
+def test_each_role_has_its_own() -> None:
+    contestants.ensure_endpoint(label="here", base_url="http://127.0.0.1:1/v1")
+    one = contestants.add_contestant(
+        slug="one",
+        variant="fc+tqa",
+        endpoint="here",
+        model="m",
+        roles={ModelRole.REVIEWER: (None, "boss")},
+    )
+    EndpointModel.objects.filter(model="boss").update(reasoning_effort="high")
+    treatment = treatment_of(one, seats_of(one))
+    endpoint = Endpoint.objects.get()
+    assert treatment.at(endpoint) == {"m": Profile(), "boss": Profile(reasoning_effort="high")}
+    refused = ParameterRefused("reasoning_effort", "no", status=400)
+    assert treatment.without(refused, endpoint=endpoint, model="boss").refused == {
+        "reasoning_effort"
+    }
+    one.refresh_from_db()
+    assert one.sends is not None
+    assert (one.sends["modifier"]["refused"], one.sends["reviewer"]["refused"]) == (
+        [],
+        ["reasoning_effort"],
+    )
+
+
+def test_contestants_from_before_go_on_with_what_they_sent() -> None:
+    migration = importlib.import_module("augment.migrations.0005_what_a_contestant_sends")
+    with serving(Model()) as server:
+        server.refuses = {"max_completion_tokens"}
+        job_at(server)
+        learn(reasoning_effort="low")
+        run("first")
+    Contestant.objects.update(sends=None)
+    learn(native_tools=True, refused_parameters=[], reasoning_effort="", max_output_tokens=100)
+    migration.fix_what_was_sent(apps, None)
+    sends = Contestant.objects.get().sends
+    assert sends == {
+        "modifier": document_of(
+            Profile(
+                native_tools=False,
+                refused=frozenset({"max_completion_tokens"}),
+                reasoning_effort="low",
+            )
+        )
+    }
+    assert ModelCall.objects.exists()
