@@ -227,7 +227,7 @@ def test_each_role_has_its_own() -> None:
 
 
 def test_contestants_from_before_go_on_with_what_they_sent() -> None:
-    migration = importlib.import_module("augment.migrations.0005_what_a_contestant_sends")
+    migration = importlib.import_module("augment.migrations.0006_what_a_contestant_sends")
     with serving(Model()) as server:
         server.refuses = {"max_completion_tokens"}
         job_at(server)

@@ -48,7 +48,7 @@ def _sent(request: dict[str, Any], known: Any) -> dict[str, Any]:
 class Migration(migrations.Migration):
 
     dependencies = [
-        ("augment", "0004_when_a_call_was_sent"),
+        ("augment", "0005_workers"),
     ]
 
     operations = [
