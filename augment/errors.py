@@ -77,21 +77,15 @@ class CannotDrive(AugmentError):
     """A scene or a planner does not allow a drive. Mend what the sentence names."""
 
 
-class InstructionNotUnderstood(AugmentError):
-    """The rule-based contestants refuse rather than guess. An outcome, never retried.
+class CannotPlace(AugmentError):
+    """A contestant without a language model refuses rather than guesses. An outcome, no retry.
 
     Args:
-        reason: What was not understood.
-        understood: The parts of the sentence that were read.
-        ignored: The parts that were not.
+        reason: What is open that it needs, or why the map or the traffic leaves no room.
     """
 
-    def __init__(
-        self, reason: str, *, understood: tuple[str, ...] = (), ignored: tuple[str, ...] = ()
-    ) -> None:
+    def __init__(self, reason: str) -> None:
         self.reason = reason
-        self.understood = understood
-        self.ignored = ignored
         super().__init__(reason)
 
 

@@ -24,12 +24,11 @@ from augment.baselines.quantised_code import (
     direction_of,
     quadrants_of,
 )
-from augment.errors import InstructionNotUnderstood
+from augment.errors import CannotPlace
 from augment.geometry.boxes import Box, overlap
 from augment.geometry.polyline import Polyline
-from augment.instruction.grammar import parse
-from augment.instruction.intent import ConesRequest, WalkRequest
 from augment.scene.entities import AgentType, Scene, TrafficAgent
+from augment.scene.intent import ConesRequest, Intent, WalkRequest
 from augment.scene.lane_graph import Way
 from augment.scene.modification import Modification
 from augment.scene.sizes import LENGTH_WIDTH_M
@@ -69,41 +68,39 @@ class Places:
     way_ids: tuple[str, ...]
 
 
-def place(scene: Scene, instruction: str, *, bin_m: float, seed: int = 0) -> Placement:
+def place(scene: Scene, intent: Intent | None, *, bin_m: float, seed: int = 0) -> Placement:
     """Vehicles where their codes allow; the same for the same seed.
 
     Args:
         scene: Where.
-        instruction: What is asked for.
+        intent: What is asked for.
         bin_m: The width of a bin of the distance, 5 or 20 m in LCTGen's prompts.
         seed: Of the draws.
 
     Raises:
-        InstructionNotUnderstood: Something that is no vehicle is asked for, the rule placer
-            refuses the instruction, or no place is left.
+        CannotPlace: Something that is no vehicle is asked for, the rule placer
+            refuses the intent, or no place is left.
     """
-    _refuse_others(instruction)
-    right = rule_placer.place(scene, instruction, seed=seed)
+    _refuse_others(intent)
+    right = rule_placer.place(scene, intent, seed=seed)
     vehicles = right.modification.added
     codes = tuple(code_of(agent, bin_m=bin_m) for agent in vehicles)
     rng = np.random.default_rng(seed)
     places = places_of(scene)
-    made: list[TrafficAgent] = []
+    added: list[TrafficAgent] = []
     notes = []
     for agent, code in zip(vehicles, codes, strict=True):
         allowed, relaxed = allowed_by(code, places, bin_m=bin_m)
-        drawn = _drawn(code, agent.id, places, allowed, (*scene.everyone, *made), rng)
+        drawn = _drawn(code, agent.id, places, allowed, (*scene.everyone, *added), rng)
         notes.append(f"{agent.id}: {code.words(bin_m)}{relaxed}.")
         if drawn is None:
             notes.append(f"{agent.id} is left out: no place was free.")
         else:
-            made.append(drawn)
-    if not made:
-        raise InstructionNotUnderstood(
-            "Every place that the code allows is taken.", understood=right.understood
-        )
+            added.append(drawn)
+    if not added:
+        raise CannotPlace("Every place that the code allows is taken.")
     return Placement(
-        modification=Modification(added=tuple(made)), codes=codes, notes=" ".join(notes)
+        modification=Modification(added=tuple(added)), codes=codes, notes=" ".join(notes)
     )
 
 
@@ -111,7 +108,7 @@ def places_of(scene: Scene) -> Places:
     """Where vehicles can be put, whatever the code; every place lies on a centreline.
 
     Raises:
-        InstructionNotUnderstood: No centreline comes near enough to the ego.
+        CannotPlace: No centreline comes near enough to the ego.
     """
     points, headings, ids = [], [], []
     ways: list[Way] = [*scene.lanes, *scene.connectors]
@@ -122,7 +119,7 @@ def places_of(scene: Scene) -> Places:
         headings.append(turned[near])
         ids += [way.id] * int(near.sum())
     if not ids:
-        raise InstructionNotUnderstood(f"No lane lies within {FURTHEST_M:g} m of the ego.")
+        raise CannotPlace(f"No lane lies within {FURTHEST_M:g} m of the ego.")
     return Places(
         points_m=np.vstack(points), headings_rad=np.concatenate(headings), way_ids=tuple(ids)
     )
@@ -155,14 +152,12 @@ def allowed_by(code: Code, places: Places, *, bin_m: float) -> tuple[NDArray[np.
 # --- Private -----------------------------------------------------------------------------------
 
 
-def _refuse_others(instruction: str) -> None:
-    intent = parse(instruction)
-    asked = [name for kind, name in _UNKNOWN.items() if any(_are(kind, intent.requests))]
+def _refuse_others(intent: Intent | None) -> None:
+    requests = () if intent is None else intent.requests
+    asked = [name for kind, name in _UNKNOWN.items() if any(_are(kind, requests))]
     if asked:
-        raise InstructionNotUnderstood(
-            f"The code knows vehicles alone, and {' and '.join(asked)} are asked for.",
-            understood=intent.understood,
-            ignored=intent.ignored,
+        raise CannotPlace(
+            f"The code knows vehicles alone, and {' and '.join(asked)} are asked for."
         )
 
 

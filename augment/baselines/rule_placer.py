@@ -1,9 +1,10 @@
 """The rule placer: a contestant without a language model, which refuses rather than guesses.
 
-The instruction becomes an intent, the intent places along the lanes, the places agents. Every
+It is handed the typed intent, not the sentence: what it measures is what a form would give, and
+not how well anybody reads. The intent becomes places along the lanes, the places agents. Every
 placement is held against the same checks that judge everybody's; where one finds something, the
-placement gives way a little along the lane or is made in another way, and if nothing helps, it is
-refused.
+placement gives way a little along the lane or is arranged otherwise, and if nothing helps, it is
+refused. So is an intent that leaves open what a placement needs.
 """
 
 from __future__ import annotations
@@ -15,25 +16,26 @@ import numpy as np
 from numpy.typing import NDArray
 
 from augment.baselines.rule_placer_cones import cones
-from augment.baselines.rule_placer_crash import crash, ways_to_crash
+from augment.baselines.rule_placer_crash import count_arrangements, crash
 from augment.baselines.rule_placer_ground import Ground
 from augment.baselines.rule_placer_jury import Jury, numbered
 from augment.baselines.rule_placer_vehicles import vehicle
 from augment.baselines.rule_placer_walkers import walkers
-from augment.baselines.rule_placer_words import described
-from augment.errors import InstructionNotUnderstood
+from augment.baselines.rule_placer_words import describe, list_conventions, name_of
+from augment.errors import CannotPlace
 from augment.geometry.boxes import Box, overlap
-from augment.instruction.grammar import parse
-from augment.instruction.intent import (
+from augment.scene.entities import Scene, TrafficAgent
+from augment.scene.intent import (
     ConesRequest,
     CrashRequest,
     Intent,
+    Length,
     Relation,
     Request,
     VehicleRequest,
     WalkRequest,
+    resolve_anchors,
 )
-from augment.scene.entities import Scene, TrafficAgent
 from augment.scene.modification import Modification
 
 _SHIFT_STEP_M = 0.25
@@ -41,80 +43,86 @@ _SHIFT_EXACT_M = 0.5
 _SHIFT_ABOUT_M = 1.5
 """How far along the lane a placement may give way, for an exact and for an "about" distance."""
 
+NO_INTENT = "The scenario has no intent: nobody has written down what its instruction asks for."
+
 _Agents = tuple[TrafficAgent, ...]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Placement:
-    """What was placed, and how the instruction was read.
+    """What was placed.
 
     Attributes:
-        understood: The parts of the sentence that were read, in its own words.
-        ignored: Parts that were read and place nothing.
-        not_understood: Words that were passed over, because they place nothing either way.
-        notes: All that in sentences, for a page.
+        notes: What stands where and which conventions filled what was open, for a page.
     """
 
     modification: Modification
-    understood: tuple[str, ...]
-    ignored: tuple[str, ...]
-    not_understood: tuple[str, ...]
     notes: str
 
 
-def place(scene: Scene, instruction: str, *, seed: int = 0) -> Placement:
-    """Add what an instruction asks for to a scene; the same for the same seed.
+def place(scene: Scene, intent: Intent | None, *, seed: int = 0) -> Placement:
+    """Add what is asked for to a scene; the same for the same seed.
 
     Raises:
-        InstructionNotUnderstood: The sentence was not read in full, or the map or the traffic
-            leaves no room for what it asks.
+        CannotPlace: Nobody has written down what is asked for, it leaves open what a placement
+            needs, or the map or the traffic leaves no room for it.
     """
-    intent = parse(instruction)
+    if intent is None:
+        raise CannotPlace(NO_INTENT)
     rng = np.random.default_rng(seed)
-    try:
-        ground, jury = Ground(scene), Jury(scene)
-        added: _Agents = ()
-        sentences = []
-        for request in intent.requests:
-            agents, distance_m = _fitted(request, ground, jury, added, rng)
-            added += agents
-            sentences.append(
-                described(request, distance_m, across_m=ground.left_of_lane_m(agents[0]))
-            )
-    except InstructionNotUnderstood as refusal:
-        raise InstructionNotUnderstood(refusal.reason, understood=intent.understood) from refusal
+    ground, jury = Ground(scene), Jury(scene)
+    added: _Agents = ()
+    sentences = []
+    for request in resolve_anchors(intent).requests:
+        _insist_on_needs(request)
+        agents, distance_m = _fitted(request, ground, jury, added, rng)
+        added += agents
+        sentences.append(describe(request, distance_m, across_m=ground.left_of_lane_m(agents[0])))
     return Placement(
-        modification=Modification(added=numbered(added, scene)),
-        understood=intent.understood,
-        ignored=intent.ignored,
-        not_understood=intent.not_understood,
-        notes=_notes(sentences, intent),
+        modification=Modification(added=numbered(added, scene)), notes=_notes(sentences, intent)
     )
 
 
 # Private
 
 
+def _insist_on_needs(request: Request) -> None:
+    """Refuse what leaves open without which nothing can be placed."""
+    needs: dict[str, object] = {"the distance": request.spot.distance}
+    match request:
+        case VehicleRequest():
+            needs |= {"whether they stand or how fast they drive": request.speed_mps}
+        case WalkRequest():
+            needs |= {"the side that they come from": request.start}
+        case ConesRequest():
+            needs |= {"the shape": request.shape}
+    needs |= {"the count": request.count}
+    for what, given in needs.items():
+        if given is None:
+            raise CannotPlace(f"What is asked of the {name_of(request)} leaves open {what}.")
+
+
 def _fitted(
     request: Request, ground: Ground, jury: Jury, added: _Agents, rng: np.random.Generator
 ) -> tuple[_Agents, float]:
     """The agents of a request nearest to the asked distance that the checks pass, and it."""
-    spot = request.spot
-    asked_m = float(rng.uniform(spot.distance.low_m, spot.distance.high_m))
+    spot, wanted = request.spot, _distance(request)
+    asked_m = float(rng.uniform(wanted.low_m, wanted.high_m))
     sign = 1.0 if spot.relation is Relation.AHEAD else -1.0
     draw = int(rng.integers(2**32))
-    tolerance_m = _SHIFT_ABOUT_M if spot.distance.is_approximate else _SHIFT_EXACT_M
+    tolerance_m = _SHIFT_ABOUT_M if wanted.is_approximate else _SHIFT_EXACT_M
     first_problem = ""
     best: tuple[int, _Agents, float] | None = None
-    for shift_m, way in itertools.product(_shifts(tolerance_m), range(_ways(request))):
+    for shift_m, arrangement in itertools.product(
+        _shifts(tolerance_m), range(_count_arrangements(request))
+    ):
         distance_m = asked_m + shift_m
-        if spot.distance.is_range and not (
-            spot.distance.low_m <= distance_m <= spot.distance.high_m
-        ):
+        if wanted.is_range and not (wanted.low_m <= distance_m <= wanted.high_m):
             continue
         again = np.random.default_rng(draw)
         agents = tuple(
-            _rounded(agent) for agent in _made(request, ground, sign * distance_m, again, way)
+            _rounded(agent)
+            for agent in _placed(request, ground, sign * distance_m, again, arrangement)
         )
         problem = _problem(request, ground, sign * distance_m, agents, added)
         if problem is None:
@@ -127,11 +135,16 @@ def _fitted(
         first_problem = first_problem or problem or ""
     if best is not None:
         return best[1], best[2]
-    raise InstructionNotUnderstood(first_problem)
+    raise CannotPlace(first_problem)
 
 
-def _ways(request: Request) -> int:
-    return ways_to_crash(request) if isinstance(request, CrashRequest) else 1
+def _distance(request: Request) -> Length:
+    assert request.spot.distance is not None  # `_insist_on_needs`
+    return request.spot.distance
+
+
+def _count_arrangements(request: Request) -> int:
+    return count_arrangements(request) if isinstance(request, CrashRequest) else 1
 
 
 def _shifts(tolerance_m: float) -> list[float]:
@@ -140,8 +153,8 @@ def _shifts(tolerance_m: float) -> list[float]:
     return [0.0, *(sign * step * _SHIFT_STEP_M for step in steps for sign in (1.0, -1.0))]
 
 
-def _made(
-    request: Request, ground: Ground, distance_m: float, rng: np.random.Generator, way: int
+def _placed(
+    request: Request, ground: Ground, distance_m: float, rng: np.random.Generator, arrangement: int
 ) -> _Agents:
     match request:
         case VehicleRequest():
@@ -151,7 +164,7 @@ def _made(
         case ConesRequest():
             return cones(request, ground, distance_m, rng)
         case CrashRequest():
-            return crash(request, ground, distance_m, rng, way=way)
+            return crash(request, ground, distance_m, rng, arrangement=arrangement)
 
 
 def _problem(
@@ -199,9 +212,10 @@ def _millimetres(length_m: float) -> float:
 
 def _notes(sentences: list[str], intent: Intent) -> str:
     parts = list(sentences)
-    if intent.assumed:
-        parts.append(f"Not said, so assumed: {'; '.join(intent.assumed)}.")
-    if intent.ignored:
-        quoted = ", ".join(f"“{words}”" for words in intent.ignored)
-        parts.append(f"Read, but placing nothing: {quoted}.")
+    conventions = list(dict.fromkeys(itertools.chain(*map(list_conventions, intent.requests))))
+    if conventions:
+        parts.append(f"Left open, so by convention: {'; '.join(conventions)}.")
+    if intent.beyond:
+        quoted = ", ".join(f"“{words}”" for words in intent.beyond)
+        parts.append(f"Asked for beyond the intent's fields, and not placed: {quoted}.")
     return " ".join(parts)

@@ -10,8 +10,9 @@ import math
 import numpy as np
 
 from augment.baselines.rule_placer_ground import Ground
-from augment.errors import InstructionNotUnderstood
-from augment.instruction.intent import (
+from augment.errors import CannotPlace
+from augment.scene.entities import AgentType, TrafficAgent
+from augment.scene.intent import (
     ConesRequest,
     LaneChoice,
     LateralTarget,
@@ -19,9 +20,11 @@ from augment.instruction.intent import (
     Shape,
     Side,
 )
-from augment.scene.entities import AgentType, TrafficAgent
 from augment.scene.lane_graph import PlaceOnWay
 from augment.scene.sizes import LENGTH_WIDTH_M
+
+CONE_SPACING_M = 2.5
+"""Between cones of which nobody says how far: interPlan's median."""
 
 _EDGE_M = LENGTH_WIDTH_M[AgentType.TRAFFIC_CONE][1] / 2.0
 """A cone at a lane boundary stands inside of it."""
@@ -39,22 +42,24 @@ def cones(
     """The cones in order, then the worker; ids are still empty.
 
     Raises:
-        InstructionNotUnderstood: The lanes end before the last cone, or there is no such lane.
+        CannotPlace: The lanes end before the last cone, or there is no such lane.
     """
-    spacing_m = float(rng.uniform(request.spacing.low_m, request.spacing.high_m))
+    spacing_m = CONE_SPACING_M
+    if request.spacing is not None:
+        spacing_m = float(rng.uniform(request.spacing.low_m, request.spacing.high_m))
     if spacing_m < 2.0 * _EDGE_M:
-        raise InstructionNotUnderstood(f"Cones {spacing_m:g} m apart would stand in each other.")
+        raise CannotPlace(f"Cones {spacing_m:g} m apart would stand in each other.")
     lane = request.spot.lane
     half_lane_m = ground.way(ground.beside(ground.along(distance_m), lane)).width_m / 2.0
     edge_m = half_lane_m - _EDGE_M
     places = _places(request, ground, distance_m, spacing_m, edge_m)
-    made = [
+    agents = [
         _standing(AgentType.TRAFFIC_CONE, _at(ground, lane, place), ground) for place in places
     ]
     if request.has_worker:
         worker = _worker(request, ground, places)
-        made.append(_standing(AgentType.PEDESTRIAN, _at(ground, lane, worker), ground))
-    return tuple(made)
+        agents.append(_standing(AgentType.PEDESTRIAN, _at(ground, lane, worker), ground))
+    return tuple(agents)
 
 
 # Private
@@ -63,11 +68,11 @@ def cones(
 def _places(
     request: ConesRequest, ground: Ground, distance_m: float, spacing_m: float, edge_m: float
 ) -> list[Place]:
-    count = request.count
+    count = request.count or 1
     gaps = max(count - 1, 1)
     along_m = spacing_m if request.reach_m is None else request.reach_m / gaps
     if along_m < 2.0 * _EDGE_M:
-        raise InstructionNotUnderstood(f"{count} cones have no room on {request.reach_m:g} m.")
+        raise CannotPlace(f"{count} cones have no room on {request.reach_m:g} m.")
     match request.shape:
         case Shape.RING:
             return _ring(distance_m, count, spacing_m, edge_m)
@@ -131,7 +136,7 @@ def _behind_taper(places: list[Place], sign: float) -> Place:
     return middle_s + across * _WORKER_GAP_M, middle_d + sign * along * _WORKER_GAP_M
 
 
-def _beside_line(places: list[Place], ground: Ground, lane: LaneChoice) -> Place:
+def _beside_line(places: list[Place], ground: Ground, lane: LaneChoice | None) -> Place:
     """Beside the middle of a line: off the road if the line's outer side is, else in its lane."""
     middle_m, d_m = (places[0][0] + places[-1][0]) / 2.0, places[0][1]
     gap_m = math.copysign(_WORKER_GAP_M, d_m or _sign(ground.kerb))
@@ -146,7 +151,7 @@ def _ring(centre_m: float, count: int, spacing_m: float, widest_m: float) -> lis
     An odd cone closes the rows towards the ego.
     """
     if count < 3:
-        raise InstructionNotUnderstood("A ring needs at least three cones.")
+        raise CannotPlace("A ring needs at least three cones.")
     radius_m = spacing_m / (2.0 * math.sin(math.pi / count))
     if radius_m <= widest_m:
         angles = (math.pi + 2.0 * math.pi * index / count for index in range(count))
@@ -160,20 +165,21 @@ def _ring(centre_m: float, count: int, spacing_m: float, widest_m: float) -> lis
 
 def _line_side(request: ConesRequest, ground: Ground) -> float:
     """1 for the left boundary of the ego's direction, -1 for the right one, 0 for the centre."""
+    lateral = request.spot.lateral
     return {
         LateralTarget.LANE_CENTRE: 0.0,
         LateralTarget.LEFT_BOUNDARY: 1.0,
         LateralTarget.RIGHT_BOUNDARY: -1.0,
         LateralTarget.KERB: _sign(ground.kerb),
         LateralTarget.CENTRE_LINE: _sign(ground.kerb.other),
-    }[request.spot.lateral.target]
+    }[LateralTarget.LANE_CENTRE if lateral is None else lateral.target]
 
 
 def _sign(side: Side) -> float:
     return 1.0 if side is Side.LEFT else -1.0
 
 
-def _at(ground: Ground, lane: LaneChoice, place: Place) -> PlaceOnWay:
+def _at(ground: Ground, lane: LaneChoice | None, place: Place) -> PlaceOnWay:
     """The place (s, d): s along the ego's lane, d from the centre of the lane asked for."""
     s_m, d_m = place
     centre = ground.beside(ground.along(s_m), lane)

@@ -1,6 +1,6 @@
 """Accidents of the rule placer: cars that touch or nearly touch, turned against each other.
 
-Where a sentence says how they stand, each is put against the one before it; what it leaves open
+Where an intent says how they stand, each is put against the one before it; what it leaves open
 is chosen so that they share as little ground as possible.
 """
 
@@ -14,13 +14,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from augment.baselines.rule_placer_ground import Ground
-from augment.baselines.rule_placer_vehicles import FACING_RAD, SIZES_M, made
-from augment.errors import InstructionNotUnderstood
+from augment.baselines.rule_placer_vehicles import FACING_RAD, SIZES_M, build_vehicle
+from augment.errors import CannotPlace
 from augment.geometry.angles import wrap
 from augment.geometry.boxes import Box, overlap
 from augment.geometry.frames import Pose
-from augment.instruction.intent import Bearing, Body, CrashedCar, CrashRequest, Facing
 from augment.scene.entities import Scene, TrafficAgent
+from augment.scene.intent import Bearing, Body, CrashedCar, CrashRequest, Facing
 
 _GAP_M = 0.05
 _MOST_SHARED = 0.1
@@ -50,8 +50,8 @@ _ASIDE_RAD = tuple(math.radians(sign * 8.0 * step) for step in range(6) for sign
 _COST_OF_TURN = 0.5
 
 
-def ways_to_crash(request: CrashRequest) -> int:
-    """In how many ways `crash` can place a request, the preferred one first."""
+def count_arrangements(request: CrashRequest) -> int:
+    """How many arrangements `crash` has for a request, the preferred one first."""
     return len(_SHIFTS_M if request.others else _LOOSER)
 
 
@@ -61,7 +61,7 @@ def crash(
     distance_m: float,
     rng: np.random.Generator,
     *,
-    way: int = 0,
+    arrangement: int = 0,
 ) -> tuple[TrafficAgent, ...]:
     """The crashed vehicles, the first at the spot.
 
@@ -70,17 +70,17 @@ def crash(
         ground: Where.
         distance_m: Of the first one, along the ego's lane.
         rng: Draws a gap from a range.
-        way: Which of the `ways_to_crash`.
+        arrangement: Which of those that `count_arrangements` counts.
 
     Raises:
-        InstructionNotUnderstood: The lanes end before the last of them, there is no such lane, or
+        CannotPlace: The lanes end before the last of them, there is no such lane, or
             at the distance asked for they would stand in each other.
     """
     if request.others:
-        poses = _told(request, ground, distance_m, _SHIFTS_M[way], rng)
+        poses = _chained(request, ground, distance_m, _SHIFTS_M[arrangement], rng)
     else:
-        poses = _in_a_row(request, ground, distance_m, _LOOSER[way])
-    return tuple(made(request.body, pose, ground.lane_at(pose), 0.0) for pose in poses)
+        poses = _in_a_row(request, ground, distance_m, _LOOSER[arrangement])
+    return tuple(build_vehicle(request.body, pose, ground.lane_at(pose), 0.0) for pose in poses)
 
 
 # Private
@@ -92,7 +92,7 @@ def _in_a_row(
     """Each as near behind the one before as it can stand."""
     poses = [_row_pose(request, ground, distance_m, 0, looseness)]
     along_m = distance_m
-    for index in range(1, request.count):
+    for index in range(1, request.count or 2):
         low_m, high_m = along_m, along_m + 2.0 * math.hypot(*SIZES_M[request.body])
         while high_m - low_m > 0.01:
             middle_m = (low_m + high_m) / 2.0
@@ -109,32 +109,40 @@ def _row_pose(
 ) -> Pose:
     place = ground.beside(ground.along(distance_m), request.spot.lane)
     pose = ground.graph.place(place.way_id, place.s_m, looseness * _SIDES_M[index]).pose
-    turn_rad = looseness * _TURNS_RAD[index] + (FACING_RAD[request.facing] if index == 0 else 0.0)
+    turn_rad = looseness * _TURNS_RAD[index]
+    if index == 0:
+        turn_rad += FACING_RAD[request.facing or Facing.WITH_LANE]
     return Pose(x_m=pose.x_m, y_m=pose.y_m, heading_rad=wrap(pose.heading_rad + turn_rad))
 
 
-def _told(
+def _chained(
     request: CrashRequest,
     ground: Ground,
     distance_m: float,
     left_m: float,
     rng: np.random.Generator,
 ) -> list[Pose]:
-    """Each where the sentence puts it against the one before."""
+    """Each where the intent puts it against the one before."""
     centre = ground.beside(ground.along(distance_m), request.spot.lane)
     spot = ground.graph.place(centre.way_id, centre.s_m, left_m)
     lane_rad = spot.pose.heading_rad
-    turn_rad = 0.0 if request.facing is Facing.WITH_LANE else FACING_RAD[request.facing]
+    turn_rad = FACING_RAD[request.facing or Facing.WITH_LANE]
     poses = [
         Pose(x_m=spot.pose.x_m, y_m=spot.pose.y_m, heading_rad=wrap(lane_rad + turn_rad)),
     ]
-    for other in request.others:
+    for other in _everyone_after(request):
         gap_m = None
         if other.gap is not None:
             gap_m = float(rng.uniform(other.gap.low_m, other.gap.high_m))
         choices = list(_choices(request.body, other, poses, lane_rad, gap_m))
         poses.append(_best(choices, request.body, ground.scene, gap_m))
     return poses
+
+
+def _everyone_after(request: CrashRequest) -> list[CrashedCar]:
+    """What is said of each further one; of the last ones perhaps nothing."""
+    unsaid = (request.count or 0) - 1 - len(request.others)
+    return [*request.others, *[CrashedCar()] * unsaid]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -150,7 +158,8 @@ def _best(choices: list[_Choice], body: Body, scene: Scene, gap_m: float | None)
     """The cheapest that shares little ground with the others, if it can be none of the scene's."""
     fitting = [choice for choice in choices if choice.shared <= _MOST_SHARED]
     if not fitting:
-        raise InstructionNotUnderstood(f"{gap_m:g} m apart the cars would stand in each other.")
+        apart = "So near" if gap_m is None else f"{gap_m:g} m apart"
+        raise CannotPlace(f"{apart} the cars would stand in each other.")
     ordered = sorted(fitting, key=lambda choice: choice.cost)
     return next((one for one in ordered if _is_free(one.pose, body, scene)), ordered[0]).pose
 
@@ -177,7 +186,7 @@ def _choices(
     for heading_rad, aside_rad in itertools.product(
         _headings(other, before.heading_rad, lane_rad), _ASIDE_RAD
     ):
-        toward_rad = lane_rad + _BEARINGS_RAD[other.bearing] + aside_rad
+        toward_rad = lane_rad + _BEARINGS_RAD[other.bearing or Bearing.AHEAD] + aside_rad
         size_m = gap_m
         if size_m is None:
             size_m = _touching_m(body, before, toward_rad, heading_rad)

@@ -12,10 +12,9 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from augment.errors import InstructionNotUnderstood
+from augment.errors import CannotPlace
 from augment.geometry.angles import difference
 from augment.geometry.frames import Pose
-from augment.instruction.intent import LaneChoice, Setting, Side
 from augment.scene.entities import (
     AgentType,
     AreaKind,
@@ -25,6 +24,7 @@ from augment.scene.entities import (
     Scene,
     TrafficAgent,
 )
+from augment.scene.intent import LaneChoice, Setting, Side
 from augment.scene.lane_graph import LaneGraph, PlaceOnWay, Way
 
 _STEP_M = 0.25
@@ -47,7 +47,7 @@ class Ground:
     """A scene read from the ego's place on its lane.
 
     Raises:
-        InstructionNotUnderstood: The ego stands on no lane, so nothing lies along it.
+        CannotPlace: The ego stands on no lane, so nothing lies along it.
     """
 
     def __init__(self, scene: Scene) -> None:
@@ -57,7 +57,7 @@ class Ground:
         if own not in self.graph.ways:
             own = self.graph.under(0.0, 0.0, 0.0)
         if own is None:
-            raise InstructionNotUnderstood("The ego stands on no lane of the map.")
+            raise CannotPlace("The ego stands on no lane of the map.")
         self._own = own
         self._start_m = self.graph.way(own).centerline.project(0.0, 0.0).s_m
         self.kerb = Side(scene.traffic_side.value)
@@ -66,21 +66,23 @@ class Ground:
         """The place that far along the ego's lane (negative: back) and d to its left.
 
         Raises:
-            InstructionNotUnderstood: The lanes end before.
+            CannotPlace: The lanes end before.
         """
         place = self.graph.along(self._own, self._start_m, distance_m, d_m)
         if place is None:
             end, where = self._reach(distance_m)
-            raise InstructionNotUnderstood(f"The lanes end {end:.0f} m {where} the ego.")
+            raise CannotPlace(f"The lanes end {end:.0f} m {where} the ego.")
         return place
 
-    def beside(self, place: PlaceOnWay, lane: LaneChoice) -> PlaceOnWay:
+    def beside(self, place: PlaceOnWay, lane: LaneChoice | None) -> PlaceOnWay:
         """The place on a lane next to a place on the ego's own; there the centre of that lane.
 
+        Where no lane is said it is the ego's own.
+
         Raises:
-            InstructionNotUnderstood: The map has no such lane there.
+            CannotPlace: The map has no such lane there.
         """
-        if lane is LaneChoice.OWN:
+        if lane in (None, LaneChoice.OWN):
             return place
         way_id = self._oncoming(place) if lane is LaneChoice.ONCOMING else None
         way = self.graph.way(place.way_id)
@@ -90,7 +92,7 @@ class Ground:
             way_id = way.right_neighbor
         if way_id is None or way_id not in self.graph.ways:
             words = "oncoming lane" if lane is LaneChoice.ONCOMING else f"lane on the {lane}"
-            raise InstructionNotUnderstood(f"The map has no {words} beside the ego's lane there.")
+            raise CannotPlace(f"The map has no {words} beside the ego's lane there.")
         s_m = self.graph.way(way_id).centerline.project(place.pose.x_m, place.pose.y_m).s_m
         return self.graph.place(way_id, s_m)
 

@@ -6,8 +6,8 @@ from dataclasses import dataclass, replace
 
 from augment.checks import Ground, Severity
 from augment.checks.against_intent import judged
-from augment.instruction.intent import Intent, Request
 from augment.scene.entities import Scene, TrafficAgent
+from augment.scene.intent import Intent, Request
 from augment.scene.modification import Modification
 
 _Agents = tuple[TrafficAgent, ...]

@@ -7,11 +7,11 @@ import math
 import numpy as np
 
 from augment.baselines.rule_placer_ground import Ground
-from augment.errors import InstructionNotUnderstood
+from augment.errors import CannotPlace
 from augment.geometry.angles import wrap
 from augment.geometry.frames import Pose
-from augment.instruction.intent import (
-    SLIGHT_OFFSET_M,
+from augment.scene.entities import AgentType, TrafficAgent
+from augment.scene.intent import (
     Body,
     Facing,
     LaneChoice,
@@ -21,7 +21,6 @@ from augment.instruction.intent import (
     Side,
     VehicleRequest,
 )
-from augment.scene.entities import AgentType, TrafficAgent
 from augment.scene.lane_graph import PlaceOnWay
 from augment.scene.sizes import LENGTH_WIDTH_M
 
@@ -40,8 +39,11 @@ FACING_RAD = {
 _EDGE_GAP_M = 0.1
 """What is left between a box at the edge of a lane and that edge."""
 
-_BUMPER_GAP_M = 1.0
-"""Between neighbours in a row, where the sentence says no distance."""
+BUMPER_GAP_M = 1.0
+"""Between neighbours in a row, where no distance is said."""
+
+SLIGHT_OFFSET_M = 0.75
+"""What "slightly" means without a number: the middle of the paper's range of 0 to 1.5 m."""
 
 
 def vehicle(
@@ -50,20 +52,20 @@ def vehicle(
     """The vehicles that were asked for, one or a row, their ids still empty.
 
     Raises:
-        InstructionNotUnderstood: There is no such lane or side, or the offset leaves the lane.
+        CannotPlace: There is no such lane or side, or the offset leaves the lane.
     """
-    apart_m = SIZES_M[request.body][0] + _BUMPER_GAP_M
+    apart_m = SIZES_M[request.body][0] + BUMPER_GAP_M
     if request.spacing is not None:
         apart_m = float(rng.uniform(request.spacing.low_m, request.spacing.high_m))
     centre = ground.beside(ground.along(distance_m), request.spot.lane)
     d_m = _offset_m(request, ground, centre, rng)
     return tuple(
         _vehicle(request, ground, distance_m + index * apart_m, d_m)
-        for index in range(request.count)
+        for index in range(request.count or 1)
     )
 
 
-def made(body: Body, pose: Pose, lane_id: str | None, speed_mps: float) -> TrafficAgent:
+def build_vehicle(body: Body, pose: Pose, lane_id: str | None, speed_mps: float) -> TrafficAgent:
     """A vehicle of that kind's size, its id still empty."""
     length_m, width_m = SIZES_M[body]
     return TrafficAgent(
@@ -87,13 +89,13 @@ def _vehicle(
 ) -> TrafficAgent:
     centre = ground.beside(ground.along(distance_m), request.spot.lane)
     place = ground.graph.place(centre.way_id, centre.s_m, d_m)
-    turn_rad = FACING_RAD[request.facing] + math.radians(request.turn_deg)
+    turn_rad = FACING_RAD[request.facing or Facing.WITH_LANE] + math.radians(request.turn_deg)
     pose = Pose(
         x_m=place.pose.x_m,
         y_m=place.pose.y_m,
         heading_rad=wrap(place.pose.heading_rad + turn_rad),
     )
-    return made(request.body, pose, place.way_id, request.speed_mps)
+    return build_vehicle(request.body, pose, place.way_id, request.speed_mps or 0.0)
 
 
 def _offset_m(
@@ -101,20 +103,21 @@ def _offset_m(
 ) -> float:
     """How far left of the lane's own direction (right is negative) the box stands."""
     lateral = request.spot.lateral
-    if lateral.target is LateralTarget.LANE_CENTRE:
+    if lateral is None or lateral.target is LateralTarget.LANE_CENTRE:
         return 0.0
     side = _side(lateral, ground)
     at_kerb = lateral.target is LateralTarget.KERB and lateral.nearness is Nearness.AT_EDGE
     if (lateral.on_shoulder or at_kerb) and ground.has_neighbour(place, side):
-        raise InstructionNotUnderstood(f"On the {side} is another lane, not the edge of the road.")
+        raise CannotPlace(f"On the {side} is another lane, not the edge of the road.")
     half_lane_m = ground.way(place).width_m / 2.0
     half_box_m = SIZES_M[request.body][1] / 2.0
     if lateral.offset is not None:
         size_m = float(rng.uniform(lateral.offset.low_m, lateral.offset.high_m))
         if size_m > half_lane_m + half_box_m:
-            raise InstructionNotUnderstood(f"An offset of {size_m:.1f} m leaves the lane.")
+            raise CannotPlace(f"An offset of {size_m:.1f} m leaves the lane.")
     else:
         size_m = {
+            None: SLIGHT_OFFSET_M,
             Nearness.SLIGHTLY: SLIGHT_OFFSET_M,
             Nearness.AT_EDGE: max(0.0, half_lane_m - half_box_m - _EDGE_GAP_M),
             Nearness.HALF_OUT: half_lane_m,
@@ -133,13 +136,8 @@ def _side(lateral: Lateral, ground: Ground) -> Side:
         LateralTarget.CENTRE_LINE: ground.kerb.other,
     }
     side = sides[lateral.target]
-    if lateral.also is not None and sides[lateral.also] is not side:
-        raise InstructionNotUnderstood(
-            f"People drive on the {ground.kerb} here, so the {lateral.also} is on the "
-            f"{sides[lateral.also]}."
-        )
     if lateral.on_shoulder and side is not ground.kerb:
-        raise InstructionNotUnderstood(
+        raise CannotPlace(
             f"People drive on the {ground.kerb} here, so there is no shoulder on the {side}."
         )
     return side

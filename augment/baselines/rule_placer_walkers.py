@@ -7,8 +7,8 @@ import math
 import numpy as np
 
 from augment.baselines.rule_placer_ground import Ground
-from augment.instruction.intent import Side, WalkRequest
 from augment.scene.entities import AgentType, Point, TrafficAgent
+from augment.scene.intent import Side, WalkRequest
 from augment.scene.sizes import LENGTH_WIDTH_M
 
 WALK_S = 15.0
@@ -18,7 +18,7 @@ SHORTEST_M, LONGEST_M = 7.0, 29.0
 """interPlan's walks are 7 to 29 m long."""
 
 _BEYOND_EDGE_M = 0.5
-_APART_M = 1.2
+APART_M = 1.2
 
 
 def walkers(
@@ -27,39 +27,52 @@ def walkers(
     """The pedestrians: side by side 1.2 m apart along the road, or in a file behind the first.
 
     Raises:
-        InstructionNotUnderstood: The lanes end before.
+        CannotPlace: The lanes end before.
     """
-    made = []
-    for index in range(request.count):
+    start = _start(request)
+    added = []
+    for index in range(request.count or 1):
         behind_m = 0.0
         if request.is_file and index > 0:
-            asked = request.behind[index - 1]
-            behind_m = float(rng.uniform(asked.low_m, asked.high_m))
-        along_m = 0.0 if request.is_file else index * _APART_M
-        made.append(_walker(request, ground, distance_m + along_m, behind_m))
-    return tuple(made)
+            behind_m = _behind_m(request, index, rng)
+        along_m = 0.0 if request.is_file else index * APART_M
+        added.append(_walker(request, start, ground, distance_m + along_m, behind_m))
+    return tuple(added)
+
+
+def _start(request: WalkRequest) -> Side:
+    assert request.start is not None  # the rule placer refuses an open one
+    return request.start
+
+
+def _behind_m(request: WalkRequest, index: int, rng: np.random.Generator) -> float:
+    """How far behind the first one that one walks; 1.2 m from each to the next where open."""
+    if index > len(request.behind):
+        return index * APART_M
+    asked = request.behind[index - 1]
+    return float(rng.uniform(asked.low_m, asked.high_m))
 
 
 def _walker(
-    request: WalkRequest, ground: Ground, distance_m: float, behind_m: float
+    request: WalkRequest, start: Side, ground: Ground, distance_m: float, behind_m: float
 ) -> TrafficAgent:
     place = ground.along(distance_m)
     if request.on_road:
         from_m = ground.way(place).width_m / 4.0
     else:
-        from_m = ground.road_edge_m(place.pose, request.start) + _BEYOND_EDGE_M
-    arrives = ground.along(distance_m + request.drift_m).pose
-    to_m = ground.road_edge_m(arrives, request.start.other) + _BEYOND_EDGE_M
-    sign = 1.0 if request.start is Side.LEFT else -1.0
+        from_m = ground.road_edge_m(place.pose, start) + _BEYOND_EDGE_M
+    arrives = ground.along(distance_m + (request.drift_m or 0.0)).pose
+    to_m = ground.road_edge_m(arrives, start.other) + _BEYOND_EDGE_M
+    sign = 1.0 if start is Side.LEFT else -1.0
     begin = place.pose.to_parent(np.array([[0.0, sign * (from_m + behind_m)]]))[0]
     end = arrives.to_parent(np.array([[0.0, -sign * to_m]]))[0]
     length_m = math.dist(begin, end)
     walked_m = min(max(length_m, SHORTEST_M), LONGEST_M)
     end = begin + (end - begin) * (walked_m / length_m)
-    return _made(ground, tuple(begin), tuple(end), request.speed_mps or walked_m / WALK_S)
+    return _build_walker(ground, tuple(begin), tuple(end), request.speed_mps or walked_m / WALK_S)
 
 
-def _made(ground: Ground, begin: Point, end: Point, speed_mps: float) -> TrafficAgent:
+def _build_walker(ground: Ground, begin: Point, end: Point, speed_mps: float) -> TrafficAgent:
     length_m, width_m = LENGTH_WIDTH_M[AgentType.PEDESTRIAN]
     return TrafficAgent(
         id="",

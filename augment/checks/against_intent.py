@@ -1,4 +1,4 @@
-"""All checks of a modification, with what an instruction asks for where it was understood.
+"""All checks of a modification, with what an instruction asks for where that is stored.
 
 The scene, the modification and the intent are all that is looked at: never a reference, never
 anybody's label.
@@ -14,10 +14,10 @@ from augment.checks.asked_across import asked_across
 from augment.checks.asked_crash import asked_crash
 from augment.checks.asked_distance import asked_distance
 from augment.checks.asked_heading import asked_heading
+from augment.checks.asked_spacing import asked_spacing
 from augment.checks.asked_things import (
     asked_count,
     asked_motion,
-    asked_spacing,
     asked_type,
     unasked,
 )
@@ -27,7 +27,8 @@ from augment.checks.ground import Ground
 from augment.checks.own_way import OwnWay
 from augment.checks.parties import cast
 from augment.checks.registry import findings_on
-from augment.instruction.intent import Intent
+from augment.checks.tolerances import USUAL, Tolerances
+from augment.scene.intent import Intent, VehicleRequest, resolve_anchors
 from augment.scene.modification import Modification
 
 ASKED_CHECKS: tuple[AskedCheck, ...] = (
@@ -45,15 +46,19 @@ ASKED_CHECKS: tuple[AskedCheck, ...] = (
 
 
 def judged(
-    ground: Ground, modification: Modification, intent: Intent | None
+    ground: Ground,
+    modification: Modification,
+    intent: Intent | None,
+    tolerances: Tolerances = USUAL,
 ) -> tuple[Finding, ...]:
     """What was measured, what was asked for first, then agent by agent.
 
     Args:
         ground: Of the scene before the change.
         modification: The change.
-        intent: What the instruction asks for; None where it was not understood. Then only the
-            checks that need none are made.
+        intent: What the instruction asks for; None where nobody has written it down. Then only
+            the checks that need none are made.
+        tolerances: How far off what is asked for something may be.
 
     Raises:
         InvalidModification: The modification does not fit the scene.
@@ -62,8 +67,8 @@ def judged(
     way = None if intent is None else OwnWay.of(ground)
     if intent is None or way is None:
         return found
-    casting = cast(intent, modification.added, way)
-    asked = Asked(modification=modification, way=way, casting=casting)
+    casting = cast(resolve_anchors(intent), modification.added, way)
+    asked = Asked(modification=modification, way=way, casting=casting, tolerances=tolerances)
     held = [one for check in ASKED_CHECKS for one in check(asked)]
     return (*held, *_settled(found, held, asked))
 
@@ -77,7 +82,12 @@ def _settled(found: Iterable[Finding], held: Iterable[Finding], asked: Asked) ->
     and how a thing stands that nobody asked for is no fault of its own.
     """
     mistyped = {agent.id for party in asked.parties for agent, _ in party.mistyped}
-    answering = {agent.id for party in asked.parties for agent in party.everyone}
+    answering = {
+        agent.id
+        for party in asked.parties
+        for agent in party.everyone
+        if not isinstance(party.request, VehicleRequest) or party.request.spot.lane is not None
+    }
     surplus = {agent.id for agent in asked.casting.surplus}
     across = {
         name

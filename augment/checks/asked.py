@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from augment.checks.finding import Finding, Severity
 from augment.checks.own_way import OwnWay
 from augment.checks.parties import Casting, Party
+from augment.checks.tolerances import Tolerances
 from augment.scene.entities import TrafficAgent, TrafficSide
 from augment.scene.modification import Modification
 
@@ -19,6 +20,7 @@ class Asked:
     modification: Modification
     way: OwnWay
     casting: Casting
+    tolerances: Tolerances
 
     @property
     def kerb(self) -> float:

@@ -14,8 +14,9 @@ from augment.checks.crash_order import in_order
 from augment.checks.finding import Finding, Kind
 from augment.checks.own_way import Band
 from augment.checks.parties import Party
-from augment.checks.tolerances import ACROSS_M, EDGE_M, MIDDLE_M
-from augment.instruction.intent import (
+from augment.checks.tolerances import Tolerances
+from augment.scene.entities import AgentType, TrafficAgent
+from augment.scene.intent import (
     ConesRequest,
     CrashRequest,
     LaneChoice,
@@ -27,7 +28,7 @@ from augment.instruction.intent import (
     VehicleRequest,
     WalkRequest,
 )
-from augment.scene.entities import TrafficAgent
+from augment.scene.sizes import LENGTH_WIDTH_M
 
 _SLIGHT_M = 1.5
 """The end of the paper's range for a slight offset."""
@@ -57,15 +58,16 @@ def asked_across(asked: Asked) -> Iterator[Finding]:
     """Vehicles by their offset, crashes and cones by the lane that they are in."""
     for party in asked.parties:
         request = party.request
-        if isinstance(request, WalkRequest) or not party.placed:
+        lane = request.spot.lane
+        if isinstance(request, WalkRequest) or not party.placed or lane is None:
             continue
         first = min(party.placed, key=lambda one: (abs(asked.ahead_m(one)), one.id))
-        band = asked.way.band(request.spot.lane, asked.ahead_m(first))
+        band = asked.way.band(lane, asked.ahead_m(first))
         if band is None:
             continue
         if isinstance(request, VehicleRequest):
             for agent in party.placed:
-                yield _vehicle(asked, request, agent, band)
+                yield _vehicle(asked, request.spot.lateral, lane, agent, band)
         elif isinstance(request, CrashRequest) and party.missing:
             continue  # it may be the nearest that is missing, and the others lie anywhere
         elif isinstance(request, CrashRequest):
@@ -73,7 +75,9 @@ def asked_across(asked: Asked) -> Iterator[Finding]:
                 first = in_order(party, request, asked.way)[0]
             left_m = asked.left_m(first) - band.left_m
             others = (one for one in party.everyone if one is not first)
-            yield _in_lane((first, *others), left_m, band, "The first of the crashed vehicles")
+            yield _in_lane(
+                asked, (first, *others), left_m, band, "The first of the crashed vehicles"
+            )
         elif isinstance(request, ConesRequest):
             yield from _cones(asked, party, request, band)
 
@@ -81,9 +85,13 @@ def asked_across(asked: Asked) -> Iterator[Finding]:
 # Private
 
 
-def _vehicle(asked: Asked, request: VehicleRequest, agent: TrafficAgent, band: Band) -> Finding:
+def _vehicle(
+    asked: Asked, lateral: Lateral | None, choice: LaneChoice, agent: TrafficAgent, band: Band
+) -> Finding:
     left_m = asked.left_m(agent) - band.left_m
-    wanted = _wanted(request.spot.lateral, asked.kerb, band, agent.width_m / 2.0)
+    if lateral is None:
+        return _in_lane(asked, (agent,), left_m, band, "{agents[0]}")
+    wanted = _wanted(asked, lateral, band, agent.width_m / 2.0)
     is_other_side = (
         wanted.off_m(left_m) > wanted.allowed_m
         and wanted.mirrored.off_m(left_m) <= wanted.allowed_m
@@ -91,7 +99,7 @@ def _vehicle(asked: Asked, request: VehicleRequest, agent: TrafficAgent, band: B
     if is_other_side:
         return _other_side((agent,), left_m, wanted)
     belongs_m = band.left_m + min(max(left_m, wanted.low_m), wanted.high_m)
-    lane = _LANES[request.spot.lane]
+    lane = _LANES[choice]
     if wanted.low_m == wanted.high_m == 0.0:
         words = "the lane centre is asked for"
     elif wanted.low_m == wanted.high_m:
@@ -113,23 +121,24 @@ def _vehicle(asked: Asked, request: VehicleRequest, agent: TrafficAgent, band: B
     )
 
 
-def _wanted(lateral: Lateral, kerb: float, band: Band, half_box_m: float) -> _Wanted:
+def _wanted(asked: Asked, lateral: Lateral, band: Band, half_box_m: float) -> _Wanted:
     """Where a vehicle belongs; sides are those of the ego's direction."""
-    sign = _SIGNS[lateral.target] or kerb * _KERB_SIGNS[lateral.target]
+    sign, tolerances = _sign(asked, lateral), asked.tolerances
     if sign == 0.0:
-        return _Wanted(low_m=0.0, high_m=0.0, allowed_m=MIDDLE_M)
+        return _Wanted(low_m=0.0, high_m=0.0, allowed_m=tolerances.middle_m)
     half_lane_m = band.width_m / 2.0
     if lateral.offset is not None:
         near_m, far_m = lateral.offset.low_m, lateral.offset.high_m
     else:
         near_m, far_m = {
+            None: (0.0, half_lane_m),
             Nearness.SLIGHTLY: (0.0, _SLIGHT_M),
             Nearness.AT_EDGE: (half_lane_m - half_box_m, half_lane_m),
             Nearness.HALF_OUT: (half_lane_m, half_lane_m),
             Nearness.OUTSIDE: (half_lane_m + half_box_m, half_lane_m + half_box_m + _FAR_OUT_M),
         }[lateral.nearness]
     low_m, high_m = sorted((sign * near_m, sign * far_m))
-    return _Wanted(low_m=low_m, high_m=high_m, allowed_m=ACROSS_M)
+    return _Wanted(low_m=low_m, high_m=high_m, allowed_m=tolerances.across_m)
 
 
 def _cones(asked: Asked, party: Party, request: ConesRequest, band: Band) -> Iterator[Finding]:
@@ -138,17 +147,17 @@ def _cones(asked: Asked, party: Party, request: ConesRequest, band: Band) -> Ite
     everyone = (*cones, *party.workers)
     lefts = [asked.left_m(one) - band.left_m for one in cones]
     middle_m = sum(lefts) / len(lefts)
-    target = request.spot.lateral.target
-    sign = _SIGNS[target] or asked.kerb * _KERB_SIGNS[target]
+    sign = _sign(asked, request.spot.lateral)
     if request.shape is Shape.LINE and sign and not request.both_sides:
         edge_m = sign * band.width_m / 2.0
-        wanted = _Wanted(low_m=edge_m, high_m=edge_m, allowed_m=ACROSS_M)
-        if wanted.off_m(middle_m) > ACROSS_M >= wanted.mirrored.off_m(middle_m):
+        across_m = _line_m(asked.tolerances)
+        wanted = _Wanted(low_m=edge_m, high_m=edge_m, allowed_m=across_m)
+        if wanted.off_m(middle_m) > across_m >= wanted.mirrored.off_m(middle_m):
             yield _other_side(cones, middle_m, wanted)
             return
         yield Finding(
             kind=Kind.ASKED_ACROSS,
-            severity=severity(fits=wanted.off_m(middle_m) <= ACROSS_M),
+            severity=severity(fits=wanted.off_m(middle_m) <= across_m),
             agents=tuple(one.id for one in everyone),
             measured={"left_m": middle_m, "asked_low_m": edge_m, "asked_high_m": edge_m},
             template=(
@@ -157,10 +166,25 @@ def _cones(asked: Asked, party: Party, request: ConesRequest, band: Band) -> Ite
             ),
         )
         return
-    yield _in_lane(everyone, middle_m, band, "The middle of the cones")
+    yield _in_lane(asked, everyone, middle_m, band, "The middle of the cones")
+    if request.ends_in_middle and party.is_exact:
+        yield _last_in_middle(asked, cones, lefts[-1])
     if request.shape is Shape.TAPER and abs(lefts[0] - lefts[-1]) > _TAPER_M:
         start = asked.kerb if request.start is None else _HANDS[request.start]
         yield _taper_side(cones, lefts, start)
+
+
+def _last_in_middle(asked: Asked, cones: Sequence[TrafficAgent], left_m: float) -> Finding:
+    return Finding(
+        kind=Kind.ASKED_ACROSS,
+        severity=severity(fits=abs(left_m) <= asked.tolerances.middle_m),
+        agents=(cones[-1].id,),
+        measured={"left_m": left_m},
+        template=(
+            f"The last cone, {{agents[0]}}, is {{left_m:.2f}} m to the {hand(left_m)} of the lane "
+            "centre, where the taper is to end."
+        ),
+    )
 
 
 def _taper_side(cones: Sequence[TrafficAgent], lefts: Sequence[float], start: float) -> Finding:
@@ -177,11 +201,13 @@ def _taper_side(cones: Sequence[TrafficAgent], lefts: Sequence[float], start: fl
     )
 
 
-def _in_lane(agents: Sequence[TrafficAgent], left_m: float, band: Band, what: str) -> Finding:
+def _in_lane(
+    asked: Asked, agents: Sequence[TrafficAgent], left_m: float, band: Band, what: str
+) -> Finding:
     beyond_m = abs(left_m) - band.width_m / 2.0
     return Finding(
         kind=Kind.ASKED_ACROSS,
-        severity=severity(fits=beyond_m <= EDGE_M),
+        severity=severity(fits=beyond_m <= asked.tolerances.edge_m),
         agents=tuple(one.id for one in agents),
         measured={"left_m": left_m, "lane_width_m": band.width_m},
         template=(
@@ -205,6 +231,19 @@ def _other_side(agents: Sequence[TrafficAgent], left_m: float, wanted: _Wanted) 
     )
 
 
+def _sign(asked: Asked, lateral: Lateral | None) -> float:
+    """1 to the left of the ego's direction, -1 to the right, 0 for the lane's centre."""
+    if lateral is None:
+        return 0.0
+    return _SIGNS[lateral.target] or asked.kerb * _KERB_SIGNS[lateral.target]
+
+
+def _line_m(tolerances: Tolerances) -> float:
+    """A cone at a boundary stands inside of it or outside: half a cone to either side."""
+    return max(tolerances.across_m, _CONE_M)
+
+
+_CONE_M = LENGTH_WIDTH_M[AgentType.TRAFFIC_CONE][1]
 _HANDS = {Side.LEFT: 1.0, Side.RIGHT: -1.0}
 _SIGNS = {
     LateralTarget.LEFT_BOUNDARY: 1.0,

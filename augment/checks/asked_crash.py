@@ -8,16 +8,16 @@ from collections.abc import Iterator
 from augment.checks.asked import Asked, hand, severity
 from augment.checks.crash_order import Pair, in_order, pairs
 from augment.checks.finding import Finding, Kind
-from augment.checks.tolerances import CRASH_M, HEADING_DEG, SPACING_M, SPACING_SHARE
+from augment.checks.tolerances import CRASH_M, USUAL
 from augment.geometry.angles import difference
-from augment.instruction.intent import CrashRequest, Facing
 from augment.scene.entities import TrafficAgent
+from augment.scene.intent import CrashRequest, Facing, LaneChoice
 
 
 def asked_crash(asked: Asked) -> Iterator[Finding]:
     """Angles (heading) and gaps (position) between neighbours, and a first one that lies across.
 
-    Nothing is said where the number of vehicles is wrong or where they lie on each other, which
+    Nothing is found where the number of vehicles is wrong or where they lie on each other, which
     are faults of their own: then nobody knows which of them is which.
     """
     for party in asked.parties:
@@ -28,22 +28,22 @@ def asked_crash(asked: Asked) -> Iterator[Finding]:
         found = pairs(order, request)
         if any(pair.gap_m < pair.one.width_m for pair in found):
             continue
-        if request.facing is not Facing.WITH_LANE:
+        if request.facing not in (None, Facing.WITH_LANE):
             yield from _facing(asked, request, order[0])
         for pair in found:
-            yield _gap(pair)
+            yield _gap(pair, asked)
             if pair.off_deg is not None:
-                yield _turn(pair)
+                yield _turn(pair, asked)
 
 
-def _turn(pair: Pair) -> Finding:
-    said_deg, off_deg = pair.said.turn_deg or 0.0, pair.off_deg or 0.0
-    side = f" to the {hand(said_deg)}" if pair.said.is_signed else ""
+def _turn(pair: Pair, asked: Asked) -> Finding:
+    asked_deg, off_deg = pair.asked.turn_deg or 0.0, pair.off_deg or 0.0
+    side = f" to the {hand(asked_deg)}" if pair.asked.is_signed else ""
     return Finding(
         kind=Kind.ASKED_HEADING,
-        severity=severity(fits=off_deg <= HEADING_DEG),
+        severity=severity(fits=off_deg <= asked.tolerances.heading_deg),
         agents=(pair.other.id, pair.one.id),
-        measured={"turn_deg": pair.turn_deg, "asked_deg": said_deg, "off_deg": off_deg},
+        measured={"turn_deg": pair.turn_deg, "asked_deg": asked_deg, "off_deg": off_deg},
         template=(
             "{agents[0]} is turned {turn_deg:.0f} degrees against {agents[1]}; "
             f"{{asked_deg:.0f}} degrees{side} are asked for."
@@ -51,16 +51,17 @@ def _turn(pair: Pair) -> Finding:
     )
 
 
-def _gap(pair: Pair) -> Finding:
+def _gap(pair: Pair, asked: Asked) -> Finding:
     """As far apart as said, else near enough to have run into each other."""
-    wanted = pair.said.gap
+    wanted = pair.asked.gap
     longest_m = max(CRASH_M, pair.one.length_m, pair.other.length_m)
     if wanted is None:
         fits = pair.gap_m <= longest_m
         words = "vehicles that have crashed are within {asked_m:.1f} m"
         asked_m = longest_m
     else:
-        fits = (pair.off_m or 0.0) <= max(SPACING_M, SPACING_SHARE * wanted.high_m)
+        allowed_m = max(asked.tolerances.spacing_m, asked.tolerances.spacing_share * wanted.high_m)
+        fits = (pair.off_m or 0.0) <= allowed_m
         words = "{asked_m:.1f} m is asked for"
         asked_m = (wanted.low_m + wanted.high_m) / 2.0
     return Finding(
@@ -73,7 +74,7 @@ def _gap(pair: Pair) -> Finding:
 
 
 def _facing(asked: Asked, request: CrashRequest, first: TrafficAgent) -> Iterator[Finding]:
-    band = asked.way.band(request.spot.lane, asked.ahead_m(first))
+    band = asked.way.band(request.spot.lane or LaneChoice.OWN, asked.ahead_m(first))
     if band is None:
         return
     turn_deg = abs(math.degrees(difference(first.heading_rad, band.tangent_rad)))
@@ -90,5 +91,5 @@ def _facing(asked: Asked, request: CrashRequest, first: TrafficAgent) -> Iterato
     )
 
 
-_ROUGHLY_DEG = 2.0 * HEADING_DEG
+_ROUGHLY_DEG = 2.0 * USUAL.heading_deg
 """A car that has spun stands "crosswise" only roughly."""

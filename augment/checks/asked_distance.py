@@ -2,23 +2,23 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 
 from augment.checks.asked import Asked, outside, severity
 from augment.checks.crash_order import in_order
 from augment.checks.finding import Finding, Kind
 from augment.checks.parties import Party
-from augment.checks.tolerances import CRASH_M, DISTANCE_M, DISTANCE_SHARE
-from augment.instruction.intent import (
+from augment.checks.tolerances import CRASH_M
+from augment.scene.entities import TrafficAgent
+from augment.scene.intent import (
     ConesRequest,
     CrashRequest,
-    Length,
     Relation,
     Shape,
     VehicleRequest,
     WalkRequest,
 )
-from augment.scene.entities import TrafficAgent
 
 
 def asked_distance(asked: Asked) -> Iterator[Finding]:
@@ -29,21 +29,23 @@ def asked_distance(asked: Asked) -> Iterator[Finding]:
     its own, any may be the first, and where the first is missing the next one is.
     """
     for party in asked.parties:
-        if party.placed:
-            yield _finding(asked, party)
+        span_m = party.request.spot.span_m
+        if party.placed and span_m is not None:
+            yield _finding(asked, party, span_m)
 
 
-def _finding(asked: Asked, party: Party) -> Finding:
-    spot = party.request.spot
-    sign = 1.0 if spot.relation is Relation.AHEAD else -1.0
-    first, measured_m = _measured(asked, party, sign)
-    wanted = spot.distance
-    off_m = outside(measured_m, wanted.low_m, wanted.high_m)
-    allowed_m = max(DISTANCE_M, DISTANCE_SHARE * wanted.high_m) + _to_next_m(party)
+def _finding(asked: Asked, party: Party, span_m: tuple[float, float]) -> Finding:
+    sign = -1.0 if party.request.spot.relation is Relation.BEHIND else 1.0
+    low_m, high_m = sorted(sign * one for one in span_m)
+    first, measured_m = _measured(asked, party, sign, (low_m, high_m))
+    off_m = outside(measured_m, low_m, high_m)
+    allowed_m = asked.tolerances.distance_m
+    if math.isfinite(high_m):
+        allowed_m = max(allowed_m, asked.tolerances.distance_share * high_m) + _to_next_m(party)
     side = "ahead of" if measured_m * sign >= 0.0 else "behind"
     where = "ahead" if sign > 0.0 else "behind"
-    what, range_words = _words(party, wanted)
-    belongs_m = sign * min(max(measured_m, wanted.low_m), wanted.high_m)
+    what, range_words = _words(party, low_m, high_m)
+    belongs_m = sign * min(max(measured_m, low_m), high_m)
     return Finding(
         kind=Kind.ASKED_DISTANCE,
         severity=severity(fits=off_m <= allowed_m),
@@ -51,20 +53,22 @@ def _finding(asked: Asked, party: Party) -> Finding:
         belongs_m=asked.way.position(belongs_m, asked.left_m(first)),
         measured={
             "along_m": measured_m,
-            "asked_low_m": wanted.low_m,
-            "asked_high_m": wanted.high_m,
+            "asked_low_m": low_m,
+            "asked_high_m": high_m if math.isfinite(high_m) else None,
             "off_m": off_m,
         },
         template=(
             f"{what} is {{along_m:.1f}} m {side} the ego along its lane; "
-            f"{range_words} m {where} is asked for."
+            f"{range_words} {where} is asked for."
         ),
     )
 
 
-def _measured(asked: Asked, party: Party, sign: float) -> tuple[TrafficAgent, float]:
+def _measured(
+    asked: Asked, party: Party, sign: float, wanted_m: tuple[float, float]
+) -> tuple[TrafficAgent, float]:
     """Who tells the distance, and the distance in the direction asked for."""
-    request, wanted = party.request, party.request.spot.distance
+    request = party.request
     along = [(sign * asked.ahead_m(one), one) for one in (*party.placed, *party.spare)]
     if isinstance(request, WalkRequest):
         along += [
@@ -81,9 +85,7 @@ def _measured(asked: Asked, party: Party, sign: float) -> tuple[TrafficAgent, fl
     elif isinstance(request, (ConesRequest, VehicleRequest)) and party.is_exact:
         value, agent = min(along, key=lambda item: (item[0], item[1].id))
         return agent, value
-    value, agent = min(
-        along, key=lambda item: (outside(item[0], wanted.low_m, wanted.high_m), item[1].id)
-    )
+    value, agent = min(along, key=lambda item: (outside(item[0], *wanted_m), item[1].id))
     return agent, value
 
 
@@ -93,7 +95,8 @@ def _to_next_m(party: Party) -> float:
         return 0.0
     if isinstance(party.request, CrashRequest):
         return CRASH_M
-    return party.request.spacing.high_m if isinstance(party.request, ConesRequest) else 0.0
+    spacing = party.request.spacing if isinstance(party.request, ConesRequest) else None
+    return 0.0 if spacing is None else spacing.high_m
 
 
 def _ends_on_road(asked: Asked, agent: TrafficAgent) -> Iterator[tuple[float, float]]:
@@ -109,7 +112,7 @@ def _ends_on_road(asked: Asked, agent: TrafficAgent) -> Iterator[tuple[float, fl
         )
 
 
-def _words(party: Party, wanted: Length) -> tuple[str, str]:
+def _words(party: Party, low_m: float, high_m: float) -> tuple[str, str]:
     request = party.request
     if isinstance(request, CrashRequest):
         what = "The first of the crashed vehicles, {agents[0]},"
@@ -120,6 +123,7 @@ def _words(party: Party, wanted: Length) -> tuple[str, str]:
         what = "The walk of {agents[0]}"
     else:
         what = "{agents[0]}"
-    return what, "{asked_low_m:.4g} to {asked_high_m:.4g}" if wanted.is_range else (
-        "{asked_low_m:.4g}"
-    )
+    if not math.isfinite(high_m):
+        return what, "a place"
+    is_range = high_m > low_m
+    return what, f"{{asked_low_m:.4g}}{' to {asked_high_m:.4g}' if is_range else ''} m"

@@ -7,10 +7,9 @@ from collections.abc import Iterator
 
 from augment.checks.asked import Asked, hand, severity
 from augment.checks.finding import Finding, Kind
-from augment.checks.tolerances import HEADING_DEG
 from augment.geometry.angles import difference
-from augment.instruction.intent import Facing, VehicleRequest
 from augment.scene.entities import TrafficAgent
+from augment.scene.intent import Facing, VehicleRequest
 
 
 def asked_heading(asked: Asked) -> Iterator[Finding]:
@@ -23,17 +22,19 @@ def asked_heading(asked: Asked) -> Iterator[Finding]:
 
 
 def _vehicle(asked: Asked, request: VehicleRequest, agent: TrafficAgent) -> Iterator[Finding]:
+    if request.spot.lane is None:
+        return
     place = asked.way.of_agent(agent)
     band = asked.way.band(request.spot.lane, place.ahead_m)
     if band is None:
         return
     turn_deg = math.degrees(difference(agent.heading_rad, band.tangent_rad))
-    turns = (turn_deg, turn_deg + 180.0) if request.facing is Facing.ACROSS else (turn_deg,)
-    wanted_deg = _FACING_DEG[request.facing] + request.turn_deg
+    turns = (turn_deg, turn_deg + 180.0) if _facing(request) is Facing.ACROSS else (turn_deg,)
+    wanted_deg = _FACING_DEG[_facing(request)] + request.turn_deg
     off_deg = min(abs(_difference_deg(one, wanted_deg)) for one in turns)
     yield Finding(
         kind=Kind.ASKED_HEADING,
-        severity=severity(fits=off_deg <= HEADING_DEG),
+        severity=severity(fits=off_deg <= asked.tolerances.heading_deg),
         agents=(agent.id,),
         measured={
             "turn_deg": turn_deg,
@@ -51,7 +52,13 @@ def _words(request: VehicleRequest) -> str:
     turn = ""
     if request.turn_deg:
         turn = f", turned {abs(request.turn_deg):g} degrees to the {hand(request.turn_deg)}"
-    return f"facing {request.facing}{turn}"
+    usual = "" if request.facing else ", as nothing else is said,"
+    return f"facing {_facing(request)}{usual}{turn}"
+
+
+def _facing(request: VehicleRequest) -> Facing:
+    """As its lane leads where nothing is said: what else would say so stands in the sentence."""
+    return request.facing or Facing.WITH_LANE
 
 
 def _difference_deg(one: float, other: float) -> float:

@@ -1,25 +1,16 @@
-"""Counts, types and motion against those that were asked for, and how cones stand together."""
+"""Counts, types and motion against those that were asked for."""
 
 from __future__ import annotations
 
-import math
-from collections.abc import Iterator, Sequence
-from itertools import combinations
-from statistics import median
+from collections.abc import Iterator
 
-from augment.checks.asked import Asked, outside, severity
+from augment.checks.asked import Asked, severity
 from augment.checks.finding import Finding, Kind, Severity
-from augment.checks.parties import Party, Role, middle_of
+from augment.checks.parties import Role, middle_of
 from augment.checks.situation import STOPPED_BELOW_MPS
-from augment.checks.tolerances import (
-    SPACING_M,
-    SPACING_SHARE,
-    SPEED_MPS,
-    SPEED_SHARE,
-    WORKER_M,
-)
-from augment.instruction.intent import ConesRequest, CrashRequest, VehicleRequest
+from augment.checks.tolerances import SPEED_MPS, SPEED_SHARE
 from augment.scene.entities import TrafficAgent
+from augment.scene.intent import CrashRequest, VehicleRequest
 
 
 def asked_count(asked: Asked) -> Iterator[Finding]:
@@ -64,6 +55,8 @@ def asked_motion(asked: Asked) -> Iterator[Finding]:
         if not isinstance(request, (VehicleRequest, CrashRequest)):
             continue
         wanted_mps = request.speed_mps if isinstance(request, VehicleRequest) else 0.0
+        if wanted_mps is None:
+            continue
         allowed_mps = max(SPEED_MPS, SPEED_SHARE * wanted_mps) if wanted_mps else STOPPED_BELOW_MPS
         words = "{asked_mps:.1f} m/s is asked for" if wanted_mps else "it is to stand"
         for agent in party.agents:
@@ -75,20 +68,6 @@ def asked_motion(asked: Asked) -> Iterator[Finding]:
                 measured={"speed_mps": agent.speed_mps, "asked_mps": wanted_mps},
                 template=f"{{agents[0]}} moves at {{speed_mps:.1f}} m/s; {words}.",
             )
-
-
-def asked_spacing(asked: Asked) -> Iterator[Finding]:
-    """The median gap from a cone to the nearest other, and from a worker to the nearest cone."""
-    for party in asked.parties:
-        request = party.request
-        if not isinstance(request, ConesRequest):
-            continue
-        is_said = request.reach_m is None and len(party.agents) > 1
-        if party.is_exact and is_said and _are_apart(party.agents):
-            yield _spacing(party.agents, request)
-        for worker in party.workers:
-            if party.agents:
-                yield _worker(worker, party)
 
 
 def unasked(asked: Asked) -> Iterator[Finding]:
@@ -105,40 +84,6 @@ def unasked(asked: Asked) -> Iterator[Finding]:
 
 
 # Private
-
-
-def _are_apart(cones: Sequence[TrafficAgent]) -> bool:
-    """Whether none stands in another, which is a fault of its own and leaves gaps elsewhere."""
-    pairs = combinations(cones, 2)
-    return all(_apart_m(one, other) > one.width_m for one, other in pairs)
-
-
-def _spacing(cones: Sequence[TrafficAgent], request: ConesRequest) -> Finding:
-    gaps_m = [min(_apart_m(one, other) for other in cones if other is not one) for one in cones]
-    gap_m, wanted = median(gaps_m), request.spacing
-    off_m = outside(gap_m, wanted.low_m, wanted.high_m)
-    return Finding(
-        kind=Kind.ASKED_SPACING,
-        severity=severity(fits=off_m <= max(SPACING_M, SPACING_SHARE * wanted.high_m)),
-        agents=tuple(one.id for one in cones),
-        measured={"gap_m": gap_m, "asked_m": (wanted.low_m + wanted.high_m) / 2.0},
-        template="The cones stand {gap_m:.1f} m apart; {asked_m:.1f} m are asked for.",
-    )
-
-
-def _worker(worker: TrafficAgent, party: Party) -> Finding:
-    nearest = min(party.agents, key=lambda cone: (_apart_m(worker, cone), cone.id))
-    return Finding(
-        kind=Kind.ASKED_SPACING,
-        severity=severity(fits=_apart_m(worker, nearest) <= WORKER_M),
-        agents=(worker.id, nearest.id),
-        measured={"gap_m": _apart_m(worker, nearest)},
-        template="The worker {agents[0]} is {gap_m:.1f} m from the nearest cone, {agents[1]}.",
-    )
-
-
-def _apart_m(one: TrafficAgent, other: TrafficAgent) -> float:
-    return math.hypot(one.x_m - other.x_m, one.y_m - other.y_m)
 
 
 def _named(agent: TrafficAgent) -> str:

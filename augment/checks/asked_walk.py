@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
+from itertools import combinations
 
 from augment.checks.asked import Asked, hand, severity
+from augment.checks.asked_spacing import apart_m, fits_gap
 from augment.checks.finding import Finding, Kind
 from augment.checks.walk_crossing import end_of_walk
-from augment.instruction.intent import Side, WalkRequest
 from augment.scene.entities import TrafficAgent
+from augment.scene.intent import Side, WalkRequest
 
 _ON_ROAD_M = 1.0
 """Who begins so near the middle of the ego's lane comes from no side of it."""
@@ -20,13 +22,73 @@ _ALONG_SHARE = 0.2
 def asked_walk(asked: Asked) -> Iterator[Finding]:
     """Side (a fault of logic), direction (of heading), crossing (of logic): the first one wrong.
 
+    Of walks that cross as asked also where they end along the lane, and the gaps of a file.
+
     Looking or walking away from the road is a fault of the heading, as in the paper; that such a
     walk crosses nothing follows from it.
     """
     for party in asked.parties:
         if isinstance(party.request, WalkRequest):
-            for agent in party.agents:
-                yield _finding(asked, agent, 1.0 if party.request.start is Side.LEFT else -1.0)
+            found = [
+                (agent, _finding(asked, agent, _start(asked, agent, party.request.start)))
+                for agent in party.agents
+            ]
+            yield from (finding for _, finding in found)
+            for agent, finding in found:
+                if not finding.is_fault:
+                    yield from _drift(asked, agent, party.request.drift_m)
+            if party.is_exact and not any(finding.is_fault for _, finding in found):
+                yield from _in_file(asked, party.agents, party.request)
+
+
+def _start(asked: Asked, agent: TrafficAgent, side: Side | None) -> float:
+    """1 from the left, -1 from the right; where that is open, from where it begins."""
+    if side is None:
+        return math.copysign(1.0, asked.left_m(agent))
+    return 1.0 if side is Side.LEFT else -1.0
+
+
+def _drift(asked: Asked, agent: TrafficAgent, wanted_m: float | None) -> Iterator[Finding]:
+    """How much further along the lane the walk ends than it begins."""
+    end = end_of_walk(agent)
+    if wanted_m is None or end is None:
+        return
+    drift_m = asked.way.place(*end).ahead_m - asked.ahead_m(agent)
+    yield Finding(
+        kind=Kind.ASKED_DISTANCE,
+        severity=severity(fits=abs(drift_m - wanted_m) <= asked.tolerances.drift_m),
+        agents=(agent.id,),
+        measured={"drift_m": drift_m, "asked_m": wanted_m},
+        template=(
+            f"The walk of {{agents[0]}} ends {{drift_m:.1f}} m {_along(drift_m)} along the lane; "
+            f"{{asked_m:.1f}} m {_along(wanted_m)} is asked for."
+        ),
+    )
+
+
+def _in_file(
+    asked: Asked, walkers: Sequence[TrafficAgent], request: WalkRequest
+) -> Iterator[Finding]:
+    """How far behind the first one, who is furthest across, each of the others walks."""
+    if not request.behind or request.start is None:
+        return
+    sign = 1.0 if request.start is Side.LEFT else -1.0
+    first, *others = sorted(walkers, key=lambda one: sign * asked.left_m(one))
+    if any(apart_m(*pair) < first.length_m for pair in combinations(walkers, 2)):
+        return  # who stands in another is a fault of its own
+    for other, wanted in zip(others, request.behind, strict=False):
+        gap_m = apart_m(first, other)
+        yield Finding(
+            kind=Kind.ASKED_SPACING,
+            severity=severity(fits=fits_gap(asked, gap_m, wanted)),
+            agents=(other.id, first.id),
+            measured={"gap_m": gap_m, "asked_m": (wanted.low_m + wanted.high_m) / 2.0},
+            template=_BEHIND,
+        )
+
+
+def _along(drift_m: float) -> str:
+    return "further" if drift_m >= 0.0 else "back"
 
 
 def _finding(asked: Asked, agent: TrafficAgent, start: float) -> Finding:
@@ -40,7 +102,7 @@ def _finding(asked: Asked, agent: TrafficAgent, start: float) -> Finding:
     measured = {"start_left_m": place.left_m, "end_left_m": end_left_m}
     begins, ends = hand(start), hand(-start)
     if is_other_side:
-        return _said(
+        return _fault(
             Kind.ASKED_SIDE, agent, measured,
             f"{{agents[0]}} crosses from the {ends} to the {begins}; from the {begins} is asked "
             "for.",
@@ -49,7 +111,7 @@ def _finding(asked: Asked, agent: TrafficAgent, start: float) -> Finding:
     if looks_away or goes == start:
         away = "looks" if looks_away else "walks"
         measured |= {"turn_deg": math.degrees(math.asin(across))}
-        return _said(
+        return _fault(
             Kind.ASKED_HEADING, agent, measured,
             f"{{agents[0]}} {away} away from its way to the {ends} side of the road.",
         )  # fmt: skip
@@ -62,13 +124,13 @@ def _finding(asked: Asked, agent: TrafficAgent, start: float) -> Finding:
             measured=measured,
             template=f"{{agents[0]}} crosses the ego's way from the {begins}, as asked for.",
         )
-    return _said(
+    return _fault(
         Kind.ASKED_CROSSING, agent, measured,
         f"{{agents[0]}} does not cross the ego's way from the {begins} to the {ends}.",
     )  # fmt: skip
 
 
-def _said(
+def _fault(
     kind: Kind, agent: TrafficAgent, measured: dict[str, float | None], words: str
 ) -> Finding:
     return Finding(
@@ -78,3 +140,6 @@ def _said(
         measured=measured,
         template=words,
     )
+
+
+_BEHIND = "{agents[0]} is {gap_m:.1f} m from {agents[1]}; {asked_m:.1f} m is asked for."

@@ -9,10 +9,10 @@ from itertools import pairwise, permutations
 
 from augment.checks.own_way import OwnWay
 from augment.checks.parties import Party
-from augment.checks.tolerances import DISTANCE_M, HEADING_DEG, SPACING_M
+from augment.checks.tolerances import USUAL
 from augment.geometry.angles import difference
-from augment.instruction.intent import Bearing, CrashedCar, CrashRequest, Relation
 from augment.scene.entities import TrafficAgent
+from augment.scene.intent import Bearing, CrashedCar, CrashRequest
 
 MOST_ORDERED = 5
 _MISPLACED = 10.0
@@ -21,11 +21,11 @@ _MISPLACED = 10.0
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Pair:
-    """A vehicle of a crash, the one named before it, and what is said of the two."""
+    """A vehicle of a crash, the one named before it, and what is asked of the two."""
 
     one: TrafficAgent
     other: TrafficAgent
-    said: CrashedCar
+    asked: CrashedCar
 
     @property
     def gap_m(self) -> float:
@@ -40,19 +40,19 @@ class Pair:
     @property
     def off_deg(self) -> float | None:
         """How far the turn is off what is said, None where nothing is."""
-        if self.said.turn_deg is None:
+        if self.asked.turn_deg is None:
             return None
-        if self.said.is_signed:
-            off_rad = difference(math.radians(self.turn_deg), math.radians(self.said.turn_deg))
+        if self.asked.is_signed:
+            off_rad = difference(math.radians(self.turn_deg), math.radians(self.asked.turn_deg))
             return abs(math.degrees(off_rad))
-        return abs(abs(self.turn_deg) - abs(self.said.turn_deg))
+        return abs(abs(self.turn_deg) - abs(self.asked.turn_deg))
 
     @property
     def off_m(self) -> float | None:
         """How far the gap is off what is said, None where nothing is."""
-        if self.said.gap is None:
+        if self.asked.gap is None:
             return None
-        return max(self.said.gap.low_m - self.gap_m, self.gap_m - self.said.gap.high_m, 0.0)
+        return max(self.asked.gap.low_m - self.gap_m, self.gap_m - self.asked.gap.high_m, 0.0)
 
 
 def in_order(party: Party, request: CrashRequest, way: OwnWay) -> tuple[TrafficAgent, ...]:
@@ -68,31 +68,23 @@ def in_order(party: Party, request: CrashRequest, way: OwnWay) -> tuple[TrafficA
 
 def pairs(order: Sequence[TrafficAgent], request: CrashRequest) -> list[Pair]:
     """Neighbours in that order, with what is said of each further one."""
-    said = list(request.others)
-    said += [CrashedCar(turn_deg=request.turn_deg)] * (len(order) - 1 - len(said))
+    asked = [*request.others, *[CrashedCar()] * (len(order) - 1 - len(request.others))]
     return [
-        Pair(one=one, other=other, said=_with_turn(about, request))
-        for (one, other), about in zip(pairwise(order), said, strict=False)
+        Pair(one=one, other=other, asked=about)
+        for (one, other), about in zip(pairwise(order), asked, strict=False)
     ]
 
 
 # Private
 
 
-def _with_turn(said: CrashedCar, request: CrashRequest) -> CrashedCar:
-    """An angle that is said of all of them holds where none is said of this one."""
-    if said.turn_deg is not None or request.turn_deg is None:
-        return said
-    return CrashedCar(gap=said.gap, bearing=said.bearing, turn_deg=request.turn_deg)
-
-
 def _misfit(order: Sequence[TrafficAgent], request: CrashRequest, way: OwnWay) -> float:
-    sign = 1.0 if request.spot.relation is Relation.AHEAD else -1.0
-    first_m = sign * way.of_agent(order[0]).ahead_m
-    wanted = request.spot.distance
-    misfit = max(wanted.low_m - first_m, first_m - wanted.high_m, 0.0) / DISTANCE_M
+    misfit, span_m = 0.0, request.spot.span_m
+    if span_m is not None:
+        first_m = way.of_agent(order[0]).ahead_m
+        misfit = max(span_m[0] - first_m, first_m - span_m[1], 0.0) / USUAL.distance_m
     for pair in pairs(order, request):
-        misfit += (pair.off_deg or 0.0) / HEADING_DEG + (pair.off_m or 0.0) / SPACING_M
+        misfit += (pair.off_deg or 0.0) / USUAL.heading_deg + (pair.off_m or 0.0) / USUAL.spacing_m
         misfit += pair.gap_m / 100.0  # the nearest neighbours, where nothing is said
         misfit += 0.0 if _bears(pair, way) else _MISPLACED
     return misfit
@@ -106,4 +98,4 @@ def _bears(pair: Pair, way: OwnWay) -> bool:
         Bearing.BEHIND: there.ahead_m <= here.ahead_m,
         Bearing.LEFT: there.left_m >= here.left_m,
         Bearing.RIGHT: there.left_m <= here.left_m,
-    }[pair.said.bearing]
+    }[pair.asked.bearing or Bearing.AHEAD]

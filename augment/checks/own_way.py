@@ -14,8 +14,8 @@ from augment.checks.ground import REACH_M, Ground
 from augment.checks.ways import Beside, best_aligned
 from augment.geometry.angles import difference
 from augment.geometry.polyline import Polyline
-from augment.instruction.intent import LaneChoice
 from augment.scene.entities import TrafficAgent
+from augment.scene.intent import LaneChoice
 from augment.scene.lane_graph import LaneGraph
 
 _BESIDE_M = 1.0

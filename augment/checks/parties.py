@@ -9,18 +9,18 @@ from enum import StrEnum
 
 from augment.checks.own_way import OwnWay
 from augment.checks.tolerances import LONG_VEHICLE_M
-from augment.instruction.intent import (
+from augment.scene.entities import AgentType, Point, TrafficAgent
+from augment.scene.intent import (
     Body,
     ConesRequest,
     CrashRequest,
     Intent,
-    Relation,
+    LaneChoice,
     Request,
     Spot,
     VehicleRequest,
     WalkRequest,
 )
-from augment.scene.entities import AgentType, Point, TrafficAgent
 
 
 class Role(StrEnum):
@@ -84,7 +84,9 @@ def cast(intent: Intent, added: Sequence[TrafficAgent], way: OwnWay) -> Casting:
     What is left over stands in, whatever its type, for what is still missing.
     """
     wanted = [
-        place for number, one in enumerate(intent.requests) for place in _places(number, one)
+        place
+        for number, one in enumerate(intent.requests)
+        for place in _places(number, one, added)
     ]
     spots = [middle_of(one.spot, way) for one in intent.requests]
     near = sorted(
@@ -108,10 +110,13 @@ def cast(intent: Intent, added: Sequence[TrafficAgent], way: OwnWay) -> Casting:
 
 
 def middle_of(spot: Spot, way: OwnWay) -> Point:
-    """The point that a spot names: the middle of its range, on the middle of its lane."""
-    sign = 1.0 if spot.relation is Relation.AHEAD else -1.0
-    ahead_m = sign * (spot.distance.low_m + spot.distance.high_m) / 2.0
-    band = way.band(spot.lane, ahead_m)
+    """The point that a spot names: the middle of its range, on the middle of its lane.
+
+    What is open is taken as the ego's own place and lane: it only says who is nearest.
+    """
+    span_m = [one for one in spot.span_m or (0.0,) if math.isfinite(one)]
+    ahead_m = sum(span_m) / len(span_m)
+    band = way.band(spot.lane or LaneChoice.OWN, ahead_m)
     return way.position(ahead_m, 0.0 if band is None else band.left_m)
 
 
@@ -124,22 +129,24 @@ class _Place:
 
     party: int
     role: Role
-    body: Body | None = None
 
 
-def _places(party: int, request: Request) -> Iterator[_Place]:
+def _places(party: int, request: Request, added: Sequence[TrafficAgent]) -> Iterator[_Place]:
+    """What a request needs; where its count is open, as many as there are, and at least one."""
     match request:
         case VehicleRequest() | CrashRequest():
-            for _ in range(request.count):
-                yield _Place(party, _role(request.body), request.body)
+            place = _Place(party, _role(request.body))
         case WalkRequest():
-            for _ in range(request.count):
-                yield _Place(party, Role.WALKER)
+            place = _Place(party, Role.WALKER)
         case ConesRequest():
-            for _ in range(request.count * (1 + request.both_sides)):
-                yield _Place(party, Role.CONE)
-            if request.has_worker:
-                yield _Place(party, Role.WORKER)
+            place = _Place(party, Role.CONE)
+    suiting = sum(_suits(place, agent) for agent in added)
+    count = request.count or max(suiting, 1)
+    if isinstance(request, ConesRequest):
+        count *= 1 + (request.both_sides and request.count is not None)
+    yield from [place] * count
+    if isinstance(request, ConesRequest) and request.has_worker:
+        yield _Place(party, Role.WORKER)
 
 
 def _role(body: Body) -> Role:

@@ -13,7 +13,7 @@ import re
 from collections.abc import Sequence
 
 from augment.baselines.rule_placer import place
-from augment.errors import InstructionNotUnderstood
+from augment.errors import CannotPlace
 from augment.fake_llm.requests import ChatRequest
 from augment.fake_llm.sight import Task, agent_of, list_of
 from augment.geometry.angles import difference
@@ -29,11 +29,11 @@ Problem = dict[str, str]
 def problems_of(task: Task) -> list[Problem]:
     """What is wrong with the work in the task, by the stand-in's own placement.
 
-    Nothing where it does not understand the wish itself.
+    Nothing where it does not know what the wish asks for.
     """
     try:
-        right = list(place(task.scene, task.instruction).modification.added)
-    except InstructionNotUnderstood:
+        right = list(place(task.scene, task.intent).modification.added)
+    except CannotPlace:
         return []
     added = list_of(task.prompt, "Added agents").items()
     made = [agent_of(name, vector[:8]) for name, vector in added]

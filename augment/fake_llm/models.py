@@ -21,6 +21,7 @@ from augment.fake_llm.responses import (
     error,
     prompt_tokens_of,
 )
+from augment.fake_llm.sight import Intents, knows_nothing
 
 
 @dataclass(slots=True)
@@ -29,9 +30,11 @@ class Surroundings:
 
     Attributes:
         slow_s: How long `fake-slow` keeps everybody waiting.
+        intents: What an instruction asks for, by its text.
     """
 
     slow_s: float = 30.0
+    intents: Intents = knows_nothing
     _seen: set[str] = field(default_factory=set)
     _lock: Lock = field(default_factory=Lock)
 
@@ -57,23 +60,25 @@ def respond(request: ChatRequest, surroundings: Surroundings) -> Response:
     return behaviour(request, surroundings)
 
 
-def good_answer(request: ChatRequest) -> str:
+def good_answer(request: ChatRequest, surroundings: Surroundings) -> str:
     """A right answer in whatever role, or an honest one to what is not understood."""
-    return playing.GOOD.answer(request).text
+    return playing.GOOD.answer(request, surroundings.intents).text
 
 
 def _as(character: playing.Character) -> Behaviour:
-    def played(request: ChatRequest, _: Surroundings) -> Response:
-        return as_json(_completed(character, request))
+    def played(request: ChatRequest, surroundings: Surroundings) -> Response:
+        return as_json(_completed(character, request, surroundings))
 
     return played
 
 
-def _completed(character: playing.Character, request: ChatRequest) -> dict[str, object]:
+def _completed(
+    character: playing.Character, request: ChatRequest, surroundings: Surroundings
+) -> dict[str, object]:
     probed = probing.answer_to(request)
     if probed is not None:
         return completion(request, probed[0] or None, calls=probed[1])
-    said = character.answer(request)
+    said = character.answer(request, surroundings.intents)
     return completion(request, said.text or None, calls=said.calls)
 
 
@@ -86,12 +91,12 @@ def _no_vision(request: ChatRequest, surroundings: Surroundings) -> Response:
     return _good(request, surroundings)
 
 
-def _cuts_context(request: ChatRequest, _: Surroundings) -> Response:
+def _cuts_context(request: ChatRequest, surroundings: Surroundings) -> Response:
     """As servers do that keep to their window without a word: 200, and the front is gone."""
-    whole = _completed(playing.GOOD, request)
+    whole = _completed(playing.GOOD, request, surroundings)
     if prompt_tokens_of(request) <= probing.WINDOW_TOKENS:
         return as_json(whole)
-    cut = _completed(playing.GOOD, probing.cut_to_window(request))
+    cut = _completed(playing.GOOD, probing.cut_to_window(request), surroundings)
     window = probing.WINDOW_TOKENS
     usage = {"prompt_tokens": window, "completion_tokens": 9, "total_tokens": window + 9}
     return as_json(cut | {"usage": usage})
@@ -165,8 +170,9 @@ def _null_choices(request: ChatRequest, _: Surroundings) -> Response:
     return as_json(completion(request, "") | {"choices": None})
 
 
-def _no_usage(request: ChatRequest, _: Surroundings) -> Response:
-    return as_json(completion(request, good_answer(request), with_usage=False))
+def _no_usage(request: ChatRequest, surroundings: Surroundings) -> Response:
+    answer = good_answer(request, surroundings)
+    return as_json(completion(request, answer, with_usage=False))
 
 
 def _refuse(request: ChatRequest, _: Surroundings) -> Response:
@@ -182,8 +188,8 @@ def _prose(request: ChatRequest, _: Surroundings) -> Response:
     return as_json(completion(request, text))
 
 
-def _cut_off(request: ChatRequest, _: Surroundings) -> Response:
-    text = good_answer(request)
+def _cut_off(request: ChatRequest, surroundings: Surroundings) -> Response:
+    text = good_answer(request, surroundings)
     middle = text.find("```json") + len("```json") + 40
     return as_json(completion(request, text[:middle], finish_reason="length"))
 

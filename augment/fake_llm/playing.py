@@ -7,11 +7,11 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 from augment.baselines.rule_placer import place
-from augment.errors import InstructionNotUnderstood
+from augment.errors import CannotPlace
 from augment.fake_llm import answers, careless, judging, tool_use
 from augment.fake_llm.hearing import Heard, Part, heard
 from augment.fake_llm.requests import ChatRequest
-from augment.fake_llm.sight import NothingSeen, Task, list_of, task_of
+from augment.fake_llm.sight import Intents, NothingSeen, Task, knows_nothing, list_of, task_of
 from augment.scene.modification import Modification
 
 Calls = tuple[tuple[str, str], ...]
@@ -47,13 +47,13 @@ class Character:
     first_calls: Calls = ()
     never_stops: bool = False
 
-    def answer(self, request: ChatRequest) -> Said:
-        """What it says, from the request alone."""
+    def answer(self, request: ChatRequest, intents: Intents = knows_nothing) -> Said:
+        """What it says, from the request and the list of intents alone."""
         understood = heard(request)
         if understood.part is Part.VIEWER:
             return Said(text=judging.seen(request))
         try:
-            task = task_of(request.messages)
+            task = task_of(request.messages, intents)
         except NothingSeen:
             return Said(text=answers.SEES_NOTHING)
         match understood.part:
@@ -71,9 +71,9 @@ class Character:
         if self.first_calls and understood.may_call and not understood.called:
             return _calling(understood, self.first_calls)
         try:
-            right = place(task.scene, task.instruction).modification
-        except InstructionNotUnderstood as refused:
-            return Said(text=answers.declined(task, refused.reason))
+            right = place(task.scene, task.intent).modification
+        except CannotPlace as refused:
+            return Said(text=answers.declined(task, _why(task, refused)))
         made = self.bend(task, answers.renumbered(right, task.first_new), understood)
         wanted = tool_use.calls_for(task.scene, made)
         spared = len(self.first_calls)
@@ -83,6 +83,12 @@ class Character:
         made = tool_use.with_results(task.scene, made, results)
         text = answers.told(task, made, _summary(task))
         return Said(text=self.spoil(task, text, understood))
+
+
+def _why(task: Task, refusal: CannotPlace) -> str:
+    if task.intent is None:
+        return "I am a stand-in and read no English; this sentence is not on my list of intents."
+    return refusal.reason
 
 
 def _calling(understood: Heard, calls: Calls) -> Said:

@@ -11,6 +11,7 @@ from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from augment.fake_llm.models import MODELS, Surroundings, respond
 from augment.fake_llm.requests import BadRequest, chat_request
 from augment.fake_llm.responses import Response, as_json, error
+from augment.fake_llm.sight import Intents, knows_nothing
 
 _LONGEST_BODY = 32_000_000
 
@@ -22,6 +23,7 @@ class FakeServer(ThreadingHTTPServer):
         host, port: Where it listens; port 0 takes a free one.
         latency_s: How long every answer takes at least.
         slow_s: How long `fake-slow` takes.
+        intents: What an instruction asks for, by its text.
 
     Raises:
         OSError: The address is taken or is none of this computer's.
@@ -36,9 +38,10 @@ class FakeServer(ThreadingHTTPServer):
         *,
         latency_s: float = 0.0,
         slow_s: float = 30.0,
+        intents: Intents = knows_nothing,
     ) -> None:
         self.latency_s = latency_s
-        self.surroundings = Surroundings(slow_s=slow_s)
+        self.surroundings = Surroundings(slow_s=slow_s, intents=intents)
         self.stopping = threading.Event()
         super().__init__((host, port), _Handler)
 
@@ -57,14 +60,19 @@ class FakeServer(ThreadingHTTPServer):
 
 @contextmanager
 def running(
-    host: str = "127.0.0.1", port: int = 0, *, latency_s: float = 0.0, slow_s: float = 30.0
+    host: str = "127.0.0.1",
+    port: int = 0,
+    *,
+    latency_s: float = 0.0,
+    slow_s: float = 30.0,
+    intents: Intents = knows_nothing,
 ) -> Iterator[FakeServer]:
     """A server that serves in the background until the block ends.
 
     Raises:
         OSError: The address is taken or is none of this computer's.
     """
-    server = FakeServer(host, port, latency_s=latency_s, slow_s=slow_s)
+    server = FakeServer(host, port, latency_s=latency_s, slow_s=slow_s, intents=intents)
     thread = threading.Thread(target=server.serve_forever, args=(0.05,), daemon=True)
     thread.start()
     try:

@@ -1,6 +1,7 @@
 """What the stand-in sees: the scene and the wish, read back out of a request's messages.
 
-It knows nothing else: no database, no file, no list of scenarios.
+English it does not read: what the wish asks for it looks up by the wish's text, where it was
+given such a list. All else comes from the request alone.
 Frame: ego frame.
 """
 
@@ -9,7 +10,7 @@ from __future__ import annotations
 import json
 import math
 import re
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from typing import Any
@@ -32,10 +33,10 @@ from augment.scene.entities import (
     Origin,
     Scene,
     TrafficAgent,
-    TrafficLight,
     TrafficSide,
     TurnType,
 )
+from augment.scene.intent import Intent
 
 _USUAL_WIDTH_M = 3.5
 _FINE_M = 0.5
@@ -43,6 +44,20 @@ _SHORTEST_PIECE_M = 1.0
 _JOINT_M = 0.1
 
 Vectors = dict[str, list]  # type: ignore[type-arg]
+
+
+Intents = Callable[[str], Intent | None]
+"""What an instruction asks for, looked up by its text."""
+
+
+def knows_nothing(instruction: str) -> Intent | None:
+    """The list of who was given none."""
+    return None
+
+
+def same_text(instruction: str) -> str:
+    """An instruction as it is compared: prompts quote it line by line, without outer space."""
+    return " ".join(instruction.split())
 
 
 class NothingSeen(Exception):
@@ -56,15 +71,17 @@ class Task:
     Attributes:
         prompt: The text that it was read from.
         first_new: The number of the first new agent.
+        intent: What the instruction asks for, None where that is not known.
     """
 
     prompt: str
     scene: Scene
     instruction: str
     first_new: int
+    intent: Intent | None = None
 
 
-def task_of(messages: Sequence[SpokenMessage]) -> Task:
+def task_of(messages: Sequence[SpokenMessage], intents: Intents = knows_nothing) -> Task:
     """The task in the first message of a user that holds one.
 
     Raises:
@@ -73,42 +90,27 @@ def task_of(messages: Sequence[SpokenMessage]) -> Task:
     for message in messages:
         if message.role == "user" and "\nAgents:\n" in message.text:
             try:
-                return _task(message.text)
+                task = _task(message.text)
             except (ValueError, TypeError, KeyError, IndexError) as error:
                 raise NothingSeen(f"the scene can't be read ({type(error).__name__})") from None
+            return replace(task, intent=intents(task.instruction))
     raise NothingSeen("no message of a user holds a scene")
 
 
 def smooth(points_m: NDArray[np.float64]) -> Polyline:
-    """A curve through points (P, 2) a few metres apart, as a fine line.
+    """A curve through points (P, 2) a few metres apart, as a fine line."""
+    from scipy.interpolate import CubicSpline
 
-    Cubic pieces whose slope at each point is that of the parabola through it and its neighbours.
-    """
     points = np.asarray(points_m, dtype=np.float64)
     if len(points) > 2 and np.hypot(*(points[-1] - points[-2])) < _SHORTEST_PIECE_M:
         # The direction of a very short last piece is mostly rounding.
         points = np.delete(points, -2, axis=0)
     coarse = Polyline(points)
-    points, stations = coarse.points_m, coarse.stations_m
     if len(points) == 2:
         return coarse
-    h = np.diff(stations)[:, None]
-    slopes = np.diff(points, axis=0) / h
-    inner = (slopes[:-1] * h[1:] + slopes[1:] * h[:-1]) / (h[:-1] + h[1:])
-    ends = 2.0 * slopes[[0, -1]] - inner[[0, -1]]
-    tangents = np.vstack([ends[:1], inner, ends[1:]])
+    stations = coarse.stations_m
     at = np.unique(np.concatenate([np.arange(0.0, stations[-1], _FINE_M), stations]))
-    piece = np.clip(np.searchsorted(stations, at, side="right") - 1, 0, len(points) - 2)
-    t = ((at - stations[piece]) / h[piece, 0])[:, None]
-    start, end = points[piece], points[piece + 1]
-    leave, arrive = tangents[piece] * h[piece], tangents[piece + 1] * h[piece]
-    curve = (
-        (2 * t**3 - 3 * t**2 + 1) * start
-        + (t**3 - 2 * t**2 + t) * leave
-        + (3 * t**2 - 2 * t**3) * end
-        + (t**3 - t**2) * arrive
-    )
-    return Polyline(curve)
+    return Polyline(CubicSpline(stations, coarse.points_m)(at))
 
 
 @lru_cache(maxsize=64)
@@ -182,17 +184,16 @@ def agent_of(name: str, vector: Sequence[object]) -> TrafficAgent:
 
 
 def _lane(name: str, vector: Sequence[Any]) -> Lane:
-    _, _, _, width, limit, points = vector
+    _, _, _, width, _, points = vector
     return Lane(
         id=name,
         centerline=_line(points),
         width_m=float(str(width)),
-        speed_limit_mps=None if limit is None else float(str(limit)),
     )
 
 
 def _connector(name: str, vector: Sequence[Any], widths: dict[str, float]) -> LaneConnector:
-    before, after, light, turn, limit, points = vector
+    before, after, _, turn, _, points = vector
     ends = [None if end is None else str(end) for end in (before, after)]
     return LaneConnector(
         id=name,
@@ -201,9 +202,7 @@ def _connector(name: str, vector: Sequence[Any], widths: dict[str, float]) -> La
         centerline=_line(points),
         # The paper's table gives a connector no width; it is as wide as what it joins.
         width_m=next((widths[end] for end in ends if end in widths), _USUAL_WIDTH_M),
-        traffic_light=TrafficLight(str(light)),
         turn_type=TurnType(str(turn)),
-        speed_limit_mps=None if limit is None else float(str(limit)),
     )
 
 

@@ -8,6 +8,7 @@ from django.db import models
 from django.db.models import Q
 
 from augment.scene.catalogue import ScenarioType
+from augment.scene.intent import IntentOrigin
 
 SLUG_HELP = "lower-case letters, digits and hyphens"
 
@@ -31,7 +32,7 @@ class BaseScene(models.Model):
 
 
 class Scenario(models.Model):
-    """A scene, its type, the user's instruction and, if there is one, the reference."""
+    """A scene, its type, the user's instruction; its intent and reference if there are any."""
 
     class Type(models.TextChoices):
         CONSTRUCTION_ZONE = (
@@ -51,6 +52,14 @@ class Scenario(models.Model):
     reference = models.JSONField(
         null=True, blank=True, help_text="the human modification, in augment.scene.codec's format"
     )
+    intent = models.JSONField(
+        null=True,
+        blank=True,
+        help_text="what the instruction asks for, in augment.scene.intent_codec's format",
+    )
+    intent_origin = models.CharField(
+        max_length=10, choices=[(one.value, one.value) for one in IntentOrigin], blank=True
+    )
     keep_traffic = models.BooleanField(
         default=False, help_text="keep the recorded traffic; interPlan clears it"
     )
@@ -66,6 +75,14 @@ class Scenario(models.Model):
             models.CheckConstraint(
                 name="scenario_type_is_known",
                 condition=Q(type__in=[member.value for member in ScenarioType]),
+            ),
+            models.CheckConstraint(
+                name="scenario_intent_has_an_origin",
+                condition=Q(intent__isnull=True, intent_origin="")
+                | Q(
+                    intent__isnull=False,
+                    intent_origin__in=[member.value for member in IntentOrigin],
+                ),
             ),
         )
 

@@ -5,21 +5,23 @@ The document carries the modification document of the reference, so one file is 
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Annotated, Any
+from typing import Annotated, Any, TypeVar
 
 from pydantic import Field, Strict
 
 from augment.errors import InvalidDocument
 from augment.scene.catalogue import ScenarioType
-from augment.scene.claims import Claim, ClaimKind
 from augment.scene.codec import modification_from_document, modification_to_document
-from augment.scene.entities import AgentType
+from augment.scene.intent import Intent
+from augment.scene.intent_codec import intent_from_document, intent_to_document
 from augment.scene.modification import Modification
 from augment.scene.schema import VERSION, Document, read
 
 SCENARIO_FORMAT = "scenario-arena/scenario"
 
+Parsed = TypeVar("Parsed")
 Text = Annotated[str, Field(min_length=1, pattern=r"\S")]
 
 
@@ -32,7 +34,7 @@ class CatalogueEntry:
         instruction: What is to be changed, in the user's words.
         keep_traffic: Whether the recorded traffic stays in the scene.
         notes: What a reader of the catalogue should know; may be empty.
-        claims: What the instruction says about the reference; may be empty.
+        intent: What the instruction asks for; None where nobody has written it down.
     """
 
     slug: str
@@ -43,16 +45,7 @@ class CatalogueEntry:
     provenance: str
     notes: str
     reference: Modification
-    claims: tuple[Claim, ...] = ()
-
-
-class ClaimDocument(Document):
-    """A `Claim`."""
-
-    kind: Annotated[ClaimKind, Strict(False)]
-    value: float
-    agents: Annotated[list[Text], Field(fail_fast=True)] = []
-    type: Annotated[AgentType, Strict(False)] | None = None
+    intent: Intent | None = None
 
 
 class EntryDocument(Document):
@@ -67,7 +60,7 @@ class EntryDocument(Document):
     keep_traffic: bool
     provenance: Text
     notes: str = ""
-    claims: Annotated[list[ClaimDocument], Field(fail_fast=True)] = []
+    intent: dict[str, Any] | None = None
     reference: dict[str, Any]
 
 
@@ -83,7 +76,7 @@ def entry_to_document(entry: CatalogueEntry) -> dict[str, Any]:
         "keep_traffic": entry.keep_traffic,
         "provenance": entry.provenance,
         "notes": entry.notes,
-        "claims": [_claim_to_document(claim) for claim in entry.claims],
+        "intent": None if entry.intent is None else intent_to_document(entry.intent),
         "reference": modification_to_document(entry.reference),
     }
 
@@ -94,13 +87,11 @@ def entry_from_document(document: object) -> CatalogueEntry:
     Raises:
         InvalidDocument: With the path and the reason of every fault.
     """
-    what = "scenario"
-    given = read(document, EntryDocument, what=what, format_name=SCENARIO_FORMAT)
-    try:
-        reference = modification_from_document(given.reference)
-    except InvalidDocument as fault:
-        problems = [(f"reference.{path}", text) for path, text in fault.problems]
-        raise InvalidDocument(what, problems) from None
+    given = read(document, EntryDocument, what="scenario", format_name=SCENARIO_FORMAT)
+    reference = _part("reference", modification_from_document, given.reference)
+    intent = None
+    if given.intent is not None:
+        intent = _part("intent", intent_from_document, given.intent)
     return CatalogueEntry(
         slug=given.slug,
         scene=given.scene,
@@ -110,17 +101,14 @@ def entry_from_document(document: object) -> CatalogueEntry:
         provenance=given.provenance,
         notes=given.notes,
         reference=reference,
-        claims=tuple(
-            Claim(kind=one.kind, value=one.value, agents=tuple(one.agents), type=one.type)
-            for one in given.claims
-        ),
+        intent=intent,
     )
 
 
-def _claim_to_document(claim: Claim) -> dict[str, Any]:
-    document: dict[str, Any] = {"kind": claim.kind.value}
-    if claim.agents:
-        document["agents"] = list(claim.agents)
-    if claim.type is not None:
-        document["type"] = claim.type.value
-    return {**document, "value": claim.value}
+def _part(name: str, parse: Callable[[object], Parsed], document: object) -> Parsed:
+    """A document within the entry's, its faults with their path in the whole."""
+    try:
+        return parse(document)
+    except InvalidDocument as fault:
+        problems = [(f"{name}.{path}", text) for path, text in fault.problems]
+        raise InvalidDocument("scenario", problems) from None

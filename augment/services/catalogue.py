@@ -24,6 +24,8 @@ from augment.scene.codec import (
     scene_to_document,
 )
 from augment.scene.entities import Scene
+from augment.scene.intent import IntentOrigin
+from augment.scene.intent_codec import intent_to_document
 from augment.scene.modification import without_traffic
 from augment.services.events import log_event
 from augment.services.scenes import add_scenario, check_reference, check_slug
@@ -185,6 +187,7 @@ def _store_scene(scene: Scene, actor: User | None) -> str:
 def _store_scenario(entry: CatalogueEntry, actor: User | None) -> str:
     row = Scenario.objects.filter(slug=entry.slug).select_related("base_scene").first()
     reference = modification_to_document(entry.reference)
+    intent = None if entry.intent is None else intent_to_document(entry.intent)
     if row is None:
         row = add_scenario(
             scene=entry.scene,
@@ -192,6 +195,8 @@ def _store_scenario(entry: CatalogueEntry, actor: User | None) -> str:
             instruction=entry.instruction,
             slug=entry.slug,
             reference=reference,
+            intent=intent,
+            intent_origin=IntentOrigin.AUTHORED,
             keep_traffic=entry.keep_traffic,
             actor=actor,
         )
@@ -209,14 +214,19 @@ def _store_scenario(entry: CatalogueEntry, actor: User | None) -> str:
         "instruction": entry.instruction.strip(),
         "reference": reference,
         "keep_traffic": entry.keep_traffic,
+        "intent": intent,
+        "intent_origin": "" if intent is None else IntentOrigin.AUTHORED.value,
     }
     changed = sorted(name for name, value in wanted.items() if getattr(row, name) != value)
     if not changed:
         return "keep"
-    _refuse_if_used(f"scenario {row.slug!r}", row.augmentations.all())
+    if row.intent is not None or set(changed) - {"intent", "intent_origin"}:
+        # An intent where there was none changes nothing that anybody was shown or asked.
+        _refuse_if_used(f"scenario {row.slug!r}", row.augmentations.all())
     for name, value in wanted.items():
         setattr(row, name, value)
-    row.original_image = ""
+    if set(changed) - {"intent", "intent_origin"}:
+        row.original_image = ""
     row.save(update_fields=[*wanted, "original_image"])
     _log(actor, "change", "scenario", row, slug=row.slug, changed=changed)
     return "change"

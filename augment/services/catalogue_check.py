@@ -1,4 +1,4 @@
-"""Whether the catalogue's references are what their instructions say, and can be shown.
+"""Whether the catalogue's references are what their intents ask for, and can be shown.
 
 Reads files, touches no rows.
 """
@@ -10,20 +10,20 @@ from collections import Counter
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
-from augment.checks import Ground, Severity
+from augment.checks import Ground
 from augment.checks.against_intent import judged
-from augment.checks.claims import broken
-from augment.checks.intent_claims import claims_of
-from augment.errors import InstructionNotUnderstood
+from augment.checks.tolerances import AUTHORED
 from augment.geometry.boxes import corners
 from augment.geometry.polyline import FloatArray
-from augment.instruction import parse
 from augment.render.camera import Camera, camera_for
 from augment.scene.catalogue_codec import CatalogueEntry
 from augment.scene.entities import Scene
+from augment.scene.intent_codec import intent_to_parts
+from augment.scene.intent_statements import list_statements
 from augment.scene.modification import without_traffic
 from augment.services.catalogue import read_catalogue
 
@@ -37,14 +37,12 @@ class ScenarioCheck:
     """What was found about one scenario.
 
     Attributes:
-        claims: How many statements of its author's were held against the reference.
-        understood: How many statements the grammar read, None where it refused the sentence.
+        statements: How many its intent makes; each is held against the reference.
         reasons: Why it is not as it should be; empty if all is well.
     """
 
     slug: str
-    claims: int
-    understood: int | None
+    statements: int
     reasons: tuple[str, ...]
 
 
@@ -57,7 +55,7 @@ class CatalogueCheck:
 
 
 def check_catalogue(*, folder: Path) -> CatalogueCheck:
-    """Hold every reference against the geometric checks, its sentence and its picture.
+    """Hold every reference against the geometric checks, its intent and its picture.
 
     Args:
         folder: Holds `scenes` and `scenarios`.
@@ -73,39 +71,37 @@ def check_catalogue(*, folder: Path) -> CatalogueCheck:
 def _check(whole: Scene, entry: CatalogueEntry) -> ScenarioCheck:
     scene = whole if entry.keep_traffic else without_traffic(whole)
     ground = Ground.of(scene)
-    try:
-        intent = parse(entry.instruction)
-    except InstructionNotUnderstood:
-        intent = None  # its author's claims alone count then
+    if entry.intent is None:
+        return ScenarioCheck(slug=entry.slug, statements=0, reasons=("it has no intent",))
     reasons = [
         f"{one.severity}: {one.sentence()}"
-        for one in judged(ground, entry.reference, intent)
-        # What is doubtful may be what was asked for, where nobody knows what that is.
-        if one.severity is Severity.WRONG or (one.is_fault and intent is not None)
+        for one in judged(ground, entry.reference, entry.intent, AUTHORED)
+        if one.is_fault
     ]
-    reasons += [str(one) for one in broken(ground, entry.reference, entry.claims)]
-    reasons += [*_unclaimed(entry), *_unseen(scene, entry)]
-    understood = None
-    if intent is not None:
-        read = claims_of(intent, entry.reference, scene.traffic_side)
-        understood = len(read)
-        reasons += [
-            f"read from the sentence: {one}" for one in broken(ground, entry.reference, read)
-        ]
     return ScenarioCheck(
         slug=entry.slug,
-        claims=len(entry.claims),
-        understood=understood,
-        reasons=tuple(reasons),
+        statements=len(list_statements(entry.intent)),
+        reasons=(*reasons, *_unheld(entry), *_unseen(scene, entry)),
     )
 
 
-def _unclaimed(entry: CatalogueEntry) -> Iterator[str]:
-    """Numbers of the sentence that no claim holds."""
-    held = {abs(claim.value) for claim in entry.claims}
+def _unheld(entry: CatalogueEntry) -> Iterator[str]:
+    """Numbers of the sentence that its intent does not hold."""
+    assert entry.intent is not None
+    held = set(_numbers_in(intent_to_parts(entry.intent)))
     for number in dict.fromkeys(_NUMBER.findall(entry.instruction)):
         if float(number) not in held:
-            yield f"the instruction says {number}, and no claim does"
+            yield f"the instruction says {number}, and its intent does not"
+
+
+def _numbers_in(part: Any) -> Iterator[float]:
+    if isinstance(part, dict):
+        part = list(part.values())
+    if isinstance(part, list):
+        for one in part:
+            yield from _numbers_in(one)
+    elif isinstance(part, (int, float)) and not isinstance(part, bool):
+        yield abs(float(part))
 
 
 def _unseen(scene: Scene, entry: CatalogueEntry) -> Iterator[str]:

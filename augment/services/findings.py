@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from augment.checks import Finding, Severity
 from augment.errors import InvalidDocument, InvalidModification
 from augment.models import Augmentation
-from augment.services.judging import findings_of, intent_of
+from augment.services.judging import findings_of
 from augment.services.marked_pictures import is_drawn, marked_name, numbered
 
 
@@ -34,7 +34,7 @@ class Checked:
 
     Attributes:
         problem: Why nothing could be checked, empty where it was.
-        is_against_intent: Whether the instruction was understood and held against it.
+        is_against_intent: Whether the scenario has an intent that it was held against.
         picture: The name of the picture that shows the faults by their numbers, empty without.
         is_drawn: Whether that picture is there.
     """
@@ -68,7 +68,7 @@ def checked(row: Augmentation) -> Checked | None:
     name = marked_name(row, found)
     return Checked(
         lines=tuple(_line(one) for one in (*numbered(found), *facts)),
-        is_against_intent=intent_of(row.scenario) is not None,
+        is_against_intent=row.scenario.intent is not None,
         picture=name,
         is_drawn=is_drawn(name),
     )

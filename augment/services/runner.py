@@ -15,9 +15,9 @@ from augment.baselines import quantised, rule_placer, simulated
 from augment.errors import (
     AugmentError,
     BudgetSpent,
+    CannotPlace,
     ClaimLost,
     DatabaseLocked,
-    InstructionNotUnderstood,
     InvalidModification,
     JobCancelled,
     ModelFault,
@@ -34,7 +34,7 @@ from augment.services.endpoint_client import EndpointClient
 from augment.services.holding import OutcomeOnCrash, heartbeat
 from augment.services.pictures import original_picture, picture_of
 from augment.services.roles import seats_of
-from augment.services.scenes import reference_of, scene_of
+from augment.services.scenes import intent_of, reference_of, scene_of
 from augment.services.seeds import seed_of
 from augment.services.transcripts import RowTranscript, sentence_of
 from augment.services.treatments import Treatment, treatment_of
@@ -211,25 +211,12 @@ def _from_reference(row: Augmentation) -> Answer:
 
 
 def _from_placer(row: Augmentation, place: Callable[..., Placed], scene: Scene) -> Answer:
-    """What a contestant that asks nobody makes of the instruction, or why it refuses."""
+    """What a contestant that asks nobody makes of the intent, or why it refuses."""
     try:
-        placed = place(scene, row.scenario.instruction, seed=seed_of(row.scenario.slug))
-    except InstructionNotUnderstood as refusal:
-        notes = _how_read(refusal.understood, refusal.ignored)
-        return Answer(state=State.REFUSED, reason=refusal.reason, notes=notes)
-    notes = placed.notes
-    if isinstance(placed, rule_placer.Placement):
-        notes = f"{notes}\n{_how_read(placed.understood, placed.not_understood)}"
-    return Answer(state=State.DONE, modification=placed.modification, notes=notes)
-
-
-def _how_read(understood: tuple[str, ...], unread: tuple[str, ...]) -> str:
-    """What was understood of an instruction and what was not, a line each."""
-    parts = {"Understood": understood, "Not understood": unread}
-    return "\n".join(
-        f"{title}: {', '.join(f'“{words}”' for words in read) or 'nothing'}."
-        for title, read in parts.items()
-    )
+        placed = place(scene, intent_of(row.scenario), seed=seed_of(row.scenario.slug))
+    except CannotPlace as refusal:
+        return Answer(state=State.REFUSED, reason=refusal.reason)
+    return Answer(state=State.DONE, modification=placed.modification, notes=placed.notes)
 
 
 def _from_errors(

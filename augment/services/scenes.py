@@ -22,6 +22,8 @@ from augment.scene.codec import (
     scene_to_document,
 )
 from augment.scene.entities import Scene
+from augment.scene.intent import Intent, IntentOrigin
+from augment.scene.intent_codec import intent_from_document, intent_to_document
 from augment.scene.lane_graph import LaneGraph
 from augment.scene.modification import Modification, check_fits, without_traffic
 from augment.scene.recording import Recording
@@ -86,10 +88,12 @@ def add_scenario(
     instruction: str,
     slug: str | None = None,
     reference: dict[str, Any] | None = None,
+    intent: dict[str, Any] | None = None,
+    intent_origin: IntentOrigin = IntentOrigin.ENTERED,
     keep_traffic: bool = False,
     actor: User | None = None,
 ) -> Scenario:
-    """Keep an instruction for a scene, with the reference modification if there is one.
+    """Keep an instruction for a scene, with its intent and reference if there are any.
 
     Args:
         scene: The slug of a stored scene.
@@ -97,12 +101,14 @@ def add_scenario(
         instruction: What is to be changed, in the user's words.
         slug: The scenario's name; made from the scene's and the type's when None.
         reference: A modification document that fits the scene.
+        intent: An intent document: what the instruction asks for.
+        intent_origin: Where that comes from.
         keep_traffic: Whether the recorded traffic stays in the scene.
         actor: Who did it.
 
     Raises:
         UnknownName: No such scene or type.
-        InvalidDocument: The slug, the instruction or the reference breaks its format.
+        InvalidDocument: The slug, the instruction, the intent or the reference breaks its format.
         InvalidModification: The reference does not fit the scene.
         Conflict: The slug is taken.
     """
@@ -122,19 +128,36 @@ def add_scenario(
         keep_traffic=keep_traffic,
     )
     if reference is not None:
-        modification = modification_from_document(reference)
-        check_reference(scene_of(scenario), modification)
-        scenario.reference = modification_to_document(modification)
+        _set_reference(scenario, reference)
+    if intent is not None:
+        scenario.intent = intent_to_document(intent_from_document(intent))
+        scenario.intent_origin = intent_origin
     _insert(scenario)
-    after = {"slug": slug, "scene": base_scene.slug, "type": kind.value}
+    _log_addition(scenario, actor)
+    return scenario
+
+
+def _log_addition(scenario: Scenario, actor: User | None) -> None:
     log_event(
         actor=actor,
         verb="add",
         object_kind="scenario",
         object_code=scenario.code,
-        after=after | {"has_reference": reference is not None, "keep_traffic": keep_traffic},
+        after={
+            "slug": scenario.slug,
+            "scene": scenario.base_scene.slug,
+            "type": scenario.type,
+            "has_reference": scenario.reference is not None,
+            "keep_traffic": scenario.keep_traffic,
+            "intent": scenario.intent_origin or None,
+        },
     )
-    return scenario
+
+
+def _set_reference(scenario: Scenario, reference: dict[str, Any]) -> None:
+    modification = modification_from_document(reference)
+    check_reference(scene_of(scenario), modification)
+    scenario.reference = modification_to_document(modification)
 
 
 def _insert(scenario: Scenario) -> None:
@@ -158,6 +181,11 @@ def reference_of(scenario: Scenario) -> Modification | None:
     if scenario.reference is None:
         return None
     return modification_from_document(scenario.reference)
+
+
+def intent_of(scenario: Scenario) -> Intent | None:
+    """What the instruction asks for, None where nobody has written it down."""
+    return None if scenario.intent is None else intent_from_document(scenario.intent)
 
 
 def check_reference(scene: Scene, modification: Modification) -> None:

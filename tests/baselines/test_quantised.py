@@ -15,13 +15,15 @@ from hypothesis import strategies as st
 from augment.baselines import quantised, rule_placer
 from augment.baselines.quantised import allowed_by, places_of
 from augment.baselines.quantised_code import Action, Code, Direction, Quadrant, code_of
-from augment.errors import InstructionNotUnderstood
+from augment.errors import CannotPlace
 from augment.scene.entities import AgentType, TrafficAgent
+from augment.scene.intent import Intent, Shape, Side
 from tests.benchmarks.displacement import PLACERS, made, measured
 from tests.fixtures.shelf import SLUGS
+from tests.intents import cones, parked, walk
 from tests.scenes import scene as street
 
-PARKED = "Park a car in the ego's lane 22 m ahead of the ego."
+PARKED = parked(22.0)
 SEEDS = 2
 
 
@@ -117,15 +119,15 @@ def test_the_seed_alone_decides_where() -> None:
 
 
 @pytest.mark.parametrize(
-    ("wish", "named"),
+    ("intent", "named"),
     [
-        ("Add a pedestrian crossing from the left 15 m in front of the ego.", "pedestrians"),
-        ("Set up a construction zone with 6 cones 20 m ahead in the ego's lane.", "cones"),
+        (walk(15.0, Side.LEFT), "pedestrians"),
+        (cones(20.0, 6, Shape.TAPER), "cones"),
     ],
 )
-def test_what_is_no_vehicle_is_refused_by_name(wish: str, named: str) -> None:
-    with pytest.raises(InstructionNotUnderstood, match=f"vehicles alone, and {named} are asked"):
-        quantised.place(street(), wish, bin_m=5.0)
+def test_what_is_no_vehicle_is_refused_by_name(intent: Intent, named: str) -> None:
+    with pytest.raises(CannotPlace, match=f"vehicles alone, and {named} are asked"):
+        quantised.place(street(), intent, bin_m=5.0)
 
 
 def test_what_has_no_place_gives_up_side_and_direction_before_the_distance() -> None:
@@ -138,7 +140,7 @@ def test_what_has_no_place_gives_up_side_and_direction_before_the_distance() -> 
 
 
 def test_on_an_empty_map_it_refuses() -> None:
-    with pytest.raises(InstructionNotUnderstood):
+    with pytest.raises(CannotPlace):
         quantised.place(street(lanes=()), PARKED, bin_m=5.0)
 
 

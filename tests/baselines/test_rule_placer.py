@@ -1,4 +1,4 @@
-"""Where the rule placer puts what a sentence asks for."""
+"""Where the rule placer puts what an intent asks for."""
 
 from __future__ import annotations
 
@@ -9,11 +9,37 @@ from dataclasses import replace
 import pytest
 
 from augment.baselines.rule_placer import place
-from augment.errors import InstructionNotUnderstood
+from augment.errors import CannotPlace
 from augment.geometry.polyline import Polyline
 from augment.scene.entities import AgentType, Lane, Scene, TrafficSide
-from tests.baselines.placing import PARKED, added, refusal
-from tests.instruction.test_parse import PAPER
+from augment.scene.intent import (
+    Body,
+    Intent,
+    LaneChoice,
+    Lateral,
+    LateralTarget,
+    Nearness,
+    Relation,
+    Setting,
+    Shape,
+    Side,
+    Spot,
+    VehicleRequest,
+    WalkRequest,
+)
+from tests.baselines.placing import added, refusal
+from tests.intents import (
+    LEFT_EDGE,
+    PAPER,
+    RIGHT_EDGE,
+    cones,
+    crash,
+    metres,
+    parked,
+    spot,
+    towards,
+    walk,
+)
 from tests.scenes import curve, junction, scene, vehicle
 
 
@@ -34,14 +60,14 @@ def three_lanes(side: TrafficSide = TrafficSide.LEFT) -> Scene:
 
 
 def test_on_a_straight_lane_it_stands_exactly_where_it_was_asked_for() -> None:
-    (car,) = added(scene(), PARKED)
+    (car,) = added(scene(), parked())
     assert (car.x_m, car.y_m, car.heading_rad) == (21.4, 0.0, 0.0)
     assert (car.id, car.type, car.lane_id) == ("Agent2", AgentType.VEHICLE, "Lane1")
     assert (car.length_m, car.width_m, car.speed_mps) == (4.8, 2.0, 0.0)
 
 
 def test_on_a_curve_the_distance_runs_along_the_arc() -> None:
-    (car,) = added(curve(40.0), PARKED)
+    (car,) = added(curve(40.0), parked())
     angle = (21.4 - 10.0) / 40.0
     assert car.x_m == pytest.approx(10.0 + 40.0 * math.sin(angle), abs=0.01)
     assert car.y_m == pytest.approx(40.0 * (1.0 - math.cos(angle)), abs=0.01)
@@ -49,8 +75,8 @@ def test_on_a_curve_the_distance_runs_along_the_arc() -> None:
 
 
 def test_across_a_junction_it_goes_straight_on() -> None:
-    (on_connector,) = added(junction(), "a parked car 30 m ahead of the ego")
-    (beyond,) = added(junction(), "a parked car 45 m ahead of the ego")
+    (on_connector,) = added(junction(), parked(30.0))
+    (beyond,) = added(junction(), parked(45.0))
     assert (on_connector.x_m, on_connector.y_m, on_connector.lane_id) == (30.0, 0.0, "Connector1")
     assert (beyond.x_m, beyond.lane_id) == (45.0, "Lane2")
 
@@ -68,101 +94,154 @@ def test_the_same_seed_gives_the_same_placement() -> None:
 
 
 @pytest.mark.parametrize(
-    ("words", "y_m"),
+    ("lateral", "y_m"),
     [
-        ("slightly towards the left lane boundary", 0.75),
-        ("slightly towards the right lane boundary", -0.75),
-        ("offset 1.3 m from the lane centre towards the right lane boundary", -1.3),
-        ("close to the left lane boundary", 0.65),
-        ("at the kerb", -0.65),
-        ("slightly towards the centre line", 0.75),
-        ("partly on the shoulder", -1.75),
-        ("in the oncoming lane", 3.5),
-        ("in the oncoming lane, slightly towards the left lane boundary", 4.25),
+        (towards(LEFT_EDGE, how=Nearness.SLIGHTLY), 0.75),
+        (towards(RIGHT_EDGE, how=Nearness.SLIGHTLY), -0.75),
+        (towards(RIGHT_EDGE), -0.75),
+        (towards(RIGHT_EDGE, 1.3), -1.3),
+        (towards(LEFT_EDGE, how=Nearness.AT_EDGE), 0.65),
+        (towards(LateralTarget.KERB, how=Nearness.AT_EDGE), -0.65),
+        (towards(LateralTarget.CENTRE_LINE, how=Nearness.SLIGHTLY), 0.75),
+        (towards(LateralTarget.KERB, how=Nearness.HALF_OUT), -1.75),
     ],
 )
-def test_sides_are_those_of_the_ego_and_the_kerb_that_of_the_map(words: str, y_m: float) -> None:
-    (car,) = added(scene(), f"{PARKED}, {words}")
+def test_sides_are_those_of_the_ego_and_the_kerb_that_of_the_map(
+    lateral: Lateral, y_m: float
+) -> None:
+    (car,) = added(scene(), parked(lateral=lateral))
+    assert (car.x_m, car.y_m) == (21.4, y_m)
+
+
+@pytest.mark.parametrize(
+    ("lateral", "y_m"), [(None, 3.5), (towards(LEFT_EDGE, how=Nearness.SLIGHTLY), 4.25)]
+)
+def test_sides_in_the_oncoming_lane_are_those_of_the_ego(
+    lateral: Lateral | None, y_m: float
+) -> None:
+    (car,) = added(scene(), parked(lane=LaneChoice.ONCOMING, lateral=lateral))
     assert (car.x_m, car.y_m) == (21.4, y_m)
 
 
 def test_where_people_drive_on_the_left_the_kerb_is_on_the_left() -> None:
-    (car,) = added(scene(traffic_side=TrafficSide.LEFT), f"{PARKED}, at the kerb")
+    (car,) = added(
+        scene(traffic_side=TrafficSide.LEFT),
+        parked(lateral=towards(LateralTarget.KERB, how=Nearness.AT_EDGE)),
+    )
     assert car.y_m == 0.65
 
 
 def test_a_car_in_the_oncoming_lane_faces_as_its_lane_leads() -> None:
-    (car,) = added(scene(), "An oncoming car approaches at 10 m/s, 50 m ahead.")
+    (car,) = added(scene(), parked(50.0, lane=LaneChoice.ONCOMING, speed_mps=10.0))
     assert (car.x_m, car.y_m, car.lane_id, car.speed_mps) == (50.0, 3.5, "Lane2", 10.0)
     assert abs(car.heading_rad) == pytest.approx(math.pi, abs=1e-4)
 
 
-@pytest.mark.parametrize(("side", "y_m"), [("left", 3.0), ("right", -3.0)])
-def test_neighbouring_lanes_are_found_on_the_map(side: str, y_m: float) -> None:
-    (car,) = added(three_lanes(), f"{PARKED} in the {side} lane")
+@pytest.mark.parametrize(("side", "y_m"), [(LaneChoice.LEFT, 3.0), (LaneChoice.RIGHT, -3.0)])
+def test_neighbouring_lanes_are_found_on_the_map(side: LaneChoice, y_m: float) -> None:
+    (car,) = added(three_lanes(), parked(lane=side))
     assert (car.x_m, car.y_m) == (21.4, y_m)
 
 
 def test_a_distance_can_run_back() -> None:
-    (car,) = added(scene(), "a parked car 12 m behind the ego")
+    (car,) = added(scene(), parked(-12.0))
     assert car.x_m == -12.0
 
 
 def test_what_stands_in_the_way_is_avoided_by_a_small_shift() -> None:
     busy = scene(agents=(vehicle("Agent2", 16.4, 0.0),))
-    (car,) = added(busy, "a parked car about 21 m ahead of the ego")
+    (car,) = added(busy, parked(21.0, about=True))
     assert (car.id, car.x_m) == ("Agent3", 21.25)
 
 
 def test_a_place_that_is_taken_is_refused() -> None:
     busy = scene(agents=(vehicle("Agent2", 21.0, 0.0),))
-    assert "it would stand in Agent2" in refusal(busy, PARKED)
-    assert "in the ego" in refusal(scene(), "a parked car 2 m ahead of the ego")
+    assert "it would stand in Agent2" in refusal(busy, parked())
+    assert "in the ego" in refusal(scene(), parked(2.0))
 
 
 def test_ids_follow_the_highest_of_the_scene() -> None:
     busy = scene(agents=(vehicle("Agent9", 60.0, 0.0), vehicle("other", 70.0, 0.0)))
-    assert added(busy, PARKED)[0].id == "Agent10"
+    assert added(busy, parked())[0].id == "Agent10"
+
+
+def on_shoulder(target: LateralTarget) -> Lateral:
+    return Lateral(target=target, nearness=Nearness.HALF_OUT, on_shoulder=True)
 
 
 @pytest.mark.parametrize(
-    ("shown", "text", "reason"),
+    ("shown", "intent", "reason"),
     [
-        (scene(), "a parked car 160 m ahead of the ego", "The lanes end 100 m ahead of the ego"),
-        (scene(), "a parked car 60 m behind the ego", "The lanes end 50 m behind the ego"),
-        (scene(), f"{PARKED} in the left lane", "no lane on the left"),
-        (curve(), f"{PARKED} in the oncoming lane", "no oncoming lane"),
-        (scene(), f"{PARKED} on the left shoulder", "no shoulder on the left"),
-        (scene(), f"{PARKED}, shifted by 9 m to the left", "leaves the lane"),
-        (three_lanes(), f"{PARKED} partly on the shoulder", "another lane"),
-        (scene(lanes=()), PARKED, "stands on no lane"),
-        (scene(), "a taper of 30 cones 90 m ahead", "The lanes end"),
-        (scene(), "two crashed cars 30 m ahead in the intersection", "not in the intersection"),
+        (scene(), parked(160.0), "The lanes end 100 m ahead of the ego"),
+        (scene(), parked(-60.0), "The lanes end 50 m behind the ego"),
+        (scene(), parked(lane=LaneChoice.LEFT), "no lane on the left"),
+        (curve(), parked(lane=LaneChoice.ONCOMING), "no oncoming lane"),
+        (scene(), parked(lateral=on_shoulder(LEFT_EDGE)), "no shoulder on the left"),
+        (scene(), parked(lateral=towards(LEFT_EDGE, 9.0)), "leaves the lane"),
+        (three_lanes(), parked(lateral=on_shoulder(LateralTarget.KERB)), "another lane"),
+        (scene(lanes=()), parked(), "stands on no lane"),
+        (scene(), cones(90.0, 30, Shape.TAPER), "The lanes end"),
+        (scene(), crash(30.0, 2, settings=(Setting.IN_INTERSECTION,)), "not in the intersection"),
         (
             junction(),
-            "a jaywalker crosses from left to right 30 m ahead, before the intersection",
+            walk(30.0, Side.LEFT, Setting.BEFORE_INTERSECTION),
             "not before the intersection",
         ),
-        (scene(), "a taper of 5 cones 20 m ahead, 0.2 m apart", "stand in each other"),
+        (scene(), cones(20.0, 5, Shape.TAPER, spacing=metres(0.2)), "stand in each other"),
     ],
 )
-def test_what_the_map_has_no_room_for_is_refused(shown: Scene, text: str, reason: str) -> None:
+def test_what_the_map_has_no_room_for_is_refused(
+    shown: Scene, intent: Intent, reason: str
+) -> None:
     if shown.lanes == ():
         shown = replace(shown, ego=replace(shown.ego, lane_id=None))
-    assert reason in refusal(shown, text)
+    assert reason in refusal(shown, intent)
 
 
-def test_notes_say_what_was_placed_assumed_and_ignored() -> None:
-    placement = place(
-        scene(), "Park a car 24 m ahead of the ego, so that it can only be overtaken."
+def opened(intent: Intent, **parts: object) -> Intent:
+    (request,) = intent.requests
+    return Intent(requests=(replace(request, **parts),))  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize(
+    ("intent", "what"),
+    [
+        (opened(parked(), spot=Spot(lane=LaneChoice.OWN)), "the distance"),
+        (opened(parked(), speed_mps=None), "whether they stand or how fast they drive"),
+        (opened(parked(), count=None), "the count"),
+        (walk(18.0, None), "the side that they come from"),
+        (opened(cones(20.0, 5, Shape.RING), shape=None), "the shape"),
+        (opened(crash(20.0, 2), count=None), "the count"),
+    ],
+)
+def test_what_an_intent_leaves_open_is_never_guessed(intent: Intent, what: str) -> None:
+    assert f"leaves open {what}" in refusal(scene(), intent)
+
+
+def test_without_an_intent_there_is_nothing_to_place() -> None:
+    with pytest.raises(CannotPlace, match="The scenario has no intent"):
+        place(scene(), None)
+
+
+def test_a_distance_from_another_object_runs_from_where_that_one_is() -> None:
+    bus = VehicleRequest(spot=spot(20.0), name="bus", body=Body.BUS, count=1, speed_mps=0.0)
+    walker = WalkRequest(
+        spot=Spot(distance=metres(6.0), relation=Relation.AHEAD, anchor="bus"),
+        start=Side.LEFT,
+        count=1,
     )
-    assert placement.notes == (
+    _, crossing = added(scene(), Intent(requests=(bus, walker)))
+    assert crossing.x_m == 26.0
+
+
+def test_notes_say_what_was_placed_by_convention_and_not_at_all() -> None:
+    intent = replace(opened(parked(24.0), spot=spot(24.0, lane=None)), beyond=("a red one",))
+    assert place(scene(), intent).notes == (
         "A car, standing, 24.0 m ahead of the ego along its lane, in the ego's lane, on the lane "
-        "centre. Not said, so assumed: in the ego's lane; in the middle of the lane. Read, but "
-        "placing nothing: “so that it can only be overtaken”."
+        "centre. Left open, so by convention: in the ego's lane; in the middle of the lane; "
+        "facing as the lane leads. Asked for beyond the intent's fields, and not placed: “a red "
+        "one”."
     )
-    assert placement.ignored == ("so that it can only be overtaken",)
-    assert placement.understood == ("Park", "a car", "24 m ahead of the ego")
 
 
 def test_notes_tell_drawn_and_moved_numbers() -> None:
@@ -170,11 +249,5 @@ def test_notes_tell_drawn_and_moved_numbers() -> None:
     (car,) = drawn.modification.added
     assert f"{car.y_m:.2f} m (drawn from 0 to 1.5 m) from the lane centre" in drawn.notes
     busy = scene(agents=(vehicle("Agent2", 16.4, 0.0),))
-    moved = place(busy, "a parked car about 21 m ahead of the ego")
+    moved = place(busy, parked(21.0, about=True))
     assert "21.2 m ahead of the ego along its lane (moved from 21 m, where it had" in moved.notes
-
-
-def test_a_refusal_on_the_map_still_tells_what_was_read() -> None:
-    with pytest.raises(InstructionNotUnderstood) as refused:
-        place(scene(), "a parked car 160 m ahead of the ego")
-    assert refused.value.understood == ("a parked car", "160 m ahead of the ego")

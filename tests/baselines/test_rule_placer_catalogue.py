@@ -1,7 +1,4 @@
-"""The rule placer on the sentences of the committed catalogue.
-
-Some sentences were written with the grammar in sight, so this shows
-that nothing broke, not how well it reads free text: docs/catalogue.md has that number."""
+"""The rule placer on the authored intents of the committed catalogue."""
 
 from __future__ import annotations
 
@@ -12,7 +9,6 @@ import pytest
 from augment.baselines.rule_placer import Placement, place
 from augment.checks import Ground, Severity
 from augment.checks.against_intent import judged
-from augment.instruction import parse
 from augment.scene.catalogue import ScenarioType
 from augment.scene.entities import AgentType, TrafficAgent
 from augment.scene.modification import apply
@@ -25,8 +21,8 @@ def of_type(agents: tuple[TrafficAgent, ...], kind: AgentType) -> list[TrafficAg
 
 @cache
 def placed(slug: str) -> Placement:
-    """What the rules make of a scenario, worked out once."""
-    return place(shown_scene(slug), entry(slug).instruction)
+    """What the rule placer makes of a scenario, worked out once."""
+    return place(shown_scene(slug), entry(slug).intent)
 
 
 def test_every_scenario_of_the_catalogue_is_placed() -> None:
@@ -35,14 +31,13 @@ def test_every_scenario_of_the_catalogue_is_placed() -> None:
 
 @pytest.mark.parametrize("slug", SLUGS)
 def test_the_checks_find_nothing_in_a_placement(slug: str) -> None:
-    entry_ = entry(slug)
     scene = shown_scene(slug)
-    found = judged(Ground.of(scene), placed(slug).modification, parse(entry_.instruction))
+    found = judged(Ground.of(scene), placed(slug).modification, entry(slug).intent)
     assert [one.sentence() for one in found if one.severity is not Severity.FACT] == []
 
 
 @pytest.mark.parametrize("slug", SLUGS)
-def test_what_is_understood_is_placed_beside_its_reference(slug: str) -> None:
+def test_what_is_asked_for_is_placed_beside_its_reference(slug: str) -> None:
     reference = entry(slug).reference
     assert reference is not None
     placement = placed(slug)
@@ -53,7 +48,7 @@ def test_what_is_understood_is_placed_beside_its_reference(slug: str) -> None:
         pairs = zip(of_type(made, kind), of_type(reference.added, kind), strict=True)
         for number, (agent, wanted) in enumerate(pairs):
             if number > 0 and entry(slug).type is ScenarioType.ACCIDENT_SITE:
-                continue  # the sentence leaves open where the others stand
+                continue  # the intent leaves open where the others stand
             here, there = measure_agent(slug, agent), measure_agent(slug, wanted)
             assert here.ahead_m == pytest.approx(there.ahead_m, abs=1.5)
             assert here.left_m == pytest.approx(there.left_m, abs=1.5)

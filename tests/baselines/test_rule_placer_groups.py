@@ -11,21 +11,23 @@ import pytest
 from augment.geometry.boxes import Box, overlap
 from augment.geometry.polyline import Polyline
 from augment.scene.entities import AgentType, Area, AreaKind, Lane
+from augment.scene.intent import CrashedCar, Setting, Shape, Side
 from tests.baselines.placing import added, refusal
+from tests.intents import LEFT_EDGE, cones, crash, metres, towards, walk
 from tests.scenes import curve, scene
 
 
 @pytest.mark.parametrize(
-    ("text", "start", "end", "heading_rad"),
+    ("side", "start", "end", "heading_rad"),
     [
-        ("from right to left", (18.0, -2.25), (18.0, 5.75), math.pi / 2),
-        ("from left to right", (18.0, 5.75), (18.0, -2.25), -math.pi / 2),
+        (Side.RIGHT, (18.0, -2.25), (18.0, 5.75), math.pi / 2),
+        (Side.LEFT, (18.0, 5.75), (18.0, -2.25), -math.pi / 2),
     ],
 )
 def test_a_pedestrian_crosses_from_edge_to_edge(
-    text: str, start: tuple[float, float], end: tuple[float, float], heading_rad: float
+    side: Side, start: tuple[float, float], end: tuple[float, float], heading_rad: float
 ) -> None:
-    (walker,) = added(scene(), f"a pedestrian crosses the road {text}, 18 m ahead of the ego")
+    (walker,) = added(scene(), walk(18.0, side))
     assert walker.type is AgentType.PEDESTRIAN
     assert walker.walk_to_m is not None
     assert (walker.x_m, walker.y_m) == pytest.approx(start, abs=0.26)
@@ -35,7 +37,7 @@ def test_a_pedestrian_crosses_from_edge_to_edge(
 
 
 def test_a_walk_over_a_narrow_road_is_seven_metres_long() -> None:
-    (walker,) = added(curve(), "a jaywalker crosses from left to right 5 m ahead")
+    (walker,) = added(curve(), walk(5.0, Side.LEFT))
     assert walker.walk_to_m is not None
     assert math.dist((walker.x_m, walker.y_m), walker.walk_to_m) == pytest.approx(7.0, abs=0.01)
 
@@ -49,7 +51,7 @@ def test_a_walk_ends_at_the_egos_road_where_a_side_road_opens() -> None:
     side_road = Lane(id="Side", centerline=Polyline([(18.0, 60.0), (18.0, 5.0)]), width_m=3.5)
     road = scene()
     opened = scene(lanes=(*road.lanes, side_road), areas=(road.areas[0], road.areas[1], mouth))
-    (walker,) = added(opened, "a jaywalker crosses from right to left 18 m ahead of the ego")
+    (walker,) = added(opened, walk(18.0, Side.RIGHT))
     assert walker.walk_to_m == pytest.approx((18.0, 5.75), abs=0.26)
 
 
@@ -60,50 +62,47 @@ def test_a_parking_lane_belongs_to_the_road() -> None:
         boundary_m=((-50.0, -4.0), (100.0, -4.0), (100.0, -1.75), (-50.0, -1.75)),
     )
     wide = scene(areas=(scene().areas[0], parking))
-    (walker,) = added(wide, "a jaywalker crosses from right to left 18 m ahead of the ego")
+    (walker,) = added(wide, walk(18.0, Side.RIGHT))
     assert walker.y_m == pytest.approx(-4.5, abs=0.26)
 
 
 def test_pedestrians_walk_side_by_side() -> None:
-    walkers = added(scene(), "three pedestrians cross from left to right 18 m ahead")
+    walkers = added(scene(), walk(18.0, Side.LEFT, count=3))
     assert [walker.x_m for walker in walkers] == [18.0, 19.2, 20.4]
     assert [walker.id for walker in walkers] == ["Agent2", "Agent3", "Agent4"]
 
 
 def test_a_taper_closes_the_lane_and_a_worker_stands_behind_it() -> None:
-    *cones, worker = added(
+    *line, worker = added(
         scene(),
-        "Add a construction zone: a taper of 6 traffic cones, 2.5 m apart, from the left lane "
-        "boundary towards the right one, the first cone 20 m ahead of the ego.",
+        cones(20.0, 6, Shape.TAPER, spacing=metres(2.5), start=Side.LEFT, has_worker=True),
     )
-    gaps = [math.dist((a.x_m, a.y_m), (b.x_m, b.y_m)) for a, b in itertools.pairwise(cones)]
+    gaps = [math.dist((a.x_m, a.y_m), (b.x_m, b.y_m)) for a, b in itertools.pairwise(line)]
     assert gaps == pytest.approx([2.5] * 5, abs=0.01)
-    assert (cones[0].x_m, cones[0].y_m, cones[-1].y_m) == (20.0, 1.5, -1.5)
+    assert (line[0].x_m, line[0].y_m, line[-1].y_m) == (20.0, 1.5, -1.5)
     assert worker.type is AgentType.PEDESTRIAN
     assert worker.walk_to_m is None
-    assert 0.8 < min(math.dist((worker.x_m, worker.y_m), (c.x_m, c.y_m)) for c in cones) < 4.0
+    assert 0.8 < min(math.dist((worker.x_m, worker.y_m), (c.x_m, c.y_m)) for c in line) < 4.0
 
 
 def test_a_line_of_cones_follows_a_curved_boundary() -> None:
-    cones = added(
-        curve(40.0), "a line of 4 cones along the left lane boundary, starting 20 m ahead"
-    )
-    radii = [math.hypot(c.x_m - 10.0, c.y_m - 40.0) for c in cones]
+    line = added(curve(40.0), cones(20.0, 4, Shape.LINE, lateral=towards(LEFT_EDGE)))
+    radii = [math.hypot(c.x_m - 10.0, c.y_m - 40.0) for c in line]
     assert radii == pytest.approx([38.5] * 4, abs=0.02)
 
 
 @pytest.mark.parametrize(("count", "apart_m"), [(3, 1.5), (8, 2.5), (7, 2.0)])
 def test_a_ring_stays_in_its_lane_and_closes(count: int, apart_m: float) -> None:
-    cones = added(scene(), f"a ring of {count} cones 25 m ahead, {apart_m} m apart")
-    assert max(abs(c.y_m) for c in cones) <= 1.75
-    points = np.array([(c.x_m, c.y_m) for c in cones])
+    ring = added(scene(), cones(25.0, count, Shape.RING, spacing=metres(apart_m)))
+    assert max(abs(c.y_m) for c in ring) <= 1.75
+    points = np.array([(c.x_m, c.y_m) for c in ring])
     gaps = np.hypot(*(points - np.roll(points, 1, axis=0)).T)
     assert gaps == pytest.approx(apart_m, abs=0.51)
 
 
 @pytest.mark.parametrize("count", [2, 3, 4])
 def test_crashed_cars_touch_at_most_and_leave_little_room(count: int) -> None:
-    cars = added(scene(), f"an accident of {count} cars, the nearest one 25 m ahead of the ego")
+    cars = added(scene(), crash(25.0, count))
     boxes = [Box(pose=car.pose, length_m=car.length_m, width_m=car.width_m) for car in cars]
     assert len(cars) == count
     assert cars[0].x_m == 25.0
@@ -114,7 +113,7 @@ def test_crashed_cars_touch_at_most_and_leave_little_room(count: int) -> None:
 
 
 def test_an_accidents_angle_is_the_one_asked_for() -> None:
-    a, b = added(scene(), "two crashed cars 25 m ahead at an angle of 80 degrees")
+    a, b = added(scene(), crash(25.0, 2, CrashedCar(turn_deg=80.0)))
     assert math.degrees(b.heading_rad - a.heading_rad) == pytest.approx(80.0, abs=0.01)
 
 
@@ -125,6 +124,6 @@ def test_away_from_the_crosswalk_is_checked_along_the_whole_walk() -> None:
         boundary_m=((17.0, 2.0), (19.0, 2.0), (19.0, 4.0), (17.0, 4.0)),
     )
     marked = scene(areas=(*scene().areas, crosswalk))
-    text = "a jaywalker crosses from right to left {} m ahead, away from the crosswalk"
-    assert "away from the crosswalk" in refusal(marked, text.format(18))
-    assert len(added(marked, text.format(24))) == 1
+    near, further = (walk(at_m, Side.RIGHT, Setting.OFF_CROSSWALK) for at_m in (18.0, 24.0))
+    assert "away from the crosswalk" in refusal(marked, near)
+    assert len(added(marked, further)) == 1

@@ -8,7 +8,7 @@ from augment.baselines.rule_placer import place
 from augment.geometry.angles import difference
 from augment.scene.lane_graph import LaneGraph
 from augment.scene.modification import apply, without_traffic
-from tests.instruction.test_parse import PAPER
+from tests.intents import PAPER
 from tests.recorded import recorded
 
 pytestmark = pytest.mark.realdata

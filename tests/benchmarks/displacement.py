@@ -11,7 +11,7 @@ from functools import partial
 
 from augment.baselines import quantised, rule_placer
 from augment.baselines.quantised import BIN_M
-from augment.errors import InstructionNotUnderstood
+from augment.errors import CannotPlace
 from augment.metrics.displacement import Displacement, displacement
 from augment.metrics.summary import summarise
 from augment.scene.catalogue import ScenarioType
@@ -30,8 +30,8 @@ def made(place: Placing, slug: str, seed: int = 0) -> Modification | None:
     """What a contestant makes of a scenario, None where it refuses."""
     scene, shelved = shown_scene(slug), entry(slug)
     try:
-        return place(scene, shelved.instruction, seed=seed_of(slug) + seed).modification
-    except InstructionNotUnderstood:
+        return place(scene, shelved.intent, seed=seed_of(slug) + seed).modification
+    except CannotPlace:
         return None
 
 

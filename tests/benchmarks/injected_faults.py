@@ -24,11 +24,9 @@ from augment.baselines.simulated_road import Road, jittered
 from augment.checks import Ground
 from augment.checks.against_intent import judged
 from augment.checks.finding import FaultClass
-from augment.errors import InstructionNotUnderstood
 from augment.fake_llm.careless import bend, dice
-from augment.instruction import parse
-from augment.instruction.intent import Intent
 from augment.metrics.fault_guess import first_guess
+from augment.scene.intent import Intent
 from augment.scene.modification import Modification
 from tests.fixtures.shelf import SLUGS, entry, shown_scene
 
@@ -143,7 +141,7 @@ def main(count: int, seed: int) -> None:
     tally = measure(count, seed)
     read = sum(case.intent is not None for case in cases())
     print(f"{count} injections, {tally.right} right placements, seed {seed}; ", end="")
-    print(f"{read} of {len(cases())} instructions are understood.\n")
+    print(f"{read} of {len(cases())} instructions have an intent.\n")
     print("| class | precision | recall |\n|---|---|---|")
     for fault in FaultClass:
         print(f"| {fault} | {tally.precision(fault):.3f} | {tally.recall(fault):.3f} |")
@@ -188,16 +186,12 @@ def _case(slug: str) -> Case:
     scene = shown_scene(slug)
     road = Road.of(scene)
     assert road is not None
-    try:
-        intent = parse(entry(slug).instruction)
-    except InstructionNotUnderstood:
-        intent = None
     return Case(
         slug=slug,
         reference=entry(slug).reference,
         ground=Ground.of(scene),
         road=road,
-        intent=intent,
+        intent=entry(slug).intent,
     )
 
 

@@ -28,6 +28,7 @@ from augment.variants.pipeline import Outcome, run
 from augment.variants.recipes import RECIPES
 from augment.variants.transcript import MemoryTranscript
 from tests.fixtures.shelf import SLUGS, entry, shown_scene
+from tests.intents import intents
 
 COUNT = 10_000
 SEED = 20_261_121
@@ -135,7 +136,7 @@ def _said(character: Character, body: bytes) -> str:
 
     What reads the answer is asked every time.
     """
-    return character.answer(chat_request(body)).text
+    return character.answer(chat_request(body), intents).text
 
 
 if __name__ == "__main__":

@@ -9,37 +9,72 @@ import pytest
 
 from augment.checks import Finding, Ground, Kind, Severity
 from augment.checks.against_intent import judged
-from augment.instruction import parse
 from augment.scene.entities import AgentType, TrafficAgent, TrafficSide
+from augment.scene.intent import (
+    Body,
+    CrashedCar,
+    Facing,
+    Intent,
+    LaneChoice,
+    LateralTarget,
+    Shape,
+    Side,
+    Spot,
+)
 from augment.scene.modification import Modification
+from tests.intents import (
+    CENTRED,
+    LEFT_EDGE,
+    RIGHT_EDGE,
+    cones,
+    crash,
+    metres,
+    parked,
+    towards,
+    walk,
+)
 from tests.scenes import cone, curve, pedestrian, scene, vehicle
 
-CAR = "Add a parked car 20 m ahead of the ego, 1.2 m to the left of the lane centre."
-MIDDLE = "A car is parked in the centre of the ego's lane 20 m ahead of the ego."
-FACING = "A car is parked 20 m ahead of the ego, facing the ego."
-WALK = "A pedestrian crosses the road from left to right, 20 m ahead of the ego."
-CRASH = "Two cars have crashed in the ego's lane 20 m ahead, at an angle of 40 degrees."
-LINE = "A line of 3 cones along the right lane boundary, 2.5 m apart, starting 20 m ahead."
-BUS = "Park a bus in the ego's lane 35 m ahead, so that the ego must overtake it."
-DRIVING = "Add a car driving at 8 m/s 30 m ahead of the ego."
-ONCOMING = "Park a car in the oncoming lane, 20 m ahead of the ego."
+CAR = parked(20.0, lateral=towards(LEFT_EDGE, 1.2))
+MIDDLE = parked(20.0, lateral=CENTRED)
+FACING = parked(20.0, facing=Facing.AGAINST_LANE)
+WALK = walk(20.0, Side.LEFT)
+CRASH = crash(20.0, 2, CrashedCar(turn_deg=40.0))
+LINE = cones(20.0, 3, Shape.LINE, lateral=towards(RIGHT_EDGE), spacing=metres(2.5))
+BUS = parked(35.0, body=Body.BUS)
+DRIVING = parked(30.0, speed_mps=8.0)
+ONCOMING = parked(20.0, lane=LaneChoice.ONCOMING)
+FILE = walk(20.0, Side.LEFT, count=2, is_file=True, behind=(metres(3.0),))
+SLANTED = walk(20.0, Side.LEFT, drift_m=8.0)
+NARROWED = cones(
+    20.0, 3, Shape.TAPER, start=Side.RIGHT, ends_in_middle=True,
+    has_worker=True, post_side=Side.RIGHT,
+)  # fmt: skip
 
 ACROSS = (pedestrian("Agent2", 20.0, 6.0, (20.0, -3.0)),)
 CARS = (vehicle("Agent2", 20.0, 0.0), vehicle("Agent3", 24.5, 0.0, math.radians(40.0)))
+IN_FILE = (
+    pedestrian("Agent2", 20.0, 1.0, (20.0, -3.0)),
+    pedestrian("Agent3", 20.0, 4.0, (20.0, -3.0)),
+)
+TAPER = (
+    *(cone(f"Agent{n + 2}", 20.0 + 2.5 * n, 0.75 * n - 1.5) for n in range(3)),
+    pedestrian("Agent5", 25.0, -2.0),
+)
 CONES = tuple(cone(f"Agent{n + 2}", 20.0 + 2.5 * n, -1.5) for n in range(3))
 A_BUS = replace(vehicle("Agent2", 35.0, 0.0), type=AgentType.BUS, length_m=7.456, width_m=2.079)
 
 
-def held(instruction: str, *added: TrafficAgent) -> tuple[Finding, ...]:
-    return judged(Ground.of(scene()), Modification(added=added), parse(instruction))
+def held(intent: Intent, *added: TrafficAgent) -> tuple[Finding, ...]:
+    return judged(Ground.of(scene()), Modification(added=added), intent)
 
 
-def faults(instruction: str, *added: TrafficAgent) -> set[Kind]:
-    return {one.kind for one in held(instruction, *added) if one.is_fault}
+def faults(intent: Intent, *added: TrafficAgent) -> set[Kind]:
+    return {one.kind for one in held(intent, *added) if one.is_fault}
 
 
 @pytest.mark.parametrize(
-    ("instruction", "added"),
+    ("intent", "added"),
     [
         (CAR, (vehicle("Agent2", 20.0, 1.2),)),
         (CAR, (vehicle("Agent2", 22.0, 0.6, math.radians(10.0)),)),
@@ -52,16 +87,19 @@ def faults(instruction: str, *added: TrafficAgent) -> set[Kind]:
         (BUS, (replace(A_BUS, type=AgentType.VEHICLE),)),
         (DRIVING, (replace(vehicle("Agent2", 30.0, 0.0), speed_mps=9.0),)),
         (ONCOMING, (vehicle("Agent2", 20.0, 3.5, math.pi),)),
+        (FILE, IN_FILE),
+        (SLANTED, (pedestrian("Agent2", 20.0, 6.0, (28.0, -3.0)),)),
+        (NARROWED, TAPER),
     ],
 )
 def test_what_is_as_asked_for_has_no_fault(
-    instruction: str, added: tuple[TrafficAgent, ...]
+    intent: Intent, added: tuple[TrafficAgent, ...]
 ) -> None:
-    assert faults(instruction, *added) == set()
+    assert faults(intent, *added) == set()
 
 
 @pytest.mark.parametrize(
-    ("instruction", "added", "kind"),
+    ("intent", "added", "kind"),
     [
         (CAR, (vehicle("Agent2", 23.0, 1.2),), Kind.ASKED_DISTANCE),
         (CAR, (vehicle("Agent2", 17.0, 1.2),), Kind.ASKED_DISTANCE),
@@ -94,12 +132,16 @@ def test_what_is_as_asked_for_has_no_fault(
         (BUS, (replace(A_BUS, type=AgentType.VEHICLE, length_m=4.8),), Kind.ASKED_TYPE),
         (DRIVING, (vehicle("Agent2", 30.0, 0.0),), Kind.ASKED_MOTION),
         (ONCOMING, (vehicle("Agent2", 20.0, 0.0, math.pi),), Kind.ASKED_ACROSS),
+        (FILE, (IN_FILE[0], replace(IN_FILE[1], y_m=5.5)), Kind.ASKED_SPACING),
+        (SLANTED, (pedestrian("Agent2", 20.0, 6.0, (20.0, -3.0)),), Kind.ASKED_DISTANCE),
+        (NARROWED, (*TAPER[:2], replace(TAPER[2], y_m=1.5), TAPER[3]), Kind.ASKED_ACROSS),
+        (NARROWED, (*TAPER[:3], replace(TAPER[3], y_m=2.0)), Kind.ASKED_SIDE),
     ],
 )
 def test_what_is_not_as_asked_for_is_the_one_fault(
-    instruction: str, added: tuple[TrafficAgent, ...], kind: Kind
+    intent: Intent, added: tuple[TrafficAgent, ...], kind: Kind
 ) -> None:
-    found = faults(instruction, *added)
+    found = faults(intent, *added)
     assert found - {Kind.WALK_HEADING} == {kind}
 
 
@@ -118,7 +160,7 @@ def test_the_distance_is_counted_along_a_bend() -> None:
     ground = Ground.of(curve())
     bent = vehicle("Agent2", 10.0 + 40.0 * math.sin(0.5), 40.0 * (1.0 - math.cos(0.5)), 0.5)
     straight = vehicle("Agent2", 30.0, 0.0)
-    said = parse("A car is parked in the centre of the ego's lane 30 m ahead of the ego.")
+    said = parked(30.0, lateral=CENTRED)
     kinds = [
         {one.kind for one in judged(ground, Modification(added=(agent,)), said) if one.is_fault}
         for agent in (bent, straight)
@@ -128,9 +170,7 @@ def test_the_distance_is_counted_along_a_bend() -> None:
 
 
 def test_the_kerb_is_where_the_map_says() -> None:
-    said = parse(
-        "Add a car parked 20 m ahead of the ego, 1.2 m from the lane centre towards the kerb."
-    )
+    said = parked(20.0, lateral=towards(LateralTarget.KERB, 1.2))
     for side, y_m in ((TrafficSide.RIGHT, -1.2), (TrafficSide.LEFT, 1.2)):
         ground = Ground.of(scene(traffic_side=side))
         found = judged(ground, Modification(added=(vehicle("Agent2", 20.0, y_m),)), said)
@@ -147,7 +187,7 @@ def test_what_is_doubtful_is_settled_where_it_was_asked_for() -> None:
 def test_who_was_in_the_scene_and_is_moved_or_removed_is_named() -> None:
     parked = vehicle("Agent2", 40.0, 0.0)
     ground = Ground.of(scene(agents=(parked,)))
-    said, car = parse(CAR), vehicle("Agent3", 20.0, 1.2)
+    said, car = CAR, vehicle("Agent3", 20.0, 1.2)
     for change in (
         Modification(added=(car,), removed=("Agent2",)),
         Modification(added=(car,), moved=(replace(parked, x_m=50.0),)),
@@ -156,11 +196,33 @@ def test_who_was_in_the_scene_and_is_moved_or_removed_is_named() -> None:
 
 
 def test_every_finding_has_a_sentence_that_stands_alone() -> None:
-    for instruction in (CAR, WALK, CRASH, LINE, BUS):
+    for intent in (CAR, WALK, CRASH, LINE, BUS):
         for added in ((), ACROSS, CARS, CONES, (A_BUS,), (*CARS, *CONES)):
             ids = {one.id for one in added}
             if len(ids) < len(added):
                 continue
-            for one in held(instruction, *added):
+            for one in held(intent, *added):
                 assert "{" not in one.sentence()
                 assert one.sentence().endswith(".")
+
+
+def test_what_is_open_is_held_against_nothing() -> None:
+    somewhere = Intent(requests=(replace(CAR.requests[0], spot=Spot(), speed_mps=None),))  # type: ignore[arg-type]
+    here = replace(vehicle("Agent2", 47.0, 0.4), speed_mps=3.0)
+    assert faults(somewhere, here) == set()
+
+
+def test_any_number_answers_an_open_count_but_none_does_not() -> None:
+    (request,) = LINE.requests
+    some = Intent(requests=(replace(request, count=None),))
+    assert faults(some, *CONES) == set()
+    assert faults(some, *CONES[:2]) == set()
+    assert faults(some) == {Kind.ASKED_COUNT}
+
+
+def test_ahead_without_a_number_is_anywhere_ahead() -> None:
+    (request,) = MIDDLE.requests
+    where = replace(request.spot, distance=None)
+    ahead = Intent(requests=(replace(request, spot=where),))
+    assert faults(ahead, vehicle("Agent2", 47.0, 0.0)) == set()
+    assert faults(ahead, vehicle("Agent2", -20.0, 0.0)) == {Kind.ASKED_DISTANCE}

@@ -9,7 +9,8 @@ import pytest
 
 from augment.checks import Ground, Kind
 from augment.checks.against_intent import judged
-from augment.instruction.intent import (
+from augment.scene.entities import TrafficAgent
+from augment.scene.intent import (
     Bearing,
     CrashedCar,
     CrashRequest,
@@ -19,7 +20,6 @@ from augment.instruction.intent import (
     Relation,
     Spot,
 )
-from augment.scene.entities import TrafficAgent
 from augment.scene.modification import Modification
 from tests.scenes import scene, vehicle
 

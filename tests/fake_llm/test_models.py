@@ -12,6 +12,7 @@ from augment.fake_llm.models import MODELS
 from augment.fake_llm.server import FakeServer, running
 from augment.variants.transcript import MemoryTranscript
 from tests.fake_llm.asking import outcome
+from tests.intents import intents
 from tests.scenes import curve, junction, scene, vehicle
 
 WISH = "Add a parked vehicle 21.4 m ahead of the ego in its lane."
@@ -59,7 +60,7 @@ def test_every_model_but_the_careless_has_an_outcome_of_its_own() -> None:
 def test_each_model_comes_to_its_outcome_in_so_many_calls(model: str) -> None:
     wanted, calls = OUTCOMES[model]
     transcript = MemoryTranscript()
-    with running(slow_s=30.0) as server:
+    with running(slow_s=30.0, intents=intents) as server:
         try:
             made = outcome(
                 server,

@@ -23,6 +23,7 @@ HEAVY = {
     "pandas": ("augment.formats", "arena.exports"),
     "pyarrow": ("augment.formats", "arena.exports"),
     "matplotlib": ("arena.exports",),
+    "scipy.interpolate": ("augment.fake_llm",),
     "scipy.optimize": ("augment.metrics",),
     "scipy.stats": ("arena.rating",),
 }

@@ -8,8 +8,11 @@ from typing import Any
 from augment.models import Augmentation, BaseScene, Contestant, Endpoint, GenerationJob, Scenario
 from augment.scene.codec import modification_to_document, scene_to_document
 from augment.scene.entities import Scene
+from augment.scene.intent import Shape
+from augment.scene.intent_codec import intent_to_document
 from augment.scene.modification import Modification
 from augment.services import claims, jobs
+from tests.intents import cones
 from tests.scenes import cone
 from tests.scenes import scene as street
 
@@ -30,6 +33,8 @@ def add_scenario(slug: str, *, scene: Scene | None = None, **columns: Any) -> Sc
         "type": Scenario.Type.CONSTRUCTION_ZONE,
         "instruction": INSTRUCTION,
         "reference": modification_to_document(TWO_CONES),
+        "intent": intent_to_document(cones(20.0, 1, Shape.LINE)),
+        "intent_origin": "entered",
     } | columns
     return Scenario.objects.create(slug=slug, base_scene=base, **columns)
 

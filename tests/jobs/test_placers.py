@@ -8,9 +8,12 @@ import pytest
 
 from augment.models import Augmentation, Contestant
 from augment.scene.codec import modification_to_document
+from augment.scene.intent import Intent, Side
+from augment.scene.intent_codec import intent_to_document
 from augment.scene.modification import Modification
 from augment.services import contestants, jobs
 from augment.services.seeds import seed_of
+from tests.intents import parked, walk
 from tests.jobs.rows import add_kind, add_scenario, launch, only_row
 from tests.jobs.running import ran
 
@@ -48,19 +51,19 @@ def test_the_rule_placer_places_the_same_each_time() -> None:
     assert second.image == first.image
 
 
-def test_the_rule_placer_refuses_what_it_does_not_understand() -> None:
-    row = ran(one_job(Contestant.Kind.RULE, instruction="Make it nicer."))
+def test_the_rule_placer_refuses_a_scenario_without_an_intent() -> None:
+    row = ran(one_job(Contestant.Kind.RULE, intent=None, intent_origin=""))
     assert row.state == State.REFUSED
-    assert row.reason
+    assert row.reason.startswith("The scenario has no intent")
     row.scenario.refresh_from_db()
     assert row.image == row.scenario.original_image
 
 
-PARKED = "Park a car in the ego's lane 22 m ahead of the ego."
+PARKED = parked(22.0)
 
 
-def quantised(slug: str, instruction: str) -> Augmentation:
-    add_scenario(f"street-{slug}", instruction=instruction)
+def quantised(slug: str, intent: Intent) -> Augmentation:
+    add_scenario(f"street-{slug}", intent=intent_to_document(intent))
     contestants.ensure_builtin()
     job = jobs.launch(name="Q", contestants=[slug], scenarios=[f"street-{slug}"])
     return ran(only_row(job))
@@ -75,7 +78,7 @@ def test_the_quantised_baselines_place_vehicles_and_tell_their_codes(slug: str) 
 
 
 def test_the_quantised_baselines_refuse_what_is_no_vehicle() -> None:
-    row = quantised("quantised-5m", "Add a pedestrian crossing from the left 15 m ahead.")
+    row = quantised("quantised-5m", walk(15.0, Side.LEFT))
     assert row.state == State.REFUSED
     assert row.reason == "The code knows vehicles alone, and pedestrians are asked for."
 
@@ -84,23 +87,14 @@ def test_a_scenario_has_a_seed_of_its_own() -> None:
     assert seed_of("street") == seed_of("street") != seed_of("street-2")
 
 
-def test_a_placement_tells_what_was_understood_of_the_instruction() -> None:
+def test_a_placement_tells_what_stands_where_and_by_which_convention() -> None:
     row = ran(one_job(Contestant.Kind.RULE))
-    *_, understood, rest = row.notes.splitlines()
-    assert understood.startswith("Understood: “")
-    assert rest == "Not understood: nothing."
+    assert row.notes.startswith("1 cones in a line, 20.0 m ahead of the ego along its lane")
+    assert "by convention: 2.5 m between the cones" in row.notes
 
 
-def test_a_placement_tells_what_was_passed_over_in_the_instruction() -> None:
-    text = "Put a parked, sadly rusty car 20 m ahead of us."
-    row = ran(one_job(Contestant.Kind.RULE, instruction=text))
-    assert row.state == State.DONE
-    assert row.notes.endswith("Not understood: “sadly”, “rusty”.")
-
-
-def test_a_refusal_tells_what_was_understood_and_what_not() -> None:
-    text = "Put a parked car 20 m ahead beside the fountain."
-    row = ran(one_job(Contestant.Kind.RULE, instruction=text))
+def test_a_refusal_says_what_the_intent_leaves_open() -> None:
+    walker = intent_to_document(walk(15.0, None))
+    row = ran(one_job(Contestant.Kind.RULE, intent=walker))
     assert row.state == State.REFUSED
-    assert "“a parked car”" in row.notes
-    assert row.notes.endswith("Not understood: “beside”, “fountain”.")
+    assert row.reason.endswith("the pedestrians leaves open the side that they come from.")

@@ -10,8 +10,11 @@ from django.core.management.base import CommandError
 
 from augment.models import BaseScene, Event, Scenario
 from augment.scene.codec import modification_to_document, scene_to_document
+from augment.scene.intent import Shape
+from augment.scene.intent_codec import intent_to_document
 from augment.scene.modification import Modification
 from augment.services.scenes import import_scene
+from tests.intents import cones
 from tests.scenes import cone, scene, vehicle
 
 pytestmark = pytest.mark.django_db
@@ -58,6 +61,24 @@ def test_a_scenario_is_added_with_and_without_a_reference(tmp_path: Path) -> Non
     out = run(slug="cones", reference=reference(tmp_path, CHANGE))
     assert out == "Added scenario cones with a reference.\n"
     assert Scenario.objects.get(slug="cones").reference == json.loads(CHANGE)
+
+
+def test_a_scenario_is_added_with_its_intent(tmp_path: Path) -> None:
+    wanted = intent_to_document(cones(9.0, 1, Shape.LINE))
+    file = tmp_path / "intent.json"
+    file.write_text(json.dumps(wanted))
+    out = run(slug="cones", intent=file)
+    assert out == "Added scenario cones without a reference, with its intent.\n"
+    row = Scenario.objects.get(slug="cones")
+    assert (row.intent, row.intent_origin) == (wanted, "entered")
+
+
+def test_an_intent_that_can_not_be_read_is_refused(tmp_path: Path) -> None:
+    file = tmp_path / "intent.json"
+    file.write_text(json.dumps(intent_to_document(cones(9.0, 1, Shape.LINE))).replace("line", "x"))
+    assert "requests[0].cones.shape" in refused(intent=file)
+    file.write_text("[]")
+    assert "expected an object" in refused(intent=file)
 
 
 def test_unknown_names_and_taken_slugs_are_refused() -> None:

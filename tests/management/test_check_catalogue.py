@@ -39,13 +39,11 @@ def checked(folder: Path) -> str:
 def test_the_projects_own_catalogue_is_clean() -> None:
     said = checked(FOLDER)
     assert said.count(" good\n") == len(SLUGS) == 50
-    assert "50 scenarios are as their instructions say" in said
+    assert "50 scenarios are as their intents ask for" in said
 
 
-def test_a_clean_folder_says_how_many_claims_were_held_against_each_reference(
-    folder: Path,
-) -> None:
-    assert "nudge-plane-tree-street       4   4 read  good" in checked(folder)
+def test_a_clean_folder_says_how_many_statements_each_intent_makes(folder: Path) -> None:
+    assert "nudge-plane-tree-street           7  good" in checked(folder)
 
 
 def test_a_reference_that_is_elsewhere_than_said_is_refused(folder: Path) -> None:
@@ -53,9 +51,8 @@ def test_a_reference_that_is_elsewhere_than_said_is_refused(folder: Path) -> Non
     with pytest.raises(CommandError) as fault:
         checked(folder)
     reasons = str(fault.value)
-    assert "ahead_m of Agent2: 21.5 is said, 24 is measured" in reasons
-    assert "left_m of Agent2: -1.3 is said, -1 is measured" in reasons
-    assert "read from the sentence: ahead_m of Agent2" in reasons
+    assert "Agent2 is 24.0 m ahead of the ego along its lane; 21.5 m ahead is asked for" in reasons
+    assert "Agent2 is 1.00 m to the right of the centre of the ego's lane; 1.3 m" in reasons
 
 
 def test_a_reference_with_something_wrong_is_refused(folder: Path) -> None:
@@ -64,15 +61,29 @@ def test_a_reference_with_something_wrong_is_refused(folder: Path) -> None:
         checked(folder)
 
 
-def test_a_number_that_nobody_claims_is_named(folder: Path) -> None:
+def test_a_number_that_the_intent_does_not_hold_is_named(folder: Path) -> None:
     edit(folder, lambda it: it.update(instruction="Park a car 19 m ahead of the ego."))
-    with pytest.raises(CommandError, match="the instruction says 19, and no claim does"):
+    with pytest.raises(CommandError, match="the instruction says 19, and its intent does not"):
         checked(folder)
 
 
-def test_a_claim_about_nobody_is_named(folder: Path) -> None:
-    edit(folder, lambda it: it["claims"][1].update(agents=["Agent9"]))
-    with pytest.raises(CommandError, match=r"ahead_m of Agent9: 21\.5 is said, nothing is"):
+@pytest.mark.parametrize(
+    ("shift_m", "is_good"), [(0.5, True), (0.51, False), (-0.5, True), (-0.51, False)]
+)
+def test_a_reference_may_be_half_a_metre_off_along_the_lane(
+    folder: Path, shift_m: float, is_good: bool
+) -> None:
+    edit(folder, lambda it: it["reference"]["add"][0].update(x_m=21.5 + shift_m))
+    if is_good:
+        assert " good\n" in checked(folder)
+    else:
+        with pytest.raises(CommandError, match=r"21\.5 m ahead is asked for"):
+            checked(folder)
+
+
+def test_a_scenario_without_an_intent_is_named(folder: Path) -> None:
+    edit(folder, lambda it: it.update(intent=None))
+    with pytest.raises(CommandError, match="nudge-plane-tree-street: it has no intent"):
         checked(folder)
 
 

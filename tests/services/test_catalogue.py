@@ -18,7 +18,8 @@ from augment.scene.catalogue_codec import CatalogueEntry, entry_to_document
 from augment.scene.codec import scene_to_document
 from augment.scene.modification import Modification
 from augment.services.catalogue import CatalogueReport, load_catalogue
-from augment.services.scenes import add_scenario, import_scene, reference_of
+from augment.services.scenes import add_scenario, import_scene, intent_of, reference_of
+from tests.intents import parked
 from tests.scenes import scene, vehicle
 
 pytestmark = pytest.mark.django_db
@@ -33,6 +34,7 @@ PARKED = CatalogueEntry(
     provenance="made for a test",
     notes="",
     reference=Modification(added=(vehicle("Agent2", 20.0, -0.8),)),
+    intent=parked(20.0),
 )
 
 
@@ -158,6 +160,28 @@ def test_every_problem_names_its_file_and_path_and_nothing_is_kept(folder: Path)
         "scenarios/lost.json: scene",
     ]
     assert not BaseScene.objects.exists()
+
+
+def test_an_intent_comes_with_its_scenario_and_is_the_authors(folder: Path) -> None:
+    load_catalogue(folder=folder)
+    row = Scenario.objects.get(slug="parked-car")
+    assert (intent_of(row), row.intent_origin) == (parked(20.0), "authored")
+
+
+def test_a_used_scenario_gets_the_intent_that_it_had_not_and_no_other(folder: Path) -> None:
+    file = folder / "scenarios/parked-car.json"
+    intent = json.loads(file.read_text())["intent"]
+    edit(file, lambda it: it.update(intent=None))
+    load_catalogue(folder=folder)
+    row = Scenario.objects.get(slug="parked-car")
+    augment(row)
+    edit(file, lambda it: it.update(intent=intent))
+    assert load_catalogue(folder=folder).scenarios_changed == 1
+    row.refresh_from_db()
+    assert row.intent == intent
+    edit(file, lambda it: it["intent"]["requests"][0].update(count=2))
+    with pytest.raises(Conflict, match="1 augmentations were made from"):
+        load_catalogue(folder=folder)
 
 
 def test_a_reference_has_to_fit_its_scene(folder: Path) -> None:

@@ -20,6 +20,7 @@ from augment.variants.recipes import RECIPES, Review, Tools, recipe
 from augment.variants.transcript import MemoryTranscript
 from tests.baselines.test_rule_placer_catalogue import placed
 from tests.fixtures.shelf import SLUGS, entry, shown_scene
+from tests.intents import intents
 
 CALLS_OF_GOOD = {
     "otm": "m",
@@ -46,7 +47,7 @@ SOME = [next(slug for slug in SLUGS if slug.startswith(kind)) for kind in KINDS]
 
 @pytest.fixture(scope="module")
 def server() -> Iterator[FakeServer]:
-    with running() as serving:
+    with running(intents=intents) as serving:
         yield serving
 
 

@@ -18,6 +18,7 @@ from augment.variants.cast import Player
 from augment.variants.pipeline import run
 from augment.variants.recipes import RECIPES, recipe
 from augment.variants.transcript import MemoryTranscript, ModelRole
+from tests.intents import intents
 from tests.scenes import scene
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -38,7 +39,7 @@ FAULTS, ELSEWHERE = table(0), table(1)
 
 @pytest.fixture(scope="module")
 def server() -> Iterator[FakeServer]:
-    with running(slow_s=30.0) as serving:
+    with running(slow_s=30.0, intents=intents) as serving:
         yield serving
 
 

@@ -17,6 +17,7 @@ from augment.variants.pipeline import run
 from augment.variants.recipes import FC, OTM, RECIPES, TQA, VQA
 from augment.variants.transcript import MemoryTranscript, ModelRole
 from tests.fixtures.shelf import entry, shown_scene
+from tests.intents import intents
 
 SLUG = "overtake-terrace-row"
 MODIFIER, REVIEWER = ModelRole.MODIFIER, ModelRole.REVIEWER
@@ -35,7 +36,7 @@ class Playing:
     def complete(self, request: Request, *, sending: Sending = unwatched) -> Reply:
         sending()
         body = json.dumps(request.to_document()).encode()
-        said = self._character.answer(chat_request(body))
+        said = self._character.answer(chat_request(body), intents)
         return Reply(text=said.text, model="m", finish_reason="stop")
 
 

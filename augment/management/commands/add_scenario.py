@@ -12,6 +12,7 @@ from augment.errors import AugmentError
 from augment.formats.json_file import read_json
 from augment.scene.catalogue import ScenarioType
 from augment.scene.codec import modification_from_document, modification_to_document
+from augment.scene.intent_codec import intent_from_document, intent_to_document
 from augment.services.scenes import add_scenario
 from augment.services.terminal import TerminalCommand
 
@@ -34,6 +35,12 @@ class Command(TerminalCommand):
             "--reference", type=Path, metavar="FILE", help="a modification in the own JSON"
         )
         parser.add_argument(
+            "--intent",
+            type=Path,
+            metavar="FILE",
+            help="what the instruction asks for, as of docs/intent.md",
+        )
+        parser.add_argument(
             "--keep-traffic", action="store_true", help="keep the recorded traffic in the scene"
         )
 
@@ -46,12 +53,16 @@ class Command(TerminalCommand):
                 instruction=options["instruction"],
                 slug=options["slug"],
                 reference=_reference(options["reference"]),
+                intent=_intent(options["intent"]),
                 keep_traffic=options["keep_traffic"],
             )
         except AugmentError as fault:
             raise CommandError(str(fault)) from fault
         with_reference = "with" if scenario.reference is not None else "without"
-        self.stdout.write(f"Added scenario {scenario.slug} {with_reference} a reference.")
+        with_intent = "" if scenario.intent is None else ", with its intent"
+        self.stdout.write(
+            f"Added scenario {scenario.slug} {with_reference} a reference{with_intent}."
+        )
 
 
 def _reference(file: Path | None) -> dict[str, Any] | None:
@@ -59,3 +70,10 @@ def _reference(file: Path | None) -> dict[str, Any] | None:
         return None
     document = read_json(file, what="modification")
     return modification_to_document(modification_from_document(document))
+
+
+def _intent(file: Path | None) -> dict[str, Any] | None:
+    if file is None:
+        return None
+    document = read_json(file, what="intent")
+    return intent_to_document(intent_from_document(document))

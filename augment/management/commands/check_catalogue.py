@@ -1,4 +1,4 @@
-"""Hold the catalogue's references against their instructions, the checks and the camera."""
+"""Hold the catalogue's references against their intents, the checks and the camera."""
 
 from __future__ import annotations
 
@@ -17,8 +17,8 @@ class Command(TerminalCommand):
     """check_catalogue [--folder FOLDER]."""
 
     help = (
-        "Check that every reference passes the geometric checks, agrees with the numbers of its "
-        "instruction and fits into its picture; exit status 1 with reasons otherwise."
+        "Check that every reference passes the geometric checks, agrees with the intent "
+        "of its instruction and fits into its picture; exit status 1 with reasons otherwise."
     )
 
     def add_arguments(self, parser: ArgumentParser) -> None:
@@ -32,23 +32,18 @@ class Command(TerminalCommand):
         except AugmentError as error:
             raise CommandError(str(error)) from error
         width = max((len(one.slug) for one in found.scenarios), default=8)
-        self.stdout.write(f"{'scenario':{width}}  claims  grammar  result")
+        self.stdout.write(f"{'scenario':{width}}  statements  result")
         for one in found.scenarios:
             self.stdout.write(_line(one, width))
         reasons = _reasons(found)
         if reasons:
             raise CommandError("\n".join(reasons))
-        understood = sum(one.understood is not None for one in found.scenarios)
-        self.stdout.write(
-            f"{len(found.scenarios)} scenarios are as their instructions say; the grammar "
-            f"understands {understood} of them."
-        )
+        self.stdout.write(f"{len(found.scenarios)} scenarios are as their intents ask for.")
 
 
 def _line(one: ScenarioCheck, width: int) -> str:
-    read = "refuses" if one.understood is None else f"{one.understood} read"
     result = f"{len(one.reasons)} reasons" if one.reasons else "good"
-    return f"{one.slug:{width}}  {one.claims:>6}  {read:>7}  {result}"
+    return f"{one.slug:{width}}  {one.statements:>10}  {result}"
 
 
 def _reasons(found: CatalogueCheck) -> list[str]:

@@ -12,6 +12,7 @@ from django.core.management.base import CommandError, CommandParser
 
 from augment.fake_llm.models import MODELS
 from augment.fake_llm.server import running
+from augment.services.stand_in import StoredIntents
 from augment.services.terminal import TerminalCommand
 
 _STOP = (signal.SIGINT, signal.SIGTERM)
@@ -21,7 +22,8 @@ class Command(TerminalCommand):
     """Serves /v1/chat/completions without a model, until it is interrupted."""
 
     help = (
-        "Run the stand-in language-model server (OpenAI-compatible, no key needed). What it does "
+        "Run the stand-in language-model server (OpenAI-compatible, no key needed). It reads no "
+        "English: it looks up the stored intents by the text of the instruction. What it does "
         f"is chosen by the model: {', '.join(MODELS)}."
     )
     requires_system_checks = ()
@@ -38,7 +40,9 @@ class Command(TerminalCommand):
         try:
             with (
                 _until_signalled() as wait,
-                running(host, port, latency_s=options["latency"]) as server,
+                running(
+                    host, port, latency_s=options["latency"], intents=StoredIntents()
+                ) as server,
             ):
                 self.stdout.write(f"The stand-in language model listens on {server.url}")
                 self.stdout.flush()

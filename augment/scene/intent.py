@@ -1,20 +1,23 @@
-"""What an instruction asks for, as frozen values; distances in metres along the ego's lane.
+"""What an instruction asks for, as frozen values; what it does not say stays open (None).
 
-Left and right are those of the ego's direction of travel. Kerb and centre line are named as such
-here and become left or right on the map, because people do not drive on one side everywhere.
+Distances run along the ego's lane, from centre to centre, in metres. Left and right are those of
+the ego's direction of travel. Kerb and centre line are named as such here and become left or
+right on the map, because people do not drive on one side everywhere.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+import math
+from dataclasses import dataclass, replace
 from enum import StrEnum
 
-SLIGHT_OFFSET_M = 0.75
-"""What "slightly" means without a number: the middle of the paper's range of 0 to 1.5 m."""
 
-CONE_COUNT = 6
-CONE_SPACING_M = 2.5
-"""A construction zone without numbers: interPlan's median count and neighbour distance."""
+class IntentOrigin(StrEnum):
+    """Where an intent comes from."""
+
+    AUTHORED = "authored"
+    ENTERED = "entered"
+    READ = "read"
 
 
 class Side(StrEnum):
@@ -30,7 +33,7 @@ class Side(StrEnum):
 
 
 class Relation(StrEnum):
-    """On which end of the ego a distance is measured."""
+    """On which end of its anchor a distance is measured."""
 
     AHEAD = "ahead"
     BEHIND = "behind"
@@ -109,7 +112,7 @@ class Post(StrEnum):
 
 
 class Setting(StrEnum):
-    """What the surroundings of the place must be."""
+    """A named place: what the surroundings must be."""
 
     BEFORE_INTERSECTION = "before the intersection"
     IN_INTERSECTION = "in the intersection"
@@ -125,7 +128,7 @@ class Setting(StrEnum):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Length:
-    """A length or a range of lengths; `is_approximate` if the sentence says "about"."""
+    """A length or a range of lengths in metres; `is_approximate` if the sentence says "about"."""
 
     low_m: float
     high_m: float
@@ -150,26 +153,42 @@ class Lateral:
     Attributes:
         on_shoulder: The sentence says that it stands (partly) beside the road, so the target has
             to be the kerb's side.
-        also: A second name of the same side, "the kerb side (left)", which the map has to bear
-            out.
     """
 
-    target: LateralTarget = LateralTarget.LANE_CENTRE
+    target: LateralTarget
     offset: Length | None = None
-    nearness: Nearness = Nearness.SLIGHTLY
+    nearness: Nearness | None = None
     on_shoulder: bool = False
-    also: LateralTarget | None = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Spot:
-    """A place by its distance from the ego's centre along the ego's lane, and its lane."""
+    """A place: how far along the lane from its anchor, in which lane, where across it.
 
-    distance: Length
-    relation: Relation
-    lane: LaneChoice = LaneChoice.OWN
-    lateral: Lateral = Lateral()
+    Attributes:
+        distance: None where no number is said; `relation` alone says on which side then.
+        anchor: The name of an earlier request, of whose first object the distance runs; None for
+            the ego.
+        lane: None where no lane is said, or none is meant (walks).
+        lateral: Where across the lane; None where nothing is said.
+    """
+
+    distance: Length | None = None
+    relation: Relation | None = None
+    anchor: str | None = None
+    lane: LaneChoice | None = None
+    lateral: Lateral | None = None
     settings: tuple[Setting, ...] = ()
+
+    @property
+    def span_m(self) -> tuple[float, float] | None:
+        """From where to where along the lane, behind the anchor negative; None where open."""
+        if self.relation is None:
+            return None
+        low_m, high_m = 0.0, math.inf
+        if self.distance is not None:
+            low_m, high_m = self.distance.low_m, self.distance.high_m
+        return (low_m, high_m) if self.relation is Relation.AHEAD else (-high_m, -low_m)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -177,17 +196,19 @@ class VehicleRequest:
     """Vehicles that stand (speed 0) or move; the first of them at the spot.
 
     Attributes:
+        name: What an anchor calls it by; empty where none does. So for all requests.
         turn_deg: On top of `facing`, positive to the left.
         count: More than one stand in a row along the lane, each further one further on.
-        spacing: Between the centres of neighbours in a row, None for a default.
+        spacing: Between the centres of neighbours in a row.
     """
 
-    spot: Spot
-    body: Body
-    facing: Facing = Facing.WITH_LANE
+    spot: Spot = Spot()
+    name: str = ""
+    body: Body = Body.VEHICLE
+    facing: Facing | None = None
     turn_deg: float = 0.0
-    speed_mps: float = 0.0
-    count: int = 1
+    speed_mps: float | None = None
+    count: int | None = None
     spacing: Length | None = None
 
 
@@ -196,18 +217,19 @@ class WalkRequest:
     """Pedestrians who cross the road, side by side; the first of them at the spot.
 
     Attributes:
-        speed_mps: None where the sentence names none; a walk takes 15 s then.
+        start: From which side; they cross to the other.
         drift_m: How much further along the lane a walk ends than it begins.
         is_file: They walk one behind the other.
         behind: How far behind the first one the others walk in a file, where that is said.
         on_road: The first one stands in the ego's lane already.
     """
 
-    spot: Spot
-    start: Side
-    count: int = 1
+    spot: Spot = Spot()
+    name: str = ""
+    start: Side | None = None
+    count: int | None = None
     speed_mps: float | None = None
-    drift_m: float = 0.0
+    drift_m: float | None = None
     is_file: bool = False
     behind: tuple[Length, ...] = ()
     on_road: bool = False
@@ -219,18 +241,19 @@ class ConesRequest:
 
     Attributes:
         spot: Of the first cone, or of a ring's centre.
-        start: The lane boundary at which a taper begins, None for the kerb's.
+        start: The lane boundary at which a taper begins.
         ends_in_middle: A taper ends in the middle of the lane, not at its other boundary.
         both_sides: A line of `count` cones along each boundary of the lane.
         reach_m: From the first cone to the last along the lane, None where the spacing says it.
-        post: Where the worker stands, None for a default of the shape.
-        post_side: To which side of the cones, where that is said.
+        post: Where the worker stands.
+        post_side: To which side of the cones.
     """
 
-    spot: Spot
-    shape: Shape
-    count: int
-    spacing: Length
+    spot: Spot = Spot()
+    name: str = ""
+    shape: Shape | None = None
+    count: int | None = None
+    spacing: Length | None = None
     start: Side | None = None
     ends_in_middle: bool = False
     both_sides: bool = False
@@ -245,32 +268,32 @@ class CrashedCar:
     """A further vehicle of an accident, against the one named before it.
 
     Attributes:
-        gap: Between the two centres, None for as close as they get.
-        turn_deg: Against the one before, positive to the left; None where none is named.
+        gap: Between the two centres.
+        bearing: Where it stands, seen from the one before.
+        turn_deg: Against the one before, positive to the left.
         is_signed: The sentence names the side that it is turned to.
     """
 
     gap: Length | None = None
-    bearing: Bearing = Bearing.AHEAD
+    bearing: Bearing | None = None
     turn_deg: float | None = None
     is_signed: bool = False
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class CrashRequest:
-    """Vehicles that have run into each other; the spot is that of the first.
+    """Vehicles that have run into each other, and stand; the spot is that of the first.
 
     Attributes:
-        turn_deg: The angle between neighbours, None where the sentence names none.
         facing: Of the first one, against its lane.
         others: What is said of the further ones in order; none where it is left open.
     """
 
-    spot: Spot
-    count: int
+    spot: Spot = Spot()
+    name: str = ""
+    count: int | None = None
     body: Body = Body.CAR
-    turn_deg: float | None = None
-    facing: Facing = Facing.WITH_LANE
+    facing: Facing | None = None
     others: tuple[CrashedCar, ...] = ()
 
 
@@ -279,17 +302,46 @@ Request = VehicleRequest | WalkRequest | ConesRequest | CrashRequest
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Intent:
-    """All that was asked for, and how the sentence was read.
+    """All that was asked for.
 
     Attributes:
-        understood: The parts that were read, in order, in the sentence's own words.
-        ignored: Parts that were read and change nothing (what the ego should do about it).
-        not_understood: Words that nothing is known about but that they change nothing.
-        assumed: What the sentence left open and a documented default filled.
+        beyond: Parts of the sentence that these fields can't hold, in its own words.
     """
 
     requests: tuple[Request, ...]
-    understood: tuple[str, ...] = ()
-    ignored: tuple[str, ...] = ()
-    not_understood: tuple[str, ...] = ()
-    assumed: tuple[str, ...] = ()
+    beyond: tuple[str, ...] = ()
+
+
+def resolve_anchors(intent: Intent) -> Intent:
+    """The intent with every distance from the ego: anchors' distances are added up.
+
+    The anchor's own spot must come before it; its distance is open where the anchor's is.
+    """
+    spots: dict[str, Spot] = {}
+    resolved: list[Request] = []
+    for request in intent.requests:
+        spot = request.spot
+        if spot.anchor is not None:
+            spot = _from_ego(spot, spots[spot.anchor])
+        spots[request.name] = spot
+        resolved.append(replace(request, spot=spot))
+    return replace(intent, requests=tuple(resolved))
+
+
+def _from_ego(spot: Spot, anchor: Spot) -> Spot:
+    own, base = spot.span_m, anchor.span_m
+    if own is None or base is None or not math.isfinite(sum((*own, *base))):
+        return replace(spot, anchor=None, distance=None, relation=None)
+    low_m, high_m = own[0] + base[0], own[1] + base[1]
+    is_ahead = low_m + high_m >= 0.0
+    is_approximate = any(one.distance and one.distance.is_approximate for one in (spot, anchor))
+    return replace(
+        spot,
+        anchor=None,
+        relation=Relation.AHEAD if is_ahead else Relation.BEHIND,
+        distance=Length(
+            low_m=low_m if is_ahead else -high_m,
+            high_m=high_m if is_ahead else -low_m,
+            is_approximate=is_approximate,
+        ),
+    )

@@ -1,0 +1,91 @@
+"""How cones and their worker stand to each other, against what is asked."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from itertools import combinations
+from statistics import median
+
+from augment.checks.asked import Asked, hand, outside, severity
+from augment.checks.finding import Finding, Kind
+from augment.checks.parties import Party
+from augment.checks.tolerances import WORKER_M
+from augment.scene.entities import TrafficAgent
+from augment.scene.intent import ConesRequest, Length, Side
+
+
+def asked_spacing(asked: Asked) -> Iterator[Finding]:
+    """The median gap from a cone to the nearest other, and from a worker to the cones."""
+    for party in asked.parties:
+        if isinstance(party.request, ConesRequest):
+            yield from _around_cones(asked, party, party.request)
+
+
+def fits_gap(asked: Asked, gap_m: float, wanted: Length) -> bool:
+    """Whether two things are as far apart as is asked for."""
+    allowed_m = max(asked.tolerances.spacing_m, asked.tolerances.spacing_share * wanted.high_m)
+    return outside(gap_m, wanted.low_m, wanted.high_m) <= allowed_m
+
+
+def apart_m(one: TrafficAgent, other: TrafficAgent) -> float:
+    """From centre to centre."""
+    return math.hypot(one.x_m - other.x_m, one.y_m - other.y_m)
+
+
+# Private
+
+
+def _around_cones(asked: Asked, party: Party, request: ConesRequest) -> Iterator[Finding]:
+    wanted = request.spacing if request.reach_m is None else None
+    if wanted and party.is_exact and len(party.agents) > 1 and _are_apart(party.agents):
+        yield _spacing(asked, party.agents, wanted)
+    for worker in party.workers:
+        if party.agents:
+            yield _worker(worker, party)
+            if request.post_side is not None:
+                yield _worker_side(asked, worker, party, request.post_side)
+
+
+def _are_apart(cones: Sequence[TrafficAgent]) -> bool:
+    """Whether none stands in another, which is a fault of its own and leaves gaps elsewhere."""
+    pairs = combinations(cones, 2)
+    return all(apart_m(one, other) > one.width_m for one, other in pairs)
+
+
+def _spacing(asked: Asked, cones: Sequence[TrafficAgent], wanted: Length) -> Finding:
+    gaps_m = [min(apart_m(one, other) for other in cones if other is not one) for one in cones]
+    gap_m = median(gaps_m)
+    return Finding(
+        kind=Kind.ASKED_SPACING,
+        severity=severity(fits=fits_gap(asked, gap_m, wanted)),
+        agents=tuple(one.id for one in cones),
+        measured={"gap_m": gap_m, "asked_m": (wanted.low_m + wanted.high_m) / 2.0},
+        template="The cones stand {gap_m:.1f} m apart; {asked_m:.1f} m are asked for.",
+    )
+
+
+def _worker(worker: TrafficAgent, party: Party) -> Finding:
+    nearest = min(party.agents, key=lambda cone: (apart_m(worker, cone), cone.id))
+    return Finding(
+        kind=Kind.ASKED_SPACING,
+        severity=severity(fits=apart_m(worker, nearest) <= WORKER_M),
+        agents=(worker.id, nearest.id),
+        measured={"gap_m": apart_m(worker, nearest)},
+        template="The worker {agents[0]} is {gap_m:.1f} m from the nearest cone, {agents[1]}.",
+    )
+
+
+def _worker_side(asked: Asked, worker: TrafficAgent, party: Party, side: Side) -> Finding:
+    nearest = min(party.agents, key=lambda cone: (apart_m(worker, cone), cone.id))
+    left_m = asked.left_m(worker) - asked.left_m(nearest)
+    return Finding(
+        kind=Kind.ASKED_SIDE,
+        severity=severity(fits=hand(left_m) == side),
+        agents=(worker.id, nearest.id),
+        measured={"left_m": left_m},
+        template=(
+            f"The worker {{agents[0]}} stands to the {hand(left_m)} of {{agents[1]}}; the {side} "
+            "is asked for."
+        ),
+    )

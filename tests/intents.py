@@ -1,0 +1,117 @@
+"""Intents for tests: short builders, and what the wishes of the stand-in's tests ask for."""
+
+from __future__ import annotations
+
+import re
+from functools import cache
+from typing import Any
+
+from augment.fake_llm.sight import same_text
+from augment.scene.intent import (
+    Body,
+    ConesRequest,
+    CrashedCar,
+    CrashRequest,
+    Intent,
+    LaneChoice,
+    Lateral,
+    LateralTarget,
+    Length,
+    Nearness,
+    Relation,
+    Setting,
+    Shape,
+    Side,
+    Spot,
+    VehicleRequest,
+    WalkRequest,
+)
+from tests.fixtures.shelf import SLUGS, entry
+
+LEFT_EDGE, RIGHT_EDGE = LateralTarget.LEFT_BOUNDARY, LateralTarget.RIGHT_BOUNDARY
+
+
+def metres(low_m: float, high_m: float | None = None, *, about: bool = False) -> Length:
+    return Length(low_m=low_m, high_m=low_m if high_m is None else high_m, is_approximate=about)
+
+
+def spot(
+    ahead_m: float,
+    *settings: Setting,
+    lane: LaneChoice | None = LaneChoice.OWN,
+    lateral: Lateral | None = None,
+    about: bool = False,
+) -> Spot:
+    """So far ahead of the ego; behind it where that is negative."""
+    return Spot(
+        distance=metres(abs(ahead_m), about=about),
+        relation=Relation.AHEAD if ahead_m >= 0.0 else Relation.BEHIND,
+        lane=lane,
+        lateral=lateral,
+        settings=settings,
+    )
+
+
+def towards(
+    target: LateralTarget, offset_m: float | None = None, how: Nearness | None = None
+) -> Lateral:
+    offset = None if offset_m is None else metres(offset_m)
+    return Lateral(target=target, offset=offset, nearness=how)
+
+
+CENTRED = towards(LateralTarget.LANE_CENTRE)
+
+
+def parked(ahead_m: float = 21.4, *, body: Body = Body.CAR, **where: Any) -> Intent:
+    """One vehicle that stands."""
+    what = {name: where.pop(name) for name in ("facing", "speed_mps", "turn_deg") if name in where}
+    request = VehicleRequest(
+        spot=spot(ahead_m, **where), body=body, count=1, **{"speed_mps": 0.0, **what}
+    )
+    return Intent(requests=(request,))
+
+
+def walk(ahead_m: float, start: Side | None, *settings: Setting, **what: Any) -> Intent:
+    """Somebody crosses from that side."""
+    request = WalkRequest(
+        spot=spot(ahead_m, *settings, lane=None), start=start, **{"count": 1, **what}
+    )
+    return Intent(requests=(request,))
+
+
+def cones(
+    ahead_m: float, count: int, shape: Shape, *, lateral: Lateral | None = None, **what: Any
+) -> Intent:
+    """Cones in a shape."""
+    request = ConesRequest(spot=spot(ahead_m, lateral=lateral), shape=shape, count=count, **what)
+    return Intent(requests=(request,))
+
+
+def crash(ahead_m: float, count: int, *others: CrashedCar, settings: Any = ()) -> Intent:
+    """Crashed cars."""
+    request = CrashRequest(spot=spot(ahead_m, *settings), count=count, others=others)
+    return Intent(requests=(request,))
+
+
+PAPER = parked(
+    body=Body.VEHICLE,
+    about=True,
+    lateral=Lateral(target=LEFT_EDGE, offset=metres(0.0, 1.5)),
+)
+"""The paper's own example: a parked vehicle 21.4 m ahead, towards the left lane boundary."""
+
+_WISH = re.compile(r"Add a parked (car|vehicle) ([0-9.]+) m ahead(?: of the ego in its lane)?\.")
+
+
+def intents(instruction: str) -> Intent | None:
+    """The stand-in's list in tests: the catalogue, and the one wish that tests make."""
+    found = _WISH.fullmatch(same_text(instruction))
+    if found:
+        return parked(float(found[2]), body=Body(found[1]))
+    return _catalogue().get(same_text(instruction))
+
+
+@cache
+def _catalogue() -> dict[str, Intent]:
+    shelved = [entry(slug) for slug in SLUGS]
+    return {same_text(one.instruction): one.intent for one in shelved if one.intent is not None}
