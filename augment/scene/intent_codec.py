@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from dataclasses import fields
 from enum import Enum
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, Literal, TypeVar
 
 from pydantic import BaseModel, Field, Strict, model_validator
 
@@ -49,6 +49,8 @@ _Words = Annotated[str, Field(min_length=1, max_length=300, pattern=r"\S")]
 _Side = Annotated[Side, Strict(False)]
 _Facing = Annotated[Facing, Strict(False)]
 _Body = Annotated[Body, Strict(False)]
+_Item = TypeVar("_Item")
+_Several = Annotated[list[_Item], Field(fail_fast=True, max_length=MOST_OBJECTS)]
 
 
 class LengthDocument(Document):
@@ -82,7 +84,7 @@ class SpotDocument(Document):
     anchor: Id | None = None
     lane: Annotated[LaneChoice, Strict(False)] | None = None
     lateral: LateralDocument | None = None
-    settings: list[Annotated[Setting, Strict(False)]] = []
+    settings: _Several[Annotated[Setting, Strict(False)]] = []
 
     @model_validator(mode="after")
     def _says_where(self) -> SpotDocument:
@@ -122,7 +124,7 @@ class WalkDocument(_RequestDocument):
     speed_mps: Annotated[float, Field(gt=0.0, le=10.0)] | None = None
     drift_m: Annotated[float, Field(ge=-100.0, le=100.0)] | None = None
     is_file: bool = False
-    behind: list[LengthDocument] = []
+    behind: _Several[LengthDocument] = []
     on_road: bool = False
 
 
@@ -156,7 +158,7 @@ class CrashDocument(_RequestDocument):
     kind: Literal["crash"]
     body: _Body = Body.CAR
     facing: _Facing | None = None
-    others: list[CrashedCarDocument] = []
+    others: _Several[CrashedCarDocument] = []
 
 
 _AnyRequest = Annotated[
@@ -167,8 +169,8 @@ _AnyRequest = Annotated[
 class IntentParts(Document):
     """What an intent says, without the frame of a document: what a language model answers."""
 
-    requests: Annotated[list[_AnyRequest], Field(min_length=1, max_length=MOST_REQUESTS)]
-    beyond: list[_Words] = []
+    requests: Annotated[list[_AnyRequest], Field(fail_fast=True, min_length=1, max_length=MOST_REQUESTS)]
+    beyond: _Several[_Words] = []
 
 
 class IntentDocument(IntentParts):
