@@ -166,10 +166,15 @@ _AnyRequest = Annotated[
 ]
 
 
+_Requests = Annotated[
+    list[_AnyRequest], Field(fail_fast=True, min_length=1, max_length=MOST_REQUESTS)
+]
+
+
 class IntentParts(Document):
     """What an intent says, without the frame of a document: what a language model answers."""
 
-    requests: Annotated[list[_AnyRequest], Field(fail_fast=True, min_length=1, max_length=MOST_REQUESTS)]
+    requests: _Requests
     beyond: _Several[_Words] = []
 
 
