@@ -4,24 +4,41 @@ from django.db import migrations, models
 
 
 class Migration(migrations.Migration):
-
     dependencies = [
-        ('augment', '0004_when_a_call_was_sent'),
+        ("augment", "0006_what_a_contestant_sends"),
     ]
 
     operations = [
         migrations.AddField(
-            model_name='scenario',
-            name='intent',
-            field=models.JSONField(blank=True, help_text="what the instruction asks for, in augment.scene.intent_codec's format", null=True),
+            model_name="scenario",
+            name="intent",
+            field=models.JSONField(
+                blank=True,
+                help_text="what the instruction asks for, in augment.scene.intent_codec's format",
+                null=True,
+            ),
         ),
         migrations.AddField(
-            model_name='scenario',
-            name='intent_origin',
-            field=models.CharField(blank=True, choices=[('authored', 'authored'), ('entered', 'entered'), ('read', 'read')], max_length=10),
+            model_name="scenario",
+            name="intent_origin",
+            field=models.CharField(
+                blank=True,
+                choices=[("authored", "authored"), ("entered", "entered"), ("read", "read")],
+                max_length=10,
+            ),
         ),
         migrations.AddConstraint(
-            model_name='scenario',
-            constraint=models.CheckConstraint(condition=models.Q(models.Q(('intent__isnull', True), ('intent_origin', '')), models.Q(('intent__isnull', False), ('intent_origin__in', ['authored', 'entered', 'read'])), _connector='OR'), name='scenario_intent_has_an_origin'),
+            model_name="scenario",
+            constraint=models.CheckConstraint(
+                condition=models.Q(
+                    models.Q(("intent__isnull", True), ("intent_origin", "")),
+                    models.Q(
+                        ("intent__isnull", False),
+                        ("intent_origin__in", ["authored", "entered", "read"]),
+                    ),
+                    _connector="OR",
+                ),
+                name="scenario_intent_has_an_origin",
+            ),
         ),
     ]
