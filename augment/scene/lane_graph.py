@@ -64,7 +64,9 @@ class LaneGraph:
 
     def predecessors(self, way_id: str) -> tuple[str, ...]:
         """Ids of what leads here, straightest first."""
-        return tuple(sorted(self._previous[way_id], key=lambda name: self._bend(name, way_id)))
+        return tuple(
+            sorted(self._previous[way_id], key=lambda name: self._bend_back(name, way_id))
+        )
 
     def under(self, x_m: float, y_m: float, heading_rad: float | None = None) -> str | None:
         """The way whose width covers the point; of several the best aligned, else the nearest."""
@@ -120,10 +122,10 @@ class LaneGraph:
             here = following
             seen.add(here)
         while s_m < 0.0:
-            before = [name for name in self._previous[here] if name not in seen]
+            before = [name for name in self.predecessors(here) if name not in seen]
             if not before:
                 return None
-            here = min(before, key=lambda name: self._bend(name, here))
+            here = before[0]
             seen.add(here)
             s_m += self.ways[here].centerline.length_m
         return self.place(here, s_m, d_m)
@@ -156,14 +158,23 @@ class LaneGraph:
         return next(iter(wanted or options), None)
 
     def _bend(self, before: str, after: str) -> tuple[int, float]:
-        way = self.ways[after]
-        line = way.centerline
-        order = _TURN_ORDER[way.turn_type] if isinstance(way, LaneConnector) else 0
-        turn = difference(
-            line.heading_at(line.length_m),
-            self.ways[before].centerline.heading_at(self.ways[before].centerline.length_m),
-        )
-        return order, abs(turn)
+        """How far one turns from the end of a way to the end of the next."""
+        line, earlier = self.ways[after].centerline, self.ways[before].centerline
+        turn = difference(line.heading_at(line.length_m), earlier.heading_at(earlier.length_m))
+        return self._turn_order(after), abs(turn)
+
+    def _bend_back(self, before: str, after: str) -> tuple[int, float]:
+        """The same for who comes from behind, start to start.
+
+        Ways that merge end alike: what tells them apart is how they got there.
+        """
+        line, earlier = self.ways[after].centerline, self.ways[before].centerline
+        turn = difference(line.heading_at(0.0), earlier.heading_at(0.0))
+        return self._turn_order(before), abs(turn)
+
+    def _turn_order(self, way_id: str) -> int:
+        way = self.ways[way_id]
+        return _TURN_ORDER[way.turn_type] if isinstance(way, LaneConnector) else 0
 
     @staticmethod
     def _covers(way: Way, place: Projection) -> bool:

@@ -172,3 +172,45 @@ def test_the_error_of_a_fit_is_its_worst_place() -> None:
 def test_what_is_no_curve_is_refused(control: list[tuple[float, float]]) -> None:
     with pytest.raises(ValueError, match="a curve needs"):
         CubicBezier(control)
+
+
+@pytest.mark.parametrize("side", [1.0, -1.0], ids=["left", "right"])
+@pytest.mark.parametrize("turn_rad", [0.0, 0.5, 1.5, 2.5, 3.1])
+@pytest.mark.parametrize("is_end", [False, True], ids=["start", "end"])
+def test_a_fit_never_leaves_or_arrives_against_the_heading_it_is_given(
+    side: float, turn_rad: float, is_end: bool
+) -> None:
+    """A line along x with a heading that may point far away from it, even backwards.
+
+    Least squares alone would put the inner control point on the wrong side of its end, so that
+    the curve keeps the line's direction and its tangent points against the heading.
+    """
+    line = Polyline([(0.0, 0.0), (10.0, side * 1.0), (20.0, 0.0)])
+    wanted_rad = side * turn_rad
+    curve = fit(line, end_rad=wanted_rad) if is_end else fit(line, start_rad=wanted_rad)
+    heading_rad = float(curve.headings(np.array([1.0 if is_end else 0.0]))[0])
+    assert math.cos(heading_rad - wanted_rad) == pytest.approx(1.0, abs=1e-6)
+    ends, inner = curve.control_m[[0, 3]], curve.control_m[[1, 2]]
+    arm = (ends - inner)[1] if is_end else (inner - ends)[0]
+    along_m = arm @ [math.cos(wanted_rad), math.sin(wanted_rad)]
+    assert along_m >= 0.01 - 1e-9
+
+
+@given(
+    st.lists(st.floats(-0.6, 0.6), min_size=3, max_size=8),
+    st.floats(-math.pi, math.pi),
+    st.floats(-math.pi, math.pi),
+)
+def test_the_fit_to_a_mirrored_line_is_the_mirrored_fit(
+    turns: list[float], start_rad: float, end_rad: float
+) -> None:
+    headings = np.cumsum(turns)
+    points = np.cumsum(4.0 * np.column_stack([np.cos(headings), np.sin(headings)]), axis=0)
+    points = np.vstack([[0.0, 0.0], points])
+    given = fit(Polyline(points), start_rad=start_rad, end_rad=end_rad)
+    mirror = [1.0, -1.0]
+    other = fit(Polyline(points * mirror), start_rad=-start_rad, end_rad=-end_rad)
+    assert np.allclose(given.control_m * mirror, other.control_m, atol=1e-5)
+    for curve, wanted in ((given, (start_rad, end_rad)), (other, (-start_rad, -end_rad))):
+        made = curve.headings(np.array([0.0, 1.0]))
+        assert np.allclose(np.cos(made - wanted), 1.0, atol=1e-6)

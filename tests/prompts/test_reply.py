@@ -167,3 +167,29 @@ def test_notes_are_the_first_two_sections_in_any_dress() -> None:
     dressed = GOOD.replace("Insights:", "## Insights:").replace("Summary:", "**Summary:**")
     assert notes_of(dressed) == "One road, two lanes.\n\nA parked car ahead."
     assert notes_of("nothing of that kind") == ""
+
+
+@pytest.mark.parametrize("axis", [0, 1], ids=["x", "y"])
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+@pytest.mark.parametrize(
+    ("value_m", "is_read"), [(79.99, True), (80.0, True), (80.01, False), (400.0, False)]
+)
+@pytest.mark.parametrize("what", ["place", "walk", "moved walk"])
+def test_neither_a_place_nor_the_end_of_a_walk_lies_beyond_the_radius(
+    axis: int, sign: float, value_m: float, is_read: bool, what: str
+) -> None:
+    point = [3.0, 3.0]
+    point[axis] = sign * value_m
+    if what == "place":
+        text = block(agent(x_m=point[0], y_m=point[1]))
+    elif what == "walk":
+        text = block(agent(type="PEDESTRIAN", walk_to=point))
+    else:
+        text = block(move=[agent(id="Agent7", type="PEDESTRIAN", walk_to=point)])
+    if is_read:
+        made = read_reply(
+            text, scene(agents=(vehicle("Agent7", 40.0, 0.0),))
+        ).modification.changed[0]
+        assert (made.walk_to_m or (made.x_m, made.y_m)) == tuple(point)
+    else:
+        assert "x and y must lie between -80 and 80" in problems(text)[0]

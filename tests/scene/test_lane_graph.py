@@ -3,12 +3,14 @@ from __future__ import annotations
 import math
 from dataclasses import replace
 
+import numpy as np
 import pytest
 
 from augment.errors import UnknownName
 from augment.geometry.polyline import Polyline
-from augment.scene.entities import TurnType
+from augment.scene.entities import Lane, LaneConnector, Scene, TurnType
 from augment.scene.lane_graph import LaneGraph
+from augment.variants.pose_tool import PoseTool
 from tests.scenes import junction, scene
 
 
@@ -60,3 +62,70 @@ def test_a_lane_can_follow_another_with_no_connector_between() -> None:
     graph = LaneGraph(street)
     assert graph.route("Lane1", 200.0) == ["Lane1", "Lane2"]
     assert graph.predecessors("Lane2") == ("Lane1",)
+
+
+def merge(side: float, *, side_first: bool, connectors: bool) -> Scene:
+    """A side road bends round 90 degrees into a straight road, from the right (-1) or left (+1).
+
+    Lane1 runs east to x = -20, what is straight runs on to x = 0, where Lane3 begins. Lane2
+    comes from the side; its bend of 20 m radius ends in the last 2 m of the very same direction.
+    """
+    bend = [
+        (20.0 * math.sin(a) - 2.0, side * 20.0 * (1.0 - math.cos(a)))
+        for a in np.linspace(-math.pi / 2, 0.0, 31)
+    ]
+    bend.append((0.0, 0.0))
+    straight = [(-20.0, 0.0), (0.0, 0.0)]
+    lanes = {
+        "Lane1": [(-100.0, 0.0), (-20.0, 0.0)],
+        "Lane2": [(bend[0][0], side * 80.0), bend[0]],
+        "Lane3": [(0.0, 0.0), (80.0, 0.0)],
+    }
+    if not connectors:
+        lanes["Lane1"] += [(0.0, 0.0)]
+        lanes["Lane2"] += bend[1:]
+    order = ["Lane2", "Lane1", "Lane3"] if side_first else ["Lane1", "Lane2", "Lane3"]
+    after = {} if connectors else {"Lane1": ("Lane3",), "Lane2": ("Lane3",)}
+    ways = [
+        LaneConnector(
+            id=f"Connector{n}",
+            from_lane=f"Lane{n}",
+            to_lane="Lane3",
+            centerline=Polyline(line),
+            width_m=3.5,
+            turn_type=turn,
+        )
+        for n, line, turn in (
+            (1, straight, TurnType.STRAIGHT),
+            (2, bend, TurnType.LEFT if side < 0.0 else TurnType.RIGHT),
+        )
+    ]
+    return scene(
+        areas=(),
+        lanes=tuple(
+            Lane(
+                id=name,
+                centerline=Polyline(lanes[name]),
+                width_m=3.5,
+                successors=after.get(name, ()),
+            )
+            for name in order
+        ),
+        connectors=tuple(ways[::-1] if side_first else ways) if connectors else (),
+    )
+
+
+@pytest.mark.parametrize("side", [-1.0, 1.0], ids=["right", "left"])
+@pytest.mark.parametrize("side_first", [False, True])
+@pytest.mark.parametrize("connectors", [False, True])
+def test_back_over_a_merge_goes_the_straightest_way_not_the_first(
+    side: float, side_first: bool, connectors: bool
+) -> None:
+    """Both ways end alike at x = 0: 40 m before x = 10 lies x = -30, on the straight road."""
+    world = merge(side, side_first=side_first, connectors=connectors)
+    place = LaneGraph(world).along("Lane3", 10.0, -40.0)
+    assert place is not None
+    assert place.way_id == "Lane1"
+    assert (place.pose.x_m, place.pose.y_m) == pytest.approx((-30.0, 0.0))
+    called = PoseTool(world).pose_on_lane("Lane3", "lane", -30.0, 0.5)
+    assert (called.pose.x_m, called.pose.y_m) == pytest.approx((-30.0, 0.5), abs=0.01)

@@ -7,7 +7,7 @@ import pytest
 from django.db import IntegrityError, transaction
 from pytest_django import DjangoAssertNumQueries
 
-from arena.errors import AlreadyDecided, InvalidVote, NotYours, StudyNotOpen
+from arena.errors import AlreadyDecided, InvalidVote, NotYours, StudyNotOpen, TooFast
 from arena.models import Person, Vote
 from arena.queries.votes import current_votes, recent_votes, tallies
 from arena.queries.votes import voting_progress as progress_of
@@ -15,7 +15,7 @@ from arena.queries.voting_path import upcoming
 from arena.services.decisions import decision_of
 from arena.services.studies import close_study
 from arena.services.vote_writes import mark_served
-from arena.services.votes import cast_vote
+from arena.services.votes import PACE_WINDOW, cast_vote, receive_vote
 from augment.errors import Conflict
 from tests.study_rows import a_study, expert, matchups_of, vote
 
@@ -77,6 +77,45 @@ def test_a_change_is_appended_and_supersedes_the_current_vote() -> None:
     assert Vote.objects.count() == 3
     assert list(current_votes(study)) == [third]
     assert [v.outcome for v in recent_votes(study=study, expert=matchup.expert)] == ["equal"]
+
+
+@pytest.mark.parametrize(
+    ("outcome", "more", "named"),
+    [
+        ("equal", {"both_miss": True}, "both_miss"),
+        ("right", {"aids": "text"}, "aids"),
+    ],
+)
+def test_a_changed_vote_is_held_against_the_studys_rules_as_a_first_one_is(
+    outcome: str, more: dict[str, Any], named: str
+) -> None:
+    first_matchup, second_matchup, *_ = matchups_of(a_study(), "eva")
+    with pytest.raises(InvalidVote) as fresh:
+        vote(second_matchup, outcome, **more)
+    first = vote(first_matchup, "left")
+    with pytest.raises(InvalidVote) as changed:
+        vote(first_matchup, outcome, supersedes=first.key, **more)
+    assert changed.value.args == fresh.value.args
+    assert named in str(vars(changed.value))
+    assert list(Vote.objects.all()) == [first]
+
+
+@pytest.mark.parametrize(("allowed", "is_stored"), [(2, True), (1, False)])
+def test_changes_count_towards_the_pace_that_a_person_can_keep(
+    allowed: int, is_stored: bool, settings: Any
+) -> None:
+    matchup = matchups_of(a_study(), "eva")[0]
+    first = vote(matchup, "left")
+    settings.VOTES_PER_S = allowed / PACE_WINDOW.total_seconds()
+    change = decision_of(
+        matchup_code=matchup.code, key=uuid.uuid4(), outcome="right", supersedes=first.key
+    )
+    if is_stored:
+        receive_vote(expert=matchup.expert, decision=change)
+    else:
+        with pytest.raises(TooFast):
+            receive_vote(expert=matchup.expert, decision=change)
+    assert Vote.objects.count() == 1 + is_stored
 
 
 def test_a_superseded_vote_cannot_be_superseded_again() -> None:
