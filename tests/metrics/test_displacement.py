@@ -38,6 +38,15 @@ def test_the_matching_has_the_smallest_sum_not_the_nearest_first() -> None:
     assert found.distances_m == (4.0, 4.0)
 
 
+def test_the_sum_counts_and_not_the_squares() -> None:
+    # Straight 0 + 5 m, crosswise 3 + 3 m: squares would take the second.
+    reference = placed(vehicle("r1", 0.0, 0.0), vehicle("r2", 3.0, 0.0))
+    generated = placed(vehicle("g1", 0.0, 0.0), vehicle("g2", -7.0 / 6.0, 2.7638539919628333))
+    found = displacement(generated, reference)
+    assert pairs(found) == {"g1": "r1", "g2": "r2"}
+    assert sorted(found.distances_m) == pytest.approx([0.0, 5.0])
+
+
 def test_of_two_wanted_the_one_without_a_counterpart_is_missing() -> None:
     reference = placed(vehicle("r1", 0.0, 0.0), vehicle("r2", 20.0, 0.0))
     found = displacement(placed(vehicle("g1", 18.0, 0.0)), reference)
@@ -152,6 +161,28 @@ def test_the_order_of_the_objects_changes_nothing(
     before, after = displacement(generated, reference), displacement(shuffled, reference)
     assert sum(after.distances_m) == pytest.approx(sum(before.distances_m), abs=1e-4)
     assert len(after.surplus) == len(before.surplus)
+
+
+@unhurried
+@given(generated=changes(), reference=changes())
+def test_no_other_matching_has_a_smaller_sum(
+    generated: Modification, reference: Modification
+) -> None:
+    """Every matching is tried, class by class."""
+    found = displacement(generated, reference)
+    for name in set(CLASS_OF.values()):
+        wanted = [one for one in reference.changed if CLASS_OF[one.type] is name]
+        placed_ = [one for one in generated.changed if CLASS_OF[one.type] is name]
+        few, many = sorted((wanted, placed_), key=len)
+        smallest = min(
+            sum(
+                math.hypot(one.x_m - other.x_m, one.y_m - other.y_m)
+                for one, other in zip(few, order, strict=True)
+            )
+            for order in itertools.permutations(many, len(few))
+        )
+        made = sum(one.distance_m for one in found.matches if one.object_class is name)
+        assert made == pytest.approx(smallest, rel=1e-4, abs=1e-6)
 
 
 def test_of_equal_sums_the_even_one_counts_in_whatever_order() -> None:

@@ -3,11 +3,13 @@ from __future__ import annotations
 from collections import Counter
 from itertools import combinations
 
+import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from arena.errors import NothingToPlan
+from arena.pairing.order import _two_places
 from arena.pairing.plan import Entry, Plan, PlannedMatchup, Rules, plan
 
 
@@ -201,3 +203,10 @@ def test_too_few_units_are_refused_with_both_numbers() -> None:
 def test_rules_that_make_no_sense_are_refused(changes: dict[str, int], sentence: str) -> None:
     with pytest.raises(NothingToPlan, match=sentence):
         plan(rules(**changes))  # type: ignore[arg-type]
+
+
+def test_a_repeat_may_come_exactly_at_the_distance_that_is_asked_for() -> None:
+    seen = {_two_places([0, 5, 7], 5, np.random.default_rng(seed)) for seed in range(40)}
+    assert seen == {(0, 5), (0, 7)}
+    too_near = {_two_places([0, 2, 4], 5, np.random.default_rng(seed)) for seed in range(5)}
+    assert too_near == {(0, 4)}, "where none is far enough, as far as can be"
