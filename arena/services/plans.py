@@ -82,19 +82,19 @@ def check_pictures(scenarios: list[Scenario]) -> tuple[tuple[Check, ...], Cells]
     return tuple(checks), cells
 
 
-def must_have_checks(*, checks: Sequence[Check], wanted: int, scenarios: list[Scenario]) -> None:
-    """Refuse a study that asks for more attention checks than there are pictures for.
+def enough_checks(scenarios: list[Scenario], *, wanted: int) -> tuple[tuple[Check, ...], Cells]:
+    """What `check_pictures` gives, if that is as much as a study asks for.
 
     Args:
-        checks: What there can be; an expert sees each once.
+        scenarios: Of the study; an expert sees at most one check of each.
         wanted: How many each expert is to see.
-        scenarios: Of the study.
 
     Raises:
         NothingToPlan: There are too few; the text says what to do.
     """
+    checks, cells = check_pictures(scenarios) if wanted else ((), {})
     if len(checks) >= wanted:
-        return
+        return checks, cells
     ready = {check.scenario for check in checks}
     with_reference = Scenario.objects.filter(
         pk__in=[row.pk for row in scenarios], reference__isnull=False

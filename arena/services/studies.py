@@ -16,9 +16,8 @@ from arena.pairing.plan import Entry, Plan, Rules, plan
 from arena.queries.people import experts as expert_accounts
 from arena.services.plans import (
     Cells,
-    check_pictures,
+    enough_checks,
     latest_pictures,
-    must_have_checks,
     rules_of,
     store,
 )
@@ -40,7 +39,7 @@ class PlanOptions:
 
     Attributes:
         check_share: Needs as many scenarios with pictures for an attention check; see
-            `must_have_checks`.
+            `enough_checks`.
     """
 
     repeat_share: float = 0.0
@@ -86,18 +85,15 @@ def open_study(
         UnknownName: A contestant, scenario or expert does not exist.
         Conflict: The name is taken, the seed is out of range, or something simulated takes part
             unasked.
-        NothingToPlan: Pictures are missing, also of attention checks, or too few to fill the
-            votes; the text has numbers.
+        NothingToPlan: Pictures are missing or too few, also of checks; the text has numbers.
     """
     name, given = _free_name(name), options or PlanOptions()
     _check_seed(seed)
     contestant_rows, scenario_rows = _contestants(contestants), _scenarios(scenarios)
     expert_rows = _experts(experts)
-    if not allow_simulated:
-        _refuse_simulated(contestant_rows, expert_rows)
-    checks, broken = check_pictures(scenario_rows) if given.check_share else ((), {})
+    _refuse_simulated(contestant_rows, expert_rows, unless=allow_simulated)
     wanted = round(given.check_share * votes_per_expert)
-    must_have_checks(checks=checks, wanted=wanted, scenarios=scenario_rows)
+    checks, broken = enough_checks(scenario_rows, wanted=wanted)
     shown = latest_pictures(contestant_rows, scenario_rows)
     rules = Rules(
         entries=_entries(shown),
@@ -192,7 +188,9 @@ def _named(kind: str, name: str, known: dict[str, Any]) -> Any:
     return known[name]
 
 
-def _refuse_simulated(contestants: list[Contestant], experts: list[User]) -> None:
+def _refuse_simulated(contestants: list[Contestant], experts: list[User], *, unless: bool) -> None:
+    if unless:
+        return
     simulated = [
         sentence("contestant %(name)s", name=row.slug) for row in contestants if row.is_simulated
     ] + [

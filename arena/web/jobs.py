@@ -11,6 +11,7 @@ from django.contrib.auth.models import User
 from django.db import transaction
 from django.http import HttpRequest, HttpResponse
 from django.shortcuts import get_object_or_404, redirect, render
+from django.urls import reverse
 from django.utils.translation import gettext as _
 from django.views.decorators.http import require_http_methods, require_POST, require_safe
 
@@ -18,8 +19,9 @@ from arena.queries import jobs, scenarios
 from arena.web.access import ADMIN, STAFF, only
 from arena.web.displacement import section
 from arena.web.forms import CapsForm, LaunchForm
+from arena.web.questions import Question, ask, is_sure
 from augment.errors import AugmentError, QueueFault
-from augment.models import Contestant, GenerationJob
+from augment.models import Augmentation, Contestant, GenerationJob
 from augment.services import caps, contestants
 from augment.services import jobs as service
 from augment.services.caps import Caps
@@ -27,6 +29,8 @@ from augment.services.job_costs import costs_of
 from augment.services.wording import said
 from augment.services.workers import workforce
 from augment.tasks import enqueue_job
+
+State = Augmentation.State
 
 
 @only(*STAFF)
@@ -99,10 +103,14 @@ def retry_job(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
 
 
 @only(ADMIN)
-@require_POST
+@require_http_methods(["GET", "HEAD", "POST"])
 def cancel_job(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
-    """Start nothing new; what is done stays."""
+    """Start nothing new; what is done stays. There is no way back, so it asks first."""
     job = get_object_or_404(GenerationJob, code=code)
+    if not is_sure(request):
+        if job.state not in service.OPEN:
+            return redirect("job", code=code)
+        return ask(request, _cancelling(job))
     try:
         service.cancel(job=job, actor=cast(User, request.user))
     except AugmentError as error:
@@ -133,6 +141,26 @@ def resume_job(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
     else:
         messages.success(request, _("What is left is queued again."))
     return redirect("job", code=code)
+
+
+def _cancelling(job: GenerationJob) -> Question:
+    """What is asked before a job is cancelled."""
+    found = jobs.counts(job).by_state
+    waiting, running = found[State.QUEUED], found[State.RUNNING]
+    settled = sum(found.values()) - waiting - running
+    facts = (
+        _("Augmentations that wait and are never made: %(n)s.") % {"n": waiting},
+        _("Running now, which end and keep their results: %(n)s.") % {"n": running},
+        _("Settled, which stay as they are: %(n)s.") % {"n": settled},
+        _("A cancelled job can’t go on; what is missing takes a new one."),
+    )
+    return Question(
+        title=_("Cancel “%(name)s”?") % {"name": job.name},
+        facts=facts,
+        button=_("Cancel the job"),
+        back=reverse("job", args=[job.code]),
+        crumbs=((_("Jobs"), reverse("jobs")), (job.name, reverse("job", args=[job.code]))),
+    )
 
 
 def _estimated(request: HttpRequest, form: LaunchForm) -> HttpResponse:

@@ -12,7 +12,7 @@ from django.shortcuts import get_object_or_404, redirect, render
 from django.utils.text import slugify
 from django.utils.translation import gettext as _
 from django.views.decorators.cache import never_cache
-from django.views.decorators.http import require_http_methods, require_POST, require_safe
+from django.views.decorators.http import require_http_methods, require_safe
 
 from arena.errors import AlreadyLabelled, ArenaError, LabellingClosed, NotYours
 from arena.exports.faults import FORMATS, fault_table
@@ -23,6 +23,8 @@ from arena.queries.people import by_pseudonym, experts, role_of
 from arena.services.faults import close_labelling, open_labelling, save_label
 from arena.web.access import ADMIN, EXPERT, STAFF, only
 from arena.web.forms import LabelForm, LabellingForm
+from arena.web.labelling_questions import closing, opening
+from arena.web.questions import ask, is_sure, wants_to_change
 from augment.errors import AugmentError, UnknownName
 from augment.models import GenerationJob
 from augment.services.fault_guess import FaultClass
@@ -55,8 +57,10 @@ def faults_page(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
     if request.method == "POST":
         if role_of(request.user) != ADMIN:
             return HttpResponse(status=403)
-        if form.is_valid() and _open(request, job, form):
-            return redirect("faults", code=code)
+        if form.is_valid() and not wants_to_change(request):
+            answer = _open(request, job, form)
+            if answer is not None:
+                return answer
     context = {
         "job": job,
         "form": form,
@@ -84,10 +88,14 @@ def export(request: HttpRequest, code: uuid.UUID, form: str) -> HttpResponse:
 
 
 @only(ADMIN)
-@require_POST
+@require_http_methods(["GET", "HEAD", "POST"])
 def close(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
-    """Take no more labels."""
+    """Take no more labels; there is no way back, so it asks first."""
     labelling = get_object_or_404(LabellingRound.objects.select_related("job"), code=code)
+    if not is_sure(request):
+        if labelling.closed_at is not None:
+            return redirect("faults", code=labelling.job.code)
+        return ask(request, closing(labelling))
     try:
         close_labelling(labelling=labelling, actor=cast(User, request.user))
     except ArenaError as error:
@@ -137,19 +145,17 @@ def _guess(label: FaultLabel) -> str:
     return _("The automatic checks had guessed: %(faults)s.") % {"faults": faults}
 
 
-def _open(request: HttpRequest, job: GenerationJob, form: LabellingForm) -> bool:
+def _open(request: HttpRequest, job: GenerationJob, form: LabellingForm) -> HttpResponse | None:
+    """The page that asks first, or where to go once it is open; None where it is refused."""
+    given = {name: form.cleaned_data[name] for name in ("name", "experts", "seed")}
     try:
-        labelling = open_labelling(
-            name=form.cleaned_data["name"],
-            job=job,
-            experts=form.cleaned_data["experts"],
-            seed=form.cleaned_data["seed"],
-            actor=cast(User, request.user),
-        )
+        if not is_sure(request):
+            return ask(request, opening(job, **given))
+        labelling = open_labelling(job=job, **given, actor=cast(User, request.user))
     except (ArenaError, AugmentError) as error:
         form.add_error(None, said(error))
-        return False
+        return None
     messages.success(
         request, _("“%(name)s” is open; its experts can label now.") % {"name": labelling.name}
     )
-    return True
+    return redirect("faults", code=job.code)

@@ -24,7 +24,9 @@ from arena.queries.votes import tallies
 from arena.services.handing_over import hand_over
 from arena.services.studies import close_study, open_study, rules_of
 from arena.web.access import ADMIN, STAFF, only
+from arena.web.questions import ask, is_sure, wants_to_change
 from arena.web.study_forms import HandOverForm, StudyForm
+from arena.web.study_questions import closing, handing_over, opening
 from augment.errors import AugmentError
 from augment.models import Contestant
 from augment.services.wording import said
@@ -52,8 +54,10 @@ def new_study_page(request: HttpRequest) -> HttpResponse:
         experts=by_pseudonym(experts()),
         initial={"checks": usual_checks()},
     )
-    if request.method == "POST" and form.is_valid():
+    if request.method == "POST" and form.is_valid() and not wants_to_change(request):
         try:
+            if not is_sure(request):
+                return ask(request, opening(form.rules()))
             study = open_study(**form.rules(), actor=cast(User, request.user))
         except (ArenaError, AugmentError) as error:
             form.add_error(None, said(error))
@@ -89,8 +93,10 @@ def study_page(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
 @only(ADMIN)
 @require_POST
 def hand_over_pairs(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
-    """Let others judge what an expert has not judged."""
+    """Let others judge what an expert has not judged; asks first."""
     study = get_object_or_404(Study, code=code)
+    if wants_to_change(request):
+        return redirect("study", code=code)
     form = HandOverForm(
         request.POST,
         givers=list(study.experts.values_list("username", flat=True)),
@@ -102,6 +108,8 @@ def hand_over_pairs(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
         return redirect("study", code=code)
     giver, takers = form.cleaned_data["giver"], form.cleaned_data["takers"]
     try:
+        if not is_sure(request):
+            return ask(request, handing_over(study, giver, takers))
         taken = hand_over(study=study, username=giver, to=takers, actor=cast(User, request.user))
     except (ArenaError, AugmentError) as error:
         messages.error(request, said(error))
@@ -112,10 +120,14 @@ def hand_over_pairs(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
 
 
 @only(ADMIN)
-@require_POST
+@require_http_methods(["GET", "HEAD", "POST"])
 def close(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
-    """Take no more votes; this can't be taken back."""
+    """Take no more votes; this can't be taken back, so it asks first."""
     study = get_object_or_404(Study, code=code)
+    if not is_sure(request):
+        if study.state != Study.State.OPEN:
+            return redirect("study", code=code)
+        return ask(request, closing(study))
     try:
         close_study(study=study, actor=cast(User, request.user))
     except ArenaError as error:

@@ -54,12 +54,12 @@ ACTIONS: dict[str, tuple[int, int, int]] = {
     "revoke": (302, 403, 403),
     "author": (302, 403, 403),
     "author-back": (302, 403, 403),
-    "job-cancel": (302, 403, 403),
+    "job-cancel": (200, 403, 403),
     "job-resume": (302, 403, 403),
     "study-rate": (403, 403, 403),
     "rating-again": (403, 403, 403),
     "results-open": (302, 302, 403),
-    "study-close": (302, 403, 403),
+    "study-close": (200, 403, 403),
     "study-hand-over": (302, 403, 403),
     "labelling-close": (404, 403, 403),
     "theme": (302, 302, 302),
@@ -123,10 +123,15 @@ def test_every_action_is_for_the_roles_of_the_table() -> None:
         assert found == expected, name
 
 
+ASKS_FIRST = {"study-close": 200, "job-cancel": 200, "labelling-close": 404}
+"""What a GET of them answers: a question, which changes nothing; here nobody labels."""
+
+
 def test_an_action_needs_a_post() -> None:
     here, admin = world(), people()["admin"]
     for name in ACTIONS:
-        assert signed_in(admin).get(address(name, here)).status_code == 405, name
+        answer = signed_in(admin).get(address(name, here))
+        assert answer.status_code == ASKS_FIRST.get(name, 405), name
 
 
 def test_the_login_alone_is_open_to_the_world() -> None:

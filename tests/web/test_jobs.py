@@ -91,10 +91,10 @@ def test_cancelling_keeps_what_is_done_and_says_so_twice() -> None:
     first = job.augmentations.all()[0]
     claims.settle(held=rows.claimed(first), settlement=rows.done(), now=rows.NOON)
     admin, url = signed_in(people()["admin"]), reverse("job-cancel", args=[job.code])
-    admin.post(url)
+    admin.post(url, {"sure": "1"})
     states = sorted(job.augmentations.values_list("state", flat=True))
     assert states == ["cancelled", "done"]
-    assert "already" in admin.post(url, follow=True).content.decode()
+    assert "already" in admin.post(url, {"sure": "1"}, follow=True).content.decode()
 
 
 def test_progress_is_counted_and_not_sent_again_while_nothing_changes() -> None:

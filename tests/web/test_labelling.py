@@ -86,7 +86,7 @@ def test_an_admin_opens_a_labelling_and_an_analyst_reads_it(job: GenerationJob, 
     assert signed_in(accounts["analyst"]).post(url, sent).status_code == 403
     admin = signed_in(accounts["admin"])
     assert admin.post(url, {**sent, "experts": []}).status_code == 422
-    assert "is open" in admin.post(url, sent, follow=True).content.decode()
+    assert "is open" in admin.post(url, {**sent, "sure": "1"}, follow=True).content.decode()
     again = admin.post(url, sent)
     assert (again.status_code, "already" in again.content.decode()) == (422, True)
     labelling = LabellingRound.objects.get()
@@ -109,8 +109,11 @@ def test_a_closed_labelling_keeps_its_labels_and_takes_no_more(
     admin, faults = signed_in(people()["admin"]), reverse("faults", args=[labelling.job.code])
     close = reverse("labelling-close", args=[labelling.code])
     assert close in admin.get(faults).content.decode()
-    assert "is closed; its labels stay." in admin.post(close, follow=True).content.decode()
-    assert "is closed already." in admin.post(close, follow=True).content.decode()
+    assert (
+        "is closed; its labels stay."
+        in admin.post(close, {"sure": "1"}, follow=True).content.decode()
+    )
+    assert "is closed already." in admin.post(close, {"sure": "1"}, follow=True).content.decode()
     assert close not in admin.get(faults).content.decode()
     late = client.post(url, {"task": second.code}, follow=True).content.decode()
     assert "is closed." in late

@@ -143,7 +143,7 @@ def test_jobs_refuse_in_german() -> None:
         ("cancel", "Abgebrochen. Was fertig ist, bleibt."),
         ("cancel", "Der Job „Round 1“ ist schon abgebrochen."),
     ):
-        told = flashed(admin, reverse(f"job-{name}", args=[job.code]))
+        told = flashed(admin, reverse(f"job-{name}", args=[job.code]), {"sure": "1"})
         assert told.startswith(german)
     rows.add_scenario("bare", reference=None)
     sent = {"name": "Night", "contestants": ["reference"], "scenarios": ["bare"]}

@@ -24,7 +24,7 @@ def test_an_admin_opens_a_study_and_its_experts_can_vote() -> None:
         "votes_per_expert": 9,
         "seed": 4,
     }
-    answer = signed_in(people()["admin"]).post(reverse("study-new"), sent)
+    answer = signed_in(people()["admin"]).post(reverse("study-new"), {**sent, "sure": "1"})
     study = Study.objects.get()
     assert answer.headers["Location"] == reverse("study", args=[study.code])
     assert (study.state, study.matchups.count()) == ("open", 18)
@@ -56,7 +56,7 @@ def test_progress_is_shown_by_expert_and_says_nothing_of_who_leads() -> None:
 def test_closing_is_for_admins_and_leads_to_the_results() -> None:
     study = study_rows.a_study()
     admin = signed_in(people()["admin"])
-    answer = admin.post(reverse("study-close", args=[study.code]), follow=True)
+    answer = admin.post(reverse("study-close", args=[study.code]), {"sure": "1"}, follow=True)
     assert reverse("results", args=[study.code]) in answer.content.decode()
     study.refresh_from_db()
     assert study.state == "closed"
@@ -65,6 +65,7 @@ def test_closing_is_for_admins_and_leads_to_the_results() -> None:
 def opened(**rules: object) -> tuple[int, str]:
     """What posting the form with these rules answers."""
     sent = {"name": "Round 1", **study_rows.cast_of(), "votes_per_expert": 12, "seed": 4}
+    sent |= {"sure": "1"}
     answer = signed_in(people()["admin"]).post(reverse("study-new"), {**sent, **rules})
     return answer.status_code, " ".join(answer.content.decode().split())
 
@@ -121,7 +122,8 @@ def test_an_admin_hands_over_what_an_expert_has_not_judged() -> None:
     study = study_rows.a_study(experts=("eva", "finn", "gus"))
     admin = signed_in(people()["admin"])
     url = reverse("study-hand-over", args=[study.code])
-    said = admin.post(url, {"giver": "eva", "takers": ["finn", "gus"]}, follow=True)
+    given = {"giver": "eva", "takers": ["finn", "gus"], "sure": "1"}
+    said = admin.post(url, given, follow=True)
     assert "Handed over: finn 5, gus 4." in said.content.decode() or (
         "Handed over: finn 4, gus 5." in said.content.decode()
     )

@@ -88,7 +88,7 @@ def test_it_is_off_unless_the_form_asks_for_it() -> None:
     assert (
         "Experts may read a text description" in admin.get(reverse("study-new")).content.decode()
     )
-    sent = {"name": "Round 1", **cast, "votes_per_expert": 9, "seed": 4}
+    sent = {"name": "Round 1", **cast, "votes_per_expert": 9, "seed": 4, "sure": "1"}
     admin.post(reverse("study-new"), sent)
     study = Study.objects.get()
     assert not study.allow_text
@@ -103,7 +103,9 @@ def test_the_form_opens_a_study_with_it_and_its_page_says_so(study: Study) -> No
         **{"name": "Round 2", "experts": ["eva"], "votes_per_expert": 9, "seed": 4},
     }
     admin = signed_in(people()["admin"])
-    answer = admin.post(reverse("study-new"), sent | {"allow_text": "on"}, follow=True)
+    answer = admin.post(
+        reverse("study-new"), sent | {"allow_text": "on", "sure": "1"}, follow=True
+    )
     assert Study.objects.get(name="Round 2").allow_text
     assert re.search(r"<dt>Text description</dt><dd>may be read</dd>", answer.content.decode())
 

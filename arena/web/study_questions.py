@@ -1,0 +1,120 @@
+"""What an admin is asked before a study opens, closes, or pairs go to somebody else."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Sequence
+from typing import Any
+
+from django.db import transaction
+from django.urls import reverse
+from django.utils.translation import gettext as _
+
+from arena.models import Matchup, Study
+from arena.queries.votes import tallies
+from arena.services.handing_over import hand_over
+from arena.services.studies import open_study
+from arena.web.questions import Question
+
+Kind = Matchup.Kind
+
+
+def opening(rules: dict[str, Any]) -> Question:
+    """Counted by opening the study and taking that back at once.
+
+    Raises:
+        ArenaError, AugmentError: It can't be opened.
+    """
+    with transaction.atomic():
+        study = open_study(**rules)
+        kinds = Counter(study.matchups.values_list("kind", flat=True))
+        later = sum(study.votes_to_plan.values())
+        people = study.experts.count()
+        sides = study.contestants.count(), study.scenarios.count()
+        transaction.set_rollback(True)
+    votes = kinds[Kind.MAIN] + later
+    numbers = {
+        "experts": people,
+        "votes": votes,
+        "contestants": sides[0],
+        "scenarios": sides[1],
+        "repeats": kinds[Kind.REPEAT],
+        "checks": kinds[Kind.CHECK],
+    }
+    facts = [
+        _(
+            "Experts: %(experts)s. Votes: %(votes)s. Contestants: %(contestants)s. Scenarios: "
+            "%(scenarios)s."
+        )
+        % numbers,
+        _("On top of the votes: hidden repeats %(repeats)s, attention checks %(checks)s.")
+        % numbers,
+    ]
+    if later:
+        facts.append(_("Votes that are planned later, by those before: %(n)s.") % {"n": later})
+    if rules["allow_simulated"]:
+        facts.append(_("What is simulated may take part; every page and file then says so."))
+    facts.append(_("Experts can vote at once. The rules can’t be changed afterwards."))
+    return Question(
+        title=_("Open the study “%(name)s”?") % {"name": rules["name"]},
+        facts=tuple(facts),
+        button=_("Open the study"),
+        back=reverse("study-new"),
+        is_final=False,
+        crumbs=((_("Studies"), reverse("studies")), (_("New study"), reverse("study-new"))),
+    )
+
+
+def closing(study: Study) -> Question:
+    """What is there, and what will never come."""
+    lines = tallies(study)
+    given = sum(line.left_wins + line.ties + line.right_wins for line in lines)
+    skipped = sum(line.skips for line in lines)
+    missing = sum(line.total - line.voted for line in lines)
+    unfinished = sum(line.voted < line.total for line in lines)
+    facts = (
+        _("Votes given: %(given)s. Pairs skipped: %(skipped)s.")
+        % {"given": given, "skipped": skipped},
+        _("Planned votes that will be missing: %(n)s. Experts who are not done: %(experts)s.")
+        % {"n": missing, "experts": unfinished},
+        _("No more votes are taken. This can’t be taken back."),
+        _("Its results can be read then, also by its experts."),
+    )
+    return Question(
+        title=_("Close the study “%(name)s”?") % {"name": study.name},
+        facts=facts,
+        button=_("Close the study"),
+        back=reverse("study", args=[study.code]),
+        crumbs=_crumbs(study),
+    )
+
+
+def handing_over(study: Study, giver: str, takers: Sequence[str]) -> Question:
+    """Counted by handing over and taking that back at once.
+
+    Raises:
+        ArenaError, AugmentError: It can't be done.
+    """
+    with transaction.atomic():
+        taken = hand_over(study=study, username=giver, to=takers)
+        transaction.set_rollback(True)
+    facts = (
+        *(
+            _("Pairs that %(name)s takes: %(n)s.") % {"name": name, "n": number}
+            for name, number in taken.items()
+        ),
+        _("%(name)s no longer sees them; votes that were given stay.") % {"name": giver},
+        _("The pairs are planned anew for who takes them. This can’t be taken back."),
+    )
+    return Question(
+        title=_("Hand over what %(name)s has not judged?") % {"name": giver},
+        facts=facts,
+        button=_("Hand over"),
+        back=reverse("study", args=[study.code]),
+        crumbs=_crumbs(study),
+    )
+
+
+def _crumbs(study: Study) -> tuple[tuple[str, str], ...]:
+    address = reverse("study", args=[study.code])
+    return ((_("Studies"), reverse("studies")), (study.name, address))

@@ -1,0 +1,159 @@
+"""What has no way back asks once more, with its numbers, and works by forms alone."""
+
+from __future__ import annotations
+
+import html
+import re
+from typing import Any
+
+import pytest
+from django.contrib.auth.models import User
+from django.test import Client
+from django.urls import reverse
+
+from arena.models import LabellingRound, Study
+from arena.services.faults import open_labelling
+from augment.models import Augmentation, Event, GenerationJob
+from augment.services import claims
+from tests import study_rows
+from tests.jobs import rows
+from tests.web.cast import people, signed_in
+
+pytestmark = pytest.mark.django_db
+
+
+def text_of(answer: Any) -> str:
+    plain = re.sub(r"<[^>]+>", " ", html.unescape(answer.content.decode()))
+    return " ".join(plain.split())
+
+
+def hidden_of(answer: Any) -> dict[str, list[str]]:
+    """What the page sends along, as a browser would."""
+    sent: dict[str, list[str]] = {}
+    pattern = r'<input type="hidden" name="([^"]+)" value="([^"]*)">'
+    for name, value in re.findall(pattern, answer.content.decode()):
+        if name != "csrfmiddlewaretoken":
+            sent.setdefault(name, []).append(html.unescape(value))
+    return sent
+
+
+def admin_of() -> Client:
+    return signed_in(people()["admin"])
+
+
+def test_closing_a_study_asks_and_says_what_will_be_missing() -> None:
+    study = study_rows.a_study()
+    first, second, *rest = study_rows.matchups_of(study, "eva")
+    study_rows.vote(first, "skip", reason="unclear")
+    for matchup in (second, *rest):
+        study_rows.vote(matchup)
+    admin, page = admin_of(), reverse("study-close", args=[study.code])
+    assert page in admin.get(reverse("study", args=[study.code])).content.decode()
+    for asked in (admin.get(page), admin.post(page)):
+        assert asked.status_code == 200
+        shown = text_of(asked)
+        assert "Close the study “Round 1”?" in shown
+        assert "Votes given: 8. Pairs skipped: 1." in shown
+        assert "will be missing: 9. Experts who are not done: 1." in shown
+        study.refresh_from_db()
+        assert study.state == "open"
+    admin.post(page, {"sure": "1"})
+    study.refresh_from_db()
+    assert study.state == "closed"
+    assert admin.get(page).status_code == 302, "a closed one asks nothing"
+
+
+def test_opening_a_study_asks_with_its_numbers_and_keeps_what_was_filled_in() -> None:
+    targets = "ann 20\r\nbob = 15\r\n\r\ncid: 13"
+    sent = {"name": "<b>Round</b> 1", **study_rows.cast_of(), "votes_per_expert": 12, "seed": 4}
+    admin, page = admin_of(), reverse("study-new")
+    events = Event.objects.count()
+    asked = admin.post(page, {**sent, "repeats": "25", "targets": targets})
+    shown = text_of(asked)
+    assert "Open the study “<b>Round</b> 1”?" in html.unescape(asked.content.decode())
+    assert "Experts: 2. Votes: 24. Contestants: 3. Scenarios: 6." in shown
+    assert "hidden repeats 6, attention checks 0." in shown
+    assert (Study.objects.count(), Event.objects.count()) == (0, events)
+    back = admin.post(page, {**hidden_of(asked), "change": "1"})
+    assert 'value="&lt;b&gt;Round&lt;/b&gt; 1"' in back.content.decode()
+    assert not Study.objects.exists()
+    admin.post(page, {**hidden_of(asked), "sure": "1"})
+    study = Study.objects.get()
+    assert study.rules["appearances"] == [["ann", 20], ["bob", 15], ["cid", 13]]
+    assert study.matchups.count() == 24 + 6
+
+
+def test_what_cannot_be_opened_is_said_on_the_form_and_not_asked() -> None:
+    sent = {"name": "Round 1", **study_rows.cast_of(), "votes_per_expert": 99, "seed": 4}
+    answer = admin_of().post(reverse("study-new"), sent)
+    assert answer.status_code == 422
+    assert 'name="sure"' not in answer.content.decode()
+
+
+def test_handing_over_asks_who_will_take_how_many() -> None:
+    study = study_rows.a_study(experts=("eva", "finn", "gus"))
+    admin, page = admin_of(), reverse("study-hand-over", args=[study.code])
+    before = study_rows.rows_planned(study)
+    asked = admin.post(page, {"giver": "eva", "takers": ["finn", "gus"]})
+    numbers = re.findall(r"Pairs that (\w+) takes: (\d)\.", text_of(asked))
+    assert (set(dict(numbers)), sum(int(n) for _, n in numbers)) == ({"finn", "gus"}, 9)
+    assert study_rows.rows_planned(study) == before
+    admin.post(page, {**hidden_of(asked), "sure": "1"})
+    assert not study.matchups.filter(expert__username="eva").exists()
+    for name, number in numbers:
+        assert study.matchups.filter(expert__username=name).count() == 9 + int(number)
+
+
+def test_cancelling_a_job_asks_and_says_what_is_lost_and_what_stays() -> None:
+    job = rows.launch(scenarios=4)
+    first, second, *_ = job.augmentations.all()
+    claims.settle(held=rows.claimed(first), settlement=rows.done(), now=rows.NOON)
+    rows.claimed(second)
+    admin, page = admin_of(), reverse("job-cancel", args=[job.code])
+    assert page in admin.get(reverse("job", args=[job.code])).content.decode()
+    for asked in (admin.get(page), admin.post(page)):
+        shown = text_of(asked)
+        assert "wait and are never made: 2." in shown
+        assert "end and keep their results: 1." in shown
+        assert "Settled, which stay as they are: 1." in shown
+        assert not Augmentation.objects.filter(state="cancelled").exists()
+    admin.post(page, {"sure": "1"})
+    assert Augmentation.objects.filter(state="cancelled").count() == 2
+    assert "Cancelled, 1 still runs" in text_of(admin.get(reverse("job", args=[job.code])))
+
+
+def test_a_labelling_asks_before_it_opens_and_before_it_closes() -> None:
+    study = study_rows.a_study()
+    job = study.matchups.all()[0].left.job
+    admin, page = admin_of(), reverse("faults", args=[job.code])
+    asked = admin.post(page, {"name": "Faults", "experts": ["eva", "finn"], "seed": "1"})
+    assert "Pictures: 1. Experts: 2. Labels planned: 2." in text_of(asked)
+    assert not LabellingRound.objects.exists()
+    back = admin.post(page, {**hidden_of(asked), "change": "1"})
+    assert 'value="Faults"' in back.content.decode()
+    admin.post(page, {**hidden_of(asked), "sure": "1"})
+    labelling = LabellingRound.objects.get()
+    close = reverse("labelling-close", args=[labelling.code])
+    assert close in admin.get(page).content.decode()
+    for asked in (admin.get(close), admin.post(close)):
+        assert "Planned labels that will be missing: 2." in text_of(asked)
+        labelling.refresh_from_db()
+        assert labelling.closed_at is None
+    admin.post(close, {"sure": "1"})
+    labelling.refresh_from_db()
+    assert labelling.closed_at is not None
+
+
+def test_every_question_is_for_admins_alone_and_no_crawler_acts() -> None:
+    study = study_rows.a_study()
+    job = GenerationJob.objects.all()[0]
+    labelling = open_labelling(name="F", job=job, experts=["eva"], seed=1)
+    analyst = signed_in(people()["analyst"])
+    for name, row in (("study-close", study), ("job-cancel", job), ("labelling-close", labelling)):
+        page = reverse(name, args=[row.code])
+        assert analyst.get(page).status_code == 403
+        assert analyst.post(page, {"sure": "1"}).status_code == 403
+    admin = signed_in(User.objects.get(username="the-admin"))
+    admin.get(reverse("study-close", args=[study.code]), {"sure": "1"})
+    study.refresh_from_db()
+    assert study.state == "open", "a GET never acts"
