@@ -12,8 +12,10 @@ import time
 from collections import deque
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
+from types import MappingProxyType
 
 KEPT_LINES = 20
+POLL_S = 0.05
 READER_S = 5.0
 """How long its last lines are waited for; what it started may keep its output open."""
 
@@ -45,19 +47,24 @@ class Child:
     Args:
         program: What to run.
         say: Gets every line that the program prints.
+        environment: What every child of the supervisor has in its environment.
     """
 
-    def __init__(self, program: Program, say: Callable[[str, str], None]) -> None:
+    def __init__(
+        self,
+        program: Program,
+        say: Callable[[str, str], None],
+        environment: Mapping[str, str] = MappingProxyType({}),
+    ) -> None:
         self.program = program
         self._last_lines: deque[str] = deque(maxlen=KEPT_LINES)
-        self.started_at = time.monotonic()
         self._say = say
         leash = (sys.executable, "-m", "arena.serving.leash", str(os.getpid()), "--")
         # A session of its own: Ctrl-C reaches the supervisor alone, which then stops its children
         # in order; and the whole group can be killed when one of them does not listen.
         self._process = subprocess.Popen(
             (*leash, *program.arguments),
-            env={**os.environ, "PYTHONUNBUFFERED": "1", **program.environment},
+            env={**os.environ, "PYTHONUNBUFFERED": "1", **environment, **program.environment},
             stdin=subprocess.DEVNULL,
             stdout=subprocess.PIPE,
             stderr=subprocess.STDOUT,
@@ -91,14 +98,23 @@ class Child:
         if self.exit_code is None:
             self._process.terminate()
 
-    def stop(self, *, at_once: bool = False) -> None:
-        """End it and whatever it started: SIGTERM, after the grace SIGKILL to the whole group."""
-        if not at_once:
-            self.ask_to_stop()
-            try:
-                self._process.wait(self.program.grace_s)
-            except subprocess.TimeoutExpired:
+    def stop(self, *, is_hurried: Callable[[], bool] = lambda: False) -> None:
+        """End it and whatever it started: SIGTERM, after the grace SIGKILL to the whole group.
+
+        Args:
+            is_hurried: Asked all the while; once it says yes, the grace is over.
+        """
+        self.ask_to_stop()
+        limit = time.monotonic() + self.program.grace_s
+        while self.exit_code is None and not is_hurried():
+            if time.monotonic() > limit:
                 self._say(self.program.name, f"did not end within {self.program.grace_s:.0f} s")
+                break
+            time.sleep(POLL_S)
+        self.kill()
+
+    def kill(self) -> None:
+        """End it and whatever it started at once."""
         with contextlib.suppress(ProcessLookupError):  # nobody of the group is left: as wanted
             os.killpg(self.pid, signal.SIGKILL)
         self._process.wait()

@@ -14,6 +14,12 @@ from arena.serving.probes import port_answers, require_free_port
 from arena.serving.redis_server import private_redis
 from augment.models import Endpoint
 
+SHORTEST_GRACE_S, DRAWING_S = 60.0, 30.0
+"""A worker that is to stop has the time of a call, and for what is drawn after it."""
+
+WEB_GRACE_S = 35.0
+"""Gunicorn itself gives its workers 30 s."""
+
 MANAGE = (sys.executable, str(settings.BASE_DIR / "manage.py"))
 
 
@@ -64,7 +70,10 @@ def web_server(web: Web) -> Program:
         "--no-control-socket",
     )
     return Program(
-        name="web", arguments=arguments, is_ready=lambda: port_answers(web.host, web.port)
+        name="web",
+        arguments=arguments,
+        is_ready=lambda: port_answers(web.host, web.port),
+        grace_s=WEB_GRACE_S,
     )
 
 
@@ -80,7 +89,12 @@ def _worker(concurrency: int) -> Program:
     # In a container everybody is root; Celery's warning of that says nothing to this user.
     environment = {"PYTHONWARNINGS": "ignore:You're running the worker"}
     return Program(
-        name="worker", arguments=arguments, environment=environment, is_ready=_worker_listens
+        name="worker",
+        arguments=arguments,
+        environment=environment,
+        is_ready=_worker_listens,
+        # A call in flight may take this long; cut off, it would be paid and asked again.
+        grace_s=max(SHORTEST_GRACE_S, settings.LLM_TIMEOUT_S) + DRAWING_S,
     )
 
 

@@ -1,4 +1,8 @@
-"""Several programs as one: all up or none, all down together, a crashed one is started again."""
+"""Several programs as one: all up or none, all down together; each crashed one starts again.
+
+One that keeps crashing is started again after longer and longer waits, and the others live on: a
+worker that can't work takes no page away from anybody.
+"""
 
 from __future__ import annotations
 
@@ -6,18 +10,49 @@ import signal
 import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
+from dataclasses import dataclass
 from types import FrameType
 
 from arena.errors import ArenaError
 from arena.serving.child import Child, Program
+from arena.serving.ledger import Ledger
 
 POLL_S = 0.1
+LONG_GRACE_S = 30.0
+"""Who may take so long to end is announced."""
+
+STEADY_S = 60.0
+"""Who has run for so long starts again at once, as after a first crash."""
+
+LONGEST_WAIT_S = 60.0
 CRASHES_ALLOWED = 3
-WITHIN_S = 60.0
+"""Who has crashed more often in a row is not steady."""
 
 
 class ChildFailed(ArenaError):
     """A program did not come up or keeps crashing; the text ends with its last lines."""
+
+
+@dataclass(slots=True)
+class Place:
+    """One program among the others: who runs it now, and how it has fared.
+
+    Attributes:
+        child: Who runs it, or ran it until it crashed.
+        started_at: When that one was started, seconds of the supervisor's clock.
+        crashes: How often in a row it ended soon after its start.
+        due_at: When it is started again; None while it runs.
+    """
+
+    child: Child
+    started_at: float
+    crashes: int = 0
+    due_at: float | None = None
+
+
+def wait_s(crashes: int) -> float:
+    """How long to wait before a start after so many crashes in a row: 0, 1, 2, 4, ... 60 s."""
+    return min(2.0 ** min(crashes - 2, 10), LONGEST_WAIT_S) if crashes > 1 else 0.0
 
 
 class Supervisor:
@@ -26,6 +61,7 @@ class Supervisor:
     Args:
         programs: What to run; each is ready before the next one starts.
         say: Gets (name, line) for every line of a child and for what the supervisor does.
+        ledger: Where the children are written down, None for nowhere.
         clock: Seconds that never run back.
     """
 
@@ -34,13 +70,14 @@ class Supervisor:
         programs: Sequence[Program],
         say: Callable[[str, str], None],
         *,
+        ledger: Ledger | None = None,
         clock: Callable[[], float] = time.monotonic,
     ) -> None:
         self._programs = programs
         self._say = say
         self._clock = clock
-        self._children: list[Child] = []
-        self._crashes: dict[str, list[float]] = {}
+        self._ledger = ledger
+        self._places: list[Place] = []
         # A plain flag, polled: a signal handler may not take the lock of what it interrupts.
         self._stopping = False
         self._interrupts = 0
@@ -54,32 +91,39 @@ class Supervisor:
         for program in self._programs:
             if self._stopping:
                 return
-            self._children.append(Child(program, self._say))
+            self._places.append(Place(self._child(program), started_at=self._clock()))
             try:
-                self._await_ready(self._children[-1])
+                self._await_ready(self._places[-1].child)
             except ChildFailed:
                 self.stop()
                 raise
 
     def watch(self) -> None:
-        """Return when somebody asks to stop.
-
-        Raises:
-            ChildFailed: A program crashed too often; everything is stopped already.
-        """
+        """Return when somebody asks to stop."""
         while not self._stopping:
             self.check()
             time.sleep(POLL_S)
 
     def check(self) -> None:
-        """Start again what has crashed.
+        """Start again what has crashed, each when its time has come."""
+        for place in self._places:
+            if self._stopping:
+                return
+            if place.due_at is not None:
+                if self._clock() >= place.due_at:
+                    self._start_again(place)
+            elif place.child.exit_code is not None:
+                self._bury(place)
+
+    def insist_on_steadiness(self) -> None:
+        """Return unless a program keeps crashing; for who waits for what the programs do.
 
         Raises:
-            ChildFailed: A program crashed too often; everything is stopped already.
+            ChildFailed: One does; nothing is stopped.
         """
-        for place, child in enumerate(self._children):
-            if child.exit_code is not None and not self._stopping:
-                self._children[place] = self._start_again(child)
+        for place in self._places:
+            if place.crashes > CRASHES_ALLOWED:
+                raise self._failure(place.child, f"crashed {place.crashes} times in a row")
 
     @property
     def is_stopping(self) -> bool:
@@ -93,8 +137,18 @@ class Supervisor:
     def stop(self) -> None:
         """Stop every child, the last started first."""
         self._stopping = True
-        while self._children:
-            self._children.pop().stop(at_once=self._interrupts > 1)
+        while self._places:
+            child = self._places[-1].child
+            if child.program.grace_s >= LONG_GRACE_S and child.exit_code is None:
+                self._say(
+                    child.program.name,
+                    f"ends what is under way, at most {child.program.grace_s:.0f} s "
+                    "(Ctrl-C once more ends it at once)",
+                )
+            child.stop(is_hurried=lambda: self._interrupts > 1)
+            self._places.pop()
+        if self._ledger is not None:
+            self._ledger.close()
 
     @contextmanager
     def signals(self) -> Iterator[None]:
@@ -124,20 +178,37 @@ class Supervisor:
                 raise self._failure(child, f"is not ready after {waited}")
             time.sleep(POLL_S)
 
-    def _start_again(self, child: Child) -> Child:
-        name, now = child.program.name, self._clock()
-        crashes = [at for at in self._crashes.get(name, []) if now - at < WITHIN_S] + [now]
-        self._crashes[name] = crashes
-        if len(crashes) > CRASHES_ALLOWED:
-            failure = self._failure(
-                child,
-                f"crashed {len(crashes)} times within {WITHIN_S:.0f} s; everything is stopped",
-            )
-            self.stop()
-            raise failure
-        self._say(name, f"ended with exit code {child.exit_code}; starting it again")
-        child.stop(at_once=True)
-        return Child(child.program, self._say)
+    def _bury(self, place: Place) -> None:
+        """Count a crash and say when the next start is due."""
+        name, code = place.child.program.name, place.child.exit_code
+        was_steady = self._clock() - place.started_at >= STEADY_S
+        place.crashes = 1 if was_steady else place.crashes + 1
+        self._put_off(place, f"ended with exit code {code}")
+        place.child.kill()
+        if place.crashes == CRASHES_ALLOWED + 1:
+            self._say(name, "keeps crashing; everything else goes on without it")
+
+    def _put_off(self, place: Place, what: str) -> None:
+        after_s = wait_s(place.crashes)
+        place.due_at = self._clock() + after_s
+        when = f"in {after_s:.0f} s" if after_s else "now"
+        self._say(place.child.program.name, f"{what}; starting it again {when}")
+
+    def _start_again(self, place: Place) -> None:
+        try:
+            place.child = self._child(place.child.program)
+        except OSError as error:  # no memory, no process left: the next try may have them
+            place.crashes += 1
+            self._put_off(place, f"could not be started ({error})")
+            return
+        place.started_at, place.due_at = self._clock(), None
+
+    def _child(self, program: Program) -> Child:
+        if self._ledger is None:
+            return Child(program, self._say)
+        child = Child(program, self._say, self._ledger.environment)
+        self._ledger.note(program.name, child.pid)
+        return child
 
     @staticmethod
     def _failure(child: Child, what: str) -> ChildFailed:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from pathlib import Path
+from threading import Thread
 
 import pytest
 
@@ -134,6 +135,37 @@ def test_a_job_goes_on_when_redis_alone_comes_back_empty(
         model.gate.set()
         wait_until(lambda: is_finished(place), what="the job is over", within_s=240)
         check_each_row_is_done_once(place, killed=set())
+    finally:
+        worker.stop()
+        redis.stop()
+
+
+@pytest.mark.parametrize("pool", ["threads", "prefork"])
+def test_a_worker_that_is_told_to_stop_waits_for_its_calls_and_takes_nothing_on(
+    place: Machine, model: WaitingModel, pool: str
+) -> None:
+    redis = place.redis()
+    worker = place.worker(pool=pool)
+    try:
+        place.must("generate", *CHOSEN)
+        flying = in_flight(place, model)
+        stopping = Thread(target=worker.stop)
+        stopping.start()
+        wait_until(lambda: "Warm shutdown" in worker.said(), what="the worker was told to stop")
+        model.gate.set()
+        stopping.join(120)
+        assert not worker.is_alive()
+        assert "Cold shutdown" not in worker.said()
+        done = {
+            pk for (pk,) in place.rows("SELECT id FROM augment_augmentation WHERE state='done'")
+        }
+        assert flying <= done
+        assert place.rows(RUNNING) == []
+        assert place.rows("SELECT COUNT(*) FROM augment_worker WHERE ended_at IS NULL") == [(0,)]
+        worker = place.worker(pool=pool)
+        wait_until(lambda: is_finished(place), what="the job is over", within_s=240)
+        check_each_row_is_done_once(place, killed=set())
+        assert model.asked == 3
     finally:
         worker.stop()
         redis.stop()

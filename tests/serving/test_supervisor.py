@@ -10,9 +10,11 @@ from pathlib import Path
 
 import psutil
 import pytest
+from django.conf import settings
 
 from arena.serving.child import Program
-from arena.serving.supervisor import ChildFailed, Supervisor
+from arena.serving.stack import background
+from arena.serving.supervisor import ChildFailed, Supervisor, wait_s
 from tests.processes import wait_until
 
 SLEEP = "import time; print('up', flush=True); time.sleep(600)"
@@ -55,7 +57,7 @@ def test_programs_start_in_order_and_stop_together() -> None:
     said = Said()
     supervisor = Supervisor([program("one", SLEEP), program("two", SLEEP)], said)
     supervisor.start()
-    children = [child.pid for child in supervisor._children]
+    children = [place.child.pid for place in supervisor._places]
     wait_until(lambda: ("two", "up") in said.lines, what="the second one is up")
     supervisor.stop()
     assert living(children) == []
@@ -71,7 +73,7 @@ def test_a_program_that_ends_while_starting_shows_its_last_lines_and_stops_the_o
     )
     with pytest.raises(ChildFailed, match=r"(?s)two ended with exit code 3.*no such table"):
         supervisor.start()
-    assert supervisor._children == []
+    assert supervisor._places == []
 
 
 def test_a_program_that_never_gets_ready_is_named() -> None:
@@ -84,41 +86,155 @@ def test_a_crashed_program_is_started_again() -> None:
     said = Said()
     supervisor = Supervisor([program("worker", SLEEP)], said)
     supervisor.start()
-    first = supervisor._children[0].pid
+    first = supervisor._places[0].child.pid
     wait_until(lambda: ("worker", "up") in said.lines, what="the worker is up")
     watcher = threading.Thread(target=supervisor.watch, daemon=True)
     watcher.start()
     os.kill(first, signal.SIGKILL)
     wait_until(lambda: said.lines.count(("worker", "up")) == 2, what="it is up again")
     # It may speak before the supervisor has put it into the place of the first.
-    wait_until(lambda: supervisor._children[0].pid != first, what="it has taken the place")
+    wait_until(lambda: supervisor._places[0].child.pid != first, what="it has taken the place")
     supervisor.ask_to_stop()
     watcher.join()
     supervisor.stop()
 
 
-def test_a_program_that_keeps_crashing_stops_the_whole_with_its_last_lines(
-    tmp_path: Path,
-) -> None:
-    full = tmp_path / "full"
-    code = f"""
-import os, time
-while not os.path.exists({str(full)!r}):
-    time.sleep(0.01)
-print("disk full")
-raise SystemExit(1)
-"""
-    supervisor = Supervisor(
-        [program("steady", SLEEP), program("broken", code)],
-        Said(),
-        clock=lambda: 0.0,  # however long its starts take, they are all within a minute
-    )
+class Clock:
+    """Seconds that go on when they are told to."""
+
+    now = 0.0
+
+    def __call__(self) -> float:
+        return self.now
+
+
+@pytest.fixture
+def clock() -> Clock:
+    return Clock()
+
+
+def crash(supervisor: Supervisor, place: int) -> None:
+    """Let the program of that place end, and let it be noticed."""
+    child = supervisor._places[place].child
+    os.kill(child.pid, signal.SIGKILL)
+    wait_until(lambda: child.exit_code is not None, what="it has crashed")
+    supervisor.check()
+
+
+def test_who_keeps_crashing_waits_longer_each_time_and_the_others_live_on(clock: Clock) -> None:
+    said = Said()
+    supervisor = Supervisor([program("web", SLEEP), program("worker", SLEEP)], said, clock=clock)
     supervisor.start()
-    steady = supervisor._children[0].pid
-    full.touch()  # not before it counts as started
-    with pytest.raises(ChildFailed, match=r"(?s)broken crashed 4 times.*disk full"):
-        supervisor.watch()
-    assert living([steady]) == []
+    web = supervisor._places[0].child.pid
+    waits = []
+    for _ in range(5):
+        crash(supervisor, 1)
+        crashed = supervisor._places[1]
+        assert crashed.due_at is not None
+        waits.append(crashed.due_at - clock.now)
+        if crashed.due_at > clock.now:
+            clock.now = crashed.due_at - 0.1
+            supervisor.check()
+            assert crashed.child.exit_code is not None, "not before its time"
+        clock.now = crashed.due_at
+        supervisor.check()
+        assert crashed.child.exit_code is None
+    assert waits == [0.0, 1.0, 2.0, 4.0, 8.0]
+    assert supervisor._places[0].child.pid == web
+    assert living([web]) == [web]
+    assert ("worker", "ended with exit code -9; starting it again in 8 s") in said.lines
+    assert ("worker", "keeps crashing; everything else goes on without it") in said.lines
+    supervisor.stop()
+
+
+@pytest.mark.parametrize(
+    ("crashes", "seconds"), [(1, 0.0), (2, 1.0), (3, 2.0), (7, 32.0), (8, 60.0), (5000, 60.0)]
+)
+def test_no_wait_is_longer_than_a_minute(crashes: int, seconds: float) -> None:
+    assert wait_s(crashes) == seconds
+
+
+@pytest.mark.parametrize(("ran_s", "crashes"), [(59.9, 4), (60.0, 1)])
+def test_who_ran_for_a_minute_begins_anew(clock: Clock, ran_s: float, crashes: int) -> None:
+    supervisor = Supervisor([program("worker", SLEEP)], Said(), clock=clock)
+    supervisor.start()
+    supervisor._places[0].crashes = 3
+    clock.now += ran_s
+    crash(supervisor, 0)
+    assert supervisor._places[0].crashes == crashes
+    supervisor.stop()
+
+
+def test_who_waits_for_the_programs_is_told_of_one_that_keeps_crashing() -> None:
+    code = "print('disk full'); raise SystemExit(1)"
+    supervisor = Supervisor([program("broken", code)], Said(), clock=lambda: 0.0)
+    supervisor.start()
+    place = supervisor._places[0]
+    wait_until(lambda: place.child.exit_code is not None, what="it has crashed")
+    supervisor.check()
+    supervisor.insist_on_steadiness()
+    place.crashes = 4
+    with pytest.raises(ChildFailed, match=r"(?s)broken crashed 4 times in a row.*disk full"):
+        supervisor.insist_on_steadiness()
+    supervisor.stop()
+
+
+DRAINS = """
+import os, signal, sys, time
+def drain(*_):
+    print("draining", flush=True)
+    while not os.path.exists(sys.argv[1]):
+        time.sleep(0.01)
+    print("drained", flush=True)
+    raise SystemExit(0)
+signal.signal(signal.SIGTERM, drain)
+print("up", flush=True)
+time.sleep(600)
+"""
+
+
+def draining(said: Said, may_end: Path) -> tuple[Supervisor, threading.Thread]:
+    """A supervisor that stops, whose program ends once a file is there."""
+    worker = Program(
+        name="worker",
+        arguments=(sys.executable, "-c", DRAINS, str(may_end)),
+        is_ready=lambda: ("worker", "up") in said.lines,
+        grace_s=600.0,
+    )
+    supervisor = Supervisor([worker], said)
+    supervisor.start()
+    stopping = threading.Thread(target=supervisor.stop, daemon=True)
+    stopping.start()
+    wait_until(lambda: ("worker", "draining") in said.lines, what="it was told to stop")
+    return supervisor, stopping
+
+
+def test_a_program_has_its_time_to_end(tmp_path: Path) -> None:
+    said = Said()
+    _, stopping = draining(said, tmp_path / "may-end")
+    (tmp_path / "may-end").touch()
+    stopping.join(60)
+    assert not stopping.is_alive()
+    assert ("worker", "drained") in said.lines
+    assert any("at most 600 s (Ctrl-C once more" in line for _, line in said.lines)
+
+
+def test_a_second_request_to_stop_ends_it_at_once(tmp_path: Path) -> None:
+    said = Said()
+    supervisor, stopping = draining(said, tmp_path / "may-end")
+    with supervisor.signals():
+        for _ in range(2):
+            signal.raise_signal(signal.SIGINT)
+        stopping.join(60)
+    assert not stopping.is_alive()
+    assert ("worker", "drained") not in said.lines
+
+
+@pytest.mark.django_db
+def test_a_worker_has_the_time_of_a_call_to_end() -> None:
+    *_, worker = background(concurrency=1)
+    assert worker.name == "worker"
+    assert worker.grace_s >= max(60.0, settings.LLM_TIMEOUT_S)
 
 
 def test_a_program_that_does_not_listen_is_killed_with_everything_it_started() -> None:

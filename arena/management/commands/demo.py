@@ -15,6 +15,7 @@ from arena.errors import ArenaError
 from arena.management.commands.serve import INTERRUPTED
 from arena.serving import demo
 from arena.serving.hold import held_alone
+from arena.serving.ledger import Ledger
 from arena.serving.stack import Web, background, web_server
 from arena.serving.supervisor import Supervisor
 from augment.errors import AugmentError
@@ -44,7 +45,7 @@ class Command(TerminalCommand):
         """Run the demo; a fault of any step ends it with a sentence."""
         web = Web(host=options["host"], port=options["port"])
         try:
-            with held_alone():
+            with held_alone(self.stdout.write):
                 self._run(web, options["per_type"], serve=not options["no_serve"])
         except (ArenaError, AugmentError) as error:
             raise CommandError(str(error)) from error
@@ -57,7 +58,9 @@ class Command(TerminalCommand):
         call_command("prepare", verbosity=0)
         demo.prepare(self.stdout.write)
         scenarios = demo.scenarios_of(per_type)
-        supervisor = Supervisor([*background(concurrency=2), *server], self._keep)
+        supervisor = Supervisor(
+            [*background(concurrency=2), *server], self._keep, ledger=Ledger(settings.VAR_DIR)
+        )
         with supervisor.signals():
             try:
                 supervisor.start()
@@ -101,6 +104,7 @@ class Command(TerminalCommand):
 def _look_at(supervisor: Supervisor) -> None:
     """Start again what crashed, and end the wait when somebody pressed Ctrl-C."""
     supervisor.check()
+    supervisor.insist_on_steadiness()
     if supervisor.is_stopping:
         raise KeyboardInterrupt
 

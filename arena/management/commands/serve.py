@@ -5,11 +5,13 @@ from __future__ import annotations
 from argparse import ArgumentTypeError
 from typing import Any
 
+from django.conf import settings
 from django.core.management import call_command
 from django.core.management.base import CommandError, CommandParser
 
 from arena.errors import ArenaError
 from arena.serving.hold import held_alone
+from arena.serving.ledger import Ledger
 from arena.serving.stack import Web, background, web_server
 from arena.serving.supervisor import Supervisor
 from augment.services.terminal import TerminalCommand
@@ -41,7 +43,7 @@ class Command(TerminalCommand):
         """Run until somebody asks to stop."""
         web = Web(host=options["host"], port=options["port"], workers=options["web_workers"])
         try:
-            with held_alone():
+            with held_alone(self.stdout.write):
                 self._serve(web, options["concurrency"])
         except ArenaError as error:
             raise CommandError(str(error)) from error
@@ -52,7 +54,11 @@ class Command(TerminalCommand):
     def _serve(self, web: Web, concurrency: int) -> None:
         server = web_server(web)
         call_command("prepare", verbosity=0)
-        supervisor = Supervisor([*background(concurrency=concurrency), server], self._say)
+        supervisor = Supervisor(
+            [*background(concurrency=concurrency), server],
+            self._say,
+            ledger=Ledger(settings.VAR_DIR),
+        )
         with supervisor.signals():
             try:
                 supervisor.start()

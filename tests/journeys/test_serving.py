@@ -1,0 +1,72 @@
+"""`manage.py serve` on a real machine after the worst: it was killed, and its web workers hang."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from pathlib import Path
+
+import psutil
+import pytest
+
+from tests.processes import ROOT, copy_database, wait_until
+from tests.stack import Home, answers, free_port
+
+pytestmark = [pytest.mark.redis, pytest.mark.slow, pytest.mark.timeout(600)]
+
+
+@contextmanager
+def serve(home: Home, port: int, log: Path) -> Iterator[subprocess.Popen[bytes]]:
+    """A running one; whatever becomes of it, nothing of it is left."""
+    with log.open("w") as file:
+        process = subprocess.Popen(
+            [sys.executable, "manage.py", "serve", "--port", str(port)],
+            cwd=ROOT,
+            env=home.environment,
+            stdout=file,
+            stderr=subprocess.STDOUT,
+        )
+    family: list[psutil.Process] = []
+    try:
+        wait_until(
+            lambda: "Ctrl-C stops it" in log.read_text() or process.poll() is not None,
+            what="everything is up",
+            within_s=240.0,
+        )
+        assert process.poll() is None, log.read_text()
+        family = psutil.Process(process.pid).children(recursive=True)
+        yield process
+    finally:
+        process.send_signal(signal.SIGINT)
+        process.wait(timeout=240)
+        for left in family:
+            with suppress(psutil.NoSuchProcess):
+                left.kill()
+
+
+def test_after_kill_9_one_serve_starts_again_and_nothing_else_is_ended(
+    migrated: Path, tmp_path_factory: pytest.TempPathFactory
+) -> None:
+    folder = tmp_path_factory.mktemp("home")
+    home, port = Home.at(folder), free_port()
+    copy_database(migrated, home.database)
+    with serve(home, port, folder / "first.log") as first:
+        web = [
+            found
+            for found in psutil.Process(first.pid).children(recursive=True)
+            if "gunicorn" in " ".join(found.cmdline())
+        ]
+        # What hangs notices nothing, and holds the port.
+        for worker in web:
+            os.kill(worker.pid, signal.SIGSTOP)
+        first.kill()
+        first.wait(60)
+        with serve(home, port, folder / "second.log"):
+            assert answers(f"http://127.0.0.1:{port}/login/")
+            said = (folder / "second.log").read_text()
+            assert "An earlier run was killed and left" in said
+    assert not list((folder / "var").glob("serving-*.json"))

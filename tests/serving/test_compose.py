@@ -1,0 +1,59 @@
+"""compose.yaml and the image hang together; they can't be built everywhere, so they are read."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import pytest
+import yaml
+from django.conf import settings
+
+from arena.serving.stack import Web, background, web_server
+from tests.processes import ROOT
+from tests.stack import free_port
+
+
+@pytest.fixture(scope="module")
+def services() -> dict[str, Any]:
+    found: dict[str, Any] = yaml.safe_load((ROOT / "compose.yaml").read_text())["services"]
+    return found
+
+
+def seconds(period: str) -> float:
+    assert period.endswith("s")
+    return float(period.removesuffix("s"))
+
+
+@pytest.mark.parametrize("name", ["web", "worker", "postgres", "redis"])
+def test_what_crashes_is_started_again(services: dict[str, Any], name: str) -> None:
+    assert services[name]["restart"] == "unless-stopped"
+
+
+@pytest.mark.parametrize("name", ["web", "worker"])
+def test_nobody_starts_before_the_tables_are_there(services: dict[str, Any], name: str) -> None:
+    waits_for = services[name]["depends_on"]
+    assert waits_for["prepare"] == {"condition": "service_completed_successfully"}
+    assert services["prepare"]["command"] == "python manage.py prepare"
+
+
+@pytest.mark.django_db
+def test_each_has_as_long_to_stop_as_serve_gives_it(services: dict[str, Any]) -> None:
+    *_, worker = background(concurrency=4)
+    web = web_server(Web(port=free_port()))
+    assert settings.LLM_TIMEOUT_S == 120, "compose.yaml counts on the default"
+    assert seconds(services["worker"]["stop_grace_period"]) >= worker.grace_s
+    assert seconds(services["web"]["stop_grace_period"]) >= web.grace_s
+
+
+def test_everybody_serves_with_the_same_worker_class(services: dict[str, Any]) -> None:
+    served = web_server(Web(port=free_port())).arguments
+    worker_class = served[served.index("--worker-class") + 1]
+    assert f"--worker-class {worker_class} " in services["web"]["command"]
+    assert f"--worker-class {worker_class} " in (ROOT / "Dockerfile").read_text()
+
+
+def test_the_image_runs_as_nobody_special() -> None:
+    lines = (ROOT / "Dockerfile").read_text().splitlines()
+    assert lines.index("USER arena") < next(
+        number for number, line in enumerate(lines) if line.startswith("CMD")
+    )
