@@ -91,6 +91,9 @@ def test_scenes_can_be_named_for_foreign_tokens(job: GenerationJob, tmp_path: Pa
     call_command("read_interplan", str(file), *arguments, stdout=out, stderr=err)
     assert f"Passed over: {token_of('mill-junction')}, 2 special scenarios" in err.getvalue()
     assert "1 special scenarios read" in out.getvalue()
+    wrong = ("--scene", "00000000000000cd=ferry-road", "--out", str(tmp_path))
+    with pytest.raises(CommandError, match="Unknown base token '00000000000000cd'"):
+        call_command("read_interplan", str(file), *wrong)
     assert (tmp_path / "00000000000000ab-s0.json").exists()
 
 
@@ -136,32 +139,27 @@ def test_kept_traffic_is_said_when_it_is_lost_and_refused_when_strict(
     assert file.exists()
 
 
+FOREIGN = (
+    'modification_details_dictionary: {"00000000000000ab": '
+    '{special_scenario: {"0": {type: avoid_crashed_cars}}}}'
+)
+
+
 @pytest.mark.parametrize(
-    ("text", "options", "sentence"),
+    ("text", "sentence"),
     [
-        ("colour: red", (), "modification_details_dictionary: is missing"),
-        ("modification_details_dictionary: {}", (), "holds no special scenario"),
-        (None, (), "none of its 1 base tokens has a scene here: 00000000000000ab; name"),
-        (
-            None,
-            ("--scene", "00000000000000cd=ferry-road"),
-            "Unknown base token '00000000000000cd'. Known: 00000000000000ab",
-        ),
+        ("colour: red", "modification_details_dictionary: is missing"),
+        ("modification_details_dictionary: {}", "holds no special scenario"),
+        (FOREIGN, "none of its 1 base tokens has a scene here: 00000000000000ab; name the scenes"),
     ],
 )
 def test_a_file_of_something_else_is_an_error_and_not_nothing_read(
-    text: str | None,
-    options: tuple[str, ...],
-    sentence: str,
-    job: GenerationJob,
-    tmp_path: Path,
+    text: str, sentence: str, tmp_path: Path
 ) -> None:
     file = tmp_path / "other.yaml"
-    entry = '{"0": {type: avoid_crashed_cars}}'
-    foreign = f'{{"00000000000000ab": {{special_scenario: {entry}}}}}'
-    file.write_text(text or f"modification_details_dictionary: {foreign}")
+    file.write_text(text)
     with pytest.raises(CommandError) as fault:
-        call_command("read_interplan", str(file), "--out", str(tmp_path / "read"), *options)
+        call_command("read_interplan", str(file), "--out", str(tmp_path / "read"))
     assert sentence in str(fault.value)
     assert not (tmp_path / "read").exists()
 

@@ -179,6 +179,14 @@ def test_no_answer_breaks_the_reader_of_calls(parts: list[str]) -> None:
         assert call.problem or call.name
 
 
+def test_arguments_of_a_megabyte_are_refused_unread() -> None:
+    doubled = "{" + ",".join(['"lane": 1'] * 100_000) + "}"
+    assert "longer than 200000 characters" in read_arguments(doubled).problem
+    short = "{" + ",".join(['"lane": 1'] * 10_000) + "}"
+    assert "'lane' stands twice" in read_arguments(short).problem
+    assert calls_in(doubled) == ()
+
+
 @given(st.text())
 def test_no_text_breaks_the_reader_of_arguments(text: str) -> None:
     read_arguments(text)
