@@ -22,7 +22,15 @@ from django.conf import settings
 from django.db import connection
 
 from augment.errors import QueueFault, QueueRefused, QueueUnreachable
-from augment.services import claims, jobs, marked_pictures, runner, stopping, workers
+from augment.services import (
+    claims,
+    jobs,
+    marked_pictures,
+    runner,
+    simulations,
+    stopping,
+    workers,
+)
 from augment.services.clock import DATABASE_TIME, Moment
 
 logger = logging.getLogger(__name__)
@@ -50,6 +58,31 @@ def run_augmentation(self: Any, augmentation_pk: int) -> None:
 def draw_marks(augmentation_pk: int) -> None:
     """Draw the faults that the checks find in one row; a second time nothing is left to do."""
     marked_pictures.draw_marked(augmentation_pk=augmentation_pk)
+
+
+@shared_task(name="augment.run_simulation", acks_late=True, ignore_result=True)
+def run_simulation(simulation_pk: int) -> None:
+    """Drive one row, unless somebody else has it or it has an outcome."""
+    if stopping.is_told():
+        raise Reject("this worker stops", requeue=True)
+    simulations.drive(simulation_pk=simulation_pk)
+
+
+def enqueue_simulations(ids: Iterable[int]) -> None:
+    """Have drives driven and remember when; for transaction.on_commit.
+
+    Raises:
+        QueueFault: No broker, or it refuses; the rows wait on and are sent by recover later.
+    """
+    waiting = list(ids)
+    if not waiting:
+        return
+    with open_broker() as broker:
+        for start in range(0, len(waiting), BATCH):
+            batch = waiting[start : start + BATCH]
+            for pk in batch:
+                run_simulation.apply_async((pk,), connection=broker, retry=False)
+            simulations.mark_sent(batch)
 
 
 def enqueue_marks(augmentation_pk: int) -> None:
@@ -136,6 +169,8 @@ def recover(*, now: Moment = DATABASE_TIME, at_start: bool = False) -> None:
         # Nothing is on its way, so what was sent a while ago and still waits is lost.
         older_than = stale_after
     enqueue(claims.unsent(now=now, older_than=older_than))
+    simulations.requeue_stale(now=now, older_than=stale_after)
+    enqueue_simulations(simulations.unsent(now=now, older_than=older_than))
 
 
 @worker_ready.connect

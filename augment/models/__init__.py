@@ -11,6 +11,7 @@ from augment.models.endpoints import CallLease, Endpoint, EndpointModel
 from augment.models.events import Event
 from augment.models.jobs import Attempt, Augmentation, GenerationJob
 from augment.models.scenes import SLUG_HELP, BaseScene, Scenario
+from augment.models.simulations import Simulation
 from augment.models.triggers import after_migrations, before_migrations
 from augment.models.workers import Worker
 
@@ -28,6 +29,7 @@ __all__ = [
     "GenerationJob",
     "ModelCall",
     "Scenario",
+    "Simulation",
     "TranscriptNote",
     "Worker",
     "after_migrations",

@@ -1,0 +1,117 @@
+"""Drive a job's results, or one scenario, in closed loop and print the driving scores."""
+
+from __future__ import annotations
+
+from argparse import ArgumentParser
+from typing import Any
+
+from django.core.management.base import CommandError
+from django.db import transaction
+
+from augment.errors import AugmentError, UnknownName
+from augment.models import Scenario, Simulation
+from augment.services import simulations
+from augment.services.choosing import job_named
+from augment.services.driving_scores import DrivingScores, scores_of_job
+from augment.services.simulations import SCORES, Options
+from augment.services.terminal import TerminalCommand
+from augment.tasks import check_broker, enqueue_simulations
+
+
+class Command(TerminalCommand):
+    """simulate JOB|SCENARIO [--planner P] [--offsets O] [--reactive] [--score S] [--queue]."""
+
+    help = (
+        "Let a planner drive every result of a job, with the scenes before the change and with "
+        "the reference, for 15 s each; or one scenario. What was driven so before stays."
+    )
+
+    def add_arguments(self, parser: ArgumentParser) -> None:
+        """What to drive, and how."""
+        parser.add_argument("what", help="name or code of a job, or slug of a scenario")
+        parser.add_argument(
+            "--planner", default="pdm-closed", help="pdm-closed, idm, or a class's dotted path"
+        )
+        parser.add_argument(
+            "--offsets",
+            default="paper",
+            help="lateral offsets of PDM-Closed: paper (-4 to 4 m) or original (-1, 0, 1 m)",
+        )
+        parser.add_argument(
+            "--reactive",
+            action="store_true",
+            help="recorded vehicles answer to the ego instead of being replayed",
+        )
+        parser.add_argument("--score", default="nuplan", help=f"one of {', '.join(SCORES)}")
+        parser.add_argument(
+            "--queue", action="store_true", help="leave the drives to the workers and return"
+        )
+
+    def handle(self, *args: Any, **options: Any) -> None:
+        """Plan the rows, drive them here or queue them, then say the scores."""
+        try:
+            if options["score"] not in SCORES:
+                raise UnknownName("score", options["score"], list(SCORES))
+            self._simulate(options)
+        except AugmentError as error:
+            raise CommandError(str(error)) from error
+
+    def _simulate(self, options: dict[str, Any]) -> None:
+        how = Options(
+            planner=options["planner"],
+            offsets=options["offsets"],
+            is_reactive=options["reactive"],
+        )
+        scenario = Scenario.objects.filter(slug=options["what"]).first()
+        job = None if scenario is not None else job_named(options["what"])
+        if options["queue"]:
+            check_broker()
+        with transaction.atomic():
+            if scenario is not None:
+                waiting = simulations.plan_scenario(scenario=scenario, options=how)
+            else:
+                assert job is not None
+                waiting = simulations.plan_job(job=job, options=how)
+            if options["queue"]:
+                transaction.on_commit(lambda: enqueue_simulations(waiting))
+        if options["queue"]:
+            self.stdout.write(f"{len(waiting)} drives wait for the workers.")
+            return
+        for number, pk in enumerate(waiting, start=1):
+            simulations.drive(simulation_pk=pk)
+            self._say(
+                Simulation.objects.select_related("scenario", "augmentation__contestant").get(
+                    pk=pk
+                ),
+                number,
+                len(waiting),
+                options["score"],
+            )
+        if job is not None:
+            self._table(scores_of_job(job, options=how, score=options["score"]))
+        elif scenario is not None and not waiting:
+            for row in how.of(scenario.simulations.filter(augmentation=None)):
+                self._say(row, 1, 1, options["score"])
+
+    def _say(self, row: Simulation, number: int, total: int, score: str) -> None:
+        who = (
+            row.get_subject_display()
+            if row.augmentation is None
+            else row.augmentation.contestant.name
+        )
+        value = getattr(row, SCORES[score])
+        said = row.reason if value is None else f"{100.0 * value:.1f}"
+        self.stdout.write(f"[{number}/{total}] {row.scenario.slug}, {who}: {said}")
+        self.stdout.flush()
+
+    def _table(self, table: DrivingScores) -> None:
+        width = max([len(line.name) for line in table.lines], default=10)
+        self.stdout.write(f"{'mean driving score, %':{width}}  score  before  drives  failed")
+        for line in table.lines:
+            mean, before = (
+                "-" if value is None else f"{100.0 * value:.1f}"
+                for value in (line.mean, line.before)
+            )
+            self.stdout.write(
+                f"{line.name:{width}}  {mean:>5}  {before:>6}  {line.drives:>6}  {line.failed:>6}"
+            )

@@ -1,0 +1,71 @@
+"""Planners by name, and anybody's own by the dotted path of its class."""
+
+from __future__ import annotations
+
+import importlib
+from collections.abc import Callable
+from functools import partial
+
+from augment.errors import CannotDrive, UnknownName
+from augment.sentences import sentence
+from augment.simulation.idm_planner import IdmPlanner
+from augment.simulation.pdm_closed import PdmClosed
+from augment.simulation.planning import Planner
+from augment.simulation.proposals import ORIGINAL_OFFSETS_M, PAPER_OFFSETS_M
+
+OFFSETS_M: dict[str, tuple[float, ...]] = {
+    "paper": PAPER_OFFSETS_M,
+    "original": ORIGINAL_OFFSETS_M,
+}
+"""The lateral offsets of PDM-Closed: the paper's up to 4 m, the released code's of 1 m."""
+
+PDM_CLOSED, IDM = "pdm-closed", "idm"
+NAMED = (PDM_CLOSED, IDM)
+
+
+def planner_named(name: str, *, offsets: str = "paper") -> Planner:
+    """A fresh planner.
+
+    Args:
+        name: One of `NAMED`, or the dotted path of a class without arguments.
+        offsets: One of `OFFSETS_M`; PDM-Closed's alone.
+
+    Raises:
+        UnknownName: No such name or offsets.
+        CannotDrive: The path leads to nothing, or to something that is no planner.
+    """
+    if offsets not in OFFSETS_M:
+        raise UnknownName("offsets", offsets, list(OFFSETS_M))
+    known: dict[str, Callable[[], Planner]] = {
+        PDM_CLOSED: partial(PdmClosed, OFFSETS_M[offsets]),
+        IDM: IdmPlanner,
+    }
+    if name in known:
+        return known[name]()
+    if "." not in name:
+        raise UnknownName("planner", name, [*NAMED, "a dotted path"])
+    return _of_path(name)
+
+
+def _of_path(path: str) -> Planner:
+    module, _, attribute = path.rpartition(".")
+    try:
+        made = getattr(importlib.import_module(module), attribute)()
+    except (ImportError, AttributeError, TypeError, ValueError) as error:
+        raise CannotDrive(
+            sentence(
+                "The planner %(path)s can't be made: %(why)s. It is the dotted path of a class"
+                " without arguments.",
+                path=path,
+                why=str(error),
+            )
+        ) from error
+    if not isinstance(made, Planner):
+        raise CannotDrive(
+            sentence(
+                "%(path)s is no planner: it needs the methods start(road, body) and"
+                " plan(situation).",
+                path=path,
+            )
+        )
+    return made

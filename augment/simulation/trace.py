@@ -1,0 +1,156 @@
+"""A drive as a compact JSON document: enough to look at it again, nothing to compute with.
+
+Metres to the centimetre, radians to the milliradian. Poses are those of box centres.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from augment.geometry.polyline import FloatArray
+from augment.scene.entities import AreaKind
+from augment.simulation.drive import Drive
+from augment.simulation.events import events_of
+from augment.simulation.objects import Kind
+from augment.simulation.score import Score
+from augment.simulation.setting import Setting
+from augment.simulation.states import SPEED, STEP_S
+
+FORMAT, VERSION = "scenario-arena/drive", 1
+PLAN_EVERY = 5
+"""So many steps lie between two plans that are kept."""
+LINE_EVERY = 8
+_AROUND_M = 90.0
+
+
+def trace_of(setting: Setting, drive: Drive, score: Score) -> dict[str, Any]:
+    """The document."""
+    changed = {agent.id for agent in setting.modification.changed}
+    return {
+        "format": FORMAT,
+        "version": VERSION,
+        "step_s": STEP_S,
+        "steps": len(drive.states),
+        "ego": {
+            "length_m": round(drive.body.length_m, 3),
+            "width_m": round(drive.body.width_m, 3),
+            "poses": _poses(drive.boxes, drive.states[:, SPEED]),
+        },
+        "objects": _objects(setting, drive, changed),
+        "plans": _plans(drive),
+        "braking": [number for number, plan in enumerate(drive.plans) if plan.braking],
+        "events": [
+            {"step": one.moment, "kind": one.kind.value, "object": one.object_id}
+            for one in events_of(drive, score)
+        ],
+        "road": _road(drive),
+    }
+
+
+# Private
+
+
+def _poses(boxes: FloatArray, speeds: FloatArray) -> list[list[float]]:
+    return [
+        [round(float(x), 2), round(float(y), 2), round(float(h), 3), round(float(v), 2)]
+        for (x, y, h), v in zip(boxes[:, :3], speeds, strict=True)
+    ]
+
+
+def _objects(setting: Setting, drive: Drive, changed: set[str]) -> list[dict[str, Any]]:
+    """Each object with its poses from its first moment on; one pose alone where it stands."""
+    types = {agent.id: agent.type.value for agent in setting.after.agents}
+    if setting.recording is not None:
+        types |= {track.agent_id: track.type for track in setting.recording.tracks}
+    found: dict[str, dict[str, Any]] = {}
+    for moment, objects in enumerate(drive.objects):
+        rows = _poses(objects.boxes, objects.speeds_mps)
+        for name, kind, box, pose in zip(
+            objects.ids, objects.kinds, objects.boxes, rows, strict=True
+        ):
+            one = found.setdefault(
+                name,
+                {
+                    "id": name,
+                    "type": types.get(name, Kind(int(kind)).name),
+                    "length_m": round(float(box[3]), 3),
+                    "width_m": round(float(box[4]), 3),
+                    "changed": name in changed,
+                    "first": moment,
+                    "poses": [],
+                },
+            )
+            gap = moment - one["first"] - len(one["poses"])
+            one["poses"] += [None] * gap + [pose]
+    whole = len(drive.objects)
+    for one in found.values():
+        still = all(pose == one["poses"][0] for pose in one["poses"])
+        if still and one["first"] == 0 and len(one["poses"]) == whole:
+            one["poses"] = one["poses"][:1]
+    return list(found.values())
+
+
+def _plans(drive: Drive) -> list[dict[str, Any]]:
+    """What was considered, every half second: a line and a score for each proposal."""
+    made = []
+    for step in range(0, len(drive.plans), PLAN_EVERY):
+        shown = drive.plans[step].proposals
+        if shown is None:
+            continue
+        lines = drive.body.centre(shown.states)[:, ::LINE_EVERY].round(1)
+        made.append(
+            {
+                "step": step,
+                "chosen": shown.chosen,
+                "scores": [round(float(score), 3) for score in shown.scores],
+                "lines": [line.ravel().tolist() for line in lines],
+            }
+        )
+    return made
+
+
+def _road(drive: Drive) -> dict[str, Any]:
+    """The ground near the drive, as rings and lines of x, y, x, y, ..."""
+    import shapely
+
+    low = drive.boxes[:, :2].min(axis=0) - _AROUND_M
+    high = drive.boxes[:, :2].max(axis=0) + _AROUND_M
+    window = shapely.box(*low, *high)
+    road = drive.road
+    near = [n for n, strip in enumerate(road.strips) if strip.intersects(window)]
+    kinds = (AreaKind.WALKWAY, AreaKind.CROSSWALK)
+    areas = [area for area in road.scene.areas if area.kind in kinds]
+    return {
+        "drivable": _rings(shapely.intersection(road.drivable.ground, window).simplify(0.05)),
+        "walkways": [_flat(area.boundary_m) for area in areas if area.kind is kinds[0]],
+        "crosswalks": [_flat(area.boundary_m) for area in areas if area.kind is kinds[1]],
+        "lanes": [
+            {
+                "line": _flat(road.ways[n].centerline.points_m),
+                "edge": _flat(shapely.get_coordinates(road.strips[n].exterior)),
+                "on_route": road.names[n] in road.route,
+                "is_red": road.names[n] in road.red,
+            }
+            for n in near
+        ],
+        "end": _flat(road.centreline.poses(np.array([road.end_m]))[:, :2]),
+    }
+
+
+def _rings(ground: Any) -> list[list[list[float]]]:
+    """Polygons as lists of rings, the outer one first."""
+    import shapely
+
+    made = []
+    for part in shapely.get_parts(ground):
+        if part.geom_type == "Polygon":
+            rings = [part.exterior, *part.interiors]
+            made.append([_flat(shapely.get_coordinates(ring)) for ring in rings])
+    return made
+
+
+def _flat(points_m: Any) -> list[float]:
+    made: list[float] = np.asarray(points_m, dtype=np.float64).round(2).ravel().tolist()
+    return made

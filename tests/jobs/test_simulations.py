@@ -1,0 +1,208 @@
+"""Drives as rows: planned once, claimed once, kept with scores, told apart from failures."""
+
+from __future__ import annotations
+
+from datetime import timedelta
+from io import StringIO
+from typing import Any
+
+import numpy as np
+import pytest
+from django.core.management import call_command
+from django.core.management.base import CommandError
+from django.utils import timezone
+
+from augment.errors import Conflict, UnknownName
+from augment.models import GenerationJob, Simulation
+from augment.services import claims, driving_scores, simulations
+from augment.services.simulations import Options
+from augment.simulation.planning import Plan, Situation
+from augment.simulation.road import Road
+from augment.simulation.states import EgoBody
+from tests.jobs import rows
+
+pytestmark = pytest.mark.django_db
+
+State, Subject = Simulation.State, Simulation.Subject
+STRAIGHT = Options(planner="tests.jobs.test_simulations.Straight")
+
+
+class Straight:
+    """Keeps speed and heading: quick to drive, and right through every cone."""
+
+    def start(self, road: Road, body: EgoBody) -> None:
+        """Nothing to prepare."""
+
+    def plan(self, situation: Situation) -> Plan:
+        x, y, heading, speed = situation.ego[:4]
+        way = speed * 0.1 * np.arange(20)
+        cos, sin = np.cos(heading), np.sin(heading)
+        return Plan(poses=np.stack([x + way * cos, y + way * sin, np.full(20, heading)], axis=1))
+
+
+class Broken(Straight):
+    """Falls over in its first step."""
+
+    def plan(self, situation: Situation) -> Plan:
+        raise RuntimeError("no idea")
+
+
+def finished_job(scenarios: int = 1) -> GenerationJob:
+    job = rows.launch(scenarios=scenarios)
+    for row in job.augmentations.all():
+        claims.settle(held=rows.claimed(row), settlement=rows.done(), now=rows.NOON)
+    return job
+
+
+def driven(job: GenerationJob, options: Options = STRAIGHT) -> GenerationJob:
+    for pk in simulations.plan_job(job=job, options=options):
+        assert simulations.drive(simulation_pk=pk)
+    return job
+
+
+def test_a_job_has_its_scenes_references_and_results_driven() -> None:
+    job = finished_job(scenarios=2)
+    waiting = simulations.plan_job(job=job, options=STRAIGHT)
+    assert len(waiting) == 6
+    assert Simulation.objects.filter(subject=Subject.AUGMENTATION).count() == 2
+    assert simulations.plan_job(job=job, options=STRAIGHT) == waiting, "nothing is planned twice"
+
+
+def test_a_drive_keeps_both_scores_their_parts_and_the_way() -> None:
+    job = driven(finished_job())
+    before = Simulation.objects.get(subject=Subject.UNMODIFIED)
+    after = Simulation.objects.get(subject=Subject.AUGMENTATION)
+    assert before.nuplan_score == pytest.approx(1.0, abs=0.01)
+    # Two cones are run over: two collisions with things leave nothing.
+    assert after.nuplan_score == 0.0
+    assert after.document is not None
+    assert [one["object"] for one in after.document["collisions"]] == ["Agent2", "Agent3"]
+    assert after.document["criticality"]["least_distance_m"] == 0.0
+    names = {metric["name"] for metric in after.document["metrics"]["nuplan"]}
+    assert "no_ego_at_fault_collisions" in names
+    trace = simulations.trace_document(after)
+    assert len(trace["ego"]["poses"]) == trace["steps"]
+    assert [one["changed"] for one in trace["objects"]] == [True, True]
+    assert {event["kind"] for event in trace["events"]} >= {"collision"}
+    assert job.augmentations.count() == 1
+
+
+def test_a_row_is_driven_once() -> None:
+    (first, *_) = simulations.plan_job(job=finished_job(), options=STRAIGHT)
+    assert simulations.drive(simulation_pk=first)
+    assert not simulations.drive(simulation_pk=first)
+
+
+def test_a_planner_that_breaks_is_a_failed_row_that_can_be_driven_again() -> None:
+    job = finished_job()
+    broken = Options(planner="tests.jobs.test_simulations.Broken")
+    driven(job, broken)
+    assert {row.state for row in Simulation.objects.all()} == {State.FAILED}
+    assert {row.reason for row in Simulation.objects.all()} == {"RuntimeError: no idea"}
+    table = driving_scores.scores_of_job(job, options=broken, score="nuplan")
+    assert table.failures == (("RuntimeError: no idea", 3),)
+    assert len(simulations.plan_job(job=job, options=broken)) == 3
+
+
+def test_a_planner_that_nobody_knows_is_named() -> None:
+    with pytest.raises(UnknownName, match="pdm-open"):
+        simulations.plan_job(job=finished_job(), options=Options(planner="pdm-open"))
+    with pytest.raises(UnknownName, match="offsets"):
+        simulations.plan_job(job=finished_other(), options=Options(offsets="wide"))
+
+
+def finished_other() -> GenerationJob:
+    return GenerationJob.objects.get()
+
+
+def test_a_job_without_results_has_nothing_to_drive() -> None:
+    with pytest.raises(Conflict, match="no result"):
+        simulations.plan_job(job=rows.launch(), options=STRAIGHT)
+
+
+def test_a_drive_whose_worker_fell_silent_waits_again() -> None:
+    (first, *_) = simulations.plan_job(job=finished_job(), options=STRAIGHT)
+    then = timezone.now() - timedelta(minutes=5)
+    Simulation.objects.filter(pk=first).update(
+        state=State.RUNNING, claim="11111111-1111-1111-1111-111111111111", heartbeat_at=then
+    )
+    assert simulations.requeue_stale(older_than=timedelta(minutes=10)) == 0
+    assert simulations.requeue_stale(older_than=timedelta(minutes=1)) == 1
+    assert first in simulations.unsent(older_than=timedelta(minutes=10))
+
+
+def test_what_was_sent_just_now_is_not_sent_again() -> None:
+    waiting = simulations.plan_job(job=finished_job(), options=STRAIGHT)
+    assert simulations.unsent(older_than=timedelta(minutes=10)) == waiting
+    simulations.mark_sent(waiting)
+    assert simulations.unsent(older_than=timedelta(minutes=10)) == []
+
+
+def test_contestants_are_ranked_by_how_much_they_lower_the_score() -> None:
+    job = rows.launch(contestants=("reference", "shy"))
+    for row in job.augmentations.select_related("contestant"):
+        settlement = rows.done()
+        if row.contestant.slug == "shy":
+            settlement = claims.Settlement(
+                state=settlement.state,
+                modification={
+                    "format": "scenario-arena/modification", "version": 1,
+                    "add": [], "move": [], "remove": [],
+                },
+                image="bev/y.png",
+            )  # fmt: skip
+        claims.settle(held=rows.claimed(row), settlement=settlement, now=rows.NOON)
+    table = driving_scores.scores_of_job(driven(job), options=STRAIGHT, score="nuplan")
+    shown = [
+        (line.name, *(round(value, 1) for value in (line.mean, line.before, line.lowered)))
+        for line in table.lines
+        if line.mean is not None and line.before is not None and line.lowered is not None
+    ]
+    assert shown == [
+        ("Unmodified scene", 1.0, 1.0, 0.0),
+        ("Reference", 0.0, 1.0, 1.0),
+        ("reference", 0.0, 1.0, 1.0),
+        ("shy", 1.0, 1.0, 0.0),
+    ]
+    assert table.lines[2].by_type["approaching_construction_zone"] == 0.0
+    assert table.lines[2].by_type["jaywalking_pedestrian"] is None
+    assert (table.under_way, table.total) == (0, 4)
+
+
+def said(*arguments: str, **options: Any) -> str:
+    out = StringIO()
+    call_command("simulate", *arguments, stdout=out, **options)
+    return out.getvalue()
+
+
+def test_the_command_drives_a_job_and_prints_the_table() -> None:
+    finished_job()
+    text = said("Round 1", planner=STRAIGHT.planner)
+    assert "[3/3]" in text
+    assert "Unmodified scene" in text
+    assert "99.8" in text
+
+
+def test_the_command_drives_a_scenario_and_says_it_again() -> None:
+    rows.add_scenario("street-9")
+    first = said("street-9", planner=STRAIGHT.planner)
+    assert "street-9, Unmodified scene: 99.8" in first
+    assert "street-9, Reference: 0.0" in first
+    assert "street-9, Unmodified scene: 99.8" in said("street-9", planner=STRAIGHT.planner)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "options", "sentence"),
+    [
+        (["nowhere"], {}, "nowhere"),
+        (["Round 1"], {"score": "carla"}, "carla"),
+        (["Round 1"], {"planner": "no.such.Planner"}, "no.such.Planner"),
+        (["Round 1"], {"planner": "tests.jobs.rows.NOON"}, "can't be made"),
+    ],
+)
+def test_the_command_refuses_in_words(
+    arguments: list[str], options: dict[str, str], sentence: str
+) -> None:
+    finished_job()
+    with pytest.raises(CommandError, match=sentence):
+        said(*arguments, **options)
