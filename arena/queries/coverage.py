@@ -16,7 +16,7 @@ from arena.models import Matchup, Report, Study, Vote
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Covered:
-    """Something planned, and how much of it is decided."""
+    """Something planned, and how much of it has a vote; a skip is none."""
 
     name: str
     planned: int
@@ -99,7 +99,8 @@ def reports_of(study: Study) -> QuerySet[Report]:
 
 
 def _counts(study: Study) -> QuerySet[Matchup, tuple[int, int, str, bool, int]]:
-    has_vote = Exists(Vote.objects.filter(matchup=OuterRef("pk")))
+    votes = Vote.objects.filter(matchup=OuterRef("pk"), superseded_by=None)
+    has_vote = Exists(votes.exclude(outcome=Vote.Outcome.SKIP))
     return (
         study.matchups.order_by()
         .annotate(has_vote=has_vote)

@@ -41,7 +41,7 @@ def take() -> Inventory:
         studies=Study.objects.count(),
         studies_open=Study.objects.filter(state=Study.State.OPEN).count(),
         studies_closed=Study.objects.filter(state=Study.State.CLOSED).count(),
-        votes=Vote.objects.filter(supersedes=None).count(),
+        votes=Vote.objects.filter(superseded_by=None).exclude(outcome=Vote.Outcome.SKIP).count(),
     )
 
 

@@ -42,7 +42,7 @@ class ExpertLine:
     @property
     def left(self) -> int:
         """Planned matchups without a vote."""
-        return self.tally.total - self.tally.voted
+        return self.tally.left
 
 
 def may_be_let_in(user: User) -> bool:

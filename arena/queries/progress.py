@@ -7,29 +7,35 @@ from dataclasses import dataclass
 from django.contrib.auth.models import User
 from django.db.models import Count, Q
 
-from arena.models import Study
+from arena.models import Study, Vote
 
-_VOTED = Count("matchups", filter=Q(matchups__votes__isnull=False), distinct=True)
+_DECIDED = Q(matchups__votes__isnull=False)
+_SKIPPED = Q(matchups__votes__outcome=Vote.Outcome.SKIP, matchups__votes__superseded_by=None)
 _PLANNED = Count("matchups", distinct=True)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class StudyProgress:
-    """A study and how many of its matchups have a vote; those to be planned later count too."""
+    """A study and how many of its matchups have a vote; those to be planned later count too.
+
+    Attributes:
+        voted: Matchups with a vote; `skipped` those that were skipped instead.
+    """
 
     study: Study
     planned: int
     voted: int
+    skipped: int
 
     @property
     def left(self) -> int:
-        """Matchups that still wait for a vote."""
-        return self.planned - self.voted
+        """Matchups that still wait for a decision."""
+        return self.planned - self.voted - self.skipped
 
 
 def of_studies() -> list[StudyProgress]:
     """Every study, the youngest first."""
-    rows = Study.objects.select_related("vote_file").annotate(planned=_PLANNED, voted=_VOTED)
+    rows = Study.objects.select_related("vote_file").annotate(planned=_PLANNED, **_counted(Q()))
     return [_line(row) for row in rows]
 
 
@@ -41,7 +47,7 @@ def of_expert(expert: User) -> list[StudyProgress]:
         .exclude(state=Study.State.DRAFT)
         .annotate(
             planned=Count("matchups", filter=own, distinct=True),
-            voted=Count("matchups", filter=own & Q(matchups__votes__isnull=False), distinct=True),
+            **_counted(own),
         )
     )
     return [_line(row, row.votes_to_plan.get(expert.username, 0)) for row in rows]
@@ -49,7 +55,14 @@ def of_expert(expert: User) -> list[StudyProgress]:
 
 def of_study(study: Study) -> StudyProgress:
     """One study over all its experts."""
-    return _line(Study.objects.annotate(planned=_PLANNED, voted=_VOTED).get(pk=study.pk))
+    return _line(Study.objects.annotate(planned=_PLANNED, **_counted(Q())).get(pk=study.pk))
+
+
+def _counted(whose: Q) -> dict[str, Count]:
+    return {
+        "decided": Count("matchups", filter=whose & _DECIDED, distinct=True),
+        "skipped": Count("matchups", filter=whose & _SKIPPED, distinct=True),
+    }
 
 
 def _line(row: Study, later: int | None = None) -> StudyProgress:
@@ -57,8 +70,8 @@ def _line(row: Study, later: int | None = None) -> StudyProgress:
     if later is None:
         later = sum(row.votes_to_plan.values())
     planned: int = row.planned  # type: ignore[attr-defined]
+    decided: int = row.decided  # type: ignore[attr-defined]
+    skipped: int = row.skipped  # type: ignore[attr-defined]
     return StudyProgress(
-        study=row,
-        planned=planned + later,
-        voted=row.voted,  # type: ignore[attr-defined]
+        study=row, planned=planned + later, voted=decided - skipped, skipped=skipped
     )

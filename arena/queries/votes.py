@@ -56,7 +56,11 @@ class VotingState:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ExpertTally:
-    """One expert's line in an admin's overview of a study."""
+    """One expert's line in an admin's overview of a study.
+
+    Attributes:
+        voted: Matchups with a vote; skips are none.
+    """
 
     expert: User
     pseudonym: str
@@ -67,6 +71,11 @@ class ExpertTally:
     ties: int
     right_wins: int
     skips: int
+
+    @property
+    def left(self) -> int:
+        """Matchups that still wait for a decision."""
+        return self.total - self.voted - self.skips
 
 
 def matchup_of(*, expert: User, code: UUID | str) -> Matchup:
@@ -143,7 +152,7 @@ def tallies(study: Study) -> list[ExpertTally]:
                 pseudonym=expert.person.pseudonym,
                 is_simulated=expert.person.is_simulated,
                 total=totals.get(expert.pk, 0) + study.votes_to_plan.get(expert.username, 0),
-                voted=sum(counts),
+                voted=sum(counts[:3]),
                 left_wins=counts[0],
                 ties=counts[1],
                 right_wins=counts[2],

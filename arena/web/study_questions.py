@@ -68,10 +68,10 @@ def opening(rules: dict[str, Any]) -> Question:
 def closing(study: Study) -> Question:
     """What is there, and what will never come."""
     lines = tallies(study)
-    given = sum(line.left_wins + line.ties + line.right_wins for line in lines)
+    given = sum(line.voted for line in lines)
     skipped = sum(line.skips for line in lines)
-    missing = sum(line.total - line.voted for line in lines)
-    unfinished = sum(line.voted < line.total for line in lines)
+    missing = sum(line.left for line in lines)
+    unfinished = sum(line.left > 0 for line in lines)
     facts = (
         _("Votes given: %(given)s. Pairs skipped: %(skipped)s.")
         % {"given": given, "skipped": skipped},
