@@ -145,6 +145,26 @@ def test_what_is_not_as_asked_for_is_the_one_fault(
     assert found - {Kind.WALK_HEADING} == {kind}
 
 
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+@pytest.mark.parametrize(
+    ("wrong_way_m", "kind"),
+    [
+        (0.44, Kind.ASKED_ACROSS),
+        (0.46, Kind.ASKED_SIDE),
+        (1.2, Kind.ASKED_SIDE),
+        (1.94, Kind.ASKED_SIDE),
+        (1.96, Kind.ASKED_ACROSS),
+    ],
+)
+def test_sides_are_exchanged_within_the_tolerance_of_the_place_across(
+    sign: float, wrong_way_m: float, kind: Kind
+) -> None:
+    # 1.2 m to one side is asked for, 0.75 m off is let pass: so is it on the other side.
+    asked = parked(20.0, lateral=towards(LEFT_EDGE if sign > 0.0 else RIGHT_EDGE, 1.2))
+    found = faults(asked, vehicle("Agent2", 20.0, -sign * wrong_way_m))
+    assert found & {Kind.ASKED_ACROSS, Kind.ASKED_SIDE} == {kind}
+
+
 def test_a_finding_says_the_numbers() -> None:
     (distance,) = (
         one for one in held(CAR, vehicle("Agent2", 27.3, 1.2)) if one.kind is Kind.ASKED_DISTANCE

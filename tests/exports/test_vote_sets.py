@@ -18,7 +18,7 @@ from arena.services.snapshots import judges_of, votes_of
 from arena.services.studies import close_study
 from arena.services.vote_rows import COLUMNS, digest_of, vote_rows, votes_csv
 from augment.errors import Conflict, UnknownName
-from augment.models import Scenario
+from augment.models import Contestant, Scenario
 from tests.append_only import rewriting
 from tests.study_rows import a_study, matchups_of, vote
 
@@ -58,6 +58,22 @@ def test_a_filter_that_names_nothing_is_refused(
     study = a_study(votes_per_expert=1)
     with pytest.raises(UnknownName, match=sentence):
         counted(study, **filters)
+
+
+@pytest.mark.parametrize(("left", "right"), [("ann", "bob"), ("bob", "ann"), ("cid", "bob")])
+def test_a_simulated_contestant_on_either_side_keeps_a_vote_out(left: str, right: str) -> None:
+    study = a_study(votes_per_expert=9)
+    Contestant.objects.filter(slug="ann").update(kind=Contestant.Kind.SIMULATED)
+    rows = study.matchups.filter(left__contestant__slug=left, right__contestant__slug=right)
+    vote(rows[0])
+    found = vote_set(study, filters=Filters(), last=last_vote_of(study))
+    is_real = "ann" not in (left, right)
+    assert len(found.counted) == is_real
+    assert found.left_out == ({} if is_real else {"simulated": 1})
+    study.allow_simulated = True
+    study.save()
+    allowed = vote_set(study, filters=Filters(), last=last_vote_of(study))
+    assert (len(allowed.counted), allowed.left_out) == (1, {})
 
 
 def test_skips_repeats_and_checks_are_counted_but_not_rated() -> None:
