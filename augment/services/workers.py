@@ -86,7 +86,7 @@ class Presence:
 
     def beat(self) -> None:
         """Say that it lives."""
-        if self._pk is None or not self._update(seen_at=DATABASE_TIME):
+        if not self._update(seen_at=DATABASE_TIME):
             _forget_old()
             made = Worker.objects.create(
                 name=self._name, started_at=DATABASE_TIME, seen_at=DATABASE_TIME
@@ -108,6 +108,8 @@ class Presence:
         self._update(seen_at=DATABASE_TIME, ended_at=DATABASE_TIME)
 
     def _update(self, **changes: object) -> bool:
+        if self._pk is None:
+            return False
         return bool(Worker.objects.filter(pk=self._pk).update(**changes))
 
 
@@ -185,5 +187,7 @@ def _worked_at(worker: Worker) -> datetime:
 
 
 def _forget_old() -> None:
-    last = Worker.objects.values_list("pk", flat=True).first()
-    Worker.objects.filter(seen_at__lt=DATABASE_TIME - KEPT).exclude(pk=last).delete()
+    old = Worker.objects.filter(seen_at__lt=DATABASE_TIME - KEPT)
+    last = Worker.objects.first()
+    if last is not None:
+        old.exclude(pk=last.pk).delete()
