@@ -7,6 +7,7 @@ from contextlib import contextmanager
 from datetime import UTC, datetime, timedelta
 
 import pytest
+from celery import current_app
 from django.db import connection
 from django.utils import timezone
 
@@ -41,10 +42,10 @@ def _broker() -> Iterator[None]:
 
 @contextmanager
 def memory_broker() -> Iterator[None]:
-    before = tasks.current_app.conf.broker_url
-    tasks.current_app.conf.broker_url = "memory://"
+    before = current_app.conf.broker_url
+    current_app.conf.broker_url = "memory://"
     yield
-    tasks.current_app.conf.broker_url = before
+    current_app.conf.broker_url = before
 
 
 def taken() -> tuple[Augmentation, claims.Claim]:

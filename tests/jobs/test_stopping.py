@@ -10,6 +10,7 @@ from celery.exceptions import Reject
 from django.conf import settings
 
 from augment import tasks
+from augment.errors import WorkerStopping
 from augment.llm.client import Sending, unwatched
 from augment.llm.messages import Reply, Request
 from augment.llm.scripted import ScriptedClient
@@ -119,7 +120,7 @@ def test_who_waits_for_a_place_gives_up_the_wait() -> None:
     queue = Queue(longest_s=600.0, still_wanted=stopping.insist_on_going_on, sleep=sleep)
     with (
         place_at(endpoint, Queue(longest_s=settings.LLM_QUEUE_S)),
-        pytest.raises(stopping.WorkerStopping),
+        pytest.raises(WorkerStopping),
         place_at(endpoint, queue),
     ):
         pytest.fail("two have one place")

@@ -8,6 +8,7 @@ import tempfile
 from collections.abc import Iterator
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
+from typing import Any
 
 import pytest
 import redis
@@ -183,7 +184,7 @@ def refusing(request: pytest.FixtureRequest) -> Iterator[str]:
     before = current_app.conf.broker_url
     try:
         wait_until(lambda: redis_answers(socket), what=process.said() or "Redis answers")
-        client = redis.Redis(unix_socket_path=str(socket))
+        client: Any = redis.Redis(unix_socket_path=str(socket))
         client.execute_command(*request.param)
         client.close()
         current_app.conf.broker_url = f"redis+socket://{socket}"
