@@ -103,11 +103,16 @@ PAPER = parked(
 _WISH = re.compile(r"Add a parked (car|vehicle) ([0-9.]+) m ahead(?: of the ego in its lane)?\.")
 
 
+CONE = "Place a traffic cone on the ego's lane 20 m in front of the ego."
+
+
 def intents(instruction: str) -> Intent | None:
     """The stand-in's list in tests: the catalogue, and the one wish that tests make."""
     found = _WISH.fullmatch(same_text(instruction))
     if found:
         return parked(float(found[2]), body=Body(found[1]))
+    if same_text(instruction) == CONE:
+        return cones(20.0, 1, Shape.LINE)
     return _catalogue().get(same_text(instruction))
 
 

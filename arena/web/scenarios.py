@@ -20,6 +20,7 @@ from augment.errors import QueueFault
 from augment.models import Augmentation, Scenario
 from augment.services.displacement import of_augmentation
 from augment.services.findings import Checked, checked
+from augment.services.intents import statements_of, waiting_reading
 from augment.services.transcript_export import transcript_of
 from augment.services.transcript_steps import totals_of, tries_of
 from augment.services.transcripts import IMAGES
@@ -43,10 +44,16 @@ def scenarios_page(request: HttpRequest) -> HttpResponse:
 def scenario_page(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
     """One scenario: before and after the reference, and every other result."""
     scenario = get_object_or_404(Scenario.objects.select_related("base_scene"), code=code)
+    reading = waiting_reading(scenario)
     context = {
         "scenario": scenario,
         "reference_code": scenarios.reference_pictures().get(scenario.pk),
         "lines": modification_lines(scenario.reference),
+        "statements": [said(one) for one in statements_of(scenario.intent)],
+        "reading": reading,
+        "reading_statements": [
+            said(one) for one in statements_of(None if reading is None else reading.document)
+        ],
         "augmentations": scenarios.augmentations_of(scenario),
     }
     return render(request, "scenarios/scenario.html", context)

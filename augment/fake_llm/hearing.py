@@ -25,6 +25,7 @@ class Part(StrEnum):
     REVIEWER = "reviewer"
     ENGINEER = "engineer"
     VIEWER = "viewer"
+    READER = "reader"
 
 
 _OPENINGS = {text(f"{part}.md").partition("\n")[0]: part for part in Part}

@@ -11,8 +11,19 @@ from augment.errors import CannotPlace
 from augment.fake_llm import answers, careless, judging, tool_use
 from augment.fake_llm.hearing import Heard, Part, heard
 from augment.fake_llm.requests import ChatRequest
-from augment.fake_llm.sight import Intents, NothingSeen, Task, knows_nothing, list_of, task_of
+from augment.fake_llm.sight import (
+    Intents,
+    NothingSeen,
+    Task,
+    instruction_in,
+    knows_nothing,
+    list_of,
+    task_of,
+)
+from augment.scene.intent_codec import intent_to_parts
 from augment.scene.modification import Modification
+
+UNKNOWN = "I am a stand-in and read no English; this sentence is not on my list of intents."
 
 Calls = tuple[tuple[str, str], ...]
 
@@ -52,6 +63,8 @@ class Character:
         understood = heard(request)
         if understood.part is Part.VIEWER:
             return Said(text=judging.seen(request))
+        if understood.part is Part.READER:
+            return self._read(request, intents)
         try:
             task = task_of(request.messages, intents)
         except NothingSeen:
@@ -64,6 +77,16 @@ class Character:
         if any(one.role == "assistant" for one in request.messages):
             return Said(text=self.decide(self.judge(task)))
         return Said(text=judging.asked(list(list_of(task.prompt, "Added agents"))))
+
+    def _read(self, request: ChatRequest, intents: Intents) -> Said:
+        """The intent from the list, as a reader would write it; nothing is read."""
+        try:
+            intent = intents(instruction_in(request.messages))
+        except NothingSeen:
+            return Said(text=answers.SEES_NOTHING)
+        if intent is None:
+            return Said(text=UNKNOWN)
+        return Said(text=f"From my list:\n```json\n{json.dumps(intent_to_parts(intent))}\n```\n")
 
     def _modified(self, task: Task, understood: Heard) -> Said:
         if self.never_stops and (understood.may_call or understood.called):
@@ -87,7 +110,7 @@ class Character:
 
 def _why(task: Task, refusal: CannotPlace) -> str:
     if task.intent is None:
-        return "I am a stand-in and read no English; this sentence is not on my list of intents."
+        return UNKNOWN
     return refusal.reason
 
 

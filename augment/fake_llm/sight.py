@@ -159,6 +159,18 @@ def list_of(text: str, title: str) -> Vectors:
     return dict(found)
 
 
+def instruction_in(messages: Sequence[SpokenMessage]) -> str:
+    """The quoted wish in the first message of a user that holds one.
+
+    Raises:
+        NothingSeen: None does.
+    """
+    for message in messages:
+        if message.role == "user" and "<instruction>" in message.text:
+            return _instruction(message.text)
+    raise NothingSeen("there is no instruction")
+
+
 def _instruction(text: str) -> str:
     quoted = re.search(r"^<instruction>\n(.*?)\n</instruction>$", text, re.DOTALL | re.MULTILINE)
     if quoted is None:

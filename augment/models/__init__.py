@@ -10,6 +10,7 @@ from augment.models.contestants import Contestant
 from augment.models.endpoints import CallLease, Endpoint, EndpointModel
 from augment.models.events import Event
 from augment.models.jobs import Attempt, Augmentation, GenerationJob
+from augment.models.readings import IntentReading
 from augment.models.scenes import SLUG_HELP, BaseScene, Scenario
 from augment.models.simulations import Simulation
 from augment.models.triggers import after_migrations, before_migrations
@@ -27,6 +28,7 @@ __all__ = [
     "EndpointModel",
     "Event",
     "GenerationJob",
+    "IntentReading",
     "ModelCall",
     "Scenario",
     "Simulation",

@@ -6,9 +6,11 @@ import uuid
 from decimal import Decimal
 
 from django.db import models
+from django.db.models import Q
 
 from augment.llm.costs import usd_of
 from augment.models.jobs import Attempt
+from augment.models.readings import IntentReading
 
 
 class ModelCall(models.Model):
@@ -20,9 +22,21 @@ class ModelCall(models.Model):
     """
 
     code = models.UUIDField(default=uuid.uuid4, unique=True, editable=False)
-    attempt = models.ForeignKey(Attempt, on_delete=models.CASCADE, related_name="calls")
+    attempt = models.ForeignKey(
+        Attempt, null=True, blank=True, on_delete=models.CASCADE, related_name="calls"
+    )
+    reading = models.ForeignKey(
+        IntentReading,
+        null=True,
+        blank=True,
+        on_delete=models.CASCADE,
+        related_name="calls",
+        help_text="for which it was made where it was for no attempt",
+    )
     number = models.PositiveIntegerField()
-    role = models.CharField(max_length=20, help_text="modifier, reviewer, engineer, viewer")
+    role = models.CharField(
+        max_length=20, help_text="modifier, reviewer, engineer, viewer, reader"
+    )
     request = models.JSONField(
         help_text="model, messages and parameters, without the key; images by their hash"
     )
@@ -59,6 +73,13 @@ class ModelCall(models.Model):
         ordering = ("number",)
         constraints = (
             models.UniqueConstraint(name="call_number_is_unique", fields=("attempt", "number")),
+            models.UniqueConstraint(
+                name="call_number_of_a_reading_is_unique", fields=("reading", "number")
+            ),
+            models.CheckConstraint(
+                name="call_is_an_attempts_or_a_readings",
+                condition=Q(attempt__isnull=True) ^ Q(reading__isnull=True),
+            ),
         )
 
     def __str__(self) -> str:

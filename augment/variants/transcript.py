@@ -14,12 +14,13 @@ from augment.llm.messages import Reply, Request
 
 
 class ModelRole(StrEnum):
-    """What a language model is asked to be: the paper's agents."""
+    """What a language model is asked to be: the paper's agents, and the reader of intents."""
 
     MODIFIER = "modifier"
     REVIEWER = "reviewer"
     ENGINEER = "engineer"
     VIEWER = "viewer"
+    READER = "reader"
 
 
 class NoteKind(StrEnum):

@@ -27,6 +27,7 @@ from augment.services import contestants, jobs, runner
 from augment.services.caps import Caps
 from augment.services.feasible import obstacle
 from augment.variants.transcript import ModelRole
+from tests.intents import intents
 from tests.jobs.rows import add_scenario, only_row
 
 pytestmark = pytest.mark.django_db
@@ -34,7 +35,7 @@ pytestmark = pytest.mark.django_db
 
 @pytest.fixture(scope="module")
 def server() -> Iterator[FakeServer]:
-    with running() as serving:
+    with running(intents=intents) as serving:
         yield serving
 
 
@@ -165,7 +166,7 @@ def test_a_cap_in_money_needs_the_price_of_every_role() -> None:
 
 
 def test_each_role_is_asked_at_its_own_endpoint(server: FakeServer) -> None:
-    with running() as other:
+    with running(intents=intents) as other:
         contestants.ensure_endpoint(label="a", base_url=server.url, is_simulated=True)
         contestants.ensure_endpoint(label="b", base_url=other.url, is_simulated=True)
         contestants.add_contestant(

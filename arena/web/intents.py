@@ -1,0 +1,68 @@
+"""What a scenario's instruction asks for, on its page: accept what a model read, or replace it."""
+
+from __future__ import annotations
+
+import json
+import uuid
+
+from django.contrib import messages
+from django.http import Http404, HttpRequest, HttpResponse, JsonResponse
+from django.shortcuts import get_object_or_404, redirect
+from django.utils.translation import gettext as _
+from django.views.decorators.http import require_POST, require_safe
+
+from arena.web.access import STAFF, only
+from augment.errors import AugmentError, Conflict
+from augment.models import Scenario
+from augment.sentences import sentence
+from augment.services.intents import accept_reading, enter_intent
+from augment.services.wording import said
+
+LONGEST_FILE = 200_000
+
+
+@only(*STAFF)
+@require_safe
+def intent_file(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
+    """The intent as its JSON document, to be mended and given back."""
+    scenario = get_object_or_404(Scenario, code=code)
+    if scenario.intent is None:
+        raise Http404
+    answer = JsonResponse(scenario.intent, json_dumps_params={"indent": 2, "ensure_ascii": False})
+    answer["Content-Disposition"] = f'attachment; filename="intent-{scenario.slug}.json"'
+    return answer
+
+
+@only(*STAFF)
+@require_POST
+def set_intent(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
+    """Accept the last reading, or take the intent of the file that came along."""
+    scenario = get_object_or_404(Scenario, code=code)
+    actor = request.user if request.user.is_authenticated else None
+    try:
+        if "accept" in request.POST:
+            accept_reading(scenario=scenario.slug, actor=actor)
+        else:
+            enter_intent(scenario=scenario.slug, document=_document(request), actor=actor)
+    except AugmentError as error:
+        messages.error(request, said(error))
+    else:
+        messages.success(request, _("The intent is set. It counts from now on."))
+    return redirect("scenario", code=code)
+
+
+def _document(request: HttpRequest) -> object:
+    """What the file holds.
+
+    Raises:
+        Conflict: There is none, it is too long, or it is no JSON.
+    """
+    file = request.FILES.get("file")
+    if file is None:
+        raise Conflict(sentence("Choose a JSON file."))
+    if file.size is None or file.size > LONGEST_FILE:
+        raise Conflict(sentence("The file is too long for an intent."))
+    try:
+        return json.loads(file.read())
+    except ValueError:
+        raise Conflict(sentence("The file is no JSON.")) from None

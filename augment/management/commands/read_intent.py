@@ -1,0 +1,87 @@
+"""Have a language model read what a scenario's instruction asks for, and accept what it read."""
+
+from __future__ import annotations
+
+from argparse import ArgumentParser
+from pathlib import Path
+from typing import Any
+
+from django.core.management.base import CommandError
+
+from augment.errors import AugmentError
+from augment.formats.json_file import read_json
+from augment.management.arguments import add_cap_arguments, caps_of
+from augment.models import IntentReading
+from augment.scene.intent_codec import intent_from_document
+from augment.scene.intent_statements import list_statements
+from augment.services.intent_readings import USUAL_CAPS, read_intent
+from augment.services.intents import accept_reading, enter_intent
+from augment.services.terminal import TerminalCommand
+
+
+class Command(TerminalCommand):
+    """read_intent SCENARIO (--endpoint E --model M | --accept | --enter FILE)."""
+
+    help = (
+        "Ask a language model what a scenario's instruction asks for. What it read is printed as "
+        "short statements and counts for nothing until somebody runs this again with --accept, "
+        "or with --enter and a mended file."
+    )
+
+    def add_arguments(self, parser: ArgumentParser) -> None:
+        """Who is asked, or what counts."""
+        parser.add_argument("scenario", help="a slug")
+        parser.add_argument("--endpoint", help="the label of an endpoint")
+        parser.add_argument("--model", help="the model id on the endpoint")
+        add_cap_arguments(parser)
+        parser.add_argument("--fresh", action="store_true", help="ask anew what was answered")
+        parser.add_argument(
+            "--accept", action="store_true", help="let the last reading count from now on"
+        )
+        parser.add_argument(
+            "--enter", type=Path, metavar="FILE", help="let the intent of a file count instead"
+        )
+
+    def handle(self, *args: Any, **options: Any) -> None:
+        """Do one of the three, and print the statements of what was read or counts now."""
+        asks = options["endpoint"] is not None or options["model"] is not None
+        if asks + options["accept"] + (options["enter"] is not None) != 1:
+            raise CommandError("Give one of: --endpoint with --model, --accept, --enter FILE.")
+        if asks and (options["endpoint"] is None or options["model"] is None):
+            raise CommandError("--endpoint and --model go together.")
+        slug = options["scenario"]
+        try:
+            if asks:
+                self._read(slug, options)
+                return
+            if options["accept"]:
+                row = accept_reading(scenario=slug)
+            else:
+                row = enter_intent(
+                    scenario=slug, document=read_json(options["enter"], what="intent")
+                )
+        except AugmentError as fault:
+            raise CommandError(str(fault)) from fault
+        self._print(row.intent)
+        self.stdout.write(f"This is the intent of {slug} now ({row.intent_origin}).")
+
+    def _read(self, slug: str, options: dict[str, Any]) -> None:
+        caps = caps_of(options)
+        reading = read_intent(
+            scenario=slug,
+            endpoint=options["endpoint"],
+            model=options["model"],
+            caps=caps if any((caps.usd, caps.calls, caps.tokens)) else USUAL_CAPS,
+            is_fresh=options["fresh"],
+        )
+        if reading.state != IntentReading.State.READ:
+            raise CommandError(f"Nothing was read: {reading.reason}")
+        self._print(reading.document)
+        self.stdout.write(
+            "It does not count yet. Hold each statement against the sentence, then accept it:\n"
+            f"  manage.py read_intent {slug} --accept"
+        )
+
+    def _print(self, document: object) -> None:
+        for statement in list_statements(intent_from_document(document)):
+            self.stdout.write(f"- {statement}")

@@ -1,0 +1,52 @@
+"""What the intent reader is asked, and how its answer becomes an intent.
+
+In: an instruction. Out: messages; from a raw answer an `Intent`, or ReplyUnreadable that says
+where it breaks the schema.
+"""
+
+from __future__ import annotations
+
+import json
+from functools import cache
+
+from pydantic import ValidationError
+
+from augment.errors import InvalidDocument, ReplyUnreadable
+from augment.llm.messages import Message, Speaker
+from augment.prompts.blocks import last_object
+from augment.prompts.texts import filled, quoted, said_by_user
+from augment.scene.intent import Intent
+from augment.scene.intent_codec import IntentParts, intent_from_parts
+from augment.scene.schema import problems_of
+
+_MOST_PROBLEMS = 8
+
+
+def reader_messages(instruction: str) -> tuple[Message, ...]:
+    """The rules with the JSON schema, and the sentence."""
+    told = filled("reader.md", schema=_schema())
+    task = filled("reader_task.md", quoted=quoted(instruction))
+    return Message(speaker=Speaker.SYSTEM, text=told), said_by_user(task)
+
+
+def read_intent(answer: str) -> Intent:
+    """The intent of a reader's answer.
+
+    Raises:
+        ReplyUnreadable: There is no block, or it breaks the schema or contradicts itself.
+    """
+    found, _ = last_object(answer, frozenset({"requests"}))
+    try:
+        return intent_from_parts(IntentParts.model_validate(found))
+    except ValidationError as fault:
+        problems = problems_of(fault)
+    except InvalidDocument as fault:
+        problems = list(fault.problems)
+    raise ReplyUnreadable(
+        [f"{ascii(path).strip(chr(39))[:80]}: {text}" for path, text in problems[:_MOST_PROBLEMS]]
+    )
+
+
+@cache
+def _schema() -> str:
+    return json.dumps(IntentParts.model_json_schema(), separators=(",", ":"))

@@ -1,0 +1,49 @@
+"""The intent reader: a language model puts a sentence into data, once and once more if need be.
+
+It sees the sentence alone. What it read counts for nothing until a person has accepted it.
+"""
+
+from __future__ import annotations
+
+from augment.llm.client import ChatClient
+from augment.llm.patience import Patience
+from augment.prompts.fill_review import review_re_ask_messages
+from augment.prompts.intent_reader import read_intent, reader_messages
+from augment.scene.intent import Intent
+from augment.variants.cast import Asking, Cast, Player
+from augment.variants.transcript import ModelRole, Transcript
+
+MAX_TOKENS = 4096
+
+
+def ask_for_intent(
+    instruction: str,
+    *,
+    client: ChatClient,
+    model: str,
+    transcript: Transcript,
+    patience: Patience | None = None,
+) -> Intent:
+    """What a model reads out of a sentence.
+
+    Raises:
+        ReplyUnreadable: Neither the first answer nor the re-asked one fits the schema.
+        ModelRefused: The model declined, or its endpoint's filter did.
+        ModelFault: The wire broke for good.
+        BudgetSpent: The transcript's budget has no room for the next call.
+    """
+    player = Player(client=client, model=model)
+    cast = Cast(
+        players={ModelRole.MODIFIER: player, ModelRole.READER: player},
+        transcript=transcript,
+        patience=patience or Patience(),
+    )
+    asking = Asking(
+        cast=cast,
+        role=ModelRole.READER,
+        again=review_re_ask_messages,
+        max_tokens=MAX_TOKENS,
+        re_asks=1,
+    )
+    intent, _, _ = asking.read(reader_messages(instruction), read_intent)
+    return intent

@@ -1,0 +1,168 @@
+"""A language model reads what an instruction asks for; a person decides whether that counts."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator
+from contextlib import contextmanager
+from decimal import Decimal
+from io import StringIO
+from pathlib import Path
+
+import pytest
+from django.core.management import call_command
+from django.core.management.base import CommandError
+
+from augment.errors import Conflict, ModelFault, UnknownName
+from augment.fake_llm.server import running
+from augment.llm.client import ChatClient
+from augment.llm.messages import Reply
+from augment.llm.scripted import ScriptedClient
+from augment.models import Event, IntentReading, ModelCall, Scenario
+from augment.scene.intent import Shape
+from augment.scene.intent_codec import intent_to_document, intent_to_parts
+from augment.services import contestants
+from augment.services.caps import Caps
+from augment.services.intent_readings import read_intent
+from augment.services.intents import accept_reading
+from tests.intents import cones, intents
+from tests.jobs.rows import add_scenario
+
+pytestmark = pytest.mark.django_db
+CONE = cones(20.0, 1, Shape.LINE)
+GOOD = f"```json\n{json.dumps(intent_to_parts(CONE))}\n```"
+State = IntentReading.State
+
+
+@contextmanager
+def opened(client: ScriptedClient) -> Iterator[ChatClient]:
+    yield client
+
+
+def reading(
+    *answers: str | Reply | ModelFault, caps: Caps | None = None, is_fresh: bool = True
+) -> IntentReading:
+    if not Scenario.objects.exists():
+        add_scenario("street", intent=None, intent_origin="")
+        contestants.ensure_endpoint(label="here", base_url="http://127.0.0.1:1/v1")
+    return read_intent(
+        scenario="street",
+        endpoint="here",
+        model="m",
+        caps=caps or Caps(calls=6),
+        is_fresh=is_fresh,
+        client=opened(ScriptedClient(answers)),
+    )
+
+
+def test_what_was_read_waits_and_counts_once_it_is_accepted() -> None:
+    made = reading(GOOD)
+    assert (made.state, made.document) == (State.READ, intent_to_document(CONE))
+    assert Scenario.objects.get().intent is None
+    row = accept_reading(scenario="street")
+    assert (row.intent, row.intent_origin) == (intent_to_document(CONE), "read")
+    assert Event.objects.filter(verb="set intent").count() == 1
+    with pytest.raises(Conflict, match="No reading of 'street' waits"):
+        accept_reading(scenario="street")
+
+
+def test_an_answer_that_breaks_the_schema_is_asked_for_once_more() -> None:
+    broken = GOOD.replace('"line"', '"zigzag"')
+    assert reading(broken, GOOD).state == State.READ
+    second = ModelCall.objects.get(number=2)
+    assert "requests[0].cones.shape" in str(second.request)
+    failed = reading(broken.replace("zigzag", "spiral"), broken)
+    assert (failed.state, failed.document) == (State.FAILED, None)
+
+
+def test_every_call_is_a_row_with_its_request_and_raw_answer() -> None:
+    made = reading(Reply(text=GOOD, model="m-1", prompt_tokens=4000, completion_tokens=80))
+    call = made.calls.get()
+    assert (call.role, call.answer, call.model_returned) == ("reader", GOOD, "m-1")
+    assert (call.spent_tokens, call.attempt, call.sent_at is not None) == (4080, None, True)
+    assert call.settled_at is not None
+    assert '"additionalProperties":false' in call.request["messages"][0]["content"]
+
+
+def test_the_same_question_is_answered_from_the_store_and_costs_nothing() -> None:
+    reading(Reply(text=GOOD, prompt_tokens=4000, completion_tokens=80))
+    again = reading(is_fresh=False)
+    assert again.state == State.READ
+    assert (again.calls.get().is_cached, again.calls.get().spent_tokens) == (True, 0)
+
+
+def test_a_cap_ends_a_reading_before_the_call_that_would_pass_it() -> None:
+    made = reading("no block", caps=Caps(calls=1))
+    assert (made.state, made.calls.count()) == (State.FAILED, 1)
+    assert made.reason == "The cap is reached: 1 calls"
+    assert reading(caps=Caps(tokens=100)).calls.count() == 0
+
+
+def test_a_cap_in_usd_needs_a_price() -> None:
+    with pytest.raises(Conflict, match="nobody knows it"):
+        reading(caps=Caps(usd=Decimal(1)))
+    assert not IntentReading.objects.exists()
+
+
+def test_a_broken_wire_is_a_failed_reading_with_a_sentence() -> None:
+    made = reading(ModelFault("the endpoint answered nonsense", retryable=False, status=400))
+    assert (made.state, made.reason) == (
+        State.FAILED, "HTTP 400: the endpoint answered nonsense",
+    )  # fmt: skip
+    assert made.calls.get().fault == made.reason
+
+
+def test_the_catalogues_intents_are_changed_in_their_files() -> None:
+    reading(GOOD)
+    Scenario.objects.update(in_catalogue=True)
+    with pytest.raises(Conflict, match="the catalogue's own"):
+        accept_reading(scenario="street")
+
+
+def test_unknown_names_are_named() -> None:
+    reading(GOOD)
+    with pytest.raises(UnknownName, match="Unknown scenario 'lane'"):
+        read_intent(scenario="lane", endpoint="here", model="m")
+    with pytest.raises(UnknownName, match="Unknown endpoint 'there'"):
+        read_intent(scenario="street", endpoint="there", model="m")
+
+
+def run(*arguments: str) -> str:
+    out = StringIO()
+    call_command("read_intent", "street", *arguments, stdout=out)
+    return out.getvalue()
+
+
+def test_the_command_reads_through_the_wire_shows_statements_and_accepts(tmp_path: Path) -> None:
+    add_scenario("street", intent=None, intent_origin="")
+    with running(intents=intents) as server:
+        contestants.ensure_endpoint(label="stand-in", base_url=server.url)
+        said = run("--endpoint", "stand-in", "--model", "fake-good")
+    assert "- cones: 20 m ahead of the ego\n" in said
+    assert "It does not count yet." in said
+    assert "This is the intent of street now (read)." in run("--accept")
+    file = tmp_path / "mended.json"
+    file.write_text(json.dumps(intent_to_document(cones(21.0, 1, Shape.LINE))))
+    assert "(entered)" in run("--enter", str(file))
+    assert Scenario.objects.get().intent_origin == "entered"
+
+
+def test_the_stand_in_says_that_it_reads_no_english() -> None:
+    add_scenario("street", instruction="Paint the sky green.", intent=None, intent_origin="")
+    with running(intents=intents) as server:
+        contestants.ensure_endpoint(label="stand-in", base_url=server.url)
+        with pytest.raises(CommandError, match="Nothing was read"):
+            run("--endpoint", "stand-in", "--model", "fake-good")
+    assert all("I am a stand-in and read no English" in (one.answer or "") for one in calls())
+
+
+def calls() -> list[ModelCall]:
+    return list(ModelCall.objects.all())
+
+
+@pytest.mark.parametrize(
+    "arguments", [(), ("--accept", "--model", "m"), ("--endpoint", "e"), ("--model", "m")]
+)
+def test_the_command_does_one_thing_at_a_time(arguments: tuple[str, ...]) -> None:
+    with pytest.raises(CommandError, match=r"Give one of|go together"):
+        run(*arguments)

@@ -1,0 +1,90 @@
+"""What a scenario asks for, on its page: shown, accepted and replaced by staff."""
+
+from __future__ import annotations
+
+import json
+
+import pytest
+from django.core.files.uploadedfile import SimpleUploadedFile
+from django.test import Client
+
+from augment.models import IntentReading, Scenario
+from augment.scene.intent import Shape
+from augment.scene.intent_codec import intent_to_document
+from augment.services import contestants
+from tests.intents import cones
+from tests.jobs.rows import add_scenario
+from tests.web.cast import people, signed_in
+
+pytestmark = pytest.mark.django_db
+LINE = intent_to_document(cones(20.0, 1, Shape.LINE))
+RING = intent_to_document(cones(25.0, 8, Shape.RING))
+
+
+@pytest.fixture
+def staff() -> Client:
+    return signed_in(people()["admin"])
+
+
+def page(client: Client, scenario: Scenario) -> str:
+    return client.get(f"/scenarios/{scenario.code}/").content.decode()
+
+
+def send(client: Client, scenario: Scenario, **fields: object) -> str:
+    answer = client.post(f"/scenarios/{scenario.code}/intent/", fields, follow=True)
+    scenario.refresh_from_db()
+    return answer.content.decode()
+
+
+def file(text: str) -> SimpleUploadedFile:
+    return SimpleUploadedFile("intent.json", text.encode())
+
+
+def test_the_page_shows_what_the_instruction_asks_for(staff: Client) -> None:
+    shown = page(staff, add_scenario("street"))
+    assert "cones: 20 m ahead of the ego" in shown
+    assert "entered" in shown
+    none = page(staff, add_scenario("bare", intent=None, intent_origin=""))
+    assert "nobody has written down what the instruction asks for" in none
+
+
+def test_what_a_model_read_is_shown_and_counts_once_accepted(staff: Client) -> None:
+    scenario = add_scenario("street", intent=None, intent_origin="")
+    endpoint = contestants.ensure_endpoint(label="here", base_url="http://127.0.0.1:1/v1")
+    IntentReading.objects.create(
+        scenario=scenario, endpoint=endpoint, model="m", state="read", document=RING
+    )
+    shown = page(staff, scenario)
+    assert "m at here read this. It does not count until you accept it" in shown
+    assert "cones: in a ring" in shown
+    assert "It counts from now on" in send(staff, scenario, accept="1")
+    assert (scenario.intent, scenario.intent_origin) == (RING, "read")
+
+
+def test_a_file_replaces_the_intent_and_can_be_fetched_again(staff: Client) -> None:
+    scenario = add_scenario("street")
+    send(staff, scenario, file=file(json.dumps(RING)))
+    assert (scenario.intent, scenario.intent_origin) == (RING, "entered")
+    assert staff.get(f"/scenarios/{scenario.code}/intent.json").json() == RING
+
+
+@pytest.mark.parametrize(
+    ("text", "why"),
+    [
+        ("{", "The file is no JSON"),
+        (json.dumps(LINE).replace("line", "zigzag"), "requests[0].cones.shape"),
+        ("[" * 200_001, "too long"),
+    ],
+)
+def test_a_file_that_is_no_intent_changes_nothing(staff: Client, text: str, why: str) -> None:
+    scenario = add_scenario("street")
+    assert why in send(staff, scenario, file=file(text))
+    assert scenario.intent == LINE
+    assert "Choose a JSON file" in send(staff, scenario)
+
+
+def test_experts_neither_see_nor_set_intents() -> None:
+    scenario = add_scenario("street")
+    expert = signed_in(people()["expert"])
+    assert expert.post(f"/scenarios/{scenario.code}/intent/", {"accept": "1"}).status_code == 403
+    assert expert.get(f"/scenarios/{scenario.code}/intent.json").status_code == 403
