@@ -39,7 +39,7 @@ def chromium(family: FontFamily = DEJAVU) -> Iterator[Browser]:
             executable_path=path,
             args=FLAGS,
             timeout=2 * PATIENCE_MS,
-            env=dict(os.environ) | family.configure(Path(folder)),
+            env={**os.environ, **family.configure(Path(folder))},
         )
         try:
             yield browser

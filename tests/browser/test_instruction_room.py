@@ -45,7 +45,8 @@ PLACES = """() => {
 
 def longest_of_the_catalogue() -> str:
     folder = Path(settings.BASE_DIR) / "fixtures" / "scenarios"
-    instructions = [json.loads(path.read_text())["instruction"] for path in folder.glob("*.json")]
+    texts = (path.read_text() for path in folder.glob("*.json"))
+    instructions = [str(json.loads(text)["instruction"]) for text in texts]
     assert len(instructions) == 50
     return max(instructions, key=len)
 
