@@ -273,6 +273,7 @@ def _from_model(
             ),
             native_tools=treatment.profiles[ModelRole.MODIFIER].native_tools is True,
             others=others,
+            intent=intent_of(row.scenario),
         )
     return Answer(
         state=State(outcome.status.value),

@@ -1,27 +1,33 @@
 """Geometric review, our own: the deterministic checks speak, no model does.
 
-What they measure and find wrong or doubtful goes back to the modifier as facts. They know nothing
-of the instruction, so a doubtful finding may be just what was asked for: a modifier that keeps its
+What they measure and find wrong or doubtful goes back to the modifier as facts. Where the scenario
+has an intent they are held against it as well: such a review knows what is asked for, as no model
+does. Without one a doubtful finding may be just what was asked for: a modifier that keeps its
 modification in spite of doubts has the last word, in spite of what is wrong it has not.
 """
 
 from __future__ import annotations
 
-from augment.checks import Finding, Ground, Severity, findings_on
+from augment.checks import Finding, Ground, Severity
+from augment.checks.against_intent import judged
 from augment.prompts.names import short_names
+from augment.scene.intent import Intent
 from augment.variants.verdict import Submission, Verdict
 
 _TOLD = (Severity.WRONG, Severity.DOUBTFUL)
 
 
-def review_geometry(submission: Submission, ground: Ground) -> Verdict:
+def review_geometry(
+    submission: Submission, ground: Ground, intent: Intent | None = None
+) -> Verdict:
     """What the checks make of a modification.
 
     Args:
         submission: What is reviewed.
         ground: Of the submission's scene.
+        intent: What the instruction asks for, None where nobody has written it down.
     """
-    found = findings_on(ground, submission.modification)
+    found = judged(ground, submission.modification, intent)
     told = [one for severity in _TOLD for one in found if one.severity is severity]
     wrong = sum(one.severity is Severity.WRONG for one in told)
     doubtful = len(told) - wrong

@@ -9,6 +9,7 @@ from augment.prompts.fill import Calling, Form
 from augment.prompts.reply import ReadReply, read_reply
 from augment.prompts.texts import said_by_model
 from augment.scene.entities import Scene
+from augment.scene.intent import Intent
 from augment.variants.cast import Asking, Cast, Messages
 from augment.variants.pose_tool import PoseTool
 from augment.variants.recipes import Recipe, Tools
@@ -45,11 +46,16 @@ def form_of(recipe: Recipe, *, native_tools: bool = False) -> Form:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Modifier:
-    """One modifier at work on one scene."""
+    """One modifier at work on one scene.
+
+    Attributes:
+        intent: What the instruction asks for: for a geometric review, never for a model.
+    """
 
     recipe: Recipe
     scene: Scene
     cast: Cast
+    intent: Intent | None = None
 
     @property
     def form(self) -> Form:

@@ -15,6 +15,7 @@ from augment.errors import ModelRefused, ReplyUnreadable, UnknownName
 from augment.llm.client import ChatClient
 from augment.llm.patience import Patience
 from augment.scene.entities import Scene
+from augment.scene.intent import Intent
 from augment.scene.modification import Modification
 from augment.variants.cast import Cast, Player
 from augment.variants.modifier import Modifier
@@ -60,6 +61,7 @@ def run(
     patience: Patience | None = None,
     native_tools: bool = False,
     others: Mapping[ModelRole, Player] | None = None,
+    intent: Intent | None = None,
 ) -> Outcome:
     """Let a model modify a scene as the recipe says.
 
@@ -73,6 +75,7 @@ def run(
         patience: How faults that may pass are waited out; by default three attempts.
         native_tools: Whether the modifier calls its tools natively instead of in its answer.
         others: Who plays the reviewers' roles; by default the modifier's model does.
+        intent: What a geometric review holds modifications against, where that is stored.
 
     Raises:
         UnknownName: Nobody can run a recipe with these parts.
@@ -86,7 +89,7 @@ def run(
         transcript=transcript,
         patience=patience or Patience(),
     )
-    modifier = Modifier(recipe=recipe, scene=scene, cast=cast)
+    modifier = Modifier(recipe=recipe, scene=scene, cast=cast, intent=intent)
     try:
         result = modify_and_review(modifier, instruction)
     except ReplyUnreadable as unreadable:

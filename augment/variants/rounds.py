@@ -103,7 +103,9 @@ def _reviewing(modifier: Modifier) -> Reviewing | None:
         case Review.VISUAL:
             return partial(review_picture, cast=cast, limits=limits)
         case Review.GEOMETRIC:
-            return partial(review_geometry, ground=Ground.of(modifier.scene))
+            return partial(
+                review_geometry, ground=Ground.of(modifier.scene), intent=modifier.intent
+            )
 
 
 def _reviewed(

@@ -11,6 +11,7 @@ from augment.llm.messages import Reply, ToolCall
 from augment.llm.patience import Patience
 from augment.llm.scripted import ScriptedClient
 from augment.scene.entities import Scene
+from augment.scene.intent import Intent
 from augment.variants.cast import Player
 from augment.variants.pipeline import Outcome, run
 from augment.variants.recipes import recipe
@@ -31,6 +32,7 @@ class Play:
         shown: Scene | None = None,
         native: bool = False,
         others: Mapping[ModelRole, Player] | None = None,
+        intent: Intent | None = None,
     ) -> None:
         self.client = ScriptedClient(script)
         self.transcript = MemoryTranscript()
@@ -44,6 +46,7 @@ class Play:
             patience=Patience(sleep=lambda _: None, rng=random.Random(0)),
             native_tools=native,
             others=others,
+            intent=intent,
         )
 
     @property

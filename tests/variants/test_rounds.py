@@ -7,9 +7,11 @@ import pytest
 from augment.errors import ModelFault
 from augment.llm.messages import Reply
 from augment.llm.scripted import ScriptedClient
+from augment.scene.intent import Facing
 from augment.variants.cast import Player
 from augment.variants.pipeline import OutcomeStatus
 from augment.variants.transcript import ModelRole
+from tests.intents import parked
 from tests.scenes import scene, vehicle
 from tests.variants.playing import Play, car, questions, rating, verdict
 
@@ -205,6 +207,22 @@ def test_a_modifier_that_insists_on_what_is_wrong_has_not() -> None:
     off = car(21.4, y_m=30.0)
     play = Play("geo", [off, off, off])
     assert (play.roles, play.outcome.is_accepted) == ("mmm", False)
+
+
+def test_a_geometric_review_holds_the_modification_against_the_intent_where_there_is_one() -> None:
+    far = car(29.4)
+    play = Play("geo", [far, car(21.4)], intent=parked(21.4))
+    assert (play.roles, play.x_m, play.outcome.is_accepted) == ("mm", 21.4, True)
+    told = play.client.requests[1].messages[-1].text
+    assert "29.4 m ahead of the ego along its lane; 21.4 m ahead is asked for" in told
+    assert Play("geo", [far]).outcome.is_accepted is True
+
+
+def test_what_is_doubtful_but_asked_for_costs_no_round() -> None:
+    facing = car(21.4, heading_rad=3.1416)
+    wanted = parked(21.4, facing=Facing.AGAINST_LANE)
+    assert Play("geo", [facing], intent=wanted).roles == "m"
+    assert Play("geo", [facing, facing]).roles == "mm"
 
 
 def test_the_least_wrong_round_counts() -> None:
