@@ -22,16 +22,9 @@ from django.conf import settings
 from django.db import connection
 
 from augment.errors import QueueFault, QueueRefused, QueueUnreachable
-from augment.services import (
-    claims,
-    jobs,
-    marked_pictures,
-    runner,
-    simulations,
-    stopping,
-    workers,
-)
 from augment.services.clock import DATABASE_TIME, Moment
+from augment.services.judging import marked_pictures, simulations
+from augment.services.running import jobs, leases, runner, stopping, workers
 
 logger = logging.getLogger(__name__)
 
@@ -112,7 +105,7 @@ def enqueue(ids: Iterable[int]) -> int:
             batch = waiting[start : start + BATCH]
             for pk in batch:
                 run_augmentation.apply_async((pk,), connection=broker, retry=False)
-            claims.mark_sent(ids=batch)
+            leases.mark_sent(ids=batch)
     return len(waiting)
 
 
@@ -122,7 +115,7 @@ def enqueue_job(job_pk: int) -> int:
     Raises:
         QueueFault: No broker, or it refuses; the rows wait on and are sent by recover later.
     """
-    return enqueue(claims.unsent(older_than=RESEND_AFTER, job_pk=job_pk))
+    return enqueue(leases.unsent(older_than=RESEND_AFTER, job_pk=job_pk))
 
 
 def check_broker() -> None:
@@ -159,7 +152,7 @@ def recover(*, now: Moment = DATABASE_TIME, at_start: bool = False) -> None:
         QueueFault: No broker, or it refuses.
     """
     stale_after = timedelta(seconds=settings.STALE_AFTER_S)
-    claims.requeue_stale(now=now, older_than=stale_after)
+    leases.requeue_stale(now=now, older_than=stale_after)
     jobs.finish_if_over(now=now)
     if at_start:
         older_than = timedelta(0)
@@ -168,7 +161,7 @@ def recover(*, now: Moment = DATABASE_TIME, at_start: bool = False) -> None:
     else:
         # Nothing is on its way, so what was sent a while ago and still waits is lost.
         older_than = stale_after
-    enqueue(claims.unsent(now=now, older_than=older_than))
+    enqueue(leases.unsent(now=now, older_than=older_than))
     simulations.requeue_stale(now=now, older_than=stale_after)
     enqueue_simulations(simulations.unsent(now=now, older_than=older_than))
 

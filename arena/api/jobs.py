@@ -14,7 +14,7 @@ from arena.api.access import StaffOnly
 from arena.api.errors import ApiView
 from arena.queries import jobs
 from augment.models import GenerationJob
-from augment.services.workers import workforce
+from augment.services.running.workers import workforce
 
 
 class JobProgressView(ApiView):

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 from arena.exports.displacement_table import DisplacementTable, marked
 from arena.exports.drawing import GRID, INK, MARK, SIMULATED, SOFT, drawn, house_style
 from arena.exports.published import SOURCE, PublishedBox
-from augment.services.displacement import VARIANTS, By, Group
+from augment.services.judging.displacement import VARIANTS, By, Group
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -10,7 +10,7 @@ from arena.exports.published import BY_VARIANT, PublishedBox
 from arena.exports.tables import SIMULATED
 from augment.models import GenerationJob, Scenario
 from augment.sentences import sentence
-from augment.services.displacement import (
+from augment.services.judging.displacement import (
     PLACED_EXACTLY,
     By,
     Group,

@@ -11,7 +11,7 @@ from arena.exports.displacement_table import DisplacementTable, marked
 from arena.exports.formats import Format, drawings, formats, rounded
 from arena.exports.published import SOURCE, PublishedBox
 from arena.services.cells import csv_text
-from augment.services.displacement import Box, Group, Measured
+from augment.services.judging.displacement import Box, Group, Measured
 
 COLUMNS = (
     "group", "contestant", "slug", "model", "variant", "simulated", "augmentations", "n",

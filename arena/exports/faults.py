@@ -18,7 +18,7 @@ from arena.rating.agreement import cohens_kappa
 from arena.rating.reliability import Metric, krippendorff_alpha
 from arena.services.cells import csv_text
 from augment.models import Augmentation, Contestant, GenerationJob
-from augment.services.fault_guess import FaultClass
+from augment.services.judging.fault_guess import FaultClass
 
 COLUMNS = (
     "contestant", "slug", "simulated", "all", "position", "heading", "logic",

@@ -14,7 +14,7 @@ from arena.models import LabelTask, Matchup
 from arena.queries.descriptions import Wording, told
 from arena.queries.people import role_of
 from augment.models import Scenario
-from augment.services.pictures import camera_of
+from augment.services.scenarios.pictures import camera_of
 
 _NOT_SHOWN = "This picture is not shown to you."
 

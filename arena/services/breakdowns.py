@@ -22,7 +22,7 @@ from arena.rating.win_rates import win_rates
 from arena.services.vote_arrays import VoteArrays, some
 from augment.models import Contestant, Scenario
 from augment.sentences import Sentence
-from augment.services.displacement import of_rows, summarise
+from augment.services.judging.displacement import of_rows, summarise
 
 Document = dict[str, Any]
 

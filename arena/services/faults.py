@@ -18,7 +18,7 @@ from augment.errors import Conflict, UnknownName
 from augment.models import Augmentation, GenerationJob
 from augment.sentences import sentence
 from augment.services.events import log_event
-from augment.services.fault_guess import FaultClass, guess
+from augment.services.judging.fault_guess import FaultClass, guess
 from augment.services.texts import one_line, storable
 
 NOTE_LENGTH = 2000

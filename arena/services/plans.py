@@ -14,7 +14,7 @@ from arena.pairing.plan import Check, Entry, PlannedMatchup, Rules
 from arena.queries.showings import view_of
 from augment.models import Augmentation, Contestant, Scenario
 from augment.sentences import Sentence, sentence
-from augment.services.descriptions import Description, descriptions
+from augment.services.scenarios.descriptions import Description, descriptions
 
 Cells = dict[tuple[str, str], Augmentation]
 """By scenario and contestant, the augmentation whose picture is shown."""

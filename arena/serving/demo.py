@@ -24,16 +24,16 @@ from arena.services.ratings import rate
 from arena.services.simulation import simulate_votes
 from arena.services.studies import close_study, open_study
 from augment.models import Augmentation, BaseScene, Contestant, Endpoint, GenerationJob, Scenario
-from augment.services.catalogue import load_catalogue
-from augment.services.choosing import ALL, chosen_contestants
-from augment.services.contestants import (
+from augment.services.endpoints.contestants import (
     REFERENCE,
     RULE_PLACER,
     add_contestant,
     ensure_builtin,
     ensure_endpoint,
 )
-from augment.services.jobs import launch, progress
+from augment.services.running.choosing import ALL, chosen_contestants
+from augment.services.running.jobs import launch, progress
+from augment.services.scenarios.catalogue import load_catalogue
 from augment.tasks import enqueue_job
 
 PASSWORD = "arena-demo"  # for the demo's own accounts on this computer

@@ -10,7 +10,7 @@ from django.utils.translation import gettext_noop
 
 from arena.exports.displacement_table import DisplacementTable
 from arena.exports.published import PublishedBox
-from augment.services.displacement import Box, Group, Summary
+from augment.services.judging.displacement import Box, Group, Summary
 
 LEFT, RIGHT = 6.0, 226.0
 """Where the axis begins and ends; the picture is 240 wide. Beyond stands what is farther out."""

@@ -18,7 +18,7 @@ from arena.web.access import STAFF, only
 from arena.web.boxes import box_sheet
 from augment.errors import UnknownName
 from augment.models import GenerationJob
-from augment.services.displacement import By, types_named
+from augment.services.judging.displacement import By, types_named
 
 LABELS = {
     By.CONTESTANT: _("Contestant"),

@@ -14,10 +14,10 @@ from arena.queries.profiles import Language, Theme
 from arena.queries.scenarios import TypeGroup
 from arena.services.decisions import LONGEST_COMMENT, Decision, decision_of
 from augment.models import Contestant
-from augment.services.caps import Caps
-from augment.services.estimates import Estimate, estimate
-from augment.services.fault_guess import FaultClass
-from augment.services.feasible import keys_missing, obstacle
+from augment.services.judging.fault_guess import FaultClass
+from augment.services.running.caps import Caps
+from augment.services.running.estimates import Estimate, estimate
+from augment.services.running.feasible import keys_missing, obstacle
 from augment.services.wording import said
 
 

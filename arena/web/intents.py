@@ -15,7 +15,7 @@ from arena.web.access import STAFF, only
 from augment.errors import AugmentError, Conflict
 from augment.models import Scenario
 from augment.sentences import sentence
-from augment.services.intents import accept_reading, enter_intent
+from augment.services.scenarios.intents import accept_reading, enter_intent
 from augment.services.wording import said
 
 LONGEST_FILE = 200_000

@@ -22,12 +22,13 @@ from arena.web.forms import CapsForm, LaunchForm
 from arena.web.questions import Question, ask, is_sure
 from augment.errors import AugmentError, QueueFault
 from augment.models import Augmentation, Contestant, GenerationJob
-from augment.services import caps, contestants
-from augment.services import jobs as service
-from augment.services.caps import Caps
-from augment.services.job_costs import costs_of
+from augment.services.endpoints import contestants
+from augment.services.running import caps
+from augment.services.running import jobs as service
+from augment.services.running.caps import Caps
+from augment.services.running.costs import costs_of
+from augment.services.running.workers import workforce
 from augment.services.wording import said
-from augment.services.workers import workforce
 from augment.tasks import enqueue_job
 
 State = Augmentation.State

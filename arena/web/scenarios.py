@@ -18,12 +18,12 @@ from arena.web.access import STAFF, only
 from arena.web.pictures import picture_response
 from augment.errors import QueueFault
 from augment.models import Augmentation, Scenario
-from augment.services.displacement import of_augmentation
-from augment.services.findings import Checked, checked
-from augment.services.intents import statements_of, waiting_reading
-from augment.services.transcript_export import transcript_of
-from augment.services.transcript_steps import totals_of, tries_of
-from augment.services.transcripts import IMAGES
+from augment.services.judging.displacement import of_augmentation
+from augment.services.judging.findings import Checked, checked
+from augment.services.running.transcript_export import transcript_of
+from augment.services.running.transcript_steps import totals_of, tries_of
+from augment.services.running.transcripts import IMAGES
+from augment.services.scenarios.intents import statements_of, waiting_reading
 from augment.services.wording import said
 from augment.tasks import enqueue_marks
 

@@ -9,7 +9,7 @@ from typing import Any
 
 from django.conf import settings
 
-from augment.services.caps import Caps
+from augment.services.running.caps import Caps
 
 
 def add_cap_arguments(parser: ArgumentParser) -> None:

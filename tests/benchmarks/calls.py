@@ -13,10 +13,10 @@ from django.utils import timezone
 from augment.llm.messages import Message, Request, Speaker
 from augment.llm.patience import Patience
 from augment.models import EndpointModel
-from augment.services import claims, jobs, runner
-from augment.services.caps import Caps
-from augment.services.contestants import add_contestant, ensure_endpoint
-from augment.services.transcripts import RowTranscript
+from augment.services.endpoints.contestants import add_contestant, ensure_endpoint
+from augment.services.running import jobs, leases, runner
+from augment.services.running.caps import Caps
+from augment.services.running.transcripts import RowTranscript
 from augment.variants.asking import Conversation
 from augment.variants.transcript import ModelRole
 from tests.jobs.rows import add_scenario, only_row
@@ -48,7 +48,7 @@ def conversation(base_url: str, model: str) -> Call:
     caps = Caps(usd=Decimal(1000), calls=10**6, tokens=10**12)
     job = jobs.launch(name="Bench", contestants=["bench"], scenarios=["bench"], caps=caps)
     row = only_row(job)
-    held = claims.claim(augmentation_pk=row.pk, now=timezone.now(), worker="bench")
+    held = leases.claim(augmentation_pk=row.pk, now=timezone.now(), worker="bench")
     assert held is not None
     talk = Conversation(
         client=runner.open_wire(endpoint, held).__enter__(),

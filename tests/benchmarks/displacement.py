@@ -16,7 +16,7 @@ from augment.metrics.displacement import Displacement, displacement
 from augment.metrics.summary import summarise
 from augment.scene.catalogue import ScenarioType
 from augment.scene.modification import Modification
-from augment.services.seeds import seed_of
+from augment.services.scenarios.scenes import seed_of
 from tests.fixtures.shelf import SLUGS, entry, shown_scene
 
 Placing = Callable[..., rule_placer.Placement | quantised.Placement]

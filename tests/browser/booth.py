@@ -13,7 +13,7 @@ from playwright.sync_api import Browser, BrowserContext, Page, ViewportSize, exp
 
 from arena.models import Matchup, Study, Vote
 from augment.models import Augmentation
-from augment.services.pictures import store
+from augment.services.scenarios.pictures import store
 from tests import study_rows
 from tests.browser.chromium import PATIENCE_MS
 from tests.web.cast import png

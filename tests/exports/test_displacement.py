@@ -19,8 +19,8 @@ from augment.models import Augmentation, Contestant, GenerationJob
 from augment.scene.catalogue import ScenarioType
 from augment.scene.codec import modification_to_document
 from augment.scene.modification import Modification
-from augment.services.displacement import By
-from augment.services.pictures import store
+from augment.services.judging.displacement import By
+from augment.services.scenarios.pictures import store
 from tests.jobs import rows
 from tests.scenes import cone
 from tests.web.cast import png

@@ -13,8 +13,8 @@ from django.core.management.base import CommandError
 
 from augment.formats.interplan import token_of
 from augment.models import Augmentation, Contestant, GenerationJob, Scenario
-from augment.services.catalogue import load_catalogue
-from augment.services.pictures import store
+from augment.services.scenarios.catalogue import load_catalogue
+from augment.services.scenarios.pictures import store
 from tests.fixtures.shelf import FOLDER
 from tests.jobs import rows
 from tests.web.cast import png

@@ -12,9 +12,9 @@ from augment.errors import ModelFault
 from augment.llm.client import ChatClient, Sending, unwatched
 from augment.llm.messages import Reply, Request
 from augment.models import Contestant, Endpoint, EndpointModel, GenerationJob
-from augment.services import jobs
-from augment.services.caps import Caps
-from augment.services.jobs import NO_CAPS
+from augment.services.running import jobs
+from augment.services.running.caps import Caps
+from augment.services.running.jobs import NO_CAPS
 from tests.jobs.rows import INSTRUCTION, add_model, add_scenario
 from tests.variants.answers import GOOD
 

@@ -11,7 +11,7 @@ from augment.scene.entities import Scene
 from augment.scene.intent import Shape
 from augment.scene.intent_codec import intent_to_document
 from augment.scene.modification import Modification
-from augment.services import claims, jobs
+from augment.services.running import jobs, leases
 from tests.intents import cones
 from tests.scenes import cone
 from tests.scenes import scene as street
@@ -64,18 +64,18 @@ def only_row(job: GenerationJob) -> Augmentation:
     return job.augmentations.get()
 
 
-def claimed(row: Augmentation, now: datetime = NOON) -> claims.Claim:
-    held = claims.claim(augmentation_pk=row.pk, now=now, worker="here")
+def claimed(row: Augmentation, now: datetime = NOON) -> leases.Claim:
+    held = leases.claim(augmentation_pk=row.pk, now=now, worker="here")
     assert held is not None
     return held
 
 
-def failed(reason: str = "the wire broke") -> claims.Settlement:
-    return claims.Settlement(state=Augmentation.State.FAILED, reason=reason)
+def failed(reason: str = "the wire broke") -> leases.Settlement:
+    return leases.Settlement(state=Augmentation.State.FAILED, reason=reason)
 
 
-def done() -> claims.Settlement:
-    return claims.Settlement(
+def done() -> leases.Settlement:
+    return leases.Settlement(
         state=Augmentation.State.DONE,
         modification=modification_to_document(TWO_CONES),
         image="bev/x.png",

@@ -10,7 +10,7 @@ from augment.llm.client import ChatClient
 from augment.llm.messages import Reply
 from augment.llm.scripted import ScriptedClient
 from augment.models import Augmentation, Endpoint
-from augment.services import runner
+from augment.services.running import runner
 
 
 class Wire:

@@ -17,7 +17,7 @@ from augment.models import (
     GenerationJob,
     ModelCall,
 )
-from augment.services import claims
+from augment.services.running import leases
 from tests.jobs.rows import add_model, claimed, done, launch, only_row
 
 pytestmark = pytest.mark.django_db
@@ -41,7 +41,7 @@ def past_job() -> None:
         started_at=timezone.now(),
         settled_at=timezone.now(),
     )
-    claims.settle(held=held, settlement=done(), now=timezone.now())
+    leases.settle(held=held, settlement=done(), now=timezone.now())
     endpoint = Endpoint.objects.create(label="local", base_url="http://127.0.0.1:9/v1")
     EndpointModel.objects.create(endpoint=endpoint, model="llama3.1")
     add_model("llama", endpoint=endpoint, model="llama3.1")

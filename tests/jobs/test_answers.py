@@ -12,8 +12,8 @@ from django.utils import timezone
 from augment.errors import ModelFault
 from augment.llm.messages import Message, Reply, Request, Speaker, ToolCall
 from augment.models import Augmentation, GenerationJob, ModelCall
-from augment.services import answers, jobs, runner
-from augment.services.transcripts import RowTranscript
+from augment.services.running import answers, jobs, runner
+from augment.services.running.transcripts import RowTranscript
 from augment.variants.transcript import ModelRole, NoteKind
 from tests.jobs.models import Model, llama_job, reply
 from tests.jobs.rows import claimed, only_row

@@ -12,8 +12,9 @@ from augment.llm.costs import Price, WorstCase
 from augment.llm.patience import Patience
 from augment.llm.wire_faults import fault_of_status
 from augment.models import Augmentation, CallLease, Endpoint, GenerationJob
-from augment.services import budget, call_limits, claims
-from augment.services.budget import Room
+from augment.services.endpoints import call_limits
+from augment.services.running import budget, leases
+from augment.services.running.budget import Room
 from tests.jobs.models import llama_job
 from tests.jobs.rows import NOON, STALE, claimed, launch, only_row
 
@@ -124,7 +125,7 @@ def test_when_a_claim_without_a_beat_is_taken_back(
     row = only_row(launch())
     claimed(row, now=NOON)
     now = NOON + after_the_beat
-    assert bool(claims.requeue_stale(now=now, older_than=STALE)) is is_taken_back
+    assert bool(leases.requeue_stale(now=now, older_than=STALE)) is is_taken_back
 
 
 @pytest.mark.parametrize(
@@ -132,15 +133,15 @@ def test_when_a_claim_without_a_beat_is_taken_back(
 )
 def test_when_a_message_counts_as_lost(age: timedelta, is_unsent: bool) -> None:
     row = only_row(launch())
-    claims.mark_sent(ids=[row.pk], now=NOON)
-    assert bool(claims.unsent(now=NOON + age, older_than=STALE)) is is_unsent
+    leases.mark_sent(ids=[row.pk], now=NOON)
+    assert bool(leases.unsent(now=NOON + age, older_than=STALE)) is is_unsent
 
 
 @pytest.mark.parametrize(
     ("lost", "state"),
     [
-        (claims.LOST_LIMIT - 1, Augmentation.State.QUEUED),
-        (claims.LOST_LIMIT, Augmentation.State.FAILED),
+        (leases.LOST_LIMIT - 1, Augmentation.State.QUEUED),
+        (leases.LOST_LIMIT, Augmentation.State.FAILED),
     ],
 )
 def test_how_many_workers_may_die_at_one_row(lost: int, state: str) -> None:
@@ -148,7 +149,7 @@ def test_how_many_workers_may_die_at_one_row(lost: int, state: str) -> None:
     for number in range(lost):
         now = NOON + number * 3 * STALE
         claimed(row, now=now)
-        claims.requeue_stale(now=now + 2 * STALE, older_than=STALE)
+        leases.requeue_stale(now=now + 2 * STALE, older_than=STALE)
     row.refresh_from_db()
     assert row.state == state
 

@@ -14,7 +14,7 @@ from django.db import connection
 
 from augment.errors import ClaimLost, EndpointBusy
 from augment.models import CallLease, Endpoint
-from augment.services.call_limits import LEASE, MINUTE, Queue, admit, clear_old, place_at
+from augment.services.endpoints.call_limits import LEASE, MINUTE, Queue, admit, clear_old, place_at
 from tests.jobs.rows import NOON
 from tests.processes import wait_until
 

@@ -13,8 +13,8 @@ from augment.errors import JobCancelled
 from augment.llm.messages import Message, Request, Speaker
 from augment.llm.openai_wire import OpenAIWire
 from augment.models import Augmentation, CallLease, Endpoint, GenerationJob, ModelCall
-from augment.services import budget, claims, jobs, runner
-from augment.services.call_limits import Queue, place_at
+from augment.services.endpoints.call_limits import Queue, place_at
+from augment.services.running import budget, jobs, leases, runner
 from tests.jobs.models import Model, llama_job, reply
 from tests.jobs.rows import only_row
 from tests.jobs.running import Wire, ran
@@ -85,7 +85,7 @@ def test_a_row_asks_nothing_more_after_its_job_was_cancelled() -> None:
 def test_a_call_that_waits_when_its_job_is_cancelled_is_not_sent() -> None:
     job = llama_job()
     row = only_row(job)
-    held = claims.claim(augmentation_pk=row.pk)
+    held = leases.claim(augmentation_pk=row.pk)
     assert held is not None
     endpoint = Endpoint.objects.get()
     Endpoint.objects.update(max_concurrency=1)

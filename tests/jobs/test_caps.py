@@ -8,8 +8,8 @@ import pytest
 
 from augment.errors import Conflict, ModelFault
 from augment.models import Augmentation, Event, GenerationJob
-from augment.services import caps, jobs, runner
-from augment.services.caps import Caps
+from augment.services.running import caps, jobs, runner
+from augment.services.running.caps import Caps
 from tests.jobs.models import Model, add_llama, llama_job
 from tests.jobs.rows import add_scenario, launch, only_row
 

@@ -13,8 +13,9 @@ from django.utils import timezone
 
 from augment import tasks
 from augment.models import Augmentation, CallLease
-from augment.services import call_limits, claims
 from augment.services.clock import DATABASE_TIME, database_now
+from augment.services.endpoints import call_limits
+from augment.services.running import leases
 from tests.jobs.models import add_llama
 from tests.jobs.rows import STALE, launch, only_row
 
@@ -48,9 +49,9 @@ def memory_broker() -> Iterator[None]:
     current_app.conf.broker_url = before
 
 
-def taken() -> tuple[Augmentation, claims.Claim]:
+def taken() -> tuple[Augmentation, leases.Claim]:
     row = only_row(launch())
-    held = claims.claim(augmentation_pk=row.pk, worker="here")
+    held = leases.claim(augmentation_pk=row.pk, worker="here")
     assert held is not None
     return row, held
 
@@ -75,10 +76,10 @@ def test_40_s_of_skew_take_no_living_claim_back(skew: Skew, seconds: float, work
     if worker == "holder":
         skew(seconds)
     row, held = taken()
-    assert claims.beat(held=held)
+    assert leases.beat(held=held)
     skew(seconds if worker == "other" else 0.0)
     tasks.recover()
-    assert claims.is_held(held=held)
+    assert leases.is_held(held=held)
     row.refresh_from_db()
     assert row.state == State.RUNNING
 
@@ -91,7 +92,7 @@ def test_a_dead_claim_is_taken_back_whatever_the_clock_of_who_looks(
     row, _ = taken()
     silent_for(row, silent_s)
     skew(seconds)
-    claims.requeue_stale(older_than=STALE)
+    leases.requeue_stale(older_than=STALE)
     row.refresh_from_db()
     assert row.state == state
 

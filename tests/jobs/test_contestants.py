@@ -7,7 +7,7 @@ from django.core.management import CommandError, call_command
 
 from augment.errors import Conflict, InvalidDocument, KeyMissing, UnknownName
 from augment.models import Contestant, Endpoint, Event
-from augment.services import contestants, keys
+from augment.services.endpoints import contestants, keys
 
 pytestmark = pytest.mark.django_db
 LOCAL = "http://127.0.0.1:11434/v1"

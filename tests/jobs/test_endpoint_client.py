@@ -13,9 +13,9 @@ from augment.llm.messages import Message, Request, Speaker
 from augment.llm.openai_wire import OpenAIWire
 from augment.llm.patience import Patience
 from augment.models import Augmentation, CallLease, Endpoint, EndpointModel, Event, ModelCall
-from augment.services import jobs, runner
-from augment.services.call_limits import Queue, place_at
-from augment.services.endpoint_client import EndpointClient
+from augment.services.endpoints.call_limits import Queue, place_at
+from augment.services.endpoints.client import EndpointClient
+from augment.services.running import jobs, runner
 from augment.variants.asking import Conversation
 from augment.variants.transcript import MemoryTranscript, ModelRole
 from tests.jobs.rows import add_model, add_scenario, only_row

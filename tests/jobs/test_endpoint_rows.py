@@ -13,7 +13,7 @@ from django.test import Client
 from django.urls import reverse
 
 from augment.models import Endpoint, EndpointModel, Event
-from augment.services import contestants
+from augment.services.endpoints import contestants
 
 pytestmark = pytest.mark.django_db
 LOCAL = "http://127.0.0.1:11434/v1"

@@ -10,10 +10,10 @@ from django.core.management import call_command
 
 from augment.errors import Conflict
 from augment.models import Contestant, EndpointModel, GenerationJob
-from augment.services import jobs, runner
-from augment.services.contestants import add_contestant, ensure_endpoint
-from augment.services.estimates import estimate
-from augment.services.feasible import keys_missing, obstacle
+from augment.services.endpoints.contestants import add_contestant, ensure_endpoint
+from augment.services.running import jobs, runner
+from augment.services.running.estimates import estimate
+from augment.services.running.feasible import keys_missing, obstacle
 from tests.jobs.models import MODEL, Model, add_llama, llama_job
 from tests.jobs.rows import add_kind, add_scenario, only_row
 

@@ -6,7 +6,7 @@ from pytest_django import DjangoAssertNumQueries
 
 from augment.errors import Conflict, InvalidDocument, UnknownName
 from augment.models import Augmentation, Contestant, Event, GenerationJob
-from augment.services import claims, jobs
+from augment.services.running import jobs, leases
 from tests.jobs.rows import NOON, add_kind, add_scenario, claimed, done, failed, launch
 
 pytestmark = pytest.mark.django_db
@@ -94,8 +94,8 @@ def test_progress_counts_states_by_one_query(
 ) -> None:
     job = launch(scenarios=4)
     first, second, third, _ = job.augmentations.order_by("pk")
-    claims.settle(held=claimed(first), settlement=done(), now=NOON)
-    claims.settle(held=claimed(second), settlement=failed(), now=NOON)
+    leases.settle(held=claimed(first), settlement=done(), now=NOON)
+    leases.settle(held=claimed(second), settlement=failed(), now=NOON)
     claimed(third)
     with django_assert_num_queries(1):
         counts = jobs.progress(job)
@@ -107,11 +107,11 @@ def test_progress_counts_states_by_one_query(
 def test_a_job_is_finished_when_nothing_is_under_way() -> None:
     job = launch(scenarios=2)
     first, second = job.augmentations.order_by("pk")
-    claims.settle(held=claimed(first), settlement=done(), now=NOON)
+    leases.settle(held=claimed(first), settlement=done(), now=NOON)
     assert jobs.finish_if_over(job_pk=job.pk, now=NOON) == 0
     held = claimed(second)
     assert jobs.finish_if_over(job_pk=job.pk, now=NOON) == 0
-    claims.settle(held=held, settlement=failed(), now=NOON)
+    leases.settle(held=held, settlement=failed(), now=NOON)
     assert jobs.finish_if_over(job_pk=job.pk, now=NOON) == 1
     assert jobs.finish_if_over(job_pk=job.pk, now=NOON) == 0
     job.refresh_from_db()
@@ -121,14 +121,14 @@ def test_a_job_is_finished_when_nothing_is_under_way() -> None:
 def test_cancel_stops_what_waits_and_keeps_what_is_done_or_runs() -> None:
     job = launch(scenarios=3)
     first, second, third = job.augmentations.order_by("pk")
-    claims.settle(held=claimed(first), settlement=done(), now=NOON)
+    leases.settle(held=claimed(first), settlement=done(), now=NOON)
     held = claimed(second)
     jobs.cancel(job)
     assert job.state == GenerationJob.State.CANCELLED
     third.refresh_from_db()
     assert third.state == State.CANCELLED
-    assert claims.claim(augmentation_pk=third.pk, now=NOON) is None
-    assert claims.settle(held=held, settlement=done(), now=NOON)
+    assert leases.claim(augmentation_pk=third.pk, now=NOON) is None
+    assert leases.settle(held=held, settlement=done(), now=NOON)
     assert jobs.finish_if_over(job_pk=job.pk, now=NOON) == 0
     counts = jobs.progress(job)
     assert (counts.done, counts.cancelled) == (2, 1)
@@ -146,8 +146,8 @@ def test_a_job_is_cancelled_once() -> None:
 def test_retry_queues_failed_rows_alone_and_opens_the_job_again() -> None:
     job = launch(scenarios=2)
     first, second = job.augmentations.order_by("pk")
-    claims.settle(held=claimed(first), settlement=failed(), now=NOON)
-    claims.settle(held=claimed(second), settlement=done(), now=NOON)
+    leases.settle(held=claimed(first), settlement=failed(), now=NOON)
+    leases.settle(held=claimed(second), settlement=done(), now=NOON)
     jobs.finish_if_over(now=NOON)
     jobs.retry_failed(job)
     assert (job.state, job.finished_at) == (GenerationJob.State.RUNNING, None)
@@ -161,7 +161,7 @@ def test_retry_queues_failed_rows_alone_and_opens_the_job_again() -> None:
 def test_there_is_nothing_to_retry_where_nothing_failed() -> None:
     job = launch()
     row = job.augmentations.get()
-    claims.settle(held=claimed(row), settlement=done(), now=NOON)
+    leases.settle(held=claimed(row), settlement=done(), now=NOON)
     jobs.finish_if_over(now=NOON)
     with pytest.raises(Conflict, match="Nothing in job 'Round 1' failed"):
         jobs.retry_failed(job)

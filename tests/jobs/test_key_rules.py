@@ -12,9 +12,10 @@ from django.urls import reverse
 
 from augment.errors import Conflict, InvalidDocument, KeyMissing, KeyNotAllowed
 from augment.models import Augmentation, Contestant, Endpoint, Event
-from augment.services import contestants, jobs, runner
-from augment.services.feasible import keys_missing, obstacle
-from augment.services.keys import key_of, may_hold_key, move_of
+from augment.services.endpoints import contestants
+from augment.services.endpoints.keys import key_of, may_hold_key, move_of
+from augment.services.running import jobs, runner
+from augment.services.running.feasible import keys_missing, obstacle
 from tests.jobs.models import add_llama, llama_job
 from tests.jobs.rows import add_scenario, only_row
 from tests.jobs.test_endpoint_rows import form, problems

@@ -11,8 +11,8 @@ from django.apps import apps
 from django.urls import reverse
 
 from augment.models import Augmentation, Endpoint, ModelCall
-from augment.services import runner
-from augment.services.transcript_export import transcript_of
+from augment.services.running import runner
+from augment.services.running.transcript_export import transcript_of
 from tests.jobs.models import llama_job
 from tests.jobs.rows import only_row
 from tests.llm.recorder import recorder

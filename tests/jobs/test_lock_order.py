@@ -11,8 +11,8 @@ from django.utils import timezone
 
 from augment.errors import Conflict
 from augment.models import GenerationJob
-from augment.services import caps, claims, jobs, runner
-from augment.services.caps import Caps
+from augment.services.running import caps, jobs, leases, runner
+from augment.services.running.caps import Caps
 from tests.jobs.models import Model, llama_job
 from tests.jobs.rows import launch
 
@@ -50,7 +50,7 @@ def test_of_many_rows_the_first_is_held_first() -> None:
     job = launch(scenarios=3)
     pks = list(job.augmentations.values_list("pk", flat=True))
     with CaptureQueriesContext(connection) as captured:
-        claims.mark_sent(ids=pks, now=timezone.now())
+        leases.mark_sent(ids=pks, now=timezone.now())
     looked, changed = (query["sql"] for query in captured if ROWS in query["sql"])
     assert " ORDER BY 1 ASC" in looked
     assert ("FOR NO KEY UPDATE" in looked) is (connection.vendor == "postgresql")

@@ -9,8 +9,8 @@ from django.core.files.base import ContentFile
 from django.core.files.storage import default_storage
 
 from augment.scene.modification import Modification
-from augment.services.pictures import original_picture, picture_of, store
-from augment.services.scenes import scene_of
+from augment.services.scenarios.pictures import original_picture, picture_of, store
+from augment.services.scenarios.scenes import scene_of
 from tests.jobs.rows import TWO_CONES, add_scenario
 
 NAME = f"bev/{hashlib.sha256(b'png').hexdigest()}.png"

@@ -11,8 +11,9 @@ from augment.scene.codec import modification_to_document
 from augment.scene.intent import Intent, Side
 from augment.scene.intent_codec import intent_to_document
 from augment.scene.modification import Modification
-from augment.services import contestants, jobs
-from augment.services.seeds import seed_of
+from augment.services.endpoints import contestants
+from augment.services.running import jobs
+from augment.services.scenarios.scenes import seed_of
 from tests.intents import parked, walk
 from tests.jobs.rows import add_kind, add_scenario, launch, only_row
 from tests.jobs.running import ran

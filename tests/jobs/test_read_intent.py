@@ -21,10 +21,10 @@ from augment.llm.scripted import ScriptedClient
 from augment.models import Event, IntentReading, ModelCall, Scenario
 from augment.scene.intent import Shape
 from augment.scene.intent_codec import intent_to_document, intent_to_parts
-from augment.services import contestants
-from augment.services.caps import Caps
-from augment.services.intent_readings import read_intent
-from augment.services.intents import accept_reading
+from augment.services.endpoints import contestants
+from augment.services.running.caps import Caps
+from augment.services.running.intent_readings import read_intent
+from augment.services.scenarios.intents import accept_reading
 from tests.intents import cones, intents
 from tests.jobs.rows import add_scenario
 

@@ -23,9 +23,10 @@ from augment.models import (
     GenerationJob,
     ModelCall,
 )
-from augment.services import contestants, jobs, runner
-from augment.services.caps import Caps
-from augment.services.feasible import obstacle
+from augment.services.endpoints import contestants
+from augment.services.running import jobs, runner
+from augment.services.running.caps import Caps
+from augment.services.running.feasible import obstacle
 from augment.variants.transcript import ModelRole
 from tests.intents import intents
 from tests.jobs.rows import add_scenario, only_row

@@ -11,7 +11,8 @@ from django.urls import reverse
 from augment.baselines.simulated import Rates
 from augment.errors import Conflict
 from augment.models import Augmentation
-from augment.services import contestants, jobs, runner
+from augment.services.endpoints import contestants
+from augment.services.running import jobs, runner
 from tests.jobs import rows
 from tests.web.cast import people, signed_in
 

@@ -14,8 +14,9 @@ from django.utils import timezone
 
 from augment.errors import Conflict, UnknownName
 from augment.models import GenerationJob, Simulation
-from augment.services import claims, driving_scores, simulations
-from augment.services.simulations import Options
+from augment.services.judging import driving_scores, simulations
+from augment.services.judging.simulations import Options
+from augment.services.running import leases
 from augment.simulation.planning import Plan, Situation
 from augment.simulation.road import Road
 from augment.simulation.states import EgoBody
@@ -50,7 +51,7 @@ class Broken(Straight):
 def finished_job(scenarios: int = 1) -> GenerationJob:
     job = rows.launch(scenarios=scenarios)
     for row in job.augmentations.all():
-        claims.settle(held=rows.claimed(row), settlement=rows.done(), now=rows.NOON)
+        leases.settle(held=rows.claimed(row), settlement=rows.done(), now=rows.NOON)
     return job
 
 
@@ -143,7 +144,7 @@ def test_contestants_are_ranked_by_how_much_they_lower_the_score() -> None:
     for row in job.augmentations.select_related("contestant"):
         settlement = rows.done()
         if row.contestant.slug == "shy":
-            settlement = claims.Settlement(
+            settlement = leases.Settlement(
                 state=settlement.state,
                 modification={
                     "format": "scenario-arena/modification", "version": 1,
@@ -151,7 +152,7 @@ def test_contestants_are_ranked_by_how_much_they_lower_the_score() -> None:
                 },
                 image="bev/y.png",
             )  # fmt: skip
-        claims.settle(held=rows.claimed(row), settlement=settlement, now=rows.NOON)
+        leases.settle(held=rows.claimed(row), settlement=settlement, now=rows.NOON)
     table = driving_scores.scores_of_job(driven(job), options=STRAIGHT, score="nuplan")
     shown = [
         (line.name, *(round(value, 1) for value in (line.mean, line.before, line.lowered)))

@@ -15,8 +15,8 @@ from augment.llm.client import Sending, unwatched
 from augment.llm.messages import Reply, Request
 from augment.llm.scripted import ScriptedClient
 from augment.models import Augmentation, Endpoint, GenerationJob, ModelCall
-from augment.services import runner, stopping
-from augment.services.call_limits import Queue, place_at
+from augment.services.endpoints.call_limits import Queue, place_at
+from augment.services.running import runner, stopping
 from tests.jobs.models import llama_job
 from tests.jobs.rows import launch, only_row
 from tests.jobs.running import Wire

@@ -13,8 +13,8 @@ from augment import tasks
 from augment.errors import QueueUnreachable
 from augment.management.commands.generate import Command
 from augment.models import Augmentation, GenerationJob
-from augment.services import claims, jobs, runner
-from augment.services.caps import Caps
+from augment.services.running import jobs, leases, runner
+from augment.services.running.caps import Caps
 from tests.jobs.models import Model, add_llama, llama_job
 from tests.jobs.rows import add_kind, add_scenario, claimed, done, failed, launch, only_row
 
@@ -95,7 +95,7 @@ def test_the_task_leaves_a_row_alone_that_somebody_else_has() -> None:
     row = only_row(launch())
     held = claimed(row, now=timezone.now())
     tasks.run_augmentation.run(row.pk)
-    assert claims.is_held(held=held)
+    assert leases.is_held(held=held)
 
 
 def test_recover_sends_what_was_never_sent(broker: Broker) -> None:
@@ -107,7 +107,7 @@ def test_recover_sends_what_was_never_sent(broker: Broker) -> None:
 def test_recover_takes_back_and_sends_what_a_dead_worker_held(broker: Broker) -> None:
     row = only_row(launch())
     now = timezone.now()
-    claims.mark_sent(ids=[row.pk], now=now - timedelta(minutes=1))
+    leases.mark_sent(ids=[row.pk], now=now - timedelta(minutes=1))
     claimed(row, now=now - timedelta(minutes=1))
     tasks.recover(now=now)
     row.refresh_from_db()
@@ -144,7 +144,7 @@ def test_a_worker_that_starts_sends_all_that_waits(broker: Broker) -> None:
 
 def test_recover_finishes_a_job_whose_last_worker_died_before_it_could(broker: Broker) -> None:
     job = launch()
-    claims.settle(
+    leases.settle(
         held=claimed(only_row(job)), settlement=done(), now=timezone.now() + timedelta(minutes=1)
     )
     tasks.recover(now=timezone.now())
@@ -199,7 +199,7 @@ def test_the_report_groups_failures_by_reason_and_fails() -> None:
     job = launch(scenarios=2, contestants=("reference", "rule-placer"))
     outcomes = [done(), failed("HTTP 500"), failed("HTTP 500"), failed("no key")]
     for row, outcome in zip(job.augmentations.order_by("pk"), outcomes, strict=True):
-        claims.settle(held=claimed(row), settlement=outcome, now=timezone.now())
+        leases.settle(held=claimed(row), settlement=outcome, now=timezone.now())
     said = StringIO()
     with pytest.raises(CommandError, match="3 failed") as caught:
         Command(stdout=said).report(job)
@@ -215,7 +215,7 @@ def test_the_report_groups_failures_by_reason_and_fails() -> None:
 
 def test_waiting_ends_with_the_job() -> None:
     job = launch()
-    claims.settle(held=claimed(only_row(job)), settlement=done(), now=timezone.now())
+    leases.settle(held=claimed(only_row(job)), settlement=done(), now=timezone.now())
     said = StringIO()
     Command(stdout=said).wait(job, timeout_s=1.0)
     assert said.getvalue() == "1 of 1, 0 running\nOver.\n"

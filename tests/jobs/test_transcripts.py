@@ -19,12 +19,12 @@ from augment.errors import ModelFault
 from augment.llm.fingerprint import request_hash
 from augment.llm.messages import Message, Reply, Request, Speaker
 from augment.models import Augmentation, Endpoint, ModelCall, TranscriptNote
-from augment.services import caps, jobs, runner
-from augment.services.caps import Caps
+from augment.services.running import caps, jobs, runner
+from augment.services.running.caps import Caps
+from augment.services.running.transcript_export import transcript_of
+from augment.services.running.transcript_steps import messages_of, totals_of, tries_of
+from augment.services.running.transcripts import RowTranscript
 from augment.services.texts import LONGEST_REASON
-from augment.services.transcript_export import transcript_of
-from augment.services.transcript_steps import messages_of, totals_of, tries_of
-from augment.services.transcripts import RowTranscript
 from augment.variants.transcript import ModelRole, NoteKind
 from tests.jobs.models import Model, after_a_second_look, llama_job, reply
 from tests.jobs.rows import INSTRUCTION, claimed, only_row

@@ -13,10 +13,11 @@ from django.apps import apps
 from augment.errors import ParameterRefused
 from augment.llm.profile import Profile
 from augment.models import Augmentation, Contestant, Endpoint, EndpointModel, Event, ModelCall
-from augment.services import contestants, jobs, probe, runner
-from augment.services.roles import seats_of
-from augment.services.transcript_export import transcript_of
-from augment.services.treatments import document_of, profile_from_document, treatment_of
+from augment.services.endpoints import contestants, probe
+from augment.services.endpoints.roles import seats_of
+from augment.services.endpoints.treatments import document_of, profile_from_document, treatment_of
+from augment.services.running import jobs, runner
+from augment.services.running.transcript_export import transcript_of
 from augment.variants.transcript import ModelRole
 from tests.jobs.rows import add_scenario
 from tests.llm.json_server import JsonServer, serving

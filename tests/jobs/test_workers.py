@@ -21,7 +21,7 @@ from augment import tasks
 from augment.errors import QueueRefused, QueueUnreachable
 from augment.models import Worker
 from augment.services.clock import DATABASE_TIME
-from augment.services.workers import FAULT_LENGTH, Presence, Rounds, Workforce, workforce
+from augment.services.running.workers import FAULT_LENGTH, Presence, Rounds, Workforce, workforce
 from tests.jobs.rows import launch, only_row
 from tests.processes import Process, wait_until
 

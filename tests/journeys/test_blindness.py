@@ -22,7 +22,7 @@ from arena.models import LabellingRound, Matchup, Study
 from arena.services.faults import open_labelling
 from arena.services.studies import close_study
 from augment.models import Augmentation, Contestant, Endpoint, GenerationJob
-from augment.services.pictures import store
+from augment.services.scenarios.pictures import store
 from tests.described import a_described_study
 from tests.journeys import planted
 from tests.journeys.blindness import (

@@ -14,7 +14,7 @@ from tests.variants.answers import GOOD
 pytestmark = [pytest.mark.redis, pytest.mark.slow, pytest.mark.timeout(600)]
 
 SEED = """
-from augment.services import contestants
+from augment.services.endpoints import contestants
 from tests.jobs.rows import add_scenario
 contestants.ensure_builtin()
 contestants.ensure_endpoint(label="waiting", base_url="{base_url}", is_simulated=True)

@@ -10,7 +10,7 @@ from arena.queries.costs import Spent, spent_on
 from augment.errors import ModelFault
 from augment.llm.messages import Reply, Request
 from augment.models import Augmentation, Contestant, GenerationJob
-from augment.services import jobs, runner
+from augment.services.running import jobs, runner
 from tests.jobs.models import Model, llama_job, reply
 from tests.jobs.rows import only_row
 from tests.variants.answers import GOOD

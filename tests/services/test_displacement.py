@@ -11,7 +11,7 @@ from augment.models import Augmentation, Contestant, GenerationJob, Scenario
 from augment.scene.catalogue import ScenarioType
 from augment.scene.codec import modification_to_document
 from augment.scene.modification import Modification
-from augment.services.displacement import (
+from augment.services.judging.displacement import (
     By,
     Group,
     Unmeasured,

@@ -6,8 +6,8 @@ from decimal import Decimal
 import pytest
 
 from augment.models import EndpointModel
-from augment.services import contestants
-from augment.services.price_list import listed_price
+from augment.services.endpoints import contestants
+from augment.services.endpoints.price_list import listed_price
 
 NOW = datetime(2026, 11, 20, tzinfo=UTC)
 OPENAI = "https://api.openai.com/v1"

@@ -17,7 +17,7 @@ from augment.errors import UnknownName
 from augment.models import Augmentation, Contestant, Scenario
 from augment.scene.codec import modification_to_document
 from augment.scene.modification import Modification
-from augment.services.attention import draw_checks
+from augment.services.scenarios.attention import draw_checks
 from tests.scenes import vehicle
 from tests.study_rows import KINDS, Cast, a_study, cast_of, contestant, picture, rows_planned
 

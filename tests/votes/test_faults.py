@@ -17,7 +17,7 @@ from arena.queries.faults import labelling_of, next_task, of_expert
 from arena.services.faults import close_labelling, open_labelling, save_label
 from augment.errors import Conflict, UnknownName
 from augment.models import Event, GenerationJob
-from augment.services.fault_guess import FaultClass
+from augment.services.judging.fault_guess import FaultClass
 from tests.append_only import rewriting
 from tests.exports.test_displacement import a_job
 from tests.study_rows import expert

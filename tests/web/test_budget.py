@@ -11,8 +11,8 @@ from django.utils.translation import override
 from arena.templatetags.money import grouped, usd
 from augment.llm.messages import Reply
 from augment.models import Contestant, Endpoint, GenerationJob
-from augment.services import runner
-from augment.services.caps import Caps
+from augment.services.running import runner
+from augment.services.running.caps import Caps
 from tests.jobs.models import Model, add_llama, llama_job
 from tests.jobs.rows import add_kind, add_scenario, only_row
 from tests.variants.answers import GOOD

@@ -13,8 +13,8 @@ from arena.web.boxes import LEFT, RIGHT, box_sheet
 from augment.models import Augmentation, GenerationJob
 from augment.scene.codec import modification_to_document
 from augment.scene.modification import Modification
-from augment.services.displacement import By
-from augment.services.findings import checked
+from augment.services.judging.displacement import By
+from augment.services.judging.findings import checked
 from tests.exports.test_displacement import a_job
 from tests.jobs import rows
 from tests.scenes import vehicle

@@ -11,7 +11,7 @@ from django.test import Client
 from augment.models import IntentReading, Scenario
 from augment.scene.intent import Shape
 from augment.scene.intent_codec import intent_to_document
-from augment.services import contestants
+from augment.services.endpoints import contestants
 from tests.intents import cones
 from tests.jobs.rows import add_scenario
 from tests.web.cast import people, signed_in

@@ -9,7 +9,7 @@ from django.urls import reverse
 from arena.models import FaultLabel, LabellingRound
 from arena.services.faults import open_labelling
 from augment.models import GenerationJob, Scenario
-from augment.services.pictures import store
+from augment.services.scenarios.pictures import store
 from tests.exports.test_displacement import a_job
 from tests.study_rows import expert
 from tests.web.cast import people, png, signed_in

@@ -11,9 +11,9 @@ from django.core.files.storage import default_storage
 from django.urls import reverse
 
 from augment.models import Augmentation
-from augment.services import claims
-from augment.services.findings import checked
-from augment.services.marked_pictures import draw_marked
+from augment.services.judging.findings import checked
+from augment.services.judging.marked_pictures import draw_marked
+from augment.services.running import leases
 from tests.jobs import rows
 from tests.web.cast import people, signed_in
 
@@ -32,7 +32,7 @@ def _media(settings: LazySettings, tmp_path: Path) -> None:
 def row() -> Augmentation:
     """Two cones where a parked car is asked for."""
     found = rows.only_row(rows.launch())
-    claims.settle(held=rows.claimed(found), settlement=rows.done(), now=rows.NOON)
+    leases.settle(held=rows.claimed(found), settlement=rows.done(), now=rows.NOON)
     found.scenario.instruction = FAR
     found.scenario.save(update_fields=["instruction"])
     return Augmentation.objects.select_related("contestant", "scenario__base_scene").get()

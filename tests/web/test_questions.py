@@ -14,7 +14,7 @@ from django.urls import reverse
 from arena.models import LabellingRound, Study
 from arena.services.faults import open_labelling
 from augment.models import Augmentation, Event, GenerationJob
-from augment.services import claims
+from augment.services.running import leases
 from tests import study_rows
 from tests.jobs import rows
 from tests.web.cast import people, signed_in
@@ -107,7 +107,7 @@ def test_handing_over_asks_who_will_take_how_many() -> None:
 def test_cancelling_a_job_asks_and_says_what_is_lost_and_what_stays() -> None:
     job = rows.launch(scenarios=4)
     first, second, *_ = job.augmentations.all()
-    claims.settle(held=rows.claimed(first), settlement=rows.done(), now=rows.NOON)
+    leases.settle(held=rows.claimed(first), settlement=rows.done(), now=rows.NOON)
     rows.claimed(second)
     admin, page = admin_of(), reverse("job-cancel", args=[job.code])
     assert page in admin.get(reverse("job", args=[job.code])).content.decode()

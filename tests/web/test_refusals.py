@@ -23,8 +23,8 @@ from arena.services.studies import close_study, open_study
 from augment.errors import Conflict, InvalidDocument, KeyMissing, QueueUnreachable, UnknownName
 from augment.models import Augmentation, Contestant, Event
 from augment.sentences import sentence, sentence_of, word
-from augment.services import caps, claims, jobs
-from augment.services.caps import Caps
+from augment.services.running import caps, jobs, leases
+from augment.services.running.caps import Caps
 from augment.services.wording import said
 from tests import study_rows
 from tests.jobs import rows
@@ -179,7 +179,7 @@ def test_nothing_that_is_stored_is_german() -> None:
             caps=Caps(calls=5, tokens=900),
         )
         caps.raise_cap(capped, caps=Caps(calls=50))
-        claims.settle(
+        leases.settle(
             held=rows.claimed(rows.only_row(job)), settlement=rows.failed(), now=rows.NOON
         )
         invite(study=study, expert=study.experts.get(username="eva"))

@@ -10,8 +10,8 @@ from django.utils import timezone
 
 from augment.llm.messages import Message, Request, Speaker
 from augment.models import Augmentation
-from augment.services import jobs, runner
-from augment.services.transcripts import RowTranscript
+from augment.services.running import jobs, runner
+from augment.services.running.transcripts import RowTranscript
 from augment.variants.transcript import ModelRole, NoteKind
 from tests.jobs.models import Model, llama_job, reply
 from tests.jobs.rows import claimed, only_row

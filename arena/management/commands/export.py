@@ -27,9 +27,9 @@ from arena.queries.results import snapshot_to_export
 from arena.queries.studies import study_named
 from arena.services.early_looks import log_early_look
 from augment.errors import AugmentError, UnknownName
-from augment.services.choosing import job_named
-from augment.services.displacement import By, types_named
-from augment.services.interplan import job_as_interplan
+from augment.services.judging.displacement import By, types_named
+from augment.services.running.choosing import job_named
+from augment.services.scenarios.interplan import job_as_interplan
 from augment.services.terminal import TerminalCommand
 
 MODIFICATION_FORMATS = ("interplan",)

@@ -13,7 +13,7 @@ from arena.pairing.target_lines import read_targets
 from arena.queries.inventory import CHECK_PERCENT, usual_checks
 from arena.services.studies import PlanOptions, open_study
 from augment.errors import AugmentError
-from augment.services.choosing import chosen_contestants, chosen_scenarios
+from augment.services.running.choosing import chosen_contestants, chosen_scenarios
 from augment.services.terminal import TerminalCommand
 
 

@@ -11,7 +11,7 @@ from django.db import transaction
 from augment.baselines.simulated import PRESETS, Rates, rates_of
 from augment.errors import AugmentError, InvalidDocument
 from augment.models import Contestant
-from augment.services.contestants import (
+from augment.services.endpoints.contestants import (
     add_contestant,
     add_simulated,
     ensure_builtin,

@@ -13,7 +13,7 @@ from augment.formats.json_file import read_json
 from augment.scene.catalogue import ScenarioType
 from augment.scene.codec import modification_from_document, modification_to_document
 from augment.scene.intent_codec import intent_from_document, intent_to_document
-from augment.services.scenes import add_scenario
+from augment.services.scenarios.scenes import add_scenario
 from augment.services.terminal import TerminalCommand
 
 

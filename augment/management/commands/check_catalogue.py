@@ -9,7 +9,11 @@ from django.core.management.base import CommandError
 
 from augment.errors import AugmentError
 from augment.management.arguments import add_folder_argument
-from augment.services.catalogue_check import CatalogueCheck, ScenarioCheck, check_catalogue
+from augment.services.scenarios.catalogue_check import (
+    CatalogueCheck,
+    ScenarioCheck,
+    check_catalogue,
+)
 from augment.services.terminal import TerminalCommand
 
 

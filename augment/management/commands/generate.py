@@ -13,12 +13,12 @@ from django.utils import timezone
 from augment.errors import AugmentError
 from augment.management.arguments import add_cap_arguments, caps_of
 from augment.models import GenerationJob
-from augment.services import jobs
-from augment.services.budget import limit_of
-from augment.services.choosing import chosen_contestants, chosen_scenarios
-from augment.services.contestants import ensure_builtin
-from augment.services.estimates import estimate
-from augment.services.job_summary import contestant_lines, failure_groups
+from augment.services.endpoints.contestants import ensure_builtin
+from augment.services.running import jobs
+from augment.services.running.budget import limit_of
+from augment.services.running.choosing import chosen_contestants, chosen_scenarios
+from augment.services.running.estimates import estimate
+from augment.services.running.summary import contestant_lines, failure_groups
 from augment.services.terminal import TerminalCommand
 from augment.tasks import check_broker, enqueue_job
 

@@ -9,7 +9,7 @@ from typing import Any
 from django.core.management.base import CommandError
 
 from augment.errors import AugmentError
-from augment.services.scenes import SOURCES, import_scene
+from augment.services.scenarios.scenes import SOURCES, import_scene
 from augment.services.terminal import TerminalCommand
 
 

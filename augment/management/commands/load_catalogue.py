@@ -9,7 +9,7 @@ from django.core.management.base import CommandError
 
 from augment.errors import AugmentError
 from augment.management.arguments import add_folder_argument
-from augment.services.catalogue import load_catalogue
+from augment.services.scenarios.catalogue import load_catalogue
 from augment.services.terminal import TerminalCommand
 
 

@@ -10,8 +10,8 @@ from django.core.management.base import CommandError
 from augment.errors import AugmentError, UnknownName
 from augment.llm.questions import Ability
 from augment.models import Endpoint
-from augment.services.endpoints import tell_sight
-from augment.services.probe import Finding, ProbeReport, probe
+from augment.services.endpoints.known_models import tell_sight
+from augment.services.endpoints.probe import Finding, ProbeReport, probe
 from augment.services.terminal import TerminalCommand
 from augment.services.texts import one_line
 

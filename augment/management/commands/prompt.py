@@ -10,7 +10,7 @@ from django.core.management.base import CommandError
 
 from augment.errors import AugmentError
 from augment.prompts.texts import prompt_version
-from augment.services.prompts import prompt_of
+from augment.services.scenarios.prompts import prompt_of
 from augment.services.terminal import TerminalCommand
 from augment.variants.showing import Shown
 from augment.variants.transcript import ModelRole

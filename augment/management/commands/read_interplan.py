@@ -11,7 +11,7 @@ from django.core.management.base import CommandError
 
 from augment.errors import AugmentError
 from augment.scene.codec import modification_to_document
-from augment.services.interplan import references_from_interplan
+from augment.services.scenarios.interplan import references_from_interplan
 from augment.services.terminal import TerminalCommand
 
 

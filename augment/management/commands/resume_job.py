@@ -10,9 +10,9 @@ from django.db import transaction
 
 from augment.errors import AugmentError
 from augment.management.arguments import add_cap_arguments, caps_of
-from augment.services import caps, jobs
-from augment.services.budget import limit_of
-from augment.services.choosing import job_named
+from augment.services.running import caps, jobs
+from augment.services.running.budget import limit_of
+from augment.services.running.choosing import job_named
 from augment.services.terminal import TerminalCommand
 from augment.tasks import check_broker, enqueue_job
 

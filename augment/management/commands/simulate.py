@@ -10,10 +10,10 @@ from django.db import transaction
 
 from augment.errors import AugmentError, UnknownName
 from augment.models import Scenario, Simulation
-from augment.services import simulations
-from augment.services.choosing import job_named
-from augment.services.driving_scores import DrivingScores, scores_of_job
-from augment.services.simulations import SCORES, Options
+from augment.services.judging import simulations
+from augment.services.judging.driving_scores import DrivingScores, scores_of_job
+from augment.services.judging.simulations import SCORES, Options
+from augment.services.running.choosing import job_named
 from augment.services.terminal import TerminalCommand
 from augment.tasks import check_broker, enqueue_simulations
 

@@ -11,8 +11,8 @@ from typing import Any
 from django.core.management.base import CommandError
 
 from augment.models import Augmentation
+from augment.services.running.transcript_export import transcript_of
 from augment.services.terminal import TerminalCommand
-from augment.services.transcript_export import transcript_of
 
 
 class Command(TerminalCommand):

@@ -13,8 +13,8 @@ from arena.services.invitations import invite  # noqa: E402
 from arena.services.people import create_person  # noqa: E402
 from arena.services.studies import open_study  # noqa: E402
 from augment.models import Augmentation, Contestant, GenerationJob, Scenario  # noqa: E402
-from augment.services.catalogue import load_catalogue  # noqa: E402
-from augment.services.pictures import store  # noqa: E402
+from augment.services.scenarios.catalogue import load_catalogue  # noqa: E402
+from augment.services.scenarios.pictures import store  # noqa: E402
 from tests.benchmarks.rivals.environments import ROOT  # noqa: E402
 from tests.web.cast import png  # noqa: E402
 

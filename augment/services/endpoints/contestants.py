@@ -1,0 +1,279 @@
+"""Contestants and the endpoints that some of them speak to. A key itself is never stored."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping
+from dataclasses import asdict
+
+from django.contrib.auth.models import User
+from django.db import transaction
+
+from augment.baselines.quantised import BIN_M
+from augment.baselines.simulated import Rates
+from augment.errors import Conflict, UnknownName
+from augment.llm.addresses import check_base_url
+from augment.models import Contestant, Endpoint
+from augment.services.endpoints.keys import check_key_variable, log_move, move_of
+from augment.services.endpoints.known_models import model_at
+from augment.services.endpoints.roles import Seat, check_roles, documents_of
+from augment.services.events import log_event
+from augment.services.scenarios.scenes import check_slug
+from augment.services.texts import one_line
+from augment.variants.recipes import Recipe, recipe, spelled
+from augment.variants.transcript import ModelRole
+
+Kind = Contestant.Kind
+LONGEST_NAME = 120
+
+REFERENCE = "reference"
+RULE_PLACER = "rule-placer"
+_BUILTIN = {
+    REFERENCE: ("Reference", Contestant.Kind.REFERENCE),
+    RULE_PLACER: ("Rule placer", Contestant.Kind.RULE),
+} | {
+    slug: (f"Quantised code, {bin_m:g} m", Contestant.Kind.BASELINE)
+    for slug, bin_m in BIN_M.items()
+}
+
+OPENAI = "openai"
+OPENAI_URL = "https://api.openai.com/v1"
+OPENAI_KEY = "OPENAI_API_KEY"
+
+
+@transaction.atomic
+def ensure_builtin() -> list[Contestant]:
+    """The contestants that need no endpoint: the reference, the rule placer, the baselines."""
+    return [
+        Contestant.objects.get_or_create(slug=slug, defaults={"name": name, "kind": kind})[0]
+        for slug, (name, kind) in _BUILTIN.items()
+    ]
+
+
+@transaction.atomic
+def ensure_endpoint(
+    *,
+    label: str,
+    base_url: str,
+    key_variable: str = "",
+    is_simulated: bool = False,
+    may_move_key: bool = False,
+    actor: User | None = None,
+) -> Endpoint:
+    """The endpoint of that label, made or moved to that address.
+
+    Args:
+        label: Lower-case letters, digits and hyphens.
+        base_url: Up to and including "/v1" or its like.
+        key_variable: The environment variable that holds the key where the worker runs; empty
+            where none is needed.
+        is_simulated: Whether what it answers counts as simulated.
+        may_move_key: Whether the key of an endpoint that exists may go to another server.
+        actor: Who wants it.
+
+    Raises:
+        InvalidDocument: The label, the address or the variable can't be used.
+        Conflict: The endpoint exists and is simulated where this one is not, or the reverse; or
+            its key would go to another server, and nobody said that it may.
+    """
+    check_slug(label, what="endpoint")
+    check_key_variable(key_variable)
+    wanted = {"base_url": check_base_url(base_url), "key_variable": key_variable}
+    endpoint, made = Endpoint.objects.get_or_create(
+        label=label, defaults=wanted | {"is_simulated": is_simulated}
+    )
+    if endpoint.is_simulated != is_simulated:
+        word = "simulated" if endpoint.is_simulated else "not simulated"
+        raise Conflict(f"Endpoint {label!r} is {word}, and stays so; choose another label.")
+    before = {"base_url": endpoint.base_url, "key_variable": endpoint.key_variable}
+    move = move_of(endpoint=endpoint, base_url=wanted["base_url"], key_variable=key_variable)
+    if move is not None and not may_move_key:
+        raise Conflict(
+            f"The key in {key_variable} of endpoint {label!r} went to {move[0]} and would go to "
+            f"{move[1]}; say so with --move-key if that is meant, or choose another label."
+        )
+    if made or before != wanted:
+        endpoint.base_url, endpoint.key_variable = wanted["base_url"], key_variable
+        endpoint.save(update_fields=["base_url", "key_variable"])
+        log_event(
+            actor=actor,
+            verb="add" if made else "change",
+            object_kind="endpoint",
+            object_code=endpoint.code,
+            before=None if made else before,
+            after={"label": label, "is_simulated": is_simulated} | wanted,
+        )
+        log_move(move, endpoint=endpoint, actor=actor)
+    return endpoint
+
+
+@transaction.atomic
+def add_contestant(
+    *,
+    slug: str,
+    variant: str,
+    endpoint: str,
+    model: str,
+    name: str | None = None,
+    roles: Mapping[ModelRole, tuple[str | None, str]] | None = None,
+    actor: User | None = None,
+) -> Contestant:
+    """A language model that runs one variant; a simulated one where the endpoint is simulated.
+
+    The same contestant twice is one. What the model can do and costs has a row of its own, made
+    empty here where there is none; `openai` can be named without having been added where
+    OPENAI_API_KEY is set.
+
+    Args:
+        slug: Lower-case letters, digits and hyphens.
+        variant: The name of a recipe, in any case.
+        endpoint: The label of an endpoint.
+        model: The model id on that endpoint.
+        name: What people read; made from model and variant when None, and from the endpoint
+            where another contestant is called so.
+        roles: Who else plays a reviewer's role: the label of an endpoint (None: the contestant's
+            own) and the model id there.
+        actor: Who adds it.
+
+    Raises:
+        UnknownName: No such variant or endpoint.
+        InvalidDocument: The slug, a model, a role or the name can't be used.
+        Conflict: The slug belongs to another contestant.
+    """
+    check_slug(slug, what="contestant")
+    way = recipe(variant)
+    address = _endpoint(endpoint, actor)
+    model = one_line("model", model, what="contestant")
+    others = _seats(way, roles or {}, address, actor)
+    seats = [Seat(endpoint=address, model=model), *others.values()]
+    title = _title(slug, model, way, others, address)
+    if name is not None:
+        title = one_line("name", name, what="contestant")
+    simulated = any(seat.endpoint.is_simulated for seat in seats)
+    wanted = {
+        "name": title,
+        "kind": Kind.SIMULATED if simulated else Kind.LLM,
+        "variant": way.slug,
+        "endpoint": address,
+        "model": model,
+        "roles": documents_of(others),
+    }
+    for seat in seats:
+        model_at(endpoint=seat.endpoint, model=seat.model)
+    contestant, made = Contestant.objects.get_or_create(slug=slug, defaults=wanted)
+    if made:
+        _log_added(contestant, actor)
+    else:
+        _refuse_another(contestant, wanted, named=name is not None)
+    return contestant
+
+
+@transaction.atomic
+def add_simulated(
+    *, slug: str, rates: Rates, name: str | None = None, actor: User | None = None
+) -> Contestant:
+    """A contestant that knows the reference and gets it wrong at set rates.
+
+    Args:
+        slug: Lower-case letters, digits and hyphens.
+        rates: How often it makes which class of error.
+        name: What people read; it says that the errors are simulated when None.
+        actor: Who adds it.
+
+    Raises:
+        InvalidDocument: The slug or the name can't be used.
+        Conflict: The slug belongs to another contestant.
+    """
+    check_slug(slug, what="contestant")
+    shares = ", ".join(f"{share:.0%} {kind}" for kind, share in asdict(rates).items() if share)
+    title = f"Simulated errors ({shares or 'none'})"[:LONGEST_NAME]
+    if name is not None:
+        title = one_line("name", name, what="contestant")
+    wanted: dict[str, object] = {
+        "name": title,
+        "kind": Kind.SIMULATED,
+        "error_rates": asdict(rates),
+    }
+    contestant, made = Contestant.objects.get_or_create(slug=slug, defaults=wanted)
+    if made:
+        log_event(
+            actor=actor,
+            verb="add",
+            object_kind="contestant",
+            object_code=contestant.code,
+            after={"slug": slug, **wanted},
+        )
+    else:
+        _refuse_another(contestant, wanted, named=name is not None)
+    return contestant
+
+
+# --- Private -----------------------------------------------------------------------------------
+
+
+def _endpoint(label: str, actor: User | None) -> Endpoint:
+    """The endpoint of that label; OpenAI's own appears where its key is at hand."""
+    found = Endpoint.objects.filter(label=label).first()
+    if found is not None:
+        return found
+    if label == OPENAI and os.environ.get(OPENAI_KEY):
+        return ensure_endpoint(
+            label=OPENAI, base_url=OPENAI_URL, key_variable=OPENAI_KEY, actor=actor
+        )
+    if label == OPENAI:
+        raise Conflict(
+            f"Endpoint {OPENAI!r} was not added yet: set {OPENAI_KEY} here, or name its address."
+        )
+    known = list(Endpoint.objects.values_list("label", flat=True))
+    raise UnknownName("endpoint", label, known)
+
+
+def _title(
+    slug: str, model: str, way: Recipe, others: Mapping[ModelRole, Seat], own: Endpoint
+) -> str:
+    """What people read where nobody chose a name; not what another contestant is called."""
+    given = (f"{role} {seat.model}" for role, seat in others.items())
+    title = " ".join([model, spelled(way.slug), *given])[:LONGEST_NAME]
+    if Contestant.objects.filter(name=title).exclude(slug=slug).exists():
+        title = f"{title} at {own.label}"[:LONGEST_NAME]
+    return title
+
+
+def _log_added(contestant: Contestant, actor: User | None) -> None:
+    facts = ("slug", "name", "kind", "variant", "model", "roles")
+    assert contestant.endpoint is not None
+    log_event(
+        actor=actor,
+        verb="add",
+        object_kind="contestant",
+        object_code=contestant.code,
+        after={name: getattr(contestant, name) for name in facts}
+        | {"endpoint": contestant.endpoint.label},
+    )
+
+
+def _seats(
+    way: Recipe,
+    roles: Mapping[ModelRole, tuple[str | None, str]],
+    own: Endpoint,
+    actor: User | None,
+) -> dict[ModelRole, Seat]:
+    """Who plays the roles that were given away."""
+    check_roles(way, roles)
+    return {
+        role: Seat(
+            endpoint=own if label is None else _endpoint(label, actor),
+            model=one_line(f"roles.{role}", model, what="contestant"),
+        )
+        for role, (label, model) in sorted(roles.items())
+    }
+
+
+def _refuse_another(contestant: Contestant, wanted: dict[str, object], *, named: bool) -> None:
+    """Raise Conflict where the slug stands for something else."""
+    facts = [field for field in wanted if field != "name" or named]
+    if any(getattr(contestant, field) != wanted[field] for field in facts):
+        raise Conflict(
+            f"There is another contestant called {contestant.slug!r} already: "
+            f"{contestant.name} ({contestant.kind}); choose another slug."
+        )

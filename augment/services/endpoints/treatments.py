@@ -1,0 +1,175 @@
+"""What a contestant sends, fixed when it first runs: later probes and entries don't change it.
+
+A contestant is one treatment. Were its tools called natively in one half of a study and in the
+answer in the other, its rating would be that of a mixture. So what was known of its models at its
+first run is kept with it, role by role.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from django.db import transaction
+from django.db.models import Exists, OuterRef
+
+from augment.errors import ModelFault, ParameterRefused
+from augment.llm.messages import LengthName
+from augment.llm.profile import Profile
+from augment.models import Augmentation, Contestant, Endpoint, ModelCall
+from augment.services.endpoints.known_models import profile_of
+from augment.services.endpoints.roles import Seat
+from augment.services.events import log_event
+from augment.variants.transcript import ModelRole
+
+_SENT = frozenset({"reasoning_effort", *LengthName})
+"""Parameters that some endpoints refuse and that contestants send."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Treatment:
+    """What a contestant sends in each of its roles."""
+
+    contestant_pk: int
+    seats: Mapping[ModelRole, Seat]
+    profiles: Mapping[ModelRole, Profile]
+
+    def at(self, endpoint: Endpoint) -> dict[str, Profile]:
+        """By model, what it sends to an endpoint."""
+        return {
+            seat.model: self.profiles[role]
+            for role, seat in self.seats.items()
+            if seat.endpoint.pk == endpoint.pk
+        }
+
+    def without(self, refused: ParameterRefused, *, endpoint: Endpoint, model: str) -> Profile:
+        """What it sends from now on to a model that does not take one parameter.
+
+        Raises:
+            ModelFault: Earlier answers of this contestant were made with the parameter.
+        """
+        roles = [
+            role
+            for role, seat in self.seats.items()
+            if (seat.endpoint.pk, seat.model) == (endpoint.pk, model)
+        ]
+        # Whether the limit of the answer's length has the one name or the other changes nothing.
+        is_only_a_name = refused.parameter in frozenset(LengthName)
+        if not is_only_a_name and _answered_with(self.contestant_pk, roles, refused.parameter):
+            raise ModelFault(
+                f"{model} at endpoint {endpoint.label} does not take {refused.parameter!r} any "
+                "more, and this contestant's earlier answers were made with it; add another "
+                "contestant for what can be sent now",
+                retryable=False,
+                status=refused.status,
+            ) from None
+        return _amend(self.contestant_pk, roles, refused.parameter)
+
+
+@transaction.atomic
+def treatment_of(contestant: Contestant, seats: Mapping[ModelRole, Seat]) -> Treatment:
+    """What a contestant sends; roles that never ran are fixed to what is known now.
+
+    Args:
+        contestant: Who is about to run.
+        seats: Who plays its roles.
+    """
+    stored = Contestant.objects.values_list("sends", flat=True).get(pk=contestant.pk) or {}
+    if any(role.value not in stored for role in seats):
+        row = Contestant.objects.select_for_update(no_key=True).get(pk=contestant.pk)
+        stored = dict(row.sends or {})
+        new = {
+            role.value: document_of(profile_of(endpoint=seat.endpoint, model=seat.model))
+            for role, seat in seats.items()
+            if role.value not in stored
+        }
+        row.sends = stored = stored | new
+        row.save(update_fields=["sends"])
+        log_event(
+            actor=None,
+            verb="fix",
+            object_kind="contestant",
+            object_code=row.code,
+            after={"slug": row.slug, "sends": new},
+        )
+    return Treatment(
+        contestant_pk=contestant.pk,
+        seats=seats,
+        profiles={role: profile_from_document(stored[role.value]) for role in seats},
+    )
+
+
+def loosen_unanswered(contestants: Iterable[Contestant]) -> int:
+    """Let contestants be fixed anew that never had an answer and do not run: nothing can mix.
+
+    Returns:
+        How many there were.
+    """
+    pks = [contestant.pk for contestant in contestants]
+    calls = ModelCall.objects.filter(
+        attempt__augmentation__contestant=OuterRef("pk"), answer__isnull=False
+    )
+    running = Augmentation.objects.filter(
+        contestant=OuterRef("pk"), state=Augmentation.State.RUNNING
+    )
+    loose = Contestant.objects.filter(pk__in=pks, sends__isnull=False)
+    return loose.exclude(Exists(calls)).exclude(Exists(running)).update(sends=None)
+
+
+def document_of(profile: Profile) -> dict[str, Any]:
+    """What of a profile changes what contestants send, ready for JSON.
+
+    No variant sends a temperature, a seed or a schema, so what is known of these is not among it.
+    """
+    return {
+        "native_tools": profile.native_tools,
+        "vision": profile.vision,
+        "refused": sorted(profile.refused & _SENT),
+        "reasoning_effort": profile.reasoning_effort,
+        "max_output_tokens": profile.max_output_tokens,
+    }
+
+
+def profile_from_document(document: Mapping[str, Any]) -> Profile:
+    """The profile that was stored as this document.
+
+    Raises:
+        KeyError: It is none.
+    """
+    return Profile(
+        native_tools=document["native_tools"],
+        vision=document["vision"],
+        refused=frozenset(document["refused"]),
+        reasoning_effort=document["reasoning_effort"],
+        max_output_tokens=document["max_output_tokens"],
+    )
+
+
+# --- Private -----------------------------------------------------------------------------------
+
+
+def _answered_with(contestant_pk: int, roles: list[ModelRole], parameter: str) -> bool:
+    """Whether the contestant has an answer to a request that had this parameter."""
+    calls = ModelCall.objects.filter(
+        attempt__augmentation__contestant=contestant_pk,
+        role__in=roles,
+        answer__isnull=False,
+        request__has_key=parameter,
+    )
+    return calls.exists()
+
+
+@transaction.atomic
+def _amend(contestant_pk: int, roles: list[ModelRole], parameter: str) -> Profile:
+    """Leave a parameter out of what is sent in these roles; what is sent then."""
+    row = Contestant.objects.select_for_update(no_key=True).get(pk=contestant_pk)
+    sends = dict(row.sends or {})
+    after = Profile()
+    for role in roles:
+        after = profile_from_document(sends[role.value]).without(parameter)
+        sends[role.value] = document_of(after)
+    if sends != row.sends:
+        row.sends = sends
+        row.save(update_fields=["sends"])
+    return after

@@ -1,0 +1,1 @@
+"""What is measured about stored augmentations: checks, displacement, drives."""

@@ -1,0 +1,241 @@
+"""The displacement error of stored augmentations, one by one and in groups."""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from collections.abc import Collection, Iterable, Iterator, Sequence
+from dataclasses import dataclass
+from enum import StrEnum
+
+from django.db.models import Max, QuerySet
+
+from augment.errors import InvalidDocument, UnknownName
+from augment.metrics.displacement import Displacement, Match, displacement
+from augment.metrics.summary import Box, Summary, summarise
+from augment.models import Augmentation, GenerationJob, Scenario
+from augment.scene.catalogue import ScenarioType
+from augment.scene.codec import modification_from_document
+from augment.scene.modification import Modification
+from augment.services.scenarios.scenes import reference_of
+from augment.variants.recipes import SPELLING, spelled
+
+__all__ = [
+    "PLACED_EXACTLY",
+    "Box",
+    "By",
+    "Displacement",
+    "Group",
+    "Match",
+    "Measured",
+    "Summary",
+    "Unmeasured",
+    "groups",
+    "of_augmentation",
+    "of_job",
+    "of_latest",
+    "of_rows",
+    "spelled",
+    "summarise",
+    "types_named",
+]
+
+State = Augmentation.State
+
+PLACED_EXACTLY = (ScenarioType.JAYWALKER, ScenarioType.NUDGE, ScenarioType.OVERTAKE)
+"""The types of the paper's figure by variant: a crash or a construction zone can lie in many
+places that all follow the instruction."""
+
+
+VARIANTS = tuple(SPELLING.values())
+"""How a group of one variant is headed, the paper's first and in its order."""
+
+NO_VARIANT = "Without a variant"
+
+Place = tuple[int, str, str, str]
+"""Sorts the groups; rows of the same place are one group."""
+
+
+class By(StrEnum):
+    """What augmentations are grouped by, beside their contestant."""
+
+    TYPE = "type"
+    VARIANT = "variant"
+    CONTESTANT = "contestant"
+
+
+class Unmeasured(StrEnum):
+    """Why an augmentation has no displacement."""
+
+    UNFINISHED = "waits, runs, failed or was cancelled"
+    NO_REFERENCE = "its scenario has no reference that can be read"
+    UNREADABLE_ROW = "its stored modification can't be read"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Measured:
+    """One augmentation and how far it is from the reference.
+
+    Attributes:
+        displacement: None where there is a reason why not; all missing for an answer that was
+            unreadable or refused.
+        why_not: The reason, None where it was measured.
+    """
+
+    row: Augmentation
+    displacement: Displacement | None = None
+    why_not: Unmeasured | None = None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Group:
+    """The augmentations of one contestant that belong together.
+
+    Attributes:
+        heading: What they have in common: a type, a variant, or the contestant's name.
+        contestant: The contestant's name; slug, model and variant as its row has them.
+    """
+
+    heading: str
+    contestant: str
+    slug: str
+    model: str
+    variant: str
+    is_simulated: bool
+    summary: Summary
+
+
+def of_job(job: GenerationJob) -> list[Measured]:
+    """Every row of a job; one query."""
+    return [*_measured(_rows().filter(job=job))]
+
+
+def of_latest() -> list[Measured]:
+    """The youngest outcome of every contestant on every scenario, over all jobs; one query."""
+    settled = Augmentation.objects.filter(state__in=Augmentation.SHOWABLE).order_by()
+    youngest = settled.values("scenario", "contestant").annotate(last=Max("pk")).values("last")
+    return [*_measured(_rows().filter(pk__in=youngest))]
+
+
+def of_rows(ids: Collection[int]) -> list[Measured]:
+    """The augmentations with these primary keys; one query."""
+    return [*_measured(_rows().filter(pk__in=ids))]
+
+
+def of_augmentation(row: Augmentation) -> Measured:
+    """One row whose scenario is loaded; no query."""
+    return next(_measured([row]))
+
+
+def groups(
+    measured: Iterable[Measured], *, by: By, types: Collection[str] | None = None
+) -> list[Group]:
+    """What was measured, summed up: by type in the catalogue's order, else by name.
+
+    Args:
+        measured: What has no displacement is left out.
+        by: What to group by, beside the contestant.
+        types: The scenario types that count; None for the paper's choice: by variant the three
+            whose places are definite, else all five.
+    """
+    if types is None:
+        types = PLACED_EXACTLY if by is By.VARIANT else tuple(ScenarioType)
+    cells: defaultdict[Place, list[tuple[Augmentation, Displacement]]]
+    cells = defaultdict(list)
+    for one in measured:
+        if one.displacement is not None and one.row.scenario.type in types:
+            cells[_place(one.row, by)].append((one.row, one.displacement))
+    return [_group(cells[place], by) for place in sorted(cells)]
+
+
+def types_named(names: Sequence[str]) -> tuple[ScenarioType, ...]:
+    """Scenario types by their names, or all five by the word `all`.
+
+    Raises:
+        UnknownName: There is no such type.
+    """
+    if list(names) == ["all"]:
+        return tuple(ScenarioType)
+    known = {kind.value: kind for kind in ScenarioType}
+    for name in names:
+        if name not in known:
+            raise UnknownName("scenario type", name, ["all", *known])
+    return tuple(known[name] for name in names)
+
+
+# Private
+
+
+def _rows() -> QuerySet[Augmentation]:
+    return (
+        Augmentation.objects.select_related("scenario", "contestant")
+        .defer("notes", "scenario__instruction")
+        .order_by("scenario__slug", "contestant__slug")
+    )
+
+
+def _measured(rows: Iterable[Augmentation]) -> Iterator[Measured]:
+    references: dict[int, Modification | None] = {}
+    for row in rows:
+        if row.scenario_id not in references:
+            references[row.scenario_id] = _reference(row.scenario)
+        yield _one(row, references[row.scenario_id])
+
+
+def _reference(scenario: Scenario) -> Modification | None:
+    try:
+        return reference_of(scenario)
+    except InvalidDocument:
+        return None
+
+
+def _one(row: Augmentation, reference: Modification | None) -> Measured:
+    if row.state not in Augmentation.SHOWABLE:
+        return Measured(row=row, why_not=Unmeasured.UNFINISHED)
+    if reference is None:
+        return Measured(row=row, why_not=Unmeasured.NO_REFERENCE)
+    if row.state != State.DONE:
+        return Measured(row=row, displacement=displacement(None, reference))
+    try:
+        generated = modification_from_document(row.modification)
+    except InvalidDocument:
+        return Measured(row=row, why_not=Unmeasured.UNREADABLE_ROW)
+    return Measured(row=row, displacement=displacement(generated, reference))
+
+
+def _place(row: Augmentation, by: By) -> Place:
+    contestant = row.contestant
+    who = (contestant.name.lower(), contestant.slug)
+    match by:
+        case By.TYPE:
+            return (Scenario.Type.values.index(row.scenario.type), "", *who)
+        case By.VARIANT:
+            return (_rank(contestant.variant), contestant.variant.lower(), *who)
+        case By.CONTESTANT:
+            return (0, "", *who)
+
+
+def _rank(variant: str) -> int:
+    """The paper's four in its order, then combinations, then what has no variant."""
+    known = list(SPELLING)
+    if not variant:
+        return len(known) + 1
+    return known.index(variant.lower()) if variant.lower() in known else len(known)
+
+
+def _group(cell: list[tuple[Augmentation, Displacement]], by: By) -> Group:
+    row = cell[0][0]
+    contestant = row.contestant
+    headings = {
+        By.TYPE: row.scenario.get_type_display(),
+        By.VARIANT: spelled(contestant.variant) or NO_VARIANT,
+        By.CONTESTANT: contestant.name,
+    }
+    return Group(
+        heading=headings[by],
+        contestant=contestant.name,
+        slug=contestant.slug,
+        model=contestant.model,
+        variant=contestant.variant,
+        is_simulated=contestant.is_simulated,
+        summary=summarise([found for _, found in cell]),
+    )

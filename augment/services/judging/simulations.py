@@ -1,0 +1,282 @@
+"""Drives as rows: planned once, claimed by one worker, driven, scored, kept."""
+
+from __future__ import annotations
+
+import json
+import logging
+import time
+import zlib
+from collections.abc import Callable, Iterable
+from dataclasses import asdict, dataclass
+from datetime import timedelta
+from typing import Any
+from uuid import UUID, uuid4
+
+from django.db import transaction
+from django.db.models import Q, QuerySet
+from django.utils import timezone
+
+from augment.errors import AugmentError, ClaimLost, Conflict
+from augment.models import Augmentation, GenerationJob, Scenario, Simulation
+from augment.scene.catalogue import ScenarioType
+from augment.scene.codec import modification_from_document
+from augment.scene.modification import Modification
+from augment.scene.recording_codec import recording_from_document
+from augment.sentences import sentence
+from augment.services.clock import DATABASE_TIME, Moment
+from augment.services.scenarios.scenes import reference_of, scene_of
+from augment.simulation.criticality import criticality
+from augment.simulation.drive import Drive, run
+from augment.simulation.expert import expert_of
+from augment.simulation.planners import PDM_CLOSED, planner_named
+from augment.simulation.progress import red_lights
+from augment.simulation.road import Road
+from augment.simulation.score import Score, ScoreKind, score_drive
+from augment.simulation.setting import Setting
+from augment.simulation.trace import trace_of
+
+logger = logging.getLogger(__name__)
+
+State, Subject = Simulation.State, Simulation.Subject
+BEAT_EVERY_S = 5.0
+NUPLAN, INTERPLAN = ScoreKind.NUPLAN.value, ScoreKind.INTERPLAN.value
+SCORES = {NUPLAN: "nuplan_score", INTERPLAN: "interplan_score"}
+"""Which column a score is in."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Options:
+    """How to drive."""
+
+    planner: str = PDM_CLOSED
+    offsets: str = "paper"
+    is_reactive: bool = False
+
+    def check(self) -> None:
+        """Raise UnknownName or CannotDrive unless there is such a planner."""
+        planner_named(self.planner, offsets=self.offsets)
+
+    def of(self, rows: QuerySet[Simulation]) -> QuerySet[Simulation]:
+        """Those driven so."""
+        return rows.filter(**self.columns)
+
+    @property
+    def columns(self) -> dict[str, Any]:
+        """As a row has them."""
+        return asdict(self)
+
+
+@transaction.atomic
+def plan_job(*, job: GenerationJob, options: Options) -> list[int]:
+    """Have every outcome of a job driven, with its scenes before the change and as referred to.
+
+    What was driven so already stays; what failed waits again.
+
+    Returns:
+        The keys of all rows that wait.
+
+    Raises:
+        UnknownName, CannotDrive: There is no such planner.
+        Conflict: The job has nothing to drive yet.
+    """
+    options.check()
+    rows = job.augmentations.filter(state__in=Augmentation.SHOWABLE).select_related("scenario")
+    if not rows:
+        raise Conflict(
+            sentence("“%(name)s” has no result yet that could be driven.", name=job.name)
+        )
+    made: list[Simulation] = []
+    for scenario in {row.scenario_id: row.scenario for row in rows}.values():
+        made += _of_scenario(scenario, options)
+    made += [
+        _row(row.scenario, Subject.AUGMENTATION, options, augmentation=row)
+        for row in rows.defer("modification")
+    ]
+    return [row.pk for row in made if row.state == State.QUEUED]
+
+
+@transaction.atomic
+def plan_scenario(*, scenario: Scenario, options: Options) -> list[int]:
+    """Have one scenario driven before the change and with its reference; as `plan_job`."""
+    options.check()
+    return [row.pk for row in _of_scenario(scenario, options) if row.state == State.QUEUED]
+
+
+def drive(*, simulation_pk: int) -> bool:
+    """Claim a row, drive it and write its outcome. A row that nobody may claim is left alone.
+
+    Returns:
+        Whether the row was claimed.
+    """
+    claim = uuid4()
+    mine = Simulation.objects.filter(pk=simulation_pk, state=State.QUEUED)
+    if not mine.update(state=State.RUNNING, claim=claim, heartbeat_at=DATABASE_TIME):
+        return False
+    rows = Simulation.objects.select_related("scenario__base_scene", "augmentation")
+    row = rows.get(pk=simulation_pk)
+    try:
+        outcome = _driven(row, _Beating(simulation_pk, claim))
+    except ClaimLost:
+        return True
+    except AugmentError as error:
+        outcome = {"state": State.FAILED, "reason": str(error)}
+    except Exception as error:  # a planner from outside may raise anything
+        logger.exception("Drive %s failed", row.code)
+        outcome = {"state": State.FAILED, "reason": f"{type(error).__name__}: {error}"[:500]}
+    held = Simulation.objects.filter(pk=simulation_pk, claim=claim)
+    held.update(claim=None, heartbeat_at=None, finished_at=timezone.now(), **outcome)
+    return True
+
+
+def requeue_stale(*, older_than: timedelta, now: Moment = DATABASE_TIME) -> int:
+    """Let drives wait again whose worker gave no sign of life for so long."""
+    silent = Simulation.objects.filter(state=State.RUNNING, heartbeat_at__lt=now - older_than)
+    return silent.update(state=State.QUEUED, claim=None, heartbeat_at=None, sent_at=None)
+
+
+def unsent(*, older_than: timedelta, now: Moment = DATABASE_TIME) -> list[int]:
+    """Keys of waiting rows without a message, or with one sent so long ago."""
+    waiting = Simulation.objects.filter(state=State.QUEUED)
+    old = Q(sent_at=None) | Q(sent_at__lt=now - older_than)
+    return list(waiting.filter(old).order_by("pk").values_list("pk", flat=True))
+
+
+def mark_sent(ids: Iterable[int]) -> None:
+    """Remember that a message was sent for these."""
+    Simulation.objects.filter(pk__in=list(ids)).update(sent_at=DATABASE_TIME)
+
+
+def trace_document(row: Simulation) -> dict[str, Any]:
+    """The drive to look at."""
+    document: dict[str, Any] = json.loads(zlib.decompress(bytes(row.trace or b"")))
+    return document
+
+
+# Private
+
+
+class _Beating:
+    """Told after each step; now and then it shows that the drive is alive, and asks if it may."""
+
+    def __init__(self, pk: int, claim: UUID) -> None:
+        self._rows = Simulation.objects.filter(pk=pk, claim=claim)
+        self._last = time.monotonic()
+
+    def __call__(self, step: int) -> None:
+        if time.monotonic() - self._last < BEAT_EVERY_S:
+            return
+        self._last = time.monotonic()
+        if not self._rows.update(heartbeat_at=DATABASE_TIME):
+            raise ClaimLost
+
+
+def _of_scenario(scenario: Scenario, options: Options) -> list[Simulation]:
+    made = [_row(scenario, Subject.UNMODIFIED, options)]
+    if scenario.reference is not None:
+        made.append(_row(scenario, Subject.REFERENCE, options))
+    return made
+
+
+def _row(
+    scenario: Scenario,
+    subject: Simulation.Subject,
+    options: Options,
+    *,
+    augmentation: Augmentation | None = None,
+) -> Simulation:
+    row, _ = Simulation.objects.get_or_create(
+        scenario=scenario, subject=subject, augmentation=augmentation, **options.columns
+    )
+    if row.state == State.FAILED:
+        row.state, row.reason, row.sent_at = State.QUEUED, "", None
+        row.save(update_fields=["state", "reason", "sent_at"])
+    return row
+
+
+def _driven(row: Simulation, beating: Callable[[int], None]) -> dict[str, Any]:
+    """The columns of a row's outcome."""
+    setting = setting_of(row)
+    road = Road(setting.scene, setting.recording)
+    planner = planner_named(row.planner, offsets=row.offsets)
+    drove = run(setting, planner, road=road, after_step=beating)
+    expert = expert_of(setting, road)
+    kind = ScenarioType(row.scenario.type)
+    scores = {
+        name: score_drive(
+            drove,
+            expert,
+            kind=name,
+            scenario_type=kind,
+            modification=setting.modification,
+        )
+        for name in ScoreKind
+    }
+    trace = json.dumps(trace_of(setting, drove, scores[ScoreKind.NUPLAN]), separators=(",", ":"))
+    return {
+        "state": State.DONE,
+        "reason": "",
+        "nuplan_score": scores[ScoreKind.NUPLAN].value,
+        "interplan_score": scores[ScoreKind.INTERPLAN].value,
+        "document": _document(drove, scores),
+        "trace": zlib.compress(trace.encode(), 6),
+    }
+
+
+def setting_of(row: Simulation) -> Setting:
+    """What a row drives.
+
+    Raises:
+        InvalidDocument: Something stored can't be read.
+    """
+    scenario = row.scenario
+    recording = scenario.base_scene.recording
+    return Setting(
+        scene=scene_of(scenario),
+        modification=_modification(row),
+        recording=None if recording is None else recording_from_document(recording),
+        replay=scenario.keep_traffic,
+        reactive=row.is_reactive,
+    )
+
+
+def _modification(row: Simulation) -> Modification:
+    """What changes; an answer that was unreadable or refused leaves the scene as it was."""
+    if row.subject == Subject.REFERENCE:
+        return reference_of(row.scenario) or Modification()
+    if row.augmentation is None or row.augmentation.modification is None:
+        return Modification()
+    return modification_from_document(row.augmentation.modification)
+
+
+def _document(drove: Drive, scores: dict[ScoreKind, Score]) -> dict[str, Any]:
+    """The parts of the scores, and what else is said of a drive; no series."""
+    score = scores[ScoreKind.NUPLAN]
+    return {
+        "duration_s": round(drove.duration_s, 1),
+        "at_map_end": drove.at_map_end,
+        "emergency_brake_steps": sum(plan.braking for plan in drove.plans),
+        "red_light_compliance": red_lights(drove).value,
+        "expert": {"kind": score.expert.kind.value, "progress_m": score.expert.progress_m},
+        "collisions": [
+            {
+                "time_s": round(one.moment * 0.1, 1),
+                "object": one.object_id,
+                "contact": one.contact.name.lower(),
+                "at_fault": one.at_fault,
+            }
+            for one in score.collisions
+        ],
+        "criticality": asdict(criticality(drove, score.collisions)),
+        "metrics": {
+            kind.value: [
+                {
+                    "name": metric.name,
+                    "value": metric.value,
+                    "weight": metric.weight,
+                    "parts": metric.parts,
+                }
+                for metric in found.metrics
+            ]
+            for kind, found in scores.items()
+        },
+    }

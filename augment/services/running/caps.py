@@ -1,0 +1,166 @@
+"""The caps of a job: what it may use at most, raised by people and by nothing else."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from decimal import Decimal
+
+from django.contrib.auth.models import User
+from django.db import transaction
+
+from augment.errors import Conflict
+from augment.llm.costs import nano_usd_of
+from augment.models import Augmentation, Contestant, GenerationJob
+from augment.sentences import Sentence, sentence, word
+from augment.services.endpoints.prices import unpriced
+from augment.services.events import log_event
+from augment.services.running.budget import limit_of, limits_of
+from augment.services.running.leases import change_all
+
+State = GenerationJob.State
+
+HIGHEST_USD = Decimal(1_000_000)
+HIGHEST_CALLS = 2_000_000_000
+HIGHEST_TOKENS = 10**15
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Caps:
+    """What a job may use at most; None is no cap. Of several, the first that is reached counts."""
+
+    usd: Decimal | None = None
+    calls: int | None = None
+    tokens: int | None = None
+
+    def columns(self) -> dict[str, int]:
+        """Those that there are, as columns of a job.
+
+        Raises:
+            Conflict: A cap is nothing or less, or too high to be counted to.
+        """
+        given: dict[str, int] = {}
+        if self.usd is not None:
+            if not (self.usd.is_finite() and Decimal(0) < self.usd <= HIGHEST_USD):
+                raise Conflict(
+                    sentence(
+                        "A cap in USD is more than 0 and at most %(highest)s.",
+                        highest=str(HIGHEST_USD),
+                    )
+                )
+            given["cap_nano_usd"] = nano_usd_of(self.usd)
+        for name, value, highest in (
+            (sentence("calls"), self.calls, HIGHEST_CALLS),
+            (sentence("tokens"), self.tokens, HIGHEST_TOKENS),
+        ):
+            if value is None:
+                continue
+            if not 0 < value <= highest:
+                raise Conflict(
+                    sentence(
+                        "A cap in %(unit)s is more than 0 and at most %(highest)s.",
+                        unit=name,
+                        highest=highest,
+                    )
+                )
+            given[f"cap_{name}"] = value
+        return given
+
+
+def check_caps(caps: Caps, contestants: Sequence[Contestant]) -> dict[str, int]:
+    """The caps as columns of a new job.
+
+    Raises:
+        Conflict: A cap can't be, or there is one in USD and a price that nobody knows.
+    """
+    columns = caps.columns()
+    unknown = unpriced(contestants) if caps.usd is not None else []
+    if unknown:
+        raise Conflict(
+            sentence(
+                "A cap in USD needs prices, and nobody knows that of %(models)s: cap the job by "
+                "calls or tokens instead, or enter the price at the endpoint.",
+                models=tuple(unknown),
+            )
+        )
+    return columns
+
+
+def over_already(job: GenerationJob) -> Sentence:
+    """Why nothing can be changed at a job that has ended."""
+    state = word(job.get_state_display().lower())
+    return sentence("Job '%(name)s' is %(state)s already.", name=job.name, state=state)
+
+
+@transaction.atomic
+def raise_cap(job: GenerationJob, *, caps: Caps, actor: User | None = None) -> GenerationJob:
+    """Raise the caps that are given; the others stay. What stopped waits on until `resume`.
+
+    Raises:
+        Conflict: Nothing is given, a cap would not be higher than it is, or the job is over.
+    """
+    columns = caps.columns()
+    if not columns:
+        raise Conflict(sentence("Say which cap to raise, and to what."))
+    job = GenerationJob.objects.select_for_update().get(pk=job.pk)
+    if job.state not in (State.RUNNING, State.STOPPED_AT_CAP):
+        raise Conflict(over_already(job))
+    before, limits = limit_of(job), limits_of(job)
+    for name, value in columns.items():
+        held = getattr(job, name)
+        if held is None:
+            raise Conflict(
+                sentence(
+                    "Job '%(name)s' has no such cap; its cap is %(limits)s.",
+                    name=job.name,
+                    limits=limits,
+                )
+            )
+        if value <= held:
+            raise Conflict(
+                sentence("The new cap must be higher than the one of %(limits)s.", limits=limits)
+            )
+        setattr(job, name, value)
+    job.save(update_fields=list(columns))
+    log_event(
+        actor=actor,
+        verb="raise cap",
+        object_kind="job",
+        object_code=job.code,
+        before={"cap": before},
+        after={"cap": limit_of(job)},
+    )
+    return job
+
+
+@transaction.atomic
+def resume(job: GenerationJob, *, actor: User | None = None) -> GenerationJob:
+    """Let a job that stopped at its cap go on with what waits; the door sends the messages.
+
+    Attempts that were stopped are replayed from the answers that they had, and pay for none twice.
+
+    Raises:
+        Conflict: The job is not stopped.
+    """
+    stopped = GenerationJob.objects.filter(pk=job.pk, state=State.STOPPED_AT_CAP)
+    waiting = Augmentation.objects.filter(job=job.pk, state=Augmentation.State.QUEUED)
+    again = change_all(waiting, sent_at=None)
+    if not stopped.update(state=State.RUNNING):
+        job.refresh_from_db()
+        raise Conflict(
+            sentence(
+                "Job '%(name)s' is %(state)s; only one that stopped at its cap can be resumed.",
+                name=job.name,
+                state=word(job.get_state_display().lower()),
+            )
+        )
+    log_event(
+        actor=actor,
+        verb="resume",
+        object_kind="job",
+        object_code=job.code,
+        before={"state": State.STOPPED_AT_CAP.value},
+        after={"state": State.RUNNING.value, "queued": again},
+    )
+    job.refresh_from_db()
+    return job

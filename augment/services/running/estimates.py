@@ -1,0 +1,259 @@
+"""What a job may cost, before it is launched: from what its contestants used, else a guess."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from decimal import ROUND_UP, Decimal
+
+from django.db.models import Count, Sum
+
+from augment.llm.costs import Price, usd_of, worst_case
+from augment.llm.messages import Request
+from augment.models import Augmentation, Contestant, ModelCall, Scenario
+from augment.scene.modification import Modification
+from augment.services.endpoints.prices import price_of
+from augment.services.endpoints.roles import Seat, seats_of
+from augment.services.scenarios.scenes import reference_of, scene_of
+from augment.variants.forecast import TokenUse, calls_of, most_tokens
+from augment.variants.recipes import Recipe, recipe
+from augment.variants.showing import shown_prompt
+from augment.variants.transcript import ModelRole
+
+ANSWER_TOKENS = 1_200
+PICTURE_TOKENS = 1_500
+"""Guesses, for where nothing is known yet."""
+
+SAMPLES = 3
+"""So many of the scenarios have their prompts measured."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Line:
+    """What one contestant is expected to use in a job.
+
+    Attributes:
+        rows: Augmentations.
+        calls: At least, as expected, and at most; retries after faults come on top.
+        tokens_in, tokens_out: As expected.
+        usd: As expected, None where a price is unknown.
+        usd_most: Where every answer is as long as it may be and every round is used.
+        seen: So many earlier augmentations the expectation rests on; 0 for a guess.
+    """
+
+    slug: str
+    name: str
+    rows: int
+    calls: tuple[int, int, int]
+    tokens_in: int
+    tokens_out: int
+    usd: Decimal | None
+    usd_most: Decimal | None
+    seen: int
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Estimate:
+    """A job before it is launched: lines of those that ask language models, and all rows."""
+
+    rows: int
+    scenarios: int
+    contestants: int
+    lines: tuple[Line, ...]
+
+    @property
+    def asking_rows(self) -> int:
+        """Augmentations that ask a language model."""
+        return sum(line.rows for line in self.lines)
+
+    @property
+    def calls(self) -> tuple[int, int, int]:
+        """At least, as expected, at most."""
+        least, usual, most = (sum(line.calls[n] for line in self.lines) for n in range(3))
+        return least, usual, most
+
+    @property
+    def tokens_in(self) -> int:
+        """As expected."""
+        return sum(line.tokens_in for line in self.lines)
+
+    @property
+    def tokens_out(self) -> int:
+        """As expected."""
+        return sum(line.tokens_out for line in self.lines)
+
+    @property
+    def unpriced(self) -> tuple[Line, ...]:
+        """Lines whose cost nobody knows."""
+        return tuple(line for line in self.lines if line.usd is None)
+
+    @property
+    def unpriced_names(self) -> str:
+        """Whose they are, as a list in a sentence."""
+        return ", ".join(line.name for line in self.unpriced)
+
+    @property
+    def usd(self) -> Decimal:
+        """As expected, of the lines with prices."""
+        return sum((line.usd for line in self.lines if line.usd is not None), Decimal(0))
+
+    @property
+    def usd_most(self) -> Decimal:
+        """At most, of the lines with prices, rounded up to cents."""
+        most = sum((line.usd_most for line in self.lines if line.usd_most is not None), Decimal(0))
+        return most.quantize(Decimal("0.01"), rounding=ROUND_UP)
+
+    @property
+    def guessed(self) -> tuple[Line, ...]:
+        """Lines that rest on no earlier augmentation."""
+        return tuple(line for line in self.lines if not line.seen)
+
+    def rows_within(self, usd: Decimal) -> int | None:
+        """About so many of the asking rows fit into a cap; None where all are expected to."""
+        if usd >= self.usd:
+            return None
+        return int(self.asking_rows * usd / self.usd)
+
+
+def estimate(contestants: Sequence[str], scenarios: Sequence[str]) -> Estimate:
+    """What a job of these would use; slugs that nobody knows are left out.
+
+    Raises:
+        UnknownName: A contestant's variant is none of ours any more.
+        Conflict: An endpoint that a contestant names is gone.
+    """
+    who = list(
+        Contestant.objects.filter(slug__in=contestants).select_related("endpoint").order_by("slug")
+    )
+    where = Scenario.objects.filter(slug__in=scenarios).order_by("slug")
+    count = where.count()
+    asking = [row for row in who if row.endpoint is not None]
+    samples = _spread(list(where.values_list("pk", flat=True))) if asking else []
+    prompts = _Prompts(Scenario.objects.select_related("base_scene").filter(pk__in=samples))
+    return Estimate(
+        rows=len(who) * count,
+        scenarios=count,
+        contestants=len(who),
+        lines=tuple(_line(row, count, prompts) for row in asking) if count else (),
+    )
+
+
+# --- Private -----------------------------------------------------------------------------------
+
+
+def _spread(pks: list[int]) -> list[int]:
+    step = max(1, len(pks) // SAMPLES)
+    return pks[::step][:SAMPLES]
+
+
+class _Prompts:
+    """The first prompts of some scenarios, each measured once."""
+
+    def __init__(self, samples: Iterable[Scenario]) -> None:
+        self._samples = [
+            (scene_of(row), row.instruction, reference_of(row) or Modification())
+            for row in samples
+        ]
+        self._measured: dict[tuple[str, ModelRole], tuple[int, int]] = {}
+
+    def tokens(self, way: Recipe, role: ModelRole) -> tuple[int, int]:
+        """About so many on average, and at most so many."""
+        key = (way.slug, role)
+        if key not in self._measured:
+            self._measured[key] = self._measure(way, role)
+        return self._measured[key]
+
+    def _measure(self, way: Recipe, role: ModelRole) -> tuple[int, int]:
+        # Of the viewer's only one is drawn: a picture takes longer than all the rest.
+        samples = self._samples[:1] if role is ModelRole.VIEWER else self._samples
+        shown = [shown_prompt(way, role, *sample) for sample in samples]
+        about = sum(one.tokens for one in shown) // len(shown)
+        pictures = max(len(message.images) for one in shown for message in one.messages)
+        most = max(
+            worst_case(Request(model="", messages=one.messages)).prompt_tokens for one in shown
+        )
+        return about + PICTURE_TOKENS * pictures, most
+
+
+def _line(row: Contestant, count: int, prompts: _Prompts) -> Line:
+    way, seats = recipe(row.variant), seats_of(row)
+    calls = calls_of(way)
+    prices = {role: _price(seat) for role, seat in seats.items()}
+    used, usual_calls, seen = _seen(row)
+    if not seen:
+        usual_calls = float(sum(one.usual for one in calls.values()))
+        used = {
+            role: TokenUse(
+                prompt=one.usual * prompts.tokens(way, role)[0],
+                completion=one.usual * ANSWER_TOKENS,
+            )
+            for role, one in calls.items()
+        }
+    most = most_tokens(way, {role: prompts.tokens(way, role)[1] for role in calls})
+    return Line(
+        slug=row.slug,
+        name=row.name,
+        rows=count,
+        calls=(
+            count * sum(one.least for one in calls.values()),
+            round(count * usual_calls),
+            count * sum(one.most for one in calls.values()),
+        ),
+        tokens_in=count * sum(use.prompt for use in used.values()),
+        tokens_out=count * sum(use.completion for use in used.values()),
+        usd=_usd(used, prices, count),
+        usd_most=_usd(most, prices, count),
+        seen=seen,
+    )
+
+
+def _price(seat: Seat) -> Price | None:
+    return price_of(seat.endpoint, seat.model)
+
+
+def _usd(
+    used: dict[ModelRole, TokenUse], prices: dict[ModelRole, Price | None], count: int
+) -> Decimal | None:
+    total = 0
+    for role, use in used.items():
+        price = prices[role]
+        if price is None:
+            return None
+        total += count * price.nano_usd(prompt_tokens=use.prompt, completion_tokens=use.completion)
+    return usd_of(total)
+
+
+def _seen(row: Contestant) -> tuple[dict[ModelRole, TokenUse], float, int]:
+    """By role what one augmentation used on average, its calls, and over how many that is.
+
+    Counted are augmentations that came to an end and asked for everything they needed; those that
+    were answered from the store would make the next ones look too cheap.
+    """
+    ended = Augmentation.objects.filter(contestant=row).exclude(
+        state__in=(
+            *Augmentation.UNDER_WAY,
+            Augmentation.State.FAILED,
+            Augmentation.State.CANCELLED,
+        )
+    )
+    fresh = ended.filter(attempts__calls__isnull=False).exclude(
+        attempts__calls__served_from__isnull=False
+    )
+    pks = set(fresh.values_list("pk", flat=True))
+    calls = ModelCall.objects.filter(
+        attempt__augmentation__in=pks, prompt_tokens__isnull=False, completion_tokens__isnull=False
+    )
+    used: dict[ModelRole, TokenUse] = {}
+    made = 0
+    for group in (
+        calls.order_by("role")
+        .values("role")
+        .annotate(
+            made=Count("pk"), prompt=Sum("prompt_tokens"), completion=Sum("completion_tokens")
+        )
+    ):
+        made += group["made"]
+        used[ModelRole(group["role"])] = TokenUse(
+            prompt=group["prompt"] // len(pks), completion=group["completion"] // len(pks)
+        )
+    return (used, made / len(pks), len(pks)) if used else ({}, 0.0, 0)

@@ -1,0 +1,165 @@
+"""What no job can do, said in words before it is launched."""
+
+from __future__ import annotations
+
+import shlex
+from collections.abc import Sequence
+
+from django.db.models import Q
+
+from augment.baselines.quantised import BIN_M
+from augment.errors import AugmentError, Conflict, KeyMissing, KeyNotAllowed
+from augment.models import Contestant, Scenario
+from augment.sentences import sentence, sentence_of
+from augment.services.endpoints.keys import key_of, may_hold_key
+from augment.services.endpoints.roles import Seat, seats_of, sight_of, viewer_of
+
+Kind = Contestant.Kind
+
+_KINDS = (Kind.REFERENCE, Kind.RULE, Kind.LLM, Kind.SIMULATED)
+
+RUNNABLE = Q(kind__in=_KINDS) | Q(kind=Kind.BASELINE, slug__in=BIN_M)
+"""Whom a job can run; what humans and outside baselines made is imported."""
+
+
+def is_runnable(contestant: Contestant) -> bool:
+    """Whether it is one of RUNNABLE."""
+    is_ours = contestant.kind == Kind.BASELINE and contestant.slug in BIN_M
+    return contestant.kind in _KINDS or is_ours
+
+
+def obstacle(contestant: Contestant) -> str:
+    """Why no job can run a contestant, whatever the scenarios; empty where one can.
+
+    To be said by a door in the language of whoever reads it.
+    """
+    if not is_runnable(contestant):
+        return sentence("made by people or by an outside program, and imported")
+    try:
+        seats_of(contestant)
+    except AugmentError as error:
+        return sentence_of(error)
+    forbidden = _forbidden_keys(contestant)
+    if forbidden:
+        return sentence(
+            "the variable %(names)s may not hold a key; its name has to end in _API_KEY, or "
+            "ARENA_KEY_VARIABLES has to list it",
+            names=forbidden,
+        )
+    viewer = viewer_of(contestant)
+    if viewer is not None and sight_of(viewer) is False:
+        return sentence("its viewer sees text alone; visual QA needs vision")
+    if viewer is not None and sight_of(viewer) is None:
+        return sentence(
+            "nobody knows whether its viewer sees pictures, which visual QA needs: %(probe)s "
+            "finds out, and with --sees yes (or at the endpoint) you say so",
+            probe=_probe(viewer),
+        )
+    return ""
+
+
+def keys_missing(contestant: Contestant) -> list[str]:
+    """Environment variables with keys that a contestant needs and this process does not have.
+
+    Workers elsewhere may have them: this is a warning, no obstacle.
+    """
+    missing = set()
+    for seat in seats_of(contestant).values():
+        try:
+            key_of(seat.endpoint)
+        except KeyMissing as error:
+            missing.add(error.variable)
+        except KeyNotAllowed:
+            continue  # an obstacle, see there
+    return sorted(missing)
+
+
+def refuse_impossible(who: Sequence[Contestant], where: Sequence[Scenario]) -> None:
+    """Do nothing for a job that can run to its end.
+
+    Raises:
+        Conflict: Nothing is chosen, or a contestant can't run, or not on these scenarios.
+    """
+    if not who:
+        raise Conflict(sentence("Choose at least one contestant."))
+    if not where:
+        raise Conflict(sentence("Choose at least one scenario."))
+    strangers = [row.slug for row in who if not is_runnable(row)]
+    if strangers:
+        raise Conflict(
+            sentence(
+                "A job can't run %(names)s: what humans or outside programs made is imported.",
+                names=tuple(strangers),
+            )
+        )
+    _refuse_forbidden_keys(who)
+    _refuse_without_sight(who)
+    references = [
+        row.slug for row in who if row.kind == Kind.REFERENCE or row.error_rates is not None
+    ]
+    without = [row.slug for row in where if row.reference is None]
+    if references and without:
+        raise Conflict(
+            sentence(
+                "%(contestant)s can't run on scenarios without a reference modification: "
+                "%(scenarios)s.",
+                contestant=references[0],
+                scenarios=tuple(without),
+            )
+        )
+
+
+# --- Private -----------------------------------------------------------------------------------
+
+
+def _forbidden_keys(contestant: Contestant) -> tuple[str, ...]:
+    """Variables that a contestant's endpoints name and that no endpoint may be sent."""
+    named = {seat.endpoint.key_variable for seat in seats_of(contestant).values()} - {""}
+    return tuple(sorted(name for name in named if not may_hold_key(name)))
+
+
+def _refuse_forbidden_keys(who: Sequence[Contestant]) -> None:
+    for row in who:
+        forbidden = _forbidden_keys(row)
+        if forbidden:
+            raise Conflict(
+                sentence(
+                    "The endpoint of %(contestant)s names %(names)s, which may not hold a key: a "
+                    "variable is needed whose name ends in _API_KEY or that ARENA_KEY_VARIABLES "
+                    "lists.",
+                    contestant=row.slug,
+                    names=forbidden,
+                )
+            )
+
+
+def _refuse_without_sight(who: Sequence[Contestant]) -> None:
+    """Two calls of every augmentation would be paid for before its viewer fails."""
+    viewers = {row.slug: viewer_of(row) for row in who}
+    lacking: dict[bool | None, list[tuple[str, Seat]]] = {True: [], False: [], None: []}
+    for slug, seat in viewers.items():
+        if seat is not None:
+            lacking[sight_of(seat)].append((slug, seat))
+    if lacking[False]:
+        raise Conflict(
+            sentence(
+                "Visual QA needs a viewer that sees, and these see text alone: %(names)s. "
+                "Give the contestant another viewer or another variant.",
+                names=tuple(f"{slug} ({seat})" for slug, seat in lacking[False]),
+            )
+        )
+    if lacking[None]:
+        raise Conflict(
+            sentence(
+                "Visual QA needs a viewer that sees, and of these nobody knows whether they do: "
+                "%(names)s. Probe the model (%(probe)s), or say what you know: the same with "
+                "--sees yes, or at the endpoint.",
+                names=tuple(f"{slug} ({seat})" for slug, seat in lacking[None]),
+                probe=_probe(lacking[None][0][1]),
+            )
+        )
+
+
+def _probe(seat: Seat) -> str:
+    """The command that asks what a model can do."""
+    return f"manage.py probe_endpoint {seat.endpoint.label} --model {shlex.quote(seat.model)}"

@@ -1,0 +1,241 @@
+"""Generation jobs: contestants x scenarios, one row a cell, until nothing is under way."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any, TypeVar
+
+from django.contrib.auth.models import User
+from django.db import transaction
+from django.db.models import Case, Count, F, Q, QuerySet, Value, When
+from django.utils import timezone
+
+from augment.errors import Conflict, UnknownName
+from augment.models import Augmentation, Contestant, GenerationJob, Scenario
+from augment.sentences import sentence
+from augment.services.clock import DATABASE_TIME, Moment
+from augment.services.endpoints.treatments import loosen_unanswered
+from augment.services.events import log_event
+from augment.services.running.budget import limit_of
+from augment.services.running.caps import Caps, check_caps, over_already
+from augment.services.running.feasible import refuse_impossible
+from augment.services.running.leases import change_all
+from augment.services.texts import one_line
+
+State = Augmentation.State
+
+_Row = TypeVar("_Row", Contestant, Scenario)
+
+NO_CAPS = Caps()
+
+OPEN = (GenerationJob.State.RUNNING, GenerationJob.State.STOPPED_AT_CAP)
+"""States of jobs that are not over."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class JobProgress:
+    """How many rows of a job are in which state."""
+
+    total: int
+    queued: int
+    running: int
+    done: int
+    unreadable: int
+    refused: int
+    failed: int
+    cancelled: int
+
+    @property
+    def under_way(self) -> int:
+        """Rows without an outcome yet."""
+        return self.queued + self.running
+
+    @property
+    def ended(self) -> int:
+        """Rows with an outcome."""
+        return self.total - self.under_way
+
+
+@transaction.atomic
+def launch(
+    *,
+    name: str,
+    contestants: Sequence[str],
+    scenarios: Sequence[str],
+    caps: Caps = NO_CAPS,
+    is_fresh: bool = False,
+    actor: User | None = None,
+) -> GenerationJob:
+    """Write a job and one waiting row per contestant and scenario; the door sends the messages.
+
+    Args:
+        name: What people call it.
+        contestants: Slugs; a slug given twice counts once.
+        scenarios: Slugs; a slug given twice counts once.
+        caps: What it may use at most.
+        is_fresh: Whether language models are asked anew what they answered in other jobs before.
+        actor: Who launches it, None for the machine.
+
+    Raises:
+        InvalidDocument: The name is empty, too long or not one line.
+        UnknownName: A slug that nobody registered.
+        Conflict: Nothing is chosen, a contestant can't be run, the reference is to run on
+            scenarios that have none, a viewer can't see, or a cap in USD meets a price that
+            nobody knows.
+    """
+    name = one_line("name", name, what="job")
+    who = _contestants(contestants)
+    where = _scenarios(scenarios)
+    refuse_impossible(who, where)
+    loosen_unanswered(who)
+    job = GenerationJob.objects.create(
+        name=name,
+        launched_by_id=actor.pk if actor else None,
+        is_fresh=is_fresh,
+        **check_caps(caps, who),
+    )
+    job.contestants.set(who)
+    job.scenarios.set(where)
+    Augmentation.objects.bulk_create(
+        Augmentation(job=job, scenario=scenario, contestant=contestant)
+        for scenario in where
+        for contestant in who
+    )
+    after: dict[str, Any] = {
+        "name": name,
+        "contestants": [contestant.slug for contestant in who],
+        "scenarios": [scenario.slug for scenario in where],
+    }
+    if caps != NO_CAPS:
+        after["cap"] = limit_of(job)
+    if is_fresh:
+        after["is_fresh"] = True
+    log_event(
+        actor=actor, verb="launch", object_kind="job", object_code=str(job.code), after=after
+    )
+    return job
+
+
+def progress(job: GenerationJob) -> JobProgress:
+    """The counts of a job, by one query."""
+    counts = {state.value: Count("pk", filter=Q(state=state)) for state in State}
+    return JobProgress(**job.augmentations.aggregate(total=Count("pk"), **counts))
+
+
+@transaction.atomic
+def cancel(job: GenerationJob, actor: User | None = None) -> GenerationJob:
+    """Cancel what waits, and what waits for a language model: its calls in flight are given up.
+
+    What is beyond its last call may end and keeps its result.
+
+    Raises:
+        Conflict: The job is over already.
+    """
+    still_open = GenerationJob.objects.filter(pk=job.pk, state__in=OPEN)
+    before = still_open.values_list("state", flat=True).first()
+    now = timezone.now()
+    waiting = Augmentation.objects.filter(job=job, state=State.QUEUED)
+    stopped = change_all(waiting, state=State.CANCELLED, finished_at=now)
+    if not still_open.update(state=GenerationJob.State.CANCELLED, finished_at=now):
+        job.refresh_from_db()
+        raise Conflict(over_already(job))
+    log_event(
+        actor=actor,
+        verb="cancel",
+        object_kind="job",
+        object_code=str(job.code),
+        before={"state": before},
+        after={"state": GenerationJob.State.CANCELLED.value, "cancelled": stopped},
+    )
+    job.refresh_from_db()
+    return job
+
+
+@transaction.atomic
+def retry_failed(job: GenerationJob, actor: User | None = None) -> GenerationJob:
+    """Let every failed row wait again; outcomes of the contestants themselves stay.
+
+    In a job that stopped at its cap they wait, with the others, until it is resumed.
+
+    Raises:
+        Conflict: The job was cancelled, or nothing in it failed.
+    """
+    states = GenerationJob.State
+    kept = Case(When(state=states.STOPPED_AT_CAP, then=F("state")), default=Value(states.RUNNING))
+    open_again = GenerationJob.objects.filter(pk=job.pk).exclude(state=states.CANCELLED)
+    if not open_again.update(state=kept, finished_at=None):
+        raise Conflict(
+            sentence("Job '%(name)s' was cancelled; launch a new one instead.", name=job.name)
+        )
+    loosen_unanswered(job.contestants.all())
+    failed = Augmentation.objects.filter(job=job, state=State.FAILED)
+    again = failed.update(state=State.QUEUED, reason="", finished_at=None, sent_at=None)
+    if not again:
+        raise Conflict(
+            sentence(
+                "Nothing in job '%(name)s' failed; there is nothing to try again.", name=job.name
+            )
+        )
+    log_event(
+        actor=actor,
+        verb="retry",
+        object_kind="job",
+        object_code=str(job.code),
+        after={"queued": again},
+    )
+    job.refresh_from_db()
+    return job
+
+
+def finish_if_over(*, now: Moment = DATABASE_TIME, job_pk: int | None = None) -> int:
+    """Finish the job, or every running job, in which nothing is under way.
+
+    To be called after an outcome is committed, never in its transaction: two workers that end
+    the last two rows at once would each still see the other's row under way.
+
+    Returns:
+        How many jobs were finished by this call.
+    """
+    running = GenerationJob.objects.filter(state=GenerationJob.State.RUNNING)
+    if job_pk is not None:
+        running = running.filter(pk=job_pk)
+    return sum(_finish(pk, now) for pk in list(running.values_list("pk", flat=True)))
+
+
+# --- Private -----------------------------------------------------------------------------------
+
+
+@transaction.atomic
+def _finish(job_pk: int, now: Moment) -> int:
+    """Finish one job if it is over; 1 when this call did.
+
+    The lock comes first: a retry that is about to commit has changed the job's row, and its rows
+    are to be seen as waiting again.
+    """
+    running = GenerationJob.objects.select_for_update().filter(
+        pk=job_pk, state=GenerationJob.State.RUNNING
+    )
+    if not list(running.values_list("pk")):
+        return 0
+    if Augmentation.objects.filter(job=job_pk, state__in=Augmentation.UNDER_WAY).exists():
+        return 0
+    return running.update(state=GenerationJob.State.FINISHED, finished_at=now)
+
+
+def _contestants(slugs: Sequence[str]) -> list[Contestant]:
+    return _in_order(Contestant.objects.all(), slugs, "contestant")
+
+
+def _scenarios(slugs: Sequence[str]) -> list[Scenario]:
+    """Without their scenes."""
+    return _in_order(Scenario.objects.all(), slugs, "scenario")
+
+
+def _in_order(rows: QuerySet[_Row], slugs: Sequence[str], what: str) -> list[_Row]:
+    """The rows of those slugs in the given order, each once."""
+    found = {row.slug: row for row in rows.filter(slug__in=slugs)}
+    for slug in slugs:
+        if slug not in found:
+            raise UnknownName(what, slug, list(rows.values_list("slug", flat=True)))
+    return [found[slug] for slug in dict.fromkeys(slugs)]

@@ -1,0 +1,271 @@
+"""Every call to a language model as a row, within the budget of its job.
+
+The request is stored and its worst case reserved before it is sent, the answer stored before it
+is read, each in a transaction of its own: a crash in between loses nothing that was paid for.
+"""
+
+from __future__ import annotations
+
+import logging
+import time
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from django.db import OperationalError, connection, transaction
+from django.utils import timezone
+
+from augment.errors import (
+    BudgetSpent,
+    ClaimLost,
+    DatabaseLocked,
+    JobCancelled,
+    ModelFault,
+    NotSent,
+)
+from augment.llm.costs import Price, WorstCase, worst_case
+from augment.llm.fingerprint import image_reference, request_hash
+from augment.llm.messages import Reply, Request
+from augment.models import Augmentation, Endpoint, GenerationJob, ModelCall, TranscriptNote
+from augment.services.endpoints.prices import price_of
+from augment.services.running import answers, budget, leases, stopping
+from augment.services.scenarios.pictures import store
+from augment.services.texts import storable, storable_document
+from augment.variants.transcript import ModelRole, NoteKind
+
+IMAGES = "asked"
+"""The folder in the media storage of the images that models are shown."""
+
+FIRST_WAIT_S, LONGEST_WAIT_S = 0.05, 1.0
+"""Between looks at a budget whose room is held by calls in flight, and at a locked database."""
+
+STORE_WITHIN_S = 600.0
+"""For so many seconds of such waits an answer that was paid for is held until it is stored."""
+
+logger = logging.getLogger(__name__)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Open:
+    """A call in flight."""
+
+    pk: int
+    worst: WorstCase
+    price: Price | None
+
+
+class RowTranscript:
+    """A transcript that writes rows of one attempt.
+
+    Nothing more is asked for an attempt whose claim was taken back (its result would be dropped)
+    or whose job has no room for the call.
+
+    Args:
+        held: The claim on the row.
+        row: The augmentation, with its job.
+        endpoint: Who is asked.
+        others: Who is asked in the roles that have an endpoint of their own.
+        sleep: Waits for that many seconds.
+    """
+
+    def __init__(
+        self,
+        held: leases.Claim,
+        row: Augmentation,
+        endpoint: Endpoint,
+        *,
+        others: Mapping[ModelRole, Endpoint] | None = None,
+        sleep: Callable[[float], None] = time.sleep,
+    ) -> None:
+        self._held = held
+        self._row = row
+        self._endpoint = endpoint
+        self._others = dict(others or {})
+        self._sleep = sleep
+        self._numbers = 0
+        self._notes = 0
+        self._open: dict[int, _Open] = {}
+        self._prices: dict[tuple[int, str], Price | None] = {}
+        self._last: tuple[ModelRole, Request, str, dict[str, Any]] | None = None
+
+    def known(self, role: ModelRole, request: Request, prompt_version: str) -> Reply | None:
+        """The answer that this request had before, recorded as a call that cost nothing.
+
+        Raises:
+            ClaimLost: The row is somebody else's now.
+        """
+        columns = self._columns(role, request, prompt_version)
+        earlier = answers.earlier(
+            request_hash=columns["request_hash"],
+            augmentation_pk=self._row.pk,
+            attempt_pk=self._held.attempt_pk,
+            is_fresh=self._row.job.is_fresh,
+        )
+        if earlier is None:
+            return None
+        with transaction.atomic():
+            self._insist_on_claim()
+            ModelCall.objects.create(
+                **columns,
+                **answers.columns_of_copy(earlier, now=timezone.now()),
+                number=self._numbers + 1,
+            )
+        self._numbers += 1
+        return answers.reply_of(earlier)
+
+    def asked(self, role: ModelRole, request: Request, prompt_version: str) -> int:
+        """Reserve the worst case of a request and store it; returns its number, from 1.
+
+        Where calls in flight hold the room that this one needs, waits for them to end.
+
+        Raises:
+            ClaimLost: The row is somebody else's now.
+            JobCancelled: Its job is cancelled.
+            BudgetSpent: The job has no room for the call, and is stopped.
+            WorkerStopping: This worker is to stop; what it was answered so far is kept.
+            Conflict: The job is capped in USD and the price is unknown.
+        """
+        columns = self._columns(role, request, prompt_version)
+        for message in request.messages:
+            for png in message.images:
+                store(png, folder=IMAGES)
+        worst, price = worst_case(request), self._price_of(self._at(role), request.model)
+        wait_s = FIRST_WAIT_S
+        while True:
+            stopping.insist_on_going_on()
+            room, pk = self._try(columns, worst, price)
+            if room == budget.Room.TAKEN:
+                self._numbers += 1
+                self._open[self._numbers] = _Open(pk=pk, worst=worst, price=price)
+                return self._numbers
+            if room == budget.Room.SPENT:
+                job = GenerationJob.objects.get(pk=self._row.job_id)
+                raise BudgetSpent(budget.limit_of(job))
+            self._sleep(wait_s)
+            wait_s = min(1.5 * wait_s, LONGEST_WAIT_S)
+
+    def sending(self, number: int) -> None:
+        """Store that the call is sent now; from here on it may be billed.
+
+        Raises:
+            ClaimLost: Somebody took the row over and settled the call as one that never was.
+            WorkerStopping: It waited for its place for so long that this worker is to stop.
+        """
+        stopping.insist_on_going_on()
+        call = ModelCall.objects.filter(pk=self._open[number].pk, settled_at=None)
+        if not call.update(sent_at=timezone.now()):
+            raise ClaimLost(f"attempt {self._held.attempt_number} has lost its row")
+
+    def answered(self, number: int, reply: Reply, fault: ModelFault | None = None) -> None:
+        """Store the raw answer to that call and what it used.
+
+        An answer with a fault is kept and paid for, but never served again.
+        """
+        call = self._open.pop(number)
+        used = budget.used_by_reply(reply, worst=call.worst, price=call.price)
+        answer = answers.columns_of(reply)
+        # Also where there is none: the worker may have been thought dead meanwhile.
+        answer["fault"] = "" if fault is None else storable(sentence_of(fault))
+        self._settle(call, used, answer)
+
+    def broke(self, number: int, fault: ModelFault) -> None:
+        """Store why there was no answer to that call, and what it may have used."""
+        call = self._open.pop(number)
+        used = budget.used_by_fault(fault, worst=call.worst, price=call.price)
+        broken: dict[str, Any] = {"fault": storable(sentence_of(fault))}
+        if isinstance(fault, NotSent):
+            broken["sent_at"] = None
+        self._settle(call, used, broken)
+
+    def note(self, kind: NoteKind, document: dict[str, object]) -> None:
+        """Store what happened since the last call."""
+        self._notes += 1
+        TranscriptNote.objects.create(
+            attempt_id=self._held.attempt_pk,
+            number=self._notes,
+            after_call=self._numbers,
+            kind=kind,
+            document=storable_document(document),
+        )
+
+    def _settle(self, call: _Open, used: budget.Used, answer: dict[str, Any]) -> None:
+        """Store how a call ended. It was paid for, so a locked database is waited out.
+
+        Raises:
+            DatabaseLocked: It never took it.
+        """
+        wait_s, waited_s = FIRST_WAIT_S, 0.0
+        while True:
+            try:
+                budget.settle(call_pk=call.pk, used=used, now=timezone.now(), answer=answer)
+                return
+            except OperationalError as error:
+                if waited_s >= STORE_WITHIN_S:
+                    raise DatabaseLocked(f"the end of a call was not stored ({error})") from error
+                logger.warning("The end of a call is not stored yet, trying again: %s", error)
+                if not connection.in_atomic_block:
+                    connection.close_if_unusable_or_obsolete()
+            self._sleep(wait_s)
+            waited_s += wait_s
+            wait_s = min(1.5 * wait_s, LONGEST_WAIT_S)
+
+    def _columns(self, role: ModelRole, request: Request, version: str) -> dict[str, Any]:
+        """What a call's row says about the request, whoever answers it.
+
+        Asked of one request several times in a row: whether it is known, and for each attempt.
+        """
+        if self._last is not None and self._last[:3] == (role, request, version):
+            return self._last[3]
+        document = storable_document(request.to_document(image_url=image_reference))
+        columns = {
+            "attempt_id": self._held.attempt_pk,
+            "role": role,
+            "request": document,
+            "request_hash": request_hash(
+                base_url=self._at(role).base_url, document=document, prompt_version=version
+            ),
+            "prompt_version": version,
+        }
+        self._last = (role, request, version, columns)
+        return columns
+
+    @transaction.atomic
+    def _try(
+        self, columns: dict[str, Any], worst: WorstCase, price: Price | None
+    ) -> tuple[budget.Room, int]:
+        """Take room and write the row in one transaction, or nothing of both."""
+        self._insist_on_claim()
+        room = budget.reserve(job_pk=self._row.job_id, worst=worst, price=price)
+        if room != budget.Room.TAKEN:
+            return room, 0
+        call = ModelCall.objects.create(
+            **columns,
+            number=self._numbers + 1,
+            started_at=timezone.now(),
+            reserved_tokens=worst.tokens,
+            reserved_nano_usd=worst.nano_usd(price),
+        )
+        return room, call.pk
+
+    def _insist_on_claim(self) -> None:
+        if not leases.is_held(held=self._held, lock=True):
+            raise ClaimLost(f"attempt {self._held.attempt_number} has lost its row")
+        if leases.is_cancelled(held=self._held):
+            raise JobCancelled
+
+    def _at(self, role: ModelRole) -> Endpoint:
+        return self._others.get(role, self._endpoint)
+
+    def _price_of(self, endpoint: Endpoint, model: str) -> Price | None:
+        asked = (endpoint.pk, model)
+        if asked not in self._prices:
+            self._prices[asked] = price_of(endpoint, model)
+        return self._prices[asked]
+
+
+def sentence_of(fault: ModelFault) -> str:
+    """What broke, with the HTTP status where there was one."""
+    text = str(fault)
+    if fault.status is None or str(fault.status) in text:
+        return text
+    return f"HTTP {fault.status}: {text}"

@@ -1,0 +1,1 @@
+"""Scenes, scenarios and the catalogue as rows, and their pictures."""

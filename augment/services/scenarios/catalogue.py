@@ -1,0 +1,247 @@
+"""The catalogue: scenes and scenarios that come with the project, from a folder into rows.
+
+A folder holds `scenes/<name>.json` and `scenarios/<slug>.json`. Loading it twice changes nothing.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TypeVar
+
+from django.contrib.auth.models import User
+from django.db import transaction
+from django.db.models import QuerySet
+
+from augment.errors import Conflict, InvalidDocument, InvalidModification
+from augment.formats.json_file import read_json
+from augment.models import Augmentation, BaseScene, Scenario
+from augment.scene.catalogue_codec import CatalogueEntry, entry_from_document
+from augment.scene.codec import (
+    modification_to_document,
+    scene_from_document,
+    scene_to_document,
+)
+from augment.scene.entities import Scene
+from augment.scene.intent import IntentOrigin
+from augment.scene.intent_codec import intent_to_document
+from augment.scene.modification import without_traffic
+from augment.services.events import log_event
+from augment.services.scenarios.scenes import add_scenario, check_reference, check_slug
+
+SOURCE = "authored"
+
+Read = TypeVar("Read")
+Problems = list[tuple[str, str]]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class CatalogueReport:
+    """How many rows a loading added, changed and found as they should be."""
+
+    scenes_added: int
+    scenes_changed: int
+    scenes_unchanged: int
+    scenarios_added: int
+    scenarios_changed: int
+    scenarios_unchanged: int
+
+
+@transaction.atomic
+def load_catalogue(*, folder: Path, actor: User | None = None) -> CatalogueReport:
+    """Bring the rows in line with the files, all of them or none.
+
+    Rows whose file is gone stay. A change is refused where something was made from the old
+    state already, because nobody could tell any more what it was made from.
+
+    Args:
+        folder: Holds `scenes` and `scenarios`.
+        actor: Who did it.
+
+    Raises:
+        InvalidDocument: The folder holds no catalogue, or files break their format or do not
+            fit together; every problem names its file and the path inside it.
+        Conflict: A slug belongs to a row from elsewhere, or what changed is in use.
+    """
+    scenes, entries = read_catalogue(folder)
+    scene_steps = [_store_scene(scene, actor) for scene in scenes.values()]
+    scenario_steps = [_store_scenario(entry, actor) for entry in entries]
+    return CatalogueReport(
+        scenes_added=scene_steps.count("add"),
+        scenes_changed=scene_steps.count("change"),
+        scenes_unchanged=scene_steps.count("keep"),
+        scenarios_added=scenario_steps.count("add"),
+        scenarios_changed=scenario_steps.count("change"),
+        scenarios_unchanged=scenario_steps.count("keep"),
+    )
+
+
+def read_catalogue(folder: Path) -> tuple[dict[str, Scene], list[CatalogueEntry]]:
+    """The scenes by name and the scenarios of a folder, each fitting its scene.
+
+    Raises:
+        InvalidDocument: As `load_catalogue`.
+    """
+    problems: Problems = []
+    scenes = {
+        name: scene
+        for name, scene in _read_files(folder / "scenes", "scene", scene_from_document, problems)
+        if _is_named(f"scenes/{name}.json", "name", name, scene.name, problems)
+    }
+    entries = [
+        entry
+        for name, entry in _read_files(
+            folder / "scenarios", "scenario", entry_from_document, problems
+        )
+        if _is_named(f"scenarios/{name}.json", "slug", name, entry.slug, problems)
+    ]
+    if not (scenes or entries or problems):
+        problems.append((str(folder), "holds no scenes/*.json and no scenarios/*.json"))
+    for entry in entries:
+        _check_fits(entry, scenes, problems)
+    if problems:
+        raise InvalidDocument("catalogue", problems)
+    return scenes, entries
+
+
+# Private: files
+
+
+def _read_files(
+    folder: Path, what: str, parse: Callable[[object], Read], problems: Problems
+) -> list[tuple[str, Read]]:
+    """What the files of a folder hold, by their names; what can't be read becomes problems."""
+    found = []
+    for file in sorted(folder.glob("*.json")):
+        try:
+            found.append((file.stem, parse(read_json(file, what=what))))
+        except InvalidDocument as fault:
+            at = f"{folder.name}/{file.name}"
+            problems += [(f"{at}: {path}" if path else at, text) for path, text in fault.problems]
+    return found
+
+
+def _is_named(at: str, key: str, name: str, given: str, problems: Problems) -> bool:
+    try:
+        check_slug(given, what="catalogue")
+    except InvalidDocument as fault:
+        problems += [(f"{at}: {key}", text) for _, text in fault.problems]
+        return False
+    if given != name:
+        problems.append(
+            (f"{at}: {key}", f"expected {name!r} as the file is called, got {given!r}")
+        )
+        return False
+    return True
+
+
+def _check_fits(entry: CatalogueEntry, scenes: dict[str, Scene], problems: Problems) -> None:
+    at = f"scenarios/{entry.slug}.json"
+    scene = scenes.get(entry.scene)
+    if scene is None:
+        known = ", ".join(scenes) or "none"
+        problems.append((f"{at}: scene", f"{entry.scene!r} is not in the folder; known: {known}"))
+        return
+    try:
+        check_reference(scene if entry.keep_traffic else without_traffic(scene), entry.reference)
+    except InvalidModification as fault:
+        problems.append((f"{at}: reference", str(fault)))
+    except InvalidDocument as fault:
+        problems += [(f"{at}: reference.{path}", text) for path, text in fault.problems]
+
+
+# Private: rows
+
+
+def _store_scene(scene: Scene, actor: User | None) -> str:
+    document = scene_to_document(scene)
+    row, is_new = BaseScene.objects.get_or_create(
+        slug=scene.name,
+        defaults={"document": document, "source": SOURCE, "provenance": scene.provenance},
+    )
+    if is_new:
+        _log(actor, "add", "scene", row, slug=row.slug, source=SOURCE)
+        return "add"
+    if row.source != SOURCE:
+        raise Conflict(
+            f"There is a scene called {row.slug!r} already, from the source {row.source!r}; "
+            "the catalogue does not replace it."
+        )
+    if row.document == document:
+        return "keep"
+    _refuse_if_used(f"scene {row.slug!r}", Augmentation.objects.filter(scenario__base_scene=row))
+    own = row.scenarios.filter(in_catalogue=False).values_list("slug", flat=True)
+    if own:
+        raise Conflict(
+            f"The scene {row.slug!r} has changed, but scenarios outside the catalogue use it: "
+            f"{', '.join(own)}."
+        )
+    row.document, row.provenance = document, scene.provenance
+    row.save(update_fields=["document", "provenance"])
+    row.scenarios.update(original_image="")
+    _log(actor, "change", "scene", row, slug=row.slug, source=SOURCE)
+    return "change"
+
+
+def _store_scenario(entry: CatalogueEntry, actor: User | None) -> str:
+    row = Scenario.objects.filter(slug=entry.slug).select_related("base_scene").first()
+    reference = modification_to_document(entry.reference)
+    intent = None if entry.intent is None else intent_to_document(entry.intent)
+    if row is None:
+        row = add_scenario(
+            scene=entry.scene,
+            type=entry.type.value,
+            instruction=entry.instruction,
+            slug=entry.slug,
+            reference=reference,
+            intent=intent,
+            intent_origin=IntentOrigin.AUTHORED,
+            keep_traffic=entry.keep_traffic,
+            actor=actor,
+        )
+        row.in_catalogue = True
+        row.save(update_fields=["in_catalogue"])
+        return "add"
+    if not row.in_catalogue:
+        raise Conflict(
+            f"There is a scenario called {row.slug!r} already that is not the catalogue's; "
+            "the catalogue does not replace it."
+        )
+    wanted = {
+        "base_scene": BaseScene.objects.get(slug=entry.scene),
+        "type": entry.type.value,
+        "instruction": entry.instruction.strip(),
+        "reference": reference,
+        "keep_traffic": entry.keep_traffic,
+        "intent": intent,
+        "intent_origin": "" if intent is None else IntentOrigin.AUTHORED.value,
+    }
+    changed = sorted(name for name, value in wanted.items() if getattr(row, name) != value)
+    if not changed:
+        return "keep"
+    if row.intent is not None or set(changed) - {"intent", "intent_origin"}:
+        # An intent where there was none changes nothing that anybody was shown or asked.
+        _refuse_if_used(f"scenario {row.slug!r}", row.augmentations.all())
+    for name, value in wanted.items():
+        setattr(row, name, value)
+    if set(changed) - {"intent", "intent_origin"}:
+        row.original_image = ""
+    row.save(update_fields=[*wanted, "original_image"])
+    _log(actor, "change", "scenario", row, slug=row.slug, changed=changed)
+    return "change"
+
+
+def _refuse_if_used(what: str, made_from_it: QuerySet[Augmentation]) -> None:
+    count = made_from_it.count()
+    if count:
+        raise Conflict(
+            f"The {what} has changed in the catalogue, but {count} augmentations were made from "
+            "the old state; give the new one another name."
+        )
+
+
+def _log(
+    actor: User | None, verb: str, kind: str, row: BaseScene | Scenario, **after: object
+) -> None:
+    log_event(actor=actor, verb=verb, object_kind=kind, object_code=row.code, after=after)

@@ -1,0 +1,131 @@
+"""Whether the catalogue's references are what their intents ask for, and can be shown.
+
+Reads files, touches no rows.
+"""
+
+from __future__ import annotations
+
+import re
+from collections import Counter
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from augment.checks import Ground
+from augment.checks.against_intent import judged
+from augment.checks.tolerances import AUTHORED
+from augment.geometry.boxes import corners
+from augment.geometry.polyline import FloatArray
+from augment.render.camera import Camera, camera_for
+from augment.scene.catalogue_codec import CatalogueEntry
+from augment.scene.entities import Scene
+from augment.scene.intent_codec import intent_to_parts
+from augment.scene.intent_statements import list_statements
+from augment.scene.modification import without_traffic
+from augment.services.scenarios.catalogue import read_catalogue
+
+MOST_ON_ONE_SCENE = 8
+
+_NUMBER = re.compile(r"\d+(?:\.\d+)?")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ScenarioCheck:
+    """What was found about one scenario.
+
+    Attributes:
+        statements: How many its intent makes; each is held against the reference.
+        reasons: Why it is not as it should be; empty if all is well.
+    """
+
+    slug: str
+    statements: int
+    reasons: tuple[str, ...]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class CatalogueCheck:
+    """All scenarios of a folder, and what is wrong with the folder as a whole."""
+
+    scenarios: tuple[ScenarioCheck, ...]
+    reasons: tuple[str, ...]
+
+
+def check_catalogue(*, folder: Path) -> CatalogueCheck:
+    """Hold every reference against the geometric checks, its intent and its picture.
+
+    Args:
+        folder: Holds `scenes` and `scenarios`.
+
+    Raises:
+        InvalidDocument: The folder holds no catalogue, or its files do not fit together.
+    """
+    scenes, entries = read_catalogue(folder)
+    checked = tuple(_check(scenes[entry.scene], entry) for entry in entries)
+    return CatalogueCheck(scenarios=checked, reasons=tuple(_whole(entries)))
+
+
+def _check(whole: Scene, entry: CatalogueEntry) -> ScenarioCheck:
+    scene = whole if entry.keep_traffic else without_traffic(whole)
+    ground = Ground.of(scene)
+    if entry.intent is None:
+        return ScenarioCheck(slug=entry.slug, statements=0, reasons=("it has no intent",))
+    reasons = [
+        f"{one.severity}: {one.sentence()}"
+        for one in judged(ground, entry.reference, entry.intent, AUTHORED)
+        if one.is_fault
+    ]
+    return ScenarioCheck(
+        slug=entry.slug,
+        statements=len(list_statements(entry.intent)),
+        reasons=(*reasons, *_unheld(entry), *_unseen(scene, entry)),
+    )
+
+
+def _unheld(entry: CatalogueEntry) -> Iterator[str]:
+    """Numbers of the sentence that its intent does not hold."""
+    assert entry.intent is not None
+    held = set(_numbers_in(intent_to_parts(entry.intent)))
+    for number in dict.fromkeys(_NUMBER.findall(entry.instruction)):
+        if float(number) not in held:
+            yield f"the instruction says {number}, and its intent does not"
+
+
+def _numbers_in(part: Any) -> Iterator[float]:
+    if isinstance(part, dict):
+        part = list(part.values())
+    if isinstance(part, list):
+        for one in part:
+            yield from _numbers_in(one)
+    elif isinstance(part, (int, float)) and not isinstance(part, bool):
+        yield abs(float(part))
+
+
+def _unseen(scene: Scene, entry: CatalogueEntry) -> Iterator[str]:
+    camera = camera_for(scene, entry.reference)
+    for agent in entry.reference.changed:
+        points = corners(agent.pose, agent.length_m, agent.width_m)
+        if agent.walk_to_m is not None:
+            points = np.vstack([points, [agent.walk_to_m]])
+        if not _holds(camera, points):
+            yield f"{agent.id} is not wholly inside the picture"
+
+
+def _holds(camera: Camera, points_m: FloatArray) -> bool:
+    pixels = camera.to_pixels(points_m)
+    return bool((pixels >= 0.0).all() and (pixels <= [camera.width_px, camera.height_px]).all())
+
+
+def _whole(entries: list[CatalogueEntry]) -> Iterator[str]:
+    for scene, number in sorted(Counter(entry.scene for entry in entries).items()):
+        if number > MOST_ON_ONE_SCENE:
+            yield f"{scene} carries {number} scenarios, more than {MOST_ON_ONE_SCENE}"
+    bare: dict[str, str] = {}
+    for entry in entries:
+        words = _NUMBER.sub("#", entry.instruction.casefold())
+        if words in bare:
+            yield f"{entry.slug} and {bare[words]} differ by numbers alone"
+        bare[words] = entry.slug

@@ -1,0 +1,122 @@
+"""A job's modifications as interPlan's file, and such a file as reference modifications."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+
+from augment.errors import Conflict, InvalidDocument, UnknownName
+from augment.formats import interplan_writer
+from augment.formats.interplan import Cell, Loss, ReadFile, token_of
+from augment.formats.interplan_reader import read_document
+from augment.formats.interplan_schema import WHAT
+from augment.formats.yaml_file import read_yaml_file
+from augment.models import Augmentation, BaseScene, GenerationJob
+from augment.scene.catalogue import ScenarioType
+from augment.scene.codec import modification_from_document, scene_from_document
+from augment.scene.modification import without_traffic
+from augment.services.scenarios.scenes import scene_of
+
+_MOST_LISTED = 12
+
+
+def job_as_interplan(
+    job: GenerationJob, *, contestant: str | None = None, strict: bool = False
+) -> tuple[str, tuple[Loss, ...]]:
+    """All that a job made, in interPlan's YAML, and what the file can't say.
+
+    Args:
+        job: Whose modifications are written, ordered by scenario and contestant.
+        contestant: The slug of the only contestant to write; None for all.
+        strict: Whether nothing is written once a scenario would not be the same there.
+
+    Raises:
+        UnknownName: The job has no such contestant.
+        Conflict: A scene has more modifications than interPlan can number, or `strict` and
+            something would change.
+    """
+    rows = job.augmentations.select_related("scenario__base_scene", "contestant")
+    slugs = sorted(set(rows.values_list("contestant__slug", flat=True)))
+    if contestant is not None:
+        if contestant not in slugs:
+            raise UnknownName("contestant", contestant, slugs)
+        rows = rows.filter(contestant__slug=contestant)
+    cells, losses = [], []
+    for row in rows.order_by("scenario__slug", "contestant__slug"):
+        name = f"{row.scenario.slug} by {row.contestant.slug}"
+        if row.modification is None:
+            text = f"there is no modification: {row.state}"
+            losses.append(Loss(cell=name, text=text, changes_scene=True))
+        else:
+            cells.append(_cell(name, row))
+    text, more = interplan_writer.write(cells)
+    losses += more
+    if strict:
+        _refuse_changes(losses)
+    return text, tuple(losses)
+
+
+def references_from_interplan(path: Path, *, scenes: Mapping[str, str] | None = None) -> ReadFile:
+    """The special scenarios of an interPlan file whose scenes are stored here.
+
+    Args:
+        path: The YAML file.
+        scenes: Slugs of stored scenes in the file's frame by base token; None for the tokens
+            that `job_as_interplan` makes from the scenes' names.
+
+    Raises:
+        UnknownName: No such scene, or no such base token in the file.
+        InvalidDocument: The file can't be read or breaks its format.
+    """
+    stored = {row.slug: row for row in BaseScene.objects.defer("recording")}
+    given = tuple(scenes or ())
+    if scenes is None:
+        scenes = {token_of(slug): slug for slug in stored}
+    for slug in scenes.values():
+        if slug not in stored:
+            raise UnknownName("scene", slug, sorted(stored))
+    document = read_yaml_file(path, what=WHAT)
+    known = {
+        token: without_traffic(scene_from_document(stored[slug].document))
+        for token, slug in scenes.items()
+    }
+    found = read_document(document, known)
+    tokens = [*dict.fromkeys(entry.id.partition("-")[0] for entry in found.entries)]
+    there = sorted({*tokens, *found.passed_over})
+    for token in given:
+        if token not in there:
+            raise UnknownName("base token", token, there)
+    if not found.entries:
+        raise InvalidDocument(
+            WHAT,
+            [
+                (
+                    "modification_details_dictionary",
+                    f"none of its {len(there)} base tokens has a scene here: "
+                    f"{', '.join(there[:_MOST_LISTED])}; name the scenes by --scene TOKEN=SLUG",
+                )
+            ],
+        )
+    return found
+
+
+def _refuse_changes(losses: list[Loss]) -> None:
+    changes = [loss for loss in losses if loss.changes_scene]
+    if changes:
+        shown = "; ".join(str(loss) for loss in changes[:_MOST_LISTED])
+        more = len(changes) - _MOST_LISTED
+        rest = f"; and {more} more" if more > 0 else ""
+        raise Conflict(
+            f"{len(changes)} things would not be the same in interPlan, and nothing was written: "
+            f"{shown}{rest}."
+        )
+
+
+def _cell(name: str, row: Augmentation) -> Cell:
+    return Cell(
+        name=name,
+        scene=scene_of(row.scenario),
+        type=ScenarioType(row.scenario.type),
+        modification=modification_from_document(row.modification),
+        keeps_traffic=row.scenario.keep_traffic,
+    )

@@ -1,0 +1,73 @@
+"""Pictures of scenarios and augmentations, stored once under the hash of their bytes."""
+
+from __future__ import annotations
+
+import hashlib
+
+from django.core.files.base import ContentFile
+from django.core.files.storage import default_storage
+
+from augment.models import Scenario
+from augment.render.bev import draw
+from augment.render.camera import Camera, camera_for
+from augment.scene.entities import Scene
+from augment.scene.modification import Modification
+from augment.services.scenarios.scenes import reference_of, scene_of
+
+
+def original_picture(scenario: Scenario) -> str:
+    """The name of the picture before any change; drawn where there is none yet.
+
+    What is drawn here takes about a tenth of a second: call it from a worker, not in a request.
+
+    Raises:
+        InvalidDocument: The stored scene can't be read.
+    """
+    kept = scenario.original_image
+    if kept and default_storage.exists(kept):
+        return kept
+    name = picture_of(scenario, scene_of(scenario), Modification())
+    Scenario.objects.filter(pk=scenario.pk).update(original_image=name)
+    scenario.original_image = name
+    return name
+
+
+def camera_of(scenario: Scenario) -> Camera:
+    """The window that all pictures of a scenario show.
+
+    Raises:
+        InvalidDocument: The stored scene can't be read.
+    """
+    return camera_for(scene_of(scenario), reference_of(scenario))
+
+
+def picture_of(scenario: Scenario, scene: Scene, modification: Modification) -> str:
+    """The name of the picture after a change.
+
+    Args:
+        scenario: Whose reference decides on the camera, the same for every contestant.
+        scene: The scene before the change.
+        modification: The change.
+
+    Raises:
+        InvalidModification: The change does not fit the scene.
+    """
+    camera = camera_for(scene, reference_of(scenario))
+    return store(draw(scene, modification, camera))
+
+
+def store(png: bytes, *, folder: str = "bev") -> str:
+    """The name under which these bytes are kept, <folder>/<sha256>.png; written only if absent."""
+    name = f"{folder}/{hashlib.sha256(png).hexdigest()}.png"
+    store_as(name, png)
+    return name
+
+
+def store_as(name: str, png: bytes) -> None:
+    """Keep these bytes under a name that belongs to them alone; written if absent or cut off.
+
+    Several workers may do so at once: what is kept is whole at every moment, and always the same.
+    """
+    if default_storage.exists(name) and default_storage.size(name) == len(png):
+        return
+    default_storage.save(name, ContentFile(png))

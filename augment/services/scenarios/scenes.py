@@ -1,0 +1,262 @@
+"""Scenes and scenarios: how they come in, and how their rows are read as values."""
+
+from __future__ import annotations
+
+import hashlib
+import re
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+from django.contrib.auth.models import User
+from django.db import IntegrityError, transaction
+
+from augment.errors import Conflict, InvalidDocument, UnknownName
+from augment.formats import argoverse2
+from augment.formats.json_file import read_json
+from augment.models import BaseScene, Scenario
+from augment.scene.catalogue import ScenarioType
+from augment.scene.codec import (
+    modification_from_document,
+    modification_to_document,
+    scene_from_document,
+    scene_to_document,
+)
+from augment.scene.entities import Scene
+from augment.scene.intent import Intent, IntentOrigin
+from augment.scene.intent_codec import intent_from_document, intent_to_document
+from augment.scene.lane_graph import LaneGraph
+from augment.scene.modification import Modification, check_fits, without_traffic
+from augment.scene.recording import Recording
+from augment.scene.recording_codec import recording_to_document
+from augment.services.events import log_event
+from augment.services.texts import check_prose
+
+SOURCES = ("av2", "json")
+SLUG_LENGTH = 80
+INSTRUCTION_LENGTH = 2_000
+"""An instruction is read above the pictures, and by models: a few sentences."""
+
+
+@transaction.atomic
+def import_scene(
+    *, source: str, path: Path, frame: int, slug: str, actor: User | None = None
+) -> BaseScene:
+    """Read a scene from outside and keep it, with its recording where there is one.
+
+    Args:
+        source: One of `SOURCES`: an Argoverse 2 Sensor log, or the project's own JSON.
+        path: The log's folder, or the JSON file.
+        frame: The annotated sweep that becomes t0, from 0; a JSON scene has frame 0 alone.
+        slug: The new scene's name; lower-case letters, digits and hyphens.
+        actor: Who did it.
+
+    Raises:
+        UnknownName: No such source.
+        InvalidDocument: The input or the slug breaks its format.
+        Conflict: The slug is taken.
+    """
+    check_slug(slug, what="scene")
+    if BaseScene.objects.filter(slug=slug).exists():
+        raise Conflict(f"There is a scene called {slug!r} already; choose another slug.")
+    scene, recording = _read(source, path, frame, slug)
+    try:
+        with transaction.atomic():
+            row = BaseScene.objects.create(
+                slug=slug,
+                document=scene_to_document(scene),
+                recording=None if recording is None else recording_to_document(recording),
+                source=source,
+                provenance=scene.provenance,
+            )
+    except IntegrityError:  # somebody else was faster
+        raise Conflict(f"There is a scene called {slug!r} already; choose another slug.") from None
+    log_event(
+        actor=actor,
+        verb="import",
+        object_kind="scene",
+        object_code=row.code,
+        after={"slug": slug, "source": source, "path": path.name, "frame": frame},
+    )
+    return row
+
+
+@transaction.atomic
+def add_scenario(
+    *,
+    scene: str,
+    type: str,
+    instruction: str,
+    slug: str | None = None,
+    reference: dict[str, Any] | None = None,
+    intent: dict[str, Any] | None = None,
+    intent_origin: IntentOrigin = IntentOrigin.ENTERED,
+    keep_traffic: bool = False,
+    actor: User | None = None,
+) -> Scenario:
+    """Keep an instruction for a scene, with its intent and reference if there are any.
+
+    Args:
+        scene: The slug of a stored scene.
+        type: The value of a `ScenarioType`.
+        instruction: What is to be changed, in the user's words.
+        slug: The scenario's name; made from the scene's and the type's when None.
+        reference: A modification document that fits the scene.
+        intent: An intent document: what the instruction asks for.
+        intent_origin: Where that comes from.
+        keep_traffic: Whether the recorded traffic stays in the scene.
+        actor: Who did it.
+
+    Raises:
+        UnknownName: No such scene or type.
+        InvalidDocument: The slug, the instruction, the intent or the reference breaks its format.
+        InvalidModification: The reference does not fit the scene.
+        Conflict: The slug is taken.
+    """
+    base_scene = _base_scene(scene)
+    kind = _type(type)
+    check_prose("instruction", instruction, what="scenario", longest=INSTRUCTION_LENGTH)
+    if slug is None:
+        slug = _free_slug(base_scene, kind)
+    check_slug(slug, what="scenario")
+    if Scenario.objects.filter(slug=slug).exists():
+        raise Conflict(f"There is a scenario called {slug!r} already; choose another slug.")
+    scenario = Scenario(
+        slug=slug,
+        base_scene=base_scene,
+        type=kind.value,
+        instruction=instruction.strip(),
+        keep_traffic=keep_traffic,
+    )
+    if reference is not None:
+        _set_reference(scenario, reference)
+    if intent is not None:
+        scenario.intent = intent_to_document(intent_from_document(intent))
+        scenario.intent_origin = intent_origin
+    _insert(scenario)
+    _log_addition(scenario, actor)
+    return scenario
+
+
+def _log_addition(scenario: Scenario, actor: User | None) -> None:
+    log_event(
+        actor=actor,
+        verb="add",
+        object_kind="scenario",
+        object_code=scenario.code,
+        after={
+            "slug": scenario.slug,
+            "scene": scenario.base_scene.slug,
+            "type": scenario.type,
+            "has_reference": scenario.reference is not None,
+            "keep_traffic": scenario.keep_traffic,
+            "intent": scenario.intent_origin or None,
+        },
+    )
+
+
+def _set_reference(scenario: Scenario, reference: dict[str, Any]) -> None:
+    modification = modification_from_document(reference)
+    check_reference(scene_of(scenario), modification)
+    scenario.reference = modification_to_document(modification)
+
+
+def _insert(scenario: Scenario) -> None:
+    try:
+        with transaction.atomic():
+            scenario.save(force_insert=True)
+    except IntegrityError:  # somebody else was faster
+        raise Conflict(
+            f"There is a scenario called {scenario.slug!r} already; try again."
+        ) from None
+
+
+def scene_of(scenario: Scenario) -> Scene:
+    """The scene that contestants are asked to change; cleared of traffic unless it is kept."""
+    scene = scene_from_document(scenario.base_scene.document)
+    return scene if scenario.keep_traffic else without_traffic(scene)
+
+
+def reference_of(scenario: Scenario) -> Modification | None:
+    """The human modification, None for a scenario without one."""
+    if scenario.reference is None:
+        return None
+    return modification_from_document(scenario.reference)
+
+
+def intent_of(scenario: Scenario) -> Intent | None:
+    """What the instruction asks for, None where nobody has written it down."""
+    return None if scenario.intent is None else intent_from_document(scenario.intent)
+
+
+def seed_of(slug: str) -> int:
+    """The seed of a scenario: the same in every job, another for every slug."""
+    return int.from_bytes(hashlib.sha256(slug.encode()).digest()[:4], "big")
+
+
+def check_reference(scene: Scene, modification: Modification) -> None:
+    """Whether a modification fits the scene, with its lanes.
+
+    Raises:
+        InvalidModification: An agent does not fit.
+        InvalidDocument: An agent names a lane that the scene does not have.
+    """
+    check_fits(scene, modification)
+    known = LaneGraph(scene).ways
+    problems = [
+        (f"{agent.id}.lane_id", f"{agent.lane_id!r} is not a lane or connector of the scene")
+        for agent in modification.changed
+        if agent.lane_id is not None and agent.lane_id not in known
+    ]
+    if problems:
+        raise InvalidDocument("modification", problems)
+
+
+def check_slug(slug: str, *, what: str) -> None:
+    """Whether a slug can be stored.
+
+    Raises:
+        InvalidDocument: It has other characters, or is too long.
+    """
+    if len(slug) > SLUG_LENGTH or not re.fullmatch(r"[a-z0-9]+(-[a-z0-9]+)*", slug):
+        rule = f"lower-case letters, digits and single hyphens, at most {SLUG_LENGTH}"
+        raise InvalidDocument(what, [("slug", f"{slug!r} must be {rule}")])
+
+
+# Private
+
+
+def _read(source: str, path: Path, frame: int, slug: str) -> tuple[Scene, Recording | None]:
+    if source == "av2":
+        return argoverse2.read(path, frame=frame, name=slug)
+    if source == "json":
+        if frame != 0:
+            raise InvalidDocument("scene", [("frame", f"a JSON scene has frame 0, not {frame}")])
+        return replace(scene_from_document(read_json(path, what="scene")), name=slug), None
+    raise UnknownName("source", source, list(SOURCES))
+
+
+def _base_scene(slug: str) -> BaseScene:
+    try:
+        return BaseScene.objects.get(slug=slug)
+    except BaseScene.DoesNotExist:
+        known = list(BaseScene.objects.values_list("slug", flat=True))
+        raise UnknownName("scene", slug, known) from None
+
+
+def _type(name: str) -> ScenarioType:
+    try:
+        return ScenarioType(name)
+    except ValueError:
+        known = [member.value for member in ScenarioType]
+        raise UnknownName("scenario type", name, known) from None
+
+
+def _free_slug(base_scene: BaseScene, kind: ScenarioType) -> str:
+    stem = kind.name.lower().replace("_", "-")
+    stem = f"{base_scene.slug[: SLUG_LENGTH - len(stem) - 8].strip('-')}-{stem}"
+    taken = set(Scenario.objects.filter(slug__startswith=stem).values_list("slug", flat=True))
+    number = 1
+    while f"{stem}-{number}" in taken:
+        number += 1
+    return f"{stem}-{number}"
