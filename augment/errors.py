@@ -259,7 +259,7 @@ class WorkerStopping(Unwanted):
     """This worker was told to stop and asks nobody any more. The row goes back to the queue."""
 
 
-class ClaimLost(Unwanted):
+class LeaseLost(Unwanted):
     """Somebody else works on this row now. Drop the result; the new holder brings its own."""
 
 

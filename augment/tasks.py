@@ -1,6 +1,6 @@
 """Celery tasks of augment: doors that carry one id, and what brings lost work back.
 
-Rows are the truth. A message may come twice (the claim refuses the second) or never (recover
+Rows are the truth. A message may come twice (the lease refuses the second) or never (recover
 sends another). Services never enqueue; doors call `enqueue_job` by transaction.on_commit.
 """
 
@@ -115,7 +115,7 @@ def enqueue_job(job_pk: int) -> int:
     Raises:
         QueueFault: No broker, or it refuses; the rows wait on and are sent by recover later.
     """
-    return enqueue(leases.unsent(older_than=RESEND_AFTER, job_pk=job_pk))
+    return enqueue(leases.find_unsent(older_than=RESEND_AFTER, job_pk=job_pk))
 
 
 def check_broker() -> None:
@@ -152,7 +152,7 @@ def recover(*, now: Moment = DATABASE_TIME, at_start: bool = False) -> None:
         QueueFault: No broker, or it refuses.
     """
     stale_after = timedelta(seconds=settings.STALE_AFTER_S)
-    leases.requeue_stale(now=now, older_than=stale_after)
+    leases.take_back_stale(now=now, older_than=stale_after)
     jobs.finish_if_over(now=now)
     if at_start:
         older_than = timedelta(0)
@@ -161,7 +161,7 @@ def recover(*, now: Moment = DATABASE_TIME, at_start: bool = False) -> None:
     else:
         # Nothing is on its way, so what was sent a while ago and still waits is lost.
         older_than = stale_after
-    enqueue(leases.unsent(now=now, older_than=older_than))
+    enqueue(leases.find_unsent(now=now, older_than=older_than))
     simulations.requeue_stale(now=now, older_than=stale_after)
     enqueue_simulations(simulations.unsent(now=now, older_than=older_than))
 

@@ -1,7 +1,7 @@
 """What time it is for whatever several workers judge: the database's time, never their own.
 
 Workers on different machines may be tens of seconds apart. Times that one of them writes and
-another one compares (claims, signs of life, places at an endpoint) are therefore both written and
+another one compares (leases, signs of life, places at an endpoint) are therefore both written and
 compared by the database; on SQLite that is the clock of its only machine.
 """
 

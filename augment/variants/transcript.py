@@ -50,7 +50,7 @@ class Transcript(Protocol):
         """Note that this call leaves the computer now, after every wait.
 
         Raises:
-            ClaimLost: Nobody needs the answer any more; it is not to be sent.
+            LeaseLost: Nobody needs the answer any more; it is not to be sent.
         """
         ...
 

@@ -48,7 +48,7 @@ def conversation(base_url: str, model: str) -> Call:
     caps = Caps(usd=Decimal(1000), calls=10**6, tokens=10**12)
     job = jobs.launch(name="Bench", contestants=["bench"], scenarios=["bench"], caps=caps)
     row = only_row(job)
-    held = leases.claim(augmentation_pk=row.pk, now=timezone.now(), worker="bench")
+    held = leases.take_lease(augmentation_pk=row.pk, now=timezone.now(), worker="bench")
     assert held is not None
     talk = Conversation(
         client=runner.open_wire(endpoint, held).__enter__(),

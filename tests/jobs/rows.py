@@ -64,8 +64,8 @@ def only_row(job: GenerationJob) -> Augmentation:
     return job.augmentations.get()
 
 
-def claimed(row: Augmentation, now: datetime = NOON) -> leases.Claim:
-    held = leases.claim(augmentation_pk=row.pk, now=now, worker="here")
+def leased(row: Augmentation, now: datetime = NOON) -> leases.Lease:
+    held = leases.take_lease(augmentation_pk=row.pk, now=now, worker="here")
     assert held is not None
     return held
 

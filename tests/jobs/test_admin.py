@@ -18,7 +18,7 @@ from augment.models import (
     ModelCall,
 )
 from augment.services.running import leases
-from tests.jobs.rows import add_model, claimed, done, launch, only_row
+from tests.jobs.rows import add_model, done, launch, leased, only_row
 
 pytestmark = pytest.mark.django_db
 PAST = (Augmentation, Attempt, Event, GenerationJob, ModelCall)
@@ -32,7 +32,7 @@ def office(client: Client) -> Client:
 
 def past_job() -> None:
     row = only_row(launch())
-    held = claimed(row, now=timezone.now())
+    held = leased(row, now=timezone.now())
     ModelCall.objects.create(
         attempt_id=held.attempt_pk,
         number=1,

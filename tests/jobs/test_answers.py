@@ -16,7 +16,7 @@ from augment.services.running import answers, jobs, runner
 from augment.services.running.transcripts import RowTranscript
 from augment.variants.transcript import ModelRole, NoteKind
 from tests.jobs.models import Model, llama_job, reply
-from tests.jobs.rows import claimed, only_row
+from tests.jobs.rows import leased, only_row
 from tests.variants.answers import GOOD
 
 pytestmark = pytest.mark.django_db
@@ -90,7 +90,7 @@ def test_a_refusal_is_an_answer_and_stays_one() -> None:
 def test_an_image_is_kept_once_in_the_media_and_named_in_the_request() -> None:
     row = only_row(llama_job())
     assert row.contestant.endpoint is not None
-    transcript = RowTranscript(claimed(row, now=timezone.now()), row, row.contestant.endpoint)
+    transcript = RowTranscript(leased(row, now=timezone.now()), row, row.contestant.endpoint)
     message = Message(speaker=Speaker.USER, text="Look.", images=(b"a picture",))
     transcript.asked(ModelRole.VIEWER, Request(model="m", messages=(message,)), "p1")
     digest = hashlib.sha256(b"a picture").hexdigest()
@@ -103,7 +103,7 @@ def test_an_image_is_kept_once_in_the_media_and_named_in_the_request() -> None:
 def test_notes_are_kept_in_their_order_between_calls() -> None:
     row = only_row(llama_job())
     assert row.contestant.endpoint is not None
-    held = claimed(row, now=timezone.now())
+    held = leased(row, now=timezone.now())
     transcript = RowTranscript(held, row, row.contestant.endpoint)
     transcript.note(NoteKind.ROUND, {"round": 1})
     message = Message(speaker=Speaker.USER, text="Go.")

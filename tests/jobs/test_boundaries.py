@@ -1,4 +1,4 @@
-"""Caps, claims, places and waits at the very value where they turn, one below and one above."""
+"""Caps, leases, places and waits at the very value where they turn, one below and one above."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from augment.services.endpoints import call_limits
 from augment.services.running import budget, leases
 from augment.services.running.budget import Room
 from tests.jobs.models import llama_job
-from tests.jobs.rows import NOON, STALE, claimed, launch, only_row
+from tests.jobs.rows import NOON, STALE, launch, leased, only_row
 
 pytestmark = pytest.mark.django_db
 
@@ -123,9 +123,9 @@ def test_when_a_claim_without_a_beat_is_taken_back(
     after_the_beat: timedelta, is_taken_back: bool
 ) -> None:
     row = only_row(launch())
-    claimed(row, now=NOON)
+    leased(row, now=NOON)
     now = NOON + after_the_beat
-    assert bool(leases.requeue_stale(now=now, older_than=STALE)) is is_taken_back
+    assert bool(leases.take_back_stale(now=now, older_than=STALE)) is is_taken_back
 
 
 @pytest.mark.parametrize(
@@ -134,7 +134,7 @@ def test_when_a_claim_without_a_beat_is_taken_back(
 def test_when_a_message_counts_as_lost(age: timedelta, is_unsent: bool) -> None:
     row = only_row(launch())
     leases.mark_sent(ids=[row.pk], now=NOON)
-    assert bool(leases.unsent(now=NOON + age, older_than=STALE)) is is_unsent
+    assert bool(leases.find_unsent(now=NOON + age, older_than=STALE)) is is_unsent
 
 
 @pytest.mark.parametrize(
@@ -148,8 +148,8 @@ def test_how_many_workers_may_die_at_one_row(lost: int, state: str) -> None:
     row = only_row(launch())
     for number in range(lost):
         now = NOON + number * 3 * STALE
-        claimed(row, now=now)
-        leases.requeue_stale(now=now + 2 * STALE, older_than=STALE)
+        leased(row, now=now)
+        leases.take_back_stale(now=now + 2 * STALE, older_than=STALE)
     row.refresh_from_db()
     assert row.state == state
 

@@ -8,7 +8,7 @@ from decimal import Decimal
 import pytest
 from django.utils import timezone
 
-from augment.errors import ClaimLost, EndpointBusy, ModelFault, NotSent
+from augment.errors import EndpointBusy, LeaseLost, ModelFault, NotSent
 from augment.llm.costs import Price, WorstCase
 from augment.llm.messages import Reply
 from augment.models import Augmentation, EndpointModel, Event, GenerationJob, ModelCall
@@ -114,10 +114,10 @@ def test_a_claim_that_is_lost_before_a_call_is_sent_costs_nothing(queue_finds_ou
 
     def lose_the_claim() -> None:
         """Another worker takes the row while the call waits for its place."""
-        leases.requeue_stale(now=timezone.now() + 2 * STALE, older_than=STALE)
+        leases.take_back_stale(now=timezone.now() + 2 * STALE, older_than=STALE)
         assert_nothing_is_counted(job)
         if queue_finds_out:
-            raise ClaimLost("attempt 1 has lost its row")
+            raise LeaseLost("attempt 1 has lost its row")
 
     model = Model(waiting=lose_the_claim)
     assert ran(job, model).state == ROW.QUEUED
@@ -155,8 +155,8 @@ def test_a_job_that_has_no_room_for_a_call_asks_nothing_and_is_stopped() -> None
     assert "5 tokens" in attempt.reason
     event = Event.objects.get(verb="stop")
     assert event.after == {"state": "stopped_at_cap", "cap": "5 tokens"}
-    assert leases.claim(augmentation_pk=row.pk, now=NOON) is None
-    assert leases.unsent(now=NOON, older_than=STALE) == []
+    assert leases.take_lease(augmentation_pk=row.pk, now=NOON) is None
+    assert leases.find_unsent(now=NOON, older_than=STALE) == []
 
 
 def test_what_is_over_at_a_cap_that_is_just_reached_finishes() -> None:
@@ -216,10 +216,10 @@ def test_a_call_of_a_dead_worker_counts_with_its_worst_case() -> None:
     job = llama_job(price="1")
     row = only_row(job)
     long_ago = timezone.now() - timedelta(minutes=1)
-    held = leases.claim(augmentation_pk=row.pk, now=long_ago)
+    held = leases.take_lease(augmentation_pk=row.pk, now=long_ago)
     assert held is not None
     in_flight(job, held)
-    leases.requeue_stale(now=timezone.now(), older_than=STALE)
+    leases.take_back_stale(now=timezone.now(), older_than=STALE)
     job.refresh_from_db()
     assert (job.reserved_calls, job.spent_calls) == (0, 1)
     assert (job.spent_tokens, job.spent_nano_usd) == (1000, 1_000_000)
@@ -230,12 +230,12 @@ def test_a_call_of_a_dead_worker_counts_with_its_worst_case() -> None:
 
 def test_a_call_that_waited_when_its_worker_died_counts_nothing() -> None:
     job = llama_job(price="1")
-    held = leases.claim(
+    held = leases.take_lease(
         augmentation_pk=only_row(job).pk, now=timezone.now() - timedelta(minutes=1)
     )
     assert held is not None
     in_flight(job, held, is_sent=False)
-    leases.requeue_stale(now=timezone.now(), older_than=STALE)
+    leases.take_back_stale(now=timezone.now(), older_than=STALE)
     assert_nothing_is_counted(job)
     call = ModelCall.objects.get()
     assert (call.cost_usd, call.spent_tokens, call.is_cost_estimated) == (Decimal(0), 0, False)
@@ -246,10 +246,10 @@ def test_a_call_that_waited_when_its_worker_died_counts_nothing() -> None:
 def test_a_worker_that_was_only_slow_corrects_what_its_call_used() -> None:
     job = llama_job(price="1")
     row = only_row(job)
-    held = leases.claim(augmentation_pk=row.pk, now=timezone.now() - timedelta(minutes=1))
+    held = leases.take_lease(augmentation_pk=row.pk, now=timezone.now() - timedelta(minutes=1))
     assert held is not None
     call = in_flight(job, held)
-    leases.requeue_stale(now=timezone.now(), older_than=STALE)
+    leases.take_back_stale(now=timezone.now(), older_than=STALE)
     used = budget.used_by_reply(reply(), worst=WORST, price=ONE_USD)
     budget.settle(call_pk=call.pk, used=used, now=timezone.now())
     job.refresh_from_db()
@@ -257,7 +257,7 @@ def test_a_worker_that_was_only_slow_corrects_what_its_call_used() -> None:
     assert (job.reserved_calls, job.reserved_tokens) == (0, 0)
 
 
-def in_flight(job: GenerationJob, held: leases.Claim, *, is_sent: bool = True) -> ModelCall:
+def in_flight(job: GenerationJob, held: leases.Lease, *, is_sent: bool = True) -> ModelCall:
     assert budget.reserve(job_pk=job.pk, worst=WORST, price=ONE_USD) == Room.TAKEN
     return ModelCall.objects.create(
         attempt_id=held.attempt_pk,

@@ -12,7 +12,7 @@ from datetime import datetime, timedelta
 import pytest
 from django.db import connection
 
-from augment.errors import ClaimLost, EndpointBusy
+from augment.errors import EndpointBusy, LeaseLost
 from augment.models import CallLease, Endpoint
 from augment.services.endpoints.call_limits import LEASE, MINUTE, Queue, admit, clear_old, place_at
 from tests.jobs.rows import NOON
@@ -142,11 +142,11 @@ def test_who_waits_asks_whether_the_call_is_still_wanted() -> None:
     def wanted() -> None:
         asked.append(1)
         if len(asked) == 3:
-            raise ClaimLost("the row is somebody else's")
+            raise LeaseLost("the row is somebody else's")
 
     with place_at(endpoint, Queue(longest_s=0.0)):
         waiting = Queue(longest_s=300.0, still_wanted=wanted, sleep=lambda _: None)
-        with pytest.raises(ClaimLost), place_at(endpoint, waiting):
+        with pytest.raises(LeaseLost), place_at(endpoint, waiting):
             pass
 
 

@@ -85,7 +85,7 @@ def test_a_row_asks_nothing_more_after_its_job_was_cancelled() -> None:
 def test_a_call_that_waits_when_its_job_is_cancelled_is_not_sent() -> None:
     job = llama_job()
     row = only_row(job)
-    held = leases.claim(augmentation_pk=row.pk)
+    held = leases.take_lease(augmentation_pk=row.pk)
     assert held is not None
     endpoint = Endpoint.objects.get()
     Endpoint.objects.update(max_concurrency=1)

@@ -66,7 +66,7 @@ class Watcher:
 def run_all(job: GenerationJob, model: Model, watcher: Watcher) -> None:
     """Eight workers, each with what a queue hands it, until nothing is left to hand out."""
     waiting: queue.SimpleQueue[int] = queue.SimpleQueue()
-    for pk in leases.unsent(now=NOON, older_than=STALE, job_pk=job.pk):
+    for pk in leases.find_unsent(now=NOON, older_than=STALE, job_pk=job.pk):
         waiting.put(pk)
 
     def work(number: int) -> None:
@@ -98,7 +98,7 @@ def test_eight_workers_stay_below_the_cap_and_resume_pays_for_nothing_twice(kind
     assert len(model.requests) == pytest.approx(CALLS / 2, abs=CALLS / 4)
     assert jobs.progress(job).failed == 0
     assert jobs.progress(job).queued > 0
-    assert leases.unsent(now=NOON, older_than=STALE) == []
+    assert leases.find_unsent(now=NOON, older_than=STALE) == []
     asked_before = len(model.requests)
     check_the_books(job)
 

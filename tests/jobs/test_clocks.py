@@ -49,9 +49,9 @@ def memory_broker() -> Iterator[None]:
     current_app.conf.broker_url = before
 
 
-def taken() -> tuple[Augmentation, leases.Claim]:
+def taken() -> tuple[Augmentation, leases.Lease]:
     row = only_row(launch())
-    held = leases.claim(augmentation_pk=row.pk, worker="here")
+    held = leases.take_lease(augmentation_pk=row.pk, worker="here")
     assert held is not None
     return row, held
 
@@ -76,7 +76,7 @@ def test_40_s_of_skew_take_no_living_claim_back(skew: Skew, seconds: float, work
     if worker == "holder":
         skew(seconds)
     row, held = taken()
-    assert leases.beat(held=held)
+    assert leases.renew(held=held)
     skew(seconds if worker == "other" else 0.0)
     tasks.recover()
     assert leases.is_held(held=held)
@@ -92,7 +92,7 @@ def test_a_dead_claim_is_taken_back_whatever_the_clock_of_who_looks(
     row, _ = taken()
     silent_for(row, silent_s)
     skew(seconds)
-    leases.requeue_stale(older_than=STALE)
+    leases.take_back_stale(older_than=STALE)
     row.refresh_from_db()
     assert row.state == state
 

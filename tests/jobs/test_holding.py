@@ -10,7 +10,7 @@ from django.utils import timezone
 
 from augment.services.running import leases
 from augment.services.running.holding import heartbeat
-from tests.jobs.rows import STALE, claimed, launch, only_row
+from tests.jobs.rows import STALE, launch, leased, only_row
 from tests.processes import wait_until
 
 pytestmark = pytest.mark.django_db(transaction=True)
@@ -19,7 +19,7 @@ pytestmark = pytest.mark.django_db(transaction=True)
 def test_the_heart_beats_while_the_work_goes_on() -> None:
     row = only_row(launch())
     before = timezone.now() - timedelta(minutes=1)
-    held = claimed(row, now=before)
+    held = leased(row, now=before)
 
     def has_beaten() -> bool:
         row.refresh_from_db()
@@ -27,13 +27,13 @@ def test_the_heart_beats_while_the_work_goes_on() -> None:
 
     with heartbeat(held, every_s=0.05):
         wait_until(has_beaten, what="the heart has beaten")
-        assert leases.requeue_stale(now=timezone.now(), older_than=STALE) == []
+        assert leases.take_back_stale(now=timezone.now(), older_than=STALE) == []
 
 
 def test_the_heart_stops_with_the_claim(caplog: pytest.LogCaptureFixture) -> None:
     row = only_row(launch())
-    held = claimed(row, now=timezone.now() - timedelta(minutes=1))
-    leases.requeue_stale(now=timezone.now(), older_than=STALE)
+    held = leased(row, now=timezone.now() - timedelta(minutes=1))
+    leases.take_back_stale(now=timezone.now(), older_than=STALE)
     with heartbeat(held, every_s=0.01):
         wait_until(lambda: "somebody else's now" in caplog.text, what="it is given up")
 
@@ -45,7 +45,7 @@ def test_of_eight_workers_that_reach_for_one_row_one_gets_it() -> None:
     def reach() -> bool:
         start.wait()
         try:
-            return leases.claim(augmentation_pk=row.pk, now=timezone.now()) is not None
+            return leases.take_lease(augmentation_pk=row.pk, now=timezone.now()) is not None
         finally:
             connection.close()
 

@@ -7,7 +7,7 @@ from pytest_django import DjangoAssertNumQueries
 from augment.errors import Conflict, InvalidDocument, UnknownName
 from augment.models import Augmentation, Contestant, Event, GenerationJob
 from augment.services.running import jobs, leases
-from tests.jobs.rows import NOON, add_kind, add_scenario, claimed, done, failed, launch
+from tests.jobs.rows import NOON, add_kind, add_scenario, done, failed, launch, leased
 
 pytestmark = pytest.mark.django_db
 State = Augmentation.State
@@ -94,9 +94,9 @@ def test_progress_counts_states_by_one_query(
 ) -> None:
     job = launch(scenarios=4)
     first, second, third, _ = job.augmentations.order_by("pk")
-    leases.settle(held=claimed(first), settlement=done(), now=NOON)
-    leases.settle(held=claimed(second), settlement=failed(), now=NOON)
-    claimed(third)
+    leases.settle(held=leased(first), settlement=done(), now=NOON)
+    leases.settle(held=leased(second), settlement=failed(), now=NOON)
+    leased(third)
     with django_assert_num_queries(1):
         counts = jobs.progress(job)
     assert (counts.total, counts.queued, counts.running) == (4, 1, 1)
@@ -107,9 +107,9 @@ def test_progress_counts_states_by_one_query(
 def test_a_job_is_finished_when_nothing_is_under_way() -> None:
     job = launch(scenarios=2)
     first, second = job.augmentations.order_by("pk")
-    leases.settle(held=claimed(first), settlement=done(), now=NOON)
+    leases.settle(held=leased(first), settlement=done(), now=NOON)
     assert jobs.finish_if_over(job_pk=job.pk, now=NOON) == 0
-    held = claimed(second)
+    held = leased(second)
     assert jobs.finish_if_over(job_pk=job.pk, now=NOON) == 0
     leases.settle(held=held, settlement=failed(), now=NOON)
     assert jobs.finish_if_over(job_pk=job.pk, now=NOON) == 1
@@ -121,13 +121,13 @@ def test_a_job_is_finished_when_nothing_is_under_way() -> None:
 def test_cancel_stops_what_waits_and_keeps_what_is_done_or_runs() -> None:
     job = launch(scenarios=3)
     first, second, third = job.augmentations.order_by("pk")
-    leases.settle(held=claimed(first), settlement=done(), now=NOON)
-    held = claimed(second)
+    leases.settle(held=leased(first), settlement=done(), now=NOON)
+    held = leased(second)
     jobs.cancel(job)
     assert job.state == GenerationJob.State.CANCELLED
     third.refresh_from_db()
     assert third.state == State.CANCELLED
-    assert leases.claim(augmentation_pk=third.pk, now=NOON) is None
+    assert leases.take_lease(augmentation_pk=third.pk, now=NOON) is None
     assert leases.settle(held=held, settlement=done(), now=NOON)
     assert jobs.finish_if_over(job_pk=job.pk, now=NOON) == 0
     counts = jobs.progress(job)
@@ -146,8 +146,8 @@ def test_a_job_is_cancelled_once() -> None:
 def test_retry_queues_failed_rows_alone_and_opens_the_job_again() -> None:
     job = launch(scenarios=2)
     first, second = job.augmentations.order_by("pk")
-    leases.settle(held=claimed(first), settlement=failed(), now=NOON)
-    leases.settle(held=claimed(second), settlement=done(), now=NOON)
+    leases.settle(held=leased(first), settlement=failed(), now=NOON)
+    leases.settle(held=leased(second), settlement=done(), now=NOON)
     jobs.finish_if_over(now=NOON)
     jobs.retry_failed(job)
     assert (job.state, job.finished_at) == (GenerationJob.State.RUNNING, None)
@@ -155,13 +155,13 @@ def test_retry_queues_failed_rows_alone_and_opens_the_job_again() -> None:
     second.refresh_from_db()
     assert (first.state, first.reason, first.sent_at) == (State.QUEUED, "", None)
     assert second.state == State.DONE
-    assert claimed(first).attempt_number == 2
+    assert leased(first).attempt_number == 2
 
 
 def test_there_is_nothing_to_retry_where_nothing_failed() -> None:
     job = launch()
     row = job.augmentations.get()
-    leases.settle(held=claimed(row), settlement=done(), now=NOON)
+    leases.settle(held=leased(row), settlement=done(), now=NOON)
     jobs.finish_if_over(now=NOON)
     with pytest.raises(Conflict, match="Nothing in job 'Round 1' failed"):
         jobs.retry_failed(job)

@@ -7,7 +7,7 @@ from django.db import IntegrityError, transaction
 
 from augment.models import Attempt, Augmentation
 from augment.services.running import jobs, leases
-from tests.jobs.rows import NOON, STALE, claimed, done, failed, launch, only_row
+from tests.jobs.rows import NOON, STALE, done, failed, launch, leased, only_row
 
 pytestmark = pytest.mark.django_db
 State = Augmentation.State
@@ -16,8 +16,8 @@ LATER = NOON + timedelta(seconds=30)
 
 def test_a_waiting_row_can_be_claimed_once() -> None:
     row = only_row(launch())
-    first = leases.claim(augmentation_pk=row.pk, now=NOON, worker="w1")
-    second = leases.claim(augmentation_pk=row.pk, now=NOON, worker="w2")
+    first = leases.take_lease(augmentation_pk=row.pk, now=NOON, worker="w1")
+    second = leases.take_lease(augmentation_pk=row.pk, now=NOON, worker="w2")
     assert first is not None
     assert second is None
     row.refresh_from_db()
@@ -30,17 +30,17 @@ def test_a_waiting_row_can_be_claimed_once() -> None:
 def test_a_row_with_an_outcome_can_not_be_claimed(state: str) -> None:
     row = only_row(launch())
     Augmentation.objects.update(state=state, modification={}, image="bev/x.png")
-    assert leases.claim(augmentation_pk=row.pk, now=NOON) is None
+    assert leases.take_lease(augmentation_pk=row.pk, now=NOON) is None
     assert not Attempt.objects.exists()
 
 
 def test_a_row_that_is_gone_can_not_be_claimed() -> None:
-    assert leases.claim(augmentation_pk=12345, now=NOON) is None
+    assert leases.take_lease(augmentation_pk=12345, now=NOON) is None
 
 
 def test_an_outcome_is_written_with_its_attempt() -> None:
     row = only_row(launch())
-    held = claimed(row)
+    held = leased(row)
     assert leases.settle(held=held, settlement=done(), now=LATER)
     row.refresh_from_db()
     assert (row.state, row.image, row.finished_at) == (State.DONE, "bev/x.png", LATER)
@@ -51,7 +51,7 @@ def test_an_outcome_is_written_with_its_attempt() -> None:
 
 def test_an_outcome_is_written_once() -> None:
     row = only_row(launch())
-    held = claimed(row)
+    held = leased(row)
     assert leases.settle(held=held, settlement=done(), now=NOON)
     assert not leases.settle(held=held, settlement=failed(), now=LATER)
     row.refresh_from_db()
@@ -60,9 +60,9 @@ def test_an_outcome_is_written_once() -> None:
 
 def test_a_heartbeat_keeps_the_claim() -> None:
     row = only_row(launch())
-    held = claimed(row)
-    assert leases.beat(held=held, now=NOON + timedelta(seconds=15))
-    assert leases.requeue_stale(now=LATER, older_than=STALE) == []
+    held = leased(row)
+    assert leases.renew(held=held, now=NOON + timedelta(seconds=15))
+    assert leases.take_back_stale(now=LATER, older_than=STALE) == []
     row.refresh_from_db()
     assert row.state == State.RUNNING
 
@@ -70,8 +70,8 @@ def test_a_heartbeat_keeps_the_claim() -> None:
 def test_a_claim_without_heartbeat_is_taken_back_and_its_attempt_is_lost() -> None:
     row = only_row(launch())
     leases.mark_sent(ids=[row.pk], now=NOON)
-    claimed(row)
-    assert leases.requeue_stale(now=LATER, older_than=STALE) == [row.pk]
+    leased(row)
+    assert leases.take_back_stale(now=LATER, older_than=STALE) == [row.pk]
     row.refresh_from_db()
     assert (row.state, row.claim, row.sent_at) == (State.QUEUED, None, None)
     attempt = row.attempts.get()
@@ -80,9 +80,9 @@ def test_a_claim_without_heartbeat_is_taken_back_and_its_attempt_is_lost() -> No
 
 def test_a_row_that_was_taken_back_gets_a_second_attempt() -> None:
     row = only_row(launch())
-    claimed(row)
-    leases.requeue_stale(now=LATER, older_than=STALE)
-    again = claimed(row, now=LATER)
+    leased(row)
+    leases.take_back_stale(now=LATER, older_than=STALE)
+    again = leased(row, now=LATER)
     assert again.attempt_number == 2
     leases.settle(held=again, settlement=done(), now=LATER)
     assert list(row.attempts.values_list("number", "outcome")) == [(1, "lost"), (2, "done")]
@@ -90,10 +90,10 @@ def test_a_row_that_was_taken_back_gets_a_second_attempt() -> None:
 
 def test_a_worker_that_lost_its_claim_writes_nothing(caplog: pytest.LogCaptureFixture) -> None:
     row = only_row(launch())
-    slow = claimed(row)
-    leases.requeue_stale(now=LATER, older_than=STALE)
-    current = claimed(row, now=LATER)
-    assert not leases.beat(held=slow, now=LATER)
+    slow = leased(row)
+    leases.take_back_stale(now=LATER, older_than=STALE)
+    current = leased(row, now=LATER)
+    assert not leases.renew(held=slow, now=LATER)
     assert not leases.is_held(held=slow)
     assert not leases.keep_modification(held=slow, modification={}, notes="")
     assert not leases.settle(held=slow, settlement=failed(), now=LATER)
@@ -106,26 +106,26 @@ def test_a_worker_that_lost_its_claim_writes_nothing(caplog: pytest.LogCaptureFi
 
 def test_a_stale_row_of_a_cancelled_job_is_cancelled() -> None:
     job = launch()
-    claimed(only_row(job))
+    leased(only_row(job))
     jobs.cancel(job)
-    assert leases.requeue_stale(now=LATER, older_than=STALE) == []
+    assert leases.take_back_stale(now=LATER, older_than=STALE) == []
     assert only_row(job).state == State.CANCELLED
 
 
 def test_a_row_that_is_given_back_to_a_cancelled_job_is_cancelled() -> None:
     job = launch()
     row = only_row(job)
-    held = claimed(row)
+    held = leased(row)
     jobs.cancel(job)
     leases.release(held=held, now=LATER)
-    assert leases.claim(augmentation_pk=row.pk, now=LATER) is None
-    assert leases.requeue_stale(now=LATER, older_than=STALE) == []
+    assert leases.take_lease(augmentation_pk=row.pk, now=LATER) is None
+    assert leases.take_back_stale(now=LATER, older_than=STALE) == []
     assert only_row(job).state == State.CANCELLED
 
 
 def test_texts_that_a_database_can_not_take_are_kept_all_the_same() -> None:
     row = only_row(launch())
-    held = claimed(row)
+    held = leased(row)
     leases.keep_modification(held=held, modification={"id": "a\0"}, notes="b\ud800")
     leases.settle(held=held, settlement=failed("c\0"), now=LATER)
     row.refresh_from_db()
@@ -137,8 +137,8 @@ def test_a_row_that_kills_its_workers_fails_in_the_end() -> None:
     row = only_row(launch())
     for number in range(1, leases.LOST_LIMIT + 1):
         now = NOON + number * timedelta(minutes=1)
-        assert claimed(row, now=now).attempt_number == number
-        leases.requeue_stale(now=now + timedelta(seconds=30), older_than=STALE)
+        assert leased(row, now=now).attempt_number == number
+        leases.take_back_stale(now=now + timedelta(seconds=30), older_than=STALE)
     row.refresh_from_db()
     assert row.state == State.FAILED
     assert "Lost 5 workers" in row.reason
@@ -149,18 +149,18 @@ def test_workers_lost_before_an_outcome_are_forgiven() -> None:
     row = only_row(job)
     for number in range(leases.LOST_LIMIT - 1):
         now = NOON + number * timedelta(minutes=1)
-        claimed(row, now=now)
-        leases.requeue_stale(now=now + timedelta(seconds=30), older_than=STALE)
+        leased(row, now=now)
+        leases.take_back_stale(now=now + timedelta(seconds=30), older_than=STALE)
     late = NOON + timedelta(hours=1)
-    leases.settle(held=claimed(row, now=late), settlement=failed(), now=late)
+    leases.settle(held=leased(row, now=late), settlement=failed(), now=late)
     jobs.retry_failed(job)
-    claimed(row, now=late)
-    assert leases.requeue_stale(now=late + timedelta(minutes=1), older_than=STALE) == [row.pk]
+    leased(row, now=late)
+    assert leases.take_back_stale(now=late + timedelta(minutes=1), older_than=STALE) == [row.pk]
 
 
 def test_a_released_row_waits_again() -> None:
     row = only_row(launch())
-    held = claimed(row)
+    held = leased(row)
     assert leases.release(held=held, now=LATER)
     row.refresh_from_db()
     assert (row.state, row.claim) == (State.QUEUED, None)
@@ -172,8 +172,8 @@ def test_rows_without_a_message_or_with_an_old_one_are_unsent() -> None:
     never, old, fresh, running = job.augmentations.order_by("pk")
     leases.mark_sent(ids=[old.pk], now=NOON - timedelta(minutes=11))
     leases.mark_sent(ids=[fresh.pk], now=NOON - timedelta(minutes=1))
-    claimed(running)
-    assert leases.unsent(now=NOON, older_than=timedelta(minutes=10)) == [never.pk, old.pk]
+    leased(running)
+    assert leases.find_unsent(now=NOON, older_than=timedelta(minutes=10)) == [never.pk, old.pk]
 
 
 def test_the_database_refuses_a_running_row_without_a_claim() -> None:
@@ -184,7 +184,7 @@ def test_the_database_refuses_a_running_row_without_a_claim() -> None:
 
 def test_the_database_refuses_a_claim_on_a_row_that_does_not_run() -> None:
     row = only_row(launch())
-    held = claimed(row)
+    held = leased(row)
     with pytest.raises(IntegrityError), transaction.atomic():
         Augmentation.objects.filter(claim=held.token).update(state=State.FAILED)
 
@@ -197,7 +197,7 @@ def test_the_database_refuses_a_done_row_without_a_picture() -> None:
 
 def test_the_database_refuses_two_attempts_of_one_number() -> None:
     row = only_row(launch())
-    claimed(row)
+    leased(row)
     with pytest.raises(IntegrityError), transaction.atomic():
         Attempt.objects.create(augmentation=row, number=1, started_at=NOON)
 

@@ -7,7 +7,7 @@ import pytest
 from django.core.files.storage import default_storage
 from django.utils import timezone
 
-from augment.errors import ClaimLost, ModelFault
+from augment.errors import LeaseLost, ModelFault
 from augment.llm.client import Sending, unwatched
 from augment.llm.messages import Reply, Request
 from augment.models import Augmentation, Endpoint, GenerationJob, ModelCall
@@ -159,11 +159,11 @@ def test_a_failed_row_is_tried_again_on_request() -> None:
 def test_an_attempt_that_was_lost_before_drawing_is_only_drawn_again() -> None:
     row = model_job()
     now = timezone.now()
-    held = leases.claim(augmentation_pk=row.pk, now=now - timedelta(minutes=1))
+    held = leases.take_lease(augmentation_pk=row.pk, now=now - timedelta(minutes=1))
     assert held is not None
     document = modification_to_document(TWO_CONES)
     leases.keep_modification(held=held, modification=document, notes="said before")
-    leases.requeue_stale(now=now, older_than=STALE)
+    leases.take_back_stale(now=now, older_than=STALE)
     wire = Wire()
     row = ran(row, wire)
     assert (row.state, row.notes, row.modification) == (State.DONE, "said before", document)
@@ -172,19 +172,19 @@ def test_an_attempt_that_was_lost_before_drawing_is_only_drawn_again() -> None:
 
 def test_a_worker_whose_claim_was_taken_asks_no_model_and_writes_nothing() -> None:
     row = model_job()
-    held = leases.claim(augmentation_pk=row.pk, now=timezone.now() - timedelta(minutes=1))
+    held = leases.take_lease(augmentation_pk=row.pk, now=timezone.now() - timedelta(minutes=1))
     assert held is not None
-    leases.requeue_stale(now=timezone.now(), older_than=STALE)
-    with pytest.raises(ClaimLost):
+    leases.take_back_stale(now=timezone.now(), older_than=STALE)
+    with pytest.raises(LeaseLost):
         runner.run(row, held=held, connect=Wire(GOOD))
     assert not ModelCall.objects.exists()
 
 
 def test_a_claim_that_is_lost_while_drawing_ends_quietly() -> None:
     row = only_row(launch())
-    held = leases.claim(augmentation_pk=row.pk, now=timezone.now() - timedelta(minutes=1))
+    held = leases.take_lease(augmentation_pk=row.pk, now=timezone.now() - timedelta(minutes=1))
     assert held is not None
-    leases.requeue_stale(now=timezone.now(), older_than=STALE)
+    leases.take_back_stale(now=timezone.now(), older_than=STALE)
     with OutcomeOnCrash(held):
         runner.run(row, held=held)
     row.refresh_from_db()

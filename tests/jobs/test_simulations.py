@@ -1,4 +1,4 @@
-"""Drives as rows: planned once, claimed once, kept with scores, told apart from failures."""
+"""Drives as rows: planned once, leased once, kept with scores, told apart from failures."""
 
 from __future__ import annotations
 
@@ -51,7 +51,7 @@ class Broken(Straight):
 def finished_job(scenarios: int = 1) -> GenerationJob:
     job = rows.launch(scenarios=scenarios)
     for row in job.augmentations.all():
-        leases.settle(held=rows.claimed(row), settlement=rows.done(), now=rows.NOON)
+        leases.settle(held=rows.leased(row), settlement=rows.done(), now=rows.NOON)
     return job
 
 
@@ -152,7 +152,7 @@ def test_contestants_are_ranked_by_how_much_they_lower_the_score() -> None:
                 },
                 image="bev/y.png",
             )  # fmt: skip
-        leases.settle(held=rows.claimed(row), settlement=settlement, now=rows.NOON)
+        leases.settle(held=rows.leased(row), settlement=settlement, now=rows.NOON)
     table = driving_scores.scores_of_job(driven(job), options=STRAIGHT, score="nuplan")
     shown = [
         (line.name, *(round(value, 1) for value in (line.mean, line.before, line.lowered)))

@@ -16,7 +16,7 @@ from augment.models import Augmentation, GenerationJob
 from augment.services.running import jobs, leases, runner
 from augment.services.running.caps import Caps
 from tests.jobs.models import Model, add_llama, llama_job
-from tests.jobs.rows import add_kind, add_scenario, claimed, done, failed, launch, only_row
+from tests.jobs.rows import add_kind, add_scenario, done, failed, launch, leased, only_row
 
 pytestmark = pytest.mark.django_db
 State = Augmentation.State
@@ -93,7 +93,7 @@ def test_the_task_runs_its_row() -> None:
 
 def test_the_task_leaves_a_row_alone_that_somebody_else_has() -> None:
     row = only_row(launch())
-    held = claimed(row, now=timezone.now())
+    held = leased(row, now=timezone.now())
     tasks.run_augmentation.run(row.pk)
     assert leases.is_held(held=held)
 
@@ -108,7 +108,7 @@ def test_recover_takes_back_and_sends_what_a_dead_worker_held(broker: Broker) ->
     row = only_row(launch())
     now = timezone.now()
     leases.mark_sent(ids=[row.pk], now=now - timedelta(minutes=1))
-    claimed(row, now=now - timedelta(minutes=1))
+    leased(row, now=now - timedelta(minutes=1))
     tasks.recover(now=now)
     row.refresh_from_db()
     assert row.state == State.QUEUED
@@ -145,7 +145,7 @@ def test_a_worker_that_starts_sends_all_that_waits(broker: Broker) -> None:
 def test_recover_finishes_a_job_whose_last_worker_died_before_it_could(broker: Broker) -> None:
     job = launch()
     leases.settle(
-        held=claimed(only_row(job)), settlement=done(), now=timezone.now() + timedelta(minutes=1)
+        held=leased(only_row(job)), settlement=done(), now=timezone.now() + timedelta(minutes=1)
     )
     tasks.recover(now=timezone.now())
     job.refresh_from_db()
@@ -199,7 +199,7 @@ def test_the_report_groups_failures_by_reason_and_fails() -> None:
     job = launch(scenarios=2, contestants=("reference", "rule-placer"))
     outcomes = [done(), failed("HTTP 500"), failed("HTTP 500"), failed("no key")]
     for row, outcome in zip(job.augmentations.order_by("pk"), outcomes, strict=True):
-        leases.settle(held=claimed(row), settlement=outcome, now=timezone.now())
+        leases.settle(held=leased(row), settlement=outcome, now=timezone.now())
     said = StringIO()
     with pytest.raises(CommandError, match="3 failed") as caught:
         Command(stdout=said).report(job)
@@ -215,7 +215,7 @@ def test_the_report_groups_failures_by_reason_and_fails() -> None:
 
 def test_waiting_ends_with_the_job() -> None:
     job = launch()
-    leases.settle(held=claimed(only_row(job)), settlement=done(), now=timezone.now())
+    leases.settle(held=leased(only_row(job)), settlement=done(), now=timezone.now())
     said = StringIO()
     Command(stdout=said).wait(job, timeout_s=1.0)
     assert said.getvalue() == "1 of 1, 0 running\nOver.\n"

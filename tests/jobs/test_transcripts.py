@@ -27,7 +27,7 @@ from augment.services.running.transcripts import RowTranscript
 from augment.services.texts import LONGEST_REASON
 from augment.variants.transcript import ModelRole, NoteKind
 from tests.jobs.models import Model, after_a_second_look, llama_job, reply
-from tests.jobs.rows import INSTRUCTION, claimed, only_row
+from tests.jobs.rows import INSTRUCTION, leased, only_row
 from tests.llm.raw_server import speaking, whole
 from tests.llm.recorder import GOOD as HEARD
 from tests.variants.answers import GOOD
@@ -44,7 +44,7 @@ def ran(row: Augmentation, model: Model) -> Augmentation:
 
 def looking(row: Augmentation) -> RowTranscript:
     assert row.contestant.endpoint is not None
-    return RowTranscript(claimed(row, now=timezone.now()), row, row.contestant.endpoint)
+    return RowTranscript(leased(row, now=timezone.now()), row, row.contestant.endpoint)
 
 
 def test_the_document_holds_the_whole_record() -> None:

@@ -77,7 +77,7 @@ def test_a_job_that_could_not_end_is_refused_in_words() -> None:
 def test_the_page_groups_failures_by_their_reason_and_retries_them() -> None:
     job = rows.launch(scenarios=3)
     for row in job.augmentations.all():
-        leases.settle(held=rows.claimed(row), settlement=rows.failed(), now=rows.NOON)
+        leases.settle(held=rows.leased(row), settlement=rows.failed(), now=rows.NOON)
     admin, url = signed_in(people()["admin"]), reverse("job", args=[job.code])
     shown = admin.get(url).content.decode()
     assert shown.count("The wire broke") == 1
@@ -89,7 +89,7 @@ def test_the_page_groups_failures_by_their_reason_and_retries_them() -> None:
 def test_cancelling_keeps_what_is_done_and_says_so_twice() -> None:
     job = rows.launch(scenarios=2)
     first = job.augmentations.all()[0]
-    leases.settle(held=rows.claimed(first), settlement=rows.done(), now=rows.NOON)
+    leases.settle(held=rows.leased(first), settlement=rows.done(), now=rows.NOON)
     admin, url = signed_in(people()["admin"]), reverse("job-cancel", args=[job.code])
     admin.post(url, {"sure": "1"})
     states = sorted(job.augmentations.values_list("state", flat=True))
@@ -107,7 +107,7 @@ def test_progress_is_counted_and_not_sent_again_while_nothing_changes() -> None:
     same = admin.get(url, headers={"If-None-Match": first.headers["ETag"]})
     assert (same.status_code, same.content) == (304, b"")
     row = job.augmentations.all()[0]
-    leases.settle(held=rows.claimed(row), settlement=rows.done(), now=rows.NOON)
+    leases.settle(held=rows.leased(row), settlement=rows.done(), now=rows.NOON)
     changed = admin.get(url, headers={"If-None-Match": first.headers["ETag"]})
     assert changed.json()["settled"] == 1
 
@@ -115,7 +115,7 @@ def test_progress_is_counted_and_not_sent_again_while_nothing_changes() -> None:
 def test_an_augmentations_page_shows_its_numbers_and_escapes_what_came_from_outside() -> None:
     job = rows.launch()
     row = rows.only_row(job)
-    leases.settle(held=rows.claimed(row), settlement=rows.done(), now=rows.NOON)
+    leases.settle(held=rows.leased(row), settlement=rows.done(), now=rows.NOON)
     Augmentation.objects.filter(pk=row.pk).update(notes="<script>alert(1)</script>")
     shown = signed_in(people()["analyst"]).get(reverse("augmentation", args=[row.code]))
     page = shown.content.decode()
@@ -185,6 +185,6 @@ def test_a_page_says_since_when_and_why_lost_work_is_not_brought_back(
 
 def test_where_nothing_waits_nobody_is_missed(staff: dict[str, Client]) -> None:
     job = rows.launch()
-    leases.settle(held=rows.claimed(rows.only_row(job)), settlement=rows.done(), now=rows.NOON)
+    leases.settle(held=rows.leased(rows.only_row(job)), settlement=rows.done(), now=rows.NOON)
     jobs.finish_if_over()
     assert all('id="workforce"' not in page(staff, name, job) for name in ("job", "jobs"))

@@ -32,7 +32,7 @@ def _media(settings: LazySettings, tmp_path: Path) -> None:
 def row() -> Augmentation:
     """Two cones where a parked car is asked for."""
     found = rows.only_row(rows.launch())
-    leases.settle(held=rows.claimed(found), settlement=rows.done(), now=rows.NOON)
+    leases.settle(held=rows.leased(found), settlement=rows.done(), now=rows.NOON)
     found.scenario.instruction = FAR
     found.scenario.save(update_fields=["instruction"])
     return Augmentation.objects.select_related("contestant", "scenario__base_scene").get()

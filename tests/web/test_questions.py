@@ -107,8 +107,8 @@ def test_handing_over_asks_who_will_take_how_many() -> None:
 def test_cancelling_a_job_asks_and_says_what_is_lost_and_what_stays() -> None:
     job = rows.launch(scenarios=4)
     first, second, *_ = job.augmentations.all()
-    leases.settle(held=rows.claimed(first), settlement=rows.done(), now=rows.NOON)
-    rows.claimed(second)
+    leases.settle(held=rows.leased(first), settlement=rows.done(), now=rows.NOON)
+    rows.leased(second)
     admin, page = admin_of(), reverse("job-cancel", args=[job.code])
     assert page in admin.get(reverse("job", args=[job.code])).content.decode()
     for asked in (admin.get(page), admin.post(page)):

@@ -180,7 +180,7 @@ def test_nothing_that_is_stored_is_german() -> None:
         )
         caps.raise_cap(capped, caps=Caps(calls=50))
         leases.settle(
-            held=rows.claimed(rows.only_row(job)), settlement=rows.failed(), now=rows.NOON
+            held=rows.leased(rows.only_row(job)), settlement=rows.failed(), now=rows.NOON
         )
         invite(study=study, expert=study.experts.get(username="eva"))
         hand_over(study=study, username="eva", to=["finn"])

@@ -14,7 +14,7 @@ from augment.services.running import jobs, runner
 from augment.services.running.transcripts import RowTranscript
 from augment.variants.transcript import ModelRole, NoteKind
 from tests.jobs.models import Model, llama_job, reply
-from tests.jobs.rows import claimed, only_row
+from tests.jobs.rows import leased, only_row
 from tests.web.cast import people, png, signed_in
 
 pytestmark = pytest.mark.django_db
@@ -66,7 +66,7 @@ def test_what_a_model_says_is_never_markup() -> None:
 def test_rounds_reviews_and_pictures_are_on_the_page() -> None:
     row = only_row(llama_job())
     assert row.contestant.endpoint is not None
-    transcript = RowTranscript(claimed(row, now=timezone.now()), row, row.contestant.endpoint)
+    transcript = RowTranscript(leased(row, now=timezone.now()), row, row.contestant.endpoint)
     transcript.note(NoteKind.ROUND, {"round": 7, "changes": "Added:\n{}"})
     message = Message(speaker=Speaker.USER, text=EVIL, images=(png(),))
     transcript.asked(ModelRole.VIEWER, Request(model="m", messages=(message,)), "p1")

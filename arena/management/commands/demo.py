@@ -12,8 +12,8 @@ from django.core.management import call_command
 from django.core.management.base import CommandError, CommandParser
 
 from arena.errors import ArenaError
+from arena.management import demo
 from arena.management.commands.serve import INTERRUPTED
-from arena.serving import demo
 from arena.serving.hold import held_alone
 from arena.serving.ledger import Ledger
 from arena.serving.stack import Web, background, web_server
@@ -73,7 +73,7 @@ class Command(TerminalCommand):
             finally:
                 supervisor.stop()
 
-    def _show(self, board: demo.Leaderboard, web: Web, took_s: float, *, serve: bool) -> None:
+    def _show(self, board: demo.DemoTable, web: Web, took_s: float, *, serve: bool) -> None:
         lines = [
             "",
             board.text,

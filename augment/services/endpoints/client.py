@@ -59,7 +59,7 @@ class EndpointClient:
             ModelFault: A parameter is not taken any more that earlier answers were made with.
             EndpointBusy: There was no place.
             ModelFault: There was no answer.
-            ClaimLost: Nobody needs the answer any more; nothing was sent.
+            LeaseLost: Nobody needs the answer any more; nothing was sent.
         """
         try:
             with place_at(self._endpoint, self._queue):

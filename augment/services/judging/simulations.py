@@ -16,7 +16,7 @@ from django.db import transaction
 from django.db.models import Q, QuerySet
 from django.utils import timezone
 
-from augment.errors import AugmentError, ClaimLost, Conflict
+from augment.errors import AugmentError, Conflict, LeaseLost
 from augment.models import Augmentation, GenerationJob, Scenario, Simulation
 from augment.scene.catalogue import ScenarioType
 from augment.scene.codec import modification_from_document
@@ -116,7 +116,7 @@ def drive(*, simulation_pk: int) -> bool:
     row = rows.get(pk=simulation_pk)
     try:
         outcome = _driven(row, _Beating(simulation_pk, claim))
-    except ClaimLost:
+    except LeaseLost:
         return True
     except AugmentError as error:
         outcome = {"state": State.FAILED, "reason": str(error)}
@@ -167,7 +167,7 @@ class _Beating:
             return
         self._last = time.monotonic()
         if not self._rows.update(heartbeat_at=DATABASE_TIME):
-            raise ClaimLost
+            raise LeaseLost
 
 
 def _of_scenario(scenario: Scenario, options: Options) -> list[Simulation]:

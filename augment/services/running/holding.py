@@ -9,7 +9,7 @@ from types import TracebackType
 
 from django.db import Error, connection
 
-from augment.errors import BudgetSpent, ClaimLost, JobCancelled, WorkerStopping
+from augment.errors import BudgetSpent, JobCancelled, LeaseLost, WorkerStopping
 from augment.models import Augmentation
 from augment.services.repeating import repeating
 from augment.services.running import leases
@@ -18,8 +18,8 @@ logger = logging.getLogger(__name__)
 
 
 @contextmanager
-def heartbeat(held: leases.Claim, *, every_s: float) -> Iterator[None]:
-    """Beat for the claim until the block is left, or until the claim is lost."""
+def heartbeat(held: leases.Lease, *, every_s: float) -> Iterator[None]:
+    """Beat for the lease until the block is left, or until the lease is lost."""
     with repeating(lambda: _beat(held), every_s=every_s, name="heartbeat"):
         yield
 
@@ -30,10 +30,10 @@ class OutcomeOnCrash:
     An exception that nobody foresaw fails the row with its class and text. A worker that is told
     to stop (WorkerStopping, SystemExit, KeyboardInterrupt) gives the row back, quietly where it
     foresaw that. So does one whose job has no room for the next call. A row whose job was
-    cancelled is cancelled. A lost claim ends quietly as well: the new holder brings the outcome.
+    cancelled is cancelled. A lost lease ends quietly as well: the new holder brings the outcome.
     """
 
-    def __init__(self, held: leases.Claim) -> None:
+    def __init__(self, held: leases.Lease) -> None:
         self._held = held
 
     def __enter__(self) -> None:
@@ -45,7 +45,7 @@ class OutcomeOnCrash:
         error: BaseException | None,
         traceback: TracebackType | None,
     ) -> bool:
-        if isinstance(error, ClaimLost):
+        if isinstance(error, LeaseLost):
             logger.warning(
                 "Stopped work on augmentation %d: %s", self._held.augmentation_pk, error
             )
@@ -70,10 +70,10 @@ class OutcomeOnCrash:
         return False
 
 
-def _beat(held: leases.Claim) -> bool:
+def _beat(held: leases.Lease) -> bool:
     """One beat; a database that can't take it now gets the next one."""
     try:
-        is_ours = leases.beat(held=held)
+        is_ours = leases.renew(held=held)
     except Error as error:
         logger.warning("No heartbeat for augmentation %d: %s", held.augmentation_pk, error)
         connection.close()

@@ -1,8 +1,8 @@
 """Who works on which augmentation: one conditional UPDATE decides, never a message.
 
-A message may come twice or never. A row is claimed by exactly one worker, which keeps the claim
-alive by a heartbeat; a claim without one is taken back and the row waits again. What time it is
-says the database, so that workers whose clocks differ judge a claim alike.
+A message may come twice or never. A row is leased to exactly one worker, which keeps the lease
+alive by a heartbeat; a lease without one is taken back and the row waits again. What time it is
+says the database, so that workers whose clocks differ judge a lease alike.
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ LOST_LIMIT = 5
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Claim:
+class Lease:
     """The right to write the outcome of one augmentation, as long as the row carries the token."""
 
     token: uuid.UUID
@@ -71,11 +71,13 @@ class TryEnd(StrEnum):
 
 
 @transaction.atomic
-def claim(*, augmentation_pk: int, now: Moment = DATABASE_TIME, worker: str = "") -> Claim | None:
+def take_lease(
+    *, augmentation_pk: int, now: Moment = DATABASE_TIME, worker: str = ""
+) -> Lease | None:
     """Take a waiting row and open its next attempt.
 
     Returns:
-        The claim, or None when the row does not wait (any more): somebody else has it, it is
+        The lease, or None when the row does not wait (any more): somebody else has it, it is
         done, it or its job was cancelled, the job stopped at its cap. A second delivery of a
         message does nothing therefore.
     """
@@ -91,7 +93,7 @@ def claim(*, augmentation_pk: int, now: Moment = DATABASE_TIME, worker: str = ""
     attempt = Attempt.objects.create(
         augmentation_id=augmentation_pk, number=number, worker=worker, started_at=now
     )
-    return Claim(
+    return Lease(
         token=token,
         augmentation_pk=augmentation_pk,
         attempt_pk=attempt.pk,
@@ -99,29 +101,29 @@ def claim(*, augmentation_pk: int, now: Moment = DATABASE_TIME, worker: str = ""
     )
 
 
-def beat(*, held: Claim, now: Moment = DATABASE_TIME) -> bool:
-    """Say that the holder is alive; False when the claim is lost."""
+def renew(*, held: Lease, now: Moment = DATABASE_TIME) -> bool:
+    """Say that the holder is alive; False when the lease is lost."""
     return bool(_row_of(held).update(heartbeat_at=now))
 
 
-def is_held(*, held: Claim, lock: bool = False) -> bool:
-    """Whether the row still carries the claim; locked, it does until the transaction ends."""
+def is_held(*, held: Lease, lock: bool = False) -> bool:
+    """Whether the row still carries the lease; locked, it does until the transaction ends."""
     row = _row_of(held)
     if lock:
         return row.select_for_update().values_list("pk").first() is not None
     return row.exists()
 
 
-def is_cancelled(*, held: Claim) -> bool:
+def is_cancelled(*, held: Lease) -> bool:
     """Whether the row's job was cancelled while it was worked on."""
     return _cancelled_jobs().filter(augmentations=held.augmentation_pk).exists()
 
 
-def keep_modification(*, held: Claim, modification: dict[str, Any], notes: str) -> bool:
+def keep_modification(*, held: Lease, modification: dict[str, Any], notes: str) -> bool:
     """Store what was understood before it is drawn, so that a second try only has to draw.
 
     Returns:
-        False when the claim is lost; nothing was written then.
+        False when the lease is lost; nothing was written then.
     """
     return bool(
         _row_of(held).update(
@@ -130,17 +132,17 @@ def keep_modification(*, held: Claim, modification: dict[str, Any], notes: str) 
     )
 
 
-def note_injected(*, held: Claim, injected: dict[str, str]) -> bool:
-    """Store the true label of a simulated answer; False when the claim is lost."""
+def note_injected(*, held: Lease, injected: dict[str, str]) -> bool:
+    """Store the true label of a simulated answer; False when the lease is lost."""
     return bool(_row_of(held).update(injected=injected))
 
 
 @transaction.atomic
-def settle(*, held: Claim, settlement: Settlement, now: Moment = DATABASE_TIME) -> bool:
+def settle(*, held: Lease, settlement: Settlement, now: Moment = DATABASE_TIME) -> bool:
     """Write the outcome and close the attempt.
 
     Returns:
-        False when the claim is lost: the result is dropped, because the row is somebody else's.
+        False when the lease is lost: the result is dropped, because the row is somebody else's.
     """
     reason = cut(storable(settlement.reason), LONGEST_REASON)
     changes: dict[str, Any] = {
@@ -157,7 +159,7 @@ def settle(*, held: Claim, settlement: Settlement, now: Moment = DATABASE_TIME) 
         changes |= {"notes": cut(storable(settlement.notes), LONGEST_NOTES)}
     if not _row_of(held).update(**changes):
         logger.warning(
-            "Dropped the result of attempt %d at augmentation %d: its claim was taken back.",
+            "Dropped the result of attempt %d at augmentation %d: its lease was taken back.",
             held.attempt_number,
             held.augmentation_pk,
         )
@@ -171,9 +173,9 @@ def settle(*, held: Claim, settlement: Settlement, now: Moment = DATABASE_TIME) 
 
 @transaction.atomic
 def release(
-    *, held: Claim, now: Moment = DATABASE_TIME, end: TryEnd = TryEnd.RELEASED, reason: str = ""
+    *, held: Lease, now: Moment = DATABASE_TIME, end: TryEnd = TryEnd.RELEASED, reason: str = ""
 ) -> bool:
-    """Give an unfinished row back to the queue; False when the claim is lost already."""
+    """Give an unfinished row back to the queue; False when the lease is lost already."""
     if not _row_of(held).update(
         state=Augmentation.State.QUEUED, claim=None, heartbeat_at=None, sent_at=None
     ):
@@ -185,8 +187,8 @@ def release(
     return True
 
 
-def requeue_stale(*, now: Moment = DATABASE_TIME, older_than: timedelta) -> list[int]:
-    """Take back every claim whose last heartbeat is older than that.
+def take_back_stale(*, now: Moment = DATABASE_TIME, older_than: timedelta) -> list[int]:
+    """Take back every lease whose last heartbeat is older than that.
 
     Rows of cancelled jobs become cancelled, also those that wait again since, because a worker
     gave them back while somebody cancelled. A row that has lost LOST_LIMIT workers in a row
@@ -207,7 +209,7 @@ def requeue_stale(*, now: Moment = DATABASE_TIME, older_than: timedelta) -> list
     return taken_back
 
 
-def unsent(
+def find_unsent(
     *, now: Moment = DATABASE_TIME, older_than: timedelta, job_pk: int | None = None
 ) -> list[int]:
     """Waiting rows, of one job or of all, without a message or with one that old.
@@ -244,7 +246,7 @@ def change_all(rows: QuerySet[Augmentation], **changes: Any) -> int:
 # --- Private -----------------------------------------------------------------------------------
 
 
-def _row_of(held: Claim) -> QuerySet[Augmentation]:
+def _row_of(held: Lease) -> QuerySet[Augmentation]:
     """The row, if it is still the holder's."""
     return Augmentation.objects.filter(
         pk=held.augmentation_pk, state=Augmentation.State.RUNNING, claim=held.token
@@ -270,7 +272,7 @@ def _silent(*, now: Moment, older_than: timedelta) -> QuerySet[Augmentation]:
 
 @transaction.atomic
 def _take_back(seen: Augmentation, *, now: Moment, older_than: timedelta) -> bool:
-    """End a stale claim, unless its holder was heard since; True when the row waits again."""
+    """End a stale lease, unless its holder was heard since; True when the row waits again."""
     lost = _lost_in_a_row(seen.pk) + 1
     changes: dict[str, Any] = {"state": Augmentation.State.QUEUED, "sent_at": None}
     if _cancelled_jobs().filter(pk=seen.job_id).exists():

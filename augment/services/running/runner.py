@@ -1,4 +1,4 @@
-"""One augmentation from claim to outcome: ask the contestant, keep the answer, draw, settle."""
+"""One augmentation from lease to outcome: ask the contestant, keep the answer, draw, settle."""
 
 from __future__ import annotations
 
@@ -16,10 +16,10 @@ from augment.errors import (
     AugmentError,
     BudgetSpent,
     CannotPlace,
-    ClaimLost,
     DatabaseLocked,
     InvalidModification,
     JobCancelled,
+    LeaseLost,
     ModelFault,
     Unwanted,
 )
@@ -62,11 +62,11 @@ class Answer:
 
 
 def open_wire(
-    endpoint: Endpoint, held: leases.Claim, treatment: Treatment | None = None
+    endpoint: Endpoint, held: leases.Lease, treatment: Treatment | None = None
 ) -> AbstractContextManager[ChatClient]:
     """A client for the endpoint, with the key that its variable holds right now.
 
-    Its calls wait for a place at the endpoint, and for their answer, as long as the claim is
+    Its calls wait for a place at the endpoint, and for their answer, as long as the lease is
     held and the job not cancelled.
 
     Raises:
@@ -83,7 +83,7 @@ def open_wire(
 
 
 def work_on(*, augmentation_pk: int, worker: str = "", connect: Connect | None = None) -> bool:
-    """Claim a row, run it and write its outcome. A row that nobody may claim is left alone.
+    """Lease a row, run it and write its outcome. A row that nobody may lease is left alone.
 
     Args:
         augmentation_pk: The row.
@@ -91,9 +91,9 @@ def work_on(*, augmentation_pk: int, worker: str = "", connect: Connect | None =
         connect: How an endpoint is reached; None over the wire.
 
     Returns:
-        Whether the row was claimed.
+        Whether the row was leased.
     """
-    held = leases.claim(augmentation_pk=augmentation_pk, worker=worker)
+    held = leases.take_lease(augmentation_pk=augmentation_pk, worker=worker)
     if held is None:
         return False
     row = _row(held)
@@ -107,7 +107,7 @@ def work_on(*, augmentation_pk: int, worker: str = "", connect: Connect | None =
 
 
 def run(
-    row: Augmentation, *, held: leases.Claim, connect: Connect | None = None
+    row: Augmentation, *, held: leases.Lease, connect: Connect | None = None
 ) -> leases.Settlement:
     """How the row ends. Every foreseen fault is a failed outcome with a sentence.
 
@@ -140,20 +140,20 @@ def run(
 # --- Private -----------------------------------------------------------------------------------
 
 
-def _insist(held: leases.Claim) -> None:
+def _insist(held: leases.Lease) -> None:
     if not leases.is_held(held=held):
-        raise ClaimLost(f"attempt {held.attempt_number} has lost its row")
+        raise LeaseLost(f"attempt {held.attempt_number} has lost its row")
     if leases.is_cancelled(held=held):
         raise JobCancelled
 
 
-def _insist_before_sending(held: leases.Claim) -> None:
+def _insist_before_sending(held: leases.Lease) -> None:
     """A worker that is to stop sends nothing more; what it has sent it waits for."""
     stopping.insist_on_going_on()
     _insist(held)
 
 
-def _insist_if_told(held: leases.Claim) -> None:
+def _insist_if_told(held: leases.Lease) -> None:
     """The same while a call is in flight: a database that can't say ends no call that is paid."""
     try:
         _insist(held)
@@ -161,7 +161,7 @@ def _insist_if_told(held: leases.Claim) -> None:
         logger.warning("Nobody could say whether a call is still wanted: %s", error)
 
 
-def _row(held: leases.Claim) -> Augmentation:
+def _row(held: leases.Lease) -> Augmentation:
     rows = Augmentation.objects.select_related(
         "job", "scenario__base_scene", "contestant__endpoint"
     )
@@ -176,14 +176,14 @@ def _kept(row: Augmentation) -> Answer | None:
     return Answer(state=State.DONE, modification=modification, notes=row.notes)
 
 
-def _keep(held: leases.Claim, answer: Answer) -> None:
+def _keep(held: leases.Lease, answer: Answer) -> None:
     assert answer.modification is not None
     document = modification_to_document(answer.modification)
     if not leases.keep_modification(held=held, modification=document, notes=answer.notes):
-        raise ClaimLost(f"attempt {held.attempt_number} has lost its row")
+        raise LeaseLost(f"attempt {held.attempt_number} has lost its row")
 
 
-def _asked(row: Augmentation, scene: Scene, held: leases.Claim, connect: Connect | None) -> Answer:
+def _asked(row: Augmentation, scene: Scene, held: leases.Lease, connect: Connect | None) -> Answer:
     """What the contestant says now."""
     match row.contestant.kind:
         case Kind.REFERENCE:
@@ -219,7 +219,7 @@ def _from_placer(row: Augmentation, place: Callable[..., Placed], scene: Scene) 
 
 
 def _from_errors(
-    row: Augmentation, scene: Scene, rates: dict[str, object], held: leases.Claim
+    row: Augmentation, scene: Scene, rates: dict[str, object], held: leases.Lease
 ) -> Answer:
     """The reference with the errors of a simulated contestant; their label is kept apart."""
     reference = reference_of(row.scenario)
@@ -233,7 +233,7 @@ def _from_errors(
     )
     label = {"class": made.fault_class, "fault": made.fault}
     if not leases.note_injected(held=held, injected=label):
-        raise ClaimLost(f"attempt {held.attempt_number} has lost its row")
+        raise LeaseLost(f"attempt {held.attempt_number} has lost its row")
     if made.modification is None:
         return Answer(state=State.UNREADABLE, reason=made.reason)
     return Answer(state=State.DONE, modification=made.modification)
@@ -243,7 +243,7 @@ def _from_model(
     row: Augmentation,
     endpoint: Endpoint,
     scene: Scene,
-    held: leases.Claim,
+    held: leases.Lease,
     connect: Connect | None,
 ) -> Answer:
     seats = seats_of(row.contestant)

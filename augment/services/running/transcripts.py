@@ -17,9 +17,9 @@ from django.utils import timezone
 
 from augment.errors import (
     BudgetSpent,
-    ClaimLost,
     DatabaseLocked,
     JobCancelled,
+    LeaseLost,
     ModelFault,
     NotSent,
 )
@@ -57,11 +57,11 @@ class _Open:
 class RowTranscript:
     """A transcript that writes rows of one attempt.
 
-    Nothing more is asked for an attempt whose claim was taken back (its result would be dropped)
+    Nothing more is asked for an attempt whose lease was taken back (its result would be dropped)
     or whose job has no room for the call.
 
     Args:
-        held: The claim on the row.
+        held: The lease on the row.
         row: The augmentation, with its job.
         endpoint: Who is asked.
         others: Who is asked in the roles that have an endpoint of their own.
@@ -70,7 +70,7 @@ class RowTranscript:
 
     def __init__(
         self,
-        held: leases.Claim,
+        held: leases.Lease,
         row: Augmentation,
         endpoint: Endpoint,
         *,
@@ -92,7 +92,7 @@ class RowTranscript:
         """The answer that this request had before, recorded as a call that cost nothing.
 
         Raises:
-            ClaimLost: The row is somebody else's now.
+            LeaseLost: The row is somebody else's now.
         """
         columns = self._columns(role, request, prompt_version)
         earlier = answers.earlier(
@@ -119,7 +119,7 @@ class RowTranscript:
         Where calls in flight hold the room that this one needs, waits for them to end.
 
         Raises:
-            ClaimLost: The row is somebody else's now.
+            LeaseLost: The row is somebody else's now.
             JobCancelled: Its job is cancelled.
             BudgetSpent: The job has no room for the call, and is stopped.
             WorkerStopping: This worker is to stop; what it was answered so far is kept.
@@ -148,13 +148,13 @@ class RowTranscript:
         """Store that the call is sent now; from here on it may be billed.
 
         Raises:
-            ClaimLost: Somebody took the row over and settled the call as one that never was.
+            LeaseLost: Somebody took the row over and settled the call as one that never was.
             WorkerStopping: It waited for its place for so long that this worker is to stop.
         """
         stopping.insist_on_going_on()
         call = ModelCall.objects.filter(pk=self._open[number].pk, settled_at=None)
         if not call.update(sent_at=timezone.now()):
-            raise ClaimLost(f"attempt {self._held.attempt_number} has lost its row")
+            raise LeaseLost(f"attempt {self._held.attempt_number} has lost its row")
 
     def answered(self, number: int, reply: Reply, fault: ModelFault | None = None) -> None:
         """Store the raw answer to that call and what it used.
@@ -249,7 +249,7 @@ class RowTranscript:
 
     def _insist_on_claim(self) -> None:
         if not leases.is_held(held=self._held, lock=True):
-            raise ClaimLost(f"attempt {self._held.attempt_number} has lost its row")
+            raise LeaseLost(f"attempt {self._held.attempt_number} has lost its row")
         if leases.is_cancelled(held=self._held):
             raise JobCancelled
 

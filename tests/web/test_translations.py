@@ -8,7 +8,7 @@ import polib
 import pytest
 
 from arena.queries.profiles import Language
-from tests.catalogue import MO, PO, marked, text_of
+from tests.translations import MO, PO, marked, text_of
 
 ON_EXPERT_PAGES = (
     "templates/vote/",
@@ -33,7 +33,7 @@ def catalogue() -> list[polib.POEntry]:
 def test_every_marked_text_is_in_the_catalogue_and_nothing_else(
     catalogue: list[polib.POEntry],
 ) -> None:
-    """Red after a change of texts: run `python -m tests.catalogue` and translate."""
+    """Red after a change of texts: run `python -m tests.translations` and translate."""
     known = {text_of(entry) for entry in catalogue}
     assert [text for text in marked() if text not in known] == []
     assert known - set(marked()) == set()

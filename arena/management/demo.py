@@ -66,7 +66,7 @@ class DemoFailed(ArenaError):
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Leaderboard:
+class DemoTable:
     """The table for a terminal, and where its files are."""
 
     text: str
@@ -136,7 +136,7 @@ def generate(
     return job
 
 
-def vote_and_rate(scenarios: list[str], say: Callable[[str], None], folder: Path) -> Leaderboard:
+def vote_and_rate(scenarios: list[str], say: Callable[[str], None], folder: Path) -> DemoTable:
     """A study with simulated votes, closed and rated, and its table as files."""
     study = Study.objects.filter(name=SIMULATED_STUDY).first()
     if study is None:
@@ -168,7 +168,7 @@ def vote_and_rate(scenarios: list[str], say: Callable[[str], None], folder: Path
     for chosen in FORMATS.values():
         files.append(folder / f"leaderboard.{chosen.suffix}")
         write_whole(files[-1], chosen.write(table))
-    return Leaderboard(text=plain_text(table), files=tuple(files))
+    return DemoTable(text=plain_text(table), files=tuple(files))
 
 
 def _person(username: str, role: str, *, is_simulated: bool = False) -> None:

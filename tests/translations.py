@@ -1,4 +1,4 @@
-"""The texts of the product and their German: `python -m tests.catalogue` writes both files.
+"""The texts of the product and their German: `python -m tests.translations` writes both files.
 
 What is marked in templates and in Python is collected, new texts get an empty translation, texts
 that are gone are dropped, and the compiled file is written anew. Nothing but Python is needed.
