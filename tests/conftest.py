@@ -15,7 +15,7 @@ from xdist.scheduler import LoadScopeScheduling
 
 from tests.append_only import empty_with_triggers
 from tests.on_postgres import FOLDERS
-from tests.processes import copy_database, machine
+from tests.processes import MIGRATED, copy_database, machine
 from tests.stack import SMALL_DEMO, Home
 
 GROUPS = {
@@ -25,8 +25,6 @@ GROUPS = {
 }
 """Tests that share a fixture which takes long to make: they run in one process, in this order of
 what a test's address begins with."""
-
-MIGRATED = "migrated.sqlite3"
 
 # Whether a property holds does not depend on how busy the machine is.
 hypothesis_settings.register_profile(

@@ -25,6 +25,8 @@ from arena.serving.redis_server import find_redis_server
 
 ROOT = Path(__file__).resolve().parents[1]
 SOCKET = "redis.sock"
+MIGRATED = "migrated.sqlite3"
+"""What is kept of the empty database, in the temporary folder of a run."""
 LONG_AGO = "2026-01-01 00:00:00"
 
 

@@ -1,95 +1,93 @@
-"""Run mutations in a copy of the tree: `python -m tests.mutants [AREA or NAME ...]`.
+"""Run mutations in copies of the tree: `python -m tests.mutants [AREA or NAME ...]`.
 
-Each one's tests run once as they are and once with it; it is caught where they fail. The table is
-printed, and written to docs/mutants.md where all mutations ran.
+First all their tests run as the tree is, then each one's tests with it; it is caught where one
+fails. The table is printed, and written to docs/mutants.md where all mutations ran.
 """
 
 from __future__ import annotations
 
+import argparse
 import os
-import shutil
-import subprocess
-import sys
 import tempfile
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+import time
+from collections.abc import Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
 from pathlib import Path
+from queue import SimpleQueue
 
 from tests.mutants.mutation import ROOT, Mutation, mutations
+from tests.mutants.trees import FAILED, PASSED, Tree
 
-LEFT_OUT = shutil.ignore_patterns(
-    ".git", ".venv", ".bench", "var", "media", "__pycache__", ".*_cache", "node_modules"
-)
-PASSED, FAILED = 0, 1
-"""What pytest returns; anything else says that the tests did not run."""
-LONGEST_S = 900
 CAUGHT, SURVIVED, EQUIVALENT = "caught", "SURVIVED", "equivalent"
 
 
-def main(wanted: Sequence[str]) -> int:
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Outcome:
+    """What became of one mutation, and the test that noticed."""
+
+    of: Mutation
+    came: str
+    noticed_by: str
+    took_s: float
+
+    @property
+    def is_right(self) -> bool:
+        return self.came in (CAUGHT, EQUIVALENT)
+
+
+def main(wanted: Sequence[str], *, at_once: int) -> int:
     chosen = [one for one in mutations() if not wanted or {one.area, one.name} & set(wanted)]
-    with copied() as tree:
-        green: dict[tuple[str, ...], bool] = {}
-        found: list[tuple[Mutation, str]] = []
-        for one in chosen:
-            if one.tests not in green:
-                green[one.tests] = run(tree, one.tests) == PASSED
-            found.append((one, outcome(tree, one) if green[one.tests] else "red without it"))
-            print(f"{one.area:13} {one.name:45} {found[-1][1]}", flush=True)
+    os.nice(10)
+    with tempfile.TemporaryDirectory(prefix="mutants-") as folder:
+        trees: SimpleQueue[Tree] = SimpleQueue()
+        for number in range(at_once):
+            trees.put(made := Tree(Path(folder) / str(number)))
+        tests = sorted({test for one in chosen for test in one.tests})
+        as_it_is = made.run(tests, to_the_end=True)
+        if as_it_is.code not in (PASSED, FAILED):
+            print(as_it_is.said, "The tests do not run without a mutation.", sep="\n")
+            return 2
+        with ThreadPoolExecutor(at_once) as threads:
+            found = []
+            for one in threads.map(lambda one: _outcome(trees, one, as_it_is.failed), chosen):
+                found.append(one)
+                print(
+                    f"{one.of.area:13} {one.of.name:45} {one.came:12} {one.took_s:5.1f} s", end=" "
+                )
+                print(one.noticed_by, flush=True)
     if not wanted:
         (ROOT / "docs" / "mutants.md").write_text(report(found))
-    bad = [one.name for one, came in found if came not in (CAUGHT, EQUIVALENT)]
+    bad = [one.of.name for one in found if not one.is_right]
     print(f"{len(found) - len(bad)} of {len(found)} noticed or equivalent", *bad, sep="\n  ")
     return 1 if bad else 0
 
 
-def outcome(tree: Path, one: Mutation) -> str:
-    """What became of one mutation; its file is as before afterwards."""
-    was = one.apply(tree)
+def _outcome(trees: SimpleQueue[Tree], one: Mutation, red: tuple[str, ...]) -> Outcome:
+    """What comes of one mutation; nothing is learnt from tests that are red without it."""
+    bad = next((test for test in red if test.startswith(one.tests)), None)
+    if bad is not None:
+        return Outcome(of=one, came="red without it", noticed_by=bad, took_s=0.0)
+    tree, began = trees.get(), time.monotonic()
     try:
-        ended = run(tree, one.tests)
+        with tree.mutated(one):
+            ended = tree.run(one.tests)
     finally:
-        (tree / one.file).write_text(was)
-    if ended == FAILED:
-        return CAUGHT if not one.equivalent else "not equivalent"
-    if ended != PASSED:
-        return f"tests did not run ({ended})"
-    return EQUIVALENT if one.equivalent else SURVIVED
+        trees.put(tree)
+    if ended.code == FAILED and ended.failed:
+        came = CAUGHT if not one.equivalent else "not equivalent"
+    elif ended.code == PASSED:
+        came = EQUIVALENT if one.equivalent else SURVIVED
+    else:
+        came = f"tests did not run ({ended.code})"
+    noticed_by = ended.failed[0] if ended.failed else ""
+    return Outcome(of=one, came=came, noticed_by=noticed_by, took_s=time.monotonic() - began)
 
 
-def run(tree: Path, tests: Sequence[str]) -> int:
-    """The exit code of pytest; the database of the tests is made once for all."""
-    command = [sys.executable, "-m", "pytest", "-q", "-x", "--no-header", "--reuse-db"]
-    command += ["-p", "no:cacheprovider", *tests]
-    environment = {
-        **os.environ,
-        "ARENA_VAR_DIR": str(tree / "var"),
-        "ARENA_MEDIA_DIR": str(tree / "media"),
-        "PYTHONDONTWRITEBYTECODE": "1",
-    }
-    environment.pop("DATABASE_URL", None)
-    try:
-        ended = subprocess.run(
-            command, cwd=tree, env=environment, capture_output=True, timeout=LONGEST_S, check=False
-        )
-    except subprocess.TimeoutExpired:
-        return FAILED  # it never ends with the mutation, and somebody would notice that
-    return ended.returncode
-
-
-@contextmanager
-def copied() -> Iterator[Path]:
-    """A copy of the tree: nothing is ever changed in place."""
-    with tempfile.TemporaryDirectory(prefix="arena-mutants-") as folder:
-        tree = Path(folder) / "tree"
-        shutil.copytree(ROOT, tree, ignore=LEFT_OUT)
-        yield tree
-
-
-def report(found: Sequence[tuple[Mutation, str]]) -> str:
+def report(found: Sequence[Outcome]) -> str:
     """The page of docs."""
-    caught = sum(came == CAUGHT for _, came in found)
-    equal = sum(came == EQUIVALENT for _, came in found)
+    caught = sum(one.came == CAUGHT for one in found)
+    equal = sum(one.came == EQUIVALENT for one in found)
     lines = [
         "# Mutations",
         "",
@@ -98,18 +96,29 @@ def report(found: Sequence[tuple[Mutation, str]]) -> str:
         "the changes, and this page is what came of the last run. It is not part of `make test`,",
         "which only checks that every change still fits the source.",
         "",
-        f"{caught} of {len(found)} are caught; {equal} change nothing that anybody could notice.",
+        f"Of {len(found)} changes {caught} are caught, and {equal} change nothing that anybody",
+        "could notice: those say why.",
         "",
         "| area | mutation | in | what came of it |",
         "|---|---|---|---|",
     ]
     lines += [
-        f"| {one.area} | {one.name.replace('-', ' ')} | `{one.file}` | "
-        f"{came}{': ' + one.equivalent if came == EQUIVALENT else ''} |"
-        for one, came in found
+        f"| {one.of.area} | {one.of.name.replace('-', ' ')} | `{one.of.file}` | {_told(one)} |"
+        for one in found
     ]
     return "\n".join([*lines, ""])
 
 
+def _told(one: Outcome) -> str:
+    if one.came == EQUIVALENT:
+        return f"{one.came}: {one.of.equivalent}"
+    path, _, test = one.noticed_by.removeprefix("tests/").partition("::")
+    return f"{one.came} by `{path}`: {test.removeprefix('test_').replace('_', ' ')}"
+
+
 if __name__ == "__main__":
-    raise SystemExit(main(sys.argv[1:]))
+    parser = argparse.ArgumentParser(prog="python -m tests.mutants", description=__doc__)
+    parser.add_argument("wanted", nargs="*", metavar="AREA|NAME", help="all of them without any")
+    parser.add_argument("-j", type=int, default=2, dest="at_once", help="how many at once")
+    asked = parser.parse_args()
+    raise SystemExit(main(asked.wanted, at_once=asked.at_once))
