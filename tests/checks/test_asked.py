@@ -165,6 +165,28 @@ def test_sides_are_exchanged_within_the_tolerance_of_the_place_across(
     assert found & {Kind.ASKED_ACROSS, Kind.ASKED_SIDE} == {kind}
 
 
+@pytest.mark.parametrize(
+    ("asked_m", "off_m", "is_fault"),
+    [
+        (20.0, 2.49, False),
+        (20.0, 2.5, False),
+        (20.0, 2.51, True),
+        # 5 % is more from 50 m on.
+        (60.0, 2.99, False),
+        (60.0, 3.0, False),
+        (60.0, 3.01, True),
+    ],
+)
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_a_distance_may_be_off_by_the_whole_tolerance(
+    sign: float, asked_m: float, off_m: float, is_fault: bool
+) -> None:
+    found = faults(
+        parked(asked_m, lateral=CENTRED), vehicle("Agent2", asked_m + sign * off_m, 0.0)
+    )
+    assert (Kind.ASKED_DISTANCE in found) == is_fault
+
+
 def test_a_finding_says_the_numbers() -> None:
     (distance,) = (
         one for one in held(CAR, vehicle("Agent2", 27.3, 1.2)) if one.kind is Kind.ASKED_DISTANCE

@@ -41,4 +41,5 @@ def test_a_shift_is_called_a_fault_beyond_the_tolerance_and_not_before() -> None
 
 
 def test_the_checks_are_given_neither_reference_nor_label() -> None:
-    assert list(inspect.signature(judged).parameters) == ["ground", "modification", "intent"]
+    given = ["ground", "modification", "intent", "tolerances"]
+    assert list(inspect.signature(judged).parameters) == given

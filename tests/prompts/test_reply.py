@@ -193,3 +193,28 @@ def test_neither_a_place_nor_the_end_of_a_walk_lies_beyond_the_radius(
         assert (made.walk_to_m or (made.x_m, made.y_m)) == tuple(point)
     else:
         assert "x and y must lie between -80 and 80" in problems(text)[0]
+
+
+@pytest.mark.parametrize(
+    ("value_m", "is_read"), [(0.19, False), (0.2, True), (20.0, True), (20.01, False)]
+)
+@pytest.mark.parametrize("key", ["width_m", "length_m"])
+def test_a_size_is_between_a_cone_and_an_articulated_bus(
+    key: str, value_m: float, is_read: bool
+) -> None:
+    text = block(agent(**{key: value_m}))
+    if is_read:
+        (added,) = read_reply(text, scene()).modification.added
+        assert getattr(added, key) == value_m
+    else:
+        assert f"add.0.{key}: Input should be" in problems(text)[0]
+
+
+def test_a_new_agent_takes_no_id_that_the_scene_uses_under_another_name() -> None:
+    """The prompt calls it Agent2; in the scene it would stand there twice."""
+    street = scene(agents=(vehicle("parked-7", 40.0, 0.0),))
+    with pytest.raises(ReplyUnreadable) as raised:
+        read_reply(block(agent(id="parked-7")), street)
+    assert raised.value.problems == ["an added agent's id is taken: number them from Agent3"]
+    (added,) = read_reply(block(agent(id="Agent3")), street).modification.added
+    assert added.id == "Agent3"

@@ -28,6 +28,19 @@ def test_straight_on_comes_first_where_lanes_part() -> None:
     assert graph.route("Lane1", 100.0) == ["Lane1", "Connector1", "Lane2"]
 
 
+@pytest.mark.parametrize("turn", [TurnType.LEFT, TurnType.RIGHT, TurnType.U_TURN])
+@pytest.mark.parametrize("straight_first", [True, False])
+def test_the_order_of_the_file_does_not_tell_where_the_road_goes_on(
+    turn: TurnType, straight_first: bool
+) -> None:
+    straight, left = junction().connectors
+    bent = replace(left, turn_type=turn)
+    given = (straight, bent) if straight_first else (bent, straight)
+    graph = LaneGraph(replace(junction(), connectors=given))
+    assert graph.successors("Lane1") == ("Connector1", "Connector2")
+    assert graph.route("Lane1", 100.0) == ["Lane1", "Connector1", "Lane2"]
+
+
 def test_a_distance_runs_on_over_connectors() -> None:
     place = LaneGraph(junction()).along("Lane1", 50.0, 40.0, 0.5)
     assert place is not None
