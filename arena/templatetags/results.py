@@ -183,3 +183,29 @@ def _with_interval(found: dict[str, Any] | None, written: Any) -> str:
         return text
     low, high = written(found["lower"]), written(found["upper"])
     return _("%(value)s (%(low)s to %(high)s)") % {"value": text, "low": low, "high": high}
+
+
+@register.filter
+def percent_one(share: float | None) -> str:
+    """A share from 0 to 1 in percent with one decimal; a dash where nobody knows."""
+    return "–" if share is None else f"{100.0 * share:.1f}"
+
+
+_METRICS: dict[str, str | Promise] = {
+    "no_ego_at_fault_collisions": gettext_lazy("No collision at fault"),
+    "drivable_area_compliance": gettext_lazy("Stays on the road"),
+    "ego_is_making_progress": gettext_lazy("Makes progress"),
+    "driving_direction_compliance": gettext_lazy("Driving direction"),
+    "ego_progress_along_expert_route": gettext_lazy("Progress along the route"),
+    "time_to_collision_within_bound": gettext_lazy("Time to collision"),
+    "speed_limit_compliance": gettext_lazy("Speed limit"),
+    "ego_is_comfortable": gettext_lazy("Comfort"),
+    "lane_changes_to_goal": gettext_lazy("Lane changes to the goal"),
+    "ego_passed_obstacles": gettext_lazy("Obstacles passed"),
+}
+
+
+@register.filter
+def metric_label(name: str) -> str | Promise:
+    """A part of the driving score in words."""
+    return _METRICS[name]

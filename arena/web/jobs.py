@@ -18,6 +18,7 @@ from django.views.decorators.http import require_http_methods, require_POST, req
 from arena.queries import jobs, scenarios
 from arena.web.access import ADMIN, STAFF, only
 from arena.web.displacement import section
+from arena.web.driving import section as driving_section
 from arena.web.forms import CapsForm, LaunchForm
 from arena.web.questions import Question, ask, is_sure
 from augment.errors import AugmentError, QueueFault
@@ -84,6 +85,7 @@ def job_page(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
         context["workforce"] = workforce()
     else:  # a page that shows itself anew every two seconds measures nothing
         context["displacement"] = section(request, job)
+        context["driving"] = driving_section(request, job)
     return render(request, "jobs/job.html", context)
 
 

@@ -11,6 +11,7 @@ from django.utils.translation import gettext_lazy as _
 from arena.exports.tables import LeaderboardTable
 from arena.models import Snapshot
 from arena.queries.results import log_of, snapshots_of
+from arena.web.driving import driving
 from arena.web.results_cost import cost, displacement
 from arena.web.results_ratings import Context, pairs, standings, types
 from arena.web.results_trust import coverage, raters
@@ -54,6 +55,7 @@ TABS = (
     Tab(name="raters", label=_("Raters"), staff=True, fill=raters),
     Tab(name="coverage", label=_("Coverage"), staff=True, fill=coverage),
     Tab(name="displacement", label=_("Displacement"), staff=True, fill=displacement),
+    Tab(name="driving", label=_("Driving"), staff=True, fill=driving),
     Tab(name="cost", label=_("Cost"), staff=True, fill=cost),
     Tab(name="log", label=_("Log"), staff=True, fill=log),
 )

@@ -12,6 +12,7 @@ from arena.services.authorships import mark_author
 from arena.services.invitations import invite
 from arena.services.studies import close_study
 from arena.web.urls import urlpatterns
+from augment.models import Simulation
 from tests.web.cast import World, people, signed_in, status, world
 
 pytestmark = pytest.mark.django_db
@@ -25,6 +26,10 @@ PAGES: dict[str, tuple[int, int, int]] = {
     "job": (200, 200, 403),
     "job-progress": (200, 200, 403),
     "displacement-export": (200, 200, 403),
+    "drives": (200, 200, 403),
+    "driving-export": (200, 200, 403),
+    "drive": (200, 200, 403),
+    "drive-file": (404, 404, 403),  # nothing was driven yet
     "faults": (200, 200, 403),
     "faults-export": (200, 200, 403),
     "label": (403, 403, 404),
@@ -50,6 +55,7 @@ PAGES: dict[str, tuple[int, int, int]] = {
 }
 ACTIONS: dict[str, tuple[int, int, int]] = {
     "job-retry": (302, 403, 403),
+    "job-simulate": (302, 403, 403),
     "invite": (200, 403, 403),
     "revoke": (302, 403, 403),
     "author": (302, 403, 403),
@@ -75,6 +81,9 @@ def address(name: str, here: World) -> str:
         "job": {"code": here.job.code},
         "job-progress": {"code": here.job.code},
         "job-retry": {"code": here.job.code},
+        "job-simulate": {"code": here.job.code},
+        "drives": {"code": here.job.code},
+        "driving-export": {"code": here.job.code, "form": "csv"},
         "job-cancel": {"code": here.job.code},
         "job-resume": {"code": here.job.code},
         "displacement-export": {"code": here.job.code, "form": "csv"},
@@ -94,6 +103,15 @@ def address(name: str, here: World) -> str:
         "rating-again": {"code": here.study.code, "rating": STRANGER},
         "matchup-image": {"token": shown.left_token},
     }
+    if name in ("drive", "drive-file"):
+        row, _ = Simulation.objects.get_or_create(
+            scenario=here.augmentation.scenario,
+            subject=Simulation.Subject.UNMODIFIED,
+            planner="idm",
+            offsets="paper",
+        )
+        form = {} if name == "drive" else {"form": "json"}
+        arguments[name] = {"code": row.code, **form}
     if name == "revoke":
         made = invite(study=here.study, expert=here.expert)
         arguments["revoke"] = {"code": made.invitation.code}

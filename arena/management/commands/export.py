@@ -10,10 +10,11 @@ from uuid import UUID
 from django.core.management.base import CommandError, CommandParser
 
 from arena.errors import ArenaError, StudyStillOpen
-from arena.exports import displacement_writers, faults
+from arena.exports import displacement_writers, driving_writers, faults
 from arena.exports.bundle import ZIP, bundle
 from arena.exports.displacement_objects import BY_OBJECT, OBJECT_FORMATS, object_rows
 from arena.exports.displacement_table import displacement_table
+from arena.exports.driving_table import DrivingTable
 from arena.exports.files import write_whole
 from arena.exports.formats import format_named
 from arena.exports.rating_charts import CONTENT_TYPES, chart_bytes
@@ -26,8 +27,10 @@ from arena.queries.jobs import grid
 from arena.queries.results import snapshot_to_export
 from arena.queries.studies import study_named
 from arena.services.early_looks import log_early_look
-from augment.errors import AugmentError, UnknownName
+from augment.errors import AugmentError, Conflict, UnknownName
 from augment.services.judging.displacement import By, types_named
+from augment.services.judging.driving_scores import options_driven, scores_of_job
+from augment.services.judging.simulations import SCORES, Options
 from augment.services.running.choosing import job_named
 from augment.services.scenarios.interplan import job_as_interplan
 from augment.services.terminal import TerminalCommand
@@ -59,6 +62,7 @@ class Command(TerminalCommand):
             "samples": self._samples,
             "modifications": self._modifications,
             "faults": self._faults,
+            "driving": self._driving,
         }
         try:
             content, suffix, is_text = write[options["what"]](options)
@@ -111,6 +115,23 @@ class Command(TerminalCommand):
     def _faults(self, options: dict[str, Any]) -> Written:
         chosen = format_named(faults.FORMATS, options["format"])
         table = faults.fault_table(job_named(options["job"]))
+        return chosen.write(table), chosen.suffix, chosen.is_text
+
+    def _driving(self, options: dict[str, Any]) -> Written:
+        chosen = format_named(driving_writers.FORMATS, options["format"])
+        job = job_named(options["job"])
+        if options["score"] not in SCORES:
+            raise UnknownName("score", options["score"], list(SCORES))
+        known = options_driven(job)
+        how = Options(
+            planner=options["planner"],
+            offsets=options["offsets"],
+            is_reactive=options["reactive"],
+        )
+        if how not in known:
+            raise Conflict(f"Job {job.name!r} was not driven so; manage.py simulate does it.")
+        scores = scores_of_job(job, options=how, score=options["score"])
+        table = DrivingTable(title=job.name, scores=scores)
         return chosen.write(table), chosen.suffix, chosen.is_text
 
     def _samples(self, options: dict[str, Any]) -> Written:
@@ -212,4 +233,13 @@ def _kinds_of_jobs(kinds: Any) -> list[ArgumentParser]:
     labels = kinds.add_parser("faults", help="how often experts saw which fault")
     labels.add_argument("job", help="its name or its code")
     labels.add_argument("--format", default="csv", help=f"one of {', '.join(faults.FORMATS)}")
-    return [displacement, samples, modifications, labels]
+    driving = kinds.add_parser("driving", help="mean driving scores of what was simulated")
+    driving.add_argument("job", help="its name or its code")
+    driving.add_argument("--score", default="nuplan", help=f"one of {', '.join(SCORES)}")
+    driving.add_argument("--planner", default="pdm-closed", help="as it was simulated with")
+    driving.add_argument("--offsets", default="paper", help="as it was simulated with")
+    driving.add_argument("--reactive", action="store_true", help="as it was simulated")
+    driving.add_argument(
+        "--format", default="csv", help=f"one of {', '.join(driving_writers.FORMATS)}"
+    )
+    return [displacement, samples, modifications, labels, driving]

@@ -9,6 +9,7 @@ import zlib
 from collections.abc import Callable, Iterable
 from dataclasses import asdict, dataclass
 from datetime import timedelta
+from types import TracebackType
 from typing import Any
 from uuid import UUID, uuid4
 
@@ -114,17 +115,8 @@ def drive(*, simulation_pk: int) -> bool:
         return False
     rows = Simulation.objects.select_related("scenario__base_scene", "augmentation")
     row = rows.get(pk=simulation_pk)
-    try:
-        outcome = _driven(row, _Beating(simulation_pk, claim))
-    except LeaseLost:
-        return True
-    except AugmentError as error:
-        outcome = {"state": State.FAILED, "reason": str(error)}
-    except Exception as error:  # a planner from outside may raise anything
-        logger.exception("Drive %s failed", row.code)
-        outcome = {"state": State.FAILED, "reason": f"{type(error).__name__}: {error}"[:500]}
-    held = Simulation.objects.filter(pk=simulation_pk, claim=claim)
-    held.update(claim=None, heartbeat_at=None, finished_at=timezone.now(), **outcome)
+    with _Settling(row, claim) as settling:
+        settling.outcome = _driven(row, _Beating(simulation_pk, claim))
     return True
 
 
@@ -146,6 +138,40 @@ def mark_sent(ids: Iterable[int]) -> None:
     Simulation.objects.filter(pk__in=list(ids)).update(sent_at=DATABASE_TIME)
 
 
+def document_of(drove: Drive, scores: dict[ScoreKind, Score]) -> dict[str, Any]:
+    """The parts of the scores, and what else is said of a drive; no series."""
+    score = scores[ScoreKind.NUPLAN]
+    return {
+        "duration_s": round(drove.duration_s, 1),
+        "at_map_end": drove.at_map_end,
+        "emergency_brake_steps": sum(plan.braking for plan in drove.plans),
+        "red_light_compliance": red_lights(drove).value,
+        "expert": {"kind": score.expert.kind.value, "progress_m": score.expert.progress_m},
+        "collisions": [
+            {
+                "time_s": round(one.moment * 0.1, 1),
+                "object": one.object_id,
+                "contact": one.contact.name.lower(),
+                "at_fault": one.at_fault,
+            }
+            for one in score.collisions
+        ],
+        "criticality": asdict(criticality(drove, score.collisions)),
+        "metrics": {
+            kind.value: [
+                {
+                    "name": metric.name,
+                    "value": metric.value,
+                    "weight": metric.weight,
+                    "parts": metric.parts,
+                }
+                for metric in found.metrics
+            ]
+            for kind, found in scores.items()
+        },
+    }
+
+
 def trace_document(row: Simulation) -> dict[str, Any]:
     """The drive to look at."""
     document: dict[str, Any] = json.loads(zlib.decompress(bytes(row.trace or b"")))
@@ -153,6 +179,41 @@ def trace_document(row: Simulation) -> dict[str, Any]:
 
 
 # Private
+
+
+class _Settling:
+    """Writes the outcome of a claimed drive, whatever becomes of it.
+
+    A planner from outside may raise anything: that is an outcome of its drive, and is logged. A
+    worker that is told to stop gives the row back. A lost lease ends quietly.
+    """
+
+    def __init__(self, row: Simulation, claim: UUID) -> None:
+        self._row = row
+        self._held = Simulation.objects.filter(pk=row.pk, claim=claim)
+        self.outcome: dict[str, Any] = {"state": State.QUEUED}
+
+    def __enter__(self) -> _Settling:
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        traceback: TracebackType | None,
+    ) -> bool:
+        if isinstance(error, LeaseLost):
+            return True
+        if isinstance(error, AugmentError):
+            self.outcome = {"state": State.FAILED, "reason": str(error)}
+        elif isinstance(error, Exception):
+            logger.error("Drive %s failed", self._row.code, exc_info=error)
+            said = f"{type(error).__name__}: {error}"[:500]
+            self.outcome = {"state": State.FAILED, "reason": said}
+        is_over = self.outcome["state"] != State.QUEUED
+        ended = {"finished_at": timezone.now()} if is_over else {}
+        self._held.update(claim=None, heartbeat_at=None, **ended, **self.outcome)
+        return isinstance(error, Exception)
 
 
 class _Beating:
@@ -217,7 +278,7 @@ def _driven(row: Simulation, beating: Callable[[int], None]) -> dict[str, Any]:
         "reason": "",
         "nuplan_score": scores[ScoreKind.NUPLAN].value,
         "interplan_score": scores[ScoreKind.INTERPLAN].value,
-        "document": _document(drove, scores),
+        "document": document_of(drove, scores),
         "trace": zlib.compress(trace.encode(), 6),
     }
 
@@ -246,37 +307,3 @@ def _modification(row: Simulation) -> Modification:
     if row.augmentation is None or row.augmentation.modification is None:
         return Modification()
     return modification_from_document(row.augmentation.modification)
-
-
-def _document(drove: Drive, scores: dict[ScoreKind, Score]) -> dict[str, Any]:
-    """The parts of the scores, and what else is said of a drive; no series."""
-    score = scores[ScoreKind.NUPLAN]
-    return {
-        "duration_s": round(drove.duration_s, 1),
-        "at_map_end": drove.at_map_end,
-        "emergency_brake_steps": sum(plan.braking for plan in drove.plans),
-        "red_light_compliance": red_lights(drove).value,
-        "expert": {"kind": score.expert.kind.value, "progress_m": score.expert.progress_m},
-        "collisions": [
-            {
-                "time_s": round(one.moment * 0.1, 1),
-                "object": one.object_id,
-                "contact": one.contact.name.lower(),
-                "at_fault": one.at_fault,
-            }
-            for one in score.collisions
-        ],
-        "criticality": asdict(criticality(drove, score.collisions)),
-        "metrics": {
-            kind.value: [
-                {
-                    "name": metric.name,
-                    "value": metric.value,
-                    "weight": metric.weight,
-                    "parts": metric.parts,
-                }
-                for metric in found.metrics
-            ]
-            for kind, found in scores.items()
-        },
-    }

@@ -1,0 +1,107 @@
+"""The mean driving scores of a job or study as a table: what its files and pages show."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from arena.exports.tables import SIMULATED
+from augment.models import Scenario, Simulation
+from augment.sentences import sentence
+from augment.services.judging.driving_scores import DrivingLine, DrivingScores
+
+SOURCE = "reported in the paper"
+REPORTED = (
+    ("Val14", 0.908),
+    ("interPlan", 0.519),
+    ("GPT-4o OTM", 0.496),
+    ("Gemini-1.5-Flash OTM", 0.535),
+    ("Llama3.1-70B OTM", 0.540),
+)
+"""The paper's table "Mean driving score of PDM-Closed"; nothing of it was measured here."""
+DIFFERENCES = (
+    sentence(
+        "Measured in this project's own simulator, by nuPlan's rules as far as a scene knows what "
+        "they need: compare contestants and the effect of a change, not absolute numbers with the "
+        "paper's."
+    ),
+    sentence(
+        "Where nobody recorded the ego, progress is measured by an IDM drive at the speed limit "
+        "without the change; where the map ends before 15 s, the drive ends there."
+    ),
+    sentence(
+        "Traffic that was not recorded drives its lanes by the IDM; what stands stays; lights "
+        "keep the colour that they have at the start."
+    ),
+)
+"""What differs from nuPlan; docs/method.md says it at length."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class DrivingTable:
+    """The lines and all that must be said with them."""
+
+    title: str
+    scores: DrivingScores
+
+    @property
+    def lines(self) -> tuple[DrivingLine, ...]:
+        """In the order in which they are shown."""
+        return self.scores.lines
+
+    @property
+    def simulated(self) -> bool:
+        """Whether a contestant in it is simulated."""
+        return any(line.is_simulated for line in self.lines)
+
+    @property
+    def types(self) -> tuple[tuple[str, str], ...]:
+        """Value and label of the scenario types that were driven."""
+        driven = {
+            kind for line in self.lines for kind, mean in line.by_type.items() if mean is not None
+        }
+        return tuple((str(v), str(label)) for v, label in Scenario.Type.choices if v in driven)
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """Sentences that belong beneath every form of it."""
+        said = [self._what, *DIFFERENCES]
+        for reason, number in self.scores.failures:
+            said.append(
+                sentence(
+                    "Drives that failed: %(number)s (%(reason)s).", number=number, reason=reason
+                )
+            )
+        if self.scores.under_way:
+            said.append(
+                sentence(
+                    "Not complete: %(number)s drives wait or run.", number=self.scores.under_way
+                )
+            )
+        if self.simulated:
+            said.append(
+                sentence("Simulated contestants are marked; they say nothing about a real one.")
+            )
+        return tuple(said)
+
+    @property
+    def _what(self) -> str:
+        how = self.scores.options
+        score = "nuPlan" if self.scores.score == "nuplan" else "interPlan"
+        return sentence(
+            "Mean of %(score)s's score over 15 s drives of the planner %(planner)s (offsets: "
+            "%(offsets)s; recorded traffic %(traffic)s); contestants by how much they lower it.",
+            score=score,
+            planner=how.planner,
+            offsets=how.offsets,
+            traffic="reactive" if how.is_reactive else "replayed",
+        )
+
+
+def named(line: DrivingLine) -> str:
+    """The name, with "(simulated)" where that is so."""
+    return f"{line.name}{SIMULATED}" if line.is_simulated else line.name
+
+
+def is_contestant(line: DrivingLine) -> bool:
+    """Whether it is a contestant's line."""
+    return line.subject == Simulation.Subject.AUGMENTATION

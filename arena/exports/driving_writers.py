@@ -1,0 +1,122 @@
+"""Mean driving scores as a file. The same drives always give the same bytes."""
+
+from __future__ import annotations
+
+import json
+from typing import Any
+
+from arena.exports.driving_table import REPORTED, SOURCE, DrivingTable, named
+from arena.exports.formats import Format, formats, rounded
+from arena.rating.printed import escape
+from arena.services.cells import csv_text
+from augment.models import Scenario
+from augment.services.judging.driving_scores import DrivingLine
+
+MEASURED = "measured"
+COLUMNS = (
+    "scenarios", "slug", "model", "variant", "simulated", "score_percent", "before_percent",
+    "lowered_percent", "drives", "failed", "collided", "emergency_braked",
+    *(f"{kind}_percent" for kind in Scenario.Type.values), "source",
+)  # fmt: skip
+
+
+def csv_bytes(table: DrivingTable) -> bytes:
+    """One line a contestant, then the paper's; what is unknown is empty."""
+    rows: list[list[object]] = []
+    for line in table.lines:
+        who = [named(line), line.slug, line.model, line.variant, line.is_simulated]
+        means = [_percent(value) for value in (line.mean, line.before, line.lowered)]
+        counts = [line.drives, line.failed, line.collided, line.braked]
+        types = [_percent(line.by_type[kind]) for kind in Scenario.Type.values]
+        rows.append([*who, *means, *counts, *types, MEASURED])
+    blank = [""] * len(Scenario.Type.values)
+    for name, score in REPORTED:
+        rows.append(
+            [name, "", "", "", "no", _percent(score), "", "", "", "", "", "", *blank, SOURCE]
+        )
+    return csv_text(COLUMNS, rows).encode()
+
+
+def json_bytes(table: DrivingTable) -> bytes:
+    """Everything, shares from 0 to 1."""
+    how = table.scores.options
+    document: dict[str, Any] = {
+        "format": "scenario-arena/driving",
+        "version": 1,
+        "title": table.title,
+        "score": table.scores.score,
+        "planner": how.planner,
+        "offsets": how.offsets,
+        "reactive": how.is_reactive,
+        "simulated": table.simulated,
+        "notes": list(table.notes),
+        "lines": [_line(line) for line in table.lines],
+        "reported": [
+            {"scenarios": name, "mean": score, "source": SOURCE} for name, score in REPORTED
+        ],
+    }
+    return (json.dumps(document, indent=2, ensure_ascii=False) + "\n").encode()
+
+
+def latex_bytes(table: DrivingTable) -> bytes:
+    """The paper's table with a second column for the scenes before the change; booktabs."""
+    lines = [
+        r"% \usepackage{booktabs}",
+        *(f"% {note}" for note in table.notes),
+        r"\begin{table}",
+        r"    \centering",
+        r"    \begin{tabular}{lrr}",
+        r"    \toprule",
+        r"    \textbf{Scenarios} & \textbf{Mean Driving Score} [\%] & \textbf{Before} [\%] \\",
+        r"    \midrule",
+        *(
+            rf"    {escape(named(line))} & {_printed(line.mean)} & {_printed(line.before)} \\"
+            for line in table.lines
+        ),
+        r"    \midrule",
+        *(
+            rf"    {escape(name)} ({escape(SOURCE)}) & {_printed(score)} & -- \\"
+            for name, score in REPORTED
+        ),
+        r"    \bottomrule",
+        r"    \end{tabular}",
+        rf"    \caption{{Mean driving score of {escape(table.scores.options.planner)}.}}",
+        r"    \label{tab:driving_score}",
+        r"\end{table}",
+    ]
+    return ("\n".join(lines) + "\n").encode()
+
+
+FORMATS: dict[str, Format[DrivingTable]] = formats(
+    csv=csv_bytes, json=json_bytes, latex=latex_bytes
+)
+
+
+# Private
+
+
+def _percent(value: float | None) -> str:
+    return "" if value is None else f"{100.0 * value:.2f}"
+
+
+def _printed(value: float | None) -> str:
+    return "--" if value is None else f"{100.0 * value:.1f}"
+
+
+def _line(line: DrivingLine) -> dict[str, Any]:
+    return {
+        "scenarios": line.name,
+        "subject": line.subject,
+        "slug": line.slug,
+        "model": line.model,
+        "variant": line.variant,
+        "simulated": line.is_simulated,
+        "mean": rounded(line.mean),
+        "before": rounded(line.before),
+        "lowered": rounded(line.lowered),
+        "drives": line.drives,
+        "failed": line.failed,
+        "collided": line.collided,
+        "emergency_braked": line.braked,
+        "by_type": {kind: rounded(mean) for kind, mean in line.by_type.items()},
+    }

@@ -1,0 +1,224 @@
+"""Driving scores on the pages of jobs and studies, and the drives to look at."""
+
+from __future__ import annotations
+
+import uuid
+from functools import partial
+from typing import Any
+
+from django.contrib import messages
+from django.db import transaction
+from django.http import Http404, HttpRequest, HttpResponse, HttpResponseBase
+from django.shortcuts import get_object_or_404, redirect, render
+from django.utils.text import slugify
+from django.utils.translation import ngettext
+from django.views.decorators.http import require_POST, require_safe
+
+from arena.exports.driving_table import REPORTED, DrivingTable
+from arena.exports.driving_writers import FORMATS
+from arena.exports.formats import format_named
+from arena.exports.tables import LeaderboardTable
+from arena.models import Snapshot
+from arena.queries.costs import shown_augmentations
+from arena.queries.driving import before_of, cells_of
+from arena.web.access import ADMIN, STAFF, only
+from augment.errors import AugmentError, QueueFault, UnknownName
+from augment.models import GenerationJob, Simulation
+from augment.services.judging import simulations
+from augment.services.judging.drive_files import FILES, drive_file
+from augment.services.judging.driving_scores import (
+    options_driven,
+    scores_of_augmentations,
+    scores_of_job,
+)
+from augment.services.judging.simulations import NUPLAN, SCORES, Options
+from augment.services.wording import said
+from augment.tasks import enqueue_simulations
+
+LABELS = {"nuplan": "nuPlan", "interplan": "interPlan"}
+
+
+@only(ADMIN)
+@require_POST
+def simulate_job(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
+    """Have the job's results driven by the workers."""
+    job = get_object_or_404(GenerationJob, code=code)
+    options = Options(
+        planner=request.POST.get("planner", "pdm-closed"),
+        offsets=request.POST.get("offsets", "paper"),
+        is_reactive=request.POST.get("reactive") == "on",
+    )
+    try:
+        with transaction.atomic():
+            waiting = simulations.plan_job(job=job, options=options)
+            transaction.on_commit(partial(_send, request, waiting))
+    except AugmentError as error:
+        messages.error(request, said(error))
+    else:
+        number = len(waiting)
+        messages.success(
+            request,
+            ngettext("%(number)s drive is queued.", "%(number)s drives are queued.", number)
+            % {"number": number},
+        )
+    return redirect("job", code=code)
+
+
+@only(*STAFF)
+@require_safe
+def drives_page(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
+    """Every drive of a job in a grid."""
+    job = get_object_or_404(GenerationJob, code=code)
+    score = _score_asked(request)
+    options = _options_asked(request, job)
+    cells = cells_of(job, options)
+    lines = [
+        {
+            "scenario": row.scenario,
+            "scenes": [
+                _cell(found.get(row.scenario.pk), score)
+                for found in (cells.before, cells.reference)
+            ],
+            "cells": [
+                _cell(None if cell is None else cells.by_augmentation.get(cell.pk), score)
+                for cell in row.cells
+            ],
+        }
+        for row in cells.grid.rows
+    ]
+    context = {"job": job, "lines": lines, "contestants": cells.grid.contestants, "score": score}
+    return render(request, "drives/list.html", context | {"labels": LABELS})
+
+
+@only(*STAFF)
+@require_safe
+def drive_page(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
+    """One drive to look at, beside the same scene before the change."""
+    row = _driven(code)
+    before = before_of(row)
+    context = {
+        "drive": row,
+        "before": before,
+        "files": FILES if row.state == Simulation.State.DONE else (),
+        "metrics": _metrics(row, before),
+        "labels": LABELS,
+    }
+    return render(request, "drives/drive.html", context)
+
+
+@only(*STAFF)
+@require_safe
+def drive_trace(request: HttpRequest, code: uuid.UUID, form: str) -> HttpResponseBase:
+    """The drive as JSON for the page, or as a moving picture or a strip of stills."""
+    row = _driven(code)
+    if row.state != Simulation.State.DONE or form not in FILES:
+        raise Http404
+    content = drive_file(row, form, before=None if form == "json" else before_of(row))
+    answer = HttpResponse(content, content_type=FILES[form])
+    answer["Cache-Control"] = "private, max-age=3600"
+    if form != "json":
+        answer["Content-Disposition"] = f'attachment; filename="{row.scenario.slug}.{form}"'
+    return answer
+
+
+@only(*STAFF)
+@require_safe
+def export(request: HttpRequest, code: uuid.UUID, form: str) -> HttpResponse:
+    """The mean driving scores of a job as a file."""
+    job = get_object_or_404(GenerationJob, code=code)
+    try:
+        chosen = format_named(FORMATS, form)
+    except UnknownName as error:
+        raise Http404 from error
+    name = f"{slugify(job.name) or 'job'}-driving-{_score_asked(request)}"
+    return HttpResponse(
+        chosen.write(_table(request, job)),
+        content_type=chosen.content_type,
+        headers={"Content-Disposition": f'attachment; filename="{name}.{chosen.suffix}"'},
+    )
+
+
+def section(request: HttpRequest, job: GenerationJob) -> dict[str, object]:
+    """What the part of the job's page shows."""
+    table = _table(request, job)
+    return {"table": table, "forms": FORMATS, **_shown(table)}
+
+
+def driving(snapshot: Snapshot, table: LeaderboardTable) -> dict[str, Any]:
+    """What the tab of a study's results shows: of the augmentations that it shows."""
+    ids = shown_augmentations(snapshot.study)
+    found = [
+        DrivingTable(
+            title=snapshot.study.name,
+            scores=scores_of_augmentations(ids, options=Options(), score=score),
+        )
+        for score in SCORES
+    ]
+    return {"drivings": [{"table": one, **_shown(one)} for one in found if one.lines]}
+
+
+# Private
+
+
+def _table(request: HttpRequest, job: GenerationJob) -> DrivingTable:
+    scores = scores_of_job(job, options=_options_asked(request, job), score=_score_asked(request))
+    return DrivingTable(title=job.name, scores=scores)
+
+
+def _shown(table: DrivingTable) -> dict[str, Any]:
+    return {
+        "lines": [
+            {"line": line, "types": [line.by_type[kind] for kind, _ in table.types]}
+            for line in table.lines
+        ],
+        "reported": REPORTED,
+        "labels": LABELS,
+        "score": table.scores.score,
+    }
+
+
+def _score_asked(request: HttpRequest) -> str:
+    wanted = request.GET.get("score", NUPLAN)
+    return wanted if wanted in SCORES else NUPLAN
+
+
+def _options_asked(request: HttpRequest, job: GenerationJob) -> Options:
+    """As the address says, else the way in which the job was driven last."""
+    known = options_driven(job)
+    wanted = request.GET.get("driven", "")
+    if wanted.isdigit() and int(wanted) < len(known):
+        return known[int(wanted)]
+    return known[0] if known else Options()
+
+
+def _driven(code: uuid.UUID) -> Simulation:
+    rows = Simulation.objects.select_related("scenario", "augmentation__contestant")
+    return get_object_or_404(rows, code=code)
+
+
+def _cell(row: Simulation | None, score: str) -> dict[str, Any] | None:
+    if row is None:
+        return None
+    return {"row": row, "value": getattr(row, SCORES[score])}
+
+
+def _metrics(row: Simulation, before: Simulation | None) -> list[dict[str, Any]]:
+    """The parts of nuPlan's score, beside those before the change."""
+    if row.document is None:
+        return []
+    old = {} if before is None or before.document is None else _values(before.document)
+    return [
+        metric | {"before": old.get(metric["name"])} for metric in row.document["metrics"][NUPLAN]
+    ]
+
+
+def _values(document: dict[str, Any]) -> dict[str, float | None]:
+    return {metric["name"]: metric["value"] for metric in document["metrics"][NUPLAN]}
+
+
+def _send(request: HttpRequest, waiting: list[int]) -> None:
+    """Put drives on the queue; without a queue they wait, and the person is told."""
+    try:
+        enqueue_simulations(waiting)
+    except QueueFault as error:
+        messages.warning(request, said(error))

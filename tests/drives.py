@@ -1,0 +1,65 @@
+"""Driven rows without a drive of 15 s each: a short one, made once, stands for all."""
+
+from __future__ import annotations
+
+import json
+import zlib
+from functools import cache
+from typing import Any
+
+from augment.models import Augmentation, GenerationJob, Simulation
+from augment.scene.modification import Modification
+from augment.services.judging import simulations
+from augment.services.judging.simulations import Options
+from augment.simulation.drive import run
+from augment.simulation.expert import expert_of
+from augment.simulation.pdm_closed import PdmClosed
+from augment.simulation.road import Road
+from augment.simulation.score import ScoreKind, score_drive
+from augment.simulation.setting import Setting
+from augment.simulation.trace import trace_of
+from tests.scenes import cone, scene
+
+
+@cache
+def short_drive() -> tuple[bytes, dict[str, Any]]:
+    """A packed trace and a document of 1.2 s towards two cones."""
+    change = Modification(added=(cone("Agent2", 20.0, 0.5), cone("Agent3", 25.0, -0.5)))
+    setting = Setting(scene=scene(), modification=change)
+    road = Road(setting.scene)
+    drive = run(setting, PdmClosed((0.0, 1.0)), road=road, steps=12)
+    score = score_drive(drive, expert_of(setting, road, steps=12))
+    document = simulations.document_of(drive, dict.fromkeys(ScoreKind, score))
+    trace = json.dumps(trace_of(setting, drive, score)).encode()
+    return zlib.compress(trace), document
+
+
+def driven(job: GenerationJob, *, before: float = 1.0, after: float = 0.25) -> list[Simulation]:
+    """Every outcome of a job as driven, with these scores; the augmentations' rows last."""
+    simulations.plan_job(job=job, options=Options())
+    trace, document = short_drive()
+    rows = list(Simulation.objects.order_by("augmentation_id", "pk"))
+    for row in rows:
+        score = before if row.subject == Simulation.Subject.UNMODIFIED else after
+        row.state, row.trace, row.document = Simulation.State.DONE, trace, document
+        row.nuplan_score = row.interplan_score = score
+        row.save()
+    return sorted(rows, key=lambda row: (row.augmentation_id is not None, row.pk))
+
+
+def finished(job: GenerationJob) -> GenerationJob:
+    """The job with an outcome in each of its rows."""
+    job.augmentations.update(
+        state=Augmentation.State.DONE,
+        image="bev/x.png",
+        modification={
+            "format": "scenario-arena/modification",
+            "version": 1,
+            "add": [],
+            "move": [],
+            "remove": [],
+        },
+    )
+    GenerationJob.objects.filter(pk=job.pk).update(state=GenerationJob.State.FINISHED)
+    job.refresh_from_db()
+    return job

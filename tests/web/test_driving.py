@@ -1,0 +1,136 @@
+"""Simulating a job by its page, the table of driving scores, and the drives to look at."""
+
+from __future__ import annotations
+
+import io
+import json
+from collections.abc import Callable
+
+import pytest
+from django.urls import reverse
+from PIL import Image
+
+from augment.models import GenerationJob, Simulation
+from tests.drives import driven, finished
+from tests.jobs import rows
+from tests.web.cast import people, signed_in
+
+pytestmark = pytest.mark.django_db
+
+OnCommit = Callable[..., object]
+
+
+def launched(scenarios: int = 1) -> GenerationJob:
+    return finished(rows.launch(scenarios=scenarios))
+
+
+def test_the_button_plans_the_drives_and_queues_them(
+    django_capture_on_commit_callbacks: OnCommit,
+) -> None:
+    job = launched(scenarios=2)
+    admin = signed_in(people()["admin"])
+    assert reverse("job-simulate", args=[job.code]) in (
+        admin.get(reverse("job", args=[job.code])).content.decode()
+    )
+    with django_capture_on_commit_callbacks() as waiting:  # type: ignore[attr-defined]
+        answer = admin.post(reverse("job-simulate", args=[job.code]))
+    assert answer.headers["Location"] == reverse("job", args=[job.code])
+    assert Simulation.objects.filter(state="queued").count() == 6
+    assert len(waiting) == 1
+
+
+def test_a_planner_that_nobody_knows_is_said_and_nothing_is_planned() -> None:
+    job = launched()
+    admin = signed_in(people()["admin"])
+    sent = {"planner": "pdm-open"}
+    shown = admin.post(reverse("job-simulate", args=[job.code]), sent, follow=True)
+    assert "pdm-open" in shown.content.decode()
+    assert not Simulation.objects.exists()
+
+
+def test_only_admins_simulate_and_only_staff_see_drives() -> None:
+    job = launched()
+    row = driven(job)[-1]
+    cast = people()
+    button = reverse("job-simulate", args=[job.code])
+    assert signed_in(cast["analyst"]).post(button).status_code == 403
+    pages = [
+        reverse("drives", args=[job.code]),
+        reverse("drive", args=[row.code]),
+        reverse("drive-file", args=[row.code, "json"]),
+        reverse("driving-export", args=[job.code, "csv"]),
+    ]
+    for page in pages:
+        assert signed_in(cast["analyst"]).get(page).status_code == 200, page
+        assert signed_in(cast["expert"]).get(page).status_code == 403, page
+
+
+def test_the_jobs_page_shows_scores_beside_the_papers() -> None:
+    job = launched()
+    driven(job)
+    shown = signed_in(people()["analyst"]).get(reverse("job", args=[job.code])).content.decode()
+    assert "Mean driving score (%)" in shown
+    assert "25.0" in shown
+    assert "75.0" in shown
+    assert "reported in the paper" in shown
+    assert "51.9" in shown
+    assert "compare contestants" in shown
+
+
+def test_the_drives_of_a_job_lead_to_each_drive() -> None:
+    job = launched()
+    made = driven(job)
+    shown = signed_in(people()["analyst"]).get(reverse("drives", args=[job.code])).content.decode()
+    for row in made:
+        assert reverse("drive", args=[row.code]) in shown
+
+
+def test_a_drive_stands_beside_the_scene_before_its_change() -> None:
+    before, *_, row = driven(launched())
+    analyst = signed_in(people()["analyst"])
+    shown = analyst.get(reverse("drive", args=[row.code])).content.decode()
+    assert shown.count("<canvas") == 2
+    for one in (before, row):
+        assert reverse("drive-file", args=[one.code, "json"]) in shown
+    trace = json.loads(analyst.get(reverse("drive-file", args=[row.code, "json"])).content)
+    assert trace["format"] == "scenario-arena/drive"
+    assert len(trace["plans"][0]["scores"]) == 10
+    assert analyst.get(reverse("drive", args=[before.code])).content.decode().count("<canvas") == 1
+
+
+@pytest.mark.parametrize(
+    ("form", "kind", "frames"), [("gif", "GIF", 7), ("apng", "PNG", 7), ("png", "PNG", 1)]
+)
+def test_a_drive_can_be_taken_away_as_pictures(form: str, kind: str, frames: int) -> None:
+    row = driven(launched())[-1]
+    answer = signed_in(people()["analyst"]).get(reverse("drive-file", args=[row.code, form]))
+    picture = Image.open(io.BytesIO(answer.content))
+    assert picture.format == kind
+    assert getattr(picture, "n_frames", 1) == frames
+    assert picture.width == 672
+
+
+def test_what_is_not_driven_yet_has_no_files() -> None:
+    job = launched()
+    row = driven(job)[-1]
+    Simulation.objects.filter(pk=row.pk).update(state="failed", reason="it broke")
+    analyst = signed_in(people()["analyst"])
+    assert analyst.get(reverse("drive-file", args=[row.code, "json"])).status_code == 404
+    assert "it broke" in analyst.get(reverse("drive", args=[row.code])).content.decode()
+
+
+@pytest.mark.parametrize(
+    ("form", "parts"),
+    [
+        ("csv", ["score_percent", "25.00", "reported in the paper", "51.90"]),
+        ("json", ['"format": "scenario-arena/driving"', '"lowered": 0.75']),
+        ("latex", [r"\label{tab:driving_score}", r"51.9", "reported in the paper"]),
+    ],
+)
+def test_the_table_as_a_file(form: str, parts: list[str]) -> None:
+    job = launched()
+    driven(job)
+    analyst = signed_in(people()["analyst"])
+    text = analyst.get(reverse("driving-export", args=[job.code, form])).content.decode()
+    for part in parts:
+        assert part in text
