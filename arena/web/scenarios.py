@@ -24,6 +24,7 @@ from augment.services.running.transcript_export import transcript_of
 from augment.services.running.transcript_steps import totals_of, tries_of
 from augment.services.running.transcripts import IMAGES
 from augment.services.scenarios.intents import statements_of, waiting_reading
+from augment.services.scenarios.scene_notes import notes_of
 from augment.services.wording import said
 from augment.tasks import enqueue_marks
 
@@ -54,6 +55,7 @@ def scenario_page(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
         "reading_statements": [
             said(one) for one in statements_of(None if reading is None else reading.document)
         ],
+        "notes": [said(note) for note in notes_of(scenario.base_scene)],
         "augmentations": scenarios.augmentations_of(scenario),
     }
     return render(request, "scenarios/scenario.html", context)

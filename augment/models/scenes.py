@@ -22,6 +22,17 @@ class BaseScene(models.Model):
     recording = models.JSONField(null=True, blank=True, help_text="tracks and ego motion after t0")
     source = models.CharField(max_length=40, help_text="authored, av2, ...")
     provenance = models.TextField()
+    notes = models.JSONField(
+        default=list,
+        blank=True,
+        help_text="losses and assumptions, as augment.scene.notes has them",
+    )
+    content_hash = models.CharField(
+        max_length=64,
+        blank=True,
+        db_index=True,
+        help_text="of what was read from outside; two scenes of one hash are the same",
+    )
     created_at = models.DateTimeField(auto_now_add=True)
 
     class Meta:

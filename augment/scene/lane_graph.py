@@ -9,6 +9,10 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable
 from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
 
 from augment.errors import UnknownName
 from augment.geometry.angles import difference
@@ -72,7 +76,7 @@ class LaneGraph:
         """The way whose width covers the point; of several the best aligned, else the nearest."""
         covering = [
             (self._misfit(way, place, heading_rad), way.id)
-            for way in self.ways.values()
+            for way in self._boxed(x_m, y_m)
             for place in [way.centerline.project(x_m, y_m)]
             if self._covers(way, place)
         ]
@@ -142,6 +146,25 @@ class LaneGraph:
             route.append(following)
             total += self.ways[following].centerline.length_m
         return route
+
+    def _boxed(self, x_m: float, y_m: float) -> list[Way]:
+        """The ways in whose box the point lies; all others are more than half a width away."""
+        low_x, low_y, high_x, high_y = self._boxes
+        inside = (low_x <= x_m) & (x_m <= high_x) & (low_y <= y_m) & (y_m <= high_y)
+        ways = list(self.ways.values())
+        return [ways[index] for index in np.flatnonzero(inside)]
+
+    @cached_property
+    def _boxes(self) -> NDArray[np.float64]:
+        """The box around each way, half a width out: least x, least y, most x, most y (4, W)."""
+        boxes = [
+            [
+                *(way.centerline.points_m.min(axis=0) - way.width_m / 2.0 - 0.1),
+                *(way.centerline.points_m.max(axis=0) + way.width_m / 2.0 + 0.1),
+            ]
+            for way in self.ways.values()
+        ]
+        return np.array(boxes, dtype=np.float64).reshape(-1, 4).T
 
     def _join(self, before: str | None, after: str | None) -> None:
         if before in self._next and after in self._previous:

@@ -33,7 +33,8 @@ class Recording:
 
     Attributes:
         times_s: (T,) seconds since t0, the first is 0.
-        ego: (T, 4): x_m, y_m, heading_rad, speed_mps of the ego's geometric centre.
+        ego: (T, 4): x_m, y_m, heading_rad, speed_mps of the ego's geometric centre; NaN where
+            nobody recorded it, but never at t0.
         tracks: One entry an agent.
     """
 

@@ -1,4 +1,4 @@
-"""Recordings as JSON documents and back, exactly; a step where an agent was not seen is null.
+"""Recordings as JSON documents and back, exactly; a step where one was not seen is null.
 
 Frame: the ego frame of t0. T steps.
 """
@@ -51,7 +51,7 @@ class RecordingDocument(Document):
         Field(min_length=4, max_length=4),
     ]
     times_s: Annotated[list[Number], Field(fail_fast=True, min_length=1)]
-    ego: Annotated[list[State], Field(fail_fast=True)]
+    ego: Annotated[list[State | None], Field(fail_fast=True)]
     tracks: Annotated[list[TrackDocument], Field(max_length=MOST_TRACKS)] = []
 
 
@@ -66,14 +66,14 @@ def recording_to_document(recording: Recording) -> dict[str, Any]:
         "version": VERSION,
         "columns": list(COLUMNS),
         "times_s": recording.times_s.tolist(),
-        "ego": recording.ego.tolist(),
+        "ego": _rows(recording.ego),
         "tracks": [
             {
                 "agent_id": track.agent_id,
                 "type": track.type,
                 "length_m": track.length_m,
                 "width_m": track.width_m,
-                "states": [None if np.isnan(row).all() else row.tolist() for row in track.states],
+                "states": _rows(track.states),
             }
             for track in recording.tracks
         ],
@@ -94,7 +94,7 @@ def recording_from_document(document: object) -> Recording:
         raise InvalidDocument("recording", problems)
     return Recording(
         times_s=_frozen(given.times_s, (-1,)),
-        ego=_frozen(given.ego, (-1, 4)),
+        ego=_frozen([row or [np.nan] * 4 for row in given.ego], (-1, 4)),
         tracks=tuple(
             Track(
                 agent_id=track.agent_id,
@@ -109,6 +109,10 @@ def recording_from_document(document: object) -> Recording:
 
 
 # Private
+
+
+def _rows(states: NDArray[np.float64]) -> list[list[float] | None]:
+    return [None if np.isnan(row).all() else row.tolist() for row in states]
 
 
 def _frozen(values: object, shape: tuple[int, ...]) -> NDArray[np.float64]:
@@ -126,6 +130,8 @@ def _problems(given: RecordingDocument) -> list[tuple[str, str]]:
     for index, (before, after) in enumerate(zip(given.times_s, given.times_s[1:], strict=False)):
         if after <= before:
             problems.append((path("times_s", index + 1), f"{after} does not follow {before}"))
+    if given.ego and given.ego[0] is None:
+        problems.append((path("ego", 0), "the ego is there at t0"))
     steps = len(given.times_s)
     lengths = [("ego", len(given.ego))]
     lengths += [(path("tracks", i, "states"), len(t.states)) for i, t in enumerate(given.tracks)]

@@ -8,6 +8,7 @@ from enum import StrEnum
 import numpy as np
 
 from augment.scene.modification import Modification
+from augment.scene.recording import Recording
 from augment.simulation.drive import DURATION_STEPS, run
 from augment.simulation.idm_planner import IdmPlanner
 from augment.simulation.road import Road
@@ -41,7 +42,7 @@ def expert_of(setting: Setting, road: Road, *, steps: int = DURATION_STEPS) -> E
 
     The recorded one goes as far as the drive lasts and the map goes.
     """
-    if setting.recording is not None:
+    if setting.recording is not None and _drove(setting.recording):
         times = setting.recording.times_s
         seen = ~np.isnan(setting.recording.ego).any(axis=1)
         ego = setting.recording.ego[seen & (times <= steps * STEP_S + STEP_S / 2.0)]
@@ -55,6 +56,11 @@ def expert_of(setting: Setting, road: Road, *, steps: int = DURATION_STEPS) -> E
     drive = run(plain, IdmPlanner(target_mps=None), road=road, steps=steps)
     ends, _ = road.centreline.beside(drive.boxes[[0, -1], :2])
     return Expert(kind=ExpertKind.IDM, start_m=float(ends[0]), end_m=float(ends[1]))
+
+
+def _drove(recording: Recording) -> bool:
+    """Whether more of the ego was recorded than where it began."""
+    return int((~np.isnan(recording.ego).any(axis=1)).sum()) > 1
 
 
 def furthest_m(road: Road, body: EgoBody) -> float:

@@ -14,7 +14,7 @@ from pathlib import Path
 from statistics import median
 
 from augment.checks import findings
-from augment.formats import argoverse2
+from augment.formats.argoverse2.sensor import ArgoverseSensor
 from augment.scene.modification import Modification
 from tests.checks.worlds import Reference, references
 from tests.scenes import cone
@@ -32,7 +32,8 @@ def main(rounds: int) -> None:
     print(f"| slowest scene, median | {max(typical):.1f} |")
     if folder := os.environ.get("REALDATA_DIR"):
         (log,) = (Path(folder) / "av2_sensor").iterdir()
-        took_ms = _times_ms(lambda: argoverse2.read(log, frame=30, name="recorded"), rounds)
+        reader = ArgoverseSensor()
+        took_ms = _times_ms(lambda: reader.read(log, item=None, frame=30, name="recorded"), rounds)
         print(f"| a recorded log, read: shortest, median | {took_ms[0]:.0f}, {took_ms[1]:.0f} |")
 
 

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from augment.errors import InvalidDocument
-from augment.formats import argoverse2
 from augment.formats.argoverse2.categories import TYPE_OF
+from augment.formats.argoverse2.sensor import ArgoverseSensor
 from augment.scene.codec import scene_from_document, scene_to_document
 from augment.scene.entities import (
     AgentType,
@@ -31,7 +31,9 @@ def log(tmp_path: Path) -> Path:
 
 
 def read(folder: Path, frame: int = 0) -> tuple[Scene, Recording]:
-    return argoverse2.read(folder, frame=frame, name="made")
+    reading = ArgoverseSensor().read(folder, item=None, frame=frame, name="made")
+    assert reading.recording is not None
+    return reading.scene, reading.recording
 
 
 def test_the_ego_is_its_centre_ahead_of_the_rear_axle(log: Path) -> None:

@@ -13,7 +13,7 @@ from augment.scene.codec import modification_to_document, scene_to_document
 from augment.scene.intent import Shape
 from augment.scene.intent_codec import intent_to_document
 from augment.scene.modification import Modification
-from augment.services.scenarios.scenes import import_scene
+from augment.services.scenarios.scene_imports import import_scene
 from tests.intents import cones
 from tests.scenes import cone, scene, vehicle
 

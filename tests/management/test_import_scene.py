@@ -34,9 +34,15 @@ def refused(*arguments: object) -> str:
 
 def test_a_recorded_scene_is_imported_and_counted(tmp_path: Path) -> None:
     out = run("av2", write_log(tmp_path / "log"), "--frame", 2, "--slug", "made")
-    assert out == (
-        "Imported scene made: 3 agents, 5 lanes, 2 connectors, 2 areas besides the ego.\n"
+    first, *notes = out.splitlines()
+    assert (
+        first == "Imported scene made: 3 agents, 5 lanes, 2 connectors, 2 areas besides the ego."
     )
+    assert notes[0] == (
+        "  No speed limits in this source: "
+        "a drive assumes 15 m/s for the ego and 10 m/s for others."
+    )
+    assert "  1 bicycle lanes of the map were left out." in notes
     assert Event.objects.filter(verb="import", after__frame=2).exists()
 
 
@@ -75,3 +81,56 @@ def test_a_frame_source_or_slug_that_can_not_be_is_refused(tmp_path: Path) -> No
     assert "frames 0 to 4" in refused("av2", folder, "--frame=-1", "--slug", "made")
     assert "Known: av2, json" in refused("osm", folder, "--slug", "made")
     assert "lower-case letters" in refused("av2", folder, "--slug", "Made Up")
+
+
+def test_a_format_that_is_not_named_is_recognised(tmp_path: Path) -> None:
+    run(write_log(tmp_path / "log"), "--slug", "made")
+    assert BaseScene.objects.get(slug="made").source == "av2"
+    file = tmp_path / "scene.json"
+    file.write_text(json.dumps(scene_to_document(junction())))
+    run(file, "--slug", "crossing")
+    assert BaseScene.objects.get(slug="crossing").source == "json"
+
+
+def test_what_looks_like_no_format_is_refused_with_all_of_them(tmp_path: Path) -> None:
+    said = refused(tmp_path, "--slug", "x")
+    assert "looks like none of the formats" in said
+    assert "av2: Argoverse 2 Sensor log (folder)" in said
+    assert "is not there" in refused(tmp_path / "nowhere", "--slug", "x")
+
+
+def test_the_same_scene_is_not_stored_twice(tmp_path: Path) -> None:
+    log = write_log(tmp_path / "log")
+    run("av2", log, "--slug", "first")
+    assert "stored already, as 'first'" in refused("av2", log, "--slug", "second")
+    run("av2", log, "--slug", "second", "--frame", 1)
+
+
+def run_log(*arguments: object) -> list[str]:
+    out = StringIO()
+    call_command("import_log", *(str(one) for one in arguments), stdout=out)
+    return out.getvalue().splitlines()
+
+
+def test_a_log_becomes_a_scene_every_few_seconds(tmp_path: Path) -> None:
+    log = write_log(tmp_path / "log")
+    lines = run_log("av2", log, "--every", "0.2s", "--slug", "drive")
+    assert lines[:3] == [
+        "frame 0: drive-1, 3 agents.",
+        "frame 2: drive-2, 3 agents.",
+        "frame 4: drive-3, 4 agents.",
+    ]
+    assert lines[-1] == "Imported 3 scenes."
+    assert BaseScene.objects.get(slug="drive-2").notes[0] == {"kind": "no_speed_limits"}
+    again = run_log(log, "--every", "0.1s", "--limit", 2, "--slug", "drive")
+    assert again[:2] == [
+        "frame 0: the same scene is stored already, as drive-1.",
+        "frame 1: drive-4, 3 agents.",
+    ]
+    assert again[-1] == "Imported 1 scenes."
+
+
+@pytest.mark.parametrize("arguments", [("--every", "0s"), ("--every", "soon"), ("--limit", "0")])
+def test_a_time_or_a_number_that_is_none_is_refused(tmp_path: Path, arguments: tuple[str]) -> None:
+    with pytest.raises(CommandError, match="is no"):
+        run_log("av2", tmp_path, "--slug", "x", *arguments)

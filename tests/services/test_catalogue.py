@@ -18,7 +18,8 @@ from augment.scene.catalogue_codec import CatalogueEntry, entry_to_document
 from augment.scene.codec import scene_to_document
 from augment.scene.modification import Modification
 from augment.services.scenarios.catalogue import CatalogueReport, load_catalogue
-from augment.services.scenarios.scenes import add_scenario, import_scene, intent_of, reference_of
+from augment.services.scenarios.scene_imports import import_scene
+from augment.services.scenarios.scenes import add_scenario, intent_of, reference_of
 from tests.intents import parked
 from tests.scenes import scene, vehicle
 

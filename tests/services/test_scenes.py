@@ -11,7 +11,8 @@ from augment.models import BaseScene, Event, Scenario
 from augment.scene.codec import modification_to_document, scene_to_document
 from augment.scene.modification import Modification
 from augment.scene.recording_codec import recording_from_document
-from augment.services.scenarios.scenes import add_scenario, import_scene, reference_of, scene_of
+from augment.services.scenarios.scene_imports import import_scene
+from augment.services.scenarios.scenes import add_scenario, reference_of, scene_of
 from tests.formats.av2_logs import write_log
 from tests.scenes import cone, scene, vehicle
 

@@ -2,13 +2,12 @@
 
 Boxes are stored in the ego frame of their own sweep, poses as city_SE3_egovehicle. The ego frame's
 origin lies under the rear axle; from here on the ego is its geometric centre. Headings are those
-of the forward axis, seen from above. T sweeps, R rows, K rows of one track.
+of the forward axis, seen from above. T sweeps, R rows.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -17,7 +16,7 @@ from numpy.typing import NDArray
 
 from augment.errors import InvalidDocument
 from augment.formats.argoverse2.categories import EGO, TYPE_OF
-from augment.scene.entities import AgentType
+from augment.formats.recorded_log import MOST_NUMBERS, Log, LoggedTrack, speeds
 
 WHAT = "Argoverse 2 log"
 BOXES = "annotations.feather"
@@ -28,48 +27,10 @@ EGO_WIDTH_M = 1.852
 REAR_AXLE_TO_CENTER_M = 1.42
 """The fleet's car, a Ford Fusion: half its length less the overhang behind the rear axle."""
 
-LONGEST_GAP_S = 0.35
-"""Sweeps are 0.1 s apart; over a longer gap no speed is taken."""
-
-NEIGHBOURS = 2
-"""Sweeps on either side that a speed is taken over: one alone shows the annotators' jitter."""
-
 FloatArray = NDArray[np.float64]
 
 _QUATERNION = ("qw", "qx", "qy", "qz")
 _PLACE = ("tx_m", "ty_m", "tz_m")
-
-
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class LoggedTrack:
-    """One annotated object.
-
-    Attributes:
-        sweeps: (K,) indices of the sweeps that show it, ascending.
-        states: (K, 4): x_m, y_m, heading_rad, speed_mps in the city frame.
-    """
-
-    uuid: str
-    type: AgentType
-    length_m: float
-    width_m: float
-    sweeps: NDArray[np.int64]
-    states: FloatArray
-
-
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Log:
-    """What was annotated.
-
-    Attributes:
-        times_s: (T,) since the first annotated sweep.
-        ego: (T, 4): x_m, y_m, heading_rad, speed_mps of the ego's centre in the city frame.
-        tracks: By uuid.
-    """
-
-    times_s: FloatArray
-    ego: FloatArray
-    tracks: tuple[LoggedTrack, ...]
 
 
 def read_log(folder: Path) -> Log:
@@ -92,13 +53,20 @@ def read_log(folder: Path) -> Log:
     heading = np.arctan2(forward[:, 1], forward[:, 0])
     level = np.column_stack([np.cos(heading), np.sin(heading)])
     center = place[:, :2] + REAR_AXLE_TO_CENTER_M * level
-    ego = np.column_stack([center, heading, _speeds(times_s, center)])
+    ego = np.column_stack([center, heading, speeds(times_s, center)])
     box_turn, box_place = _rigid(boxes)
     city_turn = turn[sweep_of_row]
     xy = (np.einsum("rij,rj->ri", city_turn, box_place) + place[sweep_of_row])[:, :2]
     ahead = np.einsum("rij,rj->ri", city_turn, box_turn[:, :, 0])
     rows = np.column_stack([xy, np.arctan2(ahead[:, 1], ahead[:, 0])])
-    return Log(times_s=times_s, ego=ego, tracks=tuple(_tracks(boxes, sweep_of_row, rows, times_s)))
+    return Log(
+        what=WHAT,
+        times_s=times_s,
+        ego=ego,
+        ego_length_m=EGO_LENGTH_M,
+        ego_width_m=EGO_WIDTH_M,
+        tracks=tuple(_tracks(boxes, sweep_of_row, rows, times_s)),
+    )
 
 
 # Private
@@ -181,30 +149,21 @@ def _tracks(
 ) -> Iterator[LoggedTrack]:
     order = np.lexsort((sweeps, boxes["track_uuid"]))
     uuids, starts = np.unique(boxes["track_uuid"][order], return_index=True)
+    if len(uuids) * len(times_s) * 4 > MOST_NUMBERS:
+        text = f"has {len(uuids)} tracks in {len(times_s)} sweeps, which is too much"
+        raise InvalidDocument(WHAT, [(BOXES, text)])
     for uuid, mine in zip(uuids.tolist(), np.split(order, starts[1:]), strict=True):
         if boxes["category"][mine[0]] == EGO:
             continue
         mine = mine[np.concatenate([[True], np.diff(sweeps[mine]) > 0])]
-        speeds = _speeds(times_s[sweeps[mine]], rows[mine, :2])
+        states = np.full((len(times_s), 4), np.nan)
+        states[sweeps[mine]] = np.column_stack(
+            [rows[mine], speeds(times_s[sweeps[mine]], rows[mine, :2])]
+        )
         yield LoggedTrack(
-            uuid=uuid,
+            name=uuid,
             type=TYPE_OF[str(boxes["category"][mine[0]])],
             length_m=float(boxes["length_m"][mine[0]]),
             width_m=float(boxes["width_m"][mine[0]]),
-            sweeps=sweeps[mine],
-            states=np.column_stack([rows[mine], speeds]),
+            states=states,
         )
-
-
-def _speeds(times_s: FloatArray, xy_m: FloatArray) -> FloatArray:
-    """Speeds (K,) over the neighbouring rows, one-sided where they end, 0 for a lone row."""
-    rows = np.arange(len(times_s))
-    gap = np.diff(times_s) > LONGEST_GAP_S
-    first = np.maximum.accumulate(np.where(np.concatenate([[True], gap]), rows, 0))
-    last = np.where(np.concatenate([gap, [True]]), rows, len(rows))
-    last = np.minimum.accumulate(last[::-1])[::-1]
-    before = np.maximum(rows - NEIGHBOURS, first)
-    after = np.minimum(rows + NEIGHBOURS, last)
-    apart = times_s[after] - times_s[before]
-    moved = np.hypot(*(xy_m[after] - xy_m[before]).T)
-    return np.divide(moved, apart, out=np.zeros(len(rows)), where=apart > 0.0)

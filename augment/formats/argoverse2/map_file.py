@@ -1,15 +1,24 @@
-"""The map archive of a log as it lies on the disk, in the city frame."""
+"""The map archive of a log: as it lies on the disk, and as what every reader's map is.
+
+City frame. Bicycle lanes are left out: no car drives there. The format has no speed limits, no
+lights (their state is unknown) and no sidewalks; boundaries run in the direction of travel.
+"""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Annotated, Literal
 
+import numpy as np
+from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from augment.errors import InvalidDocument
 from augment.formats.argoverse2.log import WHAT
 from augment.formats.json_file import read_json
+from augment.formats.road_map import RoadMap, Segment
+from augment.scene.entities import AreaKind
 from augment.scene.schema import problems_of
 
 
@@ -75,3 +84,45 @@ def read_map(file: Path) -> MapFile:
     except ValidationError as fault:
         problems = [(f"{file.name}: {place}", text) for place, text in problems_of(fault)]
         raise InvalidDocument(WHAT, problems) from None
+
+
+def road_map(city: MapFile, *, what: str, place: str) -> RoadMap:
+    """The map as segments and areas."""
+    areas = [
+        (AreaKind.DRIVABLE, _points(area.area_boundary)) for area in city.drivable_areas.values()
+    ]
+    for crossing in city.pedestrian_crossings.values():
+        one, other = _points(crossing.edge1), _points(crossing.edge2)
+        same_way = float(np.dot(one[-1] - one[0], other[-1] - other[0])) > 0.0
+        areas.append((AreaKind.CROSSWALK, np.vstack([one, other[::-1] if same_way else other])))
+    return RoadMap(
+        what=what,
+        place=place,
+        segments=tuple(
+            _segment(segment)
+            for segment in city.lane_segments.values()
+            if segment.lane_type != "BIKE"
+        ),
+        areas=tuple(areas),
+    )
+
+
+# Private
+
+
+def _segment(segment: MapSegment) -> Segment:
+    left, right = segment.left_neighbor_id, segment.right_neighbor_id
+    return Segment(
+        name=segment.id,
+        crosses=segment.is_intersection,
+        left=_points(segment.left_lane_boundary),
+        right=_points(segment.right_lane_boundary),
+        successors=tuple(segment.successors),
+        predecessors=tuple(segment.predecessors),
+        left_neighbors=() if left is None else (left,),
+        right_neighbors=() if right is None else (right,),
+    )
+
+
+def _points(points: Sequence[MapPoint]) -> NDArray[np.float64]:
+    return np.array([[point.x, point.y] for point in points])

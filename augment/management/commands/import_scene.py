@@ -9,33 +9,50 @@ from typing import Any
 from django.core.management.base import CommandError
 
 from augment.errors import AugmentError
-from augment.services.scenarios.scenes import SOURCES, import_scene
+from augment.formats.readers import READERS
+from augment.services.scenarios.scene_imports import import_scene
+from augment.services.scenarios.scene_notes import notes_of
 from augment.services.terminal import TerminalCommand
 
 
 class Command(TerminalCommand):
-    """`manage.py import_scene av2 PATH --frame N --slug S`."""
+    """`manage.py import_scene [FORMAT] PATH --slug S [--frame N] [--item I]`."""
 
-    help = "Import a scene: a frame of an Argoverse 2 Sensor log, or a scene in the own JSON."
+    help = "Import one moment of a recording, or a scene in the own JSON. Formats: " + "; ".join(
+        f"{reader.name}, {reader.title}" for reader in READERS.values()
+    )
 
     def add_arguments(self, parser: ArgumentParser) -> None:
         """Say what the command takes."""
-        parser.add_argument("source", help=f"what PATH holds: {' or '.join(SOURCES)}")
-        parser.add_argument("path", type=Path, help="the log's folder, or the JSON file")
         parser.add_argument(
-            "--frame", type=int, default=0, help="the annotated sweep to take, from 0 (default 0)"
+            "source",
+            nargs="?",
+            metavar="FORMAT",
+            help=f"what PATH holds: {' or '.join(READERS)}; recognised when not given",
+        )
+        parser.add_argument("path", type=Path, help="the file or folder")
+        parser.add_argument(
+            "--frame",
+            type=int,
+            help="the step that becomes t0, from 0 (default: what the format means, else 0)",
+        )
+        parser.add_argument(
+            "--item",
+            help="which part of a file with several: the number of a record, a planning problem, "
+            "a lidar_pc token (default: the first)",
         )
         parser.add_argument(
             "--slug", required=True, help="the scene's name: lower-case letters, digits, hyphens"
         )
 
     def handle(self, *args: Any, **options: Any) -> None:
-        """Import, and say what came in."""
+        """Import, and say what came in and what the source left open."""
         try:
             row = import_scene(
                 source=options["source"],
                 path=options["path"],
                 frame=options["frame"],
+                item=options["item"],
                 slug=options["slug"],
             )
         except AugmentError as fault:
@@ -45,3 +62,5 @@ class Command(TerminalCommand):
             for name in ("agents", "lanes", "connectors", "areas")
         )
         self.stdout.write(f"Imported scene {row.slug}: {counts} besides the ego.")
+        for note in notes_of(row):
+            self.stdout.write(f"  {note}")

@@ -4,81 +4,30 @@ from __future__ import annotations
 
 import hashlib
 import re
-from dataclasses import replace
-from pathlib import Path
 from typing import Any
 
 from django.contrib.auth.models import User
 from django.db import IntegrityError, transaction
 
 from augment.errors import Conflict, InvalidDocument, UnknownName
-from augment.formats import argoverse2
-from augment.formats.json_file import read_json
 from augment.models import BaseScene, Scenario
 from augment.scene.catalogue import ScenarioType
 from augment.scene.codec import (
     modification_from_document,
     modification_to_document,
     scene_from_document,
-    scene_to_document,
 )
 from augment.scene.entities import Scene
 from augment.scene.intent import Intent, IntentOrigin
 from augment.scene.intent_codec import intent_from_document, intent_to_document
 from augment.scene.lane_graph import LaneGraph
 from augment.scene.modification import Modification, check_fits, without_traffic
-from augment.scene.recording import Recording
-from augment.scene.recording_codec import recording_to_document
 from augment.services.events import log_event
 from augment.services.texts import check_prose
 
-SOURCES = ("av2", "json")
 SLUG_LENGTH = 80
 INSTRUCTION_LENGTH = 2_000
 """An instruction is read above the pictures, and by models: a few sentences."""
-
-
-@transaction.atomic
-def import_scene(
-    *, source: str, path: Path, frame: int, slug: str, actor: User | None = None
-) -> BaseScene:
-    """Read a scene from outside and keep it, with its recording where there is one.
-
-    Args:
-        source: One of `SOURCES`: an Argoverse 2 Sensor log, or the project's own JSON.
-        path: The log's folder, or the JSON file.
-        frame: The annotated sweep that becomes t0, from 0; a JSON scene has frame 0 alone.
-        slug: The new scene's name; lower-case letters, digits and hyphens.
-        actor: Who did it.
-
-    Raises:
-        UnknownName: No such source.
-        InvalidDocument: The input or the slug breaks its format.
-        Conflict: The slug is taken.
-    """
-    check_slug(slug, what="scene")
-    if BaseScene.objects.filter(slug=slug).exists():
-        raise Conflict(f"There is a scene called {slug!r} already; choose another slug.")
-    scene, recording = _read(source, path, frame, slug)
-    try:
-        with transaction.atomic():
-            row = BaseScene.objects.create(
-                slug=slug,
-                document=scene_to_document(scene),
-                recording=None if recording is None else recording_to_document(recording),
-                source=source,
-                provenance=scene.provenance,
-            )
-    except IntegrityError:  # somebody else was faster
-        raise Conflict(f"There is a scene called {slug!r} already; choose another slug.") from None
-    log_event(
-        actor=actor,
-        verb="import",
-        object_kind="scene",
-        object_code=row.code,
-        after={"slug": slug, "source": source, "path": path.name, "frame": frame},
-    )
-    return row
 
 
 @transaction.atomic
@@ -224,16 +173,6 @@ def check_slug(slug: str, *, what: str) -> None:
 
 
 # Private
-
-
-def _read(source: str, path: Path, frame: int, slug: str) -> tuple[Scene, Recording | None]:
-    if source == "av2":
-        return argoverse2.read(path, frame=frame, name=slug)
-    if source == "json":
-        if frame != 0:
-            raise InvalidDocument("scene", [("frame", f"a JSON scene has frame 0, not {frame}")])
-        return replace(scene_from_document(read_json(path, what="scene")), name=slug), None
-    raise UnknownName("source", source, list(SOURCES))
 
 
 def _base_scene(slug: str) -> BaseScene:

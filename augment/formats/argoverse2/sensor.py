@@ -1,0 +1,115 @@
+"""Argoverse 2 Sensor logs: one folder a log, with boxes, ego poses and a vector map.
+
+    <log>/annotations.feather, <log>/city_SE3_egovehicle.feather, <log>/map/log_map_archive_*.json
+
+A frame is an annotated sweep, counted from 0. The scene's frame is that of t0's ego, with its
+origin at the ego's geometric centre (see `log`).
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+from pathlib import Path
+
+from augment.errors import InvalidDocument
+from augment.formats.argoverse2.log import BOXES, WHAT, read_log
+from augment.formats.argoverse2.map_file import MapFile, read_map, road_map
+from augment.formats.reading import Moment, Reading, frames_every
+from augment.formats.recorded_log import scene_at
+from augment.formats.road_map import Road
+from augment.formats.roads import road_around
+from augment.scene.notes import Note, NoteKind
+
+LICENCE = "CC BY-NC-SA 4.0"
+
+
+class ArgoverseSensor:
+    """The reader of Argoverse 2 Sensor logs."""
+
+    name = "av2"
+    title = "Argoverse 2 Sensor log (folder)"
+
+    def recognises(self, path: Path) -> bool:
+        """A folder with annotations."""
+        return (path / BOXES).is_file()
+
+    def moments(self, path: Path, *, every_s: float) -> Iterator[Moment]:
+        """Sweeps that far apart."""
+        _check_folder(path)
+        for frame in frames_every(read_log(path).times_s.tolist(), every_s):
+            yield Moment(frame=frame)
+
+    def read(self, path: Path, *, item: str | None, frame: int | None, name: str) -> Reading:
+        """The scene at one annotated sweep, and what was recorded to the end of the log."""
+        _check_folder(path)
+        if item is not None:
+            raise InvalidDocument(WHAT, [("item", f"a log has no parts, {item!r} is not there")])
+        frame = frame or 0
+        map_file = map_file_in(path / "map", WHAT)
+        log = read_log(path)
+        origin = log.ego_pose(frame)
+        city = read_map(map_file)
+        road = road_around(
+            road_map(city, what=WHAT, place=f"{map_file.name}: lane_segments"), origin
+        )
+        scene, recording = scene_at(
+            log,
+            frame,
+            road,
+            name=name,
+            world=city_of(map_file),
+            provenance=(
+                f"Argoverse 2 Sensor data set, log {path.resolve().name}, frame {frame} of "
+                f"{len(log.times_s)}; {LICENCE}"
+            ),
+        )
+        return Reading(
+            scene=scene,
+            recording=recording,
+            notes=(*map_notes(city, road), Note(kind=NoteKind.SPEEDS_DIFFERENCED)),
+            moment=Moment(frame=frame),
+        )
+
+
+def map_notes(city: MapFile, road: Road) -> tuple[Note, ...]:
+    """What maps of Argoverse 2 don't say."""
+    bicycle_lanes = sum(one.lane_type == "BIKE" for one in city.lane_segments.values())
+    notes = [
+        Note(kind=NoteKind.NO_SPEED_LIMITS),
+        Note(kind=NoteKind.NO_LIGHTS),
+        Note(kind=NoteKind.NO_WALKWAYS),
+    ]
+    if bicycle_lanes:
+        notes.append(Note(kind=NoteKind.BICYCLE_LANES_LEFT_OUT, number=bicycle_lanes))
+    if road.side_is_assumed:
+        # All logs are from the United States.
+        notes.append(Note(kind=NoteKind.TRAFFIC_SIDE_ASSUMED, names=(road.traffic_side.value,)))
+    return (*notes, Note(kind=NoteKind.NON_COMMERCIAL, names=(LICENCE,)))
+
+
+def map_file_in(folder: Path, what: str) -> Path:
+    """The one map archive in a folder.
+
+    Raises:
+        InvalidDocument: There is none, or several.
+    """
+    found = sorted(folder.glob("log_map_archive_*.json"))
+    if len(found) != 1:
+        text = "no such file" if not found else f"{len(found)} such files; there must be one"
+        raise InvalidDocument(what, [("map/log_map_archive_*.json", f"{text} in {folder.parent}")])
+    return found[0]
+
+
+def city_of(map_file: Path) -> str:
+    """What the frame of a map is called."""
+    city = re.search(r"____([A-Z]+)_city", map_file.name)
+    return f"Argoverse 2 city frame {city[1]}" if city else "Argoverse 2 city frame"
+
+
+# Private
+
+
+def _check_folder(path: Path) -> None:
+    if not path.is_dir():
+        raise InvalidDocument(WHAT, [(str(path), "is not a folder")])

@@ -1,0 +1,50 @@
+"""Every format that can be read, by name."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from augment.errors import InvalidDocument, UnknownName
+from augment.formats.argoverse2.sensor import ArgoverseSensor
+from augment.formats.own_json import OwnJson
+from augment.formats.reading import Reader
+
+READERS: dict[str, Reader] = {
+    reader.name: reader
+    for reader in (
+        ArgoverseSensor(),
+        OwnJson(),
+    )
+}
+"""In the order in which a file is tried; each is asked about what is its own alone."""
+
+
+def reader_of(name: str) -> Reader:
+    """The reader of a format.
+
+    Raises:
+        UnknownName: Nobody reads that.
+    """
+    try:
+        return READERS[name]
+    except KeyError:
+        raise UnknownName("source", name, list(READERS)) from None
+
+
+def recognise(path: Path) -> Reader:
+    """The reader of the format that a file or folder looks like.
+
+    Raises:
+        InvalidDocument: There is nothing, or it looks like none of the formats, or like several.
+    """
+    if not path.exists():
+        raise InvalidDocument("input", [(str(path), "is not there")])
+    try:
+        found = [reader for reader in READERS.values() if reader.recognises(path)]
+    except OSError as fault:
+        raise InvalidDocument("input", [(str(path), fault.strerror or str(fault))]) from None
+    if len(found) == 1:
+        return found[0]
+    known = ", ".join(f"{reader.name}: {reader.title}" for reader in READERS.values())
+    said = "none of the formats" if not found else " and ".join(one.name for one in found)
+    raise InvalidDocument("input", [(str(path), f"looks like {said}; name one of {known}")])

@@ -1,0 +1,230 @@
+"""From a log in its own world frame to a scene and a recording in the ego frame of t0.
+
+What every reader needs once it knows times, ego and tracks: who is near, in which order they are
+named, which lane lies under them. Metres are rounded to millimetres, so that documents can be
+read by people. T steps.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from augment.errors import InvalidDocument
+from augment.formats.reading import frame_in
+from augment.formats.road_map import Road
+from augment.formats.roads import RADIUS_M
+from augment.geometry.angles import wrap
+from augment.geometry.frames import Pose
+from augment.scene.entities import AgentType, Origin, Scene, TrafficAgent
+from augment.scene.lane_graph import LaneGraph
+from augment.scene.recording import Recording, Track
+
+FloatArray = NDArray[np.float64]
+
+MOST_NUMBERS = 40_000_000
+"""States of all tracks together: 320 MB."""
+LONGEST_GAP_S = 0.35
+"""Steps are 0.1 s apart; over a longer gap no speed is taken."""
+
+NEIGHBOURS = 2
+"""Steps on either side that a speed is taken over: one alone shows the annotators' jitter."""
+
+_STANDING = (
+    AgentType.TRAFFIC_CONE,
+    AgentType.BARRIER,
+    AgentType.CONSTRUCTION_SIGN,
+)
+_HEADED = (AgentType.VEHICLE, AgentType.BUS, AgentType.BICYCLE)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class LoggedTrack:
+    """One object.
+
+    Attributes:
+        name: Its id in the source; an order among those that are equally near.
+        states: (T, 4): x_m, y_m, heading_rad, speed_mps in the world frame; NaN where unseen.
+    """
+
+    name: str
+    type: AgentType
+    length_m: float
+    width_m: float
+    states: FloatArray
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Log:
+    """What was recorded.
+
+    Attributes:
+        what: What the source is called in faults.
+        times_s: (T,) ascending.
+        ego: (T, 4), as a track's states, of the ego's geometric centre.
+    """
+
+    what: str
+    times_s: FloatArray
+    ego: FloatArray
+    ego_length_m: float
+    ego_width_m: float
+    tracks: tuple[LoggedTrack, ...]
+
+    def ego_pose(self, frame: int) -> Pose:
+        """Where the ego is at a frame.
+
+        Raises:
+            InvalidDocument: There is no such frame, or no ego in it.
+        """
+        frame_in(self.what, frame, len(self.times_s))
+        x_m, y_m, heading_rad, _ = self.ego[frame].tolist()
+        if not np.isfinite(self.ego[frame]).all():
+            raise InvalidDocument(self.what, [("frame", f"{frame} has no ego in it")])
+        if max(abs(x_m), abs(y_m)) > 1e8:
+            raise InvalidDocument(
+                self.what, [("ego", "lies more than 100 000 km from the origin")]
+            )
+        return Pose(x_m=x_m, y_m=y_m, heading_rad=wrap(heading_rad))
+
+
+def scene_at(
+    log: Log, frame: int, road: Road, *, name: str, world: str, provenance: str
+) -> tuple[Scene, Recording]:
+    """The scene at a frame, and what was recorded from there on.
+
+    Args:
+        log: The whole log.
+        frame: What becomes t0.
+        road: The map around the ego at that frame.
+        name: The scene's slug.
+        world: What the source's frame is called.
+        provenance: Where it comes from and under which licence.
+
+    Raises:
+        InvalidDocument: There is no such frame, or no ego in it.
+    """
+    origin = log.ego_pose(frame)
+    named = _named(log, frame)
+    ego = TrafficAgent(
+        id="Agent1",
+        type=AgentType.EGO_VEHICLE,
+        x_m=0.0,
+        y_m=0.0,
+        heading_rad=0.0,
+        width_m=round(log.ego_width_m, 3),
+        length_m=round(log.ego_length_m, 3),
+        speed_mps=round(float(log.ego[frame, 3]), 3),
+    )
+    scene = Scene(
+        name=name,
+        ego=ego,
+        traffic_side=road.traffic_side,
+        origin=Origin(frame=world, pose=origin),
+        provenance=provenance,
+        agents=_agents(named, frame, origin),
+        lanes=road.lanes,
+        connectors=road.connectors,
+        areas=road.areas,
+    )
+    return _on_lanes(scene), _recording(log, named, frame, origin)
+
+
+def speeds(times_s: FloatArray, xy_m: FloatArray) -> FloatArray:
+    """Speeds (K,) over the neighbouring rows, one-sided where they end, 0 for a lone row."""
+    rows = np.arange(len(times_s))
+    gap = np.diff(times_s) > LONGEST_GAP_S
+    first = np.maximum.accumulate(np.where(np.concatenate([[True], gap]), rows, 0))
+    last = np.where(np.concatenate([gap, [True]]), rows, len(rows))
+    last = np.minimum.accumulate(last[::-1])[::-1]
+    before = np.maximum(rows - NEIGHBOURS, first)
+    after = np.minimum(rows + NEIGHBOURS, last)
+    apart = times_s[after] - times_s[before]
+    moved = np.hypot(*(xy_m[after] - xy_m[before]).T)
+    return np.divide(moved, apart, out=np.zeros(len(rows)), where=apart > 0.0)
+
+
+# Private
+
+
+def _named(log: Log, frame: int) -> dict[str, LoggedTrack]:
+    """The tracks near the ego from t0 on, by agent id: who is there at t0 first, then by time.
+
+    Within one step the nearest comes first.
+    """
+    met = []
+    ego = log.ego[frame:, :2]
+    # Where the ego's way is not known, near is near to where it was.
+    seen = np.isfinite(ego).all(axis=1)
+    ego = ego[np.maximum.accumulate(np.where(seen, np.arange(len(ego)), 0))]
+    for track in log.tracks:
+        distances = np.hypot(*(track.states[frame:, :2] - ego).T)
+        near = np.flatnonzero(distances <= RADIUS_M)  # NaN is not near
+        if len(near):
+            first = near[0]
+            met.append((int(first), round(float(distances[first]), 3), track.name, track))
+    met.sort(key=lambda item: item[:3])
+    return {f"Agent{number}": track for number, (*_, track) in enumerate(met, start=2)}
+
+
+def _agents(named: dict[str, LoggedTrack], frame: int, origin: Pose) -> tuple[TrafficAgent, ...]:
+    agents = []
+    for agent_id, track in named.items():
+        states = _local(track.states[frame : frame + 1], origin)
+        if not np.hypot(*states[0, :2]) <= RADIUS_M:
+            continue
+        x_m, y_m, heading_rad, speed_mps = states[0].tolist()
+        agents.append(
+            TrafficAgent(
+                id=agent_id,
+                type=track.type,
+                x_m=x_m,
+                y_m=y_m,
+                heading_rad=heading_rad,
+                width_m=round(track.width_m, 3),
+                length_m=round(track.length_m, 3),
+                speed_mps=0.0 if track.type in _STANDING else speed_mps,
+            )
+        )
+    return tuple(agents)
+
+
+def _on_lanes(scene: Scene) -> Scene:
+    """Everyone with the lane under them; only of what drives does the heading count."""
+    graph = LaneGraph(scene)
+
+    def placed(agent: TrafficAgent) -> TrafficAgent:
+        heading_rad = agent.heading_rad if agent.type in _HEADED else None
+        return replace(agent, lane_id=graph.under(agent.x_m, agent.y_m, heading_rad))
+
+    ego = replace(scene.ego, lane_id=graph.under(0.0, 0.0, 0.0))
+    return replace(scene, ego=ego, agents=tuple(placed(agent) for agent in scene.agents))
+
+
+def _recording(log: Log, named: dict[str, LoggedTrack], frame: int, origin: Pose) -> Recording:
+    return Recording(
+        times_s=np.round(log.times_s[frame:] - log.times_s[frame], 6),
+        ego=_local(log.ego[frame:], origin),
+        tracks=tuple(
+            Track(
+                agent_id=agent_id,
+                type=track.type.value,
+                length_m=round(track.length_m, 3),
+                width_m=round(track.width_m, 3),
+                states=_local(track.states[frame:], origin),
+            )
+            for agent_id, track in named.items()
+        ),
+    )
+
+
+def _local(states: FloatArray, origin: Pose) -> FloatArray:
+    """States (K, 4) of the world frame in the frame of t0's ego, rounded."""
+    xy = np.round(origin.to_local(states[:, :2]), 3)
+    turn = np.remainder(states[:, 2] - origin.heading_rad + np.pi, 2.0 * np.pi) - np.pi
+    headings = np.round(np.where(turn == -np.pi, np.pi, turn), 4)
+    made = np.column_stack([xy, headings, np.round(states[:, 3], 3)])
+    made[~np.isfinite(made).all(axis=1)] = np.nan
+    return made

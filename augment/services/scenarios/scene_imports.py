@@ -1,0 +1,180 @@
+"""Recorded and written scenes from outside, as rows."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from django.contrib.auth.models import User
+from django.db import IntegrityError, transaction
+
+from augment.errors import Conflict
+from augment.formats.readers import reader_of, recognise
+from augment.formats.reading import Moment, Reader, Reading
+from augment.models import BaseScene
+from augment.scene.codec import scene_to_document
+from augment.scene.notes import notes_to_document
+from augment.scene.recording_codec import recording_to_document
+from augment.services.events import log_event
+from augment.services.scenarios.scenes import SLUG_LENGTH, check_slug
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Imported:
+    """One moment of a log.
+
+    Attributes:
+        row: The stored scene.
+        is_new: False where the same scene was stored before.
+    """
+
+    moment: Moment
+    row: BaseScene
+    is_new: bool
+
+
+def import_scene(
+    *,
+    source: str | None = None,
+    path: Path,
+    frame: int | None = None,
+    item: str | None = None,
+    slug: str,
+    actor: User | None = None,
+) -> BaseScene:
+    """Read a scene from outside and keep it, with its recording and what the source left open.
+
+    Args:
+        source: The name of a reader; None to recognise the format.
+        path: The file or folder.
+        frame: The step that becomes t0, from 0; None for what the format means.
+        item: Which part of a file that holds several; None for the first.
+        slug: The new scene's name; lower-case letters, digits and hyphens.
+        actor: Who did it.
+
+    Raises:
+        UnknownName: No such source.
+        InvalidDocument: The input or the slug breaks its format.
+        Conflict: The slug is taken, or the same scene is stored already.
+    """
+    check_slug(slug, what="scene")
+    _refuse_taken(slug)
+    reader = recognise(path) if source is None else reader_of(source)
+    reading = reader.read(path, item=item, frame=frame, name=slug)
+    document = scene_to_document(reading.scene)
+    same = _same(document)
+    if same is not None:
+        raise Conflict(f"The same scene is stored already, as {same.slug!r}.")
+    return _keep(reading, document, reader=reader, path=path, slug=slug, actor=actor)
+
+
+def import_log(
+    *,
+    source: str | None = None,
+    path: Path,
+    every_s: float,
+    limit: int | None = None,
+    slug: str,
+    actor: User | None = None,
+) -> Iterator[Imported]:
+    """Keep every so many seconds of a log as a scene of its own, one by one.
+
+    Args:
+        source: The name of a reader; None to recognise the format.
+        path: The file or folder.
+        every_s: How far the moments lie apart.
+        limit: How many scenes at most.
+        slug: What the names begin with; a number follows.
+        actor: Who did it.
+
+    Yields:
+        Each moment once its scene is stored, or was found to be stored before.
+
+    Raises:
+        UnknownName, InvalidDocument, Conflict: As above; what was yielded before stays.
+    """
+    check_slug(f"{slug}-1", what="scene")
+    reader = recognise(path) if source is None else reader_of(source)
+    number = 0
+    for count, moment in enumerate(reader.moments(path, every_s=every_s)):
+        if limit is not None and count >= limit:
+            return
+        number, name = _free(slug, number)
+        reading = reader.read(path, item=moment.item, frame=moment.frame, name=name)
+        document = scene_to_document(reading.scene)
+        same = _same(document)
+        if same is not None:
+            number -= 1
+            yield Imported(moment=moment, row=same, is_new=False)
+            continue
+        row = _keep(reading, document, reader=reader, path=path, slug=name, actor=actor)
+        yield Imported(moment=moment, row=row, is_new=True)
+
+
+def content_hash(document: dict[str, Any]) -> str:
+    """What two scenes have in common that differ in name alone."""
+    content = {key: value for key, value in document.items() if key not in ("name", "provenance")}
+    text = json.dumps(content, sort_keys=True, separators=(",", ":"), allow_nan=False)
+    return hashlib.sha256(text.encode()).hexdigest()
+
+
+# Private
+
+
+def _refuse_taken(slug: str) -> None:
+    if BaseScene.objects.filter(slug=slug).exists():
+        raise Conflict(f"There is a scene called {slug!r} already; choose another slug.")
+
+
+def _same(document: dict[str, Any]) -> BaseScene | None:
+    rows = BaseScene.objects.defer("document", "recording")
+    return rows.filter(content_hash=content_hash(document)).first()
+
+
+def _free(slug: str, number: int) -> tuple[int, str]:
+    """The next number whose name is free."""
+    while True:
+        number += 1
+        name = f"{slug[: SLUG_LENGTH - 8].strip('-')}-{number}"
+        if not BaseScene.objects.filter(slug=name).exists():
+            return number, name
+
+
+@transaction.atomic
+def _keep(
+    reading: Reading,
+    document: dict[str, Any],
+    *,
+    reader: Reader,
+    path: Path,
+    slug: str,
+    actor: User | None,
+) -> BaseScene:
+    recording = reading.recording
+    try:
+        with transaction.atomic():
+            row = BaseScene.objects.create(
+                slug=slug,
+                document=document,
+                recording=None if recording is None else recording_to_document(recording),
+                source=reader.name,
+                provenance=reading.scene.provenance,
+                notes=notes_to_document(reading.notes),
+                content_hash=content_hash(document),
+            )
+    except IntegrityError:  # somebody else was faster
+        raise Conflict(f"There is a scene called {slug!r} already; choose another slug.") from None
+    after = {
+        "slug": slug,
+        "source": reader.name,
+        "path": path.name,
+        "frame": reading.moment.frame,
+    }
+    if reading.moment.item is not None:
+        after["item"] = reading.moment.item
+    log_event(actor=actor, verb="import", object_kind="scene", object_code=row.code, after=after)
+    return row
