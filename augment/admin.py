@@ -26,7 +26,7 @@ from augment.services.endpoints.known_models import facts_of
 from augment.services.events import log_event
 
 
-class ReadOnly:
+class ReadOnlyRows:
     """Nobody adds, changes or deletes a row by hand."""
 
     def has_add_permission(self, request: HttpRequest, obj: Any = None) -> bool:
@@ -203,7 +203,7 @@ class ContestantAdmin(MadeElsewhere, admin.ModelAdmin):
     )
 
 
-class AugmentationInline(ReadOnly, admin.TabularInline):
+class AugmentationInline(ReadOnlyRows, admin.TabularInline):
     """The rows of a job."""
 
     model = Augmentation
@@ -217,7 +217,7 @@ class AugmentationInline(ReadOnly, admin.TabularInline):
 
 
 @admin.register(GenerationJob)
-class GenerationJobAdmin(ReadOnly, admin.ModelAdmin):
+class GenerationJobAdmin(ReadOnlyRows, admin.ModelAdmin):
     """Jobs; they are launched, cancelled and retried on their own pages."""
 
     list_display = ("name", "state", "launched_by", "created_at", "finished_at")
@@ -227,7 +227,7 @@ class GenerationJobAdmin(ReadOnly, admin.ModelAdmin):
     inlines = (AugmentationInline,)
 
 
-class AttemptInline(ReadOnly, admin.TabularInline):
+class AttemptInline(ReadOnlyRows, admin.TabularInline):
     """The tries at an augmentation."""
 
     model = Attempt
@@ -236,7 +236,7 @@ class AttemptInline(ReadOnly, admin.TabularInline):
 
 
 @admin.register(Augmentation)
-class AugmentationAdmin(ReadOnly, admin.ModelAdmin):
+class AugmentationAdmin(ReadOnlyRows, admin.ModelAdmin):
     """Augmentations; only workers write them."""
 
     list_display = ("code", "scenario", "contestant", "state", "finished_at")
@@ -246,7 +246,7 @@ class AugmentationAdmin(ReadOnly, admin.ModelAdmin):
     inlines = (AttemptInline,)
 
 
-class ModelCallInline(ReadOnly, admin.TabularInline):
+class ModelCallInline(ReadOnlyRows, admin.TabularInline):
     """The calls of an attempt, without their long texts."""
 
     model = ModelCall
@@ -256,7 +256,7 @@ class ModelCallInline(ReadOnly, admin.TabularInline):
 
 
 @admin.register(Attempt)
-class AttemptAdmin(ReadOnly, admin.ModelAdmin):
+class AttemptAdmin(ReadOnlyRows, admin.ModelAdmin):
     """Attempts."""
 
     list_display = ("augmentation", "number", "worker", "started_at", "finished_at", "outcome")
@@ -266,7 +266,7 @@ class AttemptAdmin(ReadOnly, admin.ModelAdmin):
 
 
 @admin.register(ModelCall)
-class ModelCallAdmin(ReadOnly, admin.ModelAdmin):
+class ModelCallAdmin(ReadOnlyRows, admin.ModelAdmin):
     """Calls to language models, with the raw answers."""
 
     list_display = ("code", "role", "model_returned", "finish_reason", "started_at", "latency_s")
@@ -275,7 +275,7 @@ class ModelCallAdmin(ReadOnly, admin.ModelAdmin):
 
 
 @admin.register(Event)
-class EventAdmin(ReadOnly, admin.ModelAdmin):
+class EventAdmin(ReadOnlyRows, admin.ModelAdmin):
     """The log."""
 
     list_display = ("at", "actor", "verb", "object_kind", "object_code")

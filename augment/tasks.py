@@ -186,7 +186,7 @@ def stop_recovering(**_: object) -> None:
 
 def _recover_until_stopped(presence: workers.Presence) -> None:
     """One round at the start, then one every RECOVER_EVERY_S."""
-    rounds = workers.Rounds(lambda at_start: recover(at_start=at_start), presence)
+    rounds = workers.RecoveryRounds(lambda at_start: recover(at_start=at_start), presence)
     while not stopping.is_told():
         rounds.go_on()
         connection.close()

@@ -27,7 +27,7 @@ from arena.models import (
 from arena.queries.results import unread_studies
 
 
-class ReadOnly:
+class ReadOnlyStudies:
     """Rows that nobody adds, changes or deletes by hand."""
 
     def has_add_permission(self, request: HttpRequest, obj: Any = None) -> bool:
@@ -43,7 +43,7 @@ class ReadOnly:
         return False
 
 
-class OfReadStudies(ReadOnly):
+class OfReadStudies(ReadOnlyStudies):
     """Rows that tell how a study goes: while it is open, only for who opened its results early."""
 
     study_path: ClassVar[str] = "study"
@@ -72,7 +72,7 @@ def _account(request: HttpRequest) -> User:
 
 
 @admin.register(Invitation)
-class InvitationAdmin(ReadOnly, admin.ModelAdmin):
+class InvitationAdmin(ReadOnlyStudies, admin.ModelAdmin):
     """Links are made and taken back on the page of a study's experts."""
 
     list_display = ("expert", "study", "invited_by", "made_at", "expires_at", "used_at")
@@ -82,7 +82,7 @@ class InvitationAdmin(ReadOnly, admin.ModelAdmin):
 
 
 @admin.register(Authorship)
-class AuthorshipAdmin(ReadOnly, admin.ModelAdmin):
+class AuthorshipAdmin(ReadOnlyStudies, admin.ModelAdmin):
     """Authors are marked and taken back on the page of a study's experts."""
 
     list_display = ("expert", "contestant", "study", "marked_by", "marked_at")
@@ -91,7 +91,7 @@ class AuthorshipAdmin(ReadOnly, admin.ModelAdmin):
 
 
 @admin.register(Study)
-class StudyAdmin(ReadOnly, admin.ModelAdmin):
+class StudyAdmin(ReadOnlyStudies, admin.ModelAdmin):
     """A study's rules are fixed when it opens."""
 
     list_display = ("name", "state", "votes_per_expert", "allow_simulated", "opened_at")
@@ -122,7 +122,7 @@ class VoteAdmin(OfReadStudies, admin.ModelAdmin):
 
 
 @admin.register(Report)
-class ReportAdmin(ReadOnly, admin.ModelAdmin):
+class ReportAdmin(ReadOnlyStudies, admin.ModelAdmin):
     """What experts reported about pairs."""
 
     list_display = ("matchup", "expert", "reason", "comment", "at")
@@ -130,7 +130,7 @@ class ReportAdmin(ReadOnly, admin.ModelAdmin):
     list_filter = ("reason", "matchup__study")
 
 
-class StandingInline(ReadOnly, admin.TabularInline):
+class StandingInline(ReadOnlyStudies, admin.TabularInline):
     """A snapshot's lines."""
 
     model = Standing
@@ -147,7 +147,7 @@ class SnapshotAdmin(OfReadStudies, admin.ModelAdmin):
 
 
 @admin.register(LabellingRound)
-class LabellingRoundAdmin(ReadOnly, admin.ModelAdmin):
+class LabellingRoundAdmin(ReadOnlyStudies, admin.ModelAdmin):
     """The plan of a labelling is fixed when it opens."""
 
     list_display = ("name", "job", "seed", "opened_at")
@@ -155,7 +155,7 @@ class LabellingRoundAdmin(ReadOnly, admin.ModelAdmin):
 
 
 @admin.register(FaultLabel)
-class FaultLabelAdmin(ReadOnly, admin.ModelAdmin):
+class FaultLabelAdmin(ReadOnlyStudies, admin.ModelAdmin):
     """What experts said; a label is never changed."""
 
     list_display = ("augmentation", "expert", "position", "heading", "logic", "at")

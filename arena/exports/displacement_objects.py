@@ -11,7 +11,7 @@ from arena.exports.formats import Format, formats
 from arena.exports.parquet import NUMBER, TEXT, YES_NO, parquet_bytes
 from arena.services.cells import cell
 from augment.models import GenerationJob
-from augment.services.judging.displaced_objects import DisplacedObject, Spot, objects_of
+from augment.services.judging.displaced_objects import DisplacedObject, ObjectPosition, objects_of
 
 BY_OBJECT = "object"
 """How it is asked for, beside the groupings."""
@@ -92,7 +92,7 @@ def _row(one: DisplacedObject) -> tuple[object, ...]:
     )
 
 
-def _place(spot: Spot | None) -> Sequence[object]:
+def _place(spot: ObjectPosition | None) -> Sequence[object]:
     if spot is None:
         return (None, None, None)
     return (spot.id, round(spot.x_m, 4), round(spot.y_m, 4))

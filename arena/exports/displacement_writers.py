@@ -11,7 +11,7 @@ from arena.exports.displacement_table import DisplacementTable, marked
 from arena.exports.formats import Format, drawings, formats, rounded
 from arena.exports.published import SOURCE, PublishedBox
 from arena.services.cells import csv_text
-from augment.services.judging.displacement import Box, Group, Measured
+from augment.services.judging.displacement import BoxSummary, Group, Measured
 
 COLUMNS = (
     "group", "contestant", "slug", "model", "variant", "simulated", "augmentations", "n",
@@ -69,7 +69,7 @@ def _who(group: Group) -> tuple[object, ...]:
     )  # fmt: skip
 
 
-def _numbers(box: Box | None) -> list[str]:
+def _numbers(box: BoxSummary | None) -> list[str]:
     """Median, quartiles, mean, whiskers and outliers, to the millimetre."""
     if box is None:
         return [""] * 7
@@ -95,7 +95,7 @@ def _group(group: Group) -> dict[str, Any]:
     }
 
 
-def _box(box: Box) -> dict[str, Any]:
+def _box(box: BoxSummary) -> dict[str, Any]:
     return {
         "median_m": rounded(box.median_m),
         "q1_m": rounded(box.q1_m),

@@ -15,7 +15,7 @@ from arena.exports.tables import SIMULATED
 from arena.models import FaultLabel
 from arena.queries.faults import labels_of
 from arena.rating.agreement import cohens_kappa
-from arena.rating.reliability import Metric, krippendorff_alpha
+from arena.rating.reliability import DifferenceMetric, krippendorff_alpha
 from arena.services.cells import csv_text
 from augment.models import Augmentation, Contestant, GenerationJob
 from augment.services.judging.fault_guess import FaultClass
@@ -231,7 +231,9 @@ def _agreement(
         fault=fault.value,
         kappa=kappa,
         n=len(pairs),
-        alpha=krippendorff_alpha(_table(fault, several), Metric.NOMINAL) if several else None,
+        alpha=krippendorff_alpha(_table(fault, several), DifferenceMetric.NOMINAL)
+        if several
+        else None,
         pictures=len(several),
     )
 

@@ -25,7 +25,7 @@ from arena.pairing.rules import (
     Check,
     Entry,
     Grid,
-    Plan,
+    MatchupPlan,
     PlannedMatchup,
     Rules,
     grid_of,
@@ -33,10 +33,10 @@ from arena.pairing.rules import (
 from arena.pairing.targets import choose_wanted, share_out
 from arena.pairing.units import choose_units, draw_probability
 
-__all__ = ["Check", "Entry", "Plan", "PlannedMatchup", "Rules", "plan"]
+__all__ = ["Check", "Entry", "MatchupPlan", "PlannedMatchup", "Rules", "plan"]
 
 
-def plan(rules: Rules) -> Plan:
+def plan(rules: Rules) -> MatchupPlan:
     """Plan who sees which pair on which scenario, in which order and on which side.
 
     No expert sees a unit twice but in a hidden repeat. The same rules give the same plan.
@@ -59,7 +59,7 @@ def plan(rules: Rules) -> Plan:
         for expert, order, flips in zip(rules.experts, orders, flipped, strict=True)
         for matchup in _matchups(rules, grid, probability, expert, order, flips, rng)
     ]
-    return Plan(matchups=tuple(matchups), scenario_gap=gap, identical=grid.identical)
+    return MatchupPlan(matchups=tuple(matchups), scenario_gap=gap, identical=grid.identical)
 
 
 def _chosen(rules: Rules, grid: Grid, rng: np.random.Generator) -> tuple[BoolArray, FloatArray]:

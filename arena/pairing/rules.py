@@ -103,7 +103,7 @@ class PlannedMatchup:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Plan:
+class MatchupPlan:
     """All showings, by expert and position.
 
     Attributes:

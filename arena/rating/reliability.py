@@ -22,7 +22,7 @@ VALUES = 3
 _TAILS = (50.0 * (1.0 - LEVEL), 50.0 * (1.0 + LEVEL))
 
 
-class Metric(StrEnum):
+class DifferenceMetric(StrEnum):
     """How far two values are apart: all alike, or a win two steps from a loss."""
 
     NOMINAL = "nominal"
@@ -73,9 +73,9 @@ def agreement(votes: Comparisons, *, rounds: int, seed: int) -> Agreement:
     whole = sums.sum(axis=0)[None]
     several = len(found) > 1
     return Agreement(
-        alpha=_estimate(_alpha, Metric.NOMINAL, whole, drawn, several),
-        alpha_interval=_estimate(_alpha, Metric.INTERVAL, whole, drawn, several),
-        percent=_estimate(_percent, Metric.NOMINAL, whole, drawn, several),
+        alpha=_estimate(_alpha, DifferenceMetric.NOMINAL, whole, drawn, several),
+        alpha_interval=_estimate(_alpha, DifferenceMetric.INTERVAL, whole, drawn, several),
+        percent=_estimate(_percent, DifferenceMetric.NOMINAL, whole, drawn, several),
         units=len(table),
         judgements=int(table.sum()),
     )
@@ -90,7 +90,7 @@ def unit_table(votes: Comparisons) -> tuple[IntArray, IntArray]:
     return table.reshape(-1, VALUES).astype(np.int64), units // pairs
 
 
-def krippendorff_alpha(table: IntArray, metric: Metric) -> float | None:
+def krippendorff_alpha(table: IntArray, metric: DifferenceMetric) -> float | None:
     """Alpha of a table (U, 3) of values by unit; None if all values are alike or none is paired.
 
     Source: K. Krippendorff, Content Analysis, chapter on reliability: 1 - observed / expected
@@ -119,12 +119,16 @@ def _equal_pairs(table: IntArray) -> FloatArray:
     return np.stack([equal, total * (total - 1)], axis=1).astype(np.float64)
 
 
-def _alpha(sums: FloatArray, metric: Metric) -> FloatArray:
+def _alpha(sums: FloatArray, metric: DifferenceMetric) -> FloatArray:
     """(B,) of sums (B, 9 or more); not a number where all values are alike."""
     seen = sums[:, : VALUES * VALUES].reshape(-1, VALUES, VALUES)
     place = np.arange(VALUES)
     gap = place[:, None] - place[None, :]
-    far = (gap != 0).astype(np.float64) if metric is Metric.NOMINAL else gap.astype(float) ** 2
+    far = (
+        (gap != 0).astype(np.float64)
+        if metric is DifferenceMetric.NOMINAL
+        else gap.astype(float) ** 2
+    )
     totals = seen.sum(axis=2)
     n = totals.sum(axis=1)
     observed = (seen * far).sum(axis=(1, 2))
@@ -133,13 +137,13 @@ def _alpha(sums: FloatArray, metric: Metric) -> FloatArray:
         return np.asarray(1.0 - (n - 1.0) * observed / expected)
 
 
-def _percent(sums: FloatArray, _: Metric) -> FloatArray:
+def _percent(sums: FloatArray, _: DifferenceMetric) -> FloatArray:
     return np.asarray(sums[:, -2] / sums[:, -1])
 
 
 def _estimate(
-    measure: Callable[[FloatArray, Metric], FloatArray],
-    metric: Metric,
+    measure: Callable[[FloatArray, DifferenceMetric], FloatArray],
+    metric: DifferenceMetric,
     whole: FloatArray,
     drawn: FloatArray,
     several: bool,

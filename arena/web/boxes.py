@@ -10,7 +10,7 @@ from django.utils.translation import gettext_noop
 
 from arena.exports.displacement_table import DisplacementTable
 from arena.exports.published import PublishedBox
-from augment.services.judging.displacement import Box, Group, Summary
+from augment.services.judging.displacement import BoxSummary, Group, Summary
 
 LEFT, RIGHT = 6.0, 226.0
 """Where the axis begins and ends; the picture is 240 wide. Beyond stands what is farther out."""
@@ -120,7 +120,7 @@ def _line(group: Group, at: Scale, end_m: float) -> BoxLine:
     )
 
 
-def _drawn(box: Box, at: Scale, end_m: float) -> Drawn:
+def _drawn(box: BoxSummary, at: Scale, end_m: float) -> Drawn:
     inside = [one for one in box.outliers_m if one <= end_m]
     return Drawn(
         low=at(box.low_m),

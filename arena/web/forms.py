@@ -16,7 +16,7 @@ from arena.services.decisions import LONGEST_COMMENT, Decision, decision_of
 from augment.models import Contestant
 from augment.services.judging.fault_guess import FaultClass
 from augment.services.running.caps import Caps
-from augment.services.running.estimates import Estimate, estimate
+from augment.services.running.estimates import JobEstimate, estimate
 from augment.services.running.feasible import keys_missing, obstacle
 from augment.services.wording import said
 
@@ -161,7 +161,7 @@ class LaunchForm(ChoiceForm, CapsForm):
         """Contestants that no job can run say why."""
         return [_offer(row) for row in self.offered]
 
-    def estimated(self) -> Estimate | None:
+    def estimated(self) -> JobEstimate | None:
         """What the job would use, as far as it is chosen; nothing has to be named or capped."""
         self.is_valid()
         chosen = [self.cleaned_data.get(name, []) for name in ("contestants", "scenarios")]

@@ -20,7 +20,7 @@ from arena.web.access import ADMIN, STAFF, only
 from arena.web.displacement import section
 from arena.web.driving import section as driving_section
 from arena.web.forms import CapsForm, LaunchForm
-from arena.web.questions import Question, ask, is_sure
+from arena.web.questions import Confirmation, ask, is_sure
 from augment.errors import AugmentError, QueueFault
 from augment.models import Augmentation, Contestant, GenerationJob
 from augment.services.endpoints import contestants
@@ -146,7 +146,7 @@ def resume_job(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
     return redirect("job", code=code)
 
 
-def _cancelling(job: GenerationJob) -> Question:
+def _cancelling(job: GenerationJob) -> Confirmation:
     """What is asked before a job is cancelled."""
     found = jobs.counts(job).by_state
     waiting, running = found[State.QUEUED], found[State.RUNNING]
@@ -157,7 +157,7 @@ def _cancelling(job: GenerationJob) -> Question:
         _("Settled, which stay as they are: %(n)s.") % {"n": settled},
         _("A cancelled job can’t go on; what is missing takes a new one."),
     )
-    return Question(
+    return Confirmation(
         title=_("Cancel “%(name)s”?") % {"name": job.name},
         facts=facts,
         button=_("Cancel the job"),

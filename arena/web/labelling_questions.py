@@ -11,11 +11,11 @@ from django.utils.translation import gettext as _
 from arena.models import LabellingRound
 from arena.queries.faults import of_job
 from arena.services.faults import open_labelling
-from arena.web.questions import Question
+from arena.web.questions import Confirmation
 from augment.models import GenerationJob
 
 
-def opening(job: GenerationJob, *, name: str, experts: Sequence[str], seed: int) -> Question:
+def opening(job: GenerationJob, *, name: str, experts: Sequence[str], seed: int) -> Confirmation:
     """Counted by opening it and taking that back at once.
 
     Raises:
@@ -31,7 +31,7 @@ def opening(job: GenerationJob, *, name: str, experts: Sequence[str], seed: int)
         % {"pictures": pictures, "experts": len(experts), "labels": tasks},
         _("Experts see it at once; who labels, and in which order, can’t be changed afterwards."),
     )
-    return Question(
+    return Confirmation(
         title=_("Open the labelling “%(name)s”?") % {"name": name},
         facts=facts,
         button=_("Open the labelling"),
@@ -41,7 +41,7 @@ def opening(job: GenerationJob, *, name: str, experts: Sequence[str], seed: int)
     )
 
 
-def closing(labelling: LabellingRound) -> Question:
+def closing(labelling: LabellingRound) -> Confirmation:
     """What is there, and what will never come."""
     line = next(one for one in of_job(labelling.job) if one.labelling.pk == labelling.pk)
     facts = (
@@ -49,7 +49,7 @@ def closing(labelling: LabellingRound) -> Question:
         _("Planned labels that will be missing: %(n)s.") % {"n": line.left},
         _("It takes no more labels. This can’t be taken back."),
     )
-    return Question(
+    return Confirmation(
         title=_("Close the labelling “%(name)s”?") % {"name": labelling.name},
         facts=facts,
         button=_("Close the labelling"),

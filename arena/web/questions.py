@@ -15,7 +15,7 @@ CHANGE = "change"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Question:
+class Confirmation:
     """What somebody is asked before it is done.
 
     Attributes:
@@ -45,7 +45,7 @@ def wants_to_change(request: HttpRequest) -> bool:
     return CHANGE in request.POST
 
 
-def ask(request: HttpRequest, question: Question) -> HttpResponse:
+def ask(request: HttpRequest, question: Confirmation) -> HttpResponse:
     """The page that asks; it sends along what came in by a form, and works without a script."""
     ours = {"csrfmiddlewaretoken", SURE, CHANGE}
     given = [

@@ -14,12 +14,12 @@ from arena.models import Matchup, Study
 from arena.queries.votes import tallies
 from arena.services.handing_over import hand_over
 from arena.services.studies import open_study
-from arena.web.questions import Question
+from arena.web.questions import Confirmation
 
 Kind = Matchup.Kind
 
 
-def opening(rules: dict[str, Any]) -> Question:
+def opening(rules: dict[str, Any]) -> Confirmation:
     """Counted by opening the study and taking that back at once.
 
     Raises:
@@ -55,7 +55,7 @@ def opening(rules: dict[str, Any]) -> Question:
     if rules["allow_simulated"]:
         facts.append(_("What is simulated may take part; every page and file then says so."))
     facts.append(_("Experts can vote at once. The rules can’t be changed afterwards."))
-    return Question(
+    return Confirmation(
         title=_("Open the study “%(name)s”?") % {"name": rules["name"]},
         facts=tuple(facts),
         button=_("Open the study"),
@@ -65,7 +65,7 @@ def opening(rules: dict[str, Any]) -> Question:
     )
 
 
-def closing(study: Study) -> Question:
+def closing(study: Study) -> Confirmation:
     """What is there, and what will never come."""
     lines = tallies(study)
     given = sum(line.voted for line in lines)
@@ -80,7 +80,7 @@ def closing(study: Study) -> Question:
         _("No more votes are taken. This can’t be taken back."),
         _("Its results can be read then, also by its experts."),
     )
-    return Question(
+    return Confirmation(
         title=_("Close the study “%(name)s”?") % {"name": study.name},
         facts=facts,
         button=_("Close the study"),
@@ -89,7 +89,7 @@ def closing(study: Study) -> Question:
     )
 
 
-def handing_over(study: Study, giver: str, takers: Sequence[str]) -> Question:
+def handing_over(study: Study, giver: str, takers: Sequence[str]) -> Confirmation:
     """Counted by handing over and taking that back at once.
 
     Raises:
@@ -106,7 +106,7 @@ def handing_over(study: Study, giver: str, takers: Sequence[str]) -> Question:
         _("%(name)s no longer sees them; votes that were given stay.") % {"name": giver},
         _("The pairs are planned anew for who takes them. This can’t be taken back."),
     )
-    return Question(
+    return Confirmation(
         title=_("Hand over what %(name)s has not judged?") % {"name": giver},
         facts=facts,
         button=_("Hand over"),

@@ -42,7 +42,7 @@ _UNKNOWN = {WalkRequest: "pedestrians", ConesRequest: "cones"}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Placement:
+class QuantisedPlacement:
     """What was placed, and from which codes.
 
     Attributes:
@@ -68,7 +68,9 @@ class Places:
     way_ids: tuple[str, ...]
 
 
-def place(scene: Scene, intent: Intent | None, *, bin_m: float, seed: int = 0) -> Placement:
+def place(
+    scene: Scene, intent: Intent | None, *, bin_m: float, seed: int = 0
+) -> QuantisedPlacement:
     """Vehicles where their codes allow; the same for the same seed.
 
     Args:
@@ -99,7 +101,7 @@ def place(scene: Scene, intent: Intent | None, *, bin_m: float, seed: int = 0) -
             added.append(drawn)
     if not added:
         raise CannotPlace("Every place that the code allows is taken.")
-    return Placement(
+    return QuantisedPlacement(
         modification=Modification(added=tuple(added)), codes=codes, notes=" ".join(notes)
     )
 

@@ -18,7 +18,7 @@ from augment.baselines.simulated_faults import (
     spoiled,
 )
 from augment.baselines.simulated_format import FormatKind, spoiled_answer
-from augment.baselines.simulated_road import Road, jittered
+from augment.baselines.simulated_road import RouteMap, jittered
 from augment.errors import InvalidDocument, ReplyUnreadable
 from augment.prompts.reply import read_reply
 from augment.scene.entities import Scene
@@ -85,7 +85,7 @@ def simulate(scene: Scene, reference: Modification, rates: Rates, *, seed: int) 
         seed: Of this scenario and contestant.
     """
     rng = random.Random(seed)
-    road = Road.of(scene)
+    road = RouteMap.of(scene)
     right = reference if road is None else jittered(road, reference, rng)
     wanted = _drawn(rates, rng)
     if wanted == "format":

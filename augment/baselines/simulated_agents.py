@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import replace
 
-from augment.baselines.simulated_road import Agents, Road
+from augment.baselines.simulated_road import Agents, RouteMap
 from augment.geometry.angles import difference, wrap
 from augment.scene.entities import AgentType, TrafficAgent
 
@@ -63,7 +63,7 @@ def replaced(agents: Agents, old: TrafficAgent, new: TrafficAgent) -> Agents:
     return tuple(new if agent is old else agent for agent in agents)
 
 
-def free_id(road: Road, agents: Agents) -> str:
+def free_id(road: RouteMap, agents: Agents) -> str:
     """An id that nobody has."""
     taken = {agent.id for agent in (*road.scene.everyone, *agents)}
     number = len(taken) + 1

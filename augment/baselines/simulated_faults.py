@@ -12,7 +12,7 @@ from enum import StrEnum
 
 from augment.baselines import simulated_logic as logic
 from augment.baselines import simulated_places as places
-from augment.baselines.simulated_road import Agents, Road
+from augment.baselines.simulated_road import Agents, RouteMap
 
 
 class FaultKind(StrEnum):
@@ -58,14 +58,14 @@ LOGIC_KINDS = (
 )
 
 
-def spoiled(road: Road, agents: Agents, kind: FaultKind, rng: random.Random) -> Agents | None:
+def spoiled(road: RouteMap, agents: Agents, kind: FaultKind, rng: random.Random) -> Agents | None:
     """The agents with that fault, None where it makes no difference here."""
     return _MAKERS[kind](road, agents, rng) if agents else None
 
 
 # Private
 
-_MAKERS: dict[FaultKind, Callable[[Road, Agents, random.Random], Agents | None]] = {
+_MAKERS: dict[FaultKind, Callable[[RouteMap, Agents, random.Random], Agents | None]] = {
     FaultKind.NEIGHBOUR_LANE: places.neighbour_lane,
     FaultKind.STRAIGHT_LINE: places.straight_line,
     FaultKind.ALONG_LANE: places.along_lane,

@@ -14,7 +14,7 @@ from augment.baselines.simulated_agents import (
     swapped,
     walks,
 )
-from augment.baselines.simulated_road import Agents, Road, each, new_contacts
+from augment.baselines.simulated_road import Agents, RouteMap, each, new_contacts
 from augment.scene.entities import AgentType, TrafficAgent
 from augment.scene.sizes import LENGTH_WIDTH_M
 
@@ -30,7 +30,7 @@ _OTHER_TYPES = {
 _EXTRA_TRIES = 8
 
 
-def overlap(road: Road, agents: Agents, rng: random.Random) -> Agents | None:
+def overlap(road: RouteMap, agents: Agents, rng: random.Random) -> Agents | None:
     """A later object of a kind on top of an earlier one; a single one is there twice."""
     kind = rng.choice([agent.type for agent in agents])
     same = [agent for agent in agents if agent.type is kind]
@@ -43,13 +43,13 @@ def overlap(road: Road, agents: Agents, rng: random.Random) -> Agents | None:
     return replaced(agents, same[number], road.renamed(moved))
 
 
-def missing(road: Road, agents: Agents, rng: random.Random) -> Agents | None:
+def missing(road: RouteMap, agents: Agents, rng: random.Random) -> Agents | None:
     """One object less."""
     gone = rng.choice(agents)
     return tuple(agent for agent in agents if agent is not gone)
 
 
-def extra(road: Road, agents: Agents, rng: random.Random) -> Agents | None:
+def extra(road: RouteMap, agents: Agents, rng: random.Random) -> Agents | None:
     """One more of what is there, some metres further or nearer, where there is room for it."""
     for _ in range(_EXTRA_TRIES):
         along_m = rng.choice((-1.0, 1.0)) * rng.uniform(4.0, 9.0)
@@ -59,7 +59,7 @@ def extra(road: Road, agents: Agents, rng: random.Random) -> Agents | None:
     return None
 
 
-def wrong_side(road: Road, agents: Agents, rng: random.Random) -> Agents | None:
+def wrong_side(road: RouteMap, agents: Agents, rng: random.Random) -> Agents | None:
     """Left and right are exchanged: an offset, a line or a taper of cones, a walk."""
     if any(walks(agent) for agent in agents):
         return each(agents, lambda agent: swapped(agent) if walks(agent) else agent)
@@ -80,7 +80,7 @@ def _apart_m(one: TrafficAgent, other: TrafficAgent) -> float:
     return math.hypot(one.x_m - other.x_m, one.y_m - other.y_m)
 
 
-def wrong_type(road: Road, agents: Agents, rng: random.Random) -> Agents | None:
+def wrong_type(road: RouteMap, agents: Agents, rng: random.Random) -> Agents | None:
     """One object is of another type, with the box of that type."""
     agent = rng.choice(agents)
     kind = rng.choice(_OTHER_TYPES.get(agent.type, (AgentType.GENERIC_OBJECT,)))
@@ -101,7 +101,7 @@ def wrong_type(road: Road, agents: Agents, rng: random.Random) -> Agents | None:
     )
 
 
-def moving(road: Road, agents: Agents, rng: random.Random) -> Agents | None:
+def moving(road: RouteMap, agents: Agents, rng: random.Random) -> Agents | None:
     """One of the vehicles that stand drives."""
     parked = [agent for agent in agents if agent.type in VEHICLES and agent.speed_mps == 0.0]
     if not parked:

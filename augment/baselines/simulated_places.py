@@ -17,7 +17,7 @@ from augment.baselines.simulated_agents import (
     turned,
     walks,
 )
-from augment.baselines.simulated_road import Agents, Road, each
+from augment.baselines.simulated_road import Agents, RouteMap, each
 from augment.geometry.angles import difference, wrap
 from augment.scene.entities import TrafficAgent, TrafficSide
 
@@ -32,7 +32,7 @@ _WALKWAY_M = 4.0
 # Position: everything is anchored in the wrong place together, as a model does it.
 
 
-def neighbour_lane(road: Road, agents: Agents, rng: random.Random) -> Agents | None:
+def neighbour_lane(road: RouteMap, agents: Agents, rng: random.Random) -> Agents | None:
     """One lane to the left or right."""
     if any(walks(agent) for agent in agents):
         return None  # which lane a crossing pedestrian starts beside is nothing that is asked for
@@ -45,7 +45,7 @@ def neighbour_lane(road: Road, agents: Agents, rng: random.Random) -> Agents | N
     return each(agents, lambda agent: road.moved(agent, 0.0, left_m))
 
 
-def straight_line(road: Road, agents: Agents, rng: random.Random) -> Agents | None:
+def straight_line(road: RouteMap, agents: Agents, rng: random.Random) -> Agents | None:
     """The distance laid out straight ahead of the ego instead of along its lane."""
 
     def laid_out(agent: TrafficAgent) -> TrafficAgent:
@@ -60,20 +60,20 @@ def straight_line(road: Road, agents: Agents, rng: random.Random) -> Agents | No
     return made if min(off_m) >= SEEN_M else None
 
 
-def _seen_m(road: Road, was: TrafficAgent, now: TrafficAgent) -> float:
+def _seen_m(road: RouteMap, was: TrafficAgent, now: TrafficAgent) -> float:
     """How far something is off; of a walk across the road only what is along the road counts."""
     if walks(was):
         return abs(road.place(now)[0] - road.place(was)[0])
     return math.hypot(now.x_m - was.x_m, now.y_m - was.y_m)
 
 
-def along_lane(road: Road, agents: Agents, rng: random.Random) -> Agents | None:
+def along_lane(road: RouteMap, agents: Agents, rng: random.Random) -> Agents | None:
     """5 to 30 m too near or too far."""
     along_m = rng.choice((-1.0, 1.0)) * rng.uniform(5.0, 30.0)
     return each(agents, lambda agent: road.moved(agent, along_m))
 
 
-def off_road(road: Road, agents: Agents, rng: random.Random) -> Agents | None:
+def off_road(road: RouteMap, agents: Agents, rng: random.Random) -> Agents | None:
     """Until no lane is under any of them, and some metres further: beside the ground of anybody.
 
     Towards the kerb; who crosses the road begins further out on its own side.
@@ -91,11 +91,11 @@ def off_road(road: Road, agents: Agents, rng: random.Random) -> Agents | None:
     return _aside(road, agents, sign * (far_m + beyond_m))
 
 
-def _aside(road: Road, agents: Agents, left_m: float) -> Agents:
+def _aside(road: RouteMap, agents: Agents, left_m: float) -> Agents:
     return each(agents, lambda agent: road.moved(agent, 0.0, left_m))
 
 
-def beyond_junction(road: Road, agents: Agents, rng: random.Random) -> Agents | None:
+def beyond_junction(road: RouteMap, agents: Agents, rng: random.Random) -> Agents | None:
     """On the far side of an intersection that lies ahead of where it belongs."""
     last_m = max(road.place(agent)[0] for agent in agents)
     first_m = min(road.place(agent)[0] for agent in agents)
@@ -109,7 +109,7 @@ def beyond_junction(road: Road, agents: Agents, rng: random.Random) -> Agents | 
 # Heading: the place is right.
 
 
-def ego_heading(road: Road, agents: Agents, rng: random.Random) -> Agents | None:
+def ego_heading(road: RouteMap, agents: Agents, rng: random.Random) -> Agents | None:
     """The lane, the angle or the direction of a walk is ignored: everybody looks like the ego."""
     made = each(
         agents, lambda agent: replace(agent, heading_rad=0.0) if has_front(agent) else agent
@@ -123,7 +123,7 @@ def ego_heading(road: Road, agents: Agents, rng: random.Random) -> Agents | None
     return made if is_seen(agents, made) else None
 
 
-def flipped(road: Road, agents: Agents, rng: random.Random) -> Agents | None:
+def flipped(road: RouteMap, agents: Agents, rng: random.Random) -> Agents | None:
     """The one vehicle looks the other way."""
     cars = [agent for agent in agents if agent.type in VEHICLES]
     if len(cars) != 1:
@@ -131,7 +131,7 @@ def flipped(road: Road, agents: Agents, rng: random.Random) -> Agents | None:
     return replaced(agents, cars[0], turned(cars[0], math.pi))
 
 
-def degrees(road: Road, agents: Agents, rng: random.Random) -> Agents | None:
+def degrees(road: RouteMap, agents: Agents, rng: random.Random) -> Agents | None:
     """The number of degrees is given where radians are meant."""
     if sum(agent.type in VEHICLES for agent in agents) > 1:
         return None
@@ -146,7 +146,7 @@ def degrees(road: Road, agents: Agents, rng: random.Random) -> Agents | None:
     return made if is_seen(agents, made) else None
 
 
-def facing_away(road: Road, agents: Agents, rng: random.Random) -> Agents | None:
+def facing_away(road: RouteMap, agents: Agents, rng: random.Random) -> Agents | None:
     """Pedestrians look away from the road that they are to cross; half of them walk there."""
     if not any(walks(agent) for agent in agents):
         return None

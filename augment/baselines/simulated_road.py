@@ -35,7 +35,7 @@ _TOUCH_M = 0.01
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Road:
+class RouteMap:
     """The ego's way as one line, and the map around it."""
 
     scene: Scene
@@ -45,7 +45,7 @@ class Road:
     width_m: float
 
     @classmethod
-    def of(cls, scene: Scene) -> Road | None:
+    def of(cls, scene: Scene) -> RouteMap | None:
         """None where the map has no lane under the ego."""
         graph = LaneGraph(scene)
         way = graph.under(scene.ego.x_m, scene.ego.y_m, scene.ego.heading_rad)
@@ -104,7 +104,7 @@ class Road:
         return ends
 
 
-def jittered(road: Road, reference: Modification, rng: random.Random) -> Modification:
+def jittered(road: RouteMap, reference: Modification, rng: random.Random) -> Modification:
     """A right placement that is not exact: all shifted together, each a little on its own.
 
     What did not touch before does not touch now; where chance finds no such place, the shift

@@ -1,7 +1,7 @@
 """Deterministic checks of a modification: each finding is a measured fact with its numbers."""
 
-from augment.checks.finding import Finding, Kind, Severity
+from augment.checks.finding import Finding, FindingKind, Severity
 from augment.checks.ground import Ground
 from augment.checks.registry import findings, findings_on
 
-__all__ = ["Finding", "Ground", "Kind", "Severity", "findings", "findings_on"]
+__all__ = ["Finding", "FindingKind", "Ground", "Severity", "findings", "findings_on"]

@@ -22,7 +22,7 @@ from augment.checks.asked_things import (
     unasked,
 )
 from augment.checks.asked_walk import asked_walk
-from augment.checks.finding import Finding, Kind, Severity
+from augment.checks.finding import Finding, FindingKind, Severity
 from augment.checks.ground import Ground
 from augment.checks.own_way import OwnWay
 from augment.checks.parties import cast
@@ -92,15 +92,15 @@ def _settled(found: Iterable[Finding], held: Iterable[Finding], asked: Asked) ->
     across = {
         name
         for one in held
-        if one.kind in (Kind.ASKED_ACROSS, Kind.ASKED_SIDE)
+        if one.kind in (FindingKind.ASKED_ACROSS, FindingKind.ASKED_SIDE)
         for name in one.agents
     }
     for one in found:
         name = one.agents[0]
         is_settled = (
-            (one.kind is Kind.HEADING and name in answering)
+            (one.kind is FindingKind.HEADING and name in answering)
             or (
-                one.kind is Kind.OFF_ROAD
+                one.kind is FindingKind.OFF_ROAD
                 and one.severity is Severity.DOUBTFUL
                 and name in across | mistyped
             )
@@ -109,4 +109,6 @@ def _settled(found: Iterable[Finding], held: Iterable[Finding], asked: Asked) ->
         yield replace(one, severity=Severity.FACT) if is_settled else one
 
 
-_OF_PLACE = frozenset({Kind.HEADING, Kind.DEGREES, Kind.WALK_HEADING, Kind.OFF_ROAD})
+_OF_PLACE = frozenset(
+    {FindingKind.HEADING, FindingKind.DEGREES, FindingKind.WALK_HEADING, FindingKind.OFF_ROAD}
+)

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 from augment.checks.asked import Asked, hand, outside, severity
 from augment.checks.crash_order import in_order
-from augment.checks.finding import Finding, Kind
+from augment.checks.finding import Finding, FindingKind
 from augment.checks.own_way import Band
 from augment.checks.parties import Party
 from augment.checks.tolerances import Tolerances
@@ -109,7 +109,7 @@ def _vehicle(
         low, high = ("low", "high") if wanted.low_m >= 0.0 else ("high", "low")
         words = f"{{asked_{low}_m:.2g}} to {{asked_{high}_m:.2g}} m to the {side} is asked for"
     return Finding(
-        kind=Kind.ASKED_ACROSS,
+        kind=FindingKind.ASKED_ACROSS,
         severity=severity(fits=wanted.off_m(left_m) <= wanted.allowed_m),
         agents=(agent.id,),
         belongs_m=asked.way.position(asked.ahead_m(agent), belongs_m),
@@ -156,7 +156,7 @@ def _cones(asked: Asked, party: Party, request: ConesRequest, band: Band) -> Ite
             yield _other_side(cones, middle_m, wanted)
             return
         yield Finding(
-            kind=Kind.ASKED_ACROSS,
+            kind=FindingKind.ASKED_ACROSS,
             severity=severity(fits=wanted.off_m(middle_m) <= across_m),
             agents=tuple(one.id for one in everyone),
             measured={"left_m": middle_m, "asked_low_m": edge_m, "asked_high_m": edge_m},
@@ -176,7 +176,7 @@ def _cones(asked: Asked, party: Party, request: ConesRequest, band: Band) -> Ite
 
 def _last_in_middle(asked: Asked, cones: Sequence[TrafficAgent], left_m: float) -> Finding:
     return Finding(
-        kind=Kind.ASKED_ACROSS,
+        kind=FindingKind.ASKED_ACROSS,
         severity=severity(fits=abs(left_m) <= asked.tolerances.middle_m),
         agents=(cones[-1].id,),
         measured={"left_m": left_m},
@@ -190,7 +190,7 @@ def _last_in_middle(asked: Asked, cones: Sequence[TrafficAgent], left_m: float) 
 def _taper_side(cones: Sequence[TrafficAgent], lefts: Sequence[float], start: float) -> Finding:
     begins = lefts[0] - lefts[-1]
     return Finding(
-        kind=Kind.ASKED_SIDE,
+        kind=FindingKind.ASKED_SIDE,
         severity=severity(fits=begins * start > 0.0),
         agents=tuple(one.id for one in cones),
         measured={"first_left_m": lefts[0], "last_left_m": lefts[-1]},
@@ -206,7 +206,7 @@ def _in_lane(
 ) -> Finding:
     beyond_m = abs(left_m) - band.width_m / 2.0
     return Finding(
-        kind=Kind.ASKED_ACROSS,
+        kind=FindingKind.ASKED_ACROSS,
         severity=severity(fits=beyond_m <= asked.tolerances.edge_m),
         agents=tuple(one.id for one in agents),
         measured={"left_m": left_m, "lane_width_m": band.width_m},
@@ -220,7 +220,7 @@ def _in_lane(
 def _other_side(agents: Sequence[TrafficAgent], left_m: float, wanted: _Wanted) -> Finding:
     side = hand(wanted.low_m + wanted.high_m)
     return Finding(
-        kind=Kind.ASKED_SIDE,
+        kind=FindingKind.ASKED_SIDE,
         severity=severity(fits=False),
         agents=tuple(one.id for one in agents),
         measured={"left_m": left_m, "asked_low_m": wanted.low_m, "asked_high_m": wanted.high_m},

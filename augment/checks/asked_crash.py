@@ -7,7 +7,7 @@ from collections.abc import Iterator
 
 from augment.checks.asked import Asked, hand, severity
 from augment.checks.crash_order import Pair, in_order, pairs
-from augment.checks.finding import Finding, Kind
+from augment.checks.finding import Finding, FindingKind
 from augment.checks.tolerances import CRASH_M, USUAL
 from augment.geometry.angles import difference
 from augment.scene.entities import TrafficAgent
@@ -40,7 +40,7 @@ def _turn(pair: Pair, asked: Asked) -> Finding:
     asked_deg, off_deg = pair.asked.turn_deg or 0.0, pair.off_deg or 0.0
     side = f" to the {hand(asked_deg)}" if pair.asked.is_signed else ""
     return Finding(
-        kind=Kind.ASKED_HEADING,
+        kind=FindingKind.ASKED_HEADING,
         severity=severity(fits=off_deg <= asked.tolerances.heading_deg),
         agents=(pair.other.id, pair.one.id),
         measured={"turn_deg": pair.turn_deg, "asked_deg": asked_deg, "off_deg": off_deg},
@@ -65,7 +65,7 @@ def _gap(pair: Pair, asked: Asked) -> Finding:
         words = "{asked_m:.1f} m is asked for"
         asked_m = (wanted.low_m + wanted.high_m) / 2.0
     return Finding(
-        kind=Kind.ASKED_SPACING,
+        kind=FindingKind.ASKED_SPACING,
         severity=severity(fits=fits),
         agents=(pair.other.id, pair.one.id),
         measured={"gap_m": pair.gap_m, "asked_m": asked_m},
@@ -80,7 +80,7 @@ def _facing(asked: Asked, request: CrashRequest, first: TrafficAgent) -> Iterato
     turn_deg = abs(math.degrees(difference(first.heading_rad, band.tangent_rad)))
     wanted_deg = 90.0 if request.facing is Facing.ACROSS else 180.0
     yield Finding(
-        kind=Kind.ASKED_HEADING,
+        kind=FindingKind.ASKED_HEADING,
         severity=severity(fits=abs(turn_deg - wanted_deg) <= _ROUGHLY_DEG),
         agents=(first.id,),
         measured={"turn_deg": turn_deg, "asked_deg": wanted_deg},

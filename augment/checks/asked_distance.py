@@ -7,7 +7,7 @@ from collections.abc import Iterator
 
 from augment.checks.asked import Asked, outside, severity
 from augment.checks.crash_order import in_order
-from augment.checks.finding import Finding, Kind
+from augment.checks.finding import Finding, FindingKind
 from augment.checks.parties import Party
 from augment.checks.tolerances import CRASH_M
 from augment.scene.entities import TrafficAgent
@@ -47,7 +47,7 @@ def _finding(asked: Asked, party: Party, span_m: tuple[float, float]) -> Finding
     what, range_words = _words(party, low_m, high_m)
     belongs_m = sign * min(max(measured_m, low_m), high_m)
     return Finding(
-        kind=Kind.ASKED_DISTANCE,
+        kind=FindingKind.ASKED_DISTANCE,
         severity=severity(fits=off_m <= allowed_m),
         agents=(first.id, *(one.id for one in party.everyone if one is not first)),
         belongs_m=asked.way.position(belongs_m, asked.left_m(first)),

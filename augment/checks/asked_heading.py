@@ -6,7 +6,7 @@ import math
 from collections.abc import Iterator
 
 from augment.checks.asked import Asked, hand, severity
-from augment.checks.finding import Finding, Kind
+from augment.checks.finding import Finding, FindingKind
 from augment.geometry.angles import difference
 from augment.scene.entities import TrafficAgent
 from augment.scene.intent import Facing, VehicleRequest
@@ -33,7 +33,7 @@ def _vehicle(asked: Asked, request: VehicleRequest, agent: TrafficAgent) -> Iter
     wanted_deg = _FACING_DEG[_facing(request)] + request.turn_deg
     off_deg = min(abs(_difference_deg(one, wanted_deg)) for one in turns)
     yield Finding(
-        kind=Kind.ASKED_HEADING,
+        kind=FindingKind.ASKED_HEADING,
         severity=severity(fits=off_deg <= asked.tolerances.heading_deg),
         agents=(agent.id,),
         measured={

@@ -8,7 +8,7 @@ from itertools import combinations
 from statistics import median
 
 from augment.checks.asked import Asked, hand, outside, severity
-from augment.checks.finding import Finding, Kind
+from augment.checks.finding import Finding, FindingKind
 from augment.checks.parties import Party
 from augment.checks.tolerances import WORKER_M
 from augment.scene.entities import TrafficAgent
@@ -57,7 +57,7 @@ def _spacing(asked: Asked, cones: Sequence[TrafficAgent], wanted: Length) -> Fin
     gaps_m = [min(apart_m(one, other) for other in cones if other is not one) for one in cones]
     gap_m = median(gaps_m)
     return Finding(
-        kind=Kind.ASKED_SPACING,
+        kind=FindingKind.ASKED_SPACING,
         severity=severity(fits=fits_gap(asked, gap_m, wanted)),
         agents=tuple(one.id for one in cones),
         measured={"gap_m": gap_m, "asked_m": (wanted.low_m + wanted.high_m) / 2.0},
@@ -68,7 +68,7 @@ def _spacing(asked: Asked, cones: Sequence[TrafficAgent], wanted: Length) -> Fin
 def _worker(worker: TrafficAgent, party: Party) -> Finding:
     nearest = min(party.agents, key=lambda cone: (apart_m(worker, cone), cone.id))
     return Finding(
-        kind=Kind.ASKED_SPACING,
+        kind=FindingKind.ASKED_SPACING,
         severity=severity(fits=apart_m(worker, nearest) <= WORKER_M),
         agents=(worker.id, nearest.id),
         measured={"gap_m": apart_m(worker, nearest)},
@@ -80,7 +80,7 @@ def _worker_side(asked: Asked, worker: TrafficAgent, party: Party, side: Side) -
     nearest = min(party.agents, key=lambda cone: (apart_m(worker, cone), cone.id))
     left_m = asked.left_m(worker) - asked.left_m(nearest)
     return Finding(
-        kind=Kind.ASKED_SIDE,
+        kind=FindingKind.ASKED_SIDE,
         severity=severity(fits=hand(left_m) == side),
         agents=(worker.id, nearest.id),
         measured={"left_m": left_m},

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from augment.checks.asked import Asked, severity
-from augment.checks.finding import Finding, Kind, Severity
+from augment.checks.finding import Finding, FindingKind, Severity
 from augment.checks.parties import Role, middle_of
 from augment.checks.situation import STOPPED_BELOW_MPS
 from augment.checks.tolerances import SPEED_MPS, SPEED_SHARE
@@ -19,7 +19,7 @@ def asked_count(asked: Asked) -> Iterator[Finding]:
         here = tuple(one.id for one in party.everyone)
         for role, number in party.missing:
             yield Finding(
-                kind=Kind.ASKED_COUNT,
+                kind=FindingKind.ASKED_COUNT,
                 severity=Severity.WRONG,
                 agents=here,
                 belongs_m=None if here else middle_of(party.request.spot, asked.way),
@@ -28,7 +28,7 @@ def asked_count(asked: Asked) -> Iterator[Finding]:
             )
     for agent in asked.casting.surplus:
         yield Finding(
-            kind=Kind.ASKED_COUNT,
+            kind=FindingKind.ASKED_COUNT,
             severity=Severity.WRONG,
             agents=(agent.id,),
             measured={"surplus": 1.0},
@@ -41,7 +41,7 @@ def asked_type(asked: Asked) -> Iterator[Finding]:
     for party in asked.parties:
         for agent, role in party.mistyped:
             yield Finding(
-                kind=Kind.ASKED_TYPE,
+                kind=FindingKind.ASKED_TYPE,
                 severity=Severity.WRONG,
                 agents=(agent.id,),
                 template=f"{{agents[0]}} is a {_named(agent)}; a {role} is asked for.",
@@ -62,7 +62,7 @@ def asked_motion(asked: Asked) -> Iterator[Finding]:
         for agent in party.agents:
             off_mps = abs(agent.speed_mps - wanted_mps)
             yield Finding(
-                kind=Kind.ASKED_MOTION,
+                kind=FindingKind.ASKED_MOTION,
                 severity=severity(fits=off_mps <= allowed_mps),
                 agents=(agent.id,),
                 measured={"speed_mps": agent.speed_mps, "asked_mps": wanted_mps},
@@ -76,7 +76,7 @@ def unasked(asked: Asked) -> Iterator[Finding]:
     removed = [(name, "removed") for name in asked.modification.removed]
     for name, done in (*moved, *removed):
         yield Finding(
-            kind=Kind.UNASKED,
+            kind=FindingKind.UNASKED,
             severity=Severity.WRONG,
             agents=(name,),
             template=f"{{agents[0]}} was in the scene and is {done}; nobody asked for that.",

@@ -8,7 +8,7 @@ from itertools import combinations
 
 from augment.checks.asked import Asked, hand, severity
 from augment.checks.asked_spacing import apart_m, fits_gap
-from augment.checks.finding import Finding, Kind
+from augment.checks.finding import Finding, FindingKind
 from augment.checks.walk_crossing import end_of_walk
 from augment.scene.entities import TrafficAgent
 from augment.scene.intent import Side, WalkRequest
@@ -55,7 +55,7 @@ def _drift(asked: Asked, agent: TrafficAgent, wanted_m: float | None) -> Iterato
         return
     drift_m = asked.way.place(*end).ahead_m - asked.ahead_m(agent)
     yield Finding(
-        kind=Kind.ASKED_DISTANCE,
+        kind=FindingKind.ASKED_DISTANCE,
         severity=severity(fits=abs(drift_m - wanted_m) <= asked.tolerances.drift_m),
         agents=(agent.id,),
         measured={"drift_m": drift_m, "asked_m": wanted_m},
@@ -79,7 +79,7 @@ def _in_file(
     for other, wanted in zip(others, request.behind, strict=False):
         gap_m = apart_m(first, other)
         yield Finding(
-            kind=Kind.ASKED_SPACING,
+            kind=FindingKind.ASKED_SPACING,
             severity=severity(fits=fits_gap(asked, gap_m, wanted)),
             agents=(other.id, first.id),
             measured={"gap_m": gap_m, "asked_m": (wanted.low_m + wanted.high_m) / 2.0},
@@ -103,7 +103,7 @@ def _finding(asked: Asked, agent: TrafficAgent, start: float) -> Finding:
     begins, ends = hand(start), hand(-start)
     if is_other_side:
         return _fault(
-            Kind.ASKED_SIDE, agent, measured,
+            FindingKind.ASKED_SIDE, agent, measured,
             f"{{agents[0]}} crosses from the {ends} to the {begins}; from the {begins} is asked "
             "for.",
         )  # fmt: skip
@@ -112,26 +112,26 @@ def _finding(asked: Asked, agent: TrafficAgent, start: float) -> Finding:
         away = "looks" if looks_away else "walks"
         measured |= {"turn_deg": math.degrees(math.asin(across))}
         return _fault(
-            Kind.ASKED_HEADING, agent, measured,
+            FindingKind.ASKED_HEADING, agent, measured,
             f"{{agents[0]}} {away} away from its way to the {ends} side of the road.",
         )  # fmt: skip
     crosses = end_left_m is not None and place.left_m * start > -_ON_ROAD_M
     if crosses and end_left_m is not None and end_left_m * start < 0.0:
         return Finding(
-            kind=Kind.ASKED_CROSSING,
+            kind=FindingKind.ASKED_CROSSING,
             severity=severity(fits=True),
             agents=(agent.id,),
             measured=measured,
             template=f"{{agents[0]}} crosses the ego's way from the {begins}, as asked for.",
         )
     return _fault(
-        Kind.ASKED_CROSSING, agent, measured,
+        FindingKind.ASKED_CROSSING, agent, measured,
         f"{{agents[0]}} does not cross the ego's way from the {begins} to the {ends}.",
     )  # fmt: skip
 
 
 def _fault(
-    kind: Kind, agent: TrafficAgent, measured: dict[str, float | None], words: str
+    kind: FindingKind, agent: TrafficAgent, measured: dict[str, float | None], words: str
 ) -> Finding:
     return Finding(
         kind=kind,

@@ -5,8 +5,8 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 
-from augment.checks.finding import Finding, Kind, Severity
-from augment.checks.situation import Situation
+from augment.checks.finding import Finding, FindingKind, Severity
+from augment.checks.situation import ChangedScene
 from augment.geometry.angles import difference
 from augment.scene.entities import AgentType, TrafficAgent
 
@@ -21,7 +21,7 @@ _ROUND = tuple(
 """Without 355: as radians that is 113 half turns, and half a turn is what facing back means."""
 
 
-def degrees(situation: Situation) -> Iterator[Finding]:
+def degrees(situation: ChangedScene) -> Iterator[Finding]:
     """Wrong beyond a full turn; doubtful where round degrees, wrapped as radians, fit exactly.
 
     The second asks for more than the number: read as degrees the heading must follow the lane or
@@ -41,7 +41,7 @@ def _is(heading_rad: float, degrees: int) -> bool:
     return degrees != 0 and abs(difference(heading_rad, float(degrees))) < EXACT_RAD
 
 
-def _fits_better(agent: TrafficAgent, degrees: int, situation: Situation) -> bool:
+def _fits_better(agent: TrafficAgent, degrees: int, situation: ChangedScene) -> bool:
     wanted = _wanted_rad(agent, situation)
     return any(
         abs(difference(math.radians(degrees), one)) < math.radians(10.0)
@@ -50,7 +50,7 @@ def _fits_better(agent: TrafficAgent, degrees: int, situation: Situation) -> boo
     )
 
 
-def _wanted_rad(agent: TrafficAgent, situation: Situation) -> list[float]:
+def _wanted_rad(agent: TrafficAgent, situation: ChangedScene) -> list[float]:
     """The directions that an agent would have: of its walk, or of the lanes under it."""
     if agent.type is AgentType.PEDESTRIAN:
         if agent.walk_to_m is None:
@@ -62,7 +62,7 @@ def _wanted_rad(agent: TrafficAgent, situation: Situation) -> list[float]:
 
 def _beyond(agent: TrafficAgent) -> Finding:
     return Finding(
-        kind=Kind.DEGREES,
+        kind=FindingKind.DEGREES,
         severity=Severity.WRONG,
         agents=(agent.id,),
         measured={"heading_rad": agent.heading_rad},
@@ -77,7 +77,7 @@ def _beyond(agent: TrafficAgent) -> Finding:
 def _suspicious(agent: TrafficAgent, degrees: int) -> Finding:
     minus = "-" if degrees < 0 else ""
     return Finding(
-        kind=Kind.DEGREES,
+        kind=FindingKind.DEGREES,
         severity=Severity.DOUBTFUL,
         agents=(agent.id,),
         measured={"heading_rad": agent.heading_rad, "read_as_deg": float(degrees)},

@@ -5,11 +5,11 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 
-from augment.checks.finding import Finding, Kind, Severity
-from augment.checks.situation import Situation
+from augment.checks.finding import Finding, FindingKind, Severity
+from augment.checks.situation import ChangedScene
 
 
-def ego_offset(situation: Situation) -> Iterator[Finding]:
+def ego_offset(situation: ChangedScene) -> Iterator[Finding]:
     """A fact for every changed agent, centre to centre, along and across the ego's heading."""
     ego = situation.ground.scene.ego.pose
     for agent in situation.changed:
@@ -17,7 +17,7 @@ def ego_offset(situation: Situation) -> Iterator[Finding]:
         along = "ahead of" if seen.x_m >= 0.0 else "behind"
         side = "left" if seen.y_m >= 0.0 else "right"
         yield Finding(
-            kind=Kind.EGO_OFFSET,
+            kind=FindingKind.EGO_OFFSET,
             severity=Severity.FACT,
             agents=(agent.id,),
             measured={

@@ -18,7 +18,7 @@ class FaultClass(StrEnum):
     LOGIC = "logic"
 
 
-class Kind(StrEnum):
+class FindingKind(StrEnum):
     """What was measured; those that begin with `asked` are held against the instruction."""
 
     EGO_OFFSET = "ego_offset"
@@ -48,30 +48,30 @@ class Kind(StrEnum):
 
 
 FAULT_OF = {
-    Kind.EGO_OFFSET: FaultClass.POSITION,
-    Kind.LANE_DISTANCE: FaultClass.POSITION,
-    Kind.LANE: FaultClass.POSITION,
-    Kind.OFF_ROAD: FaultClass.POSITION,
-    Kind.OUTSIDE_MAP: FaultClass.POSITION,
-    Kind.ASKED_DISTANCE: FaultClass.POSITION,
-    Kind.ASKED_ACROSS: FaultClass.POSITION,
-    Kind.ASKED_SPACING: FaultClass.POSITION,
-    Kind.HEADING: FaultClass.HEADING,
-    Kind.DEGREES: FaultClass.HEADING,
-    Kind.WALK_HEADING: FaultClass.HEADING,
-    Kind.ASKED_HEADING: FaultClass.HEADING,
-    Kind.LANE_NAMED: FaultClass.LOGIC,
-    Kind.WALK_CROSSING: FaultClass.LOGIC,
-    Kind.OVERLAP: FaultClass.LOGIC,
-    Kind.DUPLICATE: FaultClass.LOGIC,
-    Kind.SIZE: FaultClass.LOGIC,
-    Kind.SPEED: FaultClass.LOGIC,
-    Kind.ASKED_SIDE: FaultClass.LOGIC,
-    Kind.ASKED_CROSSING: FaultClass.LOGIC,
-    Kind.ASKED_COUNT: FaultClass.LOGIC,
-    Kind.ASKED_TYPE: FaultClass.LOGIC,
-    Kind.ASKED_MOTION: FaultClass.LOGIC,
-    Kind.UNASKED: FaultClass.LOGIC,
+    FindingKind.EGO_OFFSET: FaultClass.POSITION,
+    FindingKind.LANE_DISTANCE: FaultClass.POSITION,
+    FindingKind.LANE: FaultClass.POSITION,
+    FindingKind.OFF_ROAD: FaultClass.POSITION,
+    FindingKind.OUTSIDE_MAP: FaultClass.POSITION,
+    FindingKind.ASKED_DISTANCE: FaultClass.POSITION,
+    FindingKind.ASKED_ACROSS: FaultClass.POSITION,
+    FindingKind.ASKED_SPACING: FaultClass.POSITION,
+    FindingKind.HEADING: FaultClass.HEADING,
+    FindingKind.DEGREES: FaultClass.HEADING,
+    FindingKind.WALK_HEADING: FaultClass.HEADING,
+    FindingKind.ASKED_HEADING: FaultClass.HEADING,
+    FindingKind.LANE_NAMED: FaultClass.LOGIC,
+    FindingKind.WALK_CROSSING: FaultClass.LOGIC,
+    FindingKind.OVERLAP: FaultClass.LOGIC,
+    FindingKind.DUPLICATE: FaultClass.LOGIC,
+    FindingKind.SIZE: FaultClass.LOGIC,
+    FindingKind.SPEED: FaultClass.LOGIC,
+    FindingKind.ASKED_SIDE: FaultClass.LOGIC,
+    FindingKind.ASKED_CROSSING: FaultClass.LOGIC,
+    FindingKind.ASKED_COUNT: FaultClass.LOGIC,
+    FindingKind.ASKED_TYPE: FaultClass.LOGIC,
+    FindingKind.ASKED_MOTION: FaultClass.LOGIC,
+    FindingKind.UNASKED: FaultClass.LOGIC,
 }
 """The class of fault that a finding of each kind speaks for, where it speaks for one."""
 
@@ -99,7 +99,7 @@ class Finding:
             is told by the words: a field shows its size alone.
     """
 
-    kind: Kind
+    kind: FindingKind
     severity: Severity
     agents: tuple[str, ...]
     template: str

@@ -5,8 +5,8 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 
-from augment.checks.finding import Finding, Kind, Severity
-from augment.checks.situation import Situation, is_stopped
+from augment.checks.finding import Finding, FindingKind, Severity
+from augment.checks.situation import ChangedScene, is_stopped
 from augment.checks.ways import Beside
 from augment.geometry.angles import difference
 from augment.scene.entities import AgentType, TrafficAgent
@@ -19,7 +19,7 @@ ROADSIDE_M = 3.0
 _STEERED = frozenset({AgentType.VEHICLE, AgentType.BUS, AgentType.BICYCLE})
 
 
-def heading(situation: Situation) -> Iterator[Finding]:
+def heading(situation: ChangedScene) -> Iterator[Finding]:
     """The turn of every changed vehicle and bicycle against its lane, left positive.
 
     A fact up to 30 degrees, within an accident, on a car park and for a bicycle that stands;
@@ -31,7 +31,7 @@ def heading(situation: Situation) -> Iterator[Finding]:
             yield _finding(agent, place, situation)
 
 
-def _finding(agent: TrafficAgent, place: Beside, situation: Situation) -> Finding:
+def _finding(agent: TrafficAgent, place: Beside, situation: ChangedScene) -> Finding:
     turn_deg = math.degrees(difference(agent.heading_rad, place.tangent_rad))
     if abs(turn_deg) > OPPOSITE_ABOVE_DEG:
         words = "against the direction of {ways[0]} (turned by {turn_deg:.0f} degrees)"
@@ -45,7 +45,7 @@ def _finding(agent: TrafficAgent, place: Beside, situation: Situation) -> Findin
         minus = "-" if place.tangent_rad < 0.0 else ""
         words += f", which is {minus}{{lane_heading_rad:.3f}} rad there"
     return Finding(
-        kind=Kind.HEADING,
+        kind=FindingKind.HEADING,
         severity=severity,
         agents=(agent.id,),
         ways=(place.way_id,),
@@ -54,7 +54,7 @@ def _finding(agent: TrafficAgent, place: Beside, situation: Situation) -> Findin
     )
 
 
-def _severity(agent: TrafficAgent, turn_deg: float, situation: Situation) -> Severity:
+def _severity(agent: TrafficAgent, turn_deg: float, situation: ChangedScene) -> Severity:
     if turn_deg <= ALONG_BELOW_DEG or agent.id in situation.crashed:
         return Severity.FACT
     if is_stopped(agent) and _may_stand_askew(agent, situation):
@@ -63,6 +63,6 @@ def _severity(agent: TrafficAgent, turn_deg: float, situation: Situation) -> Sev
     return Severity.WRONG if against and not is_stopped(agent) else Severity.DOUBTFUL
 
 
-def _may_stand_askew(agent: TrafficAgent, situation: Situation) -> bool:
+def _may_stand_askew(agent: TrafficAgent, situation: ChangedScene) -> bool:
     in_carpark = situation.ground.carparks.distance_m(agent.x_m, agent.y_m) == 0.0
     return agent.type is AgentType.BICYCLE or in_carpark

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from augment.checks.finding import Finding, Kind, Severity
-from augment.checks.situation import Situation
+from augment.checks.finding import Finding, FindingKind, Severity
+from augment.checks.situation import ChangedScene
 from augment.checks.ways import Beside
 
 
-def lane(situation: Situation) -> Iterator[Finding]:
+def lane(situation: ChangedScene) -> Iterator[Finding]:
     """A fact for every changed agent: the lane under it, or how far it is off the nearest."""
     for agent in situation.changed:
         under = situation.under(agent)
@@ -44,7 +44,7 @@ def _off(agent_id: str, place: Beside) -> Finding:
 
 def _fact(agent_id: str, place: Beside, off_m: float, template: str) -> Finding:
     return Finding(
-        kind=Kind.LANE,
+        kind=FindingKind.LANE,
         severity=Severity.FACT,
         agents=(agent_id,),
         ways=(place.way_id,),

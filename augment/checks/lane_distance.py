@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from augment.checks.finding import Finding, Kind, Severity
-from augment.checks.situation import Situation
+from augment.checks.finding import Finding, FindingKind, Severity
+from augment.checks.situation import ChangedScene
 from augment.checks.ways import Beside
 from augment.scene.entities import TrafficAgent
 
@@ -13,7 +13,7 @@ FAR_M = 15.0
 """Further than this beside the ego's ways a distance along them says nothing."""
 
 
-def lane_distance(situation: Situation) -> Iterator[Finding]:
+def lane_distance(situation: ChangedScene) -> Iterator[Finding]:
     """A fact for every changed agent on a map that has a lane for the ego.
 
     `along_lanes_m` is None where no chain of successors leads from the ego to the agent's lane
@@ -26,11 +26,11 @@ def lane_distance(situation: Situation) -> Iterator[Finding]:
         yield _finding(agent, situation)
 
 
-def _finding(agent: TrafficAgent, situation: Situation) -> Finding:
+def _finding(agent: TrafficAgent, situation: ChangedScene) -> Finding:
     reached = _reached(agent, situation)
     if reached is None:
         return Finding(
-            kind=Kind.LANE_DISTANCE,
+            kind=FindingKind.LANE_DISTANCE,
             severity=Severity.FACT,
             agents=(agent.id,),
             measured={"along_lanes_m": None, "level_m": None, "beside_m": None},
@@ -48,7 +48,7 @@ def _finding(agent: TrafficAgent, situation: Situation) -> Finding:
             "of the centre of {ways[0]}."
         )
     return Finding(
-        kind=Kind.LANE_DISTANCE,
+        kind=FindingKind.LANE_DISTANCE,
         severity=Severity.FACT,
         agents=(agent.id,),
         ways=(place.way_id,),
@@ -61,7 +61,7 @@ def _finding(agent: TrafficAgent, situation: Situation) -> Finding:
     )
 
 
-def _reached(agent: TrafficAgent, situation: Situation) -> tuple[Beside, float] | None:
+def _reached(agent: TrafficAgent, situation: ChangedScene) -> tuple[Beside, float] | None:
     """The nearest way that the ego reaches or came from, and how far along it the agent is."""
     places = {place.way_id: place for place in situation.beside[agent.id]}
     candidates = [

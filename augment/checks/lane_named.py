@@ -4,26 +4,26 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from augment.checks.finding import Finding, Kind, Severity
-from augment.checks.situation import Situation
+from augment.checks.finding import Finding, FindingKind, Severity
+from augment.checks.situation import ChangedScene
 from augment.scene.entities import TrafficAgent
 
 TOLERANCE_M = 0.5
 """Beyond the lane's edge: whoever stands on the line may name either side."""
 
 
-def lane_named(situation: Situation) -> Iterator[Finding]:
+def lane_named(situation: ChangedScene) -> Iterator[Finding]:
     """Doubtful where an agent names a lane that it is not on, wrong where there is none such."""
     for agent in situation.changed:
         if agent.lane_id is not None and (finding := _finding(agent, agent.lane_id, situation)):
             yield finding
 
 
-def _finding(agent: TrafficAgent, named: str, situation: Situation) -> Finding | None:
+def _finding(agent: TrafficAgent, named: str, situation: ChangedScene) -> Finding | None:
     way = situation.ground.graph.ways.get(named)
     if way is None:
         return Finding(
-            kind=Kind.LANE_NAMED,
+            kind=FindingKind.LANE_NAMED,
             severity=Severity.WRONG,
             agents=(agent.id,),
             ways=(named,),
@@ -37,7 +37,7 @@ def _finding(agent: TrafficAgent, named: str, situation: Situation) -> Finding |
     under = situation.under(agent)
     really = "on no lane" if under is None else "on {ways[1]}"
     return Finding(
-        kind=Kind.LANE_NAMED,
+        kind=FindingKind.LANE_NAMED,
         severity=Severity.DOUBTFUL,
         agents=(agent.id,),
         ways=(named,) if under is None else (named, under.way_id),

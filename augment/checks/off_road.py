@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from augment.checks.finding import Finding, Kind, Severity
-from augment.checks.situation import VEHICLES, Situation
+from augment.checks.finding import Finding, FindingKind, Severity
+from augment.checks.situation import VEHICLES, ChangedScene
 from augment.scene.entities import AgentType, TrafficAgent
 
 SEEN_SHARE = 0.02
@@ -22,7 +22,7 @@ FAR_FROM_PATHS_M = 10.0
 _EDGE = frozenset({AgentType.TRAFFIC_CONE, AgentType.BARRIER})
 
 
-def off_road(situation: Situation) -> Iterator[Finding]:
+def off_road(situation: ChangedScene) -> Iterator[Finding]:
     """Changed agents off their ground; nothing for who stands where its kind belongs.
 
     Vehicles belong on the road: a fact up to a share that no map resolves, doubtful up to half
@@ -43,7 +43,7 @@ def off_road(situation: Situation) -> Iterator[Finding]:
             yield finding
 
 
-def _vehicle(agent: TrafficAgent, situation: Situation) -> Finding | None:
+def _vehicle(agent: TrafficAgent, situation: ChangedScene) -> Finding | None:
     share = situation.ground.road.share_outside(situation.boxes[agent.id].corners_m)
     if share <= SEEN_SHARE:
         return None
@@ -52,7 +52,7 @@ def _vehicle(agent: TrafficAgent, situation: Situation) -> Finding | None:
         severity = Severity.DOUBTFUL if share <= MOST_SHARE else Severity.WRONG
     gap_m = situation.ground.road.distance_m(agent.x_m, agent.y_m)
     return Finding(
-        kind=Kind.OFF_ROAD,
+        kind=FindingKind.OFF_ROAD,
         severity=severity,
         agents=(agent.id,),
         measured={"outside_share": share, "gap_m": gap_m},
@@ -63,12 +63,12 @@ def _vehicle(agent: TrafficAgent, situation: Situation) -> Finding | None:
     )
 
 
-def _cone(agent: TrafficAgent, situation: Situation) -> Finding | None:
+def _cone(agent: TrafficAgent, situation: ChangedScene) -> Finding | None:
     gap_m = situation.ground.road.distance_m(agent.x_m, agent.y_m)
     if gap_m <= EDGE_M:
         return None
     return Finding(
-        kind=Kind.OFF_ROAD,
+        kind=FindingKind.OFF_ROAD,
         severity=Severity.DOUBTFUL if gap_m <= NEAR_ROAD_M else Severity.WRONG,
         agents=(agent.id,),
         measured={"outside_share": 1.0, "gap_m": gap_m},
@@ -76,7 +76,7 @@ def _cone(agent: TrafficAgent, situation: Situation) -> Finding | None:
     )
 
 
-def _on_foot(agent: TrafficAgent, situation: Situation) -> Finding | None:
+def _on_foot(agent: TrafficAgent, situation: ChangedScene) -> Finding | None:
     ground = situation.ground.everything
     gap_m = ground.distance_m(agent.x_m, agent.y_m)
     if gap_m == 0.0:
@@ -86,7 +86,7 @@ def _on_foot(agent: TrafficAgent, situation: Situation) -> Finding | None:
         severity = Severity.DOUBTFUL if gap_m <= FAR_FROM_PATHS_M else Severity.WRONG
     share = ground.share_outside(situation.boxes[agent.id].corners_m)
     return Finding(
-        kind=Kind.OFF_ROAD,
+        kind=FindingKind.OFF_ROAD,
         severity=severity,
         agents=(agent.id,),
         measured={"outside_share": share, "gap_m": gap_m},

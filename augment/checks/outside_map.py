@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from augment.checks.finding import Finding, Kind, Severity
-from augment.checks.situation import Situation
+from augment.checks.finding import Finding, FindingKind, Severity
+from augment.checks.situation import ChangedScene
 
 TOLERANCE_M = 2.0
 
 
-def outside_map(situation: Situation) -> Iterator[Finding]:
+def outside_map(situation: ChangedScene) -> Iterator[Finding]:
     """Wrong for a changed agent outside the convex region around all that the map shows."""
     ground = situation.ground.everything
     if ground.is_empty:
@@ -19,7 +19,7 @@ def outside_map(situation: Situation) -> Iterator[Finding]:
         outside_m = ground.distance_to_hull_m(agent.x_m, agent.y_m)
         if outside_m > TOLERANCE_M:
             yield Finding(
-                kind=Kind.OUTSIDE_MAP,
+                kind=FindingKind.OUTSIDE_MAP,
                 severity=Severity.WRONG,
                 agents=(agent.id,),
                 measured={"outside_m": outside_m},

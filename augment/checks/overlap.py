@@ -5,8 +5,8 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 
-from augment.checks.finding import Finding, Kind, Severity
-from augment.checks.situation import VEHICLES, Situation, is_stopped
+from augment.checks.finding import Finding, FindingKind, Severity
+from augment.checks.situation import VEHICLES, ChangedScene, is_stopped
 from augment.geometry import boxes
 from augment.scene.entities import AgentType, TrafficAgent
 
@@ -22,7 +22,7 @@ SLIGHT_SHARE = 0.05
 _RIDER = frozenset({AgentType.PEDESTRIAN, AgentType.BICYCLE})
 
 
-def overlap(situation: Situation) -> Iterator[Finding]:
+def overlap(situation: ChangedScene) -> Iterator[Finding]:
     """Every pair with a changed agent in it whose boxes overlap, by the share of the smaller one.
 
     With the ego always wrong. Two stopped vehicles: contact up to 10 % is a fact, up to 20 %
@@ -42,14 +42,14 @@ def _may_meet(one: TrafficAgent, other: TrafficAgent) -> bool:
     return math.hypot(one.x_m - other.x_m, one.y_m - other.y_m) <= reach_m / 2.0 + TOUCH_M
 
 
-def _pair(agent: TrafficAgent, other: TrafficAgent, situation: Situation) -> Iterator[Finding]:
+def _pair(agent: TrafficAgent, other: TrafficAgent, situation: ChangedScene) -> Iterator[Finding]:
     shared = boxes.overlap(situation.boxes[agent.id], situation.boxes[other.id])
     if shared.depth_m <= TOUCH_M:
         return
     share = max(shared.share_of_first, shared.share_of_second)
     is_ego = other.id == situation.ground.scene.ego.id
     yield Finding(
-        kind=Kind.OVERLAP,
+        kind=FindingKind.OVERLAP,
         severity=Severity.WRONG if is_ego else _severity(agent, other, share),
         agents=(agent.id, other.id),
         measured={"share_of_smaller": share, "area_m2": shared.area_m2, "depth_m": shared.depth_m},

@@ -18,7 +18,7 @@ from augment.checks.lane_named import lane_named
 from augment.checks.off_road import off_road
 from augment.checks.outside_map import outside_map
 from augment.checks.overlap import overlap
-from augment.checks.situation import Check, Situation
+from augment.checks.situation import ChangedScene, Check
 from augment.checks.size import size
 from augment.checks.speed import speed
 from augment.checks.walk_crossing import walk_crossing
@@ -63,7 +63,7 @@ def findings_on(ground: Ground, modification: Modification) -> tuple[Finding, ..
     Raises:
         InvalidModification: The modification does not fit the scene.
     """
-    situation = Situation.of(ground, modification)
+    situation = ChangedScene.of(ground, modification)
     found = [finding for check in CHECKS for finding in check(situation)]
     order = {agent.id: number for number, agent in enumerate(situation.changed)}
     return tuple(sorted(found, key=lambda finding: order[finding.agents[0]]))

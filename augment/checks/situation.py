@@ -26,7 +26,7 @@ _SMALLEST_M = 0.01
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Situation:
+class ChangedScene:
     """A scene after its change, with what several checks need worked out once.
 
     Attributes:
@@ -40,7 +40,7 @@ class Situation:
     everyone: tuple[TrafficAgent, ...]
 
     @classmethod
-    def of(cls, ground: Ground, modification: Modification) -> Situation:
+    def of(cls, ground: Ground, modification: Modification) -> ChangedScene:
         """The modification on its ground.
 
         Raises:
@@ -84,7 +84,7 @@ class Situation:
         return frozenset(car.id for car, is_near in zip(cars, near, strict=True) if is_near)
 
 
-Check = Callable[[Situation], Iterator[Finding]]
+Check = Callable[[ChangedScene], Iterator[Finding]]
 """A check yields what it measured, and nothing where there is nothing to measure."""
 
 

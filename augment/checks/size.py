@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import NamedTuple
 
-from augment.checks.finding import Finding, Kind, Severity
-from augment.checks.situation import Situation
+from augment.checks.finding import Finding, FindingKind, Severity
+from augment.checks.situation import ChangedScene
 from augment.scene.entities import AgentType, TrafficAgent
 
 
@@ -33,7 +33,7 @@ FAR_OFF = 1.7
 _LONG = frozenset({AgentType.VEHICLE, AgentType.BUS, AgentType.BICYCLE})
 
 
-def size(situation: Situation) -> Iterator[Finding]:
+def size(situation: ChangedScene) -> Iterator[Finding]:
     """Doubtful outside the usual range of the type, wrong far outside or with sides swapped."""
     for agent in situation.changed:
         usual = USUAL[agent.type]
@@ -55,7 +55,7 @@ def _finding(agent: TrafficAgent, off: float, *, swapped: bool) -> Finding:
     if swapped:
         words = "wider than long: its length and width look swapped."
     return Finding(
-        kind=Kind.SIZE,
+        kind=FindingKind.SIZE,
         severity=Severity.WRONG if swapped or off > FAR_OFF else Severity.DOUBTFUL,
         agents=(agent.id,),
         measured={"length_m": agent.length_m, "width_m": agent.width_m},

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from augment.checks.finding import Finding, Kind, Severity
-from augment.checks.situation import STOPPED_BELOW_MPS, Situation
+from augment.checks.finding import Finding, FindingKind, Severity
+from augment.checks.situation import STOPPED_BELOW_MPS, ChangedScene
 from augment.scene.entities import AgentType, TrafficAgent
 
 USUAL_MPS: dict[AgentType, float] = {
@@ -20,7 +20,7 @@ OVER_LIMIT = 1.5
 """By this factor above the limit of its lane a vehicle is too fast to be normal traffic."""
 
 
-def speed(situation: Situation) -> Iterator[Finding]:
+def speed(situation: ChangedScene) -> Iterator[Finding]:
     """Doubtful above what is usual for the type or on its lane, or backwards; wrong far above.
 
     A thing that can't move and does is wrong.
@@ -40,7 +40,7 @@ def speed(situation: Situation) -> Iterator[Finding]:
             yield _finding(agent, "backwards.", is_wrong=False)
 
 
-def _limit_mps(agent: TrafficAgent, situation: Situation) -> float | None:
+def _limit_mps(agent: TrafficAgent, situation: ChangedScene) -> float | None:
     under = situation.under(agent)
     if under is None or agent.type not in (AgentType.VEHICLE, AgentType.BUS):
         return None
@@ -49,7 +49,7 @@ def _limit_mps(agent: TrafficAgent, situation: Situation) -> float | None:
 
 def _finding(agent: TrafficAgent, words: str, *, is_wrong: bool) -> Finding:
     return Finding(
-        kind=Kind.SPEED,
+        kind=FindingKind.SPEED,
         severity=Severity.WRONG if is_wrong else Severity.DOUBTFUL,
         agents=(agent.id,),
         measured={"speed_mps": agent.speed_mps},

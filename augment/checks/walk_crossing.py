@@ -8,8 +8,8 @@ from collections.abc import Iterator
 import numpy as np
 from numpy.typing import NDArray
 
-from augment.checks.finding import Finding, Kind, Severity
-from augment.checks.situation import Situation, is_stopped
+from augment.checks.finding import Finding, FindingKind, Severity
+from augment.checks.situation import ChangedScene, is_stopped
 from augment.geometry.polyline import Polyline
 from augment.scene.entities import AgentType, Point, TrafficAgent
 
@@ -17,7 +17,7 @@ ASSUMED_WALK_M = 30.0
 """How far a pedestrian without an end point is followed; the longest known walk is 28.8 m."""
 
 
-def walk_crossing(situation: Situation) -> Iterator[Finding]:
+def walk_crossing(situation: ChangedScene) -> Iterator[Finding]:
     """A fact for every changed pedestrian who walks: where it crosses the ego's way, if it does.
 
     The ego's way is its lane and what follows straightest, from the ego's centre on.
@@ -58,7 +58,7 @@ def _finding(agent: TrafficAgent, end: Point, line: Polyline, width_m: float) ->
     else:
         words = " does not cross the ego's lane."
     return Finding(
-        kind=Kind.WALK_CROSSING,
+        kind=FindingKind.WALK_CROSSING,
         severity=Severity.FACT,
         agents=(agent.id,),
         measured={

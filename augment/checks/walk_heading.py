@@ -5,8 +5,8 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 
-from augment.checks.finding import Finding, Kind, Severity
-from augment.checks.situation import Situation
+from augment.checks.finding import Finding, FindingKind, Severity
+from augment.checks.situation import ChangedScene
 from augment.geometry.angles import difference
 from augment.scene.entities import TrafficAgent
 
@@ -19,7 +19,7 @@ NOWHERE_M = 0.001
 """Below a millimetre the direction of a walk is rounding."""
 
 
-def walk_heading(situation: Situation) -> Iterator[Finding]:
+def walk_heading(situation: ChangedScene) -> Iterator[Finding]:
     """The turn of every changed agent with a walk against it: doubtful above 30 degrees.
 
     Above 90 degrees, walking backwards, it is wrong.
@@ -34,7 +34,7 @@ def _finding(agent: TrafficAgent, to_x_m: float, to_y_m: float) -> Finding:
     walk_m = math.hypot(dx, dy)
     if walk_m < NOWHERE_M:
         return Finding(
-            kind=Kind.WALK_HEADING,
+            kind=FindingKind.WALK_HEADING,
             severity=Severity.FACT,
             agents=(agent.id,),
             measured={"turn_deg": None, "walk_m": walk_m},
@@ -48,7 +48,7 @@ def _finding(agent: TrafficAgent, to_x_m: float, to_y_m: float) -> Finding:
     side = "left" if turn_deg >= 0.0 else "right"
     words = "along it" if abs(turn_deg) < 0.5 else f"{{turn_deg:.0f}} degrees to the {side} of it"
     return Finding(
-        kind=Kind.WALK_HEADING,
+        kind=FindingKind.WALK_HEADING,
         severity=severity,
         agents=(agent.id,),
         measured={"turn_deg": turn_deg, "walk_m": walk_m},

@@ -12,7 +12,7 @@ from augment.llm.messages import LengthName, Request
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Profile:
+class ModelProfile:
     """The abilities of a model at an endpoint.
 
     Attributes:
@@ -52,7 +52,7 @@ class Profile:
             length_name=self._length_name(request.length_name),
         )
 
-    def without(self, parameter: str) -> Profile:
+    def without(self, parameter: str) -> ModelProfile:
         """The same model, that does not take this parameter."""
         if parameter == "temperature":
             return replace(self, temperature=False)

@@ -35,7 +35,7 @@ class Ability(StrEnum):
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Question:
+class ProbeQuestion:
     """One request, and what a good answer to it is.
 
     Attributes:
@@ -48,7 +48,7 @@ class Question:
     parameter: str = ""
 
 
-def questions_for(model: str) -> tuple[Question, ...]:
+def questions_for(model: str) -> tuple[ProbeQuestion, ...]:
     """The questions in the order in which they are asked; the first decides about the others."""
     return (
         _question(model, Ability.ANSWERS, "Answer with the single word: ready", _says("ready")),
@@ -129,10 +129,10 @@ def _question(
     parameter: str = "",
     images: tuple[bytes, ...] = (),
     **changes: object,
-) -> Question:
+) -> ProbeQuestion:
     message = Message(speaker=Speaker.USER, text=text, images=images)
     request = Request(model=model, messages=(message,), max_tokens=MAX_TOKENS, **changes)  # type: ignore[arg-type]
-    return Question(ability=ability, request=request, is_good=is_good, parameter=parameter)
+    return ProbeQuestion(ability=ability, request=request, is_good=is_good, parameter=parameter)
 
 
 def _says(word: str) -> Callable[[Reply], bool]:

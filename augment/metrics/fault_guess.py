@@ -4,12 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
-from augment.checks.finding import FaultClass, Finding, Kind
+from augment.checks.finding import FaultClass, Finding, FindingKind
 
 __all__ = ["FaultClass", "first_guess"]
 
 _FOLLOWS_PLACE = frozenset(
-    {Kind.OVERLAP, Kind.WALK_CROSSING, Kind.ASKED_CROSSING, Kind.LANE_NAMED}
+    {
+        FindingKind.OVERLAP,
+        FindingKind.WALK_CROSSING,
+        FindingKind.ASKED_CROSSING,
+        FindingKind.LANE_NAMED,
+    }
 )
 
 
@@ -35,7 +40,7 @@ def _names(faults: Iterable[Finding], fault: FaultClass) -> set[str]:
 def _follows(finding: Finding, misplaced: set[str], turned: set[str]) -> bool:
     if finding.fault is FaultClass.HEADING:
         return bool(finding.agents) and finding.agents[0] in misplaced
-    if finding.kind is Kind.OVERLAP:
+    if finding.kind is FindingKind.OVERLAP:
         is_alone = len(misplaced.intersection(finding.agents)) == 1
         return is_alone or bool(turned.intersection(finding.agents))
     return finding.kind in _FOLLOWS_PLACE and bool(misplaced.intersection(finding.agents))

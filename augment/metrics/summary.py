@@ -14,7 +14,7 @@ WHISKER = 1.5
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Box:
+class BoxSummary:
     """Quartiles by linear interpolation, whiskers by Tukey, all in metres."""
 
     mean_m: float
@@ -42,7 +42,7 @@ class Summary:
     n: int
     missing: int
     surplus: int
-    box: Box | None
+    box: BoxSummary | None
 
 
 def summarise(displacements: Sequence[Displacement]) -> Summary:
@@ -57,7 +57,7 @@ def summarise(displacements: Sequence[Displacement]) -> Summary:
     )
 
 
-def box_of(values_m: Sequence[float]) -> Box:
+def box_of(values_m: Sequence[float]) -> BoxSummary:
     """The box of at least one value.
 
     Raises:
@@ -71,7 +71,7 @@ def box_of(values_m: Sequence[float]) -> Box:
     inside = (values >= q1 - reach) & (values <= q3 + reach)
     # Interpolated quartiles may leave no value between a box's edge and its whisker's reach.
     low, high = min(float(values[inside][0]), q1), max(float(values[inside][-1]), q3)
-    return Box(
+    return BoxSummary(
         mean_m=float(values.mean()),
         low_m=low,
         q1_m=q1,

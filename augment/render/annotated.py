@@ -15,7 +15,7 @@ import numpy as np
 from augment.render import palette
 from augment.render.bev import painted
 from augment.render.camera import Camera
-from augment.render.canvas import Box, Ground, text_width_px
+from augment.render.canvas import Box, MetricCanvas, text_width_px
 from augment.render.edges import mark_box, overlap, within
 from augment.render.labels import draw_labels
 from augment.scene.entities import Point, Scene, TrafficAgent
@@ -29,7 +29,7 @@ _STAMP_PX = 30
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Mark:
+class FaultMark:
     """A finding in the picture.
 
     Attributes:
@@ -49,7 +49,7 @@ def draw_annotated(
     scene: Scene,
     modification: Modification,
     camera: Camera,
-    marks: Sequence[Mark],
+    marks: Sequence[FaultMark],
     *,
     stamp: str = "",
 ) -> bytes:
@@ -83,12 +83,16 @@ def draw_annotated(
 # Private
 
 
-def _colour(mark: Mark) -> palette.Colour:
+def _colour(mark: FaultMark) -> palette.Colour:
     return palette.WRONG if mark.is_wrong else palette.DOUBTFUL
 
 
 def _place(
-    ground: Ground, mark: Mark, agents: list[TrafficAgent], taken: list[Box], boxes: list[Box]
+    ground: MetricCanvas,
+    mark: FaultMark,
+    agents: list[TrafficAgent],
+    taken: list[Box],
+    boxes: list[Box],
 ) -> None:
     """The number beside the first of the agents, else where something is missing."""
     colour = _colour(mark)
@@ -113,7 +117,7 @@ def _place(
     taken.append(_box(spot))
 
 
-def _ring(ground: Ground, agent: TrafficAgent, colour: palette.Colour) -> None:
+def _ring(ground: MetricCanvas, agent: TrafficAgent, colour: palette.Colour) -> None:
     left, top, right, bottom = mark_box(ground, agent)
     left, top, right, bottom = (
         *(value - _MARGIN_PX for value in (left, top)),
@@ -123,7 +127,7 @@ def _ring(ground: Ground, agent: TrafficAgent, colour: palette.Colour) -> None:
     ground.canvas.stroke(corners, colour, 2.0, closed=True)
 
 
-def _cross(ground: Ground, at_px: tuple[float, float], colour: palette.Colour) -> None:
+def _cross(ground: MetricCanvas, at_px: tuple[float, float], colour: palette.Colour) -> None:
     x, y = at_px
     for dx, dy in ((7.0, 7.0), (7.0, -7.0)):
         line = np.array([[x - dx, y - dy], [x + dx, y + dy]])
@@ -132,7 +136,7 @@ def _cross(ground: Ground, at_px: tuple[float, float], colour: palette.Colour) -
 
 
 def _free(
-    ground: Ground, anchor: tuple[float, float], taken: list[Box], boxes: list[Box]
+    ground: MetricCanvas, anchor: tuple[float, float], taken: list[Box], boxes: list[Box]
 ) -> tuple[float, float]:
     """The nearest spot round the anchor that covers no number and no agent, else no number."""
     for blocked in (taken + boxes, taken):
@@ -156,7 +160,7 @@ def _box(spot: tuple[float, float]) -> Box:
     return x - _RADIUS_PX, y - _RADIUS_PX, x + _RADIUS_PX, y + _RADIUS_PX
 
 
-def _inside(ground: Ground, at_px: tuple[float, float]) -> tuple[float, float]:
+def _inside(ground: MetricCanvas, at_px: tuple[float, float]) -> tuple[float, float]:
     """The point, or the nearest of the picture where it lies outside."""
     width, height = ground.canvas.width_px, ground.canvas.height_px
     return (
@@ -165,7 +169,7 @@ def _inside(ground: Ground, at_px: tuple[float, float]) -> tuple[float, float]:
     )
 
 
-def _stamp(ground: Ground, word: str, taken: list[Box]) -> None:
+def _stamp(ground: MetricCanvas, word: str, taken: list[Box]) -> None:
     """The word in large letters, above and below what happens in the middle."""
     middle, height = ground.canvas.width_px / 2.0, ground.canvas.height_px
     half = text_width_px(word, _STAMP_PX) / 2.0 + _MARGIN_PX

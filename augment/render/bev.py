@@ -11,7 +11,7 @@ from functools import lru_cache
 
 from augment.render import palette
 from augment.render.camera import Camera
-from augment.render.canvas import Box, Canvas, Ground
+from augment.render.canvas import Box, Canvas, MetricCanvas
 from augment.render.edges import draw_badges, outside, place_badges
 from augment.render.labels import draw_ghosts, draw_labels
 from augment.render.marks import draw_mark, draw_way
@@ -46,7 +46,7 @@ def draw(
 
 def painted(
     scene: Scene, modification: Modification, camera: Camera, *, ghosts: bool = True
-) -> tuple[Ground, list[Box]]:
+) -> tuple[MetricCanvas, list[Box]]:
     """All of a picture but its labels, and the boxes in pixels that text keeps free of.
 
     Raises:
@@ -72,12 +72,12 @@ def painted(
 
 
 @lru_cache(maxsize=2)
-def _flat(scene: Scene, camera: Camera) -> Ground:
+def _flat(scene: Scene, camera: Camera) -> MetricCanvas:
     """All that lies flat under the traffic, half of the work; nobody draws on it, only on copies.
 
     A job runs the contestants of a scenario one after the other. Two, because each holds 26 MB.
     """
-    ground = Ground(Canvas(camera.width_px, camera.height_px, palette.PAPER), camera)
+    ground = MetricCanvas(Canvas(camera.width_px, camera.height_px, palette.PAPER), camera)
     draw_ground(ground, scene)
     draw_grid(ground)
     return ground

@@ -144,16 +144,16 @@ class Canvas:
         return self._glass if len(colour) == 4 else self._solid
 
 
-class Ground:
+class MetricCanvas:
     """A canvas addressed in metres of the ego frame; widths and dashes of lines stay in pixels."""
 
     def __init__(self, canvas: Canvas, camera: Camera) -> None:
         self.canvas = canvas
         self.camera = camera
 
-    def copy(self) -> Ground:
+    def copy(self) -> MetricCanvas:
         """The same on a surface of its own."""
-        return Ground(self.canvas.copy(), self.camera)
+        return MetricCanvas(self.canvas.copy(), self.camera)
 
     def fill(self, points_m: FloatArray, colour: Colour) -> None:
         """A filled polygon through points (P, 2)."""

@@ -28,7 +28,7 @@ _SYMMETRIC = {AgentType.BARRIER, AgentType.GENERIC_OBJECT}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Line:
+class DescribedAgent:
     """One agent of the list.
 
     Frame: ego frame, metres ahead of the ego's centre and to its left.
@@ -52,7 +52,7 @@ class Line:
     walk_to_m: Point | None = None
 
 
-def describe(scene: Scene, modification: Modification) -> list[Line]:
+def describe(scene: Scene, modification: Modification) -> list[DescribedAgent]:
     """What was changed, then what is gone, each the nearest first, then by kind.
 
     Args:
@@ -68,7 +68,7 @@ def describe(scene: Scene, modification: Modification) -> list[Line]:
 # Private
 
 
-def _line(change: str, agent: TrafficAgent) -> Line:
+def _line(change: str, agent: TrafficAgent) -> DescribedAgent:
     walks, moves = is_walking(agent), not stands(agent)
     is_thing = agent.type in _UPRIGHT | _SYMMETRIC
     heading, along = None, None
@@ -77,7 +77,7 @@ def _line(change: str, agent: TrafficAgent) -> Line:
     elif agent.type in _SYMMETRIC:
         along = _turn(math.remainder(agent.heading_rad, math.pi))
         along = 90 if along == -90 else along
-    return Line(
+    return DescribedAgent(
         change=change,
         kind=agent.type.value,
         ahead_m=_metres(agent.x_m),
@@ -89,7 +89,7 @@ def _line(change: str, agent: TrafficAgent) -> Line:
     )
 
 
-def _place(line: Line) -> tuple[object, ...]:
+def _place(line: DescribedAgent) -> tuple[object, ...]:
     """Everything that a line says, so that two which differ never stand as they came."""
     distance_m = round(math.hypot(line.ahead_m, line.left_m), 3)
     walk = line.walk_to_m or ()

@@ -10,7 +10,7 @@ import numpy as np
 
 from augment.geometry.boxes import corners
 from augment.render import palette
-from augment.render.canvas import Box, Ground, text_width_px
+from augment.render.canvas import Box, MetricCanvas, text_width_px
 from augment.scene.entities import TrafficAgent
 
 TEXT_PX = 15
@@ -36,14 +36,14 @@ class Badge:
         return (left + right) / 2.0, (top + bottom) / 2.0
 
 
-def outside(ground: Ground, agent: TrafficAgent) -> bool:
+def outside(ground: MetricCanvas, agent: TrafficAgent) -> bool:
     """Whether the centre of an agent lies outside the picture."""
     x, y = ground.at(agent.x_m, agent.y_m)
     return not (0.0 <= x < ground.canvas.width_px and 0.0 <= y < ground.canvas.height_px)
 
 
 def place_badges(
-    ground: Ground,
+    ground: MetricCanvas,
     lost: list[TrafficAgent],
     seen: list[TrafficAgent],
     taken: tuple[Box, ...] = (),
@@ -70,7 +70,7 @@ def place_badges(
     return badges
 
 
-def draw_badges(ground: Ground, badges: list[Badge]) -> None:
+def draw_badges(ground: MetricCanvas, badges: list[Badge]) -> None:
     """White plates with a blue arrow and a distance."""
     style = palette.CHANGED_MARK
     for badge in badges:
@@ -88,7 +88,7 @@ def draw_badges(ground: Ground, badges: list[Badge]) -> None:
         )
 
 
-def mark_box(ground: Ground, agent: TrafficAgent) -> Box:
+def mark_box(ground: MetricCanvas, agent: TrafficAgent) -> Box:
     """The upright box round an agent's own, in pixels."""
     box = ground.camera.to_pixels(corners(agent.pose, agent.length_m, agent.width_m))
     (left, top), (right, bottom) = box.min(axis=0), box.max(axis=0)
@@ -105,7 +105,7 @@ def overlap(one: Box, other: Box, gap_px: float = 0.0) -> bool:
     )
 
 
-def within(ground: Ground, box: Box) -> bool:
+def within(ground: MetricCanvas, box: Box) -> bool:
     """Whether a box lies in the picture as a whole."""
     left, top, right, bottom = box
     canvas = ground.canvas
@@ -121,7 +121,7 @@ def distance_text(distance_m: float) -> str:
     return "> 999 km"
 
 
-def _candidates(ground: Ground, towards: tuple[float, float], width: float) -> Iterator[Box]:
+def _candidates(ground: MetricCanvas, towards: tuple[float, float], width: float) -> Iterator[Box]:
     """Boxes along the edge, nearest to where the line from the ego leaves the picture first."""
     ego = ground.at(0.0, 0.0)
     for row in range(8):

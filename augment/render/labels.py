@@ -7,7 +7,7 @@ import numpy as np
 from augment.geometry.boxes import corners
 from augment.geometry.polyline import FloatArray
 from augment.render import palette
-from augment.render.canvas import Box, Ground, text_width_px
+from augment.render.canvas import Box, MetricCanvas, text_width_px
 from augment.render.edges import mark_box, overlap, within
 from augment.render.scale import raster
 from augment.scene.entities import Scene
@@ -17,7 +17,7 @@ from augment.scene.modification import Modification
 _TEXT_PX = 14
 
 
-def draw_ghosts(ground: Ground, scene: Scene, modification: Modification) -> None:
+def draw_ghosts(ground: MetricCanvas, scene: Scene, modification: Modification) -> None:
     """Faint dashed outlines where removed and moved agents were before the change."""
     gone = set(modification.removed) | {agent.id for agent in modification.moved}
     for agent in scene.agents:
@@ -27,7 +27,7 @@ def draw_ghosts(ground: Ground, scene: Scene, modification: Modification) -> Non
             ground.canvas.dashed(ring, palette.GHOST, 1.5, 5.0, 4.0)
 
 
-def draw_labels(ground: Ground, scene: Scene, taken: list[Box]) -> None:
+def draw_labels(ground: MetricCanvas, scene: Scene, taken: list[Box]) -> None:
     """Ids beside agents and on lanes, metres along the upper and the left edge.
 
     Args:
@@ -51,7 +51,7 @@ def draw_labels(ground: Ground, scene: Scene, taken: list[Box]) -> None:
         _label(ground, way.id, palette.LANE_TEXT, spots, words, marks)
 
 
-def _metres(ground: Ground) -> None:
+def _metres(ground: MetricCanvas) -> None:
     camera = ground.camera
     for x_m in raster(camera.x_min_m, camera.x_max_m):
         x, _ = ground.at(x_m, 0.0)
@@ -64,7 +64,7 @@ def _metres(ground: Ground) -> None:
         ground.canvas.text((16.0, y), f"{y_m:.0f}", palette.INK, 12, halo=palette.HALO)
 
 
-def _spots(ground: Ground, line_m: FloatArray) -> list[tuple[float, float]]:
+def _spots(ground: MetricCanvas, line_m: FloatArray) -> list[tuple[float, float]]:
     """Places on a line that are in the picture, the middle one first."""
     points = ground.camera.to_pixels(line_m)
     count = max(2, int(np.hypot(*np.diff(points, axis=0).T).sum() / 40.0))
@@ -81,7 +81,7 @@ def _spots(ground: Ground, line_m: FloatArray) -> list[tuple[float, float]]:
 
 
 def _label(
-    ground: Ground,
+    ground: MetricCanvas,
     text: str,
     colour: palette.Colour,
     spots: list[tuple[float, float]],

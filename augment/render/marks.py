@@ -13,7 +13,7 @@ import numpy as np
 
 from augment.geometry.boxes import corners
 from augment.geometry.polyline import FloatArray
-from augment.render.canvas import Ground
+from augment.render.canvas import MetricCanvas
 from augment.render.palette import MarkStyle
 from augment.render.shapes import stripes
 from augment.scene.entities import AgentType, TrafficAgent
@@ -26,10 +26,10 @@ _LEAST_MARK_PX = 16.0
 # The tick at the nose of what moves is the way of this time.
 _TICK_S = 1.0
 
-_Painter = Callable[[Ground, TrafficAgent, MarkStyle], None]
+_Painter = Callable[[MetricCanvas, TrafficAgent, MarkStyle], None]
 
 
-def draw_way(ground: Ground, agent: TrafficAgent, style: MarkStyle) -> None:
+def draw_way(ground: MetricCanvas, agent: TrafficAgent, style: MarkStyle) -> None:
     """Where one agent is going: its walk if it has one, else its motion."""
     if agent.walk_to_m is not None:
         _walk(ground, agent, style)
@@ -48,7 +48,7 @@ def stands(agent: TrafficAgent) -> bool:
     return agent.walk_to_m is not None or abs(agent.speed_mps) < _STANDING_MPS
 
 
-def draw_mark(ground: Ground, agent: TrafficAgent, style: MarkStyle) -> None:
+def draw_mark(ground: MetricCanvas, agent: TrafficAgent, style: MarkStyle) -> None:
     """One agent where it is; nothing for one that is out of the picture."""
     box = corners(agent.pose, agent.length_m, agent.width_m)
     if not ground.camera.shows(box, margin_m=_LEAST_MARK_PX / ground.camera.px_per_m):
@@ -56,7 +56,9 @@ def draw_mark(ground: Ground, agent: TrafficAgent, style: MarkStyle) -> None:
     _PAINTERS[agent.type](ground, agent, style)
 
 
-def _body(ground: Ground, agent: TrafficAgent, style: MarkStyle, least_px: float = 4.0) -> float:
+def _body(
+    ground: MetricCanvas, agent: TrafficAgent, style: MarkStyle, least_px: float = 4.0
+) -> float:
     """The box with its outline inside and its hatching; returns the outline's width in metres."""
     scale = ground.camera.px_per_m
     length, width = (max(side, least_px / scale) for side in (agent.length_m, agent.width_m))
@@ -70,13 +72,15 @@ def _body(ground: Ground, agent: TrafficAgent, style: MarkStyle, least_px: float
     return edge
 
 
-def _part(ground: Ground, agent: TrafficAgent, points: list[tuple[float, float]]) -> FloatArray:
+def _part(
+    ground: MetricCanvas, agent: TrafficAgent, points: list[tuple[float, float]]
+) -> FloatArray:
     """Points in shares of half the box (front = 1, left = 1) as points of the ego frame."""
     half = np.array([agent.length_m / 2.0, agent.width_m / 2.0])
     return agent.pose.to_parent(np.array(points) * half)
 
 
-def _vehicle(ground: Ground, agent: TrafficAgent, style: MarkStyle) -> None:
+def _vehicle(ground: MetricCanvas, agent: TrafficAgent, style: MarkStyle) -> None:
     _body(ground, agent, style)
     if style.hatch is None and style.detail == style.outline:
         ground.fill(
@@ -87,13 +91,13 @@ def _vehicle(ground: Ground, agent: TrafficAgent, style: MarkStyle) -> None:
         _nose(ground, agent, style)
 
 
-def _nose(ground: Ground, agent: TrafficAgent, style: MarkStyle) -> None:
+def _nose(ground: MetricCanvas, agent: TrafficAgent, style: MarkStyle) -> None:
     """The triangle at the front: which way it faces."""
     ground.fill(_part(ground, agent, [(0.34, 0.66), (0.34, -0.66), (0.86, 0.0)]), style.outline)
     ground.fill(_part(ground, agent, [(0.40, 0.46), (0.40, -0.46), (0.76, 0.0)]), style.detail)
 
 
-def _bus(ground: Ground, agent: TrafficAgent, style: MarkStyle) -> None:
+def _bus(ground: MetricCanvas, agent: TrafficAgent, style: MarkStyle) -> None:
     """A vehicle with two hatches on its roof."""
     _vehicle(ground, agent, style)
     for rear in (-0.8, -0.35):
@@ -103,7 +107,7 @@ def _bus(ground: Ground, agent: TrafficAgent, style: MarkStyle) -> None:
         ground.stroke(roof, style.outline, 1.8, closed=True)
 
 
-def _bicycle(ground: Ground, agent: TrafficAgent, style: MarkStyle) -> None:
+def _bicycle(ground: MetricCanvas, agent: TrafficAgent, style: MarkStyle) -> None:
     """A slim box with a pointed front."""
     scale = ground.camera.px_per_m
     half_m = max(agent.width_m, 8.0 / scale) / 2.0
@@ -116,7 +120,7 @@ def _bicycle(ground: Ground, agent: TrafficAgent, style: MarkStyle) -> None:
     ground.canvas.disc(rider, max(2.0, 0.22 * scale * half_m * 2.0), style.detail)
 
 
-def _pedestrian(ground: Ground, agent: TrafficAgent, style: MarkStyle) -> None:
+def _pedestrian(ground: MetricCanvas, agent: TrafficAgent, style: MarkStyle) -> None:
     """A circle with a tick where the person faces."""
     scale = ground.camera.px_per_m
     radius_px = max(7.0, max(agent.length_m, agent.width_m) / 2.0 * scale)
@@ -132,19 +136,19 @@ def _pedestrian(ground: Ground, agent: TrafficAgent, style: MarkStyle) -> None:
     )
 
 
-def _cone(ground: Ground, agent: TrafficAgent, style: MarkStyle) -> None:
+def _cone(ground: MetricCanvas, agent: TrafficAgent, style: MarkStyle) -> None:
     """An upright triangle, whatever its heading."""
     _sign_shape(ground, agent, style, [(0.0, -1.0), (0.95, 0.75), (-0.95, 0.75)], least_px=9.5)
 
 
-def _construction_sign(ground: Ground, agent: TrafficAgent, style: MarkStyle) -> None:
+def _construction_sign(ground: MetricCanvas, agent: TrafficAgent, style: MarkStyle) -> None:
     """A diamond."""
     diamond = [(0.0, -1.0), (1.0, 0.0), (0.0, 1.0), (-1.0, 0.0)]
     _sign_shape(ground, agent, style, diamond, least_px=10.0)
 
 
 def _sign_shape(
-    ground: Ground,
+    ground: MetricCanvas,
     agent: TrafficAgent,
     style: MarkStyle,
     shape: list[tuple[float, float]],
@@ -160,7 +164,7 @@ def _sign_shape(
     ground.canvas.fill(centre + points * (radius_px - 1.7 * outline_px), style.fill)
 
 
-def _barrier(ground: Ground, agent: TrafficAgent, style: MarkStyle) -> None:
+def _barrier(ground: MetricCanvas, agent: TrafficAgent, style: MarkStyle) -> None:
     """A bar with slanting stripes."""
     scale = ground.camera.px_per_m
     length, width = (max(side, 7.0 / scale) for side in (agent.length_m, agent.width_m))
@@ -174,14 +178,14 @@ def _barrier(ground: Ground, agent: TrafficAgent, style: MarkStyle) -> None:
         ground.fill(stripe, white)
 
 
-def _generic(ground: Ground, agent: TrafficAgent, style: MarkStyle) -> None:
+def _generic(ground: MetricCanvas, agent: TrafficAgent, style: MarkStyle) -> None:
     """A box with a cross."""
     _body(ground, agent, style, least_px=12.0)
     for points in ([(0.6, 0.6), (-0.6, -0.6)], [(0.6, -0.6), (-0.6, 0.6)]):
         ground.stroke(_part(ground, agent, points), style.detail, 2.0)
 
 
-def _motion(ground: Ground, agent: TrafficAgent, style: MarkStyle) -> None:
+def _motion(ground: MetricCanvas, agent: TrafficAgent, style: MarkStyle) -> None:
     """From the nose as far as the agent gets in a second; nothing for what stands."""
     if stands(agent):
         return
@@ -192,7 +196,7 @@ def _motion(ground: Ground, agent: TrafficAgent, style: MarkStyle) -> None:
     _arrow_head(ground, line, style, 5.0)
 
 
-def _walk(ground: Ground, agent: TrafficAgent, style: MarkStyle) -> None:
+def _walk(ground: MetricCanvas, agent: TrafficAgent, style: MarkStyle) -> None:
     """A dashed arrow to where a walk ends."""
     if not is_walking(agent):
         return
@@ -201,7 +205,9 @@ def _walk(ground: Ground, agent: TrafficAgent, style: MarkStyle) -> None:
     _arrow_head(ground, line, style, 7.0)
 
 
-def _arrow_head(ground: Ground, line_m: FloatArray, style: MarkStyle, size_px: float) -> None:
+def _arrow_head(
+    ground: MetricCanvas, line_m: FloatArray, style: MarkStyle, size_px: float
+) -> None:
     start, end = ground.camera.to_pixels(line_m)
     step = end - start
     along = step / max(float(np.hypot(*step)), 1e-9) * size_px

@@ -10,7 +10,7 @@ from augment.geometry.angles import difference
 from augment.geometry.frames import Pose
 from augment.geometry.polyline import FloatArray
 from augment.render import palette
-from augment.render.canvas import Ground
+from augment.render.canvas import MetricCanvas
 from augment.render.shapes import (
     contains,
     long_axis,
@@ -35,7 +35,7 @@ _DASH_M = (2.0, 2.0)
 _INSET_M = 0.1
 
 
-def draw_ground(ground: Ground, scene: Scene) -> None:
+def draw_ground(ground: MetricCanvas, scene: Scene) -> None:
     """Everything that lies flat: areas first, then lines, then centrelines with directions."""
     all_ways: list[Way] = [*scene.lanes, *scene.connectors]
     ways = [way for way in all_ways if _seen(ground, ribbon(way))]
@@ -47,7 +47,7 @@ def draw_ground(ground: Ground, scene: Scene) -> None:
     _centrelines(ground, scene, ways)
 
 
-def _seen(ground: Ground, points_m: FloatArray) -> bool:
+def _seen(ground: MetricCanvas, points_m: FloatArray) -> bool:
     return ground.camera.shows(points_m, margin_m=1.0)
 
 
@@ -55,7 +55,7 @@ def _boundary(area: Area) -> FloatArray:
     return np.array(area.boundary_m, dtype=np.float64)
 
 
-def _walkways(ground: Ground, areas: list[Area]) -> None:
+def _walkways(ground: MetricCanvas, areas: list[Area]) -> None:
     found = [_boundary(area) for area in areas if area.kind is AreaKind.WALKWAY]
     for polygon in found:
         ground.stroke(polygon, palette.WALKWAY_EDGE, 1.5, closed=True)
@@ -63,7 +63,7 @@ def _walkways(ground: Ground, areas: list[Area]) -> None:
         ground.fill(polygon, palette.WALKWAY)
 
 
-def _surface(ground: Ground, ways: list[Way], areas: list[Area]) -> list[FloatArray]:
+def _surface(ground: MetricCanvas, ways: list[Way], areas: list[Area]) -> list[FloatArray]:
     """One grey surface: all outlines first and all fills over them leave the union's outline."""
     roads = [_boundary(area) for area in areas if area.kind in _ROAD_AREAS]
     roads += [ribbon(way) for way in ways]
@@ -81,7 +81,7 @@ def _surface(ground: Ground, ways: list[Way], areas: list[Area]) -> list[FloatAr
     return roads
 
 
-def _crosswalks(ground: Ground, areas: list[Area], ways: list[Way]) -> None:
+def _crosswalks(ground: MetricCanvas, areas: list[Area], ways: list[Way]) -> None:
     for area in areas:
         if area.kind is AreaKind.CROSSWALK:
             polygon = _boundary(area)
@@ -109,7 +109,9 @@ def _traffic_direction(polygon: FloatArray, ways: list[Way]) -> float:
     return along_rad if votes > 0.0 else along_rad + math.pi / 2.0
 
 
-def _lane_lines(ground: Ground, scene: Scene, ways: list[Way], roads: list[FloatArray]) -> None:
+def _lane_lines(
+    ground: MetricCanvas, scene: Scene, ways: list[Way], roads: list[FloatArray]
+) -> None:
     """Dashed between lanes of one direction, solid towards the other direction and the margin.
 
     Where the road itself ends its outline is the line; inside intersections there is none.
@@ -133,7 +135,9 @@ def _lane_lines(ground: Ground, scene: Scene, ways: list[Way], roads: list[Float
             ground.dashed(right, palette.LANE_LINE, width_px, *_DASH_M)
 
 
-def _solid(ground: Ground, line_m: FloatArray, outwards: float, roads: list[FloatArray]) -> None:
+def _solid(
+    ground: MetricCanvas, line_m: FloatArray, outwards: float, roads: list[FloatArray]
+) -> None:
     """A thin solid line where there is road beyond it (on its left for 1, its right for -1).
 
     It lies a little inside its own lane: two lanes that meet head on get a double line.
@@ -159,7 +163,7 @@ def _joined(graph: LaneGraph, connector: LaneConnector) -> Lane | None:
     return before if alone else None
 
 
-def _centrelines(ground: Ground, scene: Scene, ways: list[Way]) -> None:
+def _centrelines(ground: MetricCanvas, scene: Scene, ways: list[Way]) -> None:
     """Thin dashes, and chevrons that point where the traffic goes."""
     shown: list[Pose] = []
     for way in ways:

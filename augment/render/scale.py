@@ -8,7 +8,7 @@ import numpy as np
 
 from augment.geometry.polyline import FloatArray
 from augment.render import palette
-from augment.render.canvas import Box, Ground
+from augment.render.canvas import Box, MetricCanvas
 from augment.scene.entities import Scene
 
 GRID_M = 5.0
@@ -20,7 +20,7 @@ _HEIGHT_PX = 46.0
 _NEAR_PX = 50.0
 
 
-def draw_grid(ground: Ground) -> None:
+def draw_grid(ground: MetricCanvas) -> None:
     """Lines every 5 m; those through the ego's centre are stronger."""
     camera = ground.camera
     for x_m in raster(camera.x_min_m, camera.x_max_m):
@@ -37,7 +37,7 @@ def raster(low_m: float, high_m: float) -> list[float]:
     return [index * GRID_M for index in range(first, last + 1)]
 
 
-def scale_box(ground: Ground, scene: Scene) -> Box:
+def scale_box(ground: MetricCanvas, scene: Scene) -> Box:
     """The plate of the scale bar (left, top, right, bottom in pixels), in a quiet corner.
 
     The corner depends on the scene before the change alone, so that all pictures of a scenario
@@ -54,7 +54,7 @@ def scale_box(ground: Ground, scene: Scene) -> Box:
     return min(corners, key=lambda box: sum(_close(box, *at) for at in agents))
 
 
-def draw_scale(ground: Ground, box_px: Box) -> None:
+def draw_scale(ground: MetricCanvas, box_px: Box) -> None:
     """A bar of two units, one filled, one empty, with their lengths beneath."""
     left, top, _, _ = box_px
     ground.canvas.plate(box_px, palette.PLATE, None, 6.0)
@@ -81,7 +81,7 @@ def _close(box: Box, x_px: float, y_px: float) -> bool:
     )
 
 
-def _unit_m(ground: Ground) -> float:
+def _unit_m(ground: MetricCanvas) -> float:
     return 5.0 if ground.camera.px_per_m >= 9.0 else 10.0
 
 
@@ -89,5 +89,5 @@ def _rectangle(left: float, top: float, right: float, bottom: float) -> FloatArr
     return np.array([[left, top], [right, top], [right, bottom], [left, bottom]])
 
 
-def _line(ground: Ground, line_m: FloatArray, *, axis: bool) -> None:
+def _line(ground: MetricCanvas, line_m: FloatArray, *, axis: bool) -> None:
     ground.stroke(line_m, palette.GRID_AXIS if axis else palette.GRID, 1.0)

@@ -12,7 +12,7 @@ import numpy as np
 
 from augment.geometry.frames import Pose
 from augment.render import palette
-from augment.render.canvas import Ground
+from augment.render.canvas import MetricCanvas
 from augment.scene.entities import LaneConnector, Scene, TrafficLight, TurnType
 
 _COLOURS = {
@@ -24,7 +24,7 @@ _LEFT_TO_RIGHT = (TurnType.U_TURN, TurnType.LEFT, TurnType.STRAIGHT, TurnType.RI
 _LAMP_PX = 5.5
 
 
-def draw_signals(ground: Ground, scene: Scene) -> None:
+def draw_signals(ground: MetricCanvas, scene: Scene) -> None:
     """One bar for each place where ruled connectors begin, cut where their states differ."""
     starts: dict[str, list[LaneConnector]] = {}
     for connector in scene.connectors:
@@ -35,7 +35,7 @@ def draw_signals(ground: Ground, scene: Scene) -> None:
             _bar(ground, connectors)
 
 
-def _bar(ground: Ground, connectors: list[LaneConnector]) -> None:
+def _bar(ground: MetricCanvas, connectors: list[LaneConnector]) -> None:
     ordered = sorted(connectors, key=lambda one: _LEFT_TO_RIGHT.index(one.turn_type))
     # The straightest way leaves its lane most squarely, so the bar is laid across that one.
     first = min(ordered, key=lambda one: one.turn_type is not TurnType.STRAIGHT)
@@ -49,7 +49,7 @@ def _bar(ground: Ground, connectors: list[LaneConnector]) -> None:
         _lamp(ground, start, left_m - part_m / 2.0, state)
 
 
-def _lamp(ground: Ground, start: Pose, left_m: float, state: TrafficLight) -> None:
+def _lamp(ground: MetricCanvas, start: Pose, left_m: float, state: TrafficLight) -> None:
     x_m, y_m = start.to_parent(np.array([[0.0, left_m]]))[0]
     centre = ground.at(float(x_m), float(y_m))
     if state is TrafficLight.GREEN:

@@ -19,7 +19,7 @@ from augment.scene.modification import Modification
 from augment.services.scenarios.scenes import seed_of
 from tests.fixtures.shelf import SLUGS, entry, shown_scene
 
-Placing = Callable[..., rule_placer.Placement | quantised.Placement]
+Placing = Callable[..., rule_placer.Placement | quantised.QuantisedPlacement]
 
 PLACERS: dict[str, Placing] = {"rule-placer": rule_placer.place} | {
     slug: partial(quantised.place, bin_m=bin_m) for slug, bin_m in BIN_M.items()

@@ -20,7 +20,7 @@ from augment.baselines.simulated_faults import (
     FaultKind,
     spoiled,
 )
-from augment.baselines.simulated_road import Road, jittered
+from augment.baselines.simulated_road import RouteMap, jittered
 from augment.checks import Ground
 from augment.checks.against_intent import judged
 from augment.checks.finding import FaultClass
@@ -56,7 +56,7 @@ class Case:
     slug: str
     reference: Modification
     ground: Ground
-    road: Road
+    road: RouteMap
     intent: Intent | None
 
     def guess(self, change: Modification) -> frozenset[FaultClass]:
@@ -184,7 +184,7 @@ def _injections(
 
 def _case(slug: str) -> Case:
     scene = shown_scene(slug)
-    road = Road.of(scene)
+    road = RouteMap.of(scene)
     assert road is not None
     return Case(
         slug=slug,

@@ -8,7 +8,7 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from augment.checks import Finding, Kind, findings
+from augment.checks import Finding, FindingKind, findings
 from augment.geometry.frames import Pose
 from augment.scene.entities import AgentType, Area, AreaKind, Scene, TrafficAgent
 from augment.scene.modification import Modification
@@ -108,12 +108,12 @@ def test_boxes_of_no_size_raise_nothing(size_m: float) -> None:
         length_m=size_m,
     )
     kinds = {one.kind for one in findings(scene(), Modification(added=(speck,)))}
-    assert {Kind.SIZE, Kind.OVERLAP} <= kinds
+    assert {FindingKind.SIZE, FindingKind.OVERLAP} <= kinds
 
 
 def _comparable(found: tuple[Finding, ...]) -> list[Finding]:
     """Without what is about the number of a heading, which a moved scene changes."""
-    return [one for one in found if one.kind is not Kind.DEGREES]
+    return [one for one in found if one.kind is not FindingKind.DEGREES]
 
 
 def _told(found: tuple[Finding, ...]) -> list[object]:

@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import pytest
 
-from augment.checks import Finding, Ground, Kind, Severity
+from augment.checks import Finding, FindingKind, Ground, Severity
 from augment.checks.against_intent import judged
 from augment.scene.entities import AgentType, TrafficAgent, TrafficSide
 from augment.scene.intent import (
@@ -69,7 +69,7 @@ def held(intent: Intent, *added: TrafficAgent) -> tuple[Finding, ...]:
     return judged(Ground.of(scene()), Modification(added=added), intent)
 
 
-def faults(intent: Intent, *added: TrafficAgent) -> set[Kind]:
+def faults(intent: Intent, *added: TrafficAgent) -> set[FindingKind]:
     return {one.kind for one in held(intent, *added) if one.is_fault}
 
 
@@ -101,68 +101,72 @@ def test_what_is_as_asked_for_has_no_fault(
 @pytest.mark.parametrize(
     ("intent", "added", "kind"),
     [
-        (CAR, (vehicle("Agent2", 23.0, 1.2),), Kind.ASKED_DISTANCE),
-        (CAR, (vehicle("Agent2", 17.0, 1.2),), Kind.ASKED_DISTANCE),
-        (CAR, (vehicle("Agent2", -20.0, 1.2),), Kind.ASKED_DISTANCE),
-        (CAR, (vehicle("Agent2", 20.0, 2.4),), Kind.ASKED_ACROSS),
-        (CAR, (vehicle("Agent2", 20.0, -1.2),), Kind.ASKED_SIDE),
-        (CAR, (vehicle("Agent2", 20.0, 1.2, 0.4),), Kind.ASKED_HEADING),
-        (CAR, (vehicle("Agent2", 20.0, 1.2, math.pi),), Kind.ASKED_HEADING),
-        (CAR, (replace(vehicle("Agent2", 20.0, 1.2), speed_mps=4.0),), Kind.ASKED_MOTION),
-        (CAR, (), Kind.ASKED_COUNT),
-        (CAR, (vehicle("Agent2", 20.0, 1.2), vehicle("Agent3", 40.0, 0.0)), Kind.ASKED_COUNT),
-        (CAR, (cone("Agent2", 20.0, 1.2),), Kind.ASKED_TYPE),
-        (MIDDLE, (vehicle("Agent2", 20.0, 1.2),), Kind.ASKED_ACROSS),
-        (FACING, (vehicle("Agent2", 20.0, 0.0),), Kind.ASKED_HEADING),
-        (WALK, (pedestrian("Agent2", 30.0, 6.0, (30.0, -3.0)),), Kind.ASKED_DISTANCE),
-        (WALK, (pedestrian("Agent2", 20.0, -3.0, (20.0, 6.0)),), Kind.ASKED_SIDE),
-        (WALK, (replace(ACROSS[0], heading_rad=math.pi / 2.0),), Kind.ASKED_HEADING),
-        (WALK, (pedestrian("Agent2", 20.0, 6.0, (20.0, 15.0)),), Kind.ASKED_HEADING),
-        (WALK, (pedestrian("Agent2", 20.0, 6.0, (20.0, 3.0)),), Kind.ASKED_CROSSING),
-        (CRASH, CARS[:1], Kind.ASKED_COUNT),
-        (CRASH, (CARS[0], replace(CARS[1], heading_rad=0.0)), Kind.ASKED_HEADING),
-        (LINE, CONES[:2], Kind.ASKED_COUNT),
-        (LINE, tuple(replace(one, y_m=1.5) for one in CONES), Kind.ASKED_SIDE),
-        (LINE, tuple(replace(one, y_m=-2.6) for one in CONES), Kind.ASKED_ACROSS),
+        (CAR, (vehicle("Agent2", 23.0, 1.2),), FindingKind.ASKED_DISTANCE),
+        (CAR, (vehicle("Agent2", 17.0, 1.2),), FindingKind.ASKED_DISTANCE),
+        (CAR, (vehicle("Agent2", -20.0, 1.2),), FindingKind.ASKED_DISTANCE),
+        (CAR, (vehicle("Agent2", 20.0, 2.4),), FindingKind.ASKED_ACROSS),
+        (CAR, (vehicle("Agent2", 20.0, -1.2),), FindingKind.ASKED_SIDE),
+        (CAR, (vehicle("Agent2", 20.0, 1.2, 0.4),), FindingKind.ASKED_HEADING),
+        (CAR, (vehicle("Agent2", 20.0, 1.2, math.pi),), FindingKind.ASKED_HEADING),
+        (CAR, (replace(vehicle("Agent2", 20.0, 1.2), speed_mps=4.0),), FindingKind.ASKED_MOTION),
+        (CAR, (), FindingKind.ASKED_COUNT),
+        (
+            CAR,
+            (vehicle("Agent2", 20.0, 1.2), vehicle("Agent3", 40.0, 0.0)),
+            FindingKind.ASKED_COUNT,
+        ),
+        (CAR, (cone("Agent2", 20.0, 1.2),), FindingKind.ASKED_TYPE),
+        (MIDDLE, (vehicle("Agent2", 20.0, 1.2),), FindingKind.ASKED_ACROSS),
+        (FACING, (vehicle("Agent2", 20.0, 0.0),), FindingKind.ASKED_HEADING),
+        (WALK, (pedestrian("Agent2", 30.0, 6.0, (30.0, -3.0)),), FindingKind.ASKED_DISTANCE),
+        (WALK, (pedestrian("Agent2", 20.0, -3.0, (20.0, 6.0)),), FindingKind.ASKED_SIDE),
+        (WALK, (replace(ACROSS[0], heading_rad=math.pi / 2.0),), FindingKind.ASKED_HEADING),
+        (WALK, (pedestrian("Agent2", 20.0, 6.0, (20.0, 15.0)),), FindingKind.ASKED_HEADING),
+        (WALK, (pedestrian("Agent2", 20.0, 6.0, (20.0, 3.0)),), FindingKind.ASKED_CROSSING),
+        (CRASH, CARS[:1], FindingKind.ASKED_COUNT),
+        (CRASH, (CARS[0], replace(CARS[1], heading_rad=0.0)), FindingKind.ASKED_HEADING),
+        (LINE, CONES[:2], FindingKind.ASKED_COUNT),
+        (LINE, tuple(replace(one, y_m=1.5) for one in CONES), FindingKind.ASKED_SIDE),
+        (LINE, tuple(replace(one, y_m=-2.6) for one in CONES), FindingKind.ASKED_ACROSS),
         (
             LINE,
             tuple(replace(one, x_m=20.0 + 2.0 * (one.x_m - 20.0)) for one in CONES),
-            Kind.ASKED_SPACING,
+            FindingKind.ASKED_SPACING,
         ),
-        (BUS, (replace(A_BUS, type=AgentType.VEHICLE, length_m=4.8),), Kind.ASKED_TYPE),
-        (DRIVING, (vehicle("Agent2", 30.0, 0.0),), Kind.ASKED_MOTION),
-        (ONCOMING, (vehicle("Agent2", 20.0, 0.0, math.pi),), Kind.ASKED_ACROSS),
-        (FILE, (IN_FILE[0], replace(IN_FILE[1], y_m=5.5)), Kind.ASKED_SPACING),
-        (SLANTED, (pedestrian("Agent2", 20.0, 6.0, (20.0, -3.0)),), Kind.ASKED_DISTANCE),
-        (NARROWED, (*TAPER[:2], replace(TAPER[2], y_m=1.5), TAPER[3]), Kind.ASKED_ACROSS),
-        (NARROWED, (*TAPER[:3], replace(TAPER[3], y_m=2.0)), Kind.ASKED_SIDE),
+        (BUS, (replace(A_BUS, type=AgentType.VEHICLE, length_m=4.8),), FindingKind.ASKED_TYPE),
+        (DRIVING, (vehicle("Agent2", 30.0, 0.0),), FindingKind.ASKED_MOTION),
+        (ONCOMING, (vehicle("Agent2", 20.0, 0.0, math.pi),), FindingKind.ASKED_ACROSS),
+        (FILE, (IN_FILE[0], replace(IN_FILE[1], y_m=5.5)), FindingKind.ASKED_SPACING),
+        (SLANTED, (pedestrian("Agent2", 20.0, 6.0, (20.0, -3.0)),), FindingKind.ASKED_DISTANCE),
+        (NARROWED, (*TAPER[:2], replace(TAPER[2], y_m=1.5), TAPER[3]), FindingKind.ASKED_ACROSS),
+        (NARROWED, (*TAPER[:3], replace(TAPER[3], y_m=2.0)), FindingKind.ASKED_SIDE),
     ],
 )
 def test_what_is_not_as_asked_for_is_the_one_fault(
-    intent: Intent, added: tuple[TrafficAgent, ...], kind: Kind
+    intent: Intent, added: tuple[TrafficAgent, ...], kind: FindingKind
 ) -> None:
     found = faults(intent, *added)
-    assert found - {Kind.WALK_HEADING} == {kind}
+    assert found - {FindingKind.WALK_HEADING} == {kind}
 
 
 @pytest.mark.parametrize("sign", [1.0, -1.0])
 @pytest.mark.parametrize(
     ("wrong_way_m", "kind"),
     [
-        (0.44, Kind.ASKED_ACROSS),
-        (0.46, Kind.ASKED_SIDE),
-        (1.2, Kind.ASKED_SIDE),
-        (1.94, Kind.ASKED_SIDE),
-        (1.96, Kind.ASKED_ACROSS),
+        (0.44, FindingKind.ASKED_ACROSS),
+        (0.46, FindingKind.ASKED_SIDE),
+        (1.2, FindingKind.ASKED_SIDE),
+        (1.94, FindingKind.ASKED_SIDE),
+        (1.96, FindingKind.ASKED_ACROSS),
     ],
 )
 def test_sides_are_exchanged_within_the_tolerance_of_the_place_across(
-    sign: float, wrong_way_m: float, kind: Kind
+    sign: float, wrong_way_m: float, kind: FindingKind
 ) -> None:
     # 1.2 m to one side is asked for, 0.75 m off is let pass: so is it on the other side.
     asked = parked(20.0, lateral=towards(LEFT_EDGE if sign > 0.0 else RIGHT_EDGE, 1.2))
     found = faults(asked, vehicle("Agent2", 20.0, -sign * wrong_way_m))
-    assert found & {Kind.ASKED_ACROSS, Kind.ASKED_SIDE} == {kind}
+    assert found & {FindingKind.ASKED_ACROSS, FindingKind.ASKED_SIDE} == {kind}
 
 
 @pytest.mark.parametrize(
@@ -184,12 +188,14 @@ def test_a_distance_may_be_off_by_the_whole_tolerance(
     found = faults(
         parked(asked_m, lateral=CENTRED), vehicle("Agent2", asked_m + sign * off_m, 0.0)
     )
-    assert (Kind.ASKED_DISTANCE in found) == is_fault
+    assert (FindingKind.ASKED_DISTANCE in found) == is_fault
 
 
 def test_a_finding_says_the_numbers() -> None:
     (distance,) = (
-        one for one in held(CAR, vehicle("Agent2", 27.3, 1.2)) if one.kind is Kind.ASKED_DISTANCE
+        one
+        for one in held(CAR, vehicle("Agent2", 27.3, 1.2))
+        if one.kind is FindingKind.ASKED_DISTANCE
     )
     assert distance.severity is Severity.WRONG
     assert distance.measured["off_m"] == pytest.approx(7.3)
@@ -208,7 +214,7 @@ def test_the_distance_is_counted_along_a_bend() -> None:
         for agent in (bent, straight)
     ]
     assert kinds[0] == set()
-    assert Kind.ASKED_ACROSS in kinds[1]
+    assert FindingKind.ASKED_ACROSS in kinds[1]
 
 
 def test_the_kerb_is_where_the_map_says() -> None:
@@ -222,7 +228,7 @@ def test_the_kerb_is_where_the_map_says() -> None:
 def test_what_is_doubtful_is_settled_where_it_was_asked_for() -> None:
     agent = vehicle("Agent2", 20.0, 0.0, math.pi)
     alone = judged(Ground.of(scene()), Modification(added=(agent,)), None)
-    assert [one.kind for one in alone if one.is_fault] == [Kind.HEADING]
+    assert [one.kind for one in alone if one.is_fault] == [FindingKind.HEADING]
     assert faults(FACING, agent) == set()
 
 
@@ -234,7 +240,9 @@ def test_who_was_in_the_scene_and_is_moved_or_removed_is_named() -> None:
         Modification(added=(car,), removed=("Agent2",)),
         Modification(added=(car,), moved=(replace(parked, x_m=50.0),)),
     ):
-        assert {one.kind for one in judged(ground, change, said) if one.is_fault} == {Kind.UNASKED}
+        assert {one.kind for one in judged(ground, change, said) if one.is_fault} == {
+            FindingKind.UNASKED
+        }
 
 
 def test_every_finding_has_a_sentence_that_stands_alone() -> None:
@@ -259,7 +267,7 @@ def test_any_number_answers_an_open_count_but_none_does_not() -> None:
     some = Intent(requests=(replace(request, count=None),))
     assert faults(some, *CONES) == set()
     assert faults(some, *CONES[:2]) == set()
-    assert faults(some) == {Kind.ASKED_COUNT}
+    assert faults(some) == {FindingKind.ASKED_COUNT}
 
 
 def test_ahead_without_a_number_is_anywhere_ahead() -> None:
@@ -267,4 +275,4 @@ def test_ahead_without_a_number_is_anywhere_ahead() -> None:
     where = replace(request.spot, distance=None)
     ahead = Intent(requests=(replace(request, spot=where),))
     assert faults(ahead, vehicle("Agent2", 47.0, 0.0)) == set()
-    assert faults(ahead, vehicle("Agent2", -20.0, 0.0)) == {Kind.ASKED_DISTANCE}
+    assert faults(ahead, vehicle("Agent2", -20.0, 0.0)) == {FindingKind.ASKED_DISTANCE}

@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import pytest
 
-from augment.checks import Ground, Kind
+from augment.checks import FindingKind, Ground
 from augment.checks.against_intent import judged
 from augment.scene.entities import TrafficAgent
 from augment.scene.intent import (
@@ -35,7 +35,7 @@ def cars(*places: tuple[float, float, float]) -> tuple[TrafficAgent, ...]:
     )
 
 
-def faults(request: CrashRequest, *added: TrafficAgent) -> set[Kind]:
+def faults(request: CrashRequest, *added: TrafficAgent) -> set[FindingKind]:
     intent = Intent(requests=(request,))
     found = judged(Ground.of(scene()), Modification(added=added), intent)
     return {one.kind for one in found if one.is_fault}
@@ -60,38 +60,38 @@ def test_the_order_in_which_they_were_added_means_nothing(order: tuple[int, ...]
 
 def test_an_angle_that_is_not_as_said_is_a_heading() -> None:
     bent = (*AS_SAID[:2], replace(AS_SAID[2], heading_rad=math.radians(30.0)))
-    assert faults(CHAIN, *bent) == {Kind.ASKED_HEADING}
+    assert faults(CHAIN, *bent) == {FindingKind.ASKED_HEADING}
 
 
 def test_a_gap_that_is_not_as_said_is_a_place() -> None:
     apart = (*AS_SAID[:2], replace(AS_SAID[2], x_m=38.5))
-    assert faults(CHAIN, *apart) == {Kind.ASKED_SPACING}
+    assert faults(CHAIN, *apart) == {FindingKind.ASKED_SPACING}
 
 
 def test_the_whole_crash_too_far_on_is_one_fault_of_place() -> None:
     shifted = (replace(one, x_m=one.x_m + 4.6) for one in AS_SAID)
-    assert faults(CHAIN, *shifted) == {Kind.ASKED_DISTANCE}
+    assert faults(CHAIN, *shifted) == {FindingKind.ASKED_DISTANCE}
 
 
 def test_a_car_behind_the_first_is_nearer_and_that_is_right() -> None:
     assert faults(BEHIND, *cars((25.0, 0.0, 0.0), (20.4, 0.0, 40.0))) == set()
     ahead = faults(BEHIND, *cars((25.0, 0.0, 0.0), (29.6, 0.0, 40.0)))
-    assert ahead == {Kind.ASKED_DISTANCE}, "the one behind is taken for the first"
+    assert ahead == {FindingKind.ASKED_DISTANCE}, "the one behind is taken for the first"
 
 
 def test_cars_that_lie_across_the_street_from_each_other_have_not_crashed() -> None:
     plain = CrashRequest(spot=SPOT, count=2)
     assert faults(plain, *cars((25.0, 0.0, 0.0), (29.9, 0.0, 10.0))) == set()
-    assert Kind.ASKED_SPACING in faults(plain, *cars((25.0, 0.0, 0.0), (33.0, 0.0, 10.0)))
+    assert FindingKind.ASKED_SPACING in faults(plain, *cars((25.0, 0.0, 0.0), (33.0, 0.0, 10.0)))
 
 
 def test_the_first_one_stands_across_where_that_is_said() -> None:
     across = cars((25.0, 0.0, -80.0), (28.7, 0.0, 0.0))
     assert faults(ACROSS, *across) == set()
     along = cars((25.0, 0.0, 0.0), (29.9, 0.0, 0.0))
-    assert faults(ACROSS, *along) == {Kind.ASKED_HEADING}
+    assert faults(ACROSS, *along) == {FindingKind.ASKED_HEADING}
 
 
 def test_of_cars_on_top_of_each_other_only_that_is_told() -> None:
     heap = cars((25.0, 0.0, 0.0), (25.3, 0.0, 25.0), (34.2, 0.0, -35.0))
-    assert faults(CHAIN, *heap) == {Kind.OVERLAP, Kind.DUPLICATE}
+    assert faults(CHAIN, *heap) == {FindingKind.OVERLAP, FindingKind.DUPLICATE}

@@ -8,7 +8,7 @@ from dataclasses import replace
 
 import pytest
 
-from augment.checks import Kind, Severity, findings
+from augment.checks import FindingKind, Severity, findings
 from augment.scene.entities import AgentType, TrafficAgent, TrafficSide
 from augment.scene.modification import Modification
 from tests.checks.worlds import Reference, references, severities
@@ -48,7 +48,7 @@ def _turned(reference: Reference) -> TrafficAgent:
 
 @pytest.mark.parametrize("reference", REFERENCES, ids=_named)
 def test_a_reference_has_nothing_wrong(reference: Reference) -> None:
-    asked_for = {(Kind.HEADING, Severity.DOUBTFUL)} if reference.slug in FACING else set()
+    asked_for = {(FindingKind.HEADING, Severity.DOUBTFUL)} if reference.slug in FACING else set()
     assert severities(findings(reference.scene, reference.modification)) == asked_for
 
 
@@ -56,15 +56,15 @@ def test_a_reference_has_nothing_wrong(reference: Reference) -> None:
 @pytest.mark.parametrize(
     ("inject", "kind", "severity"),
     [
-        (_off_road, Kind.OFF_ROAD, Severity.WRONG),
-        (_on_the_ego, Kind.OVERLAP, Severity.WRONG),
-        (_turned, Kind.HEADING, Severity.DOUBTFUL),
+        (_off_road, FindingKind.OFF_ROAD, Severity.WRONG),
+        (_on_the_ego, FindingKind.OVERLAP, Severity.WRONG),
+        (_turned, FindingKind.HEADING, Severity.DOUBTFUL),
     ],
 )
 def test_an_injected_fault_is_named(
     reference: Reference,
     inject: Callable[[Reference], TrafficAgent],
-    kind: Kind,
+    kind: FindingKind,
     severity: Severity,
 ) -> None:
     alone = Modification(added=(inject(reference),))
@@ -77,8 +77,11 @@ def test_the_same_thing_twice_is_named(reference: Reference) -> None:
     twin = replace(added[0], id="Agent99")
     found = findings(reference.scene, Modification(added=(*added, twin)))
     named = severities(found)
-    assert {(Kind.DUPLICATE, Severity.WRONG), (Kind.OVERLAP, Severity.WRONG)} <= named
-    twins = [one for one in found if one.kind is Kind.DUPLICATE]
+    assert {
+        (FindingKind.DUPLICATE, Severity.WRONG),
+        (FindingKind.OVERLAP, Severity.WRONG),
+    } <= named
+    twins = [one for one in found if one.kind is FindingKind.DUPLICATE]
     assert [one.agents for one in twins] == [(added[0].id, "Agent99")]
 
 
@@ -89,4 +92,6 @@ def test_the_same_thing_twice_is_named(reference: Reference) -> None:
 )
 def test_a_pedestrian_who_walks_backwards_is_named(reference: Reference) -> None:
     turned = Modification(added=(_turned(reference),))
-    assert severities(findings(reference.scene, turned)) == {(Kind.WALK_HEADING, Severity.WRONG)}
+    assert severities(findings(reference.scene, turned)) == {
+        (FindingKind.WALK_HEADING, Severity.WRONG)
+    }

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import pytest
 
-from augment.checks import Finding, Kind, Severity
+from augment.checks import Finding, FindingKind, Severity
 from augment.checks.against_intent import ASKED_CHECKS
 from augment.checks.registry import CHECKS
 
 OFF = Finding(
-    kind=Kind.LANE,
+    kind=FindingKind.LANE,
     severity=Severity.FACT,
     agents=("Agent2",),
     ways=("42811-b",),
@@ -37,7 +37,10 @@ def test_its_numbers_stay_what_they_are() -> None:
 
 
 def test_every_kind_has_its_check() -> None:
-    asked = {check.__name__ for check in ASKED_CHECKS} | {Kind.ASKED_SIDE, Kind.ASKED_CROSSING}
+    asked = {check.__name__ for check in ASKED_CHECKS} | {
+        FindingKind.ASKED_SIDE,
+        FindingKind.ASKED_CROSSING,
+    }
     asked -= {"asked_walk", "asked_crash"}  # tell sides, headings, crossings and gaps
     alone = {check.__name__ for check in CHECKS}
-    assert (alone | asked, alone & asked) == ({kind.value for kind in Kind}, set())
+    assert (alone | asked, alone & asked) == ({kind.value for kind in FindingKind}, set())

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import pytest
 
-from augment.checks import Kind, Severity
+from augment.checks import FindingKind, Severity
 from augment.scene.entities import AgentType, Area, AreaKind, Scene
 from tests.checks.worlds import found_in, of_kind
 from tests.scenes import cone, pedestrian, scene, vehicle
@@ -57,7 +57,7 @@ def test_a_vehicle_on_the_kerb_counts_by_the_share_of_its_box(
     """A box 2 m wide along the road: the share outside is what its far edge is past the road's."""
     share = outside_percent / 100.0
     car = replace(vehicle("Agent2", 30.0, side * (EDGE_M - 1.0 + 2.0 * share)), type=kind)
-    found = of_kind(found_in(road(), car), Kind.OFF_ROAD)
+    found = of_kind(found_in(road(), car), FindingKind.OFF_ROAD)
     assert [one.severity for one in found] == ([] if severity is None else [severity])
     if found:
         assert found[0].measured["outside_share"] == pytest.approx(share, abs=1e-6)
@@ -71,7 +71,9 @@ def test_a_vehicle_on_the_kerb_counts_by_the_share_of_its_box(
 def test_a_cone_counts_by_how_far_its_centre_is_off_the_road(
     side: float, off_m: float, severity: Severity | None
 ) -> None:
-    found = of_kind(found_in(road(), cone("Agent2", 30.0, side * (EDGE_M + off_m))), Kind.OFF_ROAD)
+    found = of_kind(
+        found_in(road(), cone("Agent2", 30.0, side * (EDGE_M + off_m))), FindingKind.OFF_ROAD
+    )
     assert [one.severity for one in found] == ([] if severity is None else [severity])
 
 
@@ -91,5 +93,5 @@ def test_who_walks_counts_by_how_far_he_is_off_all_that_the_map_shows(
     side: float, off_m: float, severity: Severity | None
 ) -> None:
     walker = pedestrian("Agent2", 30.0, side * (6.0 + off_m))
-    found = of_kind(found_in(road(), walker), Kind.OFF_ROAD)
+    found = of_kind(found_in(road(), walker), FindingKind.OFF_ROAD)
     assert [one.severity for one in found] == ([] if severity is None else [severity])

@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from augment.checks import Kind, Severity
+from augment.checks import FindingKind, Severity
 from augment.geometry.polyline import Polyline
 from augment.scene.entities import Lane, Scene
 from tests.checks.worlds import found_in, of_kind
@@ -32,7 +32,7 @@ from tests.scenes import curve, junction, pedestrian, scene, vehicle
     ],
 )
 def test_the_straight_line_from_the_ego(x_m: float, y_m: float, words: str) -> None:
-    (offset,) = of_kind(found_in(scene(), vehicle("Agent2", x_m, y_m)), Kind.EGO_OFFSET)
+    (offset,) = of_kind(found_in(scene(), vehicle("Agent2", x_m, y_m)), FindingKind.EGO_OFFSET)
     assert offset.severity is Severity.FACT
     assert words in offset.sentence()
     assert offset.measured["ahead_m"] == pytest.approx(x_m)
@@ -52,7 +52,7 @@ def test_the_straight_line_from_the_ego(x_m: float, y_m: float, words: str) -> N
 def test_the_distance_along_the_lanes(
     world: Scene, x_m: float, y_m: float, along_m: float
 ) -> None:
-    (distance,) = of_kind(found_in(world, vehicle("Agent2", x_m, y_m)), Kind.LANE_DISTANCE)
+    (distance,) = of_kind(found_in(world, vehicle("Agent2", x_m, y_m)), FindingKind.LANE_DISTANCE)
     assert distance.measured["along_lanes_m"] == pytest.approx(along_m, abs=0.02)
     word = "ahead of" if along_m > 0.0 else "behind"
     assert f"{abs(along_m):.1f} m {word} the ego along the lanes" in distance.sentence()
@@ -73,13 +73,13 @@ def test_on_a_loop_the_shorter_way_counts(angle: float, along_m: float) -> None:
         areas=(),
     )
     car = vehicle("Agent2", 40.0 * math.sin(angle), 40.0 - 40.0 * math.cos(angle), angle)
-    (distance,) = of_kind(found_in(ring, car), Kind.LANE_DISTANCE)
+    (distance,) = of_kind(found_in(ring, car), FindingKind.LANE_DISTANCE)
     assert distance.measured["along_lanes_m"] == pytest.approx(along_m, abs=0.05)
 
 
 def test_no_lane_leads_to_the_oncoming_one() -> None:
     car = vehicle("Agent2", 30.0, 3.5, math.pi)
-    (distance,) = of_kind(found_in(scene(), car), Kind.LANE_DISTANCE)
+    (distance,) = of_kind(found_in(scene(), car), FindingKind.LANE_DISTANCE)
     assert distance.measured["along_lanes_m"] is None
     assert distance.sentence() == (
         "No lane leads from the ego to the place of Agent2: it is level with a point 30.0 m ahead "
@@ -88,18 +88,22 @@ def test_no_lane_leads_to_the_oncoming_one() -> None:
 
 
 def test_far_from_the_ego_s_lanes_no_distance_along_them_is_told() -> None:
-    (distance,) = of_kind(found_in(scene(), pedestrian("Agent2", 30.0, 60.0)), Kind.LANE_DISTANCE)
+    (distance,) = of_kind(
+        found_in(scene(), pedestrian("Agent2", 30.0, 60.0)), FindingKind.LANE_DISTANCE
+    )
     assert distance.sentence() == "No lane leads from the ego to the place of Agent2."
     assert set(distance.measured.values()) == {None}
 
 
 def test_a_lane_behind_an_ego_that_has_none_is_no_distance() -> None:
     lost = replace(scene().ego, y_m=80.0, lane_id=None)
-    assert not of_kind(found_in(scene(ego=lost), vehicle("Agent2", 30, 0)), Kind.LANE_DISTANCE)
+    assert not of_kind(
+        found_in(scene(ego=lost), vehicle("Agent2", 30, 0)), FindingKind.LANE_DISTANCE
+    )
 
 
 def test_the_lane_under_an_agent_and_its_offset() -> None:
-    (lane,) = of_kind(found_in(scene(), vehicle("Agent2", 20.0, 4.0, math.pi)), Kind.LANE)
+    (lane,) = of_kind(found_in(scene(), vehicle("Agent2", 20.0, 4.0, math.pi)), FindingKind.LANE)
     assert lane.ways == ("Lane2",)
     assert lane.measured["along_m"] == pytest.approx(80.0)
     assert lane.measured["left_m"] == pytest.approx(-0.5)
@@ -110,7 +114,7 @@ def test_the_lane_under_an_agent_and_its_offset() -> None:
 
 
 def test_off_every_lane() -> None:
-    (lane,) = of_kind(found_in(scene(), vehicle("Agent2", 18.2, -9.05)), Kind.LANE)
+    (lane,) = of_kind(found_in(scene(), vehicle("Agent2", 18.2, -9.05)), FindingKind.LANE)
     assert lane.sentence() == (
         "Agent2 is 7.3 m off every lane; the nearest lane is Lane1 at 68.2 m along it."
     )
@@ -129,11 +133,11 @@ def test_the_lane_that_an_agent_names(
     name: str | None, severity: Severity | None, words: str
 ) -> None:
     car = replace(vehicle("Agent2", 30.0, 0.0), lane_id=name)
-    found = of_kind(found_in(scene(), car), Kind.LANE_NAMED)
+    found = of_kind(found_in(scene(), car), FindingKind.LANE_NAMED)
     assert [one.severity for one in found] == ([severity] if severity else [])
     assert all(one.sentence() == f"Agent2 {words}" for one in found)
 
 
 def test_a_map_without_lanes_has_no_facts_about_lanes() -> None:
     found = found_in(scene(lanes=(), areas=()), vehicle("Agent2", 30.0, 0.0))
-    assert {one.kind for one in found} == {Kind.EGO_OFFSET}
+    assert {one.kind for one in found} == {FindingKind.EGO_OFFSET}

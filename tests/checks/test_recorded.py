@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from augment.checks import Kind, Severity, findings
+from augment.checks import FindingKind, Severity, findings
 from augment.scene.entities import AgentType, Scene
 from augment.scene.modification import Modification
 from tests.recorded import recorded
@@ -35,7 +35,7 @@ def test_most_recorded_vehicles_have_nothing_wrong(
             kinds = {one.kind for one in wrong if one.agents[0] == agent.id}
             totals[group] += 1
             faulty[group] += bool(kinds)
-            unplaced[group] += bool(kinds - {Kind.OVERLAP, Kind.DUPLICATE})
+            unplaced[group] += bool(kinds - {FindingKind.OVERLAP, FindingKind.DUPLICATE})
     with capsys.disabled():
         print("\nrecorded vehicles with something wrong (other than overlapping annotations):")
         for group, total in totals.items():
@@ -47,7 +47,13 @@ def test_most_recorded_vehicles_have_nothing_wrong(
 
 
 def test_no_recorded_agent_is_outside_its_map_or_impossible(scenes: list[Scene]) -> None:
-    never = {Kind.OUTSIDE_MAP, Kind.SIZE, Kind.SPEED, Kind.DEGREES, Kind.LANE_NAMED}
+    never = {
+        FindingKind.OUTSIDE_MAP,
+        FindingKind.SIZE,
+        FindingKind.SPEED,
+        FindingKind.DEGREES,
+        FindingKind.LANE_NAMED,
+    }
     for scene in scenes:
         found = findings(scene, Modification(moved=scene.agents))
         assert [

@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import pytest
 
-from augment.checks import Kind, Severity
+from augment.checks import FindingKind, Severity
 from augment.checks.surfaces import Surface
 from augment.geometry.boxes import corners
 from augment.geometry.frames import Pose
@@ -38,7 +38,7 @@ BUS = replace(vehicle("Agent2", 40.0, 0.0), type=AgentType.BUS, length_m=7.456, 
 def test_the_share_of_a_car_outside_the_road(
     y_m: float, share: float | None, severity: Severity | None
 ) -> None:
-    found = of_kind(found_in(scene(), vehicle("Agent2", 30.0, y_m)), Kind.OFF_ROAD)
+    found = of_kind(found_in(scene(), vehicle("Agent2", 30.0, y_m)), FindingKind.OFF_ROAD)
     assert [one.severity for one in found] == ([severity] if severity else [])
     if share is not None:
         assert found[0].measured["outside_share"] == pytest.approx(share)
@@ -47,7 +47,7 @@ def test_the_share_of_a_car_outside_the_road(
 
 def test_connectors_are_road_as_well() -> None:
     car = vehicle("Agent2", 28.0, 0.0)
-    assert not of_kind(found_in(junction(), car), Kind.OFF_ROAD)
+    assert not of_kind(found_in(junction(), car), FindingKind.OFF_ROAD)
 
 
 @pytest.mark.parametrize(
@@ -66,22 +66,22 @@ def test_connectors_are_road_as_well() -> None:
 def test_cones_keep_to_the_road_s_edge_and_people_may_use_walkways(
     agent: TrafficAgent, severity: Severity | None
 ) -> None:
-    found = of_kind(found_in(scene(), agent), Kind.OFF_ROAD)
+    found = of_kind(found_in(scene(), agent), FindingKind.OFF_ROAD)
     assert [one.severity for one in found] == ([severity] if severity else [])
 
 
 def test_where_the_map_has_no_walkways_people_off_it_are_a_fact() -> None:
     bare = scene(areas=scene().areas[:1])
-    (off,) = of_kind(found_in(bare, pedestrian("Agent2", 30.0, -4.0)), Kind.OFF_ROAD)
+    (off,) = of_kind(found_in(bare, pedestrian("Agent2", 30.0, -4.0)), FindingKind.OFF_ROAD)
     assert off.severity is Severity.FACT
     assert off.sentence() == "Agent2 is 2.2 m off everything that the map shows."
 
 
 def test_outside_the_mapped_region() -> None:
-    (outside,) = of_kind(found_in(scene(), vehicle("Agent2", 130.0, 0.0)), Kind.OUTSIDE_MAP)
+    (outside,) = of_kind(found_in(scene(), vehicle("Agent2", 130.0, 0.0)), FindingKind.OUTSIDE_MAP)
     assert outside.severity is Severity.WRONG
     assert outside.sentence() == "Agent2 is 30.0 m outside the mapped region."
-    assert not of_kind(found_in(scene(), vehicle("Agent2", 99.0, 0.0)), Kind.OUTSIDE_MAP)
+    assert not of_kind(found_in(scene(), vehicle("Agent2", 99.0, 0.0)), FindingKind.OUTSIDE_MAP)
 
 
 def test_an_area_that_crosses_itself_is_the_ground_that_it_encloses() -> None:
@@ -98,7 +98,7 @@ def test_an_area_that_crosses_itself_is_the_ground_that_it_encloses() -> None:
 )
 def test_two_stopped_cars_may_touch(gap_m: float, severity: Severity | None) -> None:
     cars = vehicle("Agent2", 30.0, 0.0), vehicle("Agent3", 34.8 + gap_m, 0.0)
-    found = of_kind(found_in(scene(), *cars), Kind.OVERLAP)
+    found = of_kind(found_in(scene(), *cars), FindingKind.OVERLAP)
     assert [one.severity for one in found] == ([severity] if severity else [])
     if found:
         assert found[0].agents == ("Agent2", "Agent3")
@@ -107,12 +107,12 @@ def test_two_stopped_cars_may_touch(gap_m: float, severity: Severity | None) -> 
 
 def test_a_moving_car_touches_nobody() -> None:
     cars = replace(vehicle("Agent2", 30.0, 0.0), speed_mps=5.0), vehicle("Agent3", 34.4, 0.0)
-    assert (Kind.OVERLAP, Severity.WRONG) in severities(found_in(scene(), *cars))
+    assert (FindingKind.OVERLAP, Severity.WRONG) in severities(found_in(scene(), *cars))
 
 
 def test_any_overlap_with_the_ego_is_wrong() -> None:
     close = vehicle("Agent2", (EGO.length_m + 4.8) / 2.0 - 0.05, 0.0)
-    (overlap,) = of_kind(found_in(scene(), close), Kind.OVERLAP)
+    (overlap,) = of_kind(found_in(scene(), close), FindingKind.OVERLAP)
     assert overlap.severity is Severity.WRONG
     assert overlap.agents == ("Agent2", "Agent1")
     assert overlap.sentence() == (
@@ -122,23 +122,25 @@ def test_any_overlap_with_the_ego_is_wrong() -> None:
 
 def test_the_small_box_counts() -> None:
     inside = cone("Agent3", 41.0, 0.2)
-    (overlap,) = of_kind(found_in(scene(), BUS, inside), Kind.OVERLAP)
+    (overlap,) = of_kind(found_in(scene(), BUS, inside), FindingKind.OVERLAP)
     assert overlap.measured["share_of_smaller"] == pytest.approx(1.0)
     assert overlap.severity is Severity.WRONG
 
 
 def test_what_was_recorded_is_in_the_way_too() -> None:
     busy = scene(agents=(vehicle("Agent2", 30.0, 0.0),))
-    assert (Kind.OVERLAP, Severity.WRONG) in severities(found_in(busy, vehicle("Agent3", 31, 0)))
+    assert (FindingKind.OVERLAP, Severity.WRONG) in severities(
+        found_in(busy, vehicle("Agent3", 31, 0))
+    )
 
 
 def test_two_agents_on_the_same_spot() -> None:
     found = found_in(scene(), vehicle("Agent2", 30, 0), vehicle("Agent3", 30.1, 0))
-    (twice,) = of_kind(found, Kind.DUPLICATE)
+    (twice,) = of_kind(found, FindingKind.DUPLICATE)
     assert twice.severity is Severity.WRONG
     assert twice.sentence() == "Agent2 and Agent3 are on the same spot, 0.10 m apart."
     row = [cone(f"Agent{number}", 30.0 + number, 0.0) for number in range(2, 6)]
-    assert not of_kind(found_in(scene(), *row), Kind.DUPLICATE)
+    assert not of_kind(found_in(scene(), *row), FindingKind.DUPLICATE)
 
 
 @pytest.mark.parametrize(
@@ -152,7 +154,7 @@ def test_two_agents_on_the_same_spot() -> None:
     ],
 )
 def test_sizes(agent: TrafficAgent, severity: Severity | None, words: str) -> None:
-    found = of_kind(found_in(scene(), agent), Kind.SIZE)
+    found = of_kind(found_in(scene(), agent), FindingKind.SIZE)
     assert [one.severity for one in found] == ([severity] if severity else [])
     assert all(words in one.sentence() for one in found)
 
@@ -172,7 +174,7 @@ def test_sizes(agent: TrafficAgent, severity: Severity | None, words: str) -> No
 def test_speeds(
     agent: TrafficAgent, speed_mps: float, severity: Severity | None, words: str
 ) -> None:
-    found = of_kind(found_in(scene(), replace(agent, speed_mps=speed_mps)), Kind.SPEED)
+    found = of_kind(found_in(scene(), replace(agent, speed_mps=speed_mps)), FindingKind.SPEED)
     assert [one.severity for one in found] == ([severity] if severity else [])
     assert all(words in one.sentence() for one in found)
 

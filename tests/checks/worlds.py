@@ -10,7 +10,7 @@ from typing import NamedTuple, TypeVar
 
 import numpy as np
 
-from augment.checks import Finding, Kind, Severity, findings
+from augment.checks import Finding, FindingKind, Severity, findings
 from augment.geometry.frames import Pose
 from augment.geometry.polyline import Polyline
 from augment.scene.codec import modification_from_document, scene_from_document
@@ -46,11 +46,11 @@ def found_in(scene: Scene, *added: TrafficAgent) -> tuple[Finding, ...]:
     return findings(scene, Modification(added=added))
 
 
-def of_kind(found: Iterable[Finding], kind: Kind) -> list[Finding]:
+def of_kind(found: Iterable[Finding], kind: FindingKind) -> list[Finding]:
     return [finding for finding in found if finding.kind is kind]
 
 
-def severities(found: Iterable[Finding]) -> set[tuple[Kind, Severity]]:
+def severities(found: Iterable[Finding]) -> set[tuple[FindingKind, Severity]]:
     """What speaks against a modification: the kinds that are more than facts."""
     return {(one.kind, one.severity) for one in found if one.severity is not Severity.FACT}
 

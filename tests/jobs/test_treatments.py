@@ -11,7 +11,7 @@ import pytest
 from django.apps import apps
 
 from augment.errors import ParameterRefused
-from augment.llm.profile import Profile
+from augment.llm.profile import ModelProfile
 from augment.models import Augmentation, Contestant, Endpoint, EndpointModel, Event, ModelCall
 from augment.services.endpoints import contestants, probe
 from augment.services.endpoints.roles import seats_of
@@ -130,7 +130,7 @@ def test_what_was_known_before_the_first_run_is_sent_and_shown() -> None:
     contestant = Contestant.objects.get()
     assert contestant.sends is not None
     assert contestant.sends["modifier"] == document_of(
-        Profile(native_tools=True, reasoning_effort="none", max_output_tokens=500)
+        ModelProfile(native_tools=True, reasoning_effort="none", max_output_tokens=500)
     )
     assert transcript_of(row)["contestant"]["sends"] == contestant.sends
     event = Event.objects.get(verb="fix")
@@ -190,7 +190,7 @@ def test_who_never_had_an_answer_is_fixed_anew_when_it_is_tried_again() -> None:
 
 
 def test_a_profile_comes_back_from_its_document() -> None:
-    profile = Profile(
+    profile = ModelProfile(
         native_tools=False,
         vision=True,
         refused=frozenset({"reasoning_effort", "max_tokens"}),
@@ -214,7 +214,10 @@ def test_each_role_has_its_own() -> None:
     EndpointModel.objects.filter(model="boss").update(reasoning_effort="high")
     treatment = treatment_of(one, seats_of(one))
     endpoint = Endpoint.objects.get()
-    assert treatment.at(endpoint) == {"m": Profile(), "boss": Profile(reasoning_effort="high")}
+    assert treatment.at(endpoint) == {
+        "m": ModelProfile(),
+        "boss": ModelProfile(reasoning_effort="high"),
+    }
     refused = ParameterRefused("reasoning_effort", "no", status=400)
     assert treatment.without(refused, endpoint=endpoint, model="boss").refused == {
         "reasoning_effort"
@@ -240,7 +243,7 @@ def test_contestants_from_before_go_on_with_what_they_sent() -> None:
     sends = Contestant.objects.get().sends
     assert sends == {
         "modifier": document_of(
-            Profile(
+            ModelProfile(
                 native_tools=False,
                 refused=frozenset({"max_completion_tokens"}),
                 reasoning_effort="low",

@@ -21,7 +21,13 @@ from augment import tasks
 from augment.errors import QueueRefused, QueueUnreachable
 from augment.models import Worker
 from augment.services.clock import DATABASE_TIME
-from augment.services.running.workers import FAULT_LENGTH, Presence, Rounds, Workforce, workforce
+from augment.services.running.workers import (
+    FAULT_LENGTH,
+    Presence,
+    RecoveryRounds,
+    Workforce,
+    workforce,
+)
 from tests.jobs.rows import launch, only_row
 from tests.processes import Process, wait_until
 
@@ -119,7 +125,7 @@ def test_no_fault_ends_the_rounds_and_all_of_them_are_told(
     fault: Exception, caplog: pytest.LogCaptureFixture
 ) -> None:
     round_ = Round(None, fault, fault, None)
-    rounds = Rounds(round_, Presence("here 1"))
+    rounds = RecoveryRounds(round_, Presence("here 1"))
     with caplog.at_level(logging.INFO, logger="augment"):
         assert [rounds.go_on() for _ in range(4)] == [True, False, False, True]
     worked = f"{datetime.now(UTC):%Y-%m-%d}"
@@ -132,14 +138,14 @@ def test_no_fault_ends_the_rounds_and_all_of_them_are_told(
 
 def test_the_first_round_that_works_sends_what_waits() -> None:
     round_ = Round(KeyError("x"), None, None)
-    rounds = Rounds(round_, Presence("here 1"))
+    rounds = RecoveryRounds(round_, Presence("here 1"))
     for _ in range(3):
         rounds.go_on()
     assert round_.first == [True, True, False]
 
 
 def test_a_fault_is_kept_for_the_pages_until_a_round_works() -> None:
-    rounds = Rounds(Round(None, KeyError("x" * 1000), None), Presence("here 1"))
+    rounds = RecoveryRounds(Round(None, KeyError("x" * 1000), None), Presence("here 1"))
     rounds.go_on()
     worked_at = Worker.objects.get().recovered_at
     rounds.go_on()
@@ -212,6 +218,6 @@ def test_a_redis_that_refuses_is_not_called_missing(refusing: str, says: str) ->
     assert not isinstance(caught.value, QueueUnreachable)
     assert "No Redis" not in str(caught.value)
     assert only_row(job).sent_at is None
-    rounds = Rounds(lambda at_start: tasks.recover(at_start=at_start), Presence("here 1"))
+    rounds = RecoveryRounds(lambda at_start: tasks.recover(at_start=at_start), Presence("here 1"))
     assert rounds.go_on() is False
     assert says in workforce().fault

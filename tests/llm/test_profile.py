@@ -13,7 +13,7 @@ from augment.llm.messages import (
     Speaker,
     Tool,
 )
-from augment.llm.profile import Profile
+from augment.llm.profile import ModelProfile
 
 HELLO = Message(speaker=Speaker.USER, text="Hello")
 SCHEMA = AnswerSchema(name="sum", schema={"type": "object"})
@@ -22,7 +22,7 @@ ASKED = Request(model="m", messages=(HELLO,), temperature=0.0, seed=7, answer_sc
 
 
 def test_what_nobody_knows_is_tried() -> None:
-    assert Profile().fitted(ASKED) == ASKED
+    assert ModelProfile().fitted(ASKED) == ASKED
 
 
 @pytest.mark.parametrize(
@@ -30,13 +30,13 @@ def test_what_nobody_knows_is_tried() -> None:
     [("temperature", "temperature"), ("seed", "seed"), ("response_format", "answer_schema")],
 )
 def test_what_was_refused_is_left_out(parameter: str, left_out: str) -> None:
-    fitted = Profile().without(parameter).fitted(ASKED)
+    fitted = ModelProfile().without(parameter).fitted(ASKED)
     assert fitted == replace(ASKED, **{left_out: None})  # type: ignore[arg-type]
     assert parameter not in fitted.to_document()
 
 
 def test_the_limit_of_the_length_goes_by_its_other_name() -> None:
-    fitted = Profile().without("max_completion_tokens").fitted(ASKED)
+    fitted = ModelProfile().without("max_completion_tokens").fitted(ASKED)
     assert fitted.length_name == LengthName.MAX_TOKENS
     document = fitted.to_document()
     assert document["max_tokens"] == ASKED.max_tokens
@@ -44,19 +44,19 @@ def test_the_limit_of_the_length_goes_by_its_other_name() -> None:
 
 
 def test_a_model_without_a_limit_of_the_length_is_not_asked() -> None:
-    boundless = Profile().without("max_completion_tokens").without("max_tokens")
+    boundless = ModelProfile().without("max_completion_tokens").without("max_tokens")
     with pytest.raises(ModelFault, match="its cost has no bound") as caught:
         boundless.fitted(ASKED)
     assert not caught.value.retryable
 
 
 def test_no_answer_is_asked_to_be_longer_than_the_model_can() -> None:
-    assert Profile(max_output_tokens=100).fitted(ASKED).max_tokens == 100
-    assert Profile(max_output_tokens=10**6).fitted(ASKED).max_tokens == ASKED.max_tokens
+    assert ModelProfile(max_output_tokens=100).fitted(ASKED).max_tokens == 100
+    assert ModelProfile(max_output_tokens=10**6).fitted(ASKED).max_tokens == ASKED.max_tokens
 
 
 def test_the_effort_is_that_of_the_row_unless_the_request_says_so() -> None:
-    profile = Profile(reasoning_effort="none")
+    profile = ModelProfile(reasoning_effort="none")
     assert profile.fitted(ASKED).to_document()["reasoning_effort"] == "none"
     own = replace(ASKED, reasoning_effort="low")
     assert profile.fitted(own).reasoning_effort == "low"
@@ -65,16 +65,16 @@ def test_the_effort_is_that_of_the_row_unless_the_request_says_so() -> None:
 
 def test_a_blind_model_is_shown_nothing() -> None:
     seen = replace(ASKED, messages=(replace(HELLO, images=(b"\x89PNG",)),))
-    assert Profile(vision=True).fitted(seen) == Profile().fitted(seen) == seen
+    assert ModelProfile(vision=True).fitted(seen) == ModelProfile().fitted(seen) == seen
     with pytest.raises(ModelFault, match="m at this endpoint can't see pictures"):
-        Profile(vision=False).fitted(seen)
+        ModelProfile(vision=False).fitted(seen)
 
 
 def test_a_model_without_native_tools_is_not_given_any() -> None:
     armed = replace(ASKED, answer_schema=None, tools=(TOOL,))
-    assert Profile().fitted(armed) == armed
+    assert ModelProfile().fitted(armed) == armed
     with pytest.raises(ModelFault, match="no native tool calls"):
-        Profile(native_tools=False).fitted(armed)
+        ModelProfile(native_tools=False).fitted(armed)
 
 
 def test_tools_and_a_schema_never_go_together() -> None:

@@ -4,7 +4,7 @@ import math
 
 import pytest
 
-from augment.checks import Kind, findings
+from augment.checks import FindingKind, findings
 from augment.checks.finding import FAULT_OF
 from augment.metrics.fault_guess import FaultClass, first_guess
 from augment.scene.entities import TrafficAgent
@@ -30,4 +30,4 @@ def test_each_class_is_guessed_from_what_was_measured(
 
 
 def test_every_kind_of_finding_has_a_class() -> None:
-    assert set(FAULT_OF) == set(Kind)
+    assert set(FAULT_OF) == set(FindingKind)

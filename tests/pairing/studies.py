@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections import Counter, defaultdict
 
 from arena.pairing.order import CHECK, MAIN, REPEAT
-from arena.pairing.plan import Check, Entry, Plan, PlannedMatchup, Rules
+from arena.pairing.plan import Check, Entry, MatchupPlan, PlannedMatchup, Rules
 
 APPEARANCES = {
     "interplan": 1960,
@@ -56,7 +56,7 @@ def paper_rules(seed: int, *, votes: int = 640, experts: int = 9, **more: object
     )
 
 
-def by_expert(made: Plan) -> dict[str, list[PlannedMatchup]]:
+def by_expert(made: MatchupPlan) -> dict[str, list[PlannedMatchup]]:
     """Every expert's showings in order."""
     found: dict[str, list[PlannedMatchup]] = defaultdict(list)
     for matchup in made.matchups:
@@ -68,7 +68,7 @@ def pair(matchup: PlannedMatchup) -> frozenset[str]:
     return frozenset((matchup.left, matchup.right))
 
 
-def appearances(made: Plan) -> Counter[str]:
+def appearances(made: MatchupPlan) -> Counter[str]:
     """In how many main matchups each contestant is shown."""
     mains = [matchup for matchup in made.matchups if matchup.kind == MAIN]
     return Counter(name for matchup in mains for name in (matchup.left, matchup.right))
@@ -93,7 +93,7 @@ def smallest_distance(mine: list[PlannedMatchup]) -> int:
     )
 
 
-def chi_square_of_sides(made: Plan) -> float:
+def chi_square_of_sides(made: MatchupPlan) -> float:
     """Of the left share of every contestant against one half; about 1 a contestant by lot."""
     left: Counter[str] = Counter()
     shown: Counter[str] = Counter()
@@ -104,7 +104,7 @@ def chi_square_of_sides(made: Plan) -> float:
     return sum((left[name] - shown[name] / 2) ** 2 / (shown[name] / 4) for name in shown)
 
 
-def check_extras(asked: Rules, made: Plan) -> None:
+def check_extras(asked: Rules, made: MatchupPlan) -> None:
     """Positions, repeats, checks and sides of every expert are as the rules say."""
     for mine in by_expert(made).values():
         mains = [matchup for matchup in mine if matchup.kind == MAIN]

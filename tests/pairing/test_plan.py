@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from arena.errors import NothingToPlan
 from arena.pairing.order import _two_places
-from arena.pairing.plan import Entry, Plan, PlannedMatchup, Rules, plan
+from arena.pairing.plan import Entry, MatchupPlan, PlannedMatchup, Rules, plan
 
 
 def rules(
@@ -47,7 +47,7 @@ def spread(counts: Counter[object], places: int) -> int:
     return max(values) - min(values)
 
 
-def check_rules_hold(asked: Rules, made: Plan) -> None:
+def check_rules_hold(asked: Rules, made: MatchupPlan) -> None:
     """What holds for every plan, whatever was available."""
     pictures = {(entry.scenario, entry.contestant): entry.picture for entry in asked.entries}
     for expert in asked.experts:

@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 
 from arena.rating.comparisons import LOSS, TIE, WIN, Comparison, Comparisons
 from arena.rating.raters import raters
-from arena.rating.reliability import Metric, agreement, krippendorff_alpha
+from arena.rating.reliability import DifferenceMetric, agreement, krippendorff_alpha
 from arena.rating.repeats import repeat_consistency
 from arena.rating.shares import share, wilson
 from tests.rating.votes import named, simulated
@@ -35,13 +35,13 @@ def test_alpha_of_a_table_worked_out_by_hand() -> None:
     # WL and LW 1 each of the second, so W 3 and L 1 of 4. Observed disagreement 2 / 4, expected
     # 2 x 3 x 1 / (4 x 3): alpha = 1 - 0.5 / 0.5.
     table = np.array([[2, 0, 0], [1, 0, 1]])
-    assert krippendorff_alpha(table, Metric.NOMINAL) == pytest.approx(0.0)
+    assert krippendorff_alpha(table, DifferenceMetric.NOMINAL) == pytest.approx(0.0)
 
 
 @given(table=tables)
-@pytest.mark.parametrize("metric", Metric)
+@pytest.mark.parametrize("metric", DifferenceMetric)
 def test_alpha_agrees_with_the_package_krippendorff(
-    metric: Metric, table: list[tuple[int, int, int]]
+    metric: DifferenceMetric, table: list[tuple[int, int, int]]
 ) -> None:
     counts = np.array(table)
     ours = krippendorff_alpha(counts, metric)

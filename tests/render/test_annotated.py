@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from augment.render import palette
-from augment.render.annotated import Mark, draw_annotated
+from augment.render.annotated import FaultMark, draw_annotated
 from augment.render.bev import draw
 from augment.render.camera import camera_for
 from augment.scene.modification import Modification
@@ -15,7 +15,7 @@ from tests.scenes import scene, vehicle
 CAR = vehicle("Agent2", 25.0, 0.0)
 CHANGE = Modification(added=(CAR,))
 CAMERA = camera_for(scene(), None)
-WRONG = Mark(number=1, agents=("Agent2",), is_wrong=True)
+WRONG = FaultMark(number=1, agents=("Agent2",), is_wrong=True)
 
 
 def places(png: bytes, colour: tuple[int, ...]) -> np.ndarray:
@@ -35,26 +35,26 @@ def test_a_mark_is_round_its_agent_and_nowhere_else() -> None:
 
 def test_what_is_doubtful_has_another_colour() -> None:
     png = draw_annotated(
-        scene(), CHANGE, CAMERA, [Mark(number=1, agents=("Agent2",), is_wrong=False)]
+        scene(), CHANGE, CAMERA, [FaultMark(number=1, agents=("Agent2",), is_wrong=False)]
     )
     assert len(places(png, palette.WRONG)) == 0
     assert len(places(png, palette.DOUBTFUL)) > 400
 
 
 def test_a_line_leads_to_where_it_belongs() -> None:
-    mark = Mark(number=1, agents=("Agent2",), is_wrong=True, belongs_m=(40.0, 0.0))
+    mark = FaultMark(number=1, agents=("Agent2",), is_wrong=True, belongs_m=(40.0, 0.0))
     found = places(draw_annotated(scene(), CHANGE, CAMERA, [mark]), palette.WRONG)
     assert 40.0 <= found[:, 0].max() <= 41.0
 
 
 def test_what_is_missing_is_marked_where_it_belongs() -> None:
-    mark = Mark(number=1, agents=(), is_wrong=True, belongs_m=(20.0, 3.5))
+    mark = FaultMark(number=1, agents=(), is_wrong=True, belongs_m=(20.0, 3.5))
     found = places(draw_annotated(scene(), Modification(), CAMERA, [mark]), palette.WRONG)
     assert np.abs(found - [20.0, 3.5]).max() < 4.0
 
 
 def test_several_marks_of_one_agent_do_not_cover_each_other() -> None:
-    marks = [Mark(number=n, agents=("Agent2",), is_wrong=True) for n in range(1, 7)]
+    marks = [FaultMark(number=n, agents=("Agent2",), is_wrong=True) for n in range(1, 7)]
     one = places(draw_annotated(scene(), CHANGE, CAMERA, marks[:1]), palette.WRONG)
     six = places(draw_annotated(scene(), CHANGE, CAMERA, marks), palette.WRONG)
     ring = 2.0 * (CAR.length_m + CAR.width_m) * CAMERA.px_per_m * 2.0
@@ -63,7 +63,7 @@ def test_several_marks_of_one_agent_do_not_cover_each_other() -> None:
 
 def test_who_is_out_of_the_picture_or_gone_breaks_nothing() -> None:
     far = Modification(added=(vehicle("Agent2", 300.0, 0.0),))
-    marks = [WRONG, Mark(number=2, agents=("Agent77",), is_wrong=True)]
+    marks = [WRONG, FaultMark(number=2, agents=("Agent77",), is_wrong=True)]
     found = places(draw_annotated(scene(), far, CAMERA, marks), palette.WRONG)
     assert len(found) > 800
 

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from augment.render.bev import draw
 from augment.render.camera import camera_for
-from augment.render.description import CHANGED, GONE, Line, describe
+from augment.render.description import CHANGED, GONE, DescribedAgent, describe
 from augment.scene.entities import AgentType, TrafficAgent
 from augment.scene.modification import Modification
 from tests.scenes import cone, pedestrian, scene, vehicle
@@ -19,7 +19,7 @@ from tests.scenes import cone, pedestrian, scene, vehicle
 STREET = scene(agents=(vehicle("Agent2", 20.04, -3.46), vehicle("Agent3", -12.0, 3.5, math.pi)))
 
 
-def line_of(agent: TrafficAgent) -> Line:
+def line_of(agent: TrafficAgent) -> DescribedAgent:
     (line,) = describe(STREET, Modification(added=(agent,)))
     return line
 
@@ -160,7 +160,7 @@ def in_a_mirror(agent: TrafficAgent) -> TrafficAgent:
     )
 
 
-def other_hand(line: Line) -> Line:
+def other_hand(line: DescribedAgent) -> DescribedAgent:
     end = line.walk_to_m
     return replace(
         line,
@@ -176,5 +176,5 @@ def turned(degrees: int | None, *, either: int) -> int | None:
     return degrees if degrees in (None, either) else -degrees
 
 
-def key(lines: list[Line]) -> list[str]:
+def key(lines: list[DescribedAgent]) -> list[str]:
     return sorted(map(repr, lines))

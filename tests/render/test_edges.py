@@ -9,7 +9,7 @@ import pytest
 
 from augment.render.bev import draw
 from augment.render.camera import camera_for
-from augment.render.canvas import Box, Canvas, Ground
+from augment.render.canvas import Box, Canvas, MetricCanvas
 from augment.render.edges import Badge, distance_text, outside, place_badges
 from augment.render.scale import scale_box
 from augment.scene.entities import TrafficAgent
@@ -18,7 +18,7 @@ from tests import scenes
 from tests.render.pictures import draw_original, opened
 
 CAMERA = camera_for(scenes.scene(), None)
-GROUND = Ground(Canvas(1200, 800, (255, 255, 255)), CAMERA)
+GROUND = MetricCanvas(Canvas(1200, 800, (255, 255, 255)), CAMERA)
 SCALE = scale_box(GROUND, scenes.scene())
 
 

@@ -11,7 +11,7 @@ from augment.errors import AugmentError, UnknownName
 from augment.llm.questions import Ability
 from augment.models import Endpoint
 from augment.services.endpoints.known_models import tell_sight
-from augment.services.endpoints.probe import Finding, ProbeReport, probe
+from augment.services.endpoints.probe import ProbeFinding, ProbeReport, probe
 from augment.services.terminal import TerminalCommand
 from augment.services.texts import one_line
 
@@ -72,6 +72,6 @@ class Command(TerminalCommand):
         self.stdout.write(f"{'cost':14}{cost}, {calls}")
 
 
-def _line(finding: Finding) -> str:
+def _line(finding: ProbeFinding) -> str:
     tokens = "" if finding.prompt_tokens is None else f"{finding.prompt_tokens} tokens in"
     return f"{finding.ability:14}{_WORDS[finding.has_it]:9}{tokens:16}{finding.note}".rstrip()

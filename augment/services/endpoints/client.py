@@ -10,7 +10,7 @@ from augment.errors import ParameterRefused
 from augment.llm.client import Sending, unwatched
 from augment.llm.messages import Reply, Request
 from augment.llm.openai_wire import OpenAIWire
-from augment.llm.profile import Profile
+from augment.llm.profile import ModelProfile
 from augment.models import Endpoint
 from augment.services.endpoints.call_limits import Queue, place_at
 from augment.services.endpoints.known_models import profile_of, remember_refusal
@@ -79,7 +79,7 @@ class EndpointClient:
     ) -> None:
         self._wire.close()
 
-    def _profile(self, model: str) -> Profile:
+    def _profile(self, model: str) -> ModelProfile:
         if model not in self._profiles:
             self._profiles[model] = profile_of(endpoint=self._endpoint, model=model)
         return self._profiles[model]

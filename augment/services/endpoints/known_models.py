@@ -11,7 +11,7 @@ from django.core.serializers.json import DjangoJSONEncoder
 from django.db import transaction
 from django.utils import timezone
 
-from augment.llm.profile import Profile
+from augment.llm.profile import ModelProfile
 from augment.models import Endpoint, EndpointModel
 from augment.services.endpoints.price_list import listed_price
 from augment.services.events import log_event
@@ -39,14 +39,14 @@ def model_at(*, endpoint: Endpoint, model: str) -> EndpointModel:
     return row
 
 
-def profile_of(*, endpoint: Endpoint, model: str) -> Profile:
+def profile_of(*, endpoint: Endpoint, model: str) -> ModelProfile:
     """What the model takes, as far as its row knows; nothing is known of one without a row."""
     row = EndpointModel.objects.filter(endpoint=endpoint, model=model).first()
-    return Profile() if row is None else _profile(row)
+    return ModelProfile() if row is None else _profile(row)
 
 
 @transaction.atomic
-def remember_refusal(*, endpoint: Endpoint, model: str, parameter: str) -> Profile:
+def remember_refusal(*, endpoint: Endpoint, model: str, parameter: str) -> ModelProfile:
     """Note that the model does not take this parameter.
 
     Returns:
@@ -99,8 +99,8 @@ def facts_of(endpoint: Endpoint) -> dict[str, Any]:
 # --- Private -----------------------------------------------------------------------------------
 
 
-def _profile(row: EndpointModel) -> Profile:
-    return Profile(
+def _profile(row: EndpointModel) -> ModelProfile:
+    return ModelProfile(
         native_tools=row.native_tools,
         vision=row.vision,
         json_schema=row.json_schema,

@@ -21,8 +21,8 @@ from augment.llm.costs import Price, usd_of
 from augment.llm.cutting import cut
 from augment.llm.messages import Reply, Request
 from augment.llm.patience import Patience
-from augment.llm.profile import Profile
-from augment.llm.questions import Ability, Question, questions_for
+from augment.llm.profile import ModelProfile
+from augment.llm.questions import Ability, ProbeQuestion, questions_for
 from augment.llm.window import cut_of
 from augment.models import Endpoint, EndpointModel
 from augment.services.endpoints.call_limits import Queue, place_at
@@ -40,7 +40,7 @@ _LONGEST_NOTE = 200
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Finding:
+class ProbeFinding:
     """What one question showed.
 
     Attributes:
@@ -69,7 +69,7 @@ class ProbeReport:
     """
 
     probed_at: datetime
-    findings: list[Finding] = field(default_factory=list)
+    findings: list[ProbeFinding] = field(default_factory=list)
     refused: list[str] = field(default_factory=list)
     calls: int = 0
     cost_usd: str | None = None
@@ -118,7 +118,7 @@ def probe(
             endpoint=endpoint,
             price=price_of(endpoint, model),
             patience=patience or Patience(attempts=2),
-            profile=Profile(
+            profile=ModelProfile(
                 reasoning_effort=row.reasoning_effort, max_output_tokens=row.max_output_tokens
             ),
         )
@@ -138,10 +138,10 @@ class _Prober:
     endpoint: Endpoint
     price: Price | None
     patience: Patience
-    profile: Profile
+    profile: ModelProfile
     calls: int = 0
 
-    def report(self, questions: tuple[Question, ...], *, now: datetime) -> ProbeReport:
+    def report(self, questions: tuple[ProbeQuestion, ...], *, now: datetime) -> ProbeReport:
         report = ProbeReport(probed_at=now)
         for question in questions:
             report.findings.append(self._finding(question))
@@ -154,22 +154,22 @@ class _Prober:
             report.cost_usd = f"{sum(Decimal(cost) for cost in costs if cost):f}"
         return report
 
-    def _finding(self, question: Question) -> Finding:
+    def _finding(self, question: ProbeQuestion) -> ProbeFinding:
         ability = question.ability
         try:
             request, reply = self._answer(question)
         except ParameterRefused as refused:
             self.profile = self.profile.without(refused.parameter)
-            return Finding(ability=ability, has_it=False, note=_short(str(refused)))
+            return ProbeFinding(ability=ability, has_it=False, note=_short(str(refused)))
         except ModelFault as fault:
             refuses = fault.status in _REFUSALS and ability != Ability.ANSWERS
             has_it = False if refuses or ability == Ability.ANSWERS else None
-            return Finding(ability=ability, has_it=has_it, note=_short(str(fault)))
+            return ProbeFinding(ability=ability, has_it=has_it, note=_short(str(fault)))
         cut = cut_of(request, reply)
         is_good = question.is_good(reply) and cut is None
         # Any answer shows that the parameter is taken.
         has_it = True if ability in (Ability.ANSWERS, Ability.TEMPERATURE) else is_good
-        return Finding(
+        return ProbeFinding(
             ability=ability,
             has_it=has_it,
             note=_short(str(cut) if cut else reply.text or reply.refusal or _called(reply)),
@@ -180,7 +180,7 @@ class _Prober:
             cost_usd=self._cost_usd(reply),
         )
 
-    def _answer(self, question: Question) -> tuple[Request, Reply]:
+    def _answer(self, question: ProbeQuestion) -> tuple[Request, Reply]:
         """The request as it was sent, and its answer."""
         attempt = 1
         while True:

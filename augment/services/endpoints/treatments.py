@@ -16,7 +16,7 @@ from django.db.models import Exists, OuterRef
 
 from augment.errors import ModelFault, ParameterRefused
 from augment.llm.messages import LengthName
-from augment.llm.profile import Profile
+from augment.llm.profile import ModelProfile
 from augment.models import Augmentation, Contestant, Endpoint, ModelCall
 from augment.services.endpoints.known_models import profile_of
 from augment.services.endpoints.roles import Seat
@@ -33,9 +33,9 @@ class Treatment:
 
     contestant_pk: int
     seats: Mapping[ModelRole, Seat]
-    profiles: Mapping[ModelRole, Profile]
+    profiles: Mapping[ModelRole, ModelProfile]
 
-    def at(self, endpoint: Endpoint) -> dict[str, Profile]:
+    def at(self, endpoint: Endpoint) -> dict[str, ModelProfile]:
         """By model, what it sends to an endpoint."""
         return {
             seat.model: self.profiles[role]
@@ -43,7 +43,9 @@ class Treatment:
             if seat.endpoint.pk == endpoint.pk
         }
 
-    def without(self, refused: ParameterRefused, *, endpoint: Endpoint, model: str) -> Profile:
+    def without(
+        self, refused: ParameterRefused, *, endpoint: Endpoint, model: str
+    ) -> ModelProfile:
         """What it sends from now on to a model that does not take one parameter.
 
         Raises:
@@ -117,7 +119,7 @@ def loosen_unanswered(contestants: Iterable[Contestant]) -> int:
     return loose.exclude(Exists(calls)).exclude(Exists(running)).update(sends=None)
 
 
-def document_of(profile: Profile) -> dict[str, Any]:
+def document_of(profile: ModelProfile) -> dict[str, Any]:
     """What of a profile changes what contestants send, ready for JSON.
 
     No variant sends a temperature, a seed or a schema, so what is known of these is not among it.
@@ -131,13 +133,13 @@ def document_of(profile: Profile) -> dict[str, Any]:
     }
 
 
-def profile_from_document(document: Mapping[str, Any]) -> Profile:
+def profile_from_document(document: Mapping[str, Any]) -> ModelProfile:
     """The profile that was stored as this document.
 
     Raises:
         KeyError: It is none.
     """
-    return Profile(
+    return ModelProfile(
         native_tools=document["native_tools"],
         vision=document["vision"],
         refused=frozenset(document["refused"]),
@@ -161,11 +163,11 @@ def _answered_with(contestant_pk: int, roles: list[ModelRole], parameter: str) -
 
 
 @transaction.atomic
-def _amend(contestant_pk: int, roles: list[ModelRole], parameter: str) -> Profile:
+def _amend(contestant_pk: int, roles: list[ModelRole], parameter: str) -> ModelProfile:
     """Leave a parameter out of what is sent in these roles; what is sent then."""
     row = Contestant.objects.select_for_update(no_key=True).get(pk=contestant_pk)
     sends = dict(row.sends or {})
-    after = Profile()
+    after = ModelProfile()
     for role in roles:
         after = profile_from_document(sends[role.value]).without(parameter)
         sends[role.value] = document_of(after)

@@ -16,7 +16,7 @@ from augment.services.judging.displacement import of_job
 from augment.services.scenarios.scenes import reference_of
 
 
-class Standing(StrEnum):
+class MatchState(StrEnum):
     """What became of an object."""
 
     MATCHED = "matched"
@@ -24,7 +24,7 @@ class Standing(StrEnum):
     SURPLUS = "surplus"
 
 
-class Spot(NamedTuple):
+class ObjectPosition(NamedTuple):
     """An object's id and the centre of its box."""
 
     id: str
@@ -43,10 +43,10 @@ class DisplacedObject:
     """
 
     row: Augmentation
-    standing: Standing
+    standing: MatchState
     object_class: ObjectClass
-    reference: Spot | None
-    generated: Spot | None
+    reference: ObjectPosition | None
+    generated: ObjectPosition | None
     distance_m: float | None
 
 
@@ -94,14 +94,14 @@ def _objects(
         )
 
 
-def _standing(reference: TrafficAgent | None, generated: TrafficAgent | None) -> Standing:
+def _standing(reference: TrafficAgent | None, generated: TrafficAgent | None) -> MatchState:
     if generated is None:
-        return Standing.MISSING
-    return Standing.SURPLUS if reference is None else Standing.MATCHED
+        return MatchState.MISSING
+    return MatchState.SURPLUS if reference is None else MatchState.MATCHED
 
 
-def _spot(agent: TrafficAgent | None) -> Spot | None:
-    return None if agent is None else Spot(id=agent.id, x_m=agent.x_m, y_m=agent.y_m)
+def _spot(agent: TrafficAgent | None) -> ObjectPosition | None:
+    return None if agent is None else ObjectPosition(id=agent.id, x_m=agent.x_m, y_m=agent.y_m)
 
 
 def _by_id(change: Modification | None) -> dict[str, TrafficAgent]:

@@ -11,7 +11,7 @@ from django.db.models import Max, QuerySet
 
 from augment.errors import InvalidDocument, UnknownName
 from augment.metrics.displacement import Displacement, Match, displacement
-from augment.metrics.summary import Box, Summary, summarise
+from augment.metrics.summary import BoxSummary, Summary, summarise
 from augment.models import Augmentation, GenerationJob, Scenario
 from augment.scene.catalogue import ScenarioType
 from augment.scene.codec import modification_from_document
@@ -21,7 +21,7 @@ from augment.variants.recipes import SPELLING, spelled
 
 __all__ = [
     "PLACED_EXACTLY",
-    "Box",
+    "BoxSummary",
     "By",
     "Displacement",
     "Group",

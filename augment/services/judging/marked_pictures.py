@@ -14,7 +14,7 @@ from django.core.files.storage import default_storage
 
 from augment.checks import Finding, Severity
 from augment.models import Augmentation
-from augment.render.annotated import Mark, draw_annotated
+from augment.render.annotated import FaultMark, draw_annotated
 from augment.render.camera import camera_for
 from augment.scene.codec import modification_from_document
 from augment.services.judging.checks import findings_of
@@ -82,7 +82,7 @@ def draw_marked(*, augmentation_pk: int) -> str:
         modification_from_document(row.modification),
         camera_for(scene, reference_of(row.scenario)),
         [
-            Mark(
+            FaultMark(
                 number=number,
                 agents=one.agents,
                 is_wrong=one.severity is Severity.WRONG,

@@ -29,7 +29,7 @@ SAMPLES = 3
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Line:
+class ContestantEstimate:
     """What one contestant is expected to use in a job.
 
     Attributes:
@@ -53,13 +53,13 @@ class Line:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Estimate:
+class JobEstimate:
     """A job before it is launched: lines of those that ask language models, and all rows."""
 
     rows: int
     scenarios: int
     contestants: int
-    lines: tuple[Line, ...]
+    lines: tuple[ContestantEstimate, ...]
 
     @property
     def asking_rows(self) -> int:
@@ -83,7 +83,7 @@ class Estimate:
         return sum(line.tokens_out for line in self.lines)
 
     @property
-    def unpriced(self) -> tuple[Line, ...]:
+    def unpriced(self) -> tuple[ContestantEstimate, ...]:
         """Lines whose cost nobody knows."""
         return tuple(line for line in self.lines if line.usd is None)
 
@@ -104,7 +104,7 @@ class Estimate:
         return most.quantize(Decimal("0.01"), rounding=ROUND_UP)
 
     @property
-    def guessed(self) -> tuple[Line, ...]:
+    def guessed(self) -> tuple[ContestantEstimate, ...]:
         """Lines that rest on no earlier augmentation."""
         return tuple(line for line in self.lines if not line.seen)
 
@@ -115,7 +115,7 @@ class Estimate:
         return int(self.asking_rows * usd / self.usd)
 
 
-def estimate(contestants: Sequence[str], scenarios: Sequence[str]) -> Estimate:
+def estimate(contestants: Sequence[str], scenarios: Sequence[str]) -> JobEstimate:
     """What a job of these would use; slugs that nobody knows are left out.
 
     Raises:
@@ -130,7 +130,7 @@ def estimate(contestants: Sequence[str], scenarios: Sequence[str]) -> Estimate:
     asking = [row for row in who if row.endpoint is not None]
     samples = _spread(list(where.values_list("pk", flat=True))) if asking else []
     prompts = _Prompts(Scenario.objects.select_related("base_scene").filter(pk__in=samples))
-    return Estimate(
+    return JobEstimate(
         rows=len(who) * count,
         scenarios=count,
         contestants=len(who),
@@ -175,7 +175,7 @@ class _Prompts:
         return about + PICTURE_TOKENS * pictures, most
 
 
-def _line(row: Contestant, count: int, prompts: _Prompts) -> Line:
+def _line(row: Contestant, count: int, prompts: _Prompts) -> ContestantEstimate:
     way, seats = recipe(row.variant), seats_of(row)
     calls = calls_of(way)
     prices = {role: _price(seat) for role, seat in seats.items()}
@@ -190,7 +190,7 @@ def _line(row: Contestant, count: int, prompts: _Prompts) -> Line:
             for role, one in calls.items()
         }
     most = most_tokens(way, {role: prompts.tokens(way, role)[1] for role in calls})
-    return Line(
+    return ContestantEstimate(
         slug=row.slug,
         name=row.name,
         rows=count,

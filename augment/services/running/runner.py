@@ -47,7 +47,7 @@ logger = logging.getLogger(__name__)
 
 Kind = Contestant.Kind
 State = Augmentation.State
-Placed = rule_placer.Placement | quantised.Placement
+Placed = rule_placer.Placement | quantised.QuantisedPlacement
 Connect = Callable[[Endpoint], AbstractContextManager[ChatClient]]
 
 

@@ -10,7 +10,13 @@ from typing import Any
 from django.core.files.storage import default_storage
 
 from augment.models import Augmentation, Contestant, ModelCall
-from augment.services.running.transcript_steps import Step, Try, images_in, totals_of, tries_of
+from augment.services.running.transcript_steps import (
+    TranscriptStep,
+    Try,
+    images_in,
+    totals_of,
+    tries_of,
+)
 from augment.services.running.transcripts import IMAGES
 
 FORMAT, VERSION = "scenario-arena/transcript", 2
@@ -95,7 +101,7 @@ def _attempt(one: Try) -> dict[str, Any]:
     }
 
 
-def _step(step: Step) -> dict[str, Any]:
+def _step(step: TranscriptStep) -> dict[str, Any]:
     if step.call is not None:
         return _call(step.call)
     assert step.note is not None

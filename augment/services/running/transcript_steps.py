@@ -37,7 +37,7 @@ class SaidMessage:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Step:
+class TranscriptStep:
     """A call or, where that is None, a note."""
 
     call: ModelCall | None = None
@@ -81,7 +81,7 @@ class Try:
     """One attempt with its steps."""
 
     attempt: Attempt
-    steps: list[Step]
+    steps: list[TranscriptStep]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -143,13 +143,13 @@ def images_in(request: dict[str, Any]) -> list[str]:
 # --- Private -----------------------------------------------------------------------------------
 
 
-def _steps(attempt: Attempt) -> Iterator[Step]:
+def _steps(attempt: Attempt) -> Iterator[TranscriptStep]:
     """Each note behind the call after which it was made."""
     notes = list(attempt.notes.all())
-    yield from (Step(note=note) for note in notes if note.after_call == 0)
+    yield from (TranscriptStep(note=note) for note in notes if note.after_call == 0)
     for call in attempt.calls.all():
-        yield Step(call=call)
-        yield from (Step(note=note) for note in notes if note.after_call == call.number)
+        yield TranscriptStep(call=call)
+        yield from (TranscriptStep(note=note) for note in notes if note.after_call == call.number)
 
 
 def _message(message: dict[str, Any]) -> SaidMessage:

@@ -113,7 +113,7 @@ class Presence:
         return bool(Worker.objects.filter(pk=self._pk).update(**changes))
 
 
-class Rounds:
+class RecoveryRounds:
     """Brings lost work back, round after round; no fault ends it.
 
     Args:
