@@ -11,16 +11,18 @@ from django.core.files.storage import default_storage
 from django.urls import reverse
 
 from augment.models import Augmentation
+from augment.scene.intent_codec import intent_to_document
 from augment.services.judging.findings import checked
 from augment.services.judging.marked_pictures import draw_marked
 from augment.services.running import leases
+from tests.intents import parked
 from tests.jobs import rows
 from tests.web.cast import people, signed_in
 
 pytestmark = pytest.mark.django_db
 
 OnCommit = Callable[..., object]
-FAR = "Place a parked car 40 m ahead of the ego."
+FAR = intent_to_document(parked(40.0))
 
 
 @pytest.fixture(autouse=True)
@@ -33,8 +35,8 @@ def row() -> Augmentation:
     """Two cones where a parked car is asked for."""
     found = rows.only_row(rows.launch())
     leases.settle(held=rows.leased(found), settlement=rows.done(), now=rows.NOON)
-    found.scenario.instruction = FAR
-    found.scenario.save(update_fields=["instruction"])
+    found.scenario.intent = FAR
+    found.scenario.save(update_fields=["intent"])
     return Augmentation.objects.select_related("contestant", "scenario__base_scene").get()
 
 
@@ -82,13 +84,13 @@ def test_other_findings_are_another_picture(row: Augmentation) -> None:
     first = draw_marked(augmentation_pk=row.pk)
     assert draw_marked(augmentation_pk=row.pk) == first
     row.scenario.instruction = "Place a parked car 20 m ahead of the ego."
-    row.scenario.save(update_fields=["instruction"])
+    row.scenario.save(update_fields=["intent"])
     assert draw_marked(augmentation_pk=row.pk) != first
 
 
 def test_without_a_fault_there_is_no_picture(row: Augmentation) -> None:
     row.scenario.instruction = "Surprise me."  # nothing can be held against that
-    row.scenario.save(update_fields=["instruction"])
+    row.scenario.save(update_fields=["intent"])
     assert draw_marked(augmentation_pk=row.pk) == ""
     analyst = signed_in(people()["analyst"])
     page = analyst.get(reverse("augmentation", args=[row.code])).content.decode()
