@@ -83,14 +83,14 @@ def test_no_expert_sees_it(row: Augmentation) -> None:
 def test_other_findings_are_another_picture(row: Augmentation) -> None:
     first = draw_marked(augmentation_pk=row.pk)
     assert draw_marked(augmentation_pk=row.pk) == first
-    row.scenario.instruction = "Place a parked car 20 m ahead of the ego."
+    row.scenario.intent = intent_to_document(parked(20.0))
     row.scenario.save(update_fields=["intent"])
     assert draw_marked(augmentation_pk=row.pk) != first
 
 
 def test_without_a_fault_there_is_no_picture(row: Augmentation) -> None:
-    row.scenario.instruction = "Surprise me."  # nothing can be held against that
-    row.scenario.save(update_fields=["intent"])
+    row.scenario.intent, row.scenario.intent_origin = None, ""  # nothing to be held against
+    row.scenario.save(update_fields=["intent", "intent_origin"])
     assert draw_marked(augmentation_pk=row.pk) == ""
     analyst = signed_in(people()["analyst"])
     page = analyst.get(reverse("augmentation", args=[row.code])).content.decode()
