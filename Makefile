@@ -12,7 +12,7 @@ SERVE ?= 1
 # Compiled once, not by each of the many processes that the tests start.
 export PYTHONDONTWRITEBYTECODE :=
 
-.PHONY: demo serve test lint check fast postgres chromium bench mutants lock clean
+.PHONY: demo serve test lint check fast postgres chromium bench mutants receivers lock clean
 
 demo: $(VENV)/.runtime ## Run the main job on the catalogue, then serve it (SERVE=0: don't)
 	$(BIN)/python manage.py demo --port $(PORT) $(if $(filter 0,$(SERVE)),--no-serve)
@@ -20,7 +20,7 @@ demo: $(VENV)/.runtime ## Run the main job on the catalogue, then serve it (SERV
 serve: $(VENV)/.runtime ## Serve what is there
 	$(BIN)/python manage.py serve --port $(PORT)
 
-test: lint chromium ## Every check and every test, on SQLite, Redis, PostgreSQL and in a browser
+test: lint chromium receivers ## Every check and every test, on SQLite, Redis, PostgreSQL and in a browser
 	$(BIN)/python -m pytest -n 2 --dist loadgroup
 	$(BIN)/python -m tests.on_postgres -m "postgres and not redis" -n 2
 
@@ -47,13 +47,22 @@ mutants: $(VENV)/.test ## Whether the tests notice small mutations of what matte
 chromium: $(VENV)/.test
 	@bash tests/browser/get_chromium.sh $(BIN)/python
 
+receivers: .bench/receivers/.made ## What reads our CommonRoad and OpenSCENARIO files in the tests
+
 lock: $(VENV)/.test ## Write the lock files anew from the *.in files
 	$(BIN)/pip install --quiet uv
 	$(BIN)/uv pip compile --universal --python-version 3.11 --generate-hashes --no-emit-index-url -q requirements.in -o requirements.txt
 	$(BIN)/uv pip compile --universal --python-version 3.11 --generate-hashes --no-emit-index-url -q requirements-test.in -o requirements-test.txt
+	$(BIN)/uv pip compile --python-version 3.11 --generate-hashes --no-emit-index-url -q tests/formats/receivers/requirements.in -o tests/formats/receivers/requirements.txt
 
 clean: ## Remove the environment and everything that a run leaves behind
 	rm -rf $(VENV) .bench var media
+
+# An environment of its own: asam-qc-opendrive wants numpy 1.
+.bench/receivers/.made: tests/formats/receivers/requirements.txt
+	$(PYTHON) -m venv .bench/receivers
+	.bench/receivers/bin/pip install --quiet --disable-pip-version-check --require-hashes -r $<
+	@touch $@
 
 $(VENV)/.made:
 	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11) and "Python 3.11 or later is needed, this is " + sys.version)'

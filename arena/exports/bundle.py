@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import io
 import json
-import zipfile
 from collections.abc import Iterable, Sequence
 from typing import Any
 
@@ -13,20 +11,13 @@ from arena.exports.rating_charts import charts
 from arena.exports.tables import leaderboard_table
 from arena.exports.votes import VOTE_FORMATS, vote_table
 from arena.exports.writers import FORMATS
+from arena.exports.zips import zip_bytes
 from arena.models import Snapshot
 from arena.services.cells import csv_text
 from arena.services.vote_rows import digest_of
 from augment.sentences import read_sentence
 
-ZIP = "zip"
-CONTENT_TYPE = "application/zip"
 MANIFEST = "manifest.json"
-
-_EPOCH = (1980, 1, 1, 0, 0, 0)
-"""The earliest time that a zip can name: the rating's own time stands in the manifest."""
-
-_READABLE = 0o100644 << 16
-_UNIX = 3
 
 
 def bundle(snapshot: Snapshot) -> bytes:
@@ -37,15 +28,7 @@ def bundle(snapshot: Snapshot) -> bytes:
     """
     files = _files(snapshot)
     files[MANIFEST] = _manifest(snapshot, files)
-    packed = io.BytesIO()
-    with zipfile.ZipFile(packed, "w") as archive:
-        for name in sorted(files):
-            entry = zipfile.ZipInfo(name, date_time=_EPOCH)
-            entry.compress_type = zipfile.ZIP_DEFLATED
-            entry.external_attr = _READABLE
-            entry.create_system = _UNIX
-            archive.writestr(entry, files[name])
-    return packed.getvalue()
+    return zip_bytes(files)
 
 
 # --- Private -----------------------------------------------------------------------------------

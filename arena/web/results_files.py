@@ -11,12 +11,13 @@ from django.utils.text import slugify
 from django.views.decorators.http import require_safe
 
 from arena.errors import NoSnapshot
-from arena.exports.bundle import CONTENT_TYPE, ZIP, bundle
+from arena.exports.bundle import bundle
 from arena.exports.formats import format_named
 from arena.exports.rating_charts import CONTENT_TYPES, chart_bytes
 from arena.exports.tables import leaderboard_table
 from arena.exports.votes import VOTE_FORMATS, vote_table
 from arena.exports.writers import FORMATS
+from arena.exports.zips import CONTENT_TYPE, ZIP
 from arena.models import Snapshot, Study
 from arena.queries.results import snapshot_to_export
 from arena.web.access import STAFF, only

@@ -14,7 +14,6 @@ from typing import Any, Final
 import yaml
 
 from augment.scene.catalogue import ScenarioType
-from augment.scene.entities import Scene
 from augment.scene.modification import Modification
 from augment.sentences import escaped
 
@@ -28,39 +27,6 @@ MOST_ENTRIES: Final = 100
 GOALS: Final = ("left", "right", "straight")
 ACCEL_MAX_MPS2: Final = 1.0
 DECEL_MAX_MPS2: Final = 2.0
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Cell:
-    """One modification to be written.
-
-    Attributes:
-        name: What a person calls it, for the file's comments and the report.
-        keeps_traffic: Whether the recorded vehicles stay.
-    """
-
-    name: str
-    scene: Scene
-    type: ScenarioType
-    modification: Modification
-    keeps_traffic: bool = False
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Loss:
-    """Something that the format can't say, or that had to be made up.
-
-    Attributes:
-        changes_scene: Whether other things stand in interPlan's scene than in ours, or do
-            something else; not so for sizes and the pace of a walk.
-    """
-
-    cell: str
-    text: str
-    changes_scene: bool = False
-
-    def __str__(self) -> str:
-        return f"{self.cell}: {self.text}"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

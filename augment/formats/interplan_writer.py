@@ -18,12 +18,11 @@ from augment.errors import Conflict
 from augment.formats.interplan import (
     MOST_ENTRIES,
     WALK_S,
-    Cell,
-    Loss,
     details,
     token_of,
     yaml_text,
 )
+from augment.formats.writing import Cell, Loss
 from augment.geometry.angles import difference, wrap
 from augment.scene.catalogue import ScenarioType
 from augment.scene.entities import AgentType, Point, Scene, TrafficAgent

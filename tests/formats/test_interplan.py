@@ -8,9 +8,10 @@ import pytest
 import yaml
 
 from augment.errors import Conflict
-from augment.formats.interplan import Cell, ReadEntry, token_of
+from augment.formats.interplan import ReadEntry, token_of
 from augment.formats.interplan_reader import read
 from augment.formats.interplan_writer import write
+from augment.formats.writing import Cell
 from augment.geometry.angles import difference
 from augment.scene.catalogue import ScenarioType
 from augment.scene.entities import AgentType, TrafficAgent

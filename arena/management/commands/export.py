@@ -8,10 +8,11 @@ from typing import Any
 from uuid import UUID
 
 from django.core.management.base import CommandError, CommandParser
+from django.utils.text import slugify
 
 from arena.errors import ArenaError, StudyStillOpen
 from arena.exports import displacement_writers, driving_writers, faults
-from arena.exports.bundle import ZIP, bundle
+from arena.exports.bundle import bundle
 from arena.exports.displacement_objects import BY_OBJECT, OBJECT_FORMATS, object_rows
 from arena.exports.displacement_table import displacement_table
 from arena.exports.driving_table import DrivingTable
@@ -19,9 +20,11 @@ from arena.exports.files import write_whole
 from arena.exports.formats import format_named
 from arena.exports.rating_charts import CONTENT_TYPES, chart_bytes
 from arena.exports.samples import SHEET_FORMATS, sheet_bytes, sheet_of
+from arena.exports.scenarios import scenario_zip, zip_name
 from arena.exports.tables import leaderboard_table
 from arena.exports.votes import VOTE_FORMATS, vote_table
 from arena.exports.writers import FORMATS
+from arena.exports.zips import ZIP
 from arena.models import Snapshot, Study
 from arena.queries.jobs import grid
 from arena.queries.results import snapshot_to_export
@@ -30,6 +33,8 @@ from arena.services.early_looks import log_early_look
 from augment.errors import AugmentError, Conflict, UnknownName
 from augment.services.judging.displacement import By, types_named
 from augment.services.judging.driving_scores import options_driven, scores_of_job
+from augment.services.judging.scenario_export import FORMATS as SCENARIO_FORMATS
+from augment.services.judging.scenario_export import RECORDED, Exported, export_job
 from augment.services.judging.simulations import SCORES, Options
 from augment.services.running.choosing import job_named
 from augment.services.scenarios.interplan import job_as_interplan
@@ -61,6 +66,7 @@ class Command(TerminalCommand):
             "displacement": self._displacement,
             "samples": self._samples,
             "modifications": self._modifications,
+            "scenarios": self._scenarios,
             "faults": self._faults,
             "driving": self._driving,
         }
@@ -160,6 +166,39 @@ class Command(TerminalCommand):
         self.stderr.write(f"{len(losses)} things could not be said in interPlan's format.")
         return text.encode(), "yaml", True
 
+    def _scenarios(self, options: dict[str, Any]) -> Written:
+        exported = export_job(
+            job_named(options["job"]),
+            file_format=options["format"],
+            contestant=options["contestant"],
+            motion=options["motion"],
+            strict=options["strict"],
+        )
+        self._tell(exported)
+        out = Path(options["out"])
+        if options["out"] != "-" and out.suffix != f".{ZIP}":
+            slug = slugify(exported.job.name) or str(exported.job.code)
+            options["out"] = str(out / zip_name(exported, slug))
+            try:
+                out.mkdir(parents=True, exist_ok=True)
+            except OSError as error:
+                raise CommandError(f"{out} can't be made a folder: {error.strerror}.") from error
+        return scenario_zip(exported), ZIP, False
+
+    def _tell(self, exported: Exported) -> None:
+        for loss in exported.missing:
+            self.stderr.write(f"Left out: {loss}.")
+        for loss in exported.written.refused:
+            self.stderr.write(f"Refused: {loss}.")
+        for loss in exported.written.losses:
+            self.stderr.write(f"Lost: {loss}.")
+        for warning in exported.warnings:
+            self.stderr.write(f"Warning: {warning}")
+        lost, refused = len(exported.written.losses), len(exported.written.refused)
+        self.stderr.write(
+            f"{lost} things could not be said as {exported.format}; {refused} refused."
+        )
+
     def _deliver(self, content: bytes, out: str, suffix: str, is_text: bool) -> None:
         if out == "-":
             if not is_text:
@@ -230,6 +269,20 @@ def _kinds_of_jobs(kinds: Any) -> list[ArgumentParser]:
         action="store_true",
         help="write nothing if a scenario would not be the same there (kept traffic, motion, ...)",
     )
+    scenarios = kinds.add_parser("scenarios", help="what a job made, in a standard format")
+    scenarios.add_argument("job", help="its name or its code")
+    scenarios.add_argument(
+        "--format", required=True, help=f"one of {', '.join(SCENARIO_FORMATS)}; OUT is a folder"
+    )
+    scenarios.add_argument("--contestant", help="the slug of one; all unless given")
+    scenarios.add_argument(
+        "--motion",
+        default=RECORDED,
+        help=f"{RECORDED}, or the planner whose finished drives say what everybody does",
+    )
+    scenarios.add_argument(
+        "--strict", action="store_true", help="write nothing if a scenario would not be the same"
+    )
     labels = kinds.add_parser("faults", help="how often experts saw which fault")
     labels.add_argument("job", help="its name or its code")
     labels.add_argument("--format", default="csv", help=f"one of {', '.join(faults.FORMATS)}")
@@ -242,4 +295,4 @@ def _kinds_of_jobs(kinds: Any) -> list[ArgumentParser]:
     driving.add_argument(
         "--format", default="csv", help=f"one of {', '.join(driving_writers.FORMATS)}"
     )
-    return [displacement, samples, modifications, labels, driving]
+    return [displacement, samples, modifications, scenarios, labels, driving]

@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 from augment.errors import Conflict, InvalidDocument, UnknownName
 from augment.formats import interplan_writer
-from augment.formats.interplan import Cell, Loss, ReadFile, token_of
+from augment.formats.interplan import ReadFile, token_of
 from augment.formats.interplan_reader import read_document
 from augment.formats.interplan_schema import WHAT
+from augment.formats.writing import Cell, Loss
 from augment.formats.yaml_file import read_yaml_file
 from augment.models import Augmentation, BaseScene, GenerationJob
 from augment.scene.catalogue import ScenarioType
@@ -52,7 +53,7 @@ def job_as_interplan(
     text, more = interplan_writer.write(cells)
     losses += more
     if strict:
-        _refuse_changes(losses)
+        refuse_changes(losses, where="interPlan")
     return text, tuple(losses)
 
 
@@ -100,14 +101,15 @@ def references_from_interplan(path: Path, *, scenes: Mapping[str, str] | None = 
     return found
 
 
-def _refuse_changes(losses: list[Loss]) -> None:
+def refuse_changes(losses: Sequence[Loss], *, where: str) -> None:
+    """Raise Conflict once a scenario would not be the same there."""
     changes = [loss for loss in losses if loss.changes_scene]
     if changes:
         shown = "; ".join(str(loss) for loss in changes[:_MOST_LISTED])
         more = len(changes) - _MOST_LISTED
         rest = f"; and {more} more" if more > 0 else ""
         raise Conflict(
-            f"{len(changes)} things would not be the same in interPlan, and nothing was written: "
+            f"{len(changes)} things would not be the same in {where}, and nothing was written: "
             f"{shown}{rest}."
         )
 

@@ -1,0 +1,62 @@
+"""Scenarios in the project's own JSON: nothing is lost, and what is read again is the same."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from augment.formats.writing import Cell, Report, Written, write_each
+from augment.scene.codec import modification_to_document, scene_to_document
+from augment.scene.motion import MotionSource, Movement
+from augment.scene.recording import Recording, Track
+from augment.scene.recording_codec import recording_to_document
+
+_SEEN = (MotionSource.RECORDED, MotionSource.SIMULATED)
+
+
+def write(cells: Sequence[Cell]) -> Written:
+    """For each cell the scene before and after its change, the change, and the tracks."""
+    return write_each(cells, _write_one)
+
+
+# Private
+
+
+def _write_one(cell: Cell, report: Report) -> dict[str, bytes]:
+    documents = {
+        "before": scene_to_document(cell.scene),
+        "scene": scene_to_document(cell.after),
+        "modification": modification_to_document(cell.modification),
+    }
+    if cell.recording is not None or cell.drive is not None:
+        documents["recording"] = recording_to_document(_recording(cell))
+    return {f"{cell.stem}.{name}.json": _text(one) for name, one in documents.items()}
+
+
+def _recording(cell: Cell) -> Recording:
+    """What was seen, in a log or in a drive; nothing that had to be assumed."""
+    motion = cell.motion
+    return Recording(
+        times_s=motion.times_s,
+        ego=motion.ego.states,
+        tracks=tuple(_track(one) for one in motion.others if one.source in _SEEN),
+    )
+
+
+def _track(movement: Movement) -> Track:
+    agent = movement.agent
+    states = np.where(movement.is_present[:, None], movement.states, np.nan)
+    return Track(
+        agent_id=agent.id,
+        type=agent.type.value,
+        length_m=agent.length_m,
+        width_m=agent.width_m,
+        states=states,
+    )
+
+
+def _text(document: dict[str, Any]) -> bytes:
+    return (json.dumps(document, indent=1, ensure_ascii=False) + "\n").encode()

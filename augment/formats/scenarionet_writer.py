@@ -1,0 +1,265 @@
+"""Scenarios as ScenarioNet's dictionaries, one pickle each, with a data set's two index files.
+
+The pickle carries numpy's names of before its version 2, so that older stacks read it too; writing
+it imports and runs nothing of theirs. Frame: the ego frame of t0. Sources: the published
+description of the format in MetaDrive's `scenario_description.py` and `type.py`.
+"""
+
+from __future__ import annotations
+
+import pickle
+import pickletools
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from augment.formats.bounds import bounds_of
+from augment.formats.movement_losses import report_motion
+from augment.formats.writing import Cell, Report, Written, write_each
+from augment.scene.entities import (
+    AgentType,
+    Area,
+    AreaKind,
+    Lane,
+    LaneConnector,
+    Scene,
+    TrafficLight,
+    TurnType,
+)
+from augment.scene.lane_graph import LaneGraph, Way
+from augment.scene.motion import Movement
+
+VERSION = "scenario-arena 1"
+DATASET = "scenario_arena"
+SUMMARY_FILE, MAPPING_FILE = "dataset_summary.pkl", "dataset_mapping.pkl"
+
+_TYPES = {
+    AgentType.EGO_VEHICLE: "VEHICLE",
+    AgentType.VEHICLE: "VEHICLE",
+    AgentType.BUS: "VEHICLE",
+    AgentType.BICYCLE: "CYCLIST",
+    AgentType.PEDESTRIAN: "PEDESTRIAN",
+    AgentType.TRAFFIC_CONE: "TRAFFIC_CONE",
+    AgentType.BARRIER: "TRAFFIC_BARRIER",
+    AgentType.CONSTRUCTION_SIGN: "TRAFFIC_OBJECT",
+    AgentType.GENERIC_OBJECT: "TRAFFIC_OBJECT",
+}
+_SAME_TYPE = {
+    AgentType.VEHICLE, AgentType.BICYCLE, AgentType.PEDESTRIAN, AgentType.TRAFFIC_CONE,
+    AgentType.BARRIER, AgentType.GENERIC_OBJECT,
+}  # fmt: skip
+_LIGHTS = {
+    TrafficLight.GREEN: "TRAFFIC_LIGHT_GREEN",
+    TrafficLight.YELLOW: "TRAFFIC_LIGHT_YELLOW",
+    TrafficLight.RED: "TRAFFIC_LIGHT_RED",
+    TrafficLight.UNKNOWN: "TRAFFIC_LIGHT_UNKNOWN",
+}
+_AREAS = {AreaKind.CROSSWALK: "CROSSWALK", AreaKind.WALKWAY: "ROAD_EDGE_SIDEWALK"}
+_HEIGHTS_M = {
+    AgentType.PEDESTRIAN: 1.789, AgentType.BUS: 3.0, AgentType.TRAFFIC_CONE: 0.5,
+    AgentType.BARRIER: 1.0,
+}  # fmt: skip
+_HEIGHT_M = 1.777
+_OLD_NAMES = {
+    "numpy._core.multiarray _reconstruct": "numpy.core.multiarray _reconstruct",
+    "numpy._core.multiarray scalar": "numpy.core.multiarray scalar",
+}
+
+
+def write(cells: Sequence[Cell]) -> Written:
+    """A data set: a file for each cell, the summary and the mapping."""
+    summaries: dict[str, dict[str, Any]] = {}
+
+    def write_one(cell: Cell, report: Report) -> dict[str, bytes]:
+        document = describe(cell, report)
+        name = f"sd_{DATASET}_1_{cell.stem}.pkl"
+        summaries[name] = document["metadata"]
+        return {name: pickled(document)}
+
+    made = write_each(cells, write_one)
+    index = {
+        SUMMARY_FILE: pickled(summaries),
+        MAPPING_FILE: pickled(dict.fromkeys(summaries, "")),
+    }
+    return replace(made, files=made.files | index)
+
+
+def describe(cell: Cell, report: Report) -> dict[str, Any]:
+    """One scenario as ScenarioNet's dictionary."""
+    scene, motion = cell.after, cell.motion
+    steps = len(motion.times_s)
+    _report(cell, report)
+    tracks = {one.agent.id: _track(one) for one in (motion.ego, *motion.others)}
+    return {
+        "id": cell.stem,
+        "version": VERSION,
+        "length": steps,
+        "metadata": {
+            "id": cell.stem,
+            "scenario_id": cell.stem,
+            "dataset": DATASET,
+            "metadrive_processed": False,
+            "coordinate": "right-handed",
+            "ts": motion.times_s.copy(),
+            "sample_rate": motion.step_s,
+            "sdc_id": scene.ego.id,
+            "source_file": scene.name,
+            "current_time_index": 0,
+            "tracks_to_predict": {},
+            "traffic_side": scene.traffic_side.value,
+            "provenance": scene.provenance,
+            "object_summary": {name: _summary(name, track) for name, track in tracks.items()},
+            "number_summary": {"num_objects": len(tracks)},
+        },
+        "tracks": tracks,
+        "dynamic_map_states": {
+            connector.id: _light(connector, steps)
+            for connector in scene.connectors
+            if connector.traffic_light is not TrafficLight.NONE
+        },
+        "map_features": _map_features(scene),
+    }
+
+
+def pickled(document: object) -> bytes:
+    """The pickle, its names those of numpy 1."""
+    # Protocol 3 writes a name as a line of text, so that one can be put in place of another.
+    packed = pickle.dumps(document, protocol=3)
+    parts, done = [], 0
+    for code, name, start in pickletools.genops(packed):
+        if start is None or code.name != "GLOBAL" or name not in _OLD_NAMES:
+            continue
+        module, _, attribute = _OLD_NAMES[name].partition(" ")
+        parts += [packed[done:start], f"c{module}\n{attribute}\n".encode()]
+        done = start + len(f"c{name}\n")
+    return b"".join([*parts, packed[done:]])
+
+
+# Private
+
+
+def _report(cell: Cell, report: Report) -> None:
+    scene = cell.after
+    report_motion(cell, report)
+    for kind in AgentType:
+        if kind in _SAME_TYPE or kind is AgentType.EGO_VEHICLE:
+            continue
+        names = [one.agent.id for one in cell.motion.others if one.agent.type is kind]
+        report.lose_of(names, f"a {kind} becomes a {_TYPES[kind]}")
+    for area_kind in AreaKind:
+        if area_kind not in _AREAS:
+            names = [area.id for area in scene.areas if area.kind is area_kind]
+            report.lose_of(names, f"left out: there is no type for a {area_kind} area")
+    names = [agent.id for agent in scene.agents if agent.walk_to_m is not None]
+    report.lose_of(names, "the walk is written as motion alone, not as its end point")
+    names = [one.id for one in scene.connectors if one.turn_type is TurnType.U_TURN]
+    report.lose_of(names, "the turn type is not said, only its line")
+    if scene.traffic_side.value == "left":
+        report.lose("that people drive on the left stands in the metadata, where nobody looks")
+    report.lose("heights are not known; those usual for the types are written")
+    report.lose("the origin in the source's own frame is not written; the ego's place at t0 is 0")
+
+
+def _track(movement: Movement) -> dict[str, Any]:
+    agent, present = movement.agent, movement.is_present
+    states = np.where(present[:, None], movement.states, 0.0)
+    steps = len(states)
+    z = np.zeros((steps, 1))
+    way = np.column_stack([np.cos(states[:, 2]), np.sin(states[:, 2])])
+    height_m = _HEIGHTS_M.get(agent.type, _HEIGHT_M)
+    return {
+        "type": _TYPES[agent.type],
+        "state": {
+            "position": np.hstack([states[:, :2], z]),
+            "heading": states[:, 2].copy(),
+            "velocity": states[:, 3:] * way,
+            "valid": present,
+            "length": np.where(present, agent.length_m, 0.0),
+            "width": np.where(present, agent.width_m, 0.0),
+            "height": np.where(present, height_m, 0.0),
+        },
+        "metadata": {
+            "type": _TYPES[agent.type],
+            "track_length": steps,
+            "object_id": agent.id,
+            "original_id": agent.id,
+            "dataset": DATASET,
+            "motion": movement.source.value,
+        },
+    }
+
+
+def _summary(name: str, track: dict[str, Any]) -> dict[str, Any]:
+    valid = track["state"]["valid"]
+    seen = track["state"]["position"][valid, :2]
+    first = int(valid.argmax()) if valid.any() else len(valid)
+    gone = np.flatnonzero(~valid[first:])
+    return {
+        "type": track["type"],
+        "object_id": name,
+        "track_length": len(valid),
+        "moving_distance": float(np.hypot(*np.diff(seen, axis=0).T).sum()),
+        "valid_length": int(valid.sum()),
+        "continuous_valid_length": int(gone[0]) if len(gone) else len(valid) - first,
+    }
+
+
+def _light(connector: LaneConnector, steps: int) -> dict[str, Any]:
+    start = connector.centerline.points_m[0]
+    return {
+        "type": "TRAFFIC_LIGHT",
+        "state": {"object_state": [_LIGHTS[connector.traffic_light]] * steps},
+        "lane": connector.id,
+        "stop_point": np.array([*start, 0.0]),
+        "metadata": {
+            "type": "TRAFFIC_LIGHT",
+            "track_length": steps,
+            "object_id": connector.id,
+            "dataset": DATASET,
+        },
+    }
+
+
+def _map_features(scene: Scene) -> dict[str, dict[str, Any]]:
+    graph = LaneGraph(scene)
+    found: dict[str, dict[str, Any]] = {}
+    ways: list[Way] = [*scene.lanes, *scene.connectors]
+    for way in ways:
+        is_lane = isinstance(way, Lane)
+        feature: dict[str, Any] = {
+            "type": "LANE_SURFACE_STREET" if is_lane else "LANE_SURFACE_UNSTRUCTURE",
+            "polyline": _raised(way.centerline.points_m),
+            "polygon": _polygon(way),
+            "width": np.tile([way.width_m / 2.0] * 2, (len(way.centerline.points_m), 1)),
+            "entry_lanes": list(graph.predecessors(way.id)),
+            "exit_lanes": list(graph.successors(way.id)),
+            "left_neighbor": _named(way.left_neighbor) if isinstance(way, Lane) else [],
+            "right_neighbor": _named(way.right_neighbor) if isinstance(way, Lane) else [],
+        }
+        if way.speed_limit_mps is not None:
+            feature["speed_limit_kmh"] = way.speed_limit_mps * 3.6
+        found[way.id] = feature
+    for area in scene.areas:
+        if area.kind in _AREAS:
+            found[area.id] = {"type": _AREAS[area.kind], "polygon": _ring(area)}
+    return found
+
+
+def _named(name: str | None) -> list[str]:
+    return [] if name is None else [name]
+
+
+def _raised(points_m: NDArray[np.float64]) -> NDArray[np.float64]:
+    return np.column_stack([points_m, np.zeros(len(points_m))])
+
+
+def _ring(area: Area) -> NDArray[np.float64]:
+    return np.array([*area.boundary_m], dtype=np.float64)
+
+
+def _polygon(way: Way) -> NDArray[np.float64]:
+    left, right = bounds_of(way)
+    return np.vstack([left.points_m, right.points_m[::-1]])

@@ -1,0 +1,139 @@
+"""What every writer of scenarios takes and gives: cells in; files and a line for each loss out.
+
+Frame of a cell: the ego frame of its scene.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from datetime import date
+from functools import cached_property
+
+from augment.scene.catalogue import ScenarioType
+from augment.scene.entities import Scene
+from augment.scene.modification import Modification, apply
+from augment.scene.motion import Motion, motion_of
+from augment.scene.recording import Recording
+
+
+@dataclass(frozen=True, kw_only=True)
+class Cell:
+    """One modification to be written.
+
+    Attributes:
+        name: What a person calls it, for a file's comments and the report.
+        scene: Before the change, without the recorded traffic unless that is kept.
+        keeps_traffic: Whether the recorded vehicles stay.
+        stem: The name of its files, without an ending.
+        made_on: When the change was made, for formats that ask for a date.
+        recording: What was recorded after t0, None where nothing was.
+        drive: A simulated drive, which then says what everybody does instead of the recording.
+    """
+
+    name: str
+    scene: Scene
+    type: ScenarioType
+    modification: Modification
+    keeps_traffic: bool = False
+    stem: str = "scenario"
+    made_on: date = date(1970, 1, 1)
+    recording: Recording | None = None
+    drive: Motion | None = None
+
+    @cached_property
+    def after(self) -> Scene:
+        """The scene after the change.
+
+        Raises:
+            InvalidModification: The change does not fit the scene.
+        """
+        return apply(self.scene, self.modification)
+
+    @cached_property
+    def motion(self) -> Motion:
+        """What everybody does after t0."""
+        if self.drive is not None:
+            return self.drive
+        moved = [agent.id for agent in self.modification.moved]
+        return motion_of(
+            self.after,
+            recording=self.recording,
+            replaced=frozenset([*moved, *self.modification.removed]),
+            with_later=self.keeps_traffic,
+        )
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Loss:
+    """Something that a format can't say, or that had to be made up.
+
+    Attributes:
+        changes_scene: Whether other things stand in the receiver's scene than in ours, or do
+            something else; not so for sizes and the pace of a walk.
+    """
+
+    cell: str
+    text: str
+    changes_scene: bool = False
+
+    def __str__(self) -> str:
+        return f"{self.cell}: {self.text}"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Written:
+    """What a writer made.
+
+    Attributes:
+        files: Their bytes by name.
+        losses: One line for each thing that the files don't say as the cells do.
+        refused: One line for each cell that can't be said at all, and has no file.
+    """
+
+    files: dict[str, bytes]
+    losses: tuple[Loss, ...]
+    refused: tuple[Loss, ...] = ()
+
+
+Writer = Callable[[Sequence[Cell]], Written]
+"""Writes cells, all or those that can be said. The same cells always give the same bytes."""
+
+
+class Report:
+    """Gathers the losses of one cell while it is written."""
+
+    def __init__(self, cell: Cell) -> None:
+        self._name = cell.name
+        self.losses: list[Loss] = []
+
+    def lose(self, text: str, *, changes_scene: bool = False) -> None:
+        """One line more."""
+        self.losses.append(Loss(cell=self._name, text=text, changes_scene=changes_scene))
+
+    def lose_of(self, names: Sequence[str], text: str, *, changes_scene: bool = False) -> None:
+        """One line for all of these; none where there are none."""
+        if names:
+            self.lose(f"{', '.join(names)}: {text}", changes_scene=changes_scene)
+
+
+class CannotExpress(Exception):
+    """A cell can't be said in a format; raised and caught inside a writer, never passed on."""
+
+
+def write_each(
+    cells: Sequence[Cell], write_one: Callable[[Cell, Report], dict[str, bytes]]
+) -> Written:
+    """The cells one by one; what can't be expressed is refused by its name and reason."""
+    files: dict[str, bytes] = {}
+    losses: list[Loss] = []
+    refused: list[Loss] = []
+    for cell in cells:
+        report = Report(cell)
+        try:
+            files |= write_one(cell, report)
+        except CannotExpress as reason:
+            refused.append(Loss(cell=cell.name, text=str(reason), changes_scene=True))
+        else:
+            losses += report.losses
+    return Written(files=files, losses=tuple(losses), refused=tuple(refused))

@@ -1,0 +1,254 @@
+"""Who is where when: what a scenario's agents do after t0, and how that is known.
+
+Frame: ego frame of t0. T steps.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+from enum import StrEnum
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from augment.geometry.angles import wrap
+from augment.scene.entities import AgentType, Scene, TrafficAgent
+from augment.scene.lane_graph import LaneGraph
+from augment.scene.recording import Recording, Track
+
+FloatArray = NDArray[np.float64]
+
+STEP_S: Final = 0.1
+LENGTH_S: Final = 15.0
+"""So far a scenario without a recording goes on: as long as the paper drives."""
+WALK_S: Final = 15.0
+"""A walk without a pace of its own takes this long, as interPlan's do."""
+SETS_OUT_WITHIN_M: Final = 50.0
+"""People with a walk set out once the ego is this near to their start."""
+
+
+class MotionSource(StrEnum):
+    """How one knows what an agent does after t0."""
+
+    RECORDED = "recorded"
+    SIMULATED = "simulated"
+    WALK = "walk"
+    HELD_SPEED = "held speed"
+    STANDING = "standing"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Movement:
+    """One agent over time.
+
+    Attributes:
+        agent: As it is at t0, or where it is first seen.
+        states: (T, 4): x_m, y_m, heading_rad, speed_mps of the box centre; NaN where it is not.
+    """
+
+    agent: TrafficAgent
+    source: MotionSource
+    states: FloatArray
+
+    @property
+    def is_present(self) -> NDArray[np.bool_]:
+        """At which steps it is there, (T,)."""
+        return np.asarray(~np.isnan(self.states).any(axis=1))
+
+    @property
+    def stands(self) -> bool:
+        """Whether it is there from t0 to the end and never moves."""
+        return self.source is MotionSource.STANDING
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Motion:
+    """Everybody over time.
+
+    Attributes:
+        times_s: (T,) seconds since t0, evenly spaced, the first is 0.
+        others: The scene's agents in its order, then who appears later.
+    """
+
+    times_s: FloatArray
+    ego: Movement
+    others: tuple[Movement, ...]
+
+    @property
+    def step_s(self) -> float:
+        """The time between two steps."""
+        return float(self.times_s[1] - self.times_s[0])
+
+
+def motion_of(
+    scene: Scene,
+    *,
+    recording: Recording | None = None,
+    replaced: frozenset[str] = frozenset(),
+    with_later: bool = False,
+) -> Motion:
+    """What is known of the scene's agents after t0, and what has to be assumed.
+
+    Who was recorded does what was recorded; who has a walk goes it; who moves otherwise holds the
+    speed of t0 along its lane, or straight on where there is none; all others stand.
+
+    Args:
+        scene: After its change.
+        recording: What was recorded after t0 in the scene before its change.
+        replaced: Ids whose tracks count no longer: moved, removed.
+        with_later: Whether who appears after t0 is part of it.
+    """
+    times_s = _times(recording)
+    graph = LaneGraph(scene)
+    if recording is None:
+        ego = _assumed(scene.ego, times_s, graph, stays=True)
+    else:
+        ego = _recorded(scene.ego, recording.ego, recording, times_s)
+    tracks = {} if recording is None else {track.agent_id: track for track in recording.tracks}
+    others = []
+    for agent in scene.agents:
+        track = tracks.get(agent.id)
+        if agent.walk_to_m is not None:
+            others.append(_walk(agent, times_s, ego))
+        elif recording is not None and track is not None and agent.id not in replaced:
+            others.append(_recorded(agent, track.states, recording, times_s))
+        else:
+            others.append(_assumed(agent, times_s, graph))
+    if recording is not None and with_later:
+        taken = {agent.id for agent in scene.everyone}
+        others += _later(recording, times_s, taken, replaced)
+    return Motion(times_s=times_s, ego=ego, others=tuple(others))
+
+
+# Private
+
+
+def _times(recording: Recording | None) -> FloatArray:
+    if recording is None or len(recording.times_s) < 2:
+        last_s = LENGTH_S
+    else:
+        last_s = float(recording.times_s[-1])
+    return np.asarray(np.arange(round(last_s / STEP_S) + 1) * STEP_S, dtype=np.float64)
+
+
+def _recorded(
+    agent: TrafficAgent, states: FloatArray, recording: Recording, times_s: FloatArray
+) -> Movement:
+    """A track, read at even times; its first state is that of the scene, to the last digit."""
+    read = _read_at(states, recording.times_s, times_s)
+    read[0] = _state(agent)
+    return Movement(agent=agent, source=MotionSource.RECORDED, states=read)
+
+
+def _read_at(states: FloatArray, recorded_s: FloatArray, times_s: FloatArray) -> FloatArray:
+    """States between two recorded ones; NaN beside a step where nothing was seen."""
+    if len(recorded_s) < 2:
+        return np.vstack([states, np.full((len(times_s) - len(states), 4), np.nan)])
+    after = np.clip(np.searchsorted(recorded_s, times_s - 1e-9), 1, len(recorded_s) - 1)
+    before = after - 1
+    share = (times_s - recorded_s[before]) / (recorded_s[after] - recorded_s[before])
+    share = np.clip(share, 0.0, 1.0)[:, None]
+    # A share of nothing of what was not seen is nothing, not NaN.
+    low, high = states[before], states[after]
+    step = high - low
+    step[:, 2] = _wrapped(step[:, 2])
+    read = np.where(share < 1e-6, low, np.where(share > 1.0 - 1e-6, high, low + share * step))
+    read[:, 2] = _wrapped(read[:, 2])
+    return np.asarray(read, dtype=np.float64)
+
+
+def _later(
+    recording: Recording, times_s: FloatArray, taken: set[str], replaced: frozenset[str]
+) -> Iterator[Movement]:
+    for track in recording.tracks:
+        if track.agent_id in taken or track.agent_id in replaced:
+            continue
+        states = _read_at(track.states, recording.times_s, times_s)
+        seen = np.flatnonzero(~np.isnan(states).any(axis=1))
+        if len(seen):
+            agent = _as_agent(track, states[seen[0]])
+            yield Movement(agent=agent, source=MotionSource.RECORDED, states=states)
+
+
+def _as_agent(track: Track, state: FloatArray) -> TrafficAgent:
+    x_m, y_m, heading_rad, speed_mps = (float(value) for value in state)
+    return TrafficAgent(
+        id=track.agent_id,
+        type=AgentType(track.type),
+        x_m=x_m,
+        y_m=y_m,
+        heading_rad=heading_rad,
+        width_m=track.width_m,
+        length_m=track.length_m,
+        speed_mps=speed_mps,
+    )
+
+
+def _walk(agent: TrafficAgent, times_s: FloatArray, ego: Movement) -> Movement:
+    """From start to end, from the moment on at which the ego is near; before and after, standing.
+
+    If the ego never comes near, nobody sets out.
+    """
+    assert agent.walk_to_m is not None
+    way = np.array(agent.walk_to_m) - (agent.x_m, agent.y_m)
+    length_m = float(np.hypot(*way))
+    states = np.tile(_state(agent), (len(times_s), 1))
+    states[:, 3] = 0.0
+    gap = np.hypot(ego.states[:, 0] - agent.x_m, ego.states[:, 1] - agent.y_m)
+    near = np.flatnonzero(gap <= SETS_OUT_WITHIN_M)
+    if length_m < 1e-6 or not len(near):
+        return Movement(agent=agent, source=MotionSource.STANDING, states=states)
+    pace_mps = walking_pace_mps(agent)
+    walked = np.clip((times_s - times_s[near[0]]) * pace_mps / length_m, 0.0, 1.0)
+    states[:, :2] += walked[:, None] * way
+    moves = (times_s >= times_s[near[0]]) & (walked < 1.0)
+    states[moves, 2] = math.atan2(way[1], way[0])
+    states[walked >= 1.0, 2] = math.atan2(way[1], way[0])
+    states[moves, 3] = pace_mps
+    states[0, 2] = agent.heading_rad
+    return Movement(agent=agent, source=MotionSource.WALK, states=states)
+
+
+def walking_pace_mps(agent: TrafficAgent) -> float:
+    """The pace of an agent with a walk: its own speed, or the whole way in `WALK_S`."""
+    if agent.walk_to_m is None or agent.speed_mps > 0.0:
+        return agent.speed_mps
+    return math.dist((agent.x_m, agent.y_m), agent.walk_to_m) / WALK_S
+
+
+def _assumed(
+    agent: TrafficAgent, times_s: FloatArray, graph: LaneGraph, *, stays: bool = False
+) -> Movement:
+    """Standing, or at the speed of t0 along the lane; past the map it is gone, or it `stays`."""
+    states = np.tile(_state(agent), (len(times_s), 1))
+    if agent.speed_mps <= 0.0:
+        return Movement(agent=agent, source=MotionSource.STANDING, states=states)
+    way = times_s * agent.speed_mps
+    if agent.type is AgentType.PEDESTRIAN or agent.lane_id not in graph.ways:
+        states[:, 0] += way * math.cos(agent.heading_rad)
+        states[:, 1] += way * math.sin(agent.heading_rad)
+        return Movement(agent=agent, source=MotionSource.HELD_SPEED, states=states)
+    assert agent.lane_id is not None
+    line = graph.way(agent.lane_id).centerline
+    here = line.project(agent.x_m, agent.y_m)
+    askew = wrap(agent.heading_rad - line.heading_at(here.s_m))
+    for step in range(1, len(times_s)):
+        place = graph.along(agent.lane_id, here.s_m, float(way[step]), here.d_m)
+        if place is None:
+            states[step:] = [*states[step - 1, :3], 0.0] if stays else np.nan
+            break
+        heading = wrap(place.pose.heading_rad + askew)
+        states[step, :3] = place.pose.x_m, place.pose.y_m, heading
+    return Movement(agent=agent, source=MotionSource.HELD_SPEED, states=states)
+
+
+def _wrapped(angles_rad: FloatArray) -> FloatArray:
+    """Angles in (-pi, pi]."""
+    return np.asarray(np.pi - np.mod(np.pi - angles_rad, 2.0 * np.pi), dtype=np.float64)
+
+
+def _state(agent: TrafficAgent) -> tuple[float, float, float, float]:
+    return agent.x_m, agent.y_m, agent.heading_rad, agent.speed_mps

@@ -1,0 +1,140 @@
+"""A job goes out as scenarios in one zip that says what it is."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import zipfile
+from io import StringIO
+from pathlib import Path
+from typing import Any
+
+import pytest
+from django.core.management import call_command
+from django.core.management.base import CommandError
+
+from augment.formats.writers import WRITERS
+from augment.models import Augmentation, BaseScene, Contestant, GenerationJob
+from augment.scene.catalogue import ScenarioType
+from augment.scene.codec import modification_to_document, scene_from_document, scene_to_document
+from augment.scene.modification import Modification
+from augment.services.scenarios.pictures import store
+from augment.services.scenarios.scenes import add_scenario
+from tests.jobs import rows
+from tests.scenes import junction, pedestrian, vehicle
+from tests.web.cast import png
+
+pytestmark = pytest.mark.django_db
+
+ADDED = Modification(
+    added=(vehicle("Agent2", 12.0, 0.5), pedestrian("Agent3", 30.0, -5.0, (30.0, 6.0)))
+)
+
+
+@pytest.fixture
+def job() -> GenerationJob:
+    """One modification by the rule placer, and nothing from a contestant that refused."""
+    BaseScene.objects.create(
+        slug="junction",
+        document=scene_to_document(junction()),
+        source="json",
+        provenance="Recorded somewhere; CC BY-NC-SA 4.0",
+    )
+    scenario = add_scenario(
+        scene="junction", type=ScenarioType.NUDGE.value, instruction="Park a car.", slug="park"
+    )
+    job = GenerationJob.objects.create(name="Round 1")
+    for slug, state, change in (
+        ("rule", "done", modification_to_document(ADDED)),
+        ("shy", "refused", None),
+    ):
+        Augmentation.objects.create(
+            job=job,
+            scenario=scenario,
+            contestant=rows.add_kind(slug, Contestant.Kind.RULE),
+            state=state,
+            modification=change,
+            image=store(png()),
+        )
+    return job
+
+
+def export(*options: str) -> str:
+    err = StringIO()
+    call_command("export", "scenarios", "Round 1", *options, stdout=StringIO(), stderr=err)
+    return err.getvalue()
+
+
+def manifest_of(archive: zipfile.ZipFile) -> dict[str, Any]:
+    made: dict[str, Any] = json.loads(archive.read("manifest.json"))
+    return made
+
+
+@pytest.mark.parametrize("form", sorted(WRITERS))
+def test_every_format_comes_as_one_zip_with_its_manifest(
+    form: str, job: GenerationJob, tmp_path: Path
+) -> None:
+    said = export("--format", form, "--out", str(tmp_path / "new" / "folder"))
+    (file,) = (tmp_path / "new" / "folder").iterdir()
+    assert file.name == f"round-1-{form}-non-commercial.zip"
+    with zipfile.ZipFile(file) as archive:
+        manifest = manifest_of(archive)
+        for name, entry in manifest["files"].items():
+            assert hashlib.sha256(archive.read(name)).hexdigest() == entry["sha256"]
+        assert set(archive.namelist()) == {*manifest["files"], "manifest.json"}
+        assert b"commercial" in archive.read("WARNING.txt")
+    assert manifest["scenarios_in"] == form
+    assert manifest["sources"][0]["is_non_commercial"] is True
+    assert manifest["missing"][0]["text"] == "there is no modification: refused"
+    assert not manifest["refused"]
+    assert all(loss["text"] in said for loss in manifest["lost"])
+    assert "Warning: Made from data that must not be used commercially: junction" in said
+
+
+def test_the_same_job_gives_the_same_bytes(job: GenerationJob, tmp_path: Path) -> None:
+    for name in ("one.zip", "two.zip"):
+        export("--format", "scenarionet", "--out", str(tmp_path / name))
+    assert (tmp_path / "one.zip").read_bytes() == (tmp_path / "two.zip").read_bytes()
+
+
+def test_the_own_format_comes_back_exactly(job: GenerationJob, tmp_path: Path) -> None:
+    export("--format", "json", "--out", str(tmp_path / "own.zip"))
+    with zipfile.ZipFile(tmp_path / "own.zip") as archive:
+        before = scene_from_document(json.loads(archive.read("park--rule.before.json")))
+        after = scene_from_document(json.loads(archive.read("park--rule.scene.json")))
+        assert manifest_of(archive)["lost"] == []
+    assert before == junction()
+    assert after.agents == ADDED.added
+
+
+def test_own_work_and_unknown_licences_are_told_apart(job: GenerationJob, tmp_path: Path) -> None:
+    BaseScene.objects.update(provenance="Authored by this project; same licence as the project.")
+    assert "Warning" not in export("--format", "json", "--out", str(tmp_path / "own.zip"))
+    BaseScene.objects.update(provenance="found on a disk")
+    said = export("--format", "json", "--out", str(tmp_path / "own.zip"))
+    assert "Warning: The licence of these sources is not known: junction." in said
+
+
+def test_strict_writes_nothing_once_something_would_change(
+    job: GenerationJob, tmp_path: Path
+) -> None:
+    with pytest.raises(CommandError, match="there is no modification: refused"):
+        export("--format", "scenarionet", "--strict", "--out", str(tmp_path / "x.zip"))
+    assert not list(tmp_path.glob("*.zip"))
+
+
+@pytest.mark.parametrize(
+    ("options", "said"),
+    [
+        (("--format", "xodr"), "Unknown format 'xodr'. Known: "),
+        (("--format", "json", "--contestant", "nobody"), "Unknown contestant 'nobody'"),
+        (("--format", "json", "--contestant", "shy"), "no modification that could be written"),
+        (("--format", "json", "--motion", "idm"), "Unknown motion 'idm'. Known: recorded"),
+    ],
+)
+def test_what_can_not_be_asked_for_is_named(
+    options: tuple[str, ...], said: str, job: GenerationJob, tmp_path: Path
+) -> None:
+    with pytest.raises(CommandError, match=said):
+        export(*options, "--out", str(tmp_path / "x.zip"))
+    assert not list(tmp_path.glob("*.zip"))

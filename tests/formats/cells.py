@@ -1,0 +1,95 @@
+"""Cells for the writers' tests: a small cast that has one of everything."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from augment.formats.writing import Cell
+from augment.geometry.frames import Pose
+from augment.scene.catalogue import ScenarioType
+from augment.scene.entities import AgentType, Area, AreaKind, Origin, Scene, TrafficSide
+from augment.scene.modification import Modification
+from augment.scene.recording import Recording, Track
+from tests.scenes import cone, junction, pedestrian, scene, vehicle
+
+OF_EACH_TYPE = tuple(
+    replace(vehicle(f"Agent{number}", 10.0 * number, 3.5, 3.0), type=kind, speed_mps=0.0)
+    for number, kind in enumerate(
+        (kind for kind in AgentType if kind is not AgentType.EGO_VEHICLE), start=20
+    )
+)
+
+
+def cell(before: Scene | None = None, **changes: Any) -> Cell:
+    """A street with a parked car, two cones and somebody who crosses."""
+    added = changes.pop(
+        "added",
+        (
+            vehicle("Agent2", 30.25, 0.5, 0.1),
+            cone("Agent3", 20.0, -1.0),
+            cone("Agent4", 22.5, -1.2),
+            pedestrian("Agent5", 70.0, -4.0, (70.0, 8.0)),
+        ),
+    )
+    given: dict[str, Any] = {
+        "name": "street by rule",
+        "stem": "street--rule",
+        "scene": scene() if before is None else before,
+        "type": ScenarioType.NUDGE,
+        "modification": Modification(added=added),
+    }
+    return Cell(**(given | changes))
+
+
+def crossing() -> Scene:
+    """A junction, driven on the left, with lights, a crosswalk and a car park, far from 0, 0."""
+    return replace(
+        junction(),
+        traffic_side=TrafficSide.LEFT,
+        origin=Origin(frame="UTM 48N", pose=Pose(x_m=365000.5, y_m=143000.25, heading_rad=1.2)),
+        areas=(
+            Area(
+                id="Area1",
+                kind=AreaKind.CROSSWALK,
+                boundary_m=((16.0, -4.0), (18.0, -4.0), (18.0, 4.0), (16.0, 4.0)),
+            ),
+            Area(
+                id="Area2",
+                kind=AreaKind.CARPARK,
+                boundary_m=((40.0, 3.0), (60.0, 3.0), (60.0, 9.0)),
+            ),
+            Area(
+                id="Area3",
+                kind=AreaKind.WALKWAY,
+                boundary_m=((0.0, 3.0), (20.0, 3.0), (20.0, 5.0), (8.0, 5.5), (0.0, 5.0)),
+            ),
+        ),
+    )
+
+
+def recorded_street() -> tuple[Scene, Recording]:
+    """The ego drives on at 8 m/s; one car drives ahead and is lost, another comes after 1 s."""
+    ahead = replace(vehicle("Agent2", 20.0, 0.0), speed_mps=10.0, lane_id="Lane1")
+    times = np.asarray(np.arange(31) * 0.1, dtype=np.float64)
+    flat = np.zeros(31)
+
+    def drives(x_m: float, y_m: float, heading_rad: float, speed_mps: float) -> Any:
+        way = speed_mps * times * np.cos(heading_rad)
+        return np.column_stack([x_m + way, flat + y_m, flat + heading_rad, flat + speed_mps])
+
+    gone, late = drives(20.0, 0.0, 0.0, 10.0), drives(80.0, 3.5, np.pi, 6.0)
+    gone[20:] = np.nan
+    late[:10] = np.nan
+    size = {"length_m": 4.8, "width_m": 2.0, "type": "VEHICLE"}
+    recording = Recording(
+        times_s=times,
+        ego=drives(0.0, 0.0, 0.0, 8.0),
+        tracks=(
+            Track(agent_id="Agent2", states=gone, **size),  # type: ignore[arg-type]
+            Track(agent_id="Agent3", states=late, **size),  # type: ignore[arg-type]
+        ),
+    )
+    return scene(agents=(ahead,)), recording

@@ -1,0 +1,143 @@
+"""Scenarios go out as CommonRoad XML, which commonroad-io loads and its schema allows."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+from xml.etree import ElementTree as ET
+
+import pytest
+
+from augment.formats.commonroad_writer import write
+from augment.formats.writing import Cell
+from augment.geometry.polyline import Polyline
+from augment.scene.entities import Lane, LaneConnector, TurnType
+from tests.formats.cells import OF_EACH_TYPE, cell, crossing, recorded_street
+from tests.formats.receivers import told_by
+from tests.recorded import recorded
+
+NAME = "street--rule.xml"
+
+
+def document(given: Cell) -> ET.Element:
+    return ET.fromstring(write([given]).files[NAME])
+
+
+def lines(given: Cell) -> list[str]:
+    return [str(loss) for loss in write([given]).losses]
+
+
+def test_commonroad_io_loads_every_file_and_the_schema_allows_it(
+    realdata: Path, tmp_path: Path
+) -> None:
+    log, seen = recorded(realdata)
+    before, recording = recorded_street()
+    cells = {
+        "street": cell(),
+        "crossing": cell(crossing(), added=OF_EACH_TYPE),
+        "recorded": cell(before, recording=recording, keeps_traffic=True, added=()),
+        "log": cell(log, recording=seen, keeps_traffic=True, added=()),
+    }
+    files = []
+    for name, given in cells.items():
+        files.append(tmp_path / f"{name}.xml")
+        files[-1].write_bytes(write([given]).files[NAME])
+    told = dict(zip(cells, told_by("read_commonroad.py", *files), strict=True))
+    assert {name: one["faults"] for name, one in told.items()} == {key: [] for key in cells}
+    check_street(told["street"])
+    check_crossing(told["crossing"])
+    assert [one["last"] for one in told["recorded"]["dynamic"]] == [19]
+    assert len(told["log"]["lanelets"]) >= len(log.lanes) + len(log.connectors)
+
+
+def check_street(told: dict[str, Any]) -> None:
+    assert [one["type"] for one in told["static"]] == ["parkedVehicle"] + ["constructionZone"] * 2
+    assert told["static"][0]["position"] == pytest.approx([30.25, 0.5])
+    assert told["static"][0]["orientation"] == pytest.approx(0.1)
+    assert told["static"][0]["size"] == [4.8, 2.0]
+    assert [one["type"] for one in told["dynamic"]] == ["pedestrian"]
+    assert told["limits"] == [13.9]
+    assert told["starts"] == [[0.0, 0.0, 8.0]]
+
+
+def check_crossing(told: dict[str, Any]) -> None:
+    """Lanes are 1 to 3, connectors 4 and 5, the crosswalk comes after signs and lights."""
+    lanelets = told["lanelets"]
+    assert lanelets["1"]["successor"] == [4, 5]
+    assert lanelets["4"]["successor"] == [2]
+    line = Polyline(lanelets["5"]["center"])
+    for x_m, y_m in crossing().connectors[1].centerline.points_m:
+        assert line.project(x_m, y_m).distance_m < 0.01
+    assert sorted(one["type"] for one in lanelets.values())[0] == ["crosswalk"]
+    assert sorted(told["lights"]) == ["green", "red"]
+    assert told["turns"] == [[[5], [4]]]
+
+
+def test_a_recorded_edge_keeps_all_its_points() -> None:
+    left = Polyline([(0.0, 2.0), (30.0, 2.5), (60.0, 2.0)])
+    right = Polyline([(0.0, -2.0), (60.0, -2.0)])
+    lane = Lane(
+        id="Lane1",
+        centerline=Polyline([(0.0, 0.0), (60.0, 0.0)]),
+        width_m=4.2,
+        left_boundary=left,
+        right_boundary=right,
+    )
+    given = cell(replace(crossing(), lanes=(lane,), connectors=()), added=())
+    bound = document(given).find("lanelet/leftBound")
+    assert bound is not None
+    points = [(float(p[0].text or ""), float(p[1].text or "")) for p in bound]
+    assert points == [(0.0, 2.0), (30.0, 2.5), (60.0, 2.0)]
+    assert any("Lane1 by 0.25 m" in line for line in lines(given))
+
+
+def test_what_is_lost_has_a_line() -> None:
+    u_turn = replace(crossing().connectors[1], turn_type=TurnType.U_TURN, from_lane=None)
+    given = cell(
+        replace(crossing(), connectors=(crossing().connectors[0], u_turn)), added=OF_EACH_TYPE
+    )
+    said = lines(given)
+    for words in (
+        "Area2: left out: a carpark area",
+        "Area3: left out: a walkway area",
+        "Connector2: a U-turn becomes",
+        "Connector2: its turn type is not said",
+        "a sign becomes a constructionZone",
+        "obstacle of unknown type",
+        "only start and end are written; its box of 5.176 x 2.297 m",
+        "drive on the left",
+        "names become numbers",
+        "lights stay as they are",
+    ):
+        assert any(words in line for line in said), (words, said)
+
+
+def test_who_appears_later_is_left_out_by_name() -> None:
+    before, recording = recorded_street()
+    given = cell(before, recording=recording, keeps_traffic=True, added=())
+    assert any("Agent3 is left out: it appears after t0" in line for line in lines(given))
+    assert len(document(given).findall("dynamicObstacle")) == 1
+
+
+def test_a_scene_without_lanes_is_refused_and_the_others_are_written() -> None:
+    bare = cell(replace(crossing(), lanes=(), connectors=()), stem="bare", name="bare by rule")
+    made = write([bare, cell()])
+    assert set(made.files) == {NAME}
+    assert [str(one) for one in made.refused] == [
+        "bare by rule: CommonRoad needs at least one lane, and this scene has none"
+    ]
+
+
+def test_connectors_that_share_a_lane_make_one_intersection() -> None:
+    scene = crossing()
+    back = LaneConnector(
+        id="Connector3",
+        from_lane="Lane3",
+        to_lane="Lane2",
+        centerline=Polyline([(28.0, 60.0), (50.0, 60.0), (36.0, 0.0)]),
+        width_m=3.5,
+    )
+    root = document(cell(replace(scene, connectors=(*scene.connectors, back))))
+    (intersection,) = root.findall("intersection")
+    assert len(intersection.findall("incoming")) == 2
