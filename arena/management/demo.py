@@ -31,10 +31,12 @@ from augment.services.endpoints.contestants import (
     ensure_builtin,
     ensure_endpoint,
 )
+from augment.services.judging.driving_scores import scores_of_job
+from augment.services.judging.simulations import NUPLAN, Options, plan_scenario
 from augment.services.running.choosing import ALL, chosen_contestants
 from augment.services.running.jobs import launch, progress
 from augment.services.scenarios.catalogue import load_catalogue
-from augment.tasks import enqueue_job
+from augment.tasks import enqueue_job, enqueue_simulations
 
 PASSWORD = "arena-demo"  # for the demo's own accounts on this computer
 STAND_IN = "stand-in"
@@ -59,6 +61,9 @@ STUCK_S = 600.0
 """A job in which nothing ends for so long is stuck; a slow computer only takes its time."""
 
 A_LINE_EVERY = 8
+DRIVEN_PER_TYPE = 2
+DRIVES_WITHIN_S = 30.0
+"""So long the demo waits for drives at most, once everything else is done."""
 
 
 class DemoFailed(ArenaError):
@@ -134,6 +139,40 @@ def generate(
         reasons = job.augmentations.filter(state=Augmentation.State.FAILED)
         raise DemoFailed("; ".join(sorted(set(reasons.values_list("reason", flat=True)))))
     return job
+
+
+def start_drives(scenarios: list[str]) -> None:
+    """Have a few scenarios driven by the workers, before the change and with the reference."""
+    kinds: dict[str, list[Scenario]] = {}
+    for row in Scenario.objects.filter(slug__in=scenarios).order_by("slug"):
+        kinds.setdefault(row.type, []).append(row)
+    chosen = [row for rows in kinds.values() for row in rows[:DRIVEN_PER_TYPE]]
+    waiting = [pk for row in chosen for pk in plan_scenario(scenario=row, options=Options())]
+    enqueue_simulations(waiting)
+
+
+def driving_lines(job: GenerationJob, look: Callable[[], None]) -> list[str]:
+    """The driving scores of what was driven within `DRIVES_WITHIN_S`; the rest goes on.
+
+    Args:
+        job: Whose scenes are driven.
+        look: Called again and again; it raises where a worker is gone for good.
+    """
+    until = time.monotonic() + DRIVES_WITHIN_S
+    while True:
+        scores = scores_of_job(job, options=Options(), score=NUPLAN)
+        if not scores.under_way or time.monotonic() > until:
+            break
+        look()
+        time.sleep(0.2)
+    lines = ["Mean driving score of PDM-Closed (nuPlan's rules, own simulator):"]
+    for line in scores.lines:
+        if line.mean is not None:
+            lines.append(f"  {line.name:20} {100.0 * line.mean:5.1f} % of {line.drives} drives")
+    if scores.under_way:
+        lines.append(f"  {scores.under_way} more drives go on while the demo is served.")
+    lines += [f"  Failed: {reason} ({number})" for reason, number in scores.failures]
+    return lines
 
 
 def vote_and_rate(scenarios: list[str], say: Callable[[str], None], folder: Path) -> DemoTable:

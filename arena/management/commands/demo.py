@@ -64,19 +64,26 @@ class Command(TerminalCommand):
         with supervisor.signals():
             try:
                 supervisor.start()
-                demo.generate(scenarios, self.stdout.write, partial(_look_at, supervisor))
+                look = partial(_look_at, supervisor)
+                job = demo.generate(scenarios, self.stdout.write, look)
+                demo.start_drives(scenarios)
                 folder = settings.VAR_DIR / "demo"
                 board = demo.vote_and_rate(scenarios, self.stdout.write, folder)
-                self._show(board, web, time.monotonic() - started, serve=serve)
+                drives = demo.driving_lines(job, look)
+                self._show(board, drives, web, time.monotonic() - started, serve=serve)
                 if serve and not supervisor.is_stopping:
                     supervisor.watch()
             finally:
                 supervisor.stop()
 
-    def _show(self, board: demo.DemoTable, web: Web, took_s: float, *, serve: bool) -> None:
+    def _show(
+        self, board: demo.DemoTable, drives: list[str], web: Web, took_s: float, *, serve: bool
+    ) -> None:
         lines = [
             "",
             board.text,
+            "",
+            *drives,
             "",
             f"Tables:   {', '.join(str(_short(path)) for path in board.files)}",
             f"Pictures: {_short(settings.MEDIA_ROOT)}/bev/",
@@ -88,6 +95,7 @@ class Command(TerminalCommand):
                 f"Scenario Arena is at {web.address}  (Ctrl-C stops it)",
                 *(f"  sign in as {name:8} password {demo.PASSWORD}" for name, _ in demo.PEOPLE),
                 f"  Vote as 'expert' in the study {demo.OPEN_STUDY!r}.",
+                f"  See the drives as 'admin': Jobs, {demo.JOB!r}, See the drives.",
             ]
         self.stdout.write("\n".join(lines))
         self.stdout.flush()

@@ -78,11 +78,7 @@ class DrivingScores:
 
 def scores_of_job(job: GenerationJob, *, options: Options, score: str) -> DrivingScores:
     """The table of a job; one query for its drives."""
-    return _scores(
-        Q(augmentation__job=job) | Q(augmentation=None, scenario__in=job.scenarios.all()),
-        options,
-        score,
-    )
+    return _scores(_of_job(job), options, score)
 
 
 def scores_of_augmentations(
@@ -98,7 +94,7 @@ def scores_of_augmentations(
 def options_driven(job: GenerationJob) -> list[Options]:
     """Every way in which drives of a job were asked for, the latest first."""
     found = (
-        Simulation.objects.filter(augmentation__job=job)
+        Simulation.objects.filter(_of_job(job))
         .order_by("-pk")
         .values_list("planner", "offsets", "is_reactive")
     )
@@ -109,6 +105,11 @@ def options_driven(job: GenerationJob) -> list[Options]:
 
 
 # Private
+
+
+def _of_job(job: GenerationJob) -> Q:
+    """Its results, and its scenes before the change and with the reference."""
+    return Q(augmentation__job=job) | Q(augmentation=None, scenario__in=job.scenarios.all())
 
 
 def _scores(which: Q, options: Options, score: str) -> DrivingScores:

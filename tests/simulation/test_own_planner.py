@@ -1,0 +1,35 @@
+"""The example of a planner in the documentation is driven as it stands there."""
+
+from __future__ import annotations
+
+import re
+from types import ModuleType
+
+import pytest
+
+from augment.errors import CannotDrive, UnknownName
+from augment.simulation.drive import run
+from augment.simulation.pdm_closed import PdmClosed
+from augment.simulation.planners import planner_named
+from augment.simulation.setting import Setting
+from tests.house.source import ROOT
+from tests.simulation.worlds import street
+
+
+def test_the_documented_planner_drives(monkeypatch: pytest.MonkeyPatch) -> None:
+    page = (ROOT / "docs" / "simulation.md").read_text()
+    found = re.search(r"```python\n(.*?)```", page, re.S)
+    assert found is not None
+    module = ModuleType("my_planners")
+    exec(compile(found.group(1), "my_planners", "exec"), module.__dict__)
+    monkeypatch.setitem(__import__("sys").modules, "my_planners", module)
+    drive = run(Setting(scene=street()), planner_named("my_planners.AlongTheCentreline"), steps=10)
+    assert drive.boxes[-1, 0] == pytest.approx(8.0, abs=0.01)
+
+
+def test_planners_have_names() -> None:
+    assert isinstance(planner_named("pdm-closed", offsets="original"), PdmClosed)
+    with pytest.raises(UnknownName, match="pdm-open"):
+        planner_named("pdm-open")
+    with pytest.raises(CannotDrive, match="no planner"):
+        planner_named("fractions.Fraction")
