@@ -13,9 +13,10 @@ from arena.exports.votes import VOTE_FORMATS, vote_table
 from arena.exports.writers import FORMATS
 from arena.exports.zips import zip_bytes
 from arena.models import Snapshot
+from arena.results.codec import results_document
+from arena.results.tree import Results
 from arena.services.cells import csv_text
 from arena.services.vote_rows import digest_of
-from augment.sentences import read_sentence
 
 MANIFEST = "manifest.json"
 
@@ -92,7 +93,7 @@ def _filters(snapshot: Snapshot) -> dict[str, Any]:
 
     An expert who was asked for without having a vote that counts has no name here.
     """
-    judges: dict[str, str] = snapshot.results.get("judges", {})
+    judges = snapshot.results.judges
     filters: dict[str, Any] = dict(snapshot.filters)
     if "experts" in filters:
         filters["experts"] = sorted(
@@ -103,21 +104,19 @@ def _filters(snapshot: Snapshot) -> dict[str, Any]:
     return filters
 
 
-def _public(results: dict[str, Any]) -> dict[str, Any]:
+def _public(results: Results) -> dict[str, Any]:
     """The statistics without the codes of people; pseudonyms stay."""
-    judges: dict[str, str] = results.get("judges", {})
-    document = {key: value for key, value in results.items() if key != "judges"}
-    trust = dict(document.get("trust") or {})
-    trust["raters"] = [
-        {key: value for key, value in line.items() if key not in ("judge", "expert")}
-        for line in trust.get("raters") or []
-    ]
-    if trust.get("repeats"):
-        trust["repeats"] = {k: v for k, v in trust["repeats"].items() if k != "by_expert"}
-    if document.get("own_votes"):
-        own = document["own_votes"]
-        document["own_votes"] = {k: v for k, v in own.items() if k != "by_judge"}
-    return document | {"trust": trust, "judges": sorted(judges.values())}
+    document = results_document(results)
+    trust = document.get("trust", {})
+    for line in trust.setdefault("raters", []):
+        del line["judge"], line["expert"]
+    for holder, codes in (
+        (trust.get("repeats"), "by_expert"),
+        (document.get("own_votes"), "by_judge"),
+    ):
+        if holder:
+            del holder[codes]
+    return document | {"trust": trust, "judges": sorted(results.judges.values())}
 
 
 def _json(document: object) -> bytes:
@@ -130,43 +129,37 @@ def _csv(head: Sequence[str], rows: Iterable[Sequence[object]]) -> bytes:
     return csv_text(head, rows).encode()
 
 
-def _pairs(results: dict[str, Any]) -> bytes:
+def _pairs(results: Results) -> bytes:
     head = ("a", "b", "wins", "ties", "losses", "both_miss", "planned")
-    return _csv(head, ([pair[name] for name in head] for pair in results.get("pairs", [])))
+    return _csv(head, ([getattr(pair, name) for name in head] for pair in results.pairs))
 
 
-def _types(results: dict[str, Any]) -> bytes:
+def _types(results: Results) -> bytes:
     head = ("type", "contestant", "rank", "elo", "lower", "upper", "votes", "too_few", "note")
-    keys = ("slug", "rank", "rating", "lower", "upper", "votes", "few")
+    keys = ("slug", "rank", "rating", "lower", "upper", "votes", "few", "note")
     return _csv(
         head,
         (
-            [part["type"], *(line[key] for key in keys), _said(line.get("note"))]
-            for part in results.get("types", [])
-            for line in part["lines"]
+            [part.type, *(getattr(line, key) for key in keys)]
+            for part in results.types
+            for line in part.lines
         ),
     )
 
 
-def _said(note: dict[str, Any] | None) -> str:
-    return "" if note is None else str(read_sentence(note))
-
-
-def _raters(results: dict[str, Any]) -> bytes:
+def _raters(results: Results) -> bytes:
     head = (
         "judge", "votes", "median_ms", "under_1_s", "ties", "left", "agreement", "shared",
         "favourites", "decided", "repeats", "repeats_same", "checks", "checks_passed", "moves",
     )  # fmt: skip
-    lines = (results.get("trust") or {}).get("raters") or []
     return _csv(
         head,
         (
             [
-                line["name"], line["votes"], line["median_ms"], line["fast"], line["ties"],
-                line["left"]["value"], line["agreement"]["value"], line["shared"],
-                line["favourites"]["value"], line["decided"], *line["repeats"], *line["checks"],
-                line["moves"],
+                line.name, line.votes, line.median_ms, line.fast, line.ties, line.left.value,
+                line.agreement.value, line.shared, line.favourites.value, line.decided,
+                *line.repeats, *line.checks, line.moves,
             ]
-            for line in lines
+            for line in results.trust.raters
         ),
     )  # fmt: skip

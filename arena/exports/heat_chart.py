@@ -9,6 +9,7 @@ import numpy as np
 
 from arena.exports.drawing import INK, SIMULATED, SOFT, drawn, house_style, width_in
 from arena.exports.tables import Row
+from arena.results.tree import PairRecord
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -22,7 +23,7 @@ _COLOURS = ("#f0a15c", "#f7f8f8", "#6aa5db")
 """Orange for the column, blue for the row: told apart with any colour vision."""
 
 
-def heat_chart(rows: Sequence[Row], pairs: Sequence[dict[str, Any]], *, file_format: str) -> bytes:
+def heat_chart(rows: Sequence[Row], pairs: Sequence[PairRecord], *, file_format: str) -> bytes:
     """Percent and number of votes in every cell, contestants in the given order.
 
     Args:
@@ -71,17 +72,16 @@ def _write(axes: Axes, text: str, x: float, y: float, size: float) -> None:
     axes.text(x, y, text, ha="center", va="center", fontsize=size, color=INK)
 
 
-def _matrices(rows: Sequence[Row], pairs: Sequence[dict[str, Any]]) -> tuple[Any, Any]:
+def _matrices(rows: Sequence[Row], pairs: Sequence[PairRecord]) -> tuple[Any, Any]:
     """(C, C) scores, not a number without votes, and numbers of votes."""
     place = {row.slug: n for n, row in enumerate(rows)}
     share = np.full((len(rows), len(rows)), np.nan)
     votes = np.zeros((len(rows), len(rows)), dtype=np.int64)
     for pair in pairs:
-        number = pair["wins"] + pair["ties"] + pair["losses"]
-        if not number:
+        if not pair.votes:
             continue
-        i, j = place[pair["a"]], place[pair["b"]]
-        share[i, j] = (pair["wins"] + pair["ties"] / 2) / number
+        i, j = place[pair.a], place[pair.b]
+        share[i, j] = (pair.wins + pair.ties / 2) / pair.votes
         share[j, i] = 1.0 - share[i, j]
-        votes[i, j] = votes[j, i] = number
+        votes[i, j] = votes[j, i] = pair.votes
     return share, votes

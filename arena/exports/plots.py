@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Any
 
 from arena.exports.tables import LeaderboardTable, Row
 from arena.models import Snapshot
@@ -101,25 +100,24 @@ def _width(table: LeaderboardTable) -> Plot:
 
 
 def _displacement(snapshot: Snapshot, table: LeaderboardTable) -> Plot:
-    metres = _by_slug(snapshot, "displacement", "median_m")
+    metres = {line.slug: line.median_m for line in snapshot.results.displacement}
     points = [
-        _rated(n, row, metres[row.slug])
+        _rated(n, row, far)
         for n, row in enumerate(table.rows, start=1)
-        if row.elo is not None and metres.get(row.slug) is not None
+        if row.elo is not None and (far := metres.get(row.slug)) is not None
     ]
     return Plot(across=METRES, up=ELO, points=points, unit=" m")
 
 
 def _cost(snapshot: Snapshot, table: LeaderboardTable) -> dict[str, Plot]:
-    metres = _by_slug(snapshot, "displacement", "median_m")
-    groups = _by_slug(snapshot, "cost", "model_class")
+    metres = {line.slug: line.median_m for line in snapshot.results.displacement}
+    costs = {line.slug: line for line in snapshot.results.cost}
     found = {}
     for what, label, unit in (("usd", USD, " USD"), ("tokens", TOKENS, "")):
-        spent = _by_slug(snapshot, "cost", what)
         rows = [
-            (n, row, spent[row.slug], groups[row.slug] or "")
+            (n, row, spent, cost.model_class)
             for n, row in enumerate(table.rows, start=1)
-            if spent.get(row.slug)
+            if (cost := costs.get(row.slug)) and (spent := getattr(cost, what))
         ]
         found[f"elo-{what}"] = Plot(
             across=label,
@@ -132,19 +130,15 @@ def _cost(snapshot: Snapshot, table: LeaderboardTable) -> dict[str, Plot]:
             across=label,
             up=METRES,
             points=[
-                _given(n, row, x=x, y=metres[row.slug], group=group)
+                _given(n, row, x=x, y=far, group=group)
                 for n, row, x, group in rows
-                if metres.get(row.slug) is not None
+                if (far := metres.get(row.slug)) is not None
             ],
             unit=unit,
             is_log=True,
             from_zero=True,
         )
     return found
-
-
-def _by_slug(snapshot: Snapshot, what: str, value: str) -> dict[str, Any]:
-    return {line["slug"]: line[value] for line in snapshot.results.get(what) or []}
 
 
 def _rated(number: int, row: Row, x: float, group: str = "") -> Given:

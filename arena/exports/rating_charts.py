@@ -28,11 +28,10 @@ def charts(snapshot: Snapshot) -> Mapping[str, Chart]:
     """Every chart beside the table's own that a rating has, by name."""
     table = leaderboard_table(snapshot)
     found: dict[str, Chart] = {}
-    pairs = snapshot.results.get("pairs") or []
-    if pairs:
-        found["pairs"] = partial(heat_chart, table.rows, pairs)
-    if snapshot.results.get("types"):
-        found["types"] = partial(type_charts, snapshot.results["types"], table)
+    if snapshot.results.pairs:
+        found["pairs"] = partial(heat_chart, table.rows, snapshot.results.pairs)
+    if snapshot.results.types:
+        found["types"] = partial(type_charts, snapshot.results.types, table)
     for name, plot in plots(snapshot, table).items():
         found[name] = partial(scatter_chart, plot)
     return found

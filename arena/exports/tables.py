@@ -10,7 +10,7 @@ from django.db.models import F
 
 from arena.models import Snapshot, Standing
 from arena.rating.printed import interval_text, notes_by_reason, rank_text, rating_text
-from augment.sentences import read_sentence, sentence
+from augment.sentences import Sentence, sentence
 
 METHODS = {
     "bt": "Bradley-Terry on the Elo scale",
@@ -152,17 +152,17 @@ class LeaderboardTable:
 def leaderboard_table(snapshot: Snapshot) -> LeaderboardTable:
     """The table of a snapshot, best first; one query."""
     standings = list(snapshot.standings.order_by(F("rating").desc(nulls_last=True), "slug"))
-    board = snapshot.results.get("board") or {}
+    board = snapshot.results.board
     names = {standing.slug: standing.name for standing in standings}
-    parts: dict[str, int] = board.get("parts") or {}
+    reasons = (snapshot.status,) if board.reasons is None else board.reasons
     last = len(standings)
-    standings.sort(key=lambda standing: parts.get(standing.slug, last))
-    if board.get("order"):
-        standings.sort(key=lambda standing: board["order"].index(standing.slug))
+    standings.sort(key=lambda standing: board.parts.get(standing.slug, last))
+    if board.order:
+        standings.sort(key=lambda standing: board.order.index(standing.slug))
     return LeaderboardTable(
         study=snapshot.study.name,
         rows=tuple(
-            _row(standing, parts.get(standing.slug, APART) if parts else 0)
+            _row(standing, board.parts.get(standing.slug, APART) if board.parts else 0)
             for standing in standings
         ),
         method=snapshot.method,
@@ -173,30 +173,31 @@ def leaderboard_table(snapshot: Snapshot) -> LeaderboardTable:
         votes=snapshot.votes_counted,
         left_out=dict(sorted(snapshot.votes_left_out.items())),
         votes_sha256=snapshot.votes_sha256,
-        reasons=sentences_of(board.get("reasons", [snapshot.status]), names),
+        reasons=sentences_of(reasons, names),
         simulated=snapshot.includes_simulated,
         early=snapshot.is_early,
-        notes=sentences_of(board.get("warnings", ()), names),
+        notes=sentences_of(board.warnings, names),
     )
 
 
-def sentences_of(kept: Sequence[Any], names: Mapping[str, str]) -> tuple[str, ...]:
+def sentences_of(kept: Sequence[str], names: Mapping[str, str]) -> tuple[str, ...]:
     """Sentences that a snapshot keeps, with names instead of slugs; older ones are plain text."""
-    found = []
-    for one in filter(None, kept):
-        if isinstance(one, str):
-            found.append(one)
-            continue
-        values = {key: _named(value, names) for key, value in one["values"].items()}
-        found.append(read_sentence({"text": one["text"], "values": values}))
-    return tuple(found)
+    return tuple(
+        sentence(one.text, **{place: _named(value, names) for place, value in one.values.items()})
+        if isinstance(one, Sentence)
+        else one
+        for one in kept
+        if one
+    )
 
 
 def _named(value: Any, names: Mapping[str, str]) -> Any:
-    """Lists are of slugs, or of lists of them."""
-    if not isinstance(value, list):
+    """Tuples are of slugs, or of tuples of them."""
+    if not isinstance(value, tuple):
         return value
-    return [_named(one, names) if isinstance(one, list) else names.get(one, one) for one in value]
+    return tuple(
+        _named(one, names) if isinstance(one, tuple) else names.get(one, one) for one in value
+    )
 
 
 def _row(standing: Standing, part: int) -> Row:

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import Any
 
 from arena.exports.charts import draw_interval, rating_axis
 from arena.exports.drawing import INK, SIMULATED, drawn, house_style, width_in
 from arena.exports.tables import LeaderboardTable
+from arena.results.tree import TypeRating
 
 _PANEL_IN, _ROW_IN, _MOST_ACROSS = 2.1, 0.26, 3
 _BETWEEN_IN, _FOOT_IN = 0.6, 0.15
@@ -16,7 +16,7 @@ _NAME_PT = 7.0
 
 
 def type_charts(
-    parts: Sequence[dict[str, Any]], table: LeaderboardTable, *, file_format: str
+    parts: Sequence[TypeRating], table: LeaderboardTable, *, file_format: str
 ) -> bytes:
     """A panel a type on one axis, contestants in the order of the whole table.
 
@@ -45,13 +45,13 @@ def type_charts(
             hspace=_BETWEEN_IN / plot,
         )
         for number, (panel, part) in enumerate(zip(panels, parts, strict=False)):
-            by_slug = {line["slug"]: line for line in part["lines"]}
+            by_slug = {line.slug: line for line in part.lines}
             for place, row in enumerate(rows):
                 line = by_slug.get(row.slug)
                 if line is not None:
-                    interval = (line["lower"], line["rating"], line["upper"])
+                    interval = (line.lower, line.rating, line.upper)
                     draw_interval(panel, place, interval, simulated=row.simulated)
-            panel.set_title(f"{part['label']} (n {part['votes']})", fontsize=7, color=INK)
+            panel.set_title(f"{part.label} (n {part.votes})", fontsize=7, color=INK)
             labels = ["" if number % across else row.model for row in rows]
             panel.set_yticks(range(len(rows)), labels, fontsize=_NAME_PT)
             for label, row in zip(panel.get_yticklabels(), rows, strict=True):

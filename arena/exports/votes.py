@@ -7,7 +7,7 @@ from typing import NamedTuple
 from arena.exports.formats import Format, formats
 from arena.exports.parquet import TEXT, WHOLE, YES_NO, parquet_bytes
 from arena.models import Snapshot
-from arena.services.snapshots import judges_of, votes_of, votes_version_of
+from arena.services.snapshots import votes_of, votes_version_of
 from arena.services.vote_rows import COLUMNS, Row, columns_of, vote_rows, votes_csv
 
 _KINDS = dict.fromkeys(COLUMNS, TEXT) | {
@@ -30,7 +30,7 @@ def vote_table(snapshot: Snapshot) -> VoteTable:
     Raises:
         Conflict: They are not what they were.
     """
-    rows = vote_rows(votes_of(snapshot).counted, judges_of(snapshot))
+    rows = vote_rows(votes_of(snapshot).counted, snapshot.results.judges)
     return VoteTable(version=votes_version_of(snapshot), rows=list(rows))
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import uuid
+from typing import TYPE_CHECKING, Any
 
 from django.conf import settings
 from django.db import models
@@ -10,7 +11,34 @@ from django.db.models import F, Q
 from django.utils import timezone
 
 from arena.models.studies import Study
+from arena.results.codec import read_results, results_document
+from arena.results.tree import Results
 from augment.models import AppendOnly, Contestant
+
+if TYPE_CHECKING:
+    _JSONField = models.JSONField[Results, Results]
+else:
+    _JSONField = models.JSONField
+
+
+class ResultsField(_JSONField):
+    """Results as their document; for migrations it is a JSON field like any other."""
+
+    def deconstruct(self) -> Any:  # noqa: D102
+        name, _, args, kwargs = super().deconstruct()
+        return name, "django.db.models.JSONField", args, kwargs | {"default": dict}
+
+    def from_db_value(self, *given: Any) -> Any:  # noqa: D102
+        return self.to_python(super().from_db_value(*given))
+
+    def to_python(self, value: Any) -> Any:  # noqa: D102
+        return read_results(value) if isinstance(value, dict) else value
+
+    def get_prep_value(self, value: Any) -> Any:  # noqa: D102
+        return results_document(value) if isinstance(value, Results) else value
+
+    def value_to_string(self, obj: models.Model) -> Any:  # noqa: D102
+        return self.get_prep_value(self.value_from_object(obj))
 
 
 class Snapshot(models.Model):
@@ -48,8 +76,8 @@ class Snapshot(models.Model):
     degenerate_rounds = models.PositiveIntegerField(
         default=0, help_text="bootstrap rounds that determined no rating; intervals leave them out"
     )
-    results = models.JSONField(
-        default=dict, help_text="all statistics beside the standings, as the pages show them"
+    results = ResultsField(
+        default=Results, help_text="all statistics beside the standings, as the pages show them"
     )
     includes_simulated = models.BooleanField(default=False)
     is_early = models.BooleanField(default=False, help_text="the study was still open")

@@ -1,4 +1,4 @@
-"""A rating seen from several sides, as the document that a snapshot keeps.
+"""A rating seen from several sides, as a snapshot keeps it.
 
 Pairs, scenario types, coverage of the plan, displacement, cost.
 """
@@ -15,16 +15,19 @@ from arena.models import Matchup, Study
 from arena.queries.costs import model_classes, shown_augmentations, spent_on
 from arena.queries.judged import Entrant, Judged, is_imported
 from arena.queries.vote_sets import Filters
-from arena.rating.bootstrap import Unit
-from arena.rating.comparisons import Comparisons
-from arena.rating.leaderboard import Method, rate
+from arena.rating.comparisons import Comparisons, chosen
+from arena.rating.leaderboard import Leaderboard, rate
 from arena.rating.win_rates import win_rates
-from arena.services.vote_arrays import VoteArrays, some
-from augment.models import Contestant, Scenario
-from augment.sentences import Sentence
+from arena.results.tree import (
+    DisplacementSummary,
+    PairRecord,
+    ScenarioCost,
+    TypeRating,
+    TypeStanding,
+)
+from arena.services.vote_arrays import VoteArrays
+from augment.models import Scenario
 from augment.services.judging.displacement import of_rows, summarise
-
-Document = dict[str, Any]
 
 FEW_VOTES = 30
 """Below so many votes of a contestant a part of the table says that they are too few."""
@@ -34,25 +37,25 @@ TYPE_ROUNDS = 2000
 
 def pairs(
     comparisons: Comparisons, votes: Sequence[Judged], planned: Counter[frozenset[str]]
-) -> list[Document]:
+) -> tuple[PairRecord, ...]:
     """Wins, ties, losses of every pair that met or should have, from the first one's view."""
     found = win_rates(comparisons)
     names = comparisons.names
     missed = Counter(frozenset((vote.left, vote.right)) for vote in votes if vote.both_miss)
-    return [
-        {
-            "a": one,
-            "b": names[j],
-            "wins": int(found.wins[i, j]),
-            "ties": int(found.ties[i, j]),
-            "losses": int(found.wins[j, i]),
-            "both_miss": missed[frozenset((one, names[j]))],
-            "planned": planned[frozenset((one, names[j]))] if planned else None,
-        }
+    return tuple(
+        PairRecord(
+            a=one,
+            b=names[j],
+            wins=int(found.wins[i, j]),
+            ties=int(found.ties[i, j]),
+            losses=int(found.wins[j, i]),
+            both_miss=missed[frozenset((one, names[j]))],
+            planned=planned[frozenset((one, names[j]))] if planned else None,
+        )
         for i, one in enumerate(names)
         for j in range(i + 1, len(names))
         if found.votes[i, j] or planned[frozenset((one, names[j]))]
-    ]
+    )
 
 
 def planned_pairs(study: Study, filters: Filters) -> Counter[frozenset[str]]:
@@ -72,98 +75,89 @@ def planned_pairs(study: Study, filters: Filters) -> Counter[frozenset[str]]:
     return planned
 
 
-def by_type(
-    arrays: VoteArrays, *, method: Method, unit: Unit, rounds: int, seed: int
-) -> list[Document]:
-    """The rating of every scenario type on its own, in the catalogue's order."""
+def by_type(arrays: VoteArrays, board: Leaderboard) -> tuple[TypeRating, ...]:
+    """The rating of every scenario type on its own, as the board's, in the catalogue's order."""
     order = [*Scenario.Type.values]
     known = sorted(
         (name for name in arrays.types if name),
         key=lambda name: order.index(name) if name in order else len(order),
     )
-    return [_one_type(arrays, name, method, unit, rounds, seed) for name in known]
+    return tuple(_one_type(arrays, name, board) for name in known)
 
 
-def displacement(study: Study) -> list[Document]:
+def displacement(study: Study) -> tuple[DisplacementSummary, ...]:
     """How far each contestant's shown augmentations are from the references."""
-    measured = [one for one in of_rows(shown_augmentations(study)) if one.displacement is not None]
     by_slug: dict[str, list[Any]] = {}
-    for one in measured:
-        by_slug.setdefault(one.row.contestant.slug, []).append(one.displacement)
-    lines = []
-    for slug, found in sorted(by_slug.items()):
-        total = summarise(found)
-        lines.append(
-            {
-                "slug": slug,
-                "median_m": None if total.box is None else total.box.median_m,
-                "mean_m": None if total.box is None else total.box.mean_m,
-                "n": total.n,
-                "missing": total.missing,
-                "surplus": total.surplus,
-                "augmentations": total.augmentations,
-            }
+    for one in of_rows(shown_augmentations(study)):
+        if one.displacement is not None:
+            by_slug.setdefault(one.row.contestant.slug, []).append(one.displacement)
+    totals = ((slug, summarise(found)) for slug, found in sorted(by_slug.items()))
+    return tuple(
+        DisplacementSummary(
+            slug=slug,
+            median_m=None if total.box is None else total.box.median_m,
+            mean_m=None if total.box is None else total.box.mean_m,
+            n=total.n,
+            missing=total.missing,
+            surplus=total.surplus,
+            augmentations=total.augmentations,
         )
-    return lines
+        for slug, total in totals
+    )
 
 
-def cost(study: Study, entrants: Sequence[Entrant]) -> list[Document]:
+def cost(study: Study, entrants: Sequence[Entrant]) -> tuple[ScenarioCost, ...]:
     """What each contestant that asks a language model takes per scenario."""
-    rows: dict[str, Contestant] = {
-        one.slug: one.contestant for one in entrants if one.contestant is not None
-    }
+    rows = [one.contestant for one in entrants if one.contestant is not None]
     spent = spent_on(shown_augmentations(study))
-    classes = model_classes(rows.values())
-    lines = []
-    for slug, row in rows.items():
-        found = spent.get(row.pk)
-        if found is None:
-            continue
-        each = found.augmentations
-        lines.append(
-            {
-                "slug": slug,
-                "model": row.model,
-                "model_class": classes.get(row.pk, ""),
-                "augmentations": each,
-                "calls": found.calls / each,
-                "tokens": None if found.tokens is None else found.tokens / each,
-                "usd": None if found.nano_usd is None else found.nano_usd / each / 1e9,
-            }
+    classes = model_classes(rows)
+    return tuple(
+        ScenarioCost(
+            slug=row.slug,
+            model=row.model,
+            model_class=classes.get(row.pk, ""),
+            augmentations=found.augmentations,
+            calls=found.calls / found.augmentations,
+            tokens=None if found.tokens is None else found.tokens / found.augmentations,
+            usd=None if found.nano_usd is None else found.nano_usd / found.augmentations / 1e9,
         )
-    return lines
+        for row in rows
+        if (found := spent.get(row.pk)) is not None
+    )
 
 
 # --- Private -----------------------------------------------------------------------------------
 
 
-def _one_type(
-    arrays: VoteArrays, name: str, method: Method, unit: Unit, rounds: int, seed: int
-) -> Document:
-    chosen = arrays.type_of == arrays.types.index(name)
-    votes = some(arrays.comparisons, chosen)
+def _one_type(arrays: VoteArrays, name: str, whole: Leaderboard) -> TypeRating:
+    votes = chosen(arrays.comparisons, arrays.type_of == arrays.types.index(name))
     board = rate(
-        votes, method=method, rounds=min(rounds, TYPE_ROUNDS), unit=unit, seed=seed, details=False
+        votes,
+        method=whole.method,
+        rounds=min(whole.rounds, TYPE_ROUNDS),
+        unit=whole.unit,
+        seed=whole.seed,
+        details=False,
     )
     labels = dict(Scenario.Type.choices)
-    return {
-        "type": name,
-        "label": str(labels.get(name, name)),
-        "votes": len(votes),
-        "scenarios": int(votes.scenario.max(initial=-1)) + 1,
-        "status": board.explanation,
-        "reasons": [one.as_document() for one in board.reasons],
-        "lines": [
-            {
-                "slug": line.name,
-                "rating": line.rating,
-                "lower": line.lower,
-                "upper": line.upper,
-                "rank": line.rank,
-                "note": line.note.as_document() if isinstance(line.note, Sentence) else None,
-                "votes": line.votes,
-                "few": line.votes < FEW_VOTES,
-            }
+    return TypeRating(
+        type=name,
+        label=str(labels.get(name, name)),
+        votes=len(votes),
+        scenarios=board.scenarios,
+        status=board.explanation,
+        reasons=board.reasons,
+        lines=tuple(
+            TypeStanding(
+                slug=line.name,
+                rating=line.rating,
+                lower=line.lower,
+                upper=line.upper,
+                rank=line.rank,
+                note=line.note or None,
+                votes=line.votes,
+                few=line.votes < FEW_VOTES,
+            )
             for line in board.standings
-        ],
-    }
+        ),
+    )

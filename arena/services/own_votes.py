@@ -7,14 +7,13 @@ snapshot like everything else.
 from __future__ import annotations
 
 from collections import Counter
-from typing import Any
+from collections.abc import Sequence
 
 from arena.queries.judged import AUTOMATIC, Judged
 from arena.queries.vote_sets import Filters, VoteSet
 from arena.rating.leaderboard import Leaderboard, Line, rate
+from arena.results.tree import BothRanks, LargestMove, OwnVotes
 from arena.services.vote_arrays import vote_arrays
-
-Document = dict[str, Any]
 
 OTHER_ROUNDS = 10_000
 """At most so many for the version that the table does not show: about a tenth more than a rating
@@ -22,11 +21,8 @@ costs. With as many rounds as the table has and the same seed, ranks differ by t
 by the draws."""
 
 
-def with_and_without(votes: VoteSet, filters: Filters, board: Leaderboard) -> Document | None:
+def with_and_without(votes: VoteSet, filters: Filters, board: Leaderboard) -> OwnVotes | None:
     """Rank and rating of everybody in both versions; None where no vote makes a difference.
-
-    `largest` says by how many ranks somebody moves at most, and who; `reasons` are sentences about
-    the version that the table does not show; `by_judge` is for the raters' panel alone.
 
     Args:
         votes: What is rated, and the votes of authors on their own contestants beside it.
@@ -47,19 +43,19 @@ def with_and_without(votes: VoteSet, filters: Filters, board: Leaderboard) -> Do
         details=False,
     )
     full, fewer = (other, board) if filters.leave_out_own else (board, other)
-    lines = [_line(*both) for both in zip(full.lines, fewer.lines, strict=True)]
+    lines = tuple(_both_ranks(*both) for both in zip(full.lines, fewer.lines, strict=True))
     by_judge = Counter(vote.judge for vote in own)
-    return {
-        "left_out": filters.leave_out_own,
-        "votes": len(own),
-        "experts": len(by_judge),
-        "of_experts": len({vote.judge for vote in votes.with_own if vote.kind != AUTOMATIC}),
-        "rounds": other.rounds,
-        "reasons": [one.as_document() for one in other.reasons],
-        "largest": _largest(lines),
-        "lines": lines,
-        "by_judge": dict(by_judge),
-    }
+    return OwnVotes(
+        left_out=filters.leave_out_own,
+        votes=len(own),
+        experts=len(by_judge),
+        of_experts=len({vote.judge for vote in votes.with_own if vote.kind != AUTOMATIC}),
+        rounds=other.rounds,
+        reasons=other.reasons,
+        largest=_largest(lines),
+        lines=lines,
+        by_judge=dict(by_judge),
+    )
 
 
 # --- Private -----------------------------------------------------------------------------------
@@ -69,25 +65,25 @@ def _is_own(vote: Judged, filters: Filters) -> bool:
     return filters.is_own(vote.judge, vote.left, vote.right)
 
 
-def _line(full: Line, fewer: Line) -> Document:
-    return {
-        "slug": full.name,
-        "rank_with": full.rank,
-        "rating_with": full.rating,
-        "rank_without": fewer.rank,
-        "rating_without": fewer.rating,
-    }
+def _both_ranks(full: Line, fewer: Line) -> BothRanks:
+    return BothRanks(
+        slug=full.name,
+        rank_with=full.rank,
+        rating_with=full.rating,
+        rank_without=fewer.rank,
+        rating_without=fewer.rating,
+    )
 
 
-def _largest(lines: list[Document]) -> Document | None:
+def _largest(lines: Sequence[BothRanks]) -> LargestMove | None:
     """None where nobody has a rank in both versions."""
     moves = {
-        line["slug"]: abs(line["rank_with"] - line["rank_without"])
+        line.slug: abs(line.rank_with - line.rank_without)
         for line in lines
-        if line["rank_with"] is not None and line["rank_without"] is not None
+        if line.rank_with is not None and line.rank_without is not None
     }
     if not moves:
         return None
     places = max(moves.values())
     who = [slug for slug, moved in moves.items() if moved == places] if places else []
-    return {"places": places, "slugs": who}
+    return LargestMove(places=places, slugs=tuple(who))

@@ -15,16 +15,16 @@ from arena.queries.judged import Entrant, Judged, is_imported
 from arena.queries.vote_sets import Filters, VoteSet, vote_set
 from arena.rating.bootstrap import Unit
 from arena.rating.leaderboard import Leaderboard, Method, rate
+from arena.results.tree import VERSION as RESULTS_VERSION
+from arena.results.tree import Results
 from arena.services import breakdowns
 from arena.services.own_votes import with_and_without
-from arena.services.trust import board_document, claims, trust
+from arena.services.trust import board_remarks, precision, trust
 from arena.services.vote_arrays import VoteArrays, vote_arrays
 from arena.services.vote_rows import VERSION as VOTES_VERSION
 from arena.services.vote_rows import digest_of, vote_rows, votes_csv
 from augment.errors import Conflict
 from augment.sentences import sentence
-
-RESULTS_VERSION = 1
 
 Report = Callable[[int], None]
 
@@ -63,7 +63,7 @@ def compute(snapshot: Snapshot, report: Report) -> Computed:
     )
     report(60)
     judges = {vote.judge: vote.judge_name for vote in votes.counted}
-    snapshot.results = _results(snapshot, votes, arrays, board) | {"judges": judges}
+    snapshot.results = _results(snapshot, votes, arrays, board, judges)
     report(90)
     snapshot.votes_sha256 = digest_of(votes_csv(vote_rows(votes.counted, judges)))
     snapshot.votes_counted = len(votes.counted)
@@ -106,7 +106,7 @@ def votes_of(snapshot: Snapshot) -> VoteSet:
         Conflict: They are not what they were: somebody changed rows by hand.
     """
     votes = _vote_set(snapshot)
-    rows = vote_rows(votes.counted, judges_of(snapshot))
+    rows = vote_rows(votes.counted, snapshot.results.judges)
     if digest_of(votes_csv(rows, votes_version_of(snapshot))) != snapshot.votes_sha256:
         raise Conflict(
             sentence(
@@ -122,12 +122,6 @@ def votes_version_of(snapshot: Snapshot) -> int:
     return int(snapshot.versions.get("votes", 1))
 
 
-def judges_of(snapshot: Snapshot) -> dict[str, str]:
-    """The judges' pseudonyms by their codes, as they were."""
-    found: dict[str, str] = snapshot.results.get("judges", {})
-    return found
-
-
 # --- Private -----------------------------------------------------------------------------------
 
 
@@ -137,29 +131,31 @@ def _vote_set(snapshot: Snapshot) -> VoteSet:
 
 
 def _results(
-    snapshot: Snapshot, votes: VoteSet, arrays: VoteArrays, board: Leaderboard
-) -> dict[str, object]:
+    snapshot: Snapshot,
+    votes: VoteSet,
+    arrays: VoteArrays,
+    board: Leaderboard,
+    judges: dict[str, str],
+) -> Results:
     study, seed = snapshot.study, snapshot.seed
-    method, unit = Method(snapshot.method), Unit(snapshot.resampling_unit)
     from_file = is_imported(study)
     filters = Filters.of_document(snapshot.filters)
     planned = breakdowns.planned_pairs(study, filters)
-    return {
-        "version": RESULTS_VERSION,
-        "board": board_document(board),
-        "trust": trust(arrays, votes, board, seed=seed),
-        "claims": claims(arrays, board, unit=unit, seed=seed),
-        "own_votes": with_and_without(votes, filters, board),
-        "pairs": breakdowns.pairs(arrays.comparisons, votes.counted, planned),
-        "types": breakdowns.by_type(
-            arrays, method=method, unit=unit, rounds=snapshot.rounds, seed=seed
-        ),
-        "displacement": [] if from_file else breakdowns.displacement(study),
-        "cost": [] if from_file else breakdowns.cost(study, votes.entrants),
-        "models": {
+    return Results(
+        version=RESULTS_VERSION,
+        board=board_remarks(board),
+        trust=trust(arrays, votes, board, seed=seed),
+        claims=precision(arrays, board, unit=board.unit, seed=seed),
+        own_votes=with_and_without(votes, filters, board),
+        pairs=breakdowns.pairs(arrays.comparisons, votes.counted, planned),
+        types=breakdowns.by_type(arrays, board),
+        displacement=() if from_file else breakdowns.displacement(study),
+        cost=() if from_file else breakdowns.cost(study, votes.entrants),
+        models={
             one.slug: one.contestant.model for one in votes.entrants if one.contestant is not None
         },
-    }
+        judges=judges,
+    )
 
 
 def _any_simulated(votes: tuple[Judged, ...], entrants: tuple[Entrant, ...]) -> bool:

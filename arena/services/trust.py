@@ -1,8 +1,8 @@
-"""How far a rating can be trusted, as the document that a snapshot keeps."""
+"""How far a rating can be trusted, as a snapshot keeps it."""
 
 from __future__ import annotations
 
-from dataclasses import asdict, replace
+from dataclasses import fields, replace
 from typing import Any
 
 import numpy as np
@@ -10,10 +10,10 @@ import numpy as np
 from arena.queries.judged import REPEAT
 from arena.queries.vote_sets import VoteSet
 from arena.rating import elo
-from arena.rating.bets import bets, limit
+from arena.rating.bets import Bet, bets, limit
 from arena.rating.bootstrap import Unit
 from arena.rating.bradley_terry import ELO_PER_LOGIT, MEAN_ELO
-from arena.rating.comparisons import Comparisons, FloatArray, chosen
+from arena.rating.comparisons import Comparisons, FloatArray, among, chosen, tally
 from arena.rating.fit_test import fit_test
 from arena.rating.influence import (
     fewest_votes_to_change_first,
@@ -23,12 +23,20 @@ from arena.rating.influence import (
 from arena.rating.leaderboard import Leaderboard, Line, Method, rate
 from arena.rating.planning import design_effect, votes_until
 from arena.rating.position import side_bias
-from arena.rating.raters import raters
+from arena.rating.raters import Rater, raters
 from arena.rating.reliability import agreement
 from arena.rating.repeats import Repeats, repeat_consistency
-from arena.services.vote_arrays import SCORES, VoteArrays, only_those_with_votes
-
-Document = dict[str, Any]
+from arena.results.tree import (
+    BoardRemarks,
+    OnlinePlace,
+    Overtaking,
+    PanelRater,
+    Precision,
+    RaterBet,
+    Trust,
+    VotesWanted,
+)
+from arena.services.vote_arrays import SCORES, VoteArrays
 
 AGREEMENT_ROUNDS = 1000
 FIT_ROUNDS = 200
@@ -38,7 +46,7 @@ WANTED = (20.0, 15.0, 10.0, 5.0)
 """Half-widths of intervals that the page says the necessary votes of."""
 
 
-def trust(arrays: VoteArrays, votes: VoteSet, board: Leaderboard, *, seed: int) -> Document:
+def trust(arrays: VoteArrays, votes: VoteSet, board: Leaderboard, *, seed: int) -> Trust:
     """All statistics about the votes themselves; parts that the votes do not determine are None.
 
     Args:
@@ -47,60 +55,53 @@ def trust(arrays: VoteArrays, votes: VoteSet, board: Leaderboard, *, seed: int) 
         board: Their rating.
         seed: Of every draw.
     """
-    inner, _ = only_those_with_votes(arrays.comparisons)
+    rated = np.flatnonzero(tally(arrays.comparisons).sum(axis=1)).tolist()
+    inner = among(arrays.comparisons, rated)
     strengths = _strengths(inner, board)
     if set(arrays.items) == {""}:  # nobody knows what was shown twice
         inner = replace(inner, scenario=np.arange(len(inner), dtype=np.int64))
     first = _repeats(arrays, votes)
-    document: Document = {
-        "tie_share": _tie_share(inner),
-        "agreement": asdict(agreement(inner, rounds=AGREEMENT_ROUNDS, seed=seed)),
-        "side": asdict(side_bias(inner)) if len(inner) else None,
-        "repeats": asdict(first) if first.number else None,
-        "raters": _panel(arrays, inner, strengths, votes, first),
-        "removal": None,
-        "elo_order": None,
-        "fit": None,
-    }
-    if strengths is not None:
-        names = inner.names
-        removal = fewest_votes_to_change_first(inner, strengths)
-        if removal is not None:
-            document["removal"] = asdict(removal) | {"rival": names[removal.rival]}
-        document["elo_order"] = _elo_order(inner, strengths, seed)
-        document["fit"] = asdict(fit_test(inner, strengths, rounds=FIT_ROUNDS, seed=seed))
-    return document
+    found = Trust(
+        tie_share=_tie_share(inner),
+        agreement=agreement(inner, rounds=AGREEMENT_ROUNDS, seed=seed),
+        side=side_bias(inner) if len(inner) else None,
+        repeats=first if first.number else None,
+        raters=_panel(arrays, inner, strengths, votes, first),
+    )
+    if strengths is None:
+        return found
+    return replace(
+        found,
+        removal=_overtaking(inner, strengths),
+        elo_order=_elo_order(inner, strengths, seed),
+        fit=fit_test(inner, strengths, rounds=FIT_ROUNDS, seed=seed),
+    )
 
 
-def board_document(board: Leaderboard) -> Document:
-    """What a rating says beside its lines.
-
-    `reasons` and `warnings` are sentences as `read_sentence` takes them; `check` are the intervals
-    in closed form, `above` the pairs that differ with all of them judged at once, both by slug;
-    `order` are the slugs, best first.
-    """
+def board_remarks(board: Leaderboard) -> BoardRemarks:
+    """What a rating says beside its lines."""
     names = [line.name for line in board.lines]
     found = board.separation
-    return {
-        "reasons": [one.as_document() for one in board.reasons],
-        "warnings": [one.as_document() for one in board.warnings],
-        "tie_strength": board.tie_strength,
-        "experts": board.experts,
-        "scenarios": board.scenarios,
-        "check": {
-            line.name: [line.check_lower, line.check_upper]
+    return BoardRemarks(
+        reasons=board.reasons,
+        warnings=board.warnings,
+        tie_strength=board.tie_strength,
+        experts=board.experts,
+        scenarios=board.scenarios,
+        check={
+            line.name: (line.check_lower, line.check_upper)
             for line in board.lines
-            if line.check_lower is not None
+            if line.check_lower is not None and line.check_upper is not None
         },
-        "order": [line.name for line in board.standings],
-        "parts": {line.name: line.part for line in board.lines if line.part >= 0},
-        "above": None
+        order=tuple(line.name for line in board.standings),
+        parts={line.name: line.part for line in board.lines if line.part >= 0},
+        above=None
         if found is None
-        else [[names[i], names[j]] for i, j in np.argwhere(found.above).tolist()],
-    }
+        else tuple((names[i], names[j]) for i, j in np.argwhere(found.above).tolist()),
+    )
 
 
-def claims(arrays: VoteArrays, board: Leaderboard, *, unit: Unit, seed: int) -> Document:
+def precision(arrays: VoteArrays, board: Leaderboard, *, unit: Unit, seed: int) -> Precision:
     """What intervals would say if votes were independent, and how many votes the real ones need.
 
     Args:
@@ -131,24 +132,24 @@ def claims(arrays: VoteArrays, board: Leaderboard, *, unit: Unit, seed: int) -> 
     known = [wide for wide, _ in widths if wide]
     typical = float(np.median(known)) if known else None
     votes = len(arrays.comparisons)
-    return {
-        "half_width": typical,
-        "independent": {
-            line.name: [line.lower, line.upper]
+    return Precision(
+        half_width=typical,
+        independent={
+            line.name: (line.lower, line.upper)
             for line in alone.lines
             if line.lower is not None and line.upper is not None
         },
-        "design_effect": float(np.median(effects)) if effects else None,
-        "planning": []
+        design_effect=float(np.median(effects)) if effects else None,
+        planning=()
         if typical is None
-        else [
-            {
-                "half_width": wanted,
-                "votes": votes_until(votes=votes, half_width=typical, wanted=wanted),
-            }
+        else tuple(
+            VotesWanted(
+                half_width=wanted,
+                votes=votes_until(votes=votes, half_width=typical, wanted=wanted),
+            )
             for wanted in WANTED
-        ],
-    }
+        ),
+    )
 
 
 # --- Private -----------------------------------------------------------------------------------
@@ -163,6 +164,13 @@ def _strengths(votes: Comparisons, board: Leaderboard) -> FloatArray | None:
     if len(ratings) < max(len(lines), 2) or len({line.part for line in lines}) > 1:
         return None
     return np.asarray((np.array(ratings, dtype=np.float64) - MEAN_ELO) / ELO_PER_LOGIT)
+
+
+def _overtaking(votes: Comparisons, strengths: FloatArray) -> Overtaking | None:
+    found = fewest_votes_to_change_first(votes, strengths)
+    if found is None:
+        return None
+    return Overtaking(votes=found.votes, exact=found.exact, rival=votes.names[found.rival])
 
 
 def _half(line: Line) -> float | None:
@@ -202,7 +210,7 @@ def _panel(
     strengths: FloatArray | None,
     votes: VoteSet,
     repeats: Repeats,
-) -> list[Document]:
+) -> tuple[PanelRater, ...]:
     experts = len(arrays.judges)
     without = np.full((experts, len(inner.names)), np.nan)
     changes: list[int | None] = [None] * experts
@@ -213,34 +221,40 @@ def _panel(
     # To say the same of the same pictures again is no new evidence.
     fresh = np.array([vote.kind != REPEAT for vote in votes.counted], dtype=bool)
     against = bets(chosen(inner, fresh))
-    return [
-        asdict(line)
-        | {
-            "judge": arrays.judges[line.expert],
-            "name": names[arrays.judges[line.expert]],
-            "moves": changes[line.expert],
-            "repeats": list(repeats.by_expert.get(line.expert, (0, 0))),
-            "checks": _checks(votes, arrays.judges[line.expert]),
-            "bet": asdict(against[line.expert]) | {"limit": limit(len(against))}
+    return tuple(
+        PanelRater(
+            **_by_field(line),
+            judge=arrays.judges[line.expert],
+            name=names[arrays.judges[line.expert]],
+            moves=changes[line.expert],
+            repeats=repeats.by_expert.get(line.expert, (0, 0)),
+            checks=_checks(votes, arrays.judges[line.expert]),
+            bet=RaterBet(**_by_field(against[line.expert]), limit=limit(len(against)))
             if line.expert in against
             else None,
-        }
+        )
         for line in raters(inner, ms=arrays.ms, without=without)
-    ]
+    )
 
 
-def _checks(votes: VoteSet, judge: str) -> list[int]:
+def _by_field(value: Rater | Bet) -> dict[str, Any]:
+    return {one.name: getattr(value, one.name) for one in fields(value)}
+
+
+def _checks(votes: VoteSet, judge: str) -> tuple[int, int]:
     """How many attention checks were answered, and how many of them for the reference."""
     own = [vote for vote in votes.checks if vote.judge == judge]
-    return [len(own), sum(vote.winner in votes.references for vote in own)]
+    return len(own), sum(vote.winner in votes.references for vote in own)
 
 
-def _elo_order(votes: Comparisons, strengths: FloatArray, seed: int) -> list[Document]:
+def _elo_order(votes: Comparisons, strengths: FloatArray, seed: int) -> tuple[OnlinePlace, ...]:
     """Contestants by Bradley-Terry, with what online Elo makes of them."""
     online = np.median(elo.resampled(votes, rounds=ELO_ROUNDS, seed=seed), axis=1)
     places = np.argsort(np.argsort(-online, kind="stable"))
     order = np.argsort(-strengths, kind="stable")
-    return [
-        {"slug": votes.names[index], "elo": float(online[index]), "place": int(places[index]) + 1}
+    return tuple(
+        OnlinePlace(
+            slug=votes.names[index], elo=float(online[index]), place=int(places[index]) + 1
+        )
         for index in order.tolist()
-    ]
+    )

@@ -10,15 +10,7 @@ import numpy as np
 
 from arena.models import Vote
 from arena.queries.judged import Judged
-from arena.rating.comparisons import (
-    LOSS,
-    TIE,
-    WIN,
-    BoolArray,
-    Comparisons,
-    FloatArray,
-    IntArray,
-)
+from arena.rating.comparisons import LOSS, TIE, WIN, Comparisons, FloatArray, IntArray
 
 SCORES = {
     Vote.Outcome.LEFT.value: WIN,
@@ -78,33 +70,3 @@ def vote_arrays(names: Sequence[str], votes: Sequence[Judged]) -> VoteArrays:
             dtype=np.float64,
         ),
     )
-
-
-def some(votes: Comparisons, rows: BoolArray) -> Comparisons:
-    """The chosen votes, their experts and scenarios numbered without gaps."""
-    _, expert = np.unique(votes.expert[rows], return_inverse=True)
-    _, scenario = np.unique(votes.scenario[rows], return_inverse=True)
-    return Comparisons(
-        names=votes.names,
-        first=votes.first[rows],
-        second=votes.second[rows],
-        score=votes.score[rows],
-        expert=expert.astype(np.int64),
-        scenario=scenario.astype(np.int64),
-    )
-
-
-def only_those_with_votes(votes: Comparisons) -> tuple[Comparisons, IntArray]:
-    """The same votes without contestants that have none, and (C,) which are kept."""
-    kept = np.unique(np.concatenate([votes.first, votes.second]))
-    place = np.zeros(len(votes.names), dtype=np.int64)
-    place[kept] = np.arange(len(kept))
-    found = Comparisons(
-        names=tuple(votes.names[index] for index in kept.tolist()),
-        first=place[votes.first],
-        second=place[votes.second],
-        score=votes.score.copy(),
-        expert=votes.expert.copy(),
-        scenario=votes.scenario.copy(),
-    )
-    return found, kept

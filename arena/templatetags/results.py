@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Callable
 from typing import Any
 
 from django import template
@@ -10,6 +11,7 @@ from django.utils.functional import Promise
 from django.utils.translation import gettext as _
 from django.utils.translation import gettext_lazy, gettext_noop
 
+from arena.rating.estimate import Estimate
 from augment.models import Scenario
 from augment.services.wording import said
 
@@ -152,19 +154,19 @@ def dollars(amount: float) -> str:
 
 
 @register.filter
-def estimate(found: dict[str, Any] | None) -> str:
+def estimate(found: Estimate | None) -> str:
     """A number with its interval: 0.31 (0.28 to 0.34)."""
     return _with_interval(found, "{:.2f}".format)
 
 
 @register.filter
-def estimate_percent(found: dict[str, Any] | None) -> str:
+def estimate_percent(found: Estimate | None) -> str:
     """The same in percent."""
     return _with_interval(found, lambda value: f"{100 * value:.0f} %")
 
 
 @register.filter
-def estimate_points(found: dict[str, Any] | None) -> str:
+def estimate_points(found: Estimate | None) -> str:
     """The same in points, with its sign."""
     return _with_interval(found, lambda value: f"{value:+.0f}" if round(value) else "0")
 
@@ -175,13 +177,13 @@ def json_line(document: dict[str, Any] | None) -> str:
     return "" if document is None else json.dumps(document, ensure_ascii=False)
 
 
-def _with_interval(found: dict[str, Any] | None, written: Any) -> str:
-    if found is None or found.get("value") is None:
+def _with_interval(found: Estimate | None, written: Callable[[float], str]) -> str:
+    if not found or found.value is None:
         return _("unknown")
-    text = str(written(found["value"]))
-    if found.get("lower") is None:
+    text = written(found.value)
+    if found.lower is None or found.upper is None:
         return text
-    low, high = written(found["lower"]), written(found["upper"])
+    low, high = written(found.lower), written(found.upper)
     return _("%(value)s (%(low)s to %(high)s)") % {"value": text, "low": low, "high": high}
 
 

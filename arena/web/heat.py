@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
 
 from arena.exports.heat_chart import STRONG
 from arena.exports.tables import Row
+from arena.results.tree import PairRecord
 
 STEPS = 10
 FEW = 30
@@ -40,7 +40,7 @@ class Line:
     cells: list[Cell | None]
 
 
-def heat_map(pairs: Sequence[dict[str, Any]], rows: Sequence[Row]) -> list[Line]:
+def heat_map(pairs: Sequence[PairRecord], rows: Sequence[Row]) -> list[Line]:
     """The table, contestants in the given order both ways.
 
     Args:
@@ -49,10 +49,9 @@ def heat_map(pairs: Sequence[dict[str, Any]], rows: Sequence[Row]) -> list[Line]
     """
     found: dict[tuple[str, str], tuple[float, int, int | None]] = {}
     for pair in pairs:
-        votes = pair["wins"] + pair["ties"] + pair["losses"]
-        score = pair["wins"] + pair["ties"] / 2
-        found[pair["a"], pair["b"]] = (score, votes, pair["planned"])
-        found[pair["b"], pair["a"]] = (votes - score, votes, pair["planned"])
+        score = pair.wins + pair.ties / 2
+        found[pair.a, pair.b] = (score, pair.votes, pair.planned)
+        found[pair.b, pair.a] = (pair.votes - score, pair.votes, pair.planned)
     return [
         Line(number=n, row=row, cells=[_cell(row, other, found) for other in rows])
         for n, row in enumerate(rows, start=1)

@@ -13,7 +13,6 @@ from arena.queries.vote_sets import Filters
 from arena.rating.bootstrap import Unit
 from arena.rating.leaderboard import Method
 from arena.services.ratings import DEFAULT_ROUNDS, MOST_ROUNDS
-from arena.services.snapshots import judges_of
 from augment.models import Scenario
 
 METHOD_LABELS = {
@@ -66,7 +65,7 @@ class RatingForm(forms.Form):
         super().__init__(data)
         for name in ("method", "unit", "rounds", "seed"):
             self.fields[name].widget.attrs["class"] = "input"
-        named = judges_of(snapshot) if snapshot is not None else {}
+        named = snapshot.results.judges if snapshot is not None else {}
         self.judges = sorted(named.items(), key=lambda item: item[1])
 
     def wanted(self) -> dict[str, Any]:

@@ -80,7 +80,7 @@ def results_page(request: HttpRequest, code: uuid.UUID, tab: str = "table") -> H
             context["own_votes"] = both_versions(snapshot, table)
         else:
             table = for_experts(table)
-        context |= {"table": table, "is_old": not snapshot.results, "early_look": EARLY_LOOK}
+        context |= {"table": table, "early_look": EARLY_LOOK}
         context |= chosen.fill(snapshot, table)
     return render(request, "results/page.html", context)
 

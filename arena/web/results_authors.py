@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 from arena.exports.tables import LeaderboardTable, Row, sentences_of
 from arena.models import Snapshot
 from arena.queries.vote_sets import Filters, LeftOut
 from arena.rating.printed import rating_text
+from arena.results.tree import BothRanks, PanelRater
 from arena.web.results_ratings import Context
 
 
@@ -16,27 +18,32 @@ def both_versions(snapshot: Snapshot, table: LeaderboardTable) -> Context | None
 
     None where there are no such votes, or an older rating never looked.
     """
-    found: Context | None = snapshot.results.get("own_votes")
-    if not found:
+    found = snapshot.results.own_votes
+    if found is None:
         return None
-    lines = {line["slug"]: line for line in found["lines"]}
+    lines = {line.slug: line for line in found.lines}
     names = {row.slug: row.name for row in table.rows}
-    largest = found["largest"] or {"places": None, "slugs": []}
-    return found | {
+    return {
+        "kept": found,
         "lines": [_both_ways(lines[row.slug], row) for row in table.rows],
-        "reasons": sentences_of(found["reasons"], names),
-        "places": largest["places"],
-        "who": [names[slug] for slug in largest["slugs"]],
+        "reasons": sentences_of(found.reasons, names),
+        "places": found.largest and found.largest.places,
+        "who": [names[slug] for slug in found.largest.slugs] if found.largest else [],
     }
 
 
-def with_authors(snapshot: Snapshot, panel: list[Context]) -> list[Context]:
+def with_authors(snapshot: Snapshot, panel: Sequence[PanelRater]) -> list[Context]:
     """The experts' panel with who was author then, and the number of votes on their own."""
     authors = {judge for judge, _ in Filters.of_document(snapshot.filters).authors}
-    own: dict[str, int] = (snapshot.results.get("own_votes") or {}).get("by_judge", {})
+    found = snapshot.results.own_votes
+    own = found.by_judge if found else {}
     return [
-        line | {"is_author": line["judge"] in authors, "own_votes": own.get(line["judge"], 0)}
-        for line in panel
+        {
+            "rater": rater,
+            "is_author": rater.judge in authors,
+            "own_votes": own.get(rater.judge, 0),
+        }
+        for rater in panel
     ]
 
 
@@ -49,13 +56,14 @@ def for_experts(table: LeaderboardTable) -> LeaderboardTable:
     return replace(table, left_out=left_out)
 
 
-def _both_ways(line: Context, row: Row) -> Context:
+def _both_ways(line: BothRanks, row: Row) -> Context:
     """A contestant's line of both versions, and whether its rank differs."""
-    first, second = line["rank_with"], line["rank_without"]
-    return line | {
+    first, second = line.rank_with, line.rank_without
+    return {
+        "kept": line,
         "name": row.name,
         "simulated": row.simulated,
-        "elo_with": rating_text(line["rating_with"]),
-        "elo_without": rating_text(line["rating_without"]),
+        "elo_with": rating_text(line.rating_with),
+        "elo_without": rating_text(line.rating_without),
         "moves": first is not None and second is not None and first != second,
     }

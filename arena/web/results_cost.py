@@ -18,9 +18,9 @@ _CLASSES = (gettext_noop("Frontier"), gettext_noop("Utility"), gettext_noop("Ope
 
 def displacement(snapshot: Snapshot, table: LeaderboardTable) -> Context:
     """Elo against the distance from the references."""
-    found = {line["slug"]: line for line in snapshot.results.get("displacement") or []}
+    found = {line.slug: line for line in snapshot.results.displacement}
     lines = [
-        {"number": n, "row": row} | found[row.slug]
+        {"number": n, "row": row, "far": found[row.slug]}
         for n, row in enumerate(table.rows, start=1)
         if row.slug in found
     ]
@@ -29,17 +29,17 @@ def displacement(snapshot: Snapshot, table: LeaderboardTable) -> Context:
 
 def cost(snapshot: Snapshot, table: LeaderboardTable) -> Context:
     """Elo and displacement against money and tokens, by class of model."""
-    spent = {line["slug"]: line for line in snapshot.results.get("cost") or []}
-    metres = {line["slug"]: line for line in snapshot.results.get("displacement") or []}
+    spent = {line.slug: line for line in snapshot.results.cost}
+    metres = {line.slug: line.median_m for line in snapshot.results.displacement}
     labels = {value: _(str(label)) for value, label in EndpointModel.ModelClass.choices}
     lines = [
         {
             "number": n,
             "row": row,
-            "class_label": labels.get(spent[row.slug]["model_class"], ""),
-            "median_m": metres.get(row.slug, {}).get("median_m"),
+            "spent": spent[row.slug],
+            "class_label": labels.get(spent[row.slug].model_class, ""),
+            "median_m": metres.get(row.slug),
         }
-        | spent[row.slug]
         for n, row in enumerate(table.rows, start=1)
         if row.slug in spent
     ]
@@ -53,7 +53,11 @@ def cost(snapshot: Snapshot, table: LeaderboardTable) -> Context:
         "keys": [
             {"group": group, "is_simulated": simulated, "label": labels.get(group, "")}
             for group, simulated in sorted(
-                {(line["model_class"], line["row"].simulated) for line in lines}
+                {
+                    (spent[row.slug].model_class, row.simulated)
+                    for row in table.rows
+                    if row.slug in spent
+                }
             )
         ],
     }

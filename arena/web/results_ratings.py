@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from statistics import median_high
 from typing import Any
 
 from arena.exports.tables import LeaderboardTable, Row, sentences_of
 from arena.models import Snapshot
+from arena.results.tree import Bounds, OnlinePlace, PairRecord, TypeStanding
 from arena.web.charts import bars, interval_chart
 from arena.web.heat import heat_map
-from augment.sentences import read_sentence
 
 Context = dict[str, Any]
 """What a tab's template needs."""
@@ -20,18 +21,17 @@ FEW = 30
 
 def standings(snapshot: Snapshot, table: LeaderboardTable) -> Context:
     """The table with its intervals, and the lines that say how far it can be trusted."""
-    results = snapshot.results
-    trust = results.get("trust") or {}
-    independent = (results.get("claims") or {}).get("independent") or {}
-    moves = [line["moves"] for line in trust.get("raters") or [] if line["moves"] is not None]
+    trust = snapshot.results.trust
+    moves = [line.moves for line in trust.raters if line.moves is not None]
     names = by_slug(table)
-    removal = trust.get("removal")
+    removal = trust.removal
     return {
         "bars": bars([(row.slug, row.lower, row.elo, row.upper) for row in table.rows]),
         "largest_move": max(moves, default=None),
-        "removal": removal and removal | {"name": names[removal["rival"]].name},
-        "disagreements": _disagreements(trust.get("elo_order") or [], names),
-        "independent": _half_width(independent),
+        "removal": removal,
+        "rival": removal and names[removal.rival].name,
+        "disagreements": _disagreements(trust.elo_order or (), names),
+        "independent": _half_width(snapshot.results.claims.independent),
         "check": _cross_check(snapshot, table),
     }
 
@@ -39,9 +39,9 @@ def standings(snapshot: Snapshot, table: LeaderboardTable) -> Context:
 def pairs(snapshot: Snapshot, table: LeaderboardTable) -> Context:
     """The heat map and every pair as a line."""
     names = by_slug(table)
-    found = snapshot.results.get("pairs") or []
+    found = snapshot.results.pairs
     place = {row.slug: n for n, row in enumerate(table.rows)}
-    above = (snapshot.results.get("board") or {}).get("above")
+    above = snapshot.results.board.above
     apart = None if above is None else {frozenset(pair) for pair in above}
     lines = [_pair(pair, names, place, apart) for pair in found]
     lines.sort(key=lambda line: (place[line["a"].slug], place[line["b"].slug]))
@@ -56,25 +56,25 @@ def pairs(snapshot: Snapshot, table: LeaderboardTable) -> Context:
 def types(snapshot: Snapshot, table: LeaderboardTable) -> Context:
     """One small chart and table a scenario type, all on one axis."""
     names = by_slug(table)
-    found = snapshot.results.get("types") or []
-    ends = [
-        end
-        for part in found
-        for line in part["lines"]
-        for end in (line["lower"], line["upper"])
-        if end is not None
-    ]
+    lines = [line for part in snapshot.results.types for line in part.lines]
+    ends = [end for line in lines for end in (line.lower, line.upper) if end is not None]
     span = (min(ends), max(ends)) if ends else None
     by_name = {row.slug: row.name for row in table.rows}
     parts = []
-    for part in found:
-        rows = [_row(line, names[line["slug"]]) for line in part["lines"] if line["votes"]]
-        if any("note" not in line for line in part["lines"]):  # of an earlier version
+    for part in snapshot.results.types:
+        rows = [_row(line, names[line.slug]) for line in part.lines if line.votes]
+        if not snapshot.results.board.order:  # of an earlier version
             rows.sort(key=lambda row: (row.elo is None, -(row.elo or 0.0), row.slug))
-        few = any(row.votes < FEW for row in rows)
-        chart = interval_chart(rows, span)
-        reasons = sentences_of(part.get("reasons", [part["status"]]), by_name)
-        parts.append(part | {"rows": rows, "chart": chart, "few": few, "reasons": reasons})
+        reasons = (part.status,) if part.reasons is None else part.reasons
+        parts.append(
+            {
+                "kept": part,
+                "rows": rows,
+                "chart": interval_chart(rows, span),
+                "few": any(row.votes < FEW for row in rows),
+                "reasons": sentences_of(reasons, by_name),
+            }
+        )
     return {"parts": parts, "few_votes": FEW}
 
 
@@ -87,57 +87,52 @@ def by_slug(table: LeaderboardTable) -> Mapping[str, Row]:
 
 
 def _pair(
-    pair: Context,
+    pair: PairRecord,
     names: Mapping[str, Row],
     place: Mapping[str, int],
     apart: set[frozenset[str]] | None,
 ) -> Context:
     """A pair from the view of the one that stands higher."""
-    first, second, wins, losses = pair["a"], pair["b"], pair["wins"], pair["losses"]
+    first, second, wins, losses = pair.a, pair.b, pair.wins, pair.losses
     if place[second] < place[first]:
         first, second, wins, losses = second, first, losses, wins
     return {
         "a": names[first],
         "b": names[second],
         "wins": wins,
-        "ties": pair["ties"],
+        "ties": pair.ties,
         "losses": losses,
-        "both_miss": pair["both_miss"],
-        "votes": wins + pair["ties"] + losses,
+        "both_miss": pair.both_miss,
+        "votes": pair.votes,
         "apart": None if apart is None else frozenset((first, second)) in apart,
     }
 
 
-def _row(line: Context, row: Row) -> Row:
+def _row(line: TypeStanding, row: Row) -> Row:
     """A contestant's line among the votes of one type."""
-    return Row(
-        model=row.model,
-        variant=row.variant,
-        slug=row.slug,
-        kind=row.kind,
-        simulated=row.simulated,
-        rank=line["rank"],
-        elo=line["rating"],
-        lower=line["lower"],
-        upper=line["upper"],
-        votes=line["votes"],
-        wins=0,
-        ties=0,
-        losses=0,
-        note=read_sentence(line["note"]) if line.get("note") else "",
+    return replace(
+        row,
+        rank=line.rank,
+        rank_best=None,
+        rank_worst=None,
+        elo=line.rating,
+        lower=line.lower,
+        upper=line.upper,
+        votes=line.votes,
+        note=line.note or "",
     )
 
 
-def _disagreements(order: list[Context], names: Mapping[str, Row]) -> list[Context]:
+def _disagreements(order: Sequence[OnlinePlace], names: Mapping[str, Row]) -> list[Context]:
     """Who stands elsewhere by online Elo."""
     return [
-        {"name": names[line["slug"]].name, "place": place, "online": line["place"]}
+        {"name": names[line.slug].name, "place": place, "online": line.place}
         for place, line in enumerate(order, start=1)
-        if line["place"] != place
+        if line.place != place
     ]
 
 
-def _half_width(bounds: Mapping[str, list[float]]) -> float | None:
+def _half_width(bounds: Mapping[str, Bounds]) -> float | None:
     """The middle one of the intervals."""
     widths = [(upper - lower) / 2 for lower, upper in bounds.values()]
     return median_high(widths) if widths else None
@@ -145,7 +140,7 @@ def _half_width(bounds: Mapping[str, list[float]]) -> float | None:
 
 def _cross_check(snapshot: Snapshot, table: LeaderboardTable) -> float | None:
     """By how many points the bounds in closed form differ at most."""
-    found = (snapshot.results.get("board") or {}).get("check") or {}
+    found = snapshot.results.board.check
     gaps = [
         max(abs(found[row.slug][0] - row.lower), abs(found[row.slug][1] - row.upper))
         for row in table.rows

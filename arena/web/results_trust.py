@@ -15,28 +15,25 @@ from arena.web.scatter import scatter
 
 def raters(snapshot: Snapshot, table: LeaderboardTable) -> Context:
     """Agreement, repeats, sides, and the panel of experts."""
-    trust = snapshot.results.get("trust") or {}
-    lines = trust.get("raters") or []
-    left = [
-        (line["judge"], line["left"]["lower"], line["left"]["value"], line["left"]["upper"])
-        for line in lines
-    ]
+    lines = snapshot.results.trust.raters
+    left = [(line.judge, line.left.lower, line.left.value, line.left.upper) for line in lines]
+    panel = sorted(with_authors(snapshot, lines), key=lambda line: natural(line["rater"].name))
     return {
-        "trust": trust,
-        "panel": sorted(with_authors(snapshot, lines), key=lambda line: natural(line["name"])),
-        "limit": next((bet["limit"] for line in lines if (bet := line.get("bet"))), None),
+        "trust": snapshot.results.trust,
+        "panel": panel,
+        "limit": next((line.bet.limit for line in lines if line.bet), None),
         "left_bars": bars(left, span=(0.0, 1.0)),
     }
 
 
 def coverage(snapshot: Snapshot, table: LeaderboardTable) -> Context:
     """Votes against the plan, widths against votes, and how many votes narrower ones need."""
-    claims = snapshot.results.get("claims") or {}
+    pairs = snapshot.results.pairs
     plot = plots(snapshot, table).get("width")
     return {
-        "claims": claims,
+        "claims": snapshot.results.claims,
         "chart": scatter(plot),
         "points": plot.points if plot else (),
-        "heat": heat_map(snapshot.results.get("pairs") or [], table.rows),
-        "planned": sum(pair["planned"] or 0 for pair in snapshot.results.get("pairs") or []),
+        "heat": heat_map(pairs, table.rows),
+        "planned": sum(pair.planned or 0 for pair in pairs),
     }

@@ -13,7 +13,6 @@ from arena.exports.tables import leaderboard_table
 from arena.queries.judged import is_imported
 from arena.queries.result_votes import votes_on_pair
 from arena.queries.results import snapshot_to_export
-from arena.services.snapshots import judges_of
 from arena.web.access import STAFF, only
 from arena.web.results import address_of, asked_rating, readable
 from arena.web.results_ratings import by_slug
@@ -47,7 +46,7 @@ def votes_page(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
         "first": first,
         "second": second,
         "found": found,
-        "judges": judges_of(snapshot),
+        "judges": snapshot.results.judges,
         "back": address_of(study, snapshot, "pairs"),
     }
     return render(request, "results/votes.html", context)

@@ -111,7 +111,7 @@ def test_an_empty_table_keeps_its_columns_and_unknown_is_null() -> None:
 
 
 def test_the_heat_chart_names_everybody_and_is_the_same_twice(snapshot: Snapshot) -> None:
-    table, pairs = leaderboard_table(snapshot), snapshot.results["pairs"]
+    table, pairs = leaderboard_table(snapshot), snapshot.results.pairs
     picture = heat_chart(table.rows, pairs, file_format="svg")
     assert picture == heat_chart(table.rows, pairs, file_format="svg")
     for row in table.rows:

@@ -61,7 +61,9 @@ def test_without_judges_votes_are_resampled(tmp_path: Path) -> None:
     study = import_votes(path=path, name="Elsewhere").study
     snapshot = rate(study=study, rounds=200)
     assert snapshot.resampling_unit == "vote"
-    assert snapshot.results["trust"]["agreement"]["units"] == 0, "nobody knows what was shown"
+    agreement = snapshot.results.trust.agreement
+    assert agreement is not None
+    assert agreement.units == 0, "nobody knows what was shown"
 
 
 @pytest.mark.parametrize(

@@ -118,9 +118,9 @@ def test_charts_are_drawn_with_open_ends(snapshot: Snapshot) -> None:
 
 def test_a_type_with_too_few_votes_has_no_ranks_in_page_and_files() -> None:
     snapshot = rate(study=judged(), rounds=50)
-    lines = [line for part in snapshot.results["types"] for line in part["lines"]]
-    assert {line["rank"] for line in lines} == {None}
-    assert all(line["note"] for line in lines if line["votes"])
+    lines = [line for part in snapshot.results.types for line in part.lines]
+    assert {line.rank for line in lines} == {None}
+    assert all(line.note for line in lines if line.votes)
     assert "kein Rang" in german(snapshot.study, "types")
     assert b"no rank" in _of_zip(bundle(snapshot), "types.csv")
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import io
 import json
 import zipfile
+from dataclasses import replace
 from typing import Any
 
 import pytest
@@ -19,6 +20,7 @@ from arena.queries.judged import MAIN, Entrant, Judged, last_vote_of
 from arena.queries.result_votes import votes_on_pair
 from arena.queries.vote_sets import Filters, VoteSet, vote_set
 from arena.rating.leaderboard import rate as rate_votes
+from arena.results.tree import OwnVotes
 from arena.services.authorships import mark_author, take_back_author
 from arena.services.own_votes import OTHER_ROUNDS, with_and_without
 from arena.services.ratings import compute_snapshot, plan_snapshot, rate
@@ -53,8 +55,15 @@ def table_of(snapshot: Snapshot) -> dict[str, tuple[Any, ...]]:
 
 
 def shown(snapshot: Snapshot, version: str) -> dict[str, tuple[Any, ...]]:
-    lines = snapshot.results["own_votes"]["lines"]
-    return {line["slug"]: (line[f"rank_{version}"], line[f"rating_{version}"]) for line in lines}
+    return {
+        line.slug: (getattr(line, f"rank_{version}"), getattr(line, f"rating_{version}"))
+        for line in own_votes(snapshot).lines
+    }
+
+
+def own_votes(snapshot: Snapshot) -> OwnVotes:
+    assert snapshot.results.own_votes is not None
+    return snapshot.results.own_votes
 
 
 def zipped(snapshot: Snapshot) -> dict[str, bytes]:
@@ -89,13 +98,14 @@ def test_both_versions_are_those_of_the_two_ratings_themselves(study: Study) -> 
     for version, snapshot in (("with", counted), ("without", left)):
         itself = {slug: line[:2] for slug, line in table_of(snapshot).items()}
         assert shown(counted, version) == itself == shown(left, version)
-    found = counted.results["own_votes"]
-    assert (found["left_out"], left.results["own_votes"]["left_out"]) == (False, True)
-    assert found["votes"] == left.votes_left_out["own"] == sum(found["by_judge"].values())
-    assert (found["experts"], found["of_experts"]) == (2, 4)
+    found = own_votes(counted)
+    assert (found.left_out, own_votes(left).left_out) == (False, True)
+    assert found.votes == left.votes_left_out["own"] == sum(found.by_judge.values())
+    assert (found.experts, found.of_experts) == (2, 4)
     moves = {slug: abs(rank - shown(left, "without")[slug][0]) for slug, (rank, _) in
              shown(counted, "with").items()}  # fmt: skip
-    assert found["largest"]["places"] == max(moves.values())
+    assert found.largest is not None
+    assert found.largest.places == max(moves.values())
 
 
 def test_a_rating_knows_the_authors_of_its_own_time(study: Study) -> None:
@@ -104,20 +114,20 @@ def test_a_rating_knows_the_authors_of_its_own_time(study: Study) -> None:
     take_back_author(authorship=study.authorships.get())
     mark(study, "expert-2", "llama-fc")
     assert len(votes_of(left).counted) == left.votes_counted
-    assert counted.results["own_votes"]["by_judge"].keys() == {code_of(AUTHOR)}
+    assert own_votes(counted).by_judge.keys() == {code_of(AUTHOR)}
     planned = plan_snapshot(study=study, rounds=20, filters=WITHOUT)
     take_back_author(authorship=study.authorships.get())
     later = compute_snapshot(snapshot_pk=planned.pk)
     assert later is not None
-    assert later.results["own_votes"]["by_judge"].keys() == {code_of("expert-2")}
+    assert own_votes(later).by_judge.keys() == {code_of("expert-2")}
 
 
 def test_without_authors_or_without_own_votes_there_is_nothing_to_compare(study: Study) -> None:
-    assert rate(study=study, rounds=10).results["own_votes"] is None
+    assert rate(study=study, rounds=10).results.own_votes is None
     mark(study)
     others = tuple(code_of(f"expert-{number}") for number in (2, 3, 4))
     snapshot = rate(study=study, rounds=10, filters=Filters(experts=others))
-    assert snapshot.results["own_votes"] is None
+    assert snapshot.results.own_votes is None
 
 
 def test_the_other_version_says_why_it_rates_nobody() -> None:
@@ -126,9 +136,9 @@ def test_the_other_version_says_why_it_rates_nobody() -> None:
         vote(matchup, "left" if number % 2 else "right")
     for slug in ("ann", "bob", "cid"):
         mark(study, "eva", slug)
-    found = rate(study=study, rounds=10, early=True).results["own_votes"]
-    assert found["largest"] is None
-    assert [one["text"] for one in found["reasons"]] == ["There are no votes to rate."]
+    found = own_votes(rate(study=study, rounds=10, early=True))
+    assert found.largest is None
+    assert [*found.reasons] == ["There are no votes to rate."]
 
 
 def test_other_reasons_are_said_before_this_one_and_repeats_follow_the_same_rule() -> None:
@@ -154,10 +164,9 @@ def test_other_reasons_are_said_before_this_one_and_repeats_follow_the_same_rule
 def test_pairs_their_plan_and_their_cells_leave_them_out_alike(study: Study) -> None:
     mark(study)
     snapshot = rate(study=study, rounds=10, filters=WITHOUT)
-    for pair in snapshot.results["pairs"]:
-        votes = pair["wins"] + pair["ties"] + pair["losses"]
-        cell = votes_on_pair(snapshot, first=pair["a"], second=pair["b"], page=1, imported=False)
-        assert cell.page.paginator.count == votes == pair["planned"], pair
+    for pair in snapshot.results.pairs:
+        cell = votes_on_pair(snapshot, first=pair.a, second=pair.b, page=1, imported=False)
+        assert cell.page.paginator.count == pair.votes == pair.planned, pair
 
 
 def test_the_zip_has_both_versions_but_never_who_is_author(study: Study) -> None:
@@ -179,12 +188,12 @@ def test_a_snapshot_of_before_still_opens_and_packs(study: Study) -> None:
     snapshot = rate(study=study, rounds=20)
     for name in ("leave_out_own", "authors"):
         del snapshot.filters[name]
-    del snapshot.results["own_votes"]
+    snapshot.results = replace(snapshot.results, own_votes=None)
     snapshot.save()
     assert Filters.of_document(snapshot.filters) == Filters()
     files = zipped(snapshot)
     assert json.loads(files["manifest.json"])["filters"] == snapshot.filters
-    assert "own_votes" not in json.loads(files["statistics.json"])
+    assert json.loads(files["statistics.json"])["own_votes"] is None
 
 
 def test_the_command_leaves_them_out_too(study: Study, capsys: pytest.CaptureFixture[str]) -> None:
@@ -240,7 +249,7 @@ def a_vote_set(votes: tuple[Judged, ...], filters: Filters) -> VoteSet:
     )  # fmt: skip
 
 
-def compared(votes: tuple[Judged, ...], filters: Filters) -> dict[str, Any] | None:
+def compared(votes: tuple[Judged, ...], filters: Filters) -> OwnVotes | None:
     found = a_vote_set(votes, filters)
     board = rate_votes(vote_arrays(SLUGS, found.counted).comparisons, rounds=30, seed=1)
     return with_and_without(found, filters, board)
@@ -269,7 +278,7 @@ def test_both_ratings_say_the_same_of_both_versions(
     if one is None or other is None:
         assert one is other
         return
-    assert one["lines"] == other["lines"]
-    assert one["largest"] == other["largest"]
-    assert one["rounds"] == min(30, OTHER_ROUNDS)
-    assert 0 < one["votes"] <= len(votes)
+    assert one.lines == other.lines
+    assert one.largest == other.largest
+    assert one.rounds == min(30, OTHER_ROUNDS)
+    assert 0 < one.votes <= len(votes)

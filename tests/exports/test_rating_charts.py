@@ -5,6 +5,7 @@ from __future__ import annotations
 import threading
 import xml.etree.ElementTree as ET
 from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -15,6 +16,7 @@ from arena.exports.charts import interval_chart
 from arena.exports.rating_charts import CONTENT_TYPES, chart_bytes, charts
 from arena.exports.tables import leaderboard_table
 from arena.models import Snapshot
+from arena.results.tree import DisplacementSummary, ScenarioCost
 from arena.services.ratings import rate
 from augment.errors import UnknownName
 from tests.full_study import Size, full_study
@@ -32,13 +34,19 @@ def snapshot() -> Snapshot:
     """With costs and displacements as language models would have them."""
     made = rate(study=full_study(size=SMALL), rounds=300, unit="vote", seed=4)
     classes = ("frontier", "utility", "open_weight", "")
-    for n, line in enumerate(made.standings.order_by("slug")):
-        spent = {"calls": 1.0, "tokens": 3000.0 + n, "usd": 0.001 * (n + 1), "augmentations": 5}
-        made.results["cost"].append(
-            {"slug": line.slug, "model": "m", "model_class": classes[n % 4], **spent}
+    slugs = [line.slug for line in made.standings.order_by("slug")]
+    cost = (
+        ScenarioCost(
+            slug=slug, model="m", model_class=classes[n % 4], augmentations=5, calls=1.0,
+            tokens=3000.0 + n, usd=0.001 * (n + 1),
         )
-        far = {"median_m": 0.5, "mean_m": 1.0, "n": 5, "missing": 0, "surplus": 0}
-        made.results["displacement"].append({"slug": line.slug, "augmentations": 5, **far})
+        for n, slug in enumerate(slugs)
+    )  # fmt: skip
+    far = DisplacementSummary(
+        slug="", median_m=0.5, mean_m=1.0, n=5, missing=0, surplus=0, augmentations=5
+    )
+    displacement = (replace(far, slug=slug) for slug in slugs)
+    made.results = replace(made.results, cost=tuple(cost), displacement=tuple(displacement))
     made.save()
     return made
 
@@ -84,7 +92,7 @@ def test_what_is_simulated_is_called_so_in_every_chart(snapshot: Snapshot) -> No
 
 
 def test_a_rating_without_costs_has_no_charts_of_them(snapshot: Snapshot) -> None:
-    snapshot.results |= {"cost": [], "displacement": []}
+    snapshot.results = replace(snapshot.results, cost=(), displacement=())
     assert list(charts(snapshot)) == ["pairs", "types", "width"]
     with pytest.raises(UnknownName, match="'elo-usd'"):
         chart_bytes(snapshot, name="elo-usd", file_format="svg")

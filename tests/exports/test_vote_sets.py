@@ -14,7 +14,7 @@ from arena.models import Matchup, Snapshot, Study, Vote
 from arena.queries.judged import last_vote_of
 from arena.queries.vote_sets import Filters, vote_set
 from arena.services.ratings import compute_snapshot, plan_snapshot, rate
-from arena.services.snapshots import judges_of, votes_of
+from arena.services.snapshots import votes_of
 from arena.services.studies import close_study
 from arena.services.vote_rows import COLUMNS, digest_of, vote_rows, votes_csv
 from augment.errors import Conflict, UnknownName
@@ -122,7 +122,7 @@ def test_a_snapshot_keeps_its_filters_and_judges_and_finds_its_votes_again() -> 
     )
     assert snapshot.filters["types"] == [Scenario.Type.NUDGE.value]
     person = matchups_of(study, "eva")[0].expert.person
-    assert judges_of(snapshot)[str(person.code)] == person.pseudonym
+    assert snapshot.results.judges[str(person.code)] == person.pseudonym
     person.pseudonym = "Somebody else"
     person.save()
     assert len(votes_of(snapshot).counted) == 6, "the name of then counts"

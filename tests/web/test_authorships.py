@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from dataclasses import replace
 from datetime import UTC, datetime
 
 import pytest
@@ -125,20 +126,21 @@ def test_staff_read_both_versions_of_the_table_and_who_is_an_author() -> None:
     assert HEADING not in page(analyst, study, "results")
     mark(study, "expert-1", "gpt-4o-otm")
     snapshot = rated(study)
-    own = snapshot.results["own_votes"]
+    own = snapshot.results.own_votes
+    assert own is not None
     shown = page(analyst, study, "results")
     assert HEADING in shown
     assert (
-        f"{own['votes']} votes, by 1 of 4 experts, are by authors on contestants of their own."
+        f"{own.votes} votes, by 1 of 4 experts, are by authors on contestants of their own."
     ) in shown
     assert "The table above counts them." in shown
     assert "computed with 100 resamples" in shown
     table = shown[shown.index(HEADING) : shown.index("How to read this")]
-    for line in own["lines"]:
-        assert f'<td class="num">{round(line["rating_without"])}</td>' in table
+    for line in own.lines:
+        assert f'<td class="num">{round(line.rating_without or 0)}</td>' in table
     raters = page(analyst, study, "results-tab", "raters")
     assert raters.count(">Author</span>") == 1
-    assert f"n {own['votes']}<" in raters
+    assert f"n {own.votes}<" in raters
     assert "expert-1" not in raters
     assert "marked an author" in page(analyst, study, "results-tab", "log")
 
@@ -166,7 +168,7 @@ def test_a_rating_of_before_opens_on_every_tab() -> None:
     snapshot = rated(study)
     for name in ("leave_out_own", "authors"):
         del snapshot.filters[name]
-    del snapshot.results["own_votes"]
+    snapshot.results = replace(snapshot.results, own_votes=None)
     snapshot.save()
     for tab in ("table", "pairs", "raters", "coverage", "log"):
         shown = page(analyst, study, "results-tab", tab)

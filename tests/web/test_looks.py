@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -11,6 +12,7 @@ from django.test import Client
 from django.urls import reverse
 
 from arena.models import Standing, Study
+from arena.results.tree import ScenarioCost
 from arena.services.ratings import rate
 from augment.models import Contestant
 from tests.full_study import Size, full_study
@@ -49,11 +51,12 @@ def test_results_belong_to_the_studies_in_the_menu(rated: Study, tab: str) -> No
 def test_the_key_of_the_cost_charts_has_the_colours_of_their_points(rated: Study) -> None:
     Standing.objects.filter(slug="interplan").update(is_simulated=True)
     snapshot = rated.snapshots.get()
-    line = {"usd": None, "tokens": 12345.0, "calls": 1.0}
-    snapshot.results["cost"] = [
-        line | {"slug": "interplan", "model_class": ""},
-        line | {"slug": "llama-otm", "model_class": "open_weight"},
-    ]
+    line = ScenarioCost(
+        slug="interplan", model="m", model_class="", augmentations=1, calls=1.0, tokens=12345.0,
+        usd=None,
+    )  # fmt: skip
+    other = replace(line, slug="llama-otm", model_class="open_weight")
+    snapshot.results = replace(snapshot.results, cost=(line, other))
     snapshot.save()
     shown = page(signed_in(people()["analyst"]), reverse("results-tab", args=[rated.code, "cost"]))
     keys = re.findall(r'<svg class="key ([\w -]+)".*?</svg>([^<]+)</span>', shown)

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+from typing import Any
+
 import pytest
 from django.contrib.auth.models import User
 from django.test import Client
@@ -10,6 +13,8 @@ from pytest_django import DjangoAssertNumQueries
 
 from arena.models import EarlyLook, Matchup, Snapshot, Study
 from arena.queries.vote_sets import Filters
+from arena.rating.bets import Manner
+from arena.results.tree import RaterBet
 from arena.services.ratings import plan_snapshot, rate
 from arena.services.studies import close_study
 from arena.web.results_tabs import TABS
@@ -73,10 +78,8 @@ def test_the_heat_map_leads_to_the_votes_with_both_pictures(study: Study, analys
     query = {"rating": str(snapshot.code), "a": "interplan", "b": "llama-otm"}
     assert f"?rating={snapshot.code}&amp;a=interplan&amp;b=llama-otm" in shown
     cell = analyst.get(reverse("results-votes", args=[study.code]), query).content.decode()
-    pair = next(
-        p for p in snapshot.results["pairs"] if {p["a"], p["b"]} == {"interplan", "llama-otm"}
-    )
-    assert cell.count("<img") == 2 * (pair["wins"] + pair["ties"] + pair["losses"])
+    pair = next(p for p in snapshot.results.pairs if {p.a, p.b} == {"interplan", "llama-otm"})
+    assert cell.count("<img") == 2 * pair.votes
     for wrong in ({"a": "interplan", "b": "interplan"}, {"a": "interplan", "b": "nobody"}):
         missing = analyst.get(reverse("results-votes", args=[study.code]), wrong)
         assert missing.status_code == 404
@@ -104,8 +107,9 @@ def test_raters_are_pseudonyms_with_repeats_and_checks(analyst: Client) -> None:
         study_rows.vote(matchup, "left")
     study = close_study(study=study)
     snapshot = rate(study=study, rounds=50)
-    repeats = snapshot.results["trust"]["repeats"]
-    assert (repeats["number"], repeats["same"]["value"]) == (1, 0.0), "left both times"
+    repeats = snapshot.results.trust.repeats
+    assert repeats is not None
+    assert (repeats.number, repeats.same.value) == (1, 0.0), "left both times"
     shown = page(analyst, study, "raters")
     assert first.expert.person.pseudonym in shown
     assert "eva" not in shown
@@ -116,20 +120,32 @@ def test_raters_are_pseudonyms_with_repeats_and_checks(analyst: Client) -> None:
 @pytest.mark.parametrize(
     ("bet", "said"),
     [
-        ({"e_value": 3.14159, "manner": "blind", "votes": 20, "limit": 40.0}, ">3.1</td>"),
-        ({"e_value": 39.9, "manner": "blind", "votes": 20, "limit": 40.0}, ">40</td>"),
-        ({"e_value": 45.0, "manner": "blind", "votes": 20, "limit": 40.0}, "as if not looking"),
-        ({"e_value": 1e12, "manner": "swapped", "votes": 20, "limit": 40.0}, ">over 1,000</td>"),
-        ({"e_value": 1e12, "manner": "swapped", "votes": 20, "limit": 40.0}, "keys were swapped"),
+        ({"e_value": 3.14159, "manner": Manner.BLIND, "votes": 20, "limit": 40.0}, ">3.1</td>"),
+        ({"e_value": 39.9, "manner": Manner.BLIND, "votes": 20, "limit": 40.0}, ">40</td>"),
+        (
+            {"e_value": 45.0, "manner": Manner.BLIND, "votes": 20, "limit": 40.0},
+            "as if not looking",
+        ),
+        (
+            {"e_value": 1e12, "manner": Manner.SWAPPED, "votes": 20, "limit": 40.0},
+            ">over 1,000</td>",
+        ),
+        (
+            {"e_value": 1e12, "manner": Manner.SWAPPED, "votes": 20, "limit": 40.0},
+            "keys were swapped",
+        ),
         (None, "–</td></tr>"),
     ],
 )
 def test_who_votes_as_if_without_looking_is_pointed_out(
-    study: Study, analyst: Client, bet: dict[str, object] | None, said: str
+    study: Study, analyst: Client, bet: dict[str, Any] | None, said: str
 ) -> None:
     snapshot = Snapshot.objects.get(study=study)
-    snapshot.results["trust"]["raters"][0]["bet"] = bet
-    Snapshot.objects.filter(pk=snapshot.pk).update(results=snapshot.results)
+    trust = snapshot.results.trust
+    first = replace(trust.raters[0], bet=None if bet is None else RaterBet(**bet))
+    trust = replace(trust, raters=(first, *trust.raters[1:]))
+    results = replace(snapshot.results, trust=trust)
+    Snapshot.objects.filter(pk=snapshot.pk).update(results=results)
     assert said in page(analyst, study, "raters")
 
 

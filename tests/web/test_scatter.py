@@ -12,6 +12,7 @@ from arena.exports.drawing import SIMULATED
 from arena.exports.plots import ELO, VOTES, Given, Plot
 from arena.exports.scatter_chart import scatter_chart
 from arena.exports.tables import Row
+from arena.results.tree import PairRecord
 from arena.web.charts import BAR_LEFT, BAR_RIGHT, bars
 from arena.web.heat import heat_map
 from arena.web.scatter import BOTTOM, LEFT, NARROW, RADIUS, RIGHT, TOP, scatter
@@ -101,7 +102,7 @@ def test_the_heat_map_mirrors_scores_and_marks_what_is_few() -> None:
             lower=None, upper=None, votes=1, wins=0, ties=1, losses=0, note="",
         )  # fmt: skip
 
-    pair = {"a": "a", "b": "b", "wins": 30, "ties": 10, "losses": 0, "planned": 50}
+    pair = PairRecord(a="a", b="b", wins=30, ties=10, losses=0, both_miss=0, planned=50)
     first, second, third = heat_map([pair], [row("a"), row("b"), row("c")])
     cells = (first.cells[1], second.cells[0])
     assert [cell.percent for cell in cells if cell] == [88, 12]

@@ -1,0 +1,302 @@
+"""What a snapshot keeps beside its standings, as values. Read this file first.
+
+In: what `arena.services` computes of the votes. Out: what pages and files read. The names of the
+fields are the keys of the stored document (`arena.results.codec`); `since` marks those that came
+with a later version of it. None and empty mean that the votes do not determine it, that nobody
+asked, or that the version which rated did not know of it yet.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Annotated, Any
+
+from pydantic import PlainValidator
+
+from arena.rating.bets import Bet
+from arena.rating.fit_test import FitTest
+from arena.rating.position import SideBias
+from arena.rating.raters import Rater
+from arena.rating.reliability import Agreement
+from arena.rating.repeats import Repeats
+from augment.sentences import read_sentence
+
+VERSION = 2
+"""1 is without the order of the board and without notes in the lines of types; a rating of
+version 0 kept its standings alone."""
+
+Bounds = tuple[float, float]
+
+
+def _read(kept: Any) -> str:
+    if isinstance(kept, dict):
+        return read_sentence(kept)
+    if not isinstance(kept, str):
+        raise ValueError(f"a sentence or plain text is allowed, not {kept!r}")
+    return kept
+
+
+Kept = Annotated[str, PlainValidator(_read)]
+"""A sentence; older ones are plain text."""
+
+
+_SINCE_2 = {"since": 2}
+"""Of fields that documents of earlier versions do not have."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class BoardRemarks:
+    """What the rating says beside its lines; contestants by slug.
+
+    Attributes:
+        reasons: Why ratings or intervals are missing; None where only the status says so.
+        warnings: What else to keep in mind.
+        tie_strength: v of Davidson's model.
+        check: The intervals in closed form.
+        order: Slugs, best first.
+        parts: Whose ratings compare: those with the same number.
+        above: The pairs that differ with all of them judged at once, the higher one first.
+    """
+
+    reasons: tuple[Kept, ...] | None = None
+    warnings: tuple[Kept, ...] = ()
+    tie_strength: float | None = None
+    experts: int = 0
+    scenarios: int = 0
+    check: dict[str, Bounds] = field(default_factory=dict)
+    order: tuple[str, ...] = field(default=(), metadata=_SINCE_2)
+    parts: dict[str, int] = field(default_factory=dict)
+    above: tuple[tuple[str, str], ...] | None = None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Overtaking:
+    """How few votes would have to go for somebody else to be first.
+
+    Attributes:
+        exact: Whether fewer are proved not to do; else it is an upper bound.
+        rival: The slug of who comes first then.
+    """
+
+    votes: int
+    exact: bool
+    rival: str
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class OnlinePlace:
+    """What online Elo makes of a contestant."""
+
+    slug: str
+    elo: float
+    place: int
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class RaterBet(Bet):
+    """A bet against an expert, and the e-value above which the expert deserves a look."""
+
+    limit: float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PanelRater(Rater):
+    """An expert with what the votes of all say of them.
+
+    Attributes:
+        judge: Their code; `name` is the pseudonym.
+        moves: By how many places a contestant moves at most without their votes.
+        repeats: How many hidden repeats they answered, and how many of them alike.
+        checks: How many attention checks they answered, and how many for the reference.
+    """
+
+    judge: str
+    name: str
+    moves: int | None
+    repeats: tuple[int, int]
+    checks: tuple[int, int]
+    bet: RaterBet | None = None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Trust:
+    """Statistics about the votes themselves.
+
+    Attributes:
+        tie_share: From 0 to 1.
+        elo_order: Contestants by Bradley-Terry, with what online Elo makes of them.
+    """
+
+    tie_share: float | None = None
+    agreement: Agreement | None = None
+    side: SideBias | None = None
+    repeats: Repeats | None = None
+    raters: tuple[PanelRater, ...] = ()
+    removal: Overtaking | None = None
+    elo_order: tuple[OnlinePlace, ...] | None = None
+    fit: FitTest | None = None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class VotesWanted:
+    """The votes in all that an interval of +-`half_width` Elo points needs."""
+
+    half_width: float
+    votes: int
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Precision:
+    """What intervals would claim of independent votes, and what narrower ones need.
+
+    Attributes:
+        half_width: Of the typical interval, Elo points.
+        independent: The intervals that single votes as units give, by slug.
+        design_effect: How many of these votes weigh as much as an independent one.
+    """
+
+    half_width: float | None = None
+    independent: dict[str, Bounds] = field(default_factory=dict)
+    design_effect: float | None = None
+    planning: tuple[VotesWanted, ...] = ()
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class LargestMove:
+    """By how many ranks somebody moves at most, and who does."""
+
+    places: int
+    slugs: tuple[str, ...]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class BothRanks:
+    """A contestant with and without the votes of authors."""
+
+    slug: str
+    rank_with: int | None
+    rating_with: float | None
+    rank_without: int | None
+    rating_without: float | None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class OwnVotes:
+    """The rating with and without the votes of authors on their own contestants.
+
+    Attributes:
+        left_out: Whether the table leaves them out.
+        votes, experts: How many there are, and by how many.
+        of_experts: How many experts there are in all.
+        rounds: Of the version that the table does not show; `reasons` are about that one.
+        largest: None where nobody has a rank in both versions.
+        by_judge: Their number by the judge's code.
+    """
+
+    left_out: bool
+    votes: int
+    experts: int
+    of_experts: int
+    rounds: int
+    reasons: tuple[Kept, ...]
+    largest: LargestMove | None
+    lines: tuple[BothRanks, ...]
+    by_judge: dict[str, int]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PairRecord:
+    """Wins, ties and losses of `a` against `b`, and how often they were to be judged."""
+
+    a: str
+    b: str
+    wins: int
+    ties: int
+    losses: int
+    both_miss: int
+    planned: int | None
+
+    @property
+    def votes(self) -> int:
+        """All of them."""
+        return self.wins + self.ties + self.losses
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class TypeStanding:
+    """A contestant among the votes on one scenario type; `few` are too few to read much from."""
+
+    slug: str
+    rating: float | None
+    lower: float | None
+    upper: float | None
+    rank: int | None
+    note: Kept | None = field(default=None, metadata=_SINCE_2)
+    votes: int
+    few: bool
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class TypeRating:
+    """The rating of one scenario type on its own.
+
+    Attributes:
+        label: The type's name as people read it.
+        reasons: Why ratings are missing; None where only the status says so.
+    """
+
+    type: str
+    label: str
+    votes: int
+    scenarios: int
+    status: str
+    reasons: tuple[Kept, ...] | None = None
+    lines: tuple[TypeStanding, ...]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class DisplacementSummary:
+    """How far a contestant's shown augmentations are from the references, over `n` objects."""
+
+    slug: str
+    median_m: float | None
+    mean_m: float | None
+    n: int
+    missing: int
+    surplus: int
+    augmentations: int
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ScenarioCost:
+    """What a contestant takes for one scenario on average; None is unknown."""
+
+    slug: str
+    model: str
+    model_class: str
+    augmentations: int
+    calls: float
+    tokens: float | None
+    usd: float | None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Results:
+    """All of it; without arguments what a rating of version 0 kept.
+
+    Attributes:
+        models: What models contestants ask, by slug.
+        judges: Pseudonyms by code.
+    """
+
+    version: int = 0
+    board: BoardRemarks = field(default_factory=BoardRemarks)
+    trust: Trust = field(default_factory=Trust)
+    claims: Precision = field(default_factory=Precision)
+    own_votes: OwnVotes | None = None
+    pairs: tuple[PairRecord, ...] = ()
+    types: tuple[TypeRating, ...] = ()
+    displacement: tuple[DisplacementSummary, ...] = ()
+    cost: tuple[ScenarioCost, ...] = ()
+    models: dict[str, str] = field(default_factory=dict)
+    judges: dict[str, str] = field(default_factory=dict)

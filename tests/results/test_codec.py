@@ -1,0 +1,116 @@
+"""Results of a snapshot: of every version read, written as they were, never half understood."""
+
+from __future__ import annotations
+
+import copy
+import hashlib
+import json
+from pathlib import Path
+from typing import Any
+
+import pytest
+from django.core import serializers
+from django.db import connection
+from django.urls import reverse
+
+from arena.exports import bundle
+from arena.models import Snapshot, Standing, Study
+from arena.results.codec import read_results, results_document
+from arena.results.tree import VERSION, Results
+from arena.web.results_tabs import TABS
+from augment.errors import InvalidDocument
+from augment.sentences import Sentence
+from tests.web.cast import people, signed_in
+
+OLD: dict[str, Any] = json.loads((Path(__file__).parent / "version_1.json").read_text())
+"""A simulated study, rated and stored by the code of version 1."""
+
+
+def stored(results: dict[str, Any]) -> Snapshot:
+    """The old snapshot in the database, with such results."""
+    study = Study.objects.create(name="Round 1", state="closed", seed=1, votes_per_expert=90)
+    snapshot = Snapshot.objects.create(study=study, **OLD["snapshot"] | {"results": Results()})
+    for line in OLD["standings"]:
+        Standing.objects.create(snapshot=snapshot, **line)
+    with connection.cursor() as cursor:
+        asked = "UPDATE arena_snapshot SET results = %s WHERE id = %s"
+        cursor.execute(asked, [json.dumps(results), snapshot.pk])
+    return Snapshot.objects.get(pk=snapshot.pk)
+
+
+def test_an_old_document_is_written_as_it_was_read() -> None:
+    kept = OLD["snapshot"]["results"]
+    found = read_results(kept)
+    assert results_document(found) == kept
+    assert (found.version, found.board.order, found.types[0].lines[0].note) == (1, (), None)
+    assert isinstance(found.board.warnings[0], Sentence)
+    assert found.trust.removal is not None
+    assert found.trust.removal.rival == "gpt-4o-otm"
+
+
+def test_what_a_version_brought_is_a_key_of_it_also_when_it_is_empty() -> None:
+    document = results_document(Results(version=VERSION))
+    assert document["board"]["order"] == []
+    assert results_document(Results(version=1))["board"].keys() == document["board"].keys() - {
+        "order"
+    }
+    assert (read_results(document), read_results({})) == (Results(version=VERSION), Results())
+    assert results_document(Results()) == {}
+
+
+@pytest.mark.parametrize(
+    ("path", "value", "said"),
+    [
+        (("version",), VERSION + 1, f"version: a version from 0 to {VERSION}, not {VERSION + 1}"),
+        (("version",), "new", "not 'new'"),
+        (("pairs", 0, "wins"), "many", "pairs.0.wins: "),
+        (("board", "warnings", 0), 7, "board.warnings.0: .*a sentence or plain text"),
+        (("trust", "raters", 0, "bet", "manner"), "asleep", "manner.*'blind' or 'swapped'"),
+    ],
+)
+def test_what_can_not_be_read_is_refused_with_its_place(
+    path: tuple[str | int, ...], value: object, said: str
+) -> None:
+    document: Any = copy.deepcopy(OLD["snapshot"]["results"])
+    place = document
+    for step in path[:-1]:
+        place = place[step]
+    place[path[-1]] = value
+    with pytest.raises(InvalidDocument, match=said):
+        read_results(document)
+
+
+@pytest.mark.django_db
+def test_an_old_rating_opens_on_every_tab_and_exports_the_same_bytes() -> None:
+    snapshot = stored(OLD["snapshot"]["results"])
+    staff = signed_in(people()["analyst"])
+    for tab in TABS:
+        page = staff.get(reverse("results-tab", args=[snapshot.study.code, tab.name]))
+        assert page.status_code == 200, tab.name
+    results = snapshot.results
+    files = {
+        "pairs.csv": bundle._pairs(results),
+        "types.csv": bundle._types(results),
+        "raters.csv": bundle._raters(results),
+        "statistics.json": bundle._json(bundle._public(results)),
+    }
+    found = {name: hashlib.sha256(content).hexdigest() for name, content in files.items()}
+    assert found == {name: OLD["files"][name] for name in files}
+
+
+@pytest.mark.django_db
+def test_a_rating_that_kept_its_standings_alone_opens_on_every_tab() -> None:
+    snapshot = stored({})
+    staff = signed_in(people()["analyst"])
+    for tab in TABS:
+        page = staff.get(reverse("results-tab", args=[snapshot.study.code, tab.name]))
+        assert "keeps the table alone" in page.content.decode(), tab.name
+
+
+@pytest.mark.django_db
+def test_a_dump_has_the_document_and_loads_again() -> None:
+    kept = OLD["snapshot"]["results"]
+    text = serializers.serialize("json", [stored(kept)])
+    assert json.loads(text)[0]["fields"]["results"] == kept
+    next(iter(serializers.deserialize("json", text))).save()
+    assert Snapshot.objects.get().results == read_results(kept)
