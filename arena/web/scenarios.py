@@ -17,7 +17,7 @@ from arena.queries.modifications import modification_lines
 from arena.web.access import STAFF, only
 from arena.web.pictures import picture_response
 from augment.errors import QueueFault
-from augment.models import Augmentation, Scenario
+from augment.models import Augmentation, Scenario, Simulation
 from augment.services.judging.displacement import of_augmentation
 from augment.services.judging.findings import Checked, checked
 from augment.services.running.transcript_export import transcript_of
@@ -71,6 +71,7 @@ def augmentation_page(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
     context = {
         "augmentation": augmentation,
         "lines": modification_lines(augmentation.modification),
+        "drive": augmentation.simulations.filter(state=Simulation.State.DONE).first(),
         "measured": of_augmentation(augmentation),
         "checked": measured,
         "drawing": _drawing(request, augmentation, measured),

@@ -185,6 +185,10 @@ class Player {
       button.addEventListener("click", () => this.jump(event.step));
       line.append(button);
       list.append(line);
+      const mark = document.createElement("i");
+      mark.className = line.className;
+      mark.style.left = `${(100 * event.step) / this.last}%`;
+      document.getElementById("marks").append(mark);
     }
   }
 

@@ -1,0 +1,83 @@
+"""The player of drives: it plays in step, jumps to events, and is usable by everybody."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import pytest
+from axe_playwright_python.sync_playwright import Axe
+from django.conf import settings
+from django.test import Client
+from django.urls import reverse
+from playwright.sync_api import Browser, Page, expect
+from pytest_django.live_server_helper import LiveServer
+
+from augment.models import Simulation
+from tests.browser.chromium import PATIENCE_MS
+from tests.drives import driven, finished
+from tests.jobs import rows
+from tests.web.cast import people
+
+pytestmark = [pytest.mark.browser, pytest.mark.django_db(transaction=True)]
+
+
+def opened(browser: Browser, address: str, row: Simulation, **options: Any) -> Page:
+    """The page of a drive, as an analyst sees it, with its traces loaded."""
+    client = Client()
+    client.force_login(people()["analyst"])
+    context = browser.new_context(base_url=address, **options)
+    context.set_default_timeout(PATIENCE_MS)
+    cookie = client.cookies[settings.SESSION_COOKIE_NAME].value
+    context.add_cookies([{"name": settings.SESSION_COOKIE_NAME, "value": cookie, "url": address}])
+    page = context.new_page()
+    page.goto(reverse("drive", args=[row.code]))
+    expect(page.locator("#player[data-ready]")).to_be_attached()
+    return page
+
+
+def picture(page: Page, number: int) -> str:
+    """What a canvas shows."""
+    shown = page.locator("canvas").nth(number).evaluate("canvas => canvas.toDataURL()")
+    return str(shown)
+
+
+def test_both_drives_are_played_stepped_and_scrubbed_in_step(
+    browser: Browser, live_server: LiveServer
+) -> None:
+    page = opened(browser, live_server.url, driven(finished(rows.launch()))[-1])
+    clock = page.locator("#clock")
+    first = [picture(page, number) for number in (0, 1)]
+    page.get_by_role("button", name="One step on").click()
+    expect(clock).to_have_text("0.1 s")
+    assert [picture(page, number) != first[number] for number in (0, 1)] == [True, True]
+    page.get_by_role("button", name="One step back").click()
+    expect(clock).to_have_text("0.0 s")
+    assert [picture(page, number) for number in (0, 1)] == first
+    page.locator("#scrub").fill("6")
+    expect(clock).to_have_text("0.6 s")
+    page.get_by_label("Speed").select_option("4")
+    page.get_by_role("button", name="Play").click()
+    expect(clock).to_have_text("1.2 s")
+    expect(page.get_by_role("button", name="Play")).to_be_visible()
+    near = picture(page, 1)
+    page.get_by_label("Follow the ego").uncheck()
+    assert picture(page, 1) != near
+    page.context.close()
+
+
+@pytest.mark.parametrize("theme", ["light", "dark"])
+def test_axe_finds_nothing_on_a_drive(
+    browser: Browser, live_server: LiveServer, theme: str
+) -> None:
+    row = driven(finished(rows.launch()))[-1]
+    page = opened(browser, live_server.url, row, color_scheme=theme, bypass_csp=True)
+    options = {
+        "runOnly": ["wcag2a", "wcag2aa", "wcag21a", "wcag21aa", "wcag22aa", "best-practice"]
+    }
+    for address in (page.url, reverse("drives", args=[row.augmentation.job.code])):  # type: ignore[union-attr]
+        page.goto(address)
+        found = Axe().run(page, options=options).response["violations"]
+        assert [
+            (rule["id"], [node["html"][:90] for node in rule["nodes"]]) for rule in found
+        ] == []
+    page.context.close()
