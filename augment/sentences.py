@@ -34,7 +34,7 @@ class Sentence(str):
 
 def sentence(text: str, /, **values: Value) -> Sentence:
     """The sentence of a text and its values; the text stands in the catalogue of translations."""
-    made = Sentence(filled(text, values))
+    made = Sentence(fill_sentence(text, values))
     made.text, made.values = text, values
     return made
 
@@ -50,7 +50,7 @@ def sentence_of(error: Exception) -> str:
     return first if isinstance(first, Sentence) else str(error)
 
 
-def filled(text: str, values: dict[str, Value]) -> str:
+def fill_sentence(text: str, values: dict[str, Value]) -> str:
     """The text with its values; names are joined by commas, groups of names by semicolons."""
     return text % {name: _written(value) for name, value in values.items()}
 
@@ -62,7 +62,7 @@ def read_sentence(document: dict[str, Any]) -> Sentence:
     )
 
 
-def escaped(text: str) -> str:
+def escape_controls(text: str) -> str:
     """The text as it may be printed: what steers a terminal is spelt out as in Python.
 
     Control characters, among them those that begin terminal sequences, characters that turn the

@@ -41,7 +41,7 @@ REFUSALS = (redis.ResponseError, redis.AuthenticationError, redis.BusyLoadingErr
 @shared_task(name="augment.run_augmentation", bind=True, acks_late=True, ignore_result=True)
 def run_augmentation(self: Any, augmentation_pk: int) -> None:
     """Run one row, unless somebody else has it or it has an outcome."""
-    if stopping.is_told():
+    if stopping.is_stop_requested():
         raise Reject("this worker stops", requeue=True)
     worker = f"{self.request.hostname or 'here'} {os.getpid()}"
     runner.work_on(augmentation_pk=augmentation_pk, worker=worker[:120])
@@ -56,7 +56,7 @@ def draw_marks(augmentation_pk: int) -> None:
 @shared_task(name="augment.run_simulation", acks_late=True, ignore_result=True)
 def run_simulation(simulation_pk: int) -> None:
     """Drive one row, unless somebody else has it or it has an outcome."""
-    if stopping.is_told():
+    if stopping.is_stop_requested():
         raise Reject("this worker stops", requeue=True)
     simulations.drive(simulation_pk=simulation_pk)
 
@@ -163,13 +163,13 @@ def recover(*, now: Moment = DATABASE_TIME, at_start: bool = False) -> None:
         older_than = stale_after
     enqueue(leases.find_unsent(now=now, older_than=older_than))
     simulations.requeue_stale(now=now, older_than=stale_after)
-    enqueue_simulations(simulations.unsent(now=now, older_than=older_than))
+    enqueue_simulations(simulations.find_unsent(now=now, older_than=older_than))
 
 
 @worker_ready.connect
 def start_recovering(sender: Any = None, **_: object) -> None:
     """Show that this worker lives and recover again and again, in threads of its main process."""
-    stopping.forget()
+    stopping.withdraw_stop()
     presence = workers.Presence(f"{getattr(sender, 'hostname', None) or 'here'} {os.getpid()}")
     Thread(target=_be_present, args=(presence,), name="presence", daemon=True).start()
     Thread(target=_recover_until_stopped, args=(presence,), name="recover", daemon=True).start()
@@ -178,7 +178,7 @@ def start_recovering(sender: Any = None, **_: object) -> None:
 @worker_shutting_down.connect
 def stop_recovering(**_: object) -> None:
     """Begin nothing new; what is under way may end."""
-    stopping.tell()
+    stopping.request_stop()
 
 
 # --- Private -----------------------------------------------------------------------------------
@@ -187,7 +187,7 @@ def stop_recovering(**_: object) -> None:
 def _recover_until_stopped(presence: workers.Presence) -> None:
     """One round at the start, then one every RECOVER_EVERY_S."""
     rounds = workers.RecoveryRounds(lambda at_start: recover(at_start=at_start), presence)
-    while not stopping.is_told():
+    while not stopping.is_stop_requested():
         rounds.go_on()
         connection.close()
         stopping.wait(settings.RECOVER_EVERY_S)

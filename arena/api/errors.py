@@ -31,7 +31,7 @@ from arena.errors import (
     TooFast,
 )
 from augment.errors import AugmentError, Conflict
-from augment.services.wording import said
+from augment.services.wording import translate
 
 STATUS: tuple[tuple[type[Exception], int, str], ...] = (
     (NotYours, 404, "not_found"),
@@ -100,7 +100,7 @@ def _message(exc: Exception) -> str:
         return _("There is nothing at this address.")
     if isinstance(exc, PermissionDenied):
         return _("Your account may not do this.")
-    return said(exc)
+    return translate(exc)
 
 
 def _extras(exc: Exception) -> dict[str, Any]:
@@ -109,7 +109,7 @@ def _extras(exc: Exception) -> dict[str, Any]:
     if isinstance(exc, exceptions.ValidationError):
         return {"fields": exc.detail}
     if isinstance(exc, (InvalidVote, InvalidPreference)):
-        return {"fields": {name: [said(sentence)] for name, sentence in exc.fields.items()}}
+        return {"fields": {name: [translate(sentence)] for name, sentence in exc.fields.items()}}
     if isinstance(exc, exceptions.ParseError):
         return {"fields": {"body": [str(exc.detail)]}}
     return {}

@@ -9,7 +9,7 @@ from django.http import HttpRequest, JsonResponse
 from django.utils.translation import gettext as _
 
 from arena.errors import DatabaseBusy
-from augment.services.wording import said
+from augment.services.wording import translate
 
 
 def unreadable(request: HttpRequest, exception: Exception | None = None) -> JsonResponse:
@@ -39,7 +39,7 @@ def broken(request: HttpRequest) -> JsonResponse:
 
 def busy(request: HttpRequest) -> JsonResponse:
     """503: something long keeps the database to itself; nothing was written."""
-    return _fault(503, "busy", said(DatabaseBusy()))
+    return _fault(503, "busy", translate(DatabaseBusy()))
 
 
 def _fault(status: int, code: str, message: str) -> JsonResponse:

@@ -17,7 +17,7 @@ from arena.models import Study
 from arena.queries.showings import as_shown
 from arena.queries.studies import voting_study
 from arena.services.replanning import next_pairs
-from augment.services.wording import in_words
+from augment.services.wording import translate_all
 
 AHEAD = 4
 """How many pairs a browser keeps ready."""
@@ -47,4 +47,4 @@ class MatchupsView(ApiView):
         if study.state != Study.State.OPEN:
             raise StudyNotOpen(f"The study {study.name!r} takes no votes: it is {study.state}.")
         matchups = next_pairs(study=study, expert=expert, n=query.validated_data["n"])
-        return Response([as_shown(matchup, in_words) for matchup in matchups])
+        return Response([as_shown(matchup, translate_all) for matchup in matchups])

@@ -24,7 +24,7 @@ from arena.queries.votes import recent_votes
 from arena.services.decisions import LONGEST_COMMENT, decision_of
 from arena.services.replanning import next_pairs
 from arena.services.votes import receive_vote
-from augment.services.wording import in_words
+from augment.services.wording import translate_all
 
 LONGEST_MS = 2**31 - 1
 MOST_VOTES = 50
@@ -94,7 +94,7 @@ class VotesView(ApiView):
                 "saved": now.progress.voted,
                 "total": now.progress.total,
                 "minutes_left": now.progress.minutes_left,
-                "next": [as_shown(matchup, in_words) for matchup in coming],
+                "next": [as_shown(matchup, translate_all) for matchup in coming],
             }
         )
 
@@ -107,5 +107,5 @@ def _as_given(vote: Vote) -> dict[str, Any]:
         "both_miss": vote.both_miss,
         "reason": vote.reason,
         "comment": vote.comment,
-        "matchup": as_shown(vote.matchup, in_words),
+        "matchup": as_shown(vote.matchup, translate_all),
     }

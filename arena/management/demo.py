@@ -33,7 +33,7 @@ from augment.services.endpoints.contestants import (
 )
 from augment.services.judging.driving_scores import scores_of_job
 from augment.services.judging.simulations import NUPLAN, Options, plan_scenario
-from augment.services.running.choosing import ALL, chosen_contestants
+from augment.services.running.choosing import ALL, resolve_contestants
 from augment.services.running.jobs import launch, progress
 from augment.services.scenarios.catalogue import load_catalogue
 from augment.tasks import enqueue_job, enqueue_simulations
@@ -117,7 +117,7 @@ def generate(
         DemoFailed: It does not get on, or rows failed.
     """
     job = GenerationJob.objects.filter(name=JOB).first() or launch(
-        name=JOB, contestants=chosen_contestants([ALL]), scenarios=scenarios
+        name=JOB, contestants=resolve_contestants([ALL]), scenarios=scenarios
     )
     enqueue_job(job.pk)
     ended, told, moved_at = -1, -1, time.monotonic()

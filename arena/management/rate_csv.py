@@ -25,7 +25,7 @@ from arena.rating.printed import (
 )
 from arena.rating.votes_file import VotesFile, VotesFileUnreadable, columns_of, read_votes
 from arena.services.cells import csv_text
-from augment.sentences import escaped
+from augment.sentences import escape_controls
 
 HELP = "Rate votes from a CSV file: columns model_a, model_b, winner, and maybe judge and item."
 RESAMPLES = {
@@ -82,9 +82,9 @@ def main(arguments: Sequence[str]) -> int:
     try:
         said = run(**options)
     except CsvNotRated as error:
-        print(escaped(f"CommandError: {error}"), file=sys.stderr)
+        print(escape_controls(f"CommandError: {error}"), file=sys.stderr)
         return 1
-    sys.stdout.write(escaped(said) if sys.stdout.isatty() else said)
+    sys.stdout.write(escape_controls(said) if sys.stdout.isatty() else said)
     return 0
 
 
@@ -197,7 +197,7 @@ def _cells(rated: RatedCsv) -> Iterator[tuple[str, str, str, str, str]]:
 
 def _table(rated: RatedCsv) -> str:
     rows = [("Model", "Rank", "Elo", "95% CI", "Votes"), *_cells(rated)]
-    rows = [(escaped(" ".join(row[0].split())), *row[1:]) for row in rows]
+    rows = [(escape_controls(" ".join(row[0].split())), *row[1:]) for row in rows]
     widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
     lines = [
         "  ".join(
@@ -215,7 +215,7 @@ def _table(rated: RatedCsv) -> str:
 def _csv(rated: RatedCsv) -> str:
     """One line a model; what is unknown is empty. Notes go to the other formats."""
     for note in rated.notes:
-        print(escaped(note), file=sys.stderr)
+        print(escape_controls(note), file=sys.stderr)
     return csv_text(
         ("model", "rank", "rating", "lower", "upper", "votes", "note"),
         (

@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from arena.models import Authorship, Study
-from arena.queries.people import natural
+from arena.queries.people import natural_order
 
 
 def authorships_of(study: Study) -> list[Authorship]:
     """Every mark of a study with its people and contestants, by pseudonym; one query."""
     rows = study.authorships.select_related("expert__person", "contestant", "marked_by__person")
     return sorted(
-        rows, key=lambda row: (natural(row.expert.person.pseudonym), row.contestant.name)
+        rows, key=lambda row: (natural_order(row.expert.person.pseudonym), row.contestant.name)
     )
 
 

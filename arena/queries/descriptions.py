@@ -41,7 +41,7 @@ Words = Mapping[str, str]
 Wording = Callable[[tuple[str, ...]], Words]
 
 
-def told(lines: Sequence[Mapping[str, Any]], wording: Wording) -> list[str]:
+def describe_in_words(lines: Sequence[Mapping[str, Any]], wording: Wording) -> list[str]:
     """One sentence for each line.
 
     Args:

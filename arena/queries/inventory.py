@@ -26,7 +26,7 @@ class Inventory:
     votes: int
 
 
-def take() -> Inventory:
+def take_inventory() -> Inventory:
     """Count; failed augmentations of cancelled jobs don't count, nobody waits for them."""
     jobs = GenerationJob.objects
     augmentations = Augmentation.objects

@@ -72,7 +72,7 @@ class FailureGroup:
     augmentations: list[Augmentation]
 
 
-def every() -> list[JobCounts]:
+def list_jobs() -> list[JobCounts]:
     """All jobs, the youngest first; two queries."""
     jobs = list(GenerationJob.objects.select_related("launched_by__person"))
     found: defaultdict[int, Counter[str]] = defaultdict(Counter)

@@ -38,10 +38,10 @@ def experts() -> QuerySet[User]:
 
 def by_pseudonym(found: QuerySet[User]) -> list[User]:
     """Accounts with a person, Expert 2 before Expert 10."""
-    return sorted(found, key=lambda user: natural(user.person.pseudonym))
+    return sorted(found, key=lambda user: natural_order(user.person.pseudonym))
 
 
-def natural(name: str) -> list[tuple[bool, int, str]]:
+def natural_order(name: str) -> list[tuple[bool, int, str]]:
     """What to sort names by so that numbers in them count as numbers."""
     parts = re.split(r"(\d+)", name)
     return [(part.isdecimal(), int(part) if part.isdecimal() else 0, part) for part in parts]

@@ -11,7 +11,7 @@ from django.urls import reverse
 
 from arena.errors import NotYours
 from arena.models import LabelTask, Matchup
-from arena.queries.descriptions import Wording, told
+from arena.queries.descriptions import Wording, describe_in_words
 from arena.queries.people import role_of
 from augment.models import Scenario
 from augment.services.scenarios.pictures import camera_of
@@ -81,7 +81,10 @@ def as_shown(matchup: Matchup, wording: Wording) -> dict[str, Any]:
     }
     if matchup.descriptions is not None:
         left, right = matchup.descriptions
-        shown["text"] = {"a": told(left, wording), "b": told(right, wording)}
+        shown["text"] = {
+            "a": describe_in_words(left, wording),
+            "b": describe_in_words(right, wording),
+        }
     return shown
 
 

@@ -22,7 +22,7 @@ from arena.rating.comparisons import (
     FloatArray,
     IntArray,
     PairCounts,
-    renumbered,
+    renumber_codes,
 )
 from arena.rating.draws import Multinomial
 from arena.rating.estimate import LEVEL
@@ -129,9 +129,9 @@ def _clusters(
     votes: Comparisons, counts: PairCounts, unit: Unit, rounds: int, seed: int
 ) -> Iterator[Rounds]:
     """Rounds are weights of clusters times their counts."""
-    experts, expert_of = renumbered(votes.expert)
-    scenarios, scenario_of = renumbered(votes.scenario)
-    cells, cell_of = renumbered(expert_of * len(scenarios) + scenario_of)
+    experts, expert_of = renumber_codes(votes.expert)
+    scenarios, scenario_of = renumber_codes(votes.scenario)
+    cells, cell_of = renumber_codes(expert_of * len(scenarios) + scenario_of)
     weights = _Weights(
         expert_of=cells // len(scenarios),
         scenario_of=cells % len(scenarios),

@@ -86,7 +86,7 @@ def fit(
 ) -> FloatArray:
     """The most likely strengths (n, C) of n sets of votes, each set's mean zero, to 1e-9.
 
-    Every set must determine them: see `connectivity.determined`.
+    Every set must determine them: see `connectivity.are_determined`.
 
     Args:
         contestants: C.
@@ -113,7 +113,7 @@ def newton(
 ) -> FloatArray:
     """The most likely strengths (C, B), each round's mean zero, by Newton's method to 1e-9.
 
-    Every round must determine them: see `connectivity.determined`.
+    Every round must determine them: see `connectivity.are_determined`.
 
     Args:
         met: The pairs.

@@ -151,19 +151,19 @@ def as_arrays(names: Sequence[str], votes: Iterable[Comparison]) -> Comparisons:
     )
 
 
-def chosen(votes: Comparisons, rows: BoolArray | IntArray) -> Comparisons:
+def select_votes(votes: Comparisons, rows: BoolArray | IntArray) -> Comparisons:
     """Some of the rows, of the same contestants."""
     columns = {column.name: getattr(votes, column.name)[rows] for column in fields(votes)[1:]}
     return replace(votes, **columns)
 
 
-def among(votes: Comparisons, members: Sequence[int]) -> Comparisons:
+def restrict_to(votes: Comparisons, members: Sequence[int]) -> Comparisons:
     """The votes in which only these contestants met, numbered anew in the given order."""
     if list(members) == list(range(len(votes.names))):
         return votes
     number = np.full(len(votes.names), -1, dtype=np.int64)
     number[list(members)] = np.arange(len(members))
-    inside = chosen(votes, (number[votes.first] >= 0) & (number[votes.second] >= 0))
+    inside = select_votes(votes, (number[votes.first] >= 0) & (number[votes.second] >= 0))
     return replace(
         inside,
         names=tuple(votes.names[member] for member in members),
@@ -176,7 +176,7 @@ def count_pairs(votes: Comparisons) -> PairCounts:
     """Count wins, ties and losses of every pair that met."""
     contestants = len(votes.names)
     low, high = np.minimum(votes.first, votes.second), np.maximum(votes.first, votes.second)
-    met, pair_of = renumbered(low * contestants + high)
+    met, pair_of = renumber_codes(low * contestants + high)
     outcome_of = (2.0 - 2.0 * votes.score).astype(np.int64)
     outcome_of = np.where(votes.first == low, outcome_of, 2 - outcome_of)
     place = pair_of * 3 + outcome_of
@@ -190,7 +190,7 @@ def count_pairs(votes: Comparisons) -> PairCounts:
     )
 
 
-def renumbered(codes: IntArray) -> tuple[IntArray, IntArray]:
+def renumber_codes(codes: IntArray) -> tuple[IntArray, IntArray]:
     """The different codes, in order, and (R,) the place of each row's code among them.
 
     What `np.unique` gives, without sorting where the codes (R,), from 0, are not far apart.

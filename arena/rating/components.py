@@ -112,7 +112,7 @@ def loose(reached: BoolArray, values: FloatArray, *, votes: FloatArray) -> Loose
     )
 
 
-def placed(rating: FloatArray, samples: FloatArray, rounds: Loose) -> Placed:
+def place_on_one_scale(rating: FloatArray, samples: FloatArray, rounds: Loose) -> Placed:
     """Put all rounds on one scale: there the mean of the reference stays that of the data.
 
     Whoever is missing from the largest component in more than a 40th of the rounds is not part of

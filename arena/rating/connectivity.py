@@ -170,7 +170,7 @@ class Determined:
             yield some, _closure(scored)
 
 
-def determined(
+def are_determined(
     *, contestants: int, low: IntArray, high: IntArray, games: FloatArray, scores: FloatArray
 ) -> BoolArray:
     """(n,) which of n sets of votes have finite Bradley-Terry strengths for every contestant.

@@ -50,7 +50,7 @@ def replay(votes: Comparisons, *, k: float = K) -> FloatArray:
     return MEAN_ELO + _ELO_PER_HALF * np.array(halves)
 
 
-def resampled(votes: Comparisons, *, rounds: int, seed: int, k: float = K) -> FloatArray:
+def resample_elo(votes: Comparisons, *, rounds: int, seed: int, k: float = K) -> FloatArray:
     """(C, B) ratings after as many votes as there are, drawn with replacement in random order."""
     halves = np.zeros(len(votes.names) * rounds)
     for places, gains in _drawn(votes, rounds, seed):

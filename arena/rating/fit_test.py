@@ -16,7 +16,7 @@ from scipy.special import expit
 
 from arena.rating import bradley_terry
 from arena.rating.comparisons import Comparisons, FloatArray, PairCounts, count_pairs
-from arena.rating.connectivity import determined
+from arena.rating.connectivity import are_determined
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -54,7 +54,7 @@ def fit_test(votes: Comparisons, strengths: FloatArray, *, rounds: int, seed: in
         return FitTest(statistic=statistic, freedom=0, p_value=None, rounds=0)
     drawn = _simulated(counts, strengths, tie_share, rounds, np.random.default_rng(seed))
     all_games = np.broadcast_to(games, drawn.shape)
-    fine = determined(
+    fine = are_determined(
         contestants=len(strengths), low=counts.low, high=counts.high, games=all_games, scores=drawn
     )
     fitted = bradley_terry.fit(

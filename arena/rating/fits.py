@@ -30,7 +30,7 @@ class Fitted:
     tie_strength: float | None = None
 
 
-def fitted(votes: Comparisons, counts: PairCounts, rules: Rules) -> Fitted | None:
+def fit_votes(votes: Comparisons, counts: PairCounts, rules: Rules) -> Fitted | None:
     """The ratings of contestants who can all be rated among each other.
 
     Returns:
@@ -47,7 +47,7 @@ def fitted(votes: Comparisons, counts: PairCounts, rules: Rules) -> Fitted | Non
 
 
 def _elo(votes: Comparisons, rules: Rules) -> Fitted:
-    samples = elo.resampled(votes, rounds=rules.rounds, seed=rules.seed, k=rules.k)
+    samples = elo.resample_elo(votes, rounds=rules.rounds, seed=rules.seed, k=rules.k)
     if rules.order is Order.RECORDED:
         rating = elo.replay(votes, k=rules.k)
     else:

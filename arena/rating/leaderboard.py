@@ -21,9 +21,9 @@ from arena.rating.bootstrap import Unit
 from arena.rating.comparisons import (
     Comparisons,
     FloatArray,
-    among,
     count_pairs,
-    renumbered,
+    renumber_codes,
+    restrict_to,
     tally,
 )
 from arena.rating.connectivity import Diagnosis, Status, diagnose
@@ -34,7 +34,7 @@ from arena.rating.rules import Method, Order, Rules
 from arena.rating.tiers import standing_order, tiers
 from augment.sentences import Sentence, sentence
 
-__all__ = ["Leaderboard", "Line", "Method", "Order", "Unit", "anchored", "rate"]
+__all__ = ["Leaderboard", "Line", "Method", "Order", "Unit", "anchor_board", "rate"]
 
 ROUNDS = 10_000
 PAPER_ROUNDS = 1000
@@ -133,7 +133,7 @@ def rate(
 def _rate(votes: Comparisons, rules: Rules) -> Leaderboard:
     counted = tally(votes)
     present = np.flatnonzero(counted.sum(axis=1)).tolist()
-    counting = among(votes, present)
+    counting = restrict_to(votes, present)
     diagnosis = _diagnose(votes, counting, rules.method)
     across = tiers(counting, diagnosis, rules.unit)
     parts = sorted(
@@ -144,7 +144,7 @@ def _rate(votes: Comparisons, rules: Rules) -> Leaderboard:
             part,
         ),
     )
-    rated = [rate_part(among(counting, part), rules, diagnosis.status) for part in parts]
+    rated = [rate_part(restrict_to(counting, part), rules, diagnosis.status) for part in parts]
     lines = blank_lines(votes.names, counted.tolist(), present, diagnosis)
     for number, (part, found) in enumerate(zip(parts, rated, strict=True)):
         fill(lines, [present[member] for member in part], number, found)
@@ -163,8 +163,8 @@ def _rate(votes: Comparisons, rules: Rules) -> Leaderboard:
         rounds=rules.rounds,
         seed=rules.seed,
         votes=votes.votes,
-        experts=len(renumbered(votes.expert)[0]),
-        scenarios=len(renumbered(votes.scenario)[0]),
+        experts=len(renumber_codes(votes.expert)[0]),
+        scenarios=len(renumber_codes(votes.scenario)[0]),
         tie_share=float(counted[:, 1].sum() / counted.sum()) if len(votes) else None,
         tie_strength=whole.tie_strength if whole else None,
         degenerate_rounds=max((found.degenerate for found in rated), default=0),
@@ -175,7 +175,7 @@ def _rate(votes: Comparisons, rules: Rules) -> Leaderboard:
     )
 
 
-def anchored(board: Leaderboard, *, name: str, at: float) -> Leaderboard:
+def anchor_board(board: Leaderboard, *, name: str, at: float) -> Leaderboard:
     """The same board with a contestant's rating shown as `at`, and all of its part moved alike.
 
     A shift of what is shown only: intervals keep their widths, and the anchor keeps its own.

@@ -12,9 +12,9 @@ import numpy as np
 from arena.rating import remarks, sandwich
 from arena.rating.bootstrap import Unit, interval
 from arena.rating.comparisons import Comparisons, FloatArray, PairCounts, count_pairs
-from arena.rating.components import Placed, open_interval, placed
+from arena.rating.components import Placed, open_interval, place_on_one_scale
 from arena.rating.connectivity import Status
-from arena.rating.fits import Fitted, fitted
+from arena.rating.fits import Fitted, fit_votes
 from arena.rating.ranking import Separation, rank_interval, separation, shown_ranks
 from arena.rating.rules import Method, Rules
 from augment.sentences import Sentence
@@ -71,13 +71,13 @@ def rate_part(votes: Comparisons, rules: Rules, status: Status) -> Rated:
         status: Of the data; where every vote is a tie there are no intervals.
     """
     counts = count_pairs(votes)
-    found = fitted(votes, counts, rules)
+    found = fit_votes(votes, counts, rules)
     if found is None:
         notes = (remarks.NOT_RATED,) * len(votes.names)
         return Rated(explanation=(remarks.NO_DAVIDSON,), notes=notes)
     if status is Status.ALL_TIES:
         return _without_intervals(found, rules, remarks.ONLY_TIES, ())
-    everywhere = placed(found.rating, found.samples, found.loose)
+    everywhere = place_on_one_scale(found.rating, found.samples, found.loose)
     if _are_all_the_same(everywhere.values):
         return _without_intervals(
             found, rules, remarks.NO_SPREAD, (remarks.ALL_THE_SAME[rules.unit],)

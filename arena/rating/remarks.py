@@ -6,7 +6,7 @@ import numpy as np
 
 from arena.rating import elo, sandwich
 from arena.rating.bootstrap import Unit
-from arena.rating.comparisons import Comparisons, FloatArray, IntArray, renumbered
+from arena.rating.comparisons import Comparisons, FloatArray, IntArray, renumber_codes
 from arena.rating.connectivity import few_of
 from augment.sentences import Sentence, sentence
 
@@ -15,9 +15,9 @@ def _clusters(votes: Comparisons, unit: Unit) -> dict[str, int]:
     """How many of what is drawn there are."""
     found = {}
     if unit in (Unit.EXPERT, Unit.TWO_WAY):
-        found["expert"] = len(renumbered(votes.expert)[0])
+        found["expert"] = len(renumber_codes(votes.expert)[0])
     if unit in (Unit.SCENARIO, Unit.TWO_WAY):
-        found["scenario"] = len(renumbered(votes.scenario)[0])
+        found["scenario"] = len(renumber_codes(votes.scenario)[0])
     return found
 
 

@@ -23,7 +23,7 @@ from arena.rating.comparisons import (
     FloatArray,
     IntArray,
     PairCounts,
-    renumbered,
+    renumber_codes,
 )
 
 FEW_CLUSTERS = 20
@@ -47,8 +47,8 @@ def covariance(
     inverse = inverse_curvature(met, counts.games, strengths)
     gap = strengths[votes.second] - strengths[votes.first]
     surprise = votes.score - 1.0 / (1.0 + np.exp(gap))
-    experts, expert_of = renumbered(votes.expert)
-    scenarios, scenario_of = renumbered(votes.scenario)
+    experts, expert_of = renumber_codes(votes.expert)
+    scenarios, scenario_of = renumber_codes(votes.scenario)
     if unit is Unit.VOTE:
         spread = _of_votes(votes, surprise)
     elif unit is Unit.EXPERT:
@@ -56,7 +56,7 @@ def covariance(
     elif unit is Unit.SCENARIO:
         spread = _of_clusters(votes, surprise, scenario_of, len(scenarios))
     else:
-        cells, cell_of = renumbered(expert_of * len(scenarios) + scenario_of)
+        cells, cell_of = renumber_codes(expert_of * len(scenarios) + scenario_of)
         spread = (
             _of_clusters(votes, surprise, expert_of, len(experts))
             + _of_clusters(votes, surprise, scenario_of, len(scenarios))

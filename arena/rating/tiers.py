@@ -29,10 +29,10 @@ from arena.rating.comparisons import (
     Comparisons,
     FloatArray,
     IntArray,
-    among,
-    chosen,
     count_pairs,
-    renumbered,
+    renumber_codes,
+    restrict_to,
+    select_votes,
 )
 from arena.rating.connectivity import Diagnosis
 from arena.rating.estimate import LEVEL
@@ -74,7 +74,7 @@ def tiers(votes: Comparisons, diagnosis: Diagnosis, unit: Unit) -> Tiers:
     for group in diagnosis.groups:
         members = list(group)
         if len(np.unique(part_of[members])) > 1:
-            level[members] = _levels(among(votes, members), part_of[members], unit)
+            level[members] = _levels(restrict_to(votes, members), part_of[members], unit)
     return Tiers(reached=diagnosis.reached, part_of=part_of, group_of=group_of, level=level)
 
 
@@ -209,7 +209,7 @@ def _levels(votes: Comparisons, part_of: IntArray, unit: Unit) -> FloatArray:
     ends = np.sort([part_of[counts.low], part_of[counts.high]], axis=0)
     for first, second in np.unique(ends[:, ends[0] != ends[1]], axis=1).T.tolist():
         pairs = (ends[0] == first) & (ends[1] == second)
-        share = _TAIL ** (1.0 / _independent(chosen(votes, pairs[counts.pair_of]), unit))
+        share = _TAIL ** (1.0 / _independent(select_votes(votes, pairs[counts.pair_of]), unit))
         won = scores[pairs] > 0.0
         scores[pairs] = games[pairs] * np.where(won, share, 1.0 - share)
     met = Meetings(contestants=len(votes.names), low=counts.low, high=counts.high)
@@ -223,7 +223,7 @@ def _independent(votes: Comparisons, unit: Unit) -> int:
     """How many votes count as independent; what there is only one of is left out."""
     numbers = []
     if unit in (Unit.EXPERT, Unit.TWO_WAY):
-        numbers.append(len(renumbered(votes.expert)[0]))
+        numbers.append(len(renumber_codes(votes.expert)[0]))
     if unit in (Unit.SCENARIO, Unit.TWO_WAY):
-        numbers.append(len(renumbered(votes.scenario)[0]))
+        numbers.append(len(renumber_codes(votes.scenario)[0]))
     return min((number for number in numbers if number > 1), default=votes.votes)

@@ -13,7 +13,7 @@ from typing import Annotated, Any
 
 from pydantic import PlainValidator
 
-from arena.rating.bets import Bet
+from arena.rating.e_values import Bet
 from arena.rating.fit_test import FitTest
 from arena.rating.position import SideBias
 from arena.rating.raters import Rater

@@ -15,7 +15,7 @@ from arena.models import Matchup, Study
 from arena.queries.costs import model_classes, shown_augmentations, spent_on
 from arena.queries.judged import Entrant, Judged, is_imported
 from arena.queries.vote_sets import Filters
-from arena.rating.comparisons import Comparisons, chosen
+from arena.rating.comparisons import Comparisons, select_votes
 from arena.rating.leaderboard import Leaderboard, rate
 from arena.rating.win_rates import win_rates
 from arena.results.tree import (
@@ -130,7 +130,7 @@ def cost(study: Study, entrants: Sequence[Entrant]) -> tuple[ScenarioCost, ...]:
 
 
 def _one_type(arrays: VoteArrays, name: str, whole: Leaderboard) -> TypeRating:
-    votes = chosen(arrays.comparisons, arrays.type_of == arrays.types.index(name))
+    votes = select_votes(arrays.comparisons, arrays.type_of == arrays.types.index(name))
     board = rate(
         votes,
         method=whole.method,

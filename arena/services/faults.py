@@ -18,7 +18,7 @@ from augment.errors import Conflict, UnknownName
 from augment.models import Augmentation, GenerationJob
 from augment.sentences import sentence
 from augment.services.events import log_event
-from augment.services.judging.fault_guess import FaultClass, guess
+from augment.services.judging.fault_guess import FaultClass, guess_faults
 from augment.services.texts import one_line, storable
 
 NOTE_LENGTH = 2000
@@ -182,7 +182,7 @@ def _save(
         raise LabellingClosed(
             sentence("The labelling '%(name)s' is closed.", name=task.labelling.name)
         )
-    guessed = guess(task.augmentation)
+    guessed = guess_faults(task.augmentation)
     return FaultLabel.objects.create(
         augmentation=task.augmentation,
         expert=expert,

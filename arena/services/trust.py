@@ -10,10 +10,10 @@ import numpy as np
 from arena.queries.judged import REPEAT
 from arena.queries.vote_sets import VoteSet
 from arena.rating import elo
-from arena.rating.bets import Bet, bets, limit
 from arena.rating.bootstrap import Unit
 from arena.rating.bradley_terry import ELO_PER_LOGIT, MEAN_ELO
-from arena.rating.comparisons import Comparisons, FloatArray, among, chosen, tally
+from arena.rating.comparisons import Comparisons, FloatArray, restrict_to, select_votes, tally
+from arena.rating.e_values import Bet, compute_e_values, detection_limit
 from arena.rating.fit_test import fit_test
 from arena.rating.influence import (
     fewest_votes_to_change_first,
@@ -56,7 +56,7 @@ def trust(arrays: VoteArrays, votes: VoteSet, board: Leaderboard, *, seed: int) 
         seed: Of every draw.
     """
     rated = np.flatnonzero(tally(arrays.comparisons).sum(axis=1)).tolist()
-    inner = among(arrays.comparisons, rated)
+    inner = restrict_to(arrays.comparisons, rated)
     strengths = _strengths(inner, board)
     if set(arrays.items) == {""}:  # nobody knows what was shown twice
         inner = replace(inner, scenario=np.arange(len(inner), dtype=np.int64))
@@ -220,7 +220,7 @@ def _panel(
     names = {vote.judge: vote.judge_name for vote in votes.counted}
     # To say the same of the same pictures again is no new evidence.
     fresh = np.array([vote.kind != REPEAT for vote in votes.counted], dtype=bool)
-    against = bets(chosen(inner, fresh))
+    against = compute_e_values(select_votes(inner, fresh))
     return tuple(
         PanelRater(
             **_by_field(line),
@@ -229,7 +229,7 @@ def _panel(
             moves=changes[line.expert],
             repeats=repeats.by_expert.get(line.expert, (0, 0)),
             checks=_checks(votes, arrays.judges[line.expert]),
-            bet=RaterBet(**_by_field(against[line.expert]), limit=limit(len(against)))
+            bet=RaterBet(**_by_field(against[line.expert]), limit=detection_limit(len(against)))
             if line.expert in against
             else None,
         )
@@ -249,7 +249,7 @@ def _checks(votes: VoteSet, judge: str) -> tuple[int, int]:
 
 def _elo_order(votes: Comparisons, strengths: FloatArray, seed: int) -> tuple[OnlinePlace, ...]:
     """Contestants by Bradley-Terry, with what online Elo makes of them."""
-    online = np.median(elo.resampled(votes, rounds=ELO_ROUNDS, seed=seed), axis=1)
+    online = np.median(elo.resample_elo(votes, rounds=ELO_ROUNDS, seed=seed), axis=1)
     places = np.argsort(np.argsort(-online, kind="stable"))
     order = np.argsort(-strengths, kind="stable")
     return tuple(

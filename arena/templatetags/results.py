@@ -13,7 +13,7 @@ from django.utils.translation import gettext_lazy, gettext_noop
 
 from arena.rating.estimate import Estimate
 from augment.models import Scenario
-from augment.services.wording import said
+from augment.services.wording import translate
 
 register = template.Library()
 
@@ -92,7 +92,7 @@ def left_out(reason: str) -> str:
     return str(_LEFT_OUT.get(reason, reason))
 
 
-register.filter("said", said)
+register.filter("said", translate)
 
 
 @register.filter

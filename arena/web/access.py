@@ -20,7 +20,7 @@ STAFF = (ADMIN, ANALYST)
 """Who may know which contestant made what."""
 
 
-def only(*roles: str) -> Callable[[View[P]], View[P]]:
+def allow_only(*roles: str) -> Callable[[View[P]], View[P]]:
     """Refuse everybody else with 403; who is not signed in never gets this far."""
 
     def wrap(view: View[P]) -> View[P]:

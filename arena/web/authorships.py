@@ -18,9 +18,9 @@ from arena.errors import ArenaError
 from arena.models import Authorship, Study
 from arena.queries.people import by_pseudonym
 from arena.services.authorships import mark_author, take_back_author
-from arena.web.access import ADMIN, only
+from arena.web.access import ADMIN, allow_only
 from augment.errors import AugmentError
-from augment.services.wording import said
+from augment.services.wording import translate
 
 
 class AuthorForm(forms.Form):
@@ -49,7 +49,7 @@ class AuthorForm(forms.Form):
             found.widget.attrs["class"] = "input"
 
 
-@only(ADMIN)
+@allow_only(ADMIN)
 @require_POST
 def mark(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
     """Mark an expert as author of a contestant, be the study open or closed."""
@@ -67,7 +67,7 @@ def mark(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
             actor=cast(User, request.user),
         )
     except (ArenaError, AugmentError) as error:
-        messages.error(request, said(error))
+        messages.error(request, translate(error))
     else:
         named = {"name": row.expert.person.pseudonym, "contestant": row.contestant.name}
         done = _("%(name)s is marked as author of %(contestant)s.") % named
@@ -75,7 +75,7 @@ def mark(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
     return redirect("experts", code=code)
 
 
-@only(ADMIN)
+@allow_only(ADMIN)
 @require_POST
 def take_back(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
     """Forget one mark; it stays in the log."""

@@ -14,7 +14,7 @@ from arena.exports.displacement_objects import BY_OBJECT, OBJECT_FORMATS, object
 from arena.exports.displacement_table import displacement_table
 from arena.exports.displacement_writers import FORMATS
 from arena.exports.formats import format_named
-from arena.web.access import STAFF, only
+from arena.web.access import STAFF, allow_only
 from arena.web.boxes import box_sheet
 from augment.errors import UnknownName
 from augment.models import GenerationJob
@@ -27,14 +27,14 @@ LABELS = {
 }
 
 
-@only(*STAFF)
+@allow_only(*STAFF)
 @require_safe
 def export(request: HttpRequest, code: uuid.UUID, form: str) -> HttpResponse:
     """The displacement errors of a job as a file; `by` as on the page."""
     job = get_object_or_404(GenerationJob, code=code)
     if request.GET.get("by") == BY_OBJECT:
         return _objects(job, form)
-    by, types = asked(request), types_asked(request)
+    by, types = read_grouping(request), types_asked(request)
     try:
         chosen = format_named(FORMATS, form)
     except UnknownName as error:
@@ -65,7 +65,7 @@ def _objects(job: GenerationJob, form: str) -> HttpResponse:
 
 def section(request: HttpRequest, job: GenerationJob) -> dict[str, object]:
     """What the part of the job's page shows."""
-    by, types = asked(request), types_asked(request)
+    by, types = read_grouping(request), types_asked(request)
     table = displacement_table(job, by=by, types=types)
     return {
         "table": table,
@@ -80,7 +80,7 @@ def section(request: HttpRequest, job: GenerationJob) -> dict[str, object]:
     }
 
 
-def asked(request: HttpRequest) -> By:
+def read_grouping(request: HttpRequest) -> By:
     """What the address asks to group by: contestants, unless it says otherwise."""
     wanted = request.GET.get("by", By.CONTESTANT)
     return By(wanted) if wanted in set(By) else By.CONTESTANT

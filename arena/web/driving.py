@@ -21,7 +21,7 @@ from arena.exports.tables import LeaderboardTable
 from arena.models import Snapshot
 from arena.queries.costs import shown_augmentations
 from arena.queries.driving import before_of, cells_of
-from arena.web.access import ADMIN, STAFF, only
+from arena.web.access import ADMIN, STAFF, allow_only
 from augment.errors import AugmentError, QueueFault, UnknownName
 from augment.models import GenerationJob, Simulation
 from augment.services.judging import simulations
@@ -32,13 +32,13 @@ from augment.services.judging.driving_scores import (
     scores_of_job,
 )
 from augment.services.judging.simulations import NUPLAN, SCORES, Options
-from augment.services.wording import said
+from augment.services.wording import translate
 from augment.tasks import enqueue_simulations
 
 LABELS = {"nuplan": "nuPlan", "interplan": "interPlan"}
 
 
-@only(ADMIN)
+@allow_only(ADMIN)
 @require_POST
 def simulate_job(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
     """Have the job's results driven by the workers."""
@@ -53,7 +53,7 @@ def simulate_job(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
             waiting = simulations.plan_job(job=job, options=options)
             transaction.on_commit(partial(_send, request, waiting))
     except AugmentError as error:
-        messages.error(request, said(error))
+        messages.error(request, translate(error))
     else:
         number = len(waiting)
         messages.success(
@@ -64,7 +64,7 @@ def simulate_job(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
     return redirect("job", code=code)
 
 
-@only(*STAFF)
+@allow_only(*STAFF)
 @require_safe
 def drives_page(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
     """Every drive of a job in a grid."""
@@ -90,7 +90,7 @@ def drives_page(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
     return render(request, "drives/list.html", context | {"labels": LABELS})
 
 
-@only(*STAFF)
+@allow_only(*STAFF)
 @require_safe
 def drive_page(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
     """One drive to look at, beside the same scene before the change."""
@@ -106,7 +106,7 @@ def drive_page(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
     return render(request, "drives/drive.html", context)
 
 
-@only(*STAFF)
+@allow_only(*STAFF)
 @require_safe
 def drive_trace(request: HttpRequest, code: uuid.UUID, form: str) -> HttpResponseBase:
     """The drive as JSON for the page, or as a moving picture or a strip of stills."""
@@ -121,7 +121,7 @@ def drive_trace(request: HttpRequest, code: uuid.UUID, form: str) -> HttpRespons
     return answer
 
 
-@only(*STAFF)
+@allow_only(*STAFF)
 @require_safe
 def export(request: HttpRequest, code: uuid.UUID, form: str) -> HttpResponse:
     """The mean driving scores of a job as a file."""
@@ -221,4 +221,4 @@ def _send(request: HttpRequest, waiting: list[int]) -> None:
     try:
         enqueue_simulations(waiting)
     except QueueFault as error:
-        messages.warning(request, said(error))
+        messages.warning(request, translate(error))

@@ -17,8 +17,8 @@ from augment.models import Contestant
 from augment.services.judging.fault_guess import FaultClass
 from augment.services.running.caps import Caps
 from augment.services.running.estimates import JobEstimate, estimate
-from augment.services.running.feasible import keys_missing, obstacle
-from augment.services.wording import said
+from augment.services.running.feasible import find_obstacle, keys_missing
+from augment.services.wording import translate
 
 
 class ThemeForm(forms.Form):
@@ -146,9 +146,9 @@ class CapsForm(forms.Form):
 
 
 def _offer(row: Contestant) -> Offer:
-    why_not = obstacle(row)
+    why_not = find_obstacle(row)
     missing = () if why_not else tuple(keys_missing(row))
-    return Offer(row=row, obstacle=said(why_not), keys_missing=missing)
+    return Offer(row=row, obstacle=translate(why_not), keys_missing=missing)
 
 
 class LaunchForm(ChoiceForm, CapsForm):

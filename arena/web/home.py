@@ -93,12 +93,12 @@ def _analyst(request: HttpRequest) -> HttpResponse:
 
 
 def _admin(request: HttpRequest) -> HttpResponse:
-    found = inventory.take()
+    found = inventory.take_inventory()
     studies = progress.of_studies()
     context = {
         "inventory": found,
         "steps": steps(found),
-        "jobs": jobs.every()[:LATEST_JOBS],
+        "jobs": jobs.list_jobs()[:LATEST_JOBS],
         "running": [line for line in studies if line.study.state == Study.State.OPEN],
     }
     return render(request, "home/admin.html", context)

@@ -11,17 +11,17 @@ from django.shortcuts import get_object_or_404, redirect
 from django.utils.translation import gettext as _
 from django.views.decorators.http import require_POST, require_safe
 
-from arena.web.access import STAFF, only
+from arena.web.access import STAFF, allow_only
 from augment.errors import AugmentError, Conflict
 from augment.models import Scenario
 from augment.sentences import sentence
 from augment.services.scenarios.intents import accept_reading, enter_intent
-from augment.services.wording import said
+from augment.services.wording import translate
 
 LONGEST_FILE = 200_000
 
 
-@only(*STAFF)
+@allow_only(*STAFF)
 @require_safe
 def intent_file(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
     """The intent as its JSON document, to be mended and given back."""
@@ -33,7 +33,7 @@ def intent_file(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
     return answer
 
 
-@only(*STAFF)
+@allow_only(*STAFF)
 @require_POST
 def set_intent(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
     """Accept the last reading, or take the intent of the file that came along."""
@@ -45,7 +45,7 @@ def set_intent(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
         else:
             enter_intent(scenario=scenario.slug, document=_document(request), actor=actor)
     except AugmentError as error:
-        messages.error(request, said(error))
+        messages.error(request, translate(error))
     else:
         messages.success(request, _("The intent is set. It counts from now on."))
     return redirect("scenario", code=code)

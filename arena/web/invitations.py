@@ -22,11 +22,11 @@ from arena.models import Invitation, Study
 from arena.queries.authorships import authorships_of
 from arena.queries.invitations import expert_lines, invitation_by_token, may_be_let_in
 from arena.services.invitations import SESSION_KEY, FreshLink, accept, invite, revoke
-from arena.web.access import ADMIN, only
+from arena.web.access import ADMIN, allow_only
 from arena.web.authorships import AuthorForm
 from arena.web.sign_in import with_own_language
 from augment.errors import AugmentError
-from augment.services.wording import said
+from augment.services.wording import translate
 
 SESSION_S = 30 * 24 * 3600
 BACKEND = "arena.queries.accounts.AccountBackend"
@@ -50,7 +50,7 @@ def invitation_page(request: HttpRequest, token: str) -> HttpResponse:
     return answer
 
 
-@only(ADMIN)
+@allow_only(ADMIN)
 @never_cache
 @require_safe
 def experts_page(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
@@ -67,7 +67,7 @@ def experts_page(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
     return render(request, "studies/experts.html", context)
 
 
-@only(ADMIN)
+@allow_only(ADMIN)
 @never_cache
 @require_POST
 def invite_experts(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
@@ -91,12 +91,12 @@ def invite_experts(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
             for line in chosen
         ]
     except (ArenaError, AugmentError) as error:
-        messages.error(request, said(error))
+        messages.error(request, translate(error))
         return redirect("experts", code=study.code)
     return render(request, "studies/links.html", {"study": study, "links": made})
 
 
-@only(ADMIN)
+@allow_only(ADMIN)
 @require_POST
 def revoke_invitation(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
     """Take one link back; whoever came in by it is signed out."""

@@ -16,7 +16,7 @@ from django.utils.translation import gettext as _
 from django.views.decorators.http import require_http_methods, require_POST, require_safe
 
 from arena.queries import jobs, scenarios
-from arena.web.access import ADMIN, STAFF, only
+from arena.web.access import ADMIN, STAFF, allow_only
 from arena.web.displacement import section
 from arena.web.driving import section as driving_section
 from arena.web.forms import CapsForm, LaunchForm
@@ -29,24 +29,24 @@ from augment.services.running import jobs as service
 from augment.services.running.caps import Caps
 from augment.services.running.costs import costs_of
 from augment.services.running.workers import workforce
-from augment.services.wording import said
+from augment.services.wording import translate
 from augment.tasks import enqueue_job
 
 State = Augmentation.State
 
 
-@only(*STAFF)
+@allow_only(*STAFF)
 @require_safe
 def jobs_page(request: HttpRequest) -> HttpResponse:
     """Every job with its bar."""
-    found = jobs.every()
+    found = jobs.list_jobs()
     context: dict[str, object] = {"jobs": found}
     if any(counts.is_moving for counts in found):
         context["workforce"] = workforce()
     return render(request, "jobs/list.html", context)
 
 
-@only(ADMIN)
+@allow_only(ADMIN)
 @require_http_methods(["GET", "HEAD", "POST"])
 def new_job_page(request: HttpRequest) -> HttpResponse:
     """Choose contestants and scenarios, then launch."""
@@ -62,14 +62,14 @@ def new_job_page(request: HttpRequest) -> HttpResponse:
         try:
             job = _launch(request, form)
         except AugmentError as error:
-            form.add_error(None, said(error))
+            form.add_error(None, translate(error))
         else:
             messages.success(request, _("“%(name)s” is launched.") % {"name": job.name})
             return redirect("job", code=job.code)
     return render(request, "jobs/new.html", {"form": form}, status=422 if form.errors else 200)
 
 
-@only(*STAFF)
+@allow_only(*STAFF)
 @require_safe
 def job_page(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
     """Progress, the grid, and failures by their reason."""
@@ -89,7 +89,7 @@ def job_page(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
     return render(request, "jobs/job.html", context)
 
 
-@only(ADMIN)
+@allow_only(ADMIN)
 @require_POST
 def retry_job(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
     """Queue again what failed."""
@@ -99,13 +99,13 @@ def retry_job(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
             service.retry_failed(job=job, actor=cast(User, request.user))
             transaction.on_commit(partial(_send, request, job.pk))
     except AugmentError as error:
-        messages.error(request, said(error))
+        messages.error(request, translate(error))
     else:
         messages.success(request, _("What failed is queued again."))
     return redirect("job", code=code)
 
 
-@only(ADMIN)
+@allow_only(ADMIN)
 @require_http_methods(["GET", "HEAD", "POST"])
 def cancel_job(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
     """Start nothing new; what is done stays. There is no way back, so it asks first."""
@@ -117,13 +117,13 @@ def cancel_job(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
     try:
         service.cancel(job=job, actor=cast(User, request.user))
     except AugmentError as error:
-        messages.error(request, said(error))
+        messages.error(request, translate(error))
     else:
         messages.success(request, _("Cancelled. What is done stays."))
     return redirect("job", code=code)
 
 
-@only(ADMIN)
+@allow_only(ADMIN)
 @require_POST
 def resume_job(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
     """Raise the caps that are given, then go on with what is left."""
@@ -140,7 +140,7 @@ def resume_job(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
             caps.resume(job, actor=actor)
             transaction.on_commit(partial(_send, request, job.pk))
     except AugmentError as error:
-        messages.error(request, said(error))
+        messages.error(request, translate(error))
     else:
         messages.success(request, _("What is left is queued again."))
     return redirect("job", code=code)
@@ -172,7 +172,7 @@ def _estimated(request: HttpRequest, form: LaunchForm) -> HttpResponse:
     try:
         found = form.estimated()
     except AugmentError as error:
-        form.add_error(None, said(error))
+        form.add_error(None, translate(error))
     else:
         cap = form.cleaned_data.get("cap_usd")
         context |= {"estimate": found, "cap_usd": cap}
@@ -200,4 +200,4 @@ def _send(request: HttpRequest, job_pk: int) -> None:
     try:
         enqueue_job(job_pk)
     except QueueFault as error:
-        messages.warning(request, said(error))
+        messages.warning(request, translate(error))

@@ -21,17 +21,17 @@ from arena.models import FaultLabel, LabellingRound
 from arena.queries import faults
 from arena.queries.people import by_pseudonym, experts, role_of
 from arena.services.faults import close_labelling, open_labelling, save_label
-from arena.web.access import ADMIN, EXPERT, STAFF, only
+from arena.web.access import ADMIN, EXPERT, STAFF, allow_only
 from arena.web.forms import LabelForm, LabellingForm
 from arena.web.labelling_questions import closing, opening
 from arena.web.questions import ask, is_sure, wants_to_change
 from augment.errors import AugmentError, UnknownName
 from augment.models import GenerationJob
 from augment.services.judging.fault_guess import FaultClass
-from augment.services.wording import said
+from augment.services.wording import translate
 
 
-@only(EXPERT)
+@allow_only(EXPERT)
 @never_cache
 @require_http_methods(["GET", "HEAD", "POST"])
 def label_page(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
@@ -48,7 +48,7 @@ def label_page(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
     return render(request, "label/label.html" if task else "label/done.html", context)
 
 
-@only(*STAFF)
+@allow_only(*STAFF)
 @require_http_methods(["GET", "HEAD", "POST"])
 def faults_page(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
     """What was labelled in a job, and the form that opens a labelling."""
@@ -70,7 +70,7 @@ def faults_page(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
     return render(request, "label/job.html", context, status=422 if form.errors else 200)
 
 
-@only(*STAFF)
+@allow_only(*STAFF)
 @require_safe
 def export(request: HttpRequest, code: uuid.UUID, form: str) -> HttpResponse:
     """The faults of a job as a file."""
@@ -87,7 +87,7 @@ def export(request: HttpRequest, code: uuid.UUID, form: str) -> HttpResponse:
     )
 
 
-@only(ADMIN)
+@allow_only(ADMIN)
 @require_http_methods(["GET", "HEAD", "POST"])
 def close(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
     """Take no more labels; there is no way back, so it asks first."""
@@ -99,7 +99,7 @@ def close(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
     try:
         close_labelling(labelling=labelling, actor=cast(User, request.user))
     except ArenaError as error:
-        messages.error(request, said(error))
+        messages.error(request, translate(error))
     else:
         messages.success(
             request, _("“%(name)s” is closed; its labels stay.") % {"name": labelling.name}
@@ -125,7 +125,7 @@ def _save(request: HttpRequest, expert: User, code: uuid.UUID) -> HttpResponse:
     except AlreadyLabelled:
         messages.info(request, _("You had labelled that picture before; your first label counts."))
     except LabellingClosed as error:
-        messages.error(request, said(error))
+        messages.error(request, translate(error))
     else:
         messages.success(request, " ".join((_("Saved."), _guess(label))))
     return redirect("label", code=code)
@@ -153,7 +153,7 @@ def _open(request: HttpRequest, job: GenerationJob, form: LabellingForm) -> Http
             return ask(request, opening(job, **given))
         labelling = open_labelling(job=job, **given, actor=cast(User, request.user))
     except (ArenaError, AugmentError) as error:
-        form.add_error(None, said(error))
+        form.add_error(None, translate(error))
         return None
     messages.success(
         request, _("“%(name)s” is open; its experts can label now.") % {"name": labelling.name}

@@ -33,18 +33,18 @@ from arena.queries.results import (
 )
 from arena.services.early_looks import open_early
 from arena.services.ratings import is_big, plan_snapshot, rate
-from arena.web.access import ADMIN, ANALYST, EXPERT, STAFF, only
+from arena.web.access import ADMIN, ANALYST, EXPERT, STAFF, allow_only
 from arena.web.rating_form import RatingForm
 from arena.web.results_authors import both_versions, for_experts
 from arena.web.results_tabs import TABS, Tab
 from augment.errors import AugmentError
-from augment.services.wording import said
+from augment.services.wording import translate
 
 SHOWN = 12
 """So many ratings can be chosen on the page; the log lists all."""
 
 
-@only(ADMIN, ANALYST, EXPERT)
+@allow_only(ADMIN, ANALYST, EXPERT)
 @require_safe
 def results_page(request: HttpRequest, code: uuid.UUID, tab: str = "table") -> HttpResponse:
     """One tab of a rating; of an open study only for staff who opened its results."""
@@ -85,7 +85,7 @@ def results_page(request: HttpRequest, code: uuid.UUID, tab: str = "table") -> H
     return render(request, "results/page.html", context)
 
 
-@only(*STAFF)
+@allow_only(*STAFF)
 @require_POST
 def rate_study(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
     """Freeze a new rating of the votes as they are now; a big one is left to a worker."""
@@ -109,11 +109,11 @@ def rate_study(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
         else:
             rate(study=study, **wanted)
     except (ArenaError, AugmentError) as error:
-        messages.error(request, said(error))
+        messages.error(request, translate(error))
     return redirect("results", code=code)
 
 
-@only(*STAFF)
+@allow_only(*STAFF)
 @require_POST
 def compute_again(request: HttpRequest, code: uuid.UUID, rating: uuid.UUID) -> HttpResponse:
     """Send a rating that waits or failed to the workers once more; twice does no harm."""
@@ -122,11 +122,11 @@ def compute_again(request: HttpRequest, code: uuid.UUID, rating: uuid.UUID) -> H
     try:
         tasks.send_snapshot(snapshot.pk)
     except AugmentError as error:
-        messages.error(request, said(error))
+        messages.error(request, translate(error))
     return redirect("results", code=code)
 
 
-@only(*STAFF)
+@allow_only(*STAFF)
 @require_POST
 def open_results_early(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
     """The explicit, logged act; who votes in the study votes no longer."""
@@ -134,7 +134,7 @@ def open_results_early(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
     try:
         open_early(study=study, actor=cast(User, request.user))
     except AugmentError as error:
-        messages.error(request, said(error))
+        messages.error(request, translate(error))
     return redirect("results", code=code)
 
 

@@ -20,13 +20,13 @@ from arena.exports.writers import FORMATS
 from arena.exports.zips import CONTENT_TYPE, ZIP
 from arena.models import Snapshot, Study
 from arena.queries.results import snapshot_to_export
-from arena.web.access import STAFF, only
+from arena.web.access import STAFF, allow_only
 from arena.web.results import asked_rating, readable
 from augment.errors import Conflict, UnknownName
-from augment.services.wording import said
+from augment.services.wording import translate
 
 
-@only(*STAFF)
+@allow_only(*STAFF)
 @require_safe
 def export(request: HttpRequest, code: uuid.UUID, form: str) -> HttpResponse:
     """The rating that the address names, else the newest, as a file or as all of them in a zip."""
@@ -36,7 +36,7 @@ def export(request: HttpRequest, code: uuid.UUID, form: str) -> HttpResponse:
         try:
             content = bundle(snapshot)
         except Conflict as error:
-            messages.error(request, said(error))
+            messages.error(request, translate(error))
             return redirect("results", code=code)
         return _file(content, CONTENT_TYPE, f"{_slug(study)}-rating.zip")
     try:
@@ -47,7 +47,7 @@ def export(request: HttpRequest, code: uuid.UUID, form: str) -> HttpResponse:
     return _file(content, chosen.content_type, f"{_slug(study)}-leaderboard.{chosen.suffix}")
 
 
-@only(*STAFF)
+@allow_only(*STAFF)
 @require_safe
 def export_chart(request: HttpRequest, code: uuid.UUID, name: str, form: str) -> HttpResponse:
     """A chart of a rating beside the table's own."""
@@ -60,7 +60,7 @@ def export_chart(request: HttpRequest, code: uuid.UUID, name: str, form: str) ->
     return _file(content, CONTENT_TYPES[form], f"{_slug(study)}-{name}.{form}")
 
 
-@only(*STAFF)
+@allow_only(*STAFF)
 @require_safe
 def export_votes(request: HttpRequest, code: uuid.UUID, form: str) -> HttpResponse:
     """The votes of a rating, with pseudonyms."""
@@ -72,7 +72,7 @@ def export_votes(request: HttpRequest, code: uuid.UUID, form: str) -> HttpRespon
     except UnknownName as error:
         raise Http404 from error
     except Conflict as error:
-        messages.error(request, said(error))
+        messages.error(request, translate(error))
         return redirect("results", code=code)
     name = f"{_slug(study)}-votes.{chosen.suffix}"
     return _file(chosen.write(rows), chosen.content_type, name)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from arena.exports.plots import plots
 from arena.exports.tables import LeaderboardTable
 from arena.models import Snapshot
-from arena.queries.people import natural
+from arena.queries.people import natural_order
 from arena.web.charts import bars
 from arena.web.heat import heat_map
 from arena.web.results_authors import with_authors
@@ -17,7 +17,9 @@ def raters(snapshot: Snapshot, table: LeaderboardTable) -> Context:
     """Agreement, repeats, sides, and the panel of experts."""
     lines = snapshot.results.trust.raters
     left = [(line.judge, line.left.lower, line.left.value, line.left.upper) for line in lines]
-    panel = sorted(with_authors(snapshot, lines), key=lambda line: natural(line["rater"].name))
+    panel = sorted(
+        with_authors(snapshot, lines), key=lambda line: natural_order(line["rater"].name)
+    )
     return {
         "trust": snapshot.results.trust,
         "panel": panel,

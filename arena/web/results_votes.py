@@ -13,12 +13,12 @@ from arena.exports.tables import leaderboard_table
 from arena.queries.judged import is_imported
 from arena.queries.result_votes import votes_on_pair
 from arena.queries.results import snapshot_to_export
-from arena.web.access import STAFF, only
+from arena.web.access import STAFF, allow_only
 from arena.web.results import address_of, asked_rating, readable
 from arena.web.results_ratings import by_slug
 
 
-@only(*STAFF)
+@allow_only(*STAFF)
 @require_safe
 def votes_page(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
     """What was judged of two contestants; `a` and `b` are slugs."""

@@ -14,25 +14,25 @@ from django.views.decorators.http import require_safe
 
 from arena.queries import scenarios
 from arena.queries.modifications import modification_lines
-from arena.web.access import STAFF, only
+from arena.web.access import STAFF, allow_only
 from arena.web.pictures import picture_response
 from augment.errors import QueueFault
 from augment.models import Augmentation, Scenario, Simulation
 from augment.services.judging.displacement import of_augmentation
-from augment.services.judging.findings import Checked, checked
+from augment.services.judging.findings import Checked, check_augmentation
 from augment.services.running.transcript_export import transcript_of
 from augment.services.running.transcript_steps import totals_of, tries_of
 from augment.services.running.transcripts import IMAGES
 from augment.services.scenarios.intents import statements_of, waiting_reading
 from augment.services.scenarios.scene_notes import notes_of
-from augment.services.wording import said
+from augment.services.wording import translate
 from augment.tasks import enqueue_marks
 
 LOOKS = tuple(str(number) for number in range(6))
 """So often the page of an augmentation looks again for a picture that is being drawn."""
 
 
-@only(*STAFF)
+@allow_only(*STAFF)
 @require_safe
 def scenarios_page(request: HttpRequest) -> HttpResponse:
     """The contact sheet: every scenario by type, its reference where it was drawn."""
@@ -40,7 +40,7 @@ def scenarios_page(request: HttpRequest) -> HttpResponse:
     return render(request, "scenarios/list.html", context)
 
 
-@only(*STAFF)
+@allow_only(*STAFF)
 @require_safe
 def scenario_page(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
     """One scenario: before and after the reference, and every other result."""
@@ -50,24 +50,24 @@ def scenario_page(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
         "scenario": scenario,
         "reference_code": scenarios.reference_pictures().get(scenario.pk),
         "lines": modification_lines(scenario.reference),
-        "statements": [said(one) for one in statements_of(scenario.intent)],
+        "statements": [translate(one) for one in statements_of(scenario.intent)],
         "reading": reading,
         "reading_statements": [
-            said(one) for one in statements_of(None if reading is None else reading.document)
+            translate(one) for one in statements_of(None if reading is None else reading.document)
         ],
-        "notes": [said(note) for note in notes_of(scenario.base_scene)],
+        "notes": [translate(note) for note in notes_of(scenario.base_scene)],
         "augmentations": scenarios.augmentations_of(scenario),
     }
     return render(request, "scenarios/scenario.html", context)
 
 
-@only(*STAFF)
+@allow_only(*STAFF)
 @require_safe
 def augmentation_page(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
     """One augmentation with everything that led to it."""
     augmentation = _augmentation(code)
     tries = tries_of(augmentation)
-    measured = checked(augmentation)
+    measured = check_augmentation(augmentation)
     context = {
         "augmentation": augmentation,
         "lines": modification_lines(augmentation.modification),
@@ -81,7 +81,7 @@ def augmentation_page(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
     return render(request, "jobs/augmentation.html", context)
 
 
-@only(*STAFF)
+@allow_only(*STAFF)
 @require_safe
 def transcript(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
     """The whole record of an augmentation as one JSON file."""
@@ -92,7 +92,7 @@ def transcript(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
     return answer
 
 
-@only(*STAFF)
+@allow_only(*STAFF)
 @require_safe
 def asked_image(request: HttpRequest, digest: str) -> HttpResponseBase:
     """An image that a language model was shown, by the hash that its request names."""
@@ -101,7 +101,7 @@ def asked_image(request: HttpRequest, digest: str) -> HttpResponseBase:
     return picture_response(f"{IMAGES}/{digest}.png")
 
 
-@only(*STAFF)
+@allow_only(*STAFF)
 @require_safe
 def picture(request: HttpRequest, kind: str, code: uuid.UUID) -> HttpResponseBase:
     """A picture by what it belongs to; the addresses of experts' pictures are others."""
@@ -110,7 +110,7 @@ def picture(request: HttpRequest, kind: str, code: uuid.UUID) -> HttpResponseBas
     elif kind == "augmentation":
         name = get_object_or_404(Augmentation.objects.only("image"), code=code).image
     elif kind == "marked":
-        found = checked(_augmentation(code))
+        found = check_augmentation(_augmentation(code))
         name = "" if found is None else found.picture
     else:
         raise Http404
@@ -132,7 +132,7 @@ def _send_marks(request: HttpRequest, augmentation_pk: int) -> None:
     try:
         enqueue_marks(augmentation_pk)
     except QueueFault as error:
-        messages.warning(request, said(error))
+        messages.warning(request, translate(error))
 
 
 def _augmentation(code: uuid.UUID) -> Augmentation:

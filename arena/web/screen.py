@@ -23,7 +23,7 @@ from arena.queries.voting_keys import (
     voting_preferences,
 )
 from arena.services.replanning import next_pairs
-from augment.services.wording import in_words
+from augment.services.wording import translate_all
 
 AHEAD = 5
 """The pair on the screen and four that are decoded ahead."""
@@ -92,7 +92,7 @@ def vote_context(study: Study, expert: User, *, change: str) -> dict[str, Any] |
             shows the next pair.
     """
     matchups = next_pairs(study=study, expert=expert, n=AHEAD)
-    pairs = [as_shown(matchup, in_words) for matchup in matchups]
+    pairs = [as_shown(matchup, translate_all) for matchup in matchups]
     context = over_context(study, expert)
     last = context["last"]
     changed = next((vote for vote in last if str(vote.key) == change), None)
@@ -149,7 +149,7 @@ def _last_votes(study: Study, expert: User) -> list[LastVote]:
             both_miss=vote.both_miss,
             comment=vote.comment,
             word=_word(vote),
-            shown=as_shown(vote.matchup, in_words),
+            shown=as_shown(vote.matchup, translate_all),
         )
         for vote in recent_votes(study=study, expert=expert, n=UNDOABLE)
     ]

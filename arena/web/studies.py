@@ -23,23 +23,23 @@ from arena.queries.results import latest_snapshot
 from arena.queries.votes import tallies
 from arena.services.handing_over import hand_over
 from arena.services.studies import close_study, open_study, rules_of
-from arena.web.access import ADMIN, STAFF, only
+from arena.web.access import ADMIN, STAFF, allow_only
 from arena.web.questions import ask, is_sure, wants_to_change
 from arena.web.study_forms import HandOverForm, StudyForm
 from arena.web.study_questions import closing, handing_over, opening
 from augment.errors import AugmentError
 from augment.models import Contestant
-from augment.services.wording import said
+from augment.services.wording import translate
 
 
-@only(*STAFF)
+@allow_only(*STAFF)
 @require_safe
 def studies_page(request: HttpRequest) -> HttpResponse:
     """Every study with its bar."""
     return render(request, "studies/list.html", {"studies": progress.of_studies()})
 
 
-@only(ADMIN)
+@allow_only(ADMIN)
 @require_http_methods(["GET", "HEAD", "POST"])
 def new_study_page(request: HttpRequest) -> HttpResponse:
     """Who competes on what, and who judges; opening plans every matchup."""
@@ -60,7 +60,7 @@ def new_study_page(request: HttpRequest) -> HttpResponse:
                 return ask(request, opening(form.rules()))
             study = open_study(**form.rules(), actor=cast(User, request.user))
         except (ArenaError, AugmentError) as error:
-            form.add_error(None, said(error))
+            form.add_error(None, translate(error))
         else:
             messages.success(
                 request, _("“%(name)s” is open; its experts can vote now.") % {"name": study.name}
@@ -69,7 +69,7 @@ def new_study_page(request: HttpRequest) -> HttpResponse:
     return render(request, "studies/new.html", {"form": form}, status=422 if form.errors else 200)
 
 
-@only(*STAFF)
+@allow_only(*STAFF)
 @require_safe
 def study_page(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
     """The rules, and how far each expert is."""
@@ -90,7 +90,7 @@ def study_page(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
     return render(request, "studies/study.html", context)
 
 
-@only(ADMIN)
+@allow_only(ADMIN)
 @require_POST
 def hand_over_pairs(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
     """Let others judge what an expert has not judged; asks first."""
@@ -112,14 +112,14 @@ def hand_over_pairs(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
             return ask(request, handing_over(study, giver, takers))
         taken = hand_over(study=study, username=giver, to=takers, actor=cast(User, request.user))
     except (ArenaError, AugmentError) as error:
-        messages.error(request, said(error))
+        messages.error(request, translate(error))
     else:
         shares = ", ".join(f"{name} {votes}" for name, votes in taken.items())
         messages.success(request, _("Handed over: %(shares)s.") % {"shares": shares})
     return redirect("study", code=code)
 
 
-@only(ADMIN)
+@allow_only(ADMIN)
 @require_http_methods(["GET", "HEAD", "POST"])
 def close(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
     """Take no more votes; this can't be taken back, so it asks first."""
@@ -131,7 +131,7 @@ def close(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
     try:
         close_study(study=study, actor=cast(User, request.user))
     except ArenaError as error:
-        messages.error(request, said(error))
+        messages.error(request, translate(error))
     else:
         messages.success(request, _("Closed. Its results can be read now."))
     return redirect("study", code=code)

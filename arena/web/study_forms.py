@@ -12,7 +12,7 @@ from arena.errors import NothingToPlan
 from arena.pairing.target_lines import Appearances, PairVotes, read_targets
 from arena.services.studies import PlanOptions
 from arena.web.forms import ChoiceForm
-from augment.services.wording import said
+from augment.services.wording import translate
 
 
 def _percent(*, initial: int, most: int) -> forms.FloatField:
@@ -51,7 +51,7 @@ class StudyForm(ChoiceForm):
         try:
             return read_targets(self.cleaned_data["targets"].splitlines())
         except NothingToPlan as error:
-            raise forms.ValidationError(said(error)) from error
+            raise forms.ValidationError(translate(error)) from error
 
     def rules(self) -> dict[str, Any]:
         """What the study is opened with, once the form is valid."""

@@ -19,14 +19,14 @@ from arena.queries.showings import picture_shown
 from arena.queries.studies import voting_study
 from arena.services.reports import report
 from arena.services.votes import receive_vote
-from arena.web.access import ADMIN, EXPERT, only
+from arena.web.access import ADMIN, EXPERT, allow_only
 from arena.web.forms import ReportForm, VoteForm
 from arena.web.pictures import picture_response
 from arena.web.screen import over_context, vote_context
 from augment.errors import Conflict
 
 
-@only(EXPERT)
+@allow_only(EXPERT)
 @never_cache
 @require_http_methods(["GET", "HEAD", "POST"])
 def vote_page(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
@@ -41,7 +41,7 @@ def vote_page(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
     return _show(request, study)
 
 
-@only(EXPERT)
+@allow_only(EXPERT)
 @require_safe
 def help_page(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
     """How to vote, for those without a script; with one it is a panel of the voting page."""
@@ -50,7 +50,7 @@ def help_page(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
 
 
 @require_POST
-@only(EXPERT)
+@allow_only(EXPERT)
 def report_pair(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
     """Keep what is wrong with a pair, then show it again."""
     study = _study_of(request, code)
@@ -76,7 +76,7 @@ def report_pair(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
     return redirect("vote", code=study.code)
 
 
-@only(EXPERT, ADMIN)
+@allow_only(EXPERT, ADMIN)
 @require_safe
 def matchup_image(request: HttpRequest, token: str) -> HttpResponseBase:
     """One side of a matchup, by a token that says nothing."""

@@ -11,7 +11,7 @@ SPACING_M = 0.6
 """Between the centres of the objects, so that a pile of several is seen as a pile."""
 
 
-def broken(reference: Modification) -> Modification | None:
+def break_reference(reference: Modification) -> Modification | None:
     """The reference with everything that it places heaped across the ego.
 
     No instruction asks for a collision with a standing ego, and no road user looks like that.

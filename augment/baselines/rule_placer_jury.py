@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 from augment.checks import Ground, Severity
-from augment.checks.against_intent import judged
+from augment.checks.against_intent import check_against_intent
 from augment.scene.entities import Scene, TrafficAgent
 from augment.scene.intent import Intent, Request
 from augment.scene.modification import Modification
@@ -51,7 +51,7 @@ class Jury:
         after = replace(self._scene, agents=(*self._scene.agents, *everyone[: len(before)]))
         ground = Ground.of(after) if before else self._ground
         own = Modification(added=tuple(agent for agent in everyone if agent.id in names))
-        found = judged(ground, own, Intent(requests=(request,)))
+        found = check_against_intent(ground, own, Intent(requests=(request,)))
         wrong = [one.sentence() for one in found if one.severity is Severity.WRONG]
         doubts = sum(one.severity is Severity.DOUBTFUL for one in found)
         return Verdict(wrong=wrong[0] if wrong else None, doubts=doubts)

@@ -15,10 +15,10 @@ from augment.baselines.simulated_faults import (
     LOGIC_KINDS,
     POSITION_KINDS,
     FaultKind,
-    spoiled,
+    inject_fault,
 )
 from augment.baselines.simulated_format import FormatKind, spoiled_answer
-from augment.baselines.simulated_road import RouteMap, jittered
+from augment.baselines.simulated_road import RouteMap, jitter
 from augment.errors import InvalidDocument, ReplyUnreadable
 from augment.prompts.reply import read_reply
 from augment.scene.entities import Scene
@@ -86,7 +86,7 @@ def simulate(scene: Scene, reference: Modification, rates: Rates, *, seed: int) 
     """
     rng = random.Random(seed)
     road = RouteMap.of(scene)
-    right = reference if road is None else jittered(road, reference, rng)
+    right = reference if road is None else jitter(road, reference, rng)
     wanted = _drawn(rates, rng)
     if wanted == "format":
         return _unwritten(scene, right, rng)
@@ -95,7 +95,7 @@ def simulate(scene: Scene, reference: Modification, rates: Rates, *, seed: int) 
     kinds = list(_KINDS[wanted])
     rng.shuffle(kinds)
     for kind in kinds:
-        agents = spoiled(road, right.added, kind, rng)
+        agents = inject_fault(road, right.added, kind, rng)
         if agents is not None:
             wrong = Modification(added=agents, moved=right.moved, removed=right.removed)
             return Simulated(modification=wrong, fault_class=wanted, fault=kind.value)

@@ -44,21 +44,25 @@ def is_seen(before: Agents, after: Agents) -> bool:
     )
 
 
-def turned(agent: TrafficAgent, turn_rad: float) -> TrafficAgent:
+def turn_agent(agent: TrafficAgent, turn_rad: float) -> TrafficAgent:
     """The agent with another heading; its walk stays."""
     return replace(agent, heading_rad=wrap(agent.heading_rad + turn_rad))
 
 
-def swapped(agent: TrafficAgent) -> TrafficAgent:
+def reverse_walk(agent: TrafficAgent) -> TrafficAgent:
     """A walk from its end to its start."""
     assert agent.walk_to_m is not None
     x_m, y_m = agent.walk_to_m
     return replace(
-        turned(agent, math.pi), x_m=x_m, y_m=y_m, walk_to_m=(agent.x_m, agent.y_m), lane_id=None
+        turn_agent(agent, math.pi),
+        x_m=x_m,
+        y_m=y_m,
+        walk_to_m=(agent.x_m, agent.y_m),
+        lane_id=None,
     )
 
 
-def replaced(agents: Agents, old: TrafficAgent, new: TrafficAgent) -> Agents:
+def replace_agent(agents: Agents, old: TrafficAgent, new: TrafficAgent) -> Agents:
     """All of them, one exchanged for another."""
     return tuple(new if agent is old else agent for agent in agents)
 

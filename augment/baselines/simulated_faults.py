@@ -58,7 +58,9 @@ LOGIC_KINDS = (
 )
 
 
-def spoiled(road: RouteMap, agents: Agents, kind: FaultKind, rng: random.Random) -> Agents | None:
+def inject_fault(
+    road: RouteMap, agents: Agents, kind: FaultKind, rng: random.Random
+) -> Agents | None:
     """The agents with that fault, None where it makes no difference here."""
     return _MAKERS[kind](road, agents, rng) if agents else None
 
@@ -72,7 +74,7 @@ _MAKERS: dict[FaultKind, Callable[[RouteMap, Agents, random.Random], Agents | No
     FaultKind.OFF_ROAD: places.off_road,
     FaultKind.BEYOND_JUNCTION: places.beyond_junction,
     FaultKind.EGO_HEADING: places.ego_heading,
-    FaultKind.FLIPPED: places.flipped,
+    FaultKind.FLIPPED: places.flip_vehicle,
     FaultKind.DEGREES: places.degrees,
     FaultKind.FACING_AWAY: places.facing_away,
     FaultKind.OVERLAP: logic.overlap,

@@ -10,11 +10,11 @@ from augment.baselines.simulated_agents import (
     VEHICLES,
     free_id,
     is_thing,
-    replaced,
-    swapped,
+    replace_agent,
+    reverse_walk,
     walks,
 )
-from augment.baselines.simulated_road import Agents, RouteMap, each, new_contacts
+from augment.baselines.simulated_road import Agents, RouteMap, change_each, new_contacts
 from augment.scene.entities import AgentType, TrafficAgent
 from augment.scene.sizes import LENGTH_WIDTH_M
 
@@ -40,7 +40,7 @@ def overlap(road: RouteMap, agents: Agents, rng: random.Random) -> Agents | None
     onto = same[number - 1]
     aside_m = rng.uniform(0.0, 0.1) * onto.length_m
     moved = replace(same[number], x_m=onto.x_m + aside_m, y_m=onto.y_m, walk_to_m=onto.walk_to_m)
-    return replaced(agents, same[number], road.renamed(moved))
+    return replace_agent(agents, same[number], road.renamed(moved))
 
 
 def missing(road: RouteMap, agents: Agents, rng: random.Random) -> Agents | None:
@@ -62,14 +62,14 @@ def extra(road: RouteMap, agents: Agents, rng: random.Random) -> Agents | None:
 def wrong_side(road: RouteMap, agents: Agents, rng: random.Random) -> Agents | None:
     """Left and right are exchanged: an offset, a line or a taper of cones, a walk."""
     if any(walks(agent) for agent in agents):
-        return each(agents, lambda agent: swapped(agent) if walks(agent) else agent)
+        return change_each(agents, lambda agent: reverse_walk(agent) if walks(agent) else agent)
     if sum(agent.type in VEHICLES for agent in agents) > 1:
         return None
 
     def mirrored(agent: TrafficAgent) -> TrafficAgent:
         return road.moved(agent, 0.0, -2.0 * road.place(agent)[1])
 
-    made = each(agents, mirrored)
+    made = change_each(agents, mirrored)
     # A ring or a row across the lane is its own mirror image, whoever stands where in it.
     things = [agent for agent in agents if is_thing(agent)]
     off_m = max(min(_apart_m(one, was) for was in things) for one in made if is_thing(one))
@@ -87,7 +87,7 @@ def wrong_type(road: RouteMap, agents: Agents, rng: random.Random) -> Agents | N
     length_m, width_m = LENGTH_WIDTH_M[kind]
     walk = agent.walk_to_m if kind is AgentType.PEDESTRIAN else None
     speed_mps = 0.0 if kind in (AgentType.TRAFFIC_CONE, AgentType.BARRIER) else agent.speed_mps
-    return replaced(
+    return replace_agent(
         agents,
         agent,
         replace(
@@ -107,4 +107,4 @@ def moving(road: RouteMap, agents: Agents, rng: random.Random) -> Agents | None:
     if not parked:
         return None
     agent = rng.choice(parked)
-    return replaced(agents, agent, replace(agent, speed_mps=round(rng.uniform(3.0, 12.0), 1)))
+    return replace_agent(agents, agent, replace(agent, speed_mps=round(rng.uniform(3.0, 12.0), 1)))

@@ -13,11 +13,11 @@ from augment.baselines.simulated_agents import (
     has_front,
     is_seen,
     is_thing,
-    replaced,
-    turned,
+    replace_agent,
+    turn_agent,
     walks,
 )
-from augment.baselines.simulated_road import Agents, RouteMap, each
+from augment.baselines.simulated_road import Agents, RouteMap, change_each
 from augment.geometry.angles import difference, wrap
 from augment.scene.entities import TrafficAgent, TrafficSide
 
@@ -42,7 +42,7 @@ def neighbour_lane(road: RouteMap, agents: Agents, rng: random.Random) -> Agents
     if abs(2.0 * middle_m + left_m) < SEEN_SIDE_M:
         # From one boundary to the next is from one side of the lane to the other: a wrong side.
         left_m = -left_m
-    return each(agents, lambda agent: road.moved(agent, 0.0, left_m))
+    return change_each(agents, lambda agent: road.moved(agent, 0.0, left_m))
 
 
 def straight_line(road: RouteMap, agents: Agents, rng: random.Random) -> Agents | None:
@@ -55,7 +55,7 @@ def straight_line(road: RouteMap, agents: Agents, rng: random.Random) -> Agents 
             walk = (walk[0] + s_m - agent.x_m, walk[1] + d_m - agent.y_m)
         return road.renamed(replace(agent, x_m=s_m, y_m=d_m, walk_to_m=walk))
 
-    made = each(agents, laid_out)
+    made = change_each(agents, laid_out)
     off_m = [_seen_m(road, was, one) for one, was in zip(made, agents, strict=True)]
     return made if min(off_m) >= SEEN_M else None
 
@@ -70,7 +70,7 @@ def _seen_m(road: RouteMap, was: TrafficAgent, now: TrafficAgent) -> float:
 def along_lane(road: RouteMap, agents: Agents, rng: random.Random) -> Agents | None:
     """5 to 30 m too near or too far."""
     along_m = rng.choice((-1.0, 1.0)) * rng.uniform(5.0, 30.0)
-    return each(agents, lambda agent: road.moved(agent, along_m))
+    return change_each(agents, lambda agent: road.moved(agent, along_m))
 
 
 def off_road(road: RouteMap, agents: Agents, rng: random.Random) -> Agents | None:
@@ -92,7 +92,7 @@ def off_road(road: RouteMap, agents: Agents, rng: random.Random) -> Agents | Non
 
 
 def _aside(road: RouteMap, agents: Agents, left_m: float) -> Agents:
-    return each(agents, lambda agent: road.moved(agent, 0.0, left_m))
+    return change_each(agents, lambda agent: road.moved(agent, 0.0, left_m))
 
 
 def beyond_junction(road: RouteMap, agents: Agents, rng: random.Random) -> Agents | None:
@@ -103,7 +103,9 @@ def beyond_junction(road: RouteMap, agents: Agents, rng: random.Random) -> Agent
     if not ends:
         return None
     along_m = ends[0] + rng.uniform(2.0, 8.0) - first_m
-    return each(agents, lambda agent: road.moved(agent, along_m)) if along_m >= 5.0 else None
+    return (
+        change_each(agents, lambda agent: road.moved(agent, along_m)) if along_m >= 5.0 else None
+    )
 
 
 # Heading: the place is right.
@@ -111,7 +113,7 @@ def beyond_junction(road: RouteMap, agents: Agents, rng: random.Random) -> Agent
 
 def ego_heading(road: RouteMap, agents: Agents, rng: random.Random) -> Agents | None:
     """The lane, the angle or the direction of a walk is ignored: everybody looks like the ego."""
-    made = each(
+    made = change_each(
         agents, lambda agent: replace(agent, heading_rad=0.0) if has_front(agent) else agent
     )
     cars = [agent for agent in agents if agent.type in VEHICLES]
@@ -123,19 +125,19 @@ def ego_heading(road: RouteMap, agents: Agents, rng: random.Random) -> Agents | 
     return made if is_seen(agents, made) else None
 
 
-def flipped(road: RouteMap, agents: Agents, rng: random.Random) -> Agents | None:
+def flip_vehicle(road: RouteMap, agents: Agents, rng: random.Random) -> Agents | None:
     """The one vehicle looks the other way."""
     cars = [agent for agent in agents if agent.type in VEHICLES]
     if len(cars) != 1:
         return None  # a crash has no front
-    return replaced(agents, cars[0], turned(cars[0], math.pi))
+    return replace_agent(agents, cars[0], turn_agent(cars[0], math.pi))
 
 
 def degrees(road: RouteMap, agents: Agents, rng: random.Random) -> Agents | None:
     """The number of degrees is given where radians are meant."""
     if sum(agent.type in VEHICLES for agent in agents) > 1:
         return None
-    made = each(
+    made = change_each(
         agents,
         lambda agent: (
             replace(agent, heading_rad=wrap(round(math.degrees(agent.heading_rad), 1)))
@@ -157,6 +159,6 @@ def facing_away(road: RouteMap, agents: Agents, rng: random.Random) -> Agents | 
             return agent
         end = agent.walk_to_m
         back = (2.0 * agent.x_m - end[0], 2.0 * agent.y_m - end[1]) if goes_there else end
-        return replace(turned(agent, math.pi), walk_to_m=back)
+        return replace(turn_agent(agent, math.pi), walk_to_m=back)
 
-    return each(agents, away)
+    return change_each(agents, away)

@@ -104,7 +104,7 @@ class RouteMap:
         return ends
 
 
-def jittered(road: RouteMap, reference: Modification, rng: random.Random) -> Modification:
+def jitter(road: RouteMap, reference: Modification, rng: random.Random) -> Modification:
     """A right placement that is not exact: all shifted together, each a little on its own.
 
     What did not touch before does not touch now; where chance finds no such place, the shift
@@ -127,7 +127,9 @@ def new_contacts(scene: Scene, before: Agents, after: Agents) -> bool:
     return len(_contacts(scene, after)) > len(_contacts(scene, before))
 
 
-def each(agents: Iterable[TrafficAgent], change: Callable[[TrafficAgent], TrafficAgent]) -> Agents:
+def change_each(
+    agents: Iterable[TrafficAgent], change: Callable[[TrafficAgent], TrafficAgent]
+) -> Agents:
     """Every agent changed."""
     return tuple(change(agent) for agent in agents)
 

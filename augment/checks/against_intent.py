@@ -25,7 +25,7 @@ from augment.checks.asked_walk import asked_walk
 from augment.checks.finding import Finding, FindingKind, Severity
 from augment.checks.ground import Ground
 from augment.checks.own_way import OwnWay
-from augment.checks.parties import cast
+from augment.checks.parties import match_to_requests
 from augment.checks.registry import findings_on
 from augment.checks.tolerances import USUAL, Tolerances
 from augment.scene.intent import Intent, VehicleRequest, resolve_anchors
@@ -45,7 +45,7 @@ ASKED_CHECKS: tuple[AskedCheck, ...] = (
 )
 
 
-def judged(
+def check_against_intent(
     ground: Ground,
     modification: Modification,
     intent: Intent | None,
@@ -67,7 +67,7 @@ def judged(
     way = None if intent is None else OwnWay.of(ground)
     if intent is None or way is None:
         return found
-    casting = cast(resolve_anchors(intent), modification.added, way)
+    casting = match_to_requests(resolve_anchors(intent), modification.added, way)
     asked = Asked(modification=modification, way=way, casting=casting, tolerances=tolerances)
     held = [one for check in ASKED_CHECKS for one in check(asked)]
     return (*held, *_settled(found, held, asked))

@@ -44,16 +44,16 @@ class Asked:
 AskedCheck = Callable[[Asked], Iterator[Finding]]
 
 
-def outside(value: float, low: float, high: float) -> float:
+def distance_outside(value: float, low: float, high: float) -> float:
     """How far a value is outside a range, 0 within it."""
     return max(low - value, value - high, 0.0)
 
 
-def severity(*, fits: bool) -> Severity:
+def severity_of(*, fits: bool) -> Severity:
     """What was asked for in so many words is there, or it is wrong."""
     return Severity.FACT if fits else Severity.WRONG
 
 
-def hand(left: float) -> str:
+def side_of(left: float) -> str:
     """The side of a number whose left is positive."""
     return "left" if left >= 0.0 else "right"

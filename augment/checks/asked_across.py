@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
-from augment.checks.asked import Asked, hand, outside, severity
+from augment.checks.asked import Asked, distance_outside, severity_of, side_of
 from augment.checks.crash_order import in_order
 from augment.checks.finding import Finding, FindingKind
 from augment.checks.own_way import Band
@@ -47,7 +47,7 @@ class _Wanted:
     allowed_m: float
 
     def off_m(self, left_m: float) -> float:
-        return outside(left_m, self.low_m, self.high_m)
+        return distance_outside(left_m, self.low_m, self.high_m)
 
     @property
     def mirrored(self) -> _Wanted:
@@ -103,19 +103,19 @@ def _vehicle(
     if wanted.low_m == wanted.high_m == 0.0:
         words = "the lane centre is asked for"
     elif wanted.low_m == wanted.high_m:
-        words = f"{{asked_low_m:.2g}} m to the {hand(wanted.low_m)} is asked for"
+        words = f"{{asked_low_m:.2g}} m to the {side_of(wanted.low_m)} is asked for"
     else:
-        side = hand(wanted.low_m + wanted.high_m)
+        side = side_of(wanted.low_m + wanted.high_m)
         low, high = ("low", "high") if wanted.low_m >= 0.0 else ("high", "low")
         words = f"{{asked_{low}_m:.2g}} to {{asked_{high}_m:.2g}} m to the {side} is asked for"
     return Finding(
         kind=FindingKind.ASKED_ACROSS,
-        severity=severity(fits=wanted.off_m(left_m) <= wanted.allowed_m),
+        severity=severity_of(fits=wanted.off_m(left_m) <= wanted.allowed_m),
         agents=(agent.id,),
         belongs_m=asked.way.position(asked.ahead_m(agent), belongs_m),
         measured={"left_m": left_m, "asked_low_m": wanted.low_m, "asked_high_m": wanted.high_m},
         template=(
-            f"{{agents[0]}} is {{left_m:.2f}} m to the {hand(left_m)} of the centre of {lane}; "
+            f"{{agents[0]}} is {{left_m:.2f}} m to the {side_of(left_m)} of the centre of {lane}; "
             f"{words}."
         ),
     )
@@ -157,12 +157,12 @@ def _cones(asked: Asked, party: Party, request: ConesRequest, band: Band) -> Ite
             return
         yield Finding(
             kind=FindingKind.ASKED_ACROSS,
-            severity=severity(fits=wanted.off_m(middle_m) <= across_m),
+            severity=severity_of(fits=wanted.off_m(middle_m) <= across_m),
             agents=tuple(one.id for one in everyone),
             measured={"left_m": middle_m, "asked_low_m": edge_m, "asked_high_m": edge_m},
             template=(
-                f"The line of cones is {{left_m:.2f}} m to the {hand(middle_m)} of the lane "
-                f"centre; the {hand(edge_m)} boundary, {{asked_low_m:.2f}} m off, is asked for."
+                f"The line of cones is {{left_m:.2f}} m to the {side_of(middle_m)} of the lane "
+                f"centre; the {side_of(edge_m)} boundary, {{asked_low_m:.2f}} m off, is asked for."
             ),
         )
         return
@@ -177,12 +177,12 @@ def _cones(asked: Asked, party: Party, request: ConesRequest, band: Band) -> Ite
 def _last_in_middle(asked: Asked, cones: Sequence[TrafficAgent], left_m: float) -> Finding:
     return Finding(
         kind=FindingKind.ASKED_ACROSS,
-        severity=severity(fits=abs(left_m) <= asked.tolerances.middle_m),
+        severity=severity_of(fits=abs(left_m) <= asked.tolerances.middle_m),
         agents=(cones[-1].id,),
         measured={"left_m": left_m},
         template=(
-            f"The last cone, {{agents[0]}}, is {{left_m:.2f}} m to the {hand(left_m)} of the lane "
-            "centre, where the taper is to end."
+            f"The last cone, {{agents[0]}}, is {{left_m:.2f}} m to the {side_of(left_m)} of the "
+            "lane centre, where the taper is to end."
         ),
     )
 
@@ -191,12 +191,12 @@ def _taper_side(cones: Sequence[TrafficAgent], lefts: Sequence[float], start: fl
     begins = lefts[0] - lefts[-1]
     return Finding(
         kind=FindingKind.ASKED_SIDE,
-        severity=severity(fits=begins * start > 0.0),
+        severity=severity_of(fits=begins * start > 0.0),
         agents=tuple(one.id for one in cones),
         measured={"first_left_m": lefts[0], "last_left_m": lefts[-1]},
         template=(
-            f"The taper begins at the {hand(begins)} of the lane with {{agents[0]}}; "
-            f"the {hand(start)} is asked for."
+            f"The taper begins at the {side_of(begins)} of the lane with {{agents[0]}}; "
+            f"the {side_of(start)} is asked for."
         ),
     )
 
@@ -207,25 +207,25 @@ def _in_lane(
     beyond_m = abs(left_m) - band.width_m / 2.0
     return Finding(
         kind=FindingKind.ASKED_ACROSS,
-        severity=severity(fits=beyond_m <= asked.tolerances.edge_m),
+        severity=severity_of(fits=beyond_m <= asked.tolerances.edge_m),
         agents=tuple(one.id for one in agents),
         measured={"left_m": left_m, "lane_width_m": band.width_m},
         template=(
-            f"{what} is {{left_m:.2f}} m to the {hand(left_m)} of the centre of the lane that is "
-            "asked for, which is {lane_width_m:.1f} m wide."
+            f"{what} is {{left_m:.2f}} m to the {side_of(left_m)} of the centre of the lane that "
+            "is asked for, which is {lane_width_m:.1f} m wide."
         ),
     )
 
 
 def _other_side(agents: Sequence[TrafficAgent], left_m: float, wanted: _Wanted) -> Finding:
-    side = hand(wanted.low_m + wanted.high_m)
+    side = side_of(wanted.low_m + wanted.high_m)
     return Finding(
         kind=FindingKind.ASKED_SIDE,
-        severity=severity(fits=False),
+        severity=severity_of(fits=False),
         agents=tuple(one.id for one in agents),
         measured={"left_m": left_m, "asked_low_m": wanted.low_m, "asked_high_m": wanted.high_m},
         template=(
-            f"{{agents[0]}} is {{left_m:.2f}} m to the {hand(left_m)} of the lane centre; the "
+            f"{{agents[0]}} is {{left_m:.2f}} m to the {side_of(left_m)} of the lane centre; the "
             f"same to the {side} is asked for: left and right are exchanged."
         ),
     )

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 
-from augment.checks.asked import Asked, hand, severity
+from augment.checks.asked import Asked, severity_of, side_of
 from augment.checks.crash_order import Pair, in_order, pairs
 from augment.checks.finding import Finding, FindingKind
 from augment.checks.tolerances import CRASH_M, USUAL
@@ -38,10 +38,10 @@ def asked_crash(asked: Asked) -> Iterator[Finding]:
 
 def _turn(pair: Pair, asked: Asked) -> Finding:
     asked_deg, off_deg = pair.asked.turn_deg or 0.0, pair.off_deg or 0.0
-    side = f" to the {hand(asked_deg)}" if pair.asked.is_signed else ""
+    side = f" to the {side_of(asked_deg)}" if pair.asked.is_signed else ""
     return Finding(
         kind=FindingKind.ASKED_HEADING,
-        severity=severity(fits=off_deg <= asked.tolerances.heading_deg),
+        severity=severity_of(fits=off_deg <= asked.tolerances.heading_deg),
         agents=(pair.other.id, pair.one.id),
         measured={"turn_deg": pair.turn_deg, "asked_deg": asked_deg, "off_deg": off_deg},
         template=(
@@ -66,7 +66,7 @@ def _gap(pair: Pair, asked: Asked) -> Finding:
         asked_m = (wanted.low_m + wanted.high_m) / 2.0
     return Finding(
         kind=FindingKind.ASKED_SPACING,
-        severity=severity(fits=fits),
+        severity=severity_of(fits=fits),
         agents=(pair.other.id, pair.one.id),
         measured={"gap_m": pair.gap_m, "asked_m": asked_m},
         template=f"{{agents[0]}} is {{gap_m:.1f}} m from {{agents[1]}}; {words}.",
@@ -81,7 +81,7 @@ def _facing(asked: Asked, request: CrashRequest, first: TrafficAgent) -> Iterato
     wanted_deg = 90.0 if request.facing is Facing.ACROSS else 180.0
     yield Finding(
         kind=FindingKind.ASKED_HEADING,
-        severity=severity(fits=abs(turn_deg - wanted_deg) <= _ROUGHLY_DEG),
+        severity=severity_of(fits=abs(turn_deg - wanted_deg) <= _ROUGHLY_DEG),
         agents=(first.id,),
         measured={"turn_deg": turn_deg, "asked_deg": wanted_deg},
         template=(

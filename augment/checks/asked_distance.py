@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 
-from augment.checks.asked import Asked, outside, severity
+from augment.checks.asked import Asked, distance_outside, severity_of
 from augment.checks.crash_order import in_order
 from augment.checks.finding import Finding, FindingKind
 from augment.checks.parties import Party
@@ -38,7 +38,7 @@ def _finding(asked: Asked, party: Party, span_m: tuple[float, float]) -> Finding
     sign = -1.0 if party.request.spot.relation is Relation.BEHIND else 1.0
     low_m, high_m = sorted(sign * one for one in span_m)
     first, measured_m = _measured(asked, party, sign, (low_m, high_m))
-    off_m = outside(measured_m, low_m, high_m)
+    off_m = distance_outside(measured_m, low_m, high_m)
     allowed_m = asked.tolerances.distance_m
     if math.isfinite(high_m):
         allowed_m = max(allowed_m, asked.tolerances.distance_share * high_m) + _to_next_m(party)
@@ -48,7 +48,7 @@ def _finding(asked: Asked, party: Party, span_m: tuple[float, float]) -> Finding
     belongs_m = sign * min(max(measured_m, low_m), high_m)
     return Finding(
         kind=FindingKind.ASKED_DISTANCE,
-        severity=severity(fits=off_m <= allowed_m),
+        severity=severity_of(fits=off_m <= allowed_m),
         agents=(first.id, *(one.id for one in party.everyone if one is not first)),
         belongs_m=asked.way.position(belongs_m, asked.left_m(first)),
         measured={
@@ -85,7 +85,7 @@ def _measured(
     elif isinstance(request, (ConesRequest, VehicleRequest)) and party.is_exact:
         value, agent = min(along, key=lambda item: (item[0], item[1].id))
         return agent, value
-    value, agent = min(along, key=lambda item: (outside(item[0], *wanted_m), item[1].id))
+    value, agent = min(along, key=lambda item: (distance_outside(item[0], *wanted_m), item[1].id))
     return agent, value
 
 

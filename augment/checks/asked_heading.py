@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 
-from augment.checks.asked import Asked, hand, severity
+from augment.checks.asked import Asked, severity_of, side_of
 from augment.checks.finding import Finding, FindingKind
 from augment.geometry.angles import difference
 from augment.scene.entities import TrafficAgent
@@ -34,7 +34,7 @@ def _vehicle(asked: Asked, request: VehicleRequest, agent: TrafficAgent) -> Iter
     off_deg = min(abs(_difference_deg(one, wanted_deg)) for one in turns)
     yield Finding(
         kind=FindingKind.ASKED_HEADING,
-        severity=severity(fits=off_deg <= asked.tolerances.heading_deg),
+        severity=severity_of(fits=off_deg <= asked.tolerances.heading_deg),
         agents=(agent.id,),
         measured={
             "turn_deg": turn_deg,
@@ -42,7 +42,7 @@ def _vehicle(asked: Asked, request: VehicleRequest, agent: TrafficAgent) -> Iter
             "off_deg": off_deg,
         },
         template=(
-            f"{{agents[0]}} is turned {{turn_deg:.0f}} degrees to the {hand(turn_deg)} of its "
+            f"{{agents[0]}} is turned {{turn_deg:.0f}} degrees to the {side_of(turn_deg)} of its "
             f"lane; {_words(request)} is asked for."
         ),
     )
@@ -51,7 +51,7 @@ def _vehicle(asked: Asked, request: VehicleRequest, agent: TrafficAgent) -> Iter
 def _words(request: VehicleRequest) -> str:
     turn = ""
     if request.turn_deg:
-        turn = f", turned {abs(request.turn_deg):g} degrees to the {hand(request.turn_deg)}"
+        turn = f", turned {abs(request.turn_deg):g} degrees to the {side_of(request.turn_deg)}"
     usual = "" if request.facing else ", as nothing else is said,"
     return f"facing {_facing(request)}{usual}{turn}"
 

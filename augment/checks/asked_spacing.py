@@ -7,7 +7,7 @@ from collections.abc import Iterator, Sequence
 from itertools import combinations
 from statistics import median
 
-from augment.checks.asked import Asked, hand, outside, severity
+from augment.checks.asked import Asked, distance_outside, severity_of, side_of
 from augment.checks.finding import Finding, FindingKind
 from augment.checks.parties import Party
 from augment.checks.tolerances import WORKER_M
@@ -25,7 +25,7 @@ def asked_spacing(asked: Asked) -> Iterator[Finding]:
 def fits_gap(asked: Asked, gap_m: float, wanted: Length) -> bool:
     """Whether two things are as far apart as is asked for."""
     allowed_m = max(asked.tolerances.spacing_m, asked.tolerances.spacing_share * wanted.high_m)
-    return outside(gap_m, wanted.low_m, wanted.high_m) <= allowed_m
+    return distance_outside(gap_m, wanted.low_m, wanted.high_m) <= allowed_m
 
 
 def apart_m(one: TrafficAgent, other: TrafficAgent) -> float:
@@ -58,7 +58,7 @@ def _spacing(asked: Asked, cones: Sequence[TrafficAgent], wanted: Length) -> Fin
     gap_m = median(gaps_m)
     return Finding(
         kind=FindingKind.ASKED_SPACING,
-        severity=severity(fits=fits_gap(asked, gap_m, wanted)),
+        severity=severity_of(fits=fits_gap(asked, gap_m, wanted)),
         agents=tuple(one.id for one in cones),
         measured={"gap_m": gap_m, "asked_m": (wanted.low_m + wanted.high_m) / 2.0},
         template="The cones stand {gap_m:.1f} m apart; {asked_m:.1f} m are asked for.",
@@ -69,7 +69,7 @@ def _worker(worker: TrafficAgent, party: Party) -> Finding:
     nearest = min(party.agents, key=lambda cone: (apart_m(worker, cone), cone.id))
     return Finding(
         kind=FindingKind.ASKED_SPACING,
-        severity=severity(fits=apart_m(worker, nearest) <= WORKER_M),
+        severity=severity_of(fits=apart_m(worker, nearest) <= WORKER_M),
         agents=(worker.id, nearest.id),
         measured={"gap_m": apart_m(worker, nearest)},
         template="The worker {agents[0]} is {gap_m:.1f} m from the nearest cone, {agents[1]}.",
@@ -81,11 +81,11 @@ def _worker_side(asked: Asked, worker: TrafficAgent, party: Party, side: Side) -
     left_m = asked.left_m(worker) - asked.left_m(nearest)
     return Finding(
         kind=FindingKind.ASKED_SIDE,
-        severity=severity(fits=hand(left_m) == side),
+        severity=severity_of(fits=side_of(left_m) == side),
         agents=(worker.id, nearest.id),
         measured={"left_m": left_m},
         template=(
-            f"The worker {{agents[0]}} stands to the {hand(left_m)} of {{agents[1]}}; the {side} "
-            "is asked for."
+            f"The worker {{agents[0]}} stands to the {side_of(left_m)} of {{agents[1]}}; the "
+            f"{side} is asked for."
         ),
     )

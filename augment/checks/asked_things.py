@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from augment.checks.asked import Asked, severity
+from augment.checks.asked import Asked, severity_of
 from augment.checks.finding import Finding, FindingKind, Severity
 from augment.checks.parties import Role, middle_of
 from augment.checks.situation import STOPPED_BELOW_MPS
@@ -63,7 +63,7 @@ def asked_motion(asked: Asked) -> Iterator[Finding]:
             off_mps = abs(agent.speed_mps - wanted_mps)
             yield Finding(
                 kind=FindingKind.ASKED_MOTION,
-                severity=severity(fits=off_mps <= allowed_mps),
+                severity=severity_of(fits=off_mps <= allowed_mps),
                 agents=(agent.id,),
                 measured={"speed_mps": agent.speed_mps, "asked_mps": wanted_mps},
                 template=f"{{agents[0]}} moves at {{speed_mps:.1f}} m/s; {words}.",

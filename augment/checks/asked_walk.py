@@ -6,7 +6,7 @@ import math
 from collections.abc import Iterator, Sequence
 from itertools import combinations
 
-from augment.checks.asked import Asked, hand, severity
+from augment.checks.asked import Asked, severity_of, side_of
 from augment.checks.asked_spacing import apart_m, fits_gap
 from augment.checks.finding import Finding, FindingKind
 from augment.checks.walk_crossing import end_of_walk
@@ -56,7 +56,7 @@ def _drift(asked: Asked, agent: TrafficAgent, wanted_m: float | None) -> Iterato
     drift_m = asked.way.place(*end).ahead_m - asked.ahead_m(agent)
     yield Finding(
         kind=FindingKind.ASKED_DISTANCE,
-        severity=severity(fits=abs(drift_m - wanted_m) <= asked.tolerances.drift_m),
+        severity=severity_of(fits=abs(drift_m - wanted_m) <= asked.tolerances.drift_m),
         agents=(agent.id,),
         measured={"drift_m": drift_m, "asked_m": wanted_m},
         template=(
@@ -80,7 +80,7 @@ def _in_file(
         gap_m = apart_m(first, other)
         yield Finding(
             kind=FindingKind.ASKED_SPACING,
-            severity=severity(fits=fits_gap(asked, gap_m, wanted)),
+            severity=severity_of(fits=fits_gap(asked, gap_m, wanted)),
             agents=(other.id, first.id),
             measured={"gap_m": gap_m, "asked_m": (wanted.low_m + wanted.high_m) / 2.0},
             template=_BEHIND,
@@ -100,7 +100,7 @@ def _finding(asked: Asked, agent: TrafficAgent, start: float) -> Finding:
     goes = math.copysign(1.0, to_left_m) if abs(to_left_m) > _ON_ROAD_M else 0.0
     is_other_side = place.left_m * start < -_ON_ROAD_M and goes == start
     measured = {"start_left_m": place.left_m, "end_left_m": end_left_m}
-    begins, ends = hand(start), hand(-start)
+    begins, ends = side_of(start), side_of(-start)
     if is_other_side:
         return _fault(
             FindingKind.ASKED_SIDE, agent, measured,
@@ -119,7 +119,7 @@ def _finding(asked: Asked, agent: TrafficAgent, start: float) -> Finding:
     if crosses and end_left_m is not None and end_left_m * start < 0.0:
         return Finding(
             kind=FindingKind.ASKED_CROSSING,
-            severity=severity(fits=True),
+            severity=severity_of(fits=True),
             agents=(agent.id,),
             measured=measured,
             template=f"{{agents[0]}} crosses the ego's way from the {begins}, as asked for.",
@@ -135,7 +135,7 @@ def _fault(
 ) -> Finding:
     return Finding(
         kind=kind,
-        severity=severity(fits=False),
+        severity=severity_of(fits=False),
         agents=(agent.id,),
         measured=measured,
         template=words,

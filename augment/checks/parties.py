@@ -78,7 +78,7 @@ class Casting:
     surplus: tuple[TrafficAgent, ...]
 
 
-def cast(intent: Intent, added: Sequence[TrafficAgent], way: OwnWay) -> Casting:
+def match_to_requests(intent: Intent, added: Sequence[TrafficAgent], way: OwnWay) -> Casting:
     """Deal the added agents out to the requests, each to the nearest spot that takes its type.
 
     What is left over stands in, whatever its type, for what is still missing.

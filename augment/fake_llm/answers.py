@@ -18,7 +18,7 @@ from augment.scene.modification import Modification
 SEES_NOTHING = "I can't find a scene and an instruction in what I was given."
 
 
-def told(task: Task, modification: Modification, summary: str) -> str:
+def write_answer(task: Task, modification: Modification, summary: str) -> str:
     """A whole answer: the modification, and how its numbers come about."""
     return _sections(
         insights=_road(task.scene),
@@ -29,7 +29,7 @@ def told(task: Task, modification: Modification, summary: str) -> str:
     )
 
 
-def declined(task: Task, reason: str) -> str:
+def write_refusal(task: Task, reason: str) -> str:
     """An honest answer to what was not understood: readable, and nothing changes."""
     return _sections(
         insights=f"{_road(task.scene)} I did not understand the instruction: {reason}",
@@ -40,7 +40,7 @@ def declined(task: Task, reason: str) -> str:
     )
 
 
-def renumbered(modification: Modification, first_new: int) -> Modification:
+def renumber_added(modification: Modification, first_new: int) -> Modification:
     """The added agents numbered on from the first new id of the task."""
     added = (replace(a, id=f"Agent{first_new + n}") for n, a in enumerate(modification.added))
     return replace(modification, added=tuple(added))

@@ -12,10 +12,12 @@ from dataclasses import dataclass
 from enum import StrEnum
 
 from augment.fake_llm.requests import ChatRequest, SpokenMessage
-from augment.prompts.texts import text
+from augment.prompts.texts import read_text
 
-_RESULT = text("function_result.md").partition("\n")[0]
-_FEEDBACK = tuple(text(name).partition("{{")[0].strip() for name in ("feedback.md", "measured.md"))
+_RESULT = read_text("function_result.md").partition("\n")[0]
+_FEEDBACK = tuple(
+    read_text(name).partition("{{")[0].strip() for name in ("feedback.md", "measured.md")
+)
 
 
 class Part(StrEnum):
@@ -28,7 +30,7 @@ class Part(StrEnum):
     READER = "reader"
 
 
-_OPENINGS = {text(f"{part}.md").partition("\n")[0]: part for part in Part}
+_OPENINGS = {read_text(f"{part}.md").partition("\n")[0]: part for part in Part}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -52,7 +54,7 @@ class Heard:
     feedback: tuple[str, ...] = ()
 
 
-def heard(request: ChatRequest) -> Heard:
+def read_conversation(request: ChatRequest) -> Heard:
     """What the conversation says about the answer that is due; by default a modifier's."""
     told = next((one.text for one in request.messages if one.role == "system"), "")
     part = _OPENINGS.get(told.partition("\n")[0], Part.MODIFIER)
@@ -61,8 +63,8 @@ def heard(request: ChatRequest) -> Heard:
     since = request.messages[start:]
     native = request.tools is not None
     offered = request.tool_choice != "none" if native else '{"call": "pose_on_lane"' in told
-    over = text("calls_are_over.md") in request.messages[-1].text
-    asked_again = request.messages[-1].text.startswith(text("re_ask.md").partition("\n")[0])
+    over = read_text("calls_are_over.md") in request.messages[-1].text
+    asked_again = request.messages[-1].text.startswith(read_text("re_ask.md").partition("\n")[0])
     return Heard(
         part=part,
         may_call=offered and not over and not asked_again,

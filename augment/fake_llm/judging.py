@@ -47,7 +47,7 @@ def problems_of(task: Task) -> list[Problem]:
     return found
 
 
-def rated(problems: Sequence[Problem]) -> str:
+def write_ratings(problems: Sequence[Problem]) -> str:
     """A text reviewer's answer: low ratings with feedback, or high ones."""
     low = {"compliance": 2, "realism": 3, "logical_consistency": 2}
     high = dict.fromkeys(low, 5)
@@ -61,7 +61,7 @@ def rated(problems: Sequence[Problem]) -> str:
     )
 
 
-def asked(names: Sequence[str]) -> str:
+def write_questions(names: Sequence[str]) -> str:
     """An engineer's questions about the agents of those names."""
     about = [f"In which lane does {name} stand?" for name in names[:6]]
     about += ["Do any two blue objects overlap?", "Is a blue object off the road?"]
@@ -69,13 +69,13 @@ def asked(names: Sequence[str]) -> str:
     return f"I ask the viewer.\n```json\n{json.dumps({'questions': about[:8]})}\n```\n"
 
 
-def decided(problems: Sequence[Problem]) -> str:
+def write_verdict(problems: Sequence[Problem]) -> str:
     """An engineer's verdict."""
     block = {"verdict": "feedback" if problems else "accept", "feedback": list(problems)}
     return f"I have weighed the answers.\n```json\n{json.dumps(block)}\n```\n"
 
 
-def seen(request: ChatRequest) -> str:
+def describe_picture(request: ChatRequest) -> str:
     """A viewer's answer to each question: what picture it was given, and nothing it can't see."""
     last = request.messages[-1]
     sizes = [image.size_px for one in request.messages for image in one.images]
@@ -87,7 +87,7 @@ def seen(request: ChatRequest) -> str:
     return "\n".join(lines + [f"{n}. cannot see" for n in range(2, count + 1)])
 
 
-def overlooked(problems: list[Problem], rng: random.Random) -> list[Problem]:
+def overlook_some(problems: list[Problem], rng: random.Random) -> list[Problem]:
     """What a careless reviewer finds of them: all or, as often, nothing."""
     return problems if rng.random() < 0.5 else []
 

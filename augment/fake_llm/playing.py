@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from augment.baselines.rule_placer import place
 from augment.errors import CannotPlace
 from augment.fake_llm import answers, careless, judging, tool_use
-from augment.fake_llm.hearing import Heard, Part, heard
+from augment.fake_llm.hearing import Heard, Part, read_conversation
 from augment.fake_llm.requests import ChatRequest
 from augment.fake_llm.sight import (
     Intents,
@@ -53,16 +53,16 @@ class Character:
     bend: Callable[[Task, Modification, Heard], Modification] = lambda task, right, _: right
     spoil: Callable[[Task, str, Heard], str] = lambda task, text, _: text
     judge: Callable[[Task], list[judging.Problem]] = judging.problems_of
-    rate: Callable[[Sequence[judging.Problem]], str] = judging.rated
-    decide: Callable[[Sequence[judging.Problem]], str] = judging.decided
+    rate: Callable[[Sequence[judging.Problem]], str] = judging.write_ratings
+    decide: Callable[[Sequence[judging.Problem]], str] = judging.write_verdict
     first_calls: Calls = ()
     never_stops: bool = False
 
     def answer(self, request: ChatRequest, intents: Intents = knows_nothing) -> Said:
         """What it says, from the request and the list of intents alone."""
-        understood = heard(request)
+        understood = read_conversation(request)
         if understood.part is Part.VIEWER:
-            return Said(text=judging.seen(request))
+            return Said(text=judging.describe_picture(request))
         if understood.part is Part.READER:
             return self._read(request, intents)
         try:
@@ -76,7 +76,7 @@ class Character:
                 return Said(text=self.rate(self.judge(task)))
         if any(one.role == "assistant" for one in request.messages):
             return Said(text=self.decide(self.judge(task)))
-        return Said(text=judging.asked(list(list_of(task.prompt, "Added agents"))))
+        return Said(text=judging.write_questions(list(list_of(task.prompt, "Added agents"))))
 
     def _read(self, request: ChatRequest, intents: Intents) -> Said:
         """The intent from the list, as a reader would write it; nothing is read."""
@@ -96,15 +96,15 @@ class Character:
         try:
             right = place(task.scene, task.intent).modification
         except CannotPlace as refused:
-            return Said(text=answers.declined(task, _why(task, refused)))
-        made = self.bend(task, answers.renumbered(right, task.first_new), understood)
+            return Said(text=answers.write_refusal(task, _why(task, refused)))
+        made = self.bend(task, answers.renumber_added(right, task.first_new), understood)
         wanted = tool_use.calls_for(task.scene, made)
         spared = len(self.first_calls)
         if understood.may_call and wanted and len(understood.results) <= spared:
             return _calling(understood, _named(wanted[: 8 - spared]))
         results = understood.results[spared:]
         made = tool_use.with_results(task.scene, made, results)
-        text = answers.told(task, made, _summary(task))
+        text = answers.write_answer(task, made, _summary(task))
         return Said(text=self.spoil(task, text, understood))
 
 
@@ -154,7 +154,7 @@ def _all_told(task: Task, understood: Heard) -> str:
 
 
 def _overlooking(task: Task) -> list[judging.Problem]:
-    return judging.overlooked(judging.problems_of(task), careless.dice(task.prompt))
+    return judging.overlook_some(judging.problems_of(task), careless.dice(task.prompt))
 
 
 def _learning(task: Task, right: Modification, understood: Heard) -> Modification:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 from xml.etree import ElementTree as ET
 
-from augment.sentences import escaped
+from augment.sentences import escape_controls
 
 DECIMALS = 9
 
@@ -44,6 +44,6 @@ def number(value: float) -> str:
 
 def text_of(root: ET.Element, *, comment: str) -> bytes:
     """The whole file."""
-    safe = escaped(comment).replace("--", "- -")
+    safe = escape_controls(comment).replace("--", "- -")
     body = ET.tostring(root, encoding="unicode")
     return f"<?xml version='1.0' encoding='UTF-8'?>\n<!-- {safe} -->\n{body}\n".encode()

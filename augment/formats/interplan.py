@@ -15,7 +15,7 @@ import yaml
 
 from augment.scene.catalogue import ScenarioType
 from augment.scene.modification import Modification
-from augment.sentences import escaped
+from augment.sentences import escape_controls
 
 STANDING_WALK_M: Final = 1.5
 """A walk up to here is a worker's: interPlan's construction workers step 1.0 m."""
@@ -87,7 +87,7 @@ def yaml_text(by_token: Mapping[str, dict[str, Any]], comments: list[str]) -> st
         },
     }
     body = yaml.dump(document, Dumper=_Dumper, sort_keys=False, allow_unicode=True, width=99)
-    head = "".join(f"# {escaped(' '.join(line.split()))}\n" for line in comments)
+    head = "".join(f"# {escape_controls(' '.join(line.split()))}\n" for line in comments)
     return head + body
 
 

@@ -11,7 +11,7 @@ Sending = Callable[[], None]
 """Called once, when a request is about to leave this computer; what it raises keeps it here."""
 
 
-def unwatched() -> None:
+def watch_nothing() -> None:
     """For requests that nobody keeps a record of."""
 
 
@@ -26,7 +26,7 @@ class ChatClient(Protocol):
         """
         ...
 
-    def complete(self, request: Request, *, sending: Sending = unwatched) -> Reply:
+    def complete(self, request: Request, *, sending: Sending = watch_nothing) -> Reply:
         """The answer to this request.
 
         A refusal is a reply (`Reply.refusal`); so is an answer that was cut off.

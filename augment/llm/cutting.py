@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 
-def cut(text: str, most: int) -> str:
+def shorten(text: str, most: int) -> str:
     """The text, or its beginning with a mark of how long it was: at most `most` characters.
 
     Raises:

@@ -16,7 +16,7 @@ from urllib.parse import urlsplit
 
 from augment.errors import Abandoned, InvalidDocument, ModelFault, NotSent, Unwanted
 from augment.llm.addresses import Resolve, check_resolved
-from augment.llm.client import Sending, unwatched
+from augment.llm.client import Sending, watch_nothing
 from augment.llm.messages import Reply, Request
 from augment.llm.wire_faults import Secret, fault_of_status, retry_after_s
 from augment.llm.wire_network import CONNECT_TIMEOUT_S, Network
@@ -67,7 +67,7 @@ class OpenAIWire:
         api_key: str | None,
         timeout_s: float = DEFAULT_TIMEOUT_S,
         most_bytes: int = DEFAULT_MOST_BYTES,
-        still_wanted: Callable[[], None] = unwatched,
+        still_wanted: Callable[[], None] = watch_nothing,
         look_every_s: float = LOOK_EVERY_S,
         proxy_url: str = "",
         resolve: Resolve = socket.getaddrinfo,
@@ -96,7 +96,7 @@ class OpenAIWire:
         """The request as it is: the wire knows no model."""
         return request
 
-    def complete(self, request: Request, *, sending: Sending = unwatched) -> Reply:
+    def complete(self, request: Request, *, sending: Sending = watch_nothing) -> Reply:
         """The endpoint's answer to one request.
 
         Raises:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 
 from augment.errors import ModelFault
-from augment.llm.client import Sending, unwatched
+from augment.llm.client import Sending, watch_nothing
 from augment.llm.messages import Reply, Request
 
 
@@ -28,7 +28,7 @@ class ScriptedClient:
         """The request as it is: a script takes everything."""
         return request
 
-    def complete(self, request: Request, *, sending: Sending = unwatched) -> Reply:
+    def complete(self, request: Request, *, sending: Sending = watch_nothing) -> Reply:
         """The next answer of the script.
 
         Raises:

@@ -11,7 +11,7 @@ from datetime import UTC
 from email.utils import parsedate_to_datetime
 
 from augment.errors import ModelFault, ParameterRefused
-from augment.llm.cutting import cut
+from augment.llm.cutting import shorten
 from augment.llm.messages import LengthName
 
 _PASSING = frozenset({408, 409, 425, 429})
@@ -64,8 +64,10 @@ def fault_of_status(
     """
     message, code, param = _message_code_and_param(body)
     passing = (status in _PASSING or status >= 500) and code not in _SPENT
-    shown = cut(message, LONGEST_MESSAGE)
-    text = f"the endpoint answered {status}" + (f" ({cut(code, LONGEST_CODE)})" if code else "")
+    shown = shorten(message, LONGEST_MESSAGE)
+    text = f"the endpoint answered {status}" + (
+        f" ({shorten(code, LONGEST_CODE)})" if code else ""
+    )
     text = f"{text}: {shown}" if shown else text
     refused = _refused(message, code, param, sent) if status in _ABOUT_THE_REQUEST else None
     if refused:

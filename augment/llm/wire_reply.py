@@ -11,7 +11,7 @@ from __future__ import annotations
 import json
 
 from augment.errors import ModelFault
-from augment.llm.cutting import cut
+from augment.llm.cutting import shorten
 from augment.llm.messages import Reply, ToolCall
 from augment.llm.wire_faults import Secret
 
@@ -58,9 +58,11 @@ def reply_of(answer: object, *, latency_s: float, secret: Secret) -> Reply:
     calls = _tool_calls(getattr(message, "tool_calls", None), secret)
     return Reply(
         text=secret.out_of(_text(getattr(message, "content", None))),
-        model=cut(secret.out_of(_text(getattr(answer, "model", None))), 120),
-        finish_reason=cut(secret.out_of(_text(getattr(choices[0], "finish_reason", None))), 40),
-        refusal=cut(secret.out_of(_text(refusal)), LONGEST_REFUSAL) or None,
+        model=shorten(secret.out_of(_text(getattr(answer, "model", None))), 120),
+        finish_reason=shorten(
+            secret.out_of(_text(getattr(choices[0], "finish_reason", None))), 40
+        ),
+        refusal=shorten(secret.out_of(_text(refusal)), LONGEST_REFUSAL) or None,
         prompt_tokens=_count(getattr(usage, "prompt_tokens", None)),
         completion_tokens=_count(getattr(usage, "completion_tokens", None)),
         latency_s=latency_s,
@@ -79,10 +81,10 @@ def _tool_calls(calls: object, secret: Secret) -> tuple[ToolCall, ...]:
             made.append(
                 ToolCall(
                     # Some servers number no calls; the answer to one must name it.
-                    id=cut(secret.out_of(_text(getattr(call, "id", None))), LONGEST_NAME)
+                    id=shorten(secret.out_of(_text(getattr(call, "id", None))), LONGEST_NAME)
                     or f"call_{number}",
-                    name=cut(secret.out_of(name), LONGEST_NAME),
-                    arguments=cut(
+                    name=shorten(secret.out_of(name), LONGEST_NAME),
+                    arguments=shorten(
                         secret.out_of(_text(getattr(function, "arguments", None))),
                         LONGEST_ARGUMENTS,
                     ),

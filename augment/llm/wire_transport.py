@@ -121,7 +121,7 @@ class Transport:
         ]
         try:
             assert isinstance(answer.stream, Iterable)
-            return unpacked(answer.stream, packings, most_bytes=watch.most_bytes)
+            return unpack_body(answer.stream, packings, most_bytes=watch.most_bytes)
         except TooLong:
             if answer.status < 400:
                 raise watch.too_long() from None
@@ -133,7 +133,7 @@ class Transport:
         return b""
 
 
-def unpacked(chunks: Iterable[bytes], packings: list[str], *, most_bytes: int) -> bytes:
+def unpack_body(chunks: Iterable[bytes], packings: list[str], *, most_bytes: int) -> bytes:
     """A body that is never held in more than so many bytes, whatever it was packed from.
 
     Raises:

@@ -38,7 +38,7 @@ def boundary_within(boundary_m: FloatArray, radius_m: float) -> FloatArray:
     return points
 
 
-def simplified(boundary_m: FloatArray, tolerance_m: float) -> FloatArray:
+def simplify_boundary(boundary_m: FloatArray, tolerance_m: float) -> FloatArray:
     """The boundary (P, 2) with fewer of its points, nowhere further off than the tolerance.
 
     Douglas and Peucker's algorithm (1973) with distances to segments: every point left out is

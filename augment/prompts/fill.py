@@ -17,17 +17,17 @@ from augment.prompts.blocks import names_changes
 from augment.prompts.calls import calls_in
 from augment.prompts.texts import (
     QUOTE,
-    filled,
+    fill_text,
+    model_message,
     prompt_version,
-    quoted,
-    said_by_model,
+    quote,
+    read_text,
     said_by_user,
-    text,
 )
 from augment.prompts.vectors import DEFAULT_RADIUS_M, LaneFormat, scene_text
 from augment.scene.entities import Scene
 
-__all__ = ["QUOTE", "Calling", "Form", "modifier_messages", "prompt_version", "quoted"]
+__all__ = ["QUOTE", "Calling", "Form", "modifier_messages", "prompt_version", "quote"]
 
 
 class Calling(StrEnum):
@@ -60,10 +60,10 @@ def modifier_messages(
 ) -> tuple[Message, ...]:
     """What the modifier is asked first."""
     form = form or Form()
-    task = filled(
+    task = fill_text(
         "task.md",
         scene=scene_text(scene, radius_m=form.radius_m, lanes=form.lanes),
-        quoted=quoted(instruction),
+        quoted=quote(instruction),
     )
     return Message(speaker=Speaker.SYSTEM, text=_modifier(form)), said_by_user(task)
 
@@ -75,10 +75,10 @@ def re_ask_messages(
 
     Only an answer that holds a block is told to keep its placement.
     """
-    told = [*problems, text("re_ask_calls.md")] if calls_in(answer) else problems
-    keep = text("re_ask_keep.md") if names_changes(answer) else ""
-    asked = filled("re_ask.md", problems=_listed(told), keep=keep)
-    return (*messages, said_by_model(answer), said_by_user(asked))
+    told = [*problems, read_text("re_ask_calls.md")] if calls_in(answer) else problems
+    keep = read_text("re_ask_keep.md") if names_changes(answer) else ""
+    asked = fill_text("re_ask.md", problems=_listed(told), keep=keep)
+    return (*messages, model_message(answer), said_by_user(asked))
 
 
 def regenerate_messages(
@@ -91,25 +91,25 @@ def regenerate_messages(
         feedback: One entry a problem.
         is_measured: Whether these are measured facts rather than somebody's opinion.
     """
-    words = filled("measured.md" if is_measured else "feedback.md", feedback=_listed(feedback))
+    words = fill_text("measured.md" if is_measured else "feedback.md", feedback=_listed(feedback))
     return (*messages, said_by_user(words))
 
 
 def result_text(results: Sequence[str], *, is_over: bool) -> str:
     """What the program says about calls made in the prompt: each result as one line of JSON."""
     lines = "\n".join(f"{number}. {result}" for number, result in enumerate(results, start=1))
-    return filled("function_result.md", results=lines, rest=go_on_text(is_over=is_over))
+    return fill_text("function_result.md", results=lines, rest=go_on_text(is_over=is_over))
 
 
 def go_on_text(*, is_over: bool) -> str:
     """Whether more calls are answered."""
-    return text("calls_are_over.md" if is_over else "calls_go_on.md")
+    return read_text("calls_are_over.md" if is_over else "calls_go_on.md")
 
 
 @cache
 def pose_tool() -> Tool:
     """The pose tool as endpoints with native calls are told of it."""
-    function = json.loads(text("pose_on_lane.json"))["function"]
+    function = json.loads(read_text("pose_on_lane.json"))["function"]
     return Tool(
         name=function["name"],
         description=function["description"],
@@ -119,7 +119,7 @@ def pose_tool() -> Tool:
 
 def input_format(lanes: LaneFormat = LaneFormat.POLYLINE) -> str:
     """How a scene is written down."""
-    return filled("input_format.md", coordinates=text(f"lanes_{lanes}.md"))
+    return fill_text("input_format.md", coordinates=read_text(f"lanes_{lanes}.md"))
 
 
 _WORK = {Calling.NONE: "walked", Calling.IN_PROMPT: "called", Calling.NATIVE: "native"}
@@ -129,21 +129,21 @@ _WORK = {Calling.NONE: "walked", Calling.IN_PROMPT: "called", Calling.NATIVE: "n
 def _modifier(form: Form) -> str:
     tools = ""
     if form.calling is not Calling.NONE:
-        tools = filled(
+        tools = fill_text(
             f"calls_{form.calling}.md",
-            function=text("pose_on_lane.md"),
+            function=read_text("pose_on_lane.md"),
             calls=str(form.calls),
             identical=str(form.identical),
         )
     manner = "walked" if form.calling is Calling.NONE else "called"
-    return filled(
+    return fill_text(
         "modifier.md",
         input_format=input_format(form.lanes),
-        distances=text(f"distances_{manner}.md"),
+        distances=read_text(f"distances_{manner}.md"),
         tools=tools,
-        calculations=text(f"calculations_{manner}.md"),
-        example=text(f"example_{form.lanes}.md"),
-        work=text(f"work_{_WORK[form.calling]}.md"),
+        calculations=read_text(f"calculations_{manner}.md"),
+        example=read_text(f"example_{form.lanes}.md"),
+        work=read_text(f"work_{_WORK[form.calling]}.md"),
     )
 
 

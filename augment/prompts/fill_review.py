@@ -9,7 +9,14 @@ from collections.abc import Mapping, Sequence
 
 from augment.llm.messages import Message, Speaker
 from augment.prompts.fill import input_format
-from augment.prompts.texts import filled, numbered, quoted, said_by_model, said_by_user, text
+from augment.prompts.texts import (
+    fill_text,
+    model_message,
+    number_lines,
+    quote,
+    read_text,
+    said_by_user,
+)
 from augment.prompts.vectors import changes_text, scene_text
 from augment.scene.entities import Scene
 from augment.scene.modification import Modification
@@ -21,7 +28,9 @@ def reviewer_messages(
     scene: Scene, instruction: str, modification: Modification, *, radius_m: float
 ) -> tuple[Message, ...]:
     """What the text reviewer is asked: scene, wish and changed vectors, no reasoning."""
-    told = filled("reviewer.md", input_format=input_format(), problems=text("common_problems.md"))
+    told = fill_text(
+        "reviewer.md", input_format=input_format(), problems=read_text("common_problems.md")
+    )
     task = _task(scene, instruction, modification, radius_m)
     return Message(speaker=Speaker.SYSTEM, text=told), said_by_user(task)
 
@@ -30,16 +39,16 @@ def engineer_messages(
     scene: Scene, instruction: str, modification: Modification, *, radius_m: float
 ) -> tuple[Message, ...]:
     """What the engineer is asked first: for questions to the viewer."""
-    told = filled("engineer.md", input_format=input_format())
+    told = fill_text("engineer.md", input_format=input_format())
     task = _task(scene, instruction, modification, radius_m)
     return Message(speaker=Speaker.SYSTEM, text=told), said_by_user(task)
 
 
 def viewer_messages(questions: Sequence[str], png: bytes) -> tuple[Message, ...]:
     """What the viewer is asked: the questions, about one picture."""
-    task = filled("viewer_task.md", questions=numbered(questions))
+    task = fill_text("viewer_task.md", questions=number_lines(questions))
     return (
-        Message(speaker=Speaker.SYSTEM, text=text("viewer.md")),
+        Message(speaker=Speaker.SYSTEM, text=read_text("viewer.md")),
         said_by_user(task, images=(png,)),
     )
 
@@ -52,7 +61,7 @@ def verdict_messages(
         f"{n}. {' '.join(question.split())} -> {answers.get(n, CANNOT_SEE)}"
         for n, question in enumerate(questions, start=1)
     ]
-    told = filled("engineer_answers.md", answers=quoted("\n".join(lines)))
+    told = fill_text("engineer_answers.md", answers=quote("\n".join(lines)))
     return (*messages, said_by_user(told))
 
 
@@ -60,19 +69,19 @@ def review_re_ask_messages(
     messages: tuple[Message, ...], answer: str, problems: Sequence[str]
 ) -> tuple[Message, ...]:
     """The conversation so far, the answer that can't be read, and what is wrong with it."""
-    asked = filled("review_re_ask.md", problems="\n".join(f"- {one}" for one in problems))
-    return (*messages, said_by_model(answer), said_by_user(asked))
+    asked = fill_text("review_re_ask.md", problems="\n".join(f"- {one}" for one in problems))
+    return (*messages, model_message(answer), said_by_user(asked))
 
 
 def viewer_re_ask_messages(messages: tuple[Message, ...], answer: str) -> tuple[Message, ...]:
     """The viewer's conversation with an answer that answers nothing; the picture stays in it."""
-    return (*messages, said_by_model(answer), said_by_user(text("viewer_re_ask.md")))
+    return (*messages, model_message(answer), said_by_user(read_text("viewer_re_ask.md")))
 
 
 def _task(scene: Scene, instruction: str, modification: Modification, radius_m: float) -> str:
-    return filled(
+    return fill_text(
         "review_task.md",
         scene=scene_text(scene, radius_m=radius_m),
-        quoted=quoted(instruction),
+        quoted=quote(instruction),
         changes=changes_text(scene, modification),
     )

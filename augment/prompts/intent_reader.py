@@ -14,7 +14,7 @@ from pydantic import ValidationError
 from augment.errors import InvalidDocument, ReplyUnreadable
 from augment.llm.messages import Message, Speaker
 from augment.prompts.blocks import last_object
-from augment.prompts.texts import filled, quoted, said_by_user
+from augment.prompts.texts import fill_text, quote, said_by_user
 from augment.scene.intent import Intent
 from augment.scene.intent_codec import IntentParts, intent_from_parts
 from augment.scene.schema import problems_of
@@ -24,8 +24,8 @@ _MOST_PROBLEMS = 8
 
 def reader_messages(instruction: str) -> tuple[Message, ...]:
     """The rules with the JSON schema, and the sentence."""
-    told = filled("reader.md", schema=_schema())
-    task = filled("reader_task.md", quoted=quoted(instruction))
+    told = fill_text("reader.md", schema=_schema())
+    task = fill_text("reader_task.md", quoted=quote(instruction))
     return Message(speaker=Speaker.SYSTEM, text=told), said_by_user(task)
 
 

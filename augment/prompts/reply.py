@@ -16,7 +16,7 @@ from augment.errors import InvalidModification, ReplyUnreadable
 from augment.geometry.angles import wrap
 from augment.prompts.blocks import last_object
 from augment.prompts.names import ShortNames, short_names
-from augment.prompts.strict import Strict, validated
+from augment.prompts.strict import Strict, validate
 from augment.prompts.vectors import DEFAULT_RADIUS_M
 from augment.scene.entities import AgentType, Scene, TrafficAgent
 from augment.scene.modification import Modification, check_fits
@@ -86,7 +86,7 @@ def read_reply(answer: str, scene: Scene, *, radius_m: float = DEFAULT_RADIUS_M)
         ReplyUnreadable: Whatever is wrong with the answer; nothing else is ever raised.
     """
     found, mended = last_object(answer, _KEYS)
-    block = validated(_Block, found)
+    block = validate(_Block, found)
     problems = _misplaced(block, scene, radius_m)
     if problems:
         raise ReplyUnreadable(problems)

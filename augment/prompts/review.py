@@ -13,7 +13,7 @@ from pydantic import Field
 
 from augment.errors import ReplyUnreadable
 from augment.prompts.blocks import LONGEST_ANSWER, last_object, without_thoughts
-from augment.prompts.strict import Strict, validated
+from augment.prompts.strict import Strict, validate
 
 FEWEST_QUESTIONS, MOST_QUESTIONS = 3, 8
 LONGEST_ENTRY = 1000
@@ -112,7 +112,7 @@ def read_ratings(answer: str, *, accepted_from: float) -> RatedReview:
             that the modifier could be told.
     """
     found, _ = last_object(answer, frozenset({"ratings", "feedback"}))
-    block = validated(_RatedBlock, found)
+    block = validate(_RatedBlock, found)
     if block.ratings.mean < accepted_from and not block.feedback:
         rule = f"feedback: must not be empty where the mean rating is below {accepted_from:g}"
         raise ReplyUnreadable([rule])
@@ -133,7 +133,7 @@ def read_questions(answer: str) -> tuple[str, ...]:
         ReplyUnreadable: They are missing, too few or too many.
     """
     found, _ = last_object(answer, frozenset({"questions"}))
-    return tuple(validated(_QuestionBlock, found).questions)
+    return tuple(validate(_QuestionBlock, found).questions)
 
 
 def read_verdict(answer: str) -> EngineerVerdict:
@@ -143,7 +143,7 @@ def read_verdict(answer: str) -> EngineerVerdict:
         ReplyUnreadable: It is missing, or it and the feedback contradict each other.
     """
     found, _ = last_object(answer, frozenset({"verdict", "feedback"}))
-    block = validated(_VerdictBlock, found)
+    block = validate(_VerdictBlock, found)
     if (block.verdict == "accept") == bool(block.feedback):
         rule = 'feedback: must be empty with "accept" and must not be empty with "feedback"'
         raise ReplyUnreadable([rule])

@@ -18,7 +18,7 @@ class Strict(BaseModel):
 _Kind = TypeVar("_Kind", bound=Strict)
 
 
-def validated(kind: type[_Kind], found: object) -> _Kind:
+def validate(kind: type[_Kind], found: object) -> _Kind:
     """What was found, as a value of that kind.
 
     Raises:

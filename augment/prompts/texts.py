@@ -27,19 +27,19 @@ def prompt_version() -> str:
 
 
 @cache
-def text(name: str) -> str:
+def read_text(name: str) -> str:
     """The text of that name as it stands in its file."""
     return files(__package__).joinpath("text", name).read_text(encoding="utf-8").strip()
 
 
-def filled(name: str, **values: str) -> str:
+def fill_text(name: str, **values: str) -> str:
     """The text with each {{name}} replaced once; what is filled in is not looked at again.
 
     Raises:
         KeyError: A name has no value.
     """
     parts = []
-    rest = text(name)
+    rest = read_text(name)
     while "{{" in rest:
         before, _, rest = rest.partition("{{")
         key, _, rest = rest.partition("}}")
@@ -47,13 +47,13 @@ def filled(name: str, **values: str) -> str:
     return re.sub(r"\n{3,}", "\n\n", "".join([*parts, rest])).strip()
 
 
-def quoted(words: str) -> str:
+def quote(words: str) -> str:
     """Somebody's words as a quotation, line by line, without control characters."""
     clean = ("".join(map(_printable, line)).strip() for line in words.splitlines())
     return "\n".join(QUOTE + line for line in clean if line)
 
 
-def said_by_model(answer: str) -> Message:
+def model_message(answer: str) -> Message:
     """A turn of the model; an empty one is refused by several servers."""
     return Message(speaker=Speaker.ASSISTANT, text=answer[:LONGEST_ECHO] or "(empty answer)")
 
@@ -63,7 +63,7 @@ def said_by_user(words: str, *, images: tuple[bytes, ...] = ()) -> Message:
     return Message(speaker=Speaker.USER, text=words, images=images)
 
 
-def numbered(entries: Sequence[str]) -> str:
+def number_lines(entries: Sequence[str]) -> str:
     """The entries as a numbered list, each on one line."""
     return "\n".join(f"{n}. {' '.join(entry.split())}" for n, entry in enumerate(entries, 1))
 

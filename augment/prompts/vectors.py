@@ -15,7 +15,7 @@ from enum import StrEnum
 import numpy as np
 
 from augment.geometry.polyline import Polyline
-from augment.prompts.clip import boundary_within, line_within, simplified
+from augment.prompts.clip import boundary_within, line_within, simplify_boundary
 from augment.prompts.lane_curves import control_points
 from augment.prompts.names import ShortNames, number_of, short_names
 from augment.scene.bezier_lanes import bezier_lane
@@ -199,7 +199,7 @@ def _boundary(area: Area, radius_m: float) -> list[list[float]]:
     points = boundary_within(np.array(area.boundary_m, dtype=np.float64), radius_m)
     if len(points) < 3:
         return []
-    return [[_metres(x), _metres(y)] for x, y in simplified(points, _BOUNDARY_TOLERANCE_M)]
+    return [[_metres(x), _metres(y)] for x, y in simplify_boundary(points, _BOUNDARY_TOLERANCE_M)]
 
 
 def _speed_limit(limit_mps: float | None) -> float | None:

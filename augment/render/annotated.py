@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from augment.render import palette
-from augment.render.bev import painted
+from augment.render.bev import paint_scene
 from augment.render.camera import Camera
 from augment.render.canvas import Box, MetricCanvas, text_width_px
 from augment.render.edges import mark_box, overlap, within
@@ -65,7 +65,7 @@ def draw_annotated(
     Raises:
         InvalidModification: The change does not fit the scene.
     """
-    ground, taken = painted(scene, modification, camera)
+    ground, taken = paint_scene(scene, modification, camera)
     after = apply(scene, modification)
     by_id = {agent.id: agent for agent in after.everyone}
     boxes = [mark_box(ground, agent) for agent in (after.ego, *modification.changed)]

@@ -38,13 +38,13 @@ def draw(
     Raises:
         InvalidModification: The change does not fit the scene.
     """
-    ground, taken = painted(scene, modification, camera, ghosts=labels)
+    ground, taken = paint_scene(scene, modification, camera, ghosts=labels)
     if labels:
         draw_labels(ground, apply(scene, modification), taken=taken)
     return ground.canvas.png()
 
 
-def painted(
+def paint_scene(
     scene: Scene, modification: Modification, camera: Camera, *, ghosts: bool = True
 ) -> tuple[MetricCanvas, list[Box]]:
     """All of a picture but its labels, and the boxes in pixels that text keeps free of.

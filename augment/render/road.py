@@ -15,7 +15,7 @@ from augment.render.shapes import (
     contains,
     long_axis,
     offset,
-    resampled,
+    resample_line,
     ribbon,
     runs,
     sides,
@@ -142,7 +142,7 @@ def _solid(
 
     It lies a little inside its own lane: two lanes that meet head on get a double line.
     """
-    fine = resampled(line_m, 2.0)
+    fine = resample_line(line_m, 2.0)
     beyond = offset(fine, 0.5 * outwards)
     beyond = (beyond[:-1] + beyond[1:]) / 2.0
     inside = np.zeros(len(beyond), dtype=bool)

@@ -58,7 +58,7 @@ def dashes(points: FloatArray, on: float, off: float) -> FloatArray:
     return np.stack([x, y], axis=2)
 
 
-def resampled(points: FloatArray, spacing: float) -> FloatArray:
+def resample_line(points: FloatArray, spacing: float) -> FloatArray:
     """A line (P, 2) cut into equal pieces no longer than the spacing, (K, 2)."""
     steps = np.diff(points, axis=0)
     stations = np.concatenate([[0.0], np.cumsum(np.hypot(steps[:, 0], steps[:, 1]))])

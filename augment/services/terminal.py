@@ -12,7 +12,7 @@ from typing import Any
 
 from django.core.management.base import BaseCommand, OutputWrapper
 
-from augment.sentences import escaped
+from augment.sentences import escape_controls
 
 
 class TerminalOutput(OutputWrapper):
@@ -25,7 +25,7 @@ class TerminalOutput(OutputWrapper):
         ending: str | None = None,
     ) -> None:
         """Write the text, escaped; what stands behind it is the command's own."""
-        super().write(escaped(msg), style_func, ending)
+        super().write(escape_controls(msg), style_func, ending)
 
     def write_data(self, text: str) -> None:
         """Write a file's content: to the byte into a file or a pipe, escaped to a terminal."""

@@ -9,7 +9,7 @@ from typing import Any
 from django.utils.translation import get_language, gettext_noop
 from django.utils.translation import gettext as _
 
-from augment.sentences import Sentence, filled, sentence_of
+from augment.sentences import Sentence, fill_sentence, sentence_of
 
 _WORDS = ("types", "reasons")
 """Values of ratings' sentences that are words of ours, not names."""
@@ -26,18 +26,18 @@ MARKED = (
 """What errors call things and states: marked here, as it stands there in values."""
 
 
-def said(sentence: str | Exception) -> str:
+def translate(sentence: str | Exception) -> str:
     """A sentence, a note or what an error says; what is not in the catalogue stays English."""
     text = sentence_of(sentence) if isinstance(sentence, Exception) else sentence
     if isinstance(text, Sentence):
         values = {
             name: _said_value(value, is_ours=name in _WORDS) for name, value in text.values.items()
         }
-        return filled(_(text.text), values)
+        return fill_sentence(_(text.text), values)
     return _(text) if text else ""
 
 
-def in_words(texts: tuple[str, ...]) -> Mapping[str, str]:
+def translate_all(texts: tuple[str, ...]) -> Mapping[str, str]:
     """Marked texts and what they are in the reader's language.
 
     For what is said many times in one answer: the catalogue takes long over a single text.
@@ -54,4 +54,4 @@ def _said_value(value: Any, *, is_ours: bool) -> Any:
     """Names stay as they are; sentences among them, and words of ours, are said."""
     if isinstance(value, tuple):
         return tuple(_said_value(part, is_ours=is_ours) for part in value)
-    return said(value) if isinstance(value, Sentence) or is_ours else value
+    return translate(value) if isinstance(value, Sentence) or is_ours else value

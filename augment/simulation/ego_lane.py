@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from augment.simulation.road import Road
-from augment.simulation.states import FloatArray, IntArray, wrapped
+from augment.simulation.states import FloatArray, IntArray, wrap_angles
 
 NO_WAY = -1
 NEAR_M = 5.0
@@ -42,7 +42,7 @@ def _pick(
     def misfit(number: int) -> tuple[bool, bool, float]:
         path = road.way_path(number)
         s_m, _ = path.beside(place_m[None])
-        turn = float(wrapped(path.poses(s_m)[0, 2] - heading_rad))
+        turn = float(wrap_angles(path.poses(s_m)[0, 2] - heading_rad))
         name = road.names[number]
         return name not in after, name not in road.beside, abs(turn)
 

@@ -11,7 +11,7 @@ from functools import lru_cache
 
 import numpy as np
 
-from augment.simulation.states import HEADING, STEP_S, FloatArray, X, Y, wrapped
+from augment.simulation.states import HEADING, STEP_S, FloatArray, X, Y, wrap_angles
 
 JERK_PENALTY = 1e-4
 """On the squared difference of neighbouring accelerations."""
@@ -30,7 +30,7 @@ def speeds(poses: FloatArray) -> FloatArray:
 def curvatures(poses: FloatArray, speed: FloatArray) -> FloatArray:
     """The curvature profile (T-1, B) of poses (T, B, 3), given their speeds (T-1, B)."""
     way = speed * STEP_S
-    right = way * wrapped(np.diff(poses[..., HEADING], axis=0))
+    right = way * wrap_angles(np.diff(poses[..., HEADING], axis=0))
     coupling = CURVATURE_RATE_PENALTY / STEP_S**2
     diagonal = way**2 + 2.0 * coupling
     diagonal[0] += FIRST_CURVATURE_PENALTY - coupling

@@ -89,7 +89,7 @@ def state_of(start: ArrayLike) -> FloatArray:
     return np.concatenate([given, np.zeros(WIDTH - len(given))])
 
 
-def wrapped(angle_rad: FloatArray) -> FloatArray:
+def wrap_angles(angle_rad: FloatArray) -> FloatArray:
     """The same directions in [-pi, pi], whatever the shape."""
     return np.asarray(angle_rad - 2.0 * np.pi * np.round(angle_rad / (2.0 * np.pi)))
 

@@ -23,7 +23,7 @@ from augment.simulation.states import (
     X,
     Y,
     state_of,
-    wrapped,
+    wrap_angles,
 )
 
 HORIZON = 10
@@ -60,7 +60,7 @@ def follow(reference: ArrayLike, start: ArrayLike, body: EgoBody | None = None) 
 def track(references: FloatArray, start: FloatArray, body: EgoBody) -> FloatArray:
     """The states (B, T, 6) of following references (B, T, 3) from one start (6,)."""
     made = drive_steps(references, start, body, references.shape[1] - 1)
-    made[..., HEADING] = wrapped(made[..., HEADING])
+    made[..., HEADING] = wrap_angles(made[..., HEADING])
     return made
 
 
@@ -140,7 +140,7 @@ class _Plan:
     ) -> FloatArray:
         pose, bends = self._poses[step], self._bends[step]
         lateral = self._cos[step] * (state[Y] - pose[Y]) - self._sin[step] * (state[X] - pose[X])
-        heading = wrapped(state[HEADING] - pose[HEADING])
+        heading = wrap_angles(state[HEADING] - pose[HEADING])
         speed, steering = state[SPEED], state[STEERING] / wheelbase_m
         powers = np.stack([speed * speed, speed * pedals, pedals * pedals])
         once = _PLAIN[0, 0] * speed + _PLAIN[0, 1] * pedals
@@ -148,7 +148,7 @@ class _Plan:
         bend_once = bends[0] * speed + bends[1] * pedals
         bend_twice = (bends[2:] * powers).sum(axis=0)
         free_lateral = lateral + heading * once + steering * twice - bend_twice
-        free_heading = wrapped(heading + steering * once - bend_once)
+        free_heading = wrap_angles(heading + steering * once - bend_once)
         # The answer to a steering rate of 1 rad/s after the horizon.
         unit = STEP_S / wheelbase_m
         by_heading = unit * (_PLAIN[2, 0] * speed + _PLAIN[2, 1] * pedals)

@@ -9,7 +9,7 @@ modification in spite of doubts has the last word, in spite of what is wrong it 
 from __future__ import annotations
 
 from augment.checks import Finding, Ground, Severity
-from augment.checks.against_intent import judged
+from augment.checks.against_intent import check_against_intent
 from augment.prompts.names import short_names
 from augment.scene.intent import Intent
 from augment.variants.verdict import Submission, Verdict
@@ -27,7 +27,7 @@ def review_geometry(
         ground: Of the submission's scene.
         intent: What the instruction asks for, None where nobody has written it down.
     """
-    found = judged(ground, submission.modification, intent)
+    found = check_against_intent(ground, submission.modification, intent)
     told = [one for severity in _TOLD for one in found if one.severity is severity]
     wrong = sum(one.severity is Severity.WRONG for one in told)
     doubtful = len(told) - wrong

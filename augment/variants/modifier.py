@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from augment.prompts import fill
 from augment.prompts.fill import Calling, Form
 from augment.prompts.reply import ReadReply, read_reply
-from augment.prompts.texts import said_by_model
+from augment.prompts.texts import model_message
 from augment.scene.entities import Scene
 from augment.scene.intent import Intent
 from augment.variants.cast import Asking, Cast, Messages
@@ -99,7 +99,7 @@ class Modifier:
             tools=(fill.pose_tool(),) if form.calling is Calling.NATIVE else (),
         )
         read, asked, answer = asking.read(messages, self._read, reply)
-        return Draft(read=read, messages=(*asked, said_by_model(answer.text)))
+        return Draft(read=read, messages=(*asked, model_message(answer.text)))
 
     def _read(self, answer: str) -> ReadReply:
         return read_reply(answer, self.scene, radius_m=self.recipe.limits.radius_m)

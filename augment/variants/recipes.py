@@ -30,8 +30,8 @@ __all__ = [
     "Recipe",
     "Review",
     "Tools",
-    "recipe",
-    "spelled",
+    "find_recipe",
+    "spell_variant",
 ]
 
 SPELLING = {"otm": "OTM", "fc": "FC", "tqa": "tQA", "vqa": "vQA", "geo": "geo"}
@@ -132,7 +132,7 @@ RECIPES: dict[str, Recipe] = {
 }
 
 
-def recipe(name: str) -> Recipe:
+def find_recipe(name: str) -> Recipe:
     """The recipe of that name, in any case ("OTM", "otm").
 
     Raises:
@@ -144,6 +144,6 @@ def recipe(name: str) -> Recipe:
         raise UnknownName("variant", name, sorted(RECIPES)) from None
 
 
-def spelled(slug: str) -> str:
+def spell_variant(slug: str) -> str:
     """A variant as people read it: "fc+tqa" is FC+tQA; one that is none of ours stays as it is."""
     return "+".join(SPELLING.get(part, part) for part in slug.lower().split("+"))

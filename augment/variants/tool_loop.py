@@ -15,7 +15,7 @@ from augment.llm.messages import Message, Reply, Speaker, ToolCall, ToolChoice
 from augment.prompts import fill
 from augment.prompts.calls import TOOL, WrittenCall, calls_in, read_arguments
 from augment.prompts.fill import Calling
-from augment.prompts.texts import said_by_model, said_by_user
+from augment.prompts.texts import model_message, said_by_user
 from augment.variants.cast import Cast, Messages
 from augment.variants.pose_call import CallLimits
 from augment.variants.pose_tool import PoseTool
@@ -121,7 +121,7 @@ def _written_turns(reply: Reply, desk: ToolDesk) -> Messages:
     if not results:
         return ()
     told = said_by_user(fill.result_text(results, is_over=desk.is_over))
-    return said_by_model(reply.text), told
+    return model_message(reply.text), told
 
 
 def _native_turns(reply: Reply, desk: ToolDesk) -> Messages:

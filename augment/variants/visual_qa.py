@@ -14,7 +14,7 @@ from augment.errors import ModelRefused, ReplyUnreadable, ReviewUnusable
 from augment.prompts import fill_review
 from augment.prompts.names import short_names
 from augment.prompts.review import read_questions, read_sight, read_verdict
-from augment.prompts.texts import said_by_model
+from augment.prompts.texts import model_message
 from augment.render.bev import draw
 from augment.render.camera import camera_for
 from augment.scene.entities import Scene
@@ -48,7 +48,7 @@ def review_picture(submission: Submission, cast: Cast, limits: Limits) -> Verdic
     try:
         questions, asked, reply = engineer.read(messages, read_questions)
         seen = _seen(submission, questions, replace(engineer, role=ModelRole.VIEWER))
-        said: Messages = (*asked, said_by_model(reply.text))
+        said: Messages = (*asked, model_message(reply.text))
         verdict, _, _ = engineer.read(
             fill_review.verdict_messages(said, questions, seen), read_verdict
         )

@@ -10,7 +10,7 @@ from django.test.utils import CaptureQueriesContext
 
 from arena.models import Study, Vote
 from arena.queries.showings import as_shown
-from augment.services.wording import in_words
+from augment.services.wording import translate_all
 from tests.api.asking import body_for, error_of, post, signed_in
 from tests.described import a_described_study, said_of
 from tests.study_rows import a_study, matchups_of
@@ -88,6 +88,6 @@ def test_putting_a_pair_into_words_takes_less_than_a_millisecond(described: Stud
     taken = []
     for _ in range(50):
         start = time.perf_counter()
-        as_shown(matchup, in_words)
+        as_shown(matchup, translate_all)
         taken.append(time.perf_counter() - start)
     assert min(taken) < 0.001

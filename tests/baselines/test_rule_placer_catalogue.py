@@ -8,7 +8,7 @@ import pytest
 
 from augment.baselines.rule_placer import Placement, place
 from augment.checks import Ground, Severity
-from augment.checks.against_intent import judged
+from augment.checks.against_intent import check_against_intent
 from augment.scene.catalogue import ScenarioType
 from augment.scene.entities import AgentType, TrafficAgent
 from augment.scene.modification import apply
@@ -32,7 +32,7 @@ def test_every_scenario_of_the_catalogue_is_placed() -> None:
 @pytest.mark.parametrize("slug", SLUGS)
 def test_the_checks_find_nothing_in_a_placement(slug: str) -> None:
     scene = shown_scene(slug)
-    found = judged(Ground.of(scene), placed(slug).modification, entry(slug).intent)
+    found = check_against_intent(Ground.of(scene), placed(slug).modification, entry(slug).intent)
     assert [one.sentence() for one in found if one.severity is not Severity.FACT] == []
 
 

@@ -10,7 +10,7 @@ from dataclasses import replace
 import pytest
 
 from augment.baselines.simulated import PRESETS, Rates, rates_of, simulate
-from augment.baselines.simulated_faults import FaultKind, spoiled
+from augment.baselines.simulated_faults import FaultKind, inject_fault
 from augment.baselines.simulated_format import FormatKind, spoiled_answer
 from augment.baselines.simulated_road import (
     ACROSS_M,
@@ -18,7 +18,7 @@ from augment.baselines.simulated_road import (
     OWN_M,
     Agents,
     RouteMap,
-    jittered,
+    jitter,
     new_contacts,
 )
 from augment.errors import InvalidDocument, ReplyUnreadable
@@ -36,7 +36,7 @@ CAR = vehicle("Agent2", 20.0, 1.2)
 
 def tried(kind: FaultKind, *agents: TrafficAgent, road: RouteMap | None = STREET) -> Agents | None:
     assert road is not None
-    return spoiled(road, agents, kind, random.Random(1))
+    return inject_fault(road, agents, kind, random.Random(1))
 
 
 def made(kind: FaultKind, *agents: TrafficAgent, road: RouteMap | None = STREET) -> Agents:
@@ -60,7 +60,7 @@ def test_a_right_answer_is_near_the_reference_and_touches_nothing_new(slug: str)
     reference, world = entry(slug).reference, shown_scene(slug)
     road = RouteMap.of(world)
     assert road is not None
-    near = jittered(road, reference, random.Random(slug))
+    near = jitter(road, reference, random.Random(slug))
     # A lane moves things on the outside of a bend further than itself.
     most_m = 1.5 * math.hypot(ALONG_M, ACROSS_M) + 2.0 * OWN_M
     assert max(displacement(near, reference).distances_m) <= most_m

@@ -18,11 +18,11 @@ from augment.baselines.simulated_faults import (
     LOGIC_KINDS,
     POSITION_KINDS,
     FaultKind,
-    spoiled,
+    inject_fault,
 )
-from augment.baselines.simulated_road import RouteMap, jittered
+from augment.baselines.simulated_road import RouteMap, jitter
 from augment.checks import Ground
-from augment.checks.against_intent import judged
+from augment.checks.against_intent import check_against_intent
 from augment.checks.finding import FaultClass
 from augment.fake_llm.careless import bend, dice
 from augment.metrics.fault_guess import first_guess
@@ -61,7 +61,7 @@ class Case:
 
     def guess(self, change: Modification) -> frozenset[FaultClass]:
         """The checks see the scene, the intent and the change: nothing else is handed over."""
-        return first_guess(judged(self.ground, change, self.intent))
+        return first_guess(check_against_intent(self.ground, change, self.intent))
 
 
 @dataclass(kw_only=True)
@@ -106,7 +106,7 @@ def measure(count: int, seed: int, *, among: tuple[Case, ...] | None = None) -> 
         tally.named[kind]["read"] += case.intent is not None
     for number in range(count):
         case = chosen[number % len(chosen)]
-        guessed = case.guess(jittered(case.road, case.reference, rng))
+        guessed = case.guess(jitter(case.road, case.reference, rng))
         tally.add(frozenset(), guessed)
         tally.clean += not guessed
         tally.right += 1
@@ -172,8 +172,8 @@ def _injections(
         for _ in among:
             case = among[turns[kind] % len(among)]
             turns[kind] += 1
-            right = jittered(case.road, case.reference, rng)
-            agents = spoiled(case.road, right.added, kind, rng)
+            right = jitter(case.road, case.reference, rng)
+            agents = inject_fault(case.road, right.added, kind, rng)
             if agents is not None:
                 yield case, kind, Modification(added=agents)
                 break

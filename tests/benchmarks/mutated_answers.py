@@ -21,7 +21,7 @@ from functools import lru_cache
 
 from augment.fake_llm.playing import GOOD, LEARNING, Character
 from augment.fake_llm.requests import chat_request
-from augment.llm.client import Sending, unwatched
+from augment.llm.client import Sending, watch_nothing
 from augment.llm.messages import Reply, Request
 from augment.llm.patience import Patience
 from augment.variants.pipeline import Outcome, run
@@ -59,7 +59,7 @@ class Answering:
     def fitted(self, request: Request) -> Request:
         return request
 
-    def complete(self, request: Request, *, sending: Sending = unwatched) -> Reply:
+    def complete(self, request: Request, *, sending: Sending = watch_nothing) -> Reply:
         sending()
         text = _right_answer(self._character, request)
         first, later = len(self._given) == self._spoilt, len(self._given) > self._spoilt

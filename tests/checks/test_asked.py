@@ -8,7 +8,7 @@ from dataclasses import replace
 import pytest
 
 from augment.checks import Finding, FindingKind, Ground, Severity
-from augment.checks.against_intent import judged
+from augment.checks.against_intent import check_against_intent
 from augment.scene.entities import AgentType, TrafficAgent, TrafficSide
 from augment.scene.intent import (
     Body,
@@ -66,7 +66,7 @@ A_BUS = replace(vehicle("Agent2", 35.0, 0.0), type=AgentType.BUS, length_m=7.456
 
 
 def held(intent: Intent, *added: TrafficAgent) -> tuple[Finding, ...]:
-    return judged(Ground.of(scene()), Modification(added=added), intent)
+    return check_against_intent(Ground.of(scene()), Modification(added=added), intent)
 
 
 def faults(intent: Intent, *added: TrafficAgent) -> set[FindingKind]:
@@ -210,7 +210,11 @@ def test_the_distance_is_counted_along_a_bend() -> None:
     straight = vehicle("Agent2", 30.0, 0.0)
     said = parked(30.0, lateral=CENTRED)
     kinds = [
-        {one.kind for one in judged(ground, Modification(added=(agent,)), said) if one.is_fault}
+        {
+            one.kind
+            for one in check_against_intent(ground, Modification(added=(agent,)), said)
+            if one.is_fault
+        }
         for agent in (bent, straight)
     ]
     assert kinds[0] == set()
@@ -221,13 +225,15 @@ def test_the_kerb_is_where_the_map_says() -> None:
     said = parked(20.0, lateral=towards(LateralTarget.KERB, 1.2))
     for side, y_m in ((TrafficSide.RIGHT, -1.2), (TrafficSide.LEFT, 1.2)):
         ground = Ground.of(scene(traffic_side=side))
-        found = judged(ground, Modification(added=(vehicle("Agent2", 20.0, y_m),)), said)
+        found = check_against_intent(
+            ground, Modification(added=(vehicle("Agent2", 20.0, y_m),)), said
+        )
         assert not [one for one in found if one.is_fault]
 
 
 def test_what_is_doubtful_is_settled_where_it_was_asked_for() -> None:
     agent = vehicle("Agent2", 20.0, 0.0, math.pi)
-    alone = judged(Ground.of(scene()), Modification(added=(agent,)), None)
+    alone = check_against_intent(Ground.of(scene()), Modification(added=(agent,)), None)
     assert [one.kind for one in alone if one.is_fault] == [FindingKind.HEADING]
     assert faults(FACING, agent) == set()
 
@@ -240,9 +246,9 @@ def test_who_was_in_the_scene_and_is_moved_or_removed_is_named() -> None:
         Modification(added=(car,), removed=("Agent2",)),
         Modification(added=(car,), moved=(replace(parked, x_m=50.0),)),
     ):
-        assert {one.kind for one in judged(ground, change, said) if one.is_fault} == {
-            FindingKind.UNASKED
-        }
+        assert {
+            one.kind for one in check_against_intent(ground, change, said) if one.is_fault
+        } == {FindingKind.UNASKED}
 
 
 def test_every_finding_has_a_sentence_that_stands_alone() -> None:

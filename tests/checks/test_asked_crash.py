@@ -8,7 +8,7 @@ from dataclasses import replace
 import pytest
 
 from augment.checks import FindingKind, Ground
-from augment.checks.against_intent import judged
+from augment.checks.against_intent import check_against_intent
 from augment.scene.entities import TrafficAgent
 from augment.scene.intent import (
     Bearing,
@@ -37,7 +37,7 @@ def cars(*places: tuple[float, float, float]) -> tuple[TrafficAgent, ...]:
 
 def faults(request: CrashRequest, *added: TrafficAgent) -> set[FindingKind]:
     intent = Intent(requests=(request,))
-    found = judged(Ground.of(scene()), Modification(added=added), intent)
+    found = check_against_intent(Ground.of(scene()), Modification(added=added), intent)
     return {one.kind for one in found if one.is_fault}
 
 

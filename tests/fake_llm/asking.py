@@ -9,7 +9,7 @@ from augment.llm.openai_wire import OpenAIWire
 from augment.llm.patience import Patience
 from augment.scene.entities import Scene
 from augment.variants.pipeline import Outcome, run
-from augment.variants.recipes import recipe
+from augment.variants.recipes import find_recipe
 from augment.variants.transcript import MemoryTranscript
 
 
@@ -25,7 +25,7 @@ def outcome(
 ) -> Outcome:
     with OpenAIWire(base_url=server.url, api_key=key, timeout_s=timeout_s) as client:
         return run(
-            recipe("otm"),
+            find_recipe("otm"),
             scene=scene,
             instruction=instruction,
             client=client,

@@ -9,7 +9,7 @@ from datetime import date
 from decimal import Decimal
 
 from augment.errors import ModelFault
-from augment.llm.client import ChatClient, Sending, unwatched
+from augment.llm.client import ChatClient, Sending, watch_nothing
 from augment.llm.messages import Reply, Request
 from augment.models import Contestant, Endpoint, EndpointModel, GenerationJob
 from augment.services.running import jobs
@@ -65,7 +65,7 @@ class Model:
     def fitted(self, request: Request) -> Request:
         return request
 
-    def complete(self, request: Request, *, sending: Sending = unwatched) -> Reply:
+    def complete(self, request: Request, *, sending: Sending = watch_nothing) -> Reply:
         self._waiting()
         sending()
         with self._lock:

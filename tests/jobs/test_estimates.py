@@ -13,7 +13,7 @@ from augment.models import Contestant, EndpointModel, GenerationJob
 from augment.services.endpoints.contestants import add_contestant, ensure_endpoint
 from augment.services.running import jobs, runner
 from augment.services.running.estimates import estimate
-from augment.services.running.feasible import keys_missing, obstacle
+from augment.services.running.feasible import find_obstacle, keys_missing
 from tests.jobs.models import MODEL, Model, add_llama, llama_job
 from tests.jobs.rows import add_kind, add_scenario, only_row
 
@@ -76,12 +76,12 @@ def test_a_cap_below_what_is_expected_covers_so_many_rows() -> None:
 def test_contestants_that_no_job_can_run_say_why() -> None:
     ensure_endpoint(label="here", base_url="http://127.0.0.1:1/v1")
     blind = add_contestant(slug="blind", variant="vqa", endpoint="here", model=MODEL)
-    assert "nobody knows whether its viewer sees pictures" in obstacle(blind)
+    assert "nobody knows whether its viewer sees pictures" in find_obstacle(blind)
     EndpointModel.objects.update_or_create(
         endpoint=blind.endpoint, model=MODEL, defaults={"vision": False}
     )
-    assert "needs vision" in obstacle(blind)
-    assert "imported" in obstacle(add_kind("by-hand", Contestant.Kind.HUMAN))
+    assert "needs vision" in find_obstacle(blind)
+    assert "imported" in find_obstacle(add_kind("by-hand", Contestant.Kind.HUMAN))
     add_scenario("street")
     with pytest.raises(Conflict, match="imported"):
         jobs.launch(name="J", contestants=["by-hand"], scenarios=["street"])
@@ -94,7 +94,7 @@ def test_a_key_that_is_missing_here_is_named(monkeypatch: pytest.MonkeyPatch) ->
     assert keys_missing(keyed) == ["SOME_API_KEY"]
     monkeypatch.setenv("SOME_API_KEY", "sk-secret")
     assert keys_missing(keyed) == []
-    assert obstacle(keyed) == ""
+    assert find_obstacle(keyed) == ""
 
 
 def test_the_command_says_what_a_job_would_use_and_launches_nothing() -> None:

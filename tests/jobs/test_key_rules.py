@@ -15,7 +15,7 @@ from augment.models import Augmentation, Contestant, Endpoint, Event
 from augment.services.endpoints import contestants
 from augment.services.endpoints.keys import key_of, may_hold_key, move_of
 from augment.services.running import jobs, runner
-from augment.services.running.feasible import keys_missing, obstacle
+from augment.services.running.feasible import find_obstacle, keys_missing
 from tests.jobs.models import add_llama, llama_job
 from tests.jobs.rows import add_scenario, only_row
 from tests.jobs.test_endpoint_rows import form, problems
@@ -83,7 +83,7 @@ def test_a_contestant_with_such_a_variable_is_refused_at_launch() -> None:
     add_scenario("street")
     Endpoint.objects.update(key_variable="DATABASE_URL")
     llama = Contestant.objects.get()
-    assert "DATABASE_URL may not hold a key" in obstacle(llama)
+    assert "DATABASE_URL may not hold a key" in find_obstacle(llama)
     assert keys_missing(llama) == []
     with pytest.raises(Conflict, match="llama names DATABASE_URL, which may not hold a key"):
         jobs.launch(name="J", contestants=["llama"], scenarios=["street"])

@@ -26,7 +26,7 @@ from augment.models import (
 from augment.services.endpoints import contestants
 from augment.services.running import jobs, runner
 from augment.services.running.caps import Caps
-from augment.services.running.feasible import obstacle
+from augment.services.running.feasible import find_obstacle
 from augment.variants.transcript import ModelRole
 from tests.intents import intents
 from tests.jobs.rows import add_scenario, only_row
@@ -128,7 +128,7 @@ def test_visual_qa_waits_until_the_viewer_is_probed_or_somebody_tells() -> None:
     assert "nobody knows whether they do: one (eyes at there)" in str(raised.value)
     assert "manage.py probe_endpoint there --model eyes" in str(raised.value)
     assert "--sees yes" in str(raised.value)
-    assert "probe_endpoint there --model eyes finds out" in obstacle(Contestant.objects.get())
+    assert "probe_endpoint there --model eyes finds out" in find_obstacle(Contestant.objects.get())
     assert not GenerationJob.objects.exists()
     out = io.StringIO()
     call_command("probe_endpoint", "there", "--model", "eyes", "--sees", "yes", stdout=out)
@@ -138,7 +138,7 @@ def test_visual_qa_waits_until_the_viewer_is_probed_or_somebody_tells() -> None:
         "model": "eyes",
         "vision": True,
     }
-    assert obstacle(Contestant.objects.get()) == ""
+    assert find_obstacle(Contestant.objects.get()) == ""
     jobs.launch(name="J", contestants=["one"], scenarios=["street-1"])
 
 

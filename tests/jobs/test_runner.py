@@ -8,7 +8,7 @@ from django.core.files.storage import default_storage
 from django.utils import timezone
 
 from augment.errors import LeaseLost, ModelFault
-from augment.llm.client import Sending, unwatched
+from augment.llm.client import Sending, watch_nothing
 from augment.llm.messages import Reply, Request
 from augment.models import Augmentation, Endpoint, GenerationJob, ModelCall
 from augment.scene.codec import modification_from_document, modification_to_document
@@ -39,7 +39,7 @@ class Stumbling:
     def fitted(self, request: Request) -> Request:
         return request
 
-    def complete(self, request: Request, *, sending: Sending = unwatched) -> Reply:
+    def complete(self, request: Request, *, sending: Sending = watch_nothing) -> Reply:
         sending()
         raise self.error
 

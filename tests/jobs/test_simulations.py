@@ -129,14 +129,14 @@ def test_a_drive_whose_worker_fell_silent_waits_again() -> None:
     )
     assert simulations.requeue_stale(older_than=timedelta(minutes=10)) == 0
     assert simulations.requeue_stale(older_than=timedelta(minutes=1)) == 1
-    assert first in simulations.unsent(older_than=timedelta(minutes=10))
+    assert first in simulations.find_unsent(older_than=timedelta(minutes=10))
 
 
 def test_what_was_sent_just_now_is_not_sent_again() -> None:
     waiting = simulations.plan_job(job=finished_job(), options=STRAIGHT)
-    assert simulations.unsent(older_than=timedelta(minutes=10)) == waiting
+    assert simulations.find_unsent(older_than=timedelta(minutes=10)) == waiting
     simulations.mark_sent(waiting)
-    assert simulations.unsent(older_than=timedelta(minutes=10)) == []
+    assert simulations.find_unsent(older_than=timedelta(minutes=10)) == []
 
 
 def test_contestants_are_ranked_by_how_much_they_lower_the_score() -> None:

@@ -11,7 +11,7 @@ from django.conf import settings
 
 from augment import tasks
 from augment.errors import WorkerStopping
-from augment.llm.client import Sending, unwatched
+from augment.llm.client import Sending, watch_nothing
 from augment.llm.messages import Reply, Request
 from augment.llm.scripted import ScriptedClient
 from augment.models import Augmentation, Endpoint, GenerationJob, ModelCall
@@ -28,9 +28,9 @@ State = Augmentation.State
 
 @pytest.fixture(autouse=True)
 def _going_on() -> Iterator[None]:
-    stopping.forget()
+    stopping.withdraw_stop()
     yield
-    stopping.forget()
+    stopping.withdraw_stop()
 
 
 class StoppedAt:
@@ -46,11 +46,11 @@ class StoppedAt:
     def fitted(self, request: Request) -> Request:
         return request
 
-    def complete(self, request: Request, *, sending: Sending = unwatched) -> Reply:
+    def complete(self, request: Request, *, sending: Sending = watch_nothing) -> Reply:
         if self._before:
-            stopping.tell()
+            stopping.request_stop()
         reply = self._client.complete(request, sending=sending)
-        stopping.tell()
+        stopping.request_stop()
         return reply
 
 
@@ -62,7 +62,7 @@ def only(job: GenerationJob) -> tuple[Augmentation, list[ModelCall]]:
 
 def test_no_row_is_claimed_any_more_and_its_message_goes_back() -> None:
     row = only_row(launch())
-    stopping.tell()
+    stopping.request_stop()
     with pytest.raises(Reject) as caught:
         tasks.run_augmentation.run(row.pk)
     assert caught.value.requeue
@@ -97,7 +97,7 @@ def test_an_answer_before_the_stop_is_not_asked_for_again() -> None:
     row, calls = only(job)
     assert row.state == State.QUEUED
     assert len(calls) == 1
-    stopping.forget()
+    stopping.withdraw_stop()
     assert runner.work_on(augmentation_pk=row.pk, connect=Wire(GOOD))
     row, calls = only(job)
     assert row.state == State.DONE
@@ -115,7 +115,7 @@ def test_who_waits_for_a_place_gives_up_the_wait() -> None:
 
     def sleep(seconds: float) -> None:
         looks.append(seconds)
-        stopping.tell()
+        stopping.request_stop()
 
     queue = Queue(longest_s=600.0, still_wanted=stopping.insist_on_going_on, sleep=sleep)
     with (

@@ -22,7 +22,7 @@ from augment.llm.wire_reply import (
     MOST_CALLS,
     MOST_TOKENS,
 )
-from augment.llm.wire_transport import BadPacking, unpacked
+from augment.llm.wire_transport import BadPacking, unpack_body
 from augment.llm.wire_watch import OutOfTime, TooLong, Watch
 from tests.llm.raw_server import Say, drip, head, speaking, whole
 from tests.llm.recorder import GOOD
@@ -245,11 +245,11 @@ def test_a_packed_answer_that_is_broken_is_named(packed: bytes) -> None:
 def test_chunks_are_unpacked_one_after_the_other() -> None:
     packed = gzip.compress(bytes(range(256)) * 40)
     chunks = [packed[at : at + 7] for at in range(0, len(packed), 7)]
-    assert unpacked(chunks, ["gzip"], most_bytes=10_240) == bytes(range(256)) * 40
+    assert unpack_body(chunks, ["gzip"], most_bytes=10_240) == bytes(range(256)) * 40
     with pytest.raises(TooLong):
-        unpacked(chunks, ["gzip"], most_bytes=10_239)
+        unpack_body(chunks, ["gzip"], most_bytes=10_239)
     with pytest.raises(BadPacking):
-        unpacked(chunks[:-2], ["gzip"], most_bytes=20_000)
+        unpack_body(chunks[:-2], ["gzip"], most_bytes=20_000)
 
 
 def test_an_error_page_of_any_size_is_that_error() -> None:

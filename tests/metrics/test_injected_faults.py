@@ -7,7 +7,7 @@ import inspect
 import pytest
 
 from augment.baselines.simulated_faults import FaultKind
-from augment.checks.against_intent import judged
+from augment.checks.against_intent import check_against_intent
 from augment.checks.finding import FaultClass
 from tests.benchmarks.injected_faults import Tally, measure, shifted_share
 
@@ -42,4 +42,4 @@ def test_a_shift_is_called_a_fault_beyond_the_tolerance_and_not_before() -> None
 
 def test_the_checks_are_given_neither_reference_nor_label() -> None:
     given = ["ground", "modification", "intent", "tolerances"]
-    assert list(inspect.signature(judged).parameters) == given
+    assert list(inspect.signature(check_against_intent).parameters) == given

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from augment.geometry.polyline import Polyline
-from augment.prompts.clip import boundary_within, line_within, simplified
+from augment.prompts.clip import boundary_within, line_within, simplify_boundary
 from augment.prompts.names import short_names
 from augment.prompts.vectors import (
     agent_vectors,
@@ -157,7 +157,7 @@ def test_a_boundary_is_cut_and_loses_points_that_say_nothing() -> None:
     ]
     assert boundary_within(square + 100.0, 10.0).shape == (0, 2)
     dotted = np.array([[0, 0], [5, 0.05], [10, 0], [10, 10], [0, 10]], dtype=float)
-    assert simplified(dotted, 0.1).tolist() == [[0, 0], [10, 0], [10, 10], [0, 10]]
+    assert simplify_boundary(dotted, 0.1).tolist() == [[0, 0], [10, 0], [10, 10], [0, 10]]
 
 
 def distances_m(points: FloatArray, ring: FloatArray) -> FloatArray:
@@ -187,7 +187,7 @@ def test_an_arc_keeps_its_tolerance_however_long_it_is(radius_m: float) -> None:
     # Each point is within the tolerance of its neighbours' line, all of them together are not.
     angles = np.linspace(0.0, np.pi, 400)
     arc = radius_m * np.column_stack([np.cos(angles), np.sin(angles)])
-    kept = simplified(arc, 0.1)
+    kept = simplify_boundary(arc, 0.1)
     assert_within(arc, kept, 0.1)
     # A chord with the sagitta e spans the angle 2 acos(1 - e / r): fewer can't do.
     fewest = np.pi / (2.0 * np.arccos(1.0 - 0.1 / radius_m))
@@ -206,7 +206,7 @@ def test_a_simplified_boundary_strays_nowhere_beyond_the_tolerance(
 ) -> None:
     ring = np.array(points)
     ring = np.cumsum(ring * 0.2, axis=0) if is_walked else ring
-    assert_within(ring, simplified(ring, tolerance_m), tolerance_m)
+    assert_within(ring, simplify_boundary(ring, tolerance_m), tolerance_m)
 
 
 @pytest.mark.parametrize("slug", sorted({entry(slug).scene for slug in SLUGS}))

@@ -9,7 +9,7 @@ import pytest
 
 from arena.rating.bootstrap import Unit
 from arena.rating.connectivity import Status
-from arena.rating.leaderboard import Method, anchored, rate
+from arena.rating.leaderboard import Method, anchor_board, rate
 from tests.rating.votes import by_votes, named, simulated, versus
 
 
@@ -52,7 +52,7 @@ def test_it_has_intervals_by_every_unit() -> None:
 
 def test_an_anchor_moves_what_is_shown_and_no_width() -> None:
     board = by_votes(simulated([1080.0, 1000.0, 920.0], 900, 3), rounds=300)
-    moved = anchored(board, name="c1", at=1500.0)
+    moved = anchor_board(board, name="c1", at=1500.0)
     assert moved.lines[1].rating == 1500.0
     for before, after in zip(board.lines, moved.lines, strict=True):
         assert after.rating is not None
@@ -62,7 +62,7 @@ def test_an_anchor_moves_what_is_shown_and_no_width() -> None:
         assert (after.lower or 0) - (before.lower or 0) == pytest.approx(shift)
         assert after.rank == before.rank
     with pytest.raises(ValueError, match="'x' has no rating"):
-        anchored(board, name="x", at=1000.0)
+        anchor_board(board, name="x", at=1000.0)
 
 
 def test_scores_by_ties_only_are_no_limit_in_this_model_and_said_to_be_none() -> None:

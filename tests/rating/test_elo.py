@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from arena.rating import elo
-from arena.rating.comparisons import Comparisons, FloatArray, chosen
+from arena.rating.comparisons import Comparisons, FloatArray, select_votes
 from tests.benchmarks.rating_sizes import SIZES, drawn
 from tests.rating.votes import simulated
 
@@ -37,14 +37,14 @@ def test_every_round_is_a_replay_of_votes_drawn_with_replacement(
     """Few votes and many, in one go and in several with a remainder."""
     votes = simulated(TRUTH, size, 1, ties=0.5)
     order = np.random.default_rng(5).integers(0, len(votes), size=(len(votes), rounds))
-    replays = [elo.replay(chosen(votes, order[:, number]), k=k) for number in range(rounds)]
-    sampled = elo.resampled(votes, rounds=rounds, seed=5, k=k).T
+    replays = [elo.replay(select_votes(votes, order[:, number]), k=k) for number in range(rounds)]
+    sampled = elo.resample_elo(votes, rounds=rounds, seed=5, k=k).T
     assert sampled == pytest.approx(np.array(replays), abs=1e-9)
 
 
 def test_counted_votes_are_resampled_like_as_many_rows() -> None:
     counted = drawn(SIZES[0]).counted(clusters=False)
-    single = chosen(counted, np.repeat(np.arange(len(counted)), counted.count))
+    single = select_votes(counted, np.repeat(np.arange(len(counted)), counted.count))
     rows = Comparisons(
         names=single.names,
         first=single.first,
@@ -54,8 +54,8 @@ def test_counted_votes_are_resampled_like_as_many_rows() -> None:
         scenario=single.scenario,
     )
     assert len(counted) < len(rows) == counted.votes
-    of_counted = elo.resampled(counted, rounds=7, seed=2)
-    assert of_counted.tolist() == elo.resampled(rows, rounds=7, seed=2).tolist()
+    of_counted = elo.resample_elo(counted, rounds=7, seed=2)
+    assert of_counted.tolist() == elo.resample_elo(rows, rounds=7, seed=2).tolist()
 
 
 def test_one_sided_votes_drive_apart_without_end_and_without_rounding() -> None:
@@ -69,6 +69,6 @@ def test_one_sided_votes_drive_apart_without_end_and_without_rounding() -> None:
         expert=votes.expert,
         scenario=votes.scenario,
     )
-    assert elo.resampled(always, rounds=2, seed=0)[:, 1] == pytest.approx(
+    assert elo.resample_elo(always, rounds=2, seed=0)[:, 1] == pytest.approx(
         as_worded(always, elo.K), abs=1e-6
     )

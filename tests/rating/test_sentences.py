@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 
-from augment.sentences import Sentence, filled, read_sentence, sentence
+from augment.sentences import Sentence, fill_sentence, read_sentence, sentence
 from tests.rating.votes import by_votes, named, versus
 
 
@@ -12,7 +12,7 @@ def test_names_are_joined_and_groups_told_apart() -> None:
     text = "%(number)s of %(groups)s and %(names)s"
     said = sentence(text, number=2, groups=(("a", "b"), ("c",)), names=("d", "e"))
     assert said == "2 of a, b; c and d, e"
-    assert filled("%(names)s", {"names": ("x", "y")}) == "x, y"
+    assert fill_sentence("%(names)s", {"names": ("x", "y")}) == "x, y"
 
 
 def test_a_sentence_survives_json() -> None:

@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from augment.render.shapes import contains, dashes, long_axis, offset, resampled, runs, stripes
+from augment.render.shapes import contains, dashes, long_axis, offset, resample_line, runs, stripes
 
 SQUARE = np.array([[0.0, 0.0], [4.0, 0.0], [4.0, 4.0], [0.0, 4.0]])
 
@@ -25,7 +25,7 @@ def test_dashes_begin_at_the_start_and_end_with_the_line() -> None:
 
 def test_a_line_is_cut_into_equal_pieces() -> None:
     line = np.array([[0.0, 0.0], [5.0, 0.0]])
-    assert resampled(line, 2.0)[:, 0] == pytest.approx([0.0, 5.0 / 3.0, 10.0 / 3.0, 5.0])
+    assert resample_line(line, 2.0)[:, 0] == pytest.approx([0.0, 5.0 / 3.0, 10.0 / 3.0, 5.0])
 
 
 def test_points_are_inside_or_outside_a_polygon() -> None:

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from arena.management.commands.rate_csv import Command as RateCsv
 from arena.management.rate_csv import main as rate_csv
-from augment.sentences import escaped
+from augment.sentences import escape_controls
 from augment.services.terminal import TerminalOutput
 
 CLEAR = "\x1b[2J"
@@ -35,12 +35,12 @@ TITLE = "\x1b]0;owned\x07"
     ],
 )
 def test_what_steers_a_terminal_is_spelt_out(text: str, printed: str) -> None:
-    assert escaped(text) == printed
+    assert escape_controls(text) == printed
 
 
 @given(st.text())
 def test_no_text_steers_a_terminal(text: str) -> None:
-    steering = {unicodedata.category(one) for one in escaped(text) if one not in "\n\t"}
+    steering = {unicodedata.category(one) for one in escape_controls(text) if one not in "\n\t"}
     assert steering.isdisjoint({"Cc", "Cf", "Cs", "Zl", "Zp"})
 
 

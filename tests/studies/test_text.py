@@ -9,12 +9,12 @@ from django.core.management import call_command
 from django.utils.translation import override
 
 from arena.models import Study
-from arena.queries.descriptions import told
+from arena.queries.descriptions import describe_in_words
 from arena.queries.showings import as_shown
 from arena.services.handing_over import hand_over
 from arena.services.replanning import plan_batch
 from augment.models import Augmentation
-from augment.services.wording import in_words
+from augment.services.wording import translate_all
 from tests.described import a_described_study, draw_changes, said_of, with_text
 from tests.study_rows import a_study, cast_of, matchups_of, vote
 
@@ -24,7 +24,7 @@ pytestmark = pytest.mark.django_db
 def read_by(study: Study, username: str) -> list[tuple[list[str], list[str]]]:
     return [
         (shown["text"]["a"], shown["text"]["b"])
-        for shown in (as_shown(row, in_words) for row in matchups_of(study, username))
+        for shown in (as_shown(row, translate_all) for row in matchups_of(study, username))
     ]
 
 
@@ -36,7 +36,9 @@ def test_without_being_asked_for_there_is_none() -> None:
     study = a_study()
     assert not study.allow_text
     assert not study.matchups.exclude(descriptions=None).exists()
-    assert all("text" not in as_shown(matchup, in_words) for matchup in matchups_of(study, "eva"))
+    assert all(
+        "text" not in as_shown(matchup, translate_all) for matchup in matchups_of(study, "eva")
+    )
 
 
 def test_every_showing_keeps_what_its_two_pictures_show() -> None:
@@ -51,7 +53,10 @@ def test_a_repeat_has_the_same_texts_on_the_other_sides() -> None:
     study = with_text(made, votes=12, repeat_share=0.25)
     for row in study.matchups.filter(kind="repeat"):
         assert row.repeat_of is not None
-        first, again = as_shown(row.repeat_of, in_words)["text"], as_shown(row, in_words)["text"]
+        first, again = (
+            as_shown(row.repeat_of, translate_all)["text"],
+            as_shown(row, translate_all)["text"],
+        )
         assert (again["a"], again["b"]) == (first["b"], first["a"])
 
 
@@ -83,7 +88,7 @@ def test_an_unreadable_answer_reads_like_its_picture_the_unchanged_scene() -> No
     study = with_text(made)
     for row in study.matchups.select_related("left__contestant"):
         if row.left.contestant.slug == "ann":
-            assert as_shown(row, in_words)["text"]["a"] == ["Nothing was changed."]
+            assert as_shown(row, translate_all)["text"]["a"] == ["Nothing was changed."]
 
 
 def test_the_command_opens_it_too() -> None:
@@ -158,13 +163,13 @@ def test_a_line_is_said_in_both_languages(
     changes: dict[str, object], english: str, german: str
 ) -> None:
     with override("en"):
-        assert told([LINE | changes], in_words) == [english]
+        assert describe_in_words([LINE | changes], translate_all) == [english]
     with override("de"):
-        assert told([LINE | changes], in_words) == [german]
+        assert describe_in_words([LINE | changes], translate_all) == [german]
 
 
 def test_nothing_is_said_in_both_languages() -> None:
     with override("en"):
-        assert told([], in_words) == ["Nothing was changed."]
+        assert describe_in_words([], translate_all) == ["Nothing was changed."]
     with override("de"):
-        assert told([], in_words) == ["Nichts wurde geändert."]
+        assert describe_in_words([], translate_all) == ["Nichts wurde geändert."]

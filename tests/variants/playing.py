@@ -14,7 +14,7 @@ from augment.scene.entities import Scene
 from augment.scene.intent import Intent
 from augment.variants.cast import Player
 from augment.variants.pipeline import Outcome, run
-from augment.variants.recipes import recipe
+from augment.variants.recipes import find_recipe
 from augment.variants.transcript import MemoryTranscript, ModelRole
 from tests.scenes import scene
 from tests.variants.answers import agent, answer, block
@@ -37,7 +37,7 @@ class Play:
         self.client = ScriptedClient(script)
         self.transcript = MemoryTranscript()
         self.outcome: Outcome = run(
-            recipe(variant),
+            find_recipe(variant),
             scene=shown or scene(),
             instruction=WISH,
             client=self.client,

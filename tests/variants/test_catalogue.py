@@ -16,7 +16,7 @@ from augment.fake_llm.server import FakeServer, running
 from augment.llm.openai_wire import OpenAIWire
 from augment.llm.patience import Patience
 from augment.variants.pipeline import Outcome, OutcomeStatus, run
-from augment.variants.recipes import RECIPES, Review, Tools, recipe
+from augment.variants.recipes import RECIPES, Review, Tools, find_recipe
 from augment.variants.transcript import MemoryTranscript
 from tests.baselines.test_rule_placer_catalogue import placed
 from tests.fixtures.shelf import SLUGS, entry, shown_scene
@@ -57,7 +57,7 @@ def played(
     transcript = MemoryTranscript()
     with OpenAIWire(base_url=server.url, api_key=None, timeout_s=30.0) as client:
         outcome = run(
-            recipe(variant),
+            find_recipe(variant),
             scene=shown_scene(slug),
             instruction=entry(slug).instruction,
             client=client,

@@ -16,7 +16,7 @@ from augment.llm.openai_wire import OpenAIWire
 from augment.llm.patience import Patience
 from augment.variants.cast import Player
 from augment.variants.pipeline import run
-from augment.variants.recipes import RECIPES, recipe
+from augment.variants.recipes import RECIPES, find_recipe
 from augment.variants.transcript import MemoryTranscript, ModelRole
 from tests.intents import intents
 from tests.scenes import scene
@@ -55,7 +55,7 @@ def test_a_fault_ends_as_the_page_says(server: FakeServer, row: list[str]) -> No
         }
         try:
             made = run(
-                recipe(variant),
+                find_recipe(variant),
                 scene=scene(),
                 instruction=WISH,
                 client=client,

@@ -11,9 +11,9 @@ from augment.fake_llm.playing import CARELESS, GOOD
 from augment.llm.patience import Patience
 from augment.prompts.blocks import names_changes
 from augment.prompts.calls import calls_in
-from augment.prompts.texts import text
+from augment.prompts.texts import read_text
 from augment.variants.pipeline import run
-from augment.variants.recipes import recipe
+from augment.variants.recipes import find_recipe
 from augment.variants.transcript import MemoryTranscript
 from tests.benchmarks.mutated_answers import Answering
 from tests.fixtures.shelf import SLUGS, entry, shown_scene
@@ -24,7 +24,7 @@ def answers(slug: str, variant: str, character: object) -> list[str]:
     """What the stand-in says to the modifier, in order."""
     transcript = MemoryTranscript()
     run(
-        recipe(variant),
+        find_recipe(variant),
         scene=shown_scene(slug),
         instruction=entry(slug).instruction,
         client=Answering(character, 10**9, random.Random(0)),  # type: ignore[arg-type]
@@ -50,6 +50,6 @@ def test_of_all_answers_on_the_catalogue_only_those_without_a_block_call(slug: s
 
 @pytest.mark.parametrize("name", ["work_called.md", "work_native.md", "work_walked.md"])
 def test_the_final_answers_of_the_prompts_examples_call_nothing(name: str) -> None:
-    final = re.split(r"^Second answer:$", text(name), flags=re.MULTILINE)[-1]
+    final = re.split(r"^Second answer:$", read_text(name), flags=re.MULTILINE)[-1]
     assert names_changes(final)
     assert calls_in(final) == ()

@@ -9,7 +9,7 @@ import pytest
 
 from augment.fake_llm.playing import GOOD, LOOPING, STUBBORN, Character
 from augment.fake_llm.requests import chat_request
-from augment.llm.client import Sending, unwatched
+from augment.llm.client import Sending, watch_nothing
 from augment.llm.messages import Reply, Request
 from augment.llm.patience import Patience
 from augment.variants.forecast import CallRange, calls_of, most_tokens
@@ -33,7 +33,7 @@ class Playing:
     def fitted(self, request: Request) -> Request:
         return request
 
-    def complete(self, request: Request, *, sending: Sending = unwatched) -> Reply:
+    def complete(self, request: Request, *, sending: Sending = watch_nothing) -> Reply:
         sending()
         body = json.dumps(request.to_document()).encode()
         said = self._character.answer(chat_request(body), intents)

@@ -13,13 +13,13 @@ from augment.variants.recipes import (
     Recipe,
     Review,
     Tools,
-    recipe,
+    find_recipe,
 )
 
 
 @pytest.mark.parametrize("name", ["otm", "OTM", " Otm "])
 def test_a_recipe_is_found_in_any_case(name: str) -> None:
-    found = recipe(name)
+    found = find_recipe(name)
     assert (found.lane_format, found.tools, found.review) == (
         LaneFormat.POLYLINE,
         Tools.NONE,
@@ -30,7 +30,7 @@ def test_a_recipe_is_found_in_any_case(name: str) -> None:
 def test_an_unknown_recipe_is_refused_with_those_there_are() -> None:
     known = r"fc, fc\+geo, fc\+tqa, fc\+vqa, geo, otm, tqa, vqa\."
     with pytest.raises(UnknownName, match=rf"Unknown variant 'zero-shot'\. Known: {known}"):
-        recipe("zero-shot")
+        find_recipe("zero-shot")
 
 
 def test_the_papers_four_are_its_table() -> None:
@@ -51,7 +51,7 @@ def test_our_own_review_is_named_ours_and_is_not_among_the_four() -> None:
 
 
 def test_a_combination_has_the_parts_of_both() -> None:
-    both = recipe("FC+tQA")
+    both = find_recipe("FC+tQA")
     assert (both.lane_format, both.tools) == (FC.lane_format, FC.tools)
     assert (both.review, both.keep) == (TQA.review, Keep.BEST)
 

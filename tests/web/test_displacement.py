@@ -14,7 +14,7 @@ from augment.models import Augmentation, GenerationJob
 from augment.scene.codec import modification_to_document
 from augment.scene.modification import Modification
 from augment.services.judging.displacement import By
-from augment.services.judging.findings import checked
+from augment.services.judging.findings import check_augmentation
 from tests.exports.test_displacement import a_job
 from tests.jobs import rows
 from tests.scenes import vehicle
@@ -130,7 +130,7 @@ def test_an_expert_sees_no_findings() -> None:
 
 
 def test_the_worst_finding_comes_first() -> None:
-    found = checked(crash())
+    found = check_augmentation(crash())
     assert found is not None
     assert found.lines[0].severity == "wrong"
     assert found.lines[-1].severity == "fact"
@@ -149,7 +149,7 @@ def test_an_answer_without_a_modification_has_no_findings() -> None:
     row = crash()
     Augmentation.objects.filter(pk=row.pk).update(state="refused", modification=None)
     row.refresh_from_db()
-    assert checked(row) is None
+    assert check_augmentation(row) is None
     assert "No object could be matched" in page_of(row)
 
 

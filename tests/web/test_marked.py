@@ -12,7 +12,7 @@ from django.urls import reverse
 
 from augment.models import Augmentation
 from augment.scene.intent_codec import intent_to_document
-from augment.services.judging.findings import checked
+from augment.services.judging.findings import check_augmentation
 from augment.services.judging.marked_pictures import draw_marked
 from augment.services.running import leases
 from tests.intents import parked
@@ -57,7 +57,7 @@ def test_the_page_has_the_picture_drawn_and_shows_it_with_the_same_numbers(
     picture = reverse("picture", args=["marked", row.code])
     assert picture in after
     assert "http-equiv" not in after
-    found = checked(row)
+    found = check_augmentation(row)
     assert found is not None
     assert after.count('class="number ') == len(found.faults) >= 2
     assert [line.kind for line in found.faults][:2] == ["asked count", "asked type"]

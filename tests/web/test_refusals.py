@@ -25,7 +25,7 @@ from augment.models import Augmentation, Contestant, Event
 from augment.sentences import sentence, sentence_of, word
 from augment.services.running import caps, jobs, leases
 from augment.services.running.caps import Caps
-from augment.services.wording import said
+from augment.services.wording import translate
 from tests import study_rows
 from tests.jobs import rows
 from tests.web.cast import people, signed_in
@@ -51,7 +51,7 @@ def shown(client: Client, address: str, sent: dict[str, Any]) -> str:
 
 def in_german(error: Exception) -> str:
     with override("de"):
-        return said(error)
+        return translate(error)
 
 
 def test_a_sentence_is_said_with_its_names_as_they_are() -> None:
@@ -59,7 +59,7 @@ def test_a_sentence_is_said_with_its_names_as_they_are() -> None:
     assert str(error) == f"There is a study named '{ODD}' already."
     assert in_german(error) == f"Eine Studie namens „{ODD}“ gibt es schon."
     with override("en"):
-        assert said(error) == str(error)
+        assert translate(error) == str(error)
 
 
 def test_words_and_sentences_within_a_sentence_are_said_and_names_are_not() -> None:
@@ -83,7 +83,7 @@ def test_words_and_sentences_within_a_sentence_are_said_and_names_are_not() -> N
 def test_errors_without_a_sentence_stay_as_they_are() -> None:
     plain = KeyMissing("KEY", "local")
     assert in_german(plain) == str(plain)
-    assert (in_german(Conflict()), said("")) == ("", "")
+    assert (in_german(Conflict()), translate("")) == ("", "")
     assert type(sentence_of(Conflict(word("100 %")))) is not str
     assert in_german(Conflict(word("100 %"))) == "100 %"
 

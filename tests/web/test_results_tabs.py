@@ -13,7 +13,7 @@ from pytest_django import DjangoAssertNumQueries
 
 from arena.models import EarlyLook, Matchup, Snapshot, Study
 from arena.queries.vote_sets import Filters
-from arena.rating.bets import Manner
+from arena.rating.e_values import Manner
 from arena.results.tree import RaterBet
 from arena.services.ratings import plan_snapshot, rate
 from arena.services.studies import close_study

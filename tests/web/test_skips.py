@@ -9,7 +9,7 @@ from django.urls import reverse
 
 from arena.queries import progress
 from arena.queries.coverage import coverage
-from arena.queries.inventory import take
+from arena.queries.inventory import take_inventory
 from arena.queries.votes import tallies
 from tests import study_rows
 from tests.web.cast import people, signed_in
@@ -34,7 +34,7 @@ def test_a_skip_is_counted_apart_everywhere_and_a_vote_instead_of_it_counts() ->
             (line.voted, line.skipped, line.left),
             (eva.voted, eva.skips, eva.left),
             (own.voted, own.skipped, own.left),
-            (main.decided, take().votes, progress.of_studies()[0].voted),
+            (main.decided, take_inventory().votes, progress.of_studies()[0].voted),
         )
 
     assert counted() == ((1, 3, 2), (1, 2, 0), (1, 2, 0), (1, 1, 1))

@@ -36,7 +36,7 @@ from augment.services.judging.driving_scores import options_driven, scores_of_jo
 from augment.services.judging.scenario_export import FORMATS as SCENARIO_FORMATS
 from augment.services.judging.scenario_export import RECORDED, Exported, export_job
 from augment.services.judging.simulations import SCORES, Options
-from augment.services.running.choosing import job_named
+from augment.services.running.choosing import find_job
 from augment.services.scenarios.interplan import job_as_interplan
 from augment.services.terminal import TerminalCommand
 
@@ -109,23 +109,23 @@ class Command(TerminalCommand):
         if options["by"] == BY_OBJECT:
             one = format_named(OBJECT_FORMATS, options["format"])
             types = None if options["types"] is None else types_named(options["types"])
-            rows = object_rows(job_named(options["job"]), types=types)
+            rows = object_rows(find_job(options["job"]), types=types)
             return one.write(rows), one.suffix, one.is_text
         chosen = format_named(displacement_writers.FORMATS, options["format"])
         if options["by"] not in set(By):
             raise UnknownName("grouping", options["by"], [*By, BY_OBJECT])
         types = None if options["types"] is None else types_named(options["types"])
-        table = displacement_table(job_named(options["job"]), by=By(options["by"]), types=types)
+        table = displacement_table(find_job(options["job"]), by=By(options["by"]), types=types)
         return chosen.write(table), chosen.suffix, chosen.is_text
 
     def _faults(self, options: dict[str, Any]) -> Written:
         chosen = format_named(faults.FORMATS, options["format"])
-        table = faults.fault_table(job_named(options["job"]))
+        table = faults.fault_table(find_job(options["job"]))
         return chosen.write(table), chosen.suffix, chosen.is_text
 
     def _driving(self, options: dict[str, Any]) -> Written:
         chosen = format_named(driving_writers.FORMATS, options["format"])
-        job = job_named(options["job"])
+        job = find_job(options["job"])
         if options["score"] not in SCORES:
             raise UnknownName("score", options["score"], list(SCORES))
         known = options_driven(job)
@@ -144,7 +144,7 @@ class Command(TerminalCommand):
         form = options["format"] or Path(options["out"]).suffix.removeprefix(".")
         if form not in SHEET_FORMATS:
             raise UnknownName("format", form, list(SHEET_FORMATS))
-        job = job_named(options["job"])
+        job = find_job(options["job"])
         sheet = sheet_of(
             job.name,
             grid(job),
@@ -157,7 +157,7 @@ class Command(TerminalCommand):
         if options["format"] not in MODIFICATION_FORMATS:
             raise UnknownName("format", options["format"], list(MODIFICATION_FORMATS))
         text, losses = job_as_interplan(
-            job_named(options["job"]),
+            find_job(options["job"]),
             contestant=options["contestant"],
             strict=options["strict"],
         )
@@ -168,7 +168,7 @@ class Command(TerminalCommand):
 
     def _scenarios(self, options: dict[str, Any]) -> Written:
         exported = export_job(
-            job_named(options["job"]),
+            find_job(options["job"]),
             file_format=options["format"],
             contestant=options["contestant"],
             motion=options["motion"],

@@ -13,7 +13,7 @@ from arena.pairing.target_lines import read_targets
 from arena.queries.inventory import CHECK_PERCENT, usual_checks
 from arena.services.studies import PlanOptions, open_study
 from augment.errors import AugmentError
-from augment.services.running.choosing import chosen_contestants, chosen_scenarios
+from augment.services.running.choosing import resolve_contestants, resolve_scenarios
 from augment.services.terminal import TerminalCommand
 
 
@@ -78,8 +78,8 @@ class Command(TerminalCommand):
             appearances, pair_votes = read_targets(options["targets"])
             study = open_study(
                 name=options["name"],
-                contestants=chosen_contestants(options["contestants"]),
-                scenarios=chosen_scenarios(options["scenarios"]),
+                contestants=resolve_contestants(options["contestants"]),
+                scenarios=resolve_scenarios(options["scenarios"]),
                 experts=options["experts"],
                 votes_per_expert=options["votes_per_expert"],
                 seed=options["seed"],

@@ -7,7 +7,7 @@ from typing import Any
 from django.core.management.base import CommandError, CommandParser
 
 from augment.errors import AugmentError
-from augment.services.running.choosing import chosen_scenarios
+from augment.services.running.choosing import resolve_scenarios
 from augment.services.scenarios.attention import draw_checks
 from augment.services.terminal import TerminalCommand
 
@@ -28,7 +28,7 @@ class Command(TerminalCommand):
     def handle(self, *args: Any, **options: Any) -> None:
         """Draw what is missing and say how many there are."""
         try:
-            drawn = draw_checks(scenarios=chosen_scenarios(options["scenarios"]))
+            drawn = draw_checks(scenarios=resolve_scenarios(options["scenarios"]))
         except AugmentError as error:
             raise CommandError(str(error)) from error
         self.stdout.write(f"{len(drawn)} pictures drawn for attention checks.")

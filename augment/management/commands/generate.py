@@ -16,7 +16,7 @@ from augment.models import GenerationJob
 from augment.services.endpoints.contestants import ensure_builtin
 from augment.services.running import jobs
 from augment.services.running.budget import limit_of
-from augment.services.running.choosing import chosen_contestants, chosen_scenarios
+from augment.services.running.choosing import resolve_contestants, resolve_scenarios
 from augment.services.running.estimates import estimate
 from augment.services.running.summary import contestant_lines, failure_groups
 from augment.services.terminal import TerminalCommand
@@ -75,7 +75,7 @@ class Command(TerminalCommand):
     def _estimate(self, options: dict[str, Any]) -> None:
         ensure_builtin()
         found = estimate(
-            chosen_contestants(options["contestants"]), chosen_scenarios(options["scenarios"])
+            resolve_contestants(options["contestants"]), resolve_scenarios(options["scenarios"])
         )
         self.stdout.write(f"{found.rows} to run, {found.asking_rows} of them ask models.")
         for line in found.lines:
@@ -95,8 +95,8 @@ class Command(TerminalCommand):
         with transaction.atomic():
             job = jobs.launch(
                 name=name,
-                contestants=chosen_contestants(options["contestants"]),
-                scenarios=chosen_scenarios(options["scenarios"]),
+                contestants=resolve_contestants(options["contestants"]),
+                scenarios=resolve_scenarios(options["scenarios"]),
                 caps=caps_of(options),
                 is_fresh=options["fresh"],
             )

@@ -12,7 +12,7 @@ from augment.errors import AugmentError
 from augment.management.arguments import add_cap_arguments, caps_of
 from augment.services.running import caps, jobs
 from augment.services.running.budget import limit_of
-from augment.services.running.choosing import job_named
+from augment.services.running.choosing import find_job
 from augment.services.terminal import TerminalCommand
 from augment.tasks import check_broker, enqueue_job
 
@@ -34,7 +34,7 @@ class Command(TerminalCommand):
         """Raise what is given, then resume."""
         wanted = caps_of(options)
         try:
-            job = job_named(options["job"])
+            job = find_job(options["job"])
             check_broker()
             with transaction.atomic():
                 if wanted != jobs.NO_CAPS:

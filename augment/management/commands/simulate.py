@@ -13,7 +13,7 @@ from augment.models import Scenario, Simulation
 from augment.services.judging import simulations
 from augment.services.judging.driving_scores import DrivingScores, scores_of_job
 from augment.services.judging.simulations import SCORES, Options
-from augment.services.running.choosing import job_named
+from augment.services.running.choosing import find_job
 from augment.services.terminal import TerminalCommand
 from augment.tasks import check_broker, enqueue_simulations
 
@@ -63,7 +63,7 @@ class Command(TerminalCommand):
             is_reactive=options["reactive"],
         )
         scenario = Scenario.objects.filter(slug=options["what"]).first()
-        job = None if scenario is not None else job_named(options["what"])
+        job = None if scenario is not None else find_job(options["what"])
         if options["queue"]:
             check_broker()
         with transaction.atomic():

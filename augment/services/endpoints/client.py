@@ -7,7 +7,7 @@ from types import TracebackType
 from typing import Self
 
 from augment.errors import ParameterRefused
-from augment.llm.client import Sending, unwatched
+from augment.llm.client import Sending, watch_nothing
 from augment.llm.messages import Reply, Request
 from augment.llm.openai_wire import OpenAIWire
 from augment.llm.profile import ModelProfile
@@ -51,7 +51,7 @@ class EndpointClient:
         """
         return self._profile(request.model).fitted(request)
 
-    def complete(self, request: Request, *, sending: Sending = unwatched) -> Reply:
+    def complete(self, request: Request, *, sending: Sending = watch_nothing) -> Reply:
         """The endpoint's answer, after waiting for a place.
 
         Raises:

@@ -20,7 +20,7 @@ from augment.services.endpoints.roles import Seat, check_roles, documents_of
 from augment.services.events import log_event
 from augment.services.scenarios.scenes import check_slug
 from augment.services.texts import one_line
-from augment.variants.recipes import Recipe, recipe, spelled
+from augment.variants.recipes import Recipe, find_recipe, spell_variant
 from augment.variants.transcript import ModelRole
 
 Kind = Contestant.Kind
@@ -141,7 +141,7 @@ def add_contestant(
         Conflict: The slug belongs to another contestant.
     """
     check_slug(slug, what="contestant")
-    way = recipe(variant)
+    way = find_recipe(variant)
     address = _endpoint(endpoint, actor)
     model = one_line("model", model, what="contestant")
     others = _seats(way, roles or {}, address, actor)
@@ -233,7 +233,7 @@ def _title(
 ) -> str:
     """What people read where nobody chose a name; not what another contestant is called."""
     given = (f"{role} {seat.model}" for role, seat in others.items())
-    title = " ".join([model, spelled(way.slug), *given])[:LONGEST_NAME]
+    title = " ".join([model, spell_variant(way.slug), *given])[:LONGEST_NAME]
     if Contestant.objects.filter(name=title).exclude(slug=slug).exists():
         title = f"{title} at {own.label}"[:LONGEST_NAME]
     return title

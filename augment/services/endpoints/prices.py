@@ -17,7 +17,7 @@ def price_of(endpoint: Endpoint, model: str) -> Price | None:
     return Price(prompt_usd=row.price_in_usd, completion_usd=row.price_out_usd)
 
 
-def unpriced(contestants: Iterable[Contestant]) -> list[str]:
+def list_unpriced_models(contestants: Iterable[Contestant]) -> list[str]:
     """What the contestants ask models whose price is unknown, as "model at endpoint"."""
     found = {
         str(seat)

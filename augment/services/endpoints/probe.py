@@ -18,7 +18,7 @@ from django.utils import timezone
 from augment.errors import ModelFault, ParameterRefused
 from augment.llm.client import ChatClient
 from augment.llm.costs import Price, usd_of
-from augment.llm.cutting import cut
+from augment.llm.cutting import shorten
 from augment.llm.messages import Reply, Request
 from augment.llm.patience import Patience
 from augment.llm.profile import ModelProfile
@@ -214,7 +214,7 @@ def _called(reply: Reply) -> str:
 
 def _short(text: str) -> str:
     line = " ".join(text.split())
-    return cut(line, _LONGEST_NOTE)
+    return shorten(line, _LONGEST_NOTE)
 
 
 @transaction.atomic

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from augment.errors import Conflict, InvalidDocument
 from augment.models import Contestant, Endpoint, EndpointModel
 from augment.sentences import sentence, word
-from augment.variants.recipes import Recipe, recipe
+from augment.variants.recipes import Recipe, find_recipe
 from augment.variants.showing import roles_of
 from augment.variants.transcript import ModelRole
 
@@ -52,7 +52,7 @@ def seats_of(contestant: Contestant) -> dict[ModelRole, Seat]:
     if contestant.endpoint is None:
         return {}
     own = Seat(endpoint=contestant.endpoint, model=contestant.model)
-    seats = dict.fromkeys(roles_of(recipe(contestant.variant)), own)
+    seats = dict.fromkeys(roles_of(find_recipe(contestant.variant)), own)
     for name, chosen in contestant.roles.items():
         endpoint = Endpoint.objects.filter(label=chosen["endpoint"]).first()
         if endpoint is None:

@@ -6,13 +6,13 @@ from collections.abc import Callable
 
 from django.conf import settings
 
-from augment.llm.client import unwatched
+from augment.llm.client import watch_nothing
 from augment.llm.openai_wire import MEGABYTE, OpenAIWire
 from augment.models import Endpoint
 from augment.services.endpoints.keys import key_of
 
 
-def wire_to(endpoint: Endpoint, *, still_wanted: Callable[[], None] = unwatched) -> OpenAIWire:
+def wire_to(endpoint: Endpoint, *, still_wanted: Callable[[], None] = watch_nothing) -> OpenAIWire:
     """A wire; its calls are given up where `still_wanted` raises.
 
     Raises:

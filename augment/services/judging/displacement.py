@@ -17,7 +17,7 @@ from augment.scene.catalogue import ScenarioType
 from augment.scene.codec import modification_from_document
 from augment.scene.modification import Modification
 from augment.services.scenarios.scenes import reference_of
-from augment.variants.recipes import SPELLING, spelled
+from augment.variants.recipes import SPELLING, spell_variant
 
 __all__ = [
     "PLACED_EXACTLY",
@@ -34,7 +34,7 @@ __all__ = [
     "of_job",
     "of_latest",
     "of_rows",
-    "spelled",
+    "spell_variant",
     "summarise",
     "types_named",
 ]
@@ -227,7 +227,7 @@ def _group(cell: list[tuple[Augmentation, Displacement]], by: By) -> Group:
     contestant = row.contestant
     headings = {
         By.TYPE: row.scenario.get_type_display(),
-        By.VARIANT: spelled(contestant.variant) or NO_VARIANT,
+        By.VARIANT: spell_variant(contestant.variant) or NO_VARIANT,
         By.CONTESTANT: contestant.name,
     }
     return Group(

@@ -7,10 +7,10 @@ from augment.metrics.fault_guess import FaultClass, first_guess
 from augment.models import Augmentation
 from augment.services.judging.checks import findings_of
 
-__all__ = ["FaultClass", "guess"]
+__all__ = ["FaultClass", "guess_faults"]
 
 
-def guess(row: Augmentation) -> frozenset[FaultClass] | None:
+def guess_faults(row: Augmentation) -> frozenset[FaultClass] | None:
     """What the checks make of a row; None where it can't be read or has no modification."""
     if row.modification is None:
         return None

@@ -8,7 +8,7 @@ from augment.checks import Finding, Severity
 from augment.errors import InvalidDocument, InvalidModification
 from augment.models import Augmentation
 from augment.services.judging.checks import findings_of
-from augment.services.judging.marked_pictures import is_drawn, marked_name, numbered
+from augment.services.judging.marked_pictures import is_drawn, marked_name, order_faults
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -56,7 +56,7 @@ class Checked:
         return [line for line in self.lines if line.severity == Severity.FACT]
 
 
-def checked(row: Augmentation) -> Checked | None:
+def check_augmentation(row: Augmentation) -> Checked | None:
     """The findings of a row whose scenario and scene are loaded; None without a modification."""
     if row.modification is None:
         return None
@@ -67,7 +67,7 @@ def checked(row: Augmentation) -> Checked | None:
     facts = [one for one in found if not one.is_fault]
     name = marked_name(row, found)
     return Checked(
-        lines=tuple(_line(one) for one in (*numbered(found), *facts)),
+        lines=tuple(_line(one) for one in (*order_faults(found), *facts)),
         is_against_intent=row.scenario.intent is not None,
         picture=name,
         is_drawn=is_drawn(name),

@@ -27,7 +27,7 @@ _ORDER = (Severity.WRONG, Severity.DOUBTFUL)
 _STAMP = "SIMULATED"
 
 
-def numbered(found: Iterable[Finding]) -> list[Finding]:
+def order_faults(found: Iterable[Finding]) -> list[Finding]:
     """The faults in the order of their numbers, from 1: the wrong ones, then the doubtful."""
     faults = list(found)
     return [one for severity in _ORDER for one in faults if one.severity is severity]
@@ -38,7 +38,7 @@ def marked_name(row: Augmentation, found: Iterable[Finding]) -> str:
 
     Empty where there is no fault to mark.
     """
-    faults = numbered(found)
+    faults = order_faults(found)
     if not faults:
         return ""
     shown = {
@@ -88,7 +88,7 @@ def draw_marked(*, augmentation_pk: int) -> str:
                 is_wrong=one.severity is Severity.WRONG,
                 belongs_m=one.belongs_m,
             )
-            for number, one in enumerate(numbered(found), start=1)
+            for number, one in enumerate(order_faults(found), start=1)
         ],
         stamp=_STAMP if row.contestant.is_simulated else "",
     )

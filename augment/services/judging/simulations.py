@@ -126,7 +126,7 @@ def requeue_stale(*, older_than: timedelta, now: Moment = DATABASE_TIME) -> int:
     return silent.update(state=State.QUEUED, claim=None, heartbeat_at=None, sent_at=None)
 
 
-def unsent(*, older_than: timedelta, now: Moment = DATABASE_TIME) -> list[int]:
+def find_unsent(*, older_than: timedelta, now: Moment = DATABASE_TIME) -> list[int]:
     """Keys of waiting rows without a message, or with one sent so long ago."""
     waiting = Simulation.objects.filter(state=State.QUEUED)
     old = Q(sent_at=None) | Q(sent_at__lt=now - older_than)

@@ -17,7 +17,7 @@ _COPIED = ("answer", "refusal", "extras", "model_returned", "finish_reason")
 _COUNTS = ("prompt_tokens", "completion_tokens")
 
 
-def earlier(
+def find_earlier_answer(
     *, request_hash: str, augmentation_pk: int, attempt_pk: int, is_fresh: bool
 ) -> ModelCall | None:
     """The last call that answered the same request, None where it is to be asked.

@@ -13,7 +13,7 @@ from augment.errors import Conflict
 from augment.llm.costs import nano_usd_of
 from augment.models import Augmentation, Contestant, GenerationJob
 from augment.sentences import Sentence, sentence, word
-from augment.services.endpoints.prices import unpriced
+from augment.services.endpoints.prices import list_unpriced_models
 from augment.services.events import log_event
 from augment.services.running.budget import limit_of, limits_of
 from augment.services.running.leases import change_all
@@ -74,7 +74,7 @@ def check_caps(caps: Caps, contestants: Sequence[Contestant]) -> dict[str, int]:
         Conflict: A cap can't be, or there is one in USD and a price that nobody knows.
     """
     columns = caps.columns()
-    unknown = unpriced(contestants) if caps.usd is not None else []
+    unknown = list_unpriced_models(contestants) if caps.usd is not None else []
     if unknown:
         raise Conflict(
             sentence(

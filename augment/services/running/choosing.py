@@ -15,14 +15,14 @@ from augment.services.running.feasible import RUNNABLE
 ALL, CATALOGUE = "all", "catalogue"
 
 
-def chosen_contestants(given: Sequence[str]) -> list[str]:
+def resolve_contestants(given: Sequence[str]) -> list[str]:
     """The slugs; `all` stands for every contestant that a job can run."""
     if list(given) != [ALL]:
         return list(given)
     return list(Contestant.objects.filter(RUNNABLE).values_list("slug", flat=True))
 
 
-def chosen_scenarios(given: Sequence[str]) -> list[str]:
+def resolve_scenarios(given: Sequence[str]) -> list[str]:
     """The slugs; `all` stands for every scenario, `catalogue` for the authored ones."""
     if list(given) == [ALL]:
         return list(Scenario.objects.values_list("slug", flat=True))
@@ -31,7 +31,7 @@ def chosen_scenarios(given: Sequence[str]) -> list[str]:
     return list(given)
 
 
-def job_named(name_or_code: str) -> GenerationJob:
+def find_job(name_or_code: str) -> GenerationJob:
     """A job by its name or its code.
 
     Raises:

@@ -16,7 +16,7 @@ from augment.services.endpoints.prices import price_of
 from augment.services.endpoints.roles import Seat, seats_of
 from augment.services.scenarios.scenes import reference_of, scene_of
 from augment.variants.forecast import TokenUse, calls_of, most_tokens
-from augment.variants.recipes import Recipe, recipe
+from augment.variants.recipes import Recipe, find_recipe
 from augment.variants.showing import shown_prompt
 from augment.variants.transcript import ModelRole
 
@@ -176,7 +176,7 @@ class _Prompts:
 
 
 def _line(row: Contestant, count: int, prompts: _Prompts) -> ContestantEstimate:
-    way, seats = recipe(row.variant), seats_of(row)
+    way, seats = find_recipe(row.variant), seats_of(row)
     calls = calls_of(way)
     prices = {role: _price(seat) for role, seat in seats.items()}
     used, usual_calls, seen = _seen(row)

@@ -28,7 +28,7 @@ def is_runnable(contestant: Contestant) -> bool:
     return contestant.kind in _KINDS or is_ours
 
 
-def obstacle(contestant: Contestant) -> str:
+def find_obstacle(contestant: Contestant) -> str:
     """Why no job can run a contestant, whatever the scenarios; empty where one can.
 
     To be said by a door in the language of whoever reads it.

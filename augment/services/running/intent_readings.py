@@ -111,7 +111,7 @@ class ReadingTranscript:
         if self._is_fresh:
             return None
         columns = self._columns(role, request, prompt_version)
-        earlier = answers.earlier(
+        earlier = answers.find_earlier_answer(
             request_hash=columns["request_hash"], augmentation_pk=0, attempt_pk=0, is_fresh=False
         )
         if earlier is None:

@@ -18,7 +18,7 @@ from typing import Any
 from django.db import transaction
 from django.db.models import Max, Q, QuerySet
 
-from augment.llm.cutting import cut
+from augment.llm.cutting import shorten
 from augment.models import Attempt, Augmentation, GenerationJob
 from augment.services.clock import DATABASE_TIME, Moment
 from augment.services.running import budget
@@ -127,7 +127,8 @@ def keep_modification(*, held: Lease, modification: dict[str, Any], notes: str) 
     """
     return bool(
         _row_of(held).update(
-            modification=storable_document(modification), notes=cut(storable(notes), LONGEST_NOTES)
+            modification=storable_document(modification),
+            notes=shorten(storable(notes), LONGEST_NOTES),
         )
     )
 
@@ -144,7 +145,7 @@ def settle(*, held: Lease, settlement: Settlement, now: Moment = DATABASE_TIME) 
     Returns:
         False when the lease is lost: the result is dropped, because the row is somebody else's.
     """
-    reason = cut(storable(settlement.reason), LONGEST_REASON)
+    reason = shorten(storable(settlement.reason), LONGEST_REASON)
     changes: dict[str, Any] = {
         "state": settlement.state,
         "reason": reason,
@@ -156,7 +157,7 @@ def settle(*, held: Lease, settlement: Settlement, now: Moment = DATABASE_TIME) 
     if settlement.modification is not None:
         changes |= {"modification": storable_document(settlement.modification)}
     if settlement.notes:
-        changes |= {"notes": cut(storable(settlement.notes), LONGEST_NOTES)}
+        changes |= {"notes": shorten(storable(settlement.notes), LONGEST_NOTES)}
     if not _row_of(held).update(**changes):
         logger.warning(
             "Dropped the result of attempt %d at augmentation %d: its lease was taken back.",
@@ -182,7 +183,7 @@ def release(
         return False
     budget.settle_unseen(attempt_pk=held.attempt_pk, now=now)
     Attempt.objects.filter(pk=held.attempt_pk).update(
-        finished_at=now, outcome=end, reason=cut(storable(reason), LONGEST_REASON)
+        finished_at=now, outcome=end, reason=shorten(storable(reason), LONGEST_REASON)
     )
     return True
 

@@ -40,7 +40,7 @@ from augment.services.scenarios.pictures import original_picture, picture_of
 from augment.services.scenarios.scenes import intent_of, reference_of, scene_of, seed_of
 from augment.variants import pipeline
 from augment.variants.cast import Player
-from augment.variants.recipes import recipe
+from augment.variants.recipes import find_recipe
 from augment.variants.transcript import ModelRole
 
 logger = logging.getLogger(__name__)
@@ -262,7 +262,7 @@ def _from_model(
             if role is not ModelRole.MODIFIER
         }
         outcome = pipeline.run(
-            recipe(row.contestant.variant),
+            find_recipe(row.contestant.variant),
             scene=scene,
             instruction=row.scenario.instruction,
             client=clients[endpoint.pk],

@@ -9,17 +9,17 @@ from augment.errors import WorkerStopping
 _told = Event()
 
 
-def tell() -> None:
+def request_stop() -> None:
     """Let nothing new begin; safe to call from a signal handler."""
     _told.set()
 
 
-def forget() -> None:
+def withdraw_stop() -> None:
     """As at the start of a process."""
     _told.clear()
 
 
-def is_told() -> bool:
+def is_stop_requested() -> bool:
     """Whether this process is to stop."""
     return _told.is_set()
 
@@ -35,5 +35,5 @@ def insist_on_going_on() -> None:
     Raises:
         WorkerStopping: The process was told to.
     """
-    if is_told():
+    if is_stop_requested():
         raise WorkerStopping("this worker was told to stop")

@@ -11,7 +11,7 @@ from typing import Any
 
 from django.db.models import Prefetch
 
-from augment.llm.cutting import cut
+from augment.llm.cutting import shorten
 from augment.llm.fingerprint import IMAGE_SCHEME
 from augment.models import Attempt, Augmentation, ModelCall, TranscriptNote
 
@@ -59,13 +59,13 @@ class TranscriptStep:
         """The answer as a page shows it, None where there is none."""
         if self.call is None or self.call.answer is None:
             return None
-        return cut(self.call.answer, LONGEST_SHOWN)
+        return shorten(self.call.answer, LONGEST_SHOWN)
 
     @property
     def extras_text(self) -> str:
         """What else the answer carried, such as native calls of tools."""
         shown = _pretty(self.call.extras) if self.call and self.call.extras else ""
-        return cut(shown, LONGEST_SHOWN)
+        return shorten(shown, LONGEST_SHOWN)
 
     @property
     def note_text(self) -> str:
@@ -73,7 +73,7 @@ class TranscriptStep:
         if self.note is None:
             return ""
         lines = (_line(name, part) for name, part in self.note.document.items())
-        return cut("\n".join(lines), LONGEST_SHOWN)
+        return shorten("\n".join(lines), LONGEST_SHOWN)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -163,9 +163,9 @@ def _message(message: dict[str, Any]) -> SaidMessage:
     text = "\n".join(texts)
     return SaidMessage(
         role=str(message.get("role", "")),
-        text=cut(text, LONGEST_SHOWN),
+        text=shorten(text, LONGEST_SHOWN),
         images=tuple(url.removeprefix(IMAGE_SCHEME) for url in urls),
-        rest=cut(_pretty(rest), LONGEST_SHOWN) if rest else "",
+        rest=shorten(_pretty(rest), LONGEST_SHOWN) if rest else "",
         length=len(text),
     )
 

@@ -95,7 +95,7 @@ class RowTranscript:
             LeaseLost: The row is somebody else's now.
         """
         columns = self._columns(role, request, prompt_version)
-        earlier = answers.earlier(
+        earlier = answers.find_earlier_answer(
             request_hash=columns["request_hash"],
             augmentation_pk=self._row.pk,
             attempt_pk=self._held.attempt_pk,

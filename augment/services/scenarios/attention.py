@@ -9,7 +9,7 @@ from django.db import transaction
 from django.db.models import QuerySet
 from django.utils import timezone
 
-from augment.baselines.broken import broken
+from augment.baselines.broken import break_reference
 from augment.models import Augmentation, Contestant, GenerationJob, Scenario
 from augment.scene.codec import modification_to_document
 from augment.services.events import log_event
@@ -42,7 +42,7 @@ def draw_checks(*, scenarios: Sequence[str], actor: User | None = None) -> list[
     drawn = []
     for row in Scenario.objects.filter(slug__in=scenarios).select_related("base_scene"):
         reference = reference_of(row)
-        change = None if reference is None else broken(reference)
+        change = None if reference is None else break_reference(reference)
         if change is None:
             continue
         document = modification_to_document(change)

@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 
 from augment.checks import Ground
-from augment.checks.against_intent import judged
+from augment.checks.against_intent import check_against_intent
 from augment.checks.tolerances import AUTHORED
 from augment.geometry.boxes import corners
 from augment.geometry.polyline import FloatArray
@@ -75,7 +75,7 @@ def _check(whole: Scene, entry: CatalogueEntry) -> ScenarioCheck:
         return ScenarioCheck(slug=entry.slug, statements=0, reasons=("it has no intent",))
     reasons = [
         f"{one.severity}: {one.sentence()}"
-        for one in judged(ground, entry.reference, entry.intent, AUTHORED)
+        for one in check_against_intent(ground, entry.reference, entry.intent, AUTHORED)
         if one.is_fault
     ]
     return ScenarioCheck(

@@ -6,7 +6,7 @@ from augment.errors import Conflict, UnknownName
 from augment.models import Scenario
 from augment.scene.modification import Modification
 from augment.services.scenarios.scenes import reference_of, scene_of
-from augment.variants.recipes import Tools, recipe
+from augment.variants.recipes import Tools, find_recipe
 from augment.variants.showing import Shown, roles_of, shown_prompt
 from augment.variants.transcript import ModelRole
 
@@ -26,7 +26,7 @@ def prompt_of(
         UnknownName: No such scenario or variant.
         Conflict: Nobody plays that role in the variant, or it is to call natively and has no tool.
     """
-    way = recipe(variant)
+    way = find_recipe(variant)
     if role not in roles_of(way):
         played = ", ".join(roles_of(way))
         raise Conflict(f"Nobody plays the {role} in {way.slug}; its roles: {played}.")

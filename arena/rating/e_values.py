@@ -30,11 +30,11 @@ from arena.rating.comparisons import (
     WIN,
     Comparisons,
     FloatArray,
-    among,
-    chosen,
     count_pairs,
+    restrict_to,
+    select_votes,
 )
-from arena.rating.connectivity import determined
+from arena.rating.connectivity import are_determined
 from arena.rating.influence import without_each_expert
 
 _FALSE_ALARMS = 0.05
@@ -70,7 +70,7 @@ class Bet:
     votes: int
 
 
-def limit(experts: int) -> float:
+def detection_limit(experts: int) -> float:
     """Above this e-value an expert deserves a look.
 
     Of so many honest experts together at least one gets there in at most 5 % of studies.
@@ -78,7 +78,7 @@ def limit(experts: int) -> float:
     return experts / _FALSE_ALARMS
 
 
-def bets(votes: Comparisons) -> dict[int, Bet]:
+def compute_e_values(votes: Comparisons) -> dict[int, Bet]:
     """By expert what a bet against their votes won; only where the others' votes say enough.
 
     Nothing is said of an expert without decided votes, nor of one without whom the decided votes
@@ -88,7 +88,7 @@ def bets(votes: Comparisons) -> dict[int, Bet]:
         votes: A row each (no counts), an expert's in the order in which they were given; `first`
             was shown on the left; without planned repeats.
     """
-    decided = _with_members(chosen(votes, votes.score != 0.5))
+    decided = _with_members(select_votes(votes, votes.score != 0.5))
     fitted = _fitted(decided)
     if fitted is None:
         return {}
@@ -101,7 +101,7 @@ def bets(votes: Comparisons) -> dict[int, Bet]:
             # The error without an expert is that of all, wider by how many votes are missing.
             missing = len(decided) / (len(decided) - number)
             unknown = error * missing + np.diag(np.full(len(error), _TASTE**2))
-            found[expert] = _bet(chosen(decided, own), without[expert], unknown)
+            found[expert] = _bet(select_votes(decided, own), without[expert], unknown)
     return found
 
 
@@ -110,14 +110,14 @@ def bets(votes: Comparisons) -> dict[int, Bet]:
 
 def _with_members(votes: Comparisons) -> Comparisons:
     """The same votes without contestants that have none."""
-    return among(votes, np.unique([votes.first, votes.second]).tolist())
+    return restrict_to(votes, np.unique([votes.first, votes.second]).tolist())
 
 
 def _fitted(votes: Comparisons) -> tuple[FloatArray, FloatArray] | None:
     """(C,) strengths and the (C, C) covariance of their errors; None where undetermined."""
     counts = count_pairs(votes)
     met = Meetings(contestants=len(votes.names), low=counts.low, high=counts.high)
-    fine = determined(
+    fine = are_determined(
         contestants=met.contestants,
         low=met.low,
         high=met.high,
@@ -132,7 +132,7 @@ def _fitted(votes: Comparisons) -> tuple[FloatArray, FloatArray] | None:
 
 def _bet(votes: Comparisons, strengths: FloatArray, unknown: FloatArray) -> Bet:
     """The bet against one expert's decided votes, in their order."""
-    votes = chosen(votes, np.arange(min(len(votes), _MOST_VOTES)))
+    votes = select_votes(votes, np.arange(min(len(votes), _MOST_VOTES)))
     left = votes.score == WIN
     claimed = np.log(_with_slips(_learnt(votes, strengths, unknown)))
     lefts = np.cumsum(left) - left
