@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from arena.exports.columns import PRINTED
 from arena.exports.tables import LeaderboardTable, Row
 from arena.rating.printed import CAPTION, escape, latex_table
 
@@ -13,9 +14,10 @@ def latex(table: LeaderboardTable) -> str:
     marks = [word for word, so in (("simulated", table.simulated), ("early", table.early)) if so]
     return latex_table(
         (
-            (_model(row), row.rank_text, row.elo_text, row.interval_text, str(row.votes))
+            [_model(row), *(column.text(row) for column in PRINTED if not column.identifies)]
             for row in table.rows
         ),
+        heads=[column.printed for column in PRINTED],
         comments=(
             f"{table.study}: {table.votes} votes; {table.method_text}",
             f"votes sha256 {table.votes_sha256}",

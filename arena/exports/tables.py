@@ -77,6 +77,13 @@ class Row:
         return rank_text(self.rank)
 
     @property
+    def ranks_text(self) -> str:
+        """The ranks that 95 % of the resamples lie between: 1–3, or 1 alone."""
+        if self.rank_best is None or self.rank_best == self.rank_worst:
+            return rank_text(self.rank_best)
+        return f"{self.rank_best}–{self.rank_worst}"
+
+    @property
     def elo_text(self) -> str:
         """The rating as a whole number."""
         return rating_text(self.elo)

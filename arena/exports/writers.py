@@ -6,30 +6,17 @@ import json
 from typing import Any
 
 from arena.exports.charts import interval_chart
+from arena.exports.columns import IN_FILES, IN_JSON, PRINTED
 from arena.exports.formats import Format, drawings, formats, rounded
 from arena.exports.latex import latex
-from arena.exports.parquet import NUMBER, TEXT, WHOLE, YES_NO, parquet_bytes
+from arena.exports.parquet import parquet_bytes
 from arena.exports.tables import LeaderboardTable, Row
 from arena.services.cells import csv_text
-
-COLUMNS = (
-    "rank", "model", "elo", "lower", "upper", "votes", "wins", "ties", "losses",
-    "slug", "kind", "simulated", "note", "study", "method", "study_simulated", "early",
-)  # fmt: skip
-
-_KINDS = {
-    name: {
-        "rank": WHOLE, "elo": NUMBER, "lower": NUMBER, "upper": NUMBER, "votes": WHOLE,
-        "wins": WHOLE, "ties": WHOLE, "losses": WHOLE, "simulated": YES_NO,
-        "study_simulated": YES_NO, "early": YES_NO,
-    }.get(name, TEXT)
-    for name in COLUMNS
-}  # fmt: skip
 
 
 def csv_bytes(table: LeaderboardTable) -> bytes:
     """One line a contestant; what is unknown is empty, numbers have two decimals."""
-    return csv_text(COLUMNS, (_values(table, row) for row in table.rows)).encode()
+    return csv_text([column.name for column in IN_FILES], _values(table)).encode()
 
 
 def json_bytes(table: LeaderboardTable) -> bytes:
@@ -61,16 +48,13 @@ def json_bytes(table: LeaderboardTable) -> bytes:
 
 def parquet_of(table: LeaderboardTable) -> bytes:
     """The columns of the CSV file, typed; numbers as they are."""
-    return parquet_bytes(_KINDS, [_values(table, row) for row in table.rows])
+    return parquet_bytes({column.name: column.kind for column in IN_FILES}, _values(table))
 
 
 def plain_text(table: LeaderboardTable) -> str:
     """The table for a terminal, with its method and warnings beneath."""
-    head = ("Model", "Rank", "Elo", "95% CI", "Votes")
-    body = [
-        (row.model, row.rank_text, row.elo_text, row.interval_text, str(row.votes))
-        for row in table.rows
-    ]
+    head = [column.printed for column in PRINTED]
+    body = [[column.text(row) for column in PRINTED] for row in table.rows]
     widths = [max(len(line[column]) for line in (head, *body)) for column in range(len(head))]
     lines = [
         "  ".join(
@@ -96,29 +80,12 @@ FORMATS: dict[str, Format[LeaderboardTable]] = formats(
 
 
 def _standing(table: LeaderboardTable, row: Row) -> dict[str, Any]:
+    values = {column.key: column.value_of(table, row) for column in IN_JSON}
     part = {"part": row.part} if table.has_parts else {}
     return {
-        "model": row.model,
-        "slug": row.slug,
-        "kind": row.kind,
-        "simulated": row.simulated,
-        "rank": row.rank,
-        "rating": rounded(row.elo),
-        "lower": rounded(row.lower),
-        "upper": rounded(row.upper),
-        "votes": row.votes,
-        "wins": row.wins,
-        "ties": row.ties,
-        "losses": row.losses,
-        "note": row.note,
+        key: rounded(value) if isinstance(value, float) else value for key, value in values.items()
     } | part
 
 
-def _values(table: LeaderboardTable, row: Row) -> tuple[object, ...]:
-    """In the order of COLUMNS."""
-    return (
-        row.rank, row.model, row.elo, row.lower, row.upper,
-        row.votes, row.wins, row.ties, row.losses,
-        row.slug, row.kind, row.simulated, row.note,
-        table.study, table.method_text, table.simulated, table.early,
-    )  # fmt: skip
+def _values(table: LeaderboardTable) -> list[list[object]]:
+    return [[column.value_of(table, row) for column in IN_FILES] for row in table.rows]

@@ -21,13 +21,14 @@ _ESCAPES = {
     ">": r"\textgreater{}",
 }
 
-_HEAD = r"""\providecolor{llm_blue}{RGB}{105, 156, 219}
+HEADS = ("Model", "Rank", "Elo", "95% CI", "Votes")
+"""Of the paper's table."""
+
+_BEGIN = r"""\providecolor{llm_blue}{RGB}{105, 156, 219}
 \begin{table}
-    \centering
-    \begin{tabular}{l>{\columncolor{llm_blue!20}}c r r r}
-    \toprule
-    \textbf{Model} & \textbf{Rank} & \textbf{Elo}~$\uparrow$ & \textbf{95\% CI} & \textbf{Votes}\\
-    \midrule"""
+    \centering"""
+_UPWARDS = {"Elo": r"~$\uparrow$"}
+"""Where more is better."""
 
 CAPTION = r"Elo with 95\% Confidence Intervals."
 
@@ -79,27 +80,32 @@ def latex_table(
     rows: Iterable[Sequence[str]],
     *,
     comments: Iterable[str],
+    heads: Sequence[str] = HEADS,
     notes: Iterable[str] = (),
     caption: str = CAPTION,
 ) -> str:
     """The paper's table; it needs booktabs and xcolor with the option `table`.
 
     Args:
-        rows: Model as TeX, then rank, rating, interval and votes as they are printed.
+        rows: Model as TeX, then rank, rating and the rest as they are printed.
         comments: Lines to put before it, as plain text.
+        heads: Of the columns, as plain text.
         notes: Lines to put beneath it, as plain text.
         caption: As TeX.
     """
+    right = " r" * (len(heads) - 2)
+    across = rf"\multicolumn{{{len(heads)}}}{{p{{0.8\linewidth}}}}"
     lines = [
         r"% \usepackage{booktabs} and \usepackage[table]{xcolor}",
         *(f"% {one_line(comment)}" for comment in comments),
-        _HEAD,
+        _BEGIN,
+        rf"    \begin{{tabular}}{{l>{{\columncolor{{llm_blue!20}}}}c{right}}}",
+        r"    \toprule",
+        "    " + " & ".join(_head(head) for head in heads) + r"\\",
+        r"    \midrule",
         *("    " + " & ".join([model, *map(_in_tex, rest)]) + r"\\" for model, *rest in rows),
         r"    \bottomrule",
-        *(
-            rf"    \multicolumn{{5}}{{p{{0.8\linewidth}}}}{{\footnotesize {escape(note)}}}\\"
-            for note in notes
-        ),
+        *(rf"    {across}{{\footnotesize {escape(note)}}}\\" for note in notes),
         r"    \end{tabular}",
         rf"    \caption{{{caption}}}",
         r"    \label{tab:elo}",
@@ -108,9 +114,13 @@ def latex_table(
     return "\n".join(lines) + "\n"
 
 
+def _head(head: str) -> str:
+    return rf"\textbf{{{escape(head)}}}{_UPWARDS.get(head, '')}"
+
+
 def _in_tex(number: str) -> str:
     """A printed number; the signs of open intervals are mathematics."""
-    for sign, command in (("∞", r"$\infty$"), ("≤", r"$\leq$"), ("≥", r"$\geq$")):
+    for sign, command in (("∞", r"$\infty$"), ("≤", r"$\leq$"), ("≥", r"$\geq$"), ("–", "--")):
         number = number.replace(sign, command)
     return number
 

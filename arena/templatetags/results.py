@@ -11,6 +11,8 @@ from django.utils.functional import Promise
 from django.utils.translation import gettext as _
 from django.utils.translation import gettext_lazy, gettext_noop
 
+from arena.exports.columns import Column
+from arena.exports.tables import Row
 from arena.rating.estimate import Estimate
 from augment.models import Scenario
 from augment.services.wording import translate
@@ -117,6 +119,12 @@ def method_label(name: str) -> str:
 def unit_label(name: str) -> str:
     """What was resampled."""
     return str(_UNITS.get(name, name))
+
+
+@register.filter
+def printed(row: Row, column: Column) -> str:
+    """What stands in a column of the table."""
+    return column.text(row)
 
 
 @register.filter

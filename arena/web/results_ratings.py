@@ -7,6 +7,7 @@ from dataclasses import replace
 from statistics import median_high
 from typing import Any
 
+from arena.exports.columns import ON_PAGE
 from arena.exports.tables import LeaderboardTable, Row, sentences_of
 from arena.models import Snapshot
 from arena.results.tree import Bounds, OnlinePlace, PairRecord, TypeStanding
@@ -26,6 +27,7 @@ def standings(snapshot: Snapshot, table: LeaderboardTable) -> Context:
     names = by_slug(table)
     removal = trust.removal
     return {
+        "columns": ON_PAGE,
         "bars": bars([(row.slug, row.lower, row.elo, row.upper) for row in table.rows]),
         "largest_move": max(moves, default=None),
         "removal": removal,

@@ -68,6 +68,8 @@ def papers_rows() -> list[Row]:
             lower=float(elo - low),
             upper=float(elo + up),
             votes=votes,
+            rank_best=1,
+            rank_worst=3,
         )
         for name, variant, rank, elo, low, up, votes in PAPER
     ]
@@ -79,14 +81,14 @@ def test_latex_has_the_form_of_the_papers_table() -> None:
         r"\providecolor{llm_blue}{RGB}{105, 156, 219}",
         r"\begin{table}",
         r"    \centering",
-        r"    \begin{tabular}{l>{\columncolor{llm_blue!20}}c r r r}",
+        r"    \begin{tabular}{l>{\columncolor{llm_blue!20}}c r r r r}",
         r"    \toprule",
         r"    \textbf{Model} & \textbf{Rank} & \textbf{Elo}~$\uparrow$ & "
-        r"\textbf{95\% CI} & \textbf{Votes}\\",
+        r"\textbf{95\% CI} & \textbf{Votes} & \textbf{95\% ranks}\\",
         r"    \midrule",
-        r"    interPlan & 1 & 1042 & -9/+11 & 1960\\",
-        r"    GPT-4o \texttt{OTM} & 1 & 1039 & -9/+11 & 1720\\",
-        r"    Gemini-1.5-Flash \texttt{vQA} & 1 & 1025 & -12/+13 & 720\\",
+        r"    interPlan & 1 & 1042 & -9/+11 & 1960 & 1--3\\",
+        r"    GPT-4o \texttt{OTM} & 1 & 1039 & -9/+11 & 1720 & 1--3\\",
+        r"    Gemini-1.5-Flash \texttt{vQA} & 1 & 1025 & -12/+13 & 720 & 1--3\\",
         r"    \bottomrule",
         r"    \end{tabular}",
         r"    \caption{Elo with 95\% Confidence Intervals.}",
@@ -115,7 +117,7 @@ def test_a_line_break_in_a_name_cannot_leave_its_comment() -> None:
 
 def test_what_is_unknown_is_two_hyphens_in_tables_and_empty_in_data() -> None:
     unknown = table(row("x", elo=None, lower=None, upper=None, rank=None, note="no votes"))
-    assert r"    x & -- & -- & -- & 10\\" in latex(unknown)
+    assert r"    x & -- & -- & -- & 10 & --\\" in latex(unknown)
     assert parsed(unknown)[0]["elo"] == ""
     assert json.loads(json_bytes(unknown))["standings"][0]["rating"] is None
 

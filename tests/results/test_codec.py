@@ -5,37 +5,21 @@ from __future__ import annotations
 import copy
 import hashlib
 import json
-from pathlib import Path
 from typing import Any
 
 import pytest
 from django.core import serializers
-from django.db import connection
 from django.urls import reverse
 
 from arena.exports import bundle
-from arena.models import Snapshot, Standing, Study
+from arena.models import Snapshot
 from arena.results.codec import read_results, results_document
 from arena.results.tree import VERSION, Results
 from arena.web.results_tabs import TABS
 from augment.errors import InvalidDocument
 from augment.sentences import Sentence
+from tests.results.old import OLD, stored
 from tests.web.cast import people, signed_in
-
-OLD: dict[str, Any] = json.loads((Path(__file__).parent / "version_1.json").read_text())
-"""A simulated study, rated and stored by the code of version 1."""
-
-
-def stored(results: dict[str, Any]) -> Snapshot:
-    """The old snapshot in the database, with such results."""
-    study = Study.objects.create(name="Round 1", state="closed", seed=1, votes_per_expert=90)
-    snapshot = Snapshot.objects.create(study=study, **OLD["snapshot"] | {"results": Results()})
-    for line in OLD["standings"]:
-        Standing.objects.create(snapshot=snapshot, **line)
-    with connection.cursor() as cursor:
-        asked = "UPDATE arena_snapshot SET results = %s WHERE id = %s"
-        cursor.execute(asked, [json.dumps(results), snapshot.pk])
-    return Snapshot.objects.get(pk=snapshot.pk)
 
 
 def test_an_old_document_is_written_as_it_was_read() -> None:

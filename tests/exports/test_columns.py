@@ -1,0 +1,77 @@
+"""The columns of a leaderboard: the same in every file, and those of before as they were."""
+
+from __future__ import annotations
+
+import csv
+import hashlib
+import io
+import json
+import re
+
+import pytest
+from pyarrow import parquet
+
+from arena.exports.columns import COLUMNS, IN_FILES, ON_PAGE
+from arena.exports.tables import LeaderboardTable, leaderboard_table
+from arena.exports.writers import FORMATS, plain_text
+from arena.services.cells import csv_text
+from tests.results.old import OLD, stored
+
+pytestmark = pytest.mark.django_db
+
+ADDED = ("rank_best", "rank_worst")
+
+
+@pytest.fixture
+def table() -> LeaderboardTable:
+    return leaderboard_table(stored(OLD["snapshot"]["results"]))
+
+
+def digest(text: str) -> str:
+    return hashlib.sha256(text.encode()).hexdigest()
+
+
+def test_files_of_an_old_rating_are_what_they_were_but_for_the_ranks_at_their_ends(
+    table: LeaderboardTable,
+) -> None:
+    head, *rows = csv.reader(io.StringIO(FORMATS["csv"].write(table).decode()))
+    assert tuple(head[-2:]) == ADDED
+    assert (
+        digest(csv_text(head[:-2], [row[:-2] for row in rows])) == OLD["files"]["leaderboard.csv"]
+    )
+    document = json.loads(FORMATS["json"].write(table))
+    for line in document["standings"]:
+        assert tuple(line)[-2:] == ADDED
+        del line["rank_best"], line["rank_worst"]
+    text = json.dumps(document, indent=2, ensure_ascii=False) + "\n"
+    assert digest(text) == OLD["files"]["leaderboard.json"]
+    tex = FORMATS["latex"].write(table).decode()
+    tex = re.sub(r" & [^&]*\\\\$", r"\\\\", tex, flags=re.MULTILINE).replace(
+        "c r r r r}", "c r r r}"
+    )
+    assert digest(tex) == OLD["files"]["leaderboard.tex"]
+
+
+def test_best_and_worst_rank_stand_in_every_file(table: LeaderboardTable) -> None:
+    wanted = [(row.rank_best, row.rank_worst) for row in table.rows]
+    assert len(set(wanted)) > 1
+    of_csv = csv.DictReader(io.StringIO(FORMATS["csv"].write(table).decode()))
+    assert [(int(line["rank_best"]), int(line["rank_worst"])) for line in of_csv] == wanted
+    of_json = json.loads(FORMATS["json"].write(table))["standings"]
+    assert [(line["rank_best"], line["rank_worst"]) for line in of_json] == wanted
+    of_parquet = parquet.read_table(io.BytesIO(FORMATS["parquet"].write(table))).to_pylist()
+    assert [(line["rank_best"], line["rank_worst"]) for line in of_parquet] == wanted
+    tex, text = FORMATS["latex"].write(table).decode(), plain_text(table)
+    for best, worst in wanted:
+        assert f" & {best}--{worst}\\\\\n" in tex
+        assert f" {best}–{worst}\n" in text
+
+
+def test_a_column_stands_once_in_the_list_with_a_unit_where_it_is_a_number() -> None:
+    names = [column.name for column in IN_FILES]
+    assert len(set(names)) == len(names)
+    for column in COLUMNS:
+        assert bool(column.unit) == (column.kind in ("whole", "number") or not column.name)
+    assert [str(column.page) for column in ON_PAGE] == [
+        "Rank", "Contestant", "Elo", "95 % CI", "Votes", "Score", "Won", "Tied", "Lost",
+    ]  # fmt: skip
