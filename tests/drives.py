@@ -16,7 +16,7 @@ from augment.simulation.expert import expert_of
 from augment.simulation.pdm_closed import PdmClosed
 from augment.simulation.road import Road
 from augment.simulation.score import ScoreKind, score_drive
-from augment.simulation.setting import Setting
+from augment.simulation.setting import DriveSetting
 from augment.simulation.trace import trace_of
 from tests.scenes import cone, scene
 
@@ -25,7 +25,7 @@ from tests.scenes import cone, scene
 def short_drive() -> tuple[bytes, dict[str, Any]]:
     """A packed trace and a document of 1.2 s towards two cones."""
     change = Modification(added=(cone("Agent2", 20.0, 0.5), cone("Agent3", 25.0, -0.5)))
-    setting = Setting(scene=scene(), modification=change)
+    setting = DriveSetting(scene=scene(), modification=change)
     road = Road(setting.scene)
     drive = run(setting, PdmClosed((0.0, 1.0)), road=road, steps=12)
     score = score_drive(drive, expert_of(setting, road, steps=12))

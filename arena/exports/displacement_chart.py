@@ -25,7 +25,7 @@ _PAPER = "#8a939c"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Line:
+class ChartLine:
     """One line of the chart, from top to bottom: a heading, or a box with its name.
 
     Attributes:
@@ -62,7 +62,7 @@ def box_plot(table: DisplacementTable, *, file_format: str) -> bytes:
         return drawn(figure, file_format)
 
 
-def is_far(lines: list[Line]) -> bool:
+def is_far(lines: list[ChartLine]) -> bool:
     """Whether outliers lie so far out that a linear axis would show little else."""
     whiskers: list[float] = [line.stats["whishi"] for line in lines if line.stats]
     outliers: list[float] = [one for line in lines if line.stats for one in line.stats["fliers"]]
@@ -73,7 +73,7 @@ def is_far(lines: list[Line]) -> bool:
 # Private
 
 
-def _lines(table: DisplacementTable) -> Iterator[Line]:
+def _lines(table: DisplacementTable) -> Iterator[ChartLine]:
     if table.by is By.CONTESTANT:
         yield from (_measured(group) for group in table.groups)
         return
@@ -82,7 +82,7 @@ def _lines(table: DisplacementTable) -> Iterator[Line]:
     names = [*(name for name in VARIANTS if name in published or name in found)]
     names += [name for name in found if name not in names]
     for name in names:
-        yield Line(label=name, is_heading=True)
+        yield ChartLine(label=name, is_heading=True)
         yield from (_measured(group) for group in found.get(name, ()))
         yield from (_from_paper(box) for box in published.get(name, ()))
 
@@ -95,7 +95,7 @@ def _variant(box: PublishedBox) -> str:
     return box.variant
 
 
-def _measured(group: Group) -> Line:
+def _measured(group: Group) -> ChartLine:
     found = group.summary
     note = f"n {found.n}"
     if found.missing:
@@ -104,7 +104,7 @@ def _measured(group: Group) -> Line:
         note += f", {found.surplus} surplus"
     colour = SIMULATED if group.is_simulated else MARK
     if found.box is None:
-        return Line(label=marked(group), note=note, colour=colour)
+        return ChartLine(label=marked(group), note=note, colour=colour)
     box = found.box
     stats = {
         "med": box.median_m,
@@ -115,10 +115,10 @@ def _measured(group: Group) -> Line:
         "mean": box.mean_m,
         "fliers": list(box.outliers_m),
     }
-    return Line(label=marked(group), note=note, stats=stats, colour=colour)
+    return ChartLine(label=marked(group), note=note, stats=stats, colour=colour)
 
 
-def _from_paper(box: PublishedBox) -> Line:
+def _from_paper(box: PublishedBox) -> ChartLine:
     stats = {
         "med": box.median_m,
         "q1": box.q1_m,
@@ -128,10 +128,10 @@ def _from_paper(box: PublishedBox) -> Line:
         "fliers": [],
     }
     label = f"{box.model} (paper)"
-    return Line(label=label, stats=stats, colour=_PAPER, is_paper=True)
+    return ChartLine(label=label, stats=stats, colour=_PAPER, is_paper=True)
 
 
-def _draw(axes: Axes, line: Line, place: int) -> None:
+def _draw(axes: Axes, line: ChartLine, place: int) -> None:
     if line.stats is None:
         return
     pen = {"color": line.colour, "linewidth": 1.1}
@@ -162,7 +162,7 @@ def _draw(axes: Axes, line: Line, place: int) -> None:
     )
 
 
-def _rows(axes: Axes, lines: list[Line]) -> None:
+def _rows(axes: Axes, lines: list[ChartLine]) -> None:
     """Names to the left, counts to the right, headings in bold."""
     axes.set_yticks(range(len(lines)), [line.label for line in lines], fontsize=8)
     for label, line in zip(axes.get_yticklabels(), lines, strict=True):
@@ -182,7 +182,7 @@ def _rows(axes: Axes, lines: list[Line]) -> None:
     axes.tick_params(axis="y", length=0)
 
 
-def _scale(axes: Axes, lines: list[Line]) -> None:
+def _scale(axes: Axes, lines: list[ChartLine]) -> None:
     """Linear from zero, or logarithmic from the first metre on where outliers need it."""
     ends = [one for line in lines if line.stats for one in _reach(line.stats)]
     furthest = max([*ends, LINEAR_UP_TO_M])

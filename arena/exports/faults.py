@@ -77,7 +77,7 @@ class FaultLine:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Agreement:
+class LabelAgreement:
     """How well the labels of one class of faults agree.
 
     Attributes:
@@ -101,7 +101,7 @@ class FaultTable:
 
     job: str
     lines: tuple[FaultLine, ...]
-    agreement: tuple[Agreement, ...]
+    agreement: tuple[LabelAgreement, ...]
 
     @property
     def labels(self) -> int:
@@ -219,7 +219,7 @@ def _is_seen(fault: FaultClass, labels: Sequence[FaultLabel]) -> bool:
 
 def _agreement(
     fault: FaultClass, labels: Sequence[FaultLabel], found: dict[int, list[FaultLabel]]
-) -> Agreement:
+) -> LabelAgreement:
     pairs = [
         (getattr(label, f"guessed_{fault.value}"), getattr(label, fault.value))
         for label in labels
@@ -227,7 +227,7 @@ def _agreement(
     ]
     kappa = cohens_kappa([one for one, _ in pairs], [other for _, other in pairs])
     several = [own for own in found.values() if len(own) > 1]
-    return Agreement(
+    return LabelAgreement(
         fault=fault.value,
         kappa=kappa,
         n=len(pairs),

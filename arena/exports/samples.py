@@ -12,7 +12,7 @@ from django.core.files.storage import default_storage
 
 from arena.exports.drawing import INK, SIMULATED, SOFT, drawn, house_style
 from arena.exports.tables import SIMULATED as SIMULATED_WORD
-from arena.queries.jobs import Grid, Row
+from arena.queries.jobs import GridRow, JobGrid
 from augment.errors import UnknownName
 from augment.models import Augmentation, Contestant
 
@@ -35,11 +35,11 @@ class Sheet:
 
     job: str
     contestants: tuple[Contestant, ...]
-    rows: tuple[Row, ...]
+    rows: tuple[GridRow, ...]
 
 
 def sheet_of(
-    job: str, grid: Grid, *, scenarios: Sequence[str], contestants: Sequence[str]
+    job: str, grid: JobGrid, *, scenarios: Sequence[str], contestants: Sequence[str]
 ) -> Sheet:
     """The chosen cells of a job's grid, in the order in which they were named.
 
@@ -60,7 +60,7 @@ def sheet_of(
         job=job,
         contestants=tuple(grid.contestants[n] for n in chosen),
         rows=tuple(
-            Row(scenario=lines[slug].scenario, cells=[lines[slug].cells[n] for n in chosen])
+            GridRow(scenario=lines[slug].scenario, cells=[lines[slug].cells[n] for n in chosen])
             for slug in scenarios
         ),
     )
@@ -157,7 +157,7 @@ def _word(cell: Augmentation | None) -> str:
     return f"no picture: {cell.get_state_display().lower()}"
 
 
-def _caption(letter: str, row: Row, across: int) -> str:
+def _caption(letter: str, row: GridRow, across: int) -> str:
     text = f"({letter}) {row.scenario.get_type_display()}: “{row.scenario.instruction.strip()}”"
     return "\n".join(textwrap.wrap(text, width=50 * across, max_lines=2, placeholder=" …"))
 

@@ -6,12 +6,12 @@ import numpy as np
 
 from arena.errors import NothingToPlan
 from arena.pairing.arrays import IntArray
-from arena.pairing.rules import Grid, Rules
+from arena.pairing.rules import Grid, PlanRules
 from arena.pairing.targets import votes_by_appearances
 from augment.sentences import Sentence, sentence
 
 
-def check_rules(rules: Rules, grid: Grid) -> None:
+def check_rules(rules: PlanRules, grid: Grid) -> None:
     """Whether the rules make sense.
 
     Raises:
@@ -43,7 +43,7 @@ def check_rules(rules: Rules, grid: Grid) -> None:
         raise NothingToPlan(_too_few(rules, grid, units))
 
 
-def pair_totals(rules: Rules, grid: Grid) -> IntArray:
+def pair_totals(rules: PlanRules, grid: Grid) -> IntArray:
     """Votes of every pair (P,) over all experts, where the rules say how often.
 
     Raises:
@@ -76,7 +76,7 @@ def pair_totals(rules: Rules, grid: Grid) -> IntArray:
 # --- Private -----------------------------------------------------------------------------------
 
 
-def _too_few(rules: Rules, grid: Grid, units: int) -> Sentence:
+def _too_few(rules: PlanRules, grid: Grid, units: int) -> Sentence:
     values = {"scenarios": len(grid.scenarios), "pairs": units, "votes": rules.votes_per_expert}
     if not grid.identical:
         return sentence(
@@ -93,7 +93,7 @@ def _too_few(rules: Rules, grid: Grid, units: int) -> Sentence:
     )
 
 
-def _check_shares(rules: Rules) -> None:
+def _check_shares(rules: PlanRules) -> None:
     shares = (
         (sentence("repeats"), rules.repeat_share, 0.5),
         (sentence("attention checks"), rules.check_share, 0.5),
@@ -119,7 +119,7 @@ def _check_shares(rules: Rules) -> None:
         )
 
 
-def _check_extras(rules: Rules, grid: Grid) -> None:
+def _check_extras(rules: PlanRules, grid: Grid) -> None:
     _check_shares(rules)
     if rules.appearances and rules.pair_votes:
         raise NothingToPlan(sentence("Targets are given by contestant or by pair, not both."))
@@ -134,7 +134,7 @@ def _check_extras(rules: Rules, grid: Grid) -> None:
         )
 
 
-def _by_pair(rules: Rules, grid: Grid, votes: int) -> IntArray:
+def _by_pair(rules: PlanRules, grid: Grid, votes: int) -> IntArray:
     totals = np.zeros(len(grid.pairs), dtype=np.int64)
     places = {pair: row for row, pair in enumerate(grid.pairs)}
     for first, second, wanted in rules.pair_votes:
@@ -159,7 +159,7 @@ def _by_pair(rules: Rules, grid: Grid, votes: int) -> IntArray:
     return totals
 
 
-def _by_contestant(rules: Rules, grid: Grid, votes: int, capacity: IntArray) -> IntArray:
+def _by_contestant(rules: PlanRules, grid: Grid, votes: int, capacity: IntArray) -> IntArray:
     names = sorted({name for pair in grid.pairs for name in pair})
     wanted = dict(rules.appearances)
     if set(wanted) != set(names) or len(wanted) < len(rules.appearances):

@@ -13,11 +13,11 @@ import numpy as np
 
 from arena.pairing.later import Wanted
 from arena.pairing.order import CHECK, MAIN, REPEAT
-from arena.pairing.rules import Grid, PlannedMatchup, Rules
+from arena.pairing.rules import Grid, PlannedMatchup, PlanRules
 
 
 def follow_on(
-    rules: Rules,
+    rules: PlanRules,
     grid: Grid,
     expert: str,
     so_far: Sequence[PlannedMatchup],
@@ -70,7 +70,7 @@ def _next_position(so_far: Sequence[PlannedMatchup]) -> int:
 
 
 def _repeats(
-    rules: Rules,
+    rules: PlanRules,
     grid: Grid,
     so_far: Sequence[PlannedMatchup],
     items: Sequence[_Item],
@@ -108,7 +108,7 @@ def _repeats(
 
 
 def _checks(
-    rules: Rules,
+    rules: PlanRules,
     grid: Grid,
     so_far: Sequence[PlannedMatchup],
     more: int,
@@ -133,7 +133,7 @@ def _in_order(
     items: Sequence[_Item],
     before: Sequence[str],
     grid: Grid,
-    rules: Rules,
+    rules: PlanRules,
     rng: np.random.Generator,
 ) -> tuple[list[_Item], int]:
     """The items with the largest gap that can be kept, also to what was shown before."""
@@ -168,7 +168,7 @@ def _try_order(
 
 
 def _shown(
-    rules: Rules,
+    rules: PlanRules,
     grid: Grid,
     expert: str,
     so_far: Sequence[PlannedMatchup],
@@ -198,7 +198,7 @@ def _shown(
 
 
 def _sides(
-    rules: Rules,
+    rules: PlanRules,
     grid: Grid,
     so_far: Sequence[PlannedMatchup],
     order: Sequence[_Item],

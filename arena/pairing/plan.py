@@ -27,16 +27,16 @@ from arena.pairing.rules import (
     Grid,
     MatchupPlan,
     PlannedMatchup,
-    Rules,
+    PlanRules,
     grid_of,
 )
 from arena.pairing.targets import choose_wanted, share_out
 from arena.pairing.units import choose_units, draw_probability
 
-__all__ = ["Check", "Entry", "MatchupPlan", "PlannedMatchup", "Rules", "plan"]
+__all__ = ["Check", "Entry", "MatchupPlan", "PlanRules", "PlannedMatchup", "plan"]
 
 
-def plan(rules: Rules) -> MatchupPlan:
+def plan(rules: PlanRules) -> MatchupPlan:
     """Plan who sees which pair on which scenario, in which order and on which side.
 
     No expert sees a unit twice but in a hidden repeat. The same rules give the same plan.
@@ -62,7 +62,9 @@ def plan(rules: Rules) -> MatchupPlan:
     return MatchupPlan(matchups=tuple(matchups), scenario_gap=gap, identical=grid.identical)
 
 
-def _chosen(rules: Rules, grid: Grid, rng: np.random.Generator) -> tuple[BoolArray, FloatArray]:
+def _chosen(
+    rules: PlanRules, grid: Grid, rng: np.random.Generator
+) -> tuple[BoolArray, FloatArray]:
     """The units of every expert (E, P, S), and how likely each unit (P, S) is a given showing."""
     experts, votes = len(rules.experts), rules.votes_at_once
     if not rules.appearances and not rules.pair_votes:
@@ -75,7 +77,7 @@ def _chosen(rules: Rules, grid: Grid, rng: np.random.Generator) -> tuple[BoolArr
     return chosen, shares
 
 
-def _extras(rules: Rules, grid: Grid, mine: BoolArray, rng: np.random.Generator) -> Extras:
+def _extras(rules: PlanRules, grid: Grid, mine: BoolArray, rng: np.random.Generator) -> Extras:
     """One expert's repeats and checks, by lot."""
     repeats = round(rules.repeat_share * rules.votes_at_once)
     checks = min(round(rules.check_share * rules.votes_at_once), len(rules.checks))
@@ -91,7 +93,7 @@ def _extras(rules: Rules, grid: Grid, mine: BoolArray, rng: np.random.Generator)
 
 
 def _matchups(
-    rules: Rules,
+    rules: PlanRules,
     grid: Grid,
     probability: FloatArray,
     expert: str,
@@ -127,7 +129,7 @@ def _matchups(
 
 
 def _sides(
-    rules: Rules, grid: Grid, order: list[Slot], flips: BoolArray, rng: np.random.Generator
+    rules: PlanRules, grid: Grid, order: list[Slot], flips: BoolArray, rng: np.random.Generator
 ) -> list[tuple[str, str]]:
     """Left and right of every showing; checks have the broken picture on either side in turn."""
     turned: dict[int, bool] = {}

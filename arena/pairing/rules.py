@@ -38,7 +38,7 @@ class Check:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Rules:
+class PlanRules:
     """Everything that a plan depends on.
 
     Attributes:

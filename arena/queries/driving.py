@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from arena.queries.jobs import Grid, grid
+from arena.queries.jobs import JobGrid, grid
 from augment.models import GenerationJob, Simulation
 from augment.services.judging.simulations import Options
 
@@ -13,7 +13,7 @@ from augment.services.judging.simulations import Options
 class DriveCells:
     """The grid of a job with its drives by augmentation, and those of the scenes."""
 
-    grid: Grid
+    grid: JobGrid
     by_augmentation: dict[int, Simulation]
     before: dict[int, Simulation]
     reference: dict[int, Simulation]

@@ -48,7 +48,7 @@ class JobCounts:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Row:
+class GridRow:
     """One scenario of the grid; a cell is None where nothing was planned."""
 
     scenario: Scenario
@@ -56,11 +56,11 @@ class Row:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Grid:
+class JobGrid:
     """Scenarios down, contestants across."""
 
     contestants: list[Contestant]
-    rows: list[Row]
+    rows: list[GridRow]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -88,7 +88,7 @@ def counts(job: GenerationJob) -> JobCounts:
     return _counts(job, Counter(dict(rows)))
 
 
-def grid(job: GenerationJob) -> Grid:
+def grid(job: GenerationJob) -> JobGrid:
     """What became of every scenario with every contestant."""
     cells = {(cell.scenario_id, cell.contestant_id): cell for cell in _cells(job)}
     contestants = sorted(
@@ -96,10 +96,10 @@ def grid(job: GenerationJob) -> Grid:
     )
     scenarios = {cell.scenario_id: cell.scenario for cell in cells.values()}
     ordered = sorted(scenarios.values(), key=lambda scenario: (scenario.type, scenario.slug))
-    return Grid(
+    return JobGrid(
         contestants=contestants,
         rows=[
-            Row(
+            GridRow(
                 scenario=scenario,
                 cells=[cells.get((scenario.pk, contestant.pk)) for contestant in contestants],
             )

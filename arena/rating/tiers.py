@@ -78,7 +78,7 @@ def tiers(votes: Comparisons, diagnosis: Diagnosis, unit: Unit) -> Tiers:
     return Tiers(reached=diagnosis.reached, part_of=part_of, group_of=group_of, level=level)
 
 
-class Standing(Protocol):
+class Ranked(Protocol):
     """What puts those of one component in order."""
 
     @property
@@ -94,7 +94,7 @@ class Standing(Protocol):
         """None where it is withheld."""
 
 
-def standing_order(found: Tiers, lines: Sequence[Standing]) -> list[int]:
+def standing_order(found: Tiers, lines: Sequence[Ranked]) -> list[int]:
     """The contestants, best first, group by group.
 
     Whoever scored stands above those who never scored back, and within a component the rating

@@ -10,7 +10,7 @@ from django.db.models import F, Max, QuerySet
 
 from arena.errors import NothingToPlan
 from arena.models import Matchup, Study
-from arena.pairing.plan import Check, Entry, PlannedMatchup, Rules
+from arena.pairing.plan import Check, Entry, PlannedMatchup, PlanRules
 from arena.queries.showings import view_of
 from augment.models import Augmentation, Contestant, Scenario
 from augment.sentences import Sentence, sentence
@@ -28,10 +28,10 @@ MOST_NAMED = 8
 """So many missing pictures are named, the others counted."""
 
 
-def rules_of(study: Study) -> Rules:
+def rules_of(study: Study) -> PlanRules:
     """The rules as they were at opening; planning them again gives the study's matchups."""
     kept = study.rules
-    return Rules(
+    return PlanRules(
         entries=tuple(Entry(**entry) for entry in kept["entries"]),
         experts=tuple(kept["experts"]),
         appearances=tuple((name, votes) for name, votes in kept.get("appearances", ())),

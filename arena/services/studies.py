@@ -12,7 +12,7 @@ from django.utils import timezone
 
 from arena.errors import StudyNotOpen
 from arena.models import Study
-from arena.pairing.plan import Entry, MatchupPlan, Rules, plan
+from arena.pairing.plan import Entry, MatchupPlan, PlanRules, plan
 from arena.queries.people import experts as expert_accounts
 from arena.services.plans import (
     Cells,
@@ -95,7 +95,7 @@ def open_study(
     wanted = round(given.check_share * votes_per_expert)
     checks, broken = enough_checks(scenario_rows, wanted=wanted)
     shown = latest_pictures(contestant_rows, scenario_rows)
-    rules = Rules(
+    rules = PlanRules(
         entries=_entries(shown),
         experts=tuple(expert.username for expert in expert_rows),
         votes_per_expert=votes_per_expert,
@@ -219,7 +219,7 @@ def _entries(shown: Cells) -> tuple[Entry, ...]:
 
 
 def _insert(
-    name: str, rules: Rules, planned: MatchupPlan, given: PlanOptions, allow_simulated: bool
+    name: str, rules: PlanRules, planned: MatchupPlan, given: PlanOptions, allow_simulated: bool
 ) -> Study:
     try:
         with transaction.atomic():
@@ -253,7 +253,7 @@ def _taken(name: str) -> Conflict:
     return Conflict(sentence("There is a study named '%(name)s' already.", name=name))
 
 
-def _frozen_rules(rules: Rules, planned: MatchupPlan) -> dict[str, Any]:
+def _frozen_rules(rules: PlanRules, planned: MatchupPlan) -> dict[str, Any]:
     """Everything that the plan came from, and what it had to give up."""
     kept: dict[str, Any] = {"planner": PLANNER, **asdict(rules)}
     kept["scenario_gap_kept"] = planned.scenario_gap

@@ -39,7 +39,7 @@ SIMULATED = "simulated"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Imported:
+class ImportedVotes:
     """What was read, for whoever asked."""
 
     study: Study
@@ -49,7 +49,7 @@ class Imported:
 
 def import_votes(
     *, path: Path, name: str, is_simulated: bool = False, actor: User | None = None
-) -> Imported:
+) -> ImportedVotes:
     """Keep all votes of a file; on any fault nothing is kept.
 
     Args:
@@ -77,7 +77,7 @@ def import_votes(
     except BaseException:  # also Ctrl-C; after a kill the next import does it
         _remove(file)
         raise
-    return Imported(study=study, votes=votes, contestants=contestants)
+    return ImportedVotes(study=study, votes=votes, contestants=contestants)
 
 
 def remove_dead() -> int:

@@ -70,7 +70,7 @@ class Mark:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Segment:
+class BarSegment:
     """A part of a stacked bar, in percent of its width."""
 
     tone: str
@@ -114,7 +114,7 @@ def mark_of(state: Augmentation.State) -> Mark:
 
 
 @register.filter
-def segments(by_state: dict[Augmentation.State, int]) -> list[Segment]:
+def segments(by_state: dict[Augmentation.State, int]) -> list[BarSegment]:
     """A stacked bar of the states that occur; what waits stays empty, what runs comes last."""
     begun = [state for state in by_state if state != Augmentation.State.QUEUED]
     order = sorted(begun, key=lambda state: state in Augmentation.UNDER_WAY)
@@ -125,7 +125,7 @@ def segments(by_state: dict[Augmentation.State, int]) -> list[Segment]:
         if width:
             look = _mark(state.value, str(state.label))
             found.append(
-                Segment(
+                BarSegment(
                     tone=look.tone,
                     label=look.label,
                     number=by_state[state],

@@ -14,7 +14,7 @@ FEW = 30
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Cell:
+class HeatCell:
     """One contestant against another.
 
     Attributes:
@@ -32,15 +32,15 @@ class Cell:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Line:
+class HeatRow:
     """A row of the table; the cell against itself is None."""
 
     number: int
     row: Row
-    cells: list[Cell | None]
+    cells: list[HeatCell | None]
 
 
-def heat_map(pairs: Sequence[PairRecord], rows: Sequence[Row]) -> list[Line]:
+def heat_map(pairs: Sequence[PairRecord], rows: Sequence[Row]) -> list[HeatRow]:
     """The table, contestants in the given order both ways.
 
     Args:
@@ -53,7 +53,7 @@ def heat_map(pairs: Sequence[PairRecord], rows: Sequence[Row]) -> list[Line]:
         found[pair.a, pair.b] = (score, pair.votes, pair.planned)
         found[pair.b, pair.a] = (pair.votes - score, pair.votes, pair.planned)
     return [
-        Line(number=n, row=row, cells=[_cell(row, other, found) for other in rows])
+        HeatRow(number=n, row=row, cells=[_cell(row, other, found) for other in rows])
         for n, row in enumerate(rows, start=1)
     ]
 
@@ -65,12 +65,12 @@ def _step(share: float) -> int:
 
 def _cell(
     row: Row, other: Row, found: dict[tuple[str, str], tuple[float, int, int | None]]
-) -> Cell | None:
+) -> HeatCell | None:
     if row.slug == other.slug:
         return None
     score, votes, planned = found.get((row.slug, other.slug), (0.0, 0, None))
     share = score / votes if votes else 0.5
-    return Cell(
+    return HeatCell(
         other=other,
         percent=round(100 * share) if votes else None,
         step=_step(share),

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from augment.baselines.rule_placer_cones import cones
 from augment.baselines.rule_placer_crash import count_arrangements, crash
-from augment.baselines.rule_placer_ground import Ground
+from augment.baselines.rule_placer_ground import PlacingGround
 from augment.baselines.rule_placer_jury import Jury, numbered
 from augment.baselines.rule_placer_vehicles import vehicle
 from augment.baselines.rule_placer_walkers import walkers
@@ -70,7 +70,7 @@ def place(scene: Scene, intent: Intent | None, *, seed: int = 0) -> Placement:
     if intent is None:
         raise CannotPlace(NO_INTENT)
     rng = np.random.default_rng(seed)
-    ground, jury = Ground(scene), Jury(scene)
+    ground, jury = PlacingGround(scene), Jury(scene)
     added: _Agents = ()
     sentences = []
     for request in resolve_anchors(intent).requests:
@@ -103,7 +103,7 @@ def _insist_on_needs(request: Request) -> None:
 
 
 def _fitted(
-    request: Request, ground: Ground, jury: Jury, added: _Agents, rng: np.random.Generator
+    request: Request, ground: PlacingGround, jury: Jury, added: _Agents, rng: np.random.Generator
 ) -> tuple[_Agents, float]:
     """The agents of a request nearest to the asked distance that the checks pass, and it."""
     spot, wanted = request.spot, _distance(request)
@@ -154,7 +154,11 @@ def _shifts(tolerance_m: float) -> list[float]:
 
 
 def _placed(
-    request: Request, ground: Ground, distance_m: float, rng: np.random.Generator, arrangement: int
+    request: Request,
+    ground: PlacingGround,
+    distance_m: float,
+    rng: np.random.Generator,
+    arrangement: int,
 ) -> _Agents:
     match request:
         case VehicleRequest():
@@ -168,7 +172,7 @@ def _placed(
 
 
 def _problem(
-    request: Request, ground: Ground, distance_m: float, agents: _Agents, added: _Agents
+    request: Request, ground: PlacingGround, distance_m: float, agents: _Agents, added: _Agents
 ) -> str | None:
     """Why the agents can't stand there, None if they can."""
     for agent in agents:

@@ -9,7 +9,7 @@ import math
 
 import numpy as np
 
-from augment.baselines.rule_placer_ground import Ground
+from augment.baselines.rule_placer_ground import PlacingGround
 from augment.errors import CannotPlace
 from augment.scene.entities import AgentType, TrafficAgent
 from augment.scene.intent import (
@@ -37,7 +37,7 @@ Place = tuple[float, float]
 
 
 def cones(
-    request: ConesRequest, ground: Ground, distance_m: float, rng: np.random.Generator
+    request: ConesRequest, ground: PlacingGround, distance_m: float, rng: np.random.Generator
 ) -> tuple[TrafficAgent, ...]:
     """The cones in order, then the worker; ids are still empty.
 
@@ -66,7 +66,11 @@ def cones(
 
 
 def _places(
-    request: ConesRequest, ground: Ground, distance_m: float, spacing_m: float, edge_m: float
+    request: ConesRequest,
+    ground: PlacingGround,
+    distance_m: float,
+    spacing_m: float,
+    edge_m: float,
 ) -> list[Place]:
     count = request.count or 1
     gaps = max(count - 1, 1)
@@ -94,7 +98,7 @@ def _places(
     return _taper(distance_m, count, spacing_m, from_d_m, across_m)
 
 
-def _worker(request: ConesRequest, ground: Ground, places: list[Place]) -> Place:
+def _worker(request: ConesRequest, ground: PlacingGround, places: list[Place]) -> Place:
     """Where the worker stands: as said, else where people stand at such a shape."""
     if request.shape is Shape.RING:
         return sum(s for s, _ in places) / len(places), 0.0
@@ -136,7 +140,7 @@ def _behind_taper(places: list[Place], sign: float) -> Place:
     return middle_s + across * _WORKER_GAP_M, middle_d + sign * along * _WORKER_GAP_M
 
 
-def _beside_line(places: list[Place], ground: Ground, lane: LaneChoice | None) -> Place:
+def _beside_line(places: list[Place], ground: PlacingGround, lane: LaneChoice | None) -> Place:
     """Beside the middle of a line: off the road if the line's outer side is, else in its lane."""
     middle_m, d_m = (places[0][0] + places[-1][0]) / 2.0, places[0][1]
     gap_m = math.copysign(_WORKER_GAP_M, d_m or _sign(ground.kerb))
@@ -163,7 +167,7 @@ def _ring(centre_m: float, count: int, spacing_m: float, widest_m: float) -> lis
     return [*closing, *((s, -side_m) for s in along), *((s, side_m) for s in reversed(along))]
 
 
-def _line_side(request: ConesRequest, ground: Ground) -> float:
+def _line_side(request: ConesRequest, ground: PlacingGround) -> float:
     """1 for the left boundary of the ego's direction, -1 for the right one, 0 for the centre."""
     lateral = request.spot.lateral
     return {
@@ -179,7 +183,7 @@ def _sign(side: Side) -> float:
     return 1.0 if side is Side.LEFT else -1.0
 
 
-def _at(ground: Ground, lane: LaneChoice | None, place: Place) -> PlaceOnWay:
+def _at(ground: PlacingGround, lane: LaneChoice | None, place: Place) -> PlaceOnWay:
     """The place (s, d): s along the ego's lane, d from the centre of the lane asked for."""
     s_m, d_m = place
     centre = ground.beside(ground.along(s_m), lane)
@@ -187,7 +191,7 @@ def _at(ground: Ground, lane: LaneChoice | None, place: Place) -> PlaceOnWay:
     return ground.graph.place(centre.way_id, centre.s_m, sign * d_m)
 
 
-def _standing(kind: AgentType, place: PlaceOnWay, ground: Ground) -> TrafficAgent:
+def _standing(kind: AgentType, place: PlaceOnWay, ground: PlacingGround) -> TrafficAgent:
     length_m, width_m = LENGTH_WIDTH_M[kind]
     on_lane = abs(place.d_m) <= ground.way(place).width_m / 2.0
     return TrafficAgent(

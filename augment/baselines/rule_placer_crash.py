@@ -13,7 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from augment.baselines.rule_placer_ground import Ground
+from augment.baselines.rule_placer_ground import PlacingGround
 from augment.baselines.rule_placer_vehicles import FACING_RAD, SIZES_M, build_vehicle
 from augment.errors import CannotPlace
 from augment.geometry.angles import wrap
@@ -57,7 +57,7 @@ def count_arrangements(request: CrashRequest) -> int:
 
 def crash(
     request: CrashRequest,
-    ground: Ground,
+    ground: PlacingGround,
     distance_m: float,
     rng: np.random.Generator,
     *,
@@ -87,7 +87,7 @@ def crash(
 
 
 def _in_a_row(
-    request: CrashRequest, ground: Ground, distance_m: float, looseness: float
+    request: CrashRequest, ground: PlacingGround, distance_m: float, looseness: float
 ) -> list[Pose]:
     """Each as near behind the one before as it can stand."""
     poses = [_row_pose(request, ground, distance_m, 0, looseness)]
@@ -105,7 +105,7 @@ def _in_a_row(
 
 
 def _row_pose(
-    request: CrashRequest, ground: Ground, distance_m: float, index: int, looseness: float
+    request: CrashRequest, ground: PlacingGround, distance_m: float, index: int, looseness: float
 ) -> Pose:
     place = ground.beside(ground.along(distance_m), request.spot.lane)
     pose = ground.graph.place(place.way_id, place.s_m, looseness * _SIDES_M[index]).pose
@@ -117,7 +117,7 @@ def _row_pose(
 
 def _chained(
     request: CrashRequest,
-    ground: Ground,
+    ground: PlacingGround,
     distance_m: float,
     left_m: float,
     rng: np.random.Generator,

@@ -43,7 +43,7 @@ _PARKED_WITHIN_M, _STANDS_BELOW_MPS = 12.0, 0.5
 _PARKED_TYPES = frozenset({AgentType.VEHICLE, AgentType.BUS})
 
 
-class Ground:
+class PlacingGround:
     """A scene read from the ego's place on its lane.
 
     Raises:

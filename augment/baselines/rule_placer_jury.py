@@ -14,7 +14,7 @@ _Agents = tuple[TrafficAgent, ...]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Verdict:
+class PlacementVerdict:
     """What was found about a placement.
 
     Attributes:
@@ -38,7 +38,7 @@ class Jury:
         self._scene = scene
         self._ground = Ground.of(scene)
 
-    def verdict(self, request: Request, before: _Agents, agents: _Agents) -> Verdict:
+    def verdict(self, request: Request, before: _Agents, agents: _Agents) -> PlacementVerdict:
         """What is found about the agents of one request.
 
         Args:
@@ -54,7 +54,7 @@ class Jury:
         found = check_against_intent(ground, own, Intent(requests=(request,)))
         wrong = [one.sentence() for one in found if one.severity is Severity.WRONG]
         doubts = sum(one.severity is Severity.DOUBTFUL for one in found)
-        return Verdict(wrong=wrong[0] if wrong else None, doubts=doubts)
+        return PlacementVerdict(wrong=wrong[0] if wrong else None, doubts=doubts)
 
 
 def numbered(agents: _Agents, scene: Scene) -> _Agents:

@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from augment.baselines.rule_placer_ground import Ground
+from augment.baselines.rule_placer_ground import PlacingGround
 from augment.errors import CannotPlace
 from augment.geometry.angles import wrap
 from augment.geometry.frames import Pose
@@ -47,7 +47,7 @@ SLIGHT_OFFSET_M = 0.75
 
 
 def vehicle(
-    request: VehicleRequest, ground: Ground, distance_m: float, rng: np.random.Generator
+    request: VehicleRequest, ground: PlacingGround, distance_m: float, rng: np.random.Generator
 ) -> tuple[TrafficAgent, ...]:
     """The vehicles that were asked for, one or a row, their ids still empty.
 
@@ -85,7 +85,7 @@ def build_vehicle(body: Body, pose: Pose, lane_id: str | None, speed_mps: float)
 
 
 def _vehicle(
-    request: VehicleRequest, ground: Ground, distance_m: float, d_m: float
+    request: VehicleRequest, ground: PlacingGround, distance_m: float, d_m: float
 ) -> TrafficAgent:
     centre = ground.beside(ground.along(distance_m), request.spot.lane)
     place = ground.graph.place(centre.way_id, centre.s_m, d_m)
@@ -99,7 +99,7 @@ def _vehicle(
 
 
 def _offset_m(
-    request: VehicleRequest, ground: Ground, place: PlaceOnWay, rng: np.random.Generator
+    request: VehicleRequest, ground: PlacingGround, place: PlaceOnWay, rng: np.random.Generator
 ) -> float:
     """How far left of the lane's own direction (right is negative) the box stands."""
     lateral = request.spot.lateral
@@ -127,7 +127,7 @@ def _offset_m(
     return size_m if to_left else -size_m
 
 
-def _side(lateral: Lateral, ground: Ground) -> Side:
+def _side(lateral: Lateral, ground: PlacingGround) -> Side:
     """The side of the ego's direction that a target is on, on this map."""
     sides = {
         LateralTarget.LEFT_BOUNDARY: Side.LEFT,

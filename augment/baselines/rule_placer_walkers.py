@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from augment.baselines.rule_placer_ground import Ground
+from augment.baselines.rule_placer_ground import PlacingGround
 from augment.scene.entities import AgentType, Point, TrafficAgent
 from augment.scene.intent import Side, WalkRequest
 from augment.scene.sizes import LENGTH_WIDTH_M
@@ -22,7 +22,7 @@ APART_M = 1.2
 
 
 def walkers(
-    request: WalkRequest, ground: Ground, distance_m: float, rng: np.random.Generator
+    request: WalkRequest, ground: PlacingGround, distance_m: float, rng: np.random.Generator
 ) -> tuple[TrafficAgent, ...]:
     """The pedestrians: side by side 1.2 m apart along the road, or in a file behind the first.
 
@@ -54,7 +54,7 @@ def _behind_m(request: WalkRequest, index: int, rng: np.random.Generator) -> flo
 
 
 def _walker(
-    request: WalkRequest, start: Side, ground: Ground, distance_m: float, behind_m: float
+    request: WalkRequest, start: Side, ground: PlacingGround, distance_m: float, behind_m: float
 ) -> TrafficAgent:
     place = ground.along(distance_m)
     if request.on_road:
@@ -72,7 +72,9 @@ def _walker(
     return _build_walker(ground, tuple(begin), tuple(end), request.speed_mps or walked_m / WALK_S)
 
 
-def _build_walker(ground: Ground, begin: Point, end: Point, speed_mps: float) -> TrafficAgent:
+def _build_walker(
+    ground: PlacingGround, begin: Point, end: Point, speed_mps: float
+) -> TrafficAgent:
     length_m, width_m = LENGTH_WIDTH_M[AgentType.PEDESTRIAN]
     return TrafficAgent(
         id="",

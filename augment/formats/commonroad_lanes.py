@@ -13,7 +13,7 @@ import numpy as np
 
 from augment.formats.bounds import bounds_of
 from augment.formats.commonroad_xml import Ids, add, number
-from augment.formats.writing import Cell, Report
+from augment.formats.writing import Cell, LossReport
 from augment.geometry.polyline import FloatArray, Polyline
 from augment.scene.entities import (
     Area,
@@ -43,7 +43,7 @@ _COLOURS = {
 }
 
 
-def write_lanes(root: ET.Element, cell: Cell, ids: Ids, report: Report) -> None:
+def write_lanes(root: ET.Element, cell: Cell, ids: Ids, report: LossReport) -> None:
     """Lanelets, then traffic signs, lights and intersections, as the schema orders them."""
     scene = cell.after
     graph = LaneGraph(scene)
@@ -99,7 +99,7 @@ def _add_lanelet(root: ET.Element, way: Way, graph: LaneGraph, ids: Ids) -> floa
     return _off_middle_m(way.centerline, (left + right) / 2.0)
 
 
-def _report_off(off_m: dict[str, float], report: Report) -> None:
+def _report_off(off_m: dict[str, float], report: LossReport) -> None:
     far = {name: distance for name, distance in off_m.items() if distance > _SAME_M}
     if far:
         names = ", ".join(f"{name} by {distance:.2f} m" for name, distance in far.items())
@@ -221,7 +221,7 @@ def _grouped(connectors: Sequence[LaneConnector]) -> list[list[LaneConnector]]:
     return [members for _, members in groups]
 
 
-def _report(scene: Scene, crossings: Sequence[Area], report: Report) -> None:
+def _report(scene: Scene, crossings: Sequence[Area], report: LossReport) -> None:
     written = {area.id for area in crossings}
     for kind in AreaKind:
         names = [a.id for a in scene.areas if a.kind is kind and a.id not in written]

@@ -14,7 +14,7 @@ import numpy as np
 from augment.formats.commonroad_lanes import write_lanes
 from augment.formats.commonroad_xml import Ids, add, number, text_of
 from augment.formats.movement_losses import appears_later, has_gaps, report_motion
-from augment.formats.writing import CannotExpress, Cell, Report, Written, write_each
+from augment.formats.writing import CannotExpress, Cell, LossReport, Written, write_each
 from augment.scene.entities import AgentType, TrafficAgent, TrafficSide
 from augment.scene.motion import FloatArray, Movement
 
@@ -44,7 +44,7 @@ def write(cells: Sequence[Cell]) -> Written:
 # Private
 
 
-def _write_one(cell: Cell, report: Report) -> dict[str, bytes]:
+def _write_one(cell: Cell, report: LossReport) -> dict[str, bytes]:
     scene = cell.after
     if not (scene.lanes or scene.connectors):
         raise CannotExpress("CommonRoad needs at least one lane, and this scene has none")
@@ -108,7 +108,7 @@ def _moves(movement: Movement) -> bool:
     return bool(np.hypot(*(seen - seen[0]).T).max() >= MOVES_M)
 
 
-def _add_static(root: ET.Element, movement: Movement, ids: Ids, report: Report) -> None:
+def _add_static(root: ET.Element, movement: Movement, ids: Ids, report: LossReport) -> None:
     agent, first = movement.agent, int(movement.is_present.argmax())
     if first > 0:
         report.lose(f"{agent.id} is first seen {first} steps after t0; it stands there from t0 on")
@@ -118,7 +118,7 @@ def _add_static(root: ET.Element, movement: Movement, ids: Ids, report: Report) 
     _add_state(obstacle, "initialState", movement.states[first], 0, has_speed=False)
 
 
-def _add_dynamic(root: ET.Element, movement: Movement, ids: Ids, report: Report) -> None:
+def _add_dynamic(root: ET.Element, movement: Movement, ids: Ids, report: LossReport) -> None:
     agent = movement.agent
     if appears_later(movement):
         report.lose(
@@ -180,7 +180,7 @@ def _add_problem(root: ET.Element, cell: Cell, ids: Ids) -> None:
     add(time, "intervalEnd", str(len(states) - 1))
 
 
-def _report(cell: Cell, report: Report) -> None:
+def _report(cell: Cell, report: LossReport) -> None:
     scene, ego = cell.after, cell.after.ego
     report_motion(cell, report)
     report.lose(

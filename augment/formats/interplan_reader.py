@@ -16,7 +16,7 @@ from augment.errors import InvalidDocument
 from augment.formats.interplan import STANDING_WALK_M, WALK_S, ReadEntry, ReadFile
 from augment.formats.interplan_schema import (
     WHAT,
-    Entry,
+    SpecialScenario,
     file_of,
     left_out_of_details,
     left_out_of_file,
@@ -88,7 +88,7 @@ def read_document(document: object, scenes: Mapping[str, Scene]) -> ReadFile:
     )
 
 
-def _read_entry(token: str, index: str | int, entry: Entry, scene: Scene) -> ReadEntry:
+def _read_entry(token: str, index: str | int, entry: SpecialScenario, scene: Scene) -> ReadEntry:
     placer = _Placer(scene, token, index)
     for kind, key, rows in (
         (AgentType.VEHICLE, "stopped_vehicle", entry.stopped_vehicle),

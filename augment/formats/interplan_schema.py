@@ -34,7 +34,7 @@ class _Part(BaseModel):
     model_config = ConfigDict(strict=True, extra="allow", allow_inf_nan=False, frozen=True)
 
 
-class Entry(_Part):
+class SpecialScenario(_Part):
     """One special scenario."""
 
     type: Annotated[ScenarioType, Strict(False)]
@@ -54,7 +54,7 @@ class Details(_Part):
     roadblock_locations_to_spawn_agents: list[Any] | None = None
     goal: dict[str, Any] | None = None
     spawn_in_intersection: bool | None = None
-    special_scenario: dict[Index, Entry] | None = None
+    special_scenario: dict[Index, SpecialScenario] | None = None
 
 
 class File(_Part):

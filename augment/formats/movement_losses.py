@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from augment.formats.writing import Cell, Report
+from augment.formats.writing import Cell, LossReport
 from augment.scene.motion import SETS_OUT_WITHIN_M, MotionSource, Movement
 
 
-def report_motion(cell: Cell, report: Report, *, can_trigger: bool = False) -> None:
+def report_motion(cell: Cell, report: LossReport, *, can_trigger: bool = False) -> None:
     """Say what of the motion was assumed, and what was fixed that depends on the ego.
 
     Args:

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from augment.formats.writing import Cell, Report, Written, write_each
+from augment.formats.writing import Cell, LossReport, Written, write_each
 from augment.scene.codec import modification_to_document, scene_to_document
 from augment.scene.motion import MotionSource, Movement
 from augment.scene.recording import Recording, Track
@@ -25,7 +25,7 @@ def write(cells: Sequence[Cell]) -> Written:
 # Private
 
 
-def _write_one(cell: Cell, report: Report) -> dict[str, bytes]:
+def _write_one(cell: Cell, report: LossReport) -> dict[str, bytes]:
     documents = {
         "before": scene_to_document(cell.scene),
         "scene": scene_to_document(cell.after),

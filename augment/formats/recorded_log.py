@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from augment.errors import InvalidDocument
 from augment.formats.reading import frame_in
-from augment.formats.road_map import Road
+from augment.formats.road_map import MapExtract
 from augment.formats.roads import RADIUS_M
 from augment.geometry.angles import wrap
 from augment.geometry.frames import Pose
@@ -91,7 +91,7 @@ class Log:
 
 
 def scene_at(
-    log: Log, frame: int, road: Road, *, name: str, world: str, provenance: str
+    log: Log, frame: int, road: MapExtract, *, name: str, world: str, provenance: str
 ) -> tuple[Scene, Recording]:
     """The scene at a frame, and what was recorded from there on.
 

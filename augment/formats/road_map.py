@@ -70,7 +70,7 @@ class RoadMap:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Road:
+class MapExtract:
     """What a scene takes from the map; ids count from the nearest to the ego.
 
     Attributes:

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from augment.errors import InvalidDocument
-from augment.formats.road_map import Name, Road, RoadMap, Segment
+from augment.formats.road_map import MapExtract, Name, RoadMap, Segment
 from augment.geometry.angles import difference
 from augment.geometry.frames import Pose
 from augment.geometry.polyline import Polyline
@@ -65,7 +65,7 @@ class Way:
         return (self.chain, _padded(self.before), _padded(self.after))
 
 
-def road_around(city: RoadMap, ego: Pose) -> Road:
+def road_around(city: RoadMap, ego: Pose) -> MapExtract:
     """The map around the ego.
 
     Args:
@@ -79,7 +79,7 @@ def road_around(city: RoadMap, ego: Pose) -> Road:
     lane_ids = _lane_ids(strips)
     lanes = _lanes(strips, lane_ids)
     side = traffic_side_of(lanes)
-    return Road(
+    return MapExtract(
         traffic_side=side or city.side,
         side_is_assumed=side is None,
         lanes=lanes,

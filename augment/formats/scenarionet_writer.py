@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from augment.formats.bounds import bounds_of
 from augment.formats.movement_losses import report_motion
-from augment.formats.writing import Cell, Report, Written, write_each
+from augment.formats.writing import Cell, LossReport, Written, write_each
 from augment.scene.entities import (
     AgentType,
     Area,
@@ -73,7 +73,7 @@ def write(cells: Sequence[Cell]) -> Written:
     """A data set: a file for each cell, the summary and the mapping."""
     summaries: dict[str, dict[str, Any]] = {}
 
-    def write_one(cell: Cell, report: Report) -> dict[str, bytes]:
+    def write_one(cell: Cell, report: LossReport) -> dict[str, bytes]:
         document = describe(cell, report)
         name = f"sd_{DATASET}_1_{cell.stem}.pkl"
         summaries[name] = document["metadata"]
@@ -87,7 +87,7 @@ def write(cells: Sequence[Cell]) -> Written:
     return replace(made, files=made.files | index)
 
 
-def describe(cell: Cell, report: Report) -> dict[str, Any]:
+def describe(cell: Cell, report: LossReport) -> dict[str, Any]:
     """One scenario as ScenarioNet's dictionary."""
     scene, motion = cell.after, cell.motion
     steps = len(motion.times_s)
@@ -141,7 +141,7 @@ def pickled(document: object) -> bytes:
 # Private
 
 
-def _report(cell: Cell, report: Report) -> None:
+def _report(cell: Cell, report: LossReport) -> None:
     scene = cell.after
     report_motion(cell, report)
     for kind in AgentType:

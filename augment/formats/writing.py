@@ -100,7 +100,7 @@ Writer = Callable[[Sequence[Cell]], Written]
 """Writes cells, all or those that can be said. The same cells always give the same bytes."""
 
 
-class Report:
+class LossReport:
     """Gathers the losses of one cell while it is written."""
 
     def __init__(self, cell: Cell) -> None:
@@ -122,14 +122,14 @@ class CannotExpress(Exception):
 
 
 def write_each(
-    cells: Sequence[Cell], write_one: Callable[[Cell, Report], dict[str, bytes]]
+    cells: Sequence[Cell], write_one: Callable[[Cell, LossReport], dict[str, bytes]]
 ) -> Written:
     """The cells one by one; what can't be expressed is refused by its name and reason."""
     files: dict[str, bytes] = {}
     losses: list[Loss] = []
     refused: list[Loss] = []
     for cell in cells:
-        report = Report(cell)
+        report = LossReport(cell)
         try:
             files |= write_one(cell, report)
         except CannotExpress as reason:

@@ -16,7 +16,7 @@ from augment.errors import InvalidDocument
 from augment.scene.schema import Document, problems_of
 
 
-class NoteKind(StrEnum):
+class SceneNoteKind(StrEnum):
     """A loss or an assumption."""
 
     NO_SPEED_LIMITS = "no_speed_limits"
@@ -57,7 +57,7 @@ class Note:
         names: What it concerns, where that has names.
     """
 
-    kind: NoteKind
+    kind: SceneNoteKind
     number: int | None = None
     of: int | None = None
     value: float | None = None
@@ -67,7 +67,7 @@ class Note:
 class NoteDocument(Document):
     """A `Note`."""
 
-    kind: Annotated[NoteKind, Strict(False)]
+    kind: Annotated[SceneNoteKind, Strict(False)]
     number: int | None = None
     of: int | None = None
     value: float | None = None

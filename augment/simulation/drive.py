@@ -12,7 +12,7 @@ from augment.sentences import sentence
 from augment.simulation.objects import Objects
 from augment.simulation.planning import Plan, Planner, Situation
 from augment.simulation.road import Road
-from augment.simulation.setting import Setting
+from augment.simulation.setting import DriveSetting
 from augment.simulation.states import STEP_S, EgoBody, FloatArray, X, Y, start_state
 from augment.simulation.tracker import drive_steps
 from augment.simulation.traffic import Traffic
@@ -50,7 +50,7 @@ class Drive:
 
 
 def run(
-    setting: Setting,
+    setting: DriveSetting,
     planner: Planner,
     *,
     road: Road | None = None,

@@ -12,7 +12,7 @@ from augment.scene.recording import Recording
 from augment.simulation.drive import DURATION_STEPS, run
 from augment.simulation.idm_planner import IdmPlanner
 from augment.simulation.road import Road
-from augment.simulation.setting import Setting
+from augment.simulation.setting import DriveSetting
 from augment.simulation.states import STEP_S, EgoBody
 
 
@@ -37,7 +37,7 @@ class Expert:
         return self.end_m - self.start_m
 
 
-def expert_of(setting: Setting, road: Road, *, steps: int = DURATION_STEPS) -> Expert:
+def expert_of(setting: DriveSetting, road: Road, *, steps: int = DURATION_STEPS) -> Expert:
     """The recorded ego, or an IDM drive at the speed limit without the change.
 
     The recorded one goes as far as the drive lasts and the map goes.

@@ -11,7 +11,7 @@ from augment.scene.recording import Recording
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Setting:
+class DriveSetting:
     """A scene with its change.
 
     Attributes:

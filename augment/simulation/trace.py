@@ -15,7 +15,7 @@ from augment.simulation.drive import Drive
 from augment.simulation.events import events_of
 from augment.simulation.objects import Kind
 from augment.simulation.score import Score
-from augment.simulation.setting import Setting
+from augment.simulation.setting import DriveSetting
 from augment.simulation.states import SPEED, STEP_S
 
 FORMAT, VERSION = "scenario-arena/drive", 1
@@ -25,7 +25,7 @@ LINE_EVERY = 8
 _AROUND_M = 90.0
 
 
-def trace_of(setting: Setting, drive: Drive, score: Score) -> dict[str, Any]:
+def trace_of(setting: DriveSetting, drive: Drive, score: Score) -> dict[str, Any]:
     """The document."""
     changed = {agent.id for agent in setting.modification.changed}
     return {
@@ -59,7 +59,7 @@ def _poses(boxes: FloatArray, speeds: FloatArray) -> list[list[float]]:
     ]
 
 
-def _objects(setting: Setting, drive: Drive, changed: set[str]) -> list[dict[str, Any]]:
+def _objects(setting: DriveSetting, drive: Drive, changed: set[str]) -> list[dict[str, Any]]:
     """Each object with its poses from its first moment on; one pose alone where it stands."""
     types = {agent.id: agent.type.value for agent in setting.after.agents}
     if setting.recording is not None:

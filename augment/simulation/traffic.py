@@ -10,7 +10,7 @@ from augment.simulation.lane_drivers import LaneDrivers, lane_under
 from augment.simulation.objects import Kind, Objects, joined
 from augment.simulation.replay import Replay, moves
 from augment.simulation.road import Road
-from augment.simulation.setting import Setting
+from augment.simulation.setting import DriveSetting
 from augment.simulation.states import SPEED, EgoBody, FloatArray
 from augment.simulation.walkers import Drifters, Walkers, objects_of
 
@@ -27,7 +27,7 @@ class Traffic:
     the IDM; anybody else who moves goes straight on.
     """
 
-    def __init__(self, setting: Setting, road: Road, body: EgoBody, ego: FloatArray) -> None:
+    def __init__(self, setting: DriveSetting, road: Road, body: EgoBody, ego: FloatArray) -> None:
         replayed = _replayed(setting, road)
         names = {track.agent_id for track in replayed}
         walking: list[TrafficAgent] = []
@@ -81,7 +81,7 @@ class Traffic:
             self._replay.step()
 
 
-def _replayed(setting: Setting, road: Road) -> list[Track]:
+def _replayed(setting: DriveSetting, road: Road) -> list[Track]:
     """The tracks that are played back."""
     if setting.recording is None or not setting.replay:
         return []

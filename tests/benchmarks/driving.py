@@ -21,7 +21,7 @@ from augment.simulation.pdm_closed import PdmClosed
 from augment.simulation.planning import Plan, Situation
 from augment.simulation.proposals import ORIGINAL_OFFSETS_M, PAPER_OFFSETS_M
 from augment.simulation.road import Road
-from augment.simulation.setting import Setting
+from augment.simulation.setting import DriveSetting
 from augment.simulation.states import EgoBody
 from augment.simulation.tracker import track
 from tests.benchmarks.report import load, table, write_section
@@ -73,7 +73,7 @@ def stage_ms(count: int) -> float:
 def driven(count: int, offsets: tuple[float, ...]) -> tuple[float, float, float]:
     """Median and 95th percentile of a planning step in ms, and the whole drive in s."""
     scene = street(700.0)
-    setting = Setting(scene=scene, modification=Modification(added=traffic(count)))
+    setting = DriveSetting(scene=scene, modification=Modification(added=traffic(count)))
     planner = Timed(offsets)
     started = time.process_time()
     run(setting, planner)

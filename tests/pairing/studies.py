@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections import Counter, defaultdict
 
 from arena.pairing.order import CHECK, MAIN, REPEAT
-from arena.pairing.plan import Check, Entry, MatchupPlan, PlannedMatchup, Rules
+from arena.pairing.plan import Check, Entry, MatchupPlan, PlannedMatchup, PlanRules
 
 APPEARANCES = {
     "interplan": 1960,
@@ -21,7 +21,7 @@ APPEARANCES = {
 """In how many of the paper's 5,760 votes each of its contestants appears."""
 
 
-def paper_rules(seed: int, *, votes: int = 640, experts: int = 9, **more: object) -> Rules:
+def paper_rules(seed: int, *, votes: int = 640, experts: int = 9, **more: object) -> PlanRules:
     """The paper's study, or one with its proportions and other numbers.
 
     Args:
@@ -43,7 +43,7 @@ def paper_rules(seed: int, *, votes: int = 640, experts: int = 9, **more: object
             for scenario in scenarios
         ),
     }
-    return Rules(
+    return PlanRules(
         entries=tuple(
             Entry(scenario=scenario, contestant=name, picture=f"{scenario} {name}")
             for scenario in scenarios
@@ -104,7 +104,7 @@ def chi_square_of_sides(made: MatchupPlan) -> float:
     return sum((left[name] - shown[name] / 2) ** 2 / (shown[name] / 4) for name in shown)
 
 
-def check_extras(asked: Rules, made: MatchupPlan) -> None:
+def check_extras(asked: PlanRules, made: MatchupPlan) -> None:
     """Positions, repeats, checks and sides of every expert are as the rules say."""
     for mine in by_expert(made).values():
         mains = [matchup for matchup in mine if matchup.kind == MAIN]

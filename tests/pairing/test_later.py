@@ -12,12 +12,12 @@ from arena.pairing.following import follow_on
 from arena.pairing.later import Wanted, deal, judges, units_of
 from arena.pairing.order import CHECK, MAIN, REPEAT
 from arena.pairing.plan import PlannedMatchup, plan
-from arena.pairing.rules import Rules, grid_of
+from arena.pairing.rules import PlanRules, grid_of
 from tests.pairing.studies import by_expert, pair, paper_rules, smallest_gap
 
 
 def handed_over(
-    rules: Rules, giver: str, done: int, to: list[str]
+    rules: PlanRules, giver: str, done: int, to: list[str]
 ) -> dict[str, list[PlannedMatchup]]:
     """Everybody's showings after the giver stopped at a position."""
     made = by_expert(plan(rules))

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from arena.errors import NothingToPlan
 from arena.pairing.order import _two_places
-from arena.pairing.plan import Entry, MatchupPlan, PlannedMatchup, Rules, plan
+from arena.pairing.plan import Entry, MatchupPlan, PlannedMatchup, PlanRules, plan
 
 
 def rules(
@@ -21,7 +21,7 @@ def rules(
     seed: int = 1,
     without: frozenset[tuple[int, int]] = frozenset(),
     same: frozenset[tuple[int, int]] = frozenset(),
-) -> Rules:
+) -> PlanRules:
     """All cells but those (contestant, scenario) in `without`; those in `same` look alike."""
     entries = tuple(
         Entry(
@@ -34,7 +34,7 @@ def rules(
         if (c, s) not in without
     )
     names = tuple(f"e{number}" for number in range(experts))
-    return Rules(entries=entries, experts=names, votes_per_expert=votes, seed=seed)
+    return PlanRules(entries=entries, experts=names, votes_per_expert=votes, seed=seed)
 
 
 def pair(matchup: PlannedMatchup) -> frozenset[str]:
@@ -47,7 +47,7 @@ def spread(counts: Counter[object], places: int) -> int:
     return max(values) - min(values)
 
 
-def check_rules_hold(asked: Rules, made: MatchupPlan) -> None:
+def check_rules_hold(asked: PlanRules, made: MatchupPlan) -> None:
     """What holds for every plan, whatever was available."""
     pictures = {(entry.scenario, entry.contestant): entry.picture for entry in asked.entries}
     for expert in asked.experts:
@@ -115,7 +115,7 @@ def test_a_plan_with_holes_keeps_every_rule(
     check_rules_hold(asked, made)
 
 
-def units(asked: Rules) -> int:
+def units(asked: PlanRules) -> int:
     count = 0
     for one, other in combinations(asked.entries, 2):
         count += one.scenario == other.scenario and one.picture != other.picture
@@ -132,7 +132,7 @@ def test_the_scenario_gap_is_the_largest_possible(counts: list[int], seed: int) 
         for c in range(contestants + 1)
     )
     showings = [(n + 1) * n // 2 for n in counts]
-    asked = Rules(entries=entries, experts=("e",), votes_per_expert=sum(showings), seed=seed)
+    asked = PlanRules(entries=entries, experts=("e",), votes_per_expert=sum(showings), seed=seed)
 
     made = plan(asked)
 

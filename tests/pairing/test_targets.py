@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from arena.errors import NothingToPlan
 from arena.pairing.order import MAIN
-from arena.pairing.plan import Entry, Rules, plan
+from arena.pairing.plan import Entry, PlanRules, plan
 from arena.pairing.targets import votes_by_appearances
 from tests.pairing.studies import (
     APPEARANCES,
@@ -79,7 +79,7 @@ def test_sums_that_some_votes_have_are_reached(size: int, most: int, seed: int) 
     assert (votes <= capacity).all()
 
 
-def small(**rules: object) -> Rules:
+def small(**rules: object) -> PlanRules:
     """Four contestants, eight scenarios, two experts with twelve votes each."""
     given: dict[str, object] = {
         "entries": tuple(
@@ -91,7 +91,7 @@ def small(**rules: object) -> Rules:
         "votes_per_expert": 12,
         "seed": 1,
     }
-    return Rules(**{**given, **rules})  # type: ignore[arg-type]
+    return PlanRules(**{**given, **rules})  # type: ignore[arg-type]
 
 
 def test_targets_by_pair_are_met_exactly() -> None:

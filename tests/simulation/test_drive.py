@@ -25,7 +25,7 @@ from augment.simulation.pdm_closed import PdmClosed
 from augment.simulation.planning import Plan, Situation
 from augment.simulation.road import Road
 from augment.simulation.score import score_drive
-from augment.simulation.setting import Setting
+from augment.simulation.setting import DriveSetting
 from augment.simulation.states import EgoBody, FloatArray, X, Y
 from tests.scenes import pedestrian, vehicle
 from tests.simulation.worlds import street
@@ -78,8 +78,8 @@ def test_a_moved_or_mirrored_world_gives_the_moved_or_mirrored_drive(
     rider = replace(vehicle("B", 30.0, 4.0, math.pi + 0.4), speed_mps=4.0)
     scene = replace(bend(), agents=(parked, rider))
     frame = Pose(x_m=x_m, y_m=y_m, heading_rad=turn_rad)
-    here = run(Setting(scene=scene), PdmClosed(), steps=8)
-    there = run(Setting(scene=moved_scene(scene, frame, flip)), PdmClosed(), steps=8)
+    here = run(DriveSetting(scene=scene), PdmClosed(), steps=8)
+    there = run(DriveSetting(scene=moved_scene(scene, frame, flip)), PdmClosed(), steps=8)
     places = frame.to_parent(here.states[:, [X, Y]] * np.array([1.0, flip]))
     assert there.states[:, [X, Y]] == pytest.approx(places, abs=1e-5)
     assert there.states[:, 3:5] == pytest.approx(here.states[:, 3:5], abs=1e-5)
@@ -97,13 +97,13 @@ print(hashlib.sha256(run(busy(), PdmClosed(), steps=8).states.tobytes()).hexdige
 """
 
 
-def busy() -> Setting:
+def busy() -> DriveSetting:
     agents = (
         vehicle("A", 25.0, -1.3),
         replace(vehicle("B", 40.0, 0.0), speed_mps=5.0),
         pedestrian("C", 30.0, -6.0, (30.0, 6.0)),
     )
-    return Setting(scene=street(), modification=Modification(added=agents))
+    return DriveSetting(scene=street(), modification=Modification(added=agents))
 
 
 def test_another_process_drives_the_same_to_the_last_bit() -> None:
@@ -123,7 +123,7 @@ def test_another_process_drives_the_same_to_the_last_bit() -> None:
 
 
 def test_the_drive_ends_where_the_map_does_and_nobody_brakes_for_it() -> None:
-    setting = Setting(scene=street(40.0, speed_mps=10.0))
+    setting = DriveSetting(scene=street(40.0, speed_mps=10.0))
     drive = run(setting, IdmPlanner(target_mps=None), steps=100)
     assert drive.at_map_end
     assert drive.boxes[-1, 0] + 2.588 == pytest.approx(40.0, abs=1.0)
@@ -133,14 +133,18 @@ def test_the_drive_ends_where_the_map_does_and_nobody_brakes_for_it() -> None:
 
 
 def test_the_expert_is_an_idm_drive_without_the_change() -> None:
-    blocked = Setting(scene=street(), modification=Modification(added=(vehicle("A", 20.0, 0.0),)))
+    blocked = DriveSetting(
+        scene=street(), modification=Modification(added=(vehicle("A", 20.0, 0.0),))
+    )
     expert = expert_of(blocked, Road(street()), steps=50)
     assert expert.kind is ExpertKind.IDM
     assert 40.0 < expert.progress_m < 50.0
 
 
 def test_the_idm_planner_waits_behind_what_stands() -> None:
-    blocked = Setting(scene=street(), modification=Modification(added=(vehicle("A", 40.0, 0.0),)))
+    blocked = DriveSetting(
+        scene=street(), modification=Modification(added=(vehicle("A", 40.0, 0.0),))
+    )
     drive = run(blocked, IdmPlanner(), steps=80)
     assert drive.states[-1, 3] < 0.3
     assert 0.3 < 40.0 - 2.4 - (drive.boxes[-1, 0] + 2.588) < 2.0
@@ -167,24 +171,24 @@ class Wrong(Straight):
 
 
 def test_a_planner_of_ones_own_is_driven() -> None:
-    drive = run(Setting(scene=street()), Straight(), steps=10)
+    drive = run(DriveSetting(scene=street()), Straight(), steps=10)
     assert drive.boxes[-1, 0] == pytest.approx(8.0, abs=1e-6)
 
 
 def test_an_answer_of_another_shape_names_it() -> None:
     with pytest.raises(CannotDrive, match=r"\(10, 2\)"):
-        run(Setting(scene=street()), Wrong(), steps=10)
+        run(DriveSetting(scene=street()), Wrong(), steps=10)
 
 
 def test_an_ego_off_every_lane_can_not_be_driven() -> None:
     lost = replace(street(), ego=replace(street().ego, y_m=-30.0))
     with pytest.raises(CannotDrive, match="no lane"):
-        run(Setting(scene=lost), Straight())
+        run(DriveSetting(scene=lost), Straight())
 
 
 def test_progress_is_told_after_every_step() -> None:
     told: list[int] = []
-    made: Drive = run(Setting(scene=street()), Straight(), steps=5, after_step=told.append)
+    made: Drive = run(DriveSetting(scene=street()), Straight(), steps=5, after_step=told.append)
     assert told == [1, 2, 3, 4, 5]
     assert len(made.plans) == 5
     shape: FloatArray = made.states

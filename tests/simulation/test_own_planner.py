@@ -11,7 +11,7 @@ from augment.errors import CannotDrive, UnknownName
 from augment.simulation.drive import run
 from augment.simulation.pdm_closed import PdmClosed
 from augment.simulation.planners import planner_named
-from augment.simulation.setting import Setting
+from augment.simulation.setting import DriveSetting
 from tests.house.source import ROOT
 from tests.simulation.worlds import street
 
@@ -23,7 +23,9 @@ def test_the_documented_planner_drives(monkeypatch: pytest.MonkeyPatch) -> None:
     module = ModuleType("my_planners")
     exec(compile(found.group(1), "my_planners", "exec"), module.__dict__)
     monkeypatch.setitem(__import__("sys").modules, "my_planners", module)
-    drive = run(Setting(scene=street()), planner_named("my_planners.AlongTheCentreline"), steps=10)
+    drive = run(
+        DriveSetting(scene=street()), planner_named("my_planners.AlongTheCentreline"), steps=10
+    )
     assert drive.boxes[-1, 0] == pytest.approx(8.0, abs=0.01)
 
 

@@ -16,7 +16,7 @@ from augment.simulation.expert import ExpertKind, expert_of
 from augment.simulation.pdm_closed import PdmClosed
 from augment.simulation.proposals import ORIGINAL_OFFSETS_M
 from augment.simulation.road import Road
-from augment.simulation.setting import Setting
+from augment.simulation.setting import DriveSetting
 from tests.recorded import recorded
 
 pytestmark = pytest.mark.realdata
@@ -27,7 +27,7 @@ def test_the_recorded_scene_is_driven_with_replayed_and_with_reactive_traffic(
 ) -> None:
     scene, recording = recorded(realdata)
     road = Road(scene, recording)
-    setting = Setting(scene=scene, recording=recording)
+    setting = DriveSetting(scene=scene, recording=recording)
     # The recorded ego turns left after 65 m; the straightest route would go on.
     ends = recording.ego[~np.isnan(recording.ego).any(axis=1)][[-1], :2]
     assert abs(road.centreline.beside(ends)[1][0]) < 2.0
@@ -54,7 +54,9 @@ def test_a_car_parked_in_the_ego_s_lane_changes_the_drive(realdata: Path) -> Non
         id="Added1", type=AgentType.VEHICLE, x_m=x_m, y_m=y_m, heading_rad=heading_rad,
         width_m=2.0, length_m=4.8,
     )  # fmt: skip
-    setting = Setting(scene=scene, recording=recording, modification=Modification(added=(parked,)))
+    setting = DriveSetting(
+        scene=scene, recording=recording, modification=Modification(added=(parked,))
+    )
     drive = run(setting, PdmClosed(), road=road, steps=25)
     beside = np.abs(road.centreline.beside(drive.boxes[:, :2])[1])
     assert beside.max() > 0.8, "it goes to the side"

@@ -14,14 +14,14 @@ from augment.scene.modification import Modification
 from augment.scene.recording import Recording, Track
 from augment.simulation.objects import Objects
 from augment.simulation.road import Road
-from augment.simulation.setting import Setting
+from augment.simulation.setting import DriveSetting
 from augment.simulation.states import start_state
 from augment.simulation.traffic import Traffic
 from tests.scenes import cone, pedestrian, vehicle
 from tests.simulation.worlds import BODY, street
 
 
-def after(setting: Setting, steps: int, *, ego_speed_mps: float = 0.0) -> list[Objects]:
+def after(setting: DriveSetting, steps: int, *, ego_speed_mps: float = 0.0) -> list[Objects]:
     """Everybody at each moment, while the ego goes straight at that speed."""
     road = Road(setting.scene, setting.recording)
     ego = start_state(setting.scene.ego, BODY)
@@ -35,8 +35,8 @@ def after(setting: Setting, steps: int, *, ego_speed_mps: float = 0.0) -> list[O
     return made
 
 
-def with_agents(*agents: TrafficAgent, length_m: float = 400.0) -> Setting:
-    return Setting(scene=street(length_m), modification=Modification(added=agents))
+def with_agents(*agents: TrafficAgent, length_m: float = 400.0) -> DriveSetting:
+    return DriveSetting(scene=street(length_m), modification=Modification(added=agents))
 
 
 def place(objects: Objects, name: str) -> tuple[float, float]:
@@ -89,7 +89,7 @@ def test_lane_drivers_stop_at_a_red_light() -> None:
         traffic_light=TrafficLight.RED,
     )
     driver = replace(vehicle("V", 20.0, 0.0), speed_mps=8.0)
-    setting = Setting(
+    setting = DriveSetting(
         scene=replace(plain, connectors=(crossing,)), modification=Modification(added=(driver,))
     )
     x, _ = place(after(setting, 140)[-1], "V")
@@ -114,7 +114,7 @@ def test_a_driver_leaves_at_the_end_of_the_map() -> None:
     assert "V" not in made[-1].ids
 
 
-def recorded(reactive: bool = False, modification: Modification | None = None) -> Setting:
+def recorded(reactive: bool = False, modification: Modification | None = None) -> DriveSetting:
     """Agent2 drives ahead at 6 m/s and brakes at once; Agent3 is seen from 1 s to 2 s."""
     times = np.arange(151, dtype=np.float64) * 0.1
     stopping = np.zeros((151, 4))
@@ -130,7 +130,7 @@ def recorded(reactive: bool = False, modification: Modification | None = None) -
         Track(agent_id="Agent3", type="VEHICLE", length_m=4.8, width_m=2.0, states=passing),
     )
     agent = replace(vehicle("Agent2", 20.0, 0.0), speed_mps=6.0)
-    return Setting(
+    return DriveSetting(
         scene=replace(street(), agents=(agent,)),
         modification=modification or Modification(),
         recording=Recording(times_s=times, ego=ego, tracks=tracks),

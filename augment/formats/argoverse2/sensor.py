@@ -17,9 +17,9 @@ from augment.formats.argoverse2.log import BOXES, WHAT, read_log
 from augment.formats.argoverse2.map_file import MapFile, read_map, road_map
 from augment.formats.reading import Moment, Reading, frames_every
 from augment.formats.recorded_log import scene_at
-from augment.formats.road_map import Road
+from augment.formats.road_map import MapExtract
 from augment.formats.roads import road_around
-from augment.scene.notes import Note, NoteKind
+from augment.scene.notes import Note, SceneNoteKind
 
 LICENCE = "CC BY-NC-SA 4.0"
 
@@ -67,25 +67,27 @@ class ArgoverseSensor:
         return Reading(
             scene=scene,
             recording=recording,
-            notes=(*map_notes(city, road), Note(kind=NoteKind.SPEEDS_DIFFERENCED)),
+            notes=(*map_notes(city, road), Note(kind=SceneNoteKind.SPEEDS_DIFFERENCED)),
             moment=Moment(frame=frame),
         )
 
 
-def map_notes(city: MapFile, road: Road) -> tuple[Note, ...]:
+def map_notes(city: MapFile, road: MapExtract) -> tuple[Note, ...]:
     """What maps of Argoverse 2 don't say."""
     bicycle_lanes = sum(one.lane_type == "BIKE" for one in city.lane_segments.values())
     notes = [
-        Note(kind=NoteKind.NO_SPEED_LIMITS),
-        Note(kind=NoteKind.NO_LIGHTS),
-        Note(kind=NoteKind.NO_WALKWAYS),
+        Note(kind=SceneNoteKind.NO_SPEED_LIMITS),
+        Note(kind=SceneNoteKind.NO_LIGHTS),
+        Note(kind=SceneNoteKind.NO_WALKWAYS),
     ]
     if bicycle_lanes:
-        notes.append(Note(kind=NoteKind.BICYCLE_LANES_LEFT_OUT, number=bicycle_lanes))
+        notes.append(Note(kind=SceneNoteKind.BICYCLE_LANES_LEFT_OUT, number=bicycle_lanes))
     if road.side_is_assumed:
         # All logs are from the United States.
-        notes.append(Note(kind=NoteKind.TRAFFIC_SIDE_ASSUMED, names=(road.traffic_side.value,)))
-    return (*notes, Note(kind=NoteKind.NON_COMMERCIAL, names=(LICENCE,)))
+        notes.append(
+            Note(kind=SceneNoteKind.TRAFFIC_SIDE_ASSUMED, names=(road.traffic_side.value,))
+        )
+    return (*notes, Note(kind=SceneNoteKind.NON_COMMERCIAL, names=(LICENCE,)))
 
 
 def map_file_in(folder: Path, what: str) -> Path:

@@ -10,7 +10,7 @@ from django.core.management.base import CommandError
 
 from augment.errors import AugmentError
 from augment.formats.readers import READERS
-from augment.services.scenarios.scene_imports import Imported, import_log
+from augment.services.scenarios.scene_imports import ImportedMoment, import_log
 from augment.services.scenarios.scene_notes import notes_of
 from augment.services.terminal import TerminalCommand
 
@@ -62,7 +62,7 @@ class Command(TerminalCommand):
         self.stdout.write(f"Imported {new} scenes.")
 
 
-def _line(one: Imported) -> str:
+def _line(one: ImportedMoment) -> str:
     if not one.is_new:
         return f"{one.moment}: the same scene is stored already, as {one.row.slug}."
     agents = len(one.row.document["agents"])

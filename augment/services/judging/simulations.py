@@ -33,7 +33,7 @@ from augment.simulation.planners import PDM_CLOSED, planner_named
 from augment.simulation.progress import red_lights
 from augment.simulation.road import Road
 from augment.simulation.score import Score, ScoreKind, score_drive
-from augment.simulation.setting import Setting
+from augment.simulation.setting import DriveSetting
 from augment.simulation.trace import trace_of
 
 logger = logging.getLogger(__name__)
@@ -283,7 +283,7 @@ def _driven(row: Simulation, beating: Callable[[int], None]) -> dict[str, Any]:
     }
 
 
-def setting_of(row: Simulation) -> Setting:
+def setting_of(row: Simulation) -> DriveSetting:
     """What a row drives.
 
     Raises:
@@ -291,7 +291,7 @@ def setting_of(row: Simulation) -> Setting:
     """
     scenario = row.scenario
     recording = scenario.base_scene.recording
-    return Setting(
+    return DriveSetting(
         scene=scene_of(scenario),
         modification=_modification(row),
         recording=None if recording is None else recording_from_document(recording),

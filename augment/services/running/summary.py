@@ -27,7 +27,7 @@ class ContestantLine:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class FailureGroup:
+class ReasonCount:
     """Rows that failed for the same reason."""
 
     reason: str
@@ -46,8 +46,8 @@ def contestant_lines(job: GenerationJob) -> list[ContestantLine]:
     return [ContestantLine(**group) for group in cast("list[dict[str, Any]]", list(groups))]
 
 
-def failure_groups(job: GenerationJob) -> list[FailureGroup]:
+def failure_groups(job: GenerationJob) -> list[ReasonCount]:
     """The reasons of the failed rows, the most frequent first."""
     failed = job.augmentations.filter(state=State.FAILED).values("reason")
     groups = failed.annotate(count=Count("pk")).order_by("-count", "reason")
-    return [FailureGroup(reason=group["reason"], count=group["count"]) for group in groups]
+    return [ReasonCount(reason=group["reason"], count=group["count"]) for group in groups]

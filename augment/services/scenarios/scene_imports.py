@@ -24,7 +24,7 @@ from augment.services.scenarios.scenes import SLUG_LENGTH, check_slug
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Imported:
+class ImportedMoment:
     """One moment of a log.
 
     Attributes:
@@ -80,7 +80,7 @@ def import_log(
     limit: int | None = None,
     slug: str,
     actor: User | None = None,
-) -> Iterator[Imported]:
+) -> Iterator[ImportedMoment]:
     """Keep every so many seconds of a log as a scene of its own, one by one.
 
     Args:
@@ -109,10 +109,10 @@ def import_log(
         same = _same(document)
         if same is not None:
             number -= 1
-            yield Imported(moment=moment, row=same, is_new=False)
+            yield ImportedMoment(moment=moment, row=same, is_new=False)
             continue
         row = _keep(reading, document, reader=reader, path=path, slug=name, actor=actor)
-        yield Imported(moment=moment, row=row, is_new=True)
+        yield ImportedMoment(moment=moment, row=row, is_new=True)
 
 
 def content_hash(document: dict[str, Any]) -> str:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from django.utils.translation import gettext_noop
 
 from augment.models import BaseScene
-from augment.scene.notes import Note, NoteKind, notes_from_document
+from augment.scene.notes import Note, SceneNoteKind, notes_from_document
 from augment.sentences import Sentence, Value, sentence
 from augment.simulation.lane_drivers import FALLBACK_MPS
 from augment.simulation.proposals import FALLBACK_LIMIT_MPS
@@ -30,84 +30,84 @@ def said_of(note: Note) -> Sentence:
     return sentence(text, **{k: v for k, v in values.items() if f"%({k})s" in text})
 
 
-_TEXTS: dict[NoteKind, str] = {
-    NoteKind.NO_SPEED_LIMITS: gettext_noop(
+_TEXTS: dict[SceneNoteKind, str] = {
+    SceneNoteKind.NO_SPEED_LIMITS: gettext_noop(
         "No speed limits in this source: a drive assumes %(ego)s m/s for the ego and %(others)s"
         " m/s for others."
     ),
-    NoteKind.SOME_SPEED_LIMITS: gettext_noop(
+    SceneNoteKind.SOME_SPEED_LIMITS: gettext_noop(
         "%(number)s of %(of)s lanes have no speed limit: a drive assumes %(ego)s m/s for the ego"
         " and %(others)s m/s for others there."
     ),
-    NoteKind.SPEED_LIMITS_IGNORED: gettext_noop(
+    SceneNoteKind.SPEED_LIMITS_IGNORED: gettext_noop(
         "The speed limit of %(number)s lanes is a constant %(value)s m/s that means nothing; it"
         " was left out."
     ),
-    NoteKind.NO_LIGHTS: gettext_noop(
+    SceneNoteKind.NO_LIGHTS: gettext_noop(
         "No traffic lights in this source: their state is unknown everywhere."
     ),
-    NoteKind.NO_WALKWAYS: gettext_noop("No sidewalks in this source."),
-    NoteKind.NO_DRIVABLE_AREAS: gettext_noop(
+    SceneNoteKind.NO_WALKWAYS: gettext_noop("No sidewalks in this source."),
+    SceneNoteKind.NO_DRIVABLE_AREAS: gettext_noop(
         "No drivable areas in this source: what can be driven on is the lanes alone."
     ),
-    NoteKind.NO_CONNECTIVITY: gettext_noop(
+    SceneNoteKind.NO_CONNECTIVITY: gettext_noop(
         "This source does not say which lane leads to which: no lane has a successor."
     ),
-    NoteKind.NO_INTERSECTIONS: gettext_noop(
+    SceneNoteKind.NO_INTERSECTIONS: gettext_noop(
         "No intersections in this source: where lanes part, they are lanes, not connectors, and"
         " have neither turn type nor light."
     ),
-    NoteKind.NO_BOX_SIZES: gettext_noop(
+    SceneNoteKind.NO_BOX_SIZES: gettext_noop(
         "No box sizes in this source: every object has the usual size of its class."
     ),
-    NoteKind.SOME_BOX_SIZES: gettext_noop(
+    SceneNoteKind.SOME_BOX_SIZES: gettext_noop(
         "%(number)s of %(of)s objects have no box size: the usual size of their class was taken."
     ),
-    NoteKind.EGO_SIZE_ASSUMED: gettext_noop(
+    SceneNoteKind.EGO_SIZE_ASSUMED: gettext_noop(
         "The ego's size is not in this source: %(value)s m long was assumed."
     ),
-    NoteKind.EGO_SIZE_SWAPPED: gettext_noop(
+    SceneNoteKind.EGO_SIZE_SWAPPED: gettext_noop(
         "The ego's length and width were swapped in this source; they were put right."
     ),
-    NoteKind.NO_EGO_MOTION: gettext_noop(
+    SceneNoteKind.NO_EGO_MOTION: gettext_noop(
         "The ego's own motion was not recorded: a drive is measured against an IDM drive."
     ),
-    NoteKind.SPEEDS_DIFFERENCED: gettext_noop(
+    SceneNoteKind.SPEEDS_DIFFERENCED: gettext_noop(
         "No speeds in this source: they were taken from the recorded places."
     ),
-    NoteKind.LANE_WIDTHS_ASSUMED: gettext_noop(
+    SceneNoteKind.LANE_WIDTHS_ASSUMED: gettext_noop(
         "%(number)s of %(of)s lanes have no boundaries on both sides: where nothing beside them"
         " told the width, %(value)s m was assumed."
     ),
-    NoteKind.TRAFFIC_SIDE_ASSUMED: gettext_noop(
+    SceneNoteKind.TRAFFIC_SIDE_ASSUMED: gettext_noop(
         "No two oncoming lanes lie side by side: that people drive on the %(names)s is what the"
         " place says."
     ),
-    NoteKind.BICYCLE_LANES_LEFT_OUT: gettext_noop(
+    SceneNoteKind.BICYCLE_LANES_LEFT_OUT: gettext_noop(
         "%(number)s bicycle lanes of the map were left out."
     ),
-    NoteKind.OBJECTS_LEFT_OUT: gettext_noop(
+    SceneNoteKind.OBJECTS_LEFT_OUT: gettext_noop(
         "%(number)s objects were left out, which no class here fits: %(names)s."
     ),
-    NoteKind.CLASSES_MERGED: gettext_noop(
+    SceneNoteKind.CLASSES_MERGED: gettext_noop(
         "Finer classes of this source count as ours: %(names)s."
     ),
-    NoteKind.MAP_PARTS_LEFT_OUT: gettext_noop(
+    SceneNoteKind.MAP_PARTS_LEFT_OUT: gettext_noop(
         "%(number)s parts of the map have no place here and were left out: %(names)s."
     ),
-    NoteKind.LIGHTS_REPEATED: gettext_noop(
+    SceneNoteKind.LIGHTS_REPEATED: gettext_noop(
         "%(number)s lights are programmed, not recorded: their state is that of the cycle at t0."
     ),
-    NoteKind.BOUNDARIES_TURNED: gettext_noop(
+    SceneNoteKind.BOUNDARIES_TURNED: gettext_noop(
         "%(number)s boundaries ran against their lane and were turned."
     ),
-    NoteKind.TURN_TYPES_CORRECTED: gettext_noop(
+    SceneNoteKind.TURN_TYPES_CORRECTED: gettext_noop(
         "The turn type of %(number)s connectors contradicts their shape; the shape was believed."
     ),
-    NoteKind.LONG_TIME_STEP: gettext_noop(
+    SceneNoteKind.LONG_TIME_STEP: gettext_noop(
         "Steps of this recording lie %(value)s s apart; a drive looks between them."
     ),
-    NoteKind.NON_COMMERCIAL: gettext_noop(
+    SceneNoteKind.NON_COMMERCIAL: gettext_noop(
         "The data's licence, %(names)s, does not allow commercial use."
     ),
 }
