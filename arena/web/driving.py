@@ -49,6 +49,7 @@ def simulate_job(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
         is_reactive=request.POST.get("reactive") == "on",
     )
     try:
+        options.check_built_in()
         with transaction.atomic():
             waiting = simulations.plan_job(job=job, options=options)
             transaction.on_commit(partial(_send, request, waiting))

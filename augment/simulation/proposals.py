@@ -15,9 +15,10 @@ from augment.simulation.idm import PROPOSAL_IDM
 from augment.simulation.leaders import Corridor
 from augment.simulation.states import STEP_S, EgoBody, FloatArray
 
-ORIGINAL_OFFSETS_M = (-1.0, 0.0, 1.0)
-PAPER_OFFSETS_M = (-4.0, -3.0, -2.0, -1.0, 0.0, 1.0, 2.0, 3.0, 4.0)
-"""The paper says up to 4 m; steps of 1 m are our reading."""
+ORIGINAL_OFFSETS_M = (0.0, -1.0, 1.0)
+"""The centreline first: of equal scores, all zero among them, the lowest number wins."""
+PAPER_OFFSETS_M = (0.0, -1.0, 1.0, -2.0, 2.0, -3.0, 3.0, -4.0, 4.0)
+"""The paper says up to 4 m; steps of 1 m and their order are our reading."""
 SPEED_SHARES = (0.2, 0.4, 0.6, 0.8, 1.0)
 HORIZON_STEPS = 40
 WHOLE_STEPS = 80

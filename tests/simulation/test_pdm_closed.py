@@ -12,7 +12,7 @@ from augment.scene.entities import TrafficAgent
 from augment.simulation.braking import brake, must_brake
 from augment.simulation.pdm_closed import PdmClosed
 from augment.simulation.planning import Plan, Situation
-from augment.simulation.proposals import ORIGINAL_OFFSETS_M, Quirks
+from augment.simulation.proposals import ORIGINAL_OFFSETS_M, PAPER_OFFSETS_M, Quirks
 from augment.simulation.road import Road
 from augment.simulation.states import FloatArray, start_state
 from augment.simulation.walkers import objects_of
@@ -44,7 +44,7 @@ def test_fifteen_proposals_by_default_of_the_release_and_45_of_the_paper() -> No
 def test_on_a_free_road_it_keeps_to_the_centreline_at_the_limit() -> None:
     plan = planned([])
     assert plan.proposals is not None
-    assert plan.proposals.chosen == 4 * 5 + 4
+    assert plan.proposals.chosen == 4, "the first path at the last speed"
     assert plan.poses[:, 1] == pytest.approx(np.zeros(81), abs=1e-9)
 
 
@@ -82,7 +82,7 @@ def test_a_stale_leader_changes_what_slow_policies_see() -> None:
 def test_it_goes_round_a_parked_car_that_leaves_room() -> None:
     plan = planned([vehicle("A", 25.0, -1.4)])
     assert plan.proposals is not None
-    assert divmod(plan.proposals.chosen, 5)[0] - 4 >= 1  # to the left
+    assert PAPER_OFFSETS_M[plan.proposals.chosen // 5] >= 1.0, "to the left"
 
 
 @pytest.mark.parametrize(
@@ -144,6 +144,15 @@ def test_it_brakes_only_slowly_driven_and_soon_hit() -> None:
     assert must_brake(2.0, 5.0)
     assert not must_brake(2.1, 5.0)
     assert not must_brake(2.0, 5.01)
+
+
+def test_where_every_proposal_fails_it_keeps_to_the_centreline() -> None:
+    wall = [vehicle(f"A{n}", 12.0, y, math.pi / 2.0) for n, y in enumerate((-6.0, -1.0, 4.0, 9.0))]
+    plan = planned(wall, speed_mps=9.0)
+    assert plan.proposals is not None
+    assert plan.proposals.scores.max() == 0.0
+    assert plan.proposals.chosen == 0
+    assert plan.poses[:, 1] == pytest.approx(np.zeros(81), abs=1e-9)
 
 
 def test_the_brakes_command() -> None:

@@ -39,12 +39,13 @@ def test_the_button_plans_the_drives_and_queues_them(
     assert len(waiting) == 1
 
 
-def test_a_planner_that_nobody_knows_is_said_and_nothing_is_planned() -> None:
+@pytest.mark.parametrize("planner", ["pdm-open", "tests.jobs.test_simulations.Straight"])
+def test_a_page_drives_with_the_projects_own_planners_alone(planner: str) -> None:
     job = launched()
     admin = signed_in(people()["admin"])
-    sent = {"planner": "pdm-open"}
+    sent = {"planner": planner}
     shown = admin.post(reverse("job-simulate", args=[job.code]), sent, follow=True)
-    assert "pdm-open" in shown.content.decode()
+    assert planner in shown.content.decode()
     assert not Simulation.objects.exists()
 
 

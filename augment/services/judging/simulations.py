@@ -17,7 +17,7 @@ from django.db import transaction
 from django.db.models import Q, QuerySet
 from django.utils import timezone
 
-from augment.errors import AugmentError, Conflict, LeaseLost
+from augment.errors import AugmentError, Conflict, LeaseLost, UnknownName
 from augment.models import Augmentation, GenerationJob, Scenario, Simulation
 from augment.scene.catalogue import ScenarioType
 from augment.scene.codec import modification_from_document
@@ -29,7 +29,7 @@ from augment.services.scenarios.scenes import reference_of, scene_of
 from augment.simulation.criticality import criticality
 from augment.simulation.drive import Drive, run
 from augment.simulation.expert import expert_of
-from augment.simulation.planners import PDM_CLOSED, planner_named
+from augment.simulation.planners import NAMED, PDM_CLOSED, planner_named
 from augment.simulation.progress import red_lights
 from augment.simulation.road import Road
 from augment.simulation.score import Score, ScoreKind, score_drive
@@ -56,6 +56,15 @@ class Options:
     def check(self) -> None:
         """Raise UnknownName or CannotDrive unless there is such a planner."""
         planner_named(self.planner, offsets=self.offsets)
+
+    def check_built_in(self) -> None:
+        """Raise UnknownName unless the planner is one of the project's own.
+
+        A dotted path runs code of whoever names it: that is for the command line, not for pages.
+        """
+        if self.planner not in NAMED:
+            raise UnknownName("planner", self.planner, list(NAMED))
+        self.check()
 
     def of(self, rows: QuerySet[Simulation]) -> QuerySet[Simulation]:
         """Those driven so."""
