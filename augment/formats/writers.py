@@ -6,7 +6,13 @@ from collections.abc import Sequence
 from typing import Final
 
 from augment.errors import UnknownName
-from augment.formats import commonroad_writer, interplan_writer, own_writer, scenarionet_writer
+from augment.formats import (
+    commonroad_writer,
+    interplan_writer,
+    openscenario_writer,
+    own_writer,
+    scenarionet_writer,
+)
 from augment.formats.writing import Cell, Writer, Written
 
 
@@ -20,6 +26,7 @@ WRITERS: Final[dict[str, Writer]] = {
     "json": own_writer.write,
     "interplan": write_interplan,
     "commonroad": commonroad_writer.write,
+    "openscenario": openscenario_writer.write,
     "scenarionet": scenarionet_writer.write,
 }
 

@@ -22,6 +22,7 @@ HEAVY = {
     ),
     "pandas": ("augment.formats", "arena.exports"),
     "pyarrow": ("augment.formats", "arena.exports"),
+    "scenariogeneration": ("augment.formats",),
     "matplotlib": ("arena.exports",),
     "scipy.interpolate": ("augment.fake_llm",),
     "scipy.optimize": ("augment.metrics",),

@@ -269,7 +269,25 @@ def _kinds_of_jobs(kinds: Any) -> list[ArgumentParser]:
         action="store_true",
         help="write nothing if a scenario would not be the same there (kept traffic, motion, ...)",
     )
-    scenarios = kinds.add_parser("scenarios", help="what a job made, in a standard format")
+    labels = kinds.add_parser("faults", help="how often experts saw which fault")
+    labels.add_argument("job", help="its name or its code")
+    labels.add_argument("--format", default="csv", help=f"one of {', '.join(faults.FORMATS)}")
+    driving = kinds.add_parser("driving", help="mean driving scores of what was simulated")
+    driving.add_argument("job", help="its name or its code")
+    driving.add_argument("--score", default="nuplan", help=f"one of {', '.join(SCORES)}")
+    driving.add_argument("--planner", default="pdm-closed", help="as it was simulated with")
+    driving.add_argument("--offsets", default="paper", help="as it was simulated with")
+    driving.add_argument("--reactive", action="store_true", help="as it was simulated")
+    driving.add_argument(
+        "--format", default="csv", help=f"one of {', '.join(driving_writers.FORMATS)}"
+    )
+    return [displacement, samples, modifications, _kind_of_scenarios(kinds), labels, driving]
+
+
+def _kind_of_scenarios(kinds: Any) -> ArgumentParser:
+    scenarios: ArgumentParser = kinds.add_parser(
+        "scenarios", help="what a job made, in a standard format"
+    )
     scenarios.add_argument("job", help="its name or its code")
     scenarios.add_argument(
         "--format", required=True, help=f"one of {', '.join(SCENARIO_FORMATS)}; OUT is a folder"
@@ -283,16 +301,4 @@ def _kinds_of_jobs(kinds: Any) -> list[ArgumentParser]:
     scenarios.add_argument(
         "--strict", action="store_true", help="write nothing if a scenario would not be the same"
     )
-    labels = kinds.add_parser("faults", help="how often experts saw which fault")
-    labels.add_argument("job", help="its name or its code")
-    labels.add_argument("--format", default="csv", help=f"one of {', '.join(faults.FORMATS)}")
-    driving = kinds.add_parser("driving", help="mean driving scores of what was simulated")
-    driving.add_argument("job", help="its name or its code")
-    driving.add_argument("--score", default="nuplan", help=f"one of {', '.join(SCORES)}")
-    driving.add_argument("--planner", default="pdm-closed", help="as it was simulated with")
-    driving.add_argument("--offsets", default="paper", help="as it was simulated with")
-    driving.add_argument("--reactive", action="store_true", help="as it was simulated")
-    driving.add_argument(
-        "--format", default="csv", help=f"one of {', '.join(driving_writers.FORMATS)}"
-    )
-    return [displacement, samples, modifications, scenarios, labels, driving]
+    return scenarios
