@@ -191,6 +191,21 @@ def test_a_distance_may_be_off_by_the_whole_tolerance(
     assert (FindingKind.ASKED_DISTANCE in found) == is_fault
 
 
+@pytest.mark.parametrize(
+    ("off_deg", "is_fault"), [(0.0, False), (14.9, False), (15.1, True), (90.0, True)]
+)
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+@pytest.mark.parametrize(
+    ("facing", "lane_deg"), [(Facing.WITH_LANE, 0.0), (Facing.AGAINST_LANE, 180.0)]
+)
+def test_a_vehicle_may_be_turned_by_fifteen_degrees(
+    facing: Facing, lane_deg: float, sign: float, off_deg: float, is_fault: bool
+) -> None:
+    heading_rad = math.remainder(math.radians(lane_deg + sign * off_deg), math.tau)
+    found = faults(parked(20.0, facing=facing), vehicle("Agent2", 20.0, 0.0, heading_rad))
+    assert (Kind.ASKED_HEADING in found) == is_fault
+
+
 def test_a_finding_says_the_numbers() -> None:
     (distance,) = (
         one

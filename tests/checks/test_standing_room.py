@@ -120,6 +120,30 @@ def test_any_overlap_with_the_ego_is_wrong() -> None:
     )
 
 
+@pytest.mark.parametrize(
+    ("ahead_m", "left_m", "is_same_spot"),
+    [
+        (0.0, 0.0, True),
+        (0.49, 0.0, True),
+        (0.5, 0.0, False),
+        (-0.49, 0.0, True),
+        (-0.5, 0.0, False),
+        (0.3, 0.39, True),
+        (0.3, 0.41, False),
+        (0.0, -0.51, False),
+    ],
+)
+def test_a_tenth_of_a_car_apart_is_another_spot(
+    ahead_m: float, left_m: float, is_same_spot: bool
+) -> None:
+    car = replace(vehicle("Agent2", 32.0, 0.0), length_m=5.0)
+    other = replace(car, id="Agent3", x_m=32.0 + ahead_m, y_m=left_m, length_m=4.0)
+    found = of_kind(found_in(scene(), car, other), Kind.DUPLICATE)
+    assert [one.agents for one in found] == ([("Agent2", "Agent3")] if is_same_spot else [])
+    unlike = replace(car, type=AgentType.BUS), other
+    assert not of_kind(found_in(scene(), *unlike), Kind.DUPLICATE)
+
+
 def test_the_small_box_counts() -> None:
     inside = cone("Agent3", 41.0, 0.2)
     (overlap,) = of_kind(found_in(scene(), BUS, inside), FindingKind.OVERLAP)

@@ -22,6 +22,16 @@ def test_the_lane_under_a_point_fits_its_heading() -> None:
     assert graph.under(20.0, 9.0) is None
 
 
+@pytest.mark.parametrize(("off_m", "is_on"), [(0.0, True), (1.75, True), (1.76, False)])
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_a_lane_reaches_half_its_width_to_either_side(
+    sign: float, off_m: float, is_on: bool
+) -> None:
+    lane = replace(scene().lanes[0], width_m=3.5)
+    graph = LaneGraph(scene(lanes=(lane,)))
+    assert graph.under(20.0, sign * off_m) == (lane.id if is_on else None)
+
+
 def test_straight_on_comes_first_where_lanes_part() -> None:
     graph = LaneGraph(junction())
     assert graph.successors("Lane1") == ("Connector1", "Connector2")
@@ -39,6 +49,20 @@ def test_the_order_of_the_file_does_not_tell_where_the_road_goes_on(
     graph = LaneGraph(replace(junction(), connectors=given))
     assert graph.successors("Lane1") == ("Connector1", "Connector2")
     assert graph.route("Lane1", 100.0) == ["Lane1", "Connector1", "Lane2"]
+
+
+@pytest.mark.parametrize("left_first", [True, False])
+def test_nobody_turns_round_where_the_road_turns_off(left_first: bool) -> None:
+    _, left = junction().connectors
+    back = replace(
+        left,
+        id="Connector3",
+        centerline=Polyline([(20.0, 0.0), (24.0, 1.0), (24.0, 5.0), (20.0, 6.0)]),
+        turn_type=TurnType.U_TURN,
+    )
+    given = (left, back) if left_first else (back, left)
+    graph = LaneGraph(replace(junction(), connectors=given))
+    assert graph.successors("Lane1") == ("Connector2", "Connector3")
 
 
 def test_a_distance_runs_on_over_connectors() -> None:
