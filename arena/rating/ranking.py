@@ -55,15 +55,20 @@ def shown_ranks(lower: FloatArray, upper: FloatArray, *, average: float) -> IntA
 def rank_interval(samples: FloatArray) -> tuple[IntArray, IntArray]:
     """(C,), (C,): between which places 95 % of the rounds (C, B) put each contestant.
 
-    A place is one plus the number of others who are rated higher in that round. Where somebody's
-    rating is unknown (NaN) the best place takes them for the first and the worst for the last.
+    A place is one plus the number of others who are rated higher in that round. A rating that is
+    unknown (NaN) may be any: the best place of everybody, known or not, takes the unknown others
+    for lower and the worst for higher.
     """
     unknown = np.isnan(samples)
     if not unknown.any():
-        lower, upper = interval(_places(samples))
+        best = worst = _places(samples)
     else:
-        lower, _ = interval(_places(np.where(unknown, np.inf, samples)))
-        _, upper = interval(_places(np.where(unknown, -np.inf, samples)))
+        # Who is unknown may be beyond all others, the infinite ones too.
+        largest = np.finfo(np.float64).max
+        known = np.clip(samples, -largest, largest)
+        best = np.where(unknown, 1.0, _places(np.where(unknown, -np.inf, known)))
+        worst = np.where(unknown, len(samples), _places(np.where(unknown, np.inf, known)))
+    (lower, _), (_, upper) = interval(best), interval(worst)
     return np.floor(lower).astype(np.int64), np.ceil(upper).astype(np.int64)
 
 

@@ -5,7 +5,7 @@ from datetime import timedelta
 import pytest
 from django.db import IntegrityError, transaction
 
-from augment.models import Attempt, Augmentation
+from augment.models import Attempt, Augmentation, GenerationJob
 from augment.services.running import jobs, leases
 from tests.jobs.rows import NOON, STALE, done, failed, launch, leased, only_row
 
@@ -32,6 +32,24 @@ def test_a_row_with_an_outcome_can_not_be_claimed(state: str) -> None:
     Augmentation.objects.update(state=state, modification={}, image="bev/x.png")
     assert leases.take_lease(augmentation_pk=row.pk, now=NOON) is None
     assert not Attempt.objects.exists()
+
+
+@pytest.mark.parametrize(
+    ("state", "is_started"),
+    [
+        (GenerationJob.State.RUNNING, True),
+        (GenerationJob.State.STOPPED_AT_CAP, False),
+        (GenerationJob.State.CANCELLED, False),
+    ],
+)
+def test_a_row_of_a_job_that_stopped_is_not_started(state: str, is_started: bool) -> None:
+    """Its message may come after the job has stopped: the row still waits by itself."""
+    row = only_row(launch())
+    GenerationJob.objects.update(state=state)
+    held = leases.take_lease(augmentation_pk=row.pk, now=NOON)
+    assert (held is not None) == is_started
+    row.refresh_from_db()
+    assert row.state == (State.RUNNING if is_started else State.QUEUED)
 
 
 def test_a_row_that_is_gone_can_not_be_claimed() -> None:

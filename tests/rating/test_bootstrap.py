@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from arena.rating.bootstrap import Unit
+from arena.rating.bootstrap import Unit, resample
+from arena.rating.comparisons import Comparisons, count_pairs
 from tests.rating.votes import by_votes, named, simulated, versus
 
 TRUTH = [1060.0, 1020.0, 1000.0, 980.0, 940.0]
@@ -54,3 +55,36 @@ def test_votes_that_agree_within_scenarios_widen_the_scenario_interval() -> None
 
     assert width(Unit.SCENARIO) > 3 * width(Unit.VOTE)
     assert width(Unit.TWO_WAY) > 3 * width(Unit.VOTE)
+
+
+@pytest.mark.parametrize(("experts", "scenarios", "contestants"), [(3, 4, 6), (25, 24, 36)])
+def test_a_vote_counts_as_often_as_its_expert_times_its_scenario_is_drawn(
+    experts: int, scenarios: int, contestants: int
+) -> None:
+    """A vote a cell, each of a pair of its own: what a pair has in a round is its cell's weight.
+
+    The few cells go by a table, the many (600 x 600 places for 600 votes) row by row.
+    """
+    cells = experts * scenarios
+    first, second = (one[:cells] for one in np.triu_indices(contestants, 1))
+    score = np.resize([0.0, 0.5, 1.0, 0.5, 0.5], cells)
+    votes = Comparisons(
+        names=tuple(f"c{number:02d}" for number in range(contestants)),
+        first=first,
+        second=second,
+        score=score,
+        expert=np.repeat(np.arange(experts), scenarios),
+        scenario=np.tile(np.arange(scenarios), experts),
+    )
+    drawn = list(resample(votes, count_pairs(votes), unit=Unit.TWO_WAY, rounds=30, seed=4))
+    games = np.hstack([one.games for one in drawn])
+    scores = np.hstack([one.scores for one in drawn])
+    assert scores.tolist() == (games * score[:, None]).tolist()
+    ties = np.concatenate([one.ties for one in drawn])
+    assert ties.tolist() == games[score == 0.5].sum(axis=0).tolist()
+    weight = games.reshape(experts, scenarios, 30)
+    of_expert, of_scenario = weight.sum(axis=1) / scenarios, weight.sum(axis=0) / experts
+    assert (weight == of_expert[:, None] * of_scenario[None]).all()
+    assert (of_expert.sum(axis=0) == experts).all()
+    assert (of_scenario.sum(axis=0) == scenarios).all()
+    assert len(np.unique(games, axis=1).T) > 20

@@ -29,6 +29,11 @@ def test_a_replay_is_the_papers_formula(k: float) -> None:
     assert elo.replay(votes, k=k) == pytest.approx(as_worded(votes, k), abs=1e-9)
 
 
+def test_nothing_said_the_stake_is_four_points() -> None:
+    votes = simulated(TRUTH, 300, 1)
+    assert elo.replay(votes) == pytest.approx(as_worded(votes, 4.0), abs=1e-9)
+
+
 @pytest.mark.parametrize("k", [0.5, 4.0, 64.0])
 @pytest.mark.parametrize(("size", "rounds"), [(307, 130), (11_003, 3), (5, 1)])
 def test_every_round_is_a_replay_of_votes_drawn_with_replacement(

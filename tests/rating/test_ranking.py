@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import itertools
+
 import numpy as np
 import pytest
 from statsmodels.stats.multitest import multipletests
@@ -23,6 +25,23 @@ def test_a_rank_interval_holds_the_places_of_95_percent_of_the_rounds() -> None:
     best, worst = rank_interval(samples)
     assert best.tolist() == [1, 1, 3]
     assert worst.tolist() == [2, 2, 3]
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_a_place_that_is_unknown_may_be_any(seed: int) -> None:
+    """One round: every unknown rating is tried above and below everybody who is known."""
+    rng = np.random.default_rng(seed)
+    some = np.array([np.nan, np.inf, 3.0, 2.0, np.nan, -np.inf])[: 2 + seed % 5]
+    ratings = rng.permutation(some)
+    unknown = np.flatnonzero(np.isnan(ratings))
+    order = np.array([np.searchsorted(np.sort(ratings), rating) for rating in ratings], float)
+    places = []
+    for ends in itertools.product((-1.0, 99.0), repeat=len(unknown)):
+        order[unknown] = ends
+        places.append([1 + (order > one).sum() for one in order])
+    best, worst = rank_interval(ratings[:, None])
+    assert best.tolist() == np.min(places, axis=0).tolist()
+    assert worst.tolist() == np.max(places, axis=0).tolist()
 
 
 def test_holm_is_statsmodels() -> None:

@@ -3,6 +3,7 @@ from __future__ import annotations
 import krippendorff
 import numpy as np
 import pytest
+import scipy.stats
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -101,6 +102,21 @@ def test_wilsons_interval_of_a_textbook() -> None:
     # 81 of 263, the example of Newcombe (1998): 0.2553 to 0.3662.
     found = wilson(81, 263)
     assert (found.lower, found.upper) == pytest.approx((0.2553, 0.3662), abs=5e-5)
+
+
+@pytest.mark.parametrize("of_ten", [(3, 6), (2, 5, 9), (4, 5, 6, 5, 3, 7)])
+def test_of_experts_with_as_many_votes_each_it_is_the_t_interval_of_their_shares(
+    of_ten: tuple[int, ...],
+) -> None:
+    experts = np.repeat(np.arange(len(of_ten)), 10)
+    hits = np.concatenate([np.arange(10) < one for one in of_ten])
+    shares = np.array(of_ten) / 10.0
+    lower, upper = scipy.stats.t.interval(
+        0.95, len(shares) - 1, loc=shares.mean(), scale=scipy.stats.sem(shares)
+    )
+    found = share(hits, experts)
+    assert found.value == pytest.approx(shares.mean())
+    assert (found.lower, found.upper) == pytest.approx((max(lower, 0.0), min(upper, 1.0)))
 
 
 def test_experts_who_differ_widen_the_interval_of_a_share() -> None:

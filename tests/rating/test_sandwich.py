@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -54,6 +55,15 @@ def test_one_way_clusters_are_statsmodels(unit: Unit) -> None:
         contrast = np.zeros(4)
         contrast[one], contrast[one + 1] = 1.0, -1.0
         assert contrast @ ours @ contrast == pytest.approx(contrast @ theirs @ contrast, rel=1e-4)
+
+
+def test_two_ways_are_the_one_and_the_other_without_what_is_in_both() -> None:
+    votes = simulated(TRUTH, 1500, 2)
+    cells = replace(votes, expert=votes.expert * 1000 + votes.scenario)
+    by_expert, by_scenario = covariance(votes, Unit.EXPERT), covariance(votes, Unit.SCENARIO)
+    wanted = by_expert + by_scenario - covariance(cells, Unit.EXPERT)
+    assert np.linalg.eigvalsh(wanted).min() > -1e-6  # else its negative parts would be cut off
+    assert covariance(votes, Unit.TWO_WAY) == pytest.approx(wanted)
 
 
 @pytest.mark.parametrize("unit", [Unit.VOTE, Unit.SCENARIO])
