@@ -203,7 +203,7 @@ def test_a_vehicle_may_be_turned_by_fifteen_degrees(
 ) -> None:
     heading_rad = math.remainder(math.radians(lane_deg + sign * off_deg), math.tau)
     found = faults(parked(20.0, facing=facing), vehicle("Agent2", 20.0, 0.0, heading_rad))
-    assert (Kind.ASKED_HEADING in found) == is_fault
+    assert (FindingKind.ASKED_HEADING in found) == is_fault
 
 
 def test_a_finding_says_the_numbers() -> None:

@@ -138,10 +138,10 @@ def test_a_tenth_of_a_car_apart_is_another_spot(
 ) -> None:
     car = replace(vehicle("Agent2", 32.0, 0.0), length_m=5.0)
     other = replace(car, id="Agent3", x_m=32.0 + ahead_m, y_m=left_m, length_m=4.0)
-    found = of_kind(found_in(scene(), car, other), Kind.DUPLICATE)
+    found = of_kind(found_in(scene(), car, other), FindingKind.DUPLICATE)
     assert [one.agents for one in found] == ([("Agent2", "Agent3")] if is_same_spot else [])
     unlike = replace(car, type=AgentType.BUS), other
-    assert not of_kind(found_in(scene(), *unlike), Kind.DUPLICATE)
+    assert not of_kind(found_in(scene(), *unlike), FindingKind.DUPLICATE)
 
 
 def test_the_small_box_counts() -> None:

@@ -8,7 +8,7 @@ from django.db import IntegrityError, transaction
 from pytest_django import DjangoAssertNumQueries
 
 from arena.errors import AlreadyDecided, InvalidVote, NotYours, StudyNotOpen, TooFast
-from arena.models import Person, Vote
+from arena.models import EarlyLook, Person, Vote
 from arena.queries.votes import current_votes, recent_votes, tallies
 from arena.queries.votes import voting_progress as progress_of
 from arena.queries.voting_path import upcoming
@@ -131,6 +131,16 @@ def test_a_first_vote_has_nothing_to_supersede() -> None:
     matchup = matchups_of(a_study(), "eva")[0]
     with pytest.raises(Conflict, match="no vote yet"):
         vote(matchup, supersedes=uuid.uuid4())
+
+
+def test_who_has_opened_the_results_of_a_study_no_longer_votes_in_it() -> None:
+    study = a_study()
+    (one, *_), (other, *_) = matchups_of(study, "eva"), matchups_of(study, "finn")
+    EarlyLook.objects.create(study=study, user=one.expert)
+    with pytest.raises(NotYours):
+        vote(one)
+    assert vote(other).expert == other.expert
+    assert Vote.objects.count() == 1
 
 
 def test_nobody_votes_on_somebody_elses_matchup() -> None:
