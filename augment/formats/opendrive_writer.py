@@ -19,7 +19,7 @@ from augment.formats.opendrive_geometry import (
     directions,
     reference_line,
 )
-from augment.formats.writing import CannotExpress, Cell, Report
+from augment.formats.writing import CannotExpress, Cell, LossReport
 from augment.scene.entities import (
     Lane,
     LaneConnector,
@@ -39,7 +39,7 @@ _TRUE_M = 0.001
 _FIRST_JUNCTION = 100_000
 
 
-def map_of(cell: Cell, report: Report) -> bytes:
+def map_of(cell: Cell, report: LossReport) -> bytes:
     """The file.
 
     Raises:
@@ -66,7 +66,9 @@ def map_of(cell: Cell, report: Report) -> bytes:
 # Private
 
 
-def _fitted(ways: Sequence[Way], network: _Network, report: Report) -> dict[str, ReferenceLine]:
+def _fitted(
+    ways: Sequence[Way], network: _Network, report: LossReport
+) -> dict[str, ReferenceLine]:
     """The lines of all roads, without a step or a kink where one is joined to another."""
     by_id = {way.id: way for way in ways}
     alone = {way.id: reference_line(way) for way in ways}
@@ -163,7 +165,7 @@ class _Network:
                     self.left_out.append(f"{way.id} to {following}")
         return before, after
 
-    def report(self, report: Report) -> None:
+    def report(self, report: LossReport) -> None:
         """Say which joins are left out."""
         report.lose_of(
             self.left_out,
@@ -267,7 +269,7 @@ def _junction(
     return junction
 
 
-def _report(scene: Scene, lines: dict[str, ReferenceLine], report: Report) -> None:
+def _report(scene: Scene, lines: dict[str, ReferenceLine], report: LossReport) -> None:
     off = {name: line.off_m for name, line in lines.items() if line.off_m > _OFF_M}
     if off:
         worst = max(off, key=lambda name: off[name])

@@ -17,7 +17,7 @@ import numpy as np
 
 from augment.formats.movement_losses import appears_later, has_gaps, report_motion
 from augment.formats.opendrive_writer import map_of
-from augment.formats.writing import Cell, Report, Written, write_each
+from augment.formats.writing import Cell, LossReport, Written, write_each
 from augment.scene.entities import AgentType, TrafficAgent
 from augment.scene.motion import SETS_OUT_WITHIN_M, FloatArray, Movement, walking_pace_mps
 
@@ -49,7 +49,7 @@ def write(cells: Sequence[Cell]) -> Written:
 # Private
 
 
-def _write_one(cell: Cell, report: Report) -> dict[str, bytes]:
+def _write_one(cell: Cell, report: LossReport) -> dict[str, bytes]:
     road_file = f"{cell.stem}.xodr"
     road = map_of(cell, report)
     scenario = _scenario(cell, road_file)
@@ -236,7 +236,7 @@ def _at(xosc: Any, name: str, at_s: float) -> Any:
     )
 
 
-def _report(cell: Cell, report: Report) -> None:
+def _report(cell: Cell, report: LossReport) -> None:
     report_motion(cell, report, can_trigger=True)
     names = [one.agent.id for one in cell.motion.others if has_gaps(one)]
     report.lose_of(names, "goes and comes back; goes straight on in between")
