@@ -6,14 +6,20 @@ from pathlib import Path
 
 from augment.errors import InvalidDocument, UnknownName
 from augment.formats.argoverse2.sensor import ArgoverseSensor
+from augment.formats.commonroad.scenario import CommonRoad
 from augment.formats.own_json import OwnJson
 from augment.formats.reading import Reader
+from augment.formats.scenarionet.scenario import ScenarioNet
+from augment.formats.waymo.scenario import WaymoMotion
 
 READERS: dict[str, Reader] = {
     reader.name: reader
     for reader in (
         ArgoverseSensor(),
         OwnJson(),
+        CommonRoad(),
+        WaymoMotion(),
+        ScenarioNet(),
     )
 }
 """In the order in which a file is tried; each is asked about what is its own alone."""

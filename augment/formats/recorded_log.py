@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from augment.errors import InvalidDocument
 from augment.formats.reading import frame_in
-from augment.formats.road_map import MapExtract
+from augment.formats.road_map import FURTHEST_M, MapExtract
 from augment.formats.roads import RADIUS_M
 from augment.geometry.angles import wrap
 from augment.geometry.frames import Pose
@@ -83,10 +83,9 @@ class Log:
         x_m, y_m, heading_rad, _ = self.ego[frame].tolist()
         if not np.isfinite(self.ego[frame]).all():
             raise InvalidDocument(self.what, [("frame", f"{frame} has no ego in it")])
-        if max(abs(x_m), abs(y_m)) > 1e8:
-            raise InvalidDocument(
-                self.what, [("ego", "lies more than 100 000 km from the origin")]
-            )
+        for name, states in (("ego", self.ego), *((one.name, one.states) for one in self.tracks)):
+            if (np.abs(states) > FURTHEST_M).any():
+                raise InvalidDocument(self.what, [(name, f"has a number over {FURTHEST_M:.0e}")])
         return Pose(x_m=x_m, y_m=y_m, heading_rad=wrap(heading_rad))
 
 

@@ -20,6 +20,9 @@ from augment.scene.entities import (
 FloatArray = NDArray[np.float64]
 Name = int | str
 
+FURTHEST_M = 1e8
+"""Nothing on earth is further from the origin of a map."""
+
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Segment:

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from augment.errors import InvalidDocument
-from augment.formats.road_map import MapExtract, Name, RoadMap, Segment
+from augment.formats.road_map import FURTHEST_M, MapExtract, Name, RoadMap, Segment
 from augment.geometry.angles import difference
 from augment.geometry.frames import Pose
 from augment.geometry.polyline import Polyline
@@ -168,8 +168,10 @@ def _strip(segment: Segment, ego: Pose) -> Strip | None:
 
 
 def _local(points: ArrayLike, ego: Pose) -> FloatArray:
-    """Points (P, 2) in the ego frame, to the millimetre."""
-    return np.round(ego.to_local(np.asarray(points, dtype=np.float64)), 3)
+    """Points (P, 2) in the ego frame, to the millimetre; NaN for what lies beyond the earth."""
+    points = np.asarray(points, dtype=np.float64)
+    points = np.where(np.abs(points) <= FURTHEST_M, points, np.nan)
+    return np.round(ego.to_local(points), 3)
 
 
 def _check_shape(points: FloatArray) -> None:

@@ -1,0 +1,1 @@
+"""CommonRoad XML, 2018b and 2020a."""

@@ -1,0 +1,246 @@
+"""Lanelets, signs, lights and intersections as segments and areas.
+
+What an intersection names as the successors of its incoming lanelets lies in it, and what follows
+these in a bend. Turn types are those that it names; a light holds for the ways in its direction.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from dataclasses import dataclass
+
+import numpy as np
+
+from augment.formats.commonroad.fields import (
+    WHAT,
+    fault,
+    points_of,
+    real,
+    references,
+    whole,
+)
+from augment.formats.commonroad.lights import Light, lights_of
+from augment.formats.road_map import FloatArray, RoadMap, Segment
+from augment.formats.roads import midline
+from augment.formats.xml_file import Element
+from augment.geometry.polyline import Polyline
+from augment.scene.directions import turn_type_of
+from augment.scene.entities import AreaKind, TrafficLight, TurnType
+from augment.scene.notes import Note, NoteKind
+
+SPEED_SIGNS = frozenset({"274", "R2-1"})
+"""The speed limit of Germany (and of Zamunda), and of the United States; values in m/s."""
+
+AREA_OF = {
+    "sidewalk": AreaKind.WALKWAY,
+    "crosswalk": AreaKind.CROSSWALK,
+    "shoulder": AreaKind.DRIVABLE,
+    "busStop": AreaKind.DRIVABLE,
+    "parking": AreaKind.CARPARK,
+}
+LEFT_OUT = frozenset({"bicycleLane", "border", "restricted"})
+_TURNS = {
+    "successorsStraight": TurnType.STRAIGHT,
+    "successorsLeft": TurnType.LEFT,
+    "successorsRight": TurnType.RIGHT,
+}
+
+
+@dataclass(slots=True, eq=False)
+class Lanelet:
+    """A lanelet as it stands in the file."""
+
+    id: int
+    left: FloatArray
+    right: FloatArray
+    kinds: frozenset[str]
+    limit_mps: float | None
+    predecessors: tuple[int, ...]
+    successors: tuple[int, ...]
+    lights: tuple[int, ...]
+    left_neighbors: tuple[int, ...]
+    right_neighbors: tuple[int, ...]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Network:
+    """The map, and what it does not say."""
+
+    map: RoadMap
+    notes: tuple[Note, ...]
+
+
+def network_of(root: Element, step: int) -> Network:
+    """The map with the lights at one time step.
+
+    Raises:
+        InvalidDocument: A lanelet, sign or light breaks the format.
+    """
+    limits, other_signs = _limits(root)
+    lanelets = {one.id: one for one in (_lanelet(e, limits) for e in root.all("lanelet"))}
+    inside = _inside(root, lanelets)
+    lights = lights_of(root)
+    roads = {
+        key: one for key, one in lanelets.items() if not one.kinds & (AREA_OF.keys() | LEFT_OUT)
+    }
+    segments = tuple(
+        _segment(one, key in inside, inside.get(key), _state(one, lanelets, inside, lights, step))
+        for key, one in roads.items()
+    )
+    areas = tuple(
+        (AREA_OF[kind], np.vstack([one.left, one.right[::-1]]))
+        for one in lanelets.values()
+        for kind in sorted(one.kinds & AREA_OF.keys())[:1]
+    )
+    notes = _notes(segments, areas, bool(inside), lights, other_signs, lanelets)
+    city = RoadMap(what=WHAT, place="lanelet", segments=segments, areas=areas)
+    return Network(map=city, notes=notes)
+
+
+# Private
+
+
+def _limits(root: Element) -> tuple[dict[int, float], Counter[str]]:
+    """The limit of each sign that is one, and the other signs."""
+    limits: dict[int, float] = {}
+    others: Counter[str] = Counter()
+    for sign in root.all("trafficSign"):
+        sign_id = whole(sign.attributes.get("id"), "trafficSign")
+        for element in sign.all("trafficSignElement"):
+            name, value = element.first("trafficSignID"), element.first("additionalValue")
+            text = "" if name is None else name.text.strip()
+            if text in SPEED_SIGNS and value is not None:
+                limits[sign_id] = real(value.text, f"trafficSign {sign_id}")
+            else:
+                others[text[:20]] += 1
+    return limits, others
+
+
+def _lanelet(element: Element, limits: dict[int, float]) -> Lanelet:
+    lanelet_id = whole(element.attributes.get("id"), "lanelet")
+    place = f"lanelet {lanelet_id}"
+    left, right = element.first("leftBound"), element.first("rightBound")
+    if left is None or right is None:
+        raise fault(place, "needs a leftBound and a rightBound")
+    given = element.first("speedLimit")
+    known = [limits[sign] for sign in references(element, "trafficSignRef") if sign in limits]
+    if given is not None:
+        known.append(real(given.text, f"{place}.speedLimit"))
+    known = [limit for limit in known if 0.0 < limit <= 100.0]
+    return Lanelet(
+        id=lanelet_id,
+        left=points_of(left, place),
+        right=points_of(right, place),
+        kinds=frozenset(kind.text.strip() for kind in element.all("laneletType")),
+        limit_mps=min(known, default=None),
+        predecessors=tuple(references(element, "predecessor")),
+        successors=tuple(references(element, "successor")),
+        lights=tuple(references(element, "trafficLightRef")),
+        left_neighbors=_beside(element, "adjacentLeft"),
+        right_neighbors=_beside(element, "adjacentRight"),
+    )
+
+
+def _beside(element: Element, name: str) -> tuple[int, ...]:
+    return tuple(
+        whole(child.attributes.get("ref"), name)
+        for child in element.all(name)
+        if child.attributes.get("drivingDir") == "same"
+    )
+
+
+def _inside(root: Element, lanelets: dict[int, Lanelet]) -> dict[int, TurnType | None]:
+    """What lies in an intersection, with its turn where the file tells it."""
+    inside: dict[int, TurnType | None] = {
+        key: None for key, one in lanelets.items() if "intersection" in one.kinds
+    }
+    for intersection in root.all("intersection"):
+        for incoming in intersection.all("incoming"):
+            for name, turn in _TURNS.items():
+                inside |= dict.fromkeys(references(incoming, name), turn)
+    inside = {key: turn for key, turn in inside.items() if key in lanelets}
+    waiting = list(inside)
+    while waiting:
+        for key in lanelets[waiting.pop()].successors:
+            one = lanelets.get(key)
+            if one is None or key in inside or not set(one.predecessors) <= inside.keys():
+                continue
+            if one.successors and _bends(one):
+                inside[key] = None
+                waiting.append(key)
+    return inside
+
+
+def _bends(one: Lanelet) -> bool:
+    try:
+        line = midline(Polyline(one.left), Polyline(one.right))
+    except ValueError:
+        return False  # it is refused where the road is built
+    return turn_type_of(line) is not TurnType.STRAIGHT
+
+
+def _state(
+    one: Lanelet,
+    lanelets: dict[int, Lanelet],
+    inside: dict[int, TurnType | None],
+    lights: dict[int, Light],
+    step: int,
+) -> TrafficLight:
+    """The light for a way through an intersection: its own, or of the lanelets before it."""
+    if one.id not in inside:
+        return TrafficLight.NONE
+    before = [lanelets[key] for key in one.predecessors if key in lanelets]
+    names = [name for lanelet in (one, *before) for name in lanelet.lights]
+    turn = inside[one.id]
+    for name in names:
+        light = lights.get(name)
+        if light is not None and light.holds_for(turn):
+            return light.state_at(step)
+    return TrafficLight.NONE
+
+
+def _segment(one: Lanelet, crosses: bool, turn: TurnType | None, light: TrafficLight) -> Segment:
+    return Segment(
+        name=one.id,
+        crosses=crosses,
+        left=one.left,
+        right=one.right,
+        successors=one.successors,
+        predecessors=one.predecessors,
+        left_neighbors=one.left_neighbors,
+        right_neighbors=one.right_neighbors,
+        speed_limit_mps=one.limit_mps,
+        light=light,
+        turn=turn,
+    )
+
+
+def _notes(
+    segments: tuple[Segment, ...],
+    areas: tuple[tuple[AreaKind, FloatArray], ...],
+    has_intersections: bool,
+    lights: dict[int, Light],
+    other_signs: Counter[str],
+    lanelets: dict[int, Lanelet],
+) -> tuple[Note, ...]:
+    notes = []
+    unlimited = sum(one.speed_limit_mps is None for one in segments)
+    if segments and unlimited == len(segments):
+        notes.append(Note(kind=NoteKind.NO_SPEED_LIMITS))
+    elif unlimited:
+        kind = NoteKind.SOME_SPEED_LIMITS
+        notes.append(Note(kind=kind, number=unlimited, of=len(segments)))
+    if not has_intersections:
+        notes.append(Note(kind=NoteKind.NO_INTERSECTIONS))
+    if lights:
+        notes.append(Note(kind=NoteKind.LIGHTS_REPEATED, number=len(lights)))
+    bicycle_lanes = sum("bicycleLane" in one.kinds for one in lanelets.values())
+    if bicycle_lanes:
+        notes.append(Note(kind=NoteKind.BICYCLE_LANES_LEFT_OUT, number=bicycle_lanes))
+    if other_signs:
+        names = tuple(f"sign {name}" for name in sorted(other_signs))
+        number = sum(other_signs.values())
+        notes.append(Note(kind=NoteKind.MAP_PARTS_LEFT_OUT, number=number, names=names[:12]))
+    if not any(kind is AreaKind.WALKWAY for kind, _ in areas):
+        notes.append(Note(kind=NoteKind.NO_WALKWAYS))
+    return tuple(notes)

@@ -1,0 +1,1 @@
+"""ScenarioNet's pickled scenario descriptions."""

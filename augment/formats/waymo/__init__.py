@@ -1,0 +1,1 @@
+"""Waymo Open Motion: TFRecord files of Scenario messages, read without TensorFlow."""

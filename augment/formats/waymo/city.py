@@ -1,0 +1,171 @@
+"""The map of a Waymo scenario as segments and areas.
+
+A lane lies in an intersection if it interpolates between others, if a light controls it, or if no
+line bounds it on either side while others begin where it begins or end where it ends. World frame.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from dataclasses import dataclass
+
+import numpy as np
+
+from augment.formats.lane_edges import USUAL_M, edge_of, whole_edge, width_of
+from augment.formats.road_map import FloatArray, RoadMap, Segment
+from augment.formats.waymo.messages import BoundaryMessage, LaneMessage, ScenarioMessage
+from augment.formats.waymo.tfrecord import WHAT
+from augment.scene.entities import AreaKind, TrafficLight
+from augment.scene.notes import Note, NoteKind
+
+BICYCLE_LANE = 3
+CROSSWALK, SPEED_BUMP, DRIVEWAY = 8, 9, 10
+MPS_OF_MPH = 0.44704
+
+LIGHT_OF = {
+    0: TrafficLight.UNKNOWN,
+    1: TrafficLight.RED,
+    2: TrafficLight.YELLOW,
+    3: TrafficLight.GREEN,
+    4: TrafficLight.RED,
+    5: TrafficLight.YELLOW,
+    6: TrafficLight.GREEN,
+    7: TrafficLight.RED,
+    8: TrafficLight.YELLOW,
+}
+"""LANE_STATE_*: arrows and round lights alike; flashing ones as what they ask for."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class City:
+    """The map, and what it does not say."""
+
+    map: RoadMap
+    notes: tuple[Note, ...]
+
+
+def city_of(scenario: ScenarioMessage, frame: int) -> City:
+    """The map with the lights of one step."""
+    lanes = {key: lane for key, lane in scenario.lanes.items() if lane.type != BICYCLE_LANE}
+    lanes = {key: lane for key, lane in lanes.items() if len(lane.line) >= 2}
+    lights = scenario.lights[frame] if frame < len(scenario.lights) else {}
+    controlled = {lane for step in scenario.lights for lane in step}
+    crossing = {key for key, lane in lanes.items() if lane.interpolating or key in controlled}
+    crossing |= _unbounded_joints(lanes)
+    segments, assumed = [], 0
+    for key, lane in lanes.items():
+        made, was_assumed = _segment(scenario, lane, key in crossing, lights.get(key))
+        segments.append(made)
+        assumed += was_assumed
+    areas = [
+        (AreaKind.CROSSWALK if kind == CROSSWALK else AreaKind.DRIVABLE, polygon)
+        for kind, polygon in scenario.polygons
+        if kind != SPEED_BUMP and len(np.unique(polygon, axis=0)) >= 3
+    ]
+    city = RoadMap(what=WHAT, place="map_features", segments=tuple(segments), areas=tuple(areas))
+    return City(map=city, notes=_notes(scenario, segments, assumed, crossing, controlled))
+
+
+# Private
+
+
+def _unbounded_joints(lanes: dict[int, LaneMessage]) -> set[int]:
+    exits = {key: len(lane.exits) for key, lane in lanes.items()}
+    entries = {key: len(lane.entries) for key, lane in lanes.items()}
+    return {
+        key
+        for key, lane in lanes.items()
+        if not lane.left_boundaries
+        and not lane.right_boundaries
+        and (
+            any(exits.get(before, 0) > 1 for before in lane.entries)
+            or any(entries.get(after, 0) > 1 for after in lane.exits)
+        )
+    }
+
+
+def _segment(
+    scenario: ScenarioMessage, lane: LaneMessage, crosses: bool, light: int | None
+) -> tuple[Segment, bool]:
+    """The segment, and whether its width was assumed."""
+    line = lane.line
+    left = edge_of(line, _parts(scenario, lane.left_boundaries))
+    right = edge_of(line, _parts(scenario, lane.right_boundaries))
+    width_m = width_of(line, left, right) or _beside_m(scenario, lane)
+    edges = whole_edge(line, left), whole_edge(line, right)
+    both = edges if edges[0] is not None and edges[1] is not None else (None, None)
+    limit = lane.speed_limit_mph
+    has_limit = limit is not None and np.isfinite(limit) and limit > 0.0
+    return (
+        Segment(
+            name=lane.id,
+            crosses=crosses,
+            centerline=line,
+            left=both[0],
+            right=both[1],
+            width_m=width_m or USUAL_M,
+            successors=tuple(lane.exits),
+            predecessors=tuple(lane.entries),
+            left_neighbors=tuple(lane.left_neighbors),
+            right_neighbors=tuple(lane.right_neighbors),
+            speed_limit_mps=round(limit * MPS_OF_MPH, 3) if has_limit and limit else None,
+            light=LIGHT_OF.get(light or 0, TrafficLight.UNKNOWN),
+        ),
+        width_m is None,
+    )
+
+
+def _parts(
+    scenario: ScenarioMessage, boundaries: list[BoundaryMessage]
+) -> list[tuple[int, int, FloatArray]]:
+    return [
+        (one.start, one.end, scenario.edges[one.feature])
+        for one in boundaries
+        if one.feature in scenario.edges
+    ]
+
+
+def _beside_m(scenario: ScenarioMessage, lane: LaneMessage) -> float | None:
+    """How far the lanes beside it are, which is as wide as a lane."""
+    none = np.full(lane.line.shape, np.nan)
+    for name in (*lane.left_neighbors, *lane.right_neighbors):
+        other = scenario.lanes.get(name)
+        if other is not None and len(other.line) >= 2:
+            beside = edge_of(lane.line, [(0, len(lane.line), other.line)])
+            # `width_of` doubles what is known of one side: half the way to the lane beside.
+            width_m = width_of(lane.line, (lane.line + beside) / 2.0, none)
+            if width_m is not None:
+                return width_m
+    return None
+
+
+def _notes(
+    scenario: ScenarioMessage,
+    segments: list[Segment],
+    assumed: int,
+    crossing: set[int],
+    controlled: set[int],
+) -> tuple[Note, ...]:
+    notes, count = [], len(segments)
+    unlimited = sum(one.speed_limit_mps is None for one in segments)
+    if count and unlimited == count:
+        notes.append(Note(kind=NoteKind.NO_SPEED_LIMITS))
+    elif unlimited:
+        notes.append(Note(kind=NoteKind.SOME_SPEED_LIMITS, number=unlimited, of=count))
+    if assumed:
+        kind = NoteKind.LANE_WIDTHS_ASSUMED
+        notes.append(Note(kind=kind, number=assumed, of=count, value=USUAL_M))
+    if not crossing:
+        notes.append(Note(kind=NoteKind.NO_INTERSECTIONS))
+    if not controlled:
+        notes.append(Note(kind=NoteKind.NO_LIGHTS))
+    bicycle_lanes = sum(lane.type == BICYCLE_LANE for lane in scenario.lanes.values())
+    if bicycle_lanes:
+        notes.append(Note(kind=NoteKind.BICYCLE_LANES_LEFT_OUT, number=bicycle_lanes))
+    parts = Counter(SPEED_BUMP for kind, _ in scenario.polygons if kind == SPEED_BUMP)
+    left_out = {"speed bumps": parts[SPEED_BUMP], "stop signs": scenario.stop_signs}
+    names = tuple(name for name, number in left_out.items() if number)
+    if names:
+        number = sum(left_out.values())
+        notes.append(Note(kind=NoteKind.MAP_PARTS_LEFT_OUT, number=number, names=names))
+    return (*notes, Note(kind=NoteKind.NO_WALKWAYS))

@@ -1,0 +1,164 @@
+"""The reader of Waymo Open Motion scenario files.
+
+`item` is the number of a record in the file, `frame` a step of it; without one the step that the
+scenario calls its current one (1.1 s after its start). Coordinates are the data set's own.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+
+from augment.errors import InvalidDocument
+from augment.formats.reading import Moment, Reading, frame_in, frames_every
+from augment.formats.recorded_log import Log, LoggedTrack, scene_at
+from augment.formats.roads import road_around
+from augment.formats.waymo.city import city_of
+from augment.formats.waymo.messages import (
+    ScenarioMessage,
+    TrackMessage,
+    read_scenario,
+    read_times,
+)
+from augment.formats.waymo.tfrecord import WHAT, read_records, starts_a_record
+from augment.scene.entities import AgentType
+from augment.scene.notes import Note, NoteKind
+
+LICENCE = "Waymo Open Dataset licence, non-commercial use"
+TYPE_OF = {
+    1: AgentType.VEHICLE,
+    2: AgentType.PEDESTRIAN,
+    3: AgentType.BICYCLE,
+    4: AgentType.GENERIC_OBJECT,
+}
+UNSET = 0
+
+
+class WaymoMotion:
+    """The reader of scenario TFRecords."""
+
+    name = "waymo"
+    title = "Waymo Open Motion scenarios (TFRecord file)"
+
+    def recognises(self, path: Path) -> bool:
+        """A file that begins with a length and its checksum."""
+        return path.is_file() and starts_a_record(path)
+
+    def moments(self, path: Path, *, every_s: float) -> Iterator[Moment]:
+        """Each record's steps."""
+        for number, payload in read_records(path):
+            times_s, _ = read_times(payload)
+            for frame in frames_every(times_s, every_s):
+                yield Moment(item=str(number), frame=frame)
+
+    def read(self, path: Path, *, item: str | None, frame: int | None, name: str) -> Reading:
+        """The scene at one step of one record."""
+        number = _number(item)
+        for found, payload in read_records(path, only=number):
+            return _reading(read_scenario(payload), path, found, frame, name)
+        raise InvalidDocument(WHAT, [("item", f"the file has no record {number}")])
+
+
+# Private
+
+
+def _number(item: str | None) -> int:
+    if item is None:
+        return 0
+    if not (item.isascii() and item.isdecimal() and len(item) < 10):
+        raise InvalidDocument(WHAT, [("item", f"{item!r} is no number of a record, from 0")])
+    return int(item)
+
+
+def _reading(
+    scenario: ScenarioMessage, path: Path, number: int, frame: int | None, name: str
+) -> Reading:
+    log = _log(scenario)
+    frame = frame_in(WHAT, scenario.current if frame is None else frame, len(log.times_s))
+    origin = log.ego_pose(frame)
+    city = city_of(scenario, frame)
+    road = road_around(city.map, origin)
+    scene, recording = scene_at(
+        log,
+        frame,
+        road,
+        name=name,
+        world="Waymo Open Motion scenario frame",
+        provenance=(
+            f"Waymo Open Motion data set, {path.name}, scenario {scenario.id}, step {frame} of "
+            f"{len(log.times_s)}; {LICENCE}"
+        ),
+    )
+    notes = list(city.notes)
+    if road.side_is_assumed:
+        notes.append(Note(kind=NoteKind.TRAFFIC_SIDE_ASSUMED, names=(road.traffic_side.value,)))
+    unset = Counter(track.type for track in scenario.tracks)[UNSET]
+    if unset:
+        kind = NoteKind.OBJECTS_LEFT_OUT
+        notes.append(Note(kind=kind, number=unset, names=("TYPE_UNSET",)))
+    notes.append(Note(kind=NoteKind.NON_COMMERCIAL, names=(LICENCE,)))
+    return Reading(
+        scene=scene,
+        recording=recording,
+        notes=tuple(notes),
+        moment=Moment(item=str(number), frame=frame),
+    )
+
+
+def _log(scenario: ScenarioMessage) -> Log:
+    times_s = np.array(scenario.times_s)
+    if not len(times_s) or not np.isfinite(times_s).all() or (np.diff(times_s) <= 0.0).any():
+        raise InvalidDocument(WHAT, [("timestamps_seconds", "must be there and ascend")])
+    if not 0 <= scenario.ego < len(scenario.tracks):
+        text = f"{scenario.ego} is none of the {len(scenario.tracks)} tracks"
+        raise InvalidDocument(WHAT, [("sdc_track_index", text)])
+    problems = [
+        (f"tracks[{index}]", f"has {len(track.states)} states for {len(times_s)} times")
+        for index, track in enumerate(scenario.tracks)
+        if len(track.states) != len(times_s)
+    ]
+    problems += [
+        (f"tracks[{index}].object_type", f"{track.type} is unknown; known: 0 to 4")
+        for index, track in enumerate(scenario.tracks)
+        if track.type not in TYPE_OF and track.type != UNSET
+    ]
+    if problems:
+        raise InvalidDocument(WHAT, problems)
+    ego = scenario.tracks[scenario.ego]
+    length_m, width_m = _size(ego)
+    return Log(
+        what=WHAT,
+        times_s=times_s - times_s[0],
+        ego=_states(ego),
+        ego_length_m=length_m,
+        ego_width_m=width_m,
+        tracks=tuple(
+            LoggedTrack(
+                name=f"{track.id:012d}",
+                type=TYPE_OF[track.type],
+                length_m=_size(track)[0],
+                width_m=_size(track)[1],
+                states=_states(track),
+            )
+            for index, track in enumerate(scenario.tracks)
+            if index != scenario.ego and track.type != UNSET and track.states[:, 7].any()
+        ),
+    )
+
+
+def _states(track: TrackMessage) -> np.ndarray[tuple[int, int], np.dtype[np.float64]]:
+    made = np.column_stack([track.states[:, :3], np.hypot(*track.states[:, 3:5].T)])
+    made[(track.states[:, 7] == 0.0) | ~np.isfinite(made).all(axis=1)] = np.nan
+    return made
+
+
+def _size(track: TrackMessage) -> tuple[float, float]:
+    """Length and width; boxes change a little from step to step, the usual one is taken."""
+    seen = track.states[track.states[:, 7] > 0.0]
+    if not len(seen):
+        return 0.0, 0.0
+    length_m, width_m = np.median(seen[:, 5:7], axis=0).tolist()
+    return length_m, width_m

@@ -1,0 +1,90 @@
+"""Each recorded file, read whole: what is in it, and whether its traffic keeps to its lanes."""
+
+from __future__ import annotations
+
+import math
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from augment.formats.readers import recognise
+from augment.formats.reading import Reading
+from augment.geometry.angles import difference
+from augment.scene.codec import scene_from_document, scene_to_document
+from augment.scene.entities import TrafficLight, TrafficSide
+from augment.scene.lane_graph import LaneGraph
+from augment.scene.recording_codec import recording_to_document
+
+pytestmark = pytest.mark.realdata
+
+FILES = {
+    "av2": "av2_sensor/7fab2350-7eaf-3b7e-a39d-6937a4c1bede",
+    "commonroad": "commonroad/USA_Peach-4_8_T-1.xml",
+    "scenarionet": "scenarionet/sd_nuscenes_mini_val_scene-0103*.pkl",
+    "waymo": "waymo_motion/womd_scenario_input.tfrecord",
+}
+
+
+@cache
+def reading(realdata: Path, name: str) -> Reading:
+    (path,) = realdata.glob(FILES[name])
+    reader = recognise(path)
+    assert reader.name == name
+    return reader.read(path, item=None, frame=None, name="recorded")
+
+
+@pytest.mark.parametrize(
+    ("name", "lanes", "connectors", "agents", "areas", "steps"),
+    [
+        ("av2", 96, 62, 35, 22, 156),
+        ("commonroad", 59, 18, 9, 0, 61),
+        ("scenarionet", 46, 55, 61, 24, 81),
+        ("waymo", 112, 1, 83, 4, 81),
+    ],
+)
+def test_all_that_a_file_holds_comes_in(
+    realdata: Path, name: str, lanes: int, connectors: int, agents: int, areas: int, steps: int
+) -> None:
+    made = reading(realdata, name)
+    scene, recording = made.scene, made.recording
+    assert recording is not None
+    found = tuple(map(len, (scene.lanes, scene.connectors, scene.agents, scene.areas)))
+    assert found == (lanes, connectors, agents, areas)
+    assert len(recording.times_s) == steps
+    assert scene_from_document(scene_to_document(scene)) == scene
+    recording_to_document(recording)
+
+
+@pytest.mark.parametrize("name", list(FILES))
+def test_moving_vehicles_head_where_their_lane_leads(realdata: Path, name: str) -> None:
+    made = reading(realdata, name)
+    assert made.recording is not None
+    graph = LaneGraph(made.scene)
+    aligned = []
+    for track in made.recording.tracks:
+        if track.type not in ("VEHICLE", "BUS"):
+            continue
+        for x_m, y_m, heading_rad, speed_mps in track.states[::3].tolist():
+            way_id = graph.under(x_m, y_m, heading_rad) if speed_mps > 2.0 else None
+            if way_id is not None:
+                line = graph.way(way_id).centerline
+                turn = difference(line.heading_at(line.project(x_m, y_m).s_m), heading_rad)
+                aligned.append(abs(turn) < math.radians(30.0))
+    assert len(aligned) >= 15
+    assert np.mean(aligned) >= 0.95
+
+
+def test_lights_show_the_programmes_state_at_the_start(realdata: Path) -> None:
+    # Both pairs at step 0: 410 steps into a cycle of 400 green, 30 yellow; and 910, in the red.
+    scene = reading(realdata, "commonroad").scene
+    lights = [connector.traffic_light for connector in scene.connectors]
+    assert lights.count(TrafficLight.YELLOW) == 9
+    assert lights.count(TrafficLight.RED) == 9
+    assert {lane.speed_limit_mps for lane in scene.lanes} == {11.176, 15.6464}
+
+
+def test_people_drive_on_the_right_in_all_of_these_places(realdata: Path) -> None:
+    sides = {reading(realdata, name).scene.traffic_side for name in FILES}
+    assert sides == {TrafficSide.RIGHT}

@@ -1,0 +1,218 @@
+from __future__ import annotations
+
+import os
+import pickle
+import struct
+from collections import defaultdict
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from augment.errors import InvalidDocument
+from augment.formats.reading import Reading
+from augment.formats.scenarionet.scenario import ScenarioNet
+from augment.formats.scenarionet.unpickling import read_pickle
+from augment.scene.codec import scene_to_document
+from augment.scene.entities import AreaKind, TrafficLight, TrafficSide, TurnType
+from augment.scene.notes import NoteKind
+
+
+def moving(x: float, speed: float, steps: int = 3, **fields: object) -> dict[str, Any]:
+    """A track along +x at that speed, a tenth of a second between steps."""
+    xs = x + 0.1 * speed * np.arange(steps)
+    column = np.ones((steps, 1))
+    return {
+        "type": "VEHICLE",
+        "state": {
+            "position": np.column_stack([xs, np.zeros(steps), np.zeros(steps)]),
+            "heading": np.zeros(steps),
+            "velocity": np.column_stack([np.full(steps, speed), np.zeros(steps)]),
+            "valid": np.ones(steps),
+            "length": 4.5 * column,
+            "width": 1.9 * column,
+        },
+        "metadata": {},
+    } | fields
+
+
+def strip(x: float, to: float, **fields: object) -> dict[str, Any]:
+    """A lane along +x, 4 m wide."""
+    line = np.array([[x, 0.0, 0.0], [to, 0.0, 0.0]])
+    ring = np.array([[x, 2.0], [to, 2.0], [to, -2.0], [x, -2.0]])
+    return {"type": "LANE_SURFACE_STREET", "polyline": line, "polygon": ring} | fields
+
+
+def description() -> dict[str, Any]:
+    bend = np.array([[30.0, 0.0, 0.0], [38.0, 3.0, 0.0], [40.0, 12.0, 0.0]])
+    inner = {"type": "LANE_SURFACE_UNSTRUCTURE", "speed_limit_kmh": 100, "entry_lanes": ["a"]}
+    ego = moving(0.0, 10.0)
+    ego["state"]["length"], ego["state"]["width"] = ego["state"]["width"], ego["state"]["length"]
+    counts: defaultdict[str, int] = defaultdict(int)
+    return {
+        "id": "made",
+        "length": 3,
+        "metadata": {
+            "sdc_id": "ego",
+            "ts": np.array([0.0, 0.1, 0.2]),
+            "dataset": "nuscenes",
+            "map": "singapore-onenorth",
+            "counts": counts,
+        },
+        "tracks": {"ego": ego, "car": moving(20.0, 5.0), "cone": moving(9.0, 0.0, type="OTHER")},
+        "dynamic_map_states": {
+            "x": {
+                "lane": "x",
+                "state": {"object_state": ["LANE_STATE_GO", "LANE_STATE_STOP", ""]},
+            }
+        },
+        "map_features": {
+            "a": strip(-30.0, 30.0, exit_lanes=["x", "y"]),
+            "x": inner | {"polyline": np.array([[30.0, 0.0], [45.0, 0.0]]), "exit_lanes": ["b"]},
+            "y": inner | {"polyline": bend, "exit_lanes": []},
+            "b": strip(45.0, 80.0),
+            "walk": {"type": "ROAD_EDGE_SIDEWALK", "polygon": np.eye(3)[:, :2] * 20.0},
+            "line": {"type": "ROAD_LINE_SOLID_SINGLE_WHITE", "polyline": np.zeros((2, 2))},
+        },
+    }
+
+
+def store(path: Path, value: object, protocol: int = 4) -> Path:
+    file = path / "made.pkl"
+    file.write_bytes(pickle.dumps(value, protocol=protocol))
+    return file
+
+
+def read(file: Path, frame: int | None = None) -> Reading:
+    return ScenarioNet().read(file, item=None, frame=frame, name="made")
+
+
+def fault_of(file: Path) -> str:
+    with pytest.raises(InvalidDocument) as caught:
+        read(file)
+    return str(caught.value)
+
+
+@pytest.mark.parametrize("protocol", [2, 3, 4, 5])
+def test_every_protocol_gives_the_same_scene(tmp_path: Path, protocol: int) -> None:
+    reading = read(store(tmp_path, description(), protocol))
+    scene, recording = reading.scene, reading.recording
+    assert (scene.ego.length_m, scene.ego.width_m) == (4.5, 1.9)
+    assert [(agent.x_m, agent.speed_mps) for agent in scene.agents] == [(9.0, 0.0), (20.0, 5.0)]
+    assert recording is not None
+    assert recording.ego[:, 0].tolist() == [0.0, 1.0, 2.0]
+    scene_to_document(scene)
+
+
+def test_the_map_has_widths_connectors_lights_and_a_side(tmp_path: Path) -> None:
+    reading = read(store(tmp_path, description()))
+    scene = reading.scene
+    street, after = scene.lanes
+    assert (street.width_m, street.speed_limit_mps) == (4.0, None)
+    assert {(c.turn_type, c.to_lane, c.traffic_light) for c in scene.connectors} == {
+        (TurnType.STRAIGHT, after.id, TrafficLight.GREEN),
+        (TurnType.LEFT, None, TrafficLight.UNKNOWN),
+    }
+    assert {c.speed_limit_mps for c in scene.connectors} == {None}
+    assert scene.traffic_side is TrafficSide.LEFT
+    assert [area.kind for area in scene.areas] == [AreaKind.WALKWAY]
+    kinds = {note.kind for note in reading.notes}
+    assert {
+        NoteKind.EGO_SIZE_SWAPPED,
+        NoteKind.SPEED_LIMITS_IGNORED,
+        NoteKind.NO_SPEED_LIMITS,
+        NoteKind.NON_COMMERCIAL,
+    } <= kinds
+
+
+class Evil:
+    """Runs a command when it is unpickled."""
+
+    def __reduce__(self) -> tuple[object, tuple[str]]:
+        return os.system, ("touch /tmp/it-ran",)
+
+
+class Eval:
+    """Evaluates when it is unpickled."""
+
+    def __reduce__(self) -> tuple[object, tuple[str]]:
+        return eval, ("1/0",)
+
+
+@pytest.mark.parametrize(
+    ("block", "said"),
+    [
+        (pickle.dumps(Evil()), "system is not on the list"),
+        (pickle.dumps({"tracks": Eval()}, protocol=2), "eval is not on the list"),
+        (pickle.dumps(np.zeros(2, dtype=[("a", "f8")])), "are not read"),
+        (b"\x80\x04r\xff\xff\xff\xffN.", "can't be unpickled safely"),
+        (b"\x80\x02Nr\xff\xff\xff\x7f.", "of its memory is too far"),
+        (b"\x80\x05\x96" + struct.pack("<Q", 1 << 40) + b".", "can't be unpickled safely"),
+        (b"\x80\x04\x8e" + struct.pack("<Q", 1 << 40) + b".", "can't be unpickled safely"),
+        (b"\x80\x04" + b"N0" * 300_000 + b"N.", "more than 400000 instructions"),
+        (b"\x80\x04\x82\x01.", "EXT1 is not on the list"),
+        (b"", "can't be unpickled safely"),
+        (b"hello", "can't be unpickled safely"),
+        (pickle.dumps([1, 2]), "holds no scenario description"),
+        (pickle.dumps({"tracks": {}}), "map_features: is missing"),
+    ],
+)
+def test_hostile_pickles_are_refused(tmp_path: Path, block: bytes, said: str) -> None:
+    file = tmp_path / "evil.pkl"
+    file.write_bytes(block)
+    assert said in fault_of(file)
+
+
+def test_an_array_that_claims_more_than_it_holds_is_refused(tmp_path: Path) -> None:
+    block = pickle.dumps(np.zeros(3), protocol=2)
+    at = block.index(b"K\x03\x85")
+    file = tmp_path / "claims.pkl"
+    file.write_bytes(block[:at] + b"\x8a\x06\xff\xff\xff\xff\xff\x00\x85" + block[at + 3 :])
+    with pytest.raises(InvalidDocument, match="can't be unpickled safely"):
+        read_pickle(file)
+
+
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [
+        ({"metadata": {"sdc_id": "nobody"}}, "'nobody' is none of the tracks"),
+        ({"tracks": {"ego": moving(0.0, 1.0, type="TANK")}}, "unknown 'TANK'"),
+        ({"tracks": {"ego": moving(0.0, 1.0, steps=2)}}, "has 2 steps; the scenario has 3"),
+        ({"map_features": {"a": {"polyline": []}}}, "needs a type"),
+        ({"map_features": {"a": strip(0, 1, polyline=np.zeros((4, 7)))}}, "two or three numbers"),
+        ({"map_features": {"a": strip(0.0, 1e300)}}, "up to 1e+08"),
+        ({"map_features": {"a": strip(0.0, float("nan"))}}, "finite"),
+        ({"dynamic_map_states": {"a": {"state": {"object_state": ["BLUE"]}}}}, "'BLUE'"),
+    ],
+)
+def test_odd_descriptions_are_refused(tmp_path: Path, change: dict[str, Any], said: str) -> None:
+    made = description() | change
+    if "sdc_id" not in made["metadata"]:
+        made["metadata"] = description()["metadata"]
+    assert said in fault_of(store(tmp_path, made))
+
+
+@given(st.data())
+@settings(max_examples=60, deadline=2000)
+def test_any_change_of_a_pickle_is_read_or_refused(
+    tmp_path_factory: pytest.TempPathFactory, data: st.DataObject
+) -> None:
+    block = bytearray(pickle.dumps(description(), protocol=4))
+    for _ in range(data.draw(st.integers(1, 5))):
+        block[data.draw(st.integers(0, len(block) - 1))] = data.draw(st.integers(0, 255))
+    file = tmp_path_factory.getbasetemp() / "changed.pkl"
+    file.write_bytes(block[: data.draw(st.integers(0, len(block)))] or bytes(block))
+    try:
+        scene_to_document(read(file).scene)
+    except InvalidDocument:
+        return
+
+
+def test_nothing_is_opened_to_recognise_it(tmp_path: Path) -> None:
+    file = tmp_path / "made.pkl"
+    file.write_bytes(pickle.dumps(Evil()))
+    assert ScenarioNet().recognises(file)
+    assert not Path("/tmp/it-ran").exists()

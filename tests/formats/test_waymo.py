@@ -1,0 +1,153 @@
+from __future__ import annotations
+
+import struct
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from augment.errors import InvalidDocument
+from augment.formats.reading import Reading
+from augment.formats.waymo.crc32c import crc32c, masked_crc32c
+from augment.formats.waymo.messages import read_scenario
+from augment.formats.waymo.scenario import WaymoMotion
+from augment.scene.codec import scene_to_document
+from augment.scene.entities import TrafficLight, TurnType
+from tests.formats.waymo_files import record, scenario, state, track, write
+
+
+def read(path: Path, item: str | None = None, frame: int | None = None) -> Reading:
+    return WaymoMotion().read(path, item=item, frame=frame, name="made")
+
+
+def fault_of(path: Path, item: str | None = None, frame: int | None = None) -> str:
+    with pytest.raises(InvalidDocument) as caught:
+        read(path, item, frame)
+    return str(caught.value)
+
+
+@pytest.fixture
+def file(tmp_path: Path) -> Path:
+    return write(tmp_path / "made.tfrecord", scenario(), scenario(ego=1))
+
+
+@pytest.mark.parametrize(
+    ("block", "checksum"),
+    [
+        (b"", 0),
+        (b"123456789", 0xE3069283),
+        (bytes(32), 0x8A9136AA),
+        (b"\xff" * 32, 0x62A8AB43),
+        (bytes(range(32)), 0x46DD794E),
+    ],
+)
+def test_checksums_are_those_of_rfc_3720(block: bytes, checksum: int) -> None:
+    assert crc32c(block) == checksum
+
+
+@given(st.integers(0, 5000), st.integers(0, 2**32 - 1))
+@settings(max_examples=20, deadline=None)
+def test_a_long_block_has_the_checksum_of_its_bytes_one_by_one(size: int, seed: int) -> None:
+    block = np.random.default_rng(seed).bytes(size)
+    state = 0xFFFFFFFF
+    for byte in block:
+        state ^= byte
+        for _ in range(8):
+            state = state >> 1 ^ (0x82F63B78 if state & 1 else 0)
+    assert crc32c(block) == state ^ 0xFFFFFFFF
+
+
+def test_the_scene_is_that_of_the_current_step(file: Path) -> None:
+    reading = read(file)
+    scene, recording = reading.scene, reading.recording
+    assert (reading.moment.item, reading.moment.frame) == ("0", 1)
+    assert (scene.origin.pose.x_m, scene.ego.speed_mps) == (1001.0, 10.0)
+    assert [(a.x_m, a.y_m, a.lane_id) for a in scene.agents] == [(20.0, 0.0, "Lane1")]
+    assert recording is not None
+    assert recording.ego[:, 0].tolist() == [0.0, 1.0]
+    scene_to_document(scene)
+
+
+def test_lanes_have_widths_limits_lights_and_turns(file: Path) -> None:
+    scene = read(file).scene
+    street, after = scene.lanes
+    assert (street.width_m, street.speed_limit_mps) == (4.0, 11.176)
+    assert street.left_boundary is not None
+    assert street.left_boundary.points_m[:, 1].tolist() == [2.0, 2.0]
+    ways = {(c.turn_type, c.from_lane, c.to_lane, c.traffic_light) for c in scene.connectors}
+    assert ways == {
+        (TurnType.STRAIGHT, street.id, after.id, TrafficLight.GREEN),
+        (TurnType.LEFT, street.id, None, TrafficLight.UNKNOWN),
+    }
+    later = read(file, frame=2).scene
+    assert TrafficLight.RED in {c.traffic_light for c in later.connectors}
+
+
+def test_each_record_is_an_item_and_each_step_a_moment(file: Path) -> None:
+    found = list(WaymoMotion().moments(file, every_s=0.2))
+    assert [(one.item, one.frame) for one in found] == [("0", 0), ("0", 2), ("1", 0), ("1", 2)]
+    assert read(file, "1").scene.origin.pose.x_m == 1021.0
+    assert "the file has no record 2" in fault_of(file, "2")
+    assert "no number of a record" in fault_of(file, "x")
+    assert "frame: 3 is not there" in fault_of(file, frame=3)
+
+
+def test_a_length_of_two_gigabytes_is_refused_before_it_is_read(tmp_path: Path) -> None:
+    head = struct.pack("<Q", 2**31)
+    path = tmp_path / "huge.tfrecord"
+    path.write_bytes(head + struct.pack("<I", masked_crc32c(head)) + b"x" * 100)
+    assert "has 2147483648 bytes; at most" in fault_of(path)
+
+
+def test_wrong_checksums_and_cut_off_files_are_refused(file: Path) -> None:
+    whole = file.read_bytes()
+    for place, part in ((3, "length"), (40, "payload")):
+        broken = bytearray(whole)
+        broken[place] ^= 1
+        file.write_bytes(broken)
+        assert f"{part} with a wrong checksum" in fault_of(file)
+    file.write_bytes(whole[:-1])
+    assert "record 1: is cut off: 1 bytes" in fault_of(file, "1")
+    file.write_bytes(whole + b"abc")
+    assert "record 2: is cut off in its length" in fault_of(file, "2")
+
+
+@pytest.mark.parametrize(
+    ("payload", "said"),
+    [
+        (scenario(ego=5), "sdc_track_index: 5 is none of the 2 tracks"),
+        (scenario(track(9, 7, *[state(0, 0, 0, 0)] * 3)), "tracks[2].object_type: 7 is unknown"),
+        (scenario(track(9, 1, state(0, 0, 0, 0))), "tracks[2]: has 1 states for 3 times"),
+        (scenario(steps=0), "timestamps_seconds"),
+        (b"", "timestamps_seconds"),
+        (b"\x0b", "field 1 is cut off or of the kind 3"),
+        (b"\x00\x00", "the number 0"),
+        (b"\x08" + b"\xff" * 10, "more than 64 bits"),
+    ],
+)
+def test_a_broken_message_says_what_is_wrong(tmp_path: Path, payload: bytes, said: str) -> None:
+    assert said in fault_of(write(tmp_path / "x.tfrecord", payload))
+
+
+@given(st.data())
+@settings(max_examples=60, deadline=2000)
+def test_any_change_of_a_message_is_read_or_refused(data: st.DataObject) -> None:
+    payload = bytearray(scenario())
+    for _ in range(data.draw(st.integers(1, 4))):
+        payload[data.draw(st.integers(0, len(payload) - 1))] = data.draw(st.integers(0, 255))
+    cut = data.draw(st.integers(0, len(payload)))
+    for block in (bytes(payload), bytes(payload[:cut])):
+        try:
+            read_scenario(block)
+        except InvalidDocument:
+            continue
+
+
+def test_it_is_recognised_by_its_first_checksum(file: Path, tmp_path: Path) -> None:
+    assert WaymoMotion().recognises(file)
+    other = tmp_path / "other"
+    other.write_bytes(b"\0" * 100)
+    assert not WaymoMotion().recognises(other)
+    assert record(b"x").startswith(b"\x01" + b"\0" * 7)
