@@ -12,8 +12,8 @@ from rest_framework.response import Response
 
 from arena.api.access import StaffOnly
 from arena.api.errors import ApiView
-from arena.queries import jobs
 from augment.models import GenerationJob
+from augment.services.running.summary import count_rows
 from augment.services.running.workers import workforce
 
 
@@ -24,7 +24,7 @@ class JobProgressView(ApiView):
 
     def get(self, request: Request, code: uuid.UUID) -> Response:
         """State, counts by state, whether it is under way and whether anybody works on it."""
-        found = jobs.counts(get_object_or_404(GenerationJob, code=code))
+        found = count_rows(get_object_or_404(GenerationJob, code=code))
         body = {
             "state": found.job.state,
             "total": found.total,

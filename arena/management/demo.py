@@ -34,7 +34,8 @@ from augment.services.endpoints.contestants import (
 from augment.services.judging.driving_scores import scores_of_job
 from augment.services.judging.simulations import NUPLAN, Options, plan_scenario
 from augment.services.running.choosing import ALL, resolve_contestants
-from augment.services.running.jobs import launch, progress
+from augment.services.running.jobs import launch
+from augment.services.running.summary import count_rows
 from augment.services.scenarios.catalogue import load_catalogue
 from augment.tasks import enqueue_job, enqueue_simulations
 
@@ -121,20 +122,21 @@ def generate(
     )
     enqueue_job(job.pk)
     ended, told, moved_at = -1, -1, time.monotonic()
-    while (now := progress(job)).under_way:
+    while (now := count_rows(job)).under_way:
         look()
-        if now.ended != ended:
-            ended, moved_at = now.ended, time.monotonic()
+        if now.settled != ended:
+            ended, moved_at = now.settled, time.monotonic()
         elif time.monotonic() - moved_at > STUCK_S:
-            raise DemoFailed(f"In the job {JOB!r} nothing ended for {STUCK_S:.0f} s: {now}.")
+            raise DemoFailed(
+                f"In the job {JOB!r} nothing ended for {STUCK_S:.0f} s: {ended} of {now.total}."
+            )
         if ended // A_LINE_EVERY > told // A_LINE_EVERY:
             say(f"  {ended} of {now.total} augmentations")
             told = ended
         time.sleep(0.2)
-    say(
-        f"Augmentations: {now.done} done, {now.unreadable} unreadable, {now.refused} refused, "
-        f"{now.failed} failed"
-    )
+    states = Augmentation.State
+    outcomes = (states.DONE, states.UNREADABLE, states.REFUSED, states.FAILED)
+    say("Augmentations: " + ", ".join(f"{now.by_state[one]} {one.value}" for one in outcomes))
     if now.failed:
         reasons = job.augmentations.filter(state=Augmentation.State.FAILED)
         raise DemoFailed("; ".join(sorted(set(reasons.values_list("reason", flat=True)))))

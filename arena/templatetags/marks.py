@@ -11,8 +11,8 @@ from django.utils.translation import gettext, gettext_lazy, ngettext
 from django.utils.translation import gettext_noop as _
 
 from arena.models import Study
-from arena.queries.jobs import JobCounts
 from augment.models import Augmentation, GenerationJob
+from augment.services.running.summary import JobCounts
 
 register = template.Library()
 

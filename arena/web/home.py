@@ -11,13 +11,14 @@ from django.utils.http import url_has_allowed_host_and_scheme
 from django.views.decorators.http import require_POST, require_safe
 
 from arena.models import Study
-from arena.queries import faults, inventory, jobs, progress
+from arena.queries import faults, inventory, progress
 from arena.queries.people import role_of
 from arena.queries.results import ResultsAccess, results_access
 from arena.services.preferences import choose_language, choose_theme
 from arena.web.checklist import steps
 from arena.web.forms import LanguageForm, ThemeForm
 from arena.web.sign_in import keep_language
+from augment.services.running.summary import list_jobs
 
 LATEST_JOBS = 5
 
@@ -98,7 +99,7 @@ def _admin(request: HttpRequest) -> HttpResponse:
     context = {
         "inventory": found,
         "steps": steps(found),
-        "jobs": jobs.list_jobs()[:LATEST_JOBS],
+        "jobs": list_jobs()[:LATEST_JOBS],
         "running": [line for line in studies if line.study.state == Study.State.OPEN],
     }
     return render(request, "home/admin.html", context)

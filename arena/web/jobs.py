@@ -28,6 +28,7 @@ from augment.services.running import caps
 from augment.services.running import jobs as service
 from augment.services.running.caps import Caps
 from augment.services.running.costs import costs_of
+from augment.services.running.summary import count_rows, failure_groups, list_jobs
 from augment.services.running.workers import workforce
 from augment.services.wording import translate
 from augment.tasks import enqueue_job
@@ -39,7 +40,7 @@ State = Augmentation.State
 @require_safe
 def jobs_page(request: HttpRequest) -> HttpResponse:
     """Every job with its bar."""
-    found = jobs.list_jobs()
+    found = list_jobs()
     context: dict[str, object] = {"jobs": found}
     if any(counts.is_moving for counts in found):
         context["workforce"] = workforce()
@@ -74,12 +75,12 @@ def new_job_page(request: HttpRequest) -> HttpResponse:
 def job_page(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
     """Progress, the grid, and failures by their reason."""
     job = get_object_or_404(GenerationJob.objects.select_related("launched_by__person"), code=code)
-    found = jobs.counts(job)
+    found = count_rows(job)
     context: dict[str, object] = {
         "counts": found,
         "costs": costs_of(job),
         "grid": jobs.grid(job),
-        "failures": jobs.failures(job),
+        "failures": failure_groups(job),
     }
     if found.is_moving:
         context["workforce"] = workforce()
@@ -148,7 +149,7 @@ def resume_job(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
 
 def _cancelling(job: GenerationJob) -> Confirmation:
     """What is asked before a job is cancelled."""
-    found = jobs.counts(job).by_state
+    found = count_rows(job).by_state
     waiting, running = found[State.QUEUED], found[State.RUNNING]
     settled = sum(found.values()) - waiting - running
     facts = (

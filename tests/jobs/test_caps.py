@@ -10,6 +10,7 @@ from augment.errors import Conflict, ModelFault
 from augment.models import Augmentation, Event, GenerationJob
 from augment.services.running import caps, jobs, runner
 from augment.services.running.caps import Caps
+from augment.services.running.summary import count_rows
 from tests.jobs.models import Model, add_llama, llama_job
 from tests.jobs.rows import add_scenario, launch, only_row
 
@@ -96,4 +97,4 @@ def test_retrying_in_a_stopped_job_leaves_it_stopped() -> None:
     job.refresh_from_db()
     assert job.state == JOB.STOPPED_AT_CAP
     jobs.retry_failed(job)
-    assert (job.state, jobs.progress(job).queued) == (JOB.STOPPED_AT_CAP, 2)
+    assert (job.state, count_rows(job).queued) == (JOB.STOPPED_AT_CAP, 2)

@@ -1,12 +1,19 @@
 from __future__ import annotations
 
+from io import StringIO
+
 import pytest
 from django.contrib.auth.models import User
+from django.core.management import CommandError
+from django.db import connection
+from django.test.utils import CaptureQueriesContext
 from pytest_django import DjangoAssertNumQueries
 
 from augment.errors import Conflict, InvalidDocument, UnknownName
+from augment.management.commands.generate import Command
 from augment.models import Augmentation, Contestant, Event, GenerationJob
 from augment.services.running import jobs, leases
+from augment.services.running.summary import count_rows, failure_groups
 from tests.jobs.rows import NOON, add_kind, add_scenario, done, failed, launch, leased
 
 pytestmark = pytest.mark.django_db
@@ -17,9 +24,7 @@ def test_a_job_gets_one_waiting_row_per_cell() -> None:
     add_kind("rule-placer", Contestant.Kind.RULE)
     job = launch(scenarios=3, contestants=("reference", "rule-placer"))
     assert job.state == GenerationJob.State.RUNNING
-    assert jobs.progress(job) == jobs.JobProgress(
-        total=6, queued=6, running=0, done=0, unreadable=0, refused=0, failed=0, cancelled=0
-    )
+    assert count_rows(job).by_state == dict.fromkeys(State, 0) | {State.QUEUED: 6}
     assert set(job.augmentations.values_list("sent_at", flat=True)) == {None}
 
 
@@ -98,10 +103,28 @@ def test_progress_counts_states_by_one_query(
     leases.settle(held=leased(second), settlement=failed(), now=NOON)
     leased(third)
     with django_assert_num_queries(1):
-        counts = jobs.progress(job)
+        counts = count_rows(job)
     assert (counts.total, counts.queued, counts.running) == (4, 1, 1)
-    assert (counts.done, counts.failed) == (1, 1)
-    assert (counts.under_way, counts.ended) == (2, 2)
+    assert (counts.by_state[State.DONE], counts.failed) == (1, 1)
+    assert (counts.under_way, counts.settled) == (2, 2)
+
+
+def test_failures_stand_by_state_and_reason_faults_of_the_machine_first() -> None:
+    job = launch(scenarios=4)
+    rows = job.augmentations.order_by("pk")
+    rows.update(state=State.UNREADABLE, reason="no block")
+    rows.filter(pk=rows[0].pk).update(state=State.FAILED, reason="the wire broke")
+    with CaptureQueriesContext(connection) as asked:
+        found = [(one.state, one.reason, one.number) for one in failure_groups(job)]
+    assert found == [
+        (State.FAILED, "the wire broke", 1), (State.UNREADABLE, "no block", 3),
+    ]  # fmt: skip
+    assert len(asked) == 1
+    said = StringIO()
+    with pytest.raises(CommandError, match="1 failed; see the reasons above"):
+        Command(stdout=said).report(job)
+    assert "failed 1 time: the wire broke" in said.getvalue()
+    assert "no block" not in said.getvalue(), "an answer of the model is no fault of a run"
 
 
 def test_a_job_is_finished_when_nothing_is_under_way() -> None:
@@ -130,8 +153,8 @@ def test_cancel_stops_what_waits_and_keeps_what_is_done_or_runs() -> None:
     assert leases.take_lease(augmentation_pk=third.pk, now=NOON) is None
     assert leases.settle(held=held, settlement=done(), now=NOON)
     assert jobs.finish_if_over(job_pk=job.pk, now=NOON) == 0
-    counts = jobs.progress(job)
-    assert (counts.done, counts.cancelled) == (2, 1)
+    counts = count_rows(job)
+    assert [counts.by_state[state] for state in (State.DONE, State.CANCELLED)] == [2, 1]
     event = Event.objects.filter(verb="cancel").get()
     assert event.after == {"state": "cancelled", "cancelled": 1}
 

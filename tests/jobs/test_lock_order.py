@@ -13,6 +13,7 @@ from augment.errors import Conflict
 from augment.models import GenerationJob
 from augment.services.running import caps, jobs, leases, runner
 from augment.services.running.caps import Caps
+from augment.services.running.summary import count_rows
 from tests.jobs.models import Model, llama_job
 from tests.jobs.rows import launch
 
@@ -62,4 +63,4 @@ def test_a_job_that_is_over_keeps_what_waits() -> None:
     GenerationJob.objects.update(state=GenerationJob.State.FINISHED)
     with pytest.raises(Conflict):
         jobs.cancel(job)
-    assert jobs.progress(job).queued == 1
+    assert count_rows(job).queued == 1

@@ -13,8 +13,9 @@ from augment import tasks
 from augment.errors import QueueUnreachable
 from augment.management.commands.generate import Command
 from augment.models import Augmentation, GenerationJob
-from augment.services.running import jobs, leases, runner
+from augment.services.running import leases, runner
 from augment.services.running.caps import Caps
+from augment.services.running.summary import count_rows
 from tests.jobs.models import Model, add_llama, llama_job
 from tests.jobs.rows import add_kind, add_scenario, done, failed, launch, leased, only_row
 
@@ -219,7 +220,7 @@ def test_waiting_ends_with_the_job() -> None:
     said = StringIO()
     Command(stdout=said).wait(job, timeout_s=1.0)
     assert said.getvalue() == "1 of 1, 0 running\nOver.\n"
-    assert jobs.progress(job).done == 1
+    assert count_rows(job).by_state[Augmentation.State.DONE] == 1
 
 
 def test_generate_caps_the_job_it_launches(broker: Broker) -> None:

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import pytest
 
-from arena.queries.jobs import JobCounts
 from arena.templatetags.marks import job_mark, percent, segments
 from augment.models import Augmentation, GenerationJob
+from augment.services.running.summary import JobCounts
 
 State = Augmentation.State
 

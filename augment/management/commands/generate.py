@@ -12,13 +12,18 @@ from django.utils import timezone
 
 from augment.errors import AugmentError
 from augment.management.arguments import add_cap_arguments, caps_of
-from augment.models import GenerationJob
+from augment.models import Augmentation, GenerationJob
 from augment.services.endpoints.contestants import ensure_builtin
 from augment.services.running import jobs
 from augment.services.running.budget import limit_of
 from augment.services.running.choosing import resolve_contestants, resolve_scenarios
 from augment.services.running.estimates import estimate
-from augment.services.running.summary import contestant_lines, failure_groups
+from augment.services.running.summary import (
+    JobCounts,
+    contestant_lines,
+    count_rows,
+    failure_groups,
+)
 from augment.services.terminal import TerminalCommand
 from augment.tasks import check_broker, enqueue_job
 
@@ -63,7 +68,7 @@ class Command(TerminalCommand):
             job = self._launch(options)
         except AugmentError as error:
             raise CommandError(str(error)) from error
-        total = jobs.progress(job).total
+        total = count_rows(job).total
         self.stdout.write(f"Job {job.code}, {job.name!r}: {total} to run.")
         if options["wait"]:
             try:
@@ -112,7 +117,7 @@ class Command(TerminalCommand):
         started = time.monotonic()
         shown, hinted = "", False
         while True:
-            counts = jobs.progress(job)
+            counts = count_rows(job)
             shown = self._show(counts, shown)
             if not counts.under_way:
                 self.stdout.write("" if self.stdout.isatty() else "Over.")
@@ -134,14 +139,14 @@ class Command(TerminalCommand):
                 hinted = True
             time.sleep(POLL_S)
 
-    def _show(self, counts: jobs.JobProgress, before: str) -> str:
+    def _show(self, counts: JobCounts, before: str) -> str:
         """A bar that moves on a terminal, elsewhere a line whenever something changed."""
-        text = f"{counts.ended} of {counts.total}, {counts.running} running"
+        text = f"{counts.settled} of {counts.total}, {counts.running} running"
         if counts.failed:
             text += f", {counts.failed} failed"
         if text != before:
             if self.stdout.isatty():
-                cells = BAR_CELLS * counts.ended // counts.total
+                cells = BAR_CELLS * counts.settled // counts.total
                 bar = "#" * cells + "." * (BAR_CELLS - cells)
                 self.stdout.write(f"[{bar}] {text}   ", ending="\r")
                 self.stdout.flush()
@@ -159,14 +164,15 @@ class Command(TerminalCommand):
                 f"{line.slug:{max(width, 10)}}  {line.done:4}  {line.unreadable:10}  "
                 f"{line.refused:7}  {line.failed:6}"
             )
-        failures = failure_groups(job)
+        failed = Augmentation.State.FAILED
+        failures = [group for group in failure_groups(job) if group.state == failed]
         for group in failures:
             self.stdout.write(
-                f"failed {group.count} time{'s' * (group.count > 1)}: {group.reason}"
+                f"failed {group.number} time{'s' * (group.number > 1)}: {group.reason}"
             )
         if failures:
-            failed = sum(group.count for group in failures)
-            raise CommandError(f"{failed} failed; see the reasons above.", returncode=1)
+            number = sum(group.number for group in failures)
+            raise CommandError(f"{number} failed; see the reasons above.", returncode=1)
 
 
 def is_stopped(job: GenerationJob) -> bool:

@@ -13,6 +13,7 @@ from augment.management.arguments import add_cap_arguments, caps_of
 from augment.services.running import caps, jobs
 from augment.services.running.budget import limit_of
 from augment.services.running.choosing import find_job
+from augment.services.running.summary import count_rows
 from augment.services.terminal import TerminalCommand
 from augment.tasks import check_broker, enqueue_job
 
@@ -44,5 +45,5 @@ class Command(TerminalCommand):
                 transaction.on_commit(lambda: enqueue_job(pk))
         except AugmentError as error:
             raise CommandError(str(error)) from error
-        waiting = jobs.progress(job).queued
+        waiting = count_rows(job).queued
         self.stdout.write(f"Job {job.code}, capped at {limit_of(job)}: {waiting} to run.")

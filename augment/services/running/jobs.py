@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import Any, TypeVar
 
 from django.contrib.auth.models import User
 from django.db import transaction
-from django.db.models import Case, Count, F, Q, QuerySet, Value, When
+from django.db.models import Case, F, QuerySet, Value, When
 from django.utils import timezone
 
 from augment.errors import Conflict, UnknownName
@@ -31,30 +30,6 @@ NO_CAPS = Caps()
 
 OPEN = (GenerationJob.State.RUNNING, GenerationJob.State.STOPPED_AT_CAP)
 """States of jobs that are not over."""
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class JobProgress:
-    """How many rows of a job are in which state."""
-
-    total: int
-    queued: int
-    running: int
-    done: int
-    unreadable: int
-    refused: int
-    failed: int
-    cancelled: int
-
-    @property
-    def under_way(self) -> int:
-        """Rows without an outcome yet."""
-        return self.queued + self.running
-
-    @property
-    def ended(self) -> int:
-        """Rows with an outcome."""
-        return self.total - self.under_way
 
 
 @transaction.atomic
@@ -115,12 +90,6 @@ def launch(
         actor=actor, verb="launch", object_kind="job", object_code=str(job.code), after=after
     )
     return job
-
-
-def progress(job: GenerationJob) -> JobProgress:
-    """The counts of a job, by one query."""
-    counts = {state.value: Count("pk", filter=Q(state=state)) for state in State}
-    return JobProgress(**job.augmentations.aggregate(total=Count("pk"), **counts))
 
 
 @transaction.atomic

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+from collections import Counter, defaultdict
 from dataclasses import dataclass
 from typing import Any, cast
 
-from django.db.models import Count, F, Q
+from django.db.models import Count, F, Q, QuerySet
 
 from augment.models import Augmentation, GenerationJob
 
@@ -27,11 +28,78 @@ class ContestantLine:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class ReasonCount:
-    """Rows that failed for the same reason."""
+class JobCounts:
+    """A job and how many of its augmentations are in each state."""
 
+    job: GenerationJob
+    by_state: dict[State, int]
+
+    @property
+    def total(self) -> int:
+        """Contestants x scenarios."""
+        return sum(self.by_state.values())
+
+    @property
+    def under_way(self) -> int:
+        """What still waits or runs."""
+        return sum(self.by_state[state] for state in Augmentation.UNDER_WAY)
+
+    @property
+    def is_moving(self) -> bool:
+        """Whether anything will change by itself: not where all that is left waits at a cap."""
+        if self.job.state == GenerationJob.State.STOPPED_AT_CAP:
+            return self.running > 0
+        return self.under_way > 0
+
+    @property
+    def settled(self) -> int:
+        """What has its outcome, whichever it is."""
+        return self.total - self.under_way
+
+    @property
+    def queued(self) -> int:
+        """What nobody has taken yet."""
+        return self.by_state[State.QUEUED]
+
+    @property
+    def running(self) -> int:
+        """What a worker has taken."""
+        return self.by_state[State.RUNNING]
+
+    @property
+    def failed(self) -> int:
+        """What broke and may be tried again."""
+        return self.by_state[State.FAILED]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class FailureGroup:
+    """Augmentations without a modification that ended for the same reason."""
+
+    state: State
     reason: str
-    count: int
+    augmentations: list[Augmentation]
+
+    @property
+    def number(self) -> int:
+        """How many there are."""
+        return len(self.augmentations)
+
+
+def list_jobs() -> list[JobCounts]:
+    """All jobs, the youngest first; two queries."""
+    jobs = list(GenerationJob.objects.select_related("launched_by__person"))
+    found: defaultdict[int, Counter[str]] = defaultdict(Counter)
+    rows = Augmentation.objects.order_by().values_list("job_id", "state")
+    for job_id, state, number in rows.annotate(number=Count("pk")):
+        found[job_id][state] = number
+    return [_counts(job, found[job.pk]) for job in jobs]
+
+
+def count_rows(job: GenerationJob) -> JobCounts:
+    """One job; one query."""
+    rows = job.augmentations.order_by().values_list("state").annotate(number=Count("pk"))
+    return _counts(job, Counter(dict(rows)))
 
 
 def contestant_lines(job: GenerationJob) -> list[ContestantLine]:
@@ -46,8 +114,26 @@ def contestant_lines(job: GenerationJob) -> list[ContestantLine]:
     return [ContestantLine(**group) for group in cast("list[dict[str, Any]]", list(groups))]
 
 
-def failure_groups(job: GenerationJob) -> list[ReasonCount]:
-    """The reasons of the failed rows, the most frequent first."""
-    failed = job.augmentations.filter(state=State.FAILED).values("reason")
-    groups = failed.annotate(count=Count("pk")).order_by("-count", "reason")
-    return [ReasonCount(reason=group["reason"], count=group["count"]) for group in groups]
+def failure_groups(job: GenerationJob) -> list[FailureGroup]:
+    """What has no modification, grouped by state and reason; machine faults first."""
+    groups: defaultdict[tuple[State, str], list[Augmentation]] = defaultdict(list)
+    for cell in cells_of(job).filter(state__in=[State.FAILED, State.UNREADABLE, State.REFUSED]):
+        groups[State(cell.state), cell.reason].append(cell)
+    found = [
+        FailureGroup(state=state, reason=reason, augmentations=cells)
+        for (state, reason), cells in groups.items()
+    ]
+    return sorted(
+        found,
+        key=lambda group: (group.state != State.FAILED, -len(group.augmentations), group.reason),
+    )
+
+
+def cells_of(job: GenerationJob) -> QuerySet[Augmentation]:
+    """The augmentations of a job with their scenarios and contestants, without documents."""
+    documents = ("modification", "scenario__reference")
+    return job.augmentations.select_related("scenario", "contestant").defer(*documents)
+
+
+def _counts(job: GenerationJob, found: Counter[str]) -> JobCounts:
+    return JobCounts(job=job, by_state={state: found[state.value] for state in State})
