@@ -91,7 +91,6 @@ import hashlib
 from augment.scene.modification import Modification
 from augment.simulation.drive import run
 from augment.simulation.pdm_closed import PdmClosed
-from augment.simulation.setting import Setting
 from tests.simulation.test_drive import busy
 print(hashlib.sha256(run(busy(), PdmClosed(), steps=8).states.tobytes()).hexdigest())
 """
