@@ -14,7 +14,7 @@ from augment.formats.reading import Reading
 from augment.formats.xml_file import read_xml
 from augment.scene.codec import scene_to_document
 from augment.scene.entities import AgentType, AreaKind, TrafficLight, TurnType
-from augment.scene.notes import NoteKind
+from augment.scene.notes import SceneNoteKind
 
 
 def bound(name: str, *pairs: tuple[float, float]) -> str:
@@ -95,7 +95,7 @@ def fault_of(path: Path, text: str, item: str | None = None) -> str:
     return str(caught.value)
 
 
-def kinds(reading: Reading) -> set[NoteKind]:
+def kinds(reading: Reading) -> set[SceneNoteKind]:
     return {note.kind for note in reading.notes}
 
 
@@ -105,7 +105,7 @@ def test_a_planning_problem_is_an_ego_without_a_drive(tmp_path: Path) -> None:
     assert recording is not None
     assert np.isnan(recording.ego[1:]).all()
     assert (scene.ego.speed_mps, scene.ego.lane_id) == (3.0, "Lane1")
-    assert {NoteKind.NO_EGO_MOTION, NoteKind.EGO_SIZE_ASSUMED} <= kinds(reading)
+    assert {SceneNoteKind.NO_EGO_MOTION, SceneNoteKind.EGO_SIZE_ASSUMED} <= kinds(reading)
     car, parked = scene.agents
     assert (car.x_m, car.y_m, car.length_m, car.speed_mps) == (10.0, 0.0, 4.4, 5.0)
     assert (parked.x_m, parked.y_m, parked.type) == (30.0, -1.0, AgentType.VEHICLE)
@@ -118,7 +118,7 @@ def test_a_recorded_vehicle_can_be_the_ego(tmp_path: Path) -> None:
     reading = read(tmp_path, newer(more=""), "70", 1)
     assert reading.recording is not None
     assert reading.recording.ego[:, 0].tolist() == [0.0, 0.5]
-    assert NoteKind.NO_EGO_MOTION not in kinds(reading)
+    assert SceneNoteKind.NO_EGO_MOTION not in kinds(reading)
     assert "name a vehicle as the ego by its id: 70" in fault_of(tmp_path, newer(more=""))
     assert "72 is not there" in fault_of(tmp_path, newer(), "72")
 
@@ -127,7 +127,7 @@ def test_the_older_dialect_has_its_own_limits_and_roles(tmp_path: Path) -> None:
     scene = read(tmp_path, older()).scene
     assert scene.lanes[0].speed_limit_mps == 9.5
     assert [agent.type for agent in scene.agents] == [AgentType.VEHICLE]
-    assert NoteKind.NO_INTERSECTIONS in kinds(read(tmp_path, older()))
+    assert SceneNoteKind.NO_INTERSECTIONS in kinds(read(tmp_path, older()))
     assert read(tmp_path, newer()).scene.lanes[0].speed_limit_mps == 11.5
 
 

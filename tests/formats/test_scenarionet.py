@@ -18,7 +18,7 @@ from augment.formats.scenarionet.scenario import ScenarioNet
 from augment.formats.scenarionet.unpickling import read_pickle
 from augment.scene.codec import scene_to_document
 from augment.scene.entities import AreaKind, TrafficLight, TrafficSide, TurnType
-from augment.scene.notes import NoteKind
+from augment.scene.notes import SceneNoteKind
 
 
 def moving(x: float, speed: float, steps: int = 3, **fields: object) -> dict[str, Any]:
@@ -121,10 +121,10 @@ def test_the_map_has_widths_connectors_lights_and_a_side(tmp_path: Path) -> None
     assert [area.kind for area in scene.areas] == [AreaKind.WALKWAY]
     kinds = {note.kind for note in reading.notes}
     assert {
-        NoteKind.EGO_SIZE_SWAPPED,
-        NoteKind.SPEED_LIMITS_IGNORED,
-        NoteKind.NO_SPEED_LIMITS,
-        NoteKind.NON_COMMERCIAL,
+        SceneNoteKind.EGO_SIZE_SWAPPED,
+        SceneNoteKind.SPEED_LIMITS_IGNORED,
+        SceneNoteKind.NO_SPEED_LIMITS,
+        SceneNoteKind.NON_COMMERCIAL,
     } <= kinds
 
 

@@ -26,7 +26,7 @@ from augment.formats.xml_file import Element
 from augment.geometry.polyline import Polyline
 from augment.scene.directions import turn_type_of
 from augment.scene.entities import AreaKind, TrafficLight, TurnType
-from augment.scene.notes import Note, NoteKind
+from augment.scene.notes import Note, SceneNoteKind
 
 SPEED_SIGNS = frozenset({"274", "R2-1"})
 """The speed limit of Germany (and of Zamunda), and of the United States; values in m/s."""
@@ -226,21 +226,21 @@ def _notes(
     notes = []
     unlimited = sum(one.speed_limit_mps is None for one in segments)
     if segments and unlimited == len(segments):
-        notes.append(Note(kind=NoteKind.NO_SPEED_LIMITS))
+        notes.append(Note(kind=SceneNoteKind.NO_SPEED_LIMITS))
     elif unlimited:
-        kind = NoteKind.SOME_SPEED_LIMITS
+        kind = SceneNoteKind.SOME_SPEED_LIMITS
         notes.append(Note(kind=kind, number=unlimited, of=len(segments)))
     if not has_intersections:
-        notes.append(Note(kind=NoteKind.NO_INTERSECTIONS))
+        notes.append(Note(kind=SceneNoteKind.NO_INTERSECTIONS))
     if lights:
-        notes.append(Note(kind=NoteKind.LIGHTS_REPEATED, number=len(lights)))
+        notes.append(Note(kind=SceneNoteKind.LIGHTS_REPEATED, number=len(lights)))
     bicycle_lanes = sum("bicycleLane" in one.kinds for one in lanelets.values())
     if bicycle_lanes:
-        notes.append(Note(kind=NoteKind.BICYCLE_LANES_LEFT_OUT, number=bicycle_lanes))
+        notes.append(Note(kind=SceneNoteKind.BICYCLE_LANES_LEFT_OUT, number=bicycle_lanes))
     if other_signs:
         names = tuple(f"sign {name}" for name in sorted(other_signs))
         number = sum(other_signs.values())
-        notes.append(Note(kind=NoteKind.MAP_PARTS_LEFT_OUT, number=number, names=names[:12]))
+        notes.append(Note(kind=SceneNoteKind.MAP_PARTS_LEFT_OUT, number=number, names=names[:12]))
     if not any(kind is AreaKind.WALKWAY for kind, _ in areas):
-        notes.append(Note(kind=NoteKind.NO_WALKWAYS))
+        notes.append(Note(kind=SceneNoteKind.NO_WALKWAYS))
     return tuple(notes)

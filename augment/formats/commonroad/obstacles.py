@@ -11,7 +11,7 @@ from augment.formats.commonroad.fields import fault, point_of, points_of, real, 
 from augment.formats.recorded_log import MOST_NUMBERS, LoggedTrack
 from augment.formats.xml_file import Element
 from augment.scene.entities import AgentType
-from augment.scene.notes import Note, NoteKind
+from augment.scene.notes import Note, SceneNoteKind
 from augment.scene.sizes import LENGTH_WIDTH_M
 
 MOST_STEPS = 100_000
@@ -110,10 +110,10 @@ def obstacles_of(root: Element) -> Obstacles:
     notes = []
     if left_out:
         number, names = sum(left_out.values()), tuple(sorted(left_out))
-        notes.append(Note(kind=NoteKind.OBJECTS_LEFT_OUT, number=number, names=names))
+        notes.append(Note(kind=SceneNoteKind.OBJECTS_LEFT_OUT, number=number, names=names))
     sizeless = sum(not one.has_size for one in found)
     if sizeless:
-        kind_of = NoteKind.SOME_BOX_SIZES
+        kind_of = SceneNoteKind.SOME_BOX_SIZES
         notes.append(Note(kind=kind_of, number=sizeless, of=len(found)))
     return Obstacles(all=tuple(found), steps=steps, notes=tuple(notes))
 

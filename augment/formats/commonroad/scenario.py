@@ -21,7 +21,7 @@ from augment.formats.road_map import FloatArray
 from augment.formats.roads import road_around
 from augment.formats.xml_file import Element, read_xml
 from augment.scene.entities import AgentType
-from augment.scene.notes import Note, NoteKind
+from augment.scene.notes import Note, SceneNoteKind
 from augment.scene.sizes import EGO_LENGTH_M, EGO_WIDTH_M
 
 VERSIONS = ("2018b", "2020a")
@@ -98,7 +98,7 @@ class CommonRoad:
         notes = [*network.notes, *obstacles.notes, *_notes(ego, _step_s(root))]
         if road.side_is_assumed:
             side = (road.traffic_side.value,)
-            notes.append(Note(kind=NoteKind.TRAFFIC_SIDE_ASSUMED, names=side))
+            notes.append(Note(kind=SceneNoteKind.TRAFFIC_SIDE_ASSUMED, names=side))
         return Reading(
             scene=scene,
             recording=recording,
@@ -177,8 +177,8 @@ def _listed(names: dict[int, object] | dict[int, Element]) -> str:
 
 def _notes(ego: _Ego, step_s: float) -> Iterator[Note]:
     if not ego.is_recorded:
-        yield Note(kind=NoteKind.EGO_SIZE_ASSUMED, value=EGO_LENGTH_M)
-        yield Note(kind=NoteKind.NO_EGO_MOTION)
+        yield Note(kind=SceneNoteKind.EGO_SIZE_ASSUMED, value=EGO_LENGTH_M)
+        yield Note(kind=SceneNoteKind.NO_EGO_MOTION)
     if step_s > LONGEST_GAP_S:
-        yield Note(kind=NoteKind.LONG_TIME_STEP, value=step_s)
-    yield Note(kind=NoteKind.NO_DRIVABLE_AREAS)
+        yield Note(kind=SceneNoteKind.LONG_TIME_STEP, value=step_s)
+    yield Note(kind=SceneNoteKind.NO_DRIVABLE_AREAS)

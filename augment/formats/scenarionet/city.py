@@ -13,7 +13,7 @@ from augment.formats.lane_edges import NARROWEST_M, USUAL_M, WIDEST_M, edge_of, 
 from augment.formats.road_map import FURTHEST_M, FloatArray, RoadMap, Segment
 from augment.formats.scenarionet.unpickling import WHAT
 from augment.scene.entities import AreaKind, TrafficLight, TrafficSide
-from augment.scene.notes import Note, NoteKind
+from augment.scene.notes import Note, SceneNoteKind
 
 CONNECTOR = "LANE_SURFACE_UNSTRUCTURE"
 LANES = frozenset(
@@ -220,26 +220,26 @@ def _notes(
 ) -> tuple[Note, ...]:
     notes, count = _limit_notes(city, meaningless), len(city.segments)
     if assumed:
-        kind = NoteKind.LANE_WIDTHS_ASSUMED
+        kind = SceneNoteKind.LANE_WIDTHS_ASSUMED
         notes.append(Note(kind=kind, number=assumed, of=count, value=USUAL_M))
     if not any(one.successors or one.predecessors for one in city.segments):
-        notes.append(Note(kind=NoteKind.NO_CONNECTIVITY))
+        notes.append(Note(kind=SceneNoteKind.NO_CONNECTIVITY))
     if not any(one.crosses for one in city.segments):
-        notes.append(Note(kind=NoteKind.NO_INTERSECTIONS))
+        notes.append(Note(kind=SceneNoteKind.NO_INTERSECTIONS))
     if not has_lights:
-        notes.append(Note(kind=NoteKind.NO_LIGHTS))
+        notes.append(Note(kind=SceneNoteKind.NO_LIGHTS))
     kinds = {kind for kind, _ in city.areas}
     if AreaKind.WALKWAY not in kinds:
-        notes.append(Note(kind=NoteKind.NO_WALKWAYS))
+        notes.append(Note(kind=SceneNoteKind.NO_WALKWAYS))
     if AreaKind.DRIVABLE not in kinds:
-        notes.append(Note(kind=NoteKind.NO_DRIVABLE_AREAS))
+        notes.append(Note(kind=SceneNoteKind.NO_DRIVABLE_AREAS))
     bicycle_lanes = left_out.pop(BICYCLE_LANE, 0)
     if bicycle_lanes:
-        notes.append(Note(kind=NoteKind.BICYCLE_LANES_LEFT_OUT, number=bicycle_lanes))
+        notes.append(Note(kind=SceneNoteKind.BICYCLE_LANES_LEFT_OUT, number=bicycle_lanes))
     if left_out:
         names = tuple(sorted(left_out))[:12]
         number = sum(left_out.values())
-        notes.append(Note(kind=NoteKind.MAP_PARTS_LEFT_OUT, number=number, names=names))
+        notes.append(Note(kind=SceneNoteKind.MAP_PARTS_LEFT_OUT, number=number, names=names))
     return tuple(notes)
 
 
@@ -247,10 +247,10 @@ def _limit_notes(city: RoadMap, meaningless: int) -> list[Note]:
     notes, count = [], len(city.segments)
     unlimited = sum(one.speed_limit_mps is None for one in city.segments)
     if meaningless:
-        kind = NoteKind.SPEED_LIMITS_IGNORED
+        kind = SceneNoteKind.SPEED_LIMITS_IGNORED
         notes.append(Note(kind=kind, number=meaningless, value=round(MEANINGLESS_KMH / 3.6, 1)))
     if count and unlimited == count:
-        notes.append(Note(kind=NoteKind.NO_SPEED_LIMITS))
+        notes.append(Note(kind=SceneNoteKind.NO_SPEED_LIMITS))
     elif unlimited:
-        notes.append(Note(kind=NoteKind.SOME_SPEED_LIMITS, number=unlimited, of=count))
+        notes.append(Note(kind=SceneNoteKind.SOME_SPEED_LIMITS, number=unlimited, of=count))
     return notes

@@ -20,7 +20,7 @@ from augment.formats.roads import road_around
 from augment.formats.scenarionet.city import city_of
 from augment.formats.scenarionet.unpickling import WHAT, read_pickle
 from augment.scene.entities import AgentType
-from augment.scene.notes import Note, NoteKind
+from augment.scene.notes import Note, SceneNoteKind
 from augment.scene.sizes import LENGTH_WIDTH_M
 
 TYPE_OF = {
@@ -93,9 +93,9 @@ class ScenarioNet:
         notes = [*city.notes, *notes]
         if road.side_is_assumed:
             side = (road.traffic_side.value,)
-            notes.append(Note(kind=NoteKind.TRAFFIC_SIDE_ASSUMED, names=side))
+            notes.append(Note(kind=SceneNoteKind.TRAFFIC_SIDE_ASSUMED, names=side))
         if licence:
-            notes.append(Note(kind=NoteKind.NON_COMMERCIAL, names=(licence,)))
+            notes.append(Note(kind=SceneNoteKind.NON_COMMERCIAL, names=(licence,)))
         return Reading(
             scene=scene, recording=recording, notes=tuple(notes), moment=Moment(frame=frame)
         )
@@ -148,7 +148,7 @@ def _log(description: dict[str, Any]) -> tuple[Log, list[Note]]:
     length_m, width_m = ego.length_m, ego.width_m
     if width_m > length_m:
         length_m, width_m = width_m, length_m
-        notes.append(Note(kind=NoteKind.EGO_SIZE_SWAPPED))
+        notes.append(Note(kind=SceneNoteKind.EGO_SIZE_SWAPPED))
     log = Log(
         what=WHAT,
         times_s=times_s,
@@ -166,7 +166,7 @@ def _log(description: dict[str, Any]) -> tuple[Log, list[Note]]:
 
 def _note_of(left_out: Counter[str]) -> Note:
     names = tuple(sorted(left_out))
-    return Note(kind=NoteKind.OBJECTS_LEFT_OUT, number=sum(left_out.values()), names=names)
+    return Note(kind=SceneNoteKind.OBJECTS_LEFT_OUT, number=sum(left_out.values()), names=names)
 
 
 def _times(metadata: dict[str, Any], length: object, ego: object) -> FloatArray:

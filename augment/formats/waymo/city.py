@@ -16,7 +16,7 @@ from augment.formats.road_map import FloatArray, RoadMap, Segment
 from augment.formats.waymo.messages import BoundaryMessage, LaneMessage, ScenarioMessage
 from augment.formats.waymo.tfrecord import WHAT
 from augment.scene.entities import AreaKind, TrafficLight
-from augment.scene.notes import Note, NoteKind
+from augment.scene.notes import Note, SceneNoteKind
 
 BICYCLE_LANE = 3
 CROSSWALK, SPEED_BUMP, DRIVEWAY = 8, 9, 10
@@ -149,23 +149,23 @@ def _notes(
     notes, count = [], len(segments)
     unlimited = sum(one.speed_limit_mps is None for one in segments)
     if count and unlimited == count:
-        notes.append(Note(kind=NoteKind.NO_SPEED_LIMITS))
+        notes.append(Note(kind=SceneNoteKind.NO_SPEED_LIMITS))
     elif unlimited:
-        notes.append(Note(kind=NoteKind.SOME_SPEED_LIMITS, number=unlimited, of=count))
+        notes.append(Note(kind=SceneNoteKind.SOME_SPEED_LIMITS, number=unlimited, of=count))
     if assumed:
-        kind = NoteKind.LANE_WIDTHS_ASSUMED
+        kind = SceneNoteKind.LANE_WIDTHS_ASSUMED
         notes.append(Note(kind=kind, number=assumed, of=count, value=USUAL_M))
     if not crossing:
-        notes.append(Note(kind=NoteKind.NO_INTERSECTIONS))
+        notes.append(Note(kind=SceneNoteKind.NO_INTERSECTIONS))
     if not controlled:
-        notes.append(Note(kind=NoteKind.NO_LIGHTS))
+        notes.append(Note(kind=SceneNoteKind.NO_LIGHTS))
     bicycle_lanes = sum(lane.type == BICYCLE_LANE for lane in scenario.lanes.values())
     if bicycle_lanes:
-        notes.append(Note(kind=NoteKind.BICYCLE_LANES_LEFT_OUT, number=bicycle_lanes))
+        notes.append(Note(kind=SceneNoteKind.BICYCLE_LANES_LEFT_OUT, number=bicycle_lanes))
     parts = Counter(SPEED_BUMP for kind, _ in scenario.polygons if kind == SPEED_BUMP)
     left_out = {"speed bumps": parts[SPEED_BUMP], "stop signs": scenario.stop_signs}
     names = tuple(name for name, number in left_out.items() if number)
     if names:
         number = sum(left_out.values())
-        notes.append(Note(kind=NoteKind.MAP_PARTS_LEFT_OUT, number=number, names=names))
-    return (*notes, Note(kind=NoteKind.NO_WALKWAYS))
+        notes.append(Note(kind=SceneNoteKind.MAP_PARTS_LEFT_OUT, number=number, names=names))
+    return (*notes, Note(kind=SceneNoteKind.NO_WALKWAYS))

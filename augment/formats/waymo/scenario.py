@@ -25,7 +25,7 @@ from augment.formats.waymo.messages import (
 )
 from augment.formats.waymo.tfrecord import WHAT, read_records, starts_a_record
 from augment.scene.entities import AgentType
-from augment.scene.notes import Note, NoteKind
+from augment.scene.notes import Note, SceneNoteKind
 
 LICENCE = "Waymo Open Dataset licence, non-commercial use"
 TYPE_OF = {
@@ -94,12 +94,14 @@ def _reading(
     )
     notes = list(city.notes)
     if road.side_is_assumed:
-        notes.append(Note(kind=NoteKind.TRAFFIC_SIDE_ASSUMED, names=(road.traffic_side.value,)))
+        notes.append(
+            Note(kind=SceneNoteKind.TRAFFIC_SIDE_ASSUMED, names=(road.traffic_side.value,))
+        )
     unset = Counter(track.type for track in scenario.tracks)[UNSET]
     if unset:
-        kind = NoteKind.OBJECTS_LEFT_OUT
+        kind = SceneNoteKind.OBJECTS_LEFT_OUT
         notes.append(Note(kind=kind, number=unset, names=("TYPE_UNSET",)))
-    notes.append(Note(kind=NoteKind.NON_COMMERCIAL, names=(LICENCE,)))
+    notes.append(Note(kind=SceneNoteKind.NON_COMMERCIAL, names=(LICENCE,)))
     return Reading(
         scene=scene,
         recording=recording,
