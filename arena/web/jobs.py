@@ -24,6 +24,7 @@ from arena.web.questions import Confirmation, ask, is_sure
 from augment.errors import AugmentError, QueueFault
 from augment.models import Augmentation, Contestant, GenerationJob
 from augment.services.endpoints import contestants
+from augment.services.judging.scenario_export import FORMATS
 from augment.services.running import caps
 from augment.services.running import jobs as service
 from augment.services.running.caps import Caps
@@ -85,6 +86,7 @@ def job_page(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
     if found.is_moving:
         context["workforce"] = workforce()
     else:  # a page that shows itself anew every two seconds measures nothing
+        context["scenario_formats"] = FORMATS
         context["displacement"] = section(request, job)
         context["driving"] = driving_section(request, job)
     return render(request, "jobs/job.html", context)

@@ -5,13 +5,15 @@ from __future__ import annotations
 import hashlib
 import json
 import zipfile
-from io import StringIO
+from io import BytesIO, StringIO
 from pathlib import Path
 from typing import Any
 
 import pytest
 from django.core.management import call_command
 from django.core.management.base import CommandError
+from django.test import Client
+from django.urls import reverse
 
 from augment.formats.writers import WRITERS
 from augment.models import Augmentation, BaseScene, Contestant, GenerationJob
@@ -121,6 +123,23 @@ def test_strict_writes_nothing_once_something_would_change(
     with pytest.raises(CommandError, match="there is no modification: refused"):
         export("--format", "scenarionet", "--strict", "--out", str(tmp_path / "x.zip"))
     assert not list(tmp_path.glob("*.zip"))
+
+
+def test_the_jobs_page_links_to_a_zip_of_each_format(
+    job: GenerationJob, admin_client: Client, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    page = admin_client.get(reverse("job", args=[job.code])).content.decode()
+    for form in WRITERS:
+        address = reverse("scenarios-export", args=[job.code, form])
+        assert f'href="{address}"' in page
+    answer = admin_client.get(reverse("scenarios-export", args=[job.code, "commonroad"]))
+    assert "round-1-commonroad-non-commercial.zip" in answer["Content-Disposition"]
+    with zipfile.ZipFile(BytesIO(answer.content)) as archive:
+        assert "park--rule.xml" in archive.namelist()
+    monkeypatch.setattr("arena.web.scenario_files.MOST", 0)
+    answer = admin_client.get(reverse("scenarios-export", args=[job.code, "json"]))
+    assert answer.status_code == 302
+    assert admin_client.get(f"/jobs/{job.code}/scenarios-xodr.zip").status_code == 404
 
 
 @pytest.mark.parametrize(

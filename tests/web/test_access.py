@@ -26,6 +26,7 @@ PAGES: dict[str, tuple[int, int, int]] = {
     "job": (200, 200, 403),
     "job-progress": (200, 200, 403),
     "displacement-export": (200, 200, 403),
+    "scenarios-export": (302, 302, 403),  # no result can be written
     "drives": (200, 200, 403),
     "driving-export": (200, 200, 403),
     "drive": (200, 200, 403),
@@ -87,6 +88,7 @@ def address(name: str, here: World) -> str:
         "job-cancel": {"code": here.job.code},
         "job-resume": {"code": here.job.code},
         "displacement-export": {"code": here.job.code, "form": "csv"},
+        "scenarios-export": {"code": here.job.code, "form": "json"},
         "faults": {"code": here.job.code},
         "faults-export": {"code": here.job.code, "form": "csv"},
         "label": {"code": here.job.code},
