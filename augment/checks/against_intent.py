@@ -67,8 +67,8 @@ def check_against_intent(
     way = None if intent is None else OwnWay.of(ground)
     if intent is None or way is None:
         return found
-    casting = match_to_requests(resolve_anchors(intent), modification.added, way)
-    asked = Asked(modification=modification, way=way, casting=casting, tolerances=tolerances)
+    matching = match_to_requests(resolve_anchors(intent), modification.added, way)
+    asked = Asked(modification=modification, way=way, matching=matching, tolerances=tolerances)
     held = [one for check in ASKED_CHECKS for one in check(asked)]
     return (*held, *_settled(found, held, asked))
 
@@ -88,7 +88,7 @@ def _settled(found: Iterable[Finding], held: Iterable[Finding], asked: Asked) ->
         for agent in party.everyone
         if not isinstance(party.request, VehicleRequest) or party.request.spot.lane is not None
     }
-    surplus = {agent.id for agent in asked.casting.surplus}
+    surplus = {agent.id for agent in asked.matching.surplus}
     across = {
         name
         for one in held

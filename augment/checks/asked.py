@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 from augment.checks.finding import Finding, Severity
 from augment.checks.own_way import OwnWay
-from augment.checks.parties import Casting, Party
+from augment.checks.parties import Party, RequestMatching
 from augment.checks.tolerances import Tolerances
 from augment.scene.entities import TrafficAgent, TrafficSide
 from augment.scene.modification import Modification
@@ -19,7 +19,7 @@ class Asked:
 
     modification: Modification
     way: OwnWay
-    casting: Casting
+    matching: RequestMatching
     tolerances: Tolerances
 
     @property
@@ -30,7 +30,7 @@ class Asked:
     @property
     def parties(self) -> tuple[Party, ...]:
         """The requests with those who answer them."""
-        return self.casting.parties
+        return self.matching.parties
 
     def ahead_m(self, agent: TrafficAgent) -> float:
         """How far along the ego's way an agent is."""

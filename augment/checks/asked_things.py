@@ -26,7 +26,7 @@ def asked_count(asked: Asked) -> Iterator[Finding]:
                 measured={"missing": float(number)},
                 template=f"{{missing:.0f}} {_plural(role, number)} asked for and not there.",
             )
-    for agent in asked.casting.surplus:
+    for agent in asked.matching.surplus:
         yield Finding(
             kind=FindingKind.ASKED_COUNT,
             severity=Severity.WRONG,

@@ -71,14 +71,16 @@ class Party:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Casting:
+class RequestMatching:
     """All parties, and the added agents that no request asks for."""
 
     parties: tuple[Party, ...]
     surplus: tuple[TrafficAgent, ...]
 
 
-def match_to_requests(intent: Intent, added: Sequence[TrafficAgent], way: OwnWay) -> Casting:
+def match_to_requests(
+    intent: Intent, added: Sequence[TrafficAgent], way: OwnWay
+) -> RequestMatching:
     """Deal the added agents out to the requests, each to the nearest spot that takes its type.
 
     What is left over stands in, whatever its type, for what is still missing.
@@ -100,7 +102,7 @@ def match_to_requests(intent: Intent, added: Sequence[TrafficAgent], way: OwnWay
             is_free = number not in taken and index not in taken.values()
             if is_free and suits(wanted[number], added[index]):
                 taken[number] = index
-    return Casting(
+    return RequestMatching(
         parties=tuple(
             _party(number, one, wanted, added, taken, way)
             for number, one in enumerate(intent.requests)

@@ -10,7 +10,7 @@ from augment.llm.patience import Patience
 from augment.prompts.fill_review import review_re_ask_messages
 from augment.prompts.intent_reader import read_intent, reader_messages
 from augment.scene.intent import Intent
-from augment.variants.cast import Asking, Cast, Player
+from augment.variants.respondents import Inquiry, RespondentClient, Respondents
 from augment.variants.transcript import ModelRole, Transcript
 
 MAX_TOKENS = 4096
@@ -32,18 +32,18 @@ def ask_for_intent(
         ModelFault: The wire broke for good.
         BudgetSpent: The transcript's budget has no room for the next call.
     """
-    player = Player(client=client, model=model)
-    cast = Cast(
-        players={ModelRole.MODIFIER: player, ModelRole.READER: player},
+    respondent = RespondentClient(client=client, model=model)
+    respondents = Respondents(
+        clients={ModelRole.MODIFIER: respondent, ModelRole.READER: respondent},
         transcript=transcript,
         patience=patience or Patience(),
     )
-    asking = Asking(
-        cast=cast,
+    inquiry = Inquiry(
+        respondents=respondents,
         role=ModelRole.READER,
         again=review_re_ask_messages,
         max_tokens=MAX_TOKENS,
         re_asks=1,
     )
-    intent, _, _ = asking.read(reader_messages(instruction), read_intent)
+    intent, _, _ = inquiry.read(reader_messages(instruction), read_intent)
     return intent

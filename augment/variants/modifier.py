@@ -10,9 +10,9 @@ from augment.prompts.reply import ReadReply, read_reply
 from augment.prompts.texts import model_message
 from augment.scene.entities import Scene
 from augment.scene.intent import Intent
-from augment.variants.cast import Asking, Cast, Messages
 from augment.variants.pose_tool import PoseTool
 from augment.variants.recipes import Recipe, Tools
+from augment.variants.respondents import Inquiry, Messages, Respondents
 from augment.variants.tool_loop import ToolDesk, ask_with_tool
 from augment.variants.transcript import ModelRole
 
@@ -54,13 +54,13 @@ class Modifier:
 
     recipe: Recipe
     scene: Scene
-    cast: Cast
+    respondents: Respondents
     intent: Intent | None = None
 
     @property
     def form(self) -> Form:
         """The form in which it gets its task."""
-        native = self.cast.player(ModelRole.MODIFIER).native_tools
+        native = self.respondents.client_of(ModelRole.MODIFIER).native_tools
         return form_of(self.recipe, native_tools=native)
 
     def task(self, instruction: str) -> Messages:
@@ -81,24 +81,24 @@ class Modifier:
             desk = ToolDesk(
                 tool=PoseTool(self.scene, limits.radius_m),
                 limits=limits.calls,
-                transcript=self.cast.transcript,
+                transcript=self.respondents.transcript,
             )
             messages, reply = ask_with_tool(
-                self.cast,
+                self.respondents,
                 messages,
                 desk=desk,
                 calling=form.calling,
                 max_tokens=limits.max_tokens,
             )
-        asking = Asking(
-            cast=self.cast,
+        inquiry = Inquiry(
+            respondents=self.respondents,
             role=ModelRole.MODIFIER,
             again=fill.re_ask_messages,
             max_tokens=limits.max_tokens,
             re_asks=limits.re_asks,
             tools=(fill.pose_tool(),) if form.calling is Calling.NATIVE else (),
         )
-        read, asked, answer = asking.read(messages, self._read, reply)
+        read, asked, answer = inquiry.read(messages, self._read, reply)
         return Draft(read=read, messages=(*asked, model_message(answer.text)))
 
     def _read(self, answer: str) -> ReadReply:

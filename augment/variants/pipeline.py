@@ -17,9 +17,9 @@ from augment.llm.patience import Patience
 from augment.scene.entities import Scene
 from augment.scene.intent import Intent
 from augment.scene.modification import Modification
-from augment.variants.cast import Cast, Player
 from augment.variants.modifier import Modifier
 from augment.variants.recipes import RECIPES, Recipe
+from augment.variants.respondents import RespondentClient, Respondents
 from augment.variants.rounds import modify_and_review
 from augment.variants.transcript import ModelRole, Transcript
 
@@ -60,7 +60,7 @@ def run(
     transcript: Transcript,
     patience: Patience | None = None,
     native_tools: bool = False,
-    others: Mapping[ModelRole, Player] | None = None,
+    others: Mapping[ModelRole, RespondentClient] | None = None,
     intent: Intent | None = None,
 ) -> Outcome:
     """Let a model modify a scene as the recipe says.
@@ -83,13 +83,13 @@ def run(
     """
     if recipe not in RECIPES.values():
         raise UnknownName("recipe", recipe.slug, sorted(RECIPES))
-    modifying = Player(client=client, model=model, native_tools=native_tools)
-    cast = Cast(
-        players={**(others or {}), ModelRole.MODIFIER: modifying},
+    modifying = RespondentClient(client=client, model=model, native_tools=native_tools)
+    respondents = Respondents(
+        clients={**(others or {}), ModelRole.MODIFIER: modifying},
         transcript=transcript,
         patience=patience or Patience(),
     )
-    modifier = Modifier(recipe=recipe, scene=scene, cast=cast, intent=intent)
+    modifier = Modifier(recipe=recipe, scene=scene, respondents=respondents, intent=intent)
     try:
         result = modify_and_review(modifier, instruction)
     except ReplyUnreadable as unreadable:

@@ -16,10 +16,10 @@ from augment.errors import ModelRefused, ReplyUnreadable, ReviewUnusable
 from augment.prompts import fill
 from augment.prompts.reply import ReadReply
 from augment.prompts.vectors import changes_text
-from augment.variants.cast import Messages
 from augment.variants.geometric_review import review_geometry
 from augment.variants.modifier import Draft, Modifier
 from augment.variants.recipes import Keep, Recipe, Review
+from augment.variants.respondents import Messages
 from augment.variants.text_qa import review_text
 from augment.variants.transcript import NoteKind
 from augment.variants.verdict import Submission, Verdict
@@ -59,7 +59,7 @@ def modify_and_review(modifier: Modifier, instruction: str) -> Result:
         ModelRefused: The modifier declined in its first round.
         ModelFault: The wire broke for good.
     """
-    recipe, transcript = modifier.recipe, modifier.cast.transcript
+    recipe, transcript = modifier.recipe, modifier.respondents.transcript
     reviewing = _reviewing(modifier)
     rounds: list[Round] = []
     remark = ""
@@ -94,14 +94,14 @@ def modify_and_review(modifier: Modifier, instruction: str) -> Result:
 
 def _reviewing(modifier: Modifier) -> Reviewing | None:
     """Who reviews, as the recipe says."""
-    cast, limits = modifier.cast, modifier.recipe.limits
+    respondents, limits = modifier.respondents, modifier.recipe.limits
     match modifier.recipe.review:
         case Review.NONE:
             return None
         case Review.TEXT:
-            return partial(review_text, cast=cast, limits=limits)
+            return partial(review_text, respondents=respondents, limits=limits)
         case Review.VISUAL:
-            return partial(review_picture, cast=cast, limits=limits)
+            return partial(review_picture, respondents=respondents, limits=limits)
         case Review.GEOMETRIC:
             return partial(
                 review_geometry, ground=Ground.of(modifier.scene), intent=modifier.intent
@@ -123,7 +123,7 @@ def _reviewed(
         earlier=rounds[-1].read.modification if rounds else None,
     )
     number, kind = len(rounds) + 1, modifier.recipe.review.value
-    note = partial(modifier.cast.transcript.note, NoteKind.REVIEW)
+    note = partial(modifier.respondents.transcript.note, NoteKind.REVIEW)
     try:
         verdict = reviewing(submission)
     except ReviewUnusable as unusable:
@@ -142,7 +142,7 @@ def _regenerate(draft: Draft, verdict: Verdict) -> Messages:
 def _note_round(modifier: Modifier, number: int, draft: Draft) -> None:
     changes = changes_text(modifier.scene, draft.read.modification)
     document = {"round": number, "changes": changes, "mended": draft.read.mended}
-    modifier.cast.transcript.note(NoteKind.ROUND, document)
+    modifier.respondents.transcript.note(NoteKind.ROUND, document)
 
 
 def _result(modifier: Modifier, rounds: list[Round], remark: str) -> Result:
@@ -152,7 +152,7 @@ def _result(modifier: Modifier, rounds: list[Round], remark: str) -> Result:
     sentence = f"{modifier.recipe.title}: round {kept.number} of {len(rounds)} counts{said}."
     if accepted is False:
         sentence += " No round was accepted."
-    modifier.cast.transcript.note(
+    modifier.respondents.transcript.note(
         NoteKind.KEPT,
         {"round": kept.number, "rounds": len(rounds), "accepted": accepted, "remark": remark},
     )

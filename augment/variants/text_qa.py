@@ -11,13 +11,13 @@ from functools import partial
 from augment.errors import ModelRefused, ReplyUnreadable, ReviewUnusable
 from augment.prompts import fill_review
 from augment.prompts.review import RatedReview, read_ratings
-from augment.variants.cast import Asking, Cast
 from augment.variants.recipes import Limits
+from augment.variants.respondents import Inquiry, Respondents
 from augment.variants.transcript import ModelRole
 from augment.variants.verdict import Submission, Verdict
 
 
-def review_text(submission: Submission, cast: Cast, limits: Limits) -> Verdict:
+def review_text(submission: Submission, respondents: Respondents, limits: Limits) -> Verdict:
     """The text reviewer's verdict.
 
     Raises:
@@ -30,15 +30,15 @@ def review_text(submission: Submission, cast: Cast, limits: Limits) -> Verdict:
         submission.modification,
         radius_m=limits.radius_m,
     )
-    asking = Asking(
-        cast=cast,
+    inquiry = Inquiry(
+        respondents=respondents,
         role=ModelRole.REVIEWER,
         again=fill_review.review_re_ask_messages,
         max_tokens=limits.max_tokens,
         re_asks=limits.re_asks,
     )
     try:
-        review, _, _ = asking.read(
+        review, _, _ = inquiry.read(
             messages, partial(read_ratings, accepted_from=limits.accepted_from)
         )
     except ReplyUnreadable as unreadable:

@@ -16,9 +16,9 @@ from augment.prompts import fill
 from augment.prompts.calls import TOOL, WrittenCall, calls_in, read_arguments
 from augment.prompts.fill import Calling
 from augment.prompts.texts import model_message, said_by_user
-from augment.variants.cast import Cast, Messages
 from augment.variants.pose_call import CallLimits
 from augment.variants.pose_tool import PoseTool
+from augment.variants.respondents import Messages, Respondents
 from augment.variants.transcript import ModelRole, NoteKind, Transcript
 
 _LONGEST_NOTED = 500
@@ -74,7 +74,7 @@ class ToolDesk:
 
 
 def ask_with_tool(
-    cast: Cast,
+    respondents: Respondents,
     messages: Messages,
     *,
     desk: ToolDesk,
@@ -94,7 +94,7 @@ def ask_with_tool(
     tools = (fill.pose_tool(),) if native else ()
     while True:
         choice = ToolChoice.NONE if desk.is_over else ToolChoice.AUTO
-        reply = cast.ask(
+        reply = respondents.ask(
             ModelRole.MODIFIER,
             messages,
             max_tokens=max_tokens,

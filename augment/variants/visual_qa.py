@@ -19,21 +19,21 @@ from augment.render.bev import draw
 from augment.render.camera import camera_for
 from augment.scene.entities import Scene
 from augment.scene.modification import Modification
-from augment.variants.cast import Asking, Cast, Messages
 from augment.variants.recipes import Limits
+from augment.variants.respondents import Inquiry, Messages, Respondents
 from augment.variants.transcript import ModelRole
 from augment.variants.verdict import Submission, Verdict
 
 
-def review_picture(submission: Submission, cast: Cast, limits: Limits) -> Verdict:
+def review_picture(submission: Submission, respondents: Respondents, limits: Limits) -> Verdict:
     """The engineer's verdict on what the viewer sees.
 
     Raises:
         ReviewUnusable: One of the two declined or can't be read, not even asked once more.
         ModelFault: The wire broke for good.
     """
-    engineer = Asking(
-        cast=cast,
+    engineer = Inquiry(
+        respondents=respondents,
         role=ModelRole.ENGINEER,
         again=fill_review.review_re_ask_messages,
         max_tokens=limits.max_tokens,
@@ -76,13 +76,13 @@ def picture(scene: Scene, modification: Modification) -> bytes:
     return draw(shown, change, camera_for(shown, change), labels=True)
 
 
-def _seen(submission: Submission, questions: tuple[str, ...], asking: Asking) -> dict[int, str]:
+def _seen(submission: Submission, questions: tuple[str, ...], inquiry: Inquiry) -> dict[int, str]:
     png = picture(submission.scene, submission.modification)
-    asking = replace(
-        asking, again=lambda told, said, _: fill_review.viewer_re_ask_messages(told, said)
+    inquiry = replace(
+        inquiry, again=lambda told, said, _: fill_review.viewer_re_ask_messages(told, said)
     )
     messages = fill_review.viewer_messages(questions, png)
-    seen, _, _ = asking.read(messages, partial(read_sight, count=len(questions)))
+    seen, _, _ = inquiry.read(messages, partial(read_sight, count=len(questions)))
     return seen
 
 

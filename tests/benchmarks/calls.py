@@ -17,7 +17,7 @@ from augment.services.endpoints.contestants import add_contestant, ensure_endpoi
 from augment.services.running import jobs, leases, runner
 from augment.services.running.caps import Caps
 from augment.services.running.transcripts import RowTranscript
-from augment.variants.asking import Conversation
+from augment.variants.recording_client import RecordingClient
 from augment.variants.transcript import ModelRole
 from tests.jobs.rows import add_scenario, only_row
 
@@ -50,7 +50,7 @@ def conversation(base_url: str, model: str) -> Call:
     row = only_row(job)
     held = leases.take_lease(augmentation_pk=row.pk, now=timezone.now(), worker="bench")
     assert held is not None
-    talk = Conversation(
+    talk = RecordingClient(
         client=runner.open_wire(endpoint, held).__enter__(),
         model=model,
         transcript=RowTranscript(held, row, endpoint),

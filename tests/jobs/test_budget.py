@@ -174,9 +174,11 @@ def test_a_stopped_attempt_is_replayed_from_its_answers_also_in_a_fresh_job() ->
     assert ran(job, model).state == ROW.DONE
     assert len(model.requests) == len(set(model.requests)) == 2
     served = ModelCall.objects.get(served_from__isnull=False)
+    assert served.attempt is not None
     assert (served.attempt.number, served.number, served.answer) == (2, 1, "Sorry?")
     assert (served.cost_nano_usd, served.spent_tokens) == (0, 0)
     assert served.served_from is not None
+    assert served.served_from.attempt is not None
     assert served.served_from.attempt.number == 1
     assert job.spent_calls == 2
 

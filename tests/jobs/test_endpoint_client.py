@@ -16,7 +16,7 @@ from augment.models import Augmentation, CallLease, Endpoint, EndpointModel, Eve
 from augment.services.endpoints.call_limits import Queue, place_at
 from augment.services.endpoints.client import EndpointClient
 from augment.services.running import jobs, runner
-from augment.variants.asking import Conversation
+from augment.variants.recording_client import RecordingClient
 from augment.variants.transcript import MemoryTranscript, ModelRole
 from tests.jobs.rows import add_model, add_scenario, only_row
 from tests.llm.json_server import JsonServer, serving
@@ -72,7 +72,7 @@ class Asking:
     def ask(self, request: Request = ASKED) -> str:
         wire = OpenAIWire(base_url=self.endpoint.base_url, api_key=None, timeout_s=60.0)
         with EndpointClient(wire, self.endpoint, Queue(longest_s=0.0)) as client:
-            conversation = Conversation(
+            conversation = RecordingClient(
                 client=client,
                 model=request.model,
                 transcript=self.transcript,

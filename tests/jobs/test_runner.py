@@ -101,6 +101,7 @@ def test_a_model_is_asked_and_every_call_is_kept() -> None:
     assert (row.state, wire.opened) == (State.DONE, ["local"])
     assert row.notes == "One road, two lanes.\n\nA parked car ahead."
     call = ModelCall.objects.get()
+    assert call.attempt is not None
     assert (call.attempt.augmentation, call.number, call.role) == (row, 1, "modifier")
     assert (call.answer, call.fault, call.finish_reason) == (GOOD, "", "stop")
     assert (call.model_returned, call.prompt_tokens) == ("llama3.1-2407", 9000)

@@ -167,6 +167,7 @@ def test_the_order_in_which_a_database_keeps_keys_does_not_show() -> None:
 
     row = ran(only_row(llama_job()), Model())
     call = ModelCall.objects.get()
+    assert call.attempt is not None
     note = TranscriptNote.objects.create(
         attempt=call.attempt,
         number=1,

@@ -14,7 +14,7 @@ from augment.errors import ParameterRefused
 from augment.llm.profile import ModelProfile
 from augment.models import Augmentation, Contestant, Endpoint, EndpointModel, Event, ModelCall
 from augment.services.endpoints import contestants, probe
-from augment.services.endpoints.roles import seats_of
+from augment.services.endpoints.respondents import respondents_of
 from augment.services.endpoints.treatments import document_of, profile_from_document, treatment_of
 from augment.services.running import jobs, runner
 from augment.services.running.transcript_export import transcript_of
@@ -212,7 +212,7 @@ def test_each_role_has_its_own() -> None:
         roles={ModelRole.REVIEWER: (None, "boss")},
     )
     EndpointModel.objects.filter(model="boss").update(reasoning_effort="high")
-    treatment = treatment_of(one, seats_of(one))
+    treatment = treatment_of(one, respondents_of(one))
     endpoint = Endpoint.objects.get()
     assert treatment.at(endpoint) == {
         "m": ModelProfile(),

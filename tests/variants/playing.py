@@ -12,9 +12,9 @@ from augment.llm.patience import Patience
 from augment.llm.scripted import ScriptedClient
 from augment.scene.entities import Scene
 from augment.scene.intent import Intent
-from augment.variants.cast import Player
 from augment.variants.pipeline import Outcome, run
 from augment.variants.recipes import find_recipe
+from augment.variants.respondents import RespondentClient
 from augment.variants.transcript import MemoryTranscript, ModelRole
 from tests.scenes import scene
 from tests.variants.answers import agent, answer, block
@@ -31,7 +31,7 @@ class Play:
         *,
         shown: Scene | None = None,
         native: bool = False,
-        others: Mapping[ModelRole, Player] | None = None,
+        others: Mapping[ModelRole, RespondentClient] | None = None,
         intent: Intent | None = None,
     ) -> None:
         self.client = ScriptedClient(script)

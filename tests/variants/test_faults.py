@@ -14,9 +14,9 @@ from augment.fake_llm.models import MODELS
 from augment.fake_llm.server import FakeServer, running
 from augment.llm.openai_wire import OpenAIWire
 from augment.llm.patience import Patience
-from augment.variants.cast import Player
 from augment.variants.pipeline import run
 from augment.variants.recipes import RECIPES, find_recipe
+from augment.variants.respondents import RespondentClient
 from augment.variants.transcript import MemoryTranscript, ModelRole
 from tests.intents import intents
 from tests.scenes import scene
@@ -50,7 +50,7 @@ def test_a_fault_ends_as_the_page_says(server: FakeServer, row: list[str]) -> No
     transcript = MemoryTranscript()
     with OpenAIWire(base_url=server.url, api_key=None, timeout_s=timeout_s) as client:
         players = {
-            ModelRole(role): Player(client=client, model=name)
+            ModelRole(role): RespondentClient(client=client, model=name)
             for role, name in re.findall(r"(\w+) (fake-[\w-]+)", others)
         }
         try:

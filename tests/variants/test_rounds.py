@@ -8,8 +8,8 @@ from augment.errors import ModelFault
 from augment.llm.messages import Reply
 from augment.llm.scripted import ScriptedClient
 from augment.scene.intent import Facing
-from augment.variants.cast import Player
 from augment.variants.pipeline import OutcomeStatus
+from augment.variants.respondents import RespondentClient
 from augment.variants.transcript import ModelRole
 from tests.intents import parked
 from tests.scenes import scene, vehicle
@@ -177,8 +177,8 @@ def test_every_role_may_be_played_by_another() -> None:
         "vqa",
         [car(21.4)],
         others={
-            ModelRole.ENGINEER: Player(client=engineer, model="boss"),
-            ModelRole.VIEWER: Player(client=viewer, model="eyes"),
+            ModelRole.ENGINEER: RespondentClient(client=engineer, model="boss"),
+            ModelRole.VIEWER: RespondentClient(client=viewer, model="eyes"),
         },
     )
     assert [call.request.model for call in play.transcript.calls] == ["m", "boss", "eyes", "boss"]

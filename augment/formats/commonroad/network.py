@@ -63,14 +63,14 @@ class Lanelet:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Network:
+class RoadNetwork:
     """The map, and what it does not say."""
 
     map: RoadMap
     notes: tuple[Note, ...]
 
 
-def network_of(root: Element, step: int) -> Network:
+def network_of(root: Element, step: int) -> RoadNetwork:
     """The map with the lights at one time step.
 
     Raises:
@@ -94,7 +94,7 @@ def network_of(root: Element, step: int) -> Network:
     )
     notes = _notes(segments, areas, bool(inside), lights, other_signs, lanelets)
     city = RoadMap(what=WHAT, place="lanelet", segments=segments, areas=areas)
-    return Network(map=city, notes=notes)
+    return RoadNetwork(map=city, notes=notes)
 
 
 # Private

@@ -16,7 +16,7 @@ from augment.llm.addresses import check_base_url
 from augment.models import Contestant, Endpoint
 from augment.services.endpoints.keys import check_key_variable, log_move, move_of
 from augment.services.endpoints.known_models import model_at
-from augment.services.endpoints.roles import Seat, check_roles, documents_of
+from augment.services.endpoints.respondents import Respondent, check_roles, documents_of
 from augment.services.events import log_event
 from augment.services.scenarios.scenes import check_slug
 from augment.services.texts import one_line
@@ -141,25 +141,25 @@ def add_contestant(
         Conflict: The slug belongs to another contestant.
     """
     check_slug(slug, what="contestant")
-    way = find_recipe(variant)
+    recipe = find_recipe(variant)
     address = _endpoint(endpoint, actor)
     model = one_line("model", model, what="contestant")
-    others = _seats(way, roles or {}, address, actor)
-    seats = [Seat(endpoint=address, model=model), *others.values()]
-    title = _title(slug, model, way, others, address)
+    others = _respondents(recipe, roles or {}, address, actor)
+    respondents = [Respondent(endpoint=address, model=model), *others.values()]
+    title = _title(slug, model, recipe, others, address)
     if name is not None:
         title = one_line("name", name, what="contestant")
-    simulated = any(seat.endpoint.is_simulated for seat in seats)
+    simulated = any(respondent.endpoint.is_simulated for respondent in respondents)
     wanted = {
         "name": title,
         "kind": Kind.SIMULATED if simulated else Kind.LLM,
-        "variant": way.slug,
+        "variant": recipe.slug,
         "endpoint": address,
         "model": model,
         "roles": documents_of(others),
     }
-    for seat in seats:
-        model_at(endpoint=seat.endpoint, model=seat.model)
+    for respondent in respondents:
+        model_at(endpoint=respondent.endpoint, model=respondent.model)
     contestant, made = Contestant.objects.get_or_create(slug=slug, defaults=wanted)
     if made:
         _log_added(contestant, actor)
@@ -229,11 +229,11 @@ def _endpoint(label: str, actor: User | None) -> Endpoint:
 
 
 def _title(
-    slug: str, model: str, way: Recipe, others: Mapping[ModelRole, Seat], own: Endpoint
+    slug: str, model: str, recipe: Recipe, others: Mapping[ModelRole, Respondent], own: Endpoint
 ) -> str:
     """What people read where nobody chose a name; not what another contestant is called."""
-    given = (f"{role} {seat.model}" for role, seat in others.items())
-    title = " ".join([model, spell_variant(way.slug), *given])[:LONGEST_NAME]
+    given = (f"{role} {respondent.model}" for role, respondent in others.items())
+    title = " ".join([model, spell_variant(recipe.slug), *given])[:LONGEST_NAME]
     if Contestant.objects.filter(name=title).exclude(slug=slug).exists():
         title = f"{title} at {own.label}"[:LONGEST_NAME]
     return title
@@ -252,16 +252,16 @@ def _log_added(contestant: Contestant, actor: User | None) -> None:
     )
 
 
-def _seats(
-    way: Recipe,
+def _respondents(
+    recipe: Recipe,
     roles: Mapping[ModelRole, tuple[str | None, str]],
     own: Endpoint,
     actor: User | None,
-) -> dict[ModelRole, Seat]:
+) -> dict[ModelRole, Respondent]:
     """Who plays the roles that were given away."""
-    check_roles(way, roles)
+    check_roles(recipe, roles)
     return {
-        role: Seat(
+        role: Respondent(
             endpoint=own if label is None else _endpoint(label, actor),
             model=one_line(f"roles.{role}", model, what="contestant"),
         )

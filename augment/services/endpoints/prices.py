@@ -6,7 +6,7 @@ from collections.abc import Iterable
 
 from augment.llm.costs import Price
 from augment.models import Contestant, Endpoint, EndpointModel
-from augment.services.endpoints.roles import seats_of
+from augment.services.endpoints.respondents import respondents_of
 
 
 def price_of(endpoint: Endpoint, model: str) -> Price | None:
@@ -20,9 +20,9 @@ def price_of(endpoint: Endpoint, model: str) -> Price | None:
 def list_unpriced_models(contestants: Iterable[Contestant]) -> list[str]:
     """What the contestants ask models whose price is unknown, as "model at endpoint"."""
     found = {
-        str(seat)
+        str(respondent)
         for row in contestants
-        for seat in seats_of(row).values()
-        if price_of(seat.endpoint, seat.model) is None
+        for respondent in respondents_of(row).values()
+        if price_of(respondent.endpoint, respondent.model) is None
     }
     return sorted(found)

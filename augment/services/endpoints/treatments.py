@@ -19,7 +19,7 @@ from augment.llm.messages import LengthName
 from augment.llm.profile import ModelProfile
 from augment.models import Augmentation, Contestant, Endpoint, ModelCall
 from augment.services.endpoints.known_models import profile_of
-from augment.services.endpoints.roles import Seat
+from augment.services.endpoints.respondents import Respondent
 from augment.services.events import log_event
 from augment.variants.transcript import ModelRole
 
@@ -32,15 +32,15 @@ class Treatment:
     """What a contestant sends in each of its roles."""
 
     contestant_pk: int
-    seats: Mapping[ModelRole, Seat]
+    respondents: Mapping[ModelRole, Respondent]
     profiles: Mapping[ModelRole, ModelProfile]
 
     def at(self, endpoint: Endpoint) -> dict[str, ModelProfile]:
         """By model, what it sends to an endpoint."""
         return {
-            seat.model: self.profiles[role]
-            for role, seat in self.seats.items()
-            if seat.endpoint.pk == endpoint.pk
+            respondent.model: self.profiles[role]
+            for role, respondent in self.respondents.items()
+            if respondent.endpoint.pk == endpoint.pk
         }
 
     def without(
@@ -53,8 +53,8 @@ class Treatment:
         """
         roles = [
             role
-            for role, seat in self.seats.items()
-            if (seat.endpoint.pk, seat.model) == (endpoint.pk, model)
+            for role, respondent in self.respondents.items()
+            if (respondent.endpoint.pk, respondent.model) == (endpoint.pk, model)
         ]
         # Whether the limit of the answer's length has the one name or the other changes nothing.
         is_only_a_name = refused.parameter in frozenset(LengthName)
@@ -70,20 +70,22 @@ class Treatment:
 
 
 @transaction.atomic
-def treatment_of(contestant: Contestant, seats: Mapping[ModelRole, Seat]) -> Treatment:
+def treatment_of(contestant: Contestant, respondents: Mapping[ModelRole, Respondent]) -> Treatment:
     """What a contestant sends; roles that never ran are fixed to what is known now.
 
     Args:
         contestant: Who is about to run.
-        seats: Who plays its roles.
+        respondents: Who plays its roles.
     """
     stored = Contestant.objects.values_list("sends", flat=True).get(pk=contestant.pk) or {}
-    if any(role.value not in stored for role in seats):
+    if any(role.value not in stored for role in respondents):
         row = Contestant.objects.select_for_update(no_key=True).get(pk=contestant.pk)
         stored = dict(row.sends or {})
         new = {
-            role.value: document_of(profile_of(endpoint=seat.endpoint, model=seat.model))
-            for role, seat in seats.items()
+            role.value: document_of(
+                profile_of(endpoint=respondent.endpoint, model=respondent.model)
+            )
+            for role, respondent in respondents.items()
             if role.value not in stored
         }
         row.sends = stored = stored | new
@@ -97,8 +99,8 @@ def treatment_of(contestant: Contestant, seats: Mapping[ModelRole, Seat]) -> Tre
         )
     return Treatment(
         contestant_pk=contestant.pk,
-        seats=seats,
-        profiles={role: profile_from_document(stored[role.value]) for role in seats},
+        respondents=respondents,
+        profiles={role: profile_from_document(stored[role.value]) for role in respondents},
     )
 
 

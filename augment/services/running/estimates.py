@@ -13,7 +13,7 @@ from augment.llm.messages import Request
 from augment.models import Augmentation, Contestant, ModelCall, Scenario
 from augment.scene.modification import Modification
 from augment.services.endpoints.prices import price_of
-from augment.services.endpoints.roles import Seat, seats_of
+from augment.services.endpoints.respondents import Respondent, respondents_of
 from augment.services.scenarios.scenes import reference_of, scene_of
 from augment.variants.forecast import TokenUse, calls_of, most_tokens
 from augment.variants.recipes import Recipe, find_recipe
@@ -156,17 +156,17 @@ class _Prompts:
         ]
         self._measured: dict[tuple[str, ModelRole], tuple[int, int]] = {}
 
-    def tokens(self, way: Recipe, role: ModelRole) -> tuple[int, int]:
+    def tokens(self, recipe: Recipe, role: ModelRole) -> tuple[int, int]:
         """About so many on average, and at most so many."""
-        key = (way.slug, role)
+        key = (recipe.slug, role)
         if key not in self._measured:
-            self._measured[key] = self._measure(way, role)
+            self._measured[key] = self._measure(recipe, role)
         return self._measured[key]
 
-    def _measure(self, way: Recipe, role: ModelRole) -> tuple[int, int]:
+    def _measure(self, recipe: Recipe, role: ModelRole) -> tuple[int, int]:
         # Of the viewer's only one is drawn: a picture takes longer than all the rest.
         samples = self._samples[:1] if role is ModelRole.VIEWER else self._samples
-        shown = [shown_prompt(way, role, *sample) for sample in samples]
+        shown = [shown_prompt(recipe, role, *sample) for sample in samples]
         about = sum(one.tokens for one in shown) // len(shown)
         pictures = max(len(message.images) for one in shown for message in one.messages)
         most = max(
@@ -176,20 +176,20 @@ class _Prompts:
 
 
 def _line(row: Contestant, count: int, prompts: _Prompts) -> ContestantEstimate:
-    way, seats = find_recipe(row.variant), seats_of(row)
-    calls = calls_of(way)
-    prices = {role: _price(seat) for role, seat in seats.items()}
+    recipe, respondents = find_recipe(row.variant), respondents_of(row)
+    calls = calls_of(recipe)
+    prices = {role: _price(respondent) for role, respondent in respondents.items()}
     used, usual_calls, seen = _seen(row)
     if not seen:
         usual_calls = float(sum(one.usual for one in calls.values()))
         used = {
             role: TokenUse(
-                prompt=one.usual * prompts.tokens(way, role)[0],
+                prompt=one.usual * prompts.tokens(recipe, role)[0],
                 completion=one.usual * ANSWER_TOKENS,
             )
             for role, one in calls.items()
         }
-    most = most_tokens(way, {role: prompts.tokens(way, role)[1] for role in calls})
+    most = most_tokens(recipe, {role: prompts.tokens(recipe, role)[1] for role in calls})
     return ContestantEstimate(
         slug=row.slug,
         name=row.name,
@@ -207,8 +207,8 @@ def _line(row: Contestant, count: int, prompts: _Prompts) -> ContestantEstimate:
     )
 
 
-def _price(seat: Seat) -> Price | None:
-    return price_of(seat.endpoint, seat.model)
+def _price(respondent: Respondent) -> Price | None:
+    return price_of(respondent.endpoint, respondent.model)
 
 
 def _usd(

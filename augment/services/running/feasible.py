@@ -12,7 +12,7 @@ from augment.errors import AugmentError, Conflict, KeyMissing, KeyNotAllowed
 from augment.models import Contestant, Scenario
 from augment.sentences import sentence, sentence_of
 from augment.services.endpoints.keys import key_of, may_hold_key
-from augment.services.endpoints.roles import Seat, seats_of, sight_of, viewer_of
+from augment.services.endpoints.respondents import Respondent, respondents_of, sight_of, viewer_of
 
 Kind = Contestant.Kind
 
@@ -36,7 +36,7 @@ def find_obstacle(contestant: Contestant) -> str:
     if not is_runnable(contestant):
         return sentence("made by people or by an outside program, and imported")
     try:
-        seats_of(contestant)
+        respondents_of(contestant)
     except AugmentError as error:
         return sentence_of(error)
     forbidden = _forbidden_keys(contestant)
@@ -64,9 +64,9 @@ def keys_missing(contestant: Contestant) -> list[str]:
     Workers elsewhere may have them: this is a warning, no obstacle.
     """
     missing = set()
-    for seat in seats_of(contestant).values():
+    for respondent in respondents_of(contestant).values():
         try:
-            key_of(seat.endpoint)
+            key_of(respondent.endpoint)
         except KeyMissing as error:
             missing.add(error.variable)
         except KeyNotAllowed:
@@ -114,7 +114,9 @@ def refuse_impossible(who: Sequence[Contestant], where: Sequence[Scenario]) -> N
 
 def _forbidden_keys(contestant: Contestant) -> tuple[str, ...]:
     """Variables that a contestant's endpoints name and that no endpoint may be sent."""
-    named = {seat.endpoint.key_variable for seat in seats_of(contestant).values()} - {""}
+    named = {
+        respondent.endpoint.key_variable for respondent in respondents_of(contestant).values()
+    } - {""}
     return tuple(sorted(name for name in named if not may_hold_key(name)))
 
 
@@ -136,16 +138,16 @@ def _refuse_forbidden_keys(who: Sequence[Contestant]) -> None:
 def _refuse_without_sight(who: Sequence[Contestant]) -> None:
     """Two calls of every augmentation would be paid for before its viewer fails."""
     viewers = {row.slug: viewer_of(row) for row in who}
-    lacking: dict[bool | None, list[tuple[str, Seat]]] = {True: [], False: [], None: []}
-    for slug, seat in viewers.items():
-        if seat is not None:
-            lacking[sight_of(seat)].append((slug, seat))
+    lacking: dict[bool | None, list[tuple[str, Respondent]]] = {True: [], False: [], None: []}
+    for slug, respondent in viewers.items():
+        if respondent is not None:
+            lacking[sight_of(respondent)].append((slug, respondent))
     if lacking[False]:
         raise Conflict(
             sentence(
                 "Visual QA needs a viewer that sees, and these see text alone: %(names)s. "
                 "Give the contestant another viewer or another variant.",
-                names=tuple(f"{slug} ({seat})" for slug, seat in lacking[False]),
+                names=tuple(f"{slug} ({respondent})" for slug, respondent in lacking[False]),
             )
         )
     if lacking[None]:
@@ -154,12 +156,13 @@ def _refuse_without_sight(who: Sequence[Contestant]) -> None:
                 "Visual QA needs a viewer that sees, and of these nobody knows whether they do: "
                 "%(names)s. Probe the model (%(probe)s), or say what you know: the same with "
                 "--sees yes, or at the endpoint.",
-                names=tuple(f"{slug} ({seat})" for slug, seat in lacking[None]),
+                names=tuple(f"{slug} ({respondent})" for slug, respondent in lacking[None]),
                 probe=_probe(lacking[None][0][1]),
             )
         )
 
 
-def _probe(seat: Seat) -> str:
+def _probe(respondent: Respondent) -> str:
     """The command that asks what a model can do."""
-    return f"manage.py probe_endpoint {seat.endpoint.label} --model {shlex.quote(seat.model)}"
+    endpoint, model = respondent.endpoint.label, shlex.quote(respondent.model)
+    return f"manage.py probe_endpoint {endpoint} --model {model}"

@@ -30,7 +30,7 @@ from augment.scene.entities import Scene
 from augment.scene.modification import Modification
 from augment.services.endpoints.call_limits import Queue
 from augment.services.endpoints.client import EndpointClient
-from augment.services.endpoints.roles import seats_of
+from augment.services.endpoints.respondents import respondents_of
 from augment.services.endpoints.treatments import Treatment, treatment_of
 from augment.services.endpoints.wires import wire_to
 from augment.services.running import jobs, leases, stopping
@@ -39,8 +39,8 @@ from augment.services.running.transcripts import RowTranscript, sentence_of
 from augment.services.scenarios.pictures import original_picture, picture_of
 from augment.services.scenarios.scenes import intent_of, reference_of, scene_of, seed_of
 from augment.variants import pipeline
-from augment.variants.cast import Player
 from augment.variants.recipes import find_recipe
+from augment.variants.respondents import RespondentClient
 from augment.variants.transcript import ModelRole
 
 logger = logging.getLogger(__name__)
@@ -246,9 +246,9 @@ def _from_model(
     held: leases.Lease,
     connect: Connect | None,
 ) -> Answer:
-    seats = seats_of(row.contestant)
-    treatment = treatment_of(row.contestant, seats)
-    sites = {seat.endpoint.pk: seat.endpoint for seat in seats.values()}
+    respondents = respondents_of(row.contestant)
+    treatment = treatment_of(row.contestant, respondents)
+    sites = {respondent.endpoint.pk: respondent.endpoint for respondent in respondents.values()}
     with ExitStack() as opened:
         clients = {
             pk: opened.enter_context(
@@ -256,9 +256,9 @@ def _from_model(
             )
             for pk, site in sites.items()
         }
-        others: dict[ModelRole, Player] = {
-            role: Player(client=clients[seat.endpoint.pk], model=seat.model)
-            for role, seat in seats.items()
+        others: dict[ModelRole, RespondentClient] = {
+            role: RespondentClient(client=clients[respondent.endpoint.pk], model=respondent.model)
+            for role, respondent in respondents.items()
             if role is not ModelRole.MODIFIER
         }
         outcome = pipeline.run(
@@ -268,7 +268,7 @@ def _from_model(
             client=clients[endpoint.pk],
             model=row.contestant.model,
             transcript=RowTranscript(
-                held, row, endpoint, others={role: seats[role].endpoint for role in others}
+                held, row, endpoint, others={role: respondents[role].endpoint for role in others}
             ),
             native_tools=treatment.profiles[ModelRole.MODIFIER].native_tools is True,
             others=others,

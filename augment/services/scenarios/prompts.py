@@ -26,18 +26,18 @@ def prompt_of(
         UnknownName: No such scenario or variant.
         Conflict: Nobody plays that role in the variant, or it is to call natively and has no tool.
     """
-    way = find_recipe(variant)
-    if role not in roles_of(way):
-        played = ", ".join(roles_of(way))
-        raise Conflict(f"Nobody plays the {role} in {way.slug}; its roles: {played}.")
-    if native_tools and (role is not ModelRole.MODIFIER or way.tools is Tools.NONE):
-        raise Conflict(f"The {role} of {way.slug} calls no function, natively or otherwise.")
+    recipe = find_recipe(variant)
+    if role not in roles_of(recipe):
+        played = ", ".join(roles_of(recipe))
+        raise Conflict(f"Nobody plays the {role} in {recipe.slug}; its roles: {played}.")
+    if native_tools and (role is not ModelRole.MODIFIER or recipe.tools is Tools.NONE):
+        raise Conflict(f"The {role} of {recipe.slug} calls no function, natively or otherwise.")
     row = Scenario.objects.select_related("base_scene").filter(slug=scenario).first()
     if row is None:
         known = Scenario.objects.values_list("slug", flat=True)
         raise UnknownName("scenario", scenario, list(known))
     return shown_prompt(
-        way,
+        recipe,
         role,
         scene_of(row),
         row.instruction,

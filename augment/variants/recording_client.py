@@ -14,7 +14,7 @@ from augment.variants.transcript import ModelRole, Transcript
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Conversation:
+class RecordingClient:
     """Who is talked to, and what keeps the record."""
 
     client: ChatClient

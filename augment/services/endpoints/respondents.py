@@ -14,7 +14,7 @@ from augment.variants.transcript import ModelRole
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Seat:
+class Respondent:
     """A model at an endpoint."""
 
     endpoint: Endpoint
@@ -29,20 +29,20 @@ class Seat:
         return EndpointModel.objects.filter(endpoint=self.endpoint, model=self.model).first()
 
 
-def check_roles(way: Recipe, roles: Iterable[ModelRole]) -> None:
+def check_roles(recipe: Recipe, roles: Iterable[ModelRole]) -> None:
     """Refuse roles that nobody plays in a recipe, and the modifier's, which is the contestant's.
 
     Raises:
         InvalidDocument: One is named.
     """
-    free = [role for role in roles_of(way) if role is not ModelRole.MODIFIER]
-    allowed = f"{way.slug} has {', '.join(free) or 'no role besides the modifier'}"
+    free = [role for role in roles_of(recipe) if role is not ModelRole.MODIFIER]
+    allowed = f"{recipe.slug} has {', '.join(free) or 'no role besides the modifier'}"
     problems = [(f"roles.{role}", allowed) for role in roles if role not in free]
     if problems:
         raise InvalidDocument("contestant", problems)
 
 
-def seats_of(contestant: Contestant) -> dict[ModelRole, Seat]:
+def respondents_of(contestant: Contestant) -> dict[ModelRole, Respondent]:
     """Who plays each role of a contestant's variant; nobody where it has none.
 
     Raises:
@@ -51,8 +51,8 @@ def seats_of(contestant: Contestant) -> dict[ModelRole, Seat]:
     """
     if contestant.endpoint is None:
         return {}
-    own = Seat(endpoint=contestant.endpoint, model=contestant.model)
-    seats = dict.fromkeys(roles_of(find_recipe(contestant.variant)), own)
+    own = Respondent(endpoint=contestant.endpoint, model=contestant.model)
+    respondents = dict.fromkeys(roles_of(find_recipe(contestant.variant)), own)
     for name, chosen in contestant.roles.items():
         endpoint = Endpoint.objects.filter(label=chosen["endpoint"]).first()
         if endpoint is None:
@@ -65,24 +65,24 @@ def seats_of(contestant: Contestant) -> dict[ModelRole, Seat]:
                     endpoint=chosen["endpoint"],
                 )
             )
-        seats[ModelRole(name)] = Seat(endpoint=endpoint, model=chosen["model"])
-    return seats
+        respondents[ModelRole(name)] = Respondent(endpoint=endpoint, model=chosen["model"])
+    return respondents
 
 
-def documents_of(seats: Mapping[ModelRole, Seat]) -> dict[str, dict[str, str]]:
-    """The seats as they are stored with a contestant."""
+def documents_of(respondents: Mapping[ModelRole, Respondent]) -> dict[str, dict[str, str]]:
+    """The respondents as they are stored with a contestant."""
     return {
-        role.value: {"endpoint": seat.endpoint.label, "model": seat.model}
-        for role, seat in sorted(seats.items())
+        role.value: {"endpoint": respondent.endpoint.label, "model": respondent.model}
+        for role, respondent in sorted(respondents.items())
     }
 
 
-def viewer_of(contestant: Contestant) -> Seat | None:
+def viewer_of(contestant: Contestant) -> Respondent | None:
     """Who looks at pictures for a contestant, None where its variant shows none."""
-    return seats_of(contestant).get(ModelRole.VIEWER)
+    return respondents_of(contestant).get(ModelRole.VIEWER)
 
 
-def sight_of(seat: Seat) -> bool | None:
+def sight_of(respondent: Respondent) -> bool | None:
     """Whether a model sees pictures, None where nobody probed it or said so."""
-    known = seat.known
+    known = respondent.known
     return None if known is None else known.vision

@@ -11,7 +11,7 @@ from augment.llm.client import ChatClient
 from augment.llm.messages import Message, Reply, Request, Tool, ToolChoice
 from augment.llm.patience import Patience
 from augment.prompts.texts import prompt_version
-from augment.variants.asking import Conversation
+from augment.variants.recording_client import RecordingClient
 from augment.variants.transcript import ModelRole, Transcript
 
 Messages = tuple[Message, ...]
@@ -19,7 +19,7 @@ _Read = TypeVar("_Read")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Player:
+class RespondentClient:
     """Who plays a role.
 
     Attributes:
@@ -33,20 +33,20 @@ class Player:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Cast:
+class Respondents:
     """Who is talked to, and what keeps the record.
 
     Attributes:
-        players: By role; a role without one is played by the modifier's.
+        clients: By role; a role without one is played by the modifier's.
     """
 
-    players: Mapping[ModelRole, Player]
+    clients: Mapping[ModelRole, RespondentClient]
     transcript: Transcript
     patience: Patience
 
-    def player(self, role: ModelRole) -> Player:
+    def client_of(self, role: ModelRole) -> RespondentClient:
         """Who plays that role."""
-        return self.players.get(role, self.players[ModelRole.MODIFIER])
+        return self.clients.get(role, self.clients[ModelRole.MODIFIER])
 
     def ask(
         self,
@@ -64,21 +64,21 @@ class Cast:
             ModelFault: The last attempt broke, or the fault is one that does not pass.
             BudgetSpent: The transcript's budget has no room for the next attempt.
         """
-        player = self.player(role)
+        respondent = self.client_of(role)
         request = Request(
-            model=player.model,
+            model=respondent.model,
             messages=messages,
             max_tokens=max_tokens,
             tools=tools,
             tool_choice=tool_choice,
         )
-        conversation = Conversation(
-            client=player.client,
-            model=player.model,
+        recording = RecordingClient(
+            client=respondent.client,
+            model=respondent.model,
             transcript=self.transcript,
             patience=self.patience,
         )
-        reply = conversation.ask(role, request, prompt_version())
+        reply = recording.ask(role, request, prompt_version())
         if reply.refusal is not None:
             raise ModelRefused(reply.refusal or "The model declined without a reason.")
         if reply.finish_reason == "content_filter":
@@ -87,7 +87,7 @@ class Cast:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Asking:
+class Inquiry:
     """How an answer is asked for until it can be read.
 
     Attributes:
@@ -96,7 +96,7 @@ class Asking:
         re_asks: How often that is done.
     """
 
-    cast: Cast
+    respondents: Respondents
     role: ModelRole
     again: Callable[[Messages, str, list[str]], Messages]
     max_tokens: int
@@ -134,7 +134,7 @@ class Asking:
 
     def _ask(self, messages: Messages, max_tokens: int) -> Reply:
         # Tools are named where the conversation holds calls, and can't be called any more.
-        return self.cast.ask(
+        return self.respondents.ask(
             self.role,
             messages,
             max_tokens=max_tokens,
