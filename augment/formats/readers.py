@@ -7,6 +7,7 @@ from pathlib import Path
 from augment.errors import InvalidDocument, UnknownName
 from augment.formats.argoverse2.sensor import ArgoverseSensor
 from augment.formats.commonroad.scenario import CommonRoad
+from augment.formats.nuplan.scenario import NuPlan
 from augment.formats.own_json import OwnJson
 from augment.formats.reading import Reader
 from augment.formats.scenarionet.scenario import ScenarioNet
@@ -19,6 +20,7 @@ READERS: dict[str, Reader] = {
         OwnJson(),
         CommonRoad(),
         WaymoMotion(),
+        NuPlan(),
         ScenarioNet(),
     )
 }

@@ -6,7 +6,7 @@ the id of either. `frame` is a time step, for a planning problem the one it star
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -76,7 +76,7 @@ class CommonRoad:
         network = network_of(root, frame)
         log = Log(
             what=WHAT,
-            times_s=np.arange(len(ego.states)) * _step_s(root),
+            times_s=np.arange(len(ego.states), dtype=np.float64) * _step_s(root),
             ego=ego.states,
             ego_length_m=ego.length_m,
             ego_width_m=ego.width_m,
@@ -170,7 +170,7 @@ def _ego(root: Element, obstacles: Obstacles, item: str | None) -> _Ego:
     )
 
 
-def _listed(names: dict[int, object] | dict[int, Element]) -> str:
+def _listed(names: Mapping[int, object]) -> str:
     shown = ", ".join(str(name) for name in list(names)[:12]) or "none"
     return shown + (f" and {len(names) - 12} more" if len(names) > 12 else "")
 

@@ -183,7 +183,8 @@ def _times(metadata: dict[str, Any], length: object, ego: object) -> FloatArray:
         raise _fault("metadata.ts", "must be finite times")
     if (np.diff(times_s) <= 0.0).any():
         raise _fault("metadata.ts", "must ascend")
-    return times_s - times_s[0]
+    made: FloatArray = times_s - times_s[0]
+    return made
 
 
 def _track(key: object, track: dict[str, Any], steps: int) -> LoggedTrack:

@@ -224,7 +224,7 @@ def _look_through(block: bytes) -> None:
             raise ValueError(f"the instruction {instruction.name} is not on the list")
         if count > MOST_INSTRUCTIONS:
             raise ValueError(f"more than {MOST_INSTRUCTIONS} instructions")
-        if instruction.name in _MEMORY and int(argument) > MOST_INSTRUCTIONS:
+        if instruction.name in _MEMORY and int(argument or 0) > MOST_INSTRUCTIONS:
             raise ValueError(f"place {str(argument)[:20]} of its memory is too far")
 
 

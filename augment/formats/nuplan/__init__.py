@@ -1,0 +1,1 @@
+"""nuPlan: a log database and the vector map of its city."""

@@ -1,0 +1,134 @@
+"""The reader of nuPlan logs.
+
+A path is a log's .db; its map lies under a folder `maps` beside it or above it, as the data set
+is laid out: maps/<location>/<version>/map.gpkg. `item` is the token of a lidar_pc, or
+`tag:<scenario type>` for the first frame that has the tag; `frame` counts tenths of a second on.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+from pathlib import Path
+
+from augment.errors import InvalidDocument
+from augment.formats.nuplan.city import city_around
+from augment.formats.nuplan.log import (
+    Place,
+    check_tables,
+    lights_at,
+    place_of,
+    read_log,
+    tokens_of,
+)
+from augment.formats.nuplan.sqlite import WHAT, Tables, open_tables
+from augment.formats.reading import Moment, Reading, frames_every
+from augment.formats.recorded_log import scene_at
+from augment.formats.roads import road_around
+from augment.scene.notes import Note, SceneNoteKind
+
+LICENCE = "nuPlan, CC BY-NC-SA 4.0"
+TAG = "tag:"
+_TOKEN = re.compile(r"[0-9a-f]{16}")
+
+
+class NuPlan:
+    """The reader of nuPlan's log databases."""
+
+    name = "nuplan"
+    title = "nuPlan log (.db file, with maps/ beside or above it)"
+
+    def recognises(self, path: Path) -> bool:
+        """A SQLite file by its name and first bytes."""
+        if path.suffix.lower() != ".db" or not path.is_file():
+            return False
+        with path.open("rb") as file:
+            return file.read(16) == b"SQLite format 3\0"
+
+    def moments(self, path: Path, *, every_s: float) -> Iterator[Moment]:
+        """Frames that far apart."""
+        with open_tables(path) as tables:
+            check_tables(tables)
+            tokens = tokens_of(tables, None)
+        times_s = [(time - tokens[0][1]) * 1e-6 for _, time in tokens]
+        for index in frames_every(times_s, every_s):
+            yield Moment(item=tokens[index][0])
+
+    def read(self, path: Path, *, item: str | None, frame: int | None, name: str) -> Reading:
+        """The scene at one lidar_pc, and half a minute from there on."""
+        if frame:
+            raise InvalidDocument(
+                WHAT, [("frame", "a token names the frame itself; leave it out")]
+            )
+        with open_tables(path) as tables:
+            check_tables(tables)
+            place = place_of(tables)
+            token = _token(tables, item)
+            log = read_log(tables, token)
+            lights = lights_at(tables, token)
+        origin = log.ego_pose(0)
+        city = city_around(
+            map_of(path, place),
+            location=place.location,
+            center_m=(origin.x_m, origin.y_m),
+            lights=lights,
+        )
+        road = road_around(city.map, origin)
+        scene, recording = scene_at(
+            log,
+            0,
+            road,
+            name=name,
+            world=f"UTM of {place.location}",
+            provenance=(
+                f"nuPlan data set, log {place.logfile or path.stem}, lidar_pc {token}; {LICENCE}"
+            ),
+        )
+        notes = list(city.notes)
+        if road.side_is_assumed:
+            side = (road.traffic_side.value,)
+            notes.append(Note(kind=SceneNoteKind.TRAFFIC_SIDE_ASSUMED, names=side))
+        notes.append(Note(kind=SceneNoteKind.NON_COMMERCIAL, names=(LICENCE,)))
+        return Reading(
+            scene=scene, recording=recording, notes=tuple(notes), moment=Moment(item=token)
+        )
+
+
+def map_of(path: Path, place: Place) -> Path:
+    """The map of a log's city.
+
+    Raises:
+        InvalidDocument: It is nowhere, or there are several.
+    """
+    for name in (place.location, place.version):
+        if not re.fullmatch(r"[\w.-]{0,60}", name):
+            raise InvalidDocument(WHAT, [("log", f"{name[:40]!r} is no name of a map")])
+    cities = dict.fromkeys(one for one in (place.location, place.version) if one.strip("."))
+    for folder in path.resolve().parents:
+        found = [
+            file for city in cities for file in sorted((folder / "maps" / city).glob("*/map.gpkg"))
+        ]
+        if len(found) > 1:
+            raise InvalidDocument(WHAT, [(str(folder / "maps"), "has several maps of this city")])
+        if found:
+            return found[0]
+    text = f"has no map of {place.location} beside or above it: maps/{place.location}/*/map.gpkg"
+    raise InvalidDocument(WHAT, [(str(path), text)])
+
+
+# Private
+
+
+def _token(tables: Tables, item: str | None) -> str:
+    if item is None or item.startswith(TAG):
+        tag = None if item is None else item.removeprefix(TAG)
+        found = tokens_of(tables, tag)
+        if not found:
+            text = "the log has no frame" if tag is None else f"no frame has the tag {tag!r}"
+            raise InvalidDocument(WHAT, [("item", text)])
+        return found[0][0]
+    if not _TOKEN.fullmatch(item.lower()):
+        raise InvalidDocument(
+            WHAT, [("item", f"{item[:40]!r} is neither a token of 16 hex digits nor tag:TYPE")]
+        )
+    return item.lower()

@@ -1,0 +1,79 @@
+"""Rows out of a SQLite file that somebody else made, opened for reading alone."""
+
+from __future__ import annotations
+
+import sqlite3
+from collections.abc import Iterator, Sequence
+from contextlib import closing, contextmanager
+from pathlib import Path
+from typing import Any
+from urllib.parse import quote
+
+from augment.errors import InvalidDocument
+
+WHAT = "nuPlan log"
+MOST_ROWS = 2_000_000
+
+
+class Tables:
+    """A database's tables."""
+
+    def __init__(self, connection: sqlite3.Connection, name: str) -> None:
+        self._connection = connection
+        self._name = name
+
+    def has(self, table: str) -> bool:
+        """Whether there is a table of that name."""
+        text = "SELECT 1 FROM sqlite_master WHERE type IN ('table', 'view') AND name = ?"
+        return bool(self._connection.execute(text, (table,)).fetchone())
+
+    def columns(self, table: str) -> set[str]:
+        """Its columns; none of a table that is not there."""
+        text = "SELECT name FROM pragma_table_info(?)"
+        return {str(row[0]) for row in self._connection.execute(text, (table,))}
+
+    def need(self, table: str, columns: Sequence[str]) -> None:
+        """Whether the table has these columns.
+
+        Raises:
+            InvalidDocument: It has not.
+        """
+        there = self.columns(table)
+        if not there:
+            raise InvalidDocument(WHAT, [(self._name, f"has no table {table!r}")])
+        missing = [name for name in columns if name not in there]
+        if missing:
+            faults = [(f"{self._name}: {table}", f"has no column {one!r}") for one in missing]
+            raise InvalidDocument(WHAT, faults)
+
+    def rows(self, query: str, values: Sequence[Any] = ()) -> list[tuple[Any, ...]]:
+        """What a query gives.
+
+        Raises:
+            InvalidDocument: It gives too much, or the file is broken.
+        """
+        found = self._connection.execute(query, tuple(values)).fetchmany(MOST_ROWS + 1)
+        if len(found) > MOST_ROWS:
+            raise InvalidDocument(WHAT, [(self._name, f"more than {MOST_ROWS} rows at once")])
+        return found
+
+
+@contextmanager
+def open_tables(path: Path) -> Iterator[Tables]:
+    """The file's tables, as long as the block lasts.
+
+    Raises:
+        InvalidDocument: It is not there, or no database.
+    """
+    if not path.is_file():
+        raise InvalidDocument(WHAT, [(str(path), "is not there")])
+    address = f"file:{quote(str(path.resolve()))}?mode=ro&immutable=1"
+    try:
+        with closing(sqlite3.connect(address, uri=True)) as connection:
+            connection.execute("PRAGMA trusted_schema = OFF")
+            connection.execute("PRAGMA cell_size_check = ON")
+            yield Tables(connection, path.name)
+    except sqlite3.Error as fault:
+        raise InvalidDocument(
+            WHAT, [(path.name, f"can't be read as a database: {fault}")]
+        ) from None

@@ -1,0 +1,182 @@
+"""Tested against the published schema: nobody may pass on a file of the data set."""
+
+from __future__ import annotations
+
+import sqlite3
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from augment.errors import InvalidDocument
+from augment.formats.nuplan.mercator import to_utm
+from augment.formats.nuplan.scenario import NuPlan
+from augment.formats.reading import Reading
+from augment.scene.codec import scene_to_document
+from augment.scene.entities import AgentType, AreaKind, TrafficLight, TrafficSide, TurnType
+from augment.scene.notes import SceneNoteKind
+from tests.formats.nuplan_files import CITIES, token, write_log, write_map
+
+START = token(100).hex()
+
+
+def read(file: Path, item: str | None = START) -> Reading:
+    return NuPlan().read(file, item=item, frame=None, name="made")
+
+
+def fault_of(file: Path, item: str | None = START) -> str:
+    with pytest.raises(InvalidDocument) as caught:
+        read(file, item)
+    return str(caught.value)
+
+
+@pytest.fixture
+def log(tmp_path: Path) -> Path:
+    write_map(tmp_path, "sg-one-north")
+    return write_log(tmp_path, "sg-one-north")
+
+
+# WGS 84's meridian is 4 984 944.378 m long up to 45 degrees; the CN Tower's published place.
+@pytest.mark.parametrize(
+    ("zone", "longitude", "latitude", "east", "north", "within"),
+    [
+        (31, 3.0, 0.0, 500_000.0, 0.0, 1e-6),
+        (31, 3.0, 45.0, 500_000.0, 0.9996 * 4_984_944.378, 1e-3),
+        (17, -79.387139, 43.642567, 630_084.0, 4_833_438.0, 2.0),
+    ],
+)
+def test_the_projection_has_known_values(
+    zone: int, longitude: float, latitude: float, east: float, north: float, within: float
+) -> None:
+    (found,) = to_utm(np.array([[longitude, latitude]]), zone=zone, is_south=False)
+    assert found == pytest.approx([east, north], abs=within)
+
+
+@pytest.mark.parametrize("city", list(CITIES))
+def test_every_city_comes_in_its_own_zone(tmp_path: Path, city: str) -> None:
+    write_map(tmp_path, city)
+    scene = read(write_log(tmp_path, city)).scene
+    _, east, north, _ = CITIES[city]
+    assert scene.origin.pose.x_m == pytest.approx(east + 1.461)
+    assert scene.origin.pose.y_m == pytest.approx(north)
+    own = next(lane for lane in scene.lanes if lane.id == scene.ego.lane_id)
+    assert own.centerline.points_m[0].tolist() == pytest.approx([-41.461, 0.0], abs=2e-3)
+    assert own.width_m == pytest.approx(4.0, abs=2e-3)
+    side = TrafficSide.LEFT if city.startswith("sg") else TrafficSide.RIGHT
+    assert scene.traffic_side is side
+
+
+def test_the_ego_is_its_centre_and_boxes_are_theirs(log: Path) -> None:
+    scene = read(log).scene
+    assert (scene.ego.length_m, scene.ego.width_m, scene.ego.speed_mps) == (5.176, 2.297, 10.0)
+    (car,) = scene.agents
+    assert (car.x_m, car.y_m, car.speed_mps, car.length_m) == (20.0, 0.0, 5.0, 4.6)
+    assert car.lane_id == scene.ego.lane_id
+    scene_to_document(scene)
+
+
+def test_what_follows_is_recorded_ten_times_a_second(log: Path) -> None:
+    recording = read(log).recording
+    assert recording is not None
+    assert recording.times_s.tolist() == pytest.approx([0.1 * step for step in range(11)])
+    assert recording.ego[:, 0].tolist() == pytest.approx([1.0 * step for step in range(11)])
+    walker = next(one for one in recording.tracks if one.type == AgentType.PEDESTRIAN)
+    assert np.isnan(walker.states[:5]).all()
+    assert np.isfinite(walker.states[5:]).all()
+
+
+def test_lanes_limits_neighbours_and_boundaries_come_from_the_map(log: Path) -> None:
+    reading = read(log)
+    scene = reading.scene
+    own, beside, after = scene.lanes
+    assert (own.speed_limit_mps, beside.speed_limit_mps, after.speed_limit_mps) == (
+        13.4,
+        None,
+        None,
+    )
+    assert (own.left_neighbor, beside.right_neighbor) == (beside.id, own.id)
+    assert own.left_boundary is not None
+    assert own.left_boundary.points_m[0, 0] < own.left_boundary.points_m[-1, 0]
+    kinds = {note.kind: note.number for note in reading.notes}
+    assert kinds[SceneNoteKind.BOUNDARIES_TURNED] == 2
+    assert kinds[SceneNoteKind.TURN_TYPES_CORRECTED] == 1
+    assert kinds[SceneNoteKind.BICYCLE_LANES_LEFT_OUT] == 1
+    assert {area.kind for area in scene.areas} == {AreaKind.INTERSECTION, AreaKind.WALKWAY}
+
+
+@pytest.mark.parametrize(
+    ("item", "state"),
+    [(START, TrafficLight.GREEN), ("tag:high_magnitude_speed", TrafficLight.RED)],
+)
+def test_a_connector_comes_from_its_exit_lane_and_has_its_light(
+    log: Path, item: str, state: TrafficLight
+) -> None:
+    scene = read(log, item).scene
+    (connector,) = scene.connectors
+    assert connector.traffic_light is state
+    assert connector.turn_type is TurnType.STRAIGHT
+    ends = [lane.id for lane in scene.lanes if lane.centerline.points_m[0, 0] > 0.0]
+    assert (connector.from_lane, connector.to_lane) == (scene.ego.lane_id, ends[0])
+
+
+def test_moments_are_tokens(log: Path) -> None:
+    found = [one.item for one in NuPlan().moments(log, every_s=0.5)]
+    assert found == [token(100).hex(), token(110).hex(), token(120).hex()]
+    assert NuPlan().recognises(log)
+
+
+def test_what_is_not_there_is_named(log: Path, tmp_path: Path) -> None:
+    assert "there is no lidar_pc 00000000000003e7" in fault_of(log, token(999).hex())
+    assert "neither a token of 16 hex digits" in fault_of(log, "x")
+    assert "no frame has the tag 'starting'" in fault_of(log, "tag:starting")
+    alone = tmp_path / "alone"
+    alone.mkdir()
+    moved = write_log(alone, "us-ma-boston")
+    assert "has no map of us-ma-boston" in fault_of(moved)
+
+
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [
+        ("DROP TABLE track", "has no table 'track'"),
+        ("ALTER TABLE lidar_box DROP COLUMN yaw", "has no column 'yaw'"),
+        ("DELETE FROM log", "log: has no row"),
+        ("DELETE FROM ego_pose", "has no pose for lidar_pc"),
+        ("UPDATE category SET name = 'tank'", "unknown 'tank'"),
+        ("UPDATE ego_pose SET x = 'west'", "no number"),
+        ("UPDATE ego_pose SET x = 1e300", "over 1e+08"),
+        ("UPDATE log SET location = '../../etc'", "is no name of a map"),
+    ],
+)
+def test_a_broken_log_says_what_is_wrong(log: Path, change: str, said: str) -> None:
+    base = sqlite3.connect(log)
+    base.execute(change)
+    base.commit()
+    base.close()
+    assert said in fault_of(log)
+
+
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [
+        ("DELETE FROM meta", "is no UTM zone"),
+        ("UPDATE meta SET value = 'EPSG:3857'", "is no UTM zone"),
+        ("UPDATE baseline_paths SET geom = x'4750'", "broken geometry"),
+        ("UPDATE baseline_paths SET geom = substr(geom, 1, 30)", "broken geometry"),
+        ("UPDATE gpkg_geometry_columns SET srs_id = 3857", "EPSG:3857, which is not read"),
+        ("DROP TABLE lanes_polygons", "has no table 'lanes_polygons'"),
+    ],
+)
+def test_a_broken_map_says_what_is_wrong(log: Path, change: str, said: str) -> None:
+    (file,) = log.parent.glob("maps/*/*/map.gpkg")
+    base = sqlite3.connect(file)
+    base.execute(change)
+    base.commit()
+    base.close()
+    assert said in fault_of(log)
+
+
+def test_what_is_no_database_is_refused(tmp_path: Path) -> None:
+    file = tmp_path / "made.db"
+    file.write_bytes(b"SQLite format 3\0" + b"x" * 5000)
+    assert "can't be read as a database" in fault_of(file)
