@@ -38,7 +38,7 @@ LEFT_HAND = "sg-"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class City:
+class NuplanCity:
     """The map, and what it does not say."""
 
     map: RoadMap
@@ -59,7 +59,7 @@ def city_around(
     location: str,
     center_m: tuple[float, float],
     lights: dict[int, TrafficLight],
-) -> City:
+) -> NuplanCity:
     """What of the map lies within reach of a point.
 
     Args:
@@ -94,7 +94,7 @@ def city_around(
         areas=areas,
         side=TrafficSide.LEFT if location.startswith(LEFT_HAND) else TrafficSide.RIGHT,
     )
-    return City(map=city, notes=_notes(city, count))
+    return NuplanCity(map=city, notes=_notes(city, count))
 
 
 # Private

@@ -49,7 +49,7 @@ _COLUMNS = {
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Place:
+class LogPlace:
     """Where a log was recorded."""
 
     location: str
@@ -67,7 +67,7 @@ def check_tables(tables: Tables) -> None:
         tables.need(table, columns)
 
 
-def place_of(tables: Tables) -> Place:
+def place_of(tables: Tables) -> LogPlace:
     """City and map of the log.
 
     Raises:
@@ -77,7 +77,7 @@ def place_of(tables: Tables) -> Place:
     if not rows:
         raise InvalidDocument(WHAT, [("log", "has no row")])
     location, version, logfile = (str(one or "") for one in rows[0])
-    return Place(location=location, version=version, logfile=logfile)
+    return LogPlace(location=location, version=version, logfile=logfile)
 
 
 def tokens_of(tables: Tables, tag: str | None) -> list[tuple[str, int]]:

@@ -14,7 +14,7 @@ from pathlib import Path
 from augment.errors import InvalidDocument
 from augment.formats.nuplan.city import city_around
 from augment.formats.nuplan.log import (
-    Place,
+    LogPlace,
     check_tables,
     lights_at,
     place_of,
@@ -94,7 +94,7 @@ class NuPlan:
         )
 
 
-def map_of(path: Path, place: Place) -> Path:
+def map_of(path: Path, place: LogPlace) -> Path:
     """The map of a log's city.
 
     Raises:

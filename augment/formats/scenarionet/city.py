@@ -44,7 +44,7 @@ _LIGHTS = {
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class City:
+class ScenarioNetCity:
     """The map, and what it does not say."""
 
     map: RoadMap
@@ -71,7 +71,7 @@ def points_of(value: object, place: str) -> FloatArray:
     return np.asarray(value[:, :2], dtype=np.float64)
 
 
-def city_of(description: dict[str, Any], frame: int, *, place_name: str) -> City:
+def city_of(description: dict[str, Any], frame: int, *, place_name: str) -> ScenarioNetCity:
     """The map with the lights of one step.
 
     Raises:
@@ -105,7 +105,7 @@ def city_of(description: dict[str, Any], frame: int, *, place_name: str) -> City
     )
     assumed = sum(was_assumed for _, was_assumed in built)
     notes = _notes(city, assumed, len(meaningless), bool(lights), left_out)
-    return City(map=city, notes=notes)
+    return ScenarioNetCity(map=city, notes=notes)
 
 
 # Private

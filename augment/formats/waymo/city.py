@@ -37,14 +37,14 @@ LIGHT_OF = {
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class City:
+class WaymoCity:
     """The map, and what it does not say."""
 
     map: RoadMap
     notes: tuple[Note, ...]
 
 
-def city_of(scenario: ScenarioMessage, frame: int) -> City:
+def city_of(scenario: ScenarioMessage, frame: int) -> WaymoCity:
     """The map with the lights of one step."""
     lanes = {key: lane for key, lane in scenario.lanes.items() if lane.type != BICYCLE_LANE}
     lanes = {key: lane for key, lane in lanes.items() if len(lane.line) >= 2}
@@ -63,7 +63,7 @@ def city_of(scenario: ScenarioMessage, frame: int) -> City:
         if kind != SPEED_BUMP and len(np.unique(polygon, axis=0)) >= 3
     ]
     city = RoadMap(what=WHAT, place="map_features", segments=tuple(segments), areas=tuple(areas))
-    return City(map=city, notes=_notes(scenario, segments, assumed, crossing, controlled))
+    return WaymoCity(map=city, notes=_notes(scenario, segments, assumed, crossing, controlled))
 
 
 # Private
