@@ -11,7 +11,7 @@ from django.shortcuts import get_object_or_404, redirect
 from django.utils.translation import gettext as _
 from django.views.decorators.http import require_POST, require_safe
 
-from arena.web.access import STAFF, allow_only
+from arena.web.access import ADMIN, STAFF, allow_only
 from augment.errors import AugmentError, Conflict
 from augment.models import Scenario
 from augment.sentences import sentence
@@ -33,7 +33,7 @@ def intent_file(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
     return answer
 
 
-@allow_only(*STAFF)
+@allow_only(ADMIN)
 @require_POST
 def set_intent(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
     """Accept the last reading, or take the intent of the file that came along."""
