@@ -39,7 +39,7 @@ PAGES: dict[str, tuple[int, int, int]] = {
     "asked-image": (404, 404, 403),
     "scenarios": (200, 200, 403),
     "scenario": (200, 200, 403),
-    "intent": (404, 404, 403),  # the scenario has none
+    "intent": (200, 200, 403),
     "picture": (200, 200, 403),
     "studies": (200, 200, 403),
     "study-new": (200, 403, 403),
