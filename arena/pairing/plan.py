@@ -1,5 +1,8 @@
 """The planner of matchups: a pure function of seed and rules.
 
+In: `PlanRules`: experts, what can be shown, numbers and a seed. Out: a `MatchupPlan`: for each
+expert the matchups in their order, each with its two sides.
+
 A unit is a scenario with a pair of contestants. The plan is made in five steps:
 
 1. every expert gets a quota of each scenario and of each pair; quotas differ by at most 1 within

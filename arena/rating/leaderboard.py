@@ -1,5 +1,8 @@
 """The rated table: which contestants, how strong, how sure, which rank. Read this file first.
 
+In: `Comparisons` of named contestants, as arrays. Out: a `Leaderboard`: for each of them a `Line`
+with rating, interval and rank, and what must be said with the numbers.
+
     votes = as_arrays(names, [Comparison(first="a", second="b", score=1.0, expert="e", ...), ...])
     board = rate(votes)  # the default: Bradley-Terry, two-way, 10,000 rounds
     board = rate(votes, unit=Unit.VOTE, rounds=PAPER_ROUNDS)  # the paper's mode

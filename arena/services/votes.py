@@ -1,4 +1,8 @@
-"""Casting votes: stored once however often they arrive, and never changed."""
+"""Casting votes: stored once however often they arrive, and never changed.
+
+In: an expert and a `Decision` about a matchup. Out: a `Vote` row, the same one for the same
+decision sent again; or an error that says why nothing was stored.
+"""
 
 from __future__ import annotations
 

@@ -1,5 +1,8 @@
 """Every check that needs no intent, and the one function that runs them.
 
+In: a `Scene` and a `Modification`. Out: `Finding`s, each a measured fact with its numbers, its
+severity and the class of fault that it speaks for.
+
 Adding a check is adding one function to `CHECKS`. Checks against an intent get their own tuple:
 these here never ask what was wanted.
 """

@@ -1,4 +1,9 @@
-"""Every format that can be read, by name."""
+"""Every format that can be read, by name.
+
+In: a path to somebody's file or folder, and where it is known the format's name. Out: its reader,
+which gives a `Reading` (reading.py): a `Scene`, a `Recording` and `Note`s on what the source left
+open. A new format is a class that fits `Reader`, and its entry in READERS.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,9 @@
-"""What the rest of the house asks of whatever answers as a language model."""
+"""What the rest of the house asks of whatever answers as a language model.
+
+In: a `Request` (messages, model, limits). Out: a `Reply` (text or calls, tokens), or a
+`ModelFault` that says whether a later attempt may do better. `openai_wire` is the one that calls
+out; `scripted` answers from a list.
+"""
 
 from __future__ import annotations
 

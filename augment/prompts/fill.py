@@ -1,5 +1,8 @@
 """What the modifier is told: prompt texts filled with a scene, an instruction and what came back.
 
+In: a `Scene`, an instruction, and the form of a variant (polylines or Bezier curves, with or
+without calls); later on what was answered, called and found. Out: `Message`s, ready to be sent.
+
 What is the same for every scenario comes first, then the scene, then the instruction, so that an
 endpoint can reuse the unchanged beginning.
 """

@@ -1,5 +1,8 @@
 """From a model's answer to a Modification, or an error whose sentences can go back to it.
 
+In: the text of an answer, and the `Scene` that it is about. Out: a `ReadReply` with the
+`Modification`, the model's notes and what had to be mended; or `ReplyUnreadable`.
+
 Frame: ego frame of the scene.
 """
 

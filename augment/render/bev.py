@@ -1,5 +1,8 @@
 """The bird's-eye view: one renderer for every picture of a scene, whoever changed it.
 
+In: a `Scene`, a `Modification` (an empty one draws the scene as it is) and a `Camera`. Out: the
+bytes of a PNG.
+
 A voting picture carries no text but its scale and the distances at its edge, and its bytes depend
 on the scene, the change and the camera alone.
 """

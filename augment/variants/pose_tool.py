@@ -1,5 +1,8 @@
 """The function that the FC variant offers to a language model: a pose on a lane.
 
+In: a `Scene`, and the arguments of a call (`pose_call.py` reads them). Out: a `PoseOnLane`, which
+the model gets as JSON, or a `ToolError` whose sentence tells the model what was wrong.
+
 `pose_on_lane(lane, start, distance_m, lateral_m)` answers from the same Bezier pieces and under
 the same short ids as the prompt shows. It follows the lanes across connectors, straightest
 first, and says on which one it ended. Everything is computed from the scene before the change.

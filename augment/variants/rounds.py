@@ -1,5 +1,8 @@
 """The only loop of the house: modify, review, and back to the modifier with what was found.
 
+In: a `Modifier` (recipe, scene, who is asked) and an instruction. Out: a `Result`, the round that
+counts with its review; everything else is in the transcript.
+
 It is bounded by the recipe's regenerations, and every turn of it is in the transcript. A review
 never takes a result away: where it is unusable, or a later round can't be read, what the modifier
 made before stands, and the notes say so.

@@ -1,4 +1,8 @@
-"""One augmentation from lease to outcome: ask the contestant, keep the answer, draw, settle."""
+"""One augmentation from lease to outcome: ask the contestant, keep the answer, draw, settle.
+
+In: the primary key of an `Augmentation` row, which says scenario and contestant. Out: the same row
+with its state, modification, notes or reason, and picture, and its calls as `ModelCall` rows.
+"""
 
 from __future__ import annotations
 

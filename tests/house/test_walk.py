@@ -1,0 +1,44 @@
+"""A newcomer's walk: the file to open first of each stage says what comes in and what goes out."""
+
+from __future__ import annotations
+
+import ast
+import re
+
+import pytest
+
+from tests.house.source import ROOT
+
+DOCS = ROOT / "docs"
+NEW = " (new)"
+"""Stands after the name of a file that whoever follows docs/extending.md is to make."""
+
+
+def opened_first() -> dict[str, str]:
+    """The file to open first by the name of the stage, from the picture of the way."""
+    rows = re.findall(
+        r"^\| \d+ \| ([^|]+) \|.*\| `([^`|]+)` \|$", (DOCS / "architecture.md").read_text(), re.M
+    )
+    return dict(rows)
+
+
+def test_every_stage_has_a_file_of_its_own_to_open_first() -> None:
+    files = opened_first()
+    assert len(files) == 13
+    assert len(set(files.values())) == 13
+
+
+@pytest.mark.parametrize("path", opened_first().values(), ids=lambda path: str(path))
+def test_it_says_what_comes_in_and_what_goes_out(path: str) -> None:
+    words = ast.get_docstring(ast.parse((ROOT / path).read_text())) or ""
+    first = words.splitlines()[:7]
+    assert [line for line in first if line.startswith("In: ")]
+    assert [line for line in first if re.search(r"\bOut: ", line)]
+
+
+def test_the_page_on_extending_names_files_that_are_there_and_new_ones_that_are_not() -> None:
+    page = (DOCS / "extending.md").read_text()
+    named = re.findall(r"`((?:arena|augment|docs|tests|templates)/[\w./+-]+)`(\s\(new\))?", page)
+    assert len(named) > 40
+    wrong = {path for path, new in named if (ROOT / path).exists() == bool(new)}
+    assert wrong == set()
