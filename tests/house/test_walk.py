@@ -46,3 +46,14 @@ def test_the_page_on_extending_names_files_that_are_there_and_folders_for_new_on
         if not ((ROOT / path).parent.is_dir() if new else (ROOT / path).exists())
     }
     assert missing == set()
+
+
+def test_every_name_that_the_page_on_extending_speaks_of_is_in_the_source() -> None:
+    page = re.sub(r"```.*?```", "", (DOCS / "extending.md").read_text(), flags=re.S)
+    spoken = set(re.findall(r"`([A-Za-z_]\w*)`", page))
+    assert len(spoken) > 60
+    paths = [
+        path for folder in ("arena", "augment", "tests") for path in (ROOT / folder).rglob("*.py")
+    ]
+    known = {word for path in paths for word in re.findall(r"\w+", path.read_text())}
+    assert spoken - known == set()
