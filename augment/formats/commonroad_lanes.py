@@ -13,6 +13,7 @@ import numpy as np
 
 from augment.formats.bounds import bounds_of
 from augment.formats.commonroad_xml import Ids, add, number
+from augment.formats.roads import width_between
 from augment.formats.writing import Cell, LossReport
 from augment.geometry.polyline import FloatArray, Polyline
 from augment.scene.entities import (
@@ -64,6 +65,7 @@ def write_lanes(root: ET.Element, cell: Cell, ids: Ids, report: LossReport) -> N
         off[way.id] = _add_lanelet(root, way, graph, ids)
         _add_marks(root[-1], way, signs, lights)
     _report_off(off, report)
+    _report_widths(ways, report)
     crossings = [area for area in scene.areas if _is_quad(area)]
     for area in crossings:
         _add_crosswalk(root, area, ids)
@@ -108,6 +110,16 @@ def _report_off(off_m: dict[str, float], report: LossReport) -> None:
         )
 
 
+def _report_widths(ways: Sequence[Way], report: LossReport) -> None:
+    apart_m = {
+        way.id: abs(width_between(way.centerline, *bounds_of(way)) - way.width_m) for way in ways
+    }
+    far = [f"{name} by {apart:.2f} m" for name, apart in apart_m.items() if apart > _SAME_M]
+    if far:
+        names = ", ".join(far)
+        report.lose(f"widths that are not the distance of the edges, which alone go out: {names}")
+
+
 def _add_marks(
     lanelet: ET.Element, way: Way, signs: dict[float, int], lights: dict[str, int]
 ) -> None:
@@ -122,8 +134,11 @@ def _add_marks(
 def _paired_bounds(way: Way) -> tuple[FloatArray, FloatArray]:
     """Both edges with equally many points, opposite to each other; no point of either is lost."""
     left, right = bounds_of(way)
-    if len(left.points_m) == len(right.points_m) and not (way.left_boundary or way.right_boundary):
-        return left.points_m, right.points_m
+    if len(left.points_m) == len(right.points_m):
+        middle = (left.points_m + right.points_m) / 2.0
+        are_opposite = _off_middle_m(way.centerline, middle) <= _SAME_M
+        if are_opposite or not (way.left_boundary or way.right_boundary):
+            return left.points_m, right.points_m
     shares = np.unique(
         np.concatenate([_shares(left), _shares(right), _shares(way.centerline)]).round(9)
     )

@@ -189,7 +189,9 @@ def _report(cell: Cell, report: LossReport) -> None:
     )
     report.lose("names become numbers; a comment in the file has both")
     for kind, said in (
+        (AgentType.TRAFFIC_CONE, "a cone becomes a constructionZone, as barriers may be"),
         (AgentType.CONSTRUCTION_SIGN, "a sign becomes a constructionZone, as cones do"),
+        (AgentType.BARRIER, "a barrier becomes a roadBoundary, which readers take for scenery"),
         (AgentType.GENERIC_OBJECT, "becomes an obstacle of unknown type"),
     ):
         names = [one.agent.id for one in cell.motion.others if one.agent.type is kind]

@@ -13,6 +13,7 @@ from typing import Any, Final
 
 import yaml
 
+from augment.checks.ground import Ground
 from augment.scene.catalogue import ScenarioType
 from augment.scene.modification import Modification
 from augment.sentences import escape_controls
@@ -58,6 +59,14 @@ class ReadFile:
     entries: tuple[ReadEntry, ...]
     passed_over: Mapping[str, int]
     left_out: tuple[str, ...]
+
+
+def cone_heading(ground: Ground, x_m: float, y_m: float) -> float:
+    """The direction of the ego's way beside a place: what a cone gets, having none in the file."""
+    if ground.route is None:
+        return 0.0
+    line = ground.route[0]
+    return line.heading_at(line.project(x_m, y_m).s_m)
 
 
 def token_of(scene_name: str) -> str:

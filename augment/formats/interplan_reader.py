@@ -13,7 +13,7 @@ import numpy as np
 
 from augment.checks.ground import Ground
 from augment.errors import InvalidDocument
-from augment.formats.interplan import STANDING_WALK_M, WALK_S, ReadEntry, ReadFile
+from augment.formats.interplan import STANDING_WALK_M, WALK_S, ReadEntry, ReadFile, cone_heading
 from augment.formats.interplan_schema import (
     WHAT,
     SpecialScenario,
@@ -137,10 +137,7 @@ class _Placer:
     def add_cone(self, x_m: float, y_m: float, *, place: Place) -> None:
         """A cone, which has no direction in the file."""
         x_m, y_m = self._local(x_m, y_m, place)
-        route = self._ground.route
-        heading_rad = 0.0
-        if route is not None:
-            heading_rad = route[0].heading_at(route[0].project(x_m, y_m).s_m)
+        heading_rad = cone_heading(self._ground, x_m, y_m)
         self._put(AgentType.TRAFFIC_CONE, Pose(x_m=x_m, y_m=y_m, heading_rad=heading_rad))
 
     def add_walker(

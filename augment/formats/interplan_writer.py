@@ -17,7 +17,9 @@ from augment.checks.ground import Ground
 from augment.errors import Conflict
 from augment.formats.interplan import (
     MOST_ENTRIES,
+    STANDING_WALK_M,
     WALK_S,
+    cone_heading,
     details,
     token_of,
     yaml_text,
@@ -38,7 +40,7 @@ METRE_DECIMALS, RADIAN_DECIMALS = 4, 6
 _STEP_M = 0.5
 _SAME_SIZE_M = 0.01
 _SAME_PACE_MPS = 0.02
-_SAME_WAY_RAD = 0.02
+_SAME_WAY_RAD = 0.001
 _NO_WALK_M = 0.01
 _MADE_UP = (
     "The base tokens are made from the scenes' names and are none of nuPlan's. Places are in "
@@ -118,6 +120,7 @@ class _Entry:
             yield self._vehicle_key(agent), [x_m, y_m, self._yaw(agent)]
         elif agent.type is AgentType.TRAFFIC_CONE:
             self._report_size(agent, AgentType.TRAFFIC_CONE)
+            self._report_cone(agent)
             yield "cones", [x_m, y_m]
         elif agent.type is AgentType.PEDESTRIAN:
             self._report_size(agent, AgentType.PEDESTRIAN)
@@ -148,6 +151,17 @@ class _Entry:
                 changes_scene=False,
             )
 
+    def _report_cone(self, agent: TrafficAgent) -> None:
+        """A cone's direction is not in the file; readers give it that of the ego's way."""
+        there_rad = cone_heading(Ground.of(self.cell.scene), agent.x_m, agent.y_m)
+        turned_rad = abs(difference(agent.heading_rad, there_rad))
+        if turned_rad > _SAME_WAY_RAD:
+            self._lose(
+                f"{agent.id} stands {math.degrees(turned_rad):.3g} degrees askew to the ego's "
+                "way; there a cone has no direction",
+                changes_scene=False,
+            )
+
     def _walk_end(self, agent: TrafficAgent) -> Point:
         if agent.walk_to_m is None:
             length_m = WORKER_STEP_M
@@ -156,6 +170,8 @@ class _Entry:
                 self._lose(
                     f"{agent.id} has no end point; {length_m:g} m along its heading is taken"
                 )
+            elif agent.speed_mps > 0.0:
+                self._lose(f"{agent.id} moves at {agent.speed_mps:g} m/s; there it stands")
             return _ahead(agent, length_m)
         east_m, north_m = agent.walk_to_m[0] - agent.x_m, agent.walk_to_m[1] - agent.y_m
         walk_m = math.hypot(east_m, north_m)
@@ -172,10 +188,13 @@ class _Entry:
         turned_rad = abs(difference(agent.heading_rad, way_rad))
         if turned_rad > _SAME_WAY_RAD:
             self._lose(
-                f"{agent.id} looks {math.degrees(turned_rad):.0f} degrees away from its walk; "
+                f"{agent.id} looks {math.degrees(turned_rad):.3g} degrees away from its walk; "
                 "there it looks along it",
                 changes_scene=False,
             )
+        if walk_m <= STANDING_WALK_M:
+            self._lose(f"{agent.id} walks {walk_m:.1f} m; read again, it is a worker who stands")
+            return
         there_mps = walk_m / WALK_S
         if abs(agent.speed_mps - there_mps) > _SAME_PACE_MPS:
             self._lose(

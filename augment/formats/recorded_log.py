@@ -20,6 +20,7 @@ from augment.geometry.angles import wrap
 from augment.geometry.frames import Pose
 from augment.scene.entities import AgentType, Origin, Scene, TrafficAgent
 from augment.scene.lane_graph import LaneGraph
+from augment.scene.notes import Note, SceneNoteKind
 from augment.scene.recording import Recording, Track
 
 FloatArray = NDArray[np.float64]
@@ -129,6 +130,15 @@ def scene_at(
         areas=road.areas,
     )
     return _on_lanes(scene), _recording(log, named, frame, origin)
+
+
+def far_notes(log: Log, frame: int, road: MapExtract) -> list[Note]:
+    """What of the map and of who is there at a frame lies too far from the ego, as a note."""
+    away_m = [np.hypot(*(one.states[frame, :2] - log.ego[frame, :2])) for one in log.tracks]
+    number = road.far + sum(bool(distance_m > RADIUS_M) for distance_m in away_m)
+    if number == 0:
+        return []
+    return [Note(kind=SceneNoteKind.FAR_PARTS_LEFT_OUT, number=number, value=RADIUS_M)]
 
 
 def speeds(times_s: FloatArray, xy_m: FloatArray) -> FloatArray:

@@ -78,6 +78,7 @@ class MapExtract:
 
     Attributes:
         side_is_assumed: Whether no two oncoming lanes told the side.
+        far: How many segments and areas lie too far from the ego and were left out.
     """
 
     traffic_side: TrafficSide
@@ -85,3 +86,4 @@ class MapExtract:
     connectors: tuple[LaneConnector, ...]
     areas: tuple[Area, ...]
     side_is_assumed: bool = False
+    far: int = 0

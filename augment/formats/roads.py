@@ -79,12 +79,14 @@ def road_around(city: RoadMap, ego: Pose) -> MapExtract:
     lane_ids = _lane_ids(strips)
     lanes = _lanes(strips, lane_ids)
     side = traffic_side_of(lanes)
+    areas = _areas(city, ego)
     return MapExtract(
         traffic_side=side or city.side,
         side_is_assumed=side is None,
         lanes=lanes,
         connectors=_connectors(strips, lane_ids),
-        areas=_areas(city, ego),
+        areas=areas,
+        far=len(city.segments) - len(strips) + len(city.areas) - len(areas),
     )
 
 
@@ -191,6 +193,8 @@ def _is_far(points: FloatArray) -> bool:
 
 def _joined(lines: Sequence[Polyline]) -> Polyline:
     """One line over several that follow each other; their shared ends are kept once."""
+    if len(lines) == 1:
+        return lines[0]
     points = np.vstack([line.points_m for line in lines])
     apart = np.hypot(*np.diff(points, axis=0).T) > SAME_POINT_M
     apart = np.concatenate([[True], apart])

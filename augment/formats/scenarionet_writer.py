@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 from augment.formats.bounds import bounds_of
 from augment.formats.movement_losses import report_motion
 from augment.formats.writing import Cell, LossReport, Written, write_each
+from augment.scene.directions import turn_type_of
 from augment.scene.entities import (
     AgentType,
     Area,
@@ -155,12 +156,26 @@ def _report(cell: Cell, report: LossReport) -> None:
             report.lose_of(names, f"left out: there is no type for a {area_kind} area")
     names = [agent.id for agent in scene.agents if agent.walk_to_m is not None]
     report.lose_of(names, "the walk is written as motion alone, not as its end point")
-    names = [one.id for one in scene.connectors if one.turn_type is TurnType.U_TURN]
-    report.lose_of(names, "the turn type is not said, only its line")
+    _report_map(scene, report)
     if scene.traffic_side.value == "left":
-        report.lose("that people drive on the left stands in the metadata, where nobody looks")
+        report.lose("that people drive on the left stands in the metadata, where few stacks look")
     report.lose("heights are not known; those usual for the types are written")
     report.lose("the origin in the source's own frame is not written; the ego's place at t0 is 0")
+
+
+def _report_map(scene: Scene, report: LossReport) -> None:
+    for turn in TurnType:
+        names = [
+            one.id
+            for one in scene.connectors
+            if one.turn_type is turn is not turn_type_of(one.centerline)
+        ]
+        report.lose_of(names, f"the turn type {turn} is not said, and the line looks otherwise")
+    names = [one.id for one in scene.connectors if one.traffic_light is TrafficLight.NONE]
+    report.lose_of(names, "that it has no light is not said")
+    ways: list[Way] = [*scene.lanes, *scene.connectors]
+    if any(way.left_boundary or way.right_boundary for way in ways):
+        report.lose("the edges of lanes are written as outlines, not as a left and a right one")
 
 
 def _track(movement: Movement) -> dict[str, Any]:

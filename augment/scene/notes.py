@@ -39,6 +39,7 @@ class SceneNoteKind(StrEnum):
     OBJECTS_LEFT_OUT = "objects_left_out"
     CLASSES_MERGED = "classes_merged"
     MAP_PARTS_LEFT_OUT = "map_parts_left_out"
+    FAR_PARTS_LEFT_OUT = "far_parts_left_out"
     LIGHTS_REPEATED = "lights_repeated"
     BOUNDARIES_TURNED = "boundaries_turned"
     TURN_TYPES_CORRECTED = "turn_types_corrected"

@@ -189,7 +189,8 @@ def walker(**changes: Any) -> TrafficAgent:
         ({"width_m": 0.5}, ["its box of 0.9 x 0.5 m becomes 0.9 x 0.791 m"]),
         ({"speed_mps": 10.7 / 15.0 + 0.019}, []),
         ({"speed_mps": 1.4}, ["walks 10.7 m at 1.4 m/s; there it takes 15 s, 0.71 m/s"]),
-        ({"heading_rad": math.pi / 2 + 0.019}, []),
+        ({"heading_rad": math.pi / 2 + 0.0009}, []),
+        ({"heading_rad": math.pi / 2 + 0.0011}, ["looks 0.063 degrees away from its walk"]),
         ({"heading_rad": math.pi}, ["looks 90 degrees away from its walk"]),
     ],
 )

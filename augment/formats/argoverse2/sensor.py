@@ -16,7 +16,7 @@ from augment.errors import InvalidDocument
 from augment.formats.argoverse2.log import BOXES, WHAT, read_log
 from augment.formats.argoverse2.map_file import MapFile, read_map, road_map
 from augment.formats.reading import Moment, Reading, frames_every
-from augment.formats.recorded_log import scene_at
+from augment.formats.recorded_log import far_notes, scene_at
 from augment.formats.road_map import MapExtract
 from augment.formats.roads import road_around
 from augment.scene.notes import Note, SceneNoteKind
@@ -67,7 +67,11 @@ class ArgoverseSensor:
         return Reading(
             scene=scene,
             recording=recording,
-            notes=(*map_notes(city, road), Note(kind=SceneNoteKind.SPEEDS_DIFFERENCED)),
+            notes=(
+                *map_notes(city, road),
+                *far_notes(log, frame, road),
+                Note(kind=SceneNoteKind.SPEEDS_DIFFERENCED),
+            ),
             moment=Moment(frame=frame),
         )
 

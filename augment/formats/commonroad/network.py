@@ -159,7 +159,8 @@ def _inside(root: Element, lanelets: dict[int, Lanelet]) -> dict[int, TurnType |
             for name, turn in _TURNS.items():
                 inside |= dict.fromkeys(references(incoming, name), turn)
     inside = {key: turn for key, turn in inside.items() if key in lanelets}
-    waiting = list(inside)
+    # Where the file says itself what is an intersection, no bend has to tell.
+    waiting = [] if any("intersection" in one.kinds for one in lanelets.values()) else list(inside)
     while waiting:
         for key in lanelets[waiting.pop()].successors:
             one = lanelets.get(key)
@@ -200,9 +201,12 @@ def _state(
 
 
 def _segment(one: Lanelet, crosses: bool, turn: TurnType | None, light: TrafficLight) -> Segment:
+    # The format pairs the points of the bounds; the middle of each pair is on the centreline.
+    paired = len(one.left) == len(one.right)
     return Segment(
         name=one.id,
         crosses=crosses,
+        centerline=(one.left + one.right) / 2.0 if paired else None,
         left=one.left,
         right=one.right,
         successors=one.successors,

@@ -16,7 +16,7 @@ from augment.formats.commonroad.fields import WHAT, fault, real, whole
 from augment.formats.commonroad.network import network_of
 from augment.formats.commonroad.obstacles import Obstacles, obstacles_of, rows_of, state_of
 from augment.formats.reading import Moment, Reading, frame_in, frames_every
-from augment.formats.recorded_log import LONGEST_GAP_S, Log, scene_at
+from augment.formats.recorded_log import LONGEST_GAP_S, Log, far_notes, scene_at
 from augment.formats.road_map import FloatArray
 from augment.formats.roads import road_around
 from augment.formats.xml_file import Element, read_xml
@@ -96,6 +96,7 @@ class CommonRoad:
             ),
         )
         notes = [*network.notes, *obstacles.notes, *_notes(ego, _step_s(root))]
+        notes += far_notes(log, frame, road)
         if road.side_is_assumed:
             side = (road.traffic_side.value,)
             notes.append(Note(kind=SceneNoteKind.TRAFFIC_SIDE_ASSUMED, names=side))

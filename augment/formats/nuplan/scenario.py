@@ -23,7 +23,7 @@ from augment.formats.nuplan.log import (
 )
 from augment.formats.nuplan.sqlite import WHAT, Tables, open_tables
 from augment.formats.reading import Moment, Reading, frames_every
-from augment.formats.recorded_log import scene_at
+from augment.formats.recorded_log import far_notes, scene_at
 from augment.formats.roads import road_around
 from augment.scene.notes import Note, SceneNoteKind
 
@@ -84,7 +84,7 @@ class NuPlan:
                 f"nuPlan data set, log {place.logfile or path.stem}, lidar_pc {token}; {LICENCE}"
             ),
         )
-        notes = list(city.notes)
+        notes = [*city.notes, *far_notes(log, 0, road)]
         if road.side_is_assumed:
             side = (road.traffic_side.value,)
             notes.append(Note(kind=SceneNoteKind.TRAFFIC_SIDE_ASSUMED, names=side))

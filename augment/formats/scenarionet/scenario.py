@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -14,12 +15,12 @@ import numpy as np
 
 from augment.errors import InvalidDocument
 from augment.formats.reading import Moment, Reading, frame_in, frames_every
-from augment.formats.recorded_log import MOST_NUMBERS, Log, LoggedTrack, scene_at
-from augment.formats.road_map import FloatArray
+from augment.formats.recorded_log import MOST_NUMBERS, Log, LoggedTrack, far_notes, scene_at
+from augment.formats.road_map import FloatArray, MapExtract
 from augment.formats.roads import road_around
 from augment.formats.scenarionet.city import city_of
 from augment.formats.scenarionet.unpickling import WHAT, read_pickle
-from augment.scene.entities import AgentType
+from augment.scene.entities import AgentType, TrafficSide
 from augment.scene.notes import Note, SceneNoteKind
 from augment.scene.sizes import LENGTH_WIDTH_M
 
@@ -29,11 +30,12 @@ TYPE_OF = {
     "CYCLIST": AgentType.BICYCLE,
     "TRAFFIC_CONE": AgentType.TRAFFIC_CONE,
     "TRAFFIC_BARRIER": AgentType.BARRIER,
+    "TRAFFIC_OBJECT": AgentType.GENERIC_OBJECT,
     "OTHER": AgentType.GENERIC_OBJECT,
 }
 BUS = "vehicle.bus"
 """What finer types of buses begin with, where a converter keeps them."""
-LEFT_OUT = frozenset({"UNSET", "TRAFFIC_LIGHT", "TRAFFIC_OBJECT"})
+LEFT_OUT = frozenset({"UNSET", "TRAFFIC_LIGHT"})
 DATA_LICENCES = {
     "nuscenes": "nuScenes, CC BY-NC-SA 4.0",
     "waymo": "Waymo Open Dataset licence, non-commercial use",
@@ -76,9 +78,9 @@ class ScenarioNet:
         origin = log.ego_pose(frame_in(WHAT, frame, len(log.times_s)))
         place = str(metadata.get("map") or "")[:60]
         city = city_of(description, frame, place_name=place)
-        road = road_around(city.map, origin)
+        road = _with_told_side(road_around(city.map, origin), metadata)
         data_set = str(metadata.get("dataset") or description.get("version") or "unknown")[:40]
-        licence = _licence(data_set)
+        licence, said = _licence(data_set), str(metadata.get("provenance") or "")[:300]
         scene, recording = scene_at(
             log,
             frame,
@@ -87,10 +89,10 @@ class ScenarioNet:
             world=f"ScenarioNet frame of {data_set} {place}".strip(),
             provenance=(
                 f"{data_set} data set by ScenarioNet, {str(description.get('id'))[:120]}, step "
-                f"{frame} of {len(log.times_s)}; {licence or 'licence not named'}"
+                f"{frame} of {len(log.times_s)}; {licence or said or 'licence not named'}"
             ),
         )
-        notes = [*city.notes, *notes]
+        notes = [*city.notes, *notes, *far_notes(log, frame, road)]
         if road.side_is_assumed:
             side = (road.traffic_side.value,)
             notes.append(Note(kind=SceneNoteKind.TRAFFIC_SIDE_ASSUMED, names=side))
@@ -106,6 +108,14 @@ class ScenarioNet:
 
 def _fault(place: str, text: str) -> InvalidDocument:
     return InvalidDocument(WHAT, [(place, text)])
+
+
+def _with_told_side(road: MapExtract, metadata: dict[str, Any]) -> MapExtract:
+    """The side that our own writer, and nobody else's, puts into the metadata."""
+    told = metadata.get("traffic_side")
+    if told not in ("left", "right"):
+        return road
+    return replace(road, traffic_side=TrafficSide(told), side_is_assumed=False)
 
 
 def _licence(data_set: str) -> str | None:

@@ -14,7 +14,7 @@ import numpy as np
 
 from augment.errors import InvalidDocument
 from augment.formats.reading import Moment, Reading, frame_in, frames_every
-from augment.formats.recorded_log import Log, LoggedTrack, scene_at
+from augment.formats.recorded_log import Log, LoggedTrack, far_notes, scene_at
 from augment.formats.roads import road_around
 from augment.formats.waymo.city import city_of
 from augment.formats.waymo.messages import (
@@ -92,7 +92,7 @@ def _reading(
             f"{len(log.times_s)}; {LICENCE}"
         ),
     )
-    notes = list(city.notes)
+    notes = [*city.notes, *far_notes(log, frame, road)]
     if road.side_is_assumed:
         notes.append(
             Note(kind=SceneNoteKind.TRAFFIC_SIDE_ASSUMED, names=(road.traffic_side.value,))

@@ -95,6 +95,9 @@ _TEXTS: dict[SceneNoteKind, str] = {
     SceneNoteKind.MAP_PARTS_LEFT_OUT: gettext_noop(
         "%(number)s parts of the map have no place here and were left out: %(names)s."
     ),
+    SceneNoteKind.FAR_PARTS_LEFT_OUT: gettext_noop(
+        "Parts of the map and objects more than %(value)s m from the ego were left out."
+    ),
     SceneNoteKind.LIGHTS_REPEATED: gettext_noop(
         "%(number)s lights are programmed, not recorded: their state is that of the cycle at t0."
     ),

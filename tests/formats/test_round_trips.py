@@ -1,0 +1,340 @@
+"""Scenes go out and come back the same, to 1 cm and 0.001 rad, or a line says what is not."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from augment.formats import commonroad_writer, scenarionet_writer
+from augment.formats.interplan import token_of
+from augment.formats.interplan_reader import read as read_interplan
+from augment.formats.interplan_writer import write as write_interplan
+from augment.formats.readers import READERS
+from augment.formats.reading import Reading
+from augment.formats.roads import RADIUS_M
+from augment.formats.writing import Cell, Written
+from augment.geometry.polyline import Polyline
+from augment.scene.catalogue import ScenarioType
+from augment.scene.entities import (
+    AgentType,
+    Lane,
+    LaneConnector,
+    Scene,
+    TrafficAgent,
+    TrafficLight,
+    TrafficSide,
+    TurnType,
+)
+from augment.scene.lane_graph import Way
+from augment.scene.modification import Modification, without_traffic
+from augment.scene.notes import SceneNoteKind
+from tests.fixtures.shelf import entry, whole_scene
+from tests.formats.cells import OF_EACH_TYPE, cell, crossing, recorded_street
+from tests.formats.round_trips import Change, agent_changes, changes
+from tests.scenes import cone, pedestrian, vehicle
+
+WRITERS: dict[str, Callable[[Sequence[Cell]], Written]] = {
+    "commonroad": commonroad_writer.write,
+    "scenarionet": scenarionet_writer.write,
+}
+
+SAID: dict[str, dict[str, str]] = {
+    "commonroad": {
+        "side": "that people drive on the left is not said",
+        "ego motion": "of the ego's motion only start and end are written",
+        "box": "its box of",
+        "class": "NAME: a (cone|sign) becomes a constructionZone",
+        "missing": "NAME: a barrier becomes a roadBoundary",
+        "later": "NAME is left out: it appears after t0",
+        "walk": "NAME: the walk is written as motion alone",
+        "area": "NAME: left out: a .* area of this shape can't be a lanelet",
+        "turn": "NAME: (a U-turn becomes a turn to the left|its turn type is not said)",
+        "way": "centrelines that are off the middle of the edges, .*NAME by",
+        "width": "widths that are not the distance of the edges, .*NAME by",
+    },
+    "scenarionet": {
+        "class": "NAME: a (BUS|CONSTRUCTION_SIGN) becomes a (VEHICLE|TRAFFIC_OBJECT)",
+        "walk": "NAME: the walk is written as motion alone",
+        "area": "NAME: left out: there is no type for a",
+        "turn": "NAME: the turn type .* is not said",
+        "light": "NAME: that it has no light is not said",
+        "edge": "the edges of lanes are written as outlines",
+        "width": "note: lane_widths_assumed",
+    },
+}
+"""What of a change the writer or the reader has to say; NAME stands for what is changed."""
+
+
+def authored(slug: str) -> Cell:
+    """A scenario of the catalogue with all of its scene's traffic."""
+    given = entry(slug)
+    scene = whole_scene(given.scene)
+    first = len(scene.everyone) + 1
+    added = [
+        replace(agent, id=f"Agent{number}")
+        for number, agent in enumerate(given.reference.added, start=first)
+    ]
+    return Cell(
+        name=slug,
+        stem=slug,
+        scene=scene,
+        type=given.type,
+        modification=Modification(added=tuple(added)),
+        keeps_traffic=True,
+    )
+
+
+def knot() -> Scene:
+    """What no scene of the catalogue has: odd turns, lights, widths, ends, neighbours."""
+    base = crossing()
+    ahead, left = base.connectors
+    bend = Polyline(
+        [(60.0 + 20.0 * np.sin(a), 20.0 * np.cos(a) - 30.0) for a in (0.0, 0.5, 1.0, 1.5)]
+    )
+    lanes = (
+        replace(base.lanes[0], right_neighbor="Lane4", speed_limit_mps=8.33),
+        replace(base.lanes[1], successors=("Lane5",), speed_limit_mps=27.7777),
+        replace(base.lanes[2], width_m=1.6),
+        replace(base.lanes[0], id="Lane4", left_neighbor="Lane1", centerline=moved(0.0, -3.5)),
+        Lane(
+            id="Lane5",
+            centerline=Polyline([(100.0, 0.0), (120.0, 1.0)]),
+            width_m=4.25,
+            left_boundary=Polyline([(100.0, 2.0), (110.0, 3.0), (120.0, 3.0)]),
+            right_boundary=Polyline([(100.0, -2.0), (120.0, -1.0)]),
+        ),
+        # After a way through the junction alone, and bending: a lane nevertheless.
+        Lane(id="Lane6", centerline=bend, width_m=3.5, successors=("Lane7",)),
+        Lane(id="Lane7", centerline=Polyline([bend.points_m[-1], (80.0, -40.0)]), width_m=3.5),
+    )
+    connectors = (
+        replace(ahead, turn_type=TurnType.RIGHT, traffic_light=TrafficLight.YELLOW),
+        replace(left, turn_type=TurnType.U_TURN, traffic_light=TrafficLight.UNKNOWN),
+        LaneConnector(
+            id="Connector3",
+            from_lane="Lane4",
+            to_lane="Lane6",
+            centerline=Polyline([(20.0, -3.5), (20.03, -3.49), (60.0, -10.0)]),
+            width_m=3.0,
+            speed_limit_mps=5.0,
+        ),
+        LaneConnector(
+            id="Connector4",
+            from_lane=None,
+            to_lane="Lane3",
+            centerline=Polyline([(8.0, 8.0), (28.0, 8.0)]),
+            width_m=3.0,
+            turn_type=TurnType.LEFT,
+        ),
+    )
+    return replace(base, lanes=lanes, connectors=connectors)
+
+
+def moved(x_m: float, y_m: float) -> Polyline:
+    return Polyline(crossing().lanes[0].centerline.points_m + np.array([x_m, y_m]))
+
+
+def near() -> tuple[TrafficAgent, ...]:
+    """One of each type, of a box and a heading of its own, within reach."""
+    return tuple(
+        replace(
+            agent,
+            x_m=-60.0 + 15.0 * number,
+            y_m=6.123,
+            heading_rad=0.3456 * number - 1.0,
+            length_m=agent.length_m + 0.1 * number,
+        )
+        for number, agent in enumerate(OF_EACH_TYPE)
+    )
+
+
+STREET, RECORDING = recorded_street()
+CAST = {
+    **{
+        slug: authored(slug)
+        for slug in (
+            "crash-station-cross",
+            "roadworks-market-crossing",
+            "jaywalker-chapel-corner",
+            "roadworks-reservoir-road",
+            "overtake-willow-crescent",
+        )
+    },
+    "street": cell(stem="street"),
+    "crossing": cell(crossing(), added=near(), stem="crossing"),
+    "knot": cell(knot(), stem="knot", added=(vehicle("Agent9", 400.0, 0.0),)),
+    "recorded": cell(STREET, recording=RECORDING, keeps_traffic=True, added=(), stem="recorded"),
+}
+
+
+def there_and_back(name: str, given: Cell, folder: Path) -> tuple[Reading, list[str]]:
+    """The scene as it comes back, and every line about it."""
+    made = WRITERS[name]([given])
+    assert made.refused == ()
+    (file,) = (key for key in made.files if given.stem in key)
+    path = folder / file
+    path.write_bytes(made.files[file])
+    reading = READERS[name].read(path, item=None, frame=None, name="back")
+    lines = [loss.text for loss in made.losses]
+    return reading, [*lines, *(f"note: {note.kind.value}" for note in reading.notes)]
+
+
+def is_said(change: Change, name: str, lines: list[str]) -> bool:
+    words = SAID[name].get(change.aspect)
+    if words is None:
+        return False
+    if "NAME:" in words:
+        names = words.replace("NAME:", rf"(?:.*, )?{change.name}(?:, .*)?:", 1)
+        return any(re.match(names, line) for line in lines)
+    pattern = words.replace("NAME", rf"\b{change.name}\b")
+    return any(re.search(pattern, line) for line in lines)
+
+
+def far_ids(scene: Scene) -> set[str]:
+    """What the readers leave out of every format, as it lies too far away."""
+    ways: list[Way] = [*scene.lanes, *scene.connectors]
+    far = {one.id for one in ways if one.centerline.project(0.0, 0.0).distance_m > RADIUS_M}
+    return far | {one.id for one in scene.agents if np.hypot(one.x_m, one.y_m) > RADIUS_M}
+
+
+@pytest.mark.parametrize("name", list(WRITERS))
+@pytest.mark.parametrize("key", list(CAST))
+def test_what_comes_back_otherwise_has_a_line(name: str, key: str, tmp_path: Path) -> None:
+    given = CAST[key]
+    reading, lines = there_and_back(name, given, tmp_path)
+    far = far_ids(given.after)
+    left = [one.number for one in reading.notes if one.kind is SceneNoteKind.FAR_PARTS_LEFT_OUT]
+    assert left == ([len(far)] if far else [])
+    unsaid = [
+        change
+        for change in changes(given, reading)
+        if change.name not in far
+        and not (change.aspect in ("successors", "to") and far)
+        and not is_said(change, name, lines)
+    ]
+    assert unsaid == []
+
+
+@pytest.mark.parametrize("name", list(WRITERS))
+def test_what_both_formats_can_say_comes_back(name: str, tmp_path: Path) -> None:
+    """Ways, limits, lights, turns, neighbours of a whole junction: nothing but areas changes."""
+    given = CAST["roadworks-market-crossing"]
+    reading, _ = there_and_back(name, given, tmp_path)
+    found = {change.aspect for change in changes(given, reading)}
+    assert (
+        found
+        == {
+            "commonroad": {"area", "class", "ego motion"},
+            "scenarionet": {"area", "edge"},
+        }[name]
+    )
+
+
+def test_our_own_left_hand_traffic_comes_back_from_scenarionet(tmp_path: Path) -> None:
+    reading, _ = there_and_back("scenarionet", CAST["crossing"], tmp_path)
+    assert reading.scene.traffic_side is TrafficSide.LEFT
+    assert "made for a test" in reading.scene.provenance
+
+
+# The ruler itself: a change put in is a change found.
+
+
+AGENT: dict[str, dict[str, Any]] = {
+    "missing": {"x_m": 0.011},
+    "heading": {"heading_rad": 0.0011},
+    "box": {"width_m": 0.011},
+    "velocity": {"speed_mps": 0.011},
+}
+"""By how much each is made otherwise."""
+LANE: dict[str, dict[str, Any]] = {
+    "width": {"width_m": 9.0},
+    "limit": {"speed_limit_mps": None},
+    "successors": {"successors": ("Lane2",)},
+    "left": {"left_neighbor": "Lane1"},
+    "right": {"right_neighbor": "Lane1"},
+}
+CONNECTOR: dict[str, dict[str, Any]] = {
+    "from": {"from_lane": None},
+    "to": {"to_lane": None},
+    "turn": {"turn_type": TurnType.U_TURN},
+    "light": {"traffic_light": TrafficLight.UNKNOWN},
+}
+
+
+def spoilt(reading: Reading) -> Iterator[tuple[str, Reading]]:
+    """The reading with one thing otherwise, and what that is."""
+    scene = reading.scene
+    agent, lane, way = scene.agents[0], scene.lanes[0], scene.connectors[0]
+    agents = {
+        aspect: {name: getattr(agent, name) + more for name, more in values.items()}
+        for aspect, values in AGENT.items()
+    }
+    for aspect, values in (agents | {"class": {"type": AgentType.GENERIC_OBJECT}}).items():
+        others = (replace(agent, **values), *scene.agents[1:])
+        yield aspect, replace(reading, scene=replace(scene, agents=others))
+    line = Polyline(lane.centerline.points_m + np.array([0.0, 0.011]))
+    for aspect, values in (LANE | {"way": {"centerline": line}}).items():
+        lanes = (replace(lane, **values), *scene.lanes[1:])
+        yield aspect, replace(reading, scene=replace(scene, lanes=lanes))
+    for aspect, values in CONNECTOR.items():
+        connectors = (replace(way, **values), *scene.connectors[1:])
+        yield aspect, replace(reading, scene=replace(scene, connectors=connectors))
+    yield "area", replace(reading, scene=replace(scene, areas=scene.areas[1:]))
+    recording = reading.recording
+    assert recording is not None
+    track = recording.tracks[0]
+    shifted = replace(track, states=track.states + np.array([0.011, 0.0, 0.0, 0.0]))
+    tracks = (shifted, *recording.tracks[1:])
+    yield "motion", replace(reading, recording=replace(recording, tracks=tracks))
+
+
+def test_the_ruler_finds_every_kind_of_change(tmp_path: Path) -> None:
+    given = CAST["roadworks-market-crossing"]
+    reading, _ = there_and_back("scenarionet", given, tmp_path)
+    before = set(map(str, changes(given, reading)))
+    for aspect, other in spoilt(reading):
+        found = [one for one in changes(given, other) if str(one) not in before]
+        assert aspect in {one.aspect for one in found}, aspect
+
+
+# Modification -> interPlan -> modification: references are in test_interplan.py.
+
+ODD = {
+    "box": replace(vehicle("Agent9", 30.0, 0.5, 0.1), length_m=5.2),
+    "velocity": replace(vehicle("Agent9", 30.0, 0.5), speed_mps=3.0),
+    "class": replace(vehicle("Agent9", 30.0, 0.5), length_m=9.0),
+    "missing": replace(cone("Agent9", 30.0, 0.5), type=AgentType.BARRIER),
+    "heading": replace(cone("Agent9", 30.0, 0.5), heading_rad=0.5),
+    "walk": pedestrian("Agent9", 30.0, -4.0),
+    "short walk": replace(pedestrian("Agent9", 30.0, -4.0, (30.0, -3.0)), speed_mps=1.0 / 15.0),
+    "fast walk": replace(pedestrian("Agent9", 30.0, -4.0, (30.0, 8.0)), speed_mps=2.0),
+    "askew walk": replace(
+        pedestrian("Agent9", 30.0, -4.0, (30.0, 8.0)), heading_rad=1.5, speed_mps=0.8
+    ),
+    "hurried worker": replace(pedestrian("Agent9", 30.0, -4.0), speed_mps=1.0),
+}
+
+
+@pytest.mark.parametrize("kind", [ScenarioType.CONSTRUCTION_ZONE, ScenarioType.JAYWALKER])
+@pytest.mark.parametrize("odd", list(ODD))
+def test_what_interplan_changes_has_a_line_with_its_name(odd: str, kind: ScenarioType) -> None:
+    given = cell(added=(ODD[odd], cone("Agent10", 20.0, -1.0)), type=kind)
+    text, losses = write_interplan([given])
+    scene = without_traffic(given.scene)
+    (found,) = read_interplan(text, {token_of(scene.name): scene}).entries
+    wanted, got = given.modification.added, found.modification.added
+    assert len(got) == (1 if odd == "missing" else 2)
+    changed = {change.name for change in agent_changes(wanted, got)}
+    if odd != "walk" or kind is ScenarioType.JAYWALKER:
+        assert changed == {"Agent9"}
+    else:
+        assert changed == set()  # a worker who stands is what interPlan's step says
+    assert changed == {
+        name for name in ("Agent9", "Agent10") if any(name in x.text for x in losses)
+    }
