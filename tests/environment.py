@@ -36,7 +36,7 @@ def fix_environment() -> None:
     kept = {
         name: value
         for name, value in os.environ.items()
-        if name in KEPT or name.startswith(("PYTEST_", "PYTHON", "COVERAGE_"))
+        if name in KEPT or name.startswith(("PYTEST_", "COVERAGE_"))
     }
     browsers = Path(os.environ.get("HOME", "/nonexistent")) / ".cache" / "ms-playwright"
     home = tempfile.mkdtemp(prefix="arena-tests-home-")

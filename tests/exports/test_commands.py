@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+import csv
 import io
 import json
 from pathlib import Path
@@ -64,7 +65,7 @@ def test_rate_prints_the_table_and_takes_a_code() -> None:
     study = voted_study()
     said = run("rate", study.code, "--rounds", 200, "--seed", 3, "--unit", "two-way")
     head, first, *_ = said.splitlines()
-    assert head.split() == ["Model", "Rank", "Elo", "95%", "CI", "Votes"]
+    assert head.split() == ["Model", "Rank", "Elo", "95%", "CI", "Votes", "95%", "ranks"]
     assert first.startswith("Ann ")
     assert "resamples of experts and scenarios, seed 3" in said
 
@@ -101,7 +102,8 @@ def test_an_open_study_is_exported_only_on_purpose_and_that_is_logged(tmp_path: 
         run(*target)
     run(*target, "--early")
     assert Event.objects.filter(verb="look early").count() == 1
-    assert ",yes\n" in (tmp_path / "x.csv").read_text()
+    with (tmp_path / "x.csv").open(newline="") as file:
+        assert {row["early"] for row in csv.DictReader(file)} == {"yes"}
 
 
 def test_a_folder_that_is_not_there_is_a_sentence(tmp_path: Path) -> None:

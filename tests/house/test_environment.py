@@ -15,7 +15,12 @@ SHOW = "import tests.environment, json, os; print(json.dumps(dict(os.environ)))"
 
 
 def test_the_tests_have_a_home_of_their_own_and_nothing_that_is_not_named() -> None:
-    foreign = {"ARENA_DEBUG": "1", "HTTPS_PROXY": "http://nowhere", "LANG": "tr_TR.UTF-8"}
+    foreign = {
+        "PYTHONUNBUFFERED": "1",
+        "ARENA_DEBUG": "1",
+        "HTTPS_PROXY": "http://nowhere",
+        "LANG": "tr_TR.UTF-8",
+    }
     shown = subprocess.run(
         [sys.executable, "-c", SHOW],
         cwd=ROOT,

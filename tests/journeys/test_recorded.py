@@ -21,11 +21,32 @@ INSTRUCTION = (
     "add a parked vehicle in front of ego at about 21.4 m, slightly towards the left lane boundary"
 )
 
+INTENT = {
+    "format": "scenario-arena/intent",
+    "version": 1,
+    "requests": [
+        {
+            "kind": "vehicles",
+            "count": 1,
+            "speed_mps": 0.0,
+            "spot": {
+                "distance": {"low_m": 21.4},
+                "relation": "ahead",
+                "lane": "own",
+                "lateral": {"target": "left lane boundary", "nearness": "slightly"},
+            },
+        }
+    ],
+}
+"""What the instruction asks for, as somebody would enter it."""
+
 
 def test_the_car_stands_where_the_sentence_says_on_the_real_road(
-    realdata: Path, migrated: Path
+    realdata: Path, migrated: Path, tmp_path: Path
 ) -> None:
     (log,) = (realdata / "av2_sensor").iterdir()
+    intent = tmp_path / "intent.json"
+    intent.write_text(json.dumps(INTENT))
     with machine(database=migrated) as place:
         place.must_all(
             ("import_scene", "av2", str(log), "--frame", "0", "--slug", "pittsburgh"),
@@ -33,6 +54,7 @@ def test_the_car_stands_where_the_sentence_says_on_the_real_road(
                 *("add_scenario", "--scene", "pittsburgh"),
                 *("--type", "nudge_around_parked_vehicle"),
                 *("--slug", "parked", "--instruction", INSTRUCTION, "--keep-traffic"),
+                *("--intent", str(intent)),
             ),
         )
         redis, worker = place.redis(), place.worker()

@@ -27,7 +27,7 @@ def test_an_account_comes_with_its_role_by_one_query(
 
 def test_of_several_roles_the_most_powerful_counts() -> None:
     person = create_person(username="eva", password=None, role="expert")
-    person.groups.add(Group.objects.get(name="analyst"))
+    person.groups.add(Group.objects.get_or_create(name="analyst")[0])
     found = AccountBackend().get_user(person.pk)
     assert found is not None
     assert role_of(found) == "analyst"
