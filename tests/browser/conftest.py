@@ -28,9 +28,22 @@ def _patience() -> None:
     expect.set_options(timeout=PATIENCE_MS)
 
 
-@pytest.fixture(scope="package", params=[DEJAVU, LIBERATION], ids=lambda family: family.name)
+FONTLESS = {"test_voting_keys", "test_voting_loop", "test_voting_trouble"}
+"""Modules about keys, votes and faults, where no width of a letter counts: DejaVu alone."""
+
+
+def pytest_generate_tests(metafunc: pytest.Metafunc) -> None:
+    """All else runs once with each family: the widest, and the one with the widths of Arial."""
+    if "browser" in metafunc.fixturenames:
+        name = metafunc.module.__name__.rpartition(".")[2]
+        families = [DEJAVU] if name in FONTLESS else [DEJAVU, LIBERATION]
+        ids = [family.name for family in families]
+        metafunc.parametrize("browser", families, ids=ids, indirect=True, scope="package")
+
+
+@pytest.fixture(scope="package")
 def browser(request: pytest.FixtureRequest) -> Iterator[Browser]:
-    """Every test runs once with each family: the widest, and the one with the widths of Arial."""
+    """A Chromium that finds one family of fonts alone."""
     with pytest.MonkeyPatch.context() as patch, chromium(request.param) as started:
         # Playwright keeps an event loop in this thread, where Django would refuse to read rows.
         patch.setenv("DJANGO_ALLOW_ASYNC_UNSAFE", "true")
