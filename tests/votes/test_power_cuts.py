@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from concurrent.futures import ThreadPoolExecutor
 
 import pytest
@@ -46,4 +47,6 @@ def test_every_confirmed_vote_is_on_the_disk() -> None:
                 assert syncs[log] >= number
             connection.close()
     except NotReachable as error:
+        if os.environ.get("CI"):
+            pytest.fail(f"syncs can't be counted, and in CI nothing is skipped: {error}")
         pytest.skip(f"this Python's SQLite does not let it be counted: {error}")
