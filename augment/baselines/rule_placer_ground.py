@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from augment.errors import CannotPlace
 from augment.geometry.angles import difference
 from augment.geometry.frames import Pose
+from augment.scene.ego_route import EgoRoute
 from augment.scene.entities import (
     AgentType,
     AreaKind,
@@ -25,7 +26,7 @@ from augment.scene.entities import (
     TrafficAgent,
 )
 from augment.scene.intent import LaneChoice, Setting, Side
-from augment.scene.lane_graph import LaneGraph, PlaceOnWay, Way
+from augment.scene.lane_graph import PlaceOnWay, Way
 
 _STEP_M = 0.25
 _GAP_M = 1.5
@@ -52,14 +53,10 @@ class PlacingGround:
 
     def __init__(self, scene: Scene) -> None:
         self.scene = scene
-        self.graph = LaneGraph(scene)
-        own = scene.ego.lane_id
-        if own not in self.graph.ways:
-            own = self.graph.under(0.0, 0.0, 0.0)
-        if own is None:
+        route = EgoRoute.of(scene)
+        if route is None:
             raise CannotPlace("The ego stands on no lane of the map.")
-        self._own = own
-        self._start_m = self.graph.way(own).centerline.project(0.0, 0.0).s_m
+        self.route, self.graph = route, route.graph
         self.kerb = Side(scene.traffic_side.value)
 
     def along(self, distance_m: float, d_m: float = 0.0) -> PlaceOnWay:
@@ -68,7 +65,7 @@ class PlacingGround:
         Raises:
             CannotPlace: The lanes end before.
         """
-        place = self.graph.along(self._own, self._start_m, distance_m, d_m)
+        place = self.route.lane_position(distance_m, d_m)
         if place is None:
             end, where = self._reach(distance_m)
             raise CannotPlace(f"The lanes end {end:.0f} m {where} the ego.")
@@ -164,7 +161,7 @@ class PlacingGround:
         return any(self.within((x, y), AreaKind.CROSSWALK) for x, y in path_m)
 
     def _in_junction(self, distance_m: float) -> bool:
-        place = self.graph.along(self._own, self._start_m, distance_m)
+        place = self.route.lane_position(distance_m)
         if place is None:
             return False
         if any(area.kind is AreaKind.INTERSECTION for area in self.scene.areas):
@@ -178,7 +175,7 @@ class PlacingGround:
 
     def _bends(self, distance_m: float) -> bool:
         around = [
-            self.graph.along(self._own, self._start_m, distance_m + step)
+            self.route.lane_position(distance_m + step)
             for step in (-_BEND_WITHIN_M, 0.0, _BEND_WITHIN_M)
         ]
         headings = [place.pose.heading_rad for place in around if place is not None]
@@ -204,7 +201,7 @@ class PlacingGround:
         sign = math.copysign(1.0, distance_m)
         while high - low > 0.1:
             middle = (low + high) / 2.0
-            found = self.graph.along(self._own, self._start_m, sign * middle)
+            found = self.route.lane_position(sign * middle)
             low, high = (low, middle) if found is None else (middle, high)
         return low, "ahead of" if sign > 0.0 else "behind"
 

@@ -18,9 +18,10 @@ from augment.baselines.simulated_faults import (
     inject_fault,
 )
 from augment.baselines.simulated_format import FormatKind, spoiled_answer
-from augment.baselines.simulated_road import RouteMap, jitter
+from augment.baselines.simulated_road import jitter
 from augment.errors import InvalidDocument, ReplyUnreadable
 from augment.prompts.reply import read_reply
+from augment.scene.ego_route import EgoRoute
 from augment.scene.entities import Scene
 from augment.scene.modification import Modification
 
@@ -85,17 +86,17 @@ def simulate(scene: Scene, reference: Modification, rates: Rates, *, seed: int) 
         seed: Of this scenario and contestant.
     """
     rng = random.Random(seed)
-    road = RouteMap.of(scene)
-    right = reference if road is None else jitter(road, reference, rng)
+    route = EgoRoute.of(scene)
+    right = reference if route is None else jitter(route, reference, rng)
     wanted = _drawn(rates, rng)
     if wanted == "format":
         return _unwritten(scene, right, rng)
-    if road is None or not wanted:
+    if route is None or not wanted:
         return Simulated(modification=right)
     kinds = list(_KINDS[wanted])
     rng.shuffle(kinds)
     for kind in kinds:
-        agents = inject_fault(road, right.added, kind, rng)
+        agents = inject_fault(route, right.added, kind, rng)
         if agents is not None:
             wrong = Modification(added=agents, moved=right.moved, removed=right.removed)
             return Simulated(modification=wrong, fault_class=wanted, fault=kind.value)

@@ -5,8 +5,9 @@ from __future__ import annotations
 import math
 from dataclasses import replace
 
-from augment.baselines.simulated_road import Agents, RouteMap
+from augment.baselines.simulated_road import Agents
 from augment.geometry.angles import difference, wrap
+from augment.scene.ego_route import EgoRoute
 from augment.scene.entities import AgentType, TrafficAgent
 
 VEHICLES = (AgentType.VEHICLE, AgentType.BUS)
@@ -67,9 +68,9 @@ def replace_agent(agents: Agents, old: TrafficAgent, new: TrafficAgent) -> Agent
     return tuple(new if agent is old else agent for agent in agents)
 
 
-def free_id(road: RouteMap, agents: Agents) -> str:
+def free_id(route: EgoRoute, agents: Agents) -> str:
     """An id that nobody has."""
-    taken = {agent.id for agent in (*road.scene.everyone, *agents)}
+    taken = {agent.id for agent in (*route.scene.everyone, *agents)}
     number = len(taken) + 1
     while f"Agent{number}" in taken:
         number += 1

@@ -12,7 +12,8 @@ from enum import StrEnum
 
 from augment.baselines import simulated_logic as logic
 from augment.baselines import simulated_places as places
-from augment.baselines.simulated_road import Agents, RouteMap
+from augment.baselines.simulated_road import Agents
+from augment.scene.ego_route import EgoRoute
 
 
 class FaultKind(StrEnum):
@@ -59,15 +60,15 @@ LOGIC_KINDS = (
 
 
 def inject_fault(
-    road: RouteMap, agents: Agents, kind: FaultKind, rng: random.Random
+    route: EgoRoute, agents: Agents, kind: FaultKind, rng: random.Random
 ) -> Agents | None:
     """The agents with that fault, None where it makes no difference here."""
-    return _MAKERS[kind](road, agents, rng) if agents else None
+    return _MAKERS[kind](route, agents, rng) if agents else None
 
 
 # Private
 
-_MAKERS: dict[FaultKind, Callable[[RouteMap, Agents, random.Random], Agents | None]] = {
+_MAKERS: dict[FaultKind, Callable[[EgoRoute, Agents, random.Random], Agents | None]] = {
     FaultKind.NEIGHBOUR_LANE: places.neighbour_lane,
     FaultKind.STRAIGHT_LINE: places.straight_line,
     FaultKind.ALONG_LANE: places.along_lane,

@@ -14,7 +14,14 @@ from augment.baselines.simulated_agents import (
     reverse_walk,
     walks,
 )
-from augment.baselines.simulated_road import Agents, RouteMap, change_each, new_contacts
+from augment.baselines.simulated_road import (
+    Agents,
+    change_each,
+    move_along,
+    name_lane,
+    new_contacts,
+)
+from augment.scene.ego_route import EgoRoute
 from augment.scene.entities import AgentType, TrafficAgent
 from augment.scene.sizes import LENGTH_WIDTH_M
 
@@ -30,36 +37,36 @@ _OTHER_TYPES = {
 _EXTRA_TRIES = 8
 
 
-def overlap(road: RouteMap, agents: Agents, rng: random.Random) -> Agents | None:
+def overlap(route: EgoRoute, agents: Agents, rng: random.Random) -> Agents | None:
     """A later object of a kind on top of an earlier one; a single one is there twice."""
     kind = rng.choice([agent.type for agent in agents])
     same = [agent for agent in agents if agent.type is kind]
     if len(same) == 1:
-        return (*agents, replace(same[0], id=free_id(road, agents)))
+        return (*agents, replace(same[0], id=free_id(route, agents)))
     number = rng.randrange(1, len(same))
     onto = same[number - 1]
     aside_m = rng.uniform(0.0, 0.1) * onto.length_m
     moved = replace(same[number], x_m=onto.x_m + aside_m, y_m=onto.y_m, walk_to_m=onto.walk_to_m)
-    return replace_agent(agents, same[number], road.renamed(moved))
+    return replace_agent(agents, same[number], name_lane(route, moved))
 
 
-def missing(road: RouteMap, agents: Agents, rng: random.Random) -> Agents | None:
+def missing(route: EgoRoute, agents: Agents, rng: random.Random) -> Agents | None:
     """One object less."""
     gone = rng.choice(agents)
     return tuple(agent for agent in agents if agent is not gone)
 
 
-def extra(road: RouteMap, agents: Agents, rng: random.Random) -> Agents | None:
+def extra(route: EgoRoute, agents: Agents, rng: random.Random) -> Agents | None:
     """One more of what is there, some metres further or nearer, where there is room for it."""
     for _ in range(_EXTRA_TRIES):
         along_m = rng.choice((-1.0, 1.0)) * rng.uniform(4.0, 9.0)
-        twin = replace(road.moved(rng.choice(agents), along_m), id=free_id(road, agents))
-        if not new_contacts(road.scene, agents, (*agents, twin)):
+        twin = replace(move_along(route, rng.choice(agents), along_m), id=free_id(route, agents))
+        if not new_contacts(route.scene, agents, (*agents, twin)):
             return (*agents, twin)
     return None
 
 
-def wrong_side(road: RouteMap, agents: Agents, rng: random.Random) -> Agents | None:
+def wrong_side(route: EgoRoute, agents: Agents, rng: random.Random) -> Agents | None:
     """Left and right are exchanged: an offset, a line or a taper of cones, a walk."""
     if any(walks(agent) for agent in agents):
         return change_each(agents, lambda agent: reverse_walk(agent) if walks(agent) else agent)
@@ -67,7 +74,7 @@ def wrong_side(road: RouteMap, agents: Agents, rng: random.Random) -> Agents | N
         return None
 
     def mirrored(agent: TrafficAgent) -> TrafficAgent:
-        return road.moved(agent, 0.0, -2.0 * road.place(agent)[1])
+        return move_along(route, agent, 0.0, -2.0 * route.locate_agent(agent).left_m)
 
     made = change_each(agents, mirrored)
     # A ring or a row across the lane is its own mirror image, whoever stands where in it.
@@ -80,7 +87,7 @@ def _apart_m(one: TrafficAgent, other: TrafficAgent) -> float:
     return math.hypot(one.x_m - other.x_m, one.y_m - other.y_m)
 
 
-def wrong_type(road: RouteMap, agents: Agents, rng: random.Random) -> Agents | None:
+def wrong_type(route: EgoRoute, agents: Agents, rng: random.Random) -> Agents | None:
     """One object is of another type, with the box of that type."""
     agent = rng.choice(agents)
     kind = rng.choice(_OTHER_TYPES.get(agent.type, (AgentType.GENERIC_OBJECT,)))
@@ -101,7 +108,7 @@ def wrong_type(road: RouteMap, agents: Agents, rng: random.Random) -> Agents | N
     )
 
 
-def moving(road: RouteMap, agents: Agents, rng: random.Random) -> Agents | None:
+def moving(route: EgoRoute, agents: Agents, rng: random.Random) -> Agents | None:
     """One of the vehicles that stand drives."""
     parked = [agent for agent in agents if agent.type in VEHICLES and agent.speed_mps == 0.0]
     if not parked:

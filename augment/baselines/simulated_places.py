@@ -17,9 +17,10 @@ from augment.baselines.simulated_agents import (
     turn_agent,
     walks,
 )
-from augment.baselines.simulated_road import Agents, RouteMap, change_each
+from augment.baselines.simulated_road import Agents, change_each, move_along, name_lane
 from augment.geometry.angles import difference, wrap
-from augment.scene.entities import TrafficAgent, TrafficSide
+from augment.scene.ego_route import EgoRoute
+from augment.scene.entities import LaneConnector, TrafficAgent, TrafficSide
 
 SEEN_M = 3.0
 """A straight line instead of the lane is a fault from so many metres on."""
@@ -32,86 +33,96 @@ _WALKWAY_M = 4.0
 # Position: everything is anchored in the wrong place together, as a model does it.
 
 
-def neighbour_lane(road: RouteMap, agents: Agents, rng: random.Random) -> Agents | None:
+def neighbour_lane(route: EgoRoute, agents: Agents, rng: random.Random) -> Agents | None:
     """One lane to the left or right."""
     if any(walks(agent) for agent in agents):
         return None  # which lane a crossing pedestrian starts beside is nothing that is asked for
-    left_m = rng.choice((-1.0, 1.0)) * road.width_m
-    things = [road.place(agent)[1] for agent in agents if is_thing(agent)]
+    left_m = rng.choice((-1.0, 1.0)) * route.graph.way(route.lane_id).width_m
+    things = [route.locate_agent(agent).left_m for agent in agents if is_thing(agent)]
     middle_m = sum(things) / len(things)
     if abs(2.0 * middle_m + left_m) < SEEN_SIDE_M:
         # From one boundary to the next is from one side of the lane to the other: a wrong side.
         left_m = -left_m
-    return change_each(agents, lambda agent: road.moved(agent, 0.0, left_m))
+    return change_each(agents, lambda agent: move_along(route, agent, 0.0, left_m))
 
 
-def straight_line(road: RouteMap, agents: Agents, rng: random.Random) -> Agents | None:
+def straight_line(route: EgoRoute, agents: Agents, rng: random.Random) -> Agents | None:
     """The distance laid out straight ahead of the ego instead of along its lane."""
 
     def laid_out(agent: TrafficAgent) -> TrafficAgent:
-        s_m, d_m = road.place(agent)
+        place = route.locate_agent(agent)
+        s_m, d_m = place.ahead_m, place.left_m
         walk = agent.walk_to_m
         if walk is not None:
             walk = (walk[0] + s_m - agent.x_m, walk[1] + d_m - agent.y_m)
-        return road.renamed(replace(agent, x_m=s_m, y_m=d_m, walk_to_m=walk))
+        return name_lane(route, replace(agent, x_m=s_m, y_m=d_m, walk_to_m=walk))
 
     made = change_each(agents, laid_out)
-    off_m = [_seen_m(road, was, one) for one, was in zip(made, agents, strict=True)]
+    off_m = [_seen_m(route, was, one) for one, was in zip(made, agents, strict=True)]
     return made if min(off_m) >= SEEN_M else None
 
 
-def _seen_m(road: RouteMap, was: TrafficAgent, now: TrafficAgent) -> float:
+def _seen_m(route: EgoRoute, was: TrafficAgent, now: TrafficAgent) -> float:
     """How far something is off; of a walk across the road only what is along the road counts."""
     if walks(was):
-        return abs(road.place(now)[0] - road.place(was)[0])
+        return abs(route.locate_agent(now).ahead_m - route.locate_agent(was).ahead_m)
     return math.hypot(now.x_m - was.x_m, now.y_m - was.y_m)
 
 
-def along_lane(road: RouteMap, agents: Agents, rng: random.Random) -> Agents | None:
+def along_lane(route: EgoRoute, agents: Agents, rng: random.Random) -> Agents | None:
     """5 to 30 m too near or too far."""
     along_m = rng.choice((-1.0, 1.0)) * rng.uniform(5.0, 30.0)
-    return change_each(agents, lambda agent: road.moved(agent, along_m))
+    return change_each(agents, lambda agent: move_along(route, agent, along_m))
 
 
-def off_road(road: RouteMap, agents: Agents, rng: random.Random) -> Agents | None:
+def off_road(route: EgoRoute, agents: Agents, rng: random.Random) -> Agents | None:
     """Until no lane is under any of them, and some metres further: beside the ground of anybody.
 
     Towards the kerb; who crosses the road begins further out on its own side.
     """
-    sign = 1.0 if road.scene.traffic_side is TrafficSide.LEFT else -1.0
+    sign = 1.0 if route.scene.traffic_side is TrafficSide.LEFT else -1.0
     first = next((agent for agent in agents if walks(agent)), None)
     if first is not None:
-        sign = math.copysign(1.0, road.place(first)[1])
+        sign = math.copysign(1.0, route.locate_agent(first).left_m)
     far_m = 0.0
     while far_m < _WIDEST_M and any(
-        road.graph.under(one.x_m, one.y_m) for one in _aside(road, agents, sign * far_m)
+        route.graph.under(one.x_m, one.y_m) for one in _aside(route, agents, sign * far_m)
     ):
         far_m += 1.0
     beyond_m = rng.uniform(4.0, 10.0) + (_WALKWAY_M if first is not None else 0.0)
-    return _aside(road, agents, sign * (far_m + beyond_m))
+    return _aside(route, agents, sign * (far_m + beyond_m))
 
 
-def _aside(road: RouteMap, agents: Agents, left_m: float) -> Agents:
-    return change_each(agents, lambda agent: road.moved(agent, 0.0, left_m))
+def _aside(route: EgoRoute, agents: Agents, left_m: float) -> Agents:
+    return change_each(agents, lambda agent: move_along(route, agent, 0.0, left_m))
 
 
-def beyond_junction(road: RouteMap, agents: Agents, rng: random.Random) -> Agents | None:
+def _list_junction_ends(route: EgoRoute) -> list[float]:
+    """How far ahead of the ego intersections end."""
+    return [
+        end_m
+        for name, end_m in zip(route.lane_ids, route.ends_m, strict=True)
+        if end_m > 0.0 and isinstance(route.graph.way(name), LaneConnector)
+    ]
+
+
+def beyond_junction(route: EgoRoute, agents: Agents, rng: random.Random) -> Agents | None:
     """On the far side of an intersection that lies ahead of where it belongs."""
-    last_m = max(road.place(agent)[0] for agent in agents)
-    first_m = min(road.place(agent)[0] for agent in agents)
-    ends = [end for end in road.junction_ends_m() if end > last_m]
+    last_m = max(route.locate_agent(agent).ahead_m for agent in agents)
+    first_m = min(route.locate_agent(agent).ahead_m for agent in agents)
+    ends = [end for end in _list_junction_ends(route) if end > last_m]
     if not ends:
         return None
     along_m = ends[0] + rng.uniform(2.0, 8.0) - first_m
-    return (
-        change_each(agents, lambda agent: road.moved(agent, along_m)) if along_m >= 5.0 else None
-    )
+    if along_m < 5.0:
+        return None
+    return change_each(agents, lambda agent: move_along(route, agent, along_m))
 
 
 # Heading: the place is right.
 
 
-def ego_heading(road: RouteMap, agents: Agents, rng: random.Random) -> Agents | None:
+def ego_heading(route: EgoRoute, agents: Agents, rng: random.Random) -> Agents | None:
     """The lane, the angle or the direction of a walk is ignored: everybody looks like the ego."""
     made = change_each(
         agents, lambda agent: replace(agent, heading_rad=0.0) if has_front(agent) else agent
@@ -125,7 +136,7 @@ def ego_heading(road: RouteMap, agents: Agents, rng: random.Random) -> Agents | 
     return made if is_seen(agents, made) else None
 
 
-def flip_vehicle(road: RouteMap, agents: Agents, rng: random.Random) -> Agents | None:
+def flip_vehicle(route: EgoRoute, agents: Agents, rng: random.Random) -> Agents | None:
     """The one vehicle looks the other way."""
     cars = [agent for agent in agents if agent.type in VEHICLES]
     if len(cars) != 1:
@@ -133,7 +144,7 @@ def flip_vehicle(road: RouteMap, agents: Agents, rng: random.Random) -> Agents |
     return replace_agent(agents, cars[0], turn_agent(cars[0], math.pi))
 
 
-def degrees(road: RouteMap, agents: Agents, rng: random.Random) -> Agents | None:
+def degrees(route: EgoRoute, agents: Agents, rng: random.Random) -> Agents | None:
     """The number of degrees is given where radians are meant."""
     if sum(agent.type in VEHICLES for agent in agents) > 1:
         return None
@@ -148,7 +159,7 @@ def degrees(road: RouteMap, agents: Agents, rng: random.Random) -> Agents | None
     return made if is_seen(agents, made) else None
 
 
-def facing_away(road: RouteMap, agents: Agents, rng: random.Random) -> Agents | None:
+def facing_away(route: EgoRoute, agents: Agents, rng: random.Random) -> Agents | None:
     """Pedestrians look away from the road that they are to cross; half of them walk there."""
     if not any(walks(agent) for agent in agents):
         return None

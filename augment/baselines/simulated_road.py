@@ -1,7 +1,6 @@
-"""The road as the simulated contestants see it, and placements that are right but not exact.
+"""Agents moved by the ego's route, and placements that are right but not exact.
 
-s runs along the ego's lane and what follows it straightest, from the ego's centre; d is left of
-it. Frame otherwise: ego frame. Nothing here looks at the checks.
+Frame: ego frame. Nothing here looks at the checks.
 """
 
 from __future__ import annotations
@@ -9,15 +8,12 @@ from __future__ import annotations
 import math
 import random
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass, replace
-
-import numpy as np
+from dataclasses import replace
 
 from augment.geometry.angles import wrap
 from augment.geometry.boxes import Box, overlap
-from augment.geometry.polyline import Polyline
-from augment.scene.entities import LaneConnector, Scene, TrafficAgent
-from augment.scene.lane_graph import LaneGraph
+from augment.scene.ego_route import EgoRoute
+from augment.scene.entities import Scene, TrafficAgent
 from augment.scene.modification import Modification
 
 Agents = tuple[TrafficAgent, ...]
@@ -29,82 +25,37 @@ TURN_DEG = 5.0
 OWN_M = 0.1
 """How far one of several objects may be off the others, either way."""
 
-_REACH_M = 200.0
 _TRIES = 20
 _TOUCH_M = 0.01
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
-class RouteMap:
-    """The ego's way as one line, and the map around it."""
-
-    scene: Scene
-    graph: LaneGraph
-    line: Polyline
-    ego_s_m: float
-    width_m: float
-
-    @classmethod
-    def of(cls, scene: Scene) -> RouteMap | None:
-        """None where the map has no lane under the ego."""
-        graph = LaneGraph(scene)
-        way = graph.under(scene.ego.x_m, scene.ego.y_m, scene.ego.heading_rad)
-        if way is None:
-            return None
-        names = graph.route(way, _REACH_M)
-        line = Polyline(np.vstack([graph.ways[name].centerline.points_m for name in names]))
-        return cls(
-            scene=scene,
-            graph=graph,
-            line=line,
-            ego_s_m=line.project(scene.ego.x_m, scene.ego.y_m).s_m,
-            width_m=graph.ways[way].width_m,
-        )
-
-    def place(self, agent: TrafficAgent) -> tuple[float, float]:
-        """(s, d) of an agent."""
-        found = self.line.project(agent.x_m, agent.y_m)
-        return found.s_m - self.ego_s_m, found.d_m
-
-    def heading_at(self, agent: TrafficAgent) -> float:
-        """The direction of the ego's way level with an agent."""
-        return self.line.heading_at(self.line.project(agent.x_m, agent.y_m).s_m)
-
-    def moved(self, agent: TrafficAgent, along_m: float, left_m: float = 0.0) -> TrafficAgent:
-        """The agent elsewhere in the frame of the way, turned as the way turns, its walk too."""
-        s_m, d_m = self.place(agent)
-        start, end = self.ego_s_m + s_m, self.ego_s_m + s_m + along_m
-        turn = self.line.heading_at(end) - self.line.heading_at(start)
-        x_m, y_m = self.line.position(end, d_m + left_m)
-        walk = agent.walk_to_m
-        if walk is not None:
-            dx, dy = walk[0] - agent.x_m, walk[1] - agent.y_m
-            cos, sin = math.cos(turn), math.sin(turn)
-            walk = (x_m + cos * dx - sin * dy, y_m + sin * dx + cos * dy)
-        elsewhere = replace(
-            agent, x_m=x_m, y_m=y_m, heading_rad=wrap(agent.heading_rad + turn), walk_to_m=walk
-        )
-        return self.renamed(elsewhere)
-
-    def renamed(self, agent: TrafficAgent) -> TrafficAgent:
-        """The agent with the lane under it, if it named one at all."""
-        if agent.lane_id is None:
-            return agent
-        return replace(agent, lane_id=self.graph.under(agent.x_m, agent.y_m, agent.heading_rad))
-
-    def junction_ends_m(self) -> list[float]:
-        """Where on the way ahead an intersection ends, as s."""
-        way = self.graph.under(self.scene.ego.x_m, self.scene.ego.y_m, self.scene.ego.heading_rad)
-        assert way is not None  # it made this road
-        ends, total_m = [], -self.ego_s_m
-        for name in self.graph.route(way, _REACH_M):
-            total_m += self.graph.ways[name].centerline.length_m
-            if isinstance(self.graph.ways[name], LaneConnector):
-                ends.append(total_m)
-        return ends
+def move_along(
+    route: EgoRoute, agent: TrafficAgent, along_m: float, left_m: float = 0.0
+) -> TrafficAgent:
+    """The agent elsewhere by the route, turned as the route turns, its walk too."""
+    place = route.locate_agent(agent)
+    ahead_m = place.ahead_m + along_m
+    turn = route.heading_at(ahead_m) - place.tangent_rad
+    x_m, y_m = route.position(ahead_m, place.left_m + left_m)
+    walk = agent.walk_to_m
+    if walk is not None:
+        dx, dy = walk[0] - agent.x_m, walk[1] - agent.y_m
+        cos, sin = math.cos(turn), math.sin(turn)
+        walk = (x_m + cos * dx - sin * dy, y_m + sin * dx + cos * dy)
+    elsewhere = replace(
+        agent, x_m=x_m, y_m=y_m, heading_rad=wrap(agent.heading_rad + turn), walk_to_m=walk
+    )
+    return name_lane(route, elsewhere)
 
 
-def jitter(road: RouteMap, reference: Modification, rng: random.Random) -> Modification:
+def name_lane(route: EgoRoute, agent: TrafficAgent) -> TrafficAgent:
+    """The agent with the lane under it, if it named one at all."""
+    if agent.lane_id is None:
+        return agent
+    return replace(agent, lane_id=route.graph.under(agent.x_m, agent.y_m, agent.heading_rad))
+
+
+def jitter(route: EgoRoute, reference: Modification, rng: random.Random) -> Modification:
     """A right placement that is not exact: all shifted together, each a little on its own.
 
     What did not touch before does not touch now; where chance finds no such place, the shift
@@ -114,10 +65,10 @@ def jitter(road: RouteMap, reference: Modification, rng: random.Random) -> Modif
         scale = 1.0 - number / _TRIES
         along, left = rng.uniform(-ALONG_M, ALONG_M), rng.uniform(-ACROSS_M, ACROSS_M)
         moved = tuple(
-            _shaken(road.moved(agent, scale * along, scale * left), scale, rng)
+            _shaken(move_along(route, agent, scale * along, scale * left), scale, rng)
             for agent in reference.added
         )
-        if not new_contacts(road.scene, reference.added, moved):
+        if not new_contacts(route.scene, reference.added, moved):
             return replace(reference, added=moved)
     return reference
 

@@ -24,7 +24,7 @@ from augment.checks.asked_things import (
 from augment.checks.asked_walk import asked_walk
 from augment.checks.finding import Finding, FindingKind, Severity
 from augment.checks.ground import Ground
-from augment.checks.own_way import OwnWay
+from augment.checks.lanes_across import LanesAcross
 from augment.checks.parties import match_to_requests
 from augment.checks.registry import findings_on
 from augment.checks.tolerances import USUAL, Tolerances
@@ -64,11 +64,11 @@ def check_against_intent(
         InvalidModification: The modification does not fit the scene.
     """
     found = findings_on(ground, modification)
-    way = None if intent is None else OwnWay.of(ground)
-    if intent is None or way is None:
+    lanes = None if intent is None else LanesAcross.of(ground)
+    if intent is None or lanes is None:
         return found
-    matching = match_to_requests(resolve_anchors(intent), modification.added, way)
-    asked = Asked(modification=modification, way=way, matching=matching, tolerances=tolerances)
+    matching = match_to_requests(resolve_anchors(intent), modification.added, lanes)
+    asked = Asked(modification=modification, lanes=lanes, matching=matching, tolerances=tolerances)
     held = [one for check in ASKED_CHECKS for one in check(asked)]
     return (*held, *_settled(found, held, asked))
 

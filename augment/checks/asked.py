@@ -6,9 +6,10 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
 from augment.checks.finding import Finding, Severity
-from augment.checks.own_way import OwnWay
+from augment.checks.lanes_across import LanesAcross
 from augment.checks.parties import Party, RequestMatching
 from augment.checks.tolerances import Tolerances
+from augment.scene.ego_route import EgoRoute
 from augment.scene.entities import TrafficAgent, TrafficSide
 from augment.scene.modification import Modification
 
@@ -18,14 +19,19 @@ class Asked:
     """One modification, held against one intent."""
 
     modification: Modification
-    way: OwnWay
+    lanes: LanesAcross
     matching: RequestMatching
     tolerances: Tolerances
 
     @property
+    def route(self) -> EgoRoute:
+        """The ego's path over lanes."""
+        return self.lanes.route
+
+    @property
     def kerb(self) -> float:
         """On which side the kerb is: 1 left, -1 right."""
-        return 1.0 if self.way.ground.scene.traffic_side is TrafficSide.LEFT else -1.0
+        return 1.0 if self.route.scene.traffic_side is TrafficSide.LEFT else -1.0
 
     @property
     def parties(self) -> tuple[Party, ...]:
@@ -33,12 +39,12 @@ class Asked:
         return self.matching.parties
 
     def ahead_m(self, agent: TrafficAgent) -> float:
-        """How far along the ego's way an agent is."""
-        return self.way.of_agent(agent).ahead_m
+        """How far along the ego's route an agent is."""
+        return self.route.locate_agent(agent).ahead_m
 
     def left_m(self, agent: TrafficAgent) -> float:
-        """How far left of the middle of the ego's way an agent is."""
-        return self.way.of_agent(agent).left_m
+        """How far left of the ego's route an agent is."""
+        return self.route.locate_agent(agent).left_m
 
 
 AskedCheck = Callable[[Asked], Iterator[Finding]]

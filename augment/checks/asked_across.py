@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from augment.checks.asked import Asked, distance_outside, severity_of, side_of
 from augment.checks.crash_order import in_order
 from augment.checks.finding import Finding, FindingKind
-from augment.checks.own_way import Band
+from augment.checks.lanes_across import Band
 from augment.checks.parties import Party
 from augment.checks.tolerances import Tolerances
 from augment.scene.entities import AgentType, TrafficAgent
@@ -62,7 +62,7 @@ def asked_across(asked: Asked) -> Iterator[Finding]:
         if isinstance(request, WalkRequest) or not party.placed or lane is None:
             continue
         first = min(party.placed, key=lambda one: (abs(asked.ahead_m(one)), one.id))
-        band = asked.way.band(lane, asked.ahead_m(first))
+        band = asked.lanes.band(lane, asked.ahead_m(first))
         if band is None:
             continue
         if isinstance(request, VehicleRequest):
@@ -72,7 +72,7 @@ def asked_across(asked: Asked) -> Iterator[Finding]:
             continue  # it may be the nearest that is missing, and the others lie anywhere
         elif isinstance(request, CrashRequest):
             if party.is_exact:
-                first = in_order(party, request, asked.way)[0]
+                first = in_order(party, request, asked.route)[0]
             left_m = asked.left_m(first) - band.left_m
             others = (one for one in party.everyone if one is not first)
             yield _in_lane(
@@ -112,7 +112,7 @@ def _vehicle(
         kind=FindingKind.ASKED_ACROSS,
         severity=severity_of(fits=wanted.off_m(left_m) <= wanted.allowed_m),
         agents=(agent.id,),
-        belongs_m=asked.way.position(asked.ahead_m(agent), belongs_m),
+        belongs_m=asked.route.position(asked.ahead_m(agent), belongs_m),
         measured={"left_m": left_m, "asked_low_m": wanted.low_m, "asked_high_m": wanted.high_m},
         template=(
             f"{{agents[0]}} is {{left_m:.2f}} m to the {side_of(left_m)} of the centre of {lane}; "

@@ -24,7 +24,7 @@ def asked_crash(asked: Asked) -> Iterator[Finding]:
         request = party.request
         if not isinstance(request, CrashRequest) or not party.is_exact:
             continue
-        order = in_order(party, request, asked.way)
+        order = in_order(party, request, asked.route)
         found = pairs(order, request)
         if any(pair.gap_m < pair.one.width_m for pair in found):
             continue
@@ -74,7 +74,7 @@ def _gap(pair: Pair, asked: Asked) -> Finding:
 
 
 def _facing(asked: Asked, request: CrashRequest, first: TrafficAgent) -> Iterator[Finding]:
-    band = asked.way.band(request.spot.lane or LaneChoice.OWN, asked.ahead_m(first))
+    band = asked.lanes.band(request.spot.lane or LaneChoice.OWN, asked.ahead_m(first))
     if band is None:
         return
     turn_deg = abs(math.degrees(difference(first.heading_rad, band.tangent_rad)))

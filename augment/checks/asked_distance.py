@@ -50,7 +50,7 @@ def _finding(asked: Asked, party: Party, span_m: tuple[float, float]) -> Finding
         kind=FindingKind.ASKED_DISTANCE,
         severity=severity_of(fits=off_m <= allowed_m),
         agents=(first.id, *(one.id for one in party.everyone if one is not first)),
-        belongs_m=asked.way.position(belongs_m, asked.left_m(first)),
+        belongs_m=asked.route.position(belongs_m, asked.left_m(first)),
         measured={
             "along_m": measured_m,
             "asked_low_m": low_m,
@@ -72,7 +72,7 @@ def _measured(
     along = [(sign * asked.ahead_m(one), one) for one in (*party.placed, *party.spare)]
     if isinstance(request, WalkRequest):
         along += [
-            (sign * asked.way.place(*point).ahead_m, one)
+            (sign * asked.route.locate(*point).ahead_m, one)
             for one in party.placed
             for point in _ends_on_road(asked, one)
         ]
@@ -80,7 +80,7 @@ def _measured(
         middle_m = sum(value for value, _ in along) / len(along)
         return min(along, key=lambda item: (item[0], item[1].id))[1], middle_m
     elif isinstance(request, CrashRequest) and party.is_exact:
-        first = in_order(party, request, asked.way)[0]
+        first = in_order(party, request, asked.route)[0]
         return first, sign * asked.ahead_m(first)
     elif isinstance(request, (ConesRequest, VehicleRequest)) and party.is_exact:
         value, agent = min(along, key=lambda item: (item[0], item[1].id))
@@ -103,7 +103,7 @@ def _ends_on_road(asked: Asked, agent: TrafficAgent) -> Iterator[tuple[float, fl
     """Where a walk is level with the middle of the ego's way, if it gets there."""
     if agent.walk_to_m is None:
         return
-    start, end = asked.left_m(agent), asked.way.place(*agent.walk_to_m).left_m
+    start, end = asked.left_m(agent), asked.route.locate(*agent.walk_to_m).left_m
     if start * end < 0.0:
         share = start / (start - end)
         yield (

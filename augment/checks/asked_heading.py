@@ -24,8 +24,8 @@ def asked_heading(asked: Asked) -> Iterator[Finding]:
 def _vehicle(asked: Asked, request: VehicleRequest, agent: TrafficAgent) -> Iterator[Finding]:
     if request.spot.lane is None:
         return
-    place = asked.way.of_agent(agent)
-    band = asked.way.band(request.spot.lane, place.ahead_m)
+    place = asked.route.locate_agent(agent)
+    band = asked.lanes.band(request.spot.lane, place.ahead_m)
     if band is None:
         return
     turn_deg = math.degrees(difference(agent.heading_rad, band.tangent_rad))

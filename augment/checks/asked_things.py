@@ -22,7 +22,7 @@ def asked_count(asked: Asked) -> Iterator[Finding]:
                 kind=FindingKind.ASKED_COUNT,
                 severity=Severity.WRONG,
                 agents=here,
-                belongs_m=None if here else middle_of(party.request.spot, asked.way),
+                belongs_m=None if here else middle_of(party.request.spot, asked.lanes),
                 measured={"missing": float(number)},
                 template=f"{{missing:.0f}} {_plural(role, number)} asked for and not there.",
             )

@@ -53,7 +53,7 @@ def _drift(asked: Asked, agent: TrafficAgent, wanted_m: float | None) -> Iterato
     end = end_of_walk(agent)
     if wanted_m is None or end is None:
         return
-    drift_m = asked.way.place(*end).ahead_m - asked.ahead_m(agent)
+    drift_m = asked.route.locate(*end).ahead_m - asked.ahead_m(agent)
     yield Finding(
         kind=FindingKind.ASKED_DISTANCE,
         severity=severity_of(fits=abs(drift_m - wanted_m) <= asked.tolerances.drift_m),
@@ -92,10 +92,10 @@ def _along(drift_m: float) -> str:
 
 
 def _finding(asked: Asked, agent: TrafficAgent, start: float) -> Finding:
-    place = asked.way.of_agent(agent)
+    place = asked.route.locate_agent(agent)
     across = math.sin(agent.heading_rad - place.tangent_rad)
     end = end_of_walk(agent)
-    end_left_m = None if end is None else asked.way.place(*end).left_m
+    end_left_m = None if end is None else asked.route.locate(*end).left_m
     to_left_m = 0.0 if end_left_m is None else end_left_m - place.left_m
     goes = math.copysign(1.0, to_left_m) if abs(to_left_m) > _ON_ROAD_M else 0.0
     is_other_side = place.left_m * start < -_ON_ROAD_M and goes == start

@@ -7,10 +7,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise, permutations
 
-from augment.checks.own_way import OwnWay
 from augment.checks.parties import Party
 from augment.checks.tolerances import USUAL
 from augment.geometry.angles import difference
+from augment.scene.ego_route import EgoRoute
 from augment.scene.entities import TrafficAgent
 from augment.scene.intent import Bearing, CrashedCar, CrashRequest
 
@@ -55,14 +55,14 @@ class Pair:
         return max(self.asked.gap.low_m - self.gap_m, self.gap_m - self.asked.gap.high_m, 0.0)
 
 
-def in_order(party: Party, request: CrashRequest, way: OwnWay) -> tuple[TrafficAgent, ...]:
+def in_order(party: Party, request: CrashRequest, route: EgoRoute) -> tuple[TrafficAgent, ...]:
     """The vehicles of a party in the order in which the request names them."""
     agents = party.agents
     if not 2 <= len(agents) <= MOST_ORDERED:
         return agents
     return min(
         permutations(agents),
-        key=lambda order: (round(_misfit(order, request, way), 6), [one.id for one in order]),
+        key=lambda order: (round(_misfit(order, request, route), 6), [one.id for one in order]),
     )
 
 
@@ -78,21 +78,21 @@ def pairs(order: Sequence[TrafficAgent], request: CrashRequest) -> list[Pair]:
 # Private
 
 
-def _misfit(order: Sequence[TrafficAgent], request: CrashRequest, way: OwnWay) -> float:
+def _misfit(order: Sequence[TrafficAgent], request: CrashRequest, route: EgoRoute) -> float:
     misfit, span_m = 0.0, request.spot.span_m
     if span_m is not None:
-        first_m = way.of_agent(order[0]).ahead_m
+        first_m = route.locate_agent(order[0]).ahead_m
         misfit = max(span_m[0] - first_m, first_m - span_m[1], 0.0) / USUAL.distance_m
     for pair in pairs(order, request):
         misfit += (pair.off_deg or 0.0) / USUAL.heading_deg + (pair.off_m or 0.0) / USUAL.spacing_m
         misfit += pair.gap_m / 100.0  # the nearest neighbours, where nothing is said
-        misfit += 0.0 if _bears(pair, way) else _MISPLACED
+        misfit += 0.0 if _bears(pair, route) else _MISPLACED
     return misfit
 
 
-def _bears(pair: Pair, way: OwnWay) -> bool:
+def _bears(pair: Pair, route: EgoRoute) -> bool:
     """Whether the second is where it is said to be, seen from the first."""
-    here, there = way.of_agent(pair.one), way.of_agent(pair.other)
+    here, there = route.locate_agent(pair.one), route.locate_agent(pair.other)
     return {
         Bearing.AHEAD: there.ahead_m >= here.ahead_m,
         Bearing.BEHIND: there.ahead_m <= here.ahead_m,

@@ -10,15 +10,10 @@ from dataclasses import dataclass
 from functools import cached_property
 
 from augment.checks.surfaces import Surface
-from augment.checks.ways import Beside, Ways, best_aligned
-from augment.geometry.polyline import Polyline
+from augment.checks.ways import Ways
+from augment.scene.ego_route import REACH_M, EgoRoute
 from augment.scene.entities import AreaKind, Scene
 from augment.scene.lane_graph import LaneGraph
-
-REACH_M = 300.0
-"""How far ahead and behind the ego distances along the lanes are followed."""
-ROUTE_M = 150.0
-"""How far the ego's lane is followed for its corridor."""
 
 _ROAD = (AreaKind.DRIVABLE, AreaKind.CARPARK, AreaKind.INTERSECTION)
 _WALKS = (AreaKind.WALKWAY, AreaKind.CROSSWALK)
@@ -66,12 +61,9 @@ class Ground:
         return any(area.kind is AreaKind.WALKWAY for area in self.scene.areas)
 
     @cached_property
-    def ego_place(self) -> Beside | None:
-        """The ego beside its own lane, None where the map has no lane for it."""
-        ego = self.scene.ego
-        beside = self.ways.beside(ego.x_m, ego.y_m)
-        named = [one for one in beside if one.way_id == ego.lane_id]
-        return named[0] if named else best_aligned(beside, ego.heading_rad)
+    def route(self) -> EgoRoute | None:
+        """The ego's path over lanes, None where the map has no lane for it."""
+        return EgoRoute.of(self.scene, self.graph)
 
     @cached_property
     def starts_m(self) -> tuple[tuple[str, float], ...]:
@@ -80,27 +72,12 @@ class Ground:
         Successors of the ego's way are followed forwards, predecessors backwards, both up to
         `REACH_M`. On a loop a way comes twice: once ahead, once behind.
         """
-        place = self.ego_place
-        if place is None:
+        if self.route is None:
             return ()
-        ahead = self._reached(place.way_id, -place.s_m, forwards=True)
-        behind = self._reached(place.way_id, -place.s_m, forwards=False)
+        lane_id, begins_m = self.route.lane_id, -self.route.lane_s_m
+        ahead = self._reached(lane_id, begins_m, forwards=True)
+        behind = self._reached(lane_id, begins_m, forwards=False)
         return (*ahead.items(), *behind.items())
-
-    @cached_property
-    def route(self) -> tuple[Polyline, float] | None:
-        """The ego's lane and what follows it straightest, from the ego on, and its mean width."""
-        place = self.ego_place
-        if place is None:
-            return None
-        names = self.graph.route(place.way_id, place.s_m + ROUTE_M)
-        ways = [self.graph.ways[name] for name in names]
-        points = [point for way in ways for point in way.centerline.points_m.tolist()]
-        line = Polyline(points)
-        if line.length_m - place.s_m < 1.0:
-            return None
-        width_m = sum(way.width_m for way in ways) / len(ways)
-        return line.between(place.s_m, line.length_m), width_m
 
     def _reached(self, way_id: str, start_m: float, *, forwards: bool) -> dict[str, float]:
         """Dijkstra over whole ways: the signed distance from the ego to each way's start."""

@@ -20,7 +20,7 @@ def lane_distance(situation: ChangedScene) -> Iterator[Finding]:
     or back (then it would be negative); `level_m` and `beside_m` then tell where the agent is
     beside the ways that can be reached, on the oncoming lane for example.
     """
-    if situation.ground.ego_place is None:
+    if situation.ground.route is None:
         return
     for agent in situation.changed:
         yield _finding(agent, situation)

@@ -7,7 +7,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from enum import StrEnum
 
-from augment.checks.own_way import OwnWay
+from augment.checks.lanes_across import LanesAcross
 from augment.checks.tolerances import LONG_VEHICLE_M
 from augment.scene.entities import AgentType, Point, TrafficAgent
 from augment.scene.intent import (
@@ -79,7 +79,7 @@ class RequestMatching:
 
 
 def match_to_requests(
-    intent: Intent, added: Sequence[TrafficAgent], way: OwnWay
+    intent: Intent, added: Sequence[TrafficAgent], lanes: LanesAcross
 ) -> RequestMatching:
     """Deal the added agents out to the requests, each to the nearest spot that takes its type.
 
@@ -90,7 +90,7 @@ def match_to_requests(
         for number, one in enumerate(intent.requests)
         for place in _places(number, one, added)
     ]
-    spots = [middle_of(one.spot, way) for one in intent.requests]
+    spots = [middle_of(one.spot, lanes) for one in intent.requests]
     near = sorted(
         (math.dist(spots[place.party], (agent.x_m, agent.y_m)), number, index)
         for number, place in enumerate(wanted)
@@ -104,22 +104,22 @@ def match_to_requests(
                 taken[number] = index
     return RequestMatching(
         parties=tuple(
-            _party(number, one, wanted, added, taken, way)
+            _party(number, one, wanted, added, taken, lanes)
             for number, one in enumerate(intent.requests)
         ),
         surplus=tuple(one for n, one in enumerate(added) if n not in taken.values()),
     )
 
 
-def middle_of(spot: Spot, way: OwnWay) -> Point:
+def middle_of(spot: Spot, lanes: LanesAcross) -> Point:
     """The point that a spot names: the middle of its range, on the middle of its lane.
 
     What is open is taken as the ego's own place and lane: it only says who is nearest.
     """
     span_m = [one for one in spot.span_m or (0.0,) if math.isfinite(one)]
     ahead_m = sum(span_m) / len(span_m)
-    band = way.band(spot.lane or LaneChoice.OWN, ahead_m)
-    return way.position(ahead_m, 0.0 if band is None else band.left_m)
+    band = lanes.band(spot.lane or LaneChoice.OWN, ahead_m)
+    return lanes.route.position(ahead_m, 0.0 if band is None else band.left_m)
 
 
 # Private
@@ -180,7 +180,7 @@ def _party(
     wanted: Sequence[_Place],
     added: Sequence[TrafficAgent],
     taken: dict[int, int],
-    way: OwnWay,
+    lanes: LanesAcross,
 ) -> Party:
     own = [(number, place) for number, place in enumerate(wanted) if place.party == party]
     found = [(place, added[taken[number]]) for number, place in own if number in taken]
@@ -191,7 +191,7 @@ def _party(
         agents=tuple(
             sorted(
                 (agent for role, agent in right if role is not Role.WORKER),
-                key=lambda agent: abs(way.of_agent(agent).ahead_m),
+                key=lambda agent: abs(lanes.route.locate_agent(agent).ahead_m),
             )
         ),
         workers=tuple(agent for role, agent in right if role is Role.WORKER),

@@ -13,6 +13,8 @@ from augment.checks.situation import ChangedScene, is_stopped
 from augment.geometry.polyline import Polyline
 from augment.scene.entities import AgentType, Point, TrafficAgent
 
+CORRIDOR_M = 150.0
+"""How far ahead of the ego a walk is held against its lane."""
 ASSUMED_WALK_M = 30.0
 """How far a pedestrian without an end point is followed; the longest known walk is 28.8 m."""
 
@@ -22,9 +24,11 @@ def walk_crossing(situation: ChangedScene) -> Iterator[Finding]:
 
     The ego's way is its lane and what follows straightest, from the ego's centre on.
     """
-    if situation.ground.route is None:
+    route = situation.ground.route
+    corridor = None if route is None else route.corridor(CORRIDOR_M)
+    if corridor is None:
         return
-    line, width_m = situation.ground.route
+    line, width_m = corridor
     for agent in situation.changed:
         end = end_of_walk(agent)
         if agent.type is AgentType.PEDESTRIAN and end is not None:

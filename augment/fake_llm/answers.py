@@ -11,6 +11,7 @@ from dataclasses import replace
 
 from augment.fake_llm.sight import Task
 from augment.prompts.vectors import compass
+from augment.scene.ego_route import EgoRoute
 from augment.scene.entities import AgentType, Scene, TrafficAgent
 from augment.scene.lane_graph import LaneGraph
 from augment.scene.modification import Modification
@@ -85,6 +86,7 @@ def _change_list(modification: Modification) -> str:
 
 def _steps(scene: Scene, modification: Modification) -> list[str]:
     graph = LaneGraph(scene)
+    route = EgoRoute.of(scene, graph)
     steps: list[str] = []
     for agent in modification.changed:
         found = graph.nearest(agent.x_m, agent.y_m)
@@ -93,8 +95,9 @@ def _steps(scene: Scene, modification: Modification) -> list[str]:
         way_id, place = found
         line = graph.ways[way_id].centerline
         x_m, y_m = line.position(place.s_m)
+        where = _ahead(graph, route, way_id, place.s_m)
         steps.append(
-            f"Step {len(steps) + 1}: {agent.id} lies {_ahead(graph, way_id, place.s_m)}. The "
+            f"Step {len(steps) + 1}: {agent.id} lies {where}. The "
             f"centreline of {way_id} is at ({x_m:.2f}, {y_m:.2f}) there and leads "
             f"{compass(line.heading_at(place.s_m))} ({line.heading_at(place.s_m):.3f} rad). "
             f"{abs(place.d_m):.2f} m to its {'left' if place.d_m >= 0.0 else 'right'} is "
@@ -103,16 +106,14 @@ def _steps(scene: Scene, modification: Modification) -> list[str]:
     return steps
 
 
-def _ahead(graph: LaneGraph, way_id: str, s_m: float) -> str:
+def _ahead(graph: LaneGraph, route: EgoRoute | None, way_id: str, s_m: float) -> str:
     """Where a place on a way lies, along the lanes where the ego's own lead there."""
-    ego_way = graph.under(0.0, 0.0, 0.0)
-    if ego_way is not None:
-        along_m = s_m - graph.ways[ego_way].centerline.project(0.0, 0.0).s_m
-        for name in graph.route(ego_way, 200.0):
-            if name == way_id:
-                return f"{along_m:.2f} m along the lanes from the ego, on {way_id}"
-            along_m += graph.ways[name].centerline.length_m
-    x_m, y_m = graph.ways[way_id].centerline.position(s_m)
+    line = graph.way(way_id).centerline
+    if route is not None and way_id in route.lane_ids:
+        end_m = route.ends_m[route.lane_ids.index(way_id)]
+        along_m = end_m - line.length_m + s_m
+        return f"{along_m:.2f} m along the lanes from the ego, on {way_id}"
+    x_m, y_m = line.position(s_m)
     return f"{math.hypot(x_m, y_m):.2f} m from the ego, on {way_id}"
 
 

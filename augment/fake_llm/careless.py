@@ -12,10 +12,8 @@ import random
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 
-import numpy as np
-
 from augment.geometry.angles import wrap
-from augment.geometry.polyline import Polyline
+from augment.scene.ego_route import EgoRoute
 from augment.scene.entities import AgentType, Scene, TrafficAgent
 from augment.scene.lane_graph import LaneGraph
 from augment.scene.modification import Modification
@@ -25,7 +23,6 @@ SPARED_BY_TOOL = frozenset({"straight-line", "ego-heading"})
 
 _UNREADABLE_SHARE = 0.1
 _RIGHT_SHARE = 0.25
-_AHEAD_M = 200.0
 _NOTICEABLE_M = 1.0
 _NOTICEABLE_RAD = 0.15
 
@@ -46,12 +43,15 @@ class Bent:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class _Setting:
-    """What a mistake looks at: the lane ahead as one line, the map, and the dice."""
+    """What a mistake looks at: the ego's route and the dice."""
 
-    line: Polyline
-    ego_s_m: float
-    graph: LaneGraph
+    route: EgoRoute
     rng: random.Random
+
+    @property
+    def graph(self) -> LaneGraph:
+        """The map."""
+        return self.route.graph
 
 
 def dice(prompt: str) -> random.Random:
@@ -107,17 +107,17 @@ def straight_line(agents: Agents, setting: _Setting) -> Agents:
     """The distance is laid out straight ahead of the ego instead of along the lane."""
     bent = []
     for agent in agents:
-        place = setting.line.project(agent.x_m, agent.y_m)
-        x_m, y_m = place.s_m - setting.ego_s_m, place.d_m
-        bent.append(_at(agent, x_m, y_m, agent.heading_rad))
+        place = setting.route.locate_agent(agent)
+        bent.append(_at(agent, place.ahead_m, place.left_m, agent.heading_rad))
     return tuple(bent)
 
 
 def ego_heading(agents: Agents, setting: _Setting) -> Agents:
     """The heading ignores how the lane runs."""
     return tuple(
-        replace(agent, heading_rad=wrap(agent.heading_rad - _lane_heading(agent, setting.line)))
+        replace(agent, heading_rad=wrap(agent.heading_rad - place.tangent_rad))
         for agent in agents
+        for place in [setting.route.locate_agent(agent)]
     )
 
 
@@ -180,23 +180,18 @@ MISTAKES: dict[str, Callable[[Agents, _Setting], Agents]] = {
 
 def _setting(scene: Scene, rng: random.Random) -> _Setting | None:
     """None where the ego is on no lane: then there is nothing to measure along."""
-    graph = LaneGraph(scene)
-    way = graph.under(0.0, 0.0, 0.0)
-    if way is None:
-        return None
-    points = [graph.ways[name].centerline.points_m for name in graph.route(way, _AHEAD_M)]
-    line = Polyline(np.vstack(points))
-    return _Setting(line=line, ego_s_m=line.project(0.0, 0.0).s_m, graph=graph, rng=rng)
+    route = EgoRoute.of(scene)
+    return None if route is None else _Setting(route=route, rng=rng)
 
 
 def _shifted(agents: Agents, setting: _Setting, along_m: float, left_m: float = 0.0) -> Agents:
     """Everybody moved along and across the lane ahead, turned as it turns."""
     moved = []
     for agent in agents:
-        place = setting.line.project(agent.x_m, agent.y_m)
-        s_m, d_m = place.s_m + along_m, place.d_m + left_m
-        turn = setting.line.heading_at(s_m) - setting.line.heading_at(place.s_m)
-        x_m, y_m = setting.line.position(s_m, d_m)
+        place = setting.route.locate_agent(agent)
+        ahead_m = place.ahead_m + along_m
+        turn = setting.route.heading_at(ahead_m) - place.tangent_rad
+        x_m, y_m = setting.route.position(ahead_m, place.left_m + left_m)
         moved.append(_at(agent, x_m, y_m, wrap(agent.heading_rad + turn)))
     return tuple(moved)
 
@@ -207,10 +202,6 @@ def _at(agent: TrafficAgent, x_m: float, y_m: float, heading_rad: float) -> Traf
     if walk is not None:
         walk = (walk[0] + x_m - agent.x_m, walk[1] + y_m - agent.y_m)
     return replace(agent, x_m=x_m, y_m=y_m, heading_rad=heading_rad, walk_to_m=walk)
-
-
-def _lane_heading(agent: TrafficAgent, line: Polyline) -> float:
-    return line.heading_at(line.project(agent.x_m, agent.y_m).s_m)
 
 
 def _differs(agents: Agents, others: Agents) -> bool:

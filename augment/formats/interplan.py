@@ -65,8 +65,7 @@ def cone_heading(ground: Ground, x_m: float, y_m: float) -> float:
     """The direction of the ego's way beside a place: what a cone gets, having none in the file."""
     if ground.route is None:
         return 0.0
-    line = ground.route[0]
-    return line.heading_at(line.project(x_m, y_m).s_m)
+    return ground.route.locate(x_m, y_m).tangent_rad
 
 
 def token_of(scene_name: str) -> str:

@@ -9,6 +9,7 @@ import numpy as np
 
 from augment.errors import CannotDrive
 from augment.geometry.angles import difference
+from augment.scene.ego_route import find_ego_lane
 from augment.scene.entities import Lane, Scene
 from augment.scene.lane_graph import LaneGraph
 from augment.scene.recording import Recording
@@ -62,9 +63,9 @@ def beside_route(scene: Scene, graph: LaneGraph, route: tuple[str, ...]) -> froz
 
 def _start(scene: Scene, graph: LaneGraph) -> str:
     ego = scene.ego
-    under = graph.under(ego.x_m, ego.y_m, ego.heading_rad)
-    if under is not None:
-        return under
+    own = find_ego_lane(scene, graph)
+    if own is not None:
+        return own
     aligned = [
         name
         for name, way in graph.ways.items()

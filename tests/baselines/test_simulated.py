@@ -17,29 +17,29 @@ from augment.baselines.simulated_road import (
     ALONG_M,
     OWN_M,
     Agents,
-    RouteMap,
     jitter,
     new_contacts,
 )
 from augment.errors import InvalidDocument, ReplyUnreadable
 from augment.metrics.displacement import displacement
 from augment.prompts.reply import read_reply
+from augment.scene.ego_route import EgoRoute
 from augment.scene.entities import TrafficAgent
 from augment.scene.modification import Modification
 from tests.fixtures.shelf import SLUGS, entry, shown_scene
 from tests.scenes import cone, curve, junction, pedestrian, scene, vehicle
 
-STREET = RouteMap.of(scene())
+STREET = EgoRoute.of(scene())
 assert STREET is not None
 CAR = vehicle("Agent2", 20.0, 1.2)
 
 
-def tried(kind: FaultKind, *agents: TrafficAgent, road: RouteMap | None = STREET) -> Agents | None:
+def tried(kind: FaultKind, *agents: TrafficAgent, road: EgoRoute | None = STREET) -> Agents | None:
     assert road is not None
     return inject_fault(road, agents, kind, random.Random(1))
 
 
-def made(kind: FaultKind, *agents: TrafficAgent, road: RouteMap | None = STREET) -> Agents:
+def made(kind: FaultKind, *agents: TrafficAgent, road: EgoRoute | None = STREET) -> Agents:
     found = tried(kind, *agents, road=road)
     assert found is not None
     return found
@@ -58,7 +58,7 @@ def test_the_same_seed_gives_the_same_answer() -> None:
 @pytest.mark.parametrize("slug", SLUGS)
 def test_a_right_answer_is_near_the_reference_and_touches_nothing_new(slug: str) -> None:
     reference, world = entry(slug).reference, shown_scene(slug)
-    road = RouteMap.of(world)
+    road = EgoRoute.of(world)
     assert road is not None
     near = jitter(road, reference, random.Random(slug))
     # A lane moves things on the outside of a bend further than itself.
@@ -140,7 +140,7 @@ def test_what_makes_no_difference_is_not_made() -> None:
 
 
 def test_a_bend_and_a_junction_make_a_difference() -> None:
-    bend, crossing = RouteMap.of(curve()), RouteMap.of(junction())
+    bend, crossing = EgoRoute.of(curve()), EgoRoute.of(junction())
     x_m, y_m = 10.0 + 40.0 * math.sin(0.8), 40.0 * (1.0 - math.cos(0.8))
     bent = vehicle("Agent2", x_m, y_m, 0.8)
     (straight,) = made(FaultKind.STRAIGHT_LINE, bent, road=bend)

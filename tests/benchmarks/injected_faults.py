@@ -20,12 +20,13 @@ from augment.baselines.simulated_faults import (
     FaultKind,
     inject_fault,
 )
-from augment.baselines.simulated_road import RouteMap, jitter
+from augment.baselines.simulated_road import jitter, move_along
 from augment.checks import Ground
 from augment.checks.against_intent import check_against_intent
 from augment.checks.finding import FaultClass
 from augment.fake_llm.careless import bend, dice
 from augment.metrics.fault_guess import first_guess
+from augment.scene.ego_route import EgoRoute
 from augment.scene.intent import Intent
 from augment.scene.modification import Modification
 from tests.fixtures.shelf import SLUGS, entry, shown_scene
@@ -56,7 +57,7 @@ class Case:
     slug: str
     reference: Modification
     ground: Ground
-    road: RouteMap
+    route: EgoRoute
     intent: Intent | None
 
     def guess(self, change: Modification) -> frozenset[FaultClass]:
@@ -106,7 +107,7 @@ def measure(count: int, seed: int, *, among: tuple[Case, ...] | None = None) -> 
         tally.named[kind]["read"] += case.intent is not None
     for number in range(count):
         case = chosen[number % len(chosen)]
-        guessed = case.guess(jitter(case.road, case.reference, rng))
+        guessed = case.guess(jitter(case.route, case.reference, rng))
         tally.add(frozenset(), guessed)
         tally.clean += not guessed
         tally.right += 1
@@ -119,7 +120,9 @@ def shifted_share(along_m: float) -> float:
     found = 0
     for case in read:
         for sign in (-1.0, 1.0):
-            moved = tuple(case.road.moved(one, sign * along_m) for one in case.reference.added)
+            moved = tuple(
+                move_along(case.route, one, sign * along_m) for one in case.reference.added
+            )
             found += FaultClass.POSITION in case.guess(Modification(added=moved))
     return _share(found, 2 * len(read))
 
@@ -172,8 +175,8 @@ def _injections(
         for _ in among:
             case = among[turns[kind] % len(among)]
             turns[kind] += 1
-            right = jitter(case.road, case.reference, rng)
-            agents = inject_fault(case.road, right.added, kind, rng)
+            right = jitter(case.route, case.reference, rng)
+            agents = inject_fault(case.route, right.added, kind, rng)
             if agents is not None:
                 yield case, kind, Modification(added=agents)
                 break
@@ -184,13 +187,13 @@ def _injections(
 
 def _case(slug: str) -> Case:
     scene = shown_scene(slug)
-    road = RouteMap.of(scene)
-    assert road is not None
+    route = EgoRoute.of(scene)
+    assert route is not None
     return Case(
         slug=slug,
         reference=entry(slug).reference,
         ground=Ground.of(scene),
-        road=road,
+        route=route,
         intent=entry(slug).intent,
     )
 

@@ -1,0 +1,144 @@
+"""The ego's path over lanes: what leads to its lane, that lane, and what follows it straightest.
+
+In: a scene. Out: positions counted as instructions count them, ahead from the ego's centre along
+the lanes and left across them.
+Frame: the scene's.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import accumulate
+
+from augment.geometry.polyline import Polyline
+from augment.scene.entities import Point, Scene, TrafficAgent
+from augment.scene.lane_graph import LaneGraph, PlaceOnWay
+
+REACH_M = 300.0
+"""How far ahead of the ego and behind it the lanes are followed."""
+_SHORTEST_M = 1.0
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class RoutePosition:
+    """Along the route (negative behind the ego), left of it, and the route's direction there."""
+
+    ahead_m: float
+    left_m: float
+    tangent_rad: float
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class EgoRoute:
+    """The path as one line.
+
+    Attributes:
+        scene: Whose ego it is.
+        lane_id: The lane or connector of the ego.
+        lane_s_m: Where on its centreline the ego is.
+        lane_ids: All lanes and connectors of the path, in the direction of travel.
+        ends_m: How far ahead of the ego each of them ends; negative behind it.
+        line: Their centrelines in one.
+        ego_s_m: Where on the line the ego is.
+    """
+
+    scene: Scene
+    graph: LaneGraph
+    lane_id: str
+    lane_s_m: float
+    lane_ids: tuple[str, ...]
+    ends_m: tuple[float, ...]
+    line: Polyline
+    ego_s_m: float
+
+    @classmethod
+    def of(cls, scene: Scene, graph: LaneGraph | None = None) -> EgoRoute | None:
+        """The route of a scene's ego, None where the map has no lane for it."""
+        graph = LaneGraph(scene) if graph is None else graph
+        own = find_ego_lane(scene, graph)
+        if own is None:
+            return None
+        lane_s_m = graph.way(own).centerline.project(scene.ego.x_m, scene.ego.y_m).s_m
+        before = _list_before(graph, own)
+        lane_ids = (*before, *graph.route(own, lane_s_m + REACH_M))
+        lines = [graph.way(name).centerline for name in lane_ids]
+        ego_s_m = sum(line.length_m for line in lines[: len(before)]) + lane_s_m
+        return cls(
+            scene=scene,
+            graph=graph,
+            lane_id=own,
+            lane_s_m=lane_s_m,
+            lane_ids=lane_ids,
+            ends_m=tuple(end - ego_s_m for end in accumulate(line.length_m for line in lines)),
+            line=Polyline([point for line in lines for point in line.points_m.tolist()]),
+            ego_s_m=ego_s_m,
+        )
+
+    def locate(self, x_m: float, y_m: float) -> RoutePosition:
+        """Where a point is by the route."""
+        beside = self.line.project(x_m, y_m)
+        return RoutePosition(
+            ahead_m=beside.s_m - self.ego_s_m,
+            left_m=beside.d_m,
+            tangent_rad=self.line.heading_at(beside.s_m),
+        )
+
+    def locate_agent(self, agent: TrafficAgent) -> RoutePosition:
+        """Where an agent's centre is by the route."""
+        return self.locate(agent.x_m, agent.y_m)
+
+    def position(self, ahead_m: float, left_m: float = 0.0) -> Point:
+        """The point so far ahead of the ego and left of the route."""
+        return self.line.position(self.ego_s_m + ahead_m, left_m)
+
+    def heading_at(self, ahead_m: float) -> float:
+        """The direction of travel so far ahead of the ego, in radians."""
+        return self.line.heading_at(self.ego_s_m + ahead_m)
+
+    def lane_position(self, ahead_m: float, left_m: float = 0.0) -> PlaceOnWay | None:
+        """The position on the lane that is so far ahead, None past the end of the lanes."""
+        return self.graph.along(self.lane_id, self.lane_s_m, ahead_m, left_m)
+
+    def corridor(self, length_m: float) -> tuple[Polyline, float] | None:
+        """The route from the ego on over the lanes that begin within a length, and their width.
+
+        The width is the mean of the lanes. None where the route ends at the ego.
+        """
+        first = self.lane_ids.index(self.lane_id)
+        begins_m = (-self.lane_s_m, *self.ends_m[first:])
+        ahead = [
+            (name, end_m)
+            for name, begin_m, end_m in zip(
+                self.lane_ids[first:], begins_m, self.ends_m[first:], strict=False
+            )
+            if begin_m < length_m
+        ]
+        end_m = ahead[-1][1]
+        if end_m < _SHORTEST_M:
+            return None
+        width_m = sum(self.graph.way(name).width_m for name, _ in ahead) / len(ahead)
+        return self.line.between(self.ego_s_m, self.ego_s_m + end_m), width_m
+
+
+def find_ego_lane(scene: Scene, graph: LaneGraph) -> str | None:
+    """The lane or connector that the ego names, else the one under it; None off every lane."""
+    ego = scene.ego
+    if ego.lane_id in graph.ways:
+        return ego.lane_id
+    return graph.under(ego.x_m, ego.y_m, ego.heading_rad)
+
+
+# Private
+
+
+def _list_before(graph: LaneGraph, lane_id: str) -> Sequence[str]:
+    """Ids of what leads to a lane, straightest, in the direction of travel, up to the reach."""
+    names, total_m = [lane_id], 0.0
+    while total_m < REACH_M:
+        leading = [name for name in graph.predecessors(names[0]) if name not in names]
+        if not leading:
+            break
+        names.insert(0, leading[0])
+        total_m += graph.way(leading[0]).centerline.length_m
+    return names[:-1]
