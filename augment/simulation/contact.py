@@ -13,6 +13,8 @@ from augment.simulation.states import HEADING, BoolArray, EgoBody, FloatArray, I
 
 AHEAD_RAD = math.radians(30.0)
 BEHIND_RAD = math.radians(150.0)
+STILL_MPS = 0.05
+"""Up to this speed somebody stands, for the score and for PDM-Closed's own judgement alike."""
 
 
 class Contact(IntEnum):
@@ -39,8 +41,6 @@ def classify(
     speeds: FloatArray,
     kinds: IntArray,
     body: EgoBody,
-    *,
-    still_mps: float,
 ) -> IntArray:
     """The `Contact` of ego poses (K, 3 or more) with boxes (K, 5).
 
@@ -51,13 +51,12 @@ def classify(
         speeds: Of whom it touches.
         kinds: Values of `Kind`.
         body: The ego.
-        still_mps: Up to this speed somebody stands.
     """
     made = np.full(len(poses), Contact.LATERAL, dtype=np.int64)
     made[_bumper_meets(poses, boxes, body)] = Contact.FRONT
     made[bearings(poses, boxes[:, :2]) > BEHIND_RAD] = Contact.REAR
-    made[(np.abs(speeds) <= still_mps) | (kinds == Kind.STATIC)] = Contact.STOPPED_TRACK
-    made[np.abs(ego_speeds) <= still_mps] = Contact.STOPPED_EGO
+    made[(np.abs(speeds) <= STILL_MPS) | (kinds == Kind.STATIC)] = Contact.STOPPED_TRACK
+    made[np.abs(ego_speeds) <= STILL_MPS] = Contact.STOPPED_EGO
     return made
 
 

@@ -12,8 +12,6 @@ from augment.simulation.objects import Kind
 from augment.simulation.overlap import corners, meet
 from augment.simulation.states import SPEED, BoolArray
 
-STILL_MPS = 0.05
-
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Collision:
@@ -48,7 +46,6 @@ def collisions(drive: Drive) -> tuple[Collision, ...]:
             objects.speeds_mps[hit],
             objects.kinds[hit],
             drive.body,
-            still_mps=STILL_MPS,
         )
         guilty = at_fault(contacts, np.full(len(hit), astray[moment]))
         for number, contact, fault in zip(hit, contacts, guilty, strict=True):

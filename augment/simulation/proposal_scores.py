@@ -24,6 +24,8 @@ from augment.simulation.states import (
     EgoBody,
     FloatArray,
     IntArray,
+    X,
+    Y,
 )
 
 STILL_MPS = 5e-3
@@ -93,7 +95,6 @@ class _Look:
         self.objects = forecast.objects
         self.moving_boxes = forecast.boxes
         self.sizes = radii(forecast.boxes[0])
-        self.first_hit = np.full((len(states), len(forecast.objects)), 10**6)
 
     def contacts(self, boxes: FloatArray, later: int) -> tuple[IntArray, IntArray, IntArray]:
         """Proposal, moment and object (K,) where boxes (B, T, 5), `later` steps on, meet."""
@@ -114,20 +115,22 @@ class _Look:
         return np.asarray(wrong[back], dtype=np.bool_)
 
     def in_intersection(self, proposal: IntArray, moment: IntArray) -> BoolArray:
-        """Whether the ego's centre (K,) is in an intersection."""
-        return self.road.intersections.contains(self.boxes[proposal, moment, :2])
+        """Whether the ego's rear axle (K,) is in an intersection."""
+        return self.road.intersections.contains(self.states[proposal, moment][:, [X, Y]])
 
 
 def _collisions(look: _Look) -> tuple[FloatArray, FloatArray]:
-    """The multiplier (B,) and the first fault (B,) in s; notes each pair's first contact."""
+    """The multiplier (B,) and the first fault (B,) in s; of each pair the first contact counts."""
     count = len(look.states)
     multiplier, fault_s = np.ones(count), np.full(count, np.inf)
     proposal, moment, thing = look.contacts(look.boxes, 0)
     if not len(proposal):
         return multiplier, fault_s
-    np.minimum.at(look.first_hit, (proposal, thing), moment)
-    proposal, thing = np.nonzero(look.first_hit < 10**6)
-    moment = look.first_hit[proposal, thing]
+    never = look.states.shape[1]
+    first = np.full((count, len(look.objects)), never)
+    np.minimum.at(first, (proposal, thing), moment)
+    proposal, thing = np.nonzero(first < never)
+    moment = first[proposal, thing]
     states = look.states[proposal, moment]
     contacts = classify(
         states,
@@ -136,7 +139,6 @@ def _collisions(look: _Look) -> tuple[FloatArray, FloatArray]:
         look.objects.speeds_mps[thing],
         look.objects.kinds[thing],
         look.body,
-        still_mps=STILL_MPS,
     )
     guilty = at_fault(contacts, look.astray(proposal, moment))
     static = look.objects.kinds[thing] == Kind.STATIC
@@ -146,16 +148,17 @@ def _collisions(look: _Look) -> tuple[FloatArray, FloatArray]:
 
 
 def _direction(look: _Look) -> FloatArray:
-    """1, 0.5 or 0 (B,) by the way travelled while the centre is on no way of the route."""
+    """1, 0.5 or 0 (B,) by the longest way in one go with the centre on no way of the route."""
     centres = look.boxes[..., :2]
     against = ~look.road.on_route.contains(centres)
     if not against.any():
         return np.ones(len(centres))
-    steps = np.hypot(*np.moveaxis(np.diff(centres, axis=1), -1, 0))
-    travelled = (steps * against[:, 1:]).sum(axis=1)
-    return np.where(
-        travelled < ONCOMING_FREE_M, 1.0, np.where(travelled < ONCOMING_HALF_M, 0.5, 0.0)
-    )
+    steps = np.zeros(against.shape)
+    steps[:, 1:] = np.hypot(*np.moveaxis(np.diff(centres, axis=1), -1, 0)) * against[:, 1:]
+    gone = np.cumsum(steps, axis=1)
+    before = np.maximum.accumulate(np.where(against, 0.0, gone), axis=1)
+    longest = (gone - before).max(axis=1)
+    return np.where(longest < ONCOMING_FREE_M, 1.0, np.where(longest < ONCOMING_HALF_M, 0.5, 0.0))
 
 
 def _progress(look: _Look, valid: FloatArray) -> FloatArray:
@@ -171,25 +174,38 @@ def _progress(look: _Look, valid: FloatArray) -> FloatArray:
 
 
 def _time_to_collision(look: _Look) -> FloatArray:
-    """1, or 0 (B,) where going on as now would hit somebody within 0.9 s of some moment."""
+    """1, or 0 (B,) where going on as now would hit somebody within 0.9 s of some moment.
+
+    Only the first such meeting with each object counts: one that does not matter, with somebody
+    behind or beside, has that object left out of all later ones.
+    """
     made = np.ones(len(look.states))
-    heading, speed = look.states[..., HEADING], look.states[..., SPEED]
-    for later in TTC_STEPS:
-        boxes = look.boxes.copy()
-        way = speed * (later * STEP_S)
-        boxes[..., 0] += way * np.cos(heading)
-        boxes[..., 1] += way * np.sin(heading)
-        proposal, moment, thing = look.contacts(boxes, later)
-        fresh = moment < look.first_hit[proposal, thing]
-        fresh &= (speed[proposal, moment] > STILL_MPS) & (made[proposal] > 0.0)
-        proposal, moment, thing = proposal[fresh], moment[fresh], thing[fresh]
-        moments = np.minimum((moment + later) // STEPS_A_SLICE, len(look.moving_boxes) - 1)
-        places = look.moving_boxes[moments, thing, :2]
-        bearing = bearings(look.states[proposal, moment], places)
-        made[proposal[bearing < AHEAD_RAD]] = 0.0
-        beside = (bearing >= AHEAD_RAD) & (bearing <= BEHIND_RAD) & (made[proposal] > 0.0)
-        proposal, moment = proposal[beside], moment[beside]
-        if len(proposal):
-            loose = look.in_intersection(proposal, moment) | look.astray(proposal, moment)
-            made[proposal[loose]] = 0.0
+    meetings = [_meetings(look, later) for later in TTC_STEPS]
+    proposal, moment, thing, later = (np.concatenate(rows) for rows in zip(*meetings, strict=True))
+    order = np.lexsort((later, moment))
+    pairs = (proposal * (len(look.objects) + 1) + thing)[order]
+    first = order[np.unique(pairs, return_index=True)[1]]
+    proposal, moment, thing, later = (row[first] for row in (proposal, moment, thing, later))
+    moments = np.minimum((moment + later) // STEPS_A_SLICE, len(look.moving_boxes) - 1)
+    places = look.moving_boxes[moments, thing, :2]
+    bearing = bearings(look.states[proposal, moment], places)
+    made[proposal[bearing < AHEAD_RAD]] = 0.0
+    beside = (bearing >= AHEAD_RAD) & (bearing <= BEHIND_RAD) & (made[proposal] > 0.0)
+    proposal, moment = proposal[beside], moment[beside]
+    if len(proposal):
+        loose = look.in_intersection(proposal, moment) | look.astray(proposal, moment)
+        made[proposal[loose]] = 0.0
     return made
+
+
+def _meetings(look: _Look, later: int) -> tuple[IntArray, IntArray, IntArray, IntArray]:
+    """Proposal, moment and object (K,) that meet if the ego goes straight on so many steps."""
+    heading, speed = look.states[..., HEADING], look.states[..., SPEED]
+    boxes = look.boxes.copy()
+    way = speed * (later * STEP_S)
+    boxes[..., 0] += way * np.cos(heading)
+    boxes[..., 1] += way * np.sin(heading)
+    proposal, moment, thing = look.contacts(boxes, later)
+    moving = speed[proposal, moment] > STILL_MPS
+    proposal, moment, thing = proposal[moving], moment[moving], thing[moving]
+    return proposal, moment, thing, np.full(len(proposal), later, dtype=np.int64)

@@ -109,6 +109,7 @@ def _leaders(
     quirks: Quirks,
 ) -> tuple[FloatArray, FloatArray]:
     """Where the leader's rear is (P, V), and its speed; nearest first, of equal ones the first."""
+    # As released: ahead is whose centre lies beyond the rear axle, even beside the ego itself.
     end = np.broadcast_to((ends_m - body.length_m / 2.0)[:, None], station.shape)
     moment = min(moment, len(corridor.near_m) - 1)
     near = corridor.near_m[moment][:, None, :]
@@ -116,7 +117,7 @@ def _leaders(
         return end, np.zeros(station.shape)
     middle = corridor.middle_m[moment][:, None, :]
     front = station[..., None]
-    ahead = (middle > front + body.centre_m) & (near - front < reach)
+    ahead = (middle > front) & (near - front < reach)
     rear = np.where(ahead, near, np.inf)
     which = rear.argmin(axis=-1)
     found = np.take_along_axis(rear, which[..., None], axis=-1)[..., 0]

@@ -53,7 +53,7 @@ class Walkers:
     """People with a walk, as interPlan has them.
 
     They are not there until the ego has come within `ACTIVE_WITHIN_M` of their start along the
-    centreline; then they go from start to end in what is left of the 15 s, and report a speed of
+    centreline; then they go from start to end in 15 s, however far that is, and report a speed of
     0, so that a planner takes them for standing unless `report_speed` says otherwise.
     """
 

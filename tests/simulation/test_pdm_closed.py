@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from augment.scene.entities import TrafficAgent
+from augment.scene.entities import Area, AreaKind, TrafficAgent
 from augment.simulation.braking import brake, must_brake
 from augment.simulation.pdm_closed import PdmClosed
 from augment.simulation.planning import Plan, Situation
@@ -124,6 +124,26 @@ def test_the_wrong_way_counts_by_2_and_6_m_in_4_s(speed: float, direction: float
     assert judged.parts["direction"].tolist() == [direction]
 
 
+def test_two_short_ways_beside_the_route_are_not_one_long_one() -> None:
+    # 1.6 m each, just across the line between the lanes; PDM-Closed takes the longest in one go.
+    states = states_along(np.full(41, 2.0), y_m=1.74)
+    states[5:13, 1] = states[20:28, 1] = 1.76
+    judged = planner().judge(states[None], objects_of([], speeds=True))
+    assert judged.parts["direction"].tolist() == [1.0]
+    states[13:20, 1] = 1.76
+    judged = planner().judge(states[None], objects_of([], speeds=True))
+    assert judged.parts["direction"].tolist() == [0.5]
+
+
+@pytest.mark.parametrize(("speed", "collision"), [(0.049, 1.0), (0.051, 0.0)])
+def test_who_hardly_moves_is_hit_rather_than_hits(speed: float, collision: float) -> None:
+    touching = [vehicle("A", 2.588 + 2.4, 0.0)]
+    judged = planner().judge(
+        states_along(np.full(41, speed))[None], objects_of(touching, speeds=True)
+    )
+    assert judged.parts["collision"].tolist() == [collision]
+
+
 def test_progress_is_a_share_of_the_best_valid_one() -> None:
     states = np.stack([states_along(np.full(41, speed)) for speed in (2.0, 4.0, 8.0)])
     parked = objects_of([vehicle("A", 30.0, 0.0)], speeds=True)  # 32 m are too far
@@ -138,6 +158,30 @@ def test_time_to_collision_looks_0_9_s_ahead_of_every_state(gap_m: float, ttc: f
     end_m = 20.0 + 2.588
     parked = objects_of([vehicle("A", end_m + gap_m + 2.4, 0.0)], speeds=True)
     assert planner().judge(states[None], parked).parts["ttc"].tolist() == [ttc]
+
+
+@pytest.mark.parametrize(("from_m", "ttc"), [(-1.0, 1.0), (-2.0, 0.0)])
+def test_of_each_object_the_first_meeting_ahead_of_time_counts(from_m: float, ttc: float) -> None:
+    # It would come from the side at once: that matters only to an ego whose rear axle, 1.46 m
+    # behind its centre, is in an intersection. Later on it would be met in front, or in one.
+    crossing = replace(vehicle("A", 1.0, 6.5, -math.pi / 2.0), speed_mps=8.0)
+    rim = ((from_m, -3.0), (60.0, -3.0), (60.0, 6.0), (from_m, 6.0))
+    area = Area(id="Area1", kind=AreaKind.INTERSECTION, boundary_m=rim)
+    made = PdmClosed()
+    made.start(Road(replace(street(), areas=(area,))), BODY)
+    judged = made.judge(states_along(np.full(41, 5.0))[None], objects_of([crossing], speeds=True))
+    assert judged.parts["ttc"].tolist() == [ttc]
+
+
+def test_who_stands_beside_the_rear_half_of_the_ego_is_a_leader_on_the_path_there() -> None:
+    # Its centre lies between rear axle and centre: beyond the rear axle is ahead, as released.
+    ends = []
+    for agents in ([], [vehicle("A", -0.7, 4.2)]):
+        plan = planned(agents, speed_mps=0.0)
+        assert plan.proposals is not None
+        left = PAPER_OFFSETS_M.index(3.0) * 5 + 4
+        ends.append(plan.proposals.states[left, -1, 3])
+    assert ends[1] < 0.1 < 4.0 < ends[0]
 
 
 def test_it_brakes_only_slowly_driven_and_soon_hit() -> None:
