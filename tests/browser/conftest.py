@@ -28,15 +28,11 @@ def _patience() -> None:
     expect.set_options(timeout=PATIENCE_MS)
 
 
-FONTLESS = {"test_voting_keys", "test_voting_loop", "test_voting_trouble"}
-"""Modules about keys, votes and faults, where no width of a letter counts: DejaVu alone."""
-
-
 def pytest_generate_tests(metafunc: pytest.Metafunc) -> None:
-    """All else runs once with each family: the widest, and the one with the widths of Arial."""
+    """DejaVu Sans, the widest; tests of layout once more with a family of the widths of Arial."""
     if "browser" in metafunc.fixturenames:
-        name = metafunc.module.__name__.rpartition(".")[2]
-        families = [DEJAVU] if name in FONTLESS else [DEJAVU, LIBERATION]
+        is_layout = metafunc.definition.get_closest_marker("layout") is not None
+        families = [DEJAVU, LIBERATION] if is_layout else [DEJAVU]
         ids = [family.name for family in families]
         metafunc.parametrize("browser", families, ids=ids, indirect=True, scope="package")
 

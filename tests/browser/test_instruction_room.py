@@ -12,7 +12,11 @@ from django.conf import settings
 from tests import study_rows
 from tests.browser.booth import Booth, press
 
-pytestmark = [pytest.mark.browser, pytest.mark.django_db(transaction=True)]
+pytestmark = [
+    pytest.mark.browser,
+    pytest.mark.layout,
+    pytest.mark.django_db(transaction=True),
+]
 
 SIZES = [(1024, 600), (1280, 720), (1366, 650), (820, 1180), (390, 844), (360, 640)]
 GERMAN = (

@@ -11,7 +11,7 @@ from playwright.sync_api import Browser
 from tests.browser.booth import PHONE
 from tests.browser.chromium import PATIENCE_MS
 
-pytestmark = pytest.mark.browser
+pytestmark = [pytest.mark.browser, pytest.mark.layout]
 SHEETS = ("tokens", "base", "components")
 
 

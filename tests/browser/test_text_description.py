@@ -107,6 +107,7 @@ def test_arrows_scroll_the_lists_that_have_the_focus_and_do_not_vote(told: Booth
     all_sent(page, 1)
 
 
+@pytest.mark.layout
 @pytest.mark.parametrize("size", [(1280, 720), (1366, 650), (1920, 1080)])
 def test_open_or_closed_nothing_scrolls_or_moves_and_every_button_is_free(
     told: Booth, size: tuple[int, int]
@@ -139,6 +140,7 @@ def test_axe_finds_nothing_with_the_lists_open(told: Booth, theme: str) -> None:
     assert faults(page) == []
 
 
+@pytest.mark.layout
 def test_a_phone_shows_the_lists_below_the_pictures(told: Booth) -> None:
     page = told.enter(viewport=PHONE, has_touch=True, is_mobile=True)
     page.locator("#text-switch").tap()

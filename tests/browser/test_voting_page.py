@@ -55,6 +55,7 @@ def test_axe_finds_nothing_on_any_page_of_voting(booth: Booth, theme: str) -> No
     assert faults(page) == [], "closed"
 
 
+@pytest.mark.layout
 @pytest.mark.parametrize("size", [(1280, 720), (1366, 650), (1920, 1080)])
 def test_nothing_scrolls_or_moves_and_the_pictures_are_as_large_as_can_be(
     booth: Booth, size: tuple[int, int]
@@ -88,6 +89,7 @@ def test_nothing_scrolls_or_moves_and_the_pictures_are_as_large_as_can_be(
         assert min(box["height"], box["width"]) >= 44, button.inner_text()
 
 
+@pytest.mark.layout
 def test_a_phone_shows_one_above_the_other_and_a_bar_to_tap(booth: Booth) -> None:
     page = booth.enter(viewport=PHONE, has_touch=True, is_mobile=True)
     first, second = (panel.bounding_box() for panel in page.locator(".panel").all())
@@ -109,6 +111,7 @@ def test_a_phone_shows_one_above_the_other_and_a_bar_to_tap(booth: Booth) -> Non
     assert booth.outcomes() == ["right", "skip"]
 
 
+@pytest.mark.layout
 def test_everything_but_looking_closely_goes_without_a_script(booth: Booth) -> None:
     booth.study.allow_both_miss = True
     booth.study.save()

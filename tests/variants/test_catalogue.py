@@ -80,9 +80,10 @@ def test_every_recipe_is_played() -> None:
 @pytest.mark.slow
 @pytest.mark.timeout(400)
 @pytest.mark.parametrize("variant", CALLS_OF_GOOD)
-def test_every_variant_does_every_scenario(server: FakeServer, variant: str) -> None:
+def test_every_variant_does_the_scenarios(server: FakeServer, variant: str) -> None:
     reviewed = RECIPES[variant].review is not Review.NONE
-    for slug in SLUGS:
+    # What is put together of two known parts shows on a quarter of them.
+    for slug in SLUGS[::4] if "+" in variant else SLUGS:
         outcome, transcript = played(server, "fake-good", variant, slug)
         assert outcome.status is OutcomeStatus.DONE, slug
         assert outcome.is_accepted is (True if reviewed else None), slug
