@@ -10,7 +10,9 @@ from django.contrib import messages
 from django.db import transaction
 from django.http import Http404, HttpRequest, HttpResponse, HttpResponseBase
 from django.shortcuts import get_object_or_404, redirect, render
+from django.urls import reverse
 from django.utils.text import slugify
+from django.utils.translation import gettext as _
 from django.utils.translation import ngettext
 from django.views.decorators.http import require_POST, require_safe
 
@@ -36,6 +38,8 @@ from augment.services.wording import translate
 from augment.tasks import enqueue_simulations
 
 LABELS = {"nuplan": "nuPlan", "interplan": "interPlan"}
+PDM_CLOSED = Options().planner
+PLANNERS = {PDM_CLOSED: "PDM-Closed", "idm": "IDM"}
 
 
 @allow_only(ADMIN)
@@ -43,13 +47,17 @@ LABELS = {"nuplan": "nuPlan", "interplan": "interPlan"}
 def simulate_job(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
     """Have the job's results driven by the workers."""
     job = get_object_or_404(GenerationJob, code=code)
+    planner = request.POST.get("planner", PDM_CLOSED)
     options = Options(
-        planner=request.POST.get("planner", "pdm-closed"),
-        offsets=request.POST.get("offsets", "paper"),
+        planner=planner,
+        offsets=request.POST.get("offsets", "paper") if planner == PDM_CLOSED else "paper",
         is_reactive=request.POST.get("reactive") == "on",
     )
+    score = request.POST.get("score", NUPLAN)
     try:
         options.check_built_in()
+        if score not in SCORES:
+            raise UnknownName("score", score, list(SCORES))
         with transaction.atomic():
             waiting = simulations.plan_job(job=job, options=options)
             transaction.on_commit(partial(_send, request, waiting))
@@ -62,7 +70,8 @@ def simulate_job(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
             ngettext("%(number)s drive is queued.", "%(number)s drives are queued.", number)
             % {"number": number},
         )
-    return redirect("job", code=code)
+    shown = f"?score={score}#driving" if score in SCORES else "#driving"
+    return redirect(reverse("job", args=[code]) + shown)
 
 
 @allow_only(*STAFF)
@@ -88,7 +97,8 @@ def drives_page(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
         for row in cells.grid.rows
     ]
     context = {"job": job, "lines": lines, "contestants": cells.grid.contestants, "score": score}
-    return render(request, "drives/list.html", context | {"labels": LABELS})
+    driven = {"labels": LABELS, "driven": _way_asked(request, options_driven(job))}
+    return render(request, "drives/list.html", context | driven)
 
 
 @allow_only(*STAFF)
@@ -142,7 +152,20 @@ def export(request: HttpRequest, code: uuid.UUID, form: str) -> HttpResponse:
 def section(request: HttpRequest, job: GenerationJob) -> dict[str, object]:
     """What the part of the job's page shows."""
     table = _table(request, job)
-    return {"table": table, "forms": FORMATS, **_shown(table)}
+    known = options_driven(job)
+    chosen = _way_asked(request, known)
+    ways = [
+        {
+            "planner": PLANNERS.get(one.planner, one.planner),
+            "offsets": _offsets()[one.offsets] if one.planner == PDM_CLOSED else "",
+            "is_reactive": one.is_reactive,
+            "is_shown": number == chosen,
+        }
+        for number, one in enumerate(known)
+    ]
+    choices = {"planner": PLANNERS.items(), "offsets": _offsets().items()}
+    asked = {"ways": ways, "driven": chosen, "choices": choices, "asked": table.scores.options}
+    return {"table": table, "forms": FORMATS, **asked, **_shown(table)}
 
 
 def driving(snapshot: Snapshot, table: LeaderboardTable) -> dict[str, Any]:
@@ -186,10 +209,17 @@ def _score_asked(request: HttpRequest) -> str:
 def _options_asked(request: HttpRequest, job: GenerationJob) -> Options:
     """As the address says, else the way in which the job was driven last."""
     known = options_driven(job)
+    return known[_way_asked(request, known)] if known else Options()
+
+
+def _way_asked(request: HttpRequest, known: list[Options]) -> int:
     wanted = request.GET.get("driven", "")
-    if wanted.isdigit() and int(wanted) < len(known):
-        return known[int(wanted)]
-    return known[0] if known else Options()
+    return int(wanted) if wanted.isdecimal() and int(wanted) < len(known) else 0
+
+
+def _offsets() -> dict[str, str]:
+    """What the names of the lateral offsets mean."""
+    return {"paper": _("Up to 4 m (paper)"), "original": _("Up to 1 m (original)")}
 
 
 def _driven(code: uuid.UUID) -> Simulation:

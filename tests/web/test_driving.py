@@ -5,6 +5,7 @@ from __future__ import annotations
 import io
 import json
 from collections.abc import Callable
+from html.parser import HTMLParser
 
 import pytest
 from django.urls import reverse
@@ -18,6 +19,32 @@ from tests.web.cast import people, signed_in
 pytestmark = pytest.mark.django_db
 
 OnCommit = Callable[..., object]
+
+
+class HTMLForm(HTMLParser):
+    """What the fields of one form offer, by the form's class."""
+
+    def __init__(self, css_class: str) -> None:
+        super().__init__()
+        self._class, self._inside, self._select = css_class, False, ""
+        self.found: dict[str, list[str]] = {}
+
+    @classmethod
+    def named(cls, page: str, css_class: str) -> dict[str, list[str]]:
+        made = cls(css_class)
+        made.feed(page)
+        return made.found
+
+    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        given = {name: value or "" for name, value in attrs}
+        if tag == "form":
+            self._inside = given.get("class") == self._class
+        elif self._inside and tag == "select":
+            self._select = given["name"]
+        elif self._inside and tag == "option":
+            self.found.setdefault(self._select, []).append(given["value"])
+        elif self._inside and tag == "input" and given.get("type") != "hidden":
+            self.found[given["name"]] = [given["value"]]
 
 
 def launched(scenarios: int = 1) -> GenerationJob:
@@ -34,9 +61,45 @@ def test_the_button_plans_the_drives_and_queues_them(
     )
     with django_capture_on_commit_callbacks() as waiting:  # type: ignore[attr-defined]
         answer = admin.post(reverse("job-simulate", args=[job.code]))
-    assert answer.headers["Location"] == reverse("job", args=[job.code])
+    assert answer.headers["Location"] == reverse("job", args=[job.code]) + "?score=nuplan#driving"
     assert Simulation.objects.filter(state="queued").count() == 6
     assert len(waiting) == 1
+
+
+def test_the_button_offers_what_the_command_does() -> None:
+    job = launched()
+    admin = signed_in(people()["admin"])
+    page = reverse("job", args=[job.code])
+    form = HTMLForm.named(admin.get(page).content.decode(), "drive-how")
+    assert form == {
+        "planner": ["pdm-closed", "idm"],
+        "offsets": ["paper", "original"],
+        "score": ["nuplan", "interplan"],
+        "reactive": ["on"],
+    }
+    sent = {"planner": "pdm-closed", "offsets": "original", "reactive": "on", "score": "interplan"}
+    shown = admin.post(reverse("job-simulate", args=[job.code]), sent, follow=True)
+    assert shown.redirect_chain[0][0] == f"{page}?score=interplan#driving"
+    rows_made = Simulation.objects.values_list("planner", "offsets", "is_reactive").distinct()
+    assert set(rows_made) == {("pdm-closed", "original", True)}
+    # Asked for in two ways, the page shows the latest and leads to the other.
+    sent = {"planner": "idm", "offsets": "original", "score": "nuplan"}
+    shown = admin.post(reverse("job-simulate", args=[job.code]), sent, follow=True)
+    assert set(Simulation.objects.values_list("planner", "offsets", "is_reactive")) == {
+        ("pdm-closed", "original", True), ("idm", "paper", False)
+    }  # fmt: skip
+    text = shown.content.decode()
+    assert "Up to 1 m (original)" in text
+    other = admin.get(page + "?driven=1&score=nuplan").content.decode()
+    assert '<option value="original" selected>' in other
+
+
+def test_a_score_that_nobody_knows_drives_nothing() -> None:
+    job = launched()
+    admin = signed_in(people()["admin"])
+    shown = admin.post(reverse("job-simulate", args=[job.code]), {"score": "carla"}, follow=True)
+    assert "carla" in shown.content.decode()
+    assert not Simulation.objects.exists()
 
 
 @pytest.mark.parametrize("planner", ["pdm-open", "tests.jobs.test_simulations.Straight"])
