@@ -29,7 +29,7 @@ from augment.geometry.boxes import Box, overlap
 from augment.geometry.polyline import Polyline
 from augment.scene.entities import AgentType, Scene, TrafficAgent
 from augment.scene.intent import ConesRequest, Intent, WalkRequest
-from augment.scene.lane_graph import Way
+from augment.scene.lane_graph import AnyLane
 from augment.scene.modification import Modification
 from augment.scene.sizes import LENGTH_WIDTH_M
 
@@ -60,12 +60,12 @@ class Places:
 
     Attributes:
         points_m, headings_rad: (P, 2) and (P,), in the direction of travel.
-        way_ids: Of the lane or connector, (P,).
+        lane_ids: Of the lane or connector, (P,).
     """
 
     points_m: NDArray[np.float64]
     headings_rad: NDArray[np.float64]
-    way_ids: tuple[str, ...]
+    lane_ids: tuple[str, ...]
 
 
 def place(
@@ -113,17 +113,17 @@ def places_of(scene: Scene) -> Places:
         CannotPlace: No centreline comes near enough to the ego.
     """
     points, headings, ids = [], [], []
-    ways: list[Way] = [*scene.lanes, *scene.connectors]
-    for way in ways:
-        found, turned = _along(way.centerline)
+    lanes: list[AnyLane] = [*scene.lanes, *scene.connectors]
+    for lane in lanes:
+        found, turned = _along(lane.centerline)
         near = np.hypot(found[:, 0], found[:, 1]) <= FURTHEST_M
         points.append(found[near])
         headings.append(turned[near])
-        ids += [way.id] * int(near.sum())
+        ids += [lane.id] * int(near.sum())
     if not ids:
         raise CannotPlace(f"No lane lies within {FURTHEST_M:g} m of the ego.")
     return Places(
-        points_m=np.vstack(points), headings_rad=np.concatenate(headings), way_ids=tuple(ids)
+        points_m=np.vstack(points), headings_rad=np.concatenate(headings), lane_ids=tuple(ids)
     )
 
 
@@ -204,7 +204,7 @@ def _drawn(
             x_m=round(float(x_m), 3),
             y_m=round(float(y_m), 3),
             heading_rad=round(float(places.headings_rad[index]), 5),
-            lane_id=places.way_ids[index],
+            lane_id=places.lane_ids[index],
         )
         if not any(overlap(_box(made), _box(other)).depth_m > 0.0 for other in others):
             return made

@@ -20,7 +20,7 @@ from augment.scene.intent import (
     Shape,
     Side,
 )
-from augment.scene.lane_graph import PlaceOnWay
+from augment.scene.lane_graph import LanePosition
 from augment.scene.sizes import LENGTH_WIDTH_M
 
 CONE_SPACING_M = 2.5
@@ -50,7 +50,7 @@ def cones(
     if spacing_m < 2.0 * _EDGE_M:
         raise CannotPlace(f"Cones {spacing_m:g} m apart would stand in each other.")
     lane = request.spot.lane
-    half_lane_m = ground.way(ground.beside(ground.along(distance_m), lane)).width_m / 2.0
+    half_lane_m = ground.lane(ground.beside(ground.along(distance_m), lane)).width_m / 2.0
     edge_m = half_lane_m - _EDGE_M
     places = _places(request, ground, distance_m, spacing_m, edge_m)
     agents = [
@@ -183,17 +183,17 @@ def _sign(side: Side) -> float:
     return 1.0 if side is Side.LEFT else -1.0
 
 
-def _at(ground: PlacingGround, lane: LaneChoice | None, place: Place) -> PlaceOnWay:
+def _at(ground: PlacingGround, lane: LaneChoice | None, place: Place) -> LanePosition:
     """The place (s, d): s along the ego's lane, d from the centre of the lane asked for."""
     s_m, d_m = place
     centre = ground.beside(ground.along(s_m), lane)
     sign = -1.0 if lane is LaneChoice.ONCOMING else 1.0
-    return ground.graph.place(centre.way_id, centre.s_m, sign * d_m)
+    return ground.graph.place(centre.lane_id, centre.s_m, sign * d_m)
 
 
-def _standing(kind: AgentType, place: PlaceOnWay, ground: PlacingGround) -> TrafficAgent:
+def _standing(kind: AgentType, place: LanePosition, ground: PlacingGround) -> TrafficAgent:
     length_m, width_m = LENGTH_WIDTH_M[kind]
-    on_lane = abs(place.d_m) <= ground.way(place).width_m / 2.0
+    on_lane = abs(place.d_m) <= ground.lane(place).width_m / 2.0
     return TrafficAgent(
         id="",
         type=kind,
@@ -202,5 +202,5 @@ def _standing(kind: AgentType, place: PlaceOnWay, ground: PlacingGround) -> Traf
         heading_rad=place.pose.heading_rad,
         length_m=length_m,
         width_m=width_m,
-        lane_id=place.way_id if on_lane else ground.lane_at(place.pose),
+        lane_id=place.lane_id if on_lane else ground.lane_at(place.pose),
     )

@@ -108,7 +108,7 @@ def _row_pose(
     request: CrashRequest, ground: PlacingGround, distance_m: float, index: int, looseness: float
 ) -> Pose:
     place = ground.beside(ground.along(distance_m), request.spot.lane)
-    pose = ground.graph.place(place.way_id, place.s_m, looseness * _SIDES_M[index]).pose
+    pose = ground.graph.place(place.lane_id, place.s_m, looseness * _SIDES_M[index]).pose
     turn_rad = looseness * _TURNS_RAD[index]
     if index == 0:
         turn_rad += FACING_RAD[request.facing or Facing.WITH_LANE]
@@ -124,7 +124,7 @@ def _chained(
 ) -> list[Pose]:
     """Each where the intent puts it against the one before."""
     centre = ground.beside(ground.along(distance_m), request.spot.lane)
-    spot = ground.graph.place(centre.way_id, centre.s_m, left_m)
+    spot = ground.graph.place(centre.lane_id, centre.s_m, left_m)
     lane_rad = spot.pose.heading_rad
     turn_rad = FACING_RAD[request.facing or Facing.WITH_LANE]
     poses = [

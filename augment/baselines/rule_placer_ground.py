@@ -26,7 +26,7 @@ from augment.scene.entities import (
     TrafficAgent,
 )
 from augment.scene.intent import LaneChoice, Setting, Side
-from augment.scene.lane_graph import PlaceOnWay, Way
+from augment.scene.lane_graph import AnyLane, LanePosition
 
 _STEP_M = 0.25
 _GAP_M = 1.5
@@ -59,7 +59,7 @@ class PlacingGround:
         self.route, self.graph = route, route.graph
         self.kerb = Side(scene.traffic_side.value)
 
-    def along(self, distance_m: float, d_m: float = 0.0) -> PlaceOnWay:
+    def along(self, distance_m: float, d_m: float = 0.0) -> LanePosition:
         """The place that far along the ego's lane (negative: back) and d to its left.
 
         Raises:
@@ -71,7 +71,7 @@ class PlacingGround:
             raise CannotPlace(f"The lanes end {end:.0f} m {where} the ego.")
         return place
 
-    def beside(self, place: PlaceOnWay, lane: LaneChoice | None) -> PlaceOnWay:
+    def beside(self, place: LanePosition, lane: LaneChoice | None) -> LanePosition:
         """The place on a lane next to a place on the ego's own; there the centre of that lane.
 
         Where no lane is said it is the ego's own.
@@ -81,28 +81,28 @@ class PlacingGround:
         """
         if lane in (None, LaneChoice.OWN):
             return place
-        way_id = self._oncoming(place) if lane is LaneChoice.ONCOMING else None
-        way = self.graph.way(place.way_id)
-        if lane is LaneChoice.LEFT and isinstance(way, Lane):
-            way_id = way.left_neighbor
-        if lane is LaneChoice.RIGHT and isinstance(way, Lane):
-            way_id = way.right_neighbor
-        if way_id is None or way_id not in self.graph.ways:
+        lane_id = self._oncoming(place) if lane is LaneChoice.ONCOMING else None
+        here = self.graph.lane(place.lane_id)
+        if lane is LaneChoice.LEFT and isinstance(here, Lane):
+            lane_id = here.left_neighbor
+        if lane is LaneChoice.RIGHT and isinstance(here, Lane):
+            lane_id = here.right_neighbor
+        if lane_id is None or lane_id not in self.graph.lanes:
             words = "oncoming lane" if lane is LaneChoice.ONCOMING else f"lane on the {lane}"
             raise CannotPlace(f"The map has no {words} beside the ego's lane there.")
-        s_m = self.graph.way(way_id).centerline.project(place.pose.x_m, place.pose.y_m).s_m
-        return self.graph.place(way_id, s_m)
+        s_m = self.graph.lane(lane_id).centerline.project(place.pose.x_m, place.pose.y_m).s_m
+        return self.graph.place(lane_id, s_m)
 
-    def way(self, place: PlaceOnWay) -> Way:
+    def lane(self, place: LanePosition) -> AnyLane:
         """The lane or connector of a place."""
-        return self.graph.way(place.way_id)
+        return self.graph.lane(place.lane_id)
 
-    def has_neighbour(self, place: PlaceOnWay, side: Side) -> bool:
+    def has_neighbour(self, place: LanePosition, side: Side) -> bool:
         """Whether another lane of the same direction lies on that side of the place's lane."""
-        way = self.way(place)
-        if not isinstance(way, Lane):
+        lane = self.lane(place)
+        if not isinstance(lane, Lane):
             return False
-        return (way.left_neighbor if side is Side.LEFT else way.right_neighbor) is not None
+        return (lane.left_neighbor if side is Side.LEFT else lane.right_neighbor) is not None
 
     def lane_at(self, pose: Pose) -> str | None:
         """The id of the lane under a pose, None off every lane."""
@@ -112,7 +112,7 @@ class PlacingGround:
         """How far an agent stands left of the centre of its lane, 0 off every lane."""
         if agent.lane_id is None:
             return 0.0
-        return self.graph.way(agent.lane_id).centerline.project(agent.x_m, agent.y_m).d_m
+        return self.graph.lane(agent.lane_id).centerline.project(agent.x_m, agent.y_m).d_m
 
     def road_edge_m(self, pose: Pose, side: Side) -> float:
         """How far from a pose on a lane its road ends on that side, straight across.
@@ -120,7 +120,7 @@ class PlacingGround:
         The road is the lanes that run along with it, in either direction, and what else can be
         driven on up to 4 m beyond them: a parking lane belongs to it, a side road does not.
         """
-        near = [way for way in self.graph.ways.values() if self._runs_along(way, pose)]
+        near = [lane for lane in self.graph.lanes.values() if self._runs_along(lane, pose)]
         lanes_m = self._scan(pose, side, 0.0, lambda point: _on_any(near, point))
         end_m = self._scan(
             pose, side, lanes_m, lambda point: self.within(point, AreaKind.DRIVABLE)
@@ -166,7 +166,7 @@ class PlacingGround:
             return False
         if any(area.kind is AreaKind.INTERSECTION for area in self.scene.areas):
             return self.within((place.pose.x_m, place.pose.y_m), AreaKind.INTERSECTION)
-        return isinstance(self.way(place), LaneConnector)
+        return isinstance(self.lane(place), LaneConnector)
 
     def _crosses_junction(self, distance_m: float) -> bool:
         """Whether an intersection lies between the ego and a place, or at the place."""
@@ -205,24 +205,24 @@ class PlacingGround:
             low, high = (low, middle) if found is None else (middle, high)
         return low, "ahead of" if sign > 0.0 else "behind"
 
-    def _oncoming(self, place: PlaceOnWay) -> str | None:
+    def _oncoming(self, place: LanePosition) -> str | None:
         """The nearest way across the road that leads the other way."""
         for step in range(1, int(_ONCOMING_WITHIN_M / _STEP_M)):
             for d_m in (step * _STEP_M, -step * _STEP_M):
                 x_m, y_m = place.pose.to_parent(np.array([[0.0, d_m]]))[0]
-                way_id = self.graph.under(x_m, y_m, place.pose.heading_rad + math.pi)
-                if way_id is None:
+                lane_id = self.graph.under(x_m, y_m, place.pose.heading_rad + math.pi)
+                if lane_id is None:
                     continue
-                line = self.graph.way(way_id).centerline
+                line = self.graph.lane(lane_id).centerline
                 heading_rad = line.heading_at(line.project(x_m, y_m).s_m)
                 if abs(difference(heading_rad, place.pose.heading_rad)) > math.radians(135.0):
-                    return way_id
+                    return lane_id
         return None
 
-    def _runs_along(self, way: Way, pose: Pose) -> bool:
-        place = way.centerline.project(pose.x_m, pose.y_m)
-        turn_rad = abs(difference(way.centerline.heading_at(place.s_m), pose.heading_rad))
-        return place.distance_m <= _WIDEST_M + way.width_m / 2.0 and (
+    def _runs_along(self, lane: AnyLane, pose: Pose) -> bool:
+        place = lane.centerline.project(pose.x_m, pose.y_m)
+        turn_rad = abs(difference(lane.centerline.heading_at(place.s_m), pose.heading_rad))
+        return place.distance_m <= _WIDEST_M + lane.width_m / 2.0 and (
             min(turn_rad, math.pi - turn_rad) <= _ALONG_RAD
         )
 
@@ -242,8 +242,10 @@ class PlacingGround:
         return end_m
 
 
-def _on_any(ways: list[Way], point_m: Point) -> bool:
-    return any(way.centerline.project(*point_m).distance_m <= way.width_m / 2.0 for way in ways)
+def _on_any(lanes: list[AnyLane], point_m: Point) -> bool:
+    return any(
+        lane.centerline.project(*point_m).distance_m <= lane.width_m / 2.0 for lane in lanes
+    )
 
 
 def _inside(point_m: Point, boundary_m: NDArray[np.float64]) -> bool:

@@ -21,7 +21,7 @@ from augment.scene.intent import (
     Side,
     VehicleRequest,
 )
-from augment.scene.lane_graph import PlaceOnWay
+from augment.scene.lane_graph import LanePosition
 from augment.scene.sizes import LENGTH_WIDTH_M
 
 SIZES_M: dict[Body, tuple[float, float]] = {
@@ -88,18 +88,18 @@ def _vehicle(
     request: VehicleRequest, ground: PlacingGround, distance_m: float, d_m: float
 ) -> TrafficAgent:
     centre = ground.beside(ground.along(distance_m), request.spot.lane)
-    place = ground.graph.place(centre.way_id, centre.s_m, d_m)
+    place = ground.graph.place(centre.lane_id, centre.s_m, d_m)
     turn_rad = FACING_RAD[request.facing or Facing.WITH_LANE] + math.radians(request.turn_deg)
     pose = Pose(
         x_m=place.pose.x_m,
         y_m=place.pose.y_m,
         heading_rad=wrap(place.pose.heading_rad + turn_rad),
     )
-    return build_vehicle(request.body, pose, place.way_id, request.speed_mps or 0.0)
+    return build_vehicle(request.body, pose, place.lane_id, request.speed_mps or 0.0)
 
 
 def _offset_m(
-    request: VehicleRequest, ground: PlacingGround, place: PlaceOnWay, rng: np.random.Generator
+    request: VehicleRequest, ground: PlacingGround, place: LanePosition, rng: np.random.Generator
 ) -> float:
     """How far left of the lane's own direction (right is negative) the box stands."""
     lateral = request.spot.lateral
@@ -109,7 +109,7 @@ def _offset_m(
     at_kerb = lateral.target is LateralTarget.KERB and lateral.nearness is Nearness.AT_EDGE
     if (lateral.on_shoulder or at_kerb) and ground.has_neighbour(place, side):
         raise CannotPlace(f"On the {side} is another lane, not the edge of the road.")
-    half_lane_m = ground.way(place).width_m / 2.0
+    half_lane_m = ground.lane(place).width_m / 2.0
     half_box_m = SIZES_M[request.body][1] / 2.0
     if lateral.offset is not None:
         size_m = float(rng.uniform(lateral.offset.low_m, lateral.offset.high_m))

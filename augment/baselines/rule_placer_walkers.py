@@ -58,7 +58,7 @@ def _walker(
 ) -> TrafficAgent:
     place = ground.along(distance_m)
     if request.on_road:
-        from_m = ground.way(place).width_m / 4.0
+        from_m = ground.lane(place).width_m / 4.0
     else:
         from_m = ground.road_edge_m(place.pose, start) + _BEYOND_EDGE_M
     arrives = ground.along(distance_m + (request.drift_m or 0.0)).pose

@@ -62,7 +62,7 @@ def _fields(agent: TrafficAgent, names: ShortNames) -> dict[str, object]:
         "width_m": round(agent.width_m, 3),
         "length_m": round(agent.length_m, 3),
         "speed_mps": round(agent.speed_mps, 2),
-        "lane": None if agent.lane_id is None else names.ways.get(agent.lane_id),
+        "lane": None if agent.lane_id is None else names.lanes.get(agent.lane_id),
     }
     if agent.type is AgentType.PEDESTRIAN and agent.walk_to_m is not None:
         fields["walk_to"] = [round(value, 2) for value in agent.walk_to_m]

@@ -37,7 +37,7 @@ def neighbour_lane(route: EgoRoute, agents: Agents, rng: random.Random) -> Agent
     """One lane to the left or right."""
     if any(walks(agent) for agent in agents):
         return None  # which lane a crossing pedestrian starts beside is nothing that is asked for
-    left_m = rng.choice((-1.0, 1.0)) * route.graph.way(route.lane_id).width_m
+    left_m = rng.choice((-1.0, 1.0)) * route.graph.lane(route.lane_id).width_m
     things = [route.locate_agent(agent).left_m for agent in agents if is_thing(agent)]
     middle_m = sum(things) / len(things)
     if abs(2.0 * middle_m + left_m) < SEEN_SIDE_M:
@@ -102,7 +102,7 @@ def _list_junction_ends(route: EgoRoute) -> list[float]:
     return [
         end_m
         for name, end_m in zip(route.lane_ids, route.ends_m, strict=True)
-        if end_m > 0.0 and isinstance(route.graph.way(name), LaneConnector)
+        if end_m > 0.0 and isinstance(route.graph.lane(name), LaneConnector)
     ]
 
 

@@ -25,7 +25,7 @@ def asked_distance(asked: Asked) -> Iterator[Finding]:
     """One finding a request: wrong beyond the tolerance.
 
     A crash counts by its first vehicle, cones by the first, a ring by its middle, pedestrians
-    by where a walk begins or meets the ego's way. Where the number is wrong, which is a fault of
+    by where a walk begins or meets the ego's route. Where the number is wrong, which is a fault of
     its own, any may be the first, and where the first is missing the next one is.
     """
     for party in asked.parties:
@@ -100,7 +100,7 @@ def _to_next_m(party: Party) -> float:
 
 
 def _ends_on_road(asked: Asked, agent: TrafficAgent) -> Iterator[tuple[float, float]]:
-    """Where a walk is level with the middle of the ego's way, if it gets there."""
+    """Where a walk is level with the middle of the ego's route, if it gets there."""
     if agent.walk_to_m is None:
         return
     start, end = asked.left_m(agent), asked.route.locate(*agent.walk_to_m).left_m

@@ -1,4 +1,4 @@
-"""Where pedestrians come from, where they look, and whether they cross the ego's way."""
+"""Where pedestrians come from, where they look, and whether they cross the ego's route."""
 
 from __future__ import annotations
 

@@ -91,11 +91,11 @@ class Finding:
     Attributes:
         agents: Ids of the agents it is about; the first is a changed one. None for what is
             missing altogether.
-        ways: Ids of the lanes and connectors that it names.
+        lanes: Ids of the lanes and connectors that it names.
         measured: Numbers by name, each name with its unit; None where there is nothing to
             measure. Left and counter-clockwise are positive.
         belongs_m: Where what was asked for would be, None where that is no one place.
-        template: Our own words with fields for `agents`, `ways` and the numbers. A number's sign
+        template: Our own words with fields for `agents`, `lanes` and the numbers. A number's sign
             is told by the words: a field shows its size alone.
     """
 
@@ -103,7 +103,7 @@ class Finding:
     severity: Severity
     agents: tuple[str, ...]
     template: str
-    ways: tuple[str, ...] = ()
+    lanes: tuple[str, ...] = ()
     belongs_m: Point | None = None
     measured: Mapping[str, float | None] = field(default_factory=dict, hash=False)
 
@@ -124,13 +124,13 @@ class Finding:
         """The finding in words.
 
         Args:
-            names: What to call agents and ways instead of their ids, such as the short names of
+            names: What to call agents and lanes instead of their ids, such as the short names of
                 a prompt; an id that is not in it stays.
         """
         known = {} if names is None else names
         sizes = {name: abs(value) for name, value in self.measured.items() if value is not None}
         return self.template.format(
             agents=[known.get(one, one) for one in self.agents],
-            ways=[known.get(one, one) for one in self.ways],
+            lanes=[known.get(one, one) for one in self.lanes],
             **sizes,
         )

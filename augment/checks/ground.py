@@ -9,8 +9,8 @@ import heapq
 from dataclasses import dataclass
 from functools import cached_property
 
+from augment.checks.lane_index import LaneIndex
 from augment.checks.surfaces import Surface
-from augment.checks.ways import Ways
 from augment.scene.ego_route import REACH_M, EgoRoute
 from augment.scene.entities import AreaKind, Scene
 from augment.scene.lane_graph import LaneGraph
@@ -26,24 +26,24 @@ class Ground:
     Attributes:
         scene: The scene before the change.
         graph: What follows what.
-        ways: Where every lane and connector lies.
+        lanes: Where every lane and connector lies.
     """
 
     scene: Scene
     graph: LaneGraph
-    ways: Ways
+    lanes: LaneIndex
 
     @classmethod
     def of(cls, scene: Scene) -> Ground:
         """The ground of a scene; surfaces are laid out when they are first asked for."""
         graph = LaneGraph(scene)
-        return cls(scene=scene, graph=graph, ways=Ways(graph.ways.values()))
+        return cls(scene=scene, graph=graph, lanes=LaneIndex(graph.lanes.values()))
 
     @cached_property
     def road(self) -> Surface:
         """What vehicles may stand on."""
         areas = (area for area in self.scene.areas if area.kind in _ROAD)
-        return Surface.of(self.graph.ways.values(), areas)
+        return Surface.of(self.graph.lanes.values(), areas)
 
     @cached_property
     def everything(self) -> Surface:
@@ -67,10 +67,10 @@ class Ground:
 
     @cached_property
     def starts_m(self) -> tuple[tuple[str, float], ...]:
-        """How far ahead of the ego ways begin, measured along the lanes: id and metres.
+        """How far ahead of the ego lanes begin, measured along the lanes: id and metres.
 
-        Successors of the ego's way are followed forwards, predecessors backwards, both up to
-        `REACH_M`. On a loop a way comes twice: once ahead, once behind.
+        Successors of the ego's lane are followed forwards, predecessors backwards, both up to
+        `REACH_M`. On a loop a lane comes twice: once ahead, once behind.
         """
         if self.route is None:
             return ()
@@ -79,11 +79,11 @@ class Ground:
         behind = self._reached(lane_id, begins_m, forwards=False)
         return (*ahead.items(), *behind.items())
 
-    def _reached(self, way_id: str, start_m: float, *, forwards: bool) -> dict[str, float]:
-        """Dijkstra over whole ways: the signed distance from the ego to each way's start."""
-        lengths = {name: way.centerline.length_m for name, way in self.graph.ways.items()}
+    def _reached(self, lane_id: str, start_m: float, *, forwards: bool) -> dict[str, float]:
+        """Dijkstra over whole lanes: the signed distance from the ego to each lane's start."""
+        lengths = {name: lane.centerline.length_m for name, lane in self.graph.lanes.items()}
         found: dict[str, float] = {}
-        queue = [(abs(start_m), way_id, start_m)]
+        queue = [(abs(start_m), lane_id, start_m)]
         while queue:
             _, here, begins_m = heapq.heappop(queue)
             if here in found:

@@ -6,8 +6,8 @@ import math
 from collections.abc import Iterator
 
 from augment.checks.finding import Finding, FindingKind, Severity
+from augment.checks.lane_index import Beside
 from augment.checks.situation import ChangedScene, is_stopped
-from augment.checks.ways import Beside
 from augment.geometry.angles import difference
 from augment.scene.entities import AgentType, TrafficAgent
 
@@ -34,12 +34,12 @@ def heading(situation: ChangedScene) -> Iterator[Finding]:
 def _finding(agent: TrafficAgent, place: Beside, situation: ChangedScene) -> Finding:
     turn_deg = math.degrees(difference(agent.heading_rad, place.tangent_rad))
     if abs(turn_deg) > OPPOSITE_ABOVE_DEG:
-        words = "against the direction of {ways[0]} (turned by {turn_deg:.0f} degrees)"
+        words = "against the direction of {lanes[0]} (turned by {turn_deg:.0f} degrees)"
     elif abs(turn_deg) < 0.5:
-        words = "along {ways[0]}"
+        words = "along {lanes[0]}"
     else:
         side = "left" if turn_deg >= 0.0 else "right"
-        words = f"{{turn_deg:.0f}} degrees to the {side} of the direction of {{ways[0]}}"
+        words = f"{{turn_deg:.0f}} degrees to the {side} of the direction of {{lanes[0]}}"
     severity = _severity(agent, abs(turn_deg), situation)
     if severity is not Severity.FACT:
         minus = "-" if place.tangent_rad < 0.0 else ""
@@ -48,7 +48,7 @@ def _finding(agent: TrafficAgent, place: Beside, situation: ChangedScene) -> Fin
         kind=FindingKind.HEADING,
         severity=severity,
         agents=(agent.id,),
-        ways=(place.way_id,),
+        lanes=(place.lane_id,),
         measured={"turn_deg": turn_deg, "lane_heading_rad": place.tangent_rad},
         template=f"{{agents[0]}} faces {words}.",
     )

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from augment.checks.finding import Finding, FindingKind, Severity
+from augment.checks.lane_index import Beside
 from augment.checks.situation import ChangedScene
-from augment.checks.ways import Beside
 
 
 def lane(situation: ChangedScene) -> Iterator[Finding]:
@@ -27,7 +27,7 @@ def _on(agent_id: str, place: Beside) -> Finding:
         agent_id,
         place,
         0.0,
-        f"{{agents[0]}} is on {{ways[0]}}, {{along_m:.1f}} m along it and {offset} its centre "
+        f"{{agents[0]}} is on {{lanes[0]}}, {{along_m:.1f}} m along it and {offset} its centre "
         "line; the lane is {lane_width_m:.1f} m wide.",
     )
 
@@ -37,7 +37,7 @@ def _off(agent_id: str, place: Beside) -> Finding:
         agent_id,
         place,
         place.off_m,
-        "{agents[0]} is {off_m:.1f} m off every lane; the nearest lane is {ways[0]} at "
+        "{agents[0]} is {off_m:.1f} m off every lane; the nearest lane is {lanes[0]} at "
         "{along_m:.1f} m along it.",
     )
 
@@ -47,7 +47,7 @@ def _fact(agent_id: str, place: Beside, off_m: float, template: str) -> Finding:
         kind=FindingKind.LANE,
         severity=Severity.FACT,
         agents=(agent_id,),
-        ways=(place.way_id,),
+        lanes=(place.lane_id,),
         measured={
             "along_m": place.s_m,
             "left_m": place.d_m,

@@ -5,12 +5,12 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from augment.checks.finding import Finding, FindingKind, Severity
+from augment.checks.lane_index import Beside
 from augment.checks.situation import ChangedScene
-from augment.checks.ways import Beside
 from augment.scene.entities import TrafficAgent
 
 FAR_M = 15.0
-"""Further than this beside the ego's ways a distance along them says nothing."""
+"""Further than this beside the ego's lanes a distance along them says nothing."""
 
 
 def lane_distance(situation: ChangedScene) -> Iterator[Finding]:
@@ -18,7 +18,7 @@ def lane_distance(situation: ChangedScene) -> Iterator[Finding]:
 
     `along_lanes_m` is None where no chain of successors leads from the ego to the agent's lane
     or back (then it would be negative); `level_m` and `beside_m` then tell where the agent is
-    beside the ways that can be reached, on the oncoming lane for example.
+    beside the lanes that can be reached, on the oncoming lane for example.
     """
     if situation.ground.route is None:
         return
@@ -45,13 +45,13 @@ def _finding(agent: TrafficAgent, situation: ChangedScene) -> Finding:
         words = (
             "No lane leads from the ego to the place of {agents[0]}: it is level with a point "
             f"{{level_m:.1f}} m {side} the ego along the lanes, {{beside_m:.1f}} m to the {hand} "
-            "of the centre of {ways[0]}."
+            "of the centre of {lanes[0]}."
         )
     return Finding(
         kind=FindingKind.LANE_DISTANCE,
         severity=Severity.FACT,
         agents=(agent.id,),
-        ways=(place.way_id,),
+        lanes=(place.lane_id,),
         measured={
             "along_lanes_m": along_m if place.covers else None,
             "level_m": along_m,
@@ -62,12 +62,12 @@ def _finding(agent: TrafficAgent, situation: ChangedScene) -> Finding:
 
 
 def _reached(agent: TrafficAgent, situation: ChangedScene) -> tuple[Beside, float] | None:
-    """The nearest way that the ego reaches or came from, and how far along it the agent is."""
-    places = {place.way_id: place for place in situation.beside[agent.id]}
+    """The nearest lane that the ego reaches or came from, and how far along it the agent is."""
+    places = {place.lane_id: place for place in situation.beside[agent.id]}
     candidates = [
         (place, start_m + place.s_m)
-        for way_id, start_m in situation.ground.starts_m
-        if (place := places.get(way_id)) and (place.covers or place.distance_m <= FAR_M)
+        for lane_id, start_m in situation.ground.starts_m
+        if (place := places.get(lane_id)) and (place.covers or place.distance_m <= FAR_M)
     ]
     return min(
         candidates,

@@ -20,30 +20,30 @@ def lane_named(situation: ChangedScene) -> Iterator[Finding]:
 
 
 def _finding(agent: TrafficAgent, named: str, situation: ChangedScene) -> Finding | None:
-    way = situation.ground.graph.ways.get(named)
-    if way is None:
+    lane = situation.ground.graph.lanes.get(named)
+    if lane is None:
         return Finding(
             kind=FindingKind.LANE_NAMED,
             severity=Severity.WRONG,
             agents=(agent.id,),
-            ways=(named,),
-            template="{agents[0]} names {ways[0]} as its lane, which the map does not have.",
+            lanes=(named,),
+            template="{agents[0]} names {lanes[0]} as its lane, which the map does not have.",
         )
-    near = [one.off_m for one in situation.beside[agent.id] if one.way_id == named]
-    far_m = way.centerline.project(agent.x_m, agent.y_m).distance_m - way.width_m / 2.0
+    near = [one.off_m for one in situation.beside[agent.id] if one.lane_id == named]
+    far_m = lane.centerline.project(agent.x_m, agent.y_m).distance_m - lane.width_m / 2.0
     off_m = near[0] if near else far_m
     if off_m <= TOLERANCE_M:
         return None
     under = situation.under(agent)
-    really = "on no lane" if under is None else "on {ways[1]}"
+    really = "on no lane" if under is None else "on {lanes[1]}"
     return Finding(
         kind=FindingKind.LANE_NAMED,
         severity=Severity.DOUBTFUL,
         agents=(agent.id,),
-        ways=(named,) if under is None else (named, under.way_id),
+        lanes=(named,) if under is None else (named, under.lane_id),
         measured={"off_named_lane_m": off_m},
         template=(
-            "{agents[0]} names {ways[0]} as its lane but is {off_named_lane_m:.1f} m off it, "
+            "{agents[0]} names {lanes[0]} as its lane but is {off_named_lane_m:.1f} m off it, "
             f"{really}."
         ),
     )

@@ -9,7 +9,7 @@ import math
 from dataclasses import dataclass
 
 from augment.checks.ground import Ground
-from augment.checks.ways import Beside, Ways, best_aligned
+from augment.checks.lane_index import Beside, LaneIndex, best_aligned
 from augment.geometry.angles import difference
 from augment.scene.ego_route import EgoRoute
 from augment.scene.intent import LaneChoice
@@ -34,17 +34,17 @@ class LanesAcross:
     """The ego's route, and the lanes that lie beside it at any station."""
 
     route: EgoRoute
-    ways: Ways
+    lanes: LaneIndex
 
     @classmethod
     def of(cls, ground: Ground) -> LanesAcross | None:
         """Those of the ground's ego, None where the map has no lane for it."""
-        return None if ground.route is None else cls(route=ground.route, ways=ground.ways)
+        return None if ground.route is None else cls(route=ground.route, lanes=ground.lanes)
 
     def band(self, choice: LaneChoice, ahead_m: float) -> Band | None:
         """The lane of that choice, None where there is none there."""
         tangent_rad = self.route.heading_at(ahead_m)
-        near = self.ways.beside(*self.route.position(ahead_m))
+        near = self.lanes.beside(*self.route.position(ahead_m))
         if choice is LaneChoice.OWN:
             own = best_aligned(near, tangent_rad)
             if own is None:

@@ -10,8 +10,8 @@ import numpy as np
 
 from augment.checks.finding import Finding
 from augment.checks.ground import Ground
+from augment.checks.lane_index import Beside, best_aligned
 from augment.checks.surfaces import gaps_m
-from augment.checks.ways import Beside, best_aligned
 from augment.geometry.boxes import Box
 from augment.scene.entities import AgentType, TrafficAgent
 from augment.scene.modification import Modification, apply
@@ -56,16 +56,16 @@ class ChangedScene:
 
     @cached_property
     def beside(self) -> dict[str, tuple[Beside, ...]]:
-        """Each changed agent's centre beside every way, by id."""
-        ways = self.ground.ways
-        return {agent.id: ways.beside(agent.x_m, agent.y_m) for agent in self.changed}
+        """Each changed agent's centre beside every lane, by id."""
+        lanes = self.ground.lanes
+        return {agent.id: lanes.beside(agent.x_m, agent.y_m) for agent in self.changed}
 
     def under(self, agent: TrafficAgent) -> Beside | None:
-        """The way under a changed agent; of several the one that fits its heading."""
+        """The lane under a changed agent; of several the one that fits its heading."""
         return best_aligned(self.beside[agent.id], agent.heading_rad)
 
     def nearest(self, agent: TrafficAgent) -> Beside | None:
-        """The way whose edge is nearest to a changed agent, None on a map without ways."""
+        """The lane whose edge is nearest to a changed agent, None on a map without lanes."""
         return min(
             self.beside[agent.id],
             key=lambda one: (round(one.off_m, 4), round(one.distance_m, 4)),

@@ -44,7 +44,7 @@ def _limit_mps(agent: TrafficAgent, situation: ChangedScene) -> float | None:
     under = situation.under(agent)
     if under is None or agent.type not in (AgentType.VEHICLE, AgentType.BUS):
         return None
-    return situation.ground.graph.ways[under.way_id].speed_limit_mps
+    return situation.ground.graph.lanes[under.lane_id].speed_limit_mps
 
 
 def _finding(agent: TrafficAgent, words: str, *, is_wrong: bool) -> Finding:

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from augment.scene.entities import Area
-from augment.scene.lane_graph import Way
+from augment.scene.lane_graph import AnyLane
 
 if TYPE_CHECKING:
     from shapely.geometry.base import BaseGeometry
@@ -35,13 +35,13 @@ class Surface:
         self._tree = shapely.STRtree(self._pieces)
 
     @classmethod
-    def of(cls, ways: Iterable[Way] = (), areas: Iterable[Area] = ()) -> Surface:
+    def of(cls, lanes: Iterable[AnyLane] = (), areas: Iterable[Area] = ()) -> Surface:
         """The ground of lanes and connectors and of areas.
 
-        Ways go by their boundaries where the map has both, else by their width. An area that
+        Lanes go by their boundaries where the map has both, else by their width. An area that
         crosses itself is taken as the ground that it encloses.
         """
-        return cls(np.concatenate([strips(list(ways)), rings(list(areas))]))
+        return cls(np.concatenate([strips(list(lanes)), rings(list(areas))]))
 
     def with_areas(self, areas: Iterable[Area]) -> Surface:
         """This ground and more areas."""
@@ -101,26 +101,26 @@ def gaps_m(boxes_m: FloatArray) -> FloatArray:
 # Private
 
 
-def strips(ways: Sequence[Way]) -> NDArray[np.object_]:
-    """One polygon a way."""
+def strips(lanes: Sequence[AnyLane]) -> NDArray[np.object_]:
+    """One polygon a lane."""
     import shapely
 
-    outlines = [_outline(way) for way in ways]
+    outlines = [_outline(lane) for lane in lanes]
     strips = _polygons([outline for outline in outlines if outline is not None])
-    made = np.full(len(ways), None, dtype=object)
+    made = np.full(len(lanes), None, dtype=object)
     made[[outline is not None for outline in outlines]] = strips
     # Those without an outline, and those whose outline crosses itself.
     broad = np.flatnonzero(~shapely.is_valid(made)).tolist()
-    lines = [shapely.LineString(ways[index].centerline.points_m) for index in broad]
-    halves_m = [ways[index].width_m / 2.0 for index in broad]
+    lines = [shapely.LineString(lanes[index].centerline.points_m) for index in broad]
+    halves_m = [lanes[index].width_m / 2.0 for index in broad]
     made[broad] = shapely.buffer(lines, halves_m, cap_style="flat", quad_segs=4)
     return made
 
 
-def _outline(way: Way) -> FloatArray | None:
-    if way.left_boundary is None or way.right_boundary is None:
+def _outline(lane: AnyLane) -> FloatArray | None:
+    if lane.left_boundary is None or lane.right_boundary is None:
         return None
-    return np.concatenate([way.left_boundary.points_m, way.right_boundary.points_m[::-1]])
+    return np.concatenate([lane.left_boundary.points_m, lane.right_boundary.points_m[::-1]])
 
 
 def rings(areas: Sequence[Area]) -> NDArray[np.object_]:

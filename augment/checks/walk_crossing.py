@@ -20,9 +20,9 @@ ASSUMED_WALK_M = 30.0
 
 
 def walk_crossing(situation: ChangedScene) -> Iterator[Finding]:
-    """A fact for every changed pedestrian who walks: where it crosses the ego's way, if it does.
+    """A fact for every changed pedestrian who walks: where it crosses the ego's route, if it does.
 
-    The ego's way is its lane and what follows straightest, from the ego's centre on.
+    Looked at is the route from the ego on.
     """
     route = situation.ground.route
     corridor = None if route is None else route.corridor(CORRIDOR_M)

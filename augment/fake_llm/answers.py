@@ -67,9 +67,9 @@ def _sections(
 
 
 def _road(scene: Scene) -> str:
-    ways = len(scene.connectors)
+    lanes = len(scene.connectors)
     ego_lane = LaneGraph(scene).under(0.0, 0.0, 0.0) or "no lane"
-    crossing = f" and {ways} lane connectors" if ways else ", no intersection"
+    crossing = f" and {lanes} lane connectors" if lanes else ", no intersection"
     return (
         f"The scene has {len(scene.lanes)} lanes{crossing}; the ego is on {ego_lane} and drives "
         f"eastwards. Traffic keeps {scene.traffic_side.value}. "
@@ -92,13 +92,13 @@ def _steps(scene: Scene, modification: Modification) -> list[str]:
         found = graph.nearest(agent.x_m, agent.y_m)
         if found is None:
             continue
-        way_id, place = found
-        line = graph.ways[way_id].centerline
+        lane_id, place = found
+        line = graph.lanes[lane_id].centerline
         x_m, y_m = line.position(place.s_m)
-        where = _ahead(graph, route, way_id, place.s_m)
+        where = _ahead(graph, route, lane_id, place.s_m)
         steps.append(
             f"Step {len(steps) + 1}: {agent.id} lies {where}. The "
-            f"centreline of {way_id} is at ({x_m:.2f}, {y_m:.2f}) there and leads "
+            f"centreline of {lane_id} is at ({x_m:.2f}, {y_m:.2f}) there and leads "
             f"{compass(line.heading_at(place.s_m))} ({line.heading_at(place.s_m):.3f} rad). "
             f"{abs(place.d_m):.2f} m to its {'left' if place.d_m >= 0.0 else 'right'} is "
             f"({agent.x_m:.2f}, {agent.y_m:.2f}); the heading is {agent.heading_rad:.3f} rad."
@@ -106,15 +106,15 @@ def _steps(scene: Scene, modification: Modification) -> list[str]:
     return steps
 
 
-def _ahead(graph: LaneGraph, route: EgoRoute | None, way_id: str, s_m: float) -> str:
+def _ahead(graph: LaneGraph, route: EgoRoute | None, lane_id: str, s_m: float) -> str:
     """Where a place on a way lies, along the lanes where the ego's own lead there."""
-    line = graph.way(way_id).centerline
-    if route is not None and way_id in route.lane_ids:
-        end_m = route.ends_m[route.lane_ids.index(way_id)]
+    line = graph.lane(lane_id).centerline
+    if route is not None and lane_id in route.lane_ids:
+        end_m = route.ends_m[route.lane_ids.index(lane_id)]
         along_m = end_m - line.length_m + s_m
-        return f"{along_m:.2f} m along the lanes from the ego, on {way_id}"
+        return f"{along_m:.2f} m along the lanes from the ego, on {lane_id}"
     x_m, y_m = line.position(s_m)
-    return f"{math.hypot(x_m, y_m):.2f} m from the ego, on {way_id}"
+    return f"{math.hypot(x_m, y_m):.2f} m from the ego, on {lane_id}"
 
 
 def _fields(agent: TrafficAgent) -> dict[str, object]:

@@ -124,7 +124,7 @@ def ego_heading(agents: Agents, setting: _Setting) -> Agents:
 def neighbour_lane(agents: Agents, setting: _Setting) -> Agents:
     """Everything lands one lane beside where it belongs."""
     found = setting.graph.nearest(agents[0].x_m, agents[0].y_m)
-    width_m = setting.graph.ways[found[0]].width_m if found else 3.5
+    width_m = setting.graph.lanes[found[0]].width_m if found else 3.5
     return _shifted(agents, setting, 0.0, setting.rng.choice([-1.0, 1.0]) * width_m)
 
 
@@ -136,7 +136,7 @@ def wrong_side(agents: Agents, setting: _Setting) -> Agents:
         if found is None or abs(found[1].d_m) > 2.0:
             bent.append(agent)
             continue
-        line = setting.graph.ways[found[0]].centerline
+        line = setting.graph.lanes[found[0]].centerline
         bent.append(_at(agent, *line.position(found[1].s_m, -found[1].d_m), agent.heading_rad))
     return tuple(bent)
 

@@ -38,13 +38,13 @@ def _arguments(graph: LaneGraph, ego: TrafficAgent, agent: TrafficAgent) -> dict
     found = graph.nearest(agent.x_m, agent.y_m)
     if found is None:
         return {"lane": "Lane1", "start": _LANE, "distance_m": 0.0}
-    way_id, place = found
+    lane_id, place = found
     start, distance_m = _LANE, place.s_m
-    if way_id == ego.lane_id:
+    if lane_id == ego.lane_id:
         start = ego.id
-        distance_m -= graph.way(way_id).centerline.project(ego.x_m, ego.y_m).s_m
+        distance_m -= graph.lane(lane_id).centerline.project(ego.x_m, ego.y_m).s_m
     return {
-        "lane": way_id,
+        "lane": lane_id,
         "start": start,
         "distance_m": round(distance_m, 3),
         "lateral_m": round(max(-30.0, min(30.0, place.d_m)), 3),
@@ -57,7 +57,7 @@ def _placed(graph: LaneGraph, agent: TrafficAgent, result: dict[str, object]) ->
     if found is None:
         return agent
     x_m, y_m, heading_rad = (float(str(result[n])) for n in ("x_m", "y_m", "heading_rad"))
-    lane_rad = graph.way(found[0]).centerline.heading_at(found[1].s_m)
+    lane_rad = graph.lane(found[0]).centerline.heading_at(found[1].s_m)
     walk = agent.walk_to_m
     if walk is not None:
         walk = (walk[0] + x_m - agent.x_m, walk[1] + y_m - agent.y_m)

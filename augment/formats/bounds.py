@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 
 from augment.geometry.polyline import Polyline
-from augment.scene.lane_graph import Way
+from augment.scene.lane_graph import AnyLane
 
 
-def bounds_of(way: Way) -> tuple[Polyline, Polyline]:
+def bounds_of(way: AnyLane) -> tuple[Polyline, Polyline]:
     """The edges as the map has them, else half a width beside the centreline."""
     half_m = way.width_m / 2.0
     left = way.left_boundary or beside(way.centerline, half_m)

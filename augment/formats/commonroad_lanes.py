@@ -25,7 +25,7 @@ from augment.scene.entities import (
     TrafficLight,
     TurnType,
 )
-from augment.scene.lane_graph import LaneGraph, Way
+from augment.scene.lane_graph import AnyLane, LaneGraph
 
 SPEED_SIGN = "274"
 _SAME_M = 0.01
@@ -48,7 +48,7 @@ def write_lanes(root: ET.Element, cell: Cell, ids: Ids, report: LossReport) -> N
     """Lanelets, then traffic signs, lights and intersections, as the schema orders them."""
     scene = cell.after
     graph = LaneGraph(scene)
-    ways: list[Way] = [*scene.lanes, *scene.connectors]
+    ways: list[AnyLane] = [*scene.lanes, *scene.connectors]
     for way in ways:
         ids.of(way.id)
     signs = {
@@ -81,7 +81,7 @@ def write_lanes(root: ET.Element, cell: Cell, ids: Ids, report: LossReport) -> N
 # Private
 
 
-def _add_lanelet(root: ET.Element, way: Way, graph: LaneGraph, ids: Ids) -> float:
+def _add_lanelet(root: ET.Element, way: AnyLane, graph: LaneGraph, ids: Ids) -> float:
     """Returns how far the centreline is from the middle of the edges, in metres."""
     left, right = _paired_bounds(way)
     lanelet = add(root, "lanelet", id=str(ids.of(way.id)))
@@ -110,7 +110,7 @@ def _report_off(off_m: dict[str, float], report: LossReport) -> None:
         )
 
 
-def _report_widths(ways: Sequence[Way], report: LossReport) -> None:
+def _report_widths(ways: Sequence[AnyLane], report: LossReport) -> None:
     apart_m = {
         way.id: abs(width_between(way.centerline, *bounds_of(way)) - way.width_m) for way in ways
     }
@@ -121,7 +121,7 @@ def _report_widths(ways: Sequence[Way], report: LossReport) -> None:
 
 
 def _add_marks(
-    lanelet: ET.Element, way: Way, signs: dict[float, int], lights: dict[str, int]
+    lanelet: ET.Element, way: AnyLane, signs: dict[float, int], lights: dict[str, int]
 ) -> None:
     add(lanelet, "laneletType", "intersection" if isinstance(way, LaneConnector) else "urban")
     add(lanelet, "userOneWay", "vehicle")
@@ -131,7 +131,7 @@ def _add_marks(
         add(lanelet, "trafficLightRef", ref=str(lights[way.id]))
 
 
-def _paired_bounds(way: Way) -> tuple[FloatArray, FloatArray]:
+def _paired_bounds(way: AnyLane) -> tuple[FloatArray, FloatArray]:
     """Both edges with equally many points, opposite to each other; no point of either is lost."""
     left, right = bounds_of(way)
     if len(left.points_m) == len(right.points_m):

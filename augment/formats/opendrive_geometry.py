@@ -15,7 +15,7 @@ from augment.formats.bounds import bounds_of
 from augment.formats.writing import CannotExpress
 from augment.geometry.angles import difference
 from augment.geometry.polyline import FloatArray, Polyline
-from augment.scene.lane_graph import Way
+from augment.scene.lane_graph import AnyLane
 
 NARROWEST_M: Final = 0.1
 _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(12)
@@ -82,7 +82,9 @@ class ReferenceLine:
         return float(self.stations_m[-1])
 
 
-def reference_line(way: Way, *, start: End | None = None, end: End | None = None) -> ReferenceLine:
+def reference_line(
+    way: AnyLane, *, start: End | None = None, end: End | None = None
+) -> ReferenceLine:
     """The reference line of a way.
 
     Args:
@@ -170,7 +172,7 @@ def _bulge(piece: Piece) -> float:
     return float(np.abs(line[:, 1] * chord[0] - line[:, 0] * chord[1]).max() / np.hypot(*chord))
 
 
-def _edges(way: Way, points: FloatArray, tangents: FloatArray) -> FloatArray:
+def _edges(way: AnyLane, points: FloatArray, tangents: FloatArray) -> FloatArray:
     """How far left the two edges are of the reference line at its points, (P, 2)."""
     if way.left_boundary is None and way.right_boundary is None:
         half = np.full(len(points), way.width_m / 2.0)

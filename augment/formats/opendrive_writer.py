@@ -27,7 +27,7 @@ from augment.scene.entities import (
     TrafficLight,
     TrafficSide,
 )
-from augment.scene.lane_graph import LaneGraph, Way
+from augment.scene.lane_graph import AnyLane, LaneGraph
 
 REVISION = ("1", "7")
 _JOINED_M = 0.01
@@ -48,7 +48,7 @@ def map_of(cell: Cell, report: LossReport) -> bytes:
     from scenariogeneration import xodr
 
     scene = cell.after
-    ways: list[Way] = [*scene.lanes, *scene.connectors]
+    ways: list[AnyLane] = [*scene.lanes, *scene.connectors]
     if not ways:
         raise CannotExpress("OpenDRIVE needs at least one road, and this scene has no lane")
     network = _Network(scene)
@@ -67,7 +67,7 @@ def map_of(cell: Cell, report: LossReport) -> bytes:
 
 
 def _fitted(
-    ways: Sequence[Way], network: _Network, report: LossReport
+    ways: Sequence[AnyLane], network: _Network, report: LossReport
 ) -> dict[str, ReferenceLine]:
     """The lines of all roads, without a step or a kink where one is joined to another."""
     by_id = {way.id: way for way in ways}
@@ -98,7 +98,7 @@ class _Network:
 
     def __init__(self, scene: Scene) -> None:
         self._graph = LaneGraph(scene)
-        ways: list[Way] = [*scene.lanes, *scene.connectors]
+        ways: list[AnyLane] = [*scene.lanes, *scene.connectors]
         self.ids = {way.id: number for number, way in enumerate(ways, start=1)}
         self.left_out: list[str] = []
         self.pairs: list[tuple[str, str]] = []
@@ -112,7 +112,7 @@ class _Network:
     def _is_connecting(self, one: LaneConnector) -> bool:
         """Whether both its ends are roads outside that it really reaches."""
         ends = [one.from_lane, one.to_lane]
-        if any(not isinstance(self._graph.ways.get(name or ""), Lane) for name in ends):
+        if any(not isinstance(self._graph.lanes.get(name or ""), Lane) for name in ends):
             return False
         assert one.from_lane is not None
         assert one.to_lane is not None
@@ -120,7 +120,7 @@ class _Network:
 
     def meet(self, first: str, second: str) -> bool:
         """Whether one road begins where the other ends, in its direction."""
-        end, start = self._graph.ways[first].centerline, self._graph.ways[second].centerline
+        end, start = self._graph.lanes[first].centerline, self._graph.lanes[second].centerline
         gap = np.hypot(*(end.points_m[-1] - start.points_m[0]))
         turn = float(directions(end.points_m)[-1] @ directions(start.points_m)[0])
         return bool(gap <= _JOINED_M) and turn >= _JOINED_COS
@@ -138,7 +138,7 @@ class _Network:
         return {_FIRST_JUNCTION + n: group for n, (_, group) in enumerate(groups)}
 
     def _joins(
-        self, ways: Sequence[Way]
+        self, ways: Sequence[AnyLane]
     ) -> tuple[dict[str, tuple[str, int]], dict[str, tuple[str, int]]]:
         """What comes before and after each road: ("road" or "junction", its number)."""
         before: dict[str, tuple[str, int]] = {}
@@ -174,7 +174,7 @@ class _Network:
         )
 
 
-def _road(xodr: Any, scene: Scene, way: Way, line: ReferenceLine, network: _Network) -> Any:
+def _road(xodr: Any, scene: Scene, way: AnyLane, line: ReferenceLine, network: _Network) -> Any:
     view = xodr.PlanView()
     for piece, start_m in zip(line.pieces, line.stations_m, strict=False):
         cubic = xodr.ParamPoly3(*piece.u, *piece.v, length=piece.length_m)
@@ -291,7 +291,7 @@ def _text(root: ET.Element, cell: Cell) -> bytes:
     """The file, its header without the time of day, and with what it covers and where it lies."""
     header = root.find("header")
     assert header is not None
-    ways: list[Way] = [*cell.after.lanes, *cell.after.connectors]
+    ways: list[AnyLane] = [*cell.after.lanes, *cell.after.connectors]
     points = np.vstack([way.centerline.points_m for way in ways])
     pose = cell.after.origin.pose
     header.set("date", f"{cell.made_on.isoformat()}T00:00:00")

@@ -30,7 +30,7 @@ from augment.scene.entities import (
     TrafficLight,
     TurnType,
 )
-from augment.scene.lane_graph import LaneGraph, Way
+from augment.scene.lane_graph import AnyLane, LaneGraph
 from augment.scene.motion import Movement
 
 VERSION = "scenario-arena 1"
@@ -173,7 +173,7 @@ def _report_map(scene: Scene, report: LossReport) -> None:
         report.lose_of(names, f"the turn type {turn} is not said, and the line looks otherwise")
     names = [one.id for one in scene.connectors if one.traffic_light is TrafficLight.NONE]
     report.lose_of(names, "that it has no light is not said")
-    ways: list[Way] = [*scene.lanes, *scene.connectors]
+    ways: list[AnyLane] = [*scene.lanes, *scene.connectors]
     if any(way.left_boundary or way.right_boundary for way in ways):
         report.lose("the edges of lanes are written as outlines, not as a left and a right one")
 
@@ -241,7 +241,7 @@ def _light(connector: LaneConnector, steps: int) -> dict[str, Any]:
 def _map_features(scene: Scene) -> dict[str, dict[str, Any]]:
     graph = LaneGraph(scene)
     found: dict[str, dict[str, Any]] = {}
-    ways: list[Way] = [*scene.lanes, *scene.connectors]
+    ways: list[AnyLane] = [*scene.lanes, *scene.connectors]
     for way in ways:
         is_lane = isinstance(way, Lane)
         feature: dict[str, Any] = {
@@ -275,6 +275,6 @@ def _ring(area: Area) -> NDArray[np.float64]:
     return np.array([*area.boundary_m], dtype=np.float64)
 
 
-def _polygon(way: Way) -> NDArray[np.float64]:
+def _polygon(way: AnyLane) -> NDArray[np.float64]:
     left, right = bounds_of(way)
     return np.vstack([left.points_m, right.points_m[::-1]])

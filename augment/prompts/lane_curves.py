@@ -17,7 +17,7 @@ from augment.prompts.clip import line_within
 from augment.prompts.names import ShortNames
 from augment.scene.bezier_lanes import BezierLane, bezier_lane, piece_ids
 from augment.scene.entities import Scene
-from augment.scene.lane_graph import LaneGraph, Way
+from augment.scene.lane_graph import AnyLane, LaneGraph
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -46,21 +46,21 @@ def lane_curves(scene: Scene, names: ShortNames, radius_m: float) -> dict[str, L
     """All lanes and connectors within the radius, by short id, in the order of the scene."""
     graph = LaneGraph(scene)
     lines = {
-        way.id: line
-        for way in graph.ways.values()
-        if (line := line_within(way.centerline, radius_m)) is not None
+        lane.id: line
+        for lane in graph.lanes.values()
+        if (line := line_within(lane.centerline, radius_m)) is not None
     }
-    begins = {key for key, line in lines.items() if _meets(line, graph.ways[key], 0)}
-    ends = {key for key, line in lines.items() if _meets(line, graph.ways[key], -1)}
+    begins = {key for key, line in lines.items() if _meets(line, graph.lanes[key], 0)}
+    ends = {key for key, line in lines.items() if _meets(line, graph.lanes[key], -1)}
 
     def shown(ids: Iterable[str], among: set[str]) -> tuple[str, ...]:
-        return tuple(names.ways[way_id] for way_id in ids if way_id in among)
+        return tuple(names.lanes[lane_id] for lane_id in ids if lane_id in among)
 
     return {
-        names.ways[key]: LaneCurve(
-            id=names.ways[key],
+        names.lanes[key]: LaneCurve(
+            id=names.lanes[key],
             lane=bezier_lane(line),
-            width_m=graph.ways[key].width_m,
+            width_m=graph.lanes[key].width_m,
             before=shown(graph.predecessors(key) if key in begins else (), ends),
             after=shown(graph.successors(key) if key in ends else (), begins),
         )
@@ -73,6 +73,6 @@ def control_points(lane: BezierLane) -> list[list[list[float]]]:
     return [np.add(np.round(control, 2), 0.0).tolist() for control in lane.control_m]
 
 
-def _meets(line: Polyline, way: Way, end: int) -> bool:
+def _meets(line: Polyline, lane: AnyLane, end: int) -> bool:
     """Whether the shown part reaches that end of the whole."""
-    return bool(np.abs(line.points_m[end] - way.centerline.points_m[end]).max() < 1e-6)
+    return bool(np.abs(line.points_m[end] - lane.centerline.points_m[end]).max() < 1e-6)

@@ -21,11 +21,11 @@ class ShortNames:
     """Ids of a scene and their short forms, such as Agent2, Lane3, Connector1, Area4.
 
     Attributes:
-        agents, ways, areas: Short form by the scene's own id; ways are lanes and connectors.
+        agents, lanes, areas: Short form by the scene's own id; lanes are lanes and connectors.
     """
 
     agents: dict[str, str]
-    ways: dict[str, str]
+    lanes: dict[str, str]
     areas: dict[str, str]
 
     @cached_property
@@ -34,9 +34,9 @@ class ShortNames:
         return {short: name for name, short in self.agents.items()}
 
     @cached_property
-    def way_ids(self) -> dict[str, str]:
+    def lane_ids(self) -> dict[str, str]:
         """The scene's lane or connector id by short form."""
-        return {short: name for name, short in self.ways.items()}
+        return {short: name for name, short in self.lanes.items()}
 
     @property
     def next_agent(self) -> str:
@@ -50,7 +50,7 @@ def short_names(scene: Scene) -> ShortNames:
     connectors = _shorten((connector.id for connector in scene.connectors), "Connector")
     return ShortNames(
         agents=_shorten((agent.id for agent in scene.everyone), "Agent"),
-        ways=lanes | connectors,
+        lanes=lanes | connectors,
         areas=_shorten((area.id for area in scene.areas), "Area"),
     )
 

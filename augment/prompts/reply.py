@@ -114,7 +114,7 @@ def _misplaced(block: _Block, scene: Scene, radius_m: float) -> list[str]:
         points = [(agent.x_m, agent.y_m), tuple(agent.walk_to or (0.0, 0.0))]
         if max(abs(value) for point in points for value in point) > radius_m:
             problems.append(f"{agent.id}: x and y must lie between -{radius_m:g} and {radius_m:g}")
-        if agent.lane is not None and agent.lane not in names.way_ids:
+        if agent.lane is not None and agent.lane not in names.lane_ids:
             problems.append(f"{agent.id}: its lane is none of the scene's; null means none")
         if agent.walk_to is not None and agent.type != AgentType.PEDESTRIAN:
             problems.append(f"{agent.id}: only a PEDESTRIAN has walk_to")
@@ -156,6 +156,6 @@ def _agent(agent: _Agent, names: ShortNames) -> TrafficAgent:
         width_m=agent.width_m,
         length_m=agent.length_m,
         speed_mps=agent.speed_mps,
-        lane_id=None if agent.lane is None else names.way_ids[agent.lane],
+        lane_id=None if agent.lane is None else names.lane_ids[agent.lane],
         walk_to_m=None if agent.walk_to is None else (agent.walk_to[0], agent.walk_to[1]),
     )

@@ -109,7 +109,7 @@ def agent_vector(agent: TrafficAgent, names: ShortNames) -> Vector:
         _metres(agent.width_m),
         _metres(agent.length_m),
         _metres(agent.speed_mps),
-        None if agent.lane_id is None else names.ways.get(agent.lane_id),
+        None if agent.lane_id is None else names.lanes.get(agent.lane_id),
     ]
 
 
@@ -122,7 +122,7 @@ def lane_vectors(
     """Lane number, travel direction, direction relative to the ego, width, limit, coordinates."""
     shown = ((lane, line_within(lane.centerline, radius_m)) for lane in scene.lanes)
     return {
-        names.ways[lane.id]: _lane_vector(lane, line, names, coordinates)
+        names.lanes[lane.id]: _lane_vector(lane, line, names, coordinates)
         for lane, line in shown
         if line is not None
     }
@@ -135,10 +135,10 @@ def connector_vectors(
     coordinates: Coordinates = polyline_coordinates,
 ) -> dict[str, Vector]:
     """From lane, to lane, light, turn, speed limit, coordinates, by connector id."""
-    shown = ((way, line_within(way.centerline, radius_m)) for way in scene.connectors)
+    shown = ((lane, line_within(lane.centerline, radius_m)) for lane in scene.connectors)
     return {
-        names.ways[way.id]: _connector_vector(way, line, names, coordinates)
-        for way, line in shown
+        names.lanes[lane.id]: _connector_vector(lane, line, names, coordinates)
+        for lane, line in shown
         if line is not None
     }
 
@@ -173,7 +173,7 @@ def _lane_vector(
 ) -> Vector:
     heading_rad = line.heading_at(line.project(0.0, 0.0).s_m)
     return [
-        number_of(names.ways[lane.id]),
+        number_of(names.lanes[lane.id]),
         compass(heading_rad),
         relative_direction(heading_rad),
         _metres(lane.width_m),
@@ -183,14 +183,14 @@ def _lane_vector(
 
 
 def _connector_vector(
-    way: LaneConnector, line: Polyline, names: ShortNames, coordinates: Coordinates
+    lane: LaneConnector, line: Polyline, names: ShortNames, coordinates: Coordinates
 ) -> Vector:
     return [
-        None if way.from_lane is None else names.ways.get(way.from_lane),
-        None if way.to_lane is None else names.ways.get(way.to_lane),
-        way.traffic_light.value,
-        way.turn_type.value,
-        _speed_limit(way.speed_limit_mps),
+        None if lane.from_lane is None else names.lanes.get(lane.from_lane),
+        None if lane.to_lane is None else names.lanes.get(lane.to_lane),
+        lane.traffic_light.value,
+        lane.turn_type.value,
+        _speed_limit(lane.speed_limit_mps),
         coordinates(line),
     ]
 

@@ -11,7 +11,7 @@ from augment.render.canvas import Box, MetricCanvas, text_width_px
 from augment.render.edges import mark_box, overlap, within
 from augment.render.scale import raster
 from augment.scene.entities import Scene
-from augment.scene.lane_graph import Way
+from augment.scene.lane_graph import AnyLane
 from augment.scene.modification import Modification
 
 _TEXT_PX = 14
@@ -45,10 +45,10 @@ def draw_labels(ground: MetricCanvas, scene: Scene, taken: list[Box]) -> None:
         spots += [(right + aside, top - 12.0), (left - aside, bottom + 12.0), (x, top - 30.0)]
         if not _label(ground, agent.id, palette.INK, spots, words, marks):
             _label(ground, agent.id, palette.INK, [*spots, (x, y)], words, [])
-    ways: list[Way] = [*scene.lanes, *scene.connectors]
-    for way in ways:
-        spots = _spots(ground, way.centerline.points_m)
-        _label(ground, way.id, palette.LANE_TEXT, spots, words, marks)
+    lanes: list[AnyLane] = [*scene.lanes, *scene.connectors]
+    for lane in lanes:
+        spots = _spots(ground, lane.centerline.points_m)
+        _label(ground, lane.id, palette.LANE_TEXT, spots, words, marks)
 
 
 def _metres(ground: MetricCanvas) -> None:

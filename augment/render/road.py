@@ -22,7 +22,7 @@ from augment.render.shapes import (
     stripes,
 )
 from augment.scene.entities import Area, AreaKind, Lane, LaneConnector, Scene
-from augment.scene.lane_graph import LaneGraph, Way
+from augment.scene.lane_graph import AnyLane, LaneGraph
 
 _ROAD_AREAS = (AreaKind.DRIVABLE, AreaKind.CARPARK, AreaKind.INTERSECTION)
 _CHEVRON_EVERY_M = 12.0
@@ -37,14 +37,14 @@ _INSET_M = 0.1
 
 def draw_ground(ground: MetricCanvas, scene: Scene) -> None:
     """Everything that lies flat: areas first, then lines, then centrelines with directions."""
-    all_ways: list[Way] = [*scene.lanes, *scene.connectors]
-    ways = [way for way in all_ways if _seen(ground, ribbon(way))]
+    all_lanes: list[AnyLane] = [*scene.lanes, *scene.connectors]
+    lanes = [lane for lane in all_lanes if _seen(ground, ribbon(lane))]
     areas = [area for area in scene.areas if _seen(ground, _boundary(area))]
     _walkways(ground, areas)
-    roads = _surface(ground, ways, areas)
-    _crosswalks(ground, areas, ways)
-    _lane_lines(ground, scene, ways, roads)
-    _centrelines(ground, scene, ways)
+    roads = _surface(ground, lanes, areas)
+    _crosswalks(ground, areas, lanes)
+    _lane_lines(ground, scene, lanes, roads)
+    _centrelines(ground, scene, lanes)
 
 
 def _seen(ground: MetricCanvas, points_m: FloatArray) -> bool:
@@ -63,10 +63,10 @@ def _walkways(ground: MetricCanvas, areas: list[Area]) -> None:
         ground.fill(polygon, palette.WALKWAY)
 
 
-def _surface(ground: MetricCanvas, ways: list[Way], areas: list[Area]) -> list[FloatArray]:
+def _surface(ground: MetricCanvas, lanes: list[AnyLane], areas: list[Area]) -> list[FloatArray]:
     """One grey surface: all outlines first and all fills over them leave the union's outline."""
     roads = [_boundary(area) for area in areas if area.kind in _ROAD_AREAS]
-    roads += [ribbon(way) for way in ways]
+    roads += [ribbon(lane) for lane in lanes]
     for polygon in roads:
         ground.stroke(polygon, palette.ROAD_EDGE, 4.0, closed=True)
     for polygon in roads:
@@ -81,36 +81,36 @@ def _surface(ground: MetricCanvas, ways: list[Way], areas: list[Area]) -> list[F
     return roads
 
 
-def _crosswalks(ground: MetricCanvas, areas: list[Area], ways: list[Way]) -> None:
+def _crosswalks(ground: MetricCanvas, areas: list[Area], lanes: list[AnyLane]) -> None:
     for area in areas:
         if area.kind is AreaKind.CROSSWALK:
             polygon = _boundary(area)
             ground.fill(polygon, palette.ZEBRA_GROUND)
-            for stripe in stripes(polygon, _traffic_direction(polygon, ways), 1.0, 0.5):
+            for stripe in stripes(polygon, _traffic_direction(polygon, lanes), 1.0, 0.5):
                 ground.fill(stripe, palette.ZEBRA)
 
 
-def _traffic_direction(polygon: FloatArray, ways: list[Way]) -> float:
+def _traffic_direction(polygon: FloatArray, lanes: list[AnyLane]) -> float:
     """Along which axis of a crosswalk the cars drive: its stripes point there.
 
     The shorter axis, since people walk along the longer one; on a stub that is about as wide as
-    long, the axis nearest to the heading of the ways there.
+    long, the axis nearest to the heading of the lanes there.
     """
     along_rad, length_m, width_m = long_axis(polygon)
     if length_m > _STUB_RATIO * width_m:
         return along_rad + math.pi / 2.0
     x_m, y_m = polygon.mean(axis=0)
     votes = 0.0
-    for way in ways:
-        place = way.centerline.project(float(x_m), float(y_m))
-        if place.distance_m < way.width_m:
-            turn = difference(way.centerline.heading_at(place.s_m), along_rad)
+    for lane in lanes:
+        place = lane.centerline.project(float(x_m), float(y_m))
+        if place.distance_m < lane.width_m:
+            turn = difference(lane.centerline.heading_at(place.s_m), along_rad)
             votes += abs(math.cos(turn)) - abs(math.sin(turn))
     return along_rad if votes > 0.0 else along_rad + math.pi / 2.0
 
 
 def _lane_lines(
-    ground: MetricCanvas, scene: Scene, ways: list[Way], roads: list[FloatArray]
+    ground: MetricCanvas, scene: Scene, lanes: list[AnyLane], roads: list[FloatArray]
 ) -> None:
     """Dashed between lanes of one direction, solid towards the other direction and the margin.
 
@@ -118,16 +118,16 @@ def _lane_lines(
     """
     graph = LaneGraph(scene)
     width_px = max(1.5, _LINE_M * ground.camera.px_per_m)
-    for way in ways:
-        lane = way if isinstance(way, Lane) else _joined(graph, way)
+    for drawn in lanes:
+        lane = drawn if isinstance(drawn, Lane) else _joined(graph, drawn)
         if lane is None:
             continue
-        left, right = sides(way)
+        left, right = sides(drawn)
         if lane.left_neighbor is not None:
             ground.dashed(left, palette.LANE_LINE, width_px, *_DASH_M)
         else:
             _solid(ground, left, 1.0, roads)
-        neighbor = graph.ways.get(lane.right_neighbor or "")
+        neighbor = graph.lanes.get(lane.right_neighbor or "")
         if lane.right_neighbor is None:
             _solid(ground, right, -1.0, roads)
         elif not isinstance(neighbor, Lane) or neighbor.left_neighbor != lane.id:
@@ -155,20 +155,20 @@ def _solid(
 
 def _joined(graph: LaneGraph, connector: LaneConnector) -> Lane | None:
     """The lane before a connector that only joins two pieces of it: nothing parts or merges."""
-    before = graph.ways.get(connector.from_lane or "")
+    before = graph.lanes.get(connector.from_lane or "")
     after = connector.to_lane
-    if not isinstance(before, Lane) or after not in graph.ways:
+    if not isinstance(before, Lane) or after not in graph.lanes:
         return None
     alone = len(graph.successors(before.id)) == 1 and len(graph.predecessors(after)) == 1
     return before if alone else None
 
 
-def _centrelines(ground: MetricCanvas, scene: Scene, ways: list[Way]) -> None:
+def _centrelines(ground: MetricCanvas, scene: Scene, lanes: list[AnyLane]) -> None:
     """Thin dashes, and chevrons that point where the traffic goes."""
     shown: list[Pose] = []
-    for way in ways:
-        colour = _line_colour(scene, way)
-        line = way.centerline
+    for lane in lanes:
+        colour = _line_colour(scene, lane)
+        line = lane.centerline
         ground.dashed(line.points_m, colour, 1.4, 0.7, 0.8)
         count = max(1, round(line.length_m / _CHEVRON_EVERY_M))
         for index in range(count):
@@ -179,10 +179,10 @@ def _centrelines(ground: MetricCanvas, scene: Scene, ways: list[Way]) -> None:
                 shown.append(pose)
 
 
-def _line_colour(scene: Scene, way: Way) -> palette.Colour:
-    if isinstance(way, LaneConnector):
+def _line_colour(scene: Scene, lane: AnyLane) -> palette.Colour:
+    if isinstance(lane, LaneConnector):
         return palette.CONNECTOR
-    return palette.EGO_LANE if way.id == scene.ego.lane_id else palette.OTHER_LANE
+    return palette.EGO_LANE if lane.id == scene.ego.lane_id else palette.OTHER_LANE
 
 
 def _alike(one: Pose, other: Pose) -> bool:

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from augment.geometry.polyline import FloatArray
-from augment.scene.lane_graph import Way
+from augment.scene.lane_graph import AnyLane
 
 # Where a line turns sharply its offset is held back to this multiple of the distance.
 _MITER_LIMIT = 2.0
@@ -30,19 +30,19 @@ def offset(points: FloatArray, distance: float) -> FloatArray:
     return np.asarray(points + distance * stretch[:, None] * middle, dtype=np.float64)
 
 
-def sides(way: Way) -> tuple[FloatArray, FloatArray]:
+def sides(lane: AnyLane) -> tuple[FloatArray, FloatArray]:
     """The left and the right boundary of a way, (P, 2) each, from its map or its width."""
-    line, half = way.centerline.points_m, way.width_m / 2.0
-    left, right = way.left_boundary, way.right_boundary
+    line, half = lane.centerline.points_m, lane.width_m / 2.0
+    left, right = lane.left_boundary, lane.right_boundary
     return (
         offset(line, half) if left is None else left.points_m,
         offset(line, -half) if right is None else right.points_m,
     )
 
 
-def ribbon(way: Way) -> FloatArray:
+def ribbon(lane: AnyLane) -> FloatArray:
     """The surface of a way as a polygon (P, 2); it reaches a little into what comes next."""
-    left, right = (_lengthened(side) for side in sides(way))
+    left, right = (_lengthened(side) for side in sides(lane))
     return np.vstack([left, right[::-1]])
 
 
@@ -128,7 +128,7 @@ def long_axis(polygon: FloatArray) -> tuple[float, float, float]:
 
 
 def _lengthened(points: FloatArray) -> FloatArray:
-    """A line with both ends drawn out; ways that bend meet at a slight angle, with a gap."""
+    """A line with both ends drawn out; lanes that bend meet at a slight angle, with a gap."""
     steps = np.array([points[0] - points[1], points[-1] - points[-2]])
     steps = steps / np.hypot(steps[:, 0], steps[:, 1])[:, None] * _REACH
     return np.vstack([points[:1] + steps[:1], points[1:-1], points[-1:] + steps[1:]])

@@ -13,7 +13,7 @@ from itertools import accumulate
 
 from augment.geometry.polyline import Polyline
 from augment.scene.entities import Point, Scene, TrafficAgent
-from augment.scene.lane_graph import LaneGraph, PlaceOnWay
+from augment.scene.lane_graph import LaneGraph, LanePosition
 
 REACH_M = 300.0
 """How far ahead of the ego and behind it the lanes are followed."""
@@ -59,10 +59,10 @@ class EgoRoute:
         own = find_ego_lane(scene, graph)
         if own is None:
             return None
-        lane_s_m = graph.way(own).centerline.project(scene.ego.x_m, scene.ego.y_m).s_m
+        lane_s_m = graph.lane(own).centerline.project(scene.ego.x_m, scene.ego.y_m).s_m
         before = _list_before(graph, own)
         lane_ids = (*before, *graph.route(own, lane_s_m + REACH_M))
-        lines = [graph.way(name).centerline for name in lane_ids]
+        lines = [graph.lane(name).centerline for name in lane_ids]
         ego_s_m = sum(line.length_m for line in lines[: len(before)]) + lane_s_m
         return cls(
             scene=scene,
@@ -96,7 +96,7 @@ class EgoRoute:
         """The direction of travel so far ahead of the ego, in radians."""
         return self.line.heading_at(self.ego_s_m + ahead_m)
 
-    def lane_position(self, ahead_m: float, left_m: float = 0.0) -> PlaceOnWay | None:
+    def lane_position(self, ahead_m: float, left_m: float = 0.0) -> LanePosition | None:
         """The position on the lane that is so far ahead, None past the end of the lanes."""
         return self.graph.along(self.lane_id, self.lane_s_m, ahead_m, left_m)
 
@@ -117,14 +117,14 @@ class EgoRoute:
         end_m = ahead[-1][1]
         if end_m < _SHORTEST_M:
             return None
-        width_m = sum(self.graph.way(name).width_m for name, _ in ahead) / len(ahead)
+        width_m = sum(self.graph.lane(name).width_m for name, _ in ahead) / len(ahead)
         return self.line.between(self.ego_s_m, self.ego_s_m + end_m), width_m
 
 
 def find_ego_lane(scene: Scene, graph: LaneGraph) -> str | None:
     """The lane or connector that the ego names, else the one under it; None off every lane."""
     ego = scene.ego
-    if ego.lane_id in graph.ways:
+    if ego.lane_id in graph.lanes:
         return ego.lane_id
     return graph.under(ego.x_m, ego.y_m, ego.heading_rad)
 
@@ -140,5 +140,5 @@ def _list_before(graph: LaneGraph, lane_id: str) -> Sequence[str]:
         if not leading:
             break
         names.insert(0, leading[0])
-        total_m += graph.way(leading[0]).centerline.length_m
+        total_m += graph.lane(leading[0]).centerline.length_m
     return names[:-1]

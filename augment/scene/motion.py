@@ -193,8 +193,8 @@ def _walk(agent: TrafficAgent, times_s: FloatArray, ego: Movement) -> Movement:
     If the ego never comes near, nobody sets out.
     """
     assert agent.walk_to_m is not None
-    way = np.array(agent.walk_to_m) - (agent.x_m, agent.y_m)
-    length_m = float(np.hypot(*way))
+    walk = np.array(agent.walk_to_m) - (agent.x_m, agent.y_m)
+    length_m = float(np.hypot(*walk))
     states = np.tile(_state(agent), (len(times_s), 1))
     states[:, 3] = 0.0
     gap = np.hypot(ego.states[:, 0] - agent.x_m, ego.states[:, 1] - agent.y_m)
@@ -203,10 +203,10 @@ def _walk(agent: TrafficAgent, times_s: FloatArray, ego: Movement) -> Movement:
         return Movement(agent=agent, source=MotionSource.STANDING, states=states)
     pace_mps = walking_pace_mps(agent)
     walked = np.clip((times_s - times_s[near[0]]) * pace_mps / length_m, 0.0, 1.0)
-    states[:, :2] += walked[:, None] * way
+    states[:, :2] += walked[:, None] * walk
     moves = (times_s >= times_s[near[0]]) & (walked < 1.0)
-    states[moves, 2] = math.atan2(way[1], way[0])
-    states[walked >= 1.0, 2] = math.atan2(way[1], way[0])
+    states[moves, 2] = math.atan2(walk[1], walk[0])
+    states[walked >= 1.0, 2] = math.atan2(walk[1], walk[0])
     states[moves, 3] = pace_mps
     states[0, 2] = agent.heading_rad
     return Movement(agent=agent, source=MotionSource.WALK, states=states)
@@ -226,17 +226,17 @@ def _assumed(
     states = np.tile(_state(agent), (len(times_s), 1))
     if agent.speed_mps <= 0.0:
         return Movement(agent=agent, source=MotionSource.STANDING, states=states)
-    way = times_s * agent.speed_mps
-    if agent.type is AgentType.PEDESTRIAN or agent.lane_id not in graph.ways:
-        states[:, 0] += way * math.cos(agent.heading_rad)
-        states[:, 1] += way * math.sin(agent.heading_rad)
+    driven_m = times_s * agent.speed_mps
+    if agent.type is AgentType.PEDESTRIAN or agent.lane_id not in graph.lanes:
+        states[:, 0] += driven_m * math.cos(agent.heading_rad)
+        states[:, 1] += driven_m * math.sin(agent.heading_rad)
         return Movement(agent=agent, source=MotionSource.HELD_SPEED, states=states)
     assert agent.lane_id is not None
-    line = graph.way(agent.lane_id).centerline
+    line = graph.lane(agent.lane_id).centerline
     here = line.project(agent.x_m, agent.y_m)
     askew = wrap(agent.heading_rad - line.heading_at(here.s_m))
     for step in range(1, len(times_s)):
-        place = graph.along(agent.lane_id, here.s_m, float(way[step]), here.d_m)
+        place = graph.along(agent.lane_id, here.s_m, float(driven_m[step]), here.d_m)
         if place is None:
             states[step:] = [*states[step - 1, :3], 0.0] if stays else np.nan
             break

@@ -32,8 +32,8 @@ def scene_problems(scene: SceneDocument) -> Iterator[Problem]:
     yield from _doubled(named + _ids("areas", scene.areas))
     yield from _not_the_ego("agents", scene.agents)
     yield from _reference_problems(scene)
-    for key, ways in (("lanes", scene.lanes), ("connectors", scene.connectors)):
-        yield from _line_problems(key, ways)
+    for key, lanes in (("lanes", scene.lanes), ("connectors", scene.connectors)):
+        yield from _line_problems(key, lanes)
     for index, area in enumerate(scene.areas):
         if len({(x, y) for x, y in area.boundary_m}) < 3:
             yield path("areas", index, "boundary_m"), "an area needs three distinct points"
@@ -83,11 +83,11 @@ def _not_the_ego(key: str, agents: Sequence[AgentDocument]) -> Iterator[Problem]
 
 def _reference_problems(scene: SceneDocument) -> Iterator[Problem]:
     lanes = {lane.id for lane in scene.lanes}
-    ways = lanes | {connector.id for connector in scene.connectors}
+    known = lanes | {connector.id for connector in scene.connectors}
     agents = [(path("ego", "lane_id"), scene.ego.lane_id)]
     agents += [(path("agents", i, "lane_id"), one.lane_id) for i, one in enumerate(scene.agents)]
     for place, name in agents:
-        if name is not None and name not in ways:
+        if name is not None and name not in known:
             yield place, f"{name!r} is not a lane or connector of this scene"
     for place, name in _lane_references(scene):
         if name is not None and name not in lanes:
@@ -95,7 +95,7 @@ def _reference_problems(scene: SceneDocument) -> Iterator[Problem]:
     for index, connector in enumerate(scene.connectors):
         for key in ("from_lane", "to_lane"):
             name = getattr(connector, key)
-            if name is not None and (name not in ways or name == connector.id):
+            if name is not None and (name not in known or name == connector.id):
                 yield path("connectors", index, key), f"{name!r} is not a lane of this scene"
 
 
@@ -108,11 +108,11 @@ def _lane_references(scene: SceneDocument) -> Iterator[tuple[str, str | None]]:
 
 
 def _line_problems(
-    key: str, ways: Sequence[LaneDocument | ConnectorDocument]
+    key: str, lanes: Sequence[LaneDocument | ConnectorDocument]
 ) -> Iterator[Problem]:
-    for index, way in enumerate(ways):
+    for index, lane in enumerate(lanes):
         for name in ("centerline_m", "left_boundary_m", "right_boundary_m"):
-            line = getattr(way, name)
+            line = getattr(lane, name)
             if line is None:
                 continue
             try:

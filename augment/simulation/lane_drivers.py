@@ -161,13 +161,13 @@ class _Lane:
         if name is None:
             raise ValueError(f"{agent.id} is on no lane")
         graph = road.graph
-        place = graph.ways[name].centerline.project(agent.x_m, agent.y_m)
+        place = graph.lanes[name].centerline.project(agent.x_m, agent.y_m)
         route = graph.route(name, place.s_m + PATH_M)
-        lines = [graph.ways[way].centerline.points_m for way in route]
+        lines = [graph.lanes[way].centerline.points_m for way in route]
         whole = np.vstack(lines)
         self.path = Path(dense(whole, 1.0))
         self.start_m = float(self.path.beside(np.array([[agent.x_m, agent.y_m]]))[0][0])
-        lengths = np.cumsum([graph.ways[way].centerline.length_m for way in route])
+        lengths = np.cumsum([graph.lanes[way].centerline.length_m for way in route])
         self._ends = lengths
         limits = road.limits_mps[[road.index[way] for way in route]]
         self._limits = np.where(np.isnan(limits), FALLBACK_MPS, limits)
@@ -191,7 +191,7 @@ def lane_under(road: Road, agent: TrafficAgent) -> str | None:
     name = road.graph.under(agent.x_m, agent.y_m, agent.heading_rad)
     if name is None:
         return None
-    line = road.graph.ways[name].centerline
+    line = road.graph.lanes[name].centerline
     heading = line.heading_at(line.project(agent.x_m, agent.y_m).s_m)
     return name if np.cos(heading - agent.heading_rad) > 0.0 else None
 

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from augment.checks.surfaces import rings, strips
 from augment.scene.entities import AreaKind, LaneConnector, Scene, TrafficLight
-from augment.scene.lane_graph import LaneGraph, Way
+from augment.scene.lane_graph import AnyLane, LaneGraph
 from augment.scene.recording import Recording
 from augment.simulation.path import Path, dense
 from augment.simulation.region import Region
@@ -47,8 +47,8 @@ class Road:
     def __init__(self, scene: Scene, recording: Recording | None = None) -> None:
         self.scene = scene
         self.graph = LaneGraph(scene)
-        self.names = tuple(self.graph.ways)
-        self.ways: list[Way] = [self.graph.ways[name] for name in self.names]
+        self.names = tuple(self.graph.lanes)
+        self.ways: list[AnyLane] = [self.graph.lanes[name] for name in self.names]
         self.index = {name: number for number, name in enumerate(self.names)}
         self.route = find_route(scene, self.graph, recording)
         self.beside = beside_route(scene, self.graph, self.route)
@@ -56,7 +56,7 @@ class Road:
             one.id for one in scene.connectors if one.traffic_light is TrafficLight.RED
         )
         self.limits_mps = self._limits()
-        line = np.vstack([self.graph.ways[name].centerline.points_m for name in self.route])
+        line = np.vstack([self.graph.lanes[name].centerline.points_m for name in self.route])
         ends = not self.graph.successors(self.route[-1])
         map_end_m = Path(dense(line)).length_m
         if ends:
@@ -155,7 +155,9 @@ class Road:
         for way in self.ways:
             limit = way.speed_limit_mps
             if limit is None and isinstance(way, LaneConnector):
-                joined = [self.graph.ways.get(name or "") for name in (way.from_lane, way.to_lane)]
+                joined = [
+                    self.graph.lanes.get(name or "") for name in (way.from_lane, way.to_lane)
+                ]
                 known = [one.speed_limit_mps for one in joined if one is not None]
                 limit = max((value for value in known if value is not None), default=None)
             made.append(np.nan if limit is None else limit)
@@ -163,7 +165,7 @@ class Road:
 
     def _stations(self) -> FloatArray:
         """Where on the centreline each way of the route ends (K,)."""
-        ends = [self.graph.ways[name].centerline.points_m[-1] for name in self.route]
+        ends = [self.graph.lanes[name].centerline.points_m[-1] for name in self.route]
         stations, _ = self.centreline.beside(np.array(ends))
         return np.maximum.accumulate(stations)
 
@@ -176,9 +178,9 @@ class Road:
             for after in self.graph.successors(before):
                 if after in names:
                     rim = np.vstack(
-                        [_rim(self.graph.ways[before], -1), _rim(self.graph.ways[after], 0)]
+                        [_rim(self.graph.lanes[before], -1), _rim(self.graph.lanes[after], 0)]
                     )
-                    if np.ptp(rim, axis=0).max() < _JOINT_M + self.graph.ways[before].width_m:
+                    if np.ptp(rim, axis=0).max() < _JOINT_M + self.graph.lanes[before].width_m:
                         wedges.append(shapely.MultiPoint(rim).convex_hull.buffer(1e-3))
         return np.array(wedges, dtype=object)
 
@@ -188,10 +190,10 @@ class Road:
 
         if self.graph.successors(self.route[-1]):
             return np.empty(0, dtype=object)
-        last = {self.route[-1], *_of_same_direction(self.graph.ways[self.route[-1]], self)}
+        last = {self.route[-1], *_of_same_direction(self.graph.lanes[self.route[-1]], self)}
         made = []
         for name in sorted(last):
-            way = self.graph.ways[name]
+            way = self.graph.lanes[name]
             line = way.centerline.points_m
             onward = np.vstack([line[-1:], _straight_on(line, RUN_OUT_M)])
             half_m = way.width_m / 2.0
@@ -208,7 +210,7 @@ def _straight_on(line: FloatArray, length_m: float) -> FloatArray:
     return np.asarray(line[-1:] + length_m * step / np.hypot(step[0], step[1]), dtype=np.float64)
 
 
-def _rim(way: Way, end: int) -> FloatArray:
+def _rim(way: AnyLane, end: int) -> FloatArray:
     """The left and the right corner (2, 2) of a way's first (0) or last (-1) edge."""
     if way.left_boundary is not None and way.right_boundary is not None:
         return np.array([way.left_boundary.points_m[end], way.right_boundary.points_m[end]])
@@ -218,16 +220,16 @@ def _rim(way: Way, end: int) -> FloatArray:
     return np.array([line.position(s_m, half_m), line.position(s_m, -half_m)])
 
 
-def _of_same_direction(way: Way, road: Road) -> set[str]:
+def _of_same_direction(way: AnyLane, road: Road) -> set[str]:
     """Neighbours of a lane that end where it ends and lead nowhere either."""
     found: set[str] = set()
     waiting = [way]
     while waiting:
         lane = waiting.pop()
         for name in (getattr(lane, "left_neighbor", None), getattr(lane, "right_neighbor", None)):
-            if name in road.graph.ways and name not in found and not road.graph.successors(name):
+            if name in road.graph.lanes and name not in found and not road.graph.successors(name):
                 found.add(name)
-                waiting.append(road.graph.ways[name])
+                waiting.append(road.graph.lanes[name])
     return found
 
 

@@ -30,14 +30,14 @@ def find_route(scene: Scene, graph: LaneGraph, recording: Recording | None) -> t
     start = _start(scene, graph)
     seen = Counter[str]() if recording is None else _driven(graph, recording)
     route = [start]
-    length_m = graph.way(start).centerline.length_m
+    length_m = graph.lane(start).centerline.length_m
     while length_m < ROUTE_M:
         options = [name for name in graph.successors(route[-1]) if name not in route]
         if not options:
             break
         # Of equally driven ones the first: successors come straightest first.
         route.append(max(options, key=lambda name: _support(graph, seen, name)))
-        length_m += graph.way(route[-1]).centerline.length_m
+        length_m += graph.lane(route[-1]).centerline.length_m
     before = [name for name in graph.predecessors(start) if name not in route]
     return (*before[:1], *route)
 
@@ -68,7 +68,7 @@ def _start(scene: Scene, graph: LaneGraph) -> str:
         return own
     aligned = [
         name
-        for name, way in graph.ways.items()
+        for name, way in graph.lanes.items()
         for place in [way.centerline.project(ego.x_m, ego.y_m)]
         if place.distance_m <= _NEAR_M
         and abs(difference(way.centerline.heading_at(place.s_m), ego.heading_rad)) < _ALIGNED_RAD
@@ -90,19 +90,19 @@ def _driven(graph: LaneGraph, recording: Recording) -> Counter[str]:
     """How many moments of the recorded ego lie on each way, in its direction."""
     counts = Counter[str]()
     states = recording.ego[~np.isnan(recording.ego).any(axis=1)]
-    for way_id, way in graph.ways.items():
+    for lane_id, way in graph.lanes.items():
         for x_m, y_m, heading_rad, _ in states:
             place = way.centerline.project(float(x_m), float(y_m))
             turn = difference(way.centerline.heading_at(place.s_m), float(heading_rad))
             if place.distance_m <= way.width_m / 2.0 and abs(turn) < _ALIGNED_RAD:
-                counts[way_id] += 1
+                counts[lane_id] += 1
     return counts
 
 
-def _support(graph: LaneGraph, seen: Counter[str], way_id: str) -> int:
+def _support(graph: LaneGraph, seen: Counter[str], lane_id: str) -> int:
     """How much of the recorded drive lies on a way and, at best, on one that follows it."""
-    after = graph.successors(way_id)
-    return seen[way_id] + max((seen[name] for name in after), default=0)
+    after = graph.successors(lane_id)
+    return seen[lane_id] + max((seen[name] for name in after), default=0)
 
 
 def _neighbours(lane: Lane) -> list[str]:

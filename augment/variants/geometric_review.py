@@ -34,7 +34,7 @@ def review_geometry(
     insists = doubtful > 0 and submission.modification == submission.earlier
     accepted = wrong == 0 and (doubtful == 0 or insists)
     names = short_names(submission.scene)
-    known = names.agents | names.ways
+    known = names.agents | names.lanes
     return Verdict(
         is_accepted=accepted,
         score=(-float(wrong), -float(doubtful)),

@@ -135,7 +135,7 @@ class PoseTool:
             remaining_m=under.length_m - s_m,
             width_m=None if here is None else here.width_m,
             next_lanes=() if here is None else here.after,
-            route=tuple(way.id for way in passed),
+            route=tuple(curve.id for curve in passed),
             start_lateral_m=start_lateral_m,
         )
 
@@ -219,7 +219,7 @@ class PoseTool:
 
     def _not_beside(self, name: str, agent: TrafficAgent, past_m: float, is_before: bool) -> str:
         where = "before the beginning" if is_before else "behind the end"
-        short = None if agent.lane_id is None else self._names.ways.get(agent.lane_id)
+        short = None if agent.lane_id is None else self._names.lanes.get(agent.lane_id)
         advice = f'call with lane "{short}"' if short in self.curves else "name a lane beside it"
         return (
             f"{name} is not beside this lane, it is {past_m:.1f} m {where} of it. To start from "
@@ -270,11 +270,11 @@ def _refuse_past_end(
     """Raise where the lanes end by more than rounding before the distance does."""
     if over_m <= _ROUNDING_M:
         return
-    way = " -> ".join(curve.id for curve in passed)
+    path = " -> ".join(curve.id for curve in passed)
     side, bound = ("end", "most") if forward else ("begin", "least")
     raise ToolError(
         TOOL,
-        f"the lanes that are shown {side} {over_m:.2f} m short of that ({way}): from this start "
+        f"the lanes that are shown {side} {over_m:.2f} m short of that ({path}): from this start "
         f"distance_m can be {_rounded(possible_m, 2):.2f} at {bound}",
     )
 

@@ -96,21 +96,21 @@ def _under_short_names(scene: Scene, modification: Modification) -> tuple[Scene,
         lanes=tuple(
             replace(
                 lane,
-                id=names.ways[lane.id],
-                left_neighbor=names.ways.get(lane.left_neighbor or ""),
-                right_neighbor=names.ways.get(lane.right_neighbor or ""),
-                successors=tuple(names.ways[n] for n in lane.successors if n in names.ways),
+                id=names.lanes[lane.id],
+                left_neighbor=names.lanes.get(lane.left_neighbor or ""),
+                right_neighbor=names.lanes.get(lane.right_neighbor or ""),
+                successors=tuple(names.lanes[n] for n in lane.successors if n in names.lanes),
             )
             for lane in scene.lanes
         ),
         connectors=tuple(
             replace(
-                way,
-                id=names.ways[way.id],
-                from_lane=names.ways.get(way.from_lane or ""),
-                to_lane=names.ways.get(way.to_lane or ""),
+                connector,
+                id=names.lanes[connector.id],
+                from_lane=names.lanes.get(connector.from_lane or ""),
+                to_lane=names.lanes.get(connector.to_lane or ""),
             )
-            for way in scene.connectors
+            for connector in scene.connectors
         ),
     )
     change = Modification(

@@ -117,4 +117,4 @@ def _comparable(found: tuple[Finding, ...]) -> list[Finding]:
 
 
 def _told(found: tuple[Finding, ...]) -> list[object]:
-    return [(one.kind, one.severity, one.agents, one.ways) for one in _comparable(found)]
+    return [(one.kind, one.severity, one.agents, one.lanes) for one in _comparable(found)]

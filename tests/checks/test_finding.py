@@ -12,9 +12,9 @@ OFF = Finding(
     kind=FindingKind.LANE,
     severity=Severity.FACT,
     agents=("Agent2",),
-    ways=("42811-b",),
+    lanes=("42811-b",),
     measured={"off_m": 7.28, "left_m": -9.0, "along_lanes_m": None},
-    template="{agents[0]} is {off_m:.1f} m off {ways[0]}, {left_m:.1f} m to its right.",
+    template="{agents[0]} is {off_m:.1f} m off {lanes[0]}, {left_m:.1f} m to its right.",
 )
 
 
@@ -27,7 +27,7 @@ def test_its_sentence_calls_things_what_the_reader_calls_them() -> None:
 
 
 def test_a_name_with_braces_is_only_a_name() -> None:
-    assert OFF.sentence({"Agent2": "{ways[0]}"}).startswith("{ways[0]} is 7.3 m")
+    assert OFF.sentence({"Agent2": "{lanes[0]}"}).startswith("{lanes[0]} is 7.3 m")
 
 
 def test_its_numbers_stay_what_they_are() -> None:

@@ -104,7 +104,7 @@ def test_a_lane_behind_an_ego_that_has_none_is_no_distance() -> None:
 
 def test_the_lane_under_an_agent_and_its_offset() -> None:
     (lane,) = of_kind(found_in(scene(), vehicle("Agent2", 20.0, 4.0, math.pi)), FindingKind.LANE)
-    assert lane.ways == ("Lane2",)
+    assert lane.lanes == ("Lane2",)
     assert lane.measured["along_m"] == pytest.approx(80.0)
     assert lane.measured["left_m"] == pytest.approx(-0.5)
     assert lane.sentence() == (

@@ -75,12 +75,12 @@ def moved_agent(agent: TrafficAgent, frame: Pose) -> TrafficAgent:
     )
 
 
-def _moved_way(way: W, frame: Pose) -> W:
+def _moved_way(lane: W, frame: Pose) -> W:
     return replace(
-        way,
-        centerline=_moved_line(way.centerline, frame),
-        left_boundary=way.left_boundary and _moved_line(way.left_boundary, frame),
-        right_boundary=way.right_boundary and _moved_line(way.right_boundary, frame),
+        lane,
+        centerline=_moved_line(lane.centerline, frame),
+        left_boundary=lane.left_boundary and _moved_line(lane.left_boundary, frame),
+        right_boundary=lane.right_boundary and _moved_line(lane.right_boundary, frame),
     )
 
 

@@ -16,7 +16,7 @@ from augment.formats.writing import Cell
 from augment.geometry.angles import difference
 from augment.geometry.polyline import Polyline
 from augment.scene.entities import Area, Lane, LaneConnector, Scene, TrafficAgent
-from augment.scene.lane_graph import Way
+from augment.scene.lane_graph import AnyLane
 from augment.scene.motion import Movement
 
 NEAR_M, NEAR_RAD, NEAR_MPS = 0.01, 0.001, 0.01
@@ -137,8 +137,8 @@ def _same_states(movement: Movement, found: np.ndarray[Any, Any]) -> bool:
 
 
 def _of_ways(before: Scene, after: Scene) -> Iterator[Change]:
-    ours: list[Way] = [*before.lanes, *before.connectors]
-    left: list[Way] = [*after.lanes, *after.connectors]
+    ours: list[AnyLane] = [*before.lanes, *before.connectors]
+    left: list[AnyLane] = [*after.lanes, *after.connectors]
     new_name: dict[str | None, str | None] = {None: None}
     pairs = []
     for was in ours:
@@ -156,7 +156,9 @@ def _of_ways(before: Scene, after: Scene) -> Iterator[Change]:
         yield from _of_way(was, found, new_name)
 
 
-def _of_way(was: Way, found: Way, new_name: dict[str | None, str | None]) -> Iterator[Change]:
+def _of_way(
+    was: AnyLane, found: AnyLane, new_name: dict[str | None, str | None]
+) -> Iterator[Change]:
     if type(was) is not type(found):
         yield Change(was.id, "kind of way")
         return

@@ -39,15 +39,15 @@ def test_a_lane_lies_under_the_ego_and_leads_on(start: tuple[Scene, Recording]) 
     scene, _ = start
     graph = LaneGraph(scene)
     assert scene.ego.lane_id is not None
-    place = graph.way(scene.ego.lane_id).centerline.project(0.0, 0.0)
-    heading = graph.way(scene.ego.lane_id).centerline.heading_at(place.s_m)
+    place = graph.lane(scene.ego.lane_id).centerline.project(0.0, 0.0)
+    heading = graph.lane(scene.ego.lane_id).centerline.heading_at(place.s_m)
     assert abs(heading) < math.radians(15.0)
     assert graph.along(scene.ego.lane_id, place.s_m, 120.0) is not None
 
 
 def test_lanes_are_as_wide_as_lanes(start: tuple[Scene, Recording]) -> None:
     # The map counts parking bays along a street to its lanes.
-    widths = [way.width_m for way in LaneGraph(start[0]).ways.values()]
+    widths = [way.width_m for way in LaneGraph(start[0]).lanes.values()]
     assert 2.8 < float(np.median(widths)) < 5.0
     assert min(widths) > 2.0
     assert max(widths) < 10.0
@@ -56,9 +56,9 @@ def test_lanes_are_as_wide_as_lanes(start: tuple[Scene, Recording]) -> None:
 def test_ways_join_where_the_map_says_they_do(start: tuple[Scene, Recording]) -> None:
     scene, _ = start
     graph = LaneGraph(scene)
-    for way_id, way in graph.ways.items():
+    for way_id, way in graph.lanes.items():
         for following in graph.successors(way_id):
-            x_m, y_m = graph.ways[following].centerline.points_m[0]
+            x_m, y_m = graph.lanes[following].centerline.points_m[0]
             end_x_m, end_y_m = way.centerline.points_m[-1]
             assert math.hypot(x_m - end_x_m, y_m - end_y_m) < 2.5, (way_id, following)
 
@@ -75,7 +75,7 @@ def test_what_drives_heads_where_it_drives(start: tuple[Scene, Recording]) -> No
                 assert abs(difference(math.atan2(dy, dx), state[2])) < math.radians(40.0)
     assert checked > 200
     aligned = [
-        abs(difference(LaneGraph(scene).way(a.lane_id).centerline.heading_at(0.0), a.heading_rad))
+        abs(difference(LaneGraph(scene).lane(a.lane_id).centerline.heading_at(0.0), a.heading_rad))
         for a in scene.agents
         if a.type is AgentType.VEHICLE and a.speed_mps > 3.0 and a.lane_id is not None
     ]

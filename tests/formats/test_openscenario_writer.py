@@ -16,7 +16,7 @@ from augment.formats.writing import Cell
 from augment.geometry.polyline import Polyline
 from augment.scene.codec import scene_from_document
 from augment.scene.entities import Lane, Scene, TrafficSide
-from augment.scene.lane_graph import Way
+from augment.scene.lane_graph import AnyLane
 from tests.formats.cells import OF_EACH_TYPE, cell, crossing, recorded_street
 from tests.formats.receivers import told_by
 from tests.recorded import recorded
@@ -66,7 +66,7 @@ def test_asams_checks_find_no_fault_in_any_file(realdata: Path, tmp_path: Path) 
 @pytest.mark.parametrize("before", [curve(), crossing()], ids=["curve", "crossing"])
 def test_roads_pass_through_every_point_and_stay_near_the_line(before: Scene) -> None:
     _, road_map = files(cell(before, added=()))
-    ways: list[Way] = [*before.lanes, *before.connectors]
+    ways: list[AnyLane] = [*before.lanes, *before.connectors]
     for road, way in zip(road_map.findall("road"), ways, strict=True):
         points = _sampled(road)
         curve_line = Polyline(points)

@@ -69,7 +69,7 @@ def test_moving_vehicles_head_where_their_lane_leads(realdata: Path, name: str) 
         for x_m, y_m, heading_rad, speed_mps in track.states[::3].tolist():
             way_id = graph.under(x_m, y_m, heading_rad) if speed_mps > 2.0 else None
             if way_id is not None:
-                line = graph.way(way_id).centerline
+                line = graph.lane(way_id).centerline
                 turn = difference(line.heading_at(line.project(x_m, y_m).s_m), heading_rad)
                 aligned.append(abs(turn) < math.radians(30.0))
     assert len(aligned) >= 15

@@ -31,7 +31,7 @@ from augment.scene.entities import (
     TrafficSide,
     TurnType,
 )
-from augment.scene.lane_graph import Way
+from augment.scene.lane_graph import AnyLane
 from augment.scene.modification import Modification, without_traffic
 from augment.scene.notes import SceneNoteKind
 from tests.fixtures.shelf import entry, whole_scene
@@ -198,7 +198,7 @@ def is_said(change: Change, name: str, lines: list[str]) -> bool:
 
 def far_ids(scene: Scene) -> set[str]:
     """What the readers leave out of every format, as it lies too far away."""
-    ways: list[Way] = [*scene.lanes, *scene.connectors]
+    ways: list[AnyLane] = [*scene.lanes, *scene.connectors]
     far = {one.id for one in ways if one.centerline.project(0.0, 0.0).distance_m > RADIUS_M}
     return far | {one.id for one in scene.agents if np.hypot(one.x_m, one.y_m) > RADIUS_M}
 

@@ -11,7 +11,7 @@ import pytest
 
 from augment.formats.scenarionet_writer import MAPPING_FILE, SUMMARY_FILE, write
 from augment.scene.entities import AgentType
-from augment.scene.lane_graph import LaneGraph, Way
+from augment.scene.lane_graph import AnyLane, LaneGraph
 from tests.formats.cells import OF_EACH_TYPE, cell, crossing, recorded_street
 from tests.formats.sanity import check_sanity, loaded
 from tests.recorded import recorded
@@ -66,7 +66,7 @@ def test_places_headings_sizes_and_speeds_are_kept() -> None:
 def test_lanes_links_limits_and_lights_are_kept() -> None:
     given, made = cell(before=crossing()).after, document(before=crossing())
     graph, features = LaneGraph(given), made["map_features"]
-    ways: list[Way] = [*given.lanes, *given.connectors]
+    ways: list[AnyLane] = [*given.lanes, *given.connectors]
     for way in ways:
         feature = features[way.id]
         assert np.allclose(feature["polyline"][:, :2], way.centerline.points_m)

@@ -72,11 +72,11 @@ def test_the_car_stands_where_the_sentence_says_on_the_real_road(
         assert (place.media / image).stat().st_size > 10_000
     graph = LaneGraph(scene_from_document(json.loads(scene)))
     (car,) = modification_from_document(json.loads(document)).added
-    start = graph.way("Lane1").centerline.project(0.0, 0.0)
+    start = graph.lane("Lane1").centerline.project(0.0, 0.0)
     wanted = graph.along("Lane1", start.s_m, 21.4)
     assert wanted is not None
-    assert graph.under(car.x_m, car.y_m, car.heading_rad) == wanted.way_id
-    found = graph.way(wanted.way_id).centerline.project(car.x_m, car.y_m)
+    assert graph.under(car.x_m, car.y_m, car.heading_rad) == wanted.lane_id
+    found = graph.lane(wanted.lane_id).centerline.project(car.x_m, car.y_m)
     assert found.s_m == pytest.approx(wanted.s_m, abs=0.1)
     assert 0.1 < found.d_m <= 1.5  # to the left, within what "slightly" may mean
     assert car.heading_rad == pytest.approx(wanted.pose.heading_rad, abs=0.02)

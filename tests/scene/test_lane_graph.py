@@ -68,7 +68,7 @@ def test_nobody_turns_round_where_the_road_turns_off(left_first: bool) -> None:
 def test_a_distance_runs_on_over_connectors() -> None:
     place = LaneGraph(junction()).along("Lane1", 50.0, 40.0, 0.5)
     assert place is not None
-    assert (place.way_id, place.s_m) == ("Lane2", 4.0)
+    assert (place.lane_id, place.s_m) == ("Lane2", 4.0)
     assert (place.pose.x_m, place.pose.y_m) == (40.0, 0.5)
 
 
@@ -76,10 +76,10 @@ def test_a_turn_can_be_asked_for_and_a_distance_can_run_back() -> None:
     graph = LaneGraph(junction())
     ahead = graph.along("Lane1", 50.0, 40.0, turn=TurnType.LEFT)
     assert ahead is not None
-    assert ahead.way_id == "Lane3"
+    assert ahead.lane_id == "Lane3"
     back = graph.along("Lane2", 4.0, -40.0)
     assert back is not None
-    assert back.way_id == "Lane1"
+    assert back.lane_id == "Lane1"
     assert back.pose.x_m == pytest.approx(0.0)
 
 
@@ -89,7 +89,7 @@ def test_past_the_map_there_is_nothing() -> None:
 
 def test_an_unknown_lane_names_the_known_ones() -> None:
     with pytest.raises(UnknownName, match="Lane1, Lane2"):
-        LaneGraph(scene()).way("Lane9")
+        LaneGraph(scene()).lane("Lane9")
 
 
 def test_a_lane_can_follow_another_with_no_connector_between() -> None:
@@ -162,7 +162,7 @@ def test_back_over_a_merge_goes_the_straightest_way_not_the_first(
     world = merge(side, side_first=side_first, connectors=connectors)
     place = LaneGraph(world).along("Lane3", 10.0, -40.0)
     assert place is not None
-    assert place.way_id == "Lane1"
+    assert place.lane_id == "Lane1"
     assert (place.pose.x_m, place.pose.y_m) == pytest.approx((-30.0, 0.0))
     called = PoseTool(world).pose_on_lane("Lane3", "lane", -30.0, 0.5)
     assert (called.pose.x_m, called.pose.y_m) == pytest.approx((-30.0, 0.5), abs=0.01)

@@ -53,8 +53,8 @@ def accuracy(tool: PoseTool) -> Accuracy:
     positions: list[float] = []
     headings: list[float] = []
     worst_position, worst_heading = (0.0, ""), (0.0, "")
-    for way in LaneGraph(tool.scene).ways.values():
-        name = names.ways[way.id]
+    for way in LaneGraph(tool.scene).lanes.values():
+        name = names.lanes[way.id]
         gaps_m, turns_rad = _errors_on(tool, name, way.centerline.points_m)
         positions += gaps_m
         headings += turns_rad

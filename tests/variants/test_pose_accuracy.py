@@ -39,11 +39,11 @@ def test_on_recorded_lanes_a_distance_leads_where_the_centrelines_lead(realdata:
     tool, graph, names = whole_map(scene), LaneGraph(scene), short_names(scene)
     start = scene.ego.lane_id
     assert start is not None
-    s_m = graph.way(start).centerline.project(0.0, 0.0).s_m
+    s_m = graph.lane(start).centerline.project(0.0, 0.0).s_m
     for distance_m in (-20.0, 12.5, 40.0, 90.0, 120.0):
         wanted = graph.along(start, s_m, distance_m)
-        found = tool.pose_on_lane(names.ways[start], "Agent1", distance_m)
+        found = tool.pose_on_lane(names.lanes[start], "Agent1", distance_m)
         assert wanted is not None
-        assert found.lane == names.ways[wanted.way_id]
+        assert found.lane == names.lanes[wanted.lane_id]
         gap_m = abs(found.pose.x_m - wanted.pose.x_m) + abs(found.pose.y_m - wanted.pose.y_m)
         assert gap_m < 0.6

@@ -151,7 +151,7 @@ def check_reference(scene: Scene, modification: Modification) -> None:
         InvalidDocument: An agent names a lane that the scene does not have.
     """
     check_fits(scene, modification)
-    known = LaneGraph(scene).ways
+    known = LaneGraph(scene).lanes
     problems = [
         (f"{agent.id}.lane_id", f"{agent.lane_id!r} is not a lane or connector of the scene")
         for agent in modification.changed
