@@ -76,7 +76,7 @@ def read_document(document: object, scenes: Mapping[str, Scene]) -> ReadFile:
     ]
     return ReadFile(
         entries=tuple(
-            _read_entry(token, index, entry, scenes[token])
+            read_entry(token, index, entry, scenes[token])
             for token, entries in special.items()
             if token in scenes
             for index, entry in entries.items()
@@ -88,7 +88,12 @@ def read_document(document: object, scenes: Mapping[str, Scene]) -> ReadFile:
     )
 
 
-def _read_entry(token: str, index: str | int, entry: SpecialScenario, scene: Scene) -> ReadEntry:
+def read_entry(token: str, index: str | int, entry: SpecialScenario, scene: Scene) -> ReadEntry:
+    """One special scenario of a base token.
+
+    Raises:
+        InvalidDocument: An object is nowhere near the scene.
+    """
     placer = _Placer(scene, token, index)
     for kind, key, rows in (
         (AgentType.VEHICLE, "stopped_vehicle", entry.stopped_vehicle),

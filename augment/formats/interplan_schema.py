@@ -58,10 +58,14 @@ class Details(_Part):
 
 
 class File(_Part):
-    """The whole file."""
+    """The whole file.
 
-    accel_max: float | None = None
-    decel_max: float | None = None
+    Attributes:
+        accel_max, decel_max: In the published file they refer to another one: "${...}".
+    """
+
+    accel_max: float | str | None = None
+    decel_max: float | str | None = None
     scenario_specifics: Any = None
     modification_details_dictionary: dict[Token, Details]
 

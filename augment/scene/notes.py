@@ -44,6 +44,11 @@ class SceneNoteKind(StrEnum):
     BOUNDARIES_TURNED = "boundaries_turned"
     TURN_TYPES_CORRECTED = "turn_types_corrected"
     LONG_TIME_STEP = "long_time_step"
+    ROUTE = "route"
+    ROUTE_NOT_IN_MAP = "route_not_in_map"
+    MISSION_GOAL = "mission_goal"
+    SCENARIO_TAGS = "scenario_tags"
+    INTERPLAN_LEFT_OUT = "interplan_left_out"
     NON_COMMERCIAL = "non_commercial"
 
 

@@ -59,6 +59,7 @@ def write_map(root: Path, city: str) -> Path:
     file = root / "maps" / city / version / "map.gpkg"
     file.parent.mkdir(parents=True, exist_ok=True)
     base = sqlite3.connect(file)
+    base.execute("PRAGMA synchronous = OFF")
 
     def shape(points: list[tuple[float, float]], *, polygon: bool = False) -> bytes:
         metres = np.array(points) + np.array([east, north])
@@ -127,6 +128,8 @@ def write_map(root: Path, city: str) -> Path:
         "lane_connector_fid, left_boundary_fid, right_boundary_fid",
         (1, shape(strip(40, 55, 0), polygon=True), 11, 7, 8),
     )
+    layer("lane_groups_polygons", line, (90, None, 0), (91, None, 0))
+    layer("lane_group_connectors", line, (30, None, 0))
     layer("intersections", line, (70, shape(strip(40, 55, 0, 8), polygon=True), 0))
     layer("walkways", line, (71, shape(strip(-40, 40, -8), polygon=True), 0))
     layer("crosswalks", line)
@@ -142,6 +145,7 @@ def write_log(root: Path, city: str, steps: int = 21) -> Path:
     _, east, north, _ = CITIES[city]
     file = root / "made.db"
     base = sqlite3.connect(file)
+    base.execute("PRAGMA synchronous = OFF")
     for table, columns in {
         "log": "token, vehicle_name, date, timestamp, logfile, location, map_version",
         "lidar_pc": "token, next_token, prev_token, ego_pose_token, lidar_token, scene_token, "

@@ -119,6 +119,37 @@ def test_a_connector_comes_from_its_exit_lane_and_has_its_light(
     assert (connector.from_lane, connector.to_lane) == (scene.ego.lane_id, ends[0])
 
 
+def test_route_goal_and_tags_are_notes(log: Path) -> None:
+    base = sqlite3.connect(log)
+    base.execute("UPDATE scene SET roadblock_ids = '90 30 999'")
+    base.commit()
+    base.close()
+    notes = {note.kind: note for note in read(log, token(110).hex()).notes}
+    assert notes[SceneNoteKind.ROUTE].names == ("90", "30", "999")
+    assert notes[SceneNoteKind.ROUTE_NOT_IN_MAP].names == ("999",)
+    # The goal is the rear axle's pose 5 m on; the frame is that of the ego's centre.
+    assert notes[SceneNoteKind.MISSION_GOAL].names == ("3.5", "0.0")
+    assert notes[SceneNoteKind.SCENARIO_TAGS].names == ("high_magnitude_speed",)
+
+
+def test_feature_ids_may_be_texts_and_logs_may_name_the_city_otherwise(log: Path) -> None:
+    (file,) = log.parent.glob("maps/*/*/map.gpkg")
+    wanted = scene_to_document(read(log).scene)
+    for name, change in (
+        (file, "UPDATE lanes_polygons SET left_boundary_fid = '' || left_boundary_fid"),
+        (file, "UPDATE lane_connectors SET exit_lane_fid = 1.0"),
+        (log, "UPDATE log SET location = 'one-north'"),
+    ):
+        base = sqlite3.connect(name)
+        base.execute(change)
+        base.commit()
+        base.close()
+    found = scene_to_document(read(log).scene)
+    for made in (wanted, found):
+        made.pop("origin")
+    assert found == wanted
+
+
 def test_moments_are_tokens(log: Path) -> None:
     found = [one.item for one in NuPlan().moments(log, every_s=0.5)]
     assert found == [token(100).hex(), token(110).hex(), token(120).hex()]
@@ -145,12 +176,24 @@ def test_what_is_not_there_is_named(log: Path, tmp_path: Path) -> None:
         ("UPDATE category SET name = 'tank'", "unknown 'tank'"),
         ("UPDATE ego_pose SET x = 'west'", "no number"),
         ("UPDATE ego_pose SET x = 1e300", "over 1e+08"),
+        ("UPDATE ego_pose SET qw = 9e999", "not finite"),
+        ("UPDATE lidar_pc SET timestamp = 'noon'", "no whole number"),
+        ("UPDATE traffic_light_status SET lane_connector_id = 'x'", "no whole number"),
+        ("UPDATE lidar_box SET vx = 'fast'", "no number"),
+        ("DELETE FROM lidar_pc", "there is no lidar_pc"),
+        (
+            "ALTER TABLE lidar_box RENAME TO b; CREATE VIEW lidar_box AS "
+            "WITH RECURSIVE n(i) AS (SELECT 1 UNION ALL SELECT i + 1 FROM n) "
+            "SELECT b.* FROM b, n",
+            "has no table 'lidar_box'",
+        ),
+        ("UPDATE log SET logfile = zeroblob(20000000)", "too big"),
         ("UPDATE log SET location = '../../etc'", "is no name of a map"),
     ],
 )
 def test_a_broken_log_says_what_is_wrong(log: Path, change: str, said: str) -> None:
     base = sqlite3.connect(log)
-    base.execute(change)
+    base.executescript(change)
     base.commit()
     base.close()
     assert said in fault_of(log)
@@ -165,12 +208,15 @@ def test_a_broken_log_says_what_is_wrong(log: Path, change: str, said: str) -> N
         ("UPDATE baseline_paths SET geom = substr(geom, 1, 30)", "broken geometry"),
         ("UPDATE gpkg_geometry_columns SET srs_id = 3857", "EPSG:3857, which is not read"),
         ("DROP TABLE lanes_polygons", "has no table 'lanes_polygons'"),
+        ("UPDATE baseline_paths SET geom = zeroblob(40)", "does not begin with GP"),
+        ("UPDATE baseline_paths SET lane_fid = 'x'", "is no feature id"),
+        ("UPDATE baseline_paths SET lane_fid = -1.5", "is no feature id"),
     ],
 )
 def test_a_broken_map_says_what_is_wrong(log: Path, change: str, said: str) -> None:
     (file,) = log.parent.glob("maps/*/*/map.gpkg")
     base = sqlite3.connect(file)
-    base.execute(change)
+    base.executescript(change)
     base.commit()
     base.close()
     assert said in fault_of(log)

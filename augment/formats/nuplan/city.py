@@ -13,6 +13,7 @@ from typing import Any
 
 import numpy as np
 
+from augment.errors import InvalidDocument
 from augment.formats.lane_edges import USUAL_M
 from augment.formats.nuplan.geopackage import Layers
 from augment.formats.nuplan.mercator import FloatArray
@@ -34,7 +35,11 @@ AREA_OF = {
     "generic_drivable_areas": AreaKind.DRIVABLE,
     "road_segments": AreaKind.DRIVABLE,
 }
+ROADBLOCKS = ("lane_groups_polygons", "lane_group_connectors")
+MOST_NAMED = 100
 LEFT_HAND = "sg-"
+BESIDE_M = 50.0
+"""Edges of a lane and what names it lie no further from its centreline than this."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -59,6 +64,7 @@ def city_around(
     location: str,
     center_m: tuple[float, float],
     lights: dict[int, TrafficLight],
+    route: tuple[str, ...] = (),
 ) -> NuplanCity:
     """What of the map lies within reach of a point.
 
@@ -67,19 +73,28 @@ def city_around(
         location: The city, such as "sg-one-north".
         center_m: The point in UTM.
         lights: The state by the feature id of the connector.
+        route: Ids of the roadblocks that the mission leads over.
 
     Raises:
         InvalidDocument: The map is not there or breaks its format.
     """
     center, count = np.array(center_m), _Count()
     with open_tables(path) as tables:
-        layers = Layers(tables)
+        layers = Layers(tables, center, RADIUS_M + BESIDE_M)
         lines = _centerlines(layers, center)
-        edges = {fid: points for (fid,), points in layers.read("boundaries", ("fid",))}
+        edges: dict[str | None, FloatArray] = {
+            _name(fid): points for (fid,), points in layers.read("boundaries", ("fid",))
+        }
         segments = [
             *_lanes(layers, lines, edges, count),
             *_connectors(layers, lines, edges, lights, count),
         ]
+        blocks = {
+            str(fid)
+            for layer in ROADBLOCKS
+            if route and tables.has(layer)
+            for (fid,) in tables.rows(f"SELECT fid FROM {layer}")
+        }
         areas = tuple(
             (kind, points)
             for layer, kind in AREA_OF.items()
@@ -92,12 +107,18 @@ def city_around(
         place=path.name,
         segments=tuple(_with_neighbors(segments)),
         areas=areas,
-        side=TrafficSide.LEFT if location.startswith(LEFT_HAND) else TrafficSide.RIGHT,
+        side=TrafficSide.LEFT if _is_left_hand(path, location) else TrafficSide.RIGHT,
     )
-    return NuplanCity(map=city, notes=_notes(city, count))
+    notes = [*_notes(city, count), *_route_notes(route, blocks)]
+    return NuplanCity(map=city, notes=tuple(notes))
 
 
 # Private
+
+
+def _is_left_hand(path: Path, location: str) -> bool:
+    """By the city that the map lies under, too: logs differ in what they call theirs."""
+    return location.startswith(LEFT_HAND) or path.parent.parent.name.startswith(LEFT_HAND)
 
 
 def _is_near(points: FloatArray, center: FloatArray) -> bool:
@@ -112,20 +133,42 @@ def _centerlines(layers: Layers, center: FloatArray) -> dict[str, FloatArray]:
     columns = ("lane_fid", "lane_connector_fid")
     for (lane, connector), points in layers.read("baseline_paths", columns):
         if _is_near(points, center):
+            if lane is None and connector is None:
+                continue  # a path of neither, which nothing refers to
             found[_name(lane) if lane is not None else _connector_name(connector)] = points
     return found
 
 
 def _name(fid: Any) -> str:
-    return f"{int(fid):09d}"
+    """Of a whole number, or of its digits as text.
+
+    Raises:
+        InvalidDocument: It is none.
+    """
+    text = str(int(fid) if isinstance(fid, float) and fid.is_integer() else fid)
+    if not isinstance(fid, int | float | str) or not text.isdecimal() or len(text) > 18:
+        raise InvalidDocument(WHAT, [("map", f"{text[:40]!r} is no feature id")])
+    return f"{int(text):09d}"
+
+
+def _name_or_none(fid: Any) -> str | None:
+    return None if fid is None or fid == "" else _name(fid)
+
+
+def _named(fid: Any) -> tuple[str, ...]:
+    name = _name_or_none(fid)
+    return () if name is None else (name,)
 
 
 def _connector_name(fid: Any) -> str:
-    return f"c{int(fid):09d}"
+    return f"c{_name(fid)}"
 
 
 def _lanes(
-    layers: Layers, lines: dict[str, FloatArray], edges: dict[Any, FloatArray], count: _Count
+    layers: Layers,
+    lines: dict[str, FloatArray],
+    edges: dict[str | None, FloatArray],
+    count: _Count,
 ) -> list[tuple[Segment, Any, Any]]:
     """Segments with the group and the place in it, by which neighbours are found."""
     made = []
@@ -139,7 +182,8 @@ def _lanes(
         if kind == BICYCLE_LANE:
             count.bicycle_lanes += 1
             continue
-        segment = _segment(_name(fid), line, edges.get(left), edges.get(right), count)
+        both = edges.get(_name_or_none(left)), edges.get(_name_or_none(right))
+        segment = _segment(_name(fid), line, both, count)
         made.append((replace(segment, speed_limit_mps=_limit(limit)), group, index))
     return made
 
@@ -147,15 +191,15 @@ def _lanes(
 def _connectors(
     layers: Layers,
     lines: dict[str, FloatArray],
-    edges: dict[Any, FloatArray],
+    edges: dict[str | None, FloatArray],
     lights: dict[int, TrafficLight],
     count: _Count,
 ) -> list[tuple[Segment, Any, Any]]:
-    sides: dict[Any, tuple[Any, Any]] = {}
+    sides: dict[str | None, list[Any]] = {}
     areas = "gen_lane_connectors_scaled_width_polygons"
     if layers.has(areas):
         named = ("lane_connector_fid", "left_boundary_fid", "right_boundary_fid")
-        sides = {fid: (left, right) for (fid, left, right), _ in layers.read(areas, named)}
+        sides = {_name_or_none(fid): pair for (fid, *pair), _ in layers.read(areas, named)}
     made = []
     columns = ("fid", "exit_lane_fid", "entry_lane_fid", "turn_type_fid", "speed_limit_mps")
     for values, own in layers.read("lane_connectors", (*columns, "traffic_light_stop_line_fids")):
@@ -163,16 +207,17 @@ def _connectors(
         if _connector_name(fid) not in lines:
             continue
         line = lines.get(_connector_name(fid), own)
-        left, right = sides.get(fid, (None, None))
-        segment = _segment(_connector_name(fid), line, edges.get(left), edges.get(right), count)
+        left, right = sides.get(_name(fid), (None, None))
+        both = edges.get(_name_or_none(left)), edges.get(_name_or_none(right))
+        segment = _segment(_connector_name(fid), line, both, count)
         dark = TrafficLight.UNKNOWN if str(stop_lines or "").strip() else TrafficLight.NONE
         segment = replace(
             segment,
             crosses=True,
-            predecessors=() if before is None else (_name(before),),
-            successors=() if after is None else (_name(after),),
+            predecessors=_named(before),
+            successors=_named(after),
             speed_limit_mps=_limit(limit),
-            light=lights.get(int(fid), dark),
+            light=lights.get(int(_name(fid)), dark),
             turn=_turn(line, turn, count),
         )
         made.append((segment, None, None))
@@ -182,13 +227,12 @@ def _connectors(
 def _segment(
     name: str,
     line: FloatArray,
-    left: FloatArray | None,
-    right: FloatArray | None,
+    edges: tuple[FloatArray | None, FloatArray | None],
     count: _Count,
 ) -> Segment:
     """With its boundaries in the direction of travel; some run against it in the source."""
     both = []
-    for edge in (left, right):
+    for edge in edges:
         if edge is not None and _runs_against(edge, line):
             edge = edge[::-1]
             count.turned += 1
@@ -236,6 +280,24 @@ def _with_neighbors(found: list[tuple[Segment, Any, Any]]) -> list[Segment]:
             )
         made.append(one)
     return made
+
+
+def _route_notes(route: tuple[str, ...], blocks: set[str]) -> list[Note]:
+    """The route; some of the data set name roadblocks that their map does not have."""
+    if not route:
+        return []
+    notes = [Note(kind=SceneNoteKind.ROUTE, number=len(route), names=route[:MOST_NAMED])]
+    missing = tuple(one for one in route if one not in blocks)
+    if blocks and missing:
+        notes.append(
+            Note(
+                kind=SceneNoteKind.ROUTE_NOT_IN_MAP,
+                number=len(missing),
+                of=len(route),
+                names=missing[:MOST_NAMED],
+            )
+        )
+    return notes
 
 
 def _notes(city: RoadMap, count: _Count) -> tuple[Note, ...]:

@@ -6,6 +6,9 @@ centre; velocities of the ego are in its own frame. Rows of 20 Hz are taken at 1
 
 from __future__ import annotations
 
+import math
+import re
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -13,7 +16,7 @@ import numpy as np
 
 from augment.errors import InvalidDocument
 from augment.formats.nuplan.sqlite import WHAT, Tables
-from augment.formats.recorded_log import Log, LoggedTrack
+from augment.formats.recorded_log import MOST_NUMBERS, Log, LoggedTrack
 from augment.scene.entities import AgentType, TrafficLight
 from augment.scene.sizes import EGO_LENGTH_M, EGO_WIDTH_M
 
@@ -21,6 +24,9 @@ REAR_AXLE_TO_CENTER_M = 1.461
 STEP_US = 100_000
 LASTS_US = 30_000_000
 """As long as interPlan's longest scenario."""
+LATEST_US = 2**62
+MOST_FRAMES = 20_000
+MOST_ROADBLOCKS = 1_000
 
 TYPE_OF = {
     "vehicle": AgentType.VEHICLE,
@@ -45,6 +51,7 @@ _COLUMNS = {
     "category": ("token", "name"),
     "scenario_tag": ("lidar_pc_token", "type"),
     "traffic_light_status": ("lidar_pc_token", "lane_connector_id", "status"),
+    "scene": ("token", "goal_ego_pose_token", "roadblock_ids"),
 }
 
 
@@ -55,6 +62,21 @@ class LogPlace:
     location: str
     version: str
     logfile: str
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Mission:
+    """Where the ego was sent, and what a moment is tagged as.
+
+    Attributes:
+        roadblocks: Ids of lane groups and group connectors, in their order.
+        goal_m: East and north; None where there is none.
+        tags: Scenario types, in alphabetical order.
+    """
+
+    roadblocks: tuple[str, ...]
+    goal_m: tuple[float, float] | None
+    tags: tuple[str, ...]
 
 
 def check_tables(tables: Tables) -> None:
@@ -91,7 +113,13 @@ def tokens_of(tables: Tables, tag: str | None) -> list[tuple[str, int]]:
             "ON s.lidar_pc_token = l.token WHERE s.type = ? ORDER BY l.timestamp",
             (tag,),
         )
-    return [(str(token).lower(), int(time)) for token, time in rows]
+    return [(str(token).lower(), _whole(time, "lidar_pc.timestamp")) for token, time in rows]
+
+
+def has_token(tables: Tables, token: str) -> bool:
+    """Whether the log has a lidar_pc of that token."""
+    text = "SELECT 1 FROM lidar_pc WHERE token = ? LIMIT 1"
+    return bool(tables.rows(text, (bytes.fromhex(token),)))
 
 
 def read_log(tables: Tables, token: str) -> Log:
@@ -100,8 +128,7 @@ def read_log(tables: Tables, token: str) -> Log:
     Raises:
         InvalidDocument: There is no such token, or a row breaks the format.
     """
-    frames = _frames(tables, token)
-    chosen = _every_tenth_of_a_second(frames)
+    chosen = _every_tenth_of_a_second(_frames(tables, token))
     index = {row[0]: step for step, row in enumerate(chosen)}
     times_s = np.array([(row[1] - chosen[0][1]) * 1e-6 for row in chosen])
     ego = np.array([_ego_state(row) for row in chosen])
@@ -111,7 +138,7 @@ def read_log(tables: Tables, token: str) -> Log:
         ego=ego,
         ego_length_m=EGO_LENGTH_M,
         ego_width_m=EGO_WIDTH_M,
-        tracks=_tracks(tables, chosen[0][1], chosen[-1][1], index),
+        tracks=_tracks(tables, index),
     )
 
 
@@ -121,22 +148,66 @@ def lights_at(tables: Tables, token: str) -> dict[int, TrafficLight]:
         "SELECT lane_connector_id, status FROM traffic_light_status WHERE lidar_pc_token = ?",
         (bytes.fromhex(token),),
     )
-    return {int(one): LIGHT_OF.get(str(state), TrafficLight.UNKNOWN) for one, state in rows}
+    place = "traffic_light_status.lane_connector_id"
+    return {
+        _whole(one, place): LIGHT_OF.get(str(state), TrafficLight.UNKNOWN) for one, state in rows
+    }
+
+
+def mission_at(tables: Tables, token: str) -> Mission:
+    """Route and goal of the scene that a lidar_pc belongs to, and its own tags."""
+    frame = (bytes.fromhex(token),)
+    scenes = tables.rows(
+        "SELECT s.roadblock_ids, e.x, e.y FROM lidar_pc l JOIN scene s ON s.token = l.scene_token "
+        "LEFT JOIN ego_pose e ON e.token = s.goal_ego_pose_token WHERE l.token = ? LIMIT 1",
+        frame,
+    )
+    tags = tables.rows(
+        "SELECT DISTINCT type FROM scenario_tag WHERE lidar_pc_token = ? ORDER BY type LIMIT 100",
+        frame,
+    )
+    # Documented with commas, written with spaces.
+    roadblocks = re.split(r"[\s,]+", str(scenes[0][0] or "")) if scenes else []
+    goal = _numbers(scenes[0][1:], "ego_pose") if scenes and scenes[0][1] is not None else None
+    return Mission(
+        roadblocks=tuple(one[:20] for one in roadblocks[:MOST_ROADBLOCKS] if one),
+        goal_m=None if goal is None else (goal[0], goal[1]),
+        tags=tuple(str(one)[:80] for (one,) in tags),
+    )
 
 
 # Private
+
+
+def _whole(value: object, place: str) -> int:
+    if isinstance(value, str) and value.isdecimal() and len(value) <= 18:
+        return int(value)
+    if not isinstance(value, int):
+        raise InvalidDocument(WHAT, [(place, f"{str(value)[:40]!r} is no whole number")])
+    return value
+
+
+def _numbers(values: Sequence[Any], place: str) -> list[float]:
+    """Finite numbers; NULL counts as 0."""
+    try:
+        found = [0.0 if one is None else float(one) for one in values]
+    except (TypeError, ValueError, OverflowError):
+        raise InvalidDocument(WHAT, [(place, "has a value that is no number")]) from None
+    if not all(map(math.isfinite, found)):
+        raise InvalidDocument(WHAT, [(place, "has a value that is not finite")])
+    return found
 
 
 def _frames(tables: Tables, token: str) -> list[tuple[Any, ...]]:
     start = tables.rows("SELECT timestamp FROM lidar_pc WHERE token = ?", (bytes.fromhex(token),))
     if not start:
         raise InvalidDocument(WHAT, [("item", f"there is no lidar_pc {token}")])
-    first = int(start[0][0])
+    first = _whole(start[0][0], "lidar_pc.timestamp")
     rows = tables.rows(
         "SELECT l.token, l.timestamp, e.x, e.y, e.qw, e.qx, e.qy, e.qz, e.vx, e.vy "
         "FROM lidar_pc l JOIN ego_pose e ON e.token = l.ego_pose_token "
-        "WHERE l.timestamp BETWEEN ? AND ? ORDER BY l.timestamp",
-        (first, first + LASTS_US),
+        "WHERE l.timestamp BETWEEN ? AND ? ORDER BY l.timestamp LIMIT ?",
+        (first, min(first, LATEST_US) + LASTS_US, MOST_FRAMES),
     )
     if not rows or rows[0][1] != first:
         raise InvalidDocument(WHAT, [("ego_pose", f"has no pose for lidar_pc {token}")])
@@ -152,47 +223,40 @@ def _every_tenth_of_a_second(frames: list[tuple[Any, ...]]) -> list[tuple[Any, .
 
 
 def _ego_state(row: tuple[Any, ...]) -> tuple[float, float, float, float]:
-    try:
-        x, y, qw, qx, qy, qz, vx, vy = (float(value) for value in row[2:])
-    except (TypeError, ValueError):
-        raise InvalidDocument(WHAT, [("ego_pose", "has a value that is no number")]) from None
+    x, y, qw, qx, qy, qz, vx, vy = _numbers(row[2:], "ego_pose")
     yaw = np.arctan2(2.0 * (qw * qz + qx * qy), 1.0 - 2.0 * (qy * qy + qz * qz))
     ahead = REAR_AXLE_TO_CENTER_M
     return x + ahead * np.cos(yaw), y + ahead * np.sin(yaw), float(yaw), float(np.hypot(vx, vy))
 
 
-def _tracks(
-    tables: Tables, first: int, last: int, index: dict[bytes, int]
-) -> tuple[LoggedTrack, ...]:
-    rows = tables.rows(
-        "SELECT b.lidar_pc_token, hex(b.track_token), c.name, b.x, b.y, b.yaw, b.vx, b.vy, "
-        "b.length, b.width FROM lidar_pc l JOIN lidar_box b ON b.lidar_pc_token = l.token "
-        "JOIN track t ON t.token = b.track_token JOIN category c ON c.token = t.category_token "
-        "WHERE l.timestamp BETWEEN ? AND ? ORDER BY l.timestamp",
-        (first, last),
+def _tracks(tables: Tables, index: dict[bytes, int]) -> tuple[LoggedTrack, ...]:
+    """All boxes of the chosen frames, one by one: a log has millions, and no index need be."""
+    names = dict(
+        tables.each(
+            "SELECT t.token, c.name FROM track t JOIN category c ON c.token = t.category_token"
+        )
     )
-    states: dict[str, Any] = {}
-    shapes: dict[str, tuple[AgentType, float, float]] = {}
-    for token, track, name, *numbers in rows:
-        step = index.get(token)
-        if step is None or name == "ego":
-            continue
-        if name not in TYPE_OF:
-            text = f"unknown {str(name)[:40]!r}; known: {', '.join(TYPE_OF)}"
-            raise InvalidDocument(WHAT, [("category.name", text)])
-        try:
-            x, y, yaw, vx, vy, length, width = (
-                float(0.0 if one is None else one) for one in numbers
-            )
-        except (TypeError, ValueError):
-            raise InvalidDocument(WHAT, [("lidar_box", "has a value that is no number")]) from None
+    states: dict[bytes, Any] = {}
+    shapes: dict[bytes, tuple[AgentType, float, float]] = {}
+    marks = ", ".join("?" * len(index))
+    for token, track, *numbers in tables.each(
+        "SELECT lidar_pc_token, track_token, x, y, yaw, vx, vy, length, width FROM lidar_box "
+        f"WHERE lidar_pc_token IN ({marks})",
+        list(index),
+    ):
+        kind = names.get(track)
+        if kind is None or kind == "ego":
+            continue  # as a join leaves it out
+        x, y, yaw, vx, vy, length, width = _numbers(numbers, "lidar_box")
         if track not in states:
+            if (len(states) + 1) * len(index) * 4 > MOST_NUMBERS:
+                raise InvalidDocument(WHAT, [("track", "too many of them at once")])
             states[track] = np.full((len(index), 4), np.nan)
-            shapes[track] = (TYPE_OF[name], length, width)
-        states[track][step] = (x, y, yaw, np.hypot(vx, vy))
+            shapes[track] = (_type_of(kind), length, width)
+        states[track][index[token]] = (x, y, yaw, math.hypot(vx, vy))
     return tuple(
         LoggedTrack(
-            name=track.lower(),
+            name=bytes(track).hex() if isinstance(track, bytes) else str(track),
             type=shapes[track][0],
             length_m=shapes[track][1],
             width_m=shapes[track][2],
@@ -200,3 +264,10 @@ def _tracks(
         )
         for track, rows in states.items()
     )
+
+
+def _type_of(name: object) -> AgentType:
+    if name not in TYPE_OF:
+        text = f"unknown {str(name)[:40]!r}; known: {', '.join(TYPE_OF)}"
+        raise InvalidDocument(WHAT, [("category.name", text)])
+    return TYPE_OF[str(name)]

@@ -8,15 +8,20 @@ is laid out: maps/<location>/<version>/map.gpkg. `item` is the token of a lidar_
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from pathlib import Path
+
+import numpy as np
 
 from augment.errors import InvalidDocument
 from augment.formats.nuplan.city import city_around
 from augment.formats.nuplan.log import (
     LogPlace,
+    Mission,
     check_tables,
+    has_token,
     lights_at,
+    mission_at,
     place_of,
     read_log,
     tokens_of,
@@ -25,6 +30,7 @@ from augment.formats.nuplan.sqlite import WHAT, Tables, open_tables
 from augment.formats.reading import Moment, Reading, frames_every
 from augment.formats.recorded_log import far_notes, scene_at
 from augment.formats.roads import road_around
+from augment.geometry.frames import Pose
 from augment.scene.notes import Note, SceneNoteKind
 
 LICENCE = "nuPlan, CC BY-NC-SA 4.0"
@@ -50,6 +56,8 @@ class NuPlan:
         with open_tables(path) as tables:
             check_tables(tables)
             tokens = tokens_of(tables, None)
+        if not tokens:
+            raise InvalidDocument(WHAT, [("lidar_pc", "has no row")])
         times_s = [(time - tokens[0][1]) * 1e-6 for _, time in tokens]
         for index in frames_every(times_s, every_s):
             yield Moment(item=tokens[index][0])
@@ -65,13 +73,14 @@ class NuPlan:
             place = place_of(tables)
             token = _token(tables, item)
             log = read_log(tables, token)
-            lights = lights_at(tables, token)
+            lights, mission = lights_at(tables, token), mission_at(tables, token)
         origin = log.ego_pose(0)
         city = city_around(
             map_of(path, place),
             location=place.location,
             center_m=(origin.x_m, origin.y_m),
             lights=lights,
+            route=mission.roadblocks,
         )
         road = road_around(city.map, origin)
         scene, recording = scene_at(
@@ -84,7 +93,7 @@ class NuPlan:
                 f"nuPlan data set, log {place.logfile or path.stem}, lidar_pc {token}; {LICENCE}"
             ),
         )
-        notes = [*city.notes, *far_notes(log, 0, road)]
+        notes = [*city.notes, *_mission_notes(mission, origin), *far_notes(log, 0, road)]
         if road.side_is_assumed:
             side = (road.traffic_side.value,)
             notes.append(Note(kind=SceneNoteKind.TRAFFIC_SIDE_ASSUMED, names=side))
@@ -92,6 +101,17 @@ class NuPlan:
         return Reading(
             scene=scene, recording=recording, notes=tuple(notes), moment=Moment(item=token)
         )
+
+
+def tokens_in(path: Path, tokens: Sequence[str]) -> tuple[str, ...]:
+    """Those of some tokens that a log has a lidar_pc of.
+
+    Raises:
+        InvalidDocument: The file is no log.
+    """
+    with open_tables(path) as tables:
+        tables.need("lidar_pc", ("token",))
+        return tuple(token for token in tokens if has_token(tables, token))
 
 
 def map_of(path: Path, place: LogPlace) -> Path:
@@ -117,6 +137,14 @@ def map_of(path: Path, place: LogPlace) -> Path:
 
 
 # Private
+
+
+def _mission_notes(mission: Mission, origin: Pose) -> Iterator[Note]:
+    if mission.goal_m is not None:
+        ((x_m, y_m),) = origin.to_local(np.array([mission.goal_m])).tolist()
+        yield Note(kind=SceneNoteKind.MISSION_GOAL, names=(f"{x_m:.1f}", f"{y_m:.1f}"))
+    if mission.tags:
+        yield Note(kind=SceneNoteKind.SCENARIO_TAGS, names=mission.tags)
 
 
 def _token(tables: Tables, item: str | None) -> str:

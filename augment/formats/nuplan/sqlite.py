@@ -5,6 +5,7 @@ from __future__ import annotations
 import sqlite3
 from collections.abc import Iterator, Sequence
 from contextlib import closing, contextmanager
+from itertools import count
 from pathlib import Path
 from typing import Any
 from urllib.parse import quote
@@ -13,6 +14,11 @@ from augment.errors import InvalidDocument
 
 WHAT = "nuPlan log"
 MOST_ROWS = 2_000_000
+LONGEST_VALUE = 16 * 1024 * 1024
+"""Bytes of one value or row."""
+MOST_STEPS = 400_000_000
+"""Steps of SQLite's machine for all questions together: a scan of ten million rows."""
+_STEPS_BETWEEN_LOOKS = 1_000_000
 
 
 class Tables:
@@ -23,12 +29,17 @@ class Tables:
         self._name = name
 
     def has(self, table: str) -> bool:
-        """Whether there is a table of that name."""
-        text = "SELECT 1 FROM sqlite_master WHERE type IN ('table', 'view') AND name = ?"
+        """Whether there is a table of that name; a view or a virtual table is a program."""
+        text = (
+            "SELECT 1 FROM sqlite_master WHERE type = 'table' AND name = ? "
+            "AND sql NOT LIKE 'CREATE VIRTUAL%'"
+        )
         return bool(self._connection.execute(text, (table,)).fetchone())
 
     def columns(self, table: str) -> set[str]:
-        """Its columns; none of a table that is not there."""
+        """Its columns, without computed ones; none of a table that is not there."""
+        if not self.has(table):
+            return set()
         text = "SELECT name FROM pragma_table_info(?)"
         return {str(row[0]) for row in self._connection.execute(text, (table,))}
 
@@ -50,12 +61,21 @@ class Tables:
         """What a query gives.
 
         Raises:
-            InvalidDocument: It gives too much, or the file is broken.
+            InvalidDocument: It gives too much.
         """
-        found = self._connection.execute(query, tuple(values)).fetchmany(MOST_ROWS + 1)
-        if len(found) > MOST_ROWS:
-            raise InvalidDocument(WHAT, [(self._name, f"more than {MOST_ROWS} rows at once")])
-        return found
+        return list(self.each(query, values))
+
+    def each(self, query: str, values: Sequence[Any] = ()) -> Iterator[tuple[Any, ...]]:
+        """The same, one by one.
+
+        Raises:
+            InvalidDocument: As above.
+        """
+        found = self._connection.execute(query, tuple(values))
+        for number, row in enumerate(found):
+            if number >= MOST_ROWS:
+                raise InvalidDocument(WHAT, [(self._name, f"more than {MOST_ROWS} rows at once")])
+            yield row
 
 
 @contextmanager
@@ -72,6 +92,10 @@ def open_tables(path: Path) -> Iterator[Tables]:
         with closing(sqlite3.connect(address, uri=True)) as connection:
             connection.execute("PRAGMA trusted_schema = OFF")
             connection.execute("PRAGMA cell_size_check = ON")
+            connection.setlimit(sqlite3.SQLITE_LIMIT_LENGTH, LONGEST_VALUE)
+            looks = count(1)
+            most = MOST_STEPS // _STEPS_BETWEEN_LOOKS
+            connection.set_progress_handler(lambda: next(looks) > most, _STEPS_BETWEEN_LOOKS)
             yield Tables(connection, path.name)
     except sqlite3.Error as fault:
         raise InvalidDocument(

@@ -122,6 +122,24 @@ def content_hash(document: dict[str, Any]) -> str:
     return hashlib.sha256(text.encode()).hexdigest()
 
 
+def keep_reading(
+    reading: Reading, *, reader: Reader, path: Path, actor: User | None = None
+) -> tuple[BaseScene, bool]:
+    """The row of a scene that was read under its name, and whether it is new.
+
+    Where the same scene is stored already, under whatever name, that row.
+
+    Raises:
+        Conflict: Another scene has the name.
+    """
+    document = scene_to_document(reading.scene)
+    same = _same(document)
+    if same is not None:
+        return same, False
+    slug = reading.scene.name
+    return _keep(reading, document, reader=reader, path=path, slug=slug, actor=actor), True
+
+
 # Private
 
 

@@ -110,6 +110,21 @@ _TEXTS: dict[SceneNoteKind, str] = {
     SceneNoteKind.LONG_TIME_STEP: gettext_noop(
         "Steps of this recording lie %(value)s s apart; a drive looks between them."
     ),
+    SceneNoteKind.ROUTE: gettext_noop(
+        "The source's route leads over %(number)s roadblocks: %(names)s. A drive follows the"
+        " recorded way instead."
+    ),
+    SceneNoteKind.ROUTE_NOT_IN_MAP: gettext_noop(
+        "%(number)s of %(of)s roadblocks of the route are not in the map: %(names)s."
+    ),
+    SceneNoteKind.MISSION_GOAL: gettext_noop(
+        "The mission's goal lies %(names)s m ahead of the ego and to its left; no drive is"
+        " measured by it."
+    ),
+    SceneNoteKind.SCENARIO_TAGS: gettext_noop("Scenario tags of this moment: %(names)s."),
+    SceneNoteKind.INTERPLAN_LEFT_OUT: gettext_noop(
+        "What interPlan says besides and is not used here: %(names)s."
+    ),
     SceneNoteKind.NON_COMMERCIAL: gettext_noop(
         "The data's licence, %(names)s, does not allow commercial use."
     ),

@@ -1,0 +1,264 @@
+"""interPlan's special scenarios on nuPlan's logs, as scenarios with their human references.
+
+A folder holds interPlan's modification file and nuPlan's logs and maps, wherever in it. Each base
+token becomes a scene, each of its special scenarios a scenario; what is stored already stays.
+"""
+
+from __future__ import annotations
+
+import csv
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+from django.contrib.auth.models import User
+
+from augment.errors import AugmentError, InvalidDocument
+from augment.formats.interplan_instruction import instruction_of
+from augment.formats.interplan_reader import read_entry
+from augment.formats.interplan_schema import (
+    WHAT,
+    Details,
+    File,
+    SpecialScenario,
+    file_of,
+    left_out_of_details,
+    left_out_of_file,
+)
+from augment.formats.nuplan.scenario import NuPlan, tokens_in
+from augment.formats.reading import Reading
+from augment.formats.yaml_file import MAX_CHARACTERS, read_yaml_file
+from augment.models import BaseScene, Scenario
+from augment.scene.codec import modification_to_document
+from augment.scene.entities import Scene
+from augment.scene.modification import without_traffic
+from augment.scene.notes import Note, SceneNoteKind
+from augment.services.scenarios.scene_imports import keep_reading
+from augment.services.scenarios.scenes import add_scenario
+
+KEY = b"modification_details_dictionary"
+SLUG = "interplan"
+COLUMNS = ("id", "instruction")
+_MOST_SENTENCES = 10_000
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class LogLooked:
+    """A log that was looked through for base tokens.
+
+    Attributes:
+        number, of: Which of how many.
+        tokens: The base tokens in it.
+        fault: Why it could not be read; empty if it could.
+    """
+
+    path: Path
+    number: int
+    of: int
+    tokens: tuple[str, ...]
+    fault: str = ""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ScenarioDone:
+    """A special scenario that is a scenario now.
+
+    Attributes:
+        id: interPlan's own name.
+        is_new: False where it was there before.
+        left_out: What of it is not kept.
+    """
+
+    id: str
+    row: Scenario
+    is_new: bool
+    left_out: tuple[str, ...]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ScenarioSkipped:
+    """A special scenario that is none, and why."""
+
+    id: str
+    reason: str
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class FileLeftOut:
+    """What the file says besides, which is not kept."""
+
+    text: str
+
+
+Step = LogLooked | ScenarioDone | ScenarioSkipped | FileLeftOut
+
+
+def import_interplan(
+    *,
+    folder: Path,
+    data: Path | None = None,
+    instructions: Path | None = None,
+    actor: User | None = None,
+) -> Iterator[Step]:
+    """Keep every special scenario whose base token lies in a log, one by one.
+
+    Args:
+        folder: Holds interPlan's YAML somewhere.
+        data: Holds nuPlan's logs and maps somewhere; None for the same folder.
+        instructions: A CSV file of ids and sentences, for those that have one of somebody's own.
+        actor: Who did it.
+
+    Yields:
+        What was looked at, kept or skipped, as it happens.
+
+    Raises:
+        InvalidDocument: There is not exactly one modification file, it breaks its format, or the
+            sentences do.
+    """
+    file = file_of(read_yaml_file(modification_file_in(folder), what=WHAT))
+    wanted = _wanted(file)
+    sentences = {} if instructions is None else _sentences(instructions, wanted)
+    yield from (FileLeftOut(text=text) for text in left_out_of_file(file))
+    logs: dict[str, Path] = {}
+    for looked in _look_through(data or folder, wanted):
+        logs |= {token: looked.path for token in looked.tokens if token not in logs}
+        yield looked
+    for token, details in wanted.items():
+        if token in logs:
+            yield from _keep_token(token, details, logs[token], sentences, actor)
+        else:
+            reason = "none of the logs has a frame of its base token"
+            yield from _skip_all(token, details, reason)
+
+
+def modification_file_in(folder: Path) -> Path:
+    """The one modification file in a folder, whatever it is called.
+
+    Raises:
+        InvalidDocument: There is none, or several.
+    """
+    if folder.is_file():
+        return folder
+    if not folder.is_dir():
+        raise InvalidDocument(WHAT, [(str(folder), "is not a folder")])
+    found = [
+        file
+        for ending in ("*.yaml", "*.yml")
+        for file in sorted(folder.rglob(ending))
+        if file.is_file() and file.stat().st_size <= MAX_CHARACTERS and KEY in file.read_bytes()
+    ]
+    if len(found) != 1:
+        named = ", ".join(str(file.relative_to(folder)) for file in found[:5])
+        text = f"holds {len(found)} YAML files with {KEY.decode()}, there must be one: {named}"
+        raise InvalidDocument(WHAT, [(str(folder), text.rstrip(": "))])
+    return found[0]
+
+
+# Private
+
+
+def _wanted(file: File) -> dict[str, Details]:
+    by_token = file.modification_details_dictionary
+    wanted = {token: one for token, one in by_token.items() if one.special_scenario}
+    if not wanted:
+        raise InvalidDocument(WHAT, [("", "holds no special scenario")])
+    return wanted
+
+
+def _entries(token: str, details: Details) -> Iterator[tuple[str, str, SpecialScenario]]:
+    """Each special scenario with interPlan's name of it and its index."""
+    for index, entry in (details.special_scenario or {}).items():
+        yield f"{token}-s{index}", str(index), entry
+
+
+def _skip_all(token: str, details: Details, reason: str) -> Iterator[ScenarioSkipped]:
+    for name, _, _ in _entries(token, details):
+        yield ScenarioSkipped(id=name, reason=reason)
+
+
+def _look_through(data: Path, wanted: Mapping[str, Details]) -> Iterator[LogLooked]:
+    paths = sorted(data.rglob("*.db"))
+    for number, path in enumerate(paths, start=1):
+        tokens: tuple[str, ...] = ()
+        fault = ""
+        try:
+            tokens = tokens_in(path, tuple(wanted))
+        except InvalidDocument as raised:
+            fault = str(raised)
+        yield LogLooked(path=path, number=number, of=len(paths), tokens=tokens, fault=fault)
+
+
+def _keep_token(
+    token: str, details: Details, log: Path, sentences: Mapping[str, str], actor: User | None
+) -> Iterator[Step]:
+    reader = NuPlan()
+    try:
+        reading = reader.read(log, item=token, frame=None, name=f"{SLUG}-{token}")
+        row, _ = keep_reading(
+            _with_notes(reading, token, details), reader=reader, path=log, actor=actor
+        )
+    except AugmentError as fault:
+        yield from _skip_all(token, details, str(fault))
+        return
+    scene = without_traffic(reading.scene)
+    for name, index, entry in _entries(token, details):
+        try:
+            yield _keep_entry(row, scene, (token, index, entry), sentences.get(name), actor)
+        except AugmentError as fault:
+            yield ScenarioSkipped(id=name, reason=str(fault))
+
+
+def _keep_entry(
+    row: BaseScene,
+    scene: Scene,
+    place: tuple[str, str, SpecialScenario],
+    sentence: str | None,
+    actor: User | None,
+) -> ScenarioDone:
+    token, index, entry = place
+    found = read_entry(token, index, entry, scene)
+    slug = f"{row.slug}-s{index}"
+    before = Scenario.objects.filter(slug=slug, base_scene=row, type=found.type.value).first()
+    made = before or add_scenario(
+        scene=row.slug,
+        type=found.type.value,
+        instruction=sentence or instruction_of(found.type, found.modification),
+        slug=slug,
+        reference=modification_to_document(found.modification),
+        actor=actor,
+    )
+    return ScenarioDone(id=found.id, row=made, is_new=before is None, left_out=found.left_out)
+
+
+def _with_notes(reading: Reading, token: str, details: Details) -> Reading:
+    """With what interPlan says of the base token and a scenario here can't."""
+    left_out = [*left_out_of_details(details)]
+    left_out += [
+        f"{name}: config {entry.config}"
+        for name, _, entry in _entries(token, details)
+        if entry.config
+    ]
+    if not left_out:
+        return reading
+    note = Note(kind=SceneNoteKind.INTERPLAN_LEFT_OUT, names=tuple(left_out))
+    return replace(reading, notes=(*reading.notes, note))
+
+
+def _sentences(file: Path, wanted: Mapping[str, Details]) -> dict[str, str]:
+    known = {name for token, one in wanted.items() for name, _, _ in _entries(token, one)}
+    what = "instructions"
+    try:
+        with file.open(encoding="utf-8-sig", newline="") as lines:
+            rows = csv.DictReader(lines)
+            if rows.fieldnames is None or not set(COLUMNS) <= set(rows.fieldnames):
+                raise InvalidDocument(what, [(file.name, f"needs the columns {COLUMNS}")])
+            found = {}
+            for number, row in zip(range(2, _MOST_SENTENCES), rows, strict=False):
+                name = str(row["id"]).strip()
+                if name not in known:
+                    text = f"{name[:40]!r} is no special scenario of the file"
+                    raise InvalidDocument(what, [(f"{file.name}, line {number}", text)])
+                found[name] = str(row["instruction"] or "").strip()
+            return found
+    except (OSError, UnicodeDecodeError, csv.Error) as fault:
+        raise InvalidDocument(what, [(str(file), f"can't be read: {fault}")]) from None
