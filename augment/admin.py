@@ -199,7 +199,7 @@ class ContestantAdmin(MadeElsewhere, admin.ModelAdmin):
     search_fields = ("slug", "name", "model")
     readonly_fields = (
         *("code", "slug", "kind", "variant", "endpoint", "model", "roles", "error_rates"),
-        *("sends", "created_at"),
+        *("options", "frozen_options", "sends", "created_at", "retired_at"),
     )
 
 
@@ -207,7 +207,7 @@ class AugmentationInline(ReadOnlyRows, admin.TabularInline):
     """The rows of a job."""
 
     model = Augmentation
-    fields = ("scenario", "contestant", "state", "reason", "finished_at")
+    fields = ("scenario", "contestant", "sample", "state", "reason", "finished_at")
     extra = 0
     show_change_link = True
 

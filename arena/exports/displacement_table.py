@@ -47,9 +47,11 @@ class DisplacementTable:
     @property
     def types_text(self) -> str:
         """Which scenario types count, in words."""
-        if len(self.types) == len(Scenario.Type.values):
+        if self.types == tuple(Scenario.Type.values):
             return sentence("All five scenario types")
-        labels = tuple(str(Scenario.Type(one).label) for one in self.types)
+        own = {one.row.scenario.type: one.row.scenario.type_label for one in self.measured}
+        known = own | {one.value: str(one.label) for one in Scenario.Type}
+        labels = tuple(known[name] for name in self.types)
         return sentence("Scenario types: %(types)s", types=labels)
 
     @property
@@ -109,9 +111,11 @@ def displacement_table(
             places are definite, else all.
     """
     measured = of_job(job)
+    own = {one.row.scenario.type for one in measured} - set(Scenario.Type.values)
+    every = (*Scenario.Type.values, *sorted(own))
     if types is None:
-        types = PLACED_EXACTLY if by is By.VARIANT else tuple(Scenario.Type.values)
-    chosen = tuple(one for one in Scenario.Type.values if one in set(types))
+        types = PLACED_EXACTLY if by is By.VARIANT else every
+    chosen = tuple(one for one in every if one in set(types))
     left_out = Counter(one.why_not.value for one in measured if one.why_not is not None)
     return DisplacementTable(
         job=job.name,

@@ -5,9 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from arena.exports.tables import SIMULATED
-from augment.models import Scenario, Simulation
+from augment.models import Simulation
 from augment.sentences import sentence
 from augment.services.judging.driving_scores import DrivingLine, DrivingScores
+from augment.services.scenarios.types import type_choices
 
 SOURCE = "reported in the paper"
 REPORTED = (
@@ -59,7 +60,7 @@ class DrivingTable:
         driven = {
             kind for line in self.lines for kind, mean in line.by_type.items() if mean is not None
         }
-        return tuple((str(v), str(label)) for v, label in Scenario.Type.choices if v in driven)
+        return tuple((name, label) for name, label in type_choices() if name in driven)
 
     @property
     def notes(self) -> tuple[str, ...]:

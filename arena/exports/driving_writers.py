@@ -13,28 +13,35 @@ from augment.models import Scenario
 from augment.services.judging.driving_scores import DrivingLine
 
 MEASURED = "measured"
-COLUMNS = (
+_BEFORE = (
     "scenarios", "slug", "model", "variant", "simulated", "score_percent", "before_percent",
     "lowered_percent", "drives", "failed", "collided", "emergency_braked",
-    *(f"{kind}_percent" for kind in Scenario.Type.values), "source",
 )  # fmt: skip
 
 
 def csv_bytes(table: DrivingTable) -> bytes:
     """One line a contestant, then the paper's; what is unknown is empty."""
     rows: list[list[object]] = []
+    kinds = _kinds(table)
     for line in table.lines:
         who = [named(line), line.slug, line.model, line.variant, line.is_simulated]
         means = [_percent(value) for value in (line.mean, line.before, line.lowered)]
         counts = [line.drives, line.failed, line.collided, line.braked]
-        types = [_percent(line.by_type[kind]) for kind in Scenario.Type.values]
+        types = [_percent(line.by_type[kind]) for kind in kinds]
         rows.append([*who, *means, *counts, *types, MEASURED])
-    blank = [""] * len(Scenario.Type.values)
+    blank = [""] * len(kinds)
     for name, score in REPORTED:
         rows.append(
             [name, "", "", "", "no", _percent(score), "", "", "", "", "", "", *blank, SOURCE]
         )
-    return csv_text(COLUMNS, rows).encode()
+    head = (*_BEFORE, *(f"{kind}_percent" for kind in kinds), "source")
+    return csv_text(head, rows).encode()
+
+
+def _kinds(table: DrivingTable) -> tuple[str, ...]:
+    """A column each: the five types, and one's own that were driven."""
+    own = {kind for line in table.lines for kind in line.by_type} - set(Scenario.Type.values)
+    return (*Scenario.Type.values, *sorted(own))
 
 
 def json_bytes(table: DrivingTable) -> bytes:

@@ -6,6 +6,7 @@ import uuid
 from dataclasses import dataclass
 
 from augment.models import Augmentation, Contestant, Scenario
+from augment.services.scenarios.types import type_choices
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -25,12 +26,8 @@ def by_type() -> list[TypeGroup]:
         )
     )
     groups = [
-        TypeGroup(
-            type=choice.value,
-            label=str(choice.label),
-            scenarios=[row for row in rows if row.type == choice.value],
-        )
-        for choice in Scenario.Type
+        TypeGroup(type=name, label=label, scenarios=[row for row in rows if row.type == name])
+        for name, label in type_choices()
     ]
     return [group for group in groups if group.scenarios]
 

@@ -28,6 +28,7 @@ from arena.results.tree import (
 from arena.services.vote_arrays import VoteArrays
 from augment.models import Scenario
 from augment.services.judging.displacement import of_rows, summarise
+from augment.services.scenarios.types import type_label
 
 FEW_VOTES = 30
 """Below so many votes of a contestant a part of the table says that they are too few."""
@@ -139,10 +140,9 @@ def _one_type(arrays: VoteArrays, name: str, whole: Leaderboard) -> TypeRating:
         seed=whole.seed,
         details=False,
     )
-    labels = dict(Scenario.Type.choices)
     return TypeRating(
         type=name,
-        label=str(labels.get(name, name)),
+        label=type_label(name),
         votes=len(votes),
         scenarios=board.scenarios,
         status=board.explanation,

@@ -15,6 +15,7 @@ from arena.exports.columns import Column
 from arena.exports.tables import Row
 from arena.rating.estimate import Estimate
 from augment.models import Scenario
+from augment.services.scenarios.types import type_label as own_label
 from augment.services.wording import translate
 
 register = template.Library()
@@ -106,7 +107,8 @@ def verb_label(verb: str) -> str:
 @register.filter
 def type_label(name: str) -> str:
     """The name of a scenario type."""
-    return _(str(dict(Scenario.Type.choices).get(name, name)))
+    known = dict(Scenario.Type.choices)
+    return _(str(known[name])) if name in known else own_label(name)
 
 
 @register.filter

@@ -13,7 +13,7 @@ from arena.queries.vote_sets import Filters
 from arena.rating.bootstrap import Unit
 from arena.rating.leaderboard import Method
 from arena.services.ratings import DEFAULT_ROUNDS, MOST_ROUNDS
-from augment.models import Scenario
+from augment.services.scenarios.types import type_choices
 
 METHOD_LABELS = {
     "bt": _("Bradley-Terry"),
@@ -53,7 +53,7 @@ class RatingForm(forms.Form):
         min_value=1, max_value=MOST_ROUNDS, initial=DEFAULT_ROUNDS, required=False
     )
     seed = forms.IntegerField(min_value=0, max_value=2**63 - 1, initial=0, required=False)
-    types = forms.MultipleChoiceField(choices=Scenario.Type.choices, required=False)
+    types = forms.MultipleChoiceField(choices=type_choices, required=False)
     experts = AnyOf(required=False)
     with_repeats = forms.BooleanField(required=False)
     automatic_ties = forms.BooleanField(required=False)

@@ -63,6 +63,10 @@ def write(cells: Iterable[Cell]) -> tuple[str, tuple[Loss, ...]]:
     by_token: dict[str, dict[str, dict[str, Any]]] = defaultdict(dict)
     comments, losses = [_MADE_UP], []
     for cell in cells:
+        if cell.type is None:
+            text = "interPlan has five types of scenarios, and this one is of another: left out"
+            losses.append(Loss(cell=cell.name, text=text, changes_scene=True))
+            continue
         token = token_of(cell.scene.name)
         index = str(len(by_token[token]))
         if len(by_token[token]) >= MOST_ENTRIES:
@@ -93,6 +97,7 @@ class _Entry:
             for key, row in self._row(agent):
                 lists[key].append(row)
         self._report_scene()
+        assert self.cell.type is not None
         return {"type": self.cell.type.value, **lists}
 
     def _lose(self, text: str, *, changes_scene: bool = True) -> None:

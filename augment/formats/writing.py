@@ -23,6 +23,7 @@ class Cell:
 
     Attributes:
         name: What a person calls it, for a file's comments and the report.
+        type: None for one that interPlan does not have.
         scene: Before the change, without the recorded traffic unless that is kept.
         keeps_traffic: Whether the recorded vehicles stay.
         stem: The name of its files, without an ending.
@@ -33,7 +34,7 @@ class Cell:
 
     name: str
     scene: Scene
-    type: ScenarioType
+    type: ScenarioType | None
     modification: Modification
     keeps_traffic: bool = False
     stem: str = "scenario"

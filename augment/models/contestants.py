@@ -42,6 +42,17 @@ class Contestant(models.Model):
         blank=True,
         help_text='of simulated errors: {"position": 0.1, ...}; null for all others',
     )
+    options = models.JSONField(
+        default=dict,
+        blank=True,
+        help_text='chosen when it was added: {"temperature": 0.7}; what is open is not in it',
+    )
+    frozen_options = models.JSONField(
+        null=True,
+        blank=True,
+        editable=False,
+        help_text="the whole set with which it runs, fixed at its first run; null before",
+    )
     sends = models.JSONField(
         null=True,
         blank=True,
@@ -49,6 +60,9 @@ class Contestant(models.Model):
         help_text="by role, what its models were known to take when it first ran; null before",
     )
     created_at = models.DateTimeField(auto_now_add=True)
+    retired_at = models.DateTimeField(
+        null=True, blank=True, help_text="forms offer it no more; what it made stays"
+    )
 
     class Meta:
         ordering = ("slug",)

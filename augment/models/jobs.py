@@ -15,7 +15,7 @@ from augment.models.scenes import Scenario
 
 
 class GenerationJob(models.Model):
-    """Contestants x scenarios, launched by an admin, within caps on what it may use.
+    """Contestants x scenarios x samples, launched by an admin, within caps on what it may use.
 
     Money is counted in whole nano-dollars, so that sums are exact on every database. Each call
     moves its worst case into `reserved_*` before it is sent, and what it used into `spent_*`
@@ -39,6 +39,9 @@ class GenerationJob(models.Model):
         blank=True,
         on_delete=models.PROTECT,
         related_name="generation_jobs",
+    )
+    samples = models.PositiveSmallIntegerField(
+        default=1, help_text="so often every contestant is asked about every scenario"
     )
     is_fresh = models.BooleanField(
         default=False, help_text="ask anew what was answered in other jobs before"
@@ -84,7 +87,7 @@ class GenerationJob(models.Model):
 
 
 class Augmentation(models.Model):
-    """One row of a job: scenario x contestant -> modification, image, and why not if not.
+    """One row of a job: scenario x contestant x sample -> modification, image, or why not.
 
     `queued` and `running` are under way; all other states are outcomes. `unreadable` and `refused`
     are the contestant's own and count as a miss: their picture is the unchanged scene. `failed`
@@ -111,6 +114,12 @@ class Augmentation(models.Model):
     contestant = models.ForeignKey(
         Contestant, on_delete=models.PROTECT, related_name="augmentations"
     )
+    sample = models.PositiveSmallIntegerField(default=1, help_text="1 for the first")
+    options = models.JSONField(
+        null=True,
+        blank=True,
+        help_text="with which its contestant asked; null where no model was asked",
+    )
     state = models.CharField(max_length=20, choices=State.choices, default=State.QUEUED)
     modification = models.JSONField(null=True, blank=True)
     notes = models.TextField(blank=True, help_text="what the contestant said about its own work")
@@ -129,11 +138,13 @@ class Augmentation(models.Model):
     finished_at = models.DateTimeField(null=True, blank=True)
 
     class Meta:
-        ordering = ("scenario__slug", "contestant__slug")
+        ordering = ("scenario__slug", "contestant__slug", "sample")
         constraints = (
             models.UniqueConstraint(
-                name="one_augmentation_per_cell", fields=("job", "scenario", "contestant")
+                name="one_augmentation_per_cell",
+                fields=("job", "scenario", "contestant", "sample"),
             ),
+            models.CheckConstraint(name="sample_counts_from_one", condition=Q(sample__gte=1)),
             models.CheckConstraint(
                 name="running_augmentation_is_claimed",
                 condition=(

@@ -58,7 +58,12 @@ class Scenario(models.Model):
     code = models.UUIDField(default=uuid.uuid4, unique=True, editable=False)
     slug = models.SlugField(max_length=80, unique=True, help_text=SLUG_HELP)
     base_scene = models.ForeignKey(BaseScene, on_delete=models.PROTECT, related_name="scenarios")
-    type = models.CharField(max_length=40, choices=Type.choices)
+    type = models.CharField(
+        max_length=40, help_text="one of the paper's five, or a slug of your own: cut_in"
+    )
+    type_label = models.CharField(
+        max_length=60, blank=True, help_text="of a type of your own; empty for the paper's five"
+    )
     instruction = models.TextField()
     reference = models.JSONField(
         null=True, blank=True, help_text="the human modification, in augment.scene.codec's format"
@@ -84,8 +89,13 @@ class Scenario(models.Model):
         ordering = ("slug",)
         constraints = (
             models.CheckConstraint(
-                name="scenario_type_is_known",
-                condition=Q(type__in=[member.value for member in ScenarioType]),
+                name="scenario_type_of_ones_own_has_a_label",
+                condition=Q(type__in=[member.value for member in ScenarioType], type_label="")
+                | (
+                    ~Q(type__in=[member.value for member in ScenarioType])
+                    & ~Q(type="")
+                    & ~Q(type_label="")
+                ),
             ),
             models.CheckConstraint(
                 name="scenario_intent_has_an_origin",
@@ -99,3 +109,7 @@ class Scenario(models.Model):
 
     def __str__(self) -> str:
         return self.slug
+
+    def get_type_display(self) -> str:
+        """What people read for its type."""
+        return self.type_label or ScenarioType(self.type).label

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -43,6 +43,10 @@ class Camera:
     def height_px(self) -> int:
         """The picture's height."""
         return round((self.y_max_m - self.y_min_m) * self.px_per_m)
+
+    def at_width(self, width_px: int) -> Camera:
+        """The same window as a picture of another width."""
+        return replace(self, px_per_m=width_px / (self.x_max_m - self.x_min_m))
 
     def to_pixels(self, points_m: FloatArray) -> FloatArray:
         """Points (N, 2) of the ego frame as pixel coordinates (N, 2), also outside the picture."""

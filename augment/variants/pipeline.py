@@ -8,7 +8,7 @@ count as such; a broken wire is nobody's outcome and is raised.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import StrEnum
 
 from augment.errors import ModelRefused, ReplyUnreadable, UnknownName
@@ -18,6 +18,7 @@ from augment.scene.entities import Scene
 from augment.scene.intent import Intent
 from augment.scene.modification import Modification
 from augment.variants.modifier import Modifier
+from augment.variants.options import Sampling
 from augment.variants.recipes import RECIPES, Recipe
 from augment.variants.respondents import RespondentClient, Respondents
 from augment.variants.rounds import modify_and_review
@@ -62,11 +63,12 @@ def run(
     native_tools: bool = False,
     others: Mapping[ModelRole, RespondentClient] | None = None,
     intent: Intent | None = None,
+    sampling: Sampling | None = None,
 ) -> Outcome:
     """Let a model modify a scene as the recipe says.
 
     Args:
-        recipe: The variant.
+        recipe: The variant, within whatever limits.
         scene: The scene before the change.
         instruction: The user's wish in natural language.
         client: Who answers.
@@ -76,18 +78,21 @@ def run(
         native_tools: Whether the modifier calls its tools natively instead of in its answer.
         others: Who plays the reviewers' roles; by default the modifier's model does.
         intent: What a geometric review holds modifications against, where that is stored.
+        sampling: What every request is sent with.
 
     Raises:
         UnknownName: Nobody can run a recipe with these parts.
         ModelFault: The wire or the endpoint broke; the same run may succeed later if it says so.
     """
-    if recipe not in RECIPES.values():
+    known = RECIPES.get(recipe.slug)
+    if known is None or replace(recipe, limits=known.limits) != known:
         raise UnknownName("recipe", recipe.slug, sorted(RECIPES))
     modifying = RespondentClient(client=client, model=model, native_tools=native_tools)
     respondents = Respondents(
         clients={**(others or {}), ModelRole.MODIFIER: modifying},
         transcript=transcript,
         patience=patience or Patience(),
+        sampling=sampling or Sampling(),
     )
     modifier = Modifier(recipe=recipe, scene=scene, respondents=respondents, intent=intent)
     try:

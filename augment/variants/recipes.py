@@ -13,6 +13,7 @@ from enum import StrEnum
 from augment.errors import UnknownName
 from augment.llm.messages import DEFAULT_MAX_TOKENS
 from augment.prompts.vectors import DEFAULT_RADIUS_M, LaneFormat
+from augment.render.camera import WIDTH_PX
 from augment.variants.pose_call import CallLimits
 
 __all__ = [
@@ -75,6 +76,7 @@ class Limits:
         regenerations: How often a review can send the modifier back to work.
         calls: Of tools, in one round.
         accepted_from: The mean rating from which a text review is content.
+        picture_px: The width of the picture that a viewer is shown.
     """
 
     radius_m: float = DEFAULT_RADIUS_M
@@ -83,6 +85,7 @@ class Limits:
     regenerations: int = 2
     calls: CallLimits = field(default_factory=CallLimits)
     accepted_from: float = 4.0
+    picture_px: int = WIDTH_PX
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

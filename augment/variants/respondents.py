@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import TypeVar
 
 from augment.errors import ModelRefused, ReplyUnreadable
@@ -11,6 +11,7 @@ from augment.llm.client import ChatClient
 from augment.llm.messages import Message, Reply, Request, Tool, ToolChoice
 from augment.llm.patience import Patience
 from augment.prompts.texts import prompt_version
+from augment.variants.options import Sampling
 from augment.variants.recording_client import RecordingClient
 from augment.variants.transcript import ModelRole, Transcript
 
@@ -38,11 +39,13 @@ class Respondents:
 
     Attributes:
         clients: By role; a role without one is played by the modifier's.
+        sampling: What every request is sent with.
     """
 
     clients: Mapping[ModelRole, RespondentClient]
     transcript: Transcript
     patience: Patience
+    sampling: Sampling = field(default_factory=Sampling)
 
     def client_of(self, role: ModelRole) -> RespondentClient:
         """Who plays that role."""
@@ -71,6 +74,9 @@ class Respondents:
             max_tokens=max_tokens,
             tools=tools,
             tool_choice=tool_choice,
+            temperature=self.sampling.temperature,
+            seed=self.sampling.seed,
+            reasoning_effort=self.sampling.reasoning_effort,
         )
         recording = RecordingClient(
             client=respondent.client,

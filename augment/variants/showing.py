@@ -119,7 +119,9 @@ def shown_prompt(
             ask = fill_review.engineer_messages
             messages = ask(scene, instruction, modification, radius_m=radius_m)
         case ModelRole.VIEWER:
-            messages = fill_review.viewer_messages(questions, picture(scene, modification))
+            messages = fill_review.viewer_messages(
+                questions, picture(scene, modification, width_px=recipe.limits.picture_px)
+            )
     return Shown(messages=messages, tools=(), fit=None)
 
 

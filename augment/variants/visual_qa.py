@@ -16,7 +16,7 @@ from augment.prompts.names import short_names
 from augment.prompts.review import read_questions, read_sight, read_verdict
 from augment.prompts.texts import model_message
 from augment.render.bev import draw
-from augment.render.camera import camera_for
+from augment.render.camera import WIDTH_PX, camera_for
 from augment.scene.entities import Scene
 from augment.scene.modification import Modification
 from augment.variants.recipes import Limits
@@ -47,7 +47,8 @@ def review_picture(submission: Submission, respondents: Respondents, limits: Lim
     )
     try:
         questions, asked, reply = engineer.read(messages, read_questions)
-        seen = _seen(submission, questions, replace(engineer, role=ModelRole.VIEWER))
+        viewer = replace(engineer, role=ModelRole.VIEWER)
+        seen = _seen(submission, questions, viewer, limits.picture_px)
         said: Messages = (*asked, model_message(reply.text))
         verdict, _, _ = engineer.read(
             fill_review.verdict_messages(said, questions, seen), read_verdict
@@ -70,14 +71,16 @@ def review_picture(submission: Submission, respondents: Respondents, limits: Lim
     )
 
 
-def picture(scene: Scene, modification: Modification) -> bytes:
+def picture(scene: Scene, modification: Modification, *, width_px: int = WIDTH_PX) -> bytes:
     """What the viewer is shown: a PNG with ids, metres and the change."""
     shown, change = _under_short_names(scene, modification)
-    return draw(shown, change, camera_for(shown, change), labels=True)
+    return draw(shown, change, camera_for(shown, change).at_width(width_px), labels=True)
 
 
-def _seen(submission: Submission, questions: tuple[str, ...], inquiry: Inquiry) -> dict[int, str]:
-    png = picture(submission.scene, submission.modification)
+def _seen(
+    submission: Submission, questions: tuple[str, ...], inquiry: Inquiry, width_px: int
+) -> dict[int, str]:
+    png = picture(submission.scene, submission.modification, width_px=width_px)
     inquiry = replace(
         inquiry, again=lambda told, said, _: fill_review.viewer_re_ask_messages(told, said)
     )

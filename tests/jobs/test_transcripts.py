@@ -50,7 +50,7 @@ def looking(row: Augmentation) -> RowTranscript:
 def test_the_document_holds_the_whole_record() -> None:
     row = ran(only_row(llama_job(price="2")), Model(after_a_second_look))
     document = json.loads(json.dumps(transcript_of(row)))
-    assert (document["format"], document["version"]) == ("scenario-arena/transcript", 2)
+    assert (document["format"], document["version"]) == ("scenario-arena/transcript", 3)
     assert document["augmentation"]["state"] == "done"
     assert document["augmentation"]["modification"] == row.modification
     assert "seed" not in document["augmentation"]

@@ -134,7 +134,11 @@ def test_what_was_known_before_the_first_run_is_sent_and_shown() -> None:
     )
     assert transcript_of(row)["contestant"]["sends"] == contestant.sends
     event = Event.objects.get(verb="fix")
-    assert event.after == {"slug": "one", "sends": contestant.sends}
+    assert event.after == {
+        "slug": "one",
+        "sends": contestant.sends,
+        "options": contestant.frozen_options,
+    }
 
 
 def test_a_parameter_that_is_refused_before_any_answer_is_left_out_for_good() -> None:
@@ -198,7 +202,9 @@ def test_a_profile_comes_back_from_its_document() -> None:
         max_output_tokens=9,
     )
     assert profile_from_document(json.loads(json.dumps(document_of(profile)))) == profile
-    unsent = replace(profile, temperature=False, json_schema=True, refused=frozenset({"seed"}))
+    fewer = replace(profile, temperature=False, refused=frozenset({"seed"}))
+    assert profile_from_document(document_of(fewer)) == fewer
+    unsent = replace(profile, json_schema=True, refused=frozenset({"response_format"}))
     assert document_of(unsent) == document_of(profile) | {"refused": []}
 
 

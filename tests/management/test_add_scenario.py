@@ -82,7 +82,7 @@ def test_an_intent_that_can_not_be_read_is_refused(tmp_path: Path) -> None:
 
 
 def test_unknown_names_and_taken_slugs_are_refused() -> None:
-    assert "Unknown scenario type 'cones'. Known: approaching" in refused(type="cones")
+    assert "'Cones!' must be one of approaching_construction_zone" in refused(type="Cones!")
     assert "Unknown scene 'road'. Known: street" in refused(scene="road")
     run(slug="cones")
     assert "There is a scenario called 'cones' already" in refused(slug="cones")

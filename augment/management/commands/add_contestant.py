@@ -10,13 +10,16 @@ from django.db import transaction
 
 from augment.baselines.simulated import PRESETS, Rates, rates_of
 from augment.errors import AugmentError, InvalidDocument
+from augment.management.arguments import add_option_arguments, options_of_arguments
 from augment.models import Contestant
 from augment.services.endpoints.contestants import (
     add_contestant,
+    add_like,
     add_simulated,
     ensure_builtin,
     ensure_endpoint,
 )
+from augment.services.endpoints.treatments import left_out
 from augment.services.terminal import TerminalCommand
 from augment.variants.transcript import ModelRole
 
@@ -24,8 +27,9 @@ ROLES = (ModelRole.REVIEWER, ModelRole.ENGINEER, ModelRole.VIEWER)
 
 _OF_MODELS = (
     *("variant", "endpoint", "model", *(role.value for role in ROLES)),
-    *("base_url", "key_variable", "simulated", "move_key"),
+    *("base_url", "key_variable", "simulated", "move_key", "like"),
 )
+_COPIED = ("variant", "endpoint", "model")
 
 
 class Command(TerminalCommand):
@@ -44,6 +48,12 @@ class Command(TerminalCommand):
         parser.add_argument("--endpoint", help="the label of an endpoint")
         parser.add_argument("--model", help="the model id on the endpoint")
         parser.add_argument(
+            "--like",
+            metavar="SLUG",
+            help="take variant, endpoint, model, roles and options from this contestant, but for "
+            "what is given beside it; with the prompts that are installed",
+        )
+        parser.add_argument(
             "--errors",
             metavar="RATES",
             help=f"{', '.join(PRESETS)}, or shares: position=0.1,heading=0.05,logic=0.1,format=0",
@@ -55,6 +65,7 @@ class Command(TerminalCommand):
                 metavar="MODEL[@ENDPOINT]",
                 help=f"who plays the {role}, where the variant has one; default: the model itself",
             )
+        add_option_arguments(parser)
         new = parser.add_argument_group("a new endpoint")
         new.add_argument("--base-url", help="for example http://127.0.0.1:11434/v1")
         new.add_argument(
@@ -76,9 +87,10 @@ class Command(TerminalCommand):
     def handle(self, *args: Any, **options: Any) -> None:
         """Make the endpoint if an address is given, then the contestant."""
         needed = [name for name in ("variant", "endpoint", "model") if not options[name]]
-        if options["errors"] is None and needed:
+        if options["errors"] is None and options["like"] is None and needed:
             raise CommandError(f"Name {_flags(needed)} for a language model, or --errors instead.")
         given = [name for name in _OF_MODELS if options[name]]
+        given += [name for name in options if name.startswith("option_") and options[name]]
         if options["errors"] is not None and given:
             raise CommandError(
                 f"--errors asks no language model, so it goes without {_flags(given)}."
@@ -93,6 +105,11 @@ class Command(TerminalCommand):
         except AugmentError as error:
             raise CommandError(str(error)) from error
         self.stdout.write(f"{contestant.slug}: {contestant.name} ({contestant.kind})")
+        for role, names in left_out(contestant).items():
+            self.stderr.write(
+                f"The {role}'s model does not take {', '.join(names)}: not sent, and said so "
+                "wherever the contestant is shown in full."
+            )
 
     @transaction.atomic
     def _add(self, options: dict[str, Any]) -> Contestant:
@@ -109,18 +126,30 @@ class Command(TerminalCommand):
                 is_simulated=options["simulated"],
                 may_move_key=options["move_key"],
             )
+        roles = {role: _seat(options[role]) for role in ROLES if options[role]}
+        chosen = options_of_arguments(options)
+        if options["like"] is not None:
+            return add_like(
+                slug=options["slug"],
+                like=options["like"],
+                changes={name: options[name] for name in _COPIED if options[name]},
+                name=options["name"],
+                roles=roles,
+                options=chosen,
+            )
         return add_contestant(
             slug=options["slug"],
             variant=options["variant"],
             endpoint=options["endpoint"],
             model=options["model"],
             name=options["name"],
-            roles={role: _seat(options[role]) for role in ROLES if options[role]},
+            roles=roles,
+            options=chosen,
         )
 
 
 def _flags(names: list[str]) -> str:
-    return ", ".join(f"--{name.replace('_', '-')}" for name in names)
+    return ", ".join(f"--{name.removeprefix('option_').replace('_', '-')}" for name in names)
 
 
 def _rates(written: str) -> Rates:

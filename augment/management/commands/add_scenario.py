@@ -26,7 +26,10 @@ class Command(TerminalCommand):
         """Say what the command takes."""
         types = ", ".join(member.value for member in ScenarioType)
         parser.add_argument("--scene", required=True, help="the slug of a stored scene")
-        parser.add_argument("--type", required=True, help=f"one of {types}")
+        parser.add_argument("--type", required=True, help=f"one of {types}, or a slug of your own")
+        parser.add_argument(
+            "--type-label", help="what people read for a type of your own; made from its slug"
+        )
         parser.add_argument("--instruction", required=True, help="what is to be changed")
         parser.add_argument(
             "--slug", help="the scenario's name; made up from the others if absent"
@@ -50,6 +53,7 @@ class Command(TerminalCommand):
             scenario = add_scenario(
                 scene=options["scene"],
                 type=options["type"],
+                type_label=options["type_label"],
                 instruction=options["instruction"],
                 slug=options["slug"],
                 reference=_reference(options["reference"]),

@@ -20,6 +20,7 @@ from augment.services.endpoints.respondents import Respondent, check_roles, docu
 from augment.services.events import log_event
 from augment.services.scenarios.scenes import check_slug
 from augment.services.texts import one_line
+from augment.variants.options import ContestantOptions, check_options, options_from_document
 from augment.variants.recipes import Recipe, find_recipe, spell_variant
 from augment.variants.transcript import ModelRole
 
@@ -116,6 +117,7 @@ def add_contestant(
     model: str,
     name: str | None = None,
     roles: Mapping[ModelRole, tuple[str | None, str]] | None = None,
+    options: ContestantOptions | None = None,
     actor: User | None = None,
 ) -> Contestant:
     """A language model that runs one variant; a simulated one where the endpoint is simulated.
@@ -133,11 +135,12 @@ def add_contestant(
             where another contestant is called so.
         roles: Who else plays a reviewer's role: the label of an endpoint (None: the contestant's
             own) and the model id there.
+        options: How it asks; what is open is fixed at its first run.
         actor: Who adds it.
 
     Raises:
         UnknownName: No such variant or endpoint.
-        InvalidDocument: The slug, a model, a role or the name can't be used.
+        InvalidDocument: The slug, a model, a role, an option or the name can't be used.
         Conflict: The slug belongs to another contestant.
     """
     check_slug(slug, what="contestant")
@@ -145,27 +148,71 @@ def add_contestant(
     address = _endpoint(endpoint, actor)
     model = one_line("model", model, what="contestant")
     others = _respondents(recipe, roles or {}, address, actor)
-    respondents = [Respondent(endpoint=address, model=model), *others.values()]
-    title = _title(slug, model, recipe, others, address)
-    if name is not None:
-        title = one_line("name", name, what="contestant")
+    respondents = (Respondent(endpoint=address, model=model), *others.values())
+    chosen = options or ContestantOptions()
+    check_options(recipe, chosen)
+    title = _title(slug, model, recipe, others, address, chosen) if name is None else name
     simulated = any(respondent.endpoint.is_simulated for respondent in respondents)
     wanted = {
-        "name": title,
+        "name": one_line("name", title, what="contestant"),
         "kind": Kind.SIMULATED if simulated else Kind.LLM,
         "variant": recipe.slug,
         "endpoint": address,
         "model": model,
         "roles": documents_of(others),
+        "options": chosen.to_document(),
     }
     for respondent in respondents:
         model_at(endpoint=respondent.endpoint, model=respondent.model)
-    contestant, made = Contestant.objects.get_or_create(slug=slug, defaults=wanted)
-    if made:
-        _log_added(contestant, actor)
-    else:
-        _refuse_another(contestant, wanted, named=name is not None)
-    return contestant
+    return _stored(slug, wanted, named=name is not None, actor=actor)
+
+
+@transaction.atomic
+def add_like(
+    *,
+    slug: str,
+    like: str,
+    changes: Mapping[str, str] | None = None,
+    name: str | None = None,
+    roles: Mapping[ModelRole, tuple[str | None, str]] | None = None,
+    options: ContestantOptions | None = None,
+    actor: User | None = None,
+) -> Contestant:
+    """A contestant as another one, but for what is given; it asks with the installed prompts.
+
+    Args:
+        slug: Of the new one.
+        like: Of the one that is followed.
+        changes: Its variant, endpoint or model, where these are to be others.
+        name: What people read.
+        roles: Who else plays a role, beside those of the one that is followed.
+        options: What it chooses otherwise.
+        actor: Who adds it.
+
+    Raises:
+        UnknownName: No such contestant, variant or endpoint.
+        InvalidDocument: Something can't be used.
+        Conflict: The one that is followed asks no model, or the slug is another one's.
+    """
+    row = Contestant.objects.select_related("endpoint").filter(slug=like).first()
+    if row is None:
+        raise UnknownName(
+            "contestant", like, list(Contestant.objects.values_list("slug", flat=True))
+        )
+    if row.endpoint is None:
+        raise Conflict(f"{like} asks no language model; there is nothing to be like.")
+    before = {"variant": row.variant, "endpoint": row.endpoint.label, "model": row.model}
+    kept = {ModelRole(role): (one["endpoint"], one["model"]) for role, one in row.roles.items()}
+    open_again = {name: value for name, value in row.options.items() if name != "prompt_version"}
+    chosen = open_again | (options or ContestantOptions()).to_document()
+    return add_contestant(
+        slug=slug,
+        **(before | dict(changes or {})),
+        name=name,
+        roles=kept | dict(roles or {}),
+        options=options_from_document(chosen),
+        actor=actor,
+    )
 
 
 @transaction.atomic
@@ -229,18 +276,25 @@ def _endpoint(label: str, actor: User | None) -> Endpoint:
 
 
 def _title(
-    slug: str, model: str, recipe: Recipe, others: Mapping[ModelRole, Respondent], own: Endpoint
+    slug: str,
+    model: str,
+    recipe: Recipe,
+    others: Mapping[ModelRole, Respondent],
+    own: Endpoint,
+    options: ContestantOptions,
 ) -> str:
     """What people read where nobody chose a name; not what another contestant is called."""
     given = (f"{role} {respondent.model}" for role, respondent in others.items())
-    title = " ".join([model, spell_variant(recipe.slug), *given])[:LONGEST_NAME]
+    said = options.describe()
+    parts = [model, spell_variant(recipe.slug), *given, *([f"({said})"] if said else [])]
+    title = " ".join(parts)[:LONGEST_NAME]
     if Contestant.objects.filter(name=title).exclude(slug=slug).exists():
         title = f"{title} at {own.label}"[:LONGEST_NAME]
     return title
 
 
 def _log_added(contestant: Contestant, actor: User | None) -> None:
-    facts = ("slug", "name", "kind", "variant", "model", "roles")
+    facts = ("slug", "name", "kind", "variant", "model", "roles", "options")
     assert contestant.endpoint is not None
     log_event(
         actor=actor,
@@ -267,6 +321,22 @@ def _respondents(
         )
         for role, (label, model) in sorted(roles.items())
     }
+
+
+def _stored(
+    slug: str, wanted: dict[str, object], *, named: bool, actor: User | None
+) -> Contestant:
+    """The contestant of that slug, made where there is none.
+
+    Raises:
+        Conflict: The slug stands for another one.
+    """
+    contestant, made = Contestant.objects.get_or_create(slug=slug, defaults=wanted)
+    if made:
+        _log_added(contestant, actor)
+    else:
+        _refuse_another(contestant, wanted, named=named)
+    return contestant
 
 
 def _refuse_another(contestant: Contestant, wanted: dict[str, object], *, named: bool) -> None:

@@ -2,7 +2,8 @@
 
 A contestant is one treatment. Were its tools called natively in one half of a study and in the
 answer in the other, its rating would be that of a mixture. So what was known of its models at its
-first run is kept with it, role by role.
+first run is kept with it, role by role, and so is the whole set of its options: what was chosen
+when it was added, and what counted then of what was left open.
 """
 
 from __future__ import annotations
@@ -14,26 +15,31 @@ from typing import Any
 from django.db import transaction
 from django.db.models import Exists, OuterRef
 
-from augment.errors import ModelFault, ParameterRefused
+from augment.errors import Conflict, ModelFault, ParameterRefused
 from augment.llm.messages import LengthName
 from augment.llm.profile import ModelProfile
 from augment.models import Augmentation, Contestant, Endpoint, ModelCall
+from augment.prompts.texts import prompt_version
+from augment.sentences import Sentence, sentence
 from augment.services.endpoints.known_models import profile_of
-from augment.services.endpoints.respondents import Respondent
+from augment.services.endpoints.respondents import Respondent, respondents_of
 from augment.services.events import log_event
+from augment.variants.options import ContestantOptions, completed, options_from_document
+from augment.variants.recipes import find_recipe
 from augment.variants.transcript import ModelRole
 
-_SENT = frozenset({"reasoning_effort", *LengthName})
+_SENT = frozenset({"temperature", "seed", "reasoning_effort", *LengthName})
 """Parameters that some endpoints refuse and that contestants send."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Treatment:
-    """What a contestant sends in each of its roles."""
+    """What a contestant sends in each of its roles, and its options, none of ours left open."""
 
     contestant_pk: int
     respondents: Mapping[ModelRole, Respondent]
     profiles: Mapping[ModelRole, ModelProfile]
+    options: ContestantOptions
 
     def at(self, endpoint: Endpoint) -> dict[str, ModelProfile]:
         """By model, what it sends to an endpoint."""
@@ -76,9 +82,13 @@ def treatment_of(contestant: Contestant, respondents: Mapping[ModelRole, Respond
     Args:
         contestant: Who is about to run.
         respondents: Who plays its roles.
+
+    Raises:
+        Conflict: It ran with prompts that are not installed any more, or is told to.
     """
-    stored = Contestant.objects.values_list("sends", flat=True).get(pk=contestant.pk) or {}
-    if any(role.value not in stored for role in respondents):
+    columns = Contestant.objects.values_list("sends", "frozen_options").get(pk=contestant.pk)
+    stored, frozen = columns[0] or {}, columns[1]
+    if frozen is None or any(role.value not in stored for role in respondents):
         row = Contestant.objects.select_for_update(no_key=True).get(pk=contestant.pk)
         stored = dict(row.sends or {})
         new = {
@@ -89,19 +99,66 @@ def treatment_of(contestant: Contestant, respondents: Mapping[ModelRole, Respond
             if role.value not in stored
         }
         row.sends = stored = stored | new
-        row.save(update_fields=["sends"])
+        row.frozen_options = frozen = row.frozen_options or _completed(row).to_document()
+        row.save(update_fields=["sends", "frozen_options"])
         log_event(
             actor=None,
             verb="fix",
             object_kind="contestant",
             object_code=row.code,
-            after={"slug": row.slug, "sends": new},
+            after={"slug": row.slug, "sends": new, "options": frozen},
         )
+    options = options_from_document(frozen)
+    unlike = other_prompts(contestant.slug, options)
+    if unlike is not None:
+        raise Conflict(unlike)
     return Treatment(
         contestant_pk=contestant.pk,
         respondents=respondents,
         profiles={role: profile_from_document(stored[role.value]) for role in respondents},
+        options=options,
     )
+
+
+def options_of(contestant: Contestant) -> ContestantOptions:
+    """The options of a contestant: fixed at its first run, before that as they would be now."""
+    if contestant.frozen_options is not None:
+        return options_from_document(contestant.frozen_options)
+    if contestant.endpoint is None:
+        return ContestantOptions()
+    return _completed(contestant)
+
+
+def other_prompts(slug: str, options: ContestantOptions) -> Sentence | None:
+    """What to say of options that name prompts which are not installed; None where they are."""
+    wanted, installed = options.prompt_version, prompt_version()
+    if wanted is None or wanted == installed:
+        return None
+    return sentence(
+        "%(contestant)s asks with prompts of version %(wanted)s, and version %(installed)s is "
+        "installed. Add another contestant: manage.py add_contestant SLUG --like %(contestant)s",
+        contestant=slug,
+        wanted=wanted,
+        installed=installed,
+    )
+
+
+def left_out(contestant: Contestant) -> dict[str, list[str]]:
+    """By role, the chosen options that its model does not take and that are not sent therefore.
+
+    Of a contestant that has not run yet: as far as it is known now.
+    """
+    chosen = {"temperature", "seed", "reasoning_effort"} & options_of(
+        contestant
+    ).to_document().keys()
+    if not chosen:
+        return {}
+    sends = contestant.sends or {
+        role.value: document_of(profile_of(endpoint=one.endpoint, model=one.model))
+        for role, one in respondents_of(contestant).items()
+    }
+    found = {role: sorted(chosen & set(sent["refused"])) for role, sent in sorted(sends.items())}
+    return {role: names for role, names in found.items() if names}
 
 
 def loosen_unanswered(contestants: Iterable[Contestant]) -> int:
@@ -118,18 +175,23 @@ def loosen_unanswered(contestants: Iterable[Contestant]) -> int:
         contestant=OuterRef("pk"), state=Augmentation.State.RUNNING
     )
     loose = Contestant.objects.filter(pk__in=pks, sends__isnull=False)
-    return loose.exclude(Exists(calls)).exclude(Exists(running)).update(sends=None)
+    return (
+        loose.exclude(Exists(calls))
+        .exclude(Exists(running))
+        .update(sends=None, frozen_options=None)
+    )
 
 
 def document_of(profile: ModelProfile) -> dict[str, Any]:
     """What of a profile changes what contestants send, ready for JSON.
 
-    No variant sends a temperature, a seed or a schema, so what is known of these is not among it.
+    No variant sends a schema, so what is known of it is not among it.
     """
+    refused = profile.refused | ({"temperature"} if profile.temperature is False else set())
     return {
         "native_tools": profile.native_tools,
         "vision": profile.vision,
-        "refused": sorted(profile.refused & _SENT),
+        "refused": sorted(refused & _SENT),
         "reasoning_effort": profile.reasoning_effort,
         "max_output_tokens": profile.max_output_tokens,
     }
@@ -141,16 +203,33 @@ def profile_from_document(document: Mapping[str, Any]) -> ModelProfile:
     Raises:
         KeyError: It is none.
     """
+    refused = frozenset(document["refused"])
     return ModelProfile(
         native_tools=document["native_tools"],
         vision=document["vision"],
-        refused=frozenset(document["refused"]),
+        temperature=False if "temperature" in refused else None,
+        refused=refused - {"temperature"},
         reasoning_effort=document["reasoning_effort"],
         max_output_tokens=document["max_output_tokens"],
     )
 
 
 # --- Private -----------------------------------------------------------------------------------
+
+
+def _completed(contestant: Contestant) -> ContestantOptions:
+    """What was chosen, and for the rest what counts now."""
+    recipe, modifier = find_recipe(contestant.variant), (contestant.sends or {}).get("modifier")
+    if modifier is None:
+        assert contestant.endpoint is not None
+        known = profile_of(endpoint=contestant.endpoint, model=contestant.model)
+        modifier = document_of(known)
+    return completed(
+        options_from_document(contestant.options),
+        recipe,
+        native_tools=modifier["native_tools"],
+        prompt_version=prompt_version(),
+    )
 
 
 def _answered_with(contestant_pk: int, roles: list[ModelRole], parameter: str) -> bool:

@@ -17,6 +17,7 @@ from augment.scene.catalogue import ScenarioType
 from augment.scene.codec import modification_from_document
 from augment.scene.modification import Modification
 from augment.services.scenarios.scenes import reference_of
+from augment.services.scenarios.types import type_choices, type_rank
 from augment.variants.recipes import SPELLING, spell_variant
 
 __all__ = [
@@ -135,31 +136,31 @@ def groups(
         measured: What has no displacement is left out.
         by: What to group by, beside the contestant.
         types: The scenario types that count; None for the paper's choice: by variant the three
-            whose places are definite, else all five.
+            whose places are definite, else all.
     """
-    if types is None:
-        types = PLACED_EXACTLY if by is By.VARIANT else tuple(ScenarioType)
+    if types is None and by is By.VARIANT:
+        types = PLACED_EXACTLY
     cells: defaultdict[Place, list[tuple[Augmentation, Displacement]]]
     cells = defaultdict(list)
     for one in measured:
-        if one.displacement is not None and one.row.scenario.type in types:
+        if one.displacement is not None and (types is None or one.row.scenario.type in types):
             cells[_place(one.row, by)].append((one.row, one.displacement))
     return [_group(cells[place], by) for place in sorted(cells)]
 
 
-def types_named(names: Sequence[str]) -> tuple[ScenarioType, ...]:
-    """Scenario types by their names, or all five by the word `all`.
+def types_named(names: Sequence[str]) -> tuple[str, ...]:
+    """Scenario types by their names, or all there are by the word `all`.
 
     Raises:
         UnknownName: There is no such type.
     """
+    known = [name for name, _ in type_choices()]
     if list(names) == ["all"]:
-        return tuple(ScenarioType)
-    known = {kind.value: kind for kind in ScenarioType}
+        return tuple(known)
     for name in names:
         if name not in known:
             raise UnknownName("scenario type", name, ["all", *known])
-    return tuple(known[name] for name in names)
+    return tuple(names)
 
 
 # Private
@@ -207,7 +208,7 @@ def _place(row: Augmentation, by: By) -> Place:
     who = (contestant.name.lower(), contestant.slug)
     match by:
         case By.TYPE:
-            return (Scenario.Type.values.index(row.scenario.type), "", *who)
+            return (type_rank(row.scenario.type), row.scenario.type, *who)
         case By.VARIANT:
             return (_rank(contestant.variant), contestant.variant.lower(), *who)
         case By.CONTESTANT:

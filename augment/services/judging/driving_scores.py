@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Collection, Iterable
+from collections.abc import Collection, Iterable, Sequence
 from dataclasses import dataclass
 
 from django.db.models import Q, QuerySet
@@ -124,7 +124,9 @@ def _scores(which: Q, options: Options, score: str) -> DrivingScores:
     for row in rows:
         who = 0 if row.augmentation is None else row.augmentation.contestant_id
         cells[row.subject, who].append(row)
-    lines = [_line(cell, before, score) for cell in cells.values()]
+    own = {row.scenario.type for row in rows} - set(Scenario.Type.values)
+    kinds = (*Scenario.Type.values, *sorted(own))
+    lines = [_line(cell, before, score, kinds) for cell in cells.values()]
     return DrivingScores(
         score=score,
         options=options,
@@ -149,7 +151,9 @@ def _rows(found: QuerySet[Simulation]) -> QuerySet[Simulation]:
     )  # fmt: skip
 
 
-def _line(cell: list[Simulation], before: dict[int, float], score: str) -> DrivingLine:
+def _line(
+    cell: list[Simulation], before: dict[int, float], score: str, kinds: Sequence[str]
+) -> DrivingLine:
     done = [row for row in cell if row.state == State.DONE]
     paired = [row for row in done if row.scenario_id in before]
     first = cell[0]
@@ -168,7 +172,7 @@ def _line(cell: list[Simulation], before: dict[int, float], score: str) -> Drivi
         before=_mean(before[row.scenario_id] for row in paired),
         by_type={
             kind: _mean(values[row.pk] for row in paired if row.scenario.type == kind)
-            for kind in Scenario.Type.values
+            for kind in kinds
         },
         collided=sum(_collided(row) for row in paired),
         braked=sum(bool((row.document or {}).get("emergency_brake_steps")) for row in paired),

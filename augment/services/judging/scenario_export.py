@@ -13,7 +13,6 @@ from augment.errors import Conflict, UnknownName
 from augment.formats.writers import WRITERS, writer_named
 from augment.formats.writing import Cell, Loss, Written
 from augment.models import Augmentation, BaseScene, GenerationJob, Simulation
-from augment.scene.catalogue import ScenarioType
 from augment.scene.codec import modification_from_document
 from augment.scene.entities import AgentType, TrafficAgent
 from augment.scene.motion import Motion, MotionSource, Movement
@@ -22,6 +21,7 @@ from augment.scene.recording_codec import recording_from_document
 from augment.services.judging.simulations import trace_document
 from augment.services.scenarios.interplan import refuse_changes
 from augment.services.scenarios.scenes import scene_of
+from augment.services.scenarios.types import type_of
 
 FORMATS = tuple(WRITERS)
 RECORDED = "recorded"
@@ -103,11 +103,13 @@ def export_job(
     scenes: dict[str, BaseScene] = {}
     for row in rows:
         cell_name = f"{row.scenario.slug} by {row.contestant.slug}"
+        if job.samples > 1:
+            cell_name += f", sample {row.sample}"
         if row.modification is None:
             text = f"there is no modification: {row.state}"
             missing.append(Loss(cell=cell_name, text=text, changes_scene=True))
             continue
-        cell = _cell(cell_name, row)
+        cell = _cell(cell_name, row, many=job.samples > 1)
         if motion != RECORDED and row.pk in drives:
             cell = replace(cell, drive=_motion(cell, trace_document(drives[row.pk])))
         elif motion != RECORDED:
@@ -139,7 +141,7 @@ def _rows(job: GenerationJob, contestant: str | None) -> Sequence[Augmentation]:
         if contestant not in slugs:
             raise UnknownName("contestant", contestant, slugs)
         rows = rows.filter(contestant__slug=contestant)
-    return list(rows.order_by("scenario__slug", "contestant__slug"))
+    return list(rows.order_by("scenario__slug", "contestant__slug", "sample"))
 
 
 def _drives(job: GenerationJob, planner: str) -> dict[int, Simulation]:
@@ -156,14 +158,14 @@ def _drives(job: GenerationJob, planner: str) -> dict[int, Simulation]:
     return drives
 
 
-def _cell(name: str, row: Augmentation) -> Cell:
+def _cell(name: str, row: Augmentation, *, many: bool) -> Cell:
     scenario = row.scenario
     assert row.modification is not None
     return Cell(
         name=name,
-        stem=f"{scenario.slug}--{row.contestant.slug}",
+        stem=f"{scenario.slug}--{row.contestant.slug}" + (f"--{row.sample}" if many else ""),
         scene=scene_of(scenario),
-        type=ScenarioType(scenario.type),
+        type=type_of(scenario.type),
         modification=modification_from_document(row.modification),
         keeps_traffic=scenario.keep_traffic,
         made_on=(row.finished_at or row.created_at).date(),

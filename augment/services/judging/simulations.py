@@ -19,13 +19,13 @@ from django.utils import timezone
 
 from augment.errors import AugmentError, Conflict, LeaseLost, UnknownName
 from augment.models import Augmentation, GenerationJob, Scenario, Simulation
-from augment.scene.catalogue import ScenarioType
 from augment.scene.codec import modification_from_document
 from augment.scene.modification import Modification
 from augment.scene.recording_codec import recording_from_document
 from augment.sentences import sentence
 from augment.services.clock import DATABASE_TIME, Moment
 from augment.services.scenarios.scenes import reference_of, scene_of
+from augment.services.scenarios.types import type_of
 from augment.simulation.criticality import criticality
 from augment.simulation.drive import Drive, run
 from augment.simulation.expert import expert_of
@@ -270,7 +270,7 @@ def _driven(row: Simulation, beating: Callable[[int], None]) -> dict[str, Any]:
     planner = planner_named(row.planner, offsets=row.offsets)
     drove = run(setting, planner, road=road, after_step=beating)
     expert = expert_of(setting, road)
-    kind = ScenarioType(row.scenario.type)
+    kind = type_of(row.scenario.type)
     scores = {
         name: score_drive(
             drove,

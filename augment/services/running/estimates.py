@@ -14,8 +14,10 @@ from augment.models import Augmentation, Contestant, ModelCall, Scenario
 from augment.scene.modification import Modification
 from augment.services.endpoints.prices import price_of
 from augment.services.endpoints.respondents import Respondent, respondents_of
+from augment.services.endpoints.treatments import options_of
 from augment.services.scenarios.scenes import reference_of, scene_of
 from augment.variants.forecast import TokenUse, calls_of, most_tokens
+from augment.variants.options import recipe_with
 from augment.variants.recipes import Recipe, find_recipe
 from augment.variants.showing import shown_prompt
 from augment.variants.transcript import ModelRole
@@ -154,11 +156,11 @@ class _Prompts:
             (scene_of(row), row.instruction, reference_of(row) or Modification())
             for row in samples
         ]
-        self._measured: dict[tuple[str, ModelRole], tuple[int, int]] = {}
+        self._measured: dict[tuple[Recipe, ModelRole], tuple[int, int]] = {}
 
     def tokens(self, recipe: Recipe, role: ModelRole) -> tuple[int, int]:
         """About so many on average, and at most so many."""
-        key = (recipe.slug, role)
+        key = (recipe, role)
         if key not in self._measured:
             self._measured[key] = self._measure(recipe, role)
         return self._measured[key]
@@ -176,7 +178,8 @@ class _Prompts:
 
 
 def _line(row: Contestant, count: int, prompts: _Prompts) -> ContestantEstimate:
-    recipe, respondents = find_recipe(row.variant), respondents_of(row)
+    recipe = recipe_with(find_recipe(row.variant), options_of(row))
+    respondents = respondents_of(row)
     calls = calls_of(recipe)
     prices = {role: _price(respondent) for role, respondent in respondents.items()}
     used, usual_calls, seen = _seen(row)

@@ -10,9 +10,12 @@ from django.db.models import Q
 from augment.baselines.quantised import BIN_M
 from augment.errors import AugmentError, Conflict, KeyMissing, KeyNotAllowed
 from augment.models import Contestant, Scenario
-from augment.sentences import sentence, sentence_of
+from augment.sentences import Sentence, sentence, sentence_of
 from augment.services.endpoints.keys import key_of, may_hold_key
 from augment.services.endpoints.respondents import Respondent, respondents_of, sight_of, viewer_of
+from augment.services.endpoints.treatments import options_of, other_prompts
+from augment.variants.options import ToolProtocol
+from augment.variants.transcript import ModelRole
 
 Kind = Contestant.Kind
 
@@ -46,6 +49,9 @@ def find_obstacle(contestant: Contestant) -> str:
             "ARENA_KEY_VARIABLES has to list it",
             names=forbidden,
         )
+    unaskable = _unaskable(contestant)
+    if unaskable is not None:
+        return unaskable
     viewer = viewer_of(contestant)
     if viewer is not None and sight_of(viewer) is False:
         return sentence("its viewer sees text alone; visual QA needs vision")
@@ -93,6 +99,10 @@ def refuse_impossible(who: Sequence[Contestant], where: Sequence[Scenario]) -> N
             )
         )
     _refuse_forbidden_keys(who)
+    for row in who:
+        unaskable = _unaskable(row)
+        if unaskable is not None:
+            raise Conflict(unaskable)
     _refuse_without_sight(who)
     references = [
         row.slug for row in who if row.kind == Kind.REFERENCE or row.error_rates is not None
@@ -110,6 +120,24 @@ def refuse_impossible(who: Sequence[Contestant], where: Sequence[Scenario]) -> N
 
 
 # --- Private -----------------------------------------------------------------------------------
+
+
+def _unaskable(contestant: Contestant) -> Sentence | None:
+    """Why nobody can ask with a contestant's options; None where it can be tried."""
+    if contestant.endpoint is None:
+        return None
+    options = options_of(contestant)
+    if options.protocol is ToolProtocol.NATIVE:
+        modifier = respondents_of(contestant)[ModelRole.MODIFIER]
+        known = modifier.known
+        if contestant.frozen_options is None and known is not None and known.native_tools is False:
+            return sentence(
+                "%(contestant)s is to call its function natively, and %(model)s has no native "
+                "calls. Add a contestant with the protocol prompt, or probe the model anew.",
+                contestant=contestant.slug,
+                model=str(modifier),
+            )
+    return other_prompts(contestant.slug, options)
 
 
 def _forbidden_keys(contestant: Contestant) -> tuple[str, ...]:

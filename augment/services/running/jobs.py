@@ -1,4 +1,4 @@
-"""Generation jobs: contestants x scenarios, one row a cell, until nothing is under way."""
+"""Generation jobs: contestants x scenarios x samples, until nothing is under way."""
 
 from __future__ import annotations
 
@@ -21,6 +21,7 @@ from augment.services.running.caps import Caps, check_caps, over_already
 from augment.services.running.feasible import refuse_impossible
 from augment.services.running.leases import change_all
 from augment.services.texts import one_line
+from augment.variants.options import MOST_SAMPLES
 
 State = Augmentation.State
 
@@ -39,16 +40,20 @@ def launch(
     contestants: Sequence[str],
     scenarios: Sequence[str],
     caps: Caps = NO_CAPS,
+    samples: int = 1,
     is_fresh: bool = False,
     actor: User | None = None,
 ) -> GenerationJob:
-    """Write a job and one waiting row per contestant and scenario; the door sends the messages.
+    """Write a job and its waiting rows, one per contestant, scenario and sample.
+
+    The door sends the messages.
 
     Args:
         name: What people call it.
         contestants: Slugs; a slug given twice counts once.
         scenarios: Slugs; a slug given twice counts once.
         caps: What it may use at most.
+        samples: So often every contestant is asked about every scenario.
         is_fresh: Whether language models are asked anew what they answered in other jobs before.
         actor: Who launches it, None for the machine.
 
@@ -60,35 +65,27 @@ def launch(
             nobody knows.
     """
     name = one_line("name", name, what="job")
+    loosen_unanswered(_contestants(contestants))
     who = _contestants(contestants)
     where = _scenarios(scenarios)
     refuse_impossible(who, where)
-    loosen_unanswered(who)
+    _check_samples(samples)
     job = GenerationJob.objects.create(
         name=name,
         launched_by_id=actor.pk if actor else None,
+        samples=samples,
         is_fresh=is_fresh,
         **check_caps(caps, who),
     )
     job.contestants.set(who)
     job.scenarios.set(where)
     Augmentation.objects.bulk_create(
-        Augmentation(job=job, scenario=scenario, contestant=contestant)
+        Augmentation(job=job, scenario=scenario, contestant=contestant, sample=sample)
+        for sample in range(1, samples + 1)
         for scenario in where
         for contestant in who
     )
-    after: dict[str, Any] = {
-        "name": name,
-        "contestants": [contestant.slug for contestant in who],
-        "scenarios": [scenario.slug for scenario in where],
-    }
-    if caps != NO_CAPS:
-        after["cap"] = limit_of(job)
-    if is_fresh:
-        after["is_fresh"] = True
-    log_event(
-        actor=actor, verb="launch", object_kind="job", object_code=str(job.code), after=after
-    )
+    _log_launch(job, who, where, actor)
     return job
 
 
@@ -190,6 +187,36 @@ def _finish(job_pk: int, now: Moment) -> int:
     if Augmentation.objects.filter(job=job_pk, state__in=Augmentation.UNDER_WAY).exists():
         return 0
     return running.update(state=GenerationJob.State.FINISHED, finished_at=now)
+
+
+def _log_launch(
+    job: GenerationJob, who: list[Contestant], where: list[Scenario], actor: User | None
+) -> None:
+    after: dict[str, Any] = {
+        "name": job.name,
+        "contestants": [contestant.slug for contestant in who],
+        "scenarios": [scenario.slug for scenario in where],
+    }
+    if job.is_capped:
+        after["cap"] = limit_of(job)
+    if job.is_fresh:
+        after["is_fresh"] = True
+    if job.samples > 1:
+        after["samples"] = job.samples
+    log_event(
+        actor=actor, verb="launch", object_kind="job", object_code=str(job.code), after=after
+    )
+
+
+def _check_samples(samples: int) -> None:
+    if not 1 <= samples <= MOST_SAMPLES:
+        raise Conflict(
+            sentence(
+                "Samples go from 1 to %(most)s, not %(samples)s.",
+                most=MOST_SAMPLES,
+                samples=samples,
+            )
+        )
 
 
 def _contestants(slugs: Sequence[str]) -> list[Contestant]:

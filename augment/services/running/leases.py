@@ -138,6 +138,11 @@ def note_injected(*, held: Lease, injected: dict[str, str]) -> bool:
     return bool(_row_of(held).update(injected=injected))
 
 
+def note_options(*, held: Lease, options: dict[str, Any]) -> bool:
+    """Store with which options a model is asked; False when the lease is lost."""
+    return bool(_row_of(held).update(options=options))
+
+
 @transaction.atomic
 def settle(*, held: Lease, settlement: Settlement, now: Moment = DATABASE_TIME) -> bool:
     """Write the outcome and close the attempt.

@@ -43,6 +43,7 @@ from augment.services.running.transcripts import RowTranscript, sentence_of
 from augment.services.scenarios.pictures import original_picture, picture_of
 from augment.services.scenarios.scenes import intent_of, reference_of, scene_of, seed_of
 from augment.variants import pipeline
+from augment.variants.options import ToolProtocol, recipe_with
 from augment.variants.recipes import find_recipe
 from augment.variants.respondents import RespondentClient
 from augment.variants.transcript import ModelRole
@@ -216,10 +217,17 @@ def _from_reference(row: Augmentation) -> Answer:
 def _from_placer(row: Augmentation, place: Callable[..., Placed], scene: Scene) -> Answer:
     """What a contestant that asks nobody makes of the intent, or why it refuses."""
     try:
-        placed = place(scene, intent_of(row.scenario), seed=seed_of(row.scenario.slug))
+        placed = place(
+            scene, intent_of(row.scenario), seed=seed_of(_drawn(row, row.scenario.slug))
+        )
     except CannotPlace as refusal:
         return Answer(state=State.REFUSED, reason=refusal.reason)
     return Answer(state=State.DONE, modification=placed.modification, notes=placed.notes)
+
+
+def _drawn(row: Augmentation, what: str) -> str:
+    """What a draw depends on: each sample has one of its own, and the first is as ever."""
+    return what if row.sample == 1 else f"{what}#{row.sample}"
 
 
 def _from_errors(
@@ -233,7 +241,7 @@ def _from_errors(
         scene,
         reference,
         simulated.rates_of(rates),
-        seed=seed_of(f"{row.contestant.slug}/{row.scenario.slug}"),
+        seed=seed_of(_drawn(row, f"{row.contestant.slug}/{row.scenario.slug}")),
     )
     label = {"class": made.fault_class, "fault": made.fault}
     if not leases.note_injected(held=held, injected=label):
@@ -252,6 +260,9 @@ def _from_model(
 ) -> Answer:
     respondents = respondents_of(row.contestant)
     treatment = treatment_of(row.contestant, respondents)
+    options = treatment.options
+    if not leases.note_options(held=held, options=options.to_document()):
+        raise LeaseLost(f"attempt {held.attempt_number} has lost its row")
     sites = {respondent.endpoint.pk: respondent.endpoint for respondent in respondents.values()}
     with ExitStack() as opened:
         clients = {
@@ -266,17 +277,22 @@ def _from_model(
             if role is not ModelRole.MODIFIER
         }
         outcome = pipeline.run(
-            find_recipe(row.contestant.variant),
+            recipe_with(find_recipe(row.contestant.variant), options),
             scene=scene,
             instruction=row.scenario.instruction,
             client=clients[endpoint.pk],
             model=row.contestant.model,
             transcript=RowTranscript(
-                held, row, endpoint, others={role: respondents[role].endpoint for role in others}
+                held,
+                row,
+                endpoint,
+                others={role: respondents[role].endpoint for role in others},
+                key=options.key(row.sample),
             ),
-            native_tools=treatment.profiles[ModelRole.MODIFIER].native_tools is True,
+            native_tools=options.protocol is ToolProtocol.NATIVE,
             others=others,
             intent=intent_of(row.scenario),
+            sampling=options.sampling(row.sample),
         )
     return Answer(
         state=State(outcome.status.value),

@@ -10,6 +10,7 @@ from typing import Any
 from django.core.files.storage import default_storage
 
 from augment.models import Augmentation, Contestant, ModelCall
+from augment.services.endpoints.treatments import left_out
 from augment.services.running.transcript_steps import (
     TranscriptStep,
     Try,
@@ -19,7 +20,7 @@ from augment.services.running.transcript_steps import (
 )
 from augment.services.running.transcripts import IMAGES
 
-FORMAT, VERSION = "scenario-arena/transcript", 2
+FORMAT, VERSION = "scenario-arena/transcript", 3
 
 
 def transcript_of(augmentation: Augmentation) -> dict[str, Any]:
@@ -31,6 +32,8 @@ def transcript_of(augmentation: Augmentation) -> dict[str, Any]:
         "version": VERSION,
         "augmentation": {
             "code": str(augmentation.code),
+            "sample": augmentation.sample,
+            "options": _same_order(augmentation.options),
             "state": augmentation.state,
             "reason": augmentation.reason,
             "notes": augmentation.notes,
@@ -45,7 +48,12 @@ def transcript_of(augmentation: Augmentation) -> dict[str, Any]:
             "instruction": scenario.instruction,
         },
         "contestant": _contestant(augmentation.contestant),
-        "job": {"code": str(job.code), "name": job.name, "is_fresh": job.is_fresh},
+        "job": {
+            "code": str(job.code),
+            "name": job.name,
+            "is_fresh": job.is_fresh,
+            "samples": job.samples,
+        },
         "totals": _totals(tries),
         "attempts": [_attempt(one) for one in tries],
         "images": _images(tries),
@@ -64,6 +72,9 @@ def _contestant(contestant: Contestant) -> dict[str, Any]:
         "variant": contestant.variant or None,
         "model": contestant.model or None,
         "roles": _same_order(contestant.roles),
+        "options": _same_order(contestant.options),
+        "frozen_options": _same_order(contestant.frozen_options),
+        "left_out": left_out(contestant),
         "sends": _same_order(contestant.sends),
         "endpoint": None
         if endpoint is None

@@ -65,6 +65,7 @@ class RowTranscript:
         row: The augmentation, with its job.
         endpoint: Who is asked.
         others: Who is asked in the roles that have an endpoint of their own.
+        key: What keeps its answers apart from those of other options and samples.
         sleep: Waits for that many seconds.
     """
 
@@ -75,12 +76,14 @@ class RowTranscript:
         endpoint: Endpoint,
         *,
         others: Mapping[ModelRole, Endpoint] | None = None,
+        key: Mapping[str, object] | None = None,
         sleep: Callable[[float], None] = time.sleep,
     ) -> None:
         self._held = held
         self._row = row
         self._endpoint = endpoint
         self._others = dict(others or {})
+        self._key = key
         self._sleep = sleep
         self._numbers = 0
         self._notes = 0
@@ -222,7 +225,10 @@ class RowTranscript:
             "role": role,
             "request": document,
             "request_hash": request_hash(
-                base_url=self._at(role).base_url, document=document, prompt_version=version
+                base_url=self._at(role).base_url,
+                document=document,
+                prompt_version=version,
+                options=self._key,
             ),
             "prompt_version": version,
         }

@@ -13,10 +13,10 @@ from augment.formats.interplan_schema import WHAT
 from augment.formats.writing import Cell, Loss
 from augment.formats.yaml_file import read_yaml_file
 from augment.models import Augmentation, BaseScene, GenerationJob
-from augment.scene.catalogue import ScenarioType
 from augment.scene.codec import modification_from_document, scene_from_document
 from augment.scene.modification import without_traffic
 from augment.services.scenarios.scenes import scene_of
+from augment.services.scenarios.types import type_of
 
 _MOST_LISTED = 12
 
@@ -43,8 +43,10 @@ def job_as_interplan(
             raise UnknownName("contestant", contestant, slugs)
         rows = rows.filter(contestant__slug=contestant)
     cells, losses = [], []
-    for row in rows.order_by("scenario__slug", "contestant__slug"):
+    for row in rows.order_by("scenario__slug", "contestant__slug", "sample"):
         name = f"{row.scenario.slug} by {row.contestant.slug}"
+        if job.samples > 1:
+            name += f", sample {row.sample}"
         if row.modification is None:
             text = f"there is no modification: {row.state}"
             losses.append(Loss(cell=name, text=text, changes_scene=True))
@@ -118,7 +120,7 @@ def _cell(name: str, row: Augmentation) -> Cell:
     return Cell(
         name=name,
         scene=scene_of(row.scenario),
-        type=ScenarioType(row.scenario.type),
+        type=type_of(row.scenario.type),
         modification=modification_from_document(row.modification),
         keeps_traffic=row.scenario.keep_traffic,
     )

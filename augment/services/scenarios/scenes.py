@@ -11,7 +11,6 @@ from django.db import IntegrityError, transaction
 
 from augment.errors import Conflict, InvalidDocument, UnknownName
 from augment.models import BaseScene, Scenario
-from augment.scene.catalogue import ScenarioType
 from augment.scene.codec import (
     modification_from_document,
     modification_to_document,
@@ -23,6 +22,7 @@ from augment.scene.intent_codec import intent_from_document, intent_to_document
 from augment.scene.lane_graph import LaneGraph
 from augment.scene.modification import Modification, check_fits, without_traffic
 from augment.services.events import log_event
+from augment.services.scenarios.types import label_for, type_of
 from augment.services.texts import check_prose
 
 SLUG_LENGTH = 80
@@ -36,6 +36,7 @@ def add_scenario(
     scene: str,
     type: str,
     instruction: str,
+    type_label: str | None = None,
     slug: str | None = None,
     reference: dict[str, Any] | None = None,
     intent: dict[str, Any] | None = None,
@@ -47,7 +48,8 @@ def add_scenario(
 
     Args:
         scene: The slug of a stored scene.
-        type: The value of a `ScenarioType`.
+        type: The value of a `ScenarioType`, or a slug of one's own.
+        type_label: What people read for a type of one's own; made from the slug when None.
         instruction: What is to be changed, in the user's words.
         slug: The scenario's name; made from the scene's and the type's when None.
         reference: A modification document that fits the scene.
@@ -57,23 +59,25 @@ def add_scenario(
         actor: Who did it.
 
     Raises:
-        UnknownName: No such scene or type.
-        InvalidDocument: The slug, the instruction, the intent or the reference breaks its format.
+        UnknownName: No such scene.
+        InvalidDocument: The slug, the type, the instruction, the intent or the reference breaks
+            its format.
         InvalidModification: The reference does not fit the scene.
-        Conflict: The slug is taken.
+        Conflict: The slug is taken, or the type has another label.
     """
     base_scene = _base_scene(scene)
-    kind = _type(type)
+    label = label_for(type, type_label)
     check_prose("instruction", instruction, what="scenario", longest=INSTRUCTION_LENGTH)
     if slug is None:
-        slug = _free_slug(base_scene, kind)
+        slug = _free_slug(base_scene, type)
     check_slug(slug, what="scenario")
     if Scenario.objects.filter(slug=slug).exists():
         raise Conflict(f"There is a scenario called {slug!r} already; choose another slug.")
     scenario = Scenario(
         slug=slug,
         base_scene=base_scene,
-        type=kind.value,
+        type=type,
+        type_label=label,
         instruction=instruction.strip(),
         keep_traffic=keep_traffic,
     )
@@ -183,16 +187,9 @@ def _base_scene(slug: str) -> BaseScene:
         raise UnknownName("scene", slug, known) from None
 
 
-def _type(name: str) -> ScenarioType:
-    try:
-        return ScenarioType(name)
-    except ValueError:
-        known = [member.value for member in ScenarioType]
-        raise UnknownName("scenario type", name, known) from None
-
-
-def _free_slug(base_scene: BaseScene, kind: ScenarioType) -> str:
-    stem = kind.name.lower().replace("_", "-")
+def _free_slug(base_scene: BaseScene, name: str) -> str:
+    kind = type_of(name)
+    stem = (name if kind is None else kind.name).lower().replace("_", "-")
     stem = f"{base_scene.slug[: SLUG_LENGTH - len(stem) - 8].strip('-')}-{stem}"
     taken = set(Scenario.objects.filter(slug__startswith=stem).values_list("slug", flat=True))
     number = 1

@@ -1,0 +1,326 @@
+"""Every option of a contestant: what it says is what is on the wire, and what is not is said."""
+
+from __future__ import annotations
+
+import base64
+import json
+import struct
+from collections.abc import Callable
+from typing import Any
+
+import pytest
+from django.core.management import CommandError, call_command
+
+from augment.errors import Conflict, InvalidDocument
+from augment.models import Augmentation, Contestant, EndpointModel, GenerationJob, ModelCall
+from augment.prompts.texts import prompt_version
+from augment.services.endpoints import contestants
+from augment.services.endpoints.known_models import tell_sight
+from augment.services.endpoints.treatments import left_out, options_of
+from augment.services.running import jobs, runner
+from augment.services.running.feasible import find_obstacle
+from augment.services.running.transcript_export import transcript_of
+from augment.variants.options import NAMES, ContestantOptions, ToolProtocol, options_from_document
+from tests.jobs.rows import add_scenario
+from tests.llm.json_server import JsonServer, serving
+from tests.scenes import cone, scene
+from tests.variants.playing import car, questions, rating, verdict
+
+pytestmark = pytest.mark.django_db
+
+CAR = car(21.4, id="Agent9")
+MEAN_3 = rating(3, 3, 3, "Too far left.")
+SCRIPTS = {
+    "otm": [CAR],
+    "fc": [CAR],
+    "tqa": [CAR, MEAN_3],
+    "vqa": [CAR, questions(), "1. yes\n2. yes\n3. yes", verdict()],
+}
+
+Bodies = list[dict[str, Any]]
+
+
+class Scripted(JsonServer):
+    """Says the same few things again and again, and keeps what it was sent."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.refuses: set[str] = set()
+        self.script = [CAR]
+        self.bodies: Bodies = []
+
+    def answer(self, body: dict[str, Any]) -> tuple[int, dict[str, Any]]:
+        for name in sorted(self.refuses & body.keys()):
+            return 400, {
+                "error": {"message": "no", "code": "unsupported_parameter", "param": name}
+            }
+        said = self.script[len(self.bodies) % len(self.script)]
+        if said == CAR:  # another one in each round, so that no review is asked for twice
+            said = car(20.0 + len(self.bodies), id="Agent9")
+        self.bodies.append(body)
+        choice = {"finish_reason": "stop", "message": {"role": "assistant", "content": said}}
+        made = {"id": "1", "object": "chat.completion", "created": 0, "model": body["model"]}
+        return 200, made | {"choices": [{"index": 0} | choice]}
+
+
+def add(server: Scripted, slug: str, variant: str = "otm", **options: object) -> Contestant:
+    contestants.ensure_endpoint(label="here", base_url=server.url)
+    server.script = SCRIPTS[variant]
+    made = contestants.add_contestant(
+        slug=slug,
+        variant=variant,
+        endpoint="here",
+        model="m",
+        options=options_from_document(options),
+    )
+    assert made.endpoint is not None
+    tell_sight(endpoint=made.endpoint, model="m", sees=True)
+    return made
+
+
+def run(*slugs: str, samples: int = 1) -> list[Augmentation]:
+    """The rows of a job on one street, by contestant and sample."""
+    if not Augmentation.objects.exists():
+        far = scene(agents=(cone("far", 60.0, 0.0),))
+        add_scenario(
+            "street", scene=far, keep_traffic=True, reference=None, intent=None, intent_origin=""
+        )
+    job = jobs.launch(name="J", contestants=slugs, scenarios=["street"], samples=samples)
+    for row in job.augmentations.order_by("contestant__slug", "sample"):
+        runner.work_on(augmentation_pk=row.pk)
+    return list(job.augmentations.order_by("contestant__slug", "sample"))
+
+
+def every(name: str, value: object) -> Callable[[Bodies], bool]:
+    return lambda bodies: {body.get(name) for body in bodies} == {value}
+
+
+def png_width(bodies: Bodies) -> int:
+    (url,) = [
+        part["image_url"]["url"]
+        for part in bodies[2]["messages"][-1]["content"]
+        if part["type"] == "image_url"
+    ]
+    return int(struct.unpack(">I", base64.b64decode(url.partition(",")[2])[16:20])[0])
+
+
+def text(bodies: Bodies) -> str:
+    return json.dumps(bodies[0]["messages"])
+
+
+TABLE: list[tuple[str, str, object, Callable[[Bodies], bool], Callable[[Bodies], bool]]] = [
+    ("temperature", "tqa", 0.7, every("temperature", 0.7), every("temperature", None)),
+    ("seed", "tqa", 41, every("seed", 41), every("seed", None)),
+    ("reasoning_effort", "tqa", "low", every("reasoning_effort", "low"),
+     every("reasoning_effort", None)),
+    ("max_output_tokens", "tqa", 500, every("max_completion_tokens", 500),
+     every("max_completion_tokens", 8192)),
+    ("protocol", "fc", "native", lambda bodies: "tools" in bodies[0],
+     lambda bodies: "tools" not in bodies[0]),
+    ("rounds", "tqa", 2, lambda bodies: len(bodies) == 4, lambda bodies: len(bodies) == 6),
+    ("accepted_from", "tqa", 3.0, lambda bodies: len(bodies) == 2,
+     lambda bodies: len(bodies) == 6),
+    ("radius_m", "otm", 30.0, lambda bodies: "60.0" not in text(bodies),
+     lambda bodies: "60.0" in text(bodies)),
+    ("prompt_version", "otm", prompt_version(), lambda bodies: len(bodies) == 1,
+     lambda bodies: len(bodies) == 1),
+    ("picture_px", "vqa", 600, lambda bodies: png_width(bodies) == 600,
+     lambda bodies: png_width(bodies) == 1200),
+]  # fmt: skip
+
+
+def test_the_table_has_every_option() -> None:
+    assert tuple(row[0] for row in TABLE) == NAMES
+
+
+@pytest.mark.parametrize(("name", "variant", "value", "as_told", "by_default"), TABLE)
+def test_what_is_sent_is_what_the_option_says(
+    name: str,
+    variant: str,
+    value: object,
+    as_told: Callable[[Bodies], bool],
+    by_default: Callable[[Bodies], bool],
+) -> None:
+    with serving(Scripted()) as server:
+        add(server, "told", variant, **{name: value})
+        add(server, "usual", variant)
+        told, usual = run("told", "usual")
+        sent = len(ModelCall.objects.filter(attempt__augmentation=told))
+        assert as_told(server.bodies[:sent])
+        # The default set is another one: nothing of it is answered from what this one got.
+        assert by_default(server.bodies[sent:]) or name == "prompt_version"
+    assert told.options is not None
+    assert told.options[name] == value
+    assert transcript_of(told)["contestant"]["frozen_options"] == told.options
+    assert transcript_of(told)["contestant"]["options"] == {name: value}
+    assert (told.options == usual.options) is (name in ("prompt_version",))
+
+
+def test_a_chosen_protocol_stands_against_what_a_probe_learns() -> None:
+    with serving(Scripted()) as server:
+        add(server, "asks-in-prompt", "fc", protocol="prompt")
+        EndpointModel.objects.update(native_tools=True)
+        (row,) = run("asks-in-prompt")
+        assert "tools" not in server.bodies[0]
+        EndpointModel.objects.update(native_tools=False)
+        contestants.add_like(
+            slug="native",
+            like="asks-in-prompt",
+            options=ContestantOptions(protocol=ToolProtocol.NATIVE),
+        )
+        with pytest.raises(Conflict, match="has no native calls"):
+            run("native")
+    assert row.options is not None
+    assert row.options["protocol"] == "prompt"
+
+
+def test_samples_are_asked_anew_with_seeds_of_their_own() -> None:
+    with serving(Scripted()) as server:
+        add(server, "a", seed=7, temperature=1.0)
+        rows = run("a", samples=3)
+        assert [body["seed"] for body in server.bodies] == [7, 8, 9]
+        assert [row.sample for row in rows] == [1, 2, 3]
+        # In another job each sample is served from its own answer.
+        again = run("a", samples=3)
+        assert len(server.bodies) == 3
+    sources = [ModelCall.objects.get(attempt__augmentation=row).served_from for row in again]
+    assert [one.attempt.augmentation for one in sources if one and one.attempt] == rows
+    sent = [transcript_of(row)["attempts"][0]["steps"][0]["request"] for row in rows]
+    assert [(call["temperature"], call["seed"]) for call in sent] == [
+        (1.0, 7),
+        (1.0, 8),
+        (1.0, 9),
+    ]
+
+
+def test_samples_without_a_seed_are_asked_anew_too() -> None:
+    with serving(Scripted()) as server:
+        add(server, "a")
+        run("a", samples=2)
+        assert len(server.bodies) == 2
+        assert server.bodies[0] == server.bodies[1]
+
+
+def test_another_option_never_reuses_an_answer_and_the_same_does() -> None:
+    with serving(Scripted()) as server:
+        for slug, rounds in (("two", 2), ("also-two", 2), ("three", 3)):
+            contestants.ensure_endpoint(label="here", base_url=server.url)
+            server.script = SCRIPTS["tqa"]
+            contestants.add_contestant(
+                slug=slug,
+                variant="tqa",
+                endpoint="here",
+                model="m",
+                name=slug,
+                options=ContestantOptions(rounds=rounds),
+            )
+        run("two")
+        assert len(server.bodies) == 4
+        run("also-two")
+        assert len(server.bodies) == 4
+        run("three")
+        assert len(server.bodies) == 10
+
+
+def test_what_the_model_does_not_take_is_left_out_and_said() -> None:
+    with serving(Scripted()) as server:
+        server.refuses = {"temperature", "seed"}
+        one = add(server, "a", temperature=0.7, seed=3)
+        assert left_out(one) == {}
+        (row,) = run("a")
+        assert not {"temperature", "seed"} & server.bodies[0].keys()
+    one.refresh_from_db()
+    assert left_out(one) == {"modifier": ["seed", "temperature"]}
+    document = transcript_of(row)
+    assert document["contestant"]["left_out"] == {"modifier": ["seed", "temperature"]}
+    answered = document["attempts"][0]["steps"][-1]["request"]
+    assert not {"temperature", "seed"} & answered.keys()
+    # Known from the beginning where a probe has seen it.
+    assert left_out(contestants.add_like(slug="b", like="a", name="b")) == left_out(one)
+
+
+def test_a_temperature_that_is_refused_after_answers_is_a_fault_and_no_mixture() -> None:
+    with serving(Scripted()) as server:
+        add(server, "a", temperature=0.7)
+        run("a")
+        server.refuses = {"temperature"}
+        (row,) = [one for one in run("a", samples=2) if one.sample == 2]
+    assert row.state == Augmentation.State.FAILED
+    assert "does not take 'temperature' any more" in row.reason
+
+
+def test_who_ran_with_other_prompts_is_not_run_with_these() -> None:
+    with serving(Scripted()) as server:
+        add(server, "a")
+        run("a")
+        Contestant.objects.update(frozen_options={"prompt_version": "0" * 12})
+        assert "version 000000000000" in find_obstacle(Contestant.objects.get(slug="a"))
+        with pytest.raises(Conflict, match="add_contestant SLUG --like a"):
+            run("a")
+        row = Augmentation.objects.create(
+            job=GenerationJob.objects.get(),
+            scenario=Augmentation.objects.get().scenario,
+            contestant=Contestant.objects.get(),
+            sample=2,
+        )
+        runner.work_on(augmentation_pk=row.pk)
+        row.refresh_from_db()
+        assert (row.state, len(server.bodies)) == (Augmentation.State.FAILED, 1)
+        contestants.add_like(slug="b", like="a", name="B")
+        run("b")
+
+
+def test_the_command_takes_every_option_and_keeps_contestants_apart(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    with serving(Scripted()) as server:
+        asked = ["--variant=fc+tqa", "--endpoint=here", "--model=m", f"--base-url={server.url}"]
+        options = [
+            *("--temperature=0.7", "--seed=5", "--reasoning-effort=low", "--max-output=900"),
+            *("--protocol=native", "--rounds=2", "--accepted-from=4.5", "--radius=60"),
+        ]
+        call_command("add_contestant", "a", *asked, *options)
+        assert "m FC+tQA (temperature 0.7, seed 5, effort low" in capsys.readouterr().out
+        made = Contestant.objects.get(slug="a")
+        assert made.options == {
+            **{"temperature": 0.7, "seed": 5, "reasoning_effort": "low", "rounds": 2},
+            **{"max_output_tokens": 900, "protocol": "native", "accepted_from": 4.5},
+            "radius_m": 60.0,
+        }
+        assert options_of(made).prompt_version == prompt_version()
+        with pytest.raises(CommandError, match="another contestant called 'a'"):
+            call_command("add_contestant", "a", *asked, "--temperature=0.8")
+        call_command("add_contestant", "b", "--like=a", "--temperature=0.8")
+        assert Contestant.objects.get(slug="b").options == made.options | {"temperature": 0.8}
+        with pytest.raises(CommandError, match=r"temperature.*from 0 to 2"):
+            call_command("add_contestant", "c", *asked, "--temperature=2.1")
+        with pytest.raises(CommandError, match="otm has no review, so it has one round"):
+            call_command("add_contestant", "c", "--like=a", "--variant=otm")
+
+
+@pytest.mark.parametrize(
+    ("name", "good", "bad"),
+    [
+        ("temperature", [0, 2.0], [-0.01, 2.01, float("nan"), "1", True]),
+        ("seed", [0, 2**31 - 1 - 100], [-1, 2**31 - 100, 1.5]),
+        ("reasoning_effort", ["none", "max"], ["", "much", 3]),
+        ("max_output_tokens", [1, 1_000_000], [0, 1_000_001]),
+        ("protocol", ["prompt", "native"], ["both", 1]),
+        ("rounds", [1, 10], [0, 11]),
+        ("accepted_from", [1, 5], [0.9, 5.1]),
+        ("radius_m", [20, 300.0], [19.9, 300.1]),
+        ("prompt_version", ["0123456789ab"], ["0123456789a", "0123456789ag"]),
+        ("picture_px", [300, 2400], [299, 2401]),
+    ],
+)
+def test_an_option_out_of_range_is_refused_with_its_name(
+    name: str, good: list[object], bad: list[object]
+) -> None:
+    for value in good:
+        assert options_from_document({name: value}).to_document() == {name: value}
+    for value in bad:
+        with pytest.raises(InvalidDocument) as refused:
+            options_from_document({name: value})
+        assert refused.value.problems[0][0] == name
+    with pytest.raises(InvalidDocument, match="is no option"):
+        options_from_document({f"{name}s": good[0]})
