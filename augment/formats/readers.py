@@ -10,6 +10,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from augment.errors import InvalidDocument, UnknownName
+from augment.formats.argoverse2.motion import ArgoverseMotion
 from augment.formats.argoverse2.sensor import ArgoverseSensor
 from augment.formats.commonroad.scenario import CommonRoad
 from augment.formats.nuplan.scenario import NuPlan
@@ -27,6 +28,7 @@ READERS: dict[str, Reader] = {
         WaymoMotion(),
         NuPlan(),
         ScenarioNet(),
+        ArgoverseMotion(),
     )
 }
 """In the order in which a file is tried; each is asked about what is its own alone."""
@@ -58,6 +60,14 @@ def recognise(path: Path) -> Reader:
         raise InvalidDocument("input", [(str(path), fault.strerror or str(fault))]) from None
     if len(found) == 1:
         return found[0]
+    if not found and _is_123d(path):
+        text = "looks like a 123D log, which is not read (docs/formats.md says why)"
+        raise InvalidDocument("input", [(str(path), text)])
     known = ", ".join(f"{reader.name}: {reader.title}" for reader in READERS.values())
     said = "none of the formats" if not found else " and ".join(one.name for one in found)
     raise InvalidDocument("input", [(str(path), f"looks like {said}; name one of {known}")])
+
+
+def _is_123d(path: Path) -> bool:
+    """A log that py123d converted has a table of its synchronised times."""
+    return (path / "sync.arrow").is_file() or path.suffix == ".arrow"

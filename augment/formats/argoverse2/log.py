@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from augment.errors import InvalidDocument
 from augment.formats.argoverse2.categories import EGO, TYPE_OF
+from augment.formats.arrow_file import TextColumn, read_arrow
 from augment.formats.recorded_log import MOST_NUMBERS, Log, LoggedTrack, speeds
 
 WHAT = "Argoverse 2 log"
@@ -26,6 +27,8 @@ EGO_LENGTH_M = 4.877
 EGO_WIDTH_M = 1.852
 REAR_AXLE_TO_CENTER_M = 1.42
 """The fleet's car, a Ford Fusion: half its length less the overhang behind the rear axle."""
+
+MOST_NAMED = 5
 
 FloatArray = NDArray[np.float64]
 
@@ -41,8 +44,10 @@ def read_log(folder: Path) -> Log:
             has no ego pose.
     """
     numbers = (*_QUATERNION, *_PLACE)
-    boxes = _columns(folder / BOXES, (*numbers, "length_m", "width_m"), ("track_uuid", "category"))
-    poses = _columns(folder / POSES, numbers, ())
+    sized, texts = (*numbers, "length_m", "width_m"), ("track_uuid", "category")
+    stamp = ("timestamp_ns",)
+    boxes = read_arrow(folder / BOXES, what=WHAT, numbers=sized, texts=texts, whole=stamp)
+    poses = read_arrow(folder / POSES, what=WHAT, numbers=numbers, texts=(), whole=stamp)
     _check_categories(boxes["category"])
     stamps, sweep_of_row = np.unique(boxes["timestamp_ns"], return_inverse=True)
     if len(stamps) == 0:
@@ -72,38 +77,9 @@ def read_log(folder: Path) -> Log:
 # Private
 
 
-def _columns(file: Path, numbers: tuple[str, ...], texts: tuple[str, ...]) -> dict[str, Any]:
-    """The named columns and the time stamps (int64) of a feather file, all present and finite."""
-    import pyarrow as pa
-    from pyarrow import feather
-
-    if not file.is_file():
-        raise InvalidDocument(WHAT, [(file.name, f"is not in {file.parent}")])
-    try:
-        table = feather.read_table(file)
-    except (pa.ArrowException, OSError) as fault:
-        raise InvalidDocument(WHAT, [(file.name, f"is not a feather file: {fault}")]) from None
-    wanted = ("timestamp_ns", *numbers, *texts)
-    missing = [name for name in wanted if name not in table.column_names]
-    if missing:
-        raise InvalidDocument(WHAT, [(file.name, f"has no column {name!r}") for name in missing])
-    try:
-        columns: dict[str, Any] = {name: np.array(table[name].to_pylist(), str) for name in texts}
-        columns |= {name: table[name].to_numpy().astype(np.float64) for name in numbers}
-        columns["timestamp_ns"] = table["timestamp_ns"].to_numpy().astype(np.int64, casting="safe")
-    except (TypeError, ValueError) as fault:
-        raise InvalidDocument(
-            WHAT, [(file.name, f"has a column of a wrong kind: {fault}")]
-        ) from None
-    for name in numbers:
-        broken = np.flatnonzero(~np.isfinite(columns[name]))
-        if len(broken):
-            raise InvalidDocument(WHAT, [(f"{file.name}[{broken[0]}].{name}", "is not finite")])
-    return columns
-
-
-def _check_categories(categories: NDArray[np.str_]) -> None:
-    unknown = sorted(set(categories.tolist()) - set(TYPE_OF) - {EGO})
+def _check_categories(categories: TextColumn) -> None:
+    used = {categories.values[code] for code in np.unique(categories.codes)}
+    unknown = sorted(used - set(TYPE_OF) - {EGO})[:MOST_NAMED]
     if unknown:
         known = ", ".join(sorted(TYPE_OF))
         problems = [(BOXES, f"unknown category {name!r}; known: {known}") for name in unknown]
@@ -147,13 +123,15 @@ def _rigid(columns: dict[str, Any]) -> tuple[FloatArray, FloatArray]:
 def _tracks(
     boxes: dict[str, Any], sweeps: NDArray[np.int64], rows: FloatArray, times_s: FloatArray
 ) -> Iterator[LoggedTrack]:
-    order = np.lexsort((sweeps, boxes["track_uuid"]))
-    uuids, starts = np.unique(boxes["track_uuid"][order], return_index=True)
+    names, kinds = boxes["track_uuid"], boxes["category"]
+    order = np.lexsort((sweeps, names.codes))
+    uuids, starts = np.unique(names.codes[order], return_index=True)
     if len(uuids) * len(times_s) * 4 > MOST_NUMBERS:
         text = f"has {len(uuids)} tracks in {len(times_s)} sweeps, which is too much"
         raise InvalidDocument(WHAT, [(BOXES, text)])
     for uuid, mine in zip(uuids.tolist(), np.split(order, starts[1:]), strict=True):
-        if boxes["category"][mine[0]] == EGO:
+        kind = kinds.values[kinds.codes[mine[0]]]
+        if kind == EGO:
             continue
         mine = mine[np.concatenate([[True], np.diff(sweeps[mine]) > 0])]
         states = np.full((len(times_s), 4), np.nan)
@@ -161,8 +139,8 @@ def _tracks(
             [rows[mine], speeds(times_s[sweeps[mine]], rows[mine, :2])]
         )
         yield LoggedTrack(
-            name=uuid,
-            type=TYPE_OF[str(boxes["category"][mine[0]])],
+            name=names.values[uuid],
+            type=TYPE_OF[kind],
             length_m=float(boxes["length_m"][mine[0]]),
             width_m=float(boxes["width_m"][mine[0]]),
             states=states,

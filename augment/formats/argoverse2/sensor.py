@@ -103,7 +103,10 @@ def map_file_in(folder: Path, what: str) -> Path:
     found = sorted(folder.glob("log_map_archive_*.json"))
     if len(found) != 1:
         text = "no such file" if not found else f"{len(found)} such files; there must be one"
-        raise InvalidDocument(what, [("map/log_map_archive_*.json", f"{text} in {folder.parent}")])
+        in_map = folder.name == "map"
+        place = "map/log_map_archive_*.json" if in_map else "log_map_archive_*.json"
+        where = folder.parent if in_map else folder
+        raise InvalidDocument(what, [(place, f"{text} in {where}")])
     return found[0]
 
 

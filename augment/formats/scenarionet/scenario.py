@@ -1,5 +1,6 @@
 """The reader of ScenarioNet's scenario descriptions, from nuScenes, Waymo or nuPlan.
 
+A path is a file, or a data set's folder, where `item` is the name of a file or its number from 0.
 `frame` is a step; without one the step that the description calls its current one, else 0.
 """
 
@@ -19,6 +20,7 @@ from augment.formats.recorded_log import MOST_NUMBERS, Log, LoggedTrack, far_not
 from augment.formats.road_map import FloatArray, MapExtract
 from augment.formats.roads import road_around
 from augment.formats.scenarionet.city import city_of
+from augment.formats.scenarionet.folder import file_in, is_data_set, names_in
 from augment.formats.scenarionet.unpickling import WHAT, read_pickle
 from augment.scene.entities import AgentType, TrafficSide
 from augment.scene.notes import Note, SceneNoteKind
@@ -48,26 +50,32 @@ class ScenarioNet:
     """The reader of scenario pickles."""
 
     name = "scenarionet"
-    title = "ScenarioNet scenario description (pickle file)"
+    title = "ScenarioNet scenario description (pickle file), or a data set of them (folder)"
 
     def recognises(self, path: Path) -> bool:
-        """A pickle by its name and first byte; it is not opened as one."""
+        """A pickle by its name and first byte, not opened as one; a folder by its files."""
+        if path.is_dir():
+            return is_data_set(path)
         if path.suffix.lower() != ".pkl" or not path.is_file():
             return False
         with path.open("rb") as file:
             return file.read(1) == b"\x80"
 
     def moments(self, path: Path, *, every_s: float) -> Iterator[Moment]:
-        """Steps in which the ego is there."""
-        log, _ = _log(_description(path))
-        seen = np.isfinite(log.ego).all(axis=1)
-        frames = np.flatnonzero(seen)
-        for index in frames_every(log.times_s[seen].tolist(), every_s):
-            yield Moment(frame=int(frames[index]))
+        """Steps in which the ego is there, of one scenario after the other."""
+        for item in names_in(path) if path.is_dir() else [None]:
+            log, _ = _log(_description(path if item is None else file_in(path, item)))
+            seen = np.isfinite(log.ego).all(axis=1)
+            frames = np.flatnonzero(seen)
+            for index in frames_every(log.times_s[seen].tolist(), every_s):
+                yield Moment(item=item, frame=int(frames[index]))
 
     def read(self, path: Path, *, item: str | None, frame: int | None, name: str) -> Reading:
         """The scene at one step."""
-        if item is not None:
+        if path.is_dir():
+            path = file_in(path, item)
+            item = path.name
+        elif item is not None:
             raise _fault("item", f"a file holds one scenario, {item!r} is not there")
         description = _description(path)
         log, notes = _log(description)
@@ -99,7 +107,10 @@ class ScenarioNet:
         if licence:
             notes.append(Note(kind=SceneNoteKind.NON_COMMERCIAL, names=(licence,)))
         return Reading(
-            scene=scene, recording=recording, notes=tuple(notes), moment=Moment(frame=frame)
+            scene=scene,
+            recording=recording,
+            notes=tuple(notes),
+            moment=Moment(item=item, frame=frame),
         )
 
 

@@ -1,0 +1,110 @@
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from augment.errors import InvalidDocument
+from augment.formats.argoverse2.motion import ArgoverseMotion
+from augment.formats.readers import recognise
+from augment.formats.reading import Reading
+from augment.scene.codec import scene_to_document
+from augment.scene.entities import AgentType
+from augment.scene.notes import SceneNoteKind
+from tests.formats.av2_motion import row, rows, write_scenario
+
+READER = ArgoverseMotion()
+
+
+def read(path: Path, *, item: str | None = None, frame: int | None = None) -> Reading:
+    return READER.read(path, item=item, frame=frame, name="made")
+
+
+def fault_of(path: Path, **choice: Any) -> str:
+    with pytest.raises(InvalidDocument) as caught:
+        read(path, **choice)
+    return str(caught.value)
+
+
+@pytest.fixture
+def folder(tmp_path: Path) -> Path:
+    return write_scenario(tmp_path / "made")
+
+
+def test_t0_is_the_last_observed_step_and_the_future_is_kept(folder: Path) -> None:
+    reading = read(folder)
+    scene, recording = reading.scene, reading.recording
+    scene_to_document(scene)
+    assert reading.moment.frame == 49
+    assert (scene.origin.pose.x_m, scene.origin.pose.y_m) == pytest.approx((100.0, 201.42))
+    assert scene.ego.lane_id is not None
+    assert scene.ego.speed_mps == 10.0
+    assert recording is not None
+    assert len(recording.times_s) == 61
+    assert recording.times_s[-1] == pytest.approx(6.0)
+    assert recording.ego[-1, :2].tolist() == pytest.approx([60.0, 0.0])
+
+
+def test_everybody_has_the_usual_size_and_that_is_said(folder: Path) -> None:
+    reading = read(folder)
+    static, walker, cyclist = reading.scene.agents
+    assert (static.type, walker.type, cyclist.type) == (
+        AgentType.GENERIC_OBJECT,
+        AgentType.PEDESTRIAN,
+        AgentType.BICYCLE,
+    )
+    assert (cyclist.x_m, cyclist.y_m, cyclist.speed_mps) == pytest.approx((38.58, 4.0, 5.0))
+    assert abs(cyclist.heading_rad) == pytest.approx(np.pi, abs=1e-3)
+    assert (walker.length_m, walker.width_m) == (0.9, 0.791)
+    notes = {note.kind: note for note in reading.notes}
+    assert SceneNoteKind.NO_BOX_SIZES in notes
+    assert notes[SceneNoteKind.CLASSES_MERGED].names == ("static: GENERIC_OBJECT",)
+    assert notes[SceneNoteKind.NON_COMMERCIAL].names == ("CC BY-NC-SA 4.0",)
+
+
+def test_another_track_can_be_the_ego(folder: Path) -> None:
+    scene = read(folder, item="7", frame=0).scene
+    assert scene.origin.pose.heading_rad == pytest.approx(-np.pi / 2)
+    assert "track 7 as the ego" in scene.provenance
+    assert "'12' is not there; known: 7, 8, 9, AV" in fault_of(folder, item="12")
+    assert "frames 0 to 109" in fault_of(folder, frame=110)
+    assert "0 has no ego in it" in fault_of(folder, item="8", frame=0)
+
+
+def test_folder_and_file_are_recognised(folder: Path) -> None:
+    assert (
+        recognise(folder).name == recognise(folder / "scenario_made.parquet").name == READER.name
+    )
+    assert [one.frame for one in READER.moments(folder, every_s=3.0)] == [0, 30, 60, 90]
+
+
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [
+        ({"object_type": "tank"}, "unknown 'tank'"),
+        ({"position_x": float("nan")}, "position_x: is not finite"),
+        ({"position_x": 1e300}, "over 1e+08"),
+        ({"timestep": -1}, "lies outside of 0 to 9999"),
+        ({"timestep": 2**40}, "lies outside of 0 to 9999"),
+        ({"track_id": None}, "a text is missing"),
+        ({"track_id": "7" * 1000}, "longer than 200"),
+    ],
+)
+def test_a_broken_row_says_what_is_wrong(
+    tmp_path: Path, change: dict[str, Any], said: str
+) -> None:
+    table = [*rows(), row("10", "vehicle", 49, 100.0, 250.0) | change]
+    assert said in fault_of(write_scenario(tmp_path / "made", table=table))
+
+
+def test_what_is_missing_is_named(tmp_path: Path) -> None:
+    table = [{key: value for key, value in one.items() if key != "heading"} for one in rows()]
+    assert "has no column 'heading'" in fault_of(write_scenario(tmp_path / "one", table=table))
+    folder = write_scenario(tmp_path / "two")
+    (folder / "scenario_made.parquet").write_bytes(b"PAR1 no")
+    assert "is not a parquet file" in fault_of(folder)
+    (folder / "log_map_archive_made.json").unlink()
+    (folder / "scenario_made.parquet").unlink()
+    assert "0 such files" in fault_of(folder)
