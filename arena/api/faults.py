@@ -12,32 +12,32 @@ from arena.errors import DatabaseBusy
 from augment.services.wording import translate
 
 
-def unreadable(request: HttpRequest, exception: Exception | None = None) -> JsonResponse:
+def answer_unreadable(request: HttpRequest, exception: Exception | None = None) -> JsonResponse:
     """400: the request itself can't be trusted, by its host name for example."""
     return _fault(400, "bad_request", _("The request can’t be read."))
 
 
-def refused(request: HttpRequest, exception: Exception | None = None) -> JsonResponse:
+def answer_refused(request: HttpRequest, exception: Exception | None = None) -> JsonResponse:
     """403: signed in, but not for this."""
     return _fault(403, "forbidden", _("Your account may not do this."))
 
 
-def forged(request: HttpRequest, reason: str = "") -> JsonResponse:
+def answer_forged(request: HttpRequest, reason: str = "") -> JsonResponse:
     """403 for a request whose token is missing or old; nothing of it was kept."""
     return _fault(403, "forbidden", _("The CSRF token is missing or old."))
 
 
-def missing(request: HttpRequest, exception: Exception | None = None) -> JsonResponse:
+def answer_missing(request: HttpRequest, exception: Exception | None = None) -> JsonResponse:
     """404: no such address, or nothing that this account may know of."""
     return _fault(404, "not_found", _("There is nothing at this address."))
 
 
-def broken(request: HttpRequest) -> JsonResponse:
+def answer_broken(request: HttpRequest) -> JsonResponse:
     """500: a fault of ours, in the log."""
     return _fault(500, "broken", _("Something broke on our side; it was written to the log."))
 
 
-def busy(request: HttpRequest) -> JsonResponse:
+def answer_busy(request: HttpRequest) -> JsonResponse:
     """503: something long keeps the database to itself; nothing was written."""
     return _fault(503, "busy", translate(DatabaseBusy()))
 

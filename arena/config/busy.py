@@ -29,7 +29,7 @@ class BusyMiddleware:
     def process_exception(self, request: HttpRequest, exception: Exception) -> HttpResponse | None:
         """Tell it from faults of ours, which stay what they are."""
         if isinstance(exception, DatabaseBusy) or is_lock_fault(exception):
-            return faults.busy(request)
+            return faults.answer_busy(request)
         return None
 
 

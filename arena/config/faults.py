@@ -10,38 +10,39 @@ from arena.errors import DatabaseBusy
 from arena.web import faults as pages
 
 
-def unreadable(request: HttpRequest, exception: Exception) -> HttpResponse:
+def answer_unreadable(request: HttpRequest, exception: Exception) -> HttpResponse:
     """400."""
-    found = wire.unreadable if _is_of_the_wire(request) else bad_request
-    return found(request, exception)
+    answer = wire.answer_unreadable if _is_of_the_wire(request) else bad_request
+    return answer(request, exception)
 
 
-def refused(request: HttpRequest, exception: Exception | None = None) -> HttpResponse:
+def answer_refused(request: HttpRequest, exception: Exception | None = None) -> HttpResponse:
     """403."""
-    found = wire.refused if _is_of_the_wire(request) else pages.refused
-    return found(request, exception)
+    answer = wire.answer_refused if _is_of_the_wire(request) else pages.answer_refused
+    return answer(request, exception)
 
 
-def forged(request: HttpRequest, reason: str = "") -> HttpResponse:
+def answer_forged(request: HttpRequest, reason: str = "") -> HttpResponse:
     """403 for a missing or old token."""
-    found = wire.forged if _is_of_the_wire(request) else pages.forged
-    return found(request, reason)
+    answer = wire.answer_forged if _is_of_the_wire(request) else pages.answer_forged
+    return answer(request, reason)
 
 
-def missing(request: HttpRequest, exception: Exception | None = None) -> HttpResponse:
+def answer_missing(request: HttpRequest, exception: Exception | None = None) -> HttpResponse:
     """404."""
-    found = wire.missing if _is_of_the_wire(request) else pages.missing
-    return found(request, exception)
+    answer = wire.answer_missing if _is_of_the_wire(request) else pages.answer_missing
+    return answer(request, exception)
 
 
-def broken(request: HttpRequest) -> HttpResponse:
+def answer_broken(request: HttpRequest) -> HttpResponse:
     """500."""
-    return wire.broken(request) if _is_of_the_wire(request) else pages.broken(request)
+    answer = wire.answer_broken if _is_of_the_wire(request) else pages.answer_broken
+    return answer(request)
 
 
-def busy(request: HttpRequest) -> HttpResponse:
+def answer_busy(request: HttpRequest) -> HttpResponse:
     """503."""
-    answer = wire.busy(request) if _is_of_the_wire(request) else pages.busy(request)
+    answer = wire.answer_busy(request) if _is_of_the_wire(request) else pages.answer_busy(request)
     answer.headers["Retry-After"] = str(DatabaseBusy.retry_after_s)
     return answer
 

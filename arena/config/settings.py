@@ -85,7 +85,7 @@ AXES_RESET_ON_SUCCESS = True
 AXES_DISABLE_ACCESS_LOG = True
 AXES_VERBOSE = False
 AXES_CLIENT_IP_CALLABLE = "arena.config.client_address.client_address"
-AXES_LOCKOUT_CALLABLE = "arena.web.faults.locked"
+AXES_LOCKOUT_CALLABLE = "arena.web.faults.answer_locked"
 
 # --- What it is made of ------------------------------------------------------------------------
 
@@ -135,7 +135,7 @@ TEMPLATES = [
         },
     }
 ]
-CSRF_FAILURE_VIEW = "arena.config.faults.forged"
+CSRF_FAILURE_VIEW = "arena.config.faults.answer_forged"
 LOGIN_URL = "login"
 LOGIN_REDIRECT_URL = "home"
 LOGOUT_REDIRECT_URL = "login"

@@ -11,7 +11,7 @@ urlpatterns = [
     path("", include("arena.web.urls")),
 ]
 
-handler400 = "arena.config.faults.unreadable"
-handler403 = "arena.config.faults.refused"
-handler404 = "arena.config.faults.missing"
-handler500 = "arena.config.faults.broken"
+handler400 = "arena.config.faults.answer_unreadable"
+handler403 = "arena.config.faults.answer_refused"
+handler404 = "arena.config.faults.answer_missing"
+handler500 = "arena.config.faults.answer_broken"

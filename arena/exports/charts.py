@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from arena.exports.drawing import GRID, INK, MARK, SIMULATED, drawn, house_style
+from arena.exports.drawing import GRID, INK, MARK, SIMULATED, house_style, write_figure
 from arena.exports.tables import LeaderboardTable
 
 if TYPE_CHECKING:
@@ -32,7 +32,7 @@ def interval_chart(table: LeaderboardTable, *, file_format: str) -> bytes:
             label.set_color(SIMULATED if row.simulated else INK)
         axes.set_xlabel(_label(table), color=INK)
         rating_axis(axes, len(table.rows))
-        return drawn(figure, file_format)
+        return write_figure(figure, file_format)
 
 
 def draw_interval(

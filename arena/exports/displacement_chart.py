@@ -7,9 +7,10 @@ from dataclasses import dataclass
 from itertools import groupby
 from typing import TYPE_CHECKING, Any
 
-from arena.exports.displacement_table import DisplacementTable, marked
-from arena.exports.drawing import GRID, INK, MARK, SIMULATED, SOFT, drawn, house_style
+from arena.exports.displacement_table import DisplacementTable
+from arena.exports.drawing import GRID, INK, MARK, SIMULATED, SOFT, house_style, write_figure
 from arena.exports.published import SOURCE, PublishedBox
+from arena.exports.tables import shown_name
 from augment.services.judging.displacement import VARIANTS, By, Group
 
 if TYPE_CHECKING:
@@ -59,7 +60,7 @@ def box_plot(table: DisplacementTable, *, file_format: str) -> bytes:
         _rows(axes, lines)
         _scale(axes, lines)
         axes.set_xlabel(_caption(table), color=INK, fontsize=8)
-        return drawn(figure, file_format)
+        return write_figure(figure, file_format)
 
 
 def is_far(lines: list[ChartLine]) -> bool:
@@ -104,7 +105,11 @@ def _measured(group: Group) -> ChartLine:
         note += f", {found.surplus} surplus"
     colour = SIMULATED if group.is_simulated else MARK
     if found.box is None:
-        return ChartLine(label=marked(group), note=note, colour=colour)
+        return ChartLine(
+            label=shown_name(group.contestant, group.is_simulated),
+            note=note,
+            colour=colour,
+        )
     box = found.box
     stats = {
         "med": box.median_m,
@@ -115,7 +120,12 @@ def _measured(group: Group) -> ChartLine:
         "mean": box.mean_m,
         "fliers": list(box.outliers_m),
     }
-    return ChartLine(label=marked(group), note=note, stats=stats, colour=colour)
+    return ChartLine(
+        label=shown_name(group.contestant, group.is_simulated),
+        note=note,
+        stats=stats,
+        colour=colour,
+    )
 
 
 def _from_paper(box: PublishedBox) -> ChartLine:

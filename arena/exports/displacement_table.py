@@ -7,7 +7,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from arena.exports.published import BY_VARIANT, PublishedBox
-from arena.exports.tables import SIMULATED
 from augment.models import GenerationJob, Scenario
 from augment.sentences import sentence
 from augment.services.judging.displacement import (
@@ -126,8 +125,3 @@ def displacement_table(
         left_out=dict(sorted(left_out.items())),
         published=BY_VARIANT if by is By.VARIANT and set(chosen) == set(PLACED_EXACTLY) else (),
     )
-
-
-def marked(group: Group) -> str:
-    """The contestant's name, with "(simulated)" where that is so."""
-    return f"{group.contestant}{SIMULATED}" if group.is_simulated else group.contestant

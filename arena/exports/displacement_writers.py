@@ -7,9 +7,10 @@ from collections.abc import Sequence
 from typing import Any
 
 from arena.exports.displacement_chart import box_plot
-from arena.exports.displacement_table import DisplacementTable, marked
-from arena.exports.formats import Format, drawings, formats, rounded
+from arena.exports.displacement_table import DisplacementTable
+from arena.exports.formats import Format, drawings, formats, round_value
 from arena.exports.published import SOURCE, PublishedBox
+from arena.exports.tables import shown_name
 from arena.services.cells import csv_text
 from augment.services.judging.displacement import BoxSummary, Group, Measured
 
@@ -65,7 +66,8 @@ FORMATS: dict[str, Format[DisplacementTable]] = formats(
 
 def _who(group: Group) -> tuple[object, ...]:
     return (
-        group.heading, marked(group), group.slug, group.model, group.variant, group.is_simulated,
+        group.heading, shown_name(group.contestant, group.is_simulated), group.slug,
+        group.model, group.variant, group.is_simulated,
     )  # fmt: skip
 
 
@@ -97,13 +99,13 @@ def _group(group: Group) -> dict[str, Any]:
 
 def _box(box: BoxSummary) -> dict[str, Any]:
     return {
-        "median_m": rounded(box.median_m),
-        "q1_m": rounded(box.q1_m),
-        "q3_m": rounded(box.q3_m),
-        "mean_m": rounded(box.mean_m),
-        "low_m": rounded(box.low_m),
-        "high_m": rounded(box.high_m),
-        "outliers_m": [rounded(one) for one in box.outliers_m],
+        "median_m": round_value(box.median_m),
+        "q1_m": round_value(box.q1_m),
+        "q3_m": round_value(box.q3_m),
+        "mean_m": round_value(box.mean_m),
+        "low_m": round_value(box.low_m),
+        "high_m": round_value(box.high_m),
+        "outliers_m": [round_value(one) for one in box.outliers_m],
     }
 
 
@@ -133,7 +135,7 @@ def _single(one: Measured) -> dict[str, Any]:
                 "reference": match.reference,
                 "generated": match.generated,
                 "class": match.object_class.value,
-                "distance_m": rounded(match.distance_m),
+                "distance_m": round_value(match.distance_m),
             }
             for match in one.displacement.matches
         ],

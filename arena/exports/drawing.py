@@ -50,7 +50,7 @@ def width_in(text: str, size_pt: float) -> float:
     return float(TextPath((0.0, 0.0), text, size=size_pt).get_extents().width) / 72.0
 
 
-def drawn(figure: Figure, file_format: str) -> bytes:
+def write_figure(figure: Figure, file_format: str) -> bytes:
     """The figure as the bytes of a file.
 
     Args:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from arena.exports.tables import SIMULATED
 from augment.models import Simulation
 from augment.sentences import sentence
 from augment.services.judging.driving_scores import DrivingLine, DrivingScores
@@ -96,11 +95,6 @@ class DrivingTable:
             offsets=how.offsets,
             traffic="reactive" if how.is_reactive else "replayed",
         )
-
-
-def named(line: DrivingLine) -> str:
-    """The name, with "(simulated)" where that is so."""
-    return f"{line.name}{SIMULATED}" if line.is_simulated else line.name
 
 
 def is_contestant(line: DrivingLine) -> bool:

@@ -5,8 +5,9 @@ from __future__ import annotations
 import json
 from typing import Any
 
-from arena.exports.driving_table import REPORTED, SOURCE, DrivingTable, named
-from arena.exports.formats import Format, formats, rounded
+from arena.exports.driving_table import REPORTED, SOURCE, DrivingTable
+from arena.exports.formats import Format, formats, round_value
+from arena.exports.tables import shown_name
 from arena.rating.printed import escape
 from arena.services.cells import csv_text
 from augment.models import Scenario
@@ -24,7 +25,13 @@ def csv_bytes(table: DrivingTable) -> bytes:
     rows: list[list[object]] = []
     kinds = _kinds(table)
     for line in table.lines:
-        who = [named(line), line.slug, line.model, line.variant, line.is_simulated]
+        who = [
+            shown_name(line.name, line.is_simulated),
+            line.slug,
+            line.model,
+            line.variant,
+            line.is_simulated,
+        ]
         means = [_percent(value) for value in (line.mean, line.before, line.lowered)]
         counts = [line.drives, line.failed, line.collided, line.braked]
         types = [_percent(line.by_type[kind]) for kind in kinds]
@@ -77,8 +84,9 @@ def latex_bytes(table: DrivingTable) -> bytes:
         r"    \textbf{Scenarios} & \textbf{Mean Driving Score} [\%] & \textbf{Before} [\%] \\",
         r"    \midrule",
         *(
-            rf"    {escape(named(line))} & {_printed(line.mean)} & {_printed(line.before)} \\"
+            rf"    {escape(name)} & {_printed(line.mean)} & {_printed(line.before)} \\"
             for line in table.lines
+            for name in [shown_name(line.name, line.is_simulated)]
         ),
         r"    \midrule",
         *(
@@ -118,12 +126,12 @@ def _line(line: DrivingLine) -> dict[str, Any]:
         "model": line.model,
         "variant": line.variant,
         "simulated": line.is_simulated,
-        "mean": rounded(line.mean),
-        "before": rounded(line.before),
-        "lowered": rounded(line.lowered),
+        "mean": round_value(line.mean),
+        "before": round_value(line.before),
+        "lowered": round_value(line.lowered),
         "drives": line.drives,
         "failed": line.failed,
         "collided": line.collided,
         "emergency_braked": line.braked,
-        "by_type": {kind: rounded(mean) for kind, mean in line.by_type.items()},
+        "by_type": {kind: round_value(mean) for kind, mean in line.by_type.items()},
     }

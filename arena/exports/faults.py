@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from arena.exports.formats import Format, formats
 from arena.exports.latex import escape
-from arena.exports.tables import SIMULATED
+from arena.exports.tables import shown_name
 from arena.models import FaultLabel
 from arena.queries.faults import labels_of
 from arena.rating.agreement import cohens_kappa
@@ -71,9 +71,9 @@ class FaultLine:
         return self.counts[FaultClass.LOGIC]
 
     @property
-    def marked(self) -> str:
+    def shown_name(self) -> str:
         """The name, with "(simulated)" where that is so."""
-        return f"{self.name}{SIMULATED}" if self.is_simulated else self.name
+        return shown_name(self.name, self.is_simulated)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -140,7 +140,7 @@ def csv_bytes(table: FaultTable) -> bytes:
     """One line a contestant."""
     rows = (
         (
-            line.marked, line.slug, line.is_simulated, line.all, line.position, line.heading,
+            line.shown_name, line.slug, line.is_simulated, line.all, line.position, line.heading,
             line.logic, line.labelled, line.labels, line.without_modification,
         )
         for line in table.lines
@@ -172,7 +172,7 @@ def latex(table: FaultTable) -> str:
         r" & \textbf{No answer}~$\downarrow$ & \textbf{n} \\",
         r"    \midrule",
         *(
-            f"    {escape(line.marked)} & {line.all} & {line.position} & {line.heading} "
+            f"    {escape(line.shown_name)} & {line.all} & {line.position} & {line.heading} "
             rf"& {line.logic} & {line.without_modification} & {line.counted}\\"
             for line in table.lines
             if line.counted

@@ -71,6 +71,6 @@ def drawings(chart: _Drawing[Table]) -> dict[str, Callable[[Table], bytes]]:
     return {name: partial(chart, file_format=name) for name in ("svg", "pdf", "png")}
 
 
-def rounded(value: float | None) -> float | None:
+def round_value(value: float | None) -> float | None:
     """Four decimals, which every machine agrees on."""
     return None if value is None else round(value, 4)

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from arena.exports.drawing import INK, SIMULATED, SOFT, drawn, house_style, width_in
+from arena.exports.drawing import INK, SIMULATED, SOFT, house_style, width_in, write_figure
 from arena.exports.tables import Row
 from arena.results.tree import PairRecord
 
@@ -64,7 +64,7 @@ def heat_chart(rows: Sequence[Row], pairs: Sequence[PairRecord], *, file_format:
             0.99, 0.08 / high, "Score of the row in percent, a tie half a win; votes beneath",
             ha="right", color=SOFT, fontsize=7.5,
         )  # fmt: skip
-        return drawn(figure, file_format)
+        return write_figure(figure, file_format)
 
 
 def _write(axes: Axes, text: str, x: float, y: float, size: float) -> None:

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 
 from django.core.files.storage import default_storage
 
-from arena.exports.drawing import INK, SIMULATED, SOFT, drawn, house_style
+from arena.exports.drawing import INK, SIMULATED, SOFT, house_style, write_figure
 from arena.exports.tables import SIMULATED as SIMULATED_WORD
 from arena.queries.jobs import GridRow, JobGrid
 from augment.errors import UnknownName
@@ -107,7 +107,7 @@ def sheet_bytes(sheet: Sheet, *, file_format: str) -> bytes:
             middle = (top_in - _HEIGHT_IN - 0.06) / size[1]
             figure.text(0.5, middle, caption, ha="center", va="top", fontsize=8, color=INK)
         figure.text(0.5, 0.09 / size[1], _legend(across), ha="center", fontsize=6, color=SOFT)
-        return drawn(figure, file_format)
+        return write_figure(figure, file_format)
 
 
 # Private

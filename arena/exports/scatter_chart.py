@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from arena.exports.badges import Place, badge_places
-from arena.exports.drawing import GRID, INK, MARK, SIMULATED, SOFT, drawn, house_style
+from arena.exports.drawing import GRID, INK, MARK, SIMULATED, SOFT, house_style, write_figure
 from arena.exports.plot_axes import axes as axes_of
 from arena.exports.plots import Given, Plot
 from arena.exports.tables import SIMULATED as SIMULATED_WORD
@@ -60,7 +60,7 @@ def scatter_chart(plot: Plot, *, file_format: str) -> bytes:
         _curve(axes, plot, across, up)
         _points(axes, plot, (wide, high))
         _key(axes, plot, wide)
-        return drawn(figure, file_format)
+        return write_figure(figure, file_format)
 
 
 # --- Private -----------------------------------------------------------------------------------

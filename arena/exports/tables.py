@@ -30,6 +30,11 @@ APART = -1
 """The part of those who are rated with nobody."""
 
 
+def shown_name(name: str, is_simulated: bool) -> str:
+    """The name, with "(simulated)" where that is so."""
+    return f"{name}{SIMULATED}" if is_simulated else name
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Row:
     """One contestant's line.
@@ -211,7 +216,7 @@ def _row(standing: Standing, part: int) -> Row:
     name, variant = standing.name, standing.variant
     last_word = name.rpartition(" ")[2]
     return Row(
-        model=f"{name}{SIMULATED}" if standing.is_simulated else name,
+        model=shown_name(name, standing.is_simulated),
         variant=last_word if variant and last_word.lower() == variant.lower() else "",
         slug=standing.slug,
         kind=standing.kind,

@@ -6,7 +6,7 @@ import math
 from collections.abc import Sequence
 
 from arena.exports.charts import draw_interval, rating_axis
-from arena.exports.drawing import INK, SIMULATED, drawn, house_style, width_in
+from arena.exports.drawing import INK, SIMULATED, house_style, width_in, write_figure
 from arena.exports.tables import LeaderboardTable
 from arena.results.tree import TypeRating
 
@@ -64,4 +64,4 @@ def type_charts(
             0.5, 0.08 / high, "Elo with 95 % intervals, each type rated by itself", ha="center",
             fontsize=8, color=INK,
         )  # fmt: skip
-        return drawn(figure, file_format)
+        return write_figure(figure, file_format)

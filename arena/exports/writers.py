@@ -7,7 +7,7 @@ from typing import Any
 
 from arena.exports.charts import interval_chart
 from arena.exports.columns import IN_FILES, IN_JSON, PRINTED
-from arena.exports.formats import Format, drawings, formats, rounded
+from arena.exports.formats import Format, drawings, formats, round_value
 from arena.exports.latex import latex
 from arena.exports.parquet import parquet_bytes
 from arena.exports.tables import LeaderboardTable, Row
@@ -83,7 +83,8 @@ def _standing(table: LeaderboardTable, row: Row) -> dict[str, Any]:
     values = {column.key: column.value_of(table, row) for column in IN_JSON}
     part = {"part": row.part} if table.has_parts else {}
     return {
-        key: rounded(value) if isinstance(value, float) else value for key, value in values.items()
+        key: round_value(value) if isinstance(value, float) else value
+        for key, value in values.items()
     } | part
 
 

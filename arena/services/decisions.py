@@ -8,7 +8,7 @@ from uuid import UUID
 
 from arena.errors import InvalidVote
 from arena.models import AIDS, Vote
-from augment.services.texts import storable
+from augment.services.texts import make_storable
 
 LONGEST_COMMENT = 1000
 
@@ -65,7 +65,7 @@ def decision_of(
         outcome=chosen,
         both_miss=both_miss,
         reason=reason,
-        comment=storable(comment.strip()),
+        comment=make_storable(comment.strip()),
         aids=" ".join(aid for aid in AIDS if aid in used),
         supersedes=None if supersedes is None else _uuid(supersedes),
         ms_visible=ms_visible,

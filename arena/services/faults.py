@@ -19,7 +19,7 @@ from augment.models import Augmentation, GenerationJob
 from augment.sentences import sentence
 from augment.services.events import log_event
 from augment.services.judging.fault_guess import FaultClass, guess_faults
-from augment.services.texts import one_line, storable
+from augment.services.texts import make_storable, one_line
 
 NOTE_LENGTH = 2000
 
@@ -171,7 +171,7 @@ def _save(
     )
     if task is None:
         raise NotYours("This picture is not yours to label.")
-    note = storable(note.strip())[:NOTE_LENGTH]
+    note = make_storable(note.strip())[:NOTE_LENGTH]
     said = {fault.value: fault in faults for fault in FaultClass}
     known = FaultLabel.objects.filter(task=task).first()
     if known is not None:

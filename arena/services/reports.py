@@ -12,7 +12,7 @@ from arena.models import Matchup, Report, Study
 from arena.queries.votes import matchup_of
 from arena.services.decisions import LONGEST_COMMENT
 from augment.errors import Conflict
-from augment.services.texts import storable
+from augment.services.texts import make_storable
 
 
 def report(
@@ -39,7 +39,7 @@ def report(
     if stored is None:
         if matchup.study.state != Study.State.OPEN:
             raise StudyNotOpen(f"The study {matchup.study.name!r} is {matchup.study.state}.")
-        stored = _insert(matchup, expert, key, reason, storable(comment.strip()))
+        stored = _insert(matchup, expert, key, reason, make_storable(comment.strip()))
     if (stored.matchup_id, stored.reason) != (matchup.pk, reason):
         raise Conflict("This key belongs to another report; make a new key for every report.")
     return stored

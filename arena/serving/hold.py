@@ -21,7 +21,7 @@ class AlreadyRunning(ArenaError):
 
 
 @contextmanager
-def held_alone(say: Callable[[str], None]) -> Iterator[None]:
+def hold_alone(say: Callable[[str], None]) -> Iterator[None]:
     """Keep other supervisors out of this folder; nothing is kept where REDIS_URL is set.
 
     The system lets go of the lock when this process ends, however it ends. What an earlier one

@@ -89,7 +89,7 @@ def results_page(request: HttpRequest, code: uuid.UUID, tab: str = "table") -> H
 @require_POST
 def rate_study(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
     """Freeze a new rating of the votes as they are now; a big one is left to a worker."""
-    study = readable(request, code)
+    study = get_readable_study(request, code)
     form = RatingForm(request.POST)
     if not form.is_valid():
         for faults in form.errors.values():
@@ -117,7 +117,7 @@ def rate_study(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
 @require_POST
 def compute_again(request: HttpRequest, code: uuid.UUID, rating: uuid.UUID) -> HttpResponse:
     """Send a rating that waits or failed to the workers once more; twice does no harm."""
-    study = readable(request, code)
+    study = get_readable_study(request, code)
     snapshot = get_object_or_404(Snapshot, study=study, code=rating)
     try:
         tasks.send_snapshot(snapshot.pk)
@@ -138,7 +138,7 @@ def open_results_early(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
     return redirect("results", code=code)
 
 
-def readable(request: HttpRequest, code: uuid.UUID) -> Study:
+def get_readable_study(request: HttpRequest, code: uuid.UUID) -> Study:
     """The study if whoever asks may read its results.
 
     Raises:

@@ -21,7 +21,7 @@ from arena.exports.zips import CONTENT_TYPE, ZIP
 from arena.models import Snapshot, Study
 from arena.queries.results import snapshot_to_export
 from arena.web.access import STAFF, allow_only
-from arena.web.results import asked_rating, readable
+from arena.web.results import asked_rating, get_readable_study
 from augment.errors import Conflict, UnknownName
 from augment.services.wording import translate
 
@@ -30,7 +30,7 @@ from augment.services.wording import translate
 @require_safe
 def export(request: HttpRequest, code: uuid.UUID, form: str) -> HttpResponse:
     """The rating that the address names, else the newest, as a file or as all of them in a zip."""
-    study = readable(request, code)
+    study = get_readable_study(request, code)
     snapshot = _snapshot(request, study)
     if form == ZIP:
         try:
@@ -51,7 +51,7 @@ def export(request: HttpRequest, code: uuid.UUID, form: str) -> HttpResponse:
 @require_safe
 def export_chart(request: HttpRequest, code: uuid.UUID, name: str, form: str) -> HttpResponse:
     """A chart of a rating beside the table's own."""
-    study = readable(request, code)
+    study = get_readable_study(request, code)
     snapshot = _snapshot(request, study)
     try:
         content = chart_bytes(snapshot, name=name, file_format=form)
@@ -64,7 +64,7 @@ def export_chart(request: HttpRequest, code: uuid.UUID, name: str, form: str) ->
 @require_safe
 def export_votes(request: HttpRequest, code: uuid.UUID, form: str) -> HttpResponse:
     """The votes of a rating, with pseudonyms."""
-    study = readable(request, code)
+    study = get_readable_study(request, code)
     snapshot = _snapshot(request, study)
     try:
         chosen = format_named(VOTE_FORMATS, form)

@@ -14,7 +14,7 @@ from arena.queries.judged import is_imported
 from arena.queries.result_votes import votes_on_pair
 from arena.queries.results import snapshot_to_export
 from arena.web.access import STAFF, allow_only
-from arena.web.results import address_of, asked_rating, readable
+from arena.web.results import address_of, asked_rating, get_readable_study
 from arena.web.results_ratings import by_slug
 
 
@@ -22,7 +22,7 @@ from arena.web.results_ratings import by_slug
 @require_safe
 def votes_page(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
     """What was judged of two contestants; `a` and `b` are slugs."""
-    study = readable(request, code)
+    study = get_readable_study(request, code)
     try:
         snapshot = snapshot_to_export(study, asked_rating(request))
     except NoSnapshot as error:

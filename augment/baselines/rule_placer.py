@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from augment.baselines.rule_placer_cones import cones
 from augment.baselines.rule_placer_crash import count_arrangements, crash
 from augment.baselines.rule_placer_ground import PlacingGround
-from augment.baselines.rule_placer_jury import Jury, numbered
+from augment.baselines.rule_placer_jury import Jury, number_agents
 from augment.baselines.rule_placer_vehicles import vehicle
 from augment.baselines.rule_placer_walkers import walkers
 from augment.baselines.rule_placer_words import describe, list_conventions, name_of
@@ -79,7 +79,8 @@ def place(scene: Scene, intent: Intent | None, *, seed: int = 0) -> Placement:
         added += agents
         sentences.append(describe(request, distance_m, across_m=ground.left_of_lane_m(agents[0])))
     return Placement(
-        modification=Modification(added=numbered(added, scene)), notes=_notes(sentences, intent)
+        modification=Modification(added=number_agents(added, scene)),
+        notes=_notes(sentences, intent),
     )
 
 

@@ -46,7 +46,7 @@ class Jury:
             before: Agents of earlier requests, which stand already.
             agents: Those that are judged.
         """
-        everyone = numbered((*before, *agents), self._scene)
+        everyone = number_agents((*before, *agents), self._scene)
         names = {agent.id for agent in everyone[len(before) :]}
         after = replace(self._scene, agents=(*self._scene.agents, *everyone[: len(before)]))
         ground = Ground.of(after) if before else self._ground
@@ -57,7 +57,7 @@ class Jury:
         return PlacementVerdict(wrong=wrong[0] if wrong else None, doubts=doubts)
 
 
-def numbered(agents: _Agents, scene: Scene) -> _Agents:
+def number_agents(agents: _Agents, scene: Scene) -> _Agents:
     """The agents with the ids that follow the highest AgentN of the scene."""
     numbers = [
         int(agent.id.removeprefix("Agent"))

@@ -19,7 +19,7 @@ from augment.checks.asked_things import (
     asked_count,
     asked_motion,
     asked_type,
-    unasked,
+    find_unasked,
 )
 from augment.checks.asked_walk import asked_walk
 from augment.checks.finding import Finding, FindingKind, Severity
@@ -41,7 +41,7 @@ ASKED_CHECKS: tuple[AskedCheck, ...] = (
     asked_walk,
     asked_motion,
     asked_spacing,
-    unasked,
+    find_unasked,
 )
 
 

@@ -70,7 +70,7 @@ def asked_motion(asked: Asked) -> Iterator[Finding]:
             )
 
 
-def unasked(asked: Asked) -> Iterator[Finding]:
+def find_unasked(asked: Asked) -> Iterator[Finding]:
     """Agents of the scene that were moved or removed, where only adding is asked for."""
     moved = [(one.id, "moved") for one in asked.modification.moved]
     removed = [(name, "removed") for name in asked.modification.removed]

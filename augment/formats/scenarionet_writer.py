@@ -78,12 +78,12 @@ def write(cells: Sequence[Cell]) -> Written:
         document = describe(cell, report)
         name = f"sd_{DATASET}_1_{cell.stem}.pkl"
         summaries[name] = document["metadata"]
-        return {name: pickled(document)}
+        return {name: write_pickle(document)}
 
     made = write_each(cells, write_one)
     index = {
-        SUMMARY_FILE: pickled(summaries),
-        MAPPING_FILE: pickled(dict.fromkeys(summaries, "")),
+        SUMMARY_FILE: write_pickle(summaries),
+        MAPPING_FILE: write_pickle(dict.fromkeys(summaries, "")),
     }
     return replace(made, files=made.files | index)
 
@@ -125,7 +125,7 @@ def describe(cell: Cell, report: LossReport) -> dict[str, Any]:
     }
 
 
-def pickled(document: object) -> bytes:
+def write_pickle(document: object) -> bytes:
     """The pickle, its names those of numpy 1."""
     # Protocol 3 writes a name as a line of text, so that one can be put in place of another.
     packed = pickle.dumps(document, protocol=3)

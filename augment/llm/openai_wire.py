@@ -10,13 +10,13 @@ import os
 import socket
 import time
 from collections.abc import Callable, Collection, Iterator
-from types import TracebackType
-from typing import TYPE_CHECKING, Self
+from typing import TYPE_CHECKING
 from urllib.parse import urlsplit
 
 from augment.errors import Abandoned, InvalidDocument, ModelFault, NotSent, Unwanted
 from augment.llm.addresses import Resolve, check_resolved
 from augment.llm.client import Sending, watch_nothing
+from augment.llm.closing import Closing
 from augment.llm.messages import Reply, Request
 from augment.llm.wire_faults import Secret, fault_of_status, retry_after_s
 from augment.llm.wire_network import CONNECT_TIMEOUT_S, Network
@@ -38,7 +38,7 @@ _KEYLESS = "no-key"
 """Sent where an endpoint needs no key: without one the package would look for OPENAI_API_KEY."""
 
 
-class OpenAIWire:
+class OpenAIWire(Closing):
     """A ChatClient that makes one real HTTP call for each request.
 
     Args:
@@ -138,17 +138,6 @@ class OpenAIWire:
     def close(self) -> None:
         """Close the connections."""
         self._client.close()
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
-        self.close()
 
     def _unanswered(self, error: BaseException, watch: Watch) -> ModelFault | Unwanted:
         """The fault of a request that got no answer, or why nothing of it was sent."""

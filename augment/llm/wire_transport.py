@@ -5,10 +5,10 @@ from __future__ import annotations
 import ssl
 import zlib
 from collections.abc import Iterable
-from types import TracebackType
-from typing import TYPE_CHECKING, Self
+from typing import TYPE_CHECKING
 
 from augment.errors import InvalidDocument, Unwanted
+from augment.llm.closing import Closing
 from augment.llm.wire_network import Network
 from augment.llm.wire_watch import OutOfTime, TooLong, Watches
 
@@ -28,7 +28,7 @@ class BadPacking(Exception):
     """A body is packed in a way that nobody asked for, or is broken."""
 
 
-class Transport:
+class Transport(Closing):
     """What the package's HTTP client sends requests by (an `httpx2.BaseTransport`).
 
     Args:
@@ -73,17 +73,6 @@ class Transport:
     def close(self) -> None:
         """Close the connections."""
         self._pool.close()
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
-        self.close()
 
     def _answered(self, request: httpx2.Request) -> httpx2.Response:
         import httpcore2

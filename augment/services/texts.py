@@ -8,19 +8,19 @@ from augment.errors import InvalidDocument
 from augment.sentences import sentence
 
 
-def storable(text: str) -> str:
+def make_storable(text: str) -> str:
     """The text without what can't be stored: PostgreSQL has no NUL, UTF-8 no half characters."""
     return text.replace("\0", "\u2400").encode("utf-8", "backslashreplace").decode("utf-8")
 
 
-def storable_document(value: Any) -> Any:
+def make_document_storable(value: Any) -> Any:
     """The JSON document with each of its texts storable."""
     if isinstance(value, str):
-        return storable(value)
+        return make_storable(value)
     if isinstance(value, dict):
-        return {storable(key): storable_document(item) for key, item in value.items()}
+        return {make_storable(key): make_document_storable(item) for key, item in value.items()}
     if isinstance(value, list):
-        return [storable_document(item) for item in value]
+        return [make_document_storable(item) for item in value]
     return value
 
 
@@ -61,5 +61,5 @@ def check_prose(field: str, value: str, *, what: str, longest: int) -> None:
     if len(value) > longest:
         rule = f"{len(value)} characters are too many, at most {longest} are allowed"
         raise InvalidDocument(what, [(field, rule)])
-    if storable(value) != value:
+    if make_storable(value) != value:
         raise InvalidDocument(what, [(field, "holds signs that no database takes")])

@@ -79,7 +79,7 @@ def comfort_signals(
     }
 
 
-def comfortable(signals: dict[str, FloatArray]) -> BoolArray:
+def is_comfortable(signals: dict[str, FloatArray]) -> BoolArray:
     """Whether each moment (..., T) is within all limits."""
     fits = [(signals[name] > low) & (signals[name] < high) for name, (low, high) in LIMITS.items()]
     return np.asarray(np.logical_and.reduce(fits), dtype=np.bool_)

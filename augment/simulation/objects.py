@@ -71,7 +71,7 @@ NOBODY = Objects(
 )
 
 
-def joined(parts: list[Objects]) -> Objects:
+def join_objects(parts: list[Objects]) -> Objects:
     """Several rows of objects as one."""
     parts = [part for part in parts if len(part)]
     if not parts:

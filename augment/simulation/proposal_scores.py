@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from augment.simulation.comfort import PROPOSAL, comfort_signals, comfortable
+from augment.simulation.comfort import PROPOSAL, comfort_signals, is_comfortable
 from augment.simulation.contact import AHEAD_RAD, BEHIND_RAD, at_fault, bearings, classify
 from augment.simulation.forecast import STEPS_A_SLICE, Forecast
 from augment.simulation.objects import Kind
@@ -62,7 +62,7 @@ def score_proposals(
     valid = collision * drivable * direction
     progress = _progress(look, valid)
     ttc = _time_to_collision(look)
-    calm = comfortable(comfort_signals(states, body, PROPOSAL))
+    calm = is_comfortable(comfort_signals(states, body, PROPOSAL))
     comfort = np.where(np.logical_and.reduce(calm, axis=1), 1.0, 0.0)
     weighted = PROGRESS_WEIGHT * progress + TTC_WEIGHT * ttc + COMFORT_WEIGHT * comfort
     total = PROGRESS_WEIGHT + TTC_WEIGHT + COMFORT_WEIGHT

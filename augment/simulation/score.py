@@ -14,7 +14,7 @@ import numpy as np
 from augment.scene.catalogue import ScenarioType
 from augment.scene.modification import Modification
 from augment.simulation import interplan
-from augment.simulation.comfort import comfort_signals, comfortable
+from augment.simulation.comfort import comfort_signals, is_comfortable
 from augment.simulation.drive import Drive
 from augment.simulation.ego_lane import ego_ways
 from augment.simulation.encounters import Collision, collisions
@@ -106,7 +106,7 @@ def comfort(drive: Drive) -> Metric:
     parts = {f"most_{name}": float(np.abs(series).max()) for name, series in signals.items()}
     return Metric(
         name="ego_is_comfortable",
-        value=float(comfortable(signals).all()),
+        value=float(is_comfortable(signals).all()),
         weight=2.0,
         parts=parts,
         series=signals,

@@ -7,7 +7,7 @@ import numpy as np
 from augment.scene.entities import AgentType, TrafficAgent
 from augment.scene.recording import Track
 from augment.simulation.lane_drivers import LaneDrivers, lane_under
-from augment.simulation.objects import Kind, Objects, joined
+from augment.simulation.objects import Kind, Objects, join_objects
 from augment.simulation.replay import Replay, moves
 from augment.simulation.road import Road
 from augment.simulation.setting import DriveSetting
@@ -62,7 +62,7 @@ class Traffic:
         parts.append(self._drivers.objects())
         if self._replay is not None:
             parts.append(self._replay.objects())
-        return joined(parts)
+        return join_objects(parts)
 
     def step(self, ego: FloatArray, objects: Objects) -> None:
         """One step on, given the ego's state (6,) and the objects of this moment."""
@@ -73,7 +73,7 @@ class Traffic:
             boxes=ego_box[None],
             speeds_mps=np.array([ego[SPEED]]),
         )
-        self._drivers.step(joined([objects, me]))
+        self._drivers.step(join_objects([objects, me]))
         self._drifters.step()
         self._walkers.step()
         self._walkers.wake(ego_box[:2])

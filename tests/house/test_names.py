@@ -14,6 +14,9 @@ SHARED = "Names that several classes may share:"
 BARE_PARTICIPLES = {"found", "given", "made", "one", "said", "seen", "told"}
 """What says nothing of what a function returns, and can't be searched for."""
 
+PARTICIPLE = re.compile(r"(?!speed$)[a-z]+(ed|able|wn|ken)")
+"""One word that says how something is, not what is done."""
+
 
 def shared_names() -> set[str]:
     """The names that the vocabulary lets several classes have."""
@@ -49,5 +52,17 @@ def test_no_public_function_is_called_by_a_bare_participle() -> None:
         for name, tree in modules()
         for node in tree.body
         if isinstance(node, ast.FunctionDef) and node.name in BARE_PARTICIPLES
+    ]
+    assert functions == []
+
+
+def test_no_public_function_is_called_by_one_word_that_is_no_verb() -> None:
+    """Template filters are: a page says `count|grouped`."""
+    functions = [
+        f"{name}.{node.name}"
+        for name, tree in modules()
+        if not name.startswith("arena.templatetags.")
+        for node in tree.body
+        if isinstance(node, ast.FunctionDef) and PARTICIPLE.fullmatch(node.name)
     ]
     assert functions == []

@@ -9,7 +9,7 @@ import pytest
 from django.conf import settings
 from django.test import override_settings
 
-from arena.serving.hold import LOCK, AlreadyRunning, held_alone
+from arena.serving.hold import LOCK, AlreadyRunning, hold_alone
 
 
 @pytest.fixture(autouse=True)
@@ -23,21 +23,21 @@ def _folder(tmp_path: Path) -> Iterator[None]:
 
 def test_a_second_supervisor_is_kept_out_while_the_first_is_there() -> None:
     with (
-        held_alone(print),
+        hold_alone(print),
         pytest.raises(AlreadyRunning, match=r"serving\.lock is held"),
-        held_alone(print),
+        hold_alone(print),
     ):
         pytest.fail("two hold the same folder")
 
 
 def test_the_folder_is_free_again_when_the_first_has_ended() -> None:
-    with held_alone(print):
+    with hold_alone(print):
         pass
-    with held_alone(print):
+    with hold_alone(print):
         pass
 
 
 @override_settings(REDIS_IS_PRIVATE=False)
 def test_with_a_redis_of_their_own_several_may_run() -> None:
-    with held_alone(print), held_alone(print):
+    with hold_alone(print), hold_alone(print):
         assert not (settings.VAR_DIR / LOCK).exists()

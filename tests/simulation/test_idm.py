@@ -10,7 +10,7 @@ import pytest
 
 from augment.simulation.idm import PLANNER_IDM, PROPOSAL_IDM, TRAFFIC_IDM, Idm
 from augment.simulation.lane_drivers import LaneDrivers
-from augment.simulation.objects import Kind, Objects, joined
+from augment.simulation.objects import Kind, Objects, join_objects
 from augment.simulation.road import Road
 from tests.scenes import vehicle
 from tests.simulation.worlds import street
@@ -65,7 +65,7 @@ def test_traffic_settles_at_the_steady_gap_and_its_sweep(sweep_s: float) -> None
             boxes=np.array([[leader_m, 0.0, 0.0, 4.8, 2.0]]),
             speeds_mps=np.array([5.0]),
         )
-        drivers.step(joined([drivers.objects(), leader]))
+        drivers.step(join_objects([drivers.objects(), leader]))
         leader_m += 0.5
     gap = leader_m - 2.4 - (drivers.objects().boxes[0, 0] + 2.4)
     # 4.6.5: the gap is measured from the sweep's end, so it grows by the swept way.

@@ -13,7 +13,7 @@ from augment.geometry.polyline import Polyline
 from augment.scene.catalogue import ScenarioType
 from augment.scene.entities import LaneConnector, Scene, TrafficAgent, TrafficLight
 from augment.scene.modification import Modification
-from augment.simulation.comfort import LIMITS, comfort_signals, comfortable
+from augment.simulation.comfort import LIMITS, comfort_signals, is_comfortable
 from augment.simulation.criticality import criticality
 from augment.simulation.drive import Drive
 from augment.simulation.encounters import collisions
@@ -189,7 +189,7 @@ def test_comfort_signals_of_a_steady_turn() -> None:
     # nuPlan adds d w^2 along the car.
     centre = signals["longitudinal_acceleration_mps2"]
     assert centre == pytest.approx(np.full(60, 1.461 * 0.25**2))
-    assert comfortable(signals).all()
+    assert is_comfortable(signals).all()
 
 
 def test_multipliers_multiply_and_what_is_unknown_does_not_count() -> None:

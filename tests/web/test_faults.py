@@ -9,7 +9,7 @@ import pytest
 from django.conf import settings
 from django.test import RequestFactory
 
-from arena.web.faults import broken
+from arena.web.faults import answer_broken
 from tests.web.cast import people, signed_in
 
 TEMPLATES = Path(settings.BASE_DIR) / "templates"
@@ -29,7 +29,7 @@ def test_a_refused_page_is_said_in_the_products_own_words() -> None:
 
 
 def test_the_page_for_our_own_fault_asks_no_database() -> None:
-    answer = broken(RequestFactory().get("/"))
+    answer = answer_broken(RequestFactory().get("/"))
     assert answer.status_code == 500
     assert "Something broke on our side" in answer.content.decode()
 

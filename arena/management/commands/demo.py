@@ -14,7 +14,7 @@ from django.core.management.base import CommandError, CommandParser
 from arena.errors import ArenaError
 from arena.management import demo
 from arena.management.commands.serve import INTERRUPTED
-from arena.serving.hold import held_alone
+from arena.serving.hold import hold_alone
 from arena.serving.ledger import Ledger
 from arena.serving.stack import Web, background, web_server
 from arena.serving.supervisor import Supervisor
@@ -45,7 +45,7 @@ class Command(TerminalCommand):
         """Run the demo; a fault of any step ends it with a sentence."""
         web = Web(host=options["host"], port=options["port"])
         try:
-            with held_alone(self.stdout.write):
+            with hold_alone(self.stdout.write):
                 self._run(web, options["per_type"], serve=not options["no_serve"])
         except (ArenaError, AugmentError) as error:
             raise CommandError(str(error)) from error

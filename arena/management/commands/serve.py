@@ -10,7 +10,7 @@ from django.core.management import call_command
 from django.core.management.base import CommandError, CommandParser
 
 from arena.errors import ArenaError
-from arena.serving.hold import held_alone
+from arena.serving.hold import hold_alone
 from arena.serving.ledger import Ledger
 from arena.serving.stack import Web, background, web_server
 from arena.serving.supervisor import Supervisor
@@ -43,7 +43,7 @@ class Command(TerminalCommand):
         """Run until somebody asks to stop."""
         web = Web(host=options["host"], port=options["port"], workers=options["web_workers"])
         try:
-            with held_alone(self.stdout.write):
+            with hold_alone(self.stdout.write):
                 self._serve(web, options["concurrency"])
         except ArenaError as error:
             raise CommandError(str(error)) from error

@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 import logging
-from types import TracebackType
-from typing import Self
 
 from augment.errors import ParameterRefused
 from augment.llm.client import Sending, watch_nothing
+from augment.llm.closing import Closing
 from augment.llm.messages import Reply, Request
 from augment.llm.openai_wire import OpenAIWire
 from augment.llm.profile import ModelProfile
@@ -19,7 +18,7 @@ from augment.services.endpoints.treatments import Treatment
 logger = logging.getLogger(__name__)
 
 
-class EndpointClient:
+class EndpointClient(Closing):
     """The wire to an endpoint, behind its queue.
 
     Args:
@@ -68,15 +67,8 @@ class EndpointClient:
             self._learn(request.model, refused)
             raise
 
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
+    def close(self) -> None:
+        """Close the connections."""
         self._wire.close()
 
     def _profile(self, model: str) -> ModelProfile:

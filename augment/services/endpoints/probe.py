@@ -30,7 +30,7 @@ from augment.services.endpoints.known_models import model_at
 from augment.services.endpoints.prices import price_of
 from augment.services.endpoints.wires import wire_to
 from augment.services.events import log_event
-from augment.services.texts import storable_document
+from augment.services.texts import make_document_storable
 
 _REFUSALS = frozenset({400, 404, 415, 422})
 """With these an endpoint answers to what it can't do; with others to how it is today."""
@@ -224,7 +224,7 @@ def _store(row: EndpointModel, report: ProbeReport, actor: User | None) -> None:
     document["probed_at"] = report.probed_at.isoformat()
     changes: dict[str, Any] = {
         "probed_at": report.probed_at,
-        "probe_report": storable_document(document),
+        "probe_report": make_document_storable(document),
     }
     found = {ability.value: report.has(ability) for ability in _STORED}
     changes |= {name: has_it for name, has_it in found.items() if has_it is not None}

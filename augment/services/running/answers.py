@@ -11,7 +11,7 @@ from typing import Any
 
 from augment.llm.messages import Reply, ToolCall
 from augment.models import ModelCall
-from augment.services.texts import storable, storable_document
+from augment.services.texts import make_document_storable, make_storable
 
 _COPIED = ("answer", "refusal", "extras", "model_returned", "finish_reason")
 _COUNTS = ("prompt_tokens", "completion_tokens")
@@ -43,11 +43,11 @@ def find_earlier_answer(
 def columns_of(reply: Reply) -> dict[str, Any]:
     """The answer as columns of its call; a refusal that says nothing else is the answer."""
     return {
-        "answer": storable(reply.text or reply.refusal or ""),
-        "refusal": None if reply.refusal is None else storable(reply.refusal),
+        "answer": make_storable(reply.text or reply.refusal or ""),
+        "refusal": None if reply.refusal is None else make_storable(reply.refusal),
         "extras": _extras_of(reply),
-        "model_returned": storable(reply.model)[:120],
-        "finish_reason": storable(reply.finish_reason)[:40],
+        "model_returned": make_storable(reply.model)[:120],
+        "finish_reason": make_storable(reply.finish_reason)[:40],
         "prompt_tokens": reply.prompt_tokens,
         "completion_tokens": reply.completion_tokens,
         "latency_s": reply.latency_s,
@@ -84,4 +84,4 @@ def _extras_of(reply: Reply) -> dict[str, Any] | None:
     extras: dict[str, Any] = {"tool_calls": [asdict(made) for made in reply.tool_calls]}
     if reply.calls_left_out:
         extras["calls_left_out"] = reply.calls_left_out
-    return dict(storable_document(extras))
+    return dict(make_document_storable(extras))

@@ -33,7 +33,7 @@ from augment.services.events import log_event
 from augment.services.running import answers, budget
 from augment.services.running.caps import Caps
 from augment.services.running.transcripts import sentence_of
-from augment.services.texts import storable, storable_document
+from augment.services.texts import make_document_storable, make_storable
 from augment.variants.intent_reader import ask_for_intent
 from augment.variants.transcript import ModelRole, NoteKind
 
@@ -149,14 +149,14 @@ class ReadingTranscript:
         call = self._open.pop(number)
         used = budget.used_by_reply(reply, worst=call.worst, price=self._price)
         answer = answers.columns_of(reply)
-        answer["fault"] = "" if fault is None else storable(sentence_of(fault))
+        answer["fault"] = "" if fault is None else make_storable(sentence_of(fault))
         _settle(call, used, answer)
 
     def broke(self, number: int, fault: ModelFault) -> None:
         """Store why there was no answer to that call, and what it may have used."""
         call = self._open.pop(number)
         used = budget.used_by_fault(fault, worst=call.worst, price=self._price)
-        broken: dict[str, Any] = {"fault": storable(sentence_of(fault))}
+        broken: dict[str, Any] = {"fault": make_storable(sentence_of(fault))}
         if isinstance(fault, NotSent):
             broken["sent_at"] = None
         _settle(call, used, broken)
@@ -178,7 +178,7 @@ class ReadingTranscript:
                 raise BudgetSpent(f"{cap} {name}")
 
     def _columns(self, role: ModelRole, request: Request, version: str) -> dict[str, Any]:
-        document = storable_document(request.to_document(image_url=image_reference))
+        document = make_document_storable(request.to_document(image_url=image_reference))
         return {
             "reading": self._reading,
             "role": role,
@@ -218,13 +218,13 @@ def _ask(
                 transcript=ReadingTranscript(reading, price, is_fresh=is_fresh),
             )
     except ModelFault as fault:
-        reading.state, reading.reason = State.FAILED, storable(sentence_of(fault))
+        reading.state, reading.reason = State.FAILED, make_storable(sentence_of(fault))
     except ReplyUnreadable as unreadable:
-        reading.state, reading.reason = State.FAILED, storable(str(unreadable))
+        reading.state, reading.reason = State.FAILED, make_storable(str(unreadable))
     except BudgetSpent as spent:
         reading.state, reading.reason = State.FAILED, f"The cap is reached: {spent.limit}"
     except AugmentError as fault:
-        reading.state, reading.reason = State.FAILED, storable(str(fault))
+        reading.state, reading.reason = State.FAILED, make_storable(str(fault))
     else:
         reading.state, reading.document = State.READ, intent_to_document(intent)
     reading.save(update_fields=["state", "reason", "document"])

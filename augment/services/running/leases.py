@@ -25,8 +25,8 @@ from augment.services.running import budget
 from augment.services.texts import (
     LONGEST_NOTES,
     LONGEST_REASON,
-    storable,
-    storable_document,
+    make_document_storable,
+    make_storable,
 )
 
 logger = logging.getLogger(__name__)
@@ -127,8 +127,8 @@ def keep_modification(*, held: Lease, modification: dict[str, Any], notes: str) 
     """
     return bool(
         _row_of(held).update(
-            modification=storable_document(modification),
-            notes=shorten(storable(notes), LONGEST_NOTES),
+            modification=make_document_storable(modification),
+            notes=shorten(make_storable(notes), LONGEST_NOTES),
         )
     )
 
@@ -150,7 +150,7 @@ def settle(*, held: Lease, settlement: Settlement, now: Moment = DATABASE_TIME) 
     Returns:
         False when the lease is lost: the result is dropped, because the row is somebody else's.
     """
-    reason = shorten(storable(settlement.reason), LONGEST_REASON)
+    reason = shorten(make_storable(settlement.reason), LONGEST_REASON)
     changes: dict[str, Any] = {
         "state": settlement.state,
         "reason": reason,
@@ -160,9 +160,9 @@ def settle(*, held: Lease, settlement: Settlement, now: Moment = DATABASE_TIME) 
         "heartbeat_at": None,
     }
     if settlement.modification is not None:
-        changes |= {"modification": storable_document(settlement.modification)}
+        changes |= {"modification": make_document_storable(settlement.modification)}
     if settlement.notes:
-        changes |= {"notes": shorten(storable(settlement.notes), LONGEST_NOTES)}
+        changes |= {"notes": shorten(make_storable(settlement.notes), LONGEST_NOTES)}
     if not _row_of(held).update(**changes):
         logger.warning(
             "Dropped the result of attempt %d at augmentation %d: its lease was taken back.",
@@ -188,7 +188,7 @@ def release(
         return False
     budget.settle_unseen(attempt_pk=held.attempt_pk, now=now)
     Attempt.objects.filter(pk=held.attempt_pk).update(
-        finished_at=now, outcome=end, reason=shorten(storable(reason), LONGEST_REASON)
+        finished_at=now, outcome=end, reason=shorten(make_storable(reason), LONGEST_REASON)
     )
     return True
 

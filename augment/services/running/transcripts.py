@@ -30,7 +30,7 @@ from augment.models import Augmentation, Endpoint, GenerationJob, ModelCall, Tra
 from augment.services.endpoints.prices import price_of
 from augment.services.running import answers, budget, leases, stopping
 from augment.services.scenarios.pictures import store
-from augment.services.texts import storable, storable_document
+from augment.services.texts import make_document_storable, make_storable
 from augment.variants.transcript import ModelRole, NoteKind
 
 IMAGES = "asked"
@@ -168,14 +168,14 @@ class RowTranscript:
         used = budget.used_by_reply(reply, worst=call.worst, price=call.price)
         answer = answers.columns_of(reply)
         # Also where there is none: the worker may have been thought dead meanwhile.
-        answer["fault"] = "" if fault is None else storable(sentence_of(fault))
+        answer["fault"] = "" if fault is None else make_storable(sentence_of(fault))
         self._settle(call, used, answer)
 
     def broke(self, number: int, fault: ModelFault) -> None:
         """Store why there was no answer to that call, and what it may have used."""
         call = self._open.pop(number)
         used = budget.used_by_fault(fault, worst=call.worst, price=call.price)
-        broken: dict[str, Any] = {"fault": storable(sentence_of(fault))}
+        broken: dict[str, Any] = {"fault": make_storable(sentence_of(fault))}
         if isinstance(fault, NotSent):
             broken["sent_at"] = None
         self._settle(call, used, broken)
@@ -188,7 +188,7 @@ class RowTranscript:
             number=self._notes,
             after_call=self._numbers,
             kind=kind,
-            document=storable_document(document),
+            document=make_document_storable(document),
         )
 
     def _settle(self, call: _Open, used: budget.Used, answer: dict[str, Any]) -> None:
@@ -219,7 +219,7 @@ class RowTranscript:
         """
         if self._last is not None and self._last[:3] == (role, request, version):
             return self._last[3]
-        document = storable_document(request.to_document(image_url=image_reference))
+        document = make_document_storable(request.to_document(image_url=image_reference))
         columns = {
             "attempt_id": self._held.attempt_pk,
             "role": role,

@@ -13,7 +13,7 @@ from django.conf import settings
 
 from augment.models import Worker
 from augment.services.clock import DATABASE_TIME, database_now
-from augment.services.texts import storable
+from augment.services.texts import make_storable
 
 logger = logging.getLogger(__name__)
 
@@ -101,7 +101,7 @@ class Presence:
     def failed(self, fault: str) -> None:
         """Say why it could not."""
         self.beat()
-        self._update(fault=storable(fault)[:FAULT_LENGTH] or "unknown")
+        self._update(fault=make_storable(fault)[:FAULT_LENGTH] or "unknown")
 
     def end(self) -> None:
         """Say that it ends in order."""
