@@ -170,7 +170,7 @@ def check_options(recipe: Recipe, options: ContestantOptions) -> None:
         raise InvalidDocument("contestant", problems)
 
 
-def completed(
+def complete_options(
     options: ContestantOptions, recipe: Recipe, *, native_tools: bool | None, prompt_version: str
 ) -> ContestantOptions:
     """The options with which a recipe runs, nothing of ours left open.

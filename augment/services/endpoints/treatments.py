@@ -24,7 +24,7 @@ from augment.sentences import Sentence, sentence
 from augment.services.endpoints.known_models import profile_of
 from augment.services.endpoints.respondents import Respondent, respondents_of
 from augment.services.events import log_event
-from augment.variants.options import ContestantOptions, completed, options_from_document
+from augment.variants.options import ContestantOptions, complete_options, options_from_document
 from augment.variants.recipes import find_recipe
 from augment.variants.transcript import ModelRole
 
@@ -224,7 +224,7 @@ def _completed(contestant: Contestant) -> ContestantOptions:
         assert contestant.endpoint is not None
         known = profile_of(endpoint=contestant.endpoint, model=contestant.model)
         modifier = document_of(known)
-    return completed(
+    return complete_options(
         options_from_document(contestant.options),
         recipe,
         native_tools=modifier["native_tools"],
