@@ -28,7 +28,7 @@ from augment.errors import CannotPlace
 from augment.geometry.boxes import Box, overlap
 from augment.geometry.polyline import Polyline
 from augment.scene.entities import AgentType, Scene, TrafficAgent
-from augment.scene.intent import ConesRequest, Intent, WalkRequest
+from augment.scene.intent import Body, ConesRequest, Intent, VehicleRequest, WalkRequest
 from augment.scene.lane_graph import AnyLane
 from augment.scene.modification import Modification
 from augment.scene.sizes import LENGTH_WIDTH_M
@@ -85,24 +85,33 @@ def place(
     """
     _refuse_others(intent)
     right = rule_placer.place(scene, intent, seed=seed)
-    vehicles = right.modification.added
+    vehicles = right.modification.changed
     codes = tuple(code_of(agent, bin_m=bin_m) for agent in vehicles)
+    gone = {*right.modification.removed, *(agent.id for agent in right.modification.moved)}
+    left = [agent for agent in scene.everyone if agent.id not in gone]
     rng = np.random.default_rng(seed)
     places = places_of(scene)
     added: list[TrafficAgent] = []
     notes = []
     for agent, code in zip(vehicles, codes, strict=True):
         allowed, relaxed = allowed_by(code, places, bin_m=bin_m)
-        drawn = _drawn(code, agent.id, places, allowed, (*scene.everyone, *added), rng)
+        drawn = _drawn(code, agent.id, places, allowed, (*left, *added), rng)
         notes.append(f"{agent.id}: {code.words(bin_m)}{relaxed}.")
         if drawn is None:
             notes.append(f"{agent.id} is left out: no place was free.")
         else:
             added.append(drawn)
-    if not added:
+    if vehicles and not added:
         raise CannotPlace("Every place that the code allows is taken.")
+    moved = {agent.id for agent in right.modification.moved}
     return QuantisedPlacement(
-        modification=Modification(added=tuple(added)), codes=codes, notes=" ".join(notes)
+        modification=Modification(
+            added=tuple(one for one in added if one.id not in moved),
+            moved=tuple(one for one in added if one.id in moved),
+            removed=right.modification.removed,
+        ),
+        codes=codes,
+        notes=" ".join(notes),
     )
 
 
@@ -157,6 +166,8 @@ def allowed_by(code: Code, places: Places, *, bin_m: float) -> tuple[NDArray[np.
 def _refuse_others(intent: Intent | None) -> None:
     requests = () if intent is None else intent.requests
     asked = [name for kind, name in _UNKNOWN.items() if any(_are(kind, requests))]
+    bodies = {one.body for one in requests if isinstance(one, VehicleRequest)}
+    asked += ["bicycles"] if Body.BICYCLE in bodies else []
     if asked:
         raise CannotPlace(
             f"The code knows vehicles alone, and {' and '.join(asked)} are asked for."

@@ -22,21 +22,26 @@ from augment.baselines.rule_placer_jury import Jury, number_agents
 from augment.baselines.rule_placer_vehicles import vehicle
 from augment.baselines.rule_placer_walkers import walkers
 from augment.baselines.rule_placer_words import describe, list_conventions, name_of
+from augment.checks import Ground
+from augment.checks.landmarks import find_picked, list_absent, resolve_landmarks
+from augment.checks.lanes_across import LanesAcross
 from augment.errors import CannotPlace
 from augment.geometry.boxes import Box, overlap
-from augment.scene.entities import Scene, TrafficAgent
+from augment.scene.entities import AgentType, Scene, TrafficAgent, TurnType
 from augment.scene.intent import (
+    Body,
     ConesRequest,
     CrashRequest,
     Intent,
     Length,
+    Move,
     Relation,
     Request,
     VehicleRequest,
     WalkRequest,
     resolve_anchors,
 )
-from augment.scene.modification import Modification
+from augment.scene.modification import Modification, apply
 
 _SHIFT_STEP_M = 0.25
 _SHIFT_EXACT_M = 0.5
@@ -69,22 +74,83 @@ def place(scene: Scene, intent: Intent | None, *, seed: int = 0) -> Placement:
     """
     if intent is None:
         raise CannotPlace(NO_INTENT)
+    if intent.unmet:
+        raise CannotPlace(f"The wish can't be met: {intent.unmet}")
     rng = np.random.default_rng(seed)
-    ground, jury = PlacingGround(scene), Jury(scene)
+    counted, changes = _counted(scene, intent)
+    sentences = [f"{name} is removed." for name in changes.removed]
+    for move, agent in counted:
+        made, distance_m = _moved(move, agent, apply(scene, changes), intent.route, rng)
+        changes = replace(changes, moved=(*changes.moved, made))
+        sentences.append(f"{agent.id} is moved to {distance_m:.1f} m along the ego's lane.")
+    after = apply(scene, changes)
+    ground, jury = PlacingGround(after, intent.route), Jury(after, intent.route)
     added: _Agents = ()
-    sentences = []
-    for request in resolve_anchors(intent).requests:
+    for request in _counted_from_ego(scene, intent).requests:
         _insist_on_needs(request)
         agents, distance_m = _fitted(request, ground, jury, added, rng)
         added += agents
         sentences.append(describe(request, distance_m, across_m=ground.left_of_lane_m(agents[0])))
     return Placement(
-        modification=Modification(added=number_agents(added, scene)),
+        modification=replace(changes, added=number_agents(added, scene)),
         notes=_notes(sentences, intent),
     )
 
 
 # Private
+
+
+def _lanes_of(scene: Scene, intent: Intent) -> LanesAcross:
+    lanes = LanesAcross.of(Ground.of(scene), intent.route)
+    if lanes is None:
+        raise CannotPlace("The ego stands on no lane of the map.")
+    return lanes
+
+
+def _counted_from_ego(scene: Scene, intent: Intent) -> Intent:
+    """The intent with every distance from the ego."""
+    return resolve_anchors(resolve_landmarks(intent, _lanes_of(scene, intent)))
+
+
+def _counted(scene: Scene, intent: Intent) -> tuple[list[tuple[Move, TrafficAgent]], Modification]:
+    """Who is to be moved where, and those that go."""
+    lanes = _lanes_of(scene, intent)
+    absent = list_absent(intent, lanes)
+    if absent:
+        raise CannotPlace(f"Not in this scene: {', '.join(absent)}.")
+    counted = resolve_landmarks(intent, lanes).moves
+    moves = [(move, find_picked(lanes, move.who)[0]) for move in counted]
+    gone = [agent.id for pick in intent.removals for agent in find_picked(lanes, pick)]
+    return moves, Modification(removed=tuple(dict.fromkeys(gone)))
+
+
+def _moved(
+    move: Move, agent: TrafficAgent, scene: Scene, route: TurnType, rng: np.random.Generator
+) -> tuple[TrafficAgent, float]:
+    """A road user of the scene in its new place, found as for what is added."""
+    request = VehicleRequest(
+        spot=move.spot,
+        body=_BODIES.get(agent.type, Body.VEHICLE),
+        facing=move.facing,
+        turn_deg=move.turn_deg,
+        speed_mps=agent.speed_mps if move.speed_mps is None else move.speed_mps,
+        count=1,
+    )
+    _insist_on_needs(request)
+    rest = replace(scene, agents=tuple(one for one in scene.agents if one.id != agent.id))
+    ground, jury = PlacingGround(rest, route), Jury(rest, route)
+    (made,), distance_m = _fitted(request, ground, jury, (), rng)
+    placed = replace(
+        made,
+        id=agent.id,
+        type=agent.type,
+        length_m=agent.length_m,
+        width_m=agent.width_m,
+    )
+    return placed, distance_m
+
+
+_BODIES = {AgentType.BUS: Body.BUS, AgentType.BICYCLE: Body.BICYCLE}
 
 
 def _insist_on_needs(request: Request) -> None:

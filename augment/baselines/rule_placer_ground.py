@@ -24,6 +24,7 @@ from augment.scene.entities import (
     Point,
     Scene,
     TrafficAgent,
+    TurnType,
 )
 from augment.scene.intent import LaneChoice, Setting, Side
 from augment.scene.lane_graph import AnyLane, LanePosition
@@ -45,15 +46,15 @@ _PARKED_TYPES = frozenset({AgentType.VEHICLE, AgentType.BUS})
 
 
 class PlacingGround:
-    """A scene read from the ego's place on its lane.
+    """A scene read from the ego's place on its lane, along the route that is asked for.
 
     Raises:
         CannotPlace: The ego stands on no lane, so nothing lies along it.
     """
 
-    def __init__(self, scene: Scene) -> None:
+    def __init__(self, scene: Scene, turn: TurnType = TurnType.STRAIGHT) -> None:
         self.scene = scene
-        route = EgoRoute.of(scene)
+        route = EgoRoute.of(scene, turn=turn)
         if route is None:
             raise CannotPlace("The ego stands on no lane of the map.")
         self.route, self.graph = route, route.graph

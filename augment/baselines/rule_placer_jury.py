@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 
 from augment.checks import Ground, Severity
 from augment.checks.against_intent import check_against_intent
-from augment.scene.entities import Scene, TrafficAgent
+from augment.scene.entities import Scene, TrafficAgent, TurnType
 from augment.scene.intent import Intent, Request
 from augment.scene.modification import Modification
 
@@ -34,8 +34,9 @@ class PlacementVerdict:
 class Jury:
     """The checks on one scene; they see the request and the placement, never a reference."""
 
-    def __init__(self, scene: Scene) -> None:
+    def __init__(self, scene: Scene, route: TurnType = TurnType.STRAIGHT) -> None:
         self._scene = scene
+        self._route = route
         self._ground = Ground.of(scene)
 
     def verdict(self, request: Request, before: _Agents, agents: _Agents) -> PlacementVerdict:
@@ -51,7 +52,7 @@ class Jury:
         after = replace(self._scene, agents=(*self._scene.agents, *everyone[: len(before)]))
         ground = Ground.of(after) if before else self._ground
         own = Modification(added=tuple(agent for agent in everyone if agent.id in names))
-        found = check_against_intent(ground, own, Intent(requests=(request,)))
+        found = check_against_intent(ground, own, Intent(requests=(request,), route=self._route))
         wrong = [one.sentence() for one in found if one.severity is Severity.WRONG]
         doubts = sum(one.severity is Severity.DOUBTFUL for one in found)
         return PlacementVerdict(wrong=wrong[0] if wrong else None, doubts=doubts)

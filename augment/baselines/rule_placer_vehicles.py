@@ -30,7 +30,10 @@ SIZES_M: dict[Body, tuple[float, float]] = {
     Body.VAN: (5.4, 2.0),
     Body.TRUCK: (8.0, 2.4),
     Body.BUS: LENGTH_WIDTH_M[AgentType.BUS],
+    Body.BICYCLE: LENGTH_WIDTH_M[AgentType.BICYCLE],
 }
+TYPES = {Body.BUS: AgentType.BUS, Body.BICYCLE: AgentType.BICYCLE}
+"""Of the bodies that are no plain vehicle."""
 FACING_RAD = {
     Facing.WITH_LANE: 0.0,
     Facing.AGAINST_LANE: math.pi,
@@ -70,7 +73,7 @@ def build_vehicle(body: Body, pose: Pose, lane_id: str | None, speed_mps: float)
     length_m, width_m = SIZES_M[body]
     return TrafficAgent(
         id="",
-        type=AgentType.BUS if body is Body.BUS else AgentType.VEHICLE,
+        type=TYPES.get(body, AgentType.VEHICLE),
         x_m=pose.x_m,
         y_m=pose.y_m,
         heading_rad=pose.heading_rad,

@@ -16,19 +16,22 @@ from augment.checks.asked_distance import asked_distance
 from augment.checks.asked_heading import asked_heading
 from augment.checks.asked_spacing import asked_spacing
 from augment.checks.asked_things import (
+    asked_changes,
     asked_count,
     asked_motion,
     asked_type,
+    find_attempted,
     find_unasked,
 )
 from augment.checks.asked_walk import asked_walk
 from augment.checks.finding import Finding, FindingKind, Severity
 from augment.checks.ground import Ground
+from augment.checks.landmarks import find_picked, resolve_landmarks
 from augment.checks.lanes_across import LanesAcross
-from augment.checks.parties import match_to_requests
+from augment.checks.parties import Party, match_to_requests
 from augment.checks.registry import findings_on
 from augment.checks.tolerances import USUAL, Tolerances
-from augment.scene.intent import Intent, VehicleRequest, resolve_anchors
+from augment.scene.intent import Intent, Move, VehicleRequest, resolve_anchors
 from augment.scene.modification import Modification
 
 ASKED_CHECKS: tuple[AskedCheck, ...] = (
@@ -41,7 +44,9 @@ ASKED_CHECKS: tuple[AskedCheck, ...] = (
     asked_walk,
     asked_motion,
     asked_spacing,
+    asked_changes,
     find_unasked,
+    find_attempted,
 )
 
 
@@ -64,13 +69,48 @@ def check_against_intent(
         InvalidModification: The modification does not fit the scene.
     """
     found = findings_on(ground, modification)
-    lanes = None if intent is None else LanesAcross.of(ground)
+    lanes = None if intent is None else LanesAcross.of(ground, intent.route)
     if intent is None or lanes is None:
         return found
-    matching = match_to_requests(resolve_anchors(intent), modification.added, lanes)
-    asked = Asked(modification=modification, lanes=lanes, matching=matching, tolerances=tolerances)
+    asked = _asked(modification, intent, lanes, tolerances)
     held = [one for check in ASKED_CHECKS for one in check(asked)]
     return (*held, *_settled(found, held, asked))
+
+
+def _asked(
+    modification: Modification, intent: Intent, lanes: LanesAcross, tolerances: Tolerances
+) -> Asked:
+    """The modification with who answers what; a move is a request for one vehicle elsewhere."""
+    counted = resolve_anchors(resolve_landmarks(intent, lanes))
+    matching = match_to_requests(counted, modification.added, lanes)
+    moved = {one.id: one for one in modification.moved}
+    picked = [(move, agent.id) for move in counted.moves for agent in find_picked(lanes, move.who)]
+    movers = [
+        Party(request=_as_request(move), agents=(moved[name],))
+        for move, name in picked
+        if name in moved
+    ]
+    return Asked(
+        modification=modification,
+        lanes=lanes,
+        matching=replace(matching, parties=(*matching.parties, *movers)),
+        tolerances=tolerances,
+        to_move=frozenset(name for _, name in picked),
+        to_remove=frozenset(
+            agent.id for pick in intent.removals for agent in find_picked(lanes, pick)
+        ),
+        unmet=intent.unmet,
+    )
+
+
+def _as_request(move: Move) -> VehicleRequest:
+    return VehicleRequest(
+        spot=move.spot,
+        facing=move.facing,
+        turn_deg=move.turn_deg,
+        speed_mps=move.speed_mps,
+        count=1,
+    )
 
 
 def _settled(found: Iterable[Finding], held: Iterable[Finding], asked: Asked) -> Iterable[Finding]:

@@ -16,12 +16,20 @@ from augment.scene.modification import Modification
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Asked:
-    """One modification, held against one intent."""
+    """One modification, held against one intent.
+
+    Attributes:
+        to_move, to_remove: Ids of the scene's agents that are to be elsewhere, or to go.
+        unmet: Why the wish can't be met; empty where it can.
+    """
 
     modification: Modification
     lanes: LanesAcross
     matching: RequestMatching
     tolerances: Tolerances
+    to_move: frozenset[str] = frozenset()
+    to_remove: frozenset[str] = frozenset()
+    unmet: str = ""
 
     @property
     def route(self) -> EgoRoute:

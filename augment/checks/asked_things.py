@@ -71,15 +71,45 @@ def asked_motion(asked: Asked) -> Iterator[Finding]:
 
 
 def find_unasked(asked: Asked) -> Iterator[Finding]:
-    """Agents of the scene that were moved or removed, where only adding is asked for."""
-    moved = [(one.id, "moved") for one in asked.modification.moved]
-    removed = [(name, "removed") for name in asked.modification.removed]
-    for name, done in (*moved, *removed):
+    """Agents of the scene that were moved or removed, and nobody asked for that."""
+    moved = [(one.id, "moved", asked.to_move) for one in asked.modification.moved]
+    removed = [(name, "removed", asked.to_remove) for name in asked.modification.removed]
+    for name, done, wanted in (*moved, *removed):
+        if name in wanted:
+            continue
         yield Finding(
             kind=FindingKind.UNASKED,
             severity=Severity.WRONG,
             agents=(name,),
             template=f"{{agents[0]}} was in the scene and is {done}; nobody asked for that.",
+        )
+
+
+def asked_changes(asked: Asked) -> Iterator[Finding]:
+    """Agents of the scene that are to be moved or removed, and were not."""
+    moved = frozenset(one.id for one in asked.modification.moved)
+    removed = frozenset(asked.modification.removed)
+    left_alone = [(name, "moved") for name in sorted(asked.to_move - moved)]
+    left_alone += [(name, "removed") for name in sorted(asked.to_remove - removed)]
+    for name, wanted in left_alone:
+        yield Finding(
+            kind=FindingKind.ASKED_COUNT,
+            severity=Severity.WRONG,
+            agents=(name,),
+            template=f"{{agents[0]}} is to be {wanted} and is not.",
+        )
+
+
+def find_attempted(asked: Asked) -> Iterator[Finding]:
+    """Whatever is done about a wish that can't be met."""
+    touched = [one.id for one in asked.modification.changed] + [*asked.modification.removed]
+    why = asked.unmet.replace("{", "{{").replace("}", "}}")
+    if why and touched:
+        yield Finding(
+            kind=FindingKind.UNASKED,
+            severity=Severity.WRONG,
+            agents=tuple(touched),
+            template=f"The wish can't be met, and {{agents[0]}} is changed: {why}",
         )
 
 

@@ -12,6 +12,7 @@ from augment.checks.ground import Ground
 from augment.checks.lane_index import Beside, LaneIndex, best_aligned
 from augment.geometry.angles import difference
 from augment.scene.ego_route import EgoRoute
+from augment.scene.entities import TurnType
 from augment.scene.intent import LaneChoice
 
 _BESIDE_M = 1.0
@@ -37,9 +38,17 @@ class LanesAcross:
     lanes: LaneIndex
 
     @classmethod
-    def of(cls, ground: Ground) -> LanesAcross | None:
-        """Those of the ground's ego, None where the map has no lane for it."""
-        return None if ground.route is None else cls(route=ground.route, lanes=ground.lanes)
+    def of(cls, ground: Ground, turn: TurnType = TurnType.STRAIGHT) -> LanesAcross | None:
+        """Those of the ground's ego, None where the map has no lane for it.
+
+        Args:
+            ground: Of the scene.
+            turn: Which way the route goes where the lanes part.
+        """
+        route = ground.route
+        if turn is not TurnType.STRAIGHT:
+            route = EgoRoute.of(ground.scene, ground.graph, turn=turn)
+        return None if route is None else cls(route=route, lanes=ground.lanes)
 
     def band(self, choice: LaneChoice, ahead_m: float) -> Band | None:
         """The lane of that choice, None where there is none there."""

@@ -29,6 +29,7 @@ class Role(StrEnum):
     VEHICLE = "vehicle"
     CAR = "car"
     BUS = "bus"
+    BICYCLE = "bicycle"
     WALKER = "pedestrian"
     CONE = "cone"
     WORKER = "worker"
@@ -152,7 +153,8 @@ def _places(party: int, request: Request, added: Sequence[TrafficAgent]) -> Iter
 
 
 def _role(body: Body) -> Role:
-    return {Body.BUS: Role.BUS, Body.VEHICLE: Role.VEHICLE}.get(body, Role.CAR)
+    roles = {Body.BUS: Role.BUS, Body.VEHICLE: Role.VEHICLE, Body.BICYCLE: Role.BICYCLE}
+    return roles.get(body, Role.CAR)
 
 
 def _suits(place: _Place, agent: TrafficAgent) -> bool:
@@ -164,6 +166,8 @@ def _suits(place: _Place, agent: TrafficAgent) -> bool:
             return agent.type is AgentType.VEHICLE
         case Role.VEHICLE:
             return agent.type in (AgentType.VEHICLE, AgentType.BUS)
+        case Role.BICYCLE:
+            return agent.type is AgentType.BICYCLE
         case Role.CONE:
             return agent.type is AgentType.TRAFFIC_CONE
         case Role.WALKER | Role.WORKER:

@@ -23,6 +23,18 @@ SCENARIO_FORMAT = "scenario-arena/scenario"
 
 Parsed = TypeVar("Parsed")
 Text = Annotated[str, Field(min_length=1, pattern=r"\S")]
+_Language = Annotated[str, Field(pattern=r"^[a-z]{2}$")]
+
+
+ENGLISH = "en"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Wording:
+    """A wish in one language (ISO 639-1)."""
+
+    language: str
+    text: str
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -32,6 +44,8 @@ class CatalogueEntry:
     Attributes:
         scene: The name of its base scene.
         instruction: What is to be changed, in the user's words.
+        language: Of the instruction.
+        paraphrases: The same wish in other words, each to be answered by the same reference.
         keep_traffic: Whether the recorded traffic stays in the scene.
         notes: What a reader of the catalogue should know; may be empty.
         intent: What the instruction asks for; None where nobody has written it down.
@@ -46,6 +60,15 @@ class CatalogueEntry:
     notes: str
     reference: Modification
     intent: Intent | None = None
+    language: str = ENGLISH
+    paraphrases: tuple[Wording, ...] = ()
+
+
+class WordingDocument(Document):
+    """A `Wording`."""
+
+    language: _Language
+    text: Text
 
 
 class EntryDocument(Document):
@@ -56,7 +79,9 @@ class EntryDocument(Document):
     slug: Text
     scene: Text
     type: Annotated[ScenarioType, Strict(False)]
+    language: _Language = ENGLISH
     instruction: Text
+    paraphrases: Annotated[list[WordingDocument], Field(max_length=20)] = []
     keep_traffic: bool
     provenance: Text
     notes: str = ""
@@ -65,14 +90,21 @@ class EntryDocument(Document):
 
 
 def entry_to_document(entry: CatalogueEntry) -> dict[str, Any]:
-    """The entry as a JSON document, the reference last because it is long."""
+    """The entry as a JSON document, the reference last because it is long.
+
+    English and an instruction without paraphrases go without saying.
+    """
+    language = {} if entry.language == ENGLISH else {"language": entry.language}
+    others = [{"language": one.language, "text": one.text} for one in entry.paraphrases]
     return {
         "format": SCENARIO_FORMAT,
         "version": VERSION,
         "slug": entry.slug,
         "scene": entry.scene,
         "type": entry.type.value,
+        **language,
         "instruction": entry.instruction,
+        **({"paraphrases": others} if others else {}),
         "keep_traffic": entry.keep_traffic,
         "provenance": entry.provenance,
         "notes": entry.notes,
@@ -102,6 +134,10 @@ def entry_from_document(document: object) -> CatalogueEntry:
         notes=given.notes,
         reference=reference,
         intent=intent,
+        language=given.language,
+        paraphrases=tuple(
+            Wording(language=one.language, text=one.text) for one in given.paraphrases
+        ),
     )
 
 

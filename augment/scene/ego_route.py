@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from itertools import accumulate
 
 from augment.geometry.polyline import Polyline
-from augment.scene.entities import Point, Scene, TrafficAgent
+from augment.scene.entities import Point, Scene, TrafficAgent, TurnType
 from augment.scene.lane_graph import LaneGraph, LanePosition
 
 REACH_M = 300.0
@@ -41,6 +41,7 @@ class EgoRoute:
         ends_m: How far ahead of the ego each of them ends; negative behind it.
         line: Their centrelines in one.
         ego_s_m: Where on the line the ego is.
+        turn: Which way it goes at every junction that has such a turn, else straight on.
     """
 
     scene: Scene
@@ -51,9 +52,16 @@ class EgoRoute:
     ends_m: tuple[float, ...]
     line: Polyline
     ego_s_m: float
+    turn: TurnType = TurnType.STRAIGHT
 
     @classmethod
-    def of(cls, scene: Scene, graph: LaneGraph | None = None) -> EgoRoute | None:
+    def of(
+        cls,
+        scene: Scene,
+        graph: LaneGraph | None = None,
+        *,
+        turn: TurnType = TurnType.STRAIGHT,
+    ) -> EgoRoute | None:
         """The route of a scene's ego, None where the map has no lane for it."""
         graph = LaneGraph(scene) if graph is None else graph
         own = find_ego_lane(scene, graph)
@@ -61,7 +69,7 @@ class EgoRoute:
             return None
         lane_s_m = graph.lane(own).centerline.project(scene.ego.x_m, scene.ego.y_m).s_m
         before = _list_before(graph, own)
-        lane_ids = (*before, *graph.route(own, lane_s_m + REACH_M))
+        lane_ids = (*before, *graph.route(own, lane_s_m + REACH_M, turn=turn))
         lines = [graph.lane(name).centerline for name in lane_ids]
         ego_s_m = sum(line.length_m for line in lines[: len(before)]) + lane_s_m
         return cls(
@@ -73,6 +81,7 @@ class EgoRoute:
             ends_m=tuple(end - ego_s_m for end in accumulate(line.length_m for line in lines)),
             line=Polyline([point for line in lines for point in line.points_m.tolist()]),
             ego_s_m=ego_s_m,
+            turn=turn,
         )
 
     def locate(self, x_m: float, y_m: float) -> RoutePosition:
@@ -98,7 +107,7 @@ class EgoRoute:
 
     def lane_position(self, ahead_m: float, left_m: float = 0.0) -> LanePosition | None:
         """The position on the lane that is so far ahead, None past the end of the lanes."""
-        return self.graph.along(self.lane_id, self.lane_s_m, ahead_m, left_m)
+        return self.graph.along(self.lane_id, self.lane_s_m, ahead_m, left_m, turn=self.turn)
 
     def corridor(self, length_m: float) -> tuple[Polyline, float] | None:
         """The route from the ego on over the lanes that begin within a length, and their width.

@@ -11,6 +11,12 @@ import math
 from dataclasses import dataclass, replace
 from enum import StrEnum
 
+from augment.scene.entities import TurnType
+from augment.scene.landmarks import LaneChoice as LaneChoice
+from augment.scene.landmarks import MapPlace, Pick
+from augment.scene.landmarks import Relation as Relation
+from augment.scene.landmarks import Side as Side
+
 
 class IntentOrigin(StrEnum):
     """Where an intent comes from."""
@@ -18,34 +24,6 @@ class IntentOrigin(StrEnum):
     AUTHORED = "authored"
     ENTERED = "entered"
     READ = "read"
-
-
-class Side(StrEnum):
-    """A side of the ego's direction of travel."""
-
-    LEFT = "left"
-    RIGHT = "right"
-
-    @property
-    def other(self) -> Side:
-        """The opposite side."""
-        return Side.RIGHT if self is Side.LEFT else Side.LEFT
-
-
-class Relation(StrEnum):
-    """On which end of its anchor a distance is measured."""
-
-    AHEAD = "ahead"
-    BEHIND = "behind"
-
-
-class LaneChoice(StrEnum):
-    """A lane by its place beside the ego's."""
-
-    OWN = "own"
-    LEFT = "left"
-    RIGHT = "right"
-    ONCOMING = "oncoming"
 
 
 class LateralTarget(StrEnum):
@@ -72,6 +50,7 @@ class Body(StrEnum):
 
     VEHICLE = "vehicle"
     CAR = "car"
+    BICYCLE = "bicycle"
     VAN = "van"
     TRUCK = "truck"
     BUS = "bus"
@@ -168,7 +147,9 @@ class Spot:
     Attributes:
         distance: None where no number is said; `relation` alone says on which side then.
         anchor: The name of an earlier request, of whose first object the distance runs; None for
-            the ego.
+            the ego, as for the two that follow, of which one alone may be given.
+        landmark: A road user of the scene of whom the distance runs.
+        mark: A place of the map of which the distance runs.
         lane: None where no lane is said, or none is meant (walks).
         lateral: Where across the lane; None where nothing is said.
     """
@@ -176,6 +157,8 @@ class Spot:
     distance: Length | None = None
     relation: Relation | None = None
     anchor: str | None = None
+    landmark: Pick | None = None
+    mark: MapPlace | None = None
     lane: LaneChoice | None = None
     lateral: Lateral | None = None
     settings: tuple[Setting, ...] = ()
@@ -301,14 +284,40 @@ Request = VehicleRequest | WalkRequest | ConesRequest | CrashRequest
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class Move:
+    """A road user of the scene that is to stand or drive elsewhere.
+
+    Attributes:
+        spot: Where it belongs; the sides and distances are as for what is added.
+        speed_mps: None where it keeps its speed.
+    """
+
+    who: Pick
+    spot: Spot
+    facing: Facing | None = None
+    turn_deg: float = 0.0
+    speed_mps: float | None = None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Intent:
     """All that was asked for.
 
     Attributes:
+        requests: What is to be added.
+        moves: Who of the scene is to be elsewhere.
+        removals: Who of the scene is to go.
+        route: Where the way leads along which the distances run, where it first parts.
+        unmet: Why the wish can't be met in its scene; then nothing else is asked for, and the
+            right outcome is a refusal. Empty where it can be met.
         beyond: Parts of the sentence that these fields can't hold, in its own words.
     """
 
-    requests: tuple[Request, ...]
+    requests: tuple[Request, ...] = ()
+    moves: tuple[Move, ...] = ()
+    removals: tuple[Pick, ...] = ()
+    route: TurnType = TurnType.STRAIGHT
+    unmet: str = ""
     beyond: tuple[str, ...] = ()
 
 
@@ -322,13 +331,14 @@ def resolve_anchors(intent: Intent) -> Intent:
     for request in intent.requests:
         spot = request.spot
         if spot.anchor is not None:
-            spot = _from_ego(spot, spots[spot.anchor])
+            spot = from_ego(spot, spots[spot.anchor])
         spots[request.name] = spot
         resolved.append(replace(request, spot=spot))
     return replace(intent, requests=tuple(resolved))
 
 
-def _from_ego(spot: Spot, anchor: Spot) -> Spot:
+def from_ego(spot: Spot, anchor: Spot) -> Spot:
+    """A spot that counts from another, counted from the ego; open where either is."""
     own, base = spot.span_m, anchor.span_m
     if own is None or base is None or not math.isfinite(sum((*own, *base))):
         return replace(spot, anchor=None, distance=None, relation=None)

@@ -14,6 +14,7 @@ from typing import Annotated, Any, Literal, TypeVar
 from pydantic import BaseModel, Field, Strict, model_validator
 
 from augment.errors import InvalidDocument
+from augment.scene.entities import TurnType
 from augment.scene.intent import (
     Bearing,
     Body,
@@ -26,6 +27,7 @@ from augment.scene.intent import (
     Lateral,
     LateralTarget,
     Length,
+    Move,
     Nearness,
     Post,
     Relation,
@@ -37,6 +39,7 @@ from augment.scene.intent import (
     VehicleRequest,
     WalkRequest,
 )
+from augment.scene.landmarks import MapPlace, Pick, Sight
 from augment.scene.schema import VERSION, Document, Id, read
 
 INTENT_FORMAT = "scenario-arena/intent"
@@ -76,12 +79,31 @@ class LateralDocument(Document):
     on_shoulder: bool = False
 
 
+class PickDocument(Document):
+    """A road user of the scene: which of those that fit, the nearest first, or every one."""
+
+    kind: Annotated[Sight, Strict(False)]
+    side: _Side | None = None
+    lane: Annotated[LaneChoice, Strict(False)] | None = None
+    relation: Annotated[Relation, Strict(False)] = Relation.AHEAD
+    ordinal: _Count = 1
+    every: bool = False
+
+    @model_validator(mode="after")
+    def _is_one_or_all(self) -> PickDocument:
+        if self.every and self.ordinal != 1:
+            raise ValueError("every one and one of a number contradict each other")
+        return self
+
+
 class SpotDocument(Document):
     """Where something is."""
 
     distance: LengthDocument | None = None
     relation: Annotated[Relation, Strict(False)] | None = None
     anchor: Id | None = None
+    landmark: PickDocument | None = None
+    mark: Annotated[MapPlace, Strict(False)] | None = None
     lane: Annotated[LaneChoice, Strict(False)] | None = None
     lateral: LateralDocument | None = None
     settings: _Several[Annotated[Setting, Strict(False)]] = []
@@ -90,6 +112,10 @@ class SpotDocument(Document):
     def _says_where(self) -> SpotDocument:
         if self.distance is not None and self.relation is None:
             raise ValueError("a distance needs a relation: ahead or behind")
+        if sum(one is not None for one in (self.anchor, self.landmark, self.mark)) > 1:
+            raise ValueError("a distance runs from one thing: an anchor, a landmark or a mark")
+        if self.landmark is not None and self.landmark.every:
+            raise ValueError("a landmark is one road user, not every one")
         return self
 
 
@@ -166,16 +192,47 @@ _AnyRequest = Annotated[
 ]
 
 
-_Requests = Annotated[
-    list[_AnyRequest], Field(fail_fast=True, min_length=1, max_length=MOST_REQUESTS)
-]
+class MoveDocument(Document):
+    """A road user of the scene that is to be elsewhere."""
+
+    who: PickDocument
+    spot: SpotDocument
+    facing: _Facing | None = None
+    turn_deg: _Degrees = 0.0
+    speed_mps: Annotated[float, Field(ge=0.0, le=100.0)] | None = None
+
+    @model_validator(mode="after")
+    def _is_one_with_a_place(self) -> MoveDocument:
+        if self.who.every:
+            raise ValueError("one road user is moved, not every one")
+        if self.spot.anchor is not None:
+            raise ValueError("a move is counted from the ego, a landmark or a mark")
+        if self.turn_deg and self.facing is None:
+            raise ValueError("turn_deg needs a facing that it is counted from")
+        return self
+
+
+_MostRequests = Field(fail_fast=True, max_length=MOST_REQUESTS)
 
 
 class IntentParts(Document):
     """What an intent says, without the frame of a document: what a language model answers."""
 
-    requests: _Requests
+    requests: Annotated[list[_AnyRequest], _MostRequests] = []
+    moves: Annotated[list[MoveDocument], _MostRequests] = []
+    removals: Annotated[list[PickDocument], _MostRequests] = []
+    route: Annotated[TurnType, Strict(False)] = TurnType.STRAIGHT
+    unmet: _Words | None = None
     beyond: _Several[_Words] = []
+
+    @model_validator(mode="after")
+    def _asks_for_something(self) -> IntentParts:
+        asks = bool(self.requests or self.moves or self.removals)
+        if self.unmet is None and not asks:
+            raise ValueError("asks for nothing: no requests, moves or removals")
+        if self.unmet is not None and asks:
+            raise ValueError("what can't be met asks for nothing else")
+        return self
 
 
 class IntentDocument(IntentParts):
@@ -200,9 +257,16 @@ def intent_to_document(intent: Intent) -> dict[str, Any]:
 
 
 def intent_to_parts(intent: Intent) -> dict[str, Any]:
-    """The requests, and what lies beyond them where there is something."""
+    """The requests, and whatever else the intent says."""
     requests = [{"kind": _KINDS[type(one)], **_written(one)} for one in intent.requests]
-    return {"requests": requests} | ({"beyond": list(intent.beyond)} if intent.beyond else {})
+    others = {
+        "moves": [_written(one) for one in intent.moves],
+        "removals": [_written(one) for one in intent.removals],
+        "route": "" if intent.route is TurnType.STRAIGHT else intent.route.value,
+        "unmet": intent.unmet,
+        "beyond": list(intent.beyond),
+    }
+    return {"requests": requests} | {name: part for name, part in others.items() if part}
 
 
 def intent_from_document(document: object) -> Intent:
@@ -222,7 +286,12 @@ def intent_from_parts(given: IntentParts) -> Intent:
         InvalidDocument: They contradict each other.
     """
     intent = Intent(
-        requests=tuple(_request(one) for one in given.requests), beyond=tuple(given.beyond)
+        requests=tuple(_request(one) for one in given.requests),
+        moves=_value(given.moves),
+        removals=_value(given.removals),
+        route=given.route,
+        unmet=given.unmet or "",
+        beyond=tuple(given.beyond),
     )
     problems = list(_contradictions(intent))
     if problems:
@@ -265,6 +334,8 @@ _PARTS: Mapping[type[Document], type] = {
     LateralDocument: Lateral,
     SpotDocument: Spot,
     CrashedCarDocument: CrashedCar,
+    PickDocument: Pick,
+    MoveDocument: Move,
 }
 
 

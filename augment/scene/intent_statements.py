@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
+from augment.scene.entities import TurnType
 from augment.scene.intent import (
     Bearing,
     Body,
@@ -15,10 +16,10 @@ from augment.scene.intent import (
     CrashRequest,
     Facing,
     Intent,
-    LaneChoice,
     Lateral,
     LateralTarget,
     Length,
+    Move,
     Nearness,
     Post,
     Relation,
@@ -30,6 +31,7 @@ from augment.scene.intent import (
     VehicleRequest,
     WalkRequest,
 )
+from augment.scene.landmark_statements import LANES, MARKS, state_pick
 from augment.sentences import Sentence, sentence
 
 
@@ -40,6 +42,14 @@ def list_statements(intent: Intent) -> tuple[Sentence, ...]:
         for request in intent.requests
         for fact in _facts(request)
     ]
+    for move in intent.moves:
+        who = state_pick(move.who)
+        made += [sentence("%(what)s: %(fact)s", what=who, fact=one) for one in _move_facts(move)]
+    made += [sentence("%(who)s: goes", who=state_pick(one)) for one in intent.removals]
+    if intent.route in _ROUTES:
+        made.append(_ROUTES[intent.route])
+    if intent.unmet:
+        made.append(sentence("can't be met: %(why)s", why=intent.unmet))
     made += [sentence("not in any field: “%(words)s”", words=words) for words in intent.beyond]
     return tuple(made)
 
@@ -80,9 +90,7 @@ def _facts(request: Request) -> Iterator[Sentence]:
 
 
 def _place_facts(spot: Spot) -> Iterator[Sentence]:
-    anchor = (
-        sentence("the ego") if spot.anchor is None else sentence("“%(name)s”", name=spot.anchor)
-    )
+    anchor = _counted_from(spot)
     if spot.relation is not None:
         end = {Relation.AHEAD: sentence("ahead of"), Relation.BEHIND: sentence("behind")}
         where = end[spot.relation]
@@ -94,11 +102,27 @@ def _place_facts(spot: Spot) -> Iterator[Sentence]:
                 distance=_length(spot.distance), where=where, anchor=anchor,
             )  # fmt: skip
     if spot.lane is not None:
-        yield _LANES[spot.lane]
+        yield LANES[spot.lane]
     if spot.lateral is not None:
         yield from _lateral_facts(spot.lateral)
     for setting in spot.settings:
         yield _SETTINGS[setting]
+
+
+def _counted_from(spot: Spot) -> Sentence:
+    if spot.landmark is not None:
+        return state_pick(spot.landmark)
+    if spot.mark is not None:
+        return MARKS[spot.mark]
+    return sentence("the ego") if spot.anchor is None else sentence("“%(name)s”", name=spot.anchor)
+
+
+def _move_facts(move: Move) -> Iterator[Sentence]:
+    yield sentence("goes elsewhere")
+    yield from _place_facts(move.spot)
+    yield from _facing_facts(move.facing, move.turn_deg)
+    if move.speed_mps is not None:
+        yield _motion(move.speed_mps)
 
 
 def _lateral_facts(lateral: Lateral) -> Iterator[Sentence]:
@@ -225,14 +249,14 @@ _BODIES = {
     Body.VAN: sentence("van"),
     Body.TRUCK: sentence("truck"),
     Body.BUS: sentence("bus"),
+    Body.BICYCLE: sentence("bicycle"),
+}
+_ROUTES = {
+    TurnType.LEFT: sentence("distances run along the way that turns left"),
+    TurnType.RIGHT: sentence("distances run along the way that turns right"),
+    TurnType.U_TURN: sentence("distances run along the way that turns back"),
 }
 _SIDES = {Side.LEFT: sentence("left"), Side.RIGHT: sentence("right")}
-_LANES = {
-    LaneChoice.OWN: sentence("in the ego's lane"),
-    LaneChoice.LEFT: sentence("in the lane on the left"),
-    LaneChoice.RIGHT: sentence("in the lane on the right"),
-    LaneChoice.ONCOMING: sentence("in the oncoming lane"),
-}
 _TARGETS = {
     LateralTarget.LANE_CENTRE: sentence("lane centre"),
     LateralTarget.LEFT_BOUNDARY: sentence("left lane boundary"),

@@ -29,7 +29,11 @@ from augment.services.scenarios.catalogue import read_catalogue
 
 MOST_ON_ONE_SCENE = 8
 
+FEWEST_PARAPHRASES = 3
+"""Of a scenario that has any."""
+
 _NUMBER = re.compile(r"\d+(?:\.\d+)?")
+_DECIMAL_COMMA = re.compile(r"(?<=\d),(?=\d)")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -81,17 +85,41 @@ def _check(whole: Scene, entry: CatalogueEntry) -> ScenarioCheck:
     return ScenarioCheck(
         slug=entry.slug,
         statements=len(list_statements(entry.intent)),
-        reasons=(*reasons, *_unheld(entry), *_unseen(scene, entry)),
+        reasons=(
+            *reasons,
+            *_unheld(entry),
+            *_unparaphrased(entry),
+            *_refusal(entry),
+            *_unseen(scene, entry),
+        ),
     )
 
 
 def _unheld(entry: CatalogueEntry) -> Iterator[str]:
-    """Numbers of the sentence that its intent does not hold."""
+    """Numbers of the sentence or a paraphrase that its intent does not hold."""
     assert entry.intent is not None
     held = set(_numbers_in(intent_to_parts(entry.intent)))
-    for number in dict.fromkeys(_NUMBER.findall(entry.instruction)):
-        if float(number) not in held:
-            yield f"the instruction says {number}, and its intent does not"
+    others = {f"paraphrase {n}": one.text for n, one in enumerate(entry.paraphrases, 1)}
+    for what, text in {"the instruction": entry.instruction, **others}.items():
+        for number in dict.fromkeys(_NUMBER.findall(_DECIMAL_COMMA.sub(".", text))):
+            if float(number) not in held:
+                yield f"{what} says {number}, and its intent does not"
+
+
+def _unparaphrased(entry: CatalogueEntry) -> Iterator[str]:
+    """Too few paraphrases, or the same twice."""
+    given = [entry.instruction, *(one.text for one in entry.paraphrases)]
+    if 1 < len(given) <= FEWEST_PARAPHRASES:
+        yield f"it has {len(given) - 1} paraphrases; {FEWEST_PARAPHRASES} are the fewest"
+    if len({" ".join(one.casefold().split()) for one in given}) < len(given):
+        yield "two of its wordings are the same"
+
+
+def _refusal(entry: CatalogueEntry) -> Iterator[str]:
+    """A reference that changes something about a wish that can't be met, or nothing otherwise."""
+    assert entry.intent is not None
+    if bool(entry.intent.unmet) is not entry.reference.is_empty:
+        yield "its reference is empty where the wish can't be met, and there alone"
 
 
 def _numbers_in(part: Any) -> Iterator[float]:
