@@ -228,7 +228,9 @@ def _fault(broker: Any, error: Exception) -> QueueFault:
 
 
 def _messages_waiting() -> int:
-    """How many messages no worker has taken yet."""
+    """How many messages no worker has taken yet, on all queues."""
     with open_broker() as broker:
-        queue = current_app.conf.task_default_queue
-        return int(broker.default_channel.queue_declare(queue=queue).message_count)
+        queues = current_app.amqp.queues
+        return sum(
+            int(broker.default_channel.queue_declare(queue=name).message_count) for name in queues
+        )

@@ -66,7 +66,7 @@ class Process:
     def stop(self) -> None:
         self._signal(signal.SIGTERM)
         try:
-            self._started.wait(60)
+            self._started.wait(150)
         except subprocess.TimeoutExpired:
             self.kill()
 

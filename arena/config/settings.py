@@ -47,6 +47,7 @@ def _secret_key() -> str:
 SECRET_KEY = _secret_key()
 SESSION_COOKIE_SECURE = CSRF_COOKIE_SECURE = HTTPS
 SECURE_SSL_REDIRECT = HTTPS
+SECURE_REDIRECT_EXEMPT = [r"^(healthz|readyz|metrics)$"]  # asked from inside, without the proxy
 SECURE_HSTS_SECONDS = 31_536_000 if HTTPS else 0
 SECURE_PROXY_SSL_HEADER = ("HTTP_X_FORWARDED_PROTO", "https") if HTTPS else None
 PROXIES = env.integer("ARENA_PROXIES", default=0, low=0, high=9)
@@ -104,6 +105,7 @@ INSTALLED_APPS = [
     "arena",
 ]
 MIDDLEWARE = [
+    "arena.config.logs.RequestIdMiddleware",
     "arena.config.headers.HeaderMiddleware",
     "django.middleware.security.SecurityMiddleware",
     "csp.middleware.CSPMiddleware",
@@ -223,6 +225,14 @@ CELERY_TASK_REJECT_ON_WORKER_LOST = True
 CELERY_WORKER_PREFETCH_MULTIPLIER = 1
 CELERY_BROKER_CONNECTION_RETRY_ON_STARTUP = True
 CELERY_TASK_ALWAYS_EAGER = False
+# Asking models is waiting, drawing and driving is computing: each can have workers of its own.
+CELERY_TASK_DEFAULT_QUEUE = "models"
+CELERY_TASK_QUEUES: dict[str, dict[str, str]] = {"models": {}, "drawing": {}}
+CELERY_TASK_ROUTES = {
+    "augment.draw_marks": {"queue": "drawing"},
+    "augment.run_simulation": {"queue": "drawing"},
+    "arena.compute_snapshot": {"queue": "drawing"},
+}
 CELERY_BROKER_TRANSPORT_OPTIONS = {"visibility_timeout": 3600, "socket_connect_timeout": 5}
 CELERY_TIMEZONE = "UTC"
 
@@ -248,16 +258,32 @@ VOTES_PER_S = env.integer("ARENA_VOTES_PER_S", default=4, low=1, high=1000)
 LOG_LEVEL = env.choice(
     "ARENA_LOG_LEVEL", default="info", allowed=("debug", "info", "warning", "error")
 ).upper()
+LOG_FORM = env.choice("ARENA_LOG_FORM", default="line", allowed=("line", "json"))
+METRICS_TOKEN = env.read("ARENA_METRICS_TOKEN", "", str, "any long random text")
 LOGGING = {
     "version": 1,
     "disable_existing_loggers": False,
-    "formatters": {"line": {"format": "{asctime} {levelname:7} {name}: {message}", "style": "{"}},
-    "filters": {"no_keys": {"()": "arena.config.hiding.HideKeys"}},
+    "formatters": {
+        "line": {
+            "format": "{asctime} {levelname:7} [{request_id}] {name}: {message}",
+            "style": "{",
+        },
+        "json": {
+            "()": "pythonjsonlogger.json.JsonFormatter",
+            "fmt": "{asctime}{levelname}{name}{message}{request_id}{process}{threadName}",
+            "style": "{",
+            "rename_fields": {"asctime": "at", "levelname": "level", "threadName": "thread"},
+        },
+    },
+    "filters": {
+        "no_keys": {"()": "arena.config.hiding.HideKeys"},
+        "request_id": {"()": "arena.config.logs.AddRequestId"},
+    },
     "handlers": {
         "console": {
             "class": "logging.StreamHandler",
-            "formatter": "line",
-            "filters": ["no_keys"],
+            "formatter": LOG_FORM,
+            "filters": ["no_keys", "request_id"],
         }
     },
     "root": {"handlers": ["console"], "level": LOG_LEVEL},

@@ -9,6 +9,7 @@ from arena.web import (
     authorships,
     displacement,
     driving,
+    health,
     home,
     intents,
     invitations,
@@ -26,6 +27,9 @@ from arena.web.sign_in import SignIn
 
 urlpatterns: list[URLPattern] = [
     path("", home.home, name="home"),
+    path("healthz", health.healthz, name="healthz"),
+    path("readyz", health.readyz, name="readyz"),
+    path("metrics", health.metrics, name="metrics"),
     path("theme/", home.theme, name="theme"),
     path("language/", home.language, name="language"),
     path("login/", SignIn.as_view(), name="login"),

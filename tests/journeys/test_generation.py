@@ -152,7 +152,7 @@ def test_a_worker_that_is_told_to_stop_waits_for_its_calls_and_takes_nothing_on(
         stopping.start()
         wait_until(lambda: "Warm shutdown" in worker.said(), what="the worker was told to stop")
         model.gate.set()
-        stopping.join(120)
+        stopping.join(200)
         assert not worker.is_alive()
         assert "Cold shutdown" not in worker.said()
         done = {

@@ -7,6 +7,7 @@ from typing import Any
 import pytest
 import yaml
 from django.conf import settings
+from django.urls import reverse
 
 from arena.serving.stack import Web, background, web_server
 from tests.processes import ROOT
@@ -24,12 +25,12 @@ def seconds(period: str) -> float:
     return float(period.removesuffix("s"))
 
 
-@pytest.mark.parametrize("name", ["web", "worker", "postgres", "redis"])
+@pytest.mark.parametrize("name", ["web", "worker", "render-worker", "postgres", "redis"])
 def test_what_crashes_is_started_again(services: dict[str, Any], name: str) -> None:
     assert services[name]["restart"] == "unless-stopped"
 
 
-@pytest.mark.parametrize("name", ["web", "worker"])
+@pytest.mark.parametrize("name", ["web", "worker", "render-worker"])
 def test_nobody_starts_before_the_tables_are_there(services: dict[str, Any], name: str) -> None:
     waits_for = services[name]["depends_on"]
     assert waits_for["prepare"] == {"condition": "service_completed_successfully"}
@@ -43,6 +44,22 @@ def test_each_has_as_long_to_stop_as_serve_gives_it(services: dict[str, Any]) ->
     assert settings.LLM_TIMEOUT_S == 120, "compose.yaml counts on the default"
     assert seconds(services["worker"]["stop_grace_period"]) >= worker.grace_s
     assert seconds(services["web"]["stop_grace_period"]) >= web.grace_s
+
+
+def test_every_queue_has_a_worker_that_is_probed(services: dict[str, Any]) -> None:
+    taken = {}
+    for name in ("worker", "render-worker"):
+        words = services[name]["command"].split()
+        queue = words[words.index("--queues") + 1]
+        taken[queue] = services[name]["healthcheck"]["test"][1]
+        assert words[words.index("--hostname") + 1] == f"{queue}@%h"
+    assert taken.keys() == settings.CELERY_TASK_QUEUES.keys()
+    assert all(f"--destination {queue}@$$HOSTNAME" in probe for queue, probe in taken.items())
+
+
+def test_the_web_server_is_probed_at_an_address_of_ours(services: dict[str, Any]) -> None:
+    assert "http://localhost:8000/readyz" in services["web"]["healthcheck"]["test"][-1]
+    assert reverse("readyz") == "/readyz"
 
 
 def test_everybody_serves_with_the_same_worker_class(services: dict[str, Any]) -> None:

@@ -25,6 +25,7 @@ PAGES: dict[str, tuple[int, int, int]] = {
     "job-new": (200, 403, 403),
     "job": (200, 200, 403),
     "job-progress": (200, 200, 403),
+    "metrics": (200, 401, 401),
     "displacement-export": (200, 200, 403),
     "scenarios-export": (302, 302, 403),  # no result can be written
     "drives": (200, 200, 403),
@@ -75,7 +76,7 @@ ACTIONS: dict[str, tuple[int, int, int]] = {
     "language": (302, 302, 302),
     "vote-report": (403, 403, 404),
 }
-OPEN_TO_THE_WORLD = {"login", "logout", "invitation"}
+OPEN_TO_THE_WORLD = {"login", "logout", "invitation", "healthz", "readyz", "metrics"}
 
 
 def address(name: str, here: World) -> str:
@@ -160,11 +161,12 @@ def test_an_action_needs_a_post() -> None:
 
 def test_the_login_alone_is_open_to_the_world() -> None:
     here = world()
-    for name in {**PAGES, **ACTIONS}.keys() - {"job-progress"}:
+    for name in {**PAGES, **ACTIONS}.keys() - {"job-progress", "metrics"}:
         answer = Client().get(address(name, here))
         assert answer.status_code == 302, name
         assert answer.headers["Location"].startswith(reverse("login")), name
     assert Client().get(address("job-progress", here)).status_code in (401, 403)
+    assert Client().get(reverse("metrics")).status_code == 401
     assert Client().get(reverse("login")).status_code == 200
 
 

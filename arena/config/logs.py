@@ -1,0 +1,61 @@
+"""The log: one id from the request of a browser to the task of a worker, as lines or as JSON."""
+
+from __future__ import annotations
+
+import logging
+import re
+import secrets
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from contextvars import ContextVar
+
+from django.http import HttpRequest
+from django.http.response import HttpResponseBase
+
+HEADER = "X-Request-ID"
+
+NOBODY = "-"
+"""What stands in place of an id where no request began it: a command, or a round of recovery."""
+
+_GIVEN = re.compile(r"[A-Za-z0-9._-]{8,64}")
+_current: ContextVar[str] = ContextVar("request_id", default=NOBODY)
+
+
+def current_request_id() -> str:
+    """The id of what this thread works on."""
+    return _current.get()
+
+
+@contextmanager
+def working_for(request_id: str) -> Iterator[None]:
+    """Everything that is logged or sent in this block belongs to one request."""
+    token = _current.set(request_id)
+    try:
+        yield
+    finally:
+        _current.reset(token)
+
+
+class RequestIdMiddleware:
+    """Gives each request an id: the one of the proxy in front where it is one, else a new one."""
+
+    def __init__(self, get_response: Callable[[HttpRequest], HttpResponseBase]) -> None:
+        self.get_response = get_response
+
+    def __call__(self, request: HttpRequest) -> HttpResponseBase:
+        """The answer, with the id in a header, so that a report can name it."""
+        given = request.headers.get(HEADER, "")
+        request_id = given if _GIVEN.fullmatch(given) else secrets.token_hex(8)
+        with working_for(request_id):
+            answer = self.get_response(request)
+        answer.headers[HEADER] = request_id
+        return answer
+
+
+class AddRequestId(logging.Filter):
+    """Write the id into every line."""
+
+    def filter(self, record: logging.LogRecord) -> bool:
+        """Let every line through."""
+        record.request_id = current_request_id()
+        return True

@@ -1,0 +1,139 @@
+"""What load balancers and monitoring ask, and what each answer gives away."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import pytest
+from celery import current_app
+from django.db import OperationalError
+from django.test import Client
+from django.urls import reverse
+from prometheus_client.parser import text_string_to_metric_families
+from pytest_django import Settings
+
+from arena.serving import readiness
+from augment.models import Worker
+from augment.services.clock import DATABASE_TIME
+from tests.study_rows import a_study, matchups_of, vote
+from tests.web.cast import people, signed_in
+
+pytestmark = pytest.mark.django_db
+
+
+@pytest.fixture
+def broker() -> Iterator[None]:
+    before = current_app.conf.broker_url
+    current_app.conf.broker_url = "memory://"
+    yield
+    current_app.conf.broker_url = before
+
+
+@pytest.fixture
+def no_broker() -> Iterator[None]:
+    before = current_app.conf.broker_url
+    current_app.conf.broker_url = "redis+socket:///nowhere/redis.sock"
+    yield
+    current_app.conf.broker_url = before
+
+
+def a_worker() -> None:
+    now = dict.fromkeys(("started_at", "seen_at", "recovered_at"), DATABASE_TIME)
+    Worker.objects.create(name="w 1", **now)
+
+
+def ask(path: str) -> tuple[int, dict[str, object]]:
+    answer = Client().get(path)
+    return answer.status_code, answer.json()
+
+
+def test_a_process_that_answers_is_healthy_whatever_else_is_gone(no_broker: None) -> None:
+    assert ask("/healthz") == (200, {"status": "ok"})
+
+
+def test_a_whole_installation_is_ready(broker: None) -> None:
+    a_worker()
+    parts = {"database": "ok", "broker": "ok", "workers": "ok"}
+    assert ask("/readyz?strict") == (200, {"status": "ok", "parts": parts})
+
+
+def test_without_broker_and_workers_people_can_still_vote(no_broker: None) -> None:
+    parts = {"database": "ok", "broker": "unreachable", "workers": "none"}
+    expected = {"status": "degraded", "parts": parts}
+    assert ask("/readyz") == (200, expected)
+    assert ask("/readyz?strict") == (503, expected)
+
+
+def test_without_the_tables_of_this_release_nobody_is_sent_here(
+    broker: None, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(readiness, "find_unapplied_migrations", lambda: ["arena.0999_new"])
+    readiness._is_prepared.clear()
+    status, document = ask("/readyz")
+    assert (status, document["status"]) == (503, "down")
+    assert "0999" not in str(document), "the inside is nobody's business"
+    readiness._is_prepared.set()
+
+
+def test_without_a_database_nobody_is_sent_here(
+    broker: None, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def unreachable() -> list[str]:
+        raise OperationalError("password of arena at 10.0.0.7")
+
+    monkeypatch.setattr(readiness, "find_unapplied_migrations", unreachable)
+    readiness._is_prepared.clear()
+    status, document = ask("/readyz")
+    assert (status, document["status"]) == (503, "down")
+    assert "10.0.0.7" not in str(document)
+
+
+def test_probes_are_not_sent_to_https(settings: Settings, broker: None) -> None:
+    settings.SECURE_SSL_REDIRECT = True
+    assert Client().get("/healthz").status_code == 200
+    assert Client().get("/login/").status_code == 301
+
+
+def read(text: str) -> dict[tuple[str, str], float]:
+    return {
+        (sample.name, sample.labels.get("state", "")): sample.value
+        for family in text_string_to_metric_families(text)
+        for sample in family.samples
+    }
+
+
+def test_metrics_count_the_rows() -> None:
+    study = a_study()
+    vote(matchups_of(study, "eva")[0], "left")
+    a_worker()
+    answer = signed_in(people()["admin"]).get(reverse("metrics"))
+    found = read(answer.content.decode())
+    assert found["arena_workers", ""] == 1
+    assert found["arena_recovery", ""] == 1
+    assert found["arena_votes", "open"] == 1
+    assert found["arena_matchups", "open"] == study.matchups.count()
+    assert found["arena_model_calls", "answered"] == 0
+    assert found["arena_model_usd", ""] == 0
+
+
+@pytest.mark.parametrize(
+    ("header", "status"),
+    [
+        ("Bearer metrics-4711", 200),
+        ("bearer metrics-4711", 200),
+        ("Bearer metrics-4712", 401),
+        ("Bearer ", 401),
+        ("metrics-4711", 401),
+        ("", 401),
+    ],
+)
+def test_metrics_open_to_the_token_of_the_settings(
+    settings: Settings, header: str, status: int
+) -> None:
+    settings.METRICS_TOKEN = "metrics-4711"
+    headers = {"Authorization": header} if header else {}
+    assert Client(headers=headers).get("/metrics").status_code == status
+
+
+def test_without_a_token_in_the_settings_no_header_opens_them() -> None:
+    assert Client(headers={"Authorization": "Bearer "}).get("/metrics").status_code == 401
