@@ -11,9 +11,11 @@ from typing import Any
 from django.db.models import Count, QuerySet, Sum
 
 from arena.models import Matchup, Snapshot, Study, Vote
-from augment.llm.costs import usd_of
 from augment.models import Augmentation, GenerationJob, ModelCall, Simulation
 from augment.services.running.workers import workforce
+
+NANO = 1e9
+"""Money is counted in whole nano-dollars."""
 
 Labelled = tuple[tuple[str, float], ...]
 
@@ -71,6 +73,6 @@ def _calls() -> list[Gauge]:
             "arena_model_usd",
             "Dollars spent, as far as prices are known",
             "",
-            (("", float(usd_of(sums["nano"] or 0))),),
+            (("", (sums["nano"] or 0) / NANO),),
         ),
     ]
