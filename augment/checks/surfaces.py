@@ -5,6 +5,7 @@ The one module of the checks that knows shapely. Frame: the scene's.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Sequence
 from functools import cached_property
 from typing import TYPE_CHECKING
@@ -19,6 +20,10 @@ if TYPE_CHECKING:
     from shapely.geometry.base import BaseGeometry
 
 FloatArray = NDArray[np.float64]
+
+
+SEAM_M = 0.3
+"""A gap between two pieces of ground up to this long is a seam of the map, not an edge."""
 
 
 class Surface:
@@ -73,6 +78,30 @@ class Surface:
             shapely.Point(x_m, y_m), return_distance=True, all_matches=False
         )
         return float(distances[0])
+
+    def reach_m(self, x_m: float, y_m: float, heading_rad: float, most_m: float) -> float | None:
+        """How far the surface goes on from a point in a direction, up to `most_m`.
+
+        Neighbouring pieces seldom meet exactly: gaps up to `SEAM_M` are passed over. None where
+        the point is not on the surface, or the surface ends nowhere within `most_m`.
+        """
+        import shapely
+
+        step = np.array([math.cos(heading_rad), math.sin(heading_rad)])
+        start = np.array([x_m, y_m])
+        ray = shapely.LineString([start - SEAM_M * step, start + most_m * step])
+        near = self._pieces[self._tree.query(ray, predicate="intersects")]
+        parts = shapely.get_parts(shapely.intersection(near, ray))
+        parts = parts[shapely.get_type_id(parts) == shapely.GeometryType.LINESTRING]
+        spans = sorted(((shapely.get_coordinates(part) - start) @ step).tolist() for part in parts)
+        reached_m = 0.0
+        is_on = False
+        for low_m, high_m in (sorted((span[0], span[-1])) for span in spans):
+            if low_m > reached_m + SEAM_M:
+                break
+            is_on = is_on or high_m >= 0.0
+            reached_m = max(reached_m, high_m)
+        return reached_m if is_on and reached_m < most_m - SEAM_M else None
 
     def distance_to_hull_m(self, x_m: float, y_m: float) -> float:
         """From the point to the smallest convex region around the whole surface, 0 inside."""

@@ -18,9 +18,9 @@ from augment.geometry.polyline import Polyline, Projection
 
 FloatArray = NDArray[np.float64]
 
-CHORD_REACH_M = 2.5
-"""A line's heading is read between the points this far before and behind: lines drawn by hand or
-by a sensor wiggle from point to point, and what drives along them does not."""
+CHORD_REACH_M = 0.75
+"""A line's heading is read between the points this far before and past: a line of points has a
+kink at each of them, and what drives along it does not."""
 
 _INTERVALS = 32
 _KNOTS = np.linspace(0.0, 1.0, _INTERVALS + 1)
@@ -175,7 +175,7 @@ class FitError:
 
     Attributes:
         position_m: Between the places at the same part of the way.
-        heading_rad: Against the line's chord of 2.5 m either way, where the line is that long.
+        heading_rad: Against the line's chord of `CHORD_REACH_M` either way, where it is that long.
     """
 
     position_m: float
@@ -231,14 +231,40 @@ def fit_error(
 
 
 def chord_headings(line: Polyline, stations_m: FloatArray) -> FloatArray:
-    """The headings (N,) of the chords from 2.5 m before to 2.5 m behind the stations (N,)."""
+    """The headings (N,) of the chords from `CHORD_REACH_M` before stations (N,) to past them."""
     chords = line.points_at(stations_m + CHORD_REACH_M) - line.points_at(
         stations_m - CHORD_REACH_M
     )
     return np.arctan2(chords[:, 1], chords[:, 0])
 
 
+def travel_pose(line: Polyline, s_m: float, d_m: float = 0.0) -> Pose:
+    """The line's own point at s with the heading of what drives along it, d to the left.
+
+    The heading is the chord's. Nearer to an end than the chord reaches it is that of the parabola
+    through the end and the two points that follow a reach apart. The ends are extended straight.
+    """
+    heading_rad = _travel_heading(line, min(max(s_m, 0.0), line.length_m))
+    x_m, y_m = line.points_at(np.array([s_m]))[0]
+    over_m = s_m - min(max(s_m, 0.0), line.length_m)
+    cos, sin = math.cos(heading_rad), math.sin(heading_rad)
+    return Pose(
+        x_m=float(x_m) + over_m * cos - d_m * sin,
+        y_m=float(y_m) + over_m * sin + d_m * cos,
+        heading_rad=heading_rad,
+    )
+
+
 # Private
+
+
+def _travel_heading(line: Polyline, s_m: float) -> float:
+    reach_m = min(CHORD_REACH_M, line.length_m / 2.0)
+    inner_m = min(max(s_m, reach_m), line.length_m - reach_m)
+    before, middle, after = line.points_at(inner_m + np.array([-reach_m, 0.0, reach_m]))
+    bend = (before - 2.0 * middle + after) * (s_m - inner_m) / reach_m
+    dx, dy = (after - before) / 2.0 + bend
+    return math.atan2(dy, dx)
 
 
 def _arms(heading_rad: float | None) -> FloatArray:

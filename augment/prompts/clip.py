@@ -16,15 +16,21 @@ _LOOK_EVERY_M = 0.5
 
 
 def line_within(line: Polyline, radius_m: float) -> Polyline | None:
-    """The line from where it first comes within the radius of the origin to where it last does.
+    """The part of the line that `span_within` names, None where there is none."""
+    span = span_within(line, radius_m)
+    return None if span is None else line.between(*span)
 
-    None where it never does, or for no more than a moment.
+
+def span_within(line: Polyline, radius_m: float) -> tuple[float, float] | None:
+    """From where a line first comes within the radius of the origin to where it last does.
+
+    Two arc lengths; None where it never does, or for no more than a moment.
     """
     stations_m = np.append(np.arange(0.0, line.length_m, _LOOK_EVERY_M), line.length_m)
     inside = stations_m[np.hypot(*line.points_at(stations_m).T) <= radius_m]
     if len(inside) < 2:
         return None
-    return line.between(float(inside[0]), float(inside[-1]))
+    return float(inside[0]), float(inside[-1])
 
 
 def boundary_within(boundary_m: FloatArray, radius_m: float) -> FloatArray:

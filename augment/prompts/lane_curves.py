@@ -1,7 +1,8 @@
-"""The lanes that a prompt shows, as Bezier pieces under their short ids.
+"""The lanes that a prompt shows, under their short ids: as Bezier pieces and as they are.
 
 What is written into a prompt and what the tool answers about both come from here, so that
-"the beginning of Lane3" and its control points are the same place in either.
+"the beginning of Lane3" and its control points are the same place in either. The prompt shows
+the pieces; the tool reads the recorded centreline itself.
 Frame: ego frame.
 """
 
@@ -12,8 +13,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from augment.geometry.polyline import Polyline
-from augment.prompts.clip import line_within
+from augment.geometry.bezier import travel_pose
+from augment.geometry.frames import Pose
+from augment.geometry.polyline import Projection
+from augment.prompts.clip import span_within
 from augment.prompts.names import ShortNames
 from augment.scene.bezier_lanes import BezierLane, bezier_lane, piece_ids
 from augment.scene.entities import Scene
@@ -27,14 +30,36 @@ class LaneCurve:
     Attributes:
         id: Its short id.
         lane: Its pieces; s = 0 is where the shown part begins.
+        whole: The whole of it, as recorded.
+        begins_m: Where on its centreline the shown part begins.
         before, after: Short ids of what joins it within the shown map, straightest first.
     """
 
     id: str
     lane: BezierLane
-    width_m: float
+    whole: AnyLane
+    begins_m: float
     before: tuple[str, ...] = ()
     after: tuple[str, ...] = ()
+
+    @property
+    def width_m(self) -> float:
+        """How wide it is."""
+        return self.whole.width_m
+
+    @property
+    def length_m(self) -> float:
+        """How long the shown part is."""
+        return self.lane.length_m
+
+    def pose_at(self, s_m: float, d_m: float = 0.0) -> Pose:
+        """The place on the recorded centreline at s of the shown part, d to the left."""
+        return travel_pose(self.whole.centerline, self.begins_m + s_m, d_m)
+
+    def project(self, x_m: float, y_m: float) -> Projection:
+        """The nearest place on the recorded centreline of the shown part."""
+        shown = self.whole.centerline.between(self.begins_m, self.begins_m + self.length_m)
+        return shown.project(x_m, y_m)
 
     @property
     def pieces(self) -> tuple[str, ...]:
@@ -45,13 +70,17 @@ class LaneCurve:
 def lane_curves(scene: Scene, names: ShortNames, radius_m: float) -> dict[str, LaneCurve]:
     """All lanes and connectors within the radius, by short id, in the order of the scene."""
     graph = LaneGraph(scene)
-    lines = {
-        lane.id: line
+    spans = {
+        lane.id: span
         for lane in graph.lanes.values()
-        if (line := line_within(lane.centerline, radius_m)) is not None
+        if (span := span_within(lane.centerline, radius_m)) is not None
     }
-    begins = {key for key, line in lines.items() if _meets(line, graph.lanes[key], 0)}
-    ends = {key for key, line in lines.items() if _meets(line, graph.lanes[key], -1)}
+    begins = {key for key, (start_m, _) in spans.items() if start_m < 1e-6}
+    ends = {
+        key
+        for key, (_, end_m) in spans.items()
+        if end_m > graph.lanes[key].centerline.length_m - 1e-6
+    }
 
     def shown(ids: Iterable[str], among: set[str]) -> tuple[str, ...]:
         return tuple(names.lanes[lane_id] for lane_id in ids if lane_id in among)
@@ -59,20 +88,16 @@ def lane_curves(scene: Scene, names: ShortNames, radius_m: float) -> dict[str, L
     return {
         names.lanes[key]: LaneCurve(
             id=names.lanes[key],
-            lane=bezier_lane(line),
-            width_m=graph.lanes[key].width_m,
+            lane=bezier_lane(graph.lanes[key].centerline.between(*span)),
+            whole=graph.lanes[key],
+            begins_m=span[0],
             before=shown(graph.predecessors(key) if key in begins else (), ends),
             after=shown(graph.successors(key) if key in ends else (), begins),
         )
-        for key, line in lines.items()
+        for key, span in spans.items()
     }
 
 
 def control_points(lane: BezierLane) -> list[list[list[float]]]:
     """The four control points [x, y] of each piece, to the centimetre, ready for JSON."""
     return [np.add(np.round(control, 2), 0.0).tolist() for control in lane.control_m]
-
-
-def _meets(line: Polyline, lane: AnyLane, end: int) -> bool:
-    """Whether the shown part reaches that end of the whole."""
-    return bool(np.abs(line.points_m[end] - lane.centerline.points_m[end]).max() < 1e-6)

@@ -14,6 +14,7 @@ every part of the program, and no distance is lost or gained at a joint.
 from __future__ import annotations
 
 import math
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
 
@@ -31,20 +32,31 @@ from augment.geometry.bezier import (
 from augment.geometry.frames import Pose
 from augment.geometry.polyline import Polyline, Projection
 
-SHORTEST_PIECE_M = CHORD_REACH_M
-SHORTEST_FOR_HEADING_M = 2.0 * CHORD_REACH_M
-"""Nothing is cut shorter for its heading's sake, which is read over a chord of this length."""
+SHORTEST_PIECE_M = 1.0
+"""Nothing is cut shorter: below it the points of a recorded line are its shape."""
 
 _CUTS_TRIED = 9
+_LOOSER = 1.03
 _END_SAMPLES = 21
+_END_M = 2.0 * CHORD_REACH_M
+_FREE_ENDS = ((False, False), (False, True), (True, False))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Tolerance:
-    """How far a piece may be from its centreline."""
+    """How far a piece may be from its centreline.
 
-    position_m: float = 0.3
-    heading_rad: float = math.radians(3.0)
+    As written, to the centimetre, it is then within 0.1 m and 3 degrees.
+    """
+
+    position_m: float = 0.092
+    heading_rad: float = math.radians(2.9)
+
+    def loosened(self, factor: float) -> Tolerance:
+        """So many times as much."""
+        return Tolerance(
+            position_m=factor * self.position_m, heading_rad=factor * self.heading_rad
+        )
 
     def used_by(self, error: FitError) -> float:
         """The larger share of the two that an error uses up; above 1 it is too large."""
@@ -129,15 +141,22 @@ class BezierLane:
 def bezier_lane(line: Polyline, tolerance: Tolerance | None = None) -> BezierLane:
     """Pieces that stay within the tolerance; a piece that does not is cut where that helps most.
 
-    A recorded line can be too restless for the tolerance. It is not cut where that brings its
-    heading no closer, nor below 5 m (2.5 m where its position is off), and keeps what error is
-    left; every piece says its error.
+    Pieces share their heading at a joint as long as that keeps to the tolerance; where a lane
+    turns on the spot they may meet at an angle within it. A line can be too restless even then:
+    it is not cut below 1 m and keeps what error is left; every piece says its error.
 
     Fitting takes tens of milliseconds for a winding lane, and prompt and tool ask for the same
     lanes in every augmentation of a scene: what was fitted lately is remembered.
     """
-    whole = _piece(line, 0.0, line.length_m)
-    return BezierLane(pieces=tuple(_cut(line, whole, tolerance or Tolerance())))
+    allowed = tolerance or Tolerance()
+    found: list[tuple[LanePiece, ...]] = []
+    # A cut is judged by what it leaves: where one aim leads nowhere, a looser one may.
+    for aim in (allowed, allowed.loosened(_LOOSER)):
+        for way in _ways_to_cut():
+            found.append(tuple(_cut(line, (0.0, line.length_m), aim, way)))
+            if _within(found[-1], aim):
+                return BezierLane(pieces=found[-1])
+    return BezierLane(pieces=min(found, key=lambda pieces: _used(pieces, allowed)))
 
 
 def piece_ids(lane_id: str, count: int) -> tuple[str, ...]:
@@ -150,28 +169,59 @@ def piece_ids(lane_id: str, count: int) -> tuple[str, ...]:
 # Private
 
 
-def _cut(line: Polyline, piece: LanePiece, allowed: Tolerance) -> list[LanePiece]:
-    """The piece, or the pieces that it takes to stay within the tolerance."""
-    used = allowed.used_by(piece.error)
-    strays = piece.error.position_m > allowed.position_m
-    shortest_m = SHORTEST_PIECE_M if strays else SHORTEST_FOR_HEADING_M
-    if used <= 1.0 or piece.length_m < 2.0 * shortest_m:
-        return [piece]
-    halves = _best_halves(line, piece, allowed, shortest_m)
-    if not strays and max(allowed.used_by(half.error) for half in halves) >= used:
-        return [piece]
-    return [small for half in halves for small in _cut(line, half, allowed)]
+_Fitting = Callable[[Polyline, float, float, Tolerance], LanePiece]
+_Span = tuple[float, float]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Way:
+    """How pieces are fitted: those that may stay, and those that a cut is judged by."""
+
+    kept: _Fitting
+    tried: _Fitting
+
+
+def _ways_to_cut() -> tuple[_Way, ...]:
+    """In the order in which they are tried: the first needs fewest pieces and no long search."""
+    return (
+        _Way(kept=_loose_piece, tried=_smooth_piece),
+        _Way(kept=_smooth_piece, tried=_smooth_piece),
+        _Way(kept=_loose_piece, tried=_loose_piece),
+    )
+
+
+def _used(pieces: Iterable[LanePiece], allowed: Tolerance) -> float:
+    return max(allowed.used_by(piece.error) for piece in pieces)
+
+
+def _within(pieces: Iterable[LanePiece], allowed: Tolerance) -> bool:
+    return _used(pieces, allowed) <= 1.0
+
+
+def _cut(line: Polyline, span: _Span, allowed: Tolerance, way: _Way) -> list[LanePiece]:
+    """The part of the line as the pieces that it takes to stay within the tolerance."""
+    whole = way.kept(line, *span, allowed)
+    if _within([whole], allowed) or whole.length_m < 2.0 * SHORTEST_PIECE_M:
+        return [whole]
+    halves = _best_halves(line, span, allowed, way.tried)
+    strays = whole.error.position_m > allowed.position_m
+    if not strays and _used(halves, allowed) >= allowed.used_by(whole.error):
+        return [whole]
+    return [
+        small for half in halves for small in _cut(line, (half.start_m, half.end_m), allowed, way)
+    ]
 
 
 def _best_halves(
-    line: Polyline, piece: LanePiece, allowed: Tolerance, shortest_m: float
+    line: Polyline, span: _Span, allowed: Tolerance, piece_of: _Fitting
 ) -> tuple[LanePiece, LanePiece]:
     """The two pieces whose worse one is best, over a coarse row of cuts and then a fine one."""
-    low_m, high_m = piece.start_m + shortest_m, piece.end_m - shortest_m
+    start_m, end_m = span
+    low_m, high_m = start_m + SHORTEST_PIECE_M, end_m - SHORTEST_PIECE_M
     for _ in range(2):
         cuts_m = np.linspace(low_m, high_m, _CUTS_TRIED)
         halves = [
-            (_piece(line, piece.start_m, cut_m), _piece(line, cut_m, piece.end_m))
+            (piece_of(line, start_m, cut_m, allowed), piece_of(line, cut_m, end_m, allowed))
             for cut_m in cuts_m.tolist()
         ]
         best = min(range(_CUTS_TRIED), key=lambda number: _badness(halves[number], allowed))
@@ -182,14 +232,29 @@ def _best_halves(
 def _badness(halves: tuple[LanePiece, LanePiece], allowed: Tolerance) -> tuple[bool, float]:
     """What to keep small: above all a place that is off, for it would have to be cut again."""
     strays = any(half.error.position_m > allowed.position_m for half in halves)
-    return strays, max(allowed.used_by(half.error) for half in halves)
+    return strays, _used(halves, allowed)
 
 
-def _piece(line: Polyline, start_m: float, end_m: float) -> LanePiece:
+def _smooth_piece(line: Polyline, start_m: float, end_m: float, allowed: Tolerance) -> LanePiece:
+    """One cubic with the line's heading at both of its ends."""
+    return _piece(line, (start_m, end_m), fixed=(True, True))
+
+
+def _loose_piece(line: Polyline, start_m: float, end_m: float, allowed: Tolerance) -> LanePiece:
+    """One cubic with the line's headings, or without where it comes closer so."""
+    smooth = _smooth_piece(line, start_m, end_m, allowed)
+    if _within([smooth], allowed):
+        return smooth
+    free = [_piece(line, (start_m, end_m), fixed=fixed) for fixed in _FREE_ENDS]
+    return min([smooth, *free], key=lambda piece: allowed.used_by(piece.error))
+
+
+def _piece(line: Polyline, span: _Span, *, fixed: tuple[bool, bool]) -> LanePiece:
+    start_m, end_m = span
     curve = fit(
         line.between(start_m, end_m),
-        start_rad=_heading_of(line, start_m),
-        end_rad=_heading_of(line, end_m),
+        start_rad=_heading_of(line, start_m) if fixed[0] else None,
+        end_rad=_heading_of(line, end_m) if fixed[1] else None,
     )
     error = fit_error(curve, line, start_m, end_m)
     return LanePiece(curve=curve, start_m=start_m, end_m=end_m, error=error)
@@ -199,11 +264,11 @@ def _heading_of(line: Polyline, s_m: float) -> float:
     """The heading of all pieces that begin or end there: no kink at a joint, no flare at an end.
 
     It is the chord's, or at an end of the line, where there is none, that of the parabola from
-    the end through the last 5 m.
+    the end through the last 1.5 m.
     """
     if 0.0 < s_m < line.length_m:
         return float(chord_headings(line, np.array([s_m]))[0])
-    inwards_m = np.linspace(0.0, min(2.0 * CHORD_REACH_M, line.length_m), _END_SAMPLES)
+    inwards_m = np.linspace(0.0, min(_END_M, line.length_m), _END_SAMPLES)
     points = line.points_at(np.abs(s_m - inwards_m))
     powers = np.column_stack([inwards_m, inwards_m * inwards_m])
     dx, dy = np.linalg.lstsq(powers, points - points[0], rcond=None)[0][0]

@@ -15,6 +15,8 @@ LANE_START = "lane"
 
 FURTHEST_M = 1000.0
 WIDEST_M = 30.0
+MOST_PLACES = 16
+"""So many distances may be asked for in one call."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -24,14 +26,15 @@ class PoseCall:
     Attributes:
         lane: The id of a lane, a connector or a piece, or a curve given by its control points.
         start: "lane" or an agent's id.
-        distance_m: From the start along the lane, negative to go back.
-        lateral_m: To the left of the lane, negative to the right.
+        places: Pairs of a distance from the start along the lane (negative to go back) and an
+            offset to its left (negative to its right).
+        is_list: Whether several were asked for, be it a list of one.
     """
 
     lane: str | CubicBezier
     start: str
-    distance_m: float
-    lateral_m: float = 0.0
+    places: tuple[tuple[float, float], ...]
+    is_list: bool = False
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -86,12 +89,37 @@ def read_call(arguments: object) -> PoseCall:
     return PoseCall(
         lane=_lane(arguments["lane"]),
         start=start,
-        distance_m=_number("distance_m", arguments["distance_m"], FURTHEST_M),
-        lateral_m=_number("lateral_m", arguments.get("lateral_m", 0.0), WIDEST_M),
+        places=_places(arguments["distance_m"], arguments.get("lateral_m", 0.0)),
+        is_list=any(isinstance(arguments.get(name), list) for name in PARAMETERS[2:]),
     )
 
 
 # Private
+
+
+def _places(distances: object, laterals: object) -> tuple[tuple[float, float], ...]:
+    """Each distance with its offset; one that is no list goes with each of the others."""
+    along = _numbers("distance_m", distances, FURTHEST_M)
+    aside = _numbers("lateral_m", laterals, WIDEST_M)
+    count = max(len(along), len(aside))
+    for name, values, given in (("distance_m", along, distances), ("lateral_m", aside, laterals)):
+        if len(values) != count and isinstance(given, list):
+            other = "lateral_m" if name == "distance_m" else "distance_m"
+            raise ToolError(
+                TOOL,
+                f"{name} is a list of {len(values)} and {other} one of {count}: make them equally "
+                "long, or give one number for all places",
+            )
+    along, aside = (values * count if len(values) == 1 else values for values in (along, aside))
+    return tuple(zip(along, aside, strict=True))
+
+
+def _numbers(name: str, value: object, limit: float) -> tuple[float, ...]:
+    if not isinstance(value, list):
+        return (_number(name, value, limit),)
+    if not 1 <= len(value) <= MOST_PLACES:
+        raise ToolError(TOOL, f"{name} must be a number or a list of 1 to {MOST_PLACES} numbers")
+    return tuple(_number(name, one, limit) for one in value)
 
 
 def _lane(value: object) -> str | CubicBezier:

@@ -2,7 +2,8 @@
 
     python -m tests.benchmarks.pose_on_lane
 
-Errors are read every 0.25 m on the whole map; headings against the chord of 2.5 m either way.
+Errors are read every 0.25 m on the whole map: of the tool's answers by id, and of the control
+points as the prompt writes them; headings against the chord of 0.75 m either way.
 Calls are timed as a model makes them, from the arguments to the answer, on the 80 m that a
 prompt shows: by a lane's id from its beginning, by its id from beside the ego (or the error if
 that is nowhere beside it), and by four control points. "build" is the first time for a scene.
@@ -21,19 +22,26 @@ from augment.prompts.lane_curves import control_points
 from augment.scene.bezier_lanes import bezier_lane
 from augment.scene.entities import Scene
 from augment.variants.pose_tool import PoseTool
-from tests.recorded import recorded
-from tests.variants.pose_accuracy import accuracy, authored_scenes, whole_map
+from tests.variants.pose_accuracy import (
+    accuracy,
+    authored_scenes,
+    recorded_scenes,
+    text_accuracy,
+    whole_map,
+)
 
 CALLS = 600
+EVERY_M = 0.25
 COLUMNS = (
     ("scene", 18),
     ("lanes", 6),
     ("pieces", 7),
     ("most", 5),
-    ("off m", 7),
-    ("deg p95", 8),
-    ("deg max", 8),
-    ("worst on", 12),
+    ("id m", 7),
+    ("id deg", 7),
+    ("text m", 7),
+    ("text deg", 9),
+    ("worst on", 14),
     ("build ms", 9),
     ("lane us", 8),
     ("ego us", 7),
@@ -46,7 +54,7 @@ def main() -> None:
     print("".join(f"{title:>{width}}" for title, width in COLUMNS))
     scenes = authored_scenes()
     if folder := os.environ.get("REALDATA_DIR"):
-        scenes.append(recorded(Path(folder))[0])
+        scenes += recorded_scenes(Path(folder))
     for scene in scenes:
         cells = (scene.name, *_accuracy_cells(scene), *_time_cells(scene))
         print("".join(f"{cell:>{width}}" for cell, (_, width) in zip(cells, COLUMNS, strict=True)))
@@ -54,16 +62,17 @@ def main() -> None:
 
 def _accuracy_cells(scene: Scene) -> tuple[str, ...]:
     tool = whole_map(scene)
-    found = accuracy(tool)
+    by_id, by_text = accuracy(tool, EVERY_M), text_accuracy(tool, EVERY_M)
     counts = [len(curve.lane.pieces) for curve in tool.curves.values()]
     return (
         str(len(counts)),
         str(sum(counts)),
         str(max(counts)),
-        f"{found.position_m.max():.3f}",
-        f"{found.heading_deg(95):.2f}",
-        f"{found.heading_deg(100):.2f}",
-        found.worst_heading_on,
+        f"{by_id.position_m.max():.3f}",
+        f"{by_id.heading_deg(100):.2f}",
+        f"{by_text.position_m.max():.3f}",
+        f"{by_text.heading_deg(100):.2f}",
+        by_text.worst_heading_on,
     )
 
 

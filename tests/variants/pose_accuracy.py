@@ -4,23 +4,36 @@ from __future__ import annotations
 
 import json
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cache
 from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
+from augment.formats.readers import recognise
+from augment.geometry.bezier import CubicBezier
+from augment.geometry.frames import Pose
+from augment.prompts.lane_curves import control_points
 from augment.prompts.names import short_names
 from augment.scene.codec import scene_from_document
 from augment.scene.entities import Scene
 from augment.scene.lane_graph import LaneGraph
 from augment.variants.pose_tool import PoseTool
 
-AUTHORED = Path(__file__).parents[2] / "fixtures" / "scenes"
+FIXTURES = Path(__file__).parents[2] / "fixtures"
+FILES = (
+    "av2_sensor/7fab2350-7eaf-3b7e-a39d-6937a4c1bede",
+    "commonroad/USA_Peach-4_8_T-1.xml",
+    "scenarionet/sd_nuscenes_mini_val_scene-0103*.pkl",
+    "waymo_motion/womd_scenario_input.tfrecord",
+)
 
-CHORD_M = 2.5
-STEP_M = 0.25
+CHORD_M = 0.75
+EVERY_M = 2.0
+"""In tests; the benchmark reads every 0.25 m."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -37,25 +50,63 @@ class Accuracy:
 
 
 def authored_scenes() -> list[Scene]:
+    """The scenes of the catalogue, and of further sets that lie beside it."""
     return [
         scene_from_document(json.loads(path.read_text(encoding="utf-8")))
-        for path in sorted(AUTHORED.glob("*.json"))
+        for path in sorted(FIXTURES.glob("**/scenes/*.json"))
     ]
+
+
+@cache
+def recorded_scenes(realdata: Path) -> tuple[Scene, ...]:
+    """One scene of each recorded file."""
+    found = []
+    for pattern in FILES:
+        (path,) = realdata.glob(pattern)
+        reader = recognise(path)
+        found.append(reader.read(path, item=None, frame=None, name=reader.name).scene)
+    return tuple(found)
 
 
 def whole_map(scene: Scene) -> PoseTool:
     return PoseTool(scene, radius_m=math.inf)
 
 
-def accuracy(tool: PoseTool) -> Accuracy:
-    """Each lane of the tool's scene read every 0.25 m from its beginning to its end."""
+def accuracy(tool: PoseTool, every_m: float = EVERY_M) -> Accuracy:
+    """What the tool says by id on each lane of its scene, from end to end."""
+    return _measured(
+        tool, every_m, lambda name: lambda s_m: tool.pose_on_lane(name, "lane", s_m).pose
+    )
+
+
+def text_accuracy(tool: PoseTool, every_m: float = EVERY_M) -> Accuracy:
+    """The same of the control points that the prompt shows, as written to the centimetre."""
+
+    def reader_of(name: str) -> Callable[[float], Pose]:
+        lane = tool.curves[name].lane
+        pieces = [CubicBezier(control) for control in control_points(lane)]
+
+        def read(s_m: float) -> Pose:
+            number = lane.piece_at(s_m)
+            piece, curve = lane.pieces[number], pieces[number]
+            share = (s_m - piece.start_m) / piece.length_m
+            return curve.pose_at(min(share, 1.0) * curve.length_m)
+
+        return read
+
+    return _measured(tool, every_m, reader_of)
+
+
+def _measured(
+    tool: PoseTool, every_m: float, reader_of: Callable[[str], Callable[[float], Pose]]
+) -> Accuracy:
     names = short_names(tool.scene)
     positions: list[float] = []
     headings: list[float] = []
     worst_position, worst_heading = (0.0, ""), (0.0, "")
     for way in LaneGraph(tool.scene).lanes.values():
         name = names.lanes[way.id]
-        gaps_m, turns_rad = _errors_on(tool, name, way.centerline.points_m)
+        gaps_m, turns_rad = _errors_on(reader_of(name), way.centerline.points_m, every_m)
         positions += gaps_m
         headings += turns_rad
         worst_position = max(worst_position, (max(gaps_m), name))
@@ -69,7 +120,7 @@ def accuracy(tool: PoseTool) -> Accuracy:
 
 
 def _errors_on(
-    tool: PoseTool, name: str, points: NDArray[np.float64]
+    pose_at: Callable[[float], Pose], points: NDArray[np.float64], every_m: float
 ) -> tuple[list[float], list[float]]:
     lengths = [math.dist(a, b) for a, b in pairwise(points)]
     along = np.concatenate([[0.0], np.cumsum(lengths)])
@@ -81,8 +132,8 @@ def _errors_on(
         )
 
     gaps_m, turns_rad = [], []
-    for s_m in [*np.arange(0.0, along[-1], STEP_M).tolist(), float(along[-1])]:
-        pose = tool.pose_on_lane(name, "lane", s_m).pose
+    for s_m in [*np.arange(0.0, along[-1], every_m).tolist(), float(along[-1])]:
+        pose = pose_at(s_m)
         gaps_m.append(math.dist((pose.x_m, pose.y_m), source(s_m)))
         if CHORD_M <= s_m <= along[-1] - CHORD_M:
             (x0, y0), (x1, y1) = source(s_m - CHORD_M), source(s_m + CHORD_M)

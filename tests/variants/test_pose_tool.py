@@ -16,7 +16,7 @@ from augment.geometry.polyline import Polyline
 from augment.prompts.calls import TOOL
 from augment.prompts.lane_curves import control_points
 from augment.scene.entities import Lane
-from augment.variants.pose_call import FURTHEST_M, WIDEST_M, CallLimits
+from augment.variants.pose_call import FURTHEST_M, MOST_PLACES, WIDEST_M, CallLimits
 from augment.variants.pose_tool import PoseTool
 from tests.scenes import curve, junction, scene, vehicle
 
@@ -32,9 +32,9 @@ def winding() -> PoseTool:
 
 def test_a_distance_from_the_ego_is_measured_along_its_lane() -> None:
     place = BEND.pose_on_lane("Lane1", "Agent1", 10.0 + 40.0 * math.radians(30.0), 1.0)
-    assert place.pose.x_m == pytest.approx(10.0 + 39.0 * math.sin(math.radians(30.0)), abs=0.3)
-    assert place.pose.y_m == pytest.approx(40.0 - 39.0 * math.cos(math.radians(30.0)), abs=0.3)
-    assert math.degrees(place.pose.heading_rad) == pytest.approx(30.0, abs=3.0)
+    assert place.pose.x_m == pytest.approx(10.0 + 39.0 * math.sin(math.radians(30.0)), abs=0.02)
+    assert place.pose.y_m == pytest.approx(40.0 - 39.0 * math.cos(math.radians(30.0)), abs=0.02)
+    assert math.degrees(place.pose.heading_rad) == pytest.approx(30.0, abs=0.5)
     assert place.start_lateral_m == pytest.approx(0.0, abs=0.01)
 
 
@@ -55,10 +55,77 @@ def test_the_answer_carries_what_an_agent_of_the_block_needs() -> None:
         "along_m": 65.0,
         "remaining_m": 5.0,
         "lane_width_m": 3.5,
+        "edge_left_m": 1.75,
+        "edge_right_m": 1.75,
         "next_lanes": ["Connector1", "Connector2"],
         "route": ["Lane1"],
         "start_lateral_m": 0.0,
     }
+
+
+def places(answer: dict[str, object]) -> list[dict[str, object]]:
+    found = answer["poses"]
+    assert isinstance(found, list)
+    return found
+
+
+def test_one_call_asks_for_several_places() -> None:
+    call = {"lane": "Lane1", "start": "Agent1"}
+    several = JUNCTION.answer({**call, "distance_m": [5, 10, 300], "lateral_m": [0, 1, 2]})
+    first, second, third = places(several)
+    assert first == {"distance_m": 5.0, "lateral_m": 0.0} | JUNCTION.answer(
+        {**call, "distance_m": 5}
+    )
+    assert (second["x_m"], second["y_m"]) == (10.0, 1.0)
+    assert list(third) == ["distance_m", "lateral_m", "error"]
+    row = JUNCTION.answer({**call, "distance_m": 5, "lateral_m": [-1, 1]})
+    assert [one["y_m"] for one in places(row)] == [-1.0, 1.0]
+
+
+@pytest.mark.parametrize(
+    ("lateral_m", "lane", "other"),
+    [
+        (1.75, "Lane1", "none"),
+        (1.76, None, "Lane2"),
+        (3.5, None, "Lane2"),
+        (5.26, None, None),
+        (-1.75, "Lane1", "none"),
+        (-1.76, None, None),
+    ],
+)
+def test_outside_the_width_of_the_lane_there_is_no_lane(
+    lateral_m: float, lane: str | None, other: str | None
+) -> None:
+    answer = STREET.answer(
+        {"lane": "Lane1", "start": "lane", "distance_m": 60, "lateral_m": lateral_m}
+    )
+    assert answer["lane"] == lane
+    assert answer.get("other_lane", "none") == other
+
+
+def test_the_edges_of_the_road_are_told_from_the_centre_of_the_lane() -> None:
+    ahead = STREET.pose_on_lane("Lane1", "lane", 60.0, 1.0)
+    assert [ahead.edge_left_m, ahead.edge_right_m] == pytest.approx([5.25, 1.75])
+    back = STREET.pose_on_lane("Lane2", "lane", 60.0)
+    assert [back.edge_left_m, back.edge_right_m] == pytest.approx([5.25, 1.75])
+
+
+def test_a_seam_between_lanes_is_no_edge_and_a_verge_is_one() -> None:
+    first = scene().lanes[0]
+    row = [
+        replace(first, id=f"Lane{n}", centerline=Polyline([(-50, y), (100, y)]))
+        for n, y in ((1, 0.0), (2, 3.75), (3, 7.9))
+    ]
+    place = PoseTool(scene(lanes=tuple(row), areas=())).pose_on_lane("Lane1", "lane", 60.0)
+    assert place.edge_left_m == pytest.approx(3.75 + 1.75)
+
+
+def test_a_road_without_an_edge_nearby_has_none() -> None:
+    square = replace(
+        scene().areas[0], boundary_m=((-90.0, -90.0), (90.0, -90.0), (90.0, 90.0), (-90.0, 90.0))
+    )
+    place = PoseTool(scene(areas=(square,))).pose_on_lane("Lane1", "lane", 60.0)
+    assert (place.edge_left_m, place.edge_right_m) == (None, None)
 
 
 def test_a_distance_runs_on_straight_over_connectors_and_back_again() -> None:
@@ -132,6 +199,14 @@ def test_ids_from_other_peoples_files_go_by_their_short_forms() -> None:
         ({"distance_m": True}, "distance_m must be a number"),
         ({"distance_m": math.nan}, "distance_m must be between -1000 and 1000"),
         ({"distance_m": 10**400}, "distance_m must be between -1000 and 1000"),
+        ({"distance_m": [1, "2"]}, "distance_m must be a number"),
+        ({"distance_m": []}, "distance_m must be a number or a list of 1 to 16 numbers"),
+        ({"distance_m": [1.0] * 17}, "distance_m must be a number or a list of 1 to 16 numbers"),
+        (
+            {"distance_m": [1, 2, 3], "lateral_m": [1, 2]},
+            "lateral_m is a list of 2 and distance_m",
+        ),
+        ({"distance_m": [1], "lateral_m": [1, 2]}, "distance_m is a list of 1 and lateral_m"),
         ({"lateral_m": 31}, "lateral_m must be between -30 and 30"),
         ({"start": 3}, 'start must be "lane" or the id of an agent'),
         ({"lane": [[0, 0], [1, 1]]}, "lane must be an id or four control points"),
@@ -224,9 +299,10 @@ def test_the_texts_tell_of_the_tool_as_it_is() -> None:
     parameters = schema["function"]["parameters"]
     assert schema["function"]["name"] == TOOL
     assert list(parameters["properties"]) == ["lane", "start", "distance_m", "lateral_m"]
-    assert parameters["properties"]["distance_m"]["maximum"] == FURTHEST_M
-    assert parameters["properties"]["lateral_m"]["minimum"] == -WIDEST_M
+    one, several = parameters["properties"]["distance_m"]["anyOf"]
+    assert (one["maximum"], several["maxItems"]) == (FURTHEST_M, MOST_PLACES)
+    assert parameters["properties"]["lateral_m"]["anyOf"][0]["minimum"] == -WIDEST_M
     told = texts.joinpath("pose_on_lane.md").read_text(encoding="utf-8")
     answer = JUNCTION.answer({"lane": "Lane1", "start": "Agent1", "distance_m": 1})
-    for name in (*parameters["properties"], *answer, "error"):
+    for name in (*parameters["properties"], *answer, "other_lane", "error"):
         assert name in told
