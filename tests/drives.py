@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import zlib
+from collections.abc import Iterable
 from functools import cache
 from typing import Any
 
@@ -63,3 +64,28 @@ def finished(job: GenerationJob) -> GenerationJob:
     GenerationJob.objects.filter(pk=job.pk).update(state=GenerationJob.State.FINISHED)
     job.refresh_from_db()
     return job
+
+
+def drive_pictures(rows: Iterable[Augmentation], **how: object) -> list[Simulation]:
+    """A drive of each of these augmentations, in which everything changed is named after it."""
+    trace, document = short_drive()
+    made = []
+    for row in rows:
+        own = json.loads(zlib.decompress(trace))
+        for one in own["objects"]:
+            one["id"] = f"{row.contestant.slug}-{one['id']}"
+        columns = {"planner": "pdm-closed", "offsets": "paper", "is_reactive": False} | how
+        made.append(
+            Simulation.objects.create(
+                scenario=row.scenario,
+                augmentation=row,
+                subject=Simulation.Subject.AUGMENTATION,
+                state=Simulation.State.DONE,
+                nuplan_score=0.4321,
+                interplan_score=0.4321,
+                document=document,
+                trace=zlib.compress(json.dumps(own).encode()),
+                **columns,
+            )
+        )
+    return made

@@ -34,6 +34,10 @@ class Study(models.Model):
     allow_text = models.BooleanField(
         default=False, help_text="experts may read what was changed, beside looking at it"
     )
+    allow_replay = models.BooleanField(
+        default=False,
+        help_text="experts may play drives under the pictures; `rules` says of which scenarios",
+    )
     votes_to_plan = models.JSONField(
         default=dict, help_text="votes that the adaptive part still has to plan, by username"
     )

@@ -12,7 +12,7 @@ from django.utils.translation import gettext_lazy as _
 from arena.models.studies import Matchup
 from augment.models import AppendOnly, Augmentation
 
-AIDS = ("zoom", "original", "ruler", "flip", "text")
+AIDS = ("zoom", "original", "ruler", "flip", "text", "replay")
 """What an expert may look with; a vote names those that were used."""
 
 _AID_SETS = [

@@ -23,6 +23,7 @@ USUAL_KEYS: dict[str, tuple[str, ...]] = {
     "reset": ("0",),
     "ruler": ("m",),
     "text": ("t",),
+    "replay": ("d",),
     "legend": ("l",),
     "help": ("h", "?"),
 }
@@ -41,12 +42,13 @@ KEY_LABELS = {
     "reset": gettext_noop("Zoom back"),
     "ruler": gettext_noop("Ruler"),
     "text": gettext_noop("Text description"),
+    "replay": gettext_noop("Drives"),
     "legend": gettext_noop("Legend"),
     "help": gettext_noop("Help"),
 }
 """Action -> what the page calls it, in English."""
 
-SOMETIMES = ("text",)
+SOMETIMES = ("text", "replay")
 """Actions that only some studies have: their usual key gives way to one that was chosen."""
 
 SWITCHES: dict[str, bool] = {"single_keys": True, "legend": True, "keep_zoom": False}

@@ -21,6 +21,7 @@ from arena.services.plans import (
     rules_of,
     store,
 )
+from arena.services.replays import Replays, replays_of
 from augment.errors import Conflict, UnknownName
 from augment.models import Contestant, Scenario
 from augment.sentences import sentence
@@ -49,6 +50,7 @@ class PlanOptions:
     pair_votes: tuple[tuple[str, str, int], ...] = ()
     allow_both_miss: bool = False
     allow_text: bool = False
+    allow_replay: bool = False
 
 
 _OF_THE_PLAN = ("appearances", "pair_votes", "repeat_share", "check_share", "adaptive_share")
@@ -85,7 +87,7 @@ def open_study(
         UnknownName: A contestant, scenario or expert does not exist.
         Conflict: The name is taken, the seed is out of range, or something simulated takes part
             unasked.
-        NothingToPlan: Pictures are missing or too few, also of checks; the text has numbers.
+        NothingToPlan: Pictures or drives are missing or too few, also of checks; the text says.
     """
     name, given = _free_name(name), options or PlanOptions()
     _check_seed(seed)
@@ -104,16 +106,12 @@ def open_study(
         **{name: getattr(given, name) for name in _OF_THE_PLAN},
     )
     planned = plan(rules)
-    study = _insert(name, rules, planned, given, allow_simulated)
+    played = replays_of(broken | shown) if given.allow_replay else None
+    study = _insert(name, _frozen_rules(rules, planned, played), given, rules, allow_simulated)
     _enrol(study, contestant_rows, scenario_rows, expert_rows)
     store(study, planned.matchups, broken | shown, expert_rows)
-    log_event(
-        actor=actor,
-        verb="open",
-        object_kind="study",
-        object_code=study.code,
-        after={"name": name, "matchups": len(planned.matchups), "seed": seed},
-    )
+    after = {"name": name, "matchups": len(planned.matchups), "seed": seed}
+    log_event(actor=actor, verb="open", object_kind="study", object_code=study.code, after=after)
     return study
 
 
@@ -219,7 +217,11 @@ def _entries(shown: Cells) -> tuple[Entry, ...]:
 
 
 def _insert(
-    name: str, rules: PlanRules, planned: MatchupPlan, given: PlanOptions, allow_simulated: bool
+    name: str,
+    frozen: dict[str, Any],
+    given: PlanOptions,
+    rules: PlanRules,
+    allow_simulated: bool,
 ) -> Study:
     try:
         with transaction.atomic():
@@ -228,10 +230,11 @@ def _insert(
                 state=Study.State.OPEN,
                 votes_per_expert=rules.votes_per_expert,
                 seed=rules.seed,
-                rules=_frozen_rules(rules, planned),
+                rules=frozen,
                 allow_simulated=allow_simulated,
                 allow_both_miss=given.allow_both_miss,
                 allow_text=given.allow_text,
+                allow_replay=given.allow_replay,
                 votes_to_plan=(
                     dict.fromkeys(rules.experts, rules.votes_later) if rules.votes_later else {}
                 ),
@@ -253,9 +256,13 @@ def _taken(name: str) -> Conflict:
     return Conflict(sentence("There is a study named '%(name)s' already.", name=name))
 
 
-def _frozen_rules(rules: PlanRules, planned: MatchupPlan) -> dict[str, Any]:
-    """Everything that the plan came from, and what it had to give up."""
+def _frozen_rules(
+    rules: PlanRules, planned: MatchupPlan, played: Replays | None
+) -> dict[str, Any]:
+    """Everything that the plan came from, what it had to give up, and which drives are played."""
     kept: dict[str, Any] = {"planner": PLANNER, **asdict(rules)}
     kept["scenario_gap_kept"] = planned.scenario_gap
     kept["identical"] = [list(triple) for triple in planned.identical]
+    if played is not None:
+        kept["replays"] = asdict(played)
     return kept

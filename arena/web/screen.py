@@ -199,8 +199,9 @@ def _preferences(study: Study, kept: VotingPreferences) -> dict[str, Any]:
 
 
 def _actions(study: Study) -> list[str]:
-    """What keys do here: nothing tells of a text description where there is none."""
-    return [name for name in USUAL_KEYS if name != "text" or study.allow_text]
+    """What keys do here: nothing tells of what the study does not have."""
+    without = {"text": not study.allow_text, "replay": not study.allow_replay}
+    return [name for name in USUAL_KEYS if not without.get(name)]
 
 
 def _looks(study: Study) -> list[tuple[str, str]]:
@@ -209,6 +210,7 @@ def _looks(study: Study) -> list[tuple[str, str]]:
         "zoom": _("Zoom"),
         "ruler": _("Ruler"),
         "text": pgettext("a way to look", "Text"),
+        "replay": _("Drives"),
         "legend": _("Legend"),
     }
     return [(name, labels[name]) for name in _actions(study) if name in labels]

@@ -34,6 +34,7 @@ class StudyForm(ChoiceForm):
     targets = forms.CharField(required=False, max_length=20_000)
     allow_both_miss = forms.BooleanField(required=False)
     allow_text = forms.BooleanField(required=False)
+    allow_replay = forms.BooleanField(required=False)
     allow_simulated = forms.BooleanField(required=False)
 
     def __init__(self, *args: Any, experts: list[User], **kwargs: Any) -> None:
@@ -66,6 +67,7 @@ class StudyForm(ChoiceForm):
             pair_votes=pair_votes,
             allow_both_miss=entered["allow_both_miss"],
             allow_text=entered["allow_text"],
+            allow_replay=entered["allow_replay"],
         )
         given = {name: entered[name] for name in (*names, "allow_simulated")}
         return given | {"options": options}

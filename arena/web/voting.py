@@ -7,7 +7,7 @@ from typing import cast
 
 from django.contrib import messages
 from django.contrib.auth.models import User
-from django.http import Http404, HttpRequest, HttpResponse, HttpResponseBase
+from django.http import Http404, HttpRequest, HttpResponse, HttpResponseBase, JsonResponse
 from django.shortcuts import redirect, render
 from django.utils.translation import gettext as _
 from django.views.decorators.cache import never_cache
@@ -15,6 +15,7 @@ from django.views.decorators.http import require_http_methods, require_POST, req
 
 from arena.errors import AlreadyDecided, InvalidVote, NotYours, StudyNotOpen, TooFast
 from arena.models import Study
+from arena.queries.replays import drives_of_pair
 from arena.queries.showings import picture_shown
 from arena.queries.studies import voting_study
 from arena.services.reports import report
@@ -85,6 +86,19 @@ def matchup_image(request: HttpRequest, token: str) -> HttpResponseBase:
     except NotYours as error:
         raise Http404 from error
     return picture_response(name)
+
+
+@allow_only(EXPERT, ADMIN)
+@require_safe
+def replay(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
+    """How a planner drove both scenes of a pair, for the script that plays it."""
+    try:
+        drives = drives_of_pair(user=cast(User, request.user), code=code)
+    except NotYours as error:
+        raise Http404 from error
+    if drives is None:
+        raise Http404
+    return JsonResponse(drives, headers={"Cache-Control": "private, no-store"})
 
 
 # Private

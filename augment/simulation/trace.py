@@ -5,6 +5,7 @@ Metres to the centimetre, radians to the milliradian. Poses are those of box cen
 
 from __future__ import annotations
 
+import json
 from typing import Any
 
 import numpy as np
@@ -46,6 +47,21 @@ def trace_of(setting: DriveSetting, drive: Drive, score: Score) -> dict[str, Any
             for one in events_of(drive, score)
         ],
         "road": _road(drive),
+    }
+
+
+def blind_trace(trace: dict[str, Any]) -> dict[str, Any]:
+    """A trace for experts who must not learn who changed the scene: who moved how, and the road.
+
+    Ids and their order go, since every contestant names and sorts in its own way; what the
+    planner thought and scored goes, since it is no part of the picture.
+    """
+    objects = [
+        {name: value for name, value in one.items() if name != "id"} for one in trace["objects"]
+    ]
+    return {
+        **{name: trace[name] for name in ("format", "version", "step_s", "steps", "ego", "road")},
+        "objects": sorted(objects, key=lambda one: json.dumps(one, sort_keys=True)),
     }
 
 

@@ -1,150 +1,7 @@
 // Plays the drives of one page in step: each canvas draws its own trace, one clock drives them all.
+import { coloursIn, View } from "./film.js";
+
 const player = document.getElementById("player");
-const PX_PER_M = 10;
-const BEHIND = 0.3;
-
-class View {
-  constructor(canvas, trace) {
-    this.canvas = canvas;
-    this.trace = trace;
-    this.pen = canvas.getContext("2d");
-    const xs = trace.ego.poses.map((pose) => pose[0]);
-    const ys = trace.ego.poses.map((pose) => pose[1]);
-    this.box = [Math.min(...xs) - 20, Math.max(...xs) + 30, Math.min(...ys) - 20, Math.max(...ys) + 20];
-  }
-
-  // From metres to the canvas: following the ego at a fixed scale, or the whole drive.
-  aim(step, follow) {
-    const { width, height } = this.canvas;
-    if (follow) {
-      const [x, y] = this.trace.ego.poses[step];
-      this.scale = PX_PER_M;
-      this.left = x - (BEHIND * width) / PX_PER_M;
-      this.top = y + height / 2 / PX_PER_M;
-      return;
-    }
-    const [left, right, bottom, top] = this.box;
-    this.scale = Math.min(width / (right - left), height / (top - bottom));
-    this.left = (left + right) / 2 - width / 2 / this.scale;
-    this.top = (top + bottom) / 2 + height / 2 / this.scale;
-  }
-
-  path(flat, close) {
-    this.pen.beginPath();
-    for (let n = 0; n < flat.length; n += 2) {
-      const x = (flat[n] - this.left) * this.scale;
-      const y = (this.top - flat[n + 1]) * this.scale;
-      if (n === 0) this.pen.moveTo(x, y);
-      else this.pen.lineTo(x, y);
-    }
-    if (close) this.pen.closePath();
-  }
-
-  fill(flat, colour) {
-    this.path(flat, true);
-    this.pen.fillStyle = colour;
-    this.pen.fill();
-  }
-
-  stroke(flat, colour, width, close = false) {
-    this.path(flat, close);
-    this.pen.strokeStyle = colour;
-    this.pen.lineWidth = width;
-    this.pen.stroke();
-  }
-
-  draw(step, options, colours) {
-    const at = Math.min(step, this.trace.steps - 1);
-    this.aim(at, options.follow);
-    this.pen.fillStyle = colours.ground;
-    this.pen.fillRect(0, 0, this.canvas.width, this.canvas.height);
-    this.drawRoad(colours);
-    if (options.proposals) this.drawProposals(at, colours);
-    for (const one of this.trace.objects) this.drawObject(one, at, colours);
-    const ego = this.trace.ego;
-    this.drawBox(ego.poses[at], ego.length_m, ego.width_m, colours.ego, colours.ink, 2);
-    this.drawText(at, colours);
-  }
-
-  drawRoad(colours) {
-    const road = this.trace.road;
-    for (const ring of road.walkways) this.fill(ring, colours.walk);
-    for (const [outer, ...holes] of road.drivable) {
-      this.fill(outer, colours.road);
-      this.stroke(outer, colours.edge, 1.5, true);
-      for (const hole of holes) this.fill(hole, colours.ground);
-    }
-    for (const ring of road.crosswalks) this.fill(ring, colours.lane);
-    for (const lane of road.lanes) {
-      this.stroke(lane.edge, colours.lane, 1, true);
-      this.pen.setLineDash([6, 8]);
-      this.stroke(lane.line, lane.is_red ? colours.low : colours.edge, lane.on_route ? 1.5 : 0.75);
-      this.pen.setLineDash([]);
-    }
-  }
-
-  drawProposals(step, colours) {
-    const plan = this.trace.plans.findLast((one) => one.step <= step);
-    if (!plan) return;
-    const order = plan.scores.map((score, n) => [score, n]).sort((a, b) => a[0] - b[0]);
-    for (const [score, n] of order) {
-      const colour = `color-mix(in oklab, ${colours.high} ${Math.round(100 * score)}%, ${colours.low})`;
-      this.pen.globalAlpha = n === plan.chosen ? 1 : 0.45;
-      this.stroke(plan.lines[n], colour, n === plan.chosen ? 4 : 1.25);
-    }
-    this.pen.globalAlpha = 1;
-    const best = plan.lines[plan.chosen];
-    this.stroke(best, colours.high, 4);
-  }
-
-  drawObject(one, step, colours) {
-    const still = one.poses.length === 1 && one.first === 0;
-    const pose = still ? one.poses[0] : one.poses[step - one.first];
-    if (!pose) return;
-    const colour = one.changed ? colours.changed : colours.other;
-    this.drawBox(pose, one.length_m, one.width_m, colour, colours.ink, one.changed ? 2 : 1);
-  }
-
-  drawBox([x, y, heading], length, width, colour, ink, line) {
-    const [cos, sin] = [Math.cos(heading), Math.sin(heading)];
-    const turned = (along, left) => [x + along * cos - left * sin, y + along * sin + left * cos];
-    const [l, w] = [length / 2, width / 2];
-    const rim = [turned(l, w), turned(-l, w), turned(-l, -w), turned(l, -w)].flat();
-    this.fill(rim, colour);
-    this.stroke(rim, ink, line, true);
-    if (length > 1.5) {
-      this.stroke([turned(l * 0.5, w * 0.8), turned(l, 0), turned(l * 0.5, -w * 0.8)].flat(), ink, 1.5);
-    }
-  }
-
-  drawText(step, colours) {
-    const speed = this.trace.ego.poses[step][3];
-    const braking = this.trace.braking.includes(step);
-    this.pen.font = "600 16px sans-serif";
-    this.pen.fillStyle = braking ? colours.low : colours.ink;
-    const mark = braking ? " ■" : "";
-    this.pen.fillText(`${(step * this.trace.step_s).toFixed(1)} s   ${speed.toFixed(1)} m/s${mark}`, 14, 26);
-    // A scale of 10 m.
-    const y = this.canvas.height - 18;
-    this.pen.fillRect(14, y, 10 * this.scale, 3);
-    this.pen.fillText("10 m", 14, y - 6);
-  }
-}
-
-function coloursNow() {
-  // Light or dark is settled by the browser: a probe says which colour a variable is right now.
-  const probe = document.createElement("i");
-  player.append(probe);
-  const names = ["ground", "road", "edge", "walk", "lane", "ego", "changed", "other", "ink", "low", "high"];
-  const found = {};
-  for (const name of names) {
-    probe.style.color = `var(--drive-${name})`;
-    found[name] = getComputedStyle(probe).color;
-  }
-  probe.remove();
-  return found;
-}
-
 class Player {
   constructor(views) {
     this.views = views;
@@ -157,7 +14,9 @@ class Player {
     this.names = JSON.parse(document.getElementById("event-names").content.textContent);
     this.listen();
     this.listEvents();
-    this.show(0);
+    const sizes = new ResizeObserver(() => this.resize());
+    for (const view of views) sizes.observe(view.canvas.parentNode);
+    this.resize();
   }
 
   listen() {
@@ -169,6 +28,11 @@ class Player {
       document.getElementById(id).addEventListener("change", () => this.show(this.step));
     }
     matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => this.show(this.step));
+  }
+
+  resize() {
+    for (const view of this.views) view.fit();
+    this.show(this.step);
   }
 
   listEvents() {
@@ -232,7 +96,7 @@ class Player {
       follow: document.getElementById("follow").checked,
       proposals: document.getElementById("proposals").checked,
     };
-    const colours = coloursNow();
+    const colours = coloursIn(player);
     for (const view of this.views) view.draw(this.step, options, colours);
   }
 }

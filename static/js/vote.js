@@ -210,6 +210,7 @@ const actions = {
   reset: () => lens.reset(),
   ruler: () => lens.rule(true),
   text: () => lists && page.toggleText() && lens.aids.add("text"),
+  replay: () => import("./vote-replay.js").then(({ toggleReplay }) => toggleReplay(lens.aids), () => page.note(text("unreachable"))),
   legend: () => ask(urls.preferences, { legend: page.toggleLegend() }),
   help: () => import("./vote-help.js").then(({ showHelp }) => showHelp(), () => open(at("help-link").href)),
   again: () => pairs.fill(),

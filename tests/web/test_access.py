@@ -55,6 +55,7 @@ PAGES: dict[str, tuple[int, int, int]] = {
     "vote": (403, 403, 404),
     "vote-help": (403, 403, 404),
     "matchup-image": (200, 403, 404),
+    "replay": (404, 403, 404),  # the study plays no drives
 }
 ACTIONS: dict[str, tuple[int, int, int]] = {
     "job-retry": (302, 403, 403),
@@ -109,6 +110,7 @@ def address(name: str, here: World) -> str:
         "results-tab": {"code": here.study.code, "tab": "pairs"},
         "rating-again": {"code": here.study.code, "rating": STRANGER},
         "matchup-image": {"token": shown.left_token},
+        "replay": {"code": shown.code},
     }
     if name in ("drive", "drive-file"):
         row, _ = Simulation.objects.get_or_create(

@@ -10,12 +10,11 @@ from django.contrib.auth.models import User
 from django.test import Client
 from django.urls import reverse
 
-from arena.config.static_files import lean
 from arena.models import Study, Vote
 from tests import study_rows
 from tests.described import a_described_study, said_of
 from tests.web.cast import people, signed_in
-from tests.web.test_weight import MOST_BYTES, STATIC
+from tests.web.test_weight import MOST_BYTES, weight
 
 pytestmark = pytest.mark.django_db
 
@@ -126,4 +125,4 @@ def test_it_loads_no_script_and_no_style_of_its_own(eva: Client, study: Study) -
     study.matchups.update(descriptions=None)
     bare = eva.get(page(study)).content.decode()
     assert loaded == set(re.findall(r'(?:src|href)="/static/([^"]+\.(?:js|css))"', bare))
-    assert sum(len(lean((STATIC / name).read_text()).encode()) for name in loaded) <= MOST_BYTES
+    assert sum(weight(name) for name in loaded) <= MOST_BYTES

@@ -233,7 +233,7 @@ def test_a_report_that_can_not_be_read_keeps_nothing() -> None:
 def test_the_help_page_names_every_key() -> None:
     here = world()
     url = reverse("vote-help", args=[here.study.code])
-    here.study.allow_text = True
+    here.study.allow_text = here.study.allow_replay = True
     here.study.save()
     shown = signed_in(here.expert).get(url).content.decode()
     for keys in USUAL_KEYS.values():

@@ -9,12 +9,17 @@ import pytest
 from django.conf import settings
 from django.urls import reverse
 
-from arena.config.static_files import lean
+from arena.config.static_files import as_served
 from tests.web.cast import signed_in, world
 
 STATIC = Path(settings.BASE_DIR) / "static"
 MOST_BYTES = 40 * 1024
 OURS = sorted([*STATIC.rglob("*.js"), *STATIC.rglob("*.css")])
+
+
+def weight(name: str) -> int:
+    """The bytes of a script or a style sheet as it is served."""
+    return len(as_served(name, (STATIC / name).read_text()).encode())
 
 
 @pytest.mark.django_db
@@ -23,7 +28,7 @@ def test_scripts_and_styles_of_the_voting_page_weigh_at_most_40_kb() -> None:
     shown = signed_in(here.expert).get(reverse("vote", args=[here.study.code])).content.decode()
     loaded = set(re.findall(r'(?:src|href)="/static/([^"]+\.(?:js|css))"', shown))
     assert {"js/vote.js", "css/vote.css"} <= loaded
-    sizes = {name: len(lean((STATIC / name).read_text()).encode()) for name in sorted(loaded)}
+    sizes = {name: weight(name) for name in sorted(loaded)}
     assert sum(sizes.values()) <= MOST_BYTES, sizes
 
 
@@ -41,10 +46,20 @@ def test_the_page_names_every_module_that_its_script_imports() -> None:
 
 def test_comments_and_indentation_are_not_served() -> None:
     script = '// why\nconst a = {\n  b: "// no comment",\n};\n\n  // more\na.b;\n'
-    assert lean(script) == 'const a = {\nb: "// no comment",\n};\na.b;\n'
-    assert (
-        lean("/* About. */\na { b: c; } /* kept */\n  /* gone */\n") == "a { b: c; } /* kept */\n"
+    assert as_served("a.js", script) == 'const a = {\nb: "// no comment",\n};\na.b;\n'
+
+
+def test_style_sheets_go_without_blanks_around_braces() -> None:
+    style = (
+        "/* About. */\na b { c: d e; f: g; }\n@media (h: 1) {\n  /* gone */\n  i { j: k; }\n}\n"
     )
+    assert as_served("a.css", style) == "a b{c: d e;f: g}@media (h: 1){\ni{j: k}}"
+
+
+@pytest.mark.parametrize("path", [p for p in OURS if p.suffix == ".css"], ids=lambda p: p.name)
+def test_no_text_of_a_style_sheet_has_braces_or_semicolons(path: Path) -> None:
+    # Else taking away what is around them would change it.
+    assert not re.search(r'"[^"\n]*[{};][^"\n]*"', path.read_text())
 
 
 @pytest.mark.parametrize("path", OURS, ids=lambda path: path.name)

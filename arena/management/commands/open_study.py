@@ -67,6 +67,12 @@ class Command(TerminalCommand):
             help="let experts read a text description of what was changed",
         )
         parser.add_argument(
+            "--replay",
+            action="store_true",
+            help="let experts play the drives of both scenes under the pictures, where every "
+            "picture of a scenario was driven",
+        )
+        parser.add_argument(
             "--allow-simulated",
             action="store_true",
             help="let simulated contestants and experts take part; everything then says so",
@@ -92,6 +98,7 @@ class Command(TerminalCommand):
                     pair_votes=pair_votes,
                     allow_both_miss=options["both_miss"],
                     allow_text=options["text"],
+                    allow_replay=options["replay"],
                 ),
             )
         except (ArenaError, AugmentError) as error:

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import json
+from typing import Any
 
 from augment.models import Simulation
 from augment.render.film import animation, strip
 from augment.services.judging.simulations import trace_document
+from augment.simulation.trace import blind_trace
 
 FILES = {
     "json": "application/json",
@@ -31,3 +33,8 @@ def drive_file(row: Simulation, form: str, *, before: Simulation | None = None) 
     if form == "png":
         return strip(traces)
     return animation(traces, file_format=form)
+
+
+def blind_drive(row: Simulation) -> dict[str, Any]:
+    """A driven row as experts see it who must not learn who changed the scene."""
+    return blind_trace(trace_document(row))

@@ -1,0 +1,84 @@
+"""D plays how a planner drove both scenes, under their pictures, and the vote says so."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import pytest
+from playwright.sync_api import Browser, Page, expect
+from pytest_django.live_server_helper import LiveServer
+
+from tests.browser.booth import PHONE, Booth, all_sent, hang, press, ready
+from tests.web.test_replay import a_replayed_study
+
+pytestmark = [pytest.mark.browser, pytest.mark.django_db(transaction=True)]
+
+
+@pytest.fixture
+def played(live_server: LiveServer, browser: Browser) -> Iterator[Booth]:
+    """A booth whose study plays drives."""
+    study = hang(a_replayed_study(experts=("eva",)))
+    made = Booth(address=live_server.url, browser=browser, study=study)
+    yield made
+    made.leave()
+
+
+def picture(page: Page, number: int) -> str:
+    shown = page.locator(".side canvas").nth(number).evaluate("canvas => canvas.toDataURL()")
+    return str(shown)
+
+
+def test_d_plays_both_drives_in_step_and_the_next_pair_ends_it(played: Booth) -> None:
+    page = played.enter(reduced_motion="reduce")
+    switch = page.get_by_role("button", name="Drives D")
+    assert not page.evaluate("performance.getEntriesByType('resource')").count("film")
+    page.keyboard.press("d")
+    expect(page.locator(".side canvas")).to_have_count(2)
+    expect(switch).to_have_attribute("aria-pressed", "true")
+    first = [picture(page, number) for number in (0, 1)]
+    time = page.get_by_role("slider", name="Time")
+    # On the page an arrow would vote; here it moves in time.
+    time.focus()
+    page.keyboard.press("ArrowRight")
+    expect(page.locator(".replay-bar output")).to_have_text("0.1 s")
+    assert [picture(page, n) != first[n] for n in (0, 1)] == [True, True]
+    page.get_by_role("button", name="Play").click()
+    expect(page.locator(".replay-bar output")).to_have_text("1.2 s")
+    expect(page.get_by_role("button", name="Play")).to_be_visible()
+    page.locator("body").click(position={"x": 5, "y": 400})
+    press(page, "1")
+    expect(page.locator(".side canvas")).to_have_count(0)
+    expect(switch).to_have_attribute("aria-pressed", "false")
+    press(page, "3")
+    all_sent(page, 2)
+    assert [vote.aids for vote in played.votes()] == ["replay", ""]
+
+
+def test_a_pair_without_drives_says_so_and_counts_no_aid(played: Booth) -> None:
+    played.study.rules["replays"]["scenarios"] = []
+    played.study.save(update_fields=["rules"])
+    page = played.enter()
+    page.keyboard.press("d")
+    expect(page.locator("#note")).to_have_text("There is no drive of this pair.")
+    press(page, "2")
+    all_sent(page, 1)
+    assert played.votes()[0].aids == ""
+
+
+@pytest.mark.parametrize("how", [{}, {"viewport": PHONE}])
+def test_the_pictures_keep_their_place_above_the_drives(
+    played: Booth, how: dict[str, object]
+) -> None:
+    page = played.enter(**how, reduced_motion="reduce")
+    page.get_by_role("button", name="Drives").click()
+    expect(page.locator(".side canvas")).to_have_count(2)
+    ready(page)
+    for side in page.locator(".side").all():
+        panel, drive = side.locator(".panel").bounding_box(), side.locator("canvas").bounding_box()
+        assert panel is not None
+        assert drive is not None
+        assert panel["y"] + panel["height"] <= drive["y"] + 1
+        assert panel["height"] >= 150
+        assert drive["height"] >= 100
+    if not how:
+        assert page.evaluate("document.documentElement.scrollHeight <= innerHeight")

@@ -1,0 +1,156 @@
+"""Which drives a study plays under its pictures, to whom, and how little they tell."""
+
+from __future__ import annotations
+
+import json
+import uuid
+from io import StringIO
+
+import pytest
+from django.contrib.auth.models import User
+from django.core.management import call_command
+
+from arena.errors import InvalidVote, NothingToPlan, NotYours
+from arena.models import Matchup, Study, Vote
+from arena.queries.replays import drives_of_pair
+from arena.services.decisions import Decision, decision_of
+from arena.services.studies import PlanOptions, open_study
+from arena.services.votes import cast_vote
+from augment.models import Augmentation
+from augment.simulation.trace import blind_trace
+from tests.drives import drive_pictures
+from tests.studies.test_rules import with_checks
+from tests.study_rows import Cast, cast_of, matchups_of
+
+pytestmark = pytest.mark.django_db
+
+
+def played(cast: Cast, **options: object) -> Study:
+    return open_study(
+        name="Round 1",
+        votes_per_expert=12,
+        seed=7,
+        options=PlanOptions(allow_replay=True, **options),  # type: ignore[arg-type]
+        **cast,
+    )
+
+
+def pictures(*places: str) -> list[Augmentation]:
+    rows = Augmentation.objects.select_related("contestant", "scenario")
+    return list(rows.filter(scenario__slug__in=places) if places else rows)
+
+
+def decided(matchup: Matchup, *aids: str) -> Decision:
+    return decision_of(matchup_code=matchup.code, key=uuid.uuid4(), outcome="left", aids=aids)
+
+
+def eva() -> User:
+    return User.objects.get(username="eva")
+
+
+def test_a_scenario_is_played_where_all_of_its_pictures_were_driven_in_one_way() -> None:
+    cast = cast_of()
+    drive_pictures(pictures("place-0", "place-3"))
+    drive_pictures(pictures("place-1")[:2])  # one is missing
+    drive_pictures(pictures("place-2")[:2])
+    drive_pictures(pictures("place-2")[2:], offsets="original")  # the third in another way
+    study = played(cast)
+    assert study.allow_replay
+    assert study.rules["replays"] == {
+        "planner": "pdm-closed",
+        "offsets": "paper",
+        "is_reactive": False,
+        "scenarios": ["place-0", "place-3"],
+    }
+    for matchup in matchups_of(study, "eva"):
+        found = drives_of_pair(user=eva(), code=matchup.code)
+        assert (found is not None) == (matchup.scenario.slug in {"place-0", "place-3"})
+
+
+def test_what_is_driven_later_changes_nothing_for_an_open_study() -> None:
+    cast = cast_of()
+    drive_pictures(pictures("place-0"))
+    study = played(cast)
+    drive_pictures(pictures("place-1"))
+    at_1 = [one for one in matchups_of(study, "eva") if one.scenario.slug == "place-1"]
+    assert [drives_of_pair(user=eva(), code=one.code) for one in at_1] == [None] * len(at_1)
+
+
+def test_a_scenario_whose_attention_check_was_not_driven_is_not_played() -> None:
+    # Else only checks would have no drive, and could be told by that.
+    cast = with_checks()
+    checks = Augmentation.objects.filter(contestant__slug="attention-check")
+    drive_pictures(row for row in pictures() if row.contestant.slug != "attention-check")
+    with pytest.raises(NothingToPlan, match=r"attention-check on place-0, .*; 8 in all"):
+        played(cast, check_share=0.1)
+    assert not Study.objects.exists()
+    drive_pictures(checks.select_related("contestant", "scenario"))
+    assert len(played(cast, check_share=0.1).rules["replays"]["scenarios"]) == 8
+
+
+def test_who_made_a_picture_can_not_be_told_from_a_single_byte_of_its_drive() -> None:
+    cast = cast_of()
+    drive_pictures(pictures())
+    study = played(cast)
+    for matchup in matchups_of(study, "eva"):
+        found = drives_of_pair(user=eva(), code=matchup.code)
+        assert found is not None
+        # Three contestants that made the same change have the same drive to the last byte.
+        assert json.dumps(found["a"]) == json.dumps(found["b"])
+        said = json.dumps(found)
+        for word in ("ann", "bob", "cid", "pdm", "Agent", "0.43", "scores", "plans", "events"):
+            assert word not in said, word
+
+
+def test_ids_and_their_order_are_gone() -> None:
+    one = {"id": "Agent2", "type": "VEHICLE", "poses": [[1.0, 2.0, 0.0, 0.0]]}
+    two = {"id": "Agent3", "type": "TRAFFIC_CONE", "poses": [[5.0, 2.0, 0.0, 0.0]]}
+    plain = {"format": "f", "version": 1, "step_s": 0.1, "steps": 1, "ego": {}, "road": {}}
+    first = plain | {"objects": [one, two], "plans": [{"scores": [0.5]}], "braking": [0]}
+    second = plain | {"objects": [two | {"id": "b"}, one | {"id": "a"}], "plans": [], "events": []}
+    assert json.dumps(blind_trace(first)) == json.dumps(blind_trace(second))
+
+
+def test_a_pair_is_played_to_its_expert_and_to_admins_alone() -> None:
+    cast = cast_of()
+    drive_pictures(pictures())
+    mine = matchups_of(played(cast), "eva")[0]
+    assert drives_of_pair(user=eva(), code=mine.code)
+    for user, code in [
+        (User.objects.get(username="finn"), mine.code),
+        (eva(), uuid.uuid4()),
+    ]:
+        with pytest.raises(NotYours):
+            drives_of_pair(user=user, code=code)
+
+
+def test_without_the_rule_nothing_is_played_and_no_vote_can_say_so() -> None:
+    cast = cast_of()
+    drive_pictures(pictures())
+    study = open_study(name="Round 1", votes_per_expert=9, seed=7, **cast)
+    assert not study.allow_replay
+    assert "replays" not in study.rules
+    first = matchups_of(study, "eva")[0]
+    assert drives_of_pair(user=eva(), code=first.code) is None
+    decision = decided(first, "replay")
+    with pytest.raises(InvalidVote, match="no drives to play"):
+        cast_vote(expert=eva(), decision=decision)
+    assert not Vote.objects.exists()
+
+
+def test_a_vote_says_that_the_drives_were_played() -> None:
+    cast = cast_of()
+    drive_pictures(pictures())
+    first = matchups_of(played(cast), "eva")[0]
+    cast_vote(expert=eva(), decision=decided(first, "replay", "zoom"))
+    assert Vote.objects.get().aids == "zoom replay"
+
+
+def test_the_command_opens_it_too() -> None:
+    cast = cast_of()
+    drive_pictures(pictures())
+    given = ["open_study", "Round 1", "--votes-per-expert", "9", "--seed", "1", "--replay"]
+    for option, names in cast.items():
+        given += [f"--{option}", *names]  # type: ignore[misc]
+    call_command(*given, stdout=StringIO())
+    assert Study.objects.get().allow_replay

@@ -1,0 +1,93 @@
+"""The drives on the voting page: where a study plays them, and no trace where it does not."""
+
+from __future__ import annotations
+
+import re
+
+import pytest
+from django.contrib.auth.models import User
+from django.urls import reverse
+
+from arena.models import Study
+from arena.services.studies import PlanOptions, open_study
+from augment.models import Augmentation
+from tests.drives import drive_pictures
+from tests.study_rows import Cast, a_study, cast_of, matchups_of
+from tests.web.cast import people, signed_in
+from tests.web.test_weight import MOST_BYTES, weight
+
+pytestmark = pytest.mark.django_db
+
+
+def a_driven_cast(**cast: object) -> Cast:
+    made = cast_of(**cast)  # type: ignore[arg-type]
+    drive_pictures(Augmentation.objects.select_related("contestant", "scenario"))
+    return made
+
+
+def a_replayed_study(**cast: object) -> Study:
+    options = PlanOptions(allow_replay=True)
+    made = a_driven_cast(**cast)
+    return open_study(name="Round 1", votes_per_expert=9, seed=7, options=options, **made)
+
+
+def page(study: Study) -> str:
+    return reverse("vote", args=[study.code])
+
+
+def loaded(shown: str) -> set[str]:
+    return set(re.findall(r'(?:src|href)="/static/([^"]+\.(?:js|css))"', shown))
+
+
+def test_the_page_offers_them_and_loads_nothing_until_they_are_asked_for() -> None:
+    study = a_replayed_study()
+    eva = signed_in(User.objects.get(username="eva"))
+    shown = eva.get(page(study)).content.decode()
+    first = matchups_of(study, "eva")[0]
+    assert 'data-do="replay"' in shown
+    assert f'data-url="{reverse("replay", args=[first.code])}"' in shown
+    names = loaded(shown)
+    assert not any("film" in name or "replay" in name for name in names)
+    assert sum(weight(name) for name in names) <= MOST_BYTES
+    assert eva.get(f"{page(study)}help/").content.decode().count("<kbd>D</kbd>") == 1
+
+
+def test_a_study_without_them_has_no_trace_of_them() -> None:
+    study = a_study()
+    eva = signed_in(User.objects.get(username="eva"))
+    for address in (page(study), f"{page(study)}help/"):
+        shown = eva.get(address).content.decode()
+        for trace in ("replay", "film", "Drives", "planner", "<kbd>D</kbd>"):
+            assert trace not in shown, (address, trace)
+
+
+def test_the_answer_says_nothing_of_where_it_comes_from() -> None:
+    first = matchups_of(a_replayed_study(), "eva")[0]
+    address = reverse("replay", args=[first.code])
+    answer = signed_in(User.objects.get(username="eva")).get(address)
+    assert set(answer.json()) == {"a", "b"}
+    assert set(answer.json()["a"]) == {
+        "format", "version", "step_s", "steps", "ego", "road", "objects"
+    }  # fmt: skip
+    assert answer["Cache-Control"] == "private, no-store"
+    assert not {"ETag", "Last-Modified", "Content-Disposition"} & set(answer.headers)
+    assert signed_in(User.objects.get(username="finn")).get(address).status_code == 404
+
+
+def test_the_form_opens_a_study_with_them_and_its_page_says_so() -> None:
+    cast = a_driven_cast(scenarios=6)
+    admin = signed_in(people()["admin"])
+    sent = {"name": "Round 1", **cast, "votes_per_expert": 9, "seed": 4, "sure": "1"}
+    answer = admin.post(reverse("study-new"), sent | {"allow_replay": "on"}, follow=True)
+    assert Study.objects.get().allow_replay
+    said = r"<dt>Drives</dt><dd>may be played on 6 scenarios</dd>"
+    assert re.search(said, answer.content.decode())
+
+
+def test_the_form_names_what_was_not_driven() -> None:
+    cast = cast_of()
+    admin = signed_in(people()["admin"])
+    sent = {"name": "Round 1", **cast, "votes_per_expert": 9, "seed": 4, "sure": "1"}
+    answer = admin.post(reverse("study-new"), sent | {"allow_replay": "on"})
+    assert "ann on place-0" in answer.content.decode()
+    assert not Study.objects.exists()
