@@ -67,6 +67,13 @@ def picture(
     )
 
 
+def hang(augmentation: Augmentation, image: str) -> None:
+    """Give an augmentation a picture, also where it is planned to be shown."""
+    Augmentation.objects.filter(pk=augmentation.pk).update(image=image)
+    augmentation.shown_left.update(left_image=image)
+    augmentation.shown_right.update(right_image=image)
+
+
 def cast_of(
     *,
     contestants: tuple[str, ...] = ("ann", "bob", "cid"),

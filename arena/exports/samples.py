@@ -123,7 +123,7 @@ def _picture(axes: Axes, cell: Augmentation | None) -> None:
     axes.spines[:].set_linewidth(0.5)
     if cell is not None and cell.image and default_storage.exists(cell.image):
         with default_storage.open(cell.image) as file:
-            axes.imshow(imread(io.BytesIO(file.read()), format="png"), aspect="auto")
+            axes.imshow(imread(io.BytesIO(file.read()), format="png"))
         if cell.contestant.is_simulated:
             _watermark(axes)
         if cell.state != Augmentation.State.DONE:

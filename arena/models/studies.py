@@ -66,7 +66,7 @@ class Study(models.Model):
 class Matchup(models.Model):
     """One planned showing of two augmentations of one scenario to one expert.
 
-    Camera, unchanged picture and descriptions are kept as they were when it was planned: a
+    Camera, pictures and descriptions are kept as they were when it was planned: a
     scenario that is edited later does not change what was judged.
     """
 
@@ -90,6 +90,8 @@ class Matchup(models.Model):
     original_image = models.CharField(
         max_length=120, blank=True, help_text="name of the picture before any change"
     )
+    left_image = models.CharField(max_length=120, blank=True, help_text="name, as it was shown")
+    right_image = models.CharField(max_length=120, blank=True, help_text="name, as it was shown")
     view = models.JSONField(
         null=True, help_text="where metres lie in its pictures: px_per_m, ego_px, width, height"
     )

@@ -37,8 +37,9 @@ def picture_shown(*, user: User, token: str) -> str:
         raise NotYours(_NOT_SHOWN)
     if matchup.original_token == token:
         return matchup.original_image
-    shown = matchup.left if matchup.left_token == token else matchup.right
-    return shown.image
+    if matchup.left_token == token:
+        return matchup.left_image or matchup.left.image
+    return matchup.right_image or matchup.right.image
 
 
 def view_of(scenario: Scenario) -> dict[str, Any]:

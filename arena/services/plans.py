@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from collections import defaultdict
 from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
 
 from django.contrib.auth.models import User
 from django.db.models import F, Max, QuerySet
@@ -15,6 +17,7 @@ from arena.queries.showings import view_of
 from augment.models import Augmentation, Contestant, Scenario
 from augment.sentences import Sentence, sentence
 from augment.services.scenarios.descriptions import Description, descriptions
+from augment.services.scenarios.pictures import window_of
 
 Cells = dict[tuple[str, str], Augmentation]
 """By scenario and contestant, the augmentation whose picture is shown."""
@@ -151,10 +154,13 @@ def store(
         cells: The pictures.
         experts: Everybody who is named.
         batch: 0 at the opening; later plannings count up.
+
+    Raises:
+        NothingToPlan: The pictures of a scenario are drawn in several windows.
     """
     by_name = {expert.username: expert for expert in experts}
     places = _places(planned, cells)
-    views = {slug: view_of(place) for slug, place in places.items()}
+    frames = _frames(planned, cells, places)
     texts = _descriptions(study, planned, cells, places)
     rows = [
         Matchup(
@@ -164,8 +170,10 @@ def store(
             scenario=places[one.scenario],
             left=left,
             right=right,
-            original_image=places[one.scenario].original_image,
-            view=views[one.scenario],
+            left_image=left.image,
+            right_image=right.image,
+            original_image=frames[one.scenario].original_image,
+            view=frames[one.scenario].view,
             descriptions=None if texts is None else [texts[left.pk], texts[right.pk]],
             kind=one.kind,
             batch=batch,
@@ -247,6 +255,51 @@ def _places(planned: Sequence[PlannedMatchup], cells: Cells) -> dict[str, Scenar
     keys = {cell.scenario_id for (slug, _), cell in cells.items() if slug in slugs}
     rows = Scenario.objects.filter(pk__in=keys).select_related("base_scene")
     return {row.slug: row for row in rows.defer("base_scene__recording")}
+
+
+@dataclass(frozen=True, slots=True)
+class _Frame:
+    """What all showings of a scenario share: where metres lie, the scene before any change."""
+
+    view: dict[str, Any]
+    original_image: str
+
+
+def _frames(
+    planned: Sequence[PlannedMatchup], cells: Cells, places: dict[str, Scenario]
+) -> dict[str, _Frame]:
+    """By scenario; both sides of every pair are drawn in one window, or nothing is planned.
+
+    Raises:
+        NothingToPlan: Some are of an earlier version, or of before the reference was changed.
+    """
+    shown: dict[str, dict[str, Augmentation]] = {}
+    for one in planned:
+        for cell in _sides(one, cells):
+            shown.setdefault(one.scenario, {})[window_of(cell.image)] = cell
+    mixed = [slug for slug, windows in sorted(shown.items()) if len(windows) > 1]
+    if mixed:
+        raise NothingToPlan(
+            sentence(
+                "The pictures of %(scenarios)s show different windows, so they can’t stand side "
+                "by side. Close the open studies that show them and run “manage.py "
+                "redraw_pictures”.",
+                scenarios=tuple(mixed[:MOST_NAMED]),
+            )
+        )
+    return {slug: _frame(places[slug], *windows.popitem()) for slug, windows in shown.items()}
+
+
+def _frame(place: Scenario, window: str, cell: Augmentation) -> _Frame:
+    """As the pictures need it: what an earlier version drew was shown before, if at all."""
+    now = _Frame(view_of(place), place.original_image)
+    if window == window_of(place.original_image):
+        return now
+    earlier = Matchup.objects.filter(scenario=place, left_image=cell.image, view__isnull=False)
+    before = earlier.order_by("pk").first()
+    if before is not None and before.view is not None:
+        return _Frame(before.view, before.original_image)
+    return replace(now, original_image="")
 
 
 def _descriptions(

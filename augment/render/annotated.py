@@ -77,7 +77,7 @@ def draw_annotated(
             _ring(ground, agent, _colour(mark))
         _place(ground, mark, found, taken, boxes)
     draw_labels(ground, after, taken=taken)
-    return ground.canvas.png()
+    return ground.canvas.png(halved=True)
 
 
 # Private

@@ -1,27 +1,50 @@
 """Which part of a scene a picture shows: one window for every contestant of a scenario.
 
+The window holds the ego and all that the scenario's reference touches, and lies where it shows
+the most of the road.
+
 Frames: metres in the ego frame (x forward, y left); pixels from the picture's top left corner
 (x right, y down). The ego faces right, so what lies to its left is further up.
 """
 
 from __future__ import annotations
 
+import hashlib
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
+from functools import lru_cache
 
 import numpy as np
+from PIL import Image, ImageDraw
 
 from augment.geometry.boxes import corners
 from augment.geometry.polyline import FloatArray
+from augment.render.shapes import ribbon
 from augment.scene.entities import Scene, TrafficAgent
+from augment.scene.lane_graph import AnyLane
 from augment.scene.modification import Modification
 
 WIDTH_PX = 1200
-STEP_M = 5.0
-MARGIN_M = 3.0
+MARGIN_M = 5.0
 # The widest window, 5 px/m: beyond it a car is a speck, and an arrow at the edge tells more.
 MAX_WIDTH_M = 240.0
+# Without a reference nothing says where a change may come: a wide view, far ahead.
+OPEN_WIDTH_M = 60.0
+_OPEN_AHEAD_M = 40.0
+LEAST_WIDTH_M = 42.0
+WIDTH_STEP_M = 6.0
+# Of the picture, width to height: a street is long, a junction is not.
+TALL, LONG = 1.5, 2.0
+# A long window must be worth it: so much less of it is blank, and the scale hardly suffers.
+_GAIN_SHARE = 0.05
+_MOST_WIDENING = 1.2
+_AHEAD_M, _BEHIND_M, _BESIDE_M = 15.0, 3.0, 3.0
+# Cells of the raster on which the ground is counted, per metre.
+_CELLS_PER_M = 2
+
+LOOK = 2
+"""Raised whenever pictures of old and new look must not stand side by side."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -48,15 +71,19 @@ class Camera:
         """The same window as a picture of another width."""
         return replace(self, px_per_m=width_px / (self.x_max_m - self.x_min_m))
 
+    @property
+    def key(self) -> str:
+        """Look and window in short: two pictures that share it can stand side by side."""
+        edges = (self.x_min_m, self.x_max_m, self.y_min_m, self.y_max_m, self.px_per_m)
+        shown = " ".join(f"{value:.6f}" for value in edges)
+        return f"{LOOK}-{hashlib.sha256(shown.encode()).hexdigest()[:8]}"
+
     def to_pixels(self, points_m: FloatArray) -> FloatArray:
         """Points (N, 2) of the ego frame as pixel coordinates (N, 2), also outside the picture."""
-        points = np.asarray(points_m, dtype=np.float64)
-        return np.column_stack(
-            [
-                (points[:, 0] - self.x_min_m) * self.px_per_m,
-                (self.y_max_m - points[:, 1]) * self.px_per_m,
-            ]
-        )
+        scale = self.px_per_m
+        pixels = np.asarray(points_m, dtype=np.float64) * (scale, -scale)
+        pixels += (-self.x_min_m * scale, self.y_max_m * scale)
+        return pixels
 
     def shows(self, points_m: FloatArray, margin_m: float = 0.0) -> bool:
         """Whether the bounding box of points (N, 2) touches the window, widened by a margin."""
@@ -70,40 +97,125 @@ class Camera:
 
 
 @dataclass(frozen=True, slots=True)
-class _Window:
+class _Need:
+    """What a window must hold, in whole metres: low and high corner."""
+
     x_min: float
     x_max: float
     y_min: float
     y_max: float
 
+    def and_points(self, points_m: FloatArray) -> _Need:
+        low = np.floor(points_m.min(axis=0) - MARGIN_M)
+        high = np.ceil(points_m.max(axis=0) + MARGIN_M)
+        return _Need(
+            min(self.x_min, float(low[0])),
+            max(self.x_max, float(high[0])),
+            min(self.y_min, float(low[1])),
+            max(self.y_max, float(high[1])),
+        )
 
-_DEFAULT = _Window(-15.0, 45.0, -20.0, 20.0)
+    def width_m(self, ratio: float, least_m: float) -> float:
+        """The least width in whole steps of a window of a shape that holds it."""
+        wanted = max(least_m, self.x_max - self.x_min, (self.y_max - self.y_min) * ratio)
+        return math.ceil(wanted / WIDTH_STEP_M) * WIDTH_STEP_M
 
 
+@dataclass(frozen=True, slots=True)
+class _Window:
+    x_min: float
+    y_min: float
+    width: float
+    height: float
+    blank_share: float
+
+    def camera(self) -> Camera:
+        return Camera(
+            x_min_m=self.x_min,
+            x_max_m=self.x_min + self.width,
+            y_min_m=self.y_min,
+            y_max_m=self.y_min + self.height,
+            px_per_m=WIDTH_PX / self.width,
+        )
+
+
+@lru_cache(maxsize=16)
 def camera_for(scene: Scene, reference: Modification | None) -> Camera:
     """The window of a scenario: it depends on the scene and its reference, on nothing else.
 
-    60 x 40 m at 20 px/m; where the reference does not fit, the window grows in steps of 5 m a
-    side and keeps 3:2, the picture its size. Of places too far apart for the widest window the
-    nearest to the ego are kept.
+    The least of the windows in steps of 6 m that holds the ego, 15 m ahead of it and with 5 m
+    around it all that the reference touches; of those on a raster of 1 m the one that shows most
+    of the ground. 3:2, or 2:1 where that leaves less blank. Of places too far apart for the
+    widest window the nearest to the ego are kept.
 
     Args:
         scene: The scene before the change; the old places of what the reference moves or
             removes belong into the picture as well.
         reference: The scenario's reference, None without one.
     """
-    window = _DEFAULT
-    if reference is not None:
-        for place in sorted(_places(scene, reference), key=_distance_m):
-            grown = _grown(window, place)
-            if grown.x_max - grown.x_min <= MAX_WIDTH_M:
-                window = grown
-    return Camera(
-        x_min_m=window.x_min,
-        x_max_m=window.x_max,
-        y_min_m=window.y_min,
-        y_max_m=window.y_max,
-        px_per_m=WIDTH_PX / (window.x_max - window.x_min),
+    half_m = scene.ego.length_m / 2.0
+    ahead_m = _OPEN_AHEAD_M if reference is None else _AHEAD_M
+    need = _Need(-math.ceil(half_m + _BEHIND_M), ahead_m, -_BESIDE_M, _BESIDE_M)
+    least_m = OPEN_WIDTH_M if reference is None else LEAST_WIDTH_M
+    for place in sorted(_places(scene, reference or Modification()), key=_distance_m):
+        more = need.and_points(place)
+        if more.width_m(TALL, least_m) <= MAX_WIDTH_M:
+            need = more
+    ground = _Ground(scene, need, reach_m=1.5 * need.width_m(TALL, least_m))
+    tall, long = (_best(need, ground, ratio, least_m) for ratio in (TALL, LONG))
+    is_worth_it = long.blank_share < tall.blank_share - _GAIN_SHARE and long.width <= min(
+        tall.width * _MOST_WIDENING, MAX_WIDTH_M
+    )
+    return (long if is_worth_it else tall).camera()
+
+
+class _Ground:
+    """How much of a rectangle is road, walkway or crosswalk, from sums over a coarse raster."""
+
+    def __init__(self, scene: Scene, need: _Need, reach_m: float) -> None:
+        self._x0, self._y0 = need.x_max - reach_m, need.y_max - reach_m
+        size_m = (need.x_min + reach_m - self._x0, need.y_min + reach_m - self._y0)
+        raster = Image.new("L", (int(size_m[0] * _CELLS_PER_M), int(size_m[1] * _CELLS_PER_M)))
+        pen = ImageDraw.Draw(raster)
+        lanes: list[AnyLane] = [*scene.lanes, *scene.connectors]
+        for polygon in (
+            *(ribbon(lane) for lane in lanes),
+            *(np.array(area.boundary_m, dtype=np.float64) for area in scene.areas),
+        ):
+            cells = (polygon - (self._x0, self._y0)) * _CELLS_PER_M
+            pen.polygon([(x, y) for x, y in cells.tolist()], fill=1)
+        sums = np.asarray(raster).astype(np.int64).cumsum(axis=0).cumsum(axis=1)
+        self._sums = np.pad(sums, ((1, 0), (1, 0)))
+
+    def share(
+        self, x_min: FloatArray, y_min: FloatArray, width: float, height: float
+    ) -> FloatArray:
+        """Of rectangles of one size with lower left corners x_min (C,) by y_min (R,): (R, C)."""
+        left = ((x_min - self._x0) * _CELLS_PER_M).astype(int)[None, :]
+        low = ((y_min - self._y0) * _CELLS_PER_M).astype(int)[:, None]
+        across, up = int(width * _CELLS_PER_M), int(height * _CELLS_PER_M)
+        sums = self._sums
+        covered = sums[low + up, left + across] - sums[low, left + across]
+        covered = covered - sums[low + up, left] + sums[low, left]
+        return np.asarray(covered / (across * up), dtype=np.float64)
+
+
+def _best(need: _Need, ground: _Ground, ratio: float, least_m: float) -> _Window:
+    """Of the least windows of a shape the one with most ground; the most usual among equals.
+
+    As usual is one with the ego in the middle of its height and a quarter behind its left edge.
+    """
+    width = need.width_m(ratio, least_m)
+    height = width / ratio
+    x_min = np.arange(need.x_max - width, need.x_min + 0.5)
+    y_min = np.arange(math.ceil(need.y_max - height), math.floor(need.y_min) + 0.5)
+    share = ground.share(x_min, y_min, width, height)
+    usual = np.abs(x_min + width / 4.0)[None, :] + np.abs(y_min + height / 2.0)[:, None]
+    # Half a hundredth of ground is nothing that anybody sees.
+    order = np.lexsort((usual.ravel(), -np.round(share.ravel() * 200.0)))
+    row, column = divmod(int(order[0]), len(x_min))
+    return _Window(
+        float(x_min[column]), float(y_min[row]), width, height, 1.0 - float(share[row, column])
     )
 
 
@@ -124,21 +236,3 @@ def _footprint(agent: TrafficAgent) -> FloatArray:
 
 def _distance_m(points_m: FloatArray) -> float:
     return float(np.hypot(points_m[:, 0], points_m[:, 1]).max())
-
-
-def _grown(window: _Window, points_m: FloatArray) -> _Window:
-    """The smallest 3:2 window on the 5 m raster that holds the given one and the points."""
-    low, high = points_m.min(axis=0) - MARGIN_M, points_m.max(axis=0) + MARGIN_M
-    x_min = min(window.x_min, math.floor(low[0] / STEP_M) * STEP_M)
-    x_max = max(window.x_max, math.ceil(high[0] / STEP_M) * STEP_M)
-    y_min = min(window.y_min, math.floor(low[1] / STEP_M) * STEP_M)
-    y_max = max(window.y_max, math.ceil(high[1] / STEP_M) * STEP_M)
-    # 15 m in width and 10 m in height are the smallest step that keeps 3:2 on the raster.
-    size = max(math.ceil((x_max - x_min) / 15.0), math.ceil((y_max - y_min) / 10.0))
-    x_max = x_min + 15.0 * size
-    while y_max - y_min < 10.0 * size:
-        if y_max <= -y_min:
-            y_max += STEP_M
-        else:
-            y_min -= STEP_M
-    return _Window(x_min, x_max, y_min, y_max)

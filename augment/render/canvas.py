@@ -1,7 +1,9 @@
 """The surface that everything is drawn on: shapes in pixels or metres in, PNG bytes out.
 
-Pillow draws without antialiasing, so the surface is three times as fine as the picture and is
-averaged down at the end. Coordinates and widths are picture pixels all the same.
+A picture is addressed in the pixels that it takes on an ordinary screen and has twice as many
+each way: on the voting page it is smooth, and when zoomed still sharp. One byte a pixel, a number
+in the palette: nothing is blended, so that drawing, copying and packing are quick. Coordinates and
+widths are picture pixels all the same.
 """
 
 from __future__ import annotations
@@ -12,32 +14,45 @@ from collections.abc import Callable
 from functools import cache
 
 import numpy as np
+from numpy.typing import NDArray
 from PIL import Image, ImageDraw, ImageFont
 
 from augment.geometry.polyline import FloatArray
+from augment.render import palette
 from augment.render.camera import Camera
 from augment.render.palette import Colour
 from augment.render.shapes import dashes
 
 Box = tuple[float, float, float, float]
 
-FINENESS = 3
+DENSITY = 2
+# Thinner lines show no notch where they turn; straighter ones neither.
+_NOTCH_PX = 1.5
+_NOTCH_COS = 0.9
+# Larger files below, slower above.
+_COMPRESS_LEVEL = 3
+
+_INKS = palette.inks()
+_FLAT_PALETTE = [value for colour in _INKS for value in colour]
 
 
 class Canvas:
     """A picture in the making, addressed in pixels.
 
     Args:
-        width_px: Of the finished picture.
-        height_px: Of the finished picture.
+        width_px: Of the picture on an ordinary screen.
+        height_px: Of the same.
         background: The colour of the empty picture.
     """
 
     def __init__(self, width_px: int, height_px: int, background: Colour) -> None:
         self.width_px = width_px
         self.height_px = height_px
-        self._texts: list[Callable[[ImageDraw.ImageDraw], None]] = []
-        self._draw_on(Image.new("RGB", (width_px * FINENESS, height_px * FINENESS), background))
+        self._texts: list[Callable[[Canvas], None]] = []
+        size = (width_px * DENSITY, height_px * DENSITY)
+        image = Image.new("P", size, _INKS[background])
+        image.putpalette(_FLAT_PALETTE)
+        self._draw_on(image)
 
     def copy(self) -> Canvas:
         """The same picture on a surface of its own."""
@@ -48,33 +63,35 @@ class Canvas:
 
     def fill(self, points_px: FloatArray, colour: Colour) -> None:
         """A filled polygon through points (P, 2)."""
-        self._pen(colour).polygon(_fine(points_px), fill=colour)
+        self._pen.polygon(_fine(points_px), fill=_INKS[colour])
 
     def stroke(
         self, points_px: FloatArray, colour: Colour, width_px: float, *, closed: bool = False
     ) -> None:
         """A line through points (P, 2) with round joints."""
-        points = np.vstack([points_px, points_px[:2]]) if closed else points_px
-        self._pen(colour).line(
-            _fine(points), fill=colour, width=max(1, round(width_px * FINENESS)), joint="curve"
-        )
+        points = np.vstack([points_px, points_px[:2]]) if closed else np.asarray(points_px)
+        width = max(1, round(width_px * DENSITY))
+        self._pen.line(_fine(points), fill=_INKS[colour], width=width)
+        if width_px > _NOTCH_PX:
+            for x, y in _sharp_turns(points).tolist():
+                self.disc((x, y), width_px / 2.0, colour)
 
     def dashed(
         self, points_px: FloatArray, colour: Colour, width_px: float, on_px: float, off_px: float
     ) -> None:
         """A dashed line through points (P, 2); what lies outside the picture costs nothing."""
-        pen, width = self._pen(colour), max(1, round(width_px * FINENESS))
+        ink, width = _INKS[colour], max(1, round(width_px * DENSITY))
         pieces = dashes(points_px, on_px, off_px)
         size = np.array([self.width_px, self.height_px])
         seen = ((pieces.max(axis=1) >= 0.0) & (pieces.min(axis=1) <= size)).all(axis=1)
-        for piece in pieces[seen]:
-            pen.line(_fine(piece), fill=colour, width=width)
+        for piece in _in_pixels(pieces[seen]).reshape(-1, 4).tolist():
+            self._pen.line(piece, fill=ink, width=width)
 
     def disc(
         self,
         centre_px: tuple[float, float],
         radius_px: float,
-        colour: Colour | None,
+        colour: Colour,
         *,
         outline: Colour | None = None,
         outline_px: float = 0.0,
@@ -82,21 +99,27 @@ class Canvas:
         """A circle; its outline lies inside the radius."""
         x, y = centre_px
         box = [
-            (x - radius_px) * FINENESS - 0.5,
-            (y - radius_px) * FINENESS - 0.5,
-            (x + radius_px) * FINENESS - 0.5,
-            (y + radius_px) * FINENESS - 0.5,
+            (x - radius_px) * DENSITY - 0.5,
+            (y - radius_px) * DENSITY - 0.5,
+            (x + radius_px) * DENSITY - 0.5,
+            (y + radius_px) * DENSITY - 0.5,
         ]
-        self._solid.ellipse(
-            box, fill=colour, outline=outline, width=round(outline_px * FINENESS) if outline else 0
+        self._pen.ellipse(
+            box,
+            fill=_INKS[colour],
+            outline=_INKS[outline] if outline else None,
+            width=round(outline_px * DENSITY) if outline else 0,
         )
 
     def plate(self, box_px: Box, colour: Colour, outline: Colour | None, radius_px: float) -> None:
         """A rectangle (left, top, right, bottom) with round corners and a thin outline."""
-        box = [value * FINENESS - 0.5 for value in box_px]
-        width = FINENESS if outline else 0
-        pen = self._pen(colour)
-        pen.rounded_rectangle(box, radius_px * FINENESS, fill=colour, outline=outline, width=width)
+        self._pen.rounded_rectangle(
+            [value * DENSITY - 0.5 for value in box_px],
+            radius_px * DENSITY,
+            fill=_INKS[colour],
+            outline=_INKS[outline] if outline else None,
+            width=DENSITY if outline else 0,
+        )
 
     def text(
         self,
@@ -110,38 +133,64 @@ class Canvas:
     ) -> None:
         """Text at a point, above everything else; the anchor is Pillow's ("mm" for its middle).
 
-        The font is smooth by itself, so text is set at the end and in the picture's own size.
+        Ink without a halo is smooth where it stands on paper; all other text has hard edges.
         """
+        if colour == palette.INK and halo is None:
+            self._texts.append(lambda on: on._smooth(at_px, text, size_px, anchor))
+            return
         self._texts.append(
-            lambda pen: pen.text(
-                at_px,
+            lambda on: on._pen.text(
+                (at_px[0] * DENSITY, at_px[1] * DENSITY),
                 text,
-                fill=colour,
-                font=_font(size_px),
+                fill=_INKS[colour],
+                font=_font(size_px * DENSITY),
                 anchor=anchor,
-                stroke_width=2 if halo else 0,
-                stroke_fill=halo,
+                stroke_width=2 * DENSITY if halo else 0,
+                stroke_fill=_INKS[halo] if halo else None,
             )
         )
 
-    def png(self) -> bytes:
-        """The finished picture: the same drawing gives the same bytes, and no metadata."""
-        finished = self._image.reduce(FINENESS)
-        pen = ImageDraw.Draw(finished)
+    def holds(self, points_px: FloatArray, colours: tuple[Colour, ...]) -> NDArray[np.bool_]:
+        """At which of points (N, 2) one of the colours lies, (N,); nowhere outside the picture."""
+        cells = np.floor(np.asarray(points_px) * DENSITY).astype(np.int64)
+        size = np.array(self._image.size)
+        within = ((cells >= 0) & (cells < size)).all(axis=1)
+        found = np.zeros(len(cells), dtype=bool)
+        pixels = np.asarray(self._image)[cells[within, 1], cells[within, 0]]
+        found[within] = np.isin(pixels, [_INKS[colour] for colour in colours])
+        return found
+
+    def png(self, *, halved: bool = False) -> bytes:
+        """The finished picture: the same drawing gives the same bytes, and no metadata.
+
+        Args:
+            halved: Give one pixel for each of the picture's, blended, in full colour: for those
+                who pay by the pixel.
+        """
+        finished = self.copy()
         for write in self._texts:
-            write(pen)
+            write(finished)
+        image = finished._image
+        if halved:
+            image = image.convert("RGB").reduce(DENSITY)
         stream = io.BytesIO()
-        finished.save(stream, format="PNG", compress_level=6)
+        image.save(stream, format="PNG", compress_level=_COMPRESS_LEVEL)
         return stream.getvalue()
+
+    def _smooth(self, at_px: tuple[float, float], text: str, size_px: int, anchor: str) -> None:
+        """Ink with soft edges: its steps towards paper are colours of the palette."""
+        font = _font(size_px * DENSITY)
+        x, y = (round(value * DENSITY) for value in at_px)
+        box = tuple(round(value) for value in font.getbbox(text, anchor=anchor))
+        left, top = box[0] - 1, box[1] - 1
+        mask = Image.new("L", (box[2] - left + 2, box[3] - top + 2))
+        ImageDraw.Draw(mask).text((-left, -top), text, fill=255, font=font, anchor=anchor)
+        self._image.paste(mask.point(_ramp()), (x + left, y + top), mask.point(_is_inked()))
 
     def _draw_on(self, image: Image.Image) -> None:
         self._image = image
-        self._solid = ImageDraw.Draw(image)
-        self._glass = ImageDraw.Draw(image, "RGBA")
-
-    def _pen(self, colour: Colour) -> ImageDraw.ImageDraw:
-        # Blending is slower than covering, so only see-through colours pay for it.
-        return self._glass if len(colour) == 4 else self._solid
+        self._pen = ImageDraw.Draw(image)
+        self._pen.fontmode = "1"
 
 
 class MetricCanvas:
@@ -174,6 +223,10 @@ class MetricCanvas:
             self.camera.to_pixels(points_m), colour, width_px, on_m * scale, off_m * scale
         )
 
+    def holds(self, points_m: FloatArray, colours: tuple[Colour, ...]) -> NDArray[np.bool_]:
+        """At which of points (N, 2) one of the colours lies so far, (N,)."""
+        return self.canvas.holds(self.camera.to_pixels(points_m), colours)
+
     def at(self, x_m: float, y_m: float) -> tuple[float, float]:
         """A point in pixels."""
         x, y = self.camera.to_pixels(np.array([[x_m, y_m]]))[0]
@@ -194,7 +247,35 @@ def _font(size_px: int) -> ImageFont.FreeTypeFont:
     return font
 
 
-def _fine(points_px: FloatArray) -> list[tuple[float, float]]:
+@cache
+def _ramp() -> list[int]:
+    steps = len(palette.TEXT_RAMP)
+    return [
+        _INKS[palette.TEXT_RAMP[max(0, value * (steps + 1) // 256 - 1)]] for value in range(256)
+    ]
+
+
+@cache
+def _is_inked() -> list[int]:
+    least = 256 // (len(palette.TEXT_RAMP) + 1)
+    return [255 if value > least else 0 for value in range(256)]
+
+
+def _sharp_turns(points_px: FloatArray) -> FloatArray:
+    """The inner points (K, 2) of a line (P, 2) at which its segments leave a notch."""
+    steps = np.diff(points_px, axis=0)
+    lengths = np.hypot(steps[:, 0], steps[:, 1])
+    along = (steps[1:] * steps[:-1]).sum(axis=1)
+    inner = points_px[1:-1][along < _NOTCH_COS * lengths[1:] * lengths[:-1]]
+    return np.asarray(inner, dtype=np.float64)
+
+
+def _in_pixels(points_px: FloatArray) -> FloatArray:
     """Continuous coordinates as Pillow's, where a whole number is the middle of a pixel."""
-    fine = np.asarray(points_px, dtype=np.float64) * FINENESS - 0.5
-    return [(float(x), float(y)) for x, y in fine]
+    return np.asarray(points_px, dtype=np.float64) * DENSITY - 0.5
+
+
+def _fine(points_px: FloatArray) -> list[float]:
+    # Pillow reads a flat list quickest.
+    flat: list[float] = _in_pixels(points_px).ravel().tolist()
+    return flat

@@ -2,15 +2,17 @@
 
 The paper's conventions: ego red, changed agents blue, drivable area grey, walkways olive. Marks
 never differ by colour alone; red and blue differ in lightness too. Widths are in picture pixels.
+Nothing is see-through: a picture has few colours, so it is small and quickly drawn.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 
-Colour = tuple[int, int, int] | tuple[int, int, int, int]
+Colour = tuple[int, int, int]
 
 PAPER: Colour = (255, 255, 255)
+BEYOND: Colour = (239, 241, 233)
 ROAD: Colour = (222, 224, 227)
 ROAD_EDGE: Colour = (138, 142, 148)
 INTERSECTION: Colour = (213, 215, 219)
@@ -22,18 +24,17 @@ LANE_SOLID: Colour = (138, 142, 148)
 ZEBRA: Colour = (255, 255, 255)
 ZEBRA_GROUND: Colour = (205, 208, 212)
 
-EGO_LANE: Colour = (20, 20, 20, 190)
-OTHER_LANE: Colour = (0, 0, 128, 105)
-CONNECTOR: Colour = (184, 134, 11, 125)
+OWN_LANE: Colour = (70, 71, 73)
+OTHER_LANE: Colour = (134, 135, 190)
+CONNECTOR: Colour = (205, 190, 150)
 
-GRID: Colour = (90, 95, 105, 42)
-GRID_AXIS: Colour = (90, 95, 105, 105)
+GRID: Colour = (207, 209, 213)
+GRID_AXIS: Colour = (172, 175, 181)
 
 INK: Colour = (33, 37, 41)
 LANE_TEXT: Colour = (0, 0, 128)
 HALO: Colour = (255, 255, 255)
-PLATE: Colour = (255, 255, 255, 222)
-GHOST: Colour = (90, 95, 105, 150)
+GHOST: Colour = (142, 146, 153)
 
 WRONG: Colour = (170, 0, 110)
 DOUBTFUL: Colour = (150, 92, 0)
@@ -49,7 +50,7 @@ class MarkStyle:
     """How the mark of one class of agents looks.
 
     Attributes:
-        detail: For what lies on the body: windscreen, nose, stripes.
+        detail: For what lies on the body: nose, wedge, cross.
         hatch: Lines across the body, None without them.
         outline_px: Drawn inside the true box, so that a thick outline adds no size.
     """
@@ -78,7 +79,40 @@ CHANGED_MARK = MarkStyle(
 OTHER_MARK = MarkStyle(
     fill=(164, 168, 174),
     outline=(84, 88, 94),
-    detail=(84, 88, 94),
+    detail=(255, 255, 255),
     hatch=None,
     outline_px=1.5,
 )
+
+
+def inks() -> dict[Colour, int]:
+    """Every colour of the pictures with its number in their palettes; smooth text comes last.
+
+    The numbers go by the order of this file, so the same drawing gives the same bytes.
+    """
+    found: dict[Colour, int] = {}
+    for value in globals().values():
+        if isinstance(value, MarkStyle):
+            for colour in (value.fill, value.outline, value.detail, value.hatch):
+                if colour is not None:
+                    found.setdefault(colour, len(found))
+        elif _is_colour(value):
+            found.setdefault(value, len(found))
+    for step in TEXT_RAMP:
+        found.setdefault(step, len(found))
+    return found
+
+
+def _is_colour(value: object) -> bool:
+    return isinstance(value, tuple) and len(value) == 3 and all(type(v) is int for v in value)
+
+
+TEXT_RAMP: tuple[Colour, ...] = tuple(
+    (
+        255 - round((255 - INK[0]) * step / 7.0),
+        255 - round((255 - INK[1]) * step / 7.0),
+        255 - round((255 - INK[2]) * step / 7.0),
+    )
+    for step in range(1, 8)
+)
+"""From almost paper to ink."""

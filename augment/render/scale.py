@@ -8,10 +8,13 @@ import numpy as np
 
 from augment.geometry.polyline import FloatArray
 from augment.render import palette
+from augment.render.camera import Camera
 from augment.render.canvas import Box, MetricCanvas
 from augment.scene.entities import Scene
 
 GRID_M = 5.0
+Corner = tuple[bool, bool]
+"""Of a picture: whether it is right, whether it is at the top."""
 _TEXT_PX = 15
 _INSET_PX = 12.0
 _PADDING_PX = 28.0
@@ -37,28 +40,33 @@ def raster(low_m: float, high_m: float) -> list[float]:
     return [index * GRID_M for index in range(first, last + 1)]
 
 
-def scale_box(ground: MetricCanvas, scene: Scene) -> Box:
-    """The plate of the scale bar (left, top, right, bottom in pixels), in a quiet corner.
+def scale_corner(scene: Scene, camera: Camera) -> Corner:
+    """The quiet corner that the scale bar lies in: (whether right, whether at the top).
 
-    The corner depends on the scene before the change alone, so that all pictures of a scenario
-    have their scale in the same place: bottom left, unless another one hides fewer agents.
+    It depends on the scene before the change alone, so that all pictures of a scenario have their
+    scale in the same place: bottom left, unless another one hides fewer agents.
     """
-    width = 2.0 * _unit_m(ground) * ground.camera.px_per_m + 2.0 * _PADDING_PX
-    right, bottom = ground.canvas.width_px - _INSET_PX, ground.canvas.height_px - _INSET_PX
-    corners = [
-        (left, top, left + width, top + _HEIGHT_PX)
-        for top in (bottom - _HEIGHT_PX, _INSET_PX)
-        for left in (_INSET_PX, right - width)
-    ]
-    agents = [ground.at(agent.x_m, agent.y_m) for agent in scene.everyone]
-    return min(corners, key=lambda box: sum(_close(box, *at) for at in agents))
+    corners: list[Corner] = [(right, top) for top in (False, True) for right in (False, True)]
+    places = np.array([[agent.x_m, agent.y_m] for agent in scene.everyone])
+    agents_px = camera.to_pixels(places).tolist()
+    boxes = {corner: scale_box(camera, corner) for corner in corners}
+    return min(corners, key=lambda one: sum(_close(boxes[one], x, y) for x, y in agents_px))
+
+
+def scale_box(camera: Camera, corner: Corner) -> Box:
+    """The plate of the scale bar in a corner: left, top, right, bottom in pixels."""
+    is_right, is_top = corner
+    width = 2.0 * _unit_m(camera) * camera.px_per_m + 2.0 * _PADDING_PX
+    left = camera.width_px - _INSET_PX - width if is_right else _INSET_PX
+    top = _INSET_PX if is_top else camera.height_px - _INSET_PX - _HEIGHT_PX
+    return left, top, left + width, top + _HEIGHT_PX
 
 
 def draw_scale(ground: MetricCanvas, box_px: Box) -> None:
     """A bar of two units, one filled, one empty, with their lengths beneath."""
     left, top, _, _ = box_px
-    ground.canvas.plate(box_px, palette.PLATE, None, 6.0)
-    unit_m = _unit_m(ground)
+    ground.canvas.plate(box_px, palette.PAPER, None, 6.0)
+    unit_m = _unit_m(ground.camera)
     unit_px = unit_m * ground.camera.px_per_m
     start, bar_top, bar_bottom = left + _PADDING_PX, top + 9.0, top + 16.0
     middle, end = start + unit_px, start + 2.0 * unit_px
@@ -81,8 +89,8 @@ def _close(box: Box, x_px: float, y_px: float) -> bool:
     )
 
 
-def _unit_m(ground: MetricCanvas) -> float:
-    return 5.0 if ground.camera.px_per_m >= 9.0 else 10.0
+def _unit_m(camera: Camera) -> float:
+    return 5.0 if camera.px_per_m >= 9.0 else 10.0
 
 
 def _rectangle(left: float, top: float, right: float, bottom: float) -> FloatArray:

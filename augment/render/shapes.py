@@ -12,26 +12,26 @@ from augment.scene.lane_graph import AnyLane
 
 # Where a line turns sharply its offset is held back to this multiple of the distance.
 _MITER_LIMIT = 2.0
-# How far the surface of a way goes on beyond its ends.
+# How far the surface of a lane goes on beyond its ends.
 _REACH = 0.1
 
 
 def offset(points: FloatArray, distance: float) -> FloatArray:
     """A line (P, 2) shifted by a distance to its left (negative: right), (P, 2)."""
-    steps = np.diff(points, axis=0)
+    steps = points[1:] - points[:-1]
     steps = steps / np.hypot(steps[:, 0], steps[:, 1])[:, None]
-    normals = np.column_stack([-steps[:, 1], steps[:, 0]])
-    before = np.vstack([normals[:1], normals])
-    after = np.vstack([normals, normals[-1:]])
-    middle = before + after
+    middle = np.empty_like(points, dtype=np.float64)
+    middle[0], middle[-1] = 2.0 * steps[0], 2.0 * steps[-1]
+    middle[1:-1] = steps[:-1] + steps[1:]
     length = np.maximum(np.hypot(middle[:, 0], middle[:, 1]), 1e-9)
-    middle = middle / length[:, None]
-    stretch = np.minimum(2.0 / length, _MITER_LIMIT)
-    return np.asarray(points + distance * stretch[:, None] * middle, dtype=np.float64)
+    reach = distance * np.minimum(2.0 / length, _MITER_LIMIT) / length
+    return np.stack(
+        [points[:, 0] - reach * middle[:, 1], points[:, 1] + reach * middle[:, 0]], axis=1
+    )
 
 
 def sides(lane: AnyLane) -> tuple[FloatArray, FloatArray]:
-    """The left and the right boundary of a way, (P, 2) each, from its map or its width."""
+    """The left and the right boundary of a lane, (P, 2) each, from its map or its width."""
     line, half = lane.centerline.points_m, lane.width_m / 2.0
     left, right = lane.left_boundary, lane.right_boundary
     return (
@@ -41,9 +41,13 @@ def sides(lane: AnyLane) -> tuple[FloatArray, FloatArray]:
 
 
 def ribbon(lane: AnyLane) -> FloatArray:
-    """The surface of a way as a polygon (P, 2); it reaches a little into what comes next."""
-    left, right = (_lengthened(side) for side in sides(lane))
-    return np.vstack([left, right[::-1]])
+    """The surface of a lane as a polygon (P, 2); it reaches a little into what comes next."""
+    return ring_of(*sides(lane))
+
+
+def ring_of(left: FloatArray, right: FloatArray) -> FloatArray:
+    """The polygon (P, 2) between two sides of a lane, (L, 2) and (R, 2), drawn out at its ends."""
+    return np.concatenate([_lengthened(left), _lengthened(right)[::-1]])
 
 
 def dashes(points: FloatArray, on: float, off: float) -> FloatArray:
@@ -66,22 +70,6 @@ def resample_line(points: FloatArray, spacing: float) -> FloatArray:
     return np.column_stack(
         [np.interp(at, stations, points[:, 0]), np.interp(at, stations, points[:, 1])]
     )
-
-
-def contains(polygon: FloatArray, points: FloatArray) -> NDArray[np.bool_]:
-    """Which of points (N, 2) lie inside a polygon (P, 2), (N,): even-odd rule."""
-    inside = np.zeros(len(points), dtype=bool)
-    low, high = polygon.min(axis=0), polygon.max(axis=0)
-    near = ((points >= low) & (points <= high)).all(axis=1)
-    if not near.any():
-        return inside
-    x, y = points[near, 0][:, None], points[near, 1][:, None]
-    (x0, y0), (x1, y1) = polygon.T, np.roll(polygon, -1, axis=0).T
-    straddles = (y0 > y) != (y1 > y)
-    rise = np.where(y1 == y0, 1.0, y1 - y0)
-    right_of = x < x0 + (y - y0) / rise * (x1 - x0)
-    inside[near] = (straddles & right_of).sum(axis=1) % 2 == 1
-    return inside
 
 
 def runs(flags: NDArray[np.bool_]) -> list[tuple[int, int]]:
@@ -129,9 +117,12 @@ def long_axis(polygon: FloatArray) -> tuple[float, float, float]:
 
 def _lengthened(points: FloatArray) -> FloatArray:
     """A line with both ends drawn out; lanes that bend meet at a slight angle, with a gap."""
-    steps = np.array([points[0] - points[1], points[-1] - points[-2]])
-    steps = steps / np.hypot(steps[:, 0], steps[:, 1])[:, None] * _REACH
-    return np.vstack([points[:1] + steps[:1], points[1:-1], points[-1:] + steps[1:]])
+    made = np.array(points, dtype=np.float64)
+    for end, inner in ((0, 1), (-1, -2)):
+        (x, y), (inner_x, inner_y) = points[end], points[inner]
+        share = _REACH / math.hypot(x - inner_x, y - inner_y)
+        made[end] = x + share * (x - inner_x), y + share * (y - inner_y)
+    return made
 
 
 def _half(polygon: FloatArray, normal: FloatArray, limit: float) -> FloatArray:

@@ -157,7 +157,7 @@ export class Lens {
     on("pointermove", (event) => {
       if (this.#drag) {
         const [x, y] = this.#drag;
-        this.pan((event.clientX - x) / panel.clientWidth, (event.clientY - y) / panel.clientHeight);
+        this.pan((event.clientX - x) / scene.offsetWidth, (event.clientY - y) / scene.offsetHeight);
         this.#drag = [event.clientX, event.clientY];
       }
       follow(event);

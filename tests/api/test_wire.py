@@ -10,6 +10,7 @@ from django.utils import timezone
 from pytest_django import Settings
 
 from arena.models import Study, Vote
+from arena.queries.showings import view_of
 from arena.services.studies import close_study
 from augment.models import Contestant, Event, GenerationJob
 from tests.api.asking import body_for, error_of, post, signed_in
@@ -31,10 +32,7 @@ def test_the_next_matchups_have_tokens_and_nothing_else(study: Study) -> None:
             "a": f"/i/{matchup.left_token}",
             "b": f"/i/{matchup.right_token}",
             "original": f"/i/{matchup.original_token}",
-            "px_per_m": 20.0,
-            "ego_px": [300.0, 400.0],
-            "width": 1200,
-            "height": 800,
+            **view_of(matchup.scenario),
         }
         for matchup in mine
     ]

@@ -40,8 +40,7 @@ def furnish(*, scenarios: int = 6, votes: int = 9) -> Study:
 def hang(study: Study) -> Study:
     """Pictures of one pixel for all of a study."""
     for number, augmentation in enumerate(Augmentation.objects.order_by("pk")):
-        augmentation.image = store(png(number % 256))
-        augmentation.save(update_fields=["image"])
+        study_rows.hang(augmentation, store(png(number % 256)))
     study.matchups.update(original_image=store(png(255)))
     return study
 

@@ -98,7 +98,7 @@ def test_tokens_are_counted_from_what_was_said() -> None:
 
 
 def test_a_picture_says_its_size() -> None:
-    assert size_of(PICTURE) == (1200, 800)
+    assert size_of(PICTURE) == (2400, 1200)
 
 
 TOOL = Tool(name="look", description="Looks.", parameters={"type": "object"})

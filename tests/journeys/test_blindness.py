@@ -34,7 +34,7 @@ from tests.journeys.blindness import (
     vote_through,
     word_leaks,
 )
-from tests.study_rows import a_study
+from tests.study_rows import a_study, hang
 
 pytestmark = pytest.mark.django_db
 
@@ -58,7 +58,7 @@ def study() -> Study:
         endpoint=endpoint,
     )
     for number, row in enumerate(Augmentation.objects.order_by("pk")):
-        Augmentation.objects.filter(pk=row.pk).update(image=store(planted.drawn(number)))
+        hang(row, store(planted.drawn(number)))
     job = GenerationJob.objects.filter(augmentations__contestant__slug="zanzibar").first()
     assert job is not None
     open_labelling(name="Faults", job=job, experts=["eva"], seed=1)
@@ -290,7 +290,7 @@ def test_a_planted_header_or_field_is_found(
 )
 def test_a_planted_picture_is_found(eva: Client, study: Study, picture: bytes, found: str) -> None:
     first = study.matchups.get(expert__username="eva", position=1)
-    Augmentation.objects.filter(pk=first.left_id).update(image=store(picture))
+    hang(first.left, store(picture))
     assert any(found in leak for leak in leaks(study, crawl(eva, [matchups_page(study)])))
 
 

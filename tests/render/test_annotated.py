@@ -7,14 +7,13 @@ import numpy as np
 from augment.render import palette
 from augment.render.annotated import FaultMark, draw_annotated
 from augment.render.bev import draw
-from augment.render.camera import camera_for
 from augment.scene.modification import Modification
-from tests.render.pictures import opened
+from tests.render.pictures import WIDE, opened
 from tests.scenes import scene, vehicle
 
 CAR = vehicle("Agent2", 25.0, 0.0)
 CHANGE = Modification(added=(CAR,))
-CAMERA = camera_for(scene(), None)
+CAMERA = WIDE
 WRONG = FaultMark(number=1, agents=("Agent2",), is_wrong=True)
 
 

@@ -9,12 +9,15 @@ import numpy as np
 import pytest
 
 from augment.errors import InvalidModification
+from augment.render import palette
 from augment.render.bev import draw
 from augment.render.camera import camera_for
 from augment.scene.entities import AgentType, Area, AreaKind, Scene, TrafficAgent
 from augment.scene.modification import Modification
 from tests import scenes
 from tests.render.pictures import (
+    WIDE,
+    at_camera_size,
     chunks,
     draw_original,
     is_blue,
@@ -24,9 +27,10 @@ from tests.render.pictures import (
     patch,
     pixel_at,
 )
+from tests.render.test_palette import contrast
 
 STREET = scenes.scene()
-CAMERA = camera_for(STREET, None)
+CAMERA = WIDE
 
 
 def added(*agents: TrafficAgent) -> Modification:
@@ -35,7 +39,7 @@ def added(*agents: TrafficAgent) -> Modification:
 
 def test_the_ego_is_red_the_lane_grey_the_walkway_olive() -> None:
     png = draw_original(STREET, CAMERA)
-    assert opened(png).size == (1200, 800)
+    assert opened(png).size == (2400, 1600)
     assert is_red(pixel_at(png, CAMERA, -0.3, 0.3))
     lane = pixel_at(png, CAMERA, 21.2, 0.8)
     assert is_grey(lane)
@@ -53,7 +57,7 @@ def test_an_added_agent_is_blue_where_it_stands() -> None:
 
 def test_left_of_the_ego_is_up_in_the_picture() -> None:
     png = draw(STREET, added(scenes.vehicle("New1", 20.0, 8.0)), CAMERA)
-    blue = [is_blue(tuple(pixel)) for pixel in np.asarray(opened(png))[:, 700].tolist()]
+    blue = [is_blue(tuple(pixel)) for pixel in at_camera_size(png, CAMERA)[:, 700].tolist()]
     assert any(blue[:400])
     assert not any(blue[400:])
 
@@ -127,7 +131,7 @@ def test_a_walk_is_a_dashed_arrow_to_its_end() -> None:
 def test_absurdly_long_walks_and_fast_agents_are_drawn() -> None:
     walker = scenes.pedestrian("New1", 20.0, -3.0, (1e5, 1e5))
     racer = replace(scenes.vehicle("New2", 10.0, 3.5), speed_mps=100.0, length_m=100.0)
-    assert opened(draw(STREET, added(walker, racer), CAMERA)).size == (1200, 800)
+    assert opened(draw(STREET, added(walker, racer), CAMERA)).size == (2400, 1600)
 
 
 def test_the_scale_is_in_the_same_corner_whatever_changed() -> None:
@@ -142,7 +146,7 @@ def test_the_same_picture_has_the_same_bytes_and_no_metadata() -> None:
     change = added(scenes.vehicle("New1", 20.0, 3.5), scenes.vehicle("New2", 500.0, 3.5))
     first, second = (draw(STREET, change, CAMERA) for _ in range(2))
     assert first == second
-    assert set(chunks(first)) == {"IHDR", "IDAT", "IEND"}
+    assert set(chunks(first)) == {"IHDR", "PLTE", "IDAT", "IEND"}
 
 
 def test_no_picture_leaves_a_trace_on_the_next_of_its_scene() -> None:
@@ -202,3 +206,80 @@ def test_a_turned_vehicle_shows_where_it_faces() -> None:
     assert pixel_at(there, CAMERA, 21.3, 3.5)[0] > 200
     assert pixel_at(back, CAMERA, 18.7, 3.5)[0] > 200
     assert pixel_at(there, CAMERA, 18.7, 3.5)[0] < 200
+
+
+def test_a_person_is_at_least_28_pixels_high_in_every_window() -> None:
+    walker = scenes.pedestrian("New1", 20.0, 6.0)
+    for camera in (CAMERA, camera_for(STREET, added(scenes.vehicle("Ref", 210.0, 0.0)))):
+        png = draw(STREET, added(walker), camera)
+        column = patch(png, camera, 20.0, 6.0, 40)[:, 40]
+        assert sum(is_blue(tuple(pixel)) or pixel.max() < 110 for pixel in column) >= 28
+
+
+def test_a_person_faces_where_the_beak_is() -> None:
+    ahead = scenes.pedestrian("New1", 20.0, 6.0)
+    for turn in np.linspace(0.0, 2.0 * math.pi, 9)[:-1]:
+        png = draw(STREET, added(replace(ahead, heading_rad=float(turn))), CAMERA)
+        front, rear = (
+            pixel_at(png, CAMERA, 20.0 + way * math.cos(turn), 6.0 + way * math.sin(turn))
+            for way in (1.05, -1.05)
+        )
+        assert max(front) < 150 < max(rear)
+
+
+@pytest.mark.parametrize("turn_deg", range(0, 360, 30))
+def test_the_front_mark_of_a_car_is_at_its_front_at_every_angle(turn_deg: int) -> None:
+    turn = math.radians(turn_deg)
+    parked = replace(scenes.vehicle("Agent2", 20.0, 9.0, turn), length_m=4.8)
+    png = draw_original(scenes.scene(agents=(parked,)), CAMERA)
+    front, rear = (
+        patch(png, CAMERA, 20.0 + way * math.cos(turn), 9.0 + way * math.sin(turn), 6)
+        for way in (1.3, -1.3)
+    )
+    assert front.min(axis=2).max() > 240 > rear.min(axis=2).max()
+
+
+def test_a_walk_lies_over_a_parked_car() -> None:
+    parked = scenes.vehicle("Agent2", 20.0, 3.5)
+    walker = scenes.pedestrian("New1", 20.0, -3.0, (20.0, 8.0))
+    for scene, change in (
+        (scenes.scene(agents=(parked,)), added(walker)),
+        (STREET, added(walker, replace(parked, id="New2"))),
+    ):
+        png = draw(scene, change, CAMERA)
+        column = [pixel_at(png, CAMERA, 20.0, y_m) for y_m in np.arange(2.6, 4.4, 0.05)]
+        assert any(min(pixel) > 200 for pixel in column)
+        assert any(is_blue(pixel) for pixel in column)
+
+
+def test_walks_of_a_group_in_single_file_are_told_apart() -> None:
+    group = [scenes.pedestrian(f"New{n}", 20.0, -3.0 - n, (20.0, 9.0)) for n in range(1, 4)]
+    png = at_camera_size(draw(STREET, added(*group), CAMERA), CAMERA)
+    columns = {
+        column - 700
+        for row in range(250, 390)
+        for column in range(660, 740)
+        if is_blue(tuple(png[row, column].tolist()))
+    }
+    assert any(-14 < column < -4 for column in columns)
+    assert any(4 < column < 14 for column in columns)
+    assert columns.isdisjoint({-5, -4, 4, 5})
+
+
+def test_ways_that_the_ego_can_take_are_dark_and_other_connectors_faint() -> None:
+    scene = replace(scenes.junction(), agents=())
+    elsewhere = replace(scene, ego=replace(scene.ego, lane_id=None))
+    shares = [
+        (np.asarray(opened(draw_original(one, CAMERA))) == palette.OWN_LANE).all(axis=2).mean()
+        for one in (scene, elsewhere)
+    ]
+    assert shares[0] > 0.0003
+    assert shares[1] < shares[0] / 2.0
+    assert contrast(palette.OWN_LANE, palette.ROAD) > 5.0
+    assert contrast(palette.CONNECTOR, palette.ROAD) < 1.5
+
+
+def test_without_walkways_the_ground_beyond_the_road_has_a_colour_of_its_own() -> None:
+    bare = replace(STREET, areas=())
+    assert pixel_at(draw_original(bare, CAMERA), CAMERA, 21.2, 12.3) == palette.BEYOND
+    assert pixel_at(draw_original(STREET, CAMERA), CAMERA, 21.2, 12.3) == palette.PAPER

@@ -8,18 +8,17 @@ from itertools import combinations
 import pytest
 
 from augment.render.bev import draw
-from augment.render.camera import camera_for
 from augment.render.canvas import Box, Canvas, MetricCanvas
 from augment.render.edges import Badge, distance_text, outside, place_badges
 from augment.render.scale import scale_box
 from augment.scene.entities import TrafficAgent
 from augment.scene.modification import Modification
 from tests import scenes
-from tests.render.pictures import draw_original, opened
+from tests.render.pictures import WIDE, draw_original, opened
 
-CAMERA = camera_for(scenes.scene(), None)
+CAMERA = WIDE
 GROUND = MetricCanvas(Canvas(1200, 800, (255, 255, 255)), CAMERA)
-SCALE = scale_box(GROUND, scenes.scene())
+SCALE = scale_box(CAMERA, (False, False))
 
 
 def badges(*lost: TrafficAgent, seen: tuple[TrafficAgent, ...] = ()) -> list[Badge]:
@@ -79,13 +78,13 @@ def test_only_changed_agents_get_an_arrow() -> None:
     change = Modification(added=(scenes.vehicle("New1", 500.0, 0.0),))
     picture = draw(without, change, CAMERA)
     assert picture != draw_original(without, CAMERA)
-    assert opened(picture).size == (1200, 800)
+    assert opened(picture).size == (2400, 1600)
 
 
 @pytest.mark.parametrize("place_m", [1e4, 1e9, -1e12])
 def test_absurd_places_are_drawn_as_arrows_too(place_m: float) -> None:
     change = Modification(added=(scenes.vehicle("New1", place_m, place_m),))
-    assert opened(draw(scenes.scene(), change, CAMERA)).size == (1200, 800)
+    assert opened(draw(scenes.scene(), change, CAMERA)).size == (2400, 1600)
 
 
 @pytest.mark.parametrize(

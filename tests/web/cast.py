@@ -67,8 +67,7 @@ def world() -> World:
     """Six scenarios by three contestants; two experts, eva and finn, with nine matchups each."""
     study = study_rows.a_study()
     for number, augmentation in enumerate(Augmentation.objects.all()):
-        augmentation.image = store(png(number))
-        augmentation.save(update_fields=["image"])
+        study_rows.hang(augmentation, store(png(number)))
     job = rows.launch(scenarios=2, contestants=("reference",))
     return World(
         study=study,

@@ -7,16 +7,20 @@ from typing import Any
 from django.conf import settings
 from django.core.management import call_command
 
+from arena.services.redrawing import redraw_pictures
 from augment.services.terminal import TerminalCommand
 
 
 class Command(TerminalCommand):
     """What has to be done once after every update, before anything is served."""
 
-    help = "Apply migrations and collect the static files."
+    help = "Apply migrations, collect the static files, redraw pictures of earlier versions."
 
     def handle(self, *args: Any, **options: Any) -> None:
         """Apply and collect."""
         call_command("migrate", interactive=False, verbosity=0)
         settings.STATIC_ROOT.mkdir(parents=True, exist_ok=True)
         call_command("collectstatic", interactive=False, verbosity=0)
+        drawn = sum(one.pictures for one in redraw_pictures())
+        if drawn:
+            self.stdout.write(f"Pictures of an earlier version drawn anew: {drawn}")

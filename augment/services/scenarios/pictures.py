@@ -14,19 +14,31 @@ from augment.scene.entities import Scene
 from augment.scene.modification import Modification
 from augment.services.scenarios.scenes import reference_of, scene_of
 
+FOLDER = "bev"
+
+
+def window_of(name: str) -> str:
+    """The key of the camera that a picture was drawn with, "" where its name has none.
+
+    Pictures of one scenario stand side by side only where this is the same.
+    """
+    parts = name.split("/")
+    return parts[1] if len(parts) == 3 and parts[0] == FOLDER else ""
+
 
 def original_picture(scenario: Scenario) -> str:
-    """The name of the picture before any change; drawn where there is none yet.
+    """The name of the picture before any change; drawn where there is none in today's window.
 
-    What is drawn here takes about a tenth of a second: call it from a worker, not in a request.
+    Call it from a worker, not in a request.
 
     Raises:
         InvalidDocument: The stored scene can't be read.
     """
-    kept = scenario.original_image
-    if kept and default_storage.exists(kept):
+    kept, scene = scenario.original_image, scene_of(scenario)
+    key = camera_for(scene, reference_of(scenario)).key
+    if kept and window_of(kept) == key and default_storage.exists(kept):
         return kept
-    name = picture_of(scenario, scene_of(scenario), Modification())
+    name = picture_of(scenario, scene, Modification())
     Scenario.objects.filter(pk=scenario.pk).update(original_image=name)
     scenario.original_image = name
     return name
@@ -53,10 +65,10 @@ def picture_of(scenario: Scenario, scene: Scene, modification: Modification) -> 
         InvalidModification: The change does not fit the scene.
     """
     camera = camera_for(scene, reference_of(scenario))
-    return store(draw(scene, modification, camera))
+    return store(draw(scene, modification, camera), folder=f"{FOLDER}/{camera.key}")
 
 
-def store(png: bytes, *, folder: str = "bev") -> str:
+def store(png: bytes, *, folder: str = FOLDER) -> str:
     """The name under which these bytes are kept, <folder>/<sha256>.png; written only if absent."""
     name = f"{folder}/{hashlib.sha256(png).hexdigest()}.png"
     store_as(name, png)

@@ -1,0 +1,49 @@
+"""Pictures of an earlier look or window, drawn anew: all of a scenario or none of it."""
+
+from __future__ import annotations
+
+from django.db import transaction
+
+from augment.models import Augmentation, Scenario
+from augment.scene.codec import modification_from_document
+from augment.scene.modification import Modification
+from augment.services.scenarios.pictures import (
+    camera_of,
+    original_picture,
+    picture_of,
+    window_of,
+)
+from augment.services.scenarios.scenes import scene_of
+
+
+def redraw(scenario: Scenario) -> int:
+    """Draw what was drawn in another window than today's; the old files stay where they are.
+
+    Call it from a worker or a command, not in a request.
+
+    Returns:
+        How many augmentations have a new picture.
+
+    Raises:
+        InvalidDocument: What is stored can't be read.
+        InvalidModification: A modification does not fit the scene.
+    """
+    key = camera_of(scenario).key
+    rows = scenario.augmentations.exclude(image="").only("image", "state", "modification")
+    outdated = [row for row in rows if window_of(row.image) != key]
+    if not outdated and (not scenario.original_image or window_of(scenario.original_image) == key):
+        return 0
+    scene = scene_of(scenario)
+    drawn = [(row, picture_of(scenario, scene, _shown(row))) for row in outdated]
+    with transaction.atomic():
+        original_picture(scenario)
+        for row, name in drawn:
+            Augmentation.objects.filter(pk=row.pk, image=row.image).update(image=name)
+    return len(drawn)
+
+
+def _shown(row: Augmentation) -> Modification:
+    """What its picture shows: an answer that could not be read changes nothing."""
+    if row.state != Augmentation.State.DONE or row.modification is None:
+        return Modification()
+    return modification_from_document(row.modification)

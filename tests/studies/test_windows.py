@@ -1,0 +1,63 @@
+"""Both pictures of a pair show one window, whatever was drawn when."""
+
+from __future__ import annotations
+
+import pytest
+from django.core.management import call_command
+
+from arena.errors import NothingToPlan
+from arena.models import Study
+from arena.services.redrawing import redraw_pictures
+from arena.services.studies import close_study, open_study
+from augment.models import Augmentation, Scenario
+from augment.scene.codec import modification_to_document
+from augment.scene.modification import Modification
+from augment.services.scenarios.pictures import camera_of, original_picture, window_of
+from tests.study_rows import cast_of
+
+pytestmark = pytest.mark.django_db
+
+
+def drawn_before() -> None:
+    """All pictures as if an earlier version had drawn them."""
+    for row in Augmentation.objects.all():
+        Augmentation.objects.filter(pk=row.pk).update(
+            image=f"bev/1-0ld/{row.pk}.png",
+            modification=modification_to_document(Modification()),
+        )
+    Scenario.objects.update(original_image="bev/1-0ld/original.png")
+
+
+def opened(name: str, **cast: object) -> Study:
+    return open_study(name=name, votes_per_expert=2, seed=7, **cast)  # type: ignore[arg-type]
+
+
+def test_pictures_of_two_windows_are_never_paired() -> None:
+    cast = cast_of(contestants=("ann", "bob"), scenarios=2, experts=("eva",))
+    drawn_before()
+    one = Augmentation.objects.filter(contestant__slug="ann")[:1].get()
+    Augmentation.objects.filter(pk=one.pk).update(image=original_picture(one.scenario))
+    with pytest.raises(NothingToPlan, match="redraw_pictures"):
+        opened("mixed", **cast)
+    call_command("redraw_pictures")
+    for row in Augmentation.objects.filter(contestant__slug="bob"):
+        Augmentation.objects.filter(pk=row.pk).update(image=row.image.replace(".png", "x.png"))
+    for matchup in opened("redrawn", **cast).matchups.all():
+        windows = {
+            window_of(name)
+            for name in (matchup.left_image, matchup.right_image, matchup.original_image)
+        }
+        assert windows == {camera_of(matchup.scenario).key}
+    assert not any(found.pictures for found in redraw_pictures())
+
+
+def test_a_study_keeps_the_pictures_that_were_shown() -> None:
+    cast = cast_of(contestants=("ann", "bob"), scenarios=2, experts=("eva",))
+    drawn_before()
+    study = opened("before", **cast)
+    shown = set(study.matchups.values_list("left_image", "right_image", "original_image"))
+    assert {found.needed_by for found in redraw_pictures()} == {"before"}
+    close_study(study=study)
+    assert sum(found.pictures for found in redraw_pictures()) == 4
+    assert not Augmentation.objects.filter(image__startswith="bev/1-0ld").exists()
+    assert set(study.matchups.values_list("left_image", "right_image", "original_image")) == shown
