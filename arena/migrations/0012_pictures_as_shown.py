@@ -17,7 +17,7 @@ def keep_names(apps: Any, schema_editor: Any) -> None:
 
 
 class Migration(migrations.Migration):
-    dependencies = [("arena", "0010_votes_written_in_batches"), ("augment", "0010_what_sources_leave_open")]
+    dependencies = [("arena", "0011_replay"), ("augment", "0010_what_sources_leave_open")]
 
     operations = [
         *(
