@@ -9,19 +9,22 @@ from typing import cast
 from django.contrib import messages
 from django.contrib.auth.models import User
 from django.db import transaction
-from django.http import HttpRequest, HttpResponse
+from django.http import Http404, HttpRequest, HttpResponse
 from django.shortcuts import get_object_or_404, redirect, render
 from django.urls import reverse
+from django.utils.text import slugify
 from django.utils.translation import gettext as _
 from django.views.decorators.http import require_http_methods, require_POST, require_safe
 
+from arena.exports.formats import format_named
+from arena.exports.tool_calls import FORMATS as TOOL_CALL_FORMATS
 from arena.queries import jobs, scenarios
 from arena.web.access import ADMIN, STAFF, allow_only
 from arena.web.displacement import section
 from arena.web.driving import section as driving_section
 from arena.web.forms import CapsForm, LaunchForm
 from arena.web.questions import Confirmation, ask, is_sure
-from augment.errors import AugmentError, QueueFault
+from augment.errors import AugmentError, QueueFault, UnknownName
 from augment.models import Augmentation, Contestant, GenerationJob
 from augment.services.endpoints import contestants
 from augment.services.judging.scenario_export import FORMATS
@@ -30,6 +33,10 @@ from augment.services.running import jobs as service
 from augment.services.running.caps import Caps
 from augment.services.running.costs import costs_of
 from augment.services.running.summary import count_rows, failure_groups, list_jobs
+from augment.services.running.tool_calls import (
+    tool_calls_by_augmentation,
+    tool_calls_by_contestant,
+)
 from augment.services.running.workers import workforce
 from augment.services.wording import translate
 from augment.tasks import enqueue_job
@@ -89,7 +96,25 @@ def job_page(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
         context["scenario_formats"] = FORMATS
         context["displacement"] = section(request, job)
         context["driving"] = driving_section(request, job)
+        context["tool_calls"] = tool_calls_by_contestant(job)
     return render(request, "jobs/job.html", context)
+
+
+@allow_only(*STAFF)
+@require_safe
+def export_tool_calls(request: HttpRequest, code: uuid.UUID, form: str) -> HttpResponse:
+    """How each augmentation's contestant called its function, as a file."""
+    job = get_object_or_404(GenerationJob, code=code)
+    try:
+        chosen = format_named(TOOL_CALL_FORMATS, form)
+    except UnknownName as error:
+        raise Http404 from error
+    name = f"{slugify(job.name) or 'job'}-tool-calls.{chosen.suffix}"
+    return HttpResponse(
+        chosen.write(tool_calls_by_augmentation(job)),
+        content_type=chosen.content_type,
+        headers={"Content-Disposition": f'attachment; filename="{name}"'},
+    )
 
 
 @allow_only(ADMIN)

@@ -52,6 +52,11 @@ urlpatterns: list[URLPattern] = [
         name="displacement-export",
     ),
     path(
+        "jobs/<uuid:code>/tool-calls.<slug:form>",
+        jobs.export_tool_calls,
+        name="tool-calls-export",
+    ),
+    path(
         "jobs/<uuid:code>/scenarios-<slug:form>.zip",
         scenario_files.export,
         name="scenarios-export",

@@ -27,6 +27,7 @@ PAGES: dict[str, tuple[int, int, int]] = {
     "job-progress": (200, 200, 403),
     "metrics": (200, 401, 401),
     "displacement-export": (200, 200, 403),
+    "tool-calls-export": (200, 200, 403),
     "scenarios-export": (302, 302, 403),  # no result can be written
     "drives": (200, 200, 403),
     "driving-export": (200, 200, 403),
@@ -92,6 +93,7 @@ def address(name: str, here: World) -> str:
         "job-cancel": {"code": here.job.code},
         "job-resume": {"code": here.job.code},
         "displacement-export": {"code": here.job.code, "form": "csv"},
+        "tool-calls-export": {"code": here.job.code, "form": "csv"},
         "scenarios-export": {"code": here.job.code, "form": "json"},
         "faults": {"code": here.job.code},
         "faults-export": {"code": here.job.code, "form": "csv"},

@@ -11,7 +11,7 @@ from django.core.management.base import CommandError, CommandParser
 from django.utils.text import slugify
 
 from arena.errors import ArenaError, StudyStillOpen
-from arena.exports import displacement_writers, driving_writers, faults
+from arena.exports import displacement_writers, driving_writers, faults, tool_calls
 from arena.exports.bundle import bundle
 from arena.exports.displacement_objects import BY_OBJECT, OBJECT_FORMATS, object_rows
 from arena.exports.displacement_table import displacement_table
@@ -37,6 +37,7 @@ from augment.services.judging.scenario_export import FORMATS as SCENARIO_FORMATS
 from augment.services.judging.scenario_export import RECORDED, Exported, export_job
 from augment.services.judging.simulations import SCORES, Options
 from augment.services.running.choosing import find_job
+from augment.services.running.tool_calls import tool_calls_by_augmentation
 from augment.services.scenarios.interplan import job_as_interplan
 from augment.services.terminal import TerminalCommand
 
@@ -69,6 +70,7 @@ class Command(TerminalCommand):
             "scenarios": self._scenarios,
             "faults": self._faults,
             "driving": self._driving,
+            "tool-calls": self._tool_calls,
         }
         try:
             content, suffix, is_text = write[options["what"]](options)
@@ -122,6 +124,11 @@ class Command(TerminalCommand):
         chosen = format_named(faults.FORMATS, options["format"])
         table = faults.fault_table(find_job(options["job"]))
         return chosen.write(table), chosen.suffix, chosen.is_text
+
+    def _tool_calls(self, options: dict[str, Any]) -> Written:
+        chosen = format_named(tool_calls.FORMATS, options["format"])
+        lines = tool_calls_by_augmentation(find_job(options["job"]))
+        return chosen.write(lines), chosen.suffix, chosen.is_text
 
     def _driving(self, options: dict[str, Any]) -> Written:
         chosen = format_named(driving_writers.FORMATS, options["format"])
@@ -281,7 +288,11 @@ def _kinds_of_jobs(kinds: Any) -> list[ArgumentParser]:
     driving.add_argument(
         "--format", default="csv", help=f"one of {', '.join(driving_writers.FORMATS)}"
     )
-    return [displacement, samples, modifications, _kind_of_scenarios(kinds), labels, driving]
+    calls = kinds.add_parser("tool-calls", help="calls of the function: tried, understood, mended")
+    calls.add_argument("job", help="its name or its code")
+    calls.add_argument("--format", default="csv", help=f"one of {', '.join(tool_calls.FORMATS)}")
+    scenarios = _kind_of_scenarios(kinds)
+    return [displacement, samples, modifications, scenarios, labels, driving, calls]
 
 
 def _kind_of_scenarios(kinds: Any) -> ArgumentParser:
