@@ -78,8 +78,8 @@ class BaseSceneAdmin(MadeElsewhere, admin.ModelAdmin):
 class ScenarioAdmin(MadeElsewhere, admin.ModelAdmin):
     """Scenarios; what contestants were asked stays as it was asked."""
 
-    list_display = ("slug", "type", "base_scene", "in_catalogue", "keep_traffic")
-    list_filter = ("type", "in_catalogue", "keep_traffic")
+    list_display = ("slug", "type", "base_scene", "catalogue_set", "keep_traffic")
+    list_filter = ("type", "catalogue_set", "language", "keep_traffic")
     list_select_related = ("base_scene",)
     search_fields = ("slug", "instruction")
     exclude = ("reference",)

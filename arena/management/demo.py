@@ -99,7 +99,8 @@ def prepare(say: Callable[[str], None]) -> None:
 def scenarios_of(per_type: int | None) -> list[str]:
     """Slugs of the catalogue: the first so many of each type, all where None is given."""
     kinds: dict[str, list[str]] = {}
-    for slug, kind in Scenario.objects.filter(in_catalogue=True).values_list("slug", "type"):
+    authored = Scenario.objects.filter(catalogue_set="paper", paraphrase_of=None)
+    for slug, kind in authored.values_list("slug", "type"):
         kinds.setdefault(kind, []).append(slug)
     return [slug for slugs in kinds.values() for slug in slugs[:per_type]]
 

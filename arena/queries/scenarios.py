@@ -5,7 +5,10 @@ from __future__ import annotations
 import uuid
 from dataclasses import dataclass
 
+from django.db.models import Count
+
 from augment.models import Augmentation, Contestant, Scenario
+from augment.scene.catalogue import CatalogueSet
 from augment.services.scenarios.types import type_choices
 
 
@@ -18,18 +21,56 @@ class TypeGroup:
     scenarios: list[Scenario]
 
 
-def by_type() -> list[TypeGroup]:
-    """Every scenario, in the order of the types; types without any are left out."""
-    rows = list(
-        Scenario.objects.select_related("base_scene").defer(
-            "reference", "base_scene__document", "base_scene__recording"
-        )
+OWN = "own"
+"""The scenarios that are in no set of the catalogue."""
+
+
+def by_type(chosen: str = "", *, with_paraphrases: bool = True) -> list[TypeGroup]:
+    """The scenarios, in the order of the types; types without any are left out.
+
+    Args:
+        chosen: A set of the catalogue, `own` for those in none; empty for all.
+        with_paraphrases: Whether those count that say another one in other words.
+    """
+    found = Scenario.objects.select_related("base_scene").defer(
+        "reference", "base_scene__document", "base_scene__recording"
     )
+    if chosen:
+        found = found.filter(catalogue_set="" if chosen == OWN else chosen)
+    if not with_paraphrases:
+        found = found.filter(paraphrase_of=None)
+    rows = list(found)
     groups = [
         TypeGroup(type=name, label=label, scenarios=[row for row in rows if row.type == name])
         for name, label in type_choices()
     ]
     return [group for group in groups if group.scenarios]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SetChoice:
+    """A part of the scenarios that a page can show alone."""
+
+    name: str
+    number: int
+    is_chosen: bool
+
+
+def set_choices(chosen: str) -> list[SetChoice]:
+    """All scenarios first (named by the empty text), then the sets that there are."""
+    counted = Scenario.objects.filter(paraphrase_of=None).values_list("catalogue_set")
+    numbers = dict(counted.annotate(number=Count("pk")).order_by())
+    found = [(one.value, numbers.get(one.value, 0)) for one in CatalogueSet]
+    found.append((OWN, numbers.get("", 0)))
+    present = [("", sum(numbers.values())), *(one for one in found if one[1])]
+    return [
+        SetChoice(name=name, number=number, is_chosen=name == chosen) for name, number in present
+    ]
+
+
+def set_asked(name: str | None) -> str:
+    """What an address asks for; all where it names no set."""
+    return name if name in {*CatalogueSet, OWN} and name is not None else ""
 
 
 def reference_pictures() -> dict[int, uuid.UUID]:

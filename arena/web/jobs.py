@@ -60,13 +60,14 @@ def jobs_page(request: HttpRequest) -> HttpResponse:
 def new_job_page(request: HttpRequest) -> HttpResponse:
     """Choose contestants and scenarios, then launch."""
     contestants.ensure_builtin()
+    chosen_set = scenarios.set_asked(request.GET.get("set"))
     form = LaunchForm(
         request.POST or None,
         contestants=list(Contestant.objects.select_related("endpoint").order_by("name")),
-        groups=scenarios.by_type(),
+        groups=scenarios.by_type(chosen_set),
     )
     if "estimate" in request.POST:
-        return _estimated(request, form)
+        return _estimated(request, form, chosen_set)
     if request.method == "POST" and form.is_valid():
         try:
             job = _launch(request, form)
@@ -75,7 +76,8 @@ def new_job_page(request: HttpRequest) -> HttpResponse:
         else:
             messages.success(request, _("“%(name)s” is launched.") % {"name": job.name})
             return redirect("job", code=job.code)
-    return render(request, "jobs/new.html", {"form": form}, status=422 if form.errors else 200)
+    context = {"form": form, "sets": scenarios.set_choices(chosen_set)}
+    return render(request, "jobs/new.html", context, status=422 if form.errors else 200)
 
 
 @allow_only(*STAFF)
@@ -194,9 +196,9 @@ def _cancelling(job: GenerationJob) -> Confirmation:
     )
 
 
-def _estimated(request: HttpRequest, form: LaunchForm) -> HttpResponse:
+def _estimated(request: HttpRequest, form: LaunchForm, chosen_set: str) -> HttpResponse:
     """The page as it came in, with what the job would use; nothing is launched."""
-    context: dict[str, object] = {"form": form}
+    context: dict[str, object] = {"form": form, "sets": scenarios.set_choices(chosen_set)}
     try:
         found = form.estimated()
     except AugmentError as error:

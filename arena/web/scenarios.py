@@ -35,8 +35,13 @@ LOOKS = tuple(str(number) for number in range(6))
 @allow_only(*STAFF)
 @require_safe
 def scenarios_page(request: HttpRequest) -> HttpResponse:
-    """The contact sheet: every scenario by type, its reference where it was drawn."""
-    context = {"groups": scenarios.by_type(), "references": scenarios.reference_pictures()}
+    """The contact sheet: scenarios of a set by type, the reference where it was drawn."""
+    chosen = scenarios.set_asked(request.GET.get("set"))
+    context = {
+        "groups": scenarios.by_type(chosen, with_paraphrases=False),
+        "sets": scenarios.set_choices(chosen),
+        "references": scenarios.reference_pictures(),
+    }
     return render(request, "scenarios/list.html", context)
 
 
@@ -44,10 +49,13 @@ def scenarios_page(request: HttpRequest) -> HttpResponse:
 @require_safe
 def scenario_page(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
     """One scenario: before and after the reference, and every other result."""
-    scenario = get_object_or_404(Scenario.objects.select_related("base_scene"), code=code)
+    scenario = get_object_or_404(
+        Scenario.objects.select_related("base_scene", "paraphrase_of"), code=code
+    )
     reading = waiting_reading(scenario)
     context = {
         "scenario": scenario,
+        "paraphrases": scenario.paraphrases.all(),
         "reference_code": scenarios.reference_pictures().get(scenario.pk),
         "lines": modification_lines(scenario.reference),
         "statements": [translate(one) for one in statements_of(scenario.intent)],

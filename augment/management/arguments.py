@@ -10,7 +10,9 @@ from typing import Any
 
 from django.conf import settings
 
+from augment.scene.catalogue import CatalogueSet
 from augment.services.running.caps import Caps
+from augment.services.scenarios.catalogue import folder_of
 from augment.variants.options import EFFORTS, ContestantOptions, options_from_document
 
 
@@ -80,6 +82,23 @@ _OPTION_ARGUMENTS: tuple[tuple[str, str, Callable[[str], object], str], ...] = (
     ("--prompt-version", "prompt_version", str, "run with these prompts or not at all"),
     ("--picture-px", "picture_px", int, "width of the viewer's picture; default: 1200"),
 )
+
+
+SETS = ("paper", "hard", "all")
+
+
+def add_set_argument(parser: ArgumentParser, *, default: str) -> None:
+    """--set paper|hard|all: which part of the catalogue."""
+    parser.add_argument(
+        "--set", dest="sets", choices=SETS, default=default, help=f"default: {default}"
+    )
+
+
+def sets_of(options: dict[str, Any]) -> tuple[CatalogueSet, ...]:
+    """What was given; of all sets those that the folder has."""
+    if options["sets"] != "all":
+        return (CatalogueSet(options["sets"]),)
+    return tuple(one for one in CatalogueSet if folder_of(options["folder"], one).is_dir())
 
 
 def _usd(text: str) -> Decimal:

@@ -7,7 +7,7 @@ import uuid
 from django.db import models
 from django.db.models import Q
 
-from augment.scene.catalogue import ScenarioType
+from augment.scene.catalogue import CatalogueSet, ScenarioType
 from augment.scene.intent import IntentOrigin
 
 SLUG_HELP = "lower-case letters, digits and hyphens"
@@ -79,7 +79,22 @@ class Scenario(models.Model):
     keep_traffic = models.BooleanField(
         default=False, help_text="keep the recorded traffic; interPlan clears it"
     )
-    in_catalogue = models.BooleanField(default=False)
+    catalogue_set = models.CharField(
+        max_length=10,
+        blank=True,
+        db_index=True,
+        choices=[(one.value, one.value) for one in CatalogueSet],
+        help_text="the part of the authored catalogue that it belongs to; empty for all others",
+    )
+    language = models.CharField(max_length=2, default="en", help_text="of the instruction")
+    paraphrase_of = models.ForeignKey(
+        "self",
+        null=True,
+        blank=True,
+        on_delete=models.PROTECT,
+        related_name="paraphrases",
+        help_text="the scenario that it asks for in other words",
+    )
     original_image = models.CharField(
         max_length=120, blank=True, help_text="name of the picture before any change"
     )
@@ -109,6 +124,11 @@ class Scenario(models.Model):
 
     def __str__(self) -> str:
         return self.slug
+
+    @property
+    def in_catalogue(self) -> bool:
+        """Whether it comes with the project; its file alone changes it then."""
+        return bool(self.catalogue_set)
 
     def get_type_display(self) -> str:
         """What people read for its type."""

@@ -1,4 +1,4 @@
-"""The five scenario types of interPlan that the paper recreates."""
+"""The five scenario types of interPlan that the paper recreates, and the sets of the catalogue."""
 
 from __future__ import annotations
 
@@ -18,6 +18,13 @@ class ScenarioType(StrEnum):
     def label(self) -> str:
         """The words that the paper uses for it."""
         return _LABELS[self]
+
+
+class CatalogueSet(StrEnum):
+    """Which part of the authored catalogue a scenario belongs to."""
+
+    PAPER = "paper"
+    HARD = "hard"
 
 
 _LABELS = {

@@ -114,7 +114,7 @@ def test_a_broken_wire_is_a_failed_reading_with_a_sentence() -> None:
 
 def test_the_catalogues_intents_are_changed_in_their_files() -> None:
     reading(GOOD)
-    Scenario.objects.update(in_catalogue=True)
+    Scenario.objects.update(catalogue_set="paper")
     with pytest.raises(Conflict, match="the catalogue's own"):
         accept_reading(scenario="street")
 

@@ -157,7 +157,7 @@ def test_generate_launches_what_all_and_catalogue_stand_for(
     broker: Broker, django_capture_on_commit_callbacks: object
 ) -> None:
     add_scenario("own")
-    add_scenario("shipped", in_catalogue=True)
+    add_scenario("shipped", catalogue_set="paper")
     said = StringIO()
     with django_capture_on_commit_callbacks(execute=True):  # type: ignore[operator]
         call_command("generate", "--contestants", "all", "--scenarios", "catalogue", stdout=said)

@@ -17,9 +17,11 @@ from augment.scene.catalogue import ScenarioType
 from augment.scene.catalogue_codec import CatalogueEntry, entry_to_document
 from augment.scene.codec import scene_to_document
 from augment.scene.modification import Modification
+from augment.services.running.choosing import resolve_scenarios
 from augment.services.scenarios.catalogue import CatalogueReport, load_catalogue
 from augment.services.scenarios.scene_imports import import_scene
 from augment.services.scenarios.scenes import add_scenario, intent_of, reference_of
+from tests.fixtures.shelf import HARD
 from tests.intents import parked
 from tests.scenes import scene, vehicle
 
@@ -101,7 +103,32 @@ def test_the_projects_own_catalogue_loads_twice_through_the_command() -> None:
         call_command("load_catalogue", stdout=out)
         assert f"scenes: {scenes} changed" in out.getvalue()
         assert f"scenarios: {scenarios} changed" in out.getvalue()
-    assert Scenario.objects.filter(in_catalogue=True).count() == 50
+    assert Scenario.objects.filter(catalogue_set="paper").count() == 50
+
+
+def test_the_hard_set_comes_when_it_is_asked_for_with_its_paraphrases_beside(
+    folder: Path,
+) -> None:
+    for name in ("scenes/hairpin-hill.json", "scenarios/hairpin-hill-van.json"):
+        (folder / "hard" / name).parent.mkdir(parents=True)
+        shutil.copy(HARD / name, folder / "hard" / name)
+    out = StringIO()
+    call_command("load_catalogue", "--folder", str(folder), stdout=out)
+    assert resolve_scenarios(["catalogue"]) == ["parked-car"]
+    call_command("load_catalogue", "--folder", str(folder), "--set", "all", stdout=out)
+    assert resolve_scenarios(["catalogue"]) == ["hairpin-hill-van", "parked-car"]
+    call_command(
+        "load_catalogue", "--folder", str(folder), "--set", "hard", "--paraphrases", stdout=out
+    )
+    assert "scenarios: 3 added, 0 changed, 1 unchanged" in out.getvalue()
+    assert resolve_scenarios(["paper"]) == ["parked-car"]
+    assert resolve_scenarios(["hard", "hairpin-hill-van"]) == ["hairpin-hill-van"]
+    assert len(resolve_scenarios(["hard", "paraphrases"])) == 4
+    german = Scenario.objects.get(slug="hairpin-hill-van-p2")
+    original = Scenario.objects.get(slug="hairpin-hill-van")
+    assert (german.language, german.paraphrase_of) == ("de", original)
+    assert (german.reference, german.intent) == (original.reference, original.intent)
+    assert german.instruction.startswith("In der Kehre")
 
 
 def test_an_unused_scenario_and_its_scene_may_change(folder: Path) -> None:

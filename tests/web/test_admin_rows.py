@@ -93,7 +93,7 @@ def odd_contestant(office: Client, here: World) -> None:
 
 
 def odd_scenario(office: Client, here: World) -> None:
-    edit(office, Scenario.objects.all()[0], in_catalogue="on")
+    edit(office, Scenario.objects.all()[0], catalogue_set="paper")
 
 
 def model_fields(row: EndpointModel, **values: Any) -> dict[str, Any]:

@@ -8,7 +8,7 @@ from typing import Any
 from django.core.management.base import CommandError
 
 from augment.errors import AugmentError
-from augment.management.arguments import add_folder_argument
+from augment.management.arguments import add_folder_argument, add_set_argument, sets_of
 from augment.services.scenarios.catalogue_check import (
     CatalogueCheck,
     ScenarioCheck,
@@ -18,7 +18,7 @@ from augment.services.terminal import TerminalCommand
 
 
 class Command(TerminalCommand):
-    """check_catalogue [--folder FOLDER]."""
+    """check_catalogue [--set paper|hard|all] [--folder FOLDER]."""
 
     help = (
         "Check that every reference passes the geometric checks, agrees with the intent "
@@ -28,11 +28,12 @@ class Command(TerminalCommand):
     def add_arguments(self, parser: ArgumentParser) -> None:
         """Where the catalogue is."""
         add_folder_argument(parser)
+        add_set_argument(parser, default="all")
 
     def handle(self, *args: Any, **options: Any) -> None:
         """Print a line for each scenario, then the reasons."""
         try:
-            found = check_catalogue(folder=options["folder"])
+            found = check_catalogue(folder=options["folder"], sets=sets_of(options))
         except AugmentError as error:
             raise CommandError(str(error)) from error
         width = max((len(one.slug) for one in found.scenarios), default=8)

@@ -43,7 +43,10 @@ class Command(TerminalCommand):
         """What to run, and whether to wait."""
         parser.add_argument("--contestants", nargs="+", required=True, help="slugs, or all")
         parser.add_argument(
-            "--scenarios", nargs="+", required=True, help="slugs, or all, or catalogue"
+            "--scenarios",
+            nargs="+",
+            required=True,
+            help="slugs, or all, catalogue, paper, hard, paraphrases",
         )
         parser.add_argument("--name", help="what people call the job")
         add_cap_arguments(parser)

@@ -8,13 +8,13 @@ from typing import Any
 from django.core.management.base import CommandError
 
 from augment.errors import AugmentError
-from augment.management.arguments import add_folder_argument
+from augment.management.arguments import add_folder_argument, add_set_argument, sets_of
 from augment.services.scenarios.catalogue import load_catalogue
 from augment.services.terminal import TerminalCommand
 
 
 class Command(TerminalCommand):
-    """load_catalogue [--folder FOLDER]."""
+    """load_catalogue [--set paper|hard|all] [--paraphrases] [--folder FOLDER]."""
 
     help = (
         "Load the catalogue: base scenes, instructions and reference modifications. "
@@ -24,11 +24,21 @@ class Command(TerminalCommand):
     def add_arguments(self, parser: ArgumentParser) -> None:
         """Where the catalogue is."""
         add_folder_argument(parser)
+        add_set_argument(parser, default="paper")
+        parser.add_argument(
+            "--paraphrases",
+            action="store_true",
+            help="also every paraphrase, as a scenario beside the one that it says anew",
+        )
 
     def handle(self, *args: Any, **options: Any) -> None:
         """Load it and say what that changed."""
         try:
-            report = load_catalogue(folder=options["folder"])
+            report = load_catalogue(
+                folder=options["folder"],
+                sets=sets_of(options),
+                with_paraphrases=options["paraphrases"],
+            )
         except AugmentError as error:
             raise CommandError(str(error)) from error
         for kind in ("scenes", "scenarios"):

@@ -6,13 +6,14 @@ from collections.abc import Sequence
 from contextlib import suppress
 from uuid import UUID
 
-from django.db.models import Q
+from django.db.models import Q, QuerySet
 
 from augment.errors import Conflict, UnknownName
 from augment.models import Contestant, GenerationJob, Scenario
+from augment.scene.catalogue import CatalogueSet
 from augment.services.running.feasible import RUNNABLE
 
-ALL, CATALOGUE = "all", "catalogue"
+ALL = "all"
 
 
 def resolve_contestants(given: Sequence[str]) -> list[str]:
@@ -23,12 +24,30 @@ def resolve_contestants(given: Sequence[str]) -> list[str]:
 
 
 def resolve_scenarios(given: Sequence[str]) -> list[str]:
-    """The slugs; `all` stands for every scenario, `catalogue` for the authored ones."""
-    if list(given) == [ALL]:
-        return list(Scenario.objects.values_list("slug", flat=True))
-    if list(given) == [CATALOGUE]:
-        return list(Scenario.objects.filter(in_catalogue=True).values_list("slug", flat=True))
-    return list(given)
+    """The slugs, each once; words that are no slugs stand for several.
+
+    `all`: every scenario; `catalogue`: the authored ones, `paper` or `hard`: those of one set,
+    all three without paraphrases; `paraphrases`: those of the catalogue.
+    """
+    slugs: list[str] = []
+    for word in given:
+        several = _several(word)
+        slugs += [word] if several is None else several.values_list("slug", flat=True)
+    return list(dict.fromkeys(slugs))
+
+
+def _several(word: str) -> QuerySet[Scenario] | None:
+    authored = Scenario.objects.exclude(catalogue_set="")
+    match word:
+        case "all":
+            return Scenario.objects.all()
+        case "paraphrases":
+            return authored.exclude(paraphrase_of=None)
+        case "catalogue":
+            return authored.filter(paraphrase_of=None)
+        case CatalogueSet.PAPER | CatalogueSet.HARD:
+            return authored.filter(paraphrase_of=None, catalogue_set=word)
+    return None
 
 
 def find_job(name_or_code: str) -> GenerationJob:

@@ -5,8 +5,8 @@ A folder holds `scenes/<name>.json` and `scenarios/<slug>.json`. Loading it twic
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TypeVar
 
@@ -17,6 +17,7 @@ from django.db.models import QuerySet
 from augment.errors import Conflict, InvalidDocument, InvalidModification
 from augment.formats.json_file import read_json
 from augment.models import Augmentation, BaseScene, Scenario
+from augment.scene.catalogue import CatalogueSet
 from augment.scene.catalogue_codec import CatalogueEntry, entry_from_document
 from augment.scene.codec import (
     modification_to_document,
@@ -49,24 +50,40 @@ class CatalogueReport:
 
 
 @transaction.atomic
-def load_catalogue(*, folder: Path, actor: User | None = None) -> CatalogueReport:
+def load_catalogue(
+    *,
+    folder: Path,
+    actor: User | None = None,
+    sets: Sequence[CatalogueSet] = (CatalogueSet.PAPER,),
+    with_paraphrases: bool = False,
+) -> CatalogueReport:
     """Bring the rows in line with the files, all of them or none.
 
     Rows whose file is gone stay. A change is refused where something was made from the old
     state already, because nobody could tell any more what it was made from.
 
     Args:
-        folder: Holds `scenes` and `scenarios`.
+        folder: Holds `scenes` and `scenarios`, and those of the hard set in `hard`.
         actor: Who did it.
+        sets: Which parts of it.
+        with_paraphrases: Whether every paraphrase becomes a scenario of its own beside the one
+            that it says in other words, with the same intent and reference.
 
     Raises:
         InvalidDocument: The folder holds no catalogue, or files break their format or do not
             fit together; every problem names its file and the path inside it.
         Conflict: A slug belongs to a row from elsewhere, or what changed is in use.
     """
-    scenes, entries = read_catalogue(folder)
-    scene_steps = [_store_scene(scene, actor) for scene in scenes.values()]
-    scenario_steps = [_store_scenario(entry, actor) for entry in entries]
+    read = {one: read_catalogue(folder_of(folder, one)) for one in sets}
+    scene_steps = [
+        _store_scene(scene, actor) for scenes, _ in read.values() for scene in scenes.values()
+    ]
+    scenario_steps = []
+    for one, (_, entries) in read.items():
+        for entry in entries:
+            scenario_steps.append(_store_scenario(entry, one, actor))
+            if with_paraphrases:
+                scenario_steps += _store_paraphrases(entry, one, actor)
     return CatalogueReport(
         scenes_added=scene_steps.count("add"),
         scenes_changed=scene_steps.count("change"),
@@ -75,6 +92,11 @@ def load_catalogue(*, folder: Path, actor: User | None = None) -> CatalogueRepor
         scenarios_changed=scenario_steps.count("change"),
         scenarios_unchanged=scenario_steps.count("keep"),
     )
+
+
+def folder_of(folder: Path, one: CatalogueSet) -> Path:
+    """Where the files of a set lie within a catalogue's folder."""
+    return folder if one is CatalogueSet.PAPER else folder / one.value
 
 
 def read_catalogue(folder: Path) -> tuple[dict[str, Scene], list[CatalogueEntry]]:
@@ -171,7 +193,7 @@ def _store_scene(scene: Scene, actor: User | None) -> str:
     if row.document == document:
         return "keep"
     _refuse_if_used(f"scene {row.slug!r}", Augmentation.objects.filter(scenario__base_scene=row))
-    own = row.scenarios.filter(in_catalogue=False).values_list("slug", flat=True)
+    own = row.scenarios.filter(catalogue_set="").values_list("slug", flat=True)
     if own:
         raise Conflict(
             f"The scene {row.slug!r} has changed, but scenarios outside the catalogue use it: "
@@ -184,7 +206,32 @@ def _store_scene(scene: Scene, actor: User | None) -> str:
     return "change"
 
 
-def _store_scenario(entry: CatalogueEntry, actor: User | None) -> str:
+def _store_paraphrases(
+    entry: CatalogueEntry, which: CatalogueSet, actor: User | None
+) -> list[str]:
+    original = Scenario.objects.get(slug=entry.slug)
+    return [
+        _store_scenario(
+            replace(
+                entry,
+                slug=f"{entry.slug}-p{number}",
+                instruction=wording.text,
+                language=wording.language,
+            ),
+            which,
+            actor,
+            original,
+        )
+        for number, wording in enumerate(entry.paraphrases, start=1)
+    ]
+
+
+def _store_scenario(
+    entry: CatalogueEntry,
+    which: CatalogueSet,
+    actor: User | None,
+    original: Scenario | None = None,
+) -> str:
     row = Scenario.objects.filter(slug=entry.slug).select_related("base_scene").first()
     reference = modification_to_document(entry.reference)
     intent = None if entry.intent is None else intent_to_document(entry.intent)
@@ -200,8 +247,9 @@ def _store_scenario(entry: CatalogueEntry, actor: User | None) -> str:
             keep_traffic=entry.keep_traffic,
             actor=actor,
         )
-        row.in_catalogue = True
-        row.save(update_fields=["in_catalogue"])
+        row.catalogue_set, row.language = which.value, entry.language
+        row.paraphrase_of = original
+        row.save(update_fields=["catalogue_set", "language", "paraphrase_of"])
         return "add"
     if not row.in_catalogue:
         raise Conflict(
@@ -214,6 +262,9 @@ def _store_scenario(entry: CatalogueEntry, actor: User | None) -> str:
         "instruction": entry.instruction.strip(),
         "reference": reference,
         "keep_traffic": entry.keep_traffic,
+        "catalogue_set": which.value,
+        "language": entry.language,
+        "paraphrase_of": original,
         "intent": intent,
         "intent_origin": "" if intent is None else IntentOrigin.AUTHORED.value,
     }

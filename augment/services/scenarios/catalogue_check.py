@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import re
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -20,12 +20,13 @@ from augment.checks.tolerances import AUTHORED
 from augment.geometry.boxes import corners
 from augment.geometry.polyline import FloatArray
 from augment.render.camera import Camera, camera_for
+from augment.scene.catalogue import CatalogueSet
 from augment.scene.catalogue_codec import CatalogueEntry
 from augment.scene.entities import Scene
 from augment.scene.intent_codec import intent_to_parts
 from augment.scene.intent_statements import list_statements
 from augment.scene.modification import without_traffic
-from augment.services.scenarios.catalogue import read_catalogue
+from augment.services.scenarios.catalogue import folder_of, read_catalogue
 
 MOST_ON_ONE_SCENE = 8
 
@@ -58,18 +59,22 @@ class CatalogueCheck:
     reasons: tuple[str, ...]
 
 
-def check_catalogue(*, folder: Path) -> CatalogueCheck:
+def check_catalogue(
+    *, folder: Path, sets: Sequence[CatalogueSet] = (CatalogueSet.PAPER,)
+) -> CatalogueCheck:
     """Hold every reference against the geometric checks, its intent and its picture.
 
     Args:
-        folder: Holds `scenes` and `scenarios`.
+        folder: Holds `scenes` and `scenarios`, and those of the hard set in `hard`.
+        sets: Which parts of it.
 
     Raises:
         InvalidDocument: The folder holds no catalogue, or its files do not fit together.
     """
-    scenes, entries = read_catalogue(folder)
-    checked = tuple(_check(scenes[entry.scene], entry) for entry in entries)
-    return CatalogueCheck(scenarios=checked, reasons=tuple(_whole(entries)))
+    read = [read_catalogue(folder_of(folder, one)) for one in sets]
+    checked = [_check(scenes[entry.scene], entry) for scenes, entries in read for entry in entries]
+    everything = [entry for _, entries in read for entry in entries]
+    return CatalogueCheck(scenarios=tuple(checked), reasons=tuple(_whole(everything)))
 
 
 def _check(whole: Scene, entry: CatalogueEntry) -> ScenarioCheck:
