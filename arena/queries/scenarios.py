@@ -8,7 +8,6 @@ from dataclasses import dataclass
 from django.db.models import Count
 
 from augment.models import Augmentation, Contestant, Scenario
-from augment.scene.catalogue import CatalogueSet
 from augment.services.scenarios.types import type_choices
 
 
@@ -60,7 +59,7 @@ def set_choices(chosen: str) -> list[SetChoice]:
     """All scenarios first (named by the empty text), then the sets that there are."""
     counted = Scenario.objects.filter(paraphrase_of=None).values_list("catalogue_set")
     numbers = dict(counted.annotate(number=Count("pk")).order_by())
-    found = [(one.value, numbers.get(one.value, 0)) for one in CatalogueSet]
+    found = [(name, numbers.get(name, 0)) for name in Scenario.SETS]
     found.append((OWN, numbers.get("", 0)))
     present = [("", sum(numbers.values())), *(one for one in found if one[1])]
     return [
@@ -70,7 +69,7 @@ def set_choices(chosen: str) -> list[SetChoice]:
 
 def set_asked(name: str | None) -> str:
     """What an address asks for; all where it names no set."""
-    return name if name in {*CatalogueSet, OWN} and name is not None else ""
+    return name if name in {*Scenario.SETS, OWN} and name is not None else ""
 
 
 def reference_pictures() -> dict[int, uuid.UUID]:

@@ -55,6 +55,9 @@ class Scenario(models.Model):
         NUDGE = ScenarioType.NUDGE.value, ScenarioType.NUDGE.label
         OVERTAKE = ScenarioType.OVERTAKE.value, ScenarioType.OVERTAKE.label
 
+    SETS = tuple(one.value for one in CatalogueSet)
+    """The parts of the authored catalogue, by name."""
+
     code = models.UUIDField(default=uuid.uuid4, unique=True, editable=False)
     slug = models.SlugField(max_length=80, unique=True, help_text=SLUG_HELP)
     base_scene = models.ForeignKey(BaseScene, on_delete=models.PROTECT, related_name="scenarios")
