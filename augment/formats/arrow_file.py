@@ -20,10 +20,12 @@ from augment.errors import InvalidDocument
 from augment.formats.thrift import Truncated, read_struct
 
 MOST_FILE_BYTES = 128 * 1024 * 1024
-MOST_BYTES = 256 * 1024 * 1024
+MOST_BYTES = 128 * 1024 * 1024
 """Of all that is unpacked."""
-MOST_ROWS = 2_000_000
+MOST_ROWS = 500_000
 LONGEST_TEXT = 200
+MOST_TEXTS = 50_000
+"""Different ones in a column."""
 
 _ARROW, _HEAD_BYTES = b"ARROW1", 8
 _DICTIONARY_BATCH, _RECORD_BATCH = 2, 3
@@ -162,6 +164,7 @@ def _columns(
 def _text_column(column: Any) -> TextColumn:
     """Each text once: a thousand rows may share one of a megabyte."""
     import pyarrow as pa
+    from pyarrow import compute
 
     if not pa.types.is_dictionary(column.type):
         column = column.dictionary_encode()
@@ -172,8 +175,10 @@ def _text_column(column: Any) -> TextColumn:
         )
     if array.null_count or array.dictionary.null_count:
         raise ValueError("a text is missing")
-    lengths = pa.compute.binary_length(array.dictionary)
-    if len(lengths) and (pa.compute.max(lengths).as_py() or 0) > 4 * LONGEST_TEXT:
+    if len(array.dictionary) > MOST_TEXTS:
+        raise ValueError(f"more than {MOST_TEXTS} different texts")
+    lengths = compute.binary_length(array.dictionary)
+    if len(lengths) and (compute.max(lengths).as_py() or 0) > 4 * LONGEST_TEXT:
         raise ValueError(f"a text is longer than {LONGEST_TEXT} characters")
     given = [str(one) for one in array.dictionary.to_pylist()]
     values = tuple(sorted(set(given)))
@@ -187,7 +192,7 @@ def _text_column(column: Any) -> TextColumn:
 
 
 def _check_messages(messages: Any) -> None:
-    total = 0
+    total = rows = 0
     for message in messages:
         header = message.metadata.to_pybytes()
         table = _followed(header, 0)
@@ -201,18 +206,26 @@ def _check_messages(messages: Any) -> None:
             if place is None:
                 continue
             batch = _followed(header, place)
+        rows += _rows_of(header, batch)
+        if rows > MOST_ROWS:
+            raise ValueError(f"more than {MOST_ROWS} rows")
         total += sum(_unpacked(header, batch, message.body))
         if total > MOST_BYTES:
             raise ValueError(f"unpacks to more than {MOST_BYTES} bytes")
 
 
+def _rows_of(header: bytes, batch: int) -> int:
+    """How many rows a batch, or the longest of its columns, claims to have."""
+    rows = _field(header, batch, 0)
+    counts = [0] if rows is None else [struct.unpack_from("<q", header, rows)[0]]
+    counts += [length for length, _ in _pairs(header, _field(header, batch, 1))]
+    if min(counts) < 0:
+        raise ValueError("a negative number of rows")
+    return int(max(counts))
+
+
 def _unpacked(header: bytes, batch: int, body: Any) -> Iterator[int]:
     """How many bytes each buffer of a batch claims to be."""
-    rows = _field(header, batch, 0)
-    counts = [] if rows is None else [struct.unpack_from("<q", header, rows)[0]]
-    counts += [length for length, _ in _pairs(header, _field(header, batch, 1))]
-    if any(not 0 <= one <= MOST_ROWS for one in counts):
-        raise ValueError(f"more than {MOST_ROWS} rows")
     is_packed = _field(header, batch, 3) is not None
     for offset, length in _pairs(header, _field(header, batch, 2)):
         if not is_packed or length < 8:

@@ -10,6 +10,9 @@ from typing import Any
 from augment.errors import InvalidDocument
 
 MAX_BYTES = 64 * 1024 * 1024
+MOST_PARTS = 600_000
+"""Objects and lists: an empty one takes two bytes here and sixty in memory."""
+MOST_VALUES = 2_000_000
 _MOST_NAMED = 5
 _LONGEST_NAMED = 40
 
@@ -30,7 +33,9 @@ def read_json(file: Path, *, what: str) -> object:
         if size > MAX_BYTES:
             text = f"{size} bytes; at most {MAX_BYTES} are read"
             raise InvalidDocument(what, [(file.name, text)])
-        value = json.loads(file.read_text(encoding="utf-8"), object_pairs_hook=_object)
+        block = file.read_bytes()
+        _check_counts(block)
+        value = json.loads(block.decode("utf-8"), object_pairs_hook=_object)
         _check_texts(value)
         return value
     except OSError as fault:
@@ -39,6 +44,14 @@ def read_json(file: Path, *, what: str) -> object:
         raise InvalidDocument(what, [(file.name, "is nested too deeply")]) from None
     except ValueError as fault:  # not JSON, not UTF-8, or a number of thousands of digits
         raise InvalidDocument(what, [(file.name, f"is not JSON: {fault}")]) from None
+
+
+def _check_counts(block: bytes) -> None:
+    """Raise ValueError for more than is read; brackets and commas within texts count too."""
+    if block.count(b"{") + block.count(b"[") > MOST_PARTS:
+        raise ValueError(f"more than {MOST_PARTS} objects and lists")
+    if block.count(b",") > MOST_VALUES:
+        raise ValueError(f"more than {MOST_VALUES} values")
 
 
 def _object(pairs: list[tuple[str, Any]]) -> dict[str, Any]:

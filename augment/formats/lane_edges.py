@@ -15,12 +15,18 @@ FloatArray = NDArray[np.float64]
 NARROWEST_M = 2.0
 WIDEST_M = 8.0
 USUAL_M = 3.5
+MOST_CELLS = 500_000
+"""Pairs of a point and a piece of line that are looked at in one go."""
 
 
 def nearest_on(points: FloatArray, line: FloatArray) -> FloatArray:
     """The nearest place (P, 2) on a line (Q, 2) to each of some points (P, 2)."""
     if len(line) < 2:
         return np.full(points.shape, np.nan)
+    most = max(1, MOST_CELLS // len(line))
+    if len(points) > most:
+        parts = [nearest_on(points[at : at + most], line) for at in range(0, len(points), most)]
+        return np.vstack(parts)
     start, step = line[:-1], np.diff(line, axis=0)
     square = np.maximum((step**2).sum(axis=1), 1e-12)
     along = ((points[:, None] - start) * step).sum(axis=2) / square

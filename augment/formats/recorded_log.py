@@ -25,8 +25,9 @@ from augment.scene.recording import Recording, Track
 
 FloatArray = NDArray[np.float64]
 
-MOST_NUMBERS = 40_000_000
-"""States of all tracks together: 320 MB."""
+MOST_NUMBERS = 20_000_000
+"""States of all tracks together: 160 MB."""
+MOST_TRACKS = 20_000
 LONGEST_GAP_S = 0.35
 """Steps are 0.1 s apart; over a longer gap no speed is taken."""
 
@@ -88,6 +89,17 @@ class Log:
             if (np.abs(states) > FURTHEST_M).any():
                 raise InvalidDocument(self.what, [(name, f"has a number over {FURTHEST_M:.0e}")])
         return Pose(x_m=x_m, y_m=y_m, heading_rad=wrap(heading_rad))
+
+
+def check_count(what: str, place: str, *, tracks: int, steps: int) -> None:
+    """Whether so many tracks over so many steps are read.
+
+    Raises:
+        InvalidDocument: They are not.
+    """
+    if tracks > MOST_TRACKS or tracks * steps * 4 > MOST_NUMBERS:
+        text = f"{tracks} objects over {steps} steps are too many"
+        raise InvalidDocument(what, [(place, text)])
 
 
 def scene_at(

@@ -11,6 +11,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
+from itertools import islice
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -35,6 +36,13 @@ SPACING_M = 2.0
 SAME_POINT_M = 0.05
 LONGEST_WAY = 8
 """Segments of one way through an intersection; maps have one to three."""
+
+MOST_SEGMENTS = 10_000
+MOST_NEAR = 2_000
+"""Segments within reach; a city centre has some hundreds."""
+MOST_WAYS = 4_000
+MOST_AREAS = 10_000
+MOST_NAMED = 10
 
 FloatArray = NDArray[np.float64]
 
@@ -77,6 +85,8 @@ def road_around(city: RoadMap, ego: Pose) -> MapExtract:
     """
     strips = _near_strips(city, ego)
     lane_ids = _lane_ids(strips)
+    ways = list(islice(_ways(strips), MOST_WAYS + 1))
+    _check_count(city, "ways through intersections", len(ways), MOST_WAYS)
     lanes = _lanes(strips, lane_ids)
     side = traffic_side_of(lanes)
     areas = _areas(city, ego)
@@ -84,7 +94,7 @@ def road_around(city: RoadMap, ego: Pose) -> MapExtract:
         traffic_side=side or city.side,
         side_is_assumed=side is None,
         lanes=lanes,
-        connectors=_connectors(strips, lane_ids),
+        connectors=_connectors(ways, strips, lane_ids),
         areas=areas,
         far=len(city.segments) - len(strips) + len(city.areas) - len(areas),
     )
@@ -120,25 +130,44 @@ def _padded(name: Name | None) -> str:
 
 
 def _near_strips(city: RoadMap, ego: Pose) -> dict[Name, Strip]:
-    strips, problems = {}, []
+    _check_count(city, "segments", len(city.segments), MOST_SEGMENTS)
+    near, strips, problems = [], {}, []
     for segment in city.segments:
         try:
-            strip = _strip(segment, ego)
+            local = _near_lines(segment, ego)
+        except ValueError as fault:
+            problems.append((f"{city.place}.{segment.name}", str(fault)))
+            continue
+        if local is not None:
+            near.append((segment, local))
+    _check_count(city, f"segments within {RADIUS_M:g} m of the ego", len(near), MOST_NEAR)
+    for segment, local in near:
+        try:
+            strip = _strip(segment, local)
         except ValueError as fault:
             problems.append((f"{city.place}.{segment.name}", str(fault)))
             continue
         if strip is not None:
             strips[segment.name] = strip
     if problems:
-        raise InvalidDocument(city.what, problems)
+        more = len(problems) - MOST_NAMED
+        rest = [(city.place, f"and {more} more")] if more > 0 else []
+        raise InvalidDocument(city.what, [*problems[:MOST_NAMED], *rest])
     return strips
 
 
-def _strip(segment: Segment, ego: Pose) -> Strip | None:
-    """The segment seen from the ego; None if it lies far away.
+def _check_count(city: RoadMap, name: str, number: int, most: int) -> None:
+    if number > most:
+        raise InvalidDocument(
+            city.what, [(city.place, f"{number} {name} are too many, at most {most} are read")]
+        )
+
+
+def _near_lines(segment: Segment, ego: Pose) -> list[FloatArray] | None:
+    """Centreline, left and right, as far as there are, from the ego; None if they lie far away.
 
     Raises:
-        ValueError: It has no shape.
+        ValueError: A line has no shape.
     """
     given = [
         line for line in (segment.centerline, segment.left, segment.right) if line is not None
@@ -148,6 +177,15 @@ def _strip(segment: Segment, ego: Pose) -> Strip | None:
         for points in local:
             _check_shape(points)
         return None
+    return local
+
+
+def _strip(segment: Segment, local: list[FloatArray]) -> Strip | None:
+    """The segment of its lines in the ego frame; None if it lies far away after all.
+
+    Raises:
+        ValueError: It has no shape.
+    """
     lines = [Polyline(points) for points in local]
     line = lines.pop(0) if segment.centerline is not None else midline(lines[0], lines[1])
     left, right = (lines[0], lines[1]) if len(lines) == 2 else (None, None)
@@ -261,8 +299,10 @@ def _neighbor(
     return lane_ids[min(found)[1]] if found else None
 
 
-def _connectors(strips: dict[Name, Strip], lane_ids: dict[Name, str]) -> tuple[LaneConnector, ...]:
-    ways = [(way, _joined([strips[name].line for name in way.chain])) for way in _ways(strips)]
+def _connectors(
+    found: list[Way], strips: dict[Name, Strip], lane_ids: dict[Name, str]
+) -> tuple[LaneConnector, ...]:
+    ways = [(way, _joined([strips[name].line for name in way.chain])) for way in found]
     ways.sort(key=lambda item: (round(item[1].project(0.0, 0.0).distance_m, 3), item[0].key))
     return tuple(
         _connector(f"Connector{number}", way, line, strips, lane_ids)
@@ -338,6 +378,7 @@ def _ways(strips: dict[Name, Strip]) -> Iterator[Way]:
 
 
 def _areas(city: RoadMap, ego: Pose) -> tuple[Area, ...]:
+    _check_count(city, "areas", len(city.areas), MOST_AREAS)
     near = []
     for kind, points in city.areas:
         ring = _local(points, ego)

@@ -6,12 +6,13 @@ Frame: any, as long as it is one frame.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Iterator, Sequence
 from itertools import pairwise
 
 import numpy as np
 
 from augment.geometry.angles import difference
+from augment.geometry.frames import Pose
 from augment.geometry.polyline import Polyline
 from augment.scene.entities import Lane, TrafficSide, TurnType
 
@@ -20,6 +21,9 @@ U_TURN_ABOVE_RAD = math.radians(150.0)
 ONCOMING_ABOVE_RAD = math.radians(150.0)
 ONCOMING_WITHIN_M = 8.0
 """Between centrelines: two lanes side by side, or with a narrow median between."""
+
+MOST_BESIDE = 200
+"""Lanes that are looked at beside one; no road has as many."""
 
 
 def turn_type_of(line: Polyline) -> TurnType:
@@ -40,7 +44,18 @@ def traffic_side_of(lanes: Sequence[Lane]) -> TrafficSide | None:
         None where no two lanes of opposite directions lie side by side, or as many speak for
         either side.
     """
-    balance = sum(_oncoming_side(lane, lanes) for lane in lanes)
+    if not lanes:
+        return None
+    low = np.array([lane.centerline.points_m.min(axis=0) for lane in lanes]) - ONCOMING_WITHIN_M
+    high = np.array([lane.centerline.points_m.max(axis=0) for lane in lanes]) + ONCOMING_WITHIN_M
+
+    def near(middle: Pose) -> Iterator[Lane]:
+        """The lanes whose surrounding rectangle comes near; of very many, the first."""
+        here = np.array([middle.x_m, middle.y_m])
+        found = np.flatnonzero(((low <= here) & (here <= high)).all(axis=1))
+        return (lanes[place] for place in found[:MOST_BESIDE].tolist())
+
+    balance = sum(_oncoming_side(lane, near) for lane in lanes)
     if balance == 0:
         return None
     return TrafficSide.RIGHT if balance > 0 else TrafficSide.LEFT
@@ -49,11 +64,11 @@ def traffic_side_of(lanes: Sequence[Lane]) -> TrafficSide | None:
 # Private
 
 
-def _oncoming_side(lane: Lane, lanes: Sequence[Lane]) -> int:
+def _oncoming_side(lane: Lane, near: Callable[[Pose], Iterator[Lane]]) -> int:
     """1 if the nearest oncoming lane is to the left of the lane's middle, -1 right, 0 none."""
     middle = lane.centerline.pose_at(lane.centerline.length_m / 2.0)
     nearest_m, side = ONCOMING_WITHIN_M, 0
-    for other in lanes:
+    for other in near(middle):
         place = other.centerline.project(middle.x_m, middle.y_m)
         if other is lane or place.distance_m > nearest_m:
             continue

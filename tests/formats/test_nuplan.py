@@ -188,6 +188,7 @@ def test_what_is_not_there_is_named(log: Path, tmp_path: Path) -> None:
             "has no table 'lidar_box'",
         ),
         ("UPDATE log SET logfile = zeroblob(20000000)", "too big"),
+        ("UPDATE log SET logfile = CAST(x'80' AS TEXT)", "can't be read as a database"),
         ("UPDATE log SET location = '../../etc'", "is no name of a map"),
     ],
 )

@@ -7,8 +7,16 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from augment.formats.commonroad.fields import fault, point_of, points_of, real, value_of, whole
-from augment.formats.recorded_log import MOST_NUMBERS, LoggedTrack
+from augment.formats.commonroad.fields import (
+    WHAT,
+    fault,
+    point_of,
+    points_of,
+    real,
+    value_of,
+    whole,
+)
+from augment.formats.recorded_log import LoggedTrack, check_count
 from augment.formats.xml_file import Element
 from augment.scene.entities import AgentType
 from augment.scene.notes import Note, SceneNoteKind
@@ -105,8 +113,7 @@ def obstacles_of(root: Element) -> Obstacles:
             found.append(_obstacle(element, TYPE_OF[name], place))
     left_out.update(one.name for one in root.all("environmentObstacle", "phantomObstacle"))
     steps = 1 + max((one.states[-1].step for one in found), default=0)
-    if steps > MOST_STEPS or steps * 4 * max(len(found), 1) > MOST_NUMBERS:
-        raise fault("obstacles", f"{len(found)} of them over {steps} steps are too many")
+    check_count(WHAT, "obstacles", tracks=len(found), steps=steps)
     notes = []
     if left_out:
         number, names = sum(left_out.values()), tuple(sorted(left_out))

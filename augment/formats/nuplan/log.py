@@ -16,7 +16,7 @@ import numpy as np
 
 from augment.errors import InvalidDocument
 from augment.formats.nuplan.sqlite import WHAT, Tables
-from augment.formats.recorded_log import MOST_NUMBERS, Log, LoggedTrack
+from augment.formats.recorded_log import Log, LoggedTrack, check_count
 from augment.scene.entities import AgentType, TrafficLight
 from augment.scene.sizes import EGO_LENGTH_M, EGO_WIDTH_M
 
@@ -249,8 +249,7 @@ def _tracks(tables: Tables, index: dict[bytes, int]) -> tuple[LoggedTrack, ...]:
             continue  # as a join leaves it out
         x, y, yaw, vx, vy, length, width = _numbers(numbers, "lidar_box")
         if track not in states:
-            if (len(states) + 1) * len(index) * 4 > MOST_NUMBERS:
-                raise InvalidDocument(WHAT, [("track", "too many of them at once")])
+            check_count(WHAT, "track", tracks=len(states) + 1, steps=len(index))
             states[track] = np.full((len(index), 4), np.nan)
             shapes[track] = (_type_of(kind), length, width)
         states[track][index[token]] = (x, y, yaw, math.hypot(vx, vy))

@@ -97,7 +97,7 @@ def open_tables(path: Path) -> Iterator[Tables]:
             most = MOST_STEPS // _STEPS_BETWEEN_LOOKS
             connection.set_progress_handler(lambda: next(looks) > most, _STEPS_BETWEEN_LOOKS)
             yield Tables(connection, path.name)
-    except sqlite3.Error as fault:
+    except (sqlite3.Error, UnicodeDecodeError) as fault:
         raise InvalidDocument(
             WHAT, [(path.name, f"can't be read as a database: {fault}")]
         ) from None

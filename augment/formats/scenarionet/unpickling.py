@@ -12,6 +12,8 @@ import io
 import pickle
 import pickletools
 import re
+from collections.abc import Iterator
+from itertools import count
 from pathlib import Path
 from typing import Any
 
@@ -22,6 +24,8 @@ from augment.errors import InvalidDocument
 WHAT = "ScenarioNet file"
 MOST_BYTES = 64 * 1024 * 1024
 MOST_INSTRUCTIONS = 400_000
+MOST_VALUES = 2_000_000
+"""What is written once can be referred to a thousand times."""
 
 _INSTRUCTIONS = frozenset(
     [
@@ -219,10 +223,10 @@ class _Unpickler(pickle.Unpickler):
 
 def _look_through(block: bytes) -> None:
     """Raises ValueError for an instruction that is not on the list, and for a huge memory."""
-    for count, (instruction, argument, _) in enumerate(pickletools.genops(block)):
+    for number, (instruction, argument, _) in enumerate(pickletools.genops(block)):
         if instruction.name not in _INSTRUCTIONS:
             raise ValueError(f"the instruction {instruction.name} is not on the list")
-        if count > MOST_INSTRUCTIONS:
+        if number > MOST_INSTRUCTIONS:
             raise ValueError(f"more than {MOST_INSTRUCTIONS} instructions")
         if instruction.name in _MEMORY and int(argument or 0) > MOST_INSTRUCTIONS:
             raise ValueError(f"place {str(argument)[:20]} of its memory is too far")
@@ -245,16 +249,22 @@ def _as_bytes(block: Any) -> bytes:
     return block.encode("latin1") if isinstance(block, str) else bytes(block)
 
 
-def _plain(value: Any, depth: int = 0) -> Any:
+def _plain(value: Any, depth: int = 0, counted: Iterator[int] | None = None) -> Any:
     """The value with arrays in the place of what stood for them."""
     if depth > 12:
         raise ValueError("is more than 12 levels deep")
+    counted = counted or count(1)
+    if next(counted) > MOST_VALUES:
+        raise ValueError(f"has more than {MOST_VALUES} values")
     if isinstance(value, _Array | _Scalar):
-        return _plain(value.value, depth + 1)
+        return _plain(value.value, depth + 1, counted)
     if isinstance(value, dict):
-        return {_plain(key, depth + 1): _plain(one, depth + 1) for key, one in value.items()}
+        return {
+            _plain(key, depth + 1, counted): _plain(one, depth + 1, counted)
+            for key, one in value.items()
+        }
     if isinstance(value, list | tuple | set):
-        return [_plain(one, depth + 1) for one in value]
+        return [_plain(one, depth + 1, counted) for one in value]
     if value is None or isinstance(value, str | bytes | int | float | np.ndarray):
         return value
     raise ValueError(f"holds a {type(value).__name__.strip('_')}, which is no plain value")

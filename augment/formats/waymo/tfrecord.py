@@ -15,7 +15,7 @@ from augment.errors import InvalidDocument
 from augment.formats.waymo.crc32c import masked_crc32c
 
 WHAT = "Waymo Open Motion file"
-LONGEST_RECORD = 64 * 1024 * 1024
+LONGEST_RECORD = 8 * 1024 * 1024
 """A scenario takes one to four megabytes; with lidar it is another file."""
 
 _HEAD = struct.Struct("<QI")
