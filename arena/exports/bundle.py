@@ -69,6 +69,7 @@ def _manifest(snapshot: Snapshot, files: dict[str, bytes]) -> bytes:
                 "name": table.method,
                 "text": table.method_text,
                 "resampling_unit": table.unit,
+                **table.intervals_note,
                 "rounds": table.rounds,
                 "seed": table.seed,
             },
@@ -131,7 +132,12 @@ def _csv(head: Sequence[str], rows: Iterable[Sequence[object]]) -> bytes:
 
 def _pairs(results: Results) -> bytes:
     head = ("a", "b", "wins", "ties", "losses", "both_miss", "planned")
-    return _csv(head, ([getattr(pair, name) for name in head] for pair in results.pairs))
+    rows = ([getattr(pair, name) for name in head] for pair in results.pairs)
+    if results.board.p_values is None:
+        return _csv(head, rows)
+    adjusted = {frozenset((one.a, one.b)): one.p for one in results.board.p_values}
+    of_pairs = (adjusted.get(frozenset((pair.a, pair.b))) for pair in results.pairs)
+    return _csv((*head, "p_adjusted"), ([*row, p] for row, p in zip(rows, of_pairs, strict=True)))
 
 
 def _types(results: Results) -> bytes:

@@ -9,7 +9,14 @@ from typing import Any
 from django.db.models import F
 
 from arena.models import Snapshot, Standing
-from arena.rating.printed import interval_text, notes_by_reason, rank_text, rating_text
+from arena.rating.printed import (
+    interval_text,
+    notes_by_reason,
+    places_text,
+    rank_text,
+    rating_text,
+)
+from arena.rating.rules import Intervals
 from augment.sentences import Sentence, sentence
 
 METHODS = {
@@ -83,10 +90,8 @@ class Row:
 
     @property
     def ranks_text(self) -> str:
-        """The ranks that 95 % of the resamples lie between: 1–3, or 1 alone."""
-        if self.rank_best is None or self.rank_best == self.rank_worst:
-            return rank_text(self.rank_best)
-        return f"{self.rank_best}–{self.rank_worst}"
+        """The places that are left with all pairs judged at once: 1–3, or 1 alone."""
+        return places_text(self.rank_best, self.rank_worst)
 
     @property
     def elo_text(self) -> str:
@@ -120,6 +125,7 @@ class LeaderboardTable:
     method: str
     rounds: int
     unit: str
+    intervals: str = "resamples"
     seed: int
     degenerate_rounds: int
     votes: int
@@ -138,10 +144,17 @@ class LeaderboardTable:
     @property
     def method_text(self) -> str:
         """How the numbers came about, in one line."""
-        return (
-            f"{METHODS[self.method]}, 95 % intervals by {self.rounds} resamples of "
-            f"{UNITS[self.unit]}, seed {self.seed}"
-        )
+        return f"{METHODS[self.method]}, {intervals_text(self)}, seed {self.seed}"
+
+    @property
+    def intervals_note(self) -> dict[str, str]:
+        """How intervals were found, for documents; older ratings had no word for resamples."""
+        return {"intervals": self.intervals} if self.is_closed_form else {}
+
+    @property
+    def is_closed_form(self) -> bool:
+        """Whether intervals come from a formula and not from resampled rounds."""
+        return self.intervals == Intervals.CLOSED_FORM.value
 
     @property
     def warnings(self) -> tuple[str, ...]:
@@ -159,6 +172,14 @@ class LeaderboardTable:
     def has_parts(self) -> bool:
         """Whether there are groups that can't be compared with each other."""
         return len({row.part for row in self.rows if row.elo is not None}) > 1
+
+
+def intervals_text(table: LeaderboardTable) -> str:
+    """How intervals were found."""
+    unit = UNITS[table.unit]
+    if table.is_closed_form:
+        return f"95 % intervals in closed form, by {unit} (moderated sandwich, Student's t)"
+    return f"95 % intervals by {table.rounds} resamples of {unit}"
 
 
 def leaderboard_table(snapshot: Snapshot) -> LeaderboardTable:
@@ -180,6 +201,7 @@ def leaderboard_table(snapshot: Snapshot) -> LeaderboardTable:
         method=snapshot.method,
         rounds=snapshot.rounds,
         unit=snapshot.resampling_unit,
+        intervals=snapshot.intervals,
         seed=snapshot.seed,
         degenerate_rounds=snapshot.degenerate_rounds,
         votes=snapshot.votes_counted,

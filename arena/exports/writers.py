@@ -31,6 +31,7 @@ def json_bytes(table: LeaderboardTable) -> bytes:
             "name": table.method,
             "text": table.method_text,
             "resampling_unit": table.unit,
+            **table.intervals_note,
             "rounds": table.rounds,
             "degenerate_rounds": table.degenerate_rounds,
             "seed": table.seed,

@@ -61,6 +61,9 @@ class Snapshot(models.Model):
     method = models.CharField(max_length=20, help_text="bt, elo or davidson")
     rounds = models.PositiveIntegerField()
     resampling_unit = models.CharField(max_length=20)
+    intervals = models.CharField(
+        max_length=20, default="resamples", help_text="closed form or resamples"
+    )
     seed = models.BigIntegerField()
     filters = models.JSONField(
         default=dict, help_text="which votes were asked for: types, experts, kinds, automatic_ties"

@@ -15,7 +15,7 @@ from __future__ import annotations
 import numpy as np
 
 from arena.rating.bradley_terry import Meetings
-from arena.rating.comparisons import BoolArray, FloatArray
+from arena.rating.comparisons import BoolArray, FloatArray, IntArray
 
 _TOLERANCE = 1e-9
 _MOST_STEPS = 200
@@ -64,6 +64,32 @@ def fit(
             None if together is None else together[block],
         )
     return answer
+
+
+def inverse_curvature(met: Meetings, games: FloatArray, answer: FloatArray) -> FloatArray:
+    """(C + 1, C + 1) inverse curvature of the likelihood at an answer (C + 1,).
+
+    The direction of a common shift is filled; what sums to zero over contestants does not see it.
+
+    Args:
+        met: The pairs.
+        games: (P,) comparisons of the pair.
+        answer: Strengths and the logarithm of v.
+    """
+    expected, tied = chances(answer, met.low, met.high)
+    expected, tied = expected[:, None], tied[:, None]
+    one = np.ones((1, 1, 1))
+    return np.asarray(np.linalg.inv(_curvature(met, games[:, None], expected, tied, one)[0]))
+
+
+def chances(
+    answer: FloatArray, first: IntArray, second: IntArray
+) -> tuple[FloatArray, FloatArray]:
+    """(n,) the score that `first` (n,) is expected to make against `second`, and of a tie."""
+    half_gap = 0.5 * (answer[first] - answer[second])
+    win, tie, loss = np.exp(half_gap), np.exp(answer[-1]), np.exp(-half_gap)
+    tied = tie / (win + tie + loss)
+    return np.asarray(win / (win + tie + loss) + 0.5 * tied), np.asarray(tied)
 
 
 def _newton(

@@ -16,16 +16,22 @@ from arena.rating.bradley_terry import Meetings, to_elo
 from arena.rating.comparisons import BoolArray, Comparisons, FloatArray, PairCounts, tally
 from arena.rating.components import Loose, loose
 from arena.rating.connectivity import Determined
-from arena.rating.rules import Method, Order, Rules
+from arena.rating.pulls import Pulls, bradley_terry_pulls, davidson_pulls
+from arena.rating.rules import Intervals, Method, Order, Rules
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Fitted:
-    """Ratings of the data (C,), of the rounds that determine everybody (C, b), and the others."""
+    """Ratings of the data (C,), of the rounds that determine everybody (C, b), and the others.
+
+    For intervals in closed form the rounds only say who is determined; their ratings are those of
+    the data.
+    """
 
     rating: FloatArray
     samples: FloatArray
     loose: Loose
+    pulls: Pulls | None = None
     strengths: FloatArray | None = None
     tie_strength: float | None = None
 
@@ -58,7 +64,14 @@ def _elo(votes: Comparisons, rules: Rules) -> Fitted:
 def _bradley_terry(votes: Comparisons, counts: PairCounts, rules: Rules) -> Fitted:
     met = Meetings(contestants=len(votes.names), low=counts.low, high=counts.high)
     point = bradley_terry.newton(met, counts.games[:, None], counts.scores[:, None])[:, 0]
-    inverse = bradley_terry.inverse_curvature(met, counts.games, point) * counts.games.sum()
+    curvature = bradley_terry.inverse_curvature(met, counts.games, point)
+    pulls = bradley_terry_pulls(votes, point, curvature)
+    if rules.intervals is Intervals.CLOSED_FORM:
+        samples, rest = _same_everywhere(votes, counts, rules, to_elo(point))
+        return Fitted(
+            rating=to_elo(point), samples=samples, loose=rest, pulls=pulls, strengths=point
+        )
+    inverse = curvature * counts.games.sum()
 
     def whole(drawn: Rounds) -> FloatArray:
         return to_elo(
@@ -73,7 +86,7 @@ def _bradley_terry(votes: Comparisons, counts: PairCounts, rules: Rules) -> Fitt
         return to_elo(found)
 
     samples, rest = _samples(votes, counts, rules, whole, apart)
-    return Fitted(rating=to_elo(point), samples=samples, loose=rest, strengths=point)
+    return Fitted(rating=to_elo(point), samples=samples, loose=rest, pulls=pulls, strengths=point)
 
 
 def _davidson(votes: Comparisons, counts: PairCounts, rules: Rules) -> Fitted | None:
@@ -83,6 +96,14 @@ def _davidson(votes: Comparisons, counts: PairCounts, rules: Rules) -> Fitted | 
     point = davidson.fit(met, counts.games[:, None], counts.scores[:, None], ties)[:, 0]
     if np.isnan(point).any():
         return None
+    tie_strength = float(np.exp(point[-1]))
+    pulls = davidson_pulls(votes, met, counts.games, point)
+    rating = to_elo(point[:-1])
+    if rules.intervals is Intervals.CLOSED_FORM:
+        samples, rest = _same_everywhere(votes, counts, rules, rating)
+        return Fitted(
+            rating=rating, samples=samples, loose=rest, pulls=pulls, tie_strength=tie_strength
+        )
 
     def whole(drawn: Rounds) -> FloatArray:
         return apart(drawn, None)
@@ -103,11 +124,22 @@ def _davidson(votes: Comparisons, counts: PairCounts, rules: Rules) -> Fitted | 
 
     samples, rest = _samples(votes, counts, rules, whole, apart)
     return Fitted(
-        rating=to_elo(point[:-1]),
-        samples=samples,
-        loose=rest,
-        tie_strength=float(np.exp(point[-1])),
+        rating=rating, samples=samples, loose=rest, pulls=pulls, tie_strength=tie_strength
     )
+
+
+def _same_everywhere(
+    votes: Comparisons, counts: PairCounts, rules: Rules, rating: FloatArray
+) -> tuple[FloatArray, Loose]:
+    """The data's ratings (C,) in every round: only who is determined differs."""
+
+    def whole(drawn: Rounds) -> FloatArray:
+        return np.repeat(rating[:, None], drawn.games.shape[1], axis=1)
+
+    def apart(drawn: Rounds, together: BoolArray) -> FloatArray:
+        return whole(drawn)
+
+    return _samples(votes, counts, rules, whole, apart)
 
 
 def _samples(

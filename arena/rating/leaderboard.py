@@ -4,7 +4,7 @@ In: `Comparisons` of named contestants, as arrays. Out: a `Leaderboard`: for eac
 with rating, interval and rank, and what must be said with the numbers.
 
     votes = as_arrays(names, [Comparison(first="a", second="b", score=1.0, expert="e", ...), ...])
-    board = rate(votes)  # the default: Bradley-Terry, two-way, 10,000 rounds
+    board = rate(votes)  # the default: Bradley-Terry, two-way, intervals in closed form
     board = rate(votes, unit=Unit.VOTE, rounds=PAPER_ROUNDS)  # the paper's mode
     board.lines[i].rating, .lower, .upper, .rank  # None where the votes do not determine them
     board.status, board.explanation, board.warnings  # always shown with the numbers
@@ -33,11 +33,11 @@ from arena.rating.connectivity import Diagnosis, Status, diagnose
 from arena.rating.lines import Line, blank_lines, fill, rank_across
 from arena.rating.parts import Rated, rate_part
 from arena.rating.ranking import Separation
-from arena.rating.rules import Method, Order, Rules
+from arena.rating.rules import Intervals, Method, Order, Rules, default_intervals
 from arena.rating.tiers import standing_order, tiers
 from augment.sentences import Sentence, sentence
 
-__all__ = ["Leaderboard", "Line", "Method", "Order", "Unit", "anchor_board", "rate"]
+__all__ = ["Intervals", "Leaderboard", "Line", "Method", "Order", "Unit", "anchor_board", "rate"]
 
 ROUNDS = 10_000
 PAPER_ROUNDS = 1000
@@ -71,6 +71,7 @@ class Leaderboard:
     warnings: tuple[Sentence, ...] = ()
     method: Method
     unit: Unit
+    intervals: Intervals
     rounds: int
     seed: int
     votes: int = 0
@@ -99,6 +100,7 @@ def rate(
     method: Method = Method.BRADLEY_TERRY,
     rounds: int = ROUNDS,
     unit: Unit | None = None,
+    intervals: Intervals | None = None,
     seed: int = 0,
     k: float = elo.K,
     order: Order = Order.SHUFFLED,
@@ -114,9 +116,11 @@ def rate(
     Args:
         votes: What was voted; contestants without votes get a line without a rating.
         method: Bradley-Terry, Davidson's tie model, or online Elo.
-        rounds: Of the bootstrap.
-        unit: What it draws: both ways by default, single votes for online Elo, which knows no
-            other.
+        rounds: Of the bootstrap; for intervals in closed form, of what is drawn to see who is
+            determined and how far apart equals come to lie.
+        unit: What hangs together: both ways by default, single votes for online Elo, which knows
+            no other.
+        intervals: In closed form by default, but resampled where the unit is single votes.
         seed: Of its draws; the same votes and seed give the same table.
         k: Points at stake in a vote, online Elo only.
         order: Online Elo's point: the median over shuffled rounds, or the recorded order.
@@ -128,7 +132,14 @@ def rate(
     if unit is None:
         unit = Unit.VOTE if method is Method.ELO else Unit.TWO_WAY
     rules = Rules(
-        method=method, unit=unit, rounds=rounds, seed=seed, k=k, order=order, details=details
+        method=method,
+        unit=unit,
+        intervals=intervals or default_intervals(method, unit),
+        rounds=rounds,
+        seed=seed,
+        k=k,
+        order=order,
+        details=details,
     )
     return _rate(votes, rules)
 
@@ -163,6 +174,7 @@ def _rate(votes: Comparisons, rules: Rules) -> Leaderboard:
         warnings=_once(*(found.warnings for found in rated)),
         method=rules.method,
         unit=rules.unit,
+        intervals=rules.intervals,
         rounds=rules.rounds,
         seed=rules.seed,
         votes=votes.votes,

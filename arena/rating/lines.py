@@ -28,8 +28,10 @@ class Line:
             stand alone: without the other one, and without a rating for who won or lost all.
         rank: As the paper defines it: 1 + the number of others whose lower bound is above `upper`.
             Nobody is first for want of bounds: see `ranking.shown_ranks`.
-        rank_best, rank_worst: Places that 95 % of the bootstrap rounds lie between.
-        check_lower, check_upper: The interval in closed form (Bradley-Terry only), to compare.
+        rank_best, rank_worst: The simultaneous 95 % rank set: behind everybody who is shown to be
+            above and ahead of everybody who is shown to be below, all pairs judged at once.
+        check_lower, check_upper: The interval by the plain sandwich (Bradley-Terry only), to
+            compare.
         part: Who have the same number here are rated together; ratings and ranks of different
             parts can't be compared.
     """

@@ -11,12 +11,20 @@ import numpy as np
 
 from arena.rating import remarks, sandwich
 from arena.rating.bootstrap import Unit, interval
-from arena.rating.comparisons import Comparisons, FloatArray, PairCounts, count_pairs
+from arena.rating.comparisons import Comparisons, FloatArray, count_pairs
 from arena.rating.components import Placed, open_interval, place_on_one_scale
 from arena.rating.connectivity import Status
 from arena.rating.fits import Fitted, fit_votes
-from arena.rating.ranking import Separation, rank_interval, separation, shown_ranks
-from arena.rating.rules import Method, Rules
+from arena.rating.moderated import Spread, spread_of
+from arena.rating.ranking import (
+    Separation,
+    above_by_bounds,
+    rank_sets,
+    separation,
+    shown_ranks,
+)
+from arena.rating.rules import Intervals, Method, Rules
+from arena.rating.simultaneous import judge_pairs
 from augment.sentences import Sentence
 
 _SAME = 1e-6
@@ -78,7 +86,10 @@ def rate_part(votes: Comparisons, rules: Rules, status: Status) -> Rated:
     if status is Status.ALL_TIES:
         return _without_intervals(found, rules, remarks.ONLY_TIES, ())
     everywhere = place_on_one_scale(found.rating, found.samples, found.loose)
-    if _are_all_the_same(everywhere.values):
+    spread = None
+    if rules.intervals is Intervals.CLOSED_FORM and found.pulls is not None:
+        spread = spread_of(votes, found.pulls, rules.unit, everywhere.reference)
+    if _are_all_the_same(everywhere.values if spread is None else _ends(spread)):
         return _without_intervals(
             found, rules, remarks.NO_SPREAD, (remarks.ALL_THE_SAME[rules.unit],)
         )
@@ -90,7 +101,15 @@ def rate_part(votes: Comparisons, rules: Rules, status: Status) -> Rated:
         lost = found.loose.values.shape[1]
         said = remarks.why_no_interval(votes.names, lost=lost, rounds=rules.rounds)
         return _without_intervals(found, rules, remarks.TOO_FEW, said)
-    return _with_intervals(votes, counts, rules, found, everywhere, bounds)
+    if spread is not None:
+        return _in_closed_form(votes, rules, found, everywhere, bounds, spread)
+    return _by_rounds(votes, rules, found, everywhere, bounds)
+
+
+def _ends(spread: Spread) -> FloatArray:
+    """(C, 2) both ends of the intervals, around zero."""
+    half = spread.half_widths()
+    return np.stack([-half, half], axis=1)
 
 
 def _are_all_the_same(values: FloatArray) -> bool:
@@ -114,34 +133,70 @@ def _without_intervals(
     )
 
 
-def _with_intervals(
+def _by_rounds(
     votes: Comparisons,
-    counts: PairCounts,
     rules: Rules,
     fit: Fitted,
     everywhere: Placed,
     bounds: tuple[FloatArray, FloatArray],
 ) -> Rated:
+    """Intervals are percentiles of the resampled rounds."""
     few = remarks.few_clusters(votes, rules.unit)
     lower, upper = bounds
     if few and rules.unit is not Unit.TWO_WAY:
         wider = sandwich.factor(few) / sandwich.NORMAL
         lower = fit.rating + wider * (lower - fit.rating)
         upper = fit.rating + wider * (upper - fit.rating)
-    best, worst = rank_interval(everywhere.values)
+    covariance = None
+    if rules.details:
+        if rules.method is Method.BRADLEY_TERRY and fit.pulls is not None:
+            covariance = sandwich.covariance(votes, fit.pulls, rules.unit)
+        elif fit.samples.shape[1] > 1:
+            covariance = np.cov(fit.samples)
+    judged = _separation(fit.rating, everywhere)
+    return _with_intervals(votes, rules, fit, everywhere, (lower, upper), judged, covariance)
+
+
+def _in_closed_form(
+    votes: Comparisons,
+    rules: Rules,
+    fit: Fitted,
+    everywhere: Placed,
+    open_bounds: tuple[FloatArray, FloatArray],
+    spread: Spread,
+) -> Rated:
+    """Student's t around the ratings; a bound is missing where the rounds leave it open."""
+    half = spread.half_widths()
+    below, above = (np.where(np.isnan(bound), np.nan, half) for bound in open_bounds)
+    members = np.flatnonzero(everywhere.reference)
+    judged = judge_pairs(
+        fit.rating[members], spread.among(members), rounds=rules.rounds, seed=rules.seed
+    ).among(members, len(fit.rating))
+    bounds = (fit.rating - below, fit.rating + above)
+    return _with_intervals(votes, rules, fit, everywhere, bounds, judged, spread.covariance)
+
+
+def _with_intervals(
+    votes: Comparisons,
+    rules: Rules,
+    fit: Fitted,
+    everywhere: Placed,
+    bounds: tuple[FloatArray, FloatArray],
+    judged: Separation | None,
+    covariance: FloatArray | None,
+) -> Rated:
+    lower, upper = bounds
+    rank = shown_ranks(lower, upper, average=float(fit.rating[everywhere.reference].mean()))
+    nobody = np.zeros((len(lower), len(lower)), dtype=bool)
+    shown = above_by_bounds(nobody if judged is None else judged.above, lower, upper)
+    best, worst = rank_sets(shown)
     unbounded = np.isnan(lower) & np.isnan(upper)
     best[unbounded] = worst[unbounded] = 0
-    reference = everywhere.reference
-    rank = shown_ranks(lower, upper, average=float(fit.rating[reference].mean()))
-    covariance = check = None
-    if rules.details and fit.strengths is not None:
-        covariance = sandwich.covariance(votes, counts, fit.strengths, rules.unit)
-        spread = sandwich.relative_to(covariance, reference)
-        check = sandwich.factor(few) * np.sqrt(spread.diagonal())
+    check = None
+    if rules.details and fit.pulls is not None and rules.method is Method.BRADLEY_TERRY:
+        check = _cross_check(votes, rules, fit, everywhere)
         check[np.isnan(lower) | np.isnan(upper)] = np.nan
-    elif rules.details and fit.samples.shape[1] > 1:
-        covariance = np.cov(fit.samples)
-    degenerate = fit.loose.values.shape[1]
+    degenerate, drawn = fit.loose.values.shape[1], everywhere.values.shape[1]
     notes = remarks.notes_on_bounds(lower, upper, rank)
     return Rated(
         rating=fit.rating,
@@ -152,15 +207,24 @@ def _with_intervals(
         rank_worst=worst,
         check_lower=None if check is None else fit.rating - check,
         check_upper=None if check is None else fit.rating + check,
-        covariance=covariance,
-        separation=_separation(fit.rating, everywhere) if rules.details else None,
+        covariance=covariance if rules.details else None,
+        separation=judged if rules.details else None,
         tie_strength=fit.tie_strength,
         degenerate=degenerate,
         notes=notes,
         explanation=remarks.who_is_open(votes.names, notes),
         warnings=_notes_on_method(rules)
-        + remarks.warnings(votes, unit=rules.unit, rounds=rules.rounds, degenerate=degenerate),
+        + remarks.warnings(votes, rules=rules, rounds=drawn, degenerate=degenerate),
     )
+
+
+def _cross_check(votes: Comparisons, rules: Rules, fit: Fitted, everywhere: Placed) -> FloatArray:
+    """(C,) half-widths by the plain sandwich, in which each contestant stands for itself."""
+    assert fit.pulls is not None
+    covariance = sandwich.covariance(votes, fit.pulls, rules.unit)
+    spread = sandwich.relative_to(covariance, everywhere.reference)
+    few = remarks.few_clusters(votes, rules.unit)
+    return np.asarray(sandwich.factor(few) * np.sqrt(spread.diagonal()))
 
 
 def _separation(rating: FloatArray, everywhere: Placed) -> Separation | None:

@@ -11,6 +11,7 @@ from scipy.special import ndtri
 
 from arena.rating.bradley_terry import ELO_PER_LOGIT
 from arena.rating.estimate import LEVEL
+from arena.rating.leaderboard import Leaderboard
 
 QUANTILE = float(ndtri(0.5 + LEVEL / 2))
 
@@ -58,11 +59,20 @@ def votes_until(*, votes: int, half_width: float, wanted: float) -> int:
     return math.ceil(votes * (half_width / wanted) ** 2)
 
 
-def design_effect(clustered: float, independent: float) -> float | None:
-    """How many votes of these weigh as much as one independent vote.
+def design_effects(board: Leaderboard, independent: Leaderboard) -> list[float]:
+    """How many votes weigh as much as one independent vote, by contestant with an interval.
+
+    The ratio of the variances. Half-widths would also count what Student's t adds for few experts.
 
     Args:
-        clustered: A half-width or standard error that knows of experts and scenarios.
-        independent: The same for independent votes; None comes of zero.
+        board: Its covariance knows of experts and scenarios.
+        independent: The same votes rated as if each stood for itself.
     """
-    return (clustered / independent) ** 2 if independent > 0 else None
+    if board.covariance is None or independent.covariance is None:
+        return []
+    both = zip(board.covariance.diagonal(), independent.covariance.diagonal(), strict=True)
+    return [
+        float(clustered / alone)
+        for line, (clustered, alone) in zip(board.lines, both, strict=True)
+        if line.lower is not None and line.upper is not None and alone > 0.0
+    ]

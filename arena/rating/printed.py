@@ -43,6 +43,11 @@ def rank_text(rank: int | None) -> str:
     return UNKNOWN if rank is None else str(rank)
 
 
+def places_text(best: int | None, worst: int | None) -> str:
+    """The places between two, 1–3, one alone, or two hyphens without any."""
+    return rank_text(best) if best is None or best == worst else f"{best}–{worst}"
+
+
 def interval_text(rating: float | None, lower: float | None, upper: float | None) -> str:
     """The interval as the paper prints it: -9/+11 around the printed rating.
 

@@ -1,4 +1,4 @@
-"""Who can be told apart from whom: the paper's rank, its spread, and all pairs at once.
+"""Who can be told apart from whom: the paper's rank, rank sets, and all pairs at once.
 
 Notation: C contestants, B rounds.
 """
@@ -12,7 +12,6 @@ from typing import Self
 import numpy as np
 from numpy.typing import ArrayLike
 
-from arena.rating.bootstrap import interval
 from arena.rating.comparisons import BoolArray, FloatArray, IntArray
 from arena.rating.estimate import LEVEL
 
@@ -52,32 +51,32 @@ def shown_ranks(lower: FloatArray, upper: FloatArray, *, average: float) -> IntA
     return np.where(decided, found, 0)
 
 
-def rank_interval(samples: FloatArray) -> tuple[IntArray, IntArray]:
-    """(C,), (C,): between which places 95 % of the rounds (C, B) put each contestant.
+def rank_sets(above: BoolArray) -> tuple[IntArray, IntArray]:
+    """(C,), (C,): between which places each contestant's true place lies, all of them at once.
 
-    A place is one plus the number of others who are rated higher in that round. A rating that is
-    unknown (NaN) may be any: the best place of everybody, known or not, takes the unknown others
-    for lower and the worst for higher.
+    Behind everybody who is shown to be above, ahead of everybody who is shown to be below
+    (Mogstad, Romano, Shaikh, Wilhelm 2024). If no pair is wrongly told apart, all are right.
+
+    Args:
+        above: (C, C) whether the row's contestant is shown to be above the column's.
     """
-    unknown = np.isnan(samples)
-    if not unknown.any():
-        best = worst = _places(samples)
-    else:
-        # Who is unknown may be beyond all others, the infinite ones too.
-        largest = np.finfo(np.float64).max
-        known = np.clip(samples, -largest, largest)
-        best = np.where(unknown, 1.0, _places(np.where(unknown, -np.inf, known)))
-        worst = np.where(unknown, len(samples), _places(np.where(unknown, np.inf, known)))
-    (lower, _), (_, upper) = interval(best), interval(worst)
-    return np.floor(lower).astype(np.int64), np.ceil(upper).astype(np.int64)
+    best = 1 + above.sum(axis=0)
+    worst = len(above) - above.sum(axis=1)
+    return best.astype(np.int64), worst.astype(np.int64)
 
 
-def _places(samples: FloatArray) -> FloatArray:
-    """(C, B)."""
-    order = np.argsort(-samples, axis=0, kind="stable")
-    places = np.empty(samples.shape)
-    np.put_along_axis(places, order, np.arange(1.0, len(samples) + 1.0)[:, None], axis=0)
-    return places
+def above_by_bounds(above: BoolArray, lower: FloatArray, upper: FloatArray) -> BoolArray:
+    """(C, C): who is above whom, also among those whose pairs were not judged at once.
+
+    Args:
+        above: (C, C) of those who were.
+        lower: (C,) bounds, NaN where there is none.
+        upper: (C,) bounds, NaN where there is none.
+    """
+    missing = np.isnan(lower) | np.isnan(upper)
+    with np.errstate(invalid="ignore"):
+        apart = lower[:, None] > upper[None, :]
+    return np.asarray(above | (apart & (missing[:, None] | missing[None, :])))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -145,11 +144,11 @@ def separation(rating: FloatArray, samples: FloatArray) -> Separation:
     above[high, low] = differs & (gap < 0)
     return Separation(
         above=above,
-        p_value=_square(contestants, low, high, adjusted, 1.0),
-        holm=_square(contestants, low, high, holm(normal), 1.0),
+        p_value=square_of(contestants, low, high, adjusted, 1.0),
+        holm=square_of(contestants, low, high, holm(normal), 1.0),
         critical=critical,
         difference=rating[:, None] - rating[None, :],
-        error=_square(contestants, low, high, error, 0.0),
+        error=square_of(contestants, low, high, error, 0.0),
     )
 
 
@@ -179,9 +178,10 @@ def _largest_deviations(
     return largest
 
 
-def _square(
+def square_of(
     contestants: int, low: IntArray, high: IntArray, values: FloatArray, diagonal: float
 ) -> FloatArray:
+    """(C, C), symmetric, of what pairs have (P,)."""
     square = np.full((contestants, contestants), diagonal)
     square[low, high] = values
     square[high, low] = values

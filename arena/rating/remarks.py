@@ -8,6 +8,7 @@ from arena.rating import elo, sandwich
 from arena.rating.bootstrap import Unit
 from arena.rating.comparisons import Comparisons, FloatArray, IntArray, renumber_codes
 from arena.rating.connectivity import few_of
+from arena.rating.rules import Intervals, Rules
 from augment.sentences import Sentence, sentence
 
 
@@ -84,15 +85,16 @@ def who_is_open(names: tuple[str, ...], notes: tuple[Sentence | str, ...]) -> tu
 
 
 def warnings(
-    votes: Comparisons, *, unit: Unit, rounds: int, degenerate: int
+    votes: Comparisons, *, rules: Rules, rounds: int, degenerate: int
 ) -> tuple[Sentence, ...]:
-    """What to keep in mind with intervals by this unit."""
+    """What to keep in mind with intervals by these rules."""
     said = []
+    unit = rules.unit
     few = 0
     for kind, number in _clusters(votes, unit).items():
         if number == 1:
             said.append(_ONLY_ONE[kind])
-        elif number < sandwich.FEW_CLUSTERS:
+        elif number < sandwich.FEW_CLUSTERS and rules.intervals is Intervals.RESAMPLES:
             said.append(_few(kind, number))
             few += 1
     if few:
@@ -210,6 +212,7 @@ _WIDENED = {
     Unit.EXPERT: _BY_T,
     Unit.SCENARIO: _BY_T,
     Unit.TWO_WAY: sentence(
-        "Drawing both ways errs on the wide side; the cross-check uses Student's t."
+        "Drawing both ways is too wide where votes are independent and too narrow where few "
+        "experts differ much; intervals in closed form are neither."
     ),
 }

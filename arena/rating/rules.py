@@ -1,4 +1,4 @@
-"""How to rate: method, what is resampled, how often, by which seed."""
+"""How to rate: method, what hangs together, how intervals are found, how often, by which seed."""
 
 from __future__ import annotations
 
@@ -23,12 +23,27 @@ class Order(StrEnum):
     RECORDED = "recorded"
 
 
+class Intervals(StrEnum):
+    """How intervals are found: in closed form, or as percentiles of resampled rounds."""
+
+    CLOSED_FORM = "closed form"
+    RESAMPLES = "resamples"
+
+
+def default_intervals(method: Method, unit: Unit) -> Intervals:
+    """In closed form wherever votes hang together; single votes are resampled as in the paper."""
+    if method is Method.ELO or unit is Unit.VOTE:
+        return Intervals.RESAMPLES
+    return Intervals.CLOSED_FORM
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Rules:
     """How to rate."""
 
     method: Method
     unit: Unit
+    intervals: Intervals
     rounds: int
     seed: int
     k: float
@@ -40,3 +55,5 @@ class Rules:
             raise ValueError(f"a bootstrap needs at least 1 round, not {self.rounds}")
         if self.method is Method.ELO and self.unit is not Unit.VOTE:
             raise ValueError(f"online Elo resamples single votes only, not by {self.unit}")
+        if self.method is Method.ELO and self.intervals is Intervals.CLOSED_FORM:
+            raise ValueError("online Elo has no intervals in closed form, only resamples")

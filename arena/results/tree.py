@@ -21,9 +21,10 @@ from arena.rating.reliability import Agreement
 from arena.rating.repeats import Repeats
 from augment.sentences import read_sentence
 
-VERSION = 2
-"""1 is without the order of the board and without notes in the lines of types; a rating of
-version 0 kept its standings alone."""
+VERSION = 3
+"""2 is without adjusted p-values and the measures that came with them; 1 is also without the order
+of the board and without notes in the lines of types; a rating of version 0 kept its standings
+alone."""
 
 Bounds = tuple[float, float]
 
@@ -40,8 +41,17 @@ Kept = Annotated[str, PlainValidator(_read)]
 """A sentence; older ones are plain text."""
 
 
-_SINCE_2 = {"since": 2}
+_SINCE_2, _SINCE_3 = {"since": 2}, {"since": 3}
 """Of fields that documents of earlier versions do not have."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PairP:
+    """How likely a difference as large as that of `a` and `b` is among equals, in any pair."""
+
+    a: str
+    b: str
+    p: float
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -55,7 +65,9 @@ class BoardRemarks:
         check: The intervals in closed form.
         order: Slugs, best first.
         parts: Whose ratings compare: those with the same number.
-        above: The pairs that differ with all of them judged at once, the higher one first.
+        above: The pairs that differ with all of them judged at once, the higher one first; None
+            where votes hang together in ways that the intervals do not know of.
+        p_values: Of pairs, adjusted for all of them; None as `above`.
     """
 
     reasons: tuple[Kept, ...] | None = None
@@ -67,6 +79,7 @@ class BoardRemarks:
     order: tuple[str, ...] = field(default=(), metadata=_SINCE_2)
     parts: dict[str, int] = field(default_factory=dict)
     above: tuple[tuple[str, str], ...] | None = None
+    p_values: tuple[PairP, ...] | None = field(default=None, metadata=_SINCE_3)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -137,6 +137,7 @@ def _one_type(arrays: VoteArrays, name: str, whole: Leaderboard) -> TypeRating:
         method=whole.method,
         rounds=min(whole.rounds, TYPE_ROUNDS),
         unit=whole.unit,
+        intervals=whole.intervals,
         seed=whole.seed,
         details=False,
     )

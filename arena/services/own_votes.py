@@ -39,6 +39,7 @@ def with_and_without(votes: VoteSet, filters: Filters, board: Leaderboard) -> Ow
         method=board.method,
         rounds=min(board.rounds, OTHER_ROUNDS),
         unit=board.unit,
+        intervals=board.intervals,
         seed=board.seed,
         details=False,
     )

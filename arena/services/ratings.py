@@ -16,6 +16,7 @@ from arena.queries.judged import is_imported, last_vote_of
 from arena.queries.vote_sets import Filters
 from arena.rating.bootstrap import Unit
 from arena.rating.leaderboard import Method
+from arena.rating.rules import Intervals, default_intervals
 from arena.services.snapshots import compute, keep, note_progress
 from arena.services.turns import in_turn
 from augment.errors import Conflict, UnknownName
@@ -38,6 +39,7 @@ class Choices(TypedDict, total=False):
     rounds: int
     seed: int
     unit: str | None
+    intervals: str | None
     filters: Filters | None
     early: bool
     actor: User | None
@@ -69,6 +71,8 @@ def plan_snapshot(*, study: Study, **choices: Unpack[Choices]) -> Snapshot:
         seed: Of its draws, 0 or more.
         unit: What the bootstrap draws: "vote", "scenario", "expert" or "two-way"; None for
             two-way where the votes name experts and scenarios, else votes.
+        intervals: "closed form" or "resamples"; None for the closed form, but resamples of single
+            votes and for online Elo.
         filters: Which votes count; None for all main ones. Who is author of what is added to them
             here, so that later marks do not change the rating.
         early: Rate a study that is still open; the snapshot and the log say so.
@@ -76,7 +80,8 @@ def plan_snapshot(*, study: Study, **choices: Unpack[Choices]) -> Snapshot:
 
     Raises:
         StudyStillOpen: The study is open and nobody asked to look early.
-        UnknownName: There is no such method or unit, or a filter names what does not occur.
+        UnknownName: There is no such method, unit or kind of intervals, or a filter names what
+            does not occur.
         Conflict: Rounds or seed are out of range, or online Elo is asked for another unit.
     """
     snapshot = _planned(study=study, **choices)
@@ -144,6 +149,7 @@ def _planned(
     rounds: int = DEFAULT_ROUNDS,
     seed: int = 0,
     unit: str | None = None,
+    intervals: str | None = None,
     filters: Filters | None = None,
     early: bool = False,
     actor: User | None = None,
@@ -161,6 +167,7 @@ def _planned(
         method=chosen,
         rounds=rounds,
         resampling_unit=drawn,
+        intervals=_intervals(intervals, chosen, drawn),
         seed=seed,
         filters=replace(filters or Filters(), authors=authors_of(study)).as_document(),
         last_vote=last_vote_of(study),
@@ -199,6 +206,16 @@ def _unit(name: str) -> Unit:
     if name not in list(Unit):
         raise UnknownName("resampling unit", name, [unit.value for unit in Unit])
     return Unit(name)
+
+
+def _intervals(name: str | None, method: Method, unit: Unit) -> Intervals:
+    if name is None:
+        return default_intervals(method, unit)
+    if name not in list(Intervals):
+        raise UnknownName("kind of intervals", name, [one.value for one in Intervals])
+    if method is Method.ELO and name != Intervals.RESAMPLES:
+        raise Conflict(sentence("Online Elo has no intervals in closed form, only resamples."))
+    return Intervals(name)
 
 
 def _default_unit(study: Study, method: Method) -> Unit:

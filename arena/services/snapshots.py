@@ -14,7 +14,7 @@ from arena.models import Snapshot, Standing
 from arena.queries.judged import Entrant, Judged, is_imported
 from arena.queries.vote_sets import Filters, VoteSet, vote_set
 from arena.rating.bootstrap import Unit
-from arena.rating.leaderboard import Leaderboard, Method, rate
+from arena.rating.leaderboard import Intervals, Leaderboard, Method, rate
 from arena.results.tree import VERSION as RESULTS_VERSION
 from arena.results.tree import Results
 from arena.services import breakdowns
@@ -59,6 +59,7 @@ def compute(snapshot: Snapshot, report: Report) -> Computed:
         method=Method(snapshot.method),
         rounds=snapshot.rounds,
         unit=Unit(snapshot.resampling_unit),
+        intervals=Intervals(snapshot.intervals),
         seed=snapshot.seed,
     )
     report(60)

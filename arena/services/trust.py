@@ -20,9 +20,10 @@ from arena.rating.influence import (
     rank_changes,
     without_each_expert,
 )
-from arena.rating.leaderboard import Leaderboard, Line, Method, rate
-from arena.rating.planning import design_effect, votes_until
+from arena.rating.leaderboard import Intervals, Leaderboard, Line, Method, rate
+from arena.rating.planning import design_effects, votes_until
 from arena.rating.position import side_bias
+from arena.rating.ranking import Separation
 from arena.rating.raters import Rater, raters
 from arena.rating.reliability import agreement
 from arena.rating.repeats import Repeats, repeat_consistency
@@ -30,6 +31,7 @@ from arena.results.tree import (
     BoardRemarks,
     OnlinePlace,
     Overtaking,
+    PairP,
     PanelRater,
     Precision,
     RaterBet,
@@ -81,7 +83,7 @@ def trust(arrays: VoteArrays, votes: VoteSet, board: Leaderboard, *, seed: int) 
 def board_remarks(board: Leaderboard) -> BoardRemarks:
     """What a rating says beside its lines."""
     names = [line.name for line in board.lines]
-    found = board.separation
+    found = board.separation if _knows_what_hangs_together(board) else None
     return BoardRemarks(
         reasons=board.reasons,
         warnings=board.warnings,
@@ -98,7 +100,20 @@ def board_remarks(board: Leaderboard) -> BoardRemarks:
         above=None
         if found is None
         else tuple((names[i], names[j]) for i, j in np.argwhere(found.above).tolist()),
+        p_values=None if found is None else _p_values(names, found),
     )
+
+
+def _knows_what_hangs_together(board: Leaderboard) -> bool:
+    """Whether "at 5 % for the whole table" holds: resamples take too much for certain."""
+    alone = board.experts <= 1 and board.scenarios <= 1
+    return board.intervals is Intervals.CLOSED_FORM or alone
+
+
+def _p_values(names: list[str], found: Separation) -> tuple[PairP, ...]:
+    low, high = np.triu_indices(len(names), 1)
+    known = zip(low.tolist(), high.tolist(), found.p_value[low, high].tolist(), strict=True)
+    return tuple(PairP(a=names[i], b=names[j], p=p) for i, j, p in known if not np.isnan(p))
 
 
 def precision(arrays: VoteArrays, board: Leaderboard, *, unit: Unit, seed: int) -> Precision:
@@ -114,22 +129,14 @@ def precision(arrays: VoteArrays, board: Leaderboard, *, unit: Unit, seed: int) 
     if unit is not Unit.VOTE:
         alone = rate(
             arrays.comparisons,
-            method=Method.BRADLEY_TERRY,
+            method=Method.DAVIDSON if board.method is Method.DAVIDSON else Method.BRADLEY_TERRY,
             rounds=CLAIM_ROUNDS,
             unit=Unit.VOTE,
+            intervals=Intervals.CLOSED_FORM,
             seed=seed,
-            details=False,
         )
-    lines = zip(board.lines, alone.lines, strict=True)
-    widths = [(_half(line), _half(other)) for line, other in lines]
-    effects = [
-        effect
-        for wide, narrow in widths
-        if wide is not None and narrow is not None
-        for effect in [design_effect(wide, narrow)]
-        if effect is not None
-    ]
-    known = [wide for wide, _ in widths if wide]
+    effects = design_effects(board, alone)
+    known = [half for half in map(_half, board.lines) if half]
     typical = float(np.median(known)) if known else None
     votes = len(arrays.comparisons)
     return Precision(

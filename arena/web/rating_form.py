@@ -11,7 +11,7 @@ from arena.models import Snapshot
 from arena.queries.judged import MAIN, REPEAT
 from arena.queries.vote_sets import Filters
 from arena.rating.bootstrap import Unit
-from arena.rating.leaderboard import Method
+from arena.rating.leaderboard import Intervals, Method
 from arena.services.ratings import DEFAULT_ROUNDS, MOST_ROUNDS
 from augment.services.scenarios.types import type_choices
 
@@ -26,6 +26,13 @@ UNIT_LABELS = {
     "scenario": _("scenarios"),
     "expert": _("experts"),
     "vote": _("votes, as in the paper"),
+}
+
+
+INTERVAL_LABELS = {
+    "": _("right for the method"),
+    "closed form": _("in closed form"),
+    "resamples": _("by resamples"),
 }
 
 
@@ -49,6 +56,13 @@ class RatingForm(forms.Form):
         choices=[("", UNIT_LABELS[""]), *((one.value, UNIT_LABELS[one.value]) for one in Unit)],
         required=False,
     )
+    intervals = forms.ChoiceField(
+        choices=[
+            ("", INTERVAL_LABELS[""]),
+            *((one.value, INTERVAL_LABELS[one.value]) for one in Intervals),
+        ],
+        required=False,
+    )
     rounds = forms.IntegerField(
         min_value=1, max_value=MOST_ROUNDS, initial=DEFAULT_ROUNDS, required=False
     )
@@ -63,7 +77,7 @@ class RatingForm(forms.Form):
         self, data: dict[str, Any] | None = None, *, snapshot: Snapshot | None = None
     ) -> None:
         super().__init__(data)
-        for name in ("method", "unit", "rounds", "seed"):
+        for name in ("method", "unit", "intervals", "rounds", "seed"):
             self.fields[name].widget.attrs["class"] = "input"
         named = snapshot.results.judges if snapshot is not None else {}
         self.judges = sorted(named.items(), key=lambda item: item[1])
@@ -75,6 +89,7 @@ class RatingForm(forms.Form):
         return {
             "method": asked["method"] or Method.BRADLEY_TERRY.value,
             "unit": asked["unit"] or None,
+            "intervals": asked["intervals"] or None,
             "rounds": asked["rounds"] or DEFAULT_ROUNDS,
             "seed": asked["seed"] or 0,
             "filters": Filters(

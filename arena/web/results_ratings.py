@@ -45,12 +45,14 @@ def pairs(snapshot: Snapshot, table: LeaderboardTable) -> Context:
     place = {row.slug: n for n, row in enumerate(table.rows)}
     above = snapshot.results.board.above
     apart = None if above is None else {frozenset(pair) for pair in above}
-    lines = [_pair(pair, names, place, apart) for pair in found]
+    p_values = {frozenset((one.a, one.b)): one.p for one in snapshot.results.board.p_values or ()}
+    lines = [_pair(pair, names, place, apart, p_values) for pair in found]
     lines.sort(key=lambda line: (place[line["a"].slug], place[line["b"].slug]))
     return {
         "heat": heat_map(found, table.rows),
         "lines": lines,
         "few": FEW,
+        "has_p_values": bool(p_values),
         "told_apart": None if apart is None else len(apart),
     }
 
@@ -93,6 +95,7 @@ def _pair(
     names: Mapping[str, Row],
     place: Mapping[str, int],
     apart: set[frozenset[str]] | None,
+    p_values: Mapping[frozenset[str], float],
 ) -> Context:
     """A pair from the view of the one that stands higher."""
     first, second, wins, losses = pair.a, pair.b, pair.wins, pair.losses
@@ -106,6 +109,7 @@ def _pair(
         "losses": losses,
         "both_miss": pair.both_miss,
         "votes": pair.votes,
+        "p": p_values.get(frozenset((first, second))),
         "apart": None if apart is None else frozenset((first, second)) in apart,
     }
 

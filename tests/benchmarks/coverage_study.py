@@ -1,99 +1,39 @@
-"""How often 95 % intervals contain the truth, over simulated studies of the paper's size.
+"""How often 95 % intervals contain the truth, over simulated studies: `docs/coverage.md`.
 
-    python -m tests.benchmarks.coverage_study [STUDIES]
+    python -m tests.benchmarks.coverage_study [STUDIES] [--write]
 
-Every study has the paper's nine ratings, nine experts, 50 scenarios and 5,760 votes with a tie
-share of about 0.4. Experts and scenarios may differ in what they make of each contestant: normal
-effects with a standard deviation in Elo points. The truth is then what infinitely many votes of
-new experts on new scenarios would be rated. All of it is simulated; 1,000 studies take minutes.
+Numbers of experts, votes and sizes of effects as in `EXPERTS`, `VOTES` and `EFFECTS`, with the
+paper's nine ratings and with nine equals. All of it is simulated; 250 studies a row take a
+quarter of an hour of one processor.
 """
 
 from __future__ import annotations
 
-import json
-import sys
+import argparse
+import re
 import time
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
 
-from arena.rating import bradley_terry
 from arena.rating.bootstrap import Unit
-from arena.rating.bradley_terry import ELO_PER_LOGIT
-from arena.rating.comparisons import LOSS, TIE, WIN, Comparisons, FloatArray
-from arena.rating.leaderboard import Leaderboard, rate
+from arena.rating.bradley_terry import DidNotConverge
+from arena.rating.comparisons import Comparisons, FloatArray
+from arena.rating.leaderboard import Intervals, Leaderboard, rate
+from tests.benchmarks.worlds import World, paper_ratings
 
-PAPER = Path(__file__).parents[1] / "rating" / "paper_table.json"
-VOTES, EXPERTS, SCENARIOS, TIES = 5760, 9, 50, 0.4
-SETTINGS = ((0.0, 0.0), (100.0, 0.0), (0.0, 40.0), (100.0, 40.0))
-METHODS = (
-    ("votes, paper mode", Unit.VOTE),
-    ("scenarios", Unit.SCENARIO),
-    ("experts", Unit.EXPERT),
-    ("two-way, default", Unit.TWO_WAY),
-)
-CROSS_CHECK = "two-way sandwich"
+EXPERTS = (3, 5, 9, 12, 20)
+VOTES = (40, 200, 480)
+EFFECTS = ((0.0, 0.0), (100.0, 40.0), (0.0, 80.0), (100.0, 80.0))
+ROUNDS = 1000
+RESAMPLED_ROUNDS = 400
+PAGE = Path(__file__).resolve().parents[2] / "docs" / "coverage.md"
 
-
-def paper_ratings() -> FloatArray:
-    return np.array([row[2] for row in json.loads(PAPER.read_text())["rows"]], dtype=np.float64)
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class World:
-    """What is true: ratings, and how much scenarios and experts differ, in Elo points."""
-
-    ratings: FloatArray
-    scenario_sd: float = 0.0
-    expert_sd: float = 0.0
-    experts: int = EXPERTS
-    scenarios: int = SCENARIOS
-    ties: float = TIES
-
-    def truth(self) -> FloatArray:
-        """(C,) what infinitely many votes of this world would be rated."""
-        strengths = self.ratings / ELO_PER_LOGIT
-        low, high = np.triu_indices(len(strengths), 1)
-        spread = np.sqrt(2.0 * (self.scenario_sd**2 + self.expert_sd**2)) / ELO_PER_LOGIT
-        nodes, weights = np.polynomial.hermite_e.hermegauss(60)
-        gaps = (strengths[low] - strengths[high])[:, None] + spread * nodes
-        scores = (1.0 / (1.0 + np.exp(-gaps))) @ (weights / weights.sum())
-        fitted = bradley_terry.fit(
-            contestants=len(strengths),
-            low=low,
-            high=high,
-            games=np.ones((1, len(low))),
-            scores=scores[None],
-        )
-        return bradley_terry.to_elo(fitted[0])
-
-    def votes(self, number: int, rng: np.random.Generator) -> Comparisons:
-        """A study: experts and scenarios are new ones each time."""
-        contestants = len(self.ratings)
-        of_scenarios = rng.normal(0.0, self.scenario_sd, (self.scenarios, contestants))
-        of_experts = rng.normal(0.0, self.expert_sd, (self.experts, contestants))
-        first = rng.integers(0, contestants, number)
-        second = (first + rng.integers(1, contestants, number)) % contestants
-        expert = rng.integers(0, self.experts, number)
-        scenario = rng.integers(0, self.scenarios, number)
-        seen = self.ratings + of_scenarios[scenario] + of_experts[expert]
-        rows = np.arange(number)
-        gap = (seen[rows, first] - seen[rows, second]) / ELO_PER_LOGIT
-        expected = 1.0 / (1.0 + np.exp(-gap))
-        tie = self.ties * 2.0 * np.minimum(expected, 1.0 - expected)
-        drawn = rng.random(number)
-        return Comparisons(
-            names=tuple(f"c{index}" for index in range(contestants)),
-            first=first,
-            second=second,
-            score=np.where(
-                drawn < expected - tie / 2, WIN, np.where(drawn < expected + tie / 2, TIE, LOSS)
-            ),
-            expert=expert,
-            scenario=scenario,
-        )
+DEFAULT, PLAIN = "closed form, default", "plain sandwich, t"
+RESAMPLED, PAPERS = "two-way resamples", "paper's mode"
+METHODS = (DEFAULT, PLAIN, RESAMPLED, PAPERS)
 
 
 @dataclass(slots=True)
@@ -105,9 +45,12 @@ class Tally:
     half_widths: float = 0.0
 
     def add(self, truth: FloatArray, lower: FloatArray, upper: FloatArray) -> None:
-        self.held += int(((lower <= truth) & (truth <= upper)).sum())
-        self.seen += len(truth)
-        self.half_widths += float((upper - lower).sum() / 2.0)
+        """Intervals without one of their ends say nothing of widths and are left out."""
+        known = ~(np.isnan(lower) | np.isnan(upper))
+        inside = (lower <= truth) & (truth <= upper)
+        self.held += int(inside[known].sum())
+        self.seen += int(known.sum())
+        self.half_widths += float((upper - lower)[known].sum() / 2.0)
 
     @property
     def coverage(self) -> float:
@@ -117,9 +60,39 @@ class Tally:
     def half_width(self) -> float:
         return self.half_widths / self.seen
 
+    def __str__(self) -> str:
+        return f"{self.coverage:.1%} ±{self.half_width:.0f}" if self.seen else "none"
+
+
+@dataclass(slots=True)
+class Found:
+    """What studies of one world said.
+
+    Attributes:
+        intervals: By method.
+        hardest: The default's of the controversial contestants alone.
+        ranks: The share of contestants whose true place is in their rank set.
+        false: Studies in which a pair was wrongly told apart.
+        studies: How many there were, without those whose votes determine no ratings.
+    """
+
+    intervals: dict[str, Tally] = field(
+        default_factory=lambda: {name: Tally() for name in METHODS}
+    )
+    hardest: Tally = field(default_factory=Tally)
+    ranked: int = 0
+    ranks_held: int = 0
+    places: int = 0
+    false: int = 0
+    studies: int = 0
+
+    @property
+    def ranks(self) -> str:
+        return f"{self.ranks_held / self.ranked:.1%} {self.places / self.ranked:.1f}"
+
 
 def bounds(board: Leaderboard, *, check: bool = False) -> tuple[FloatArray, FloatArray]:
-    """(C,), (C,) of a table in which everybody has an interval."""
+    """(C,), (C,); NaN where there is none."""
     kinds = ("check_lower", "check_upper") if check else ("lower", "upper")
     lower, upper = (
         np.array([getattr(line, kind) for line in board.lines], dtype=np.float64) for kind in kinds
@@ -127,45 +100,126 @@ def bounds(board: Leaderboard, *, check: bool = False) -> tuple[FloatArray, Floa
     return lower, upper
 
 
-def study(
-    world: World, *, studies: int, rounds: int, votes: int = VOTES, units: tuple[Unit, ...]
-) -> dict[str, Tally]:
-    """Coverage by method's name over studies with seeds 0, 1, 2 and so on."""
-    tallies = {name: Tally() for name, unit in METHODS if unit in units}
-    if Unit.TWO_WAY in units:
-        tallies[CROSS_CHECK] = Tally()
-    truth = world.truth()
+def study(world: World, *, studies: int, methods: tuple[str, ...] = METHODS) -> Found:
+    """What studies with seeds 0, 1, 2 and so on say of a world."""
+    found, truth = Found(), world.truth()
     for seed in range(studies):
-        drawn = world.votes(votes, np.random.default_rng(seed))
-        for name, unit in METHODS:
-            if unit not in units:
-                continue
-            checked = unit is Unit.TWO_WAY
-            board = rate(drawn, unit=unit, rounds=rounds, seed=seed, details=checked)
-            tallies[name].add(truth, *bounds(board))
-            if checked:
-                tallies[CROSS_CHECK].add(truth, *bounds(board, check=True))
-    return tallies
+        votes = world.votes(np.random.default_rng(seed))
+        try:
+            board = rate(votes, rounds=ROUNDS, seed=seed)
+        except DidNotConverge:
+            continue
+        if any(line.rating is None for line in board.lines):
+            continue
+        found.studies += 1
+        found.intervals[DEFAULT].add(truth, *bounds(board))
+        found.intervals[PLAIN].add(truth, *bounds(board, check=True))
+        hard = list(world.controversial)
+        found.hardest.add(truth[hard], *(one[hard] for one in bounds(board)))
+        _add_ranks(found, board, truth)
+        for name, unit in ((RESAMPLED, Unit.TWO_WAY), (PAPERS, Unit.VOTE)):
+            if name in methods:
+                found.intervals[name].add(truth, *bounds(_resampled(votes, unit, seed)))
+    return found
 
 
-def lines(studies: int, rounds: int) -> Iterator[str]:
-    names = [*(name for name, _ in METHODS), CROSS_CHECK]
-    yield f"| scenario / expert effects | {' | '.join(names)} |"
-    yield "|---" * (1 + len(names)) + "|"
-    for scenario_sd, expert_sd in SETTINGS:
-        world = World(ratings=paper_ratings(), scenario_sd=scenario_sd, expert_sd=expert_sd)
-        found = study(world, studies=studies, rounds=rounds, units=tuple(Unit))
-        cells = [f"{found[name].coverage:.1%} (±{found[name].half_width:.0f})" for name in names]
-        yield f"| {scenario_sd:.0f} / {expert_sd:.0f} | {' | '.join(cells)} |"
+def _resampled(votes: Comparisons, unit: Unit, seed: int) -> Leaderboard:
+    rounds = RESAMPLED_ROUNDS
+    way = Intervals.RESAMPLES
+    return rate(votes, unit=unit, intervals=way, rounds=rounds, seed=seed, details=False)
+
+
+def _add_ranks(found: Found, board: Leaderboard, truth: FloatArray) -> None:
+    """True places; equals share theirs, and whoever is told apart from an equal is wrong."""
+    close = 1e-6
+    best = 1 + (truth[:, None] > truth[None, :] + close).sum(axis=0)
+    worst = len(truth) - (truth[:, None] < truth[None, :] - close).sum(axis=0)
+    for line, first, last in zip(board.lines, best, worst, strict=True):
+        if line.rank_best is not None and line.rank_worst is not None:
+            found.ranked += 1
+            found.ranks_held += line.rank_best <= first and last <= line.rank_worst
+            found.places += line.rank_worst - line.rank_best + 1
+    if board.separation is not None:
+        wrong = board.separation.above & (truth[:, None] < truth[None, :] + close)
+        found.false += bool(wrong.any())
+
+
+def lines(studies: int, numbers: tuple[int, ...] = EXPERTS) -> Iterator[str]:
+    """The big table, row by row, for numbers of experts."""
+    heads = ("experts x votes", "scenario / expert", *METHODS, "rank sets", "false separations")
+    yield "| " + " | ".join(heads) + " |"
+    yield "|---" * len(heads) + "|"
+    equal = np.full(len(paper_ratings()), 1000.0)
+    for experts in numbers:
+        for votes in VOTES:
+            for scenario_sd, expert_sd in EFFECTS:
+                world = World(
+                    ratings=paper_ratings(),
+                    scenario_sd=scenario_sd,
+                    expert_sd=expert_sd,
+                    experts=experts,
+                    votes_per_expert=votes,
+                )
+                found = study(world, studies=studies)
+                alike = study(replace(world, ratings=equal), studies=studies, methods=())
+                cells = [
+                    f"{experts} x {votes}",
+                    f"{scenario_sd:.0f} / {expert_sd:.0f}",
+                    *(str(found.intervals[name]) for name in METHODS),
+                    found.ranks,
+                    f"{alike.false / alike.studies:.1%}",
+                ]
+                yield "| " + " | ".join(cells) + " |"
+
+
+def controversial_lines(studies: int) -> Iterator[str]:
+    """One contestant about whom experts differ four times as much (160 points against 40)."""
+    heads = ("experts x votes", DEFAULT, "of the one contestant", PLAIN)
+    yield "| " + " | ".join(heads) + " |"
+    yield "|---" * len(heads) + "|"
+    for experts in EXPERTS:
+        world = World(
+            ratings=paper_ratings(),
+            scenario_sd=100.0,
+            expert_sd=40.0,
+            experts=experts,
+            votes_per_expert=200,
+            controversial=(4,),
+        )
+        found = study(world, studies=studies, methods=())
+        cells = (str(found.intervals[DEFAULT]), str(found.hardest), str(found.intervals[PLAIN]))
+        yield f"| {experts} x 200 | " + " | ".join(cells) + " |"
+
+
+def _write(name: str, text: str) -> None:
+    """Replace what stands between the marks of a table."""
+    begin, end = f"<!-- {name} -->\n", f"<!-- end of {name} -->"
+    page = re.sub(
+        f"{re.escape(begin)}.*?{re.escape(end)}",
+        lambda _: f"{begin}{text}\n{end}",
+        PAGE.read_text(),
+        flags=re.S,
+    )
+    PAGE.write_text(page)
 
 
 def main() -> None:
-    studies = int(sys.argv[1]) if len(sys.argv) > 1 else 1000
-    began = time.perf_counter()
-    print(f"{studies} simulated studies of {VOTES} votes, 1000 rounds each; coverage (half-width)")
-    for line in lines(studies, rounds=1000):
-        print(line, flush=True)
-    print(f"{time.perf_counter() - began:.0f} s")
+    parser = argparse.ArgumentParser()
+    parser.add_argument("studies", type=int, nargs="?", default=250)
+    parser.add_argument("--write", action="store_true", help="into docs/coverage.md")
+    asked = parser.parse_args()
+    began = time.process_time()
+    for name, rows in (
+        ("controversial", controversial_lines(asked.studies)),
+        ("worlds", lines(asked.studies)),
+    ):
+        said = [f"{asked.studies} simulated studies a row.", ""]
+        for line in rows:
+            print(line, flush=True)
+            said.append(line)
+        if asked.write:
+            _write(name, "\n".join(said))
+    print(f"{time.process_time() - began:.0f} s of processor")
 
 
 if __name__ == "__main__":

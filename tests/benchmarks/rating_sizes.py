@@ -13,7 +13,7 @@ import numpy as np
 
 from arena.rating.bradley_terry import ELO_PER_LOGIT
 from arena.rating.comparisons import Comparisons, IntArray
-from tests.benchmarks.coverage_study import paper_ratings
+from tests.benchmarks.worlds import paper_ratings
 
 WINNERS = ("model_a", "tie", "model_b")
 EXPERTS, SCENARIOS, TIES = 9, 50, 0.2

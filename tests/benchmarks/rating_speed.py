@@ -25,6 +25,7 @@ from arena.rating import bradley_terry, sandwich
 from arena.rating.bootstrap import Unit
 from arena.rating.comparisons import Comparisons, count_pairs
 from arena.rating.leaderboard import Method, rate
+from arena.rating.pulls import bradley_terry_pulls
 from tests.benchmarks.rating_sizes import SIZES, Votes, drawn
 from tests.benchmarks.report import load, table, write_section
 from tests.benchmarks.rivals.environments import RIVALS, ROOT, NotInstalled, python_of
@@ -128,7 +129,9 @@ def closed_form(votes: Comparisons) -> None:
         games=counts.games[None],
         scores=counts.scores[None],
     )[0]
-    sandwich.covariance(votes, counts, strengths, Unit.VOTE)
+    met = bradley_terry.Meetings(contestants=len(votes.names), low=counts.low, high=counts.high)
+    inverse = bradley_terry.inverse_curvature(met, counts.games, strengths)
+    sandwich.covariance(votes, bradley_terry_pulls(votes, strengths, inverse), Unit.VOTE)
 
 
 def ours(name: str, votes: Votes) -> Iterator[tuple[str, Measured]]:

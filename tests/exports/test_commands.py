@@ -67,7 +67,10 @@ def test_rate_prints_the_table_and_takes_a_code() -> None:
     head, first, *_ = said.splitlines()
     assert head.split() == ["Model", "Rank", "Elo", "95%", "CI", "Votes", "95%", "ranks"]
     assert first.startswith("Ann ")
-    assert "resamples of experts and scenarios, seed 3" in said
+    assert (
+        "in closed form, by experts and scenarios (moderated sandwich, Student's t), seed 3"
+        in said
+    )
 
 
 def test_the_same_snapshot_is_written_byte_for_byte(tmp_path: Path) -> None:

@@ -13,7 +13,7 @@ from arena.rating.bootstrap import Unit
 from arena.rating.comparisons import Comparison, Comparisons, as_arrays
 from arena.rating.components import open_interval
 from arena.rating.connectivity import Status
-from arena.rating.leaderboard import Leaderboard, Line, Method, rate
+from arena.rating.leaderboard import Intervals, Leaderboard, Line, Method, rate
 from arena.rating.ranking import ranks, shown_ranks
 from tests.rating.votes import by_votes, named, versus
 
@@ -54,7 +54,7 @@ def line_of(board: Leaderboard, name: str) -> Line:
 
 @pytest.mark.parametrize("unit", Unit)
 def test_one_contestant_with_six_votes_takes_nothing_from_nine_others(unit: Unit) -> None:
-    rest = nine_of(12, 6, 7)
+    rest = nine_of(13, 6, 7)
     few = versus("x", "a", 1, 0, 0) + versus("x", "e", 1, 0, 1) + versus("x", "i", 2, 0, 1)
     alone = rate(spread(rest), unit=unit, rounds=2000, seed=1)
     board = rate(spread(rest + few), unit=unit, rounds=2000, seed=1)
@@ -273,7 +273,14 @@ def test_two_way_intervals_are_those_of_the_rounds_and_not_widened() -> None:
         for e, s in cells
         for k in range(4)
     ]
-    line = rate(as_arrays(("a", "b"), votes), unit=Unit.TWO_WAY, rounds=8000, seed=5).lines[0]
+    drawn_both_ways = rate(
+        as_arrays(("a", "b"), votes),
+        unit=Unit.TWO_WAY,
+        intervals=Intervals.RESAMPLES,
+        rounds=8000,
+        seed=5,
+    )
+    line = drawn_both_ways.lines[0]
     table = np.array([[wins[e, s] for s in range(8)] for e in range(6)], dtype=float)
     drawn = []
     for _ in range(8000):

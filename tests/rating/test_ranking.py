@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-import itertools
-
 import numpy as np
 import pytest
 from statsmodels.stats.multitest import multipletests
 
 from arena.rating.bootstrap import Unit
 from arena.rating.leaderboard import rate
-from arena.rating.ranking import holm, rank_interval, ranks, separation
+from arena.rating.ranking import above_by_bounds, holm, rank_sets, ranks, separation
 from tests.rating.votes import simulated
 
 
@@ -19,29 +17,19 @@ def test_who_can_not_be_told_apart_shares_a_rank() -> None:
     assert ranks([-np.inf, 1.0], [np.inf, 2.0]).tolist() == [1, 1]
 
 
-def test_a_rank_interval_holds_the_places_of_95_percent_of_the_rounds() -> None:
-    samples = np.tile([[3.0], [2.0], [1.0]], (1, 100))
-    samples[0, :4] = 1.5  # second in 4 of 100 rounds
-    best, worst = rank_interval(samples)
-    assert best.tolist() == [1, 1, 3]
-    assert worst.tolist() == [2, 2, 3]
+def test_a_rank_set_counts_who_is_shown_to_be_above_and_below() -> None:
+    above = np.zeros((4, 4), dtype=bool)
+    above[0, 2] = above[0, 3] = above[1, 3] = True
+    best, worst = rank_sets(above)
+    assert best.tolist() == [1, 1, 2, 3]
+    assert worst.tolist() == [2, 3, 4, 4]
 
 
-@pytest.mark.parametrize("seed", range(20))
-def test_a_place_that_is_unknown_may_be_any(seed: int) -> None:
-    """One round: every unknown rating is tried above and below everybody who is known."""
-    rng = np.random.default_rng(seed)
-    some = np.array([np.nan, np.inf, 3.0, 2.0, np.nan, -np.inf])[: 2 + seed % 5]
-    ratings = rng.permutation(some)
-    unknown = np.flatnonzero(np.isnan(ratings))
-    order = np.array([np.searchsorted(np.sort(ratings), rating) for rating in ratings], float)
-    places = []
-    for ends in itertools.product((-1.0, 99.0), repeat=len(unknown)):
-        order[unknown] = ends
-        places.append([1 + (order > one).sum() for one in order])
-    best, worst = rank_interval(ratings[:, None])
-    assert best.tolist() == np.min(places, axis=0).tolist()
-    assert worst.tolist() == np.max(places, axis=0).tolist()
+def test_bounds_tell_apart_who_has_one_alone() -> None:
+    """The first two were judged at once; the third has no lower bound, the fourth none at all."""
+    nan, nobody = np.nan, np.zeros((4, 4), dtype=bool)
+    lower, upper = np.array([50.0, 40.0, nan, nan]), np.array([70.0, 45.0, 30.0, nan])
+    assert np.argwhere(above_by_bounds(nobody, lower, upper)).tolist() == [[0, 2], [1, 2]]
 
 
 def test_holm_is_statsmodels() -> None:

@@ -13,9 +13,11 @@ import statsmodels.api as sm
 
 from arena.rating import sandwich
 from arena.rating.bootstrap import Unit
-from arena.rating.bradley_terry import ELO_PER_LOGIT
+from arena.rating.bradley_terry import ELO_PER_LOGIT, Meetings, inverse_curvature
 from arena.rating.comparisons import Comparisons, FloatArray, count_pairs
-from arena.rating.leaderboard import rate
+from arena.rating.leaderboard import Intervals, rate
+from arena.rating.pulls import Pulls, bradley_terry_pulls
+from arena.rating.student import t_above, t_quantile
 from tests.rating.votes import fit, simulated
 
 ARENA_RANK = json.loads((Path(__file__).parent / "arena_rank.json").read_text())
@@ -23,12 +25,22 @@ TRUTH = [1060.0, 1020.0, 1000.0, 980.0, 940.0]
 
 
 def covariance(votes: Comparisons, unit: Unit) -> FloatArray:
-    return sandwich.covariance(votes, count_pairs(votes), fit(votes), unit)
+    return sandwich.covariance(votes, pulls_of(votes), unit)
 
 
-@pytest.mark.parametrize("degrees", [1, 2, 3, 8, 19])
-def test_students_t_is_scipys(degrees: int) -> None:
-    assert sandwich.t_quantile(degrees) == pytest.approx(scipy.stats.t.ppf(0.975, degrees))
+def pulls_of(votes: Comparisons) -> Pulls:
+    counts, strengths = count_pairs(votes), fit(votes)
+    met = Meetings(contestants=len(votes.names), low=counts.low, high=counts.high)
+    inverse = inverse_curvature(met, counts.games, strengths)
+    return bradley_terry_pulls(votes, strengths, inverse)
+
+
+@pytest.mark.parametrize("degrees", [1.0, 1.3, 2.0, 3.0, 8.0, 19.0, 57.4, 4000.0, 1e6])
+def test_students_t_is_scipys(degrees: float) -> None:
+    theirs = scipy.stats.t(degrees)
+    assert t_quantile(degrees) == pytest.approx(theirs.ppf(0.975), rel=1e-6)
+    values = np.array([0.0, 0.3, 1.0, 2.5, 6.0])
+    assert t_above(values, degrees) == pytest.approx(theirs.sf(values), rel=1e-5, abs=1e-100)
 
 
 def test_the_factor_is_the_normals_where_clusters_are_many() -> None:
@@ -69,14 +81,14 @@ def test_two_ways_are_the_one_and_the_other_without_what_is_in_both() -> None:
 @pytest.mark.parametrize("unit", [Unit.VOTE, Unit.SCENARIO])
 def test_the_bootstrap_agrees_where_clusters_are_many(unit: Unit) -> None:
     votes = simulated(TRUTH, 4000, 3, scenarios=200)
-    for line in rate(votes, unit=unit, rounds=4000).lines:
+    for line in rate(votes, unit=unit, intervals=Intervals.RESAMPLES, rounds=4000).lines:
         assert line.lower == pytest.approx(line.check_lower, abs=1.5)
         assert line.upper == pytest.approx(line.check_upper, abs=1.5)
 
 
 def test_rows_of_a_covariance_add_to_zero_and_the_board_carries_it() -> None:
     votes = simulated(TRUTH, 800, 4)
-    board = rate(votes, rounds=200)
+    board = rate(votes, intervals=Intervals.RESAMPLES, rounds=200)
     assert board.covariance is not None
     assert board.covariance == pytest.approx(covariance(votes, Unit.TWO_WAY))
     assert np.abs(board.covariance.sum(axis=1)).max() < 1e-6

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 import statsmodels.api as sm
 
+from arena.rating.bootstrap import Unit
 from arena.rating.bradley_terry import ELO_PER_LOGIT
 from arena.rating.comparisons import Comparison, Comparisons
 from arena.rating.fit_test import fit_test
@@ -12,9 +13,11 @@ from arena.rating.influence import (
     rank_changes,
     without_each_expert,
 )
-from arena.rating.planning import design_effect, votes_for, votes_until
+from arena.rating.leaderboard import Intervals, rate
+from arena.rating.planning import design_effects, votes_for, votes_until
 from arena.rating.position import side_bias
 from arena.rating.win_rates import win_rates
+from tests.benchmarks.worlds import World
 from tests.rating.votes import fit, named, simulated, versus
 
 PAPERS = [1042.0, 1039, 1025, 1011, 1003, 998, 984, 953, 941]
@@ -169,8 +172,23 @@ def test_a_design_effect_of_two_needs_twice_the_votes() -> None:
     assert votes_for(
         contestants=9, half_width=10, tie_share=0.2, design_effect=2.0
     ) == pytest.approx(2 * alone, abs=1)
-    assert design_effect(14.0, 10.0) == pytest.approx(1.96)
-    assert design_effect(14.0, 0.0) is None
+
+
+@pytest.mark.parametrize(("expert_sd", "least", "most"), [(0.0, 0.8, 1.4), (80.0, 2.5, 6.0)])
+def test_a_design_effect_is_one_where_votes_are_independent(
+    expert_sd: float, least: float, most: float
+) -> None:
+    """It was 2.8 by two-way resamples of independent votes of 12 experts."""
+    world = World(
+        ratings=np.linspace(940.0, 1060.0, 9),
+        expert_sd=expert_sd,
+        experts=12,
+        votes_per_expert=200,
+    )
+    votes = world.votes(np.random.default_rng(3))
+    alone = rate(votes, unit=Unit.VOTE, intervals=Intervals.CLOSED_FORM, rounds=50)
+    effects = design_effects(rate(votes, rounds=50), alone)
+    assert least < float(np.median(effects)) < most
 
 
 def test_half_the_width_needs_four_times_the_votes() -> None:

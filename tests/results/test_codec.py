@@ -36,7 +36,8 @@ def test_what_a_version_brought_is_a_key_of_it_also_when_it_is_empty() -> None:
     document = results_document(Results(version=VERSION))
     assert document["board"]["order"] == []
     assert results_document(Results(version=1))["board"].keys() == document["board"].keys() - {
-        "order"
+        "order",
+        "p_values",
     }
     assert (read_results(document), read_results({})) == (Results(version=VERSION), Results())
     assert results_document(Results()) == {}

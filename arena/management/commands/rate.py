@@ -11,6 +11,7 @@ from arena.exports.tables import leaderboard_table
 from arena.exports.writers import plain_text
 from arena.queries.studies import study_named
 from arena.queries.vote_sets import Filters
+from arena.rating.rules import Intervals
 from arena.services.ratings import DEFAULT_ROUNDS, rate
 from augment.errors import AugmentError
 from augment.services.terminal import TerminalCommand
@@ -33,6 +34,11 @@ class Command(TerminalCommand):
             "where votes name experts and scenarios, unless given",
         )
         parser.add_argument(
+            "--intervals",
+            choices=[one.value for one in Intervals],
+            help="closed form (the default where votes hang together) or resamples",
+        )
+        parser.add_argument(
             "--leave-out-own",
             action="store_true",
             help="votes of authors on their own contestants do not count",
@@ -50,6 +56,7 @@ class Command(TerminalCommand):
                 rounds=options["rounds"],
                 seed=options["seed"],
                 unit=options["unit"],
+                intervals=options["intervals"],
                 filters=Filters(leave_out_own=options["leave_out_own"]),
                 early=options["early"],
             )

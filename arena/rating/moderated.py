@@ -1,0 +1,237 @@
+"""How sure ratings are when votes hang together by expert and by scenario, in closed form.
+
+Every vote pulls at its two contestants by how much it surprises. The pulls of a cluster are added
+up before they are squared, so that what its votes have in common counts (the sandwich); clustered
+two ways, the squares by expert and by scenario are added and those of the cells, which are in
+both, taken off once (Cameron, Gelbach, Miller 2011).
+
+With few experts such a square is a guess by few numbers, and Student's t makes it twice as wide as
+need be. But contestants are many: by how much experts disagree about one says something about the
+others. So each contestant's own square is drawn towards what all of them have in common, the less
+the more they differ (moderated variances, Smyth 2004), and Student's t gets the degrees of freedom
+of what it then rests on (Satterthwaite 1946). docs/coverage.md has how often the truth is inside.
+
+Notation: C contestants, R rows, G clusters of one kind. Strengths are logarithms of odds.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Self
+
+import numpy as np
+
+from arena.rating.bootstrap import Unit
+from arena.rating.comparisons import (
+    BoolArray,
+    Comparisons,
+    FloatArray,
+    IntArray,
+    renumber_codes,
+)
+from arena.rating.pulls import Pulls, without_negative_parts
+from arena.rating.student import t_quantile
+
+MOST_PRIOR = 24.0
+"""The others count at most like so many further clusters, however alike all contestants seem: one
+whom experts disagree about more is then still seen."""
+
+LEAST = 0.75
+"""No variance is smaller than this share of what single cells would give."""
+
+_FAR = 1e9
+"""Degrees of freedom of what is as good as known."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Component:
+    """What clusters of one kind add to the covariance of the ratings.
+
+    Attributes:
+        covariance: (C, C) moderated.
+        common: (C, C) what it would be if all contestants were disagreed about alike.
+        own_share: (C,) the weight of a contestant's own square, 0 to 1.
+        own_degrees: (C,) degrees of freedom of that square: effective clusters less one.
+        degrees: (C,) those of the moderated one.
+    """
+
+    covariance: FloatArray
+    common: FloatArray
+    own_share: FloatArray
+    own_degrees: FloatArray
+    degrees: FloatArray
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Spread:
+    """How sure ratings are.
+
+    Attributes:
+        covariance: (C, C) in squared points, around the mean of the reference.
+        degrees: (C,) of Student's t for a rating.
+        common: (C, C) the covariance if contestants were disagreed about alike.
+        base: (C, C) that of independent cells, or votes.
+        components: By kind of cluster; none for votes that count as independent.
+    """
+
+    covariance: FloatArray
+    degrees: FloatArray
+    common: FloatArray
+    base: FloatArray
+    components: tuple[Component, ...]
+
+    def among(self, members: IntArray) -> Self:
+        """The same for some of the contestants alone."""
+        if len(members) == len(self.degrees):
+            return self
+        places = np.ix_(members, members)
+        return replace(
+            self,
+            covariance=self.covariance[places],
+            degrees=self.degrees[members],
+            common=self.common[places],
+            base=self.base[places],
+            components=tuple(
+                Component(
+                    covariance=one.covariance[places],
+                    common=one.common[places],
+                    own_share=one.own_share[members],
+                    own_degrees=one.own_degrees[members],
+                    degrees=one.degrees[members],
+                )
+                for one in self.components
+            ),
+        )
+
+    def half_widths(self) -> FloatArray:
+        """(C,) of the 95 % intervals, in points."""
+        return t_factor(self.degrees) * np.sqrt(self.covariance.diagonal())
+
+
+def t_factor(degrees: FloatArray) -> FloatArray:
+    """By how much to multiply a standard error for a 95 % interval."""
+    return np.asarray(t_quantile(np.maximum(degrees, 1.0)))
+
+
+def spread_of(
+    votes: Comparisons, pulls: Pulls, unit: Unit, reference: BoolArray | None = None
+) -> Spread:
+    """The spread of ratings by votes that hang together as the unit says.
+
+    Args:
+        votes: Of contestants who all have votes.
+        pulls: What each row pulls at its contestants.
+        unit: What hangs together. Where all votes are of one expert, or on one scenario, that
+            side says nothing and is left out.
+        reference: (C,) those whose mean is fixed, by default everybody. Only they say what
+            contestants have in common: who has hardly any votes widens nobody else's interval.
+    """
+    if reference is None:
+        reference = np.ones(pulls.contestants, dtype=np.bool_)
+    pulls = pulls.relative_to(reference)
+    kinds = clusters_of(votes, unit)
+    base = pulls.by_row()
+    if len(kinds) > 1:
+        cells, cell_of = renumber_codes(kinds[0][1] * kinds[1][0] + kinds[1][1])
+        base = pulls.by_cluster(cell_of, len(cells))
+    components = tuple(
+        _component(pulls, base, clusters, of_row, reference) for clusters, of_row in kinds
+    )
+    if not components and unit is not Unit.VOTE:
+        base = np.zeros_like(base)  # there is but one of what differs: nothing can be said
+    if not components:
+        known = np.full(len(base), _FAR)
+        return Spread(covariance=base, degrees=known, common=base, base=base, components=())
+    found = sum((one.covariance for one in components[1:]), components[0].covariance)
+    common = sum((one.common for one in components[1:]), components[0].common)
+    if len(components) > 1:
+        found, common = found - base, common - base
+    found = _at_least(without_negative_parts(found), LEAST * base)
+    return Spread(
+        covariance=found,
+        degrees=satterthwaite(found.diagonal(), components),
+        common=common,
+        base=base,
+        components=components,
+    )
+
+
+def satterthwaite(variance: FloatArray, components: tuple[Component, ...]) -> FloatArray:
+    """(C,) degrees of freedom of variances (C,) that are sums of the components'."""
+    of_parts = sum(one.covariance.diagonal() ** 2 / one.degrees for one in components)
+    return np.asarray(variance**2 / np.maximum(of_parts, 1e-300))
+
+
+def clusters_of(votes: Comparisons, unit: Unit) -> list[tuple[int, IntArray]]:
+    """The number of clusters of each kind that the unit names, from two on, and (R,) whose."""
+    wanted = {
+        Unit.VOTE: (),
+        Unit.EXPERT: (votes.expert,),
+        Unit.SCENARIO: (votes.scenario,),
+        Unit.TWO_WAY: (votes.expert, votes.scenario),
+    }
+    found = [renumber_codes(codes) for codes in wanted[unit]]
+    return [(len(codes), of_row) for codes, of_row in found if len(codes) > 1]
+
+
+def prior_degrees(own: FloatArray, common: FloatArray, degrees: FloatArray) -> float:
+    """How many clusters what all have in common counts for: few where contestants differ.
+
+    The spread of own squares (C,) around the common ones (C,), less what chance alone gives with
+    so many degrees of freedom (C,), as moments of a scaled F distribution.
+    """
+    known = (degrees > 0.5) & (common > 0.0)
+    if known.sum() < 3:
+        return MOST_PRIOR
+    ratio, weight = own[known] / common[known], degrees[known]
+    surplus = float((weight * ((ratio - 1.0) ** 2 - 2.0 / weight)).sum() / weight.sum())
+    surplus /= 1.0 + 2.0 / float(weight.mean())
+    return MOST_PRIOR if surplus <= 0.0 else min(MOST_PRIOR, 4.0 + 2.0 / surplus)
+
+
+# --- Private -----------------------------------------------------------------------------------
+
+
+def _component(
+    pulls: Pulls, base: FloatArray, clusters: int, of_row: IntArray, reference: BoolArray
+) -> Component:
+    raw = pulls.by_cluster(of_row, clusters)
+    uneven = np.clip(pulls.concentration(of_row, clusters), 1.0 / clusters, 1.0)
+    left = 1.0 - uneven  # what the fit leaves of a cluster's pulls
+    effects = _centred(uneven, reference)
+    surplus = raw.diagonal() - base.diagonal() * left
+    room = effects.diagonal() * left
+    weight = np.where(reference, 1.0 / np.maximum(base.diagonal(), 1e-9) ** 2, 0.0)
+    # Chance makes this as often too small as too large: cut off at zero it would be too large.
+    effect = float((weight * surplus).sum()) / max(float((weight * room).sum()), 1e-300)
+    common = _at_least(without_negative_parts(base + effect * effects), LEAST * base)
+    degrees = left / uneven
+    with np.errstate(invalid="ignore", divide="ignore"):
+        own = np.where(left > 0.0, raw.diagonal() / left, 0.0)
+    prior = prior_degrees(own[reference], common.diagonal()[reference], degrees[reference])
+    share = degrees / (prior + degrees)
+    mine = np.sqrt(1.0 / (prior * uneven + left))
+    others = np.sqrt(1.0 - share)
+    everybody = float(degrees[reference].sum()) * (1.0 - 1.0 / reference.sum())
+    return Component(
+        covariance=mine[:, None] * raw * mine + others[:, None] * common * others,
+        common=common,
+        own_share=share,
+        own_degrees=degrees,
+        degrees=np.maximum(np.minimum(prior + degrees, everybody), 1.0),
+    )
+
+
+def _centred(values: FloatArray, reference: BoolArray) -> FloatArray:
+    """(C, C) covariance of independent numbers with these variances (C,), around a mean."""
+    number = reference.sum()
+    of_mean = np.where(reference, values, 0.0)
+    found = np.diag(values) - (of_mean[:, None] + of_mean) / number
+    return np.asarray(found + of_mean.sum() / number**2)
+
+
+def _at_least(found: FloatArray, base: FloatArray) -> FloatArray:
+    """The covariance with variances no smaller than those of single cells."""
+    now, least = found.diagonal(), base.diagonal()
+    wider = np.sqrt(np.maximum(1.0, least / np.maximum(now, 1e-300)))
+    return np.asarray(wider[:, None] * found * wider)

@@ -1,0 +1,147 @@
+"""What votes pull at contestants, added up by cluster and squared: the parts of every sandwich.
+
+Notation: R rows, C contestants, K parameters (C strengths, and what a model has besides), G
+clusters.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from itertools import pairwise
+from typing import Self
+
+import numpy as np
+
+from arena.rating import davidson
+from arena.rating.bradley_terry import ELO_PER_LOGIT, Meetings
+from arena.rating.comparisons import TIE, BoolArray, Comparisons, FloatArray, IntArray
+
+_NUMBERS_AT_ONCE = 2_000_000
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Pulls:
+    """The slope of each row's likelihood at the fitted strengths, and the way back to ratings.
+
+    Attributes:
+        contestants: C.
+        first, second, count: (R,) of the rows.
+        surprise: (R,) what `first` scored above what was expected, in one vote; `second` the
+            opposite.
+        information: (R,) how much a vote of the row says of the difference of the two.
+        besides: (R,) the slope by a model's further parameter, in one vote; None without.
+        inverse: (K, K) of the likelihood's curvature, from slopes (columns) to strengths.
+    """
+
+    contestants: int
+    first: IntArray
+    second: IntArray
+    count: IntArray
+    surprise: FloatArray
+    information: FloatArray
+    inverse: FloatArray
+    besides: FloatArray | None = None
+
+    def relative_to(self, reference: BoolArray) -> Self:
+        """The same for ratings whose mean over a reference (C,) is fixed, not everybody's."""
+        if reference.all():
+            return self
+        inverse = self.inverse.copy()
+        inverse[: self.contestants] -= inverse[: self.contestants][reference].mean(axis=0)
+        return replace(self, inverse=inverse)
+
+    def by_row(self) -> FloatArray:
+        """(C, C) squared points: the sandwich of independent votes."""
+        size = len(self.inverse)
+        found = np.zeros((size, size))
+        squared = self.surprise**2 * self.count
+        np.add.at(found, (self.first, self.second), -squared)
+        found += found.T
+        found[np.diag_indices(size)] = -found.sum(axis=1)
+        if self.besides is not None:
+            both = self.surprise * self.besides * self.count
+            ends = np.bincount(self.first, weights=both, minlength=size)
+            ends -= np.bincount(self.second, weights=both, minlength=size)
+            found[-1, :-1] = found[:-1, -1] = ends[:-1]
+            found[-1, -1] = (self.besides**2 * self.count).sum()
+        return self._of_ratings(found)
+
+    def by_cluster(self, cluster_of: IntArray, clusters: int) -> FloatArray:
+        """(C, C) squared points: the pulls of each of G clusters added up and squared."""
+        size = len(self.inverse)
+        pull = self.surprise * self.count
+        found = np.zeros((size, size))
+        at_once = max(1, _NUMBERS_AT_ONCE // size)
+        order = np.argsort(cluster_of, kind="stable")
+        bounds = np.searchsorted(cluster_of[order], np.arange(0, clusters + at_once, at_once))
+        for block, (begin, end) in enumerate(pairwise(bounds)):
+            rows = order[begin:end]
+            place = (cluster_of[rows] - block * at_once) * size
+            room = min(at_once, clusters - block * at_once) * size
+            pulls = np.bincount(place + self.first[rows], weights=pull[rows], minlength=room)
+            pulls -= np.bincount(place + self.second[rows], weights=pull[rows], minlength=room)
+            if self.besides is not None:
+                more = self.besides[rows] * self.count[rows]
+                pulls += np.bincount(place + size - 1, weights=more, minlength=room)
+            of_clusters = pulls.reshape(-1, size)
+            found += of_clusters.T @ of_clusters
+        return self._of_ratings(found)
+
+    def concentration(self, cluster_of: IntArray, clusters: int) -> FloatArray:
+        """(C,) how unevenly a contestant's information comes from the clusters.
+
+        The sum of squared shares: 1 / G where all give alike, 1 where one gives all.
+        """
+        weight = self.information * self.count
+        place = np.concatenate([self.first, self.second]) * clusters + np.tile(cluster_of, 2)
+        met, of_row = np.unique(place, return_inverse=True)
+        given = np.bincount(of_row, weights=np.tile(weight, 2))
+        total = np.bincount(met // clusters, weights=given, minlength=self.contestants)
+        shares = given / total[met // clusters]
+        squares = np.bincount(met // clusters, weights=shares**2, minlength=self.contestants)
+        return squares.astype(np.float64)
+
+    def _of_ratings(self, squares: FloatArray) -> FloatArray:
+        """(C, C) from squared sums of slopes (K, K)."""
+        back = self.inverse[: self.contestants]
+        return np.asarray(ELO_PER_LOGIT**2 * back @ squares @ back.T)
+
+
+def bradley_terry_pulls(votes: Comparisons, strengths: FloatArray, inverse: FloatArray) -> Pulls:
+    """Those of Bradley-Terry with strengths (C,) and the inverse curvature (C, C)."""
+    expected = 1.0 / (1.0 + np.exp(strengths[votes.second] - strengths[votes.first]))
+    return Pulls(
+        contestants=len(votes.names),
+        first=votes.first,
+        second=votes.second,
+        count=votes.count,
+        surprise=votes.score - expected,
+        information=expected * (1.0 - expected),
+        inverse=inverse,
+    )
+
+
+def davidson_pulls(
+    votes: Comparisons, met: Meetings, games: FloatArray, answer: FloatArray
+) -> Pulls:
+    """Those of Davidson's model with strengths and the logarithm of v (C + 1,)."""
+    expected, tied = davidson.chances(answer, votes.first, votes.second)
+    return Pulls(
+        contestants=len(votes.names),
+        first=votes.first,
+        second=votes.second,
+        count=votes.count,
+        surprise=votes.score - expected,
+        information=expected - 0.25 * tied - expected**2,
+        inverse=davidson.inverse_curvature(met, games, answer),
+        besides=(votes.score == TIE) - tied,
+    )
+
+
+def without_negative_parts(matrix: FloatArray) -> FloatArray:
+    """Few clusters can make a difference of sums negative in some direction: that is cut off."""
+    matrix = 0.5 * (matrix + matrix.T)
+    values, directions = np.linalg.eigh(matrix)
+    if values[0] >= 0.0:
+        return matrix
+    return np.asarray((directions * np.maximum(values, 0.0)) @ directions.T)

@@ -1,0 +1,146 @@
+"""All pairs judged at once by intervals in closed form: who differs at 5 % for the whole table.
+
+The largest of all standardised differences among equals is drawn as it comes about: ratings from
+their covariance, and beside them the squares of so few clusters as there are, moderated in the
+same way as those of the data. With three experts every such square is a rough guess, and the
+largest of 36 ratios of guesses is far beyond what a normal distribution has. From the
+largest difference on, each is held against the largest of those that are left (the step-down of
+Westfall and Young 1993, Romano and Wolf 2005).
+
+Notation: C contestants, P pairs, N draws.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from arena.rating.comparisons import FloatArray, IntArray
+from arena.rating.estimate import LEVEL
+from arena.rating.moderated import LEAST, Component, Spread
+from arena.rating.ranking import Separation, holm, square_of
+from arena.rating.student import t_above
+
+CAUTION = 1.8
+"""What p-values are multiplied by: effects of scenarios are no sums of many, and simulated studies
+of equals were told apart up to so much more often than the draws foresee (docs/coverage.md)."""
+MOST_DRAWN = 300
+"""Contestants above whom pairs go by Holm's step-down alone, without draws."""
+MOST_ROUNDS = 2000
+"""By so many a p-value of 5 % is known to one percent."""
+_MANY_CLUSTERS = 200.0
+"""So many degrees of freedom make a square as good as known."""
+_NUMBERS_AT_ONCE = 2_000_000
+_MOST_KEPT = 20_000_000
+
+
+def judge_pairs(rating: FloatArray, spread: Spread, *, rounds: int, seed: int) -> Separation:
+    """Which pairs of ratings (C,) differ, at 5 % for all of them together.
+
+    Args:
+        rating: In points.
+        spread: How sure they are.
+        rounds: Draws of the largest difference among equals.
+        seed: Of the draws.
+    """
+    contestants = len(rating)
+    low, high = np.triu_indices(contestants, 1)
+    gap = rating[low] - rating[high]
+    # Of 36 pairs some have a small square by chance, and those would be told apart first.
+    variance = np.maximum(
+        _of_pairs(spread.covariance, low, high), _of_pairs(spread.common, low, high)
+    )
+    error = np.sqrt(np.maximum(variance, 1e-300))
+    size = np.abs(gap) / error
+    single = 2.0 * t_above(size, np.minimum(spread.degrees[low], spread.degrees[high]))
+    by_holm = holm(single)
+    if contestants <= MOST_DRAWN:
+        number = min(rounds, MOST_ROUNDS, max(500, _MOST_KEPT // max(len(low), 1)))
+        drawn = _drawn(spread, low, high, number, seed)
+        adjusted, critical = _step_down(size, drawn)
+    else:
+        adjusted, critical = by_holm, float("nan")
+    adjusted = np.minimum(CAUTION * adjusted, 1.0)
+    differs = adjusted <= 1.0 - LEVEL
+    above = np.zeros((contestants, contestants), dtype=bool)
+    above[low, high] = differs & (gap > 0)
+    above[high, low] = differs & (gap < 0)
+    return Separation(
+        above=above,
+        p_value=square_of(contestants, low, high, adjusted, 1.0),
+        holm=square_of(contestants, low, high, by_holm, 1.0),
+        critical=critical,
+        difference=rating[:, None] - rating[None, :],
+        error=square_of(contestants, low, high, error, 0.0),
+    )
+
+
+# --- Private -----------------------------------------------------------------------------------
+
+
+def _of_pairs(covariance: FloatArray, low: IntArray, high: IntArray) -> FloatArray:
+    """(..., P) variances of differences, from covariances (..., C, C)."""
+    variance = np.diagonal(covariance, axis1=-2, axis2=-1)
+    both = covariance[..., low, high]
+    return np.asarray(variance[..., low] + variance[..., high] - 2.0 * both)
+
+
+def _drawn(spread: Spread, low: IntArray, high: IntArray, rounds: int, seed: int) -> FloatArray:
+    """(P, N) standardised differences of equals."""
+    rng = np.random.default_rng(seed)
+    contestants = len(spread.covariance)
+    root = _root(spread.common)
+    least = LEAST * _of_pairs(spread.base, low, high)
+    taken_off = max(len(spread.components) - 1, 0) * _of_pairs(spread.base, low, high)
+    clusters = sum(one.own_degrees.max(initial=1.0) for one in spread.components)
+    at_once = int(max(1, _NUMBERS_AT_ONCE // (contestants * (contestants + clusters))))
+    blocks = []
+    for first in range(0, rounds, at_once):
+        number = min(at_once, rounds - first)
+        ratings = rng.standard_normal((number, contestants)) @ root
+        variance = np.zeros((number, len(low)))
+        if not spread.components:
+            variance += _of_pairs(spread.covariance, low, high)
+        for one in spread.components:
+            variance += _variances(one, low, high, number, rng)
+        variance = np.maximum(variance - taken_off, least)
+        gaps = np.abs(ratings[:, low] - ratings[:, high])
+        blocks.append((gaps / np.sqrt(np.maximum(variance, 1e-300))).T)
+    return np.hstack(blocks)
+
+
+def _variances(
+    one: Component, low: IntArray, high: IntArray, number: int, rng: np.random.Generator
+) -> FloatArray:
+    """(N, P) what a component would say of the pairs' variances if all were alike."""
+    degrees = float(np.median(one.own_degrees))
+    common = _of_pairs(one.common, low, high)
+    if degrees >= _MANY_CLUSTERS:
+        return np.asarray(np.broadcast_to(common, (number, len(low))))
+    clusters = max(1, round(degrees))
+    contestants = len(one.common)
+    pulls = rng.standard_normal((number, clusters, contestants)) @ _root(one.common)
+    squares = np.matmul(pulls.transpose(0, 2, 1), pulls) / clusters
+    seen = np.diagonal(squares, axis1=1, axis2=2) / np.maximum(one.common.diagonal(), 1e-300)
+    mine, others = np.sqrt(one.own_share), np.sqrt(1.0 - one.own_share)
+    own = _of_pairs(mine[:, None] * squares * mine, low, high)
+    shared = _of_pairs(others[:, None] * one.common * others, low, high)
+    return np.asarray(own + seen.mean(axis=1)[:, None] * shared)
+
+
+def _root(covariance: FloatArray) -> FloatArray:
+    """(C, C): standard normal rows times it have the covariance."""
+    values, directions = np.linalg.eigh(0.5 * (covariance + covariance.T))
+    return np.asarray(np.sqrt(np.maximum(values, 0.0))[:, None] * directions.T)
+
+
+def _step_down(size: FloatArray, drawn: FloatArray) -> tuple[FloatArray, float]:
+    """(P,) adjusted p-values of sizes (P,), and what the largest must exceed."""
+    order = np.argsort(size, kind="stable")
+    largest = np.maximum.accumulate(drawn[order], axis=0)
+    rounds = drawn.shape[1]
+    reached = (largest >= size[order, None]).sum(axis=1)
+    stepped = (1.0 + reached) / (1.0 + rounds)
+    adjusted = np.empty(len(size))
+    adjusted[order] = np.maximum.accumulate(stepped[::-1])[::-1]
+    critical = float(np.quantile(largest[-1], LEVEL)) if len(size) else float("inf")
+    return adjusted, critical
