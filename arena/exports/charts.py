@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from arena.exports.drawing import GRID, INK, MARK, SIMULATED, house_style, write_figure
+from arena.exports.plot_axes import Interval, interval_ticks
 from arena.exports.tables import LeaderboardTable
 
 if TYPE_CHECKING:
@@ -26,19 +27,25 @@ def interval_chart(table: LeaderboardTable, *, file_format: str) -> bytes:
         figure = Figure(figsize=(6.4, 1.1 + _ROW_IN * len(table.rows)), layout="constrained")
         axes = figure.add_subplot()
         for place, row in enumerate(table.rows):
-            draw_interval(axes, place, (row.lower, row.elo, row.upper), simulated=row.simulated)
+            draw_interval(axes, place, row.interval, simulated=row.simulated)
         axes.set_yticks(range(len(table.rows)), [row.model for row in table.rows])
         for label, row in zip(axes.get_yticklabels(), table.rows, strict=True):
             label.set_color(SIMULATED if row.simulated else INK)
         axes.set_xlabel(_label(table), color=INK)
         rating_axis(axes, len(table.rows))
+        ratings = [row.elo for row in table.rows if row.elo is not None]
+        span = (min(ratings), max(ratings)) if ratings else None
+        marks = interval_ticks((row.interval for row in table.rows), span)
+        if marks:
+            axes.set_xlim(marks[0], marks[-1])
+            axes.set_xticks(marks, [f"{mark:g}" for mark in marks])
         return write_figure(figure, file_format)
 
 
 def draw_interval(
     axes: Axes,
     place: int,
-    interval: tuple[float | None, float | None, float | None],
+    interval: Interval,
     *,
     simulated: bool,
 ) -> None:

@@ -2,20 +2,17 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any
-
-import numpy as np
+from typing import TYPE_CHECKING
 
 from arena.exports.drawing import INK, SIMULATED, SOFT, house_style, width_in, write_figure
+from arena.exports.heat import STRONG, heat_map
 from arena.exports.tables import Row
 from arena.results.tree import PairRecord
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
-
-STRONG = 0.3
-"""So far from even a score has the full colour: experts who tie often leave little beyond."""
 
 _CELL_IN, _FOOT_IN, _FEWEST_IN = 0.62, 0.5, 3.9
 _NAME_PT = 8.0
@@ -34,7 +31,7 @@ def heat_chart(rows: Sequence[Row], pairs: Sequence[PairRecord], *, file_format:
     from matplotlib.colors import LinearSegmentedColormap
     from matplotlib.figure import Figure
 
-    share, votes = _matrices(rows, pairs)
+    lines = heat_map(pairs, rows)
     numbers = [str(n) for n in range(1, len(rows) + 1)]
     with house_style():
         names_in = max((width_in(row.model, _NAME_PT) for row in rows), default=0.0) + 0.45
@@ -43,13 +40,16 @@ def heat_chart(rows: Sequence[Row], pairs: Sequence[PairRecord], *, file_format:
         figure = Figure(figsize=(wide, high))
         axes = figure.add_axes((names_in / wide, _FOOT_IN / high, side / wide, side / high))
         colours = LinearSegmentedColormap.from_list("score", _COLOURS)
-        axes.imshow(
-            np.ma.masked_invalid(share), cmap=colours, vmin=0.5 - STRONG, vmax=0.5 + STRONG
-        )
-        for (i, j), value in np.ndenumerate(share):
-            if not np.isnan(value):
-                _write(axes, f"{100 * value:.0f}", j, i - 0.12, 9.0)
-                _write(axes, f"{votes[i, j]}", j, i + 0.24, 6.5)
+        shares = [
+            [math.nan if cell is None or cell.share is None else cell.share for cell in line.cells]
+            for line in lines
+        ]
+        axes.imshow(shares, cmap=colours, vmin=0.5 - STRONG, vmax=0.5 + STRONG)
+        for i, line in enumerate(lines):
+            for j, cell in enumerate(line.cells):
+                if cell is not None and cell.votes:
+                    _write(axes, f"{cell.percent}", j, i - 0.12, 9.0)
+                    _write(axes, f"{cell.votes}", j, i + 0.24, 6.5)
         axes.set_yticks(range(len(rows)), numbers, fontsize=8)
         axes.set_xticks(range(len(rows)), numbers, fontsize=8)
         for place, row in enumerate(rows):
@@ -70,18 +70,3 @@ def heat_chart(rows: Sequence[Row], pairs: Sequence[PairRecord], *, file_format:
 def _write(axes: Axes, text: str, x: float, y: float, size: float) -> None:
     """Inside a cell; ink keeps a contrast of 4.5 on every colour."""
     axes.text(x, y, text, ha="center", va="center", fontsize=size, color=INK)
-
-
-def _matrices(rows: Sequence[Row], pairs: Sequence[PairRecord]) -> tuple[Any, Any]:
-    """(C, C) scores, not a number without votes, and numbers of votes."""
-    place = {row.slug: n for n, row in enumerate(rows)}
-    share = np.full((len(rows), len(rows)), np.nan)
-    votes = np.zeros((len(rows), len(rows)), dtype=np.int64)
-    for pair in pairs:
-        if not pair.votes:
-            continue
-        i, j = place[pair.a], place[pair.b]
-        share[i, j] = (pair.wins + pair.ties / 2) / pair.votes
-        share[j, i] = 1.0 - share[i, j]
-        votes[i, j] = votes[j, i] = pair.votes
-    return share, votes

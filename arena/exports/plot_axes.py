@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 
 from arena.exports.plots import Plot
 
 MOST_TICKS = 7
 FEWEST_TICKS = 4
+CURVE_STEPS = 80
+
+Interval = tuple[float | None, float | None, float | None]
 
 
 def axes(plot: Plot) -> tuple[list[float], list[float]]:
@@ -19,6 +22,41 @@ def axes(plot: Plot) -> tuple[list[float], list[float]]:
     tops = [one.y if one.upper is None else one.upper for one in plot.points]
     lows = [one.y if one.lower is None else one.lower for one in plot.points]
     return across, ticks(0.0 if plot.from_zero else min(lows), max(tops))
+
+
+def interval_ticks(
+    intervals: Iterable[Interval], span: tuple[float, float] | None = None
+) -> list[float]:
+    """The marks of an axis for intervals; none without any.
+
+    Args:
+        intervals: Lower end, middle and upper end of each.
+        span: What the axis has to cover beside them, so that several charts have the same.
+    """
+    ends = [end for interval in intervals for end in known_ends(interval)]
+    return ticks(min([*ends, *(span or ())]), max([*ends, *(span or ())])) if ends else []
+
+
+def known_ends(interval: Interval) -> list[float]:
+    """What of an interval there is; nothing without any bound."""
+    if interval[0] is None and interval[2] is None:
+        return []
+    return [end for end in interval if end is not None]
+
+
+def curve_points(plot: Plot) -> list[tuple[float, float]]:
+    """The points of the plot's curve, as far as it stays inside."""
+    if plot.curve is None:
+        return []
+    across, up = axes(plot)
+    first, last = across[0], across[-1]
+    along = [first + (last - first) * n / CURVE_STEPS for n in range(1, CURVE_STEPS + 1)]
+    return [(x, plot.curve(x)) for x in along if x > 0 and plot.curve(x) <= up[-1]]
+
+
+def shorten_name(name: str, longest: int) -> str:
+    """The name, cut with a mark where it is longer."""
+    return name if len(name) <= longest else name[: longest - 1] + "…"
 
 
 def ticks(low: float, high: float) -> list[float]:

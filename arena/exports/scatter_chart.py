@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 from arena.exports.badges import Place, badge_places
 from arena.exports.drawing import GRID, INK, MARK, SIMULATED, SOFT, house_style, write_figure
 from arena.exports.plot_axes import axes as axes_of
+from arena.exports.plot_axes import curve_points, shorten_name
 from arena.exports.plots import Given, Plot
 from arena.exports.tables import SIMULATED as SIMULATED_WORD
 
@@ -57,7 +58,8 @@ def scatter_chart(plot: Plot, *, file_format: str) -> bytes:
         axes.spines[:].set_visible(False)
         axes.set_xlabel(str(plot.across), color=INK, fontsize=9)
         axes.set_ylabel(str(plot.up), color=INK, fontsize=9)
-        _curve(axes, plot, across, up)
+        if plot.curve is not None:
+            _curve(axes, plot)
         _points(axes, plot, (wide, high))
         _key(axes, plot, wide)
         return write_figure(figure, file_format)
@@ -76,13 +78,10 @@ def _groups(plot: Plot) -> list[str]:
     return sorted({point.group for point in plot.points} & set(_LOOKS))
 
 
-def _curve(axes: Axes, plot: Plot, across: list[float], up: list[float]) -> None:
-    if plot.curve is None:
-        return
-    steps = [across[0] + (across[-1] - across[0]) * n / 80 for n in range(1, 81)]
-    inside = [(x, plot.curve(x)) for x in steps if x > 0 and plot.curve(x) <= up[-1]]
+def _curve(axes: Axes, plot: Plot) -> None:
+    points = curve_points(plot)
     axes.plot(
-        [x for x, _ in inside], [y for _, y in inside], color=SOFT, linewidth=0.9, linestyle="--"
+        [x for x, _ in points], [y for _, y in points], color=SOFT, linewidth=0.9, linestyle="--"
     )
 
 
@@ -140,8 +139,8 @@ def _key(axes: Axes, plot: Plot, wide_in: float) -> None:
             fontweight="bold", color=colour,
         )  # fmt: skip
         axes.text(
-            left + 0.17 / wide_in, y, _short(name), transform=axes.transAxes, fontsize=7,
-            va="center", color=INK,
+            left + 0.17 / wide_in, y, shorten_name(name, _LONGEST), transform=axes.transAxes,
+            fontsize=7, va="center", color=INK,
         )  # fmt: skip
     for line, group in enumerate(_groups(plot), start=len(plot.points) + 1):
         colour, shape, word = _LOOKS[group]
@@ -159,7 +158,3 @@ def _key(axes: Axes, plot: Plot, wide_in: float) -> None:
 
 
 _LONGEST = 38
-
-
-def _short(name: str) -> str:
-    return name if len(name) <= _LONGEST else name[: _LONGEST - 1] + "…"

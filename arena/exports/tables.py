@@ -79,6 +79,11 @@ class Row:
         return self.model.removesuffix(SIMULATED)
 
     @property
+    def interval(self) -> tuple[float | None, float | None, float | None]:
+        """Lower bound, rating and upper bound, each None where it is not determined."""
+        return self.lower, self.elo, self.upper
+
+    @property
     def score_percent(self) -> int:
         """The mean score of a vote in percent, a tie half; 0 without votes."""
         return round(100 * (self.wins + self.ties / 2) / self.votes) if self.votes else 0

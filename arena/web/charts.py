@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 from django.utils.translation import gettext as _
 
-from arena.exports.plot_axes import ticks
+from arena.exports.plot_axes import interval_ticks, known_ends, shorten_name
 from arena.exports.tables import Row
 
 WIDTH = 760.0
@@ -90,12 +90,10 @@ def interval_chart(table: Sequence[Row], span: Span | None = None) -> IntervalCh
         table: Lines from top to bottom.
         span: What the axis has to cover beside them, so that several charts have the same.
     """
-    drawn = [line for line in table if _numbers(line.lower, line.elo, line.upper)]
-    if not drawn:
+    drawn = [line for line in table if known_ends(line.interval)]
+    marks = interval_ticks((line.interval for line in drawn), span)
+    if not marks:
         return None
-    ends = [one for line in drawn for one in _numbers(line.lower, line.elo, line.upper)]
-    ends += span or ()
-    marks = ticks(min(ends), max(ends))
     first, extent = marks[0], marks[-1] - marks[0]
 
     def at(value: float) -> float:
@@ -108,7 +106,7 @@ def interval_chart(table: Sequence[Row], span: Span | None = None) -> IntervalCh
         bottom=bottom,
         rows=[
             IntervalRow(
-                name=_short(line.name),
+                name=shorten_name(line.name, LONGEST_NAME),
                 y=TOP + ROW * (n + 0.5),
                 low_x=LEFT if line.lower is None else at(line.lower),
                 x=None if line.elo is None else at(line.elo),
@@ -139,15 +137,12 @@ def bars(
     known = [
         (key, low, middle, high)
         for key, low, middle, high in values
-        if _numbers(low, middle, high)
+        if known_ends((low, middle, high))
     ]
     if not known:
         return None
-    if span is None:
-        ends = [one for _, low, middle, high in known for one in _numbers(low, middle, high)]
-        marks = ticks(min(ends), max(ends))
-        span = marks[0], marks[-1]
-    first, last = span
+    marks = span or interval_ticks(line[1:] for line in known)
+    first, last = marks[0], marks[-1]
 
     def at(value: float) -> float:
         share = (min(max(value, first), last) - first) / (last - first)
@@ -166,13 +161,6 @@ def bars(
     return Bars(first=first, last=last, by_key=found)
 
 
-def _numbers(lower: float | None, middle: float | None, upper: float | None) -> list[float]:
-    """What of an interval there is; nothing without any bound."""
-    if lower is None and upper is None:
-        return []
-    return [one for one in (lower, middle, upper) if one is not None]
-
-
 def _title(line: Row) -> str:
     """What the chart says of a line when asked."""
     if line.elo is None or line.lower is None or line.upper is None:
@@ -183,7 +171,3 @@ def _title(line: Row) -> str:
         "low": f"{line.lower:.0f}",
         "high": f"{line.upper:.0f}",
     }
-
-
-def _short(name: str) -> str:
-    return name if len(name) <= LONGEST_NAME else name[: LONGEST_NAME - 1] + "…"

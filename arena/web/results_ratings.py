@@ -8,11 +8,11 @@ from statistics import median_high
 from typing import Any
 
 from arena.exports.columns import ON_PAGE
+from arena.exports.heat import heat_map
 from arena.exports.tables import LeaderboardTable, Row, sentences_of
 from arena.models import Snapshot
 from arena.results.tree import Bounds, OnlinePlace, PairRecord, TypeStanding
 from arena.web.charts import bars, interval_chart
-from arena.web.heat import heat_map
 
 Context = dict[str, Any]
 """What a tab's template needs."""

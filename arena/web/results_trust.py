@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
+from arena.exports.heat import heat_map
 from arena.exports.plots import plots
 from arena.exports.tables import LeaderboardTable
 from arena.models import Snapshot
 from arena.queries.people import natural_order
 from arena.web.charts import bars
-from arena.web.heat import heat_map
 from arena.web.results_authors import with_authors
 from arena.web.results_ratings import Context
 from arena.web.scatter import scatter

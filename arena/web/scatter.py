@@ -6,11 +6,10 @@ A point's number stands in it and in the table beneath the chart, so no label co
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 from arena.exports.badges import badge_places
-from arena.exports.plot_axes import axes
+from arena.exports.plot_axes import axes, curve_points
 from arena.exports.plots import Plot
 from arena.web.charts import Tick
 from augment.sentences import Sentence
@@ -139,19 +138,5 @@ def scatter(plot: Plot | None, *, width: float = WIDE) -> Scatter | None:
         up=[Tick(x=y_of(mark), label=f"{mark:g}") for mark in up],
         across_label=plot.across,
         up_label=plot.up,
-        curve="" if plot.curve is None else _curve(plot.curve, across, x_of, y_of, up[-1]),
+        curve=" ".join(f"{x_of(x)},{y_of(y)}" for x, y in curve_points(plot)),
     )
-
-
-def _curve(
-    curve: Callable[[float], float],
-    across: Sequence[float],
-    x_of: Callable[[float], float],
-    y_of: Callable[[float], float],
-    top: float,
-) -> str:
-    """The points of a polyline, as far as it stays inside the plot."""
-    steps = 80
-    first, last = across[0], across[-1]
-    xs = [first + (last - first) * n / steps for n in range(1, steps + 1)]
-    return " ".join(f"{x_of(x)},{y_of(curve(x))}" for x in xs if x > 0 and curve(x) <= top)

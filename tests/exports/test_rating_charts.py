@@ -18,6 +18,7 @@ from arena.exports.tables import leaderboard_table
 from arena.models import Snapshot
 from arena.results.tree import DisplacementSummary, ScenarioCost
 from arena.services.ratings import rate
+from arena.web import charts as charts_of_page
 from augment.errors import UnknownName
 from tests.full_study import Size, full_study
 from tests.web.cast import people, signed_in
@@ -80,6 +81,11 @@ def test_charts_say_what_their_axes_are_and_who_is_in_them(snapshot: Snapshot) -
         words = words_of(chart_bytes(snapshot, name=name, file_format="svg"))
         assert label in words
         assert [row.model for row in table.rows if row.model not in words] == []
+    row = replace(table.rows[0], lower=950.0, elo=1000.0, upper=1050.0)
+    on_page = charts_of_page.interval_chart([row])
+    assert on_page is not None
+    in_file = words_of(interval_chart(replace(table, rows=(row,)), file_format="svg")).split()
+    assert [tick.label for tick in on_page.ticks if tick.label not in in_file] == []
 
 
 def test_what_is_simulated_is_called_so_in_every_chart(snapshot: Snapshot) -> None:

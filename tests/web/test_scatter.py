@@ -9,12 +9,12 @@ import pytest
 
 from arena.exports.badges import badge_places
 from arena.exports.drawing import SIMULATED
+from arena.exports.heat import heat_map
 from arena.exports.plots import ELO, VOTES, Given, Plot
 from arena.exports.scatter_chart import scatter_chart
 from arena.exports.tables import Row
 from arena.results.tree import PairRecord
 from arena.web.charts import BAR_LEFT, BAR_RIGHT, bars
-from arena.web.heat import heat_map
 from arena.web.scatter import BOTTOM, LEFT, NARROW, RADIUS, RIGHT, TOP, scatter
 
 

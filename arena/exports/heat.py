@@ -1,14 +1,15 @@
-"""Who scored what against whom, as the cells of a table."""
+"""Who scored what against whom, as the cells of a table: pages and files show the same."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from arena.exports.heat_chart import STRONG
 from arena.exports.tables import Row
 from arena.results.tree import PairRecord
 
+STRONG = 0.3
+"""So far from even a score has the full colour: experts who tie often leave little beyond."""
 STEPS = 10
 FEW = 30
 
@@ -18,17 +19,22 @@ class HeatCell:
     """One contestant against another.
 
     Attributes:
-        percent: The row's mean score, a tie half; None without votes.
+        share: The row's mean score, a tie half; None without votes.
         step: How far towards the row it is, 0 to 10; the colour.
         planned: How often the pair was to be judged, None where nothing was planned.
     """
 
     other: Row
-    percent: int | None
+    share: float | None
     step: int
     votes: int
     planned: int | None
     is_few: bool
+
+    @property
+    def percent(self) -> int | None:
+        """The share in percent."""
+        return None if self.share is None else round(100 * self.share)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -69,11 +75,11 @@ def _cell(
     if row.slug == other.slug:
         return None
     score, votes, planned = found.get((row.slug, other.slug), (0.0, 0, None))
-    share = score / votes if votes else 0.5
+    share = score / votes if votes else None
     return HeatCell(
         other=other,
-        percent=round(100 * share) if votes else None,
-        step=_step(share),
+        share=share,
+        step=_step(0.5 if share is None else share),
         votes=votes,
         planned=planned,
         is_few=votes < FEW,
