@@ -18,7 +18,6 @@ from rest_framework import exceptions
 from rest_framework.response import Response
 from rest_framework.views import APIView
 
-from arena.api.letters import LETTERS
 from arena.api.parsing import SoundJSONParser
 from arena.errors import (
     AlreadyDecided,
@@ -30,6 +29,7 @@ from arena.errors import (
     StudyNotOpen,
     TooFast,
 )
+from arena.models import OUTCOME_LETTERS
 from augment.errors import AugmentError, Conflict
 from augment.services.wording import translate
 
@@ -105,7 +105,7 @@ def _message(exc: Exception) -> str:
 
 def _extras(exc: Exception) -> dict[str, Any]:
     if isinstance(exc, AlreadyDecided):
-        return {"outcome": LETTERS[exc.outcome]}
+        return {"outcome": OUTCOME_LETTERS[exc.outcome]}
     if isinstance(exc, exceptions.ValidationError):
         return {"fields": exc.detail}
     if isinstance(exc, (InvalidVote, InvalidPreference)):

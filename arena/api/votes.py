@@ -15,9 +15,8 @@ from rest_framework.response import Response
 from arena.api.access import ExpertsOnly
 from arena.api.errors import ApiView
 from arena.api.fields import CodeField, FlagField, StrictSerializer, TextField, WholeNumberField
-from arena.api.letters import LETTERS, OUTCOMES
 from arena.api.matchups import AHEAD, MOST
-from arena.models import AIDS, Matchup, Vote
+from arena.models import AIDS, OUTCOME_LETTERS, Matchup, Vote
 from arena.queries.showings import as_shown
 from arena.queries.studies import voting_study
 from arena.queries.votes import recent_votes
@@ -26,6 +25,7 @@ from arena.services.replanning import next_pairs
 from arena.services.votes import receive_vote
 from augment.services.wording import translate_all
 
+OUTCOMES = {letter: outcome for outcome, letter in OUTCOME_LETTERS.items()}
 LONGEST_MS = 2**31 - 1
 MOST_VOTES = 50
 
@@ -103,7 +103,7 @@ def _as_given(vote: Vote) -> dict[str, Any]:
     """What the expert said, with the pair that it was said of."""
     return {
         "key": str(vote.key),
-        "outcome": LETTERS[vote.outcome],
+        "outcome": OUTCOME_LETTERS[vote.outcome],
         "both_miss": vote.both_miss,
         "reason": vote.reason,
         "comment": vote.comment,

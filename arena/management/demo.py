@@ -26,7 +26,6 @@ from arena.services.studies import close_study, open_study
 from augment.models import Augmentation, BaseScene, Contestant, Endpoint, GenerationJob, Scenario
 from augment.services.endpoints.contestants import (
     REFERENCE,
-    RULE_PLACER,
     add_contestant,
     ensure_builtin,
     ensure_endpoint,
@@ -47,7 +46,7 @@ SIMULATED = (
     ("sim-careless-fc", "fc", "fake-careless", "Simulated careless FC"),
     ("sim-careless-tqa", "tqa", "fake-careless", "Simulated careless tQA"),
 )
-RATED = (REFERENCE, RULE_PLACER, "sim-good-otm", "sim-careless-otm")
+RATED = (REFERENCE, "rule-placer", "sim-good-otm", "sim-careless-otm")
 """Who is voted on: with more, so few votes would leave no intervals."""
 
 SIMULATED_EXPERTS = tuple(f"sim-expert-{number}" for number in range(1, 6))

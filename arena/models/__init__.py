@@ -9,10 +9,11 @@ from arena.models.people import Person
 from arena.models.ratings import EarlyLook, ImportedVote, Snapshot, Standing, VoteFile
 from arena.models.studies import Matchup, Study
 from arena.models.tokens import fresh_token
-from arena.models.votes import AIDS, Report, Vote
+from arena.models.votes import AIDS, OUTCOME_LETTERS, Report, Vote
 
 __all__ = [
     "AIDS",
+    "OUTCOME_LETTERS",
     "Authorship",
     "EarlyLook",
     "FaultLabel",

@@ -9,6 +9,7 @@ from django.db import models
 from django.db.models import F, Q
 
 from arena.models.tokens import fresh_token
+from arena.pairing import order
 from augment.models import Augmentation, Contestant, Scenario
 
 
@@ -71,9 +72,9 @@ class Matchup(models.Model):
     """
 
     class Kind(models.TextChoices):
-        MAIN = "main", "Main"
-        REPEAT = "repeat", "Hidden repeat"
-        CHECK = "check", "Attention check"
+        MAIN = order.MAIN, "Main"
+        REPEAT = order.REPEAT, "Hidden repeat"
+        CHECK = order.CHECK, "Attention check"
 
     code = models.UUIDField(default=uuid.uuid4, unique=True, editable=False)
     study = models.ForeignKey(Study, on_delete=models.CASCADE, related_name="matchups")

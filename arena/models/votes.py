@@ -20,6 +20,10 @@ _AID_SETS = [
 ]
 
 
+OUTCOME_LETTERS = {"left": "A", "equal": "E", "right": "B", "skip": "skip"}
+"""What an expert presses and the wire says: the left picture is A."""
+
+
 class Vote(AppendOnly):
     """What the expert decided. Append-only: a change is a new row that supersedes the old one.
 

@@ -13,9 +13,11 @@ from typing import NamedTuple
 from django.db.models import Max, Q
 
 from arena.models import ImportedVote, Person, Study, Vote
+from arena.pairing.order import MAIN
 from augment.models import Contestant
 
-MAIN, REPEAT, CHECK, AUTOMATIC = "main", "repeat", "check", "automatic"
+AUTOMATIC = "automatic"
+"""A kind beside those of matchups: a pair of identical pictures, which nobody sees."""
 
 IMPORTED = "imported"
 """The kind of a contestant that is known by its name alone."""

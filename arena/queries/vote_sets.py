@@ -9,11 +9,9 @@ from enum import StrEnum
 from typing import Any
 
 from arena.models import Study, Vote
+from arena.pairing.order import CHECK, MAIN, REPEAT
 from arena.queries.judged import (
     AUTOMATIC,
-    CHECK,
-    MAIN,
-    REPEAT,
     Entrant,
     Judged,
     automatic_ties,

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from arena.queries.judged import REPEAT
+from arena.pairing.order import REPEAT
 from arena.queries.vote_sets import VoteSet
 from arena.rating import elo
 from arena.rating.bootstrap import Unit

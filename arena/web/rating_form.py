@@ -8,7 +8,7 @@ from django import forms
 from django.utils.translation import gettext_lazy as _
 
 from arena.models import Snapshot
-from arena.queries.judged import MAIN, REPEAT
+from arena.pairing.order import MAIN, REPEAT
 from arena.queries.vote_sets import Filters
 from arena.rating.bootstrap import Unit
 from arena.rating.leaderboard import Intervals, Method

@@ -12,7 +12,7 @@ from django.urls import reverse
 from django.utils.translation import gettext as _
 from django.utils.translation import pgettext
 
-from arena.models import Report, Study, Vote
+from arena.models import OUTCOME_LETTERS, Report, Study, Vote
 from arena.queries.showings import as_shown
 from arena.queries.studies import longest_instructions
 from arena.queries.votes import VotingProgress, recent_votes, voting_progress
@@ -34,8 +34,6 @@ MODULES = tuple(
     f"js/vote-{name}.js" for name in ("outbox", "page", "pairs", "lens", "keys", "tabs")
 )
 """What vote.js imports, named in the page so that all of it loads at once."""
-
-_LETTERS = {"left": "A", "equal": "E", "right": "B", "skip": "skip"}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -75,7 +73,7 @@ class LastVote:
         return {
             "key": str(self.key),
             "position": self.position,
-            "outcome": _LETTERS[self.outcome],
+            "outcome": OUTCOME_LETTERS[self.outcome],
             "both_miss": self.both_miss,
             "comment": self.comment,
             "shown": self.shown,

@@ -33,9 +33,6 @@ from augment.scene.lane_graph import AnyLane
 from augment.scene.modification import Modification
 from augment.scene.sizes import LENGTH_WIDTH_M
 
-BIN_M = {"quantised-5m": 5.0, "quantised-20m": 20.0}
-"""The contestants by their slugs, and how wide a bin of the distance is."""
-
 _STEP_M = 0.5
 _DRAWS = 50
 _UNKNOWN = {WalkRequest: "pedestrians", ConesRequest: "cones"}

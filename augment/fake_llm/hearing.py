@@ -9,10 +9,10 @@ import json
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass
-from enum import StrEnum
 
 from augment.fake_llm.requests import ChatRequest, SpokenMessage
 from augment.prompts.texts import read_text
+from augment.variants.transcript import ModelRole
 
 _RESULT = read_text("function_result.md").partition("\n")[0]
 _FEEDBACK = tuple(
@@ -20,17 +20,7 @@ _FEEDBACK = tuple(
 )
 
 
-class Part(StrEnum):
-    """What the stand-in is asked to be, by the first line that it is told."""
-
-    MODIFIER = "modifier"
-    REVIEWER = "reviewer"
-    ENGINEER = "engineer"
-    VIEWER = "viewer"
-    READER = "reader"
-
-
-_OPENINGS = {read_text(f"{part}.md").partition("\n")[0]: part for part in Part}
+_OPENINGS = {read_text(f"{part}.md").partition("\n")[0]: part for part in ModelRole}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -46,7 +36,7 @@ class Heard:
         feedback: What reviews sent back so far.
     """
 
-    part: Part
+    part: ModelRole
     may_call: bool = False
     is_native: bool = False
     results: tuple[dict[str, object] | None, ...] = ()
@@ -57,7 +47,7 @@ class Heard:
 def read_conversation(request: ChatRequest) -> Heard:
     """What the conversation says about the answer that is due; by default a modifier's."""
     told = next((one.text for one in request.messages if one.role == "system"), "")
-    part = _OPENINGS.get(told.partition("\n")[0], Part.MODIFIER)
+    part = _OPENINGS.get(told.partition("\n")[0], ModelRole.MODIFIER)
     feedback = [one.text for one in request.messages if _is_feedback(one)]
     start = max((n for n, one in enumerate(request.messages) if _is_feedback(one)), default=0)
     since = request.messages[start:]

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from augment.baselines.rule_placer import place
 from augment.errors import CannotPlace
 from augment.fake_llm import answers, careless, judging, tool_use
-from augment.fake_llm.hearing import Heard, Part, read_conversation
+from augment.fake_llm.hearing import Heard, read_conversation
 from augment.fake_llm.requests import ChatRequest
 from augment.fake_llm.sight import (
     Intents,
@@ -22,6 +22,7 @@ from augment.fake_llm.sight import (
 )
 from augment.scene.intent_codec import intent_to_parts
 from augment.scene.modification import Modification
+from augment.variants.transcript import ModelRole
 
 UNKNOWN = "I am a stand-in and read no English; this sentence is not on my list of intents."
 
@@ -61,18 +62,18 @@ class Character:
     def answer(self, request: ChatRequest, intents: Intents = knows_nothing) -> Said:
         """What it says, from the request and the list of intents alone."""
         understood = read_conversation(request)
-        if understood.part is Part.VIEWER:
+        if understood.part is ModelRole.VIEWER:
             return Said(text=judging.describe_picture(request))
-        if understood.part is Part.READER:
+        if understood.part is ModelRole.READER:
             return self._read(request, intents)
         try:
             task = task_of(request.messages, intents)
         except NothingSeen:
             return Said(text=answers.SEES_NOTHING)
         match understood.part:
-            case Part.MODIFIER:
+            case ModelRole.MODIFIER:
                 return self._modified(task, understood)
-            case Part.REVIEWER:
+            case ModelRole.REVIEWER:
                 return Said(text=self.rate(self.judge(task)))
         if any(one.role == "assistant" for one in request.messages):
             return Said(text=self.decide(self.judge(task)))

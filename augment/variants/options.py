@@ -1,6 +1,6 @@
 """How a contestant asks, beyond its model and its variant: a frozen value.
 
-In: what an admin chose. Out: the complete options of a run (`complete_options`), the recipe with them
+In: what an admin chose. Out: a run's complete options (`complete_options`), the recipe with them
 (`recipe_with`), what is sent with every request (`ContestantOptions.sampling`) and what keeps
 stored answers apart (`ContestantOptions.key`). None means: left open, so that the default counts,
 or what is known of the model.

@@ -15,10 +15,11 @@ from hypothesis import strategies as st
 from augment.baselines import quantised, rule_placer
 from augment.baselines.quantised import allowed_by, places_of
 from augment.baselines.quantised_code import Action, Code, Direction, Quadrant, code_of
+from augment.baselines.registry import PLACERS
 from augment.errors import CannotPlace
 from augment.scene.entities import AgentType, TrafficAgent
 from augment.scene.intent import Intent, Shape, Side
-from tests.benchmarks.displacement import PLACERS, made, measured
+from tests.benchmarks.displacement import made, measured
 from tests.fixtures.shelf import SLUGS
 from tests.intents import cones, parked, walk
 from tests.scenes import scene as street
@@ -150,8 +151,8 @@ def errors_m() -> dict[str, list[float]]:
     found: defaultdict[str, list[float]] = defaultdict(list)
     for slug, seed in product(SLUGS, range(SEEDS)):
         tried = {}
-        for name, place in PLACERS.items():
-            modification = made(place, slug, seed)
+        for name, placer in PLACERS.items():
+            modification = made(placer.place, slug, seed)
             if modification is None:
                 break  # the others are not asked for what is not compared
             tried[name] = modification

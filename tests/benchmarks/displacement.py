@@ -7,10 +7,9 @@ refuses is missing; the last table counts only the objects of scenarios that all
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from functools import partial
 
 from augment.baselines import quantised, rule_placer
-from augment.baselines.quantised import BIN_M
+from augment.baselines.registry import PLACERS, PlaceIntent
 from augment.errors import CannotPlace
 from augment.metrics.displacement import Displacement, displacement
 from augment.metrics.summary import summarise
@@ -21,12 +20,8 @@ from tests.fixtures.shelf import SLUGS, entry, shown_scene
 
 Placing = Callable[..., rule_placer.Placement | quantised.QuantisedPlacement]
 
-PLACERS: dict[str, Placing] = {"rule-placer": rule_placer.place} | {
-    slug: partial(quantised.place, bin_m=bin_m) for slug, bin_m in BIN_M.items()
-}
 
-
-def made(place: Placing, slug: str, seed: int = 0) -> Modification | None:
+def made(place: PlaceIntent, slug: str, seed: int = 0) -> Modification | None:
     """What a contestant makes of a scenario, None where it refuses."""
     scene, shelved = shown_scene(slug), entry(slug)
     try:
@@ -67,7 +62,8 @@ def table(
 def main() -> None:
     """Print the tables."""
     made_by = {
-        name: {slug: made(place, slug) for slug in SLUGS} for name, place in PLACERS.items()
+        name: {slug: made(placer.place, slug) for slug in SLUGS}
+        for name, placer in PLACERS.items()
     }
     table("All", SLUGS, made_by)
     for kind in ScenarioType:

@@ -16,7 +16,8 @@ from hypothesis import strategies as st
 
 from arena.exports.bundle import bundle
 from arena.models import Snapshot, Study
-from arena.queries.judged import MAIN, Entrant, Judged, last_vote_of
+from arena.pairing.order import MAIN
+from arena.queries.judged import Entrant, Judged, last_vote_of
 from arena.queries.result_votes import votes_on_pair
 from arena.queries.vote_sets import Filters, VoteSet, vote_set
 from arena.rating.leaderboard import rate as rate_votes

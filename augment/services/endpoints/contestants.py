@@ -9,7 +9,7 @@ from dataclasses import asdict
 from django.contrib.auth.models import User
 from django.db import transaction
 
-from augment.baselines.quantised import BIN_M
+from augment.baselines.registry import PLACERS
 from augment.baselines.simulated import Rates
 from augment.errors import Conflict, UnknownName
 from augment.llm.addresses import check_base_url
@@ -28,13 +28,11 @@ Kind = Contestant.Kind
 LONGEST_NAME = 120
 
 REFERENCE = "reference"
-RULE_PLACER = "rule-placer"
 _BUILTIN = {
-    REFERENCE: ("Reference", Contestant.Kind.REFERENCE),
-    RULE_PLACER: ("Rule placer", Contestant.Kind.RULE),
+    REFERENCE: ("Reference", Kind.REFERENCE),
 } | {
-    slug: (f"Quantised code, {bin_m:g} m", Contestant.Kind.BASELINE)
-    for slug, bin_m in BIN_M.items()
+    slug: (placer.name, Kind.RULE if placer.is_rule else Kind.BASELINE)
+    for slug, placer in PLACERS.items()
 }
 
 OPENAI = "openai"

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 
 from django.db.models import Q
 
-from augment.baselines.quantised import BIN_M
+from augment.baselines.registry import PLACERS
 from augment.errors import AugmentError, Conflict, KeyMissing, KeyNotAllowed
 from augment.models import Contestant, Scenario
 from augment.sentences import Sentence, sentence, sentence_of
@@ -21,13 +21,13 @@ Kind = Contestant.Kind
 
 _KINDS = (Kind.REFERENCE, Kind.RULE, Kind.LLM, Kind.SIMULATED)
 
-RUNNABLE = Q(kind__in=_KINDS) | Q(kind=Kind.BASELINE, slug__in=BIN_M)
+RUNNABLE = Q(kind__in=_KINDS) | Q(kind=Kind.BASELINE, slug__in=PLACERS)
 """Whom a job can run; what humans and outside baselines made is imported."""
 
 
 def is_runnable(contestant: Contestant) -> bool:
     """Whether it is one of RUNNABLE."""
-    is_ours = contestant.kind == Kind.BASELINE and contestant.slug in BIN_M
+    is_ours = contestant.kind == Kind.BASELINE and contestant.slug in PLACERS
     return contestant.kind in _KINDS or is_ours
 
 

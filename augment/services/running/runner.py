@@ -10,12 +10,12 @@ import logging
 from collections.abc import Callable
 from contextlib import AbstractContextManager, ExitStack
 from dataclasses import dataclass
-from functools import partial
 
 from django.conf import settings
 from django.db import Error, OperationalError
 
-from augment.baselines import quantised, rule_placer, simulated
+from augment.baselines import simulated
+from augment.baselines.registry import PLACERS, RULE_PLACER, PlaceIntent
 from augment.errors import (
     AugmentError,
     BudgetSpent,
@@ -52,7 +52,6 @@ logger = logging.getLogger(__name__)
 
 Kind = Contestant.Kind
 State = Augmentation.State
-Placed = rule_placer.Placement | quantised.QuantisedPlacement
 Connect = Callable[[Endpoint], AbstractContextManager[ChatClient]]
 
 
@@ -194,10 +193,9 @@ def _asked(row: Augmentation, scene: Scene, held: leases.Lease, connect: Connect
         case Kind.REFERENCE:
             return _from_reference(row)
         case Kind.RULE:
-            return _from_placer(row, rule_placer.place, scene)
-        case Kind.BASELINE if row.contestant.slug in quantised.BIN_M:
-            bin_m = quantised.BIN_M[row.contestant.slug]
-            return _from_placer(row, partial(quantised.place, bin_m=bin_m), scene)
+            return _from_placer(row, PLACERS[RULE_PLACER].place, scene)
+        case Kind.BASELINE if row.contestant.slug in PLACERS:
+            return _from_placer(row, PLACERS[row.contestant.slug].place, scene)
         case Kind.SIMULATED if row.contestant.error_rates is not None:
             return _from_errors(row, scene, row.contestant.error_rates, held)
         case Kind.LLM | Kind.SIMULATED if row.contestant.endpoint is not None:
@@ -214,7 +212,7 @@ def _from_reference(row: Augmentation) -> Answer:
     return Answer(state=State.DONE, modification=reference)
 
 
-def _from_placer(row: Augmentation, place: Callable[..., Placed], scene: Scene) -> Answer:
+def _from_placer(row: Augmentation, place: PlaceIntent, scene: Scene) -> Answer:
     """What a contestant that asks nobody makes of the intent, or why it refuses."""
     try:
         placed = place(

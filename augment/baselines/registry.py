@@ -1,0 +1,67 @@
+"""The contestants that ask nobody and place what an intent asks for, by their slugs.
+
+In: a scene, its intent, a seed. Out: a modification with notes, or why it refuses. A new one is an
+entry of PLACERS; slugs are kept in databases, so they stay.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import partial
+from typing import Protocol
+
+from augment.baselines import quantised, rule_placer
+from augment.scene.entities import Scene
+from augment.scene.intent import Intent
+from augment.scene.modification import Modification
+
+RULE_PLACER = "rule-placer"
+
+
+class PlacedIntent(Protocol):
+    """What was placed."""
+
+    @property
+    def modification(self) -> Modification:
+        """What is added."""
+        ...
+
+    @property
+    def notes(self) -> str:
+        """How, in words."""
+        ...
+
+
+class PlaceIntent(Protocol):
+    """Adds what is asked for to a scene."""
+
+    def __call__(self, scene: Scene, intent: Intent | None, /, *, seed: int) -> PlacedIntent:
+        """The same for the same seed.
+
+        Raises:
+            CannotPlace: It refuses, with the reason.
+        """
+        ...
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Placer:
+    """One of them.
+
+    Attributes:
+        name: For people.
+        is_rule: Whether it is a contestant of kind "rule"; the others are of kind "baseline".
+    """
+
+    name: str
+    place: PlaceIntent
+    is_rule: bool = False
+
+
+PLACERS: dict[str, Placer] = {
+    RULE_PLACER: Placer(name="Rule placer", place=rule_placer.place, is_rule=True),
+    "quantised-5m": Placer(name="Quantised code, 5 m", place=partial(quantised.place, bin_m=5.0)),
+    "quantised-20m": Placer(
+        name="Quantised code, 20 m", place=partial(quantised.place, bin_m=20.0)
+    ),
+}
