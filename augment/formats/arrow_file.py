@@ -119,7 +119,7 @@ def _faults() -> tuple[type[BaseException], ...]:
     """All that a broken file makes of pyarrow, and of our own looking."""
     import pyarrow as pa
 
-    ours = (Truncated, ValueError, TypeError, struct.error, IndexError)
+    ours = (Truncated, ValueError, TypeError, KeyError, IndexError, struct.error)
     return (*ours, pa.ArrowException, OSError, MemoryError, OverflowError, NotImplementedError)
 
 

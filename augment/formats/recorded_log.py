@@ -22,12 +22,15 @@ from augment.scene.entities import AgentType, Origin, Scene, TrafficAgent
 from augment.scene.lane_graph import LaneGraph
 from augment.scene.notes import Note, SceneNoteKind
 from augment.scene.recording import Recording, Track
+from augment.scene.sizes import LENGTH_WIDTH_M
 
 FloatArray = NDArray[np.float64]
 
 MOST_NUMBERS = 20_000_000
 """States of all tracks together: 160 MB."""
 MOST_TRACKS = 20_000
+LONGEST_M = 100.0
+"""No road user is longer."""
 LONGEST_GAP_S = 0.35
 """Steps are 0.1 s apart; over a longer gap no speed is taken."""
 
@@ -145,12 +148,15 @@ def scene_at(
 
 
 def far_notes(log: Log, frame: int, road: MapExtract) -> list[Note]:
-    """What of the map and of who is there at a frame lies too far from the ego, as a note."""
+    """What of the map and of who is there lies too far from the ego, and whose box was none."""
+    sizeless = sum(not _has_size(one) for one in log.tracks)
+    notes = [Note(kind=SceneNoteKind.SOME_BOX_SIZES, number=sizeless, of=len(log.tracks))]
+    notes = notes if sizeless else []
     away_m = [np.hypot(*(one.states[frame, :2] - log.ego[frame, :2])) for one in log.tracks]
     number = road.far + sum(bool(distance_m > RADIUS_M) for distance_m in away_m)
-    if number == 0:
-        return []
-    return [Note(kind=SceneNoteKind.FAR_PARTS_LEFT_OUT, number=number, value=RADIUS_M)]
+    if number:
+        notes.append(Note(kind=SceneNoteKind.FAR_PARTS_LEFT_OUT, number=number, value=RADIUS_M))
+    return notes
 
 
 def speeds(times_s: FloatArray, xy_m: FloatArray) -> FloatArray:
@@ -170,6 +176,18 @@ def speeds(times_s: FloatArray, xy_m: FloatArray) -> FloatArray:
 # Private
 
 
+def _has_size(track: LoggedTrack) -> bool:
+    return 0.0005 < track.length_m <= LONGEST_M and 0.0005 < track.width_m <= LONGEST_M
+
+
+def _sized(track: LoggedTrack) -> LoggedTrack:
+    """With the usual size of its class where its own can't be."""
+    if _has_size(track):
+        return track
+    length_m, width_m = LENGTH_WIDTH_M[track.type]
+    return replace(track, length_m=length_m, width_m=width_m)
+
+
 def _named(log: Log, frame: int) -> dict[str, LoggedTrack]:
     """The tracks near the ego from t0 on, by agent id: who is there at t0 first, then by time.
 
@@ -185,7 +203,8 @@ def _named(log: Log, frame: int) -> dict[str, LoggedTrack]:
         near = np.flatnonzero(distances <= RADIUS_M)  # NaN is not near
         if len(near):
             first = near[0]
-            met.append((int(first), round(float(distances[first]), 3), track.name, track))
+            away_m = round(float(distances[first]), 3)
+            met.append((int(first), away_m, track.name, _sized(track)))
     met.sort(key=lambda item: item[:3])
     return {f"Agent{number}": track for number, (*_, track) in enumerate(met, start=2)}
 

@@ -9,14 +9,15 @@ rounded to millimetres.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
 from itertools import islice
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from augment.errors import InvalidDocument
+from augment.formats.intersection_ways import Way, following_of, ways_through
 from augment.formats.road_map import FURTHEST_M, MapExtract, Name, RoadMap, Segment
 from augment.geometry.angles import difference
 from augment.geometry.frames import Pose
@@ -34,8 +35,6 @@ RADIUS_M = 150.0
 
 SPACING_M = 2.0
 SAME_POINT_M = 0.05
-LONGEST_WAY = 8
-"""Segments of one way through an intersection; maps have one to three."""
 
 MOST_SEGMENTS = 10_000
 MOST_NEAR = 2_000
@@ -59,20 +58,6 @@ class Strip:
     distance_m: float
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Way:
-    """Intersection segments from one lane to another; None where the map begins or ends."""
-
-    before: Name | None
-    chain: tuple[Name, ...]
-    after: Name | None = None
-
-    @property
-    def key(self) -> tuple[tuple[Name, ...], str, str]:
-        """An order among ways that lie equally near."""
-        return (self.chain, _padded(self.before), _padded(self.after))
-
-
 def road_around(city: RoadMap, ego: Pose) -> MapExtract:
     """The map around the ego.
 
@@ -85,9 +70,11 @@ def road_around(city: RoadMap, ego: Pose) -> MapExtract:
     """
     strips = _near_strips(city, ego)
     lane_ids = _lane_ids(strips)
-    ways = list(islice(_ways(strips), MOST_WAYS + 1))
+    following = following_of({name: strip.segment for name, strip in strips.items()})
+    inside = {name for name, strip in strips.items() if strip.segment.crosses}
+    ways = list(islice(ways_through(following, inside), MOST_WAYS + 1))
     _check_count(city, "ways through intersections", len(ways), MOST_WAYS)
-    lanes = _lanes(strips, lane_ids)
+    lanes = _lanes(strips, lane_ids, following)
     side = traffic_side_of(lanes)
     areas = _areas(city, ego)
     return MapExtract(
@@ -122,11 +109,6 @@ def width_between(line: Polyline, left: Polyline, right: Polyline) -> float:
 
 
 # Private: geometry
-
-
-def _padded(name: Name | None) -> str:
-    """A text that sorts as the names do, where these are numbers."""
-    return "" if name is None else str(name).rjust(20)
 
 
 def _near_strips(city: RoadMap, ego: Pose) -> dict[Name, Strip]:
@@ -242,27 +224,15 @@ def _joined(lines: Sequence[Polyline]) -> Polyline:
 # Private: ids and references
 
 
-def _following(strips: dict[Name, Strip]) -> dict[Name, list[Name]]:
-    """The segments after each one, ascending; a joint counts if either end names it."""
-    joints = {(name, after) for name in strips for after in strips[name].segment.successors}
-    joints |= {(before, name) for name in strips for before in strips[name].segment.predecessors}
-    following: dict[Name, list[Name]] = {name: [] for name in strips}
-    for before, after in sorted(
-        (before, after) for before, after in joints if before in strips and after in strips
-    ):
-        if before != after:
-            following[before].append(after)
-    return following
-
-
 def _lane_ids(strips: dict[Name, Strip]) -> dict[Name, str]:
     plain = [name for name, strip in strips.items() if not strip.segment.crosses]
     plain.sort(key=lambda name: (round(strips[name].distance_m, 3), name))
     return {name: f"Lane{number}" for number, name in enumerate(plain, start=1)}
 
 
-def _lanes(strips: dict[Name, Strip], lane_ids: dict[Name, str]) -> tuple[Lane, ...]:
-    following = _following(strips)
+def _lanes(
+    strips: dict[Name, Strip], lane_ids: dict[Name, str], following: dict[Name, list[Name]]
+) -> tuple[Lane, ...]:
     return tuple(
         Lane(
             id=lane_id,
@@ -349,32 +319,6 @@ def _mean_width(strips: Iterable[Strip]) -> float:
     widths = [(strip.width_m, strip.line.length_m) for strip in strips]
     total = sum(length for _, length in widths)
     return round(sum(width * length for width, length in widths) / total, 3)
-
-
-def _ways(strips: dict[Name, Strip]) -> Iterator[Way]:
-    """Every way from a lane, or from where the map begins, over an intersection's segments."""
-    following = _following(strips)
-    inside = {name for name, strip in strips.items() if strip.segment.crosses}
-    entered = {after for options in following.values() for after in options}
-    open_ways = [
-        Way(before=before, chain=(after,))
-        for before in strips
-        if before not in inside
-        for after in following[before]
-        if after in inside
-    ]
-    open_ways += [Way(before=None, chain=(name,)) for name in inside - entered]
-    while open_ways:
-        way = open_ways.pop()
-        options = following[way.chain[-1]]
-        if not options or len(way.chain) == LONGEST_WAY:
-            yield way
-            continue
-        for after in options:
-            if after not in inside:
-                yield replace(way, after=after)
-            elif after not in way.chain:
-                open_ways.append(replace(way, chain=(*way.chain, after)))
 
 
 def _areas(city: RoadMap, ego: Pose) -> tuple[Area, ...]:

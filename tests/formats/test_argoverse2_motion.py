@@ -103,6 +103,10 @@ def test_what_is_missing_is_named(tmp_path: Path) -> None:
     table = [{key: value for key, value in one.items() if key != "heading"} for one in rows()]
     assert "has no column 'heading'" in fault_of(write_scenario(tmp_path / "one", table=table))
     folder = write_scenario(tmp_path / "two")
+    file = folder / "scenario_made.parquet"
+    # The name in the Arrow schema, and not the one in Parquet's own.
+    file.write_bytes(file.read_bytes().replace(b"object_type", b"object_tyqe", 1))
+    assert "can't be read" in fault_of(folder)
     (folder / "scenario_made.parquet").write_bytes(b"PAR1 no")
     assert "is not a parquet file" in fault_of(folder)
     (folder / "log_map_archive_made.json").unlink()

@@ -75,6 +75,23 @@ def test_the_ego_is_its_centre_and_boxes_are_theirs(log: Path) -> None:
     scene_to_document(scene)
 
 
+def test_a_box_without_a_size_gets_the_usual_one_and_that_is_said(log: Path) -> None:
+    base = sqlite3.connect(log)
+    base.execute(
+        "UPDATE lidar_box SET width = 0, length = NULL WHERE track_token = ?", (token(60),)
+    )
+    base.commit()
+    base.close()
+    reading = read(log)
+    (car,) = reading.scene.agents
+    assert (car.length_m, car.width_m) == (4.8, 2.0)
+    notes = {note.kind: note for note in reading.notes}
+    assert (
+        notes[SceneNoteKind.SOME_BOX_SIZES].number,
+        notes[SceneNoteKind.SOME_BOX_SIZES].of,
+    ) == (1, 2)
+
+
 def test_what_follows_is_recorded_ten_times_a_second(log: Path) -> None:
     recording = read(log).recording
     assert recording is not None
