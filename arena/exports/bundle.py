@@ -27,9 +27,18 @@ def bundle(snapshot: Snapshot) -> bytes:
     Raises:
         Conflict: The votes are not what they were when they were rated.
     """
+    return zip_bytes(bundle_files(snapshot))
+
+
+def bundle_files(snapshot: Snapshot) -> dict[str, bytes]:
+    """What is in the zip, by name.
+
+    Raises:
+        Conflict: The votes are not what they were when they were rated.
+    """
     files = _files(snapshot)
     files[MANIFEST] = _manifest(snapshot, files)
-    return zip_bytes(files)
+    return files
 
 
 # --- Private -----------------------------------------------------------------------------------

@@ -64,6 +64,21 @@ def test_a_second_run_uses_what_is_there(demo_home: Home, tmp_path: Path) -> Non
     assert (again.folder / "var" / "demo" / "leaderboard.csv").read_bytes() == before
 
 
+def test_its_study_travels_whole(demo_home: Home, tmp_path: Path) -> None:
+    """Export, import into an empty installation, export again: the same folder, to the byte."""
+    first, second = tmp_path / "first", tmp_path / "second"
+    ((name,),) = demo_home.rows("SELECT name FROM arena_study WHERE state = 'closed'")
+    demo_home.must("export", "study", name, "--out", str(first))
+    elsewhere = Home.at(tmp_path / "h")
+    elsewhere.must_all(
+        ("import", "study", str(first)), ("export", "study", name, "--out", str(second))
+    )
+    compared = subprocess.run(["diff", "-r", str(first), str(second)], capture_output=True)
+    assert compared.stdout == b""
+    assert len(list((first / "transcripts").iterdir())) >= 20
+    assert len(list((first / "media" / "bev").iterdir())) >= 20
+
+
 def test_ctrl_c_in_the_middle_ends_it_at_once(migrated: Path, tmp_path: Path) -> None:
     copy_database(migrated, tmp_path / "db.sqlite3")
     log = tmp_path / "demo.log"

@@ -17,10 +17,12 @@ from django.core.management import CommandError, call_command
 from django.db import connection
 from pytest_django import Settings
 
-from arena.management.backups.archive import MANIFEST, open_archive, read_manifest
-from arena.management.backups.rows import find_tables, frozen_rows, label_of
+from arena.management.backups.archive import MANIFEST, ZipSource, read_manifest
 from arena.management.backups.taking import take_backup
 from arena.models import Vote
+from arena.services.ratings import rate
+from arena.services.stored_rows import find_tables, frozen_rows, label_of
+from arena.services.studies import close_study
 from augment.models import Event
 from augment.services.events import log_event
 from tests.study_rows import a_study, matchups_of, vote
@@ -52,6 +54,11 @@ def a_full_house() -> None:
     study = a_study()
     for matchup, outcome in zip(matchups_of(study, "eva"), OUTCOMES, strict=False):
         vote(matchup, outcome)
+    for matchup in matchups_of(study, "finn"):
+        vote(matchup, "left")
+    close_study(study=study)
+    study.refresh_from_db()
+    rate(study=study, rounds=20)
     note(study.code)
     default_storage.save("bev/one.png", ContentFile(PNG))
 
@@ -164,8 +171,8 @@ def test_a_row_that_does_not_fit_takes_everything_back(tmp_path: Path) -> None:
     a_full_house()
     path = tmp_path / "b.zip"
     take_backup(path, now=NOW, say=quiet)
-    with path.open("rb") as file, open_archive(file) as archive:
-        manifest = read_manifest(archive)
+    with path.open("rb") as file:
+        manifest = read_manifest(ZipSource(file))
     manifest.rows["arena.vote"] += 1
     change(path, lambda found: with_manifest(found, rows=manifest.rows))
     empty()

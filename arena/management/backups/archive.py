@@ -11,10 +11,10 @@ from __future__ import annotations
 import hashlib
 import json
 import zipfile
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable
 from dataclasses import dataclass, field
-from pathlib import PurePosixPath
-from typing import IO, Any
+from pathlib import Path, PurePosixPath
+from typing import IO, Any, Protocol
 
 from arena.errors import ArenaError
 
@@ -70,76 +70,118 @@ def add_member(
     manifest.members[name] = digest.hexdigest()
 
 
-def open_archive(file: IO[bytes]) -> zipfile.ZipFile:
-    """The file as a zip.
+class MemberSource(Protocol):
+    """What is restored from: a zip or a folder."""
+
+    def find_names(self) -> set[str]:
+        """The names of all members."""
+
+    def open(self, name: str) -> IO[bytes]:
+        """One member; lines and pieces can be read from it."""
+
+    def size(self, name: str) -> int:
+        """Its length in bytes."""
+
+
+class ZipSource:
+    """The members of a zip.
 
     Raises:
         BackupUnreadable: It is none.
     """
-    try:
-        return zipfile.ZipFile(file)
-    except zipfile.BadZipFile as error:
-        raise BackupUnreadable(f"This is no backup: {error}.") from error
+
+    def __init__(self, file: IO[bytes]) -> None:
+        try:
+            self._archive = zipfile.ZipFile(file)
+        except zipfile.BadZipFile as error:
+            raise BackupUnreadable(f"This is no backup: {error}.") from error
+
+    def find_names(self) -> set[str]:
+        """The names of all members."""
+        return set(self._archive.namelist())
+
+    def open(self, name: str) -> IO[bytes]:
+        """One member."""
+        return self._archive.open(name)
+
+    def size(self, name: str) -> int:
+        """Its length once it is unpacked."""
+        return self._archive.getinfo(name).file_size
 
 
-def read_manifest(archive: zipfile.ZipFile) -> Manifest:
-    """What the file says of itself, held against what is in it, every byte.
+class FolderSource:
+    """The files below a folder; links are none of them."""
+
+    def __init__(self, root: Path) -> None:
+        self._root = root
+
+    def find_names(self) -> set[str]:
+        """Their names, with slashes."""
+        files = (path for path in self._root.rglob("*") if path.is_file())
+        return {path.relative_to(self._root).as_posix() for path in files if not path.is_symlink()}
+
+    def open(self, name: str) -> IO[bytes]:
+        """One file."""
+        return (self._root / name).open("rb")
+
+    def size(self, name: str) -> int:
+        """Its length."""
+        return (self._root / name).stat().st_size
+
+
+def read_manifest(source: MemberSource, *, wanted: str = FORMAT) -> Manifest:
+    """What it says of itself, held against what is in it, every byte.
 
     Raises:
         BackupUnreadable: Another kind of file, a later version, or a member is missing, broken
             or not named.
     """
-    manifest = _parse_manifest(archive)
-    there = set(archive.namelist()) - {MANIFEST}
+    manifest = _parse_manifest(source, wanted)
+    there = source.find_names() - {MANIFEST}
     for name in sorted(there ^ manifest.members.keys()):
         what = "is not named in its manifest" if name in there else "is missing"
-        raise BackupUnreadable(f"This backup is not whole: {name} {what}.")
+        raise BackupUnreadable(f"This is not whole: {name} {what}.")
     for name, expected in manifest.members.items():
         _check_place(name)
         digest = hashlib.sha256()
         try:
-            for part in read_member(archive, name):
-                digest.update(part)
-        except (zipfile.BadZipFile, EOFError, OSError) as error:
-            raise BackupUnreadable(f"This backup is not whole: {name}: {error}.") from error
+            with source.open(name) as file:
+                while part := file.read(CHUNK):
+                    digest.update(part)
+        except (zipfile.BadZipFile, EOFError) as error:
+            raise BackupUnreadable(f"This is not whole: {name}: {error}.") from error
         if digest.hexdigest() != expected:
-            raise BackupUnreadable(f"This backup is not whole: {name} has another content.")
+            raise BackupUnreadable(f"This is not whole: {name} has another content.")
     return manifest
 
 
-def read_member(archive: zipfile.ZipFile, name: str) -> Iterator[bytes]:
-    """Its content in pieces."""
-    with archive.open(name) as file:
-        while part := file.read(CHUNK):
-            yield part
-
-
-def _parse_manifest(archive: zipfile.ZipFile) -> Manifest:
+def _parse_manifest(source: MemberSource, wanted: str) -> Manifest:
     try:
-        if archive.getinfo(MANIFEST).file_size > SMALL:
-            raise BackupUnreadable(f"This is no backup: its {MANIFEST} is too long.")
-        document = json.loads(archive.read(MANIFEST))
-        if document["format"] != FORMAT:
-            raise BackupUnreadable(f"This is no backup: its format is not {FORMAT}.")
+        if source.size(MANIFEST) > SMALL:
+            raise BackupUnreadable(f"This can't be restored: its {MANIFEST} is too long.")
+        with source.open(MANIFEST) as file:
+            document = json.load(file)
+        if document["format"] != wanted:
+            raise BackupUnreadable(f"This can't be restored: its format is not {wanted}.")
         if document["version"] != VERSION:
             raise BackupUnreadable(
-                f"This backup has version {document['version']} of its format; this release "
-                f"reads {VERSION}."
+                f"This has version {document['version']} of its format; this release reads "
+                f"{VERSION}."
             )
         return Manifest(
-            made_at=str(document["made_at"]),
-            database=str(document["database"]),
+            made_at=str(document.get("made_at", "")),
+            database=str(document.get("database", "")),
             migrations=[str(name) for name in document["migrations"]],
             rows={str(label): int(number) for label, number in document["rows"].items()},
             members={str(name): str(digest) for name, digest in document["members"].items()},
         )
-    except (KeyError, TypeError, ValueError, AttributeError, zipfile.BadZipFile) as error:
-        raise BackupUnreadable(f"This is no backup: no {MANIFEST} that can be read.") from error
+    except (KeyError, TypeError, ValueError, AttributeError, OSError) as error:
+        text = f"This is no backup and no study: no {MANIFEST} that can be read."
+        raise BackupUnreadable(text) from error
 
 
 def _check_place(name: str) -> None:
     """Raise for what would be written outside of the media."""
     parts = PurePosixPath(name).parts
-    is_known = name == SECRET_KEY or name.startswith((ROWS, MEDIA))
-    if not is_known or name.startswith("/") or ".." in parts or "\\" in name or "\0" in name:
-        raise BackupUnreadable(f"This backup has a member at a place of none: {name!r}.")
+    if name.startswith("/") or ".." in parts or "\\" in name or "\0" in name:
+        raise BackupUnreadable(f"A member is at a place of none: {name!r}.")

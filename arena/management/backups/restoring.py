@@ -1,31 +1,35 @@
-"""Restore a backup into an empty installation: all of it or nothing."""
+"""Restore a backup, or a study's folder, into an empty installation: all of it or nothing."""
 
 from __future__ import annotations
 
-import zipfile
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable
 from pathlib import Path
 
 from django.conf import settings
+from django.contrib.auth.models import Group, User
 from django.core.files.base import ContentFile
 from django.core.files.storage import default_storage
 from django.core.management import call_command
-from django.db import DatabaseError, transaction
+from django.db import DatabaseError, models, transaction
 
 from arena.errors import ArenaError
 from arena.exports.files import write_whole
-from arena.management.backups import rows
+from arena.exports.study_folder.writing import FORMAT as STUDY
 from arena.management.backups.archive import (
     MEDIA,
     ROWS,
     SECRET_KEY,
     BackupUnreadable,
+    FolderSource,
     Manifest,
-    open_archive,
+    MemberSource,
+    ZipSource,
     read_manifest,
-    read_member,
 )
-from arena.management.backups.taking import applied_migrations
+from arena.services import stored_rows
+
+EXPERTS = "expert"
+"""The role of every account of a study's folder."""
 
 
 def restore_backup(path: Path, *, say: Callable[[str], None]) -> Manifest:
@@ -36,78 +40,111 @@ def restore_backup(path: Path, *, say: Callable[[str], None]) -> Manifest:
         ArenaError: It is another release's, or this installation is not empty.
         OSError: The file can't be read, or the pictures can't be written.
     """
-    with path.open("rb") as file, open_archive(file) as archive:
-        manifest = read_manifest(archive)
+    with path.open("rb") as file:
+        source = ZipSource(file)
+        manifest = read_manifest(source)
         say(f"whole: a backup of {manifest.made_at}, {manifest.database}")
-        _check_release(manifest)
-        call_command("migrate", interactive=False, verbosity=0)
-        if filled := rows.find_filled_tables():
-            raise ArenaError(
-                "A backup is restored into an empty installation, and this one has rows in "
-                f"{', '.join(filled)}. Point DATABASE_URL to a new database."
-            )
-        written: list[str] = []
-        try:
-            _write_media(archive, manifest, written)
-            say(f"pictures: {len(written)}")
-            with transaction.atomic():
-                _write_rows(archive, manifest)
-        except BaseException:
-            for name in written:
-                default_storage.delete(name)
-            raise
-        say(f"rows: {sum(manifest.rows.values())} of {len(manifest.rows)} tables")
-        _write_key(archive, manifest)
+        tables = stored_rows.find_tables()
+        if {stored_rows.label_of(model) for model in tables} != manifest.rows.keys():
+            raise BackupUnreadable("This backup has other tables than this release.")
+
+        def write() -> None:
+            stored_rows.empty_what_migrating_made()
+            _write_rows(source, manifest, tables)
+
+        _restore(source, manifest, write, say)
+        if SECRET_KEY in manifest.members:
+            with source.open(SECRET_KEY) as key:
+                write_whole(settings.VAR_DIR / SECRET_KEY, key.read(), mode=0o600)
     return manifest
 
 
+def import_study(folder: Path, *, say: Callable[[str], None]) -> Manifest:
+    """Check every file of a study's folder, then take its rows and pictures in.
+
+    Raises:
+        BackupUnreadable: It is no whole study.
+        ArenaError: It is another release's, or this installation is not empty.
+        OSError: It can't be read, or the pictures can't be written.
+    """
+    source = FolderSource(folder)
+    manifest = read_manifest(source, wanted=STUDY)
+    by_label = {stored_rows.label_of(model): model for model in stored_rows.find_tables()}
+    if unknown := sorted(manifest.rows.keys() - by_label.keys()):
+        raise BackupUnreadable(f"This study has tables that nobody knows: {', '.join(unknown)}.")
+
+    def write() -> None:
+        _write_rows(source, manifest, [by_label[label] for label in manifest.rows])
+        group, _ = Group.objects.get_or_create(name=EXPERTS)
+        group.user_set.set(User.objects.all())
+
+    _restore(source, manifest, write, say)
+    return manifest
+
+
+def _restore(
+    source: MemberSource, manifest: Manifest, write: Callable[[], None], say: Callable[[str], None]
+) -> None:
+    """Pictures and rows, or neither."""
+    _check_release(manifest)
+    call_command("migrate", interactive=False, verbosity=0)
+    if filled := stored_rows.find_filled_tables():
+        raise ArenaError(
+            f"An empty installation is needed, and this one has rows in {', '.join(filled)}. "
+            "Point DATABASE_URL to a new database."
+        )
+    written: list[str] = []
+    try:
+        _write_media(source, manifest, written)
+        say(f"pictures: {len(written)}")
+        with transaction.atomic():
+            write()
+            stored_rows.reset_sequences()
+    except BaseException:
+        for name in written:
+            default_storage.delete(name)
+        raise
+    say(f"rows: {sum(manifest.rows.values())} of {len(manifest.rows)} tables")
+
+
 def _check_release(manifest: Manifest) -> None:
-    """Raise unless the backup has the tables of this release."""
-    ours, theirs = set(applied_migrations()), set(manifest.migrations)
-    tables = {rows.label_of(model) for model in rows.find_tables()}
-    if ours == theirs and tables == manifest.rows.keys():
+    """Raise unless the tables are those of this release."""
+    ours, theirs = set(stored_rows.applied_migrations()), set(manifest.migrations)
+    if ours == theirs:
         return
     lacking = ", ".join(sorted(ours - theirs)) or "nothing"
     beyond = ", ".join(sorted(theirs - ours)) or "nothing"
     raise ArenaError(
-        f"This backup is another release's: it lacks {lacking}, and has {beyond} beyond this one. "
+        f"This is of another release: it lacks {lacking}, and has {beyond} beyond this one. "
         "Restore it with the release that made it, then bring that up to date."
     )
 
 
-def _write_media(archive: zipfile.ZipFile, manifest: Manifest, written: list[str]) -> None:
+def _write_media(source: MemberSource, manifest: Manifest, written: list[str]) -> None:
     for member in manifest.members:
         if not member.startswith(MEDIA):
             continue
-        name, content = member.removeprefix(MEDIA), b"".join(read_member(archive, member))
+        name = member.removeprefix(MEDIA)
+        with source.open(member) as file:
+            content = file.read()
         if default_storage.exists(name):
-            with default_storage.open(name) as file:
-                if file.read() == content:
+            with default_storage.open(name) as there:
+                if there.read() == content:
                     continue
-            raise ArenaError(f"Another picture of the name {name} is there; nothing was restored.")
+            raise ArenaError(f"Another picture of the name {name} is there.")
         written.append(name)
         default_storage.save(name, ContentFile(content))
 
 
-def _write_rows(archive: zipfile.ZipFile, manifest: Manifest) -> None:
-    rows.empty_what_migrating_made()
-    for model in rows.find_tables():
-        label = rows.label_of(model)
+def _write_rows(
+    source: MemberSource, manifest: Manifest, tables: Iterable[type[models.Model]]
+) -> None:
+    for model in tables:
+        label = stored_rows.label_of(model)
         try:
-            number = rows.write_rows(model, _lines(archive, f"{ROWS}{label}.jsonl"))
-        except (ValueError, TypeError, DatabaseError) as error:
+            with source.open(f"{ROWS}{label}.jsonl") as lines:
+                number = stored_rows.write_rows(model, lines)
+        except (ValueError, TypeError, KeyError, OSError, DatabaseError) as error:
             raise BackupUnreadable(f"The rows of {label} can't be stored: {error}") from error
         if number != manifest.rows[label]:
             raise BackupUnreadable(f"{label} has {number} rows, not {manifest.rows[label]}.")
-    rows.reset_sequences()
-
-
-def _lines(archive: zipfile.ZipFile, member: str) -> Iterator[bytes]:
-    with archive.open(member) as file:
-        yield from file
-
-
-def _write_key(archive: zipfile.ZipFile, manifest: Manifest) -> None:
-    """Sessions and links go on where the key was the installation's own."""
-    if SECRET_KEY in manifest.members:
-        write_whole(settings.VAR_DIR / SECRET_KEY, archive.read(SECRET_KEY), mode=0o600)

@@ -12,11 +12,16 @@ from pathlib import Path
 from django.conf import settings
 from django.core.files.storage import default_storage
 from django.db import connection
-from django.db.migrations.loader import MigrationLoader
 
 from arena.errors import ArenaError
 from arena.management.backups.archive import MEDIA, ROWS, SECRET_KEY, Manifest, add_member
-from arena.management.backups.rows import find_tables, frozen_rows, label_of, read_rows
+from arena.services.stored_rows import (
+    applied_migrations,
+    find_tables,
+    frozen_rows,
+    label_of,
+    read_rows,
+)
 from arena.serving.readiness import find_unapplied_migrations
 
 
@@ -46,11 +51,6 @@ def take_backup(path: Path, *, now: datetime, say: Callable[[str], None]) -> Man
     finally:
         beside.unlink(missing_ok=True)
     return manifest
-
-
-def applied_migrations() -> list[str]:
-    """The migrations of this release, as app.name; all of them are applied."""
-    return sorted(f"{app}.{name}" for app, name in MigrationLoader(connection).disk_migrations)
 
 
 def find_media(folder: str = "") -> Iterator[str]:

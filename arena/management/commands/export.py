@@ -21,6 +21,7 @@ from arena.exports.formats import format_named
 from arena.exports.rating_charts import CONTENT_TYPES, chart_bytes
 from arena.exports.samples import SHEET_FORMATS, sheet_bytes, sheet_of
 from arena.exports.scenarios import scenario_zip, zip_name
+from arena.exports.study_folder.writing import write_study
 from arena.exports.tables import leaderboard_table
 from arena.exports.votes import VOTE_FORMATS, vote_table
 from arena.exports.writers import FORMATS
@@ -60,6 +61,9 @@ class Command(TerminalCommand):
 
     def handle(self, *args: Any, **options: Any) -> None:
         """Write the file."""
+        if options["what"] == "study":
+            self._study(options)
+            return
         write = {
             "leaderboard": self._leaderboard,
             "votes": self._votes,
@@ -77,6 +81,14 @@ class Command(TerminalCommand):
         except (ArenaError, AugmentError) as error:
             raise CommandError(str(error)) from error
         self._deliver(content, options["out"], suffix, is_text)
+
+    def _study(self, options: dict[str, Any]) -> None:
+        try:
+            study = study_named(options["study"])
+            write_study(study, Path(options["out"]), say=self.stderr.write)
+        except (ArenaError, AugmentError, OSError) as error:
+            raise CommandError(f"Nothing was exported. {error}") from error
+        self.stderr.write(f"Wrote {options['out']}.")
 
     def _leaderboard(self, options: dict[str, Any]) -> Written:
         form = options["format"]
@@ -233,12 +245,14 @@ def _kinds_of_studies(kinds: Any) -> list[ArgumentParser]:
         "--chart", required=True, help="pairs, types, width, displacement, elo-usd, ..."
     )
     chart.add_argument("--format", default="svg", help=f"one of {', '.join(CONTENT_TYPES)}")
+    whole = kinds.add_parser("study", help="a whole study; OUT is a new folder")
+    whole.add_argument("study", help="its name or its code; it is closed")
     for kind in (leaderboard, votes, chart):
         kind.add_argument("--rating", type=UUID, help="the code of an older rating")
         kind.add_argument(
             "--early", action="store_true", help="export from an open study; this is logged"
         )
-    return [leaderboard, votes, chart]
+    return [leaderboard, votes, chart, whole]
 
 
 def _kinds_of_jobs(kinds: Any) -> list[ArgumentParser]:

@@ -15,6 +15,8 @@ from uuid import UUID
 from django.apps import apps
 from django.core.management.color import no_style
 from django.db import connection, models, transaction
+from django.db.migrations.loader import MigrationLoader
+from django.db.models import QuerySet
 
 LEFT_OUT = frozenset(
     {
@@ -29,6 +31,11 @@ MADE_BY_MIGRATING = ("auth.permission", "contenttypes.contenttype", "auth.group"
 """What an empty installation has already; a restore puts the backup's in its place."""
 
 AT_ONCE = 500
+
+
+def applied_migrations() -> list[str]:
+    """The migrations of this release, as app.name."""
+    return sorted(f"{app}.{name}" for app, name in MigrationLoader(connection).disk_migrations)
 
 
 def find_tables() -> list[type[models.Model]]:
@@ -67,10 +74,21 @@ def frozen_rows() -> Iterator[None]:
 
 def read_rows(model: type[models.Model]) -> Iterator[bytes]:
     """Each row as a line: its column values in the order of `columns_of`."""
-    names = [field.attname for field in columns_of(model)]
-    found = model._base_manager.order_by("pk").values_list(*names)
-    for row in found.iterator(chunk_size=AT_ONCE):
-        yield json.dumps([_plain(value) for value in row], ensure_ascii=False).encode() + b"\n"
+    for row in read_values(model._base_manager.all()):
+        yield as_line(row)
+
+
+def read_values(found: QuerySet[Any]) -> Iterator[list[Any]]:
+    """Each row as plain values, in the order of `columns_of` and of their keys."""
+    columns = columns_of(found.model)
+    names = [field.attname for field in columns]
+    for row in found.order_by("pk").values_list(*names).iterator(chunk_size=AT_ONCE):
+        yield [_plain(field, value) for field, value in zip(columns, row, strict=True)]
+
+
+def as_line(values: list[Any]) -> bytes:
+    """A row as it stands in a file; keys are sorted, for databases order them as they like."""
+    return json.dumps(values, ensure_ascii=False, sort_keys=True).encode() + b"\n"
 
 
 def columns_of(model: type[models.Model]) -> list[models.Field[Any, Any]]:
@@ -129,7 +147,9 @@ def _row(
     return model(**{field.attname: _typed(field, value) for field, value in given})
 
 
-def _plain(value: object) -> object:
+def _plain(field: models.Field[Any, Any], value: Any) -> Any:
+    if isinstance(field, models.JSONField):
+        return None if value is None else field.get_prep_value(value)
     match value:
         case datetime() | date():
             return value.isoformat()

@@ -1,0 +1,216 @@
+"""Which rows a study is made of, and how people stand in them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from typing import Any
+
+from django.contrib.auth.models import User
+from django.db import models
+from django.db.models import Q, QuerySet
+
+from arena.models import (
+    Authorship,
+    EarlyLook,
+    FaultLabel,
+    ImportedVote,
+    LabellingRound,
+    LabelTask,
+    Matchup,
+    Person,
+    Report,
+    Snapshot,
+    Standing,
+    Study,
+    Vote,
+    VoteFile,
+)
+from arena.services.stored_rows import columns_of, read_values
+from augment.models import (
+    Attempt,
+    Augmentation,
+    BaseScene,
+    Contestant,
+    Endpoint,
+    EndpointModel,
+    GenerationJob,
+    IntentReading,
+    ModelCall,
+    Scenario,
+    Simulation,
+    TranscriptNote,
+)
+
+LONG_AGO = "2000-01-01T00:00:00+00:00"
+"""When an account was made is nobody's business."""
+
+Rows = QuerySet[Any]
+
+
+@dataclass(slots=True)
+class Closure:
+    """A study and all that its rows lead to.
+
+    Attributes:
+        study: Which.
+        jobs: Whose augmentations are shown, whole, and those that they took answers from.
+        accounts: The names that accounts get instead of their own, by key.
+        names: The same by their own names.
+    """
+
+    study: Study
+    jobs: set[int] = field(default_factory=set)
+    accounts: dict[int, str] = field(default_factory=dict)
+    names: dict[str, str] = field(default_factory=dict)
+
+    def tables(self) -> Iterator[Rows]:
+        """The rows of each table, those first that others name."""
+        contestants = Contestant.objects.filter(self._of("contestants"))
+        scenarios = Scenario.objects.filter(self._of("scenarios"))
+        attempts = Attempt.objects.filter(augmentation__job__in=self.jobs)
+        readings = IntentReading.objects.filter(
+            pk__in=ModelCall.objects.filter(copies__attempt__in=attempts).values("reading")
+        )
+        endpoints = self._endpoints(contestants, readings)
+        experts = User.objects.filter(pk__in=self.accounts)
+        labellings = LabellingRound.objects.filter(job__in=self.jobs)
+        matchups = self.study.matchups.all()
+        snapshots = self.study.snapshots.filter(state=Snapshot.State.READY)
+        files = VoteFile.objects.filter(study=self.study)
+        yield experts
+        yield Person.objects.filter(user__in=self.accounts)
+        yield BaseScene.objects.filter(pk__in=scenarios.values("base_scene"))
+        yield scenarios
+        yield endpoints
+        yield EndpointModel.objects.filter(endpoint__in=endpoints)
+        yield contestants
+        yield GenerationJob.objects.filter(pk__in=self.jobs)
+        yield GenerationJob.contestants.through._default_manager.filter(
+            generationjob__in=self.jobs
+        )
+        yield GenerationJob.scenarios.through._default_manager.filter(generationjob__in=self.jobs)
+        yield Augmentation.objects.filter(job__in=self.jobs)
+        yield attempts
+        yield readings
+        yield ModelCall.objects.filter(Q(attempt__in=attempts) | Q(reading__in=readings))
+        yield TranscriptNote.objects.filter(attempt__in=attempts)
+        yield Simulation.objects.filter(
+            Q(augmentation__job__in=self.jobs)
+            | Q(augmentation=None, scenario__in=scenarios.values("pk"))
+        )
+        yield Study.objects.filter(pk=self.study.pk)
+        yield Study.contestants.through._default_manager.filter(study=self.study)
+        yield Study.scenarios.through._default_manager.filter(study=self.study)
+        yield Study.experts.through._default_manager.filter(study=self.study)
+        yield matchups
+        yield Vote.objects.filter(matchup__in=matchups)
+        yield Report.objects.filter(matchup__in=matchups)
+        yield Authorship.objects.filter(study=self.study)
+        yield EarlyLook.objects.filter(study=self.study)
+        yield files
+        yield ImportedVote.objects.filter(file__in=files)
+        yield snapshots
+        yield Standing.objects.filter(snapshot__in=snapshots)
+        yield labellings
+        yield LabellingRound.experts.through._default_manager.filter(labellinground__in=labellings)
+        yield LabelTask.objects.filter(labelling__in=labellings)
+        yield FaultLabel.objects.filter(task__labelling__in=labellings)
+
+    def rename(self, document: Any) -> Any:
+        """A stored document with the names that accounts get, wherever one is named."""
+        match document:
+            case dict():
+                return {self.rename(key): self.rename(one) for key, one in document.items()}
+            case list():
+                return [self.rename(one) for one in document]
+            case str():
+                return self.names.get(document, document)
+            case _:
+                return document
+
+    def _of(self, name: str) -> Q:
+        """What the study names, its jobs work on, or its pairs show."""
+        return Q(pk__in=getattr(self.study, name).values("pk")) | Q(jobs__in=self.jobs)
+
+    def _endpoints(self, contestants: Rows, readings: Rows) -> Rows:
+        named = set(contestants.exclude(endpoint=None).values_list("endpoint", flat=True))
+        named |= set(readings.values_list("endpoint", flat=True))
+        for roles in contestants.values_list("roles", flat=True):
+            labels = [one.get("endpoint") for one in (roles or {}).values()]
+            named |= set(Endpoint.objects.filter(label__in=labels).values_list("pk", flat=True))
+        return Endpoint.objects.filter(pk__in=named)
+
+
+def close_over(study: Study) -> Closure:
+    """Follow a study to everything that its rows name."""
+    closure = Closure(study)
+    shown = Augmentation.objects.filter(
+        Q(shown_left__study=study) | Q(shown_right__study=study)
+    ).distinct()
+    new = set(shown.values_list("job", flat=True))
+    while new:
+        closure.jobs |= new
+        sources = ModelCall.objects.filter(copies__attempt__augmentation__job__in=new)
+        found = sources.exclude(attempt=None).values_list("attempt__augmentation__job", flat=True)
+        new = set(found) - closure.jobs
+    people = _people(closure)
+    # In the order of their names, so that whatever is ordered by name stays as it is.
+    named = User.objects.filter(pk__in=people).order_by("username").values_list("pk", "username")
+    for place, (pk, username) in enumerate(named, start=1):
+        closure.accounts[pk] = closure.names[username] = f"expert-{place:04}"
+    return closure
+
+
+def _people(closure: Closure) -> set[int]:
+    """Who votes, labels, has written or has looked; whoever only administered stays at home."""
+    study, labellings = closure.study, LabellingRound.objects.filter(job__in=closure.jobs)
+    found: tuple[Rows, ...] = (
+        study.experts.values_list("pk", flat=True),
+        Matchup.objects.filter(study=study).values_list("expert", flat=True),
+        Vote.objects.filter(matchup__study=study).values_list("expert", flat=True),
+        Report.objects.filter(matchup__study=study).values_list("expert", flat=True),
+        Authorship.objects.filter(study=study).values_list("expert", flat=True),
+        EarlyLook.objects.filter(study=study).values_list("user", flat=True),
+        LabelTask.objects.filter(labelling__in=labellings).values_list("expert", flat=True),
+        labellings.exclude(experts=None).values_list("experts", flat=True),
+    )
+    return {pk for keys in found for pk in keys}
+
+
+def travelling_rows(closure: Closure, rows: Rows) -> Iterator[list[Any]]:
+    """The rows of one table without names of accounts, machines or addresses of people."""
+    model = rows.model
+    columns = columns_of(model)
+    for values in read_values(rows):
+        row = dict(zip([column.attname for column in columns], values, strict=True))
+        _hide(model, columns, row, closure)
+        yield list(row.values())
+
+
+def _hide(
+    model: type[models.Model],
+    columns: list[models.Field[Any, Any]],
+    row: dict[str, Any],
+    closure: Closure,
+) -> None:
+    for column in columns:
+        is_account = isinstance(column, models.ForeignKey) and column.related_model is User
+        if is_account and column.null and row[column.attname] not in closure.accounts:
+            row[column.attname] = None
+    if model is User:
+        row |= {
+            "username": closure.accounts[row["id"]],
+            **{"password": "!", "first_name": "", "last_name": "", "email": ""},
+            **{"is_staff": False, "is_superuser": False, "last_login": None},
+            "date_joined": LONG_AGO,
+        }
+    elif model is Person:
+        row["preferences"] = {}
+    elif model is Attempt:
+        row["worker"] = ""
+    elif model is Augmentation:
+        row |= {"claim": None, "heartbeat_at": None}
+    elif model is Study:
+        for name in ("votes_to_plan", "rules"):
+            row[name] = closure.rename(row[name])

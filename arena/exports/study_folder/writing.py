@@ -1,0 +1,141 @@
+"""Write a study's folder: whole, or not at all."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import re
+import shutil
+import tempfile
+from collections.abc import Callable, Iterable, Iterator
+from importlib.metadata import version
+from pathlib import Path
+from typing import Any
+
+from django.core.files.storage import default_storage
+from django.template.loader import render_to_string
+
+from arena.errors import ArenaError
+from arena.exports.study_folder.closure import Closure, close_over, travelling_rows
+from arena.exports.study_folder.tables import files_for_people
+from arena.models import Study
+from arena.services.stored_rows import applied_migrations, as_line, frozen_rows, label_of
+from augment.models import GenerationJob
+
+FORMAT, VERSION = "scenario-arena-study", 1
+MANIFEST, README = "manifest.json", "README.md"
+ROWS, MEDIA = "rows/", "media/"
+
+PACKAGES = ("django", "numpy", "scipy", "pillow", "openai")
+"""Whose versions may change a result."""
+
+_NAMES = re.compile(rb"[a-z_]+/[0-9a-f]{16,64}\.png")
+_DIGESTS = re.compile(rb'sha256[":= ]+([0-9a-f]{64})')
+ASKED = "asked"
+"""Where the pictures lie that reviewers were sent; a request names them by their hash."""
+
+
+def write_study(study: Study, out: Path, *, say: Callable[[str], None]) -> None:
+    """Write the folder.
+
+    Args:
+        study: Any that is not open.
+        out: A folder that is not there yet.
+        say: Told what was written.
+
+    Raises:
+        ArenaError: The study is open, a job of it still runs, or the folder is there.
+        OSError: It can't be written; nothing is left of it.
+    """
+    if out.exists():
+        raise ArenaError(f"{out} is there already; an export overwrites nothing.")
+    if study.state == Study.State.OPEN:
+        raise ArenaError(f"The study {study.name!r} is open; close it before it is exported.")
+    out.parent.mkdir(parents=True, exist_ok=True)
+    beside = Path(tempfile.mkdtemp(dir=out.parent, prefix=f".{out.name}."))
+    try:
+        with frozen_rows():
+            _fill(study, beside, say)
+        beside.chmod(0o755)
+        beside.rename(out)
+    finally:
+        shutil.rmtree(beside, ignore_errors=True)
+
+
+def _fill(study: Study, folder: Path, say: Callable[[str], None]) -> None:
+    closure = close_over(study)
+    running = GenerationJob.objects.filter(pk__in=closure.jobs, state=GenerationJob.State.RUNNING)
+    if job := running.first():
+        raise ArenaError(f"The job {job.name!r} of this study still runs.")
+    writer = _Folder(folder)
+    counts: dict[str, int] = {}
+    for rows in closure.tables():
+        label = label_of(rows.model)
+        counts[label] = writer.write_lines(f"{ROWS}{label}.jsonl", _lines(closure, rows))
+    say(f"rows: {sum(counts.values())} of {len(counts)} tables")
+    for name in sorted(writer.media):
+        if default_storage.exists(name):
+            with default_storage.open(name) as file:
+                writer.write(f"{MEDIA}{name}", file.read())
+    for name, content in files_for_people(closure):
+        writer.write(name, content)
+    context = {"study": study, "tables": counts, "jobs": len(closure.jobs)}
+    writer.write(README, render_to_string("exports/study_readme.md", context).encode())
+    say(f"files: {len(writer.digests)}")
+    (folder / MANIFEST).write_bytes(_manifest(closure, counts, writer.digests))
+
+
+def _lines(closure: Closure, rows: Any) -> Iterator[bytes]:
+    return (as_line(row) for row in travelling_rows(closure, rows))
+
+
+def _manifest(closure: Closure, counts: dict[str, int], digests: dict[str, str]) -> bytes:
+    study = closure.study
+    document = {
+        "format": FORMAT,
+        "version": VERSION,
+        "study": {
+            "name": study.name,
+            "code": str(study.code),
+            "seed": study.seed,
+            "rules": closure.rename(study.rules),
+            "opened_at": study.opened_at.isoformat() if study.opened_at else None,
+            "closed_at": study.closed_at.isoformat() if study.closed_at else None,
+            "allow_simulated": study.allow_simulated,
+        },
+        "packages": {name: version(name) for name in PACKAGES},
+        "migrations": applied_migrations(),
+        "rows": counts,
+        "members": dict(sorted(digests.items())),
+    }
+    return (json.dumps(document, indent=1, ensure_ascii=False, sort_keys=True) + "\n").encode()
+
+
+class _Folder:
+    """Files with their hashes, and the names of pictures that were seen in the rows."""
+
+    def __init__(self, root: Path) -> None:
+        self._root = root
+        self.digests: dict[str, str] = {}
+        self.media: set[str] = set()
+
+    def write(self, name: str, content: bytes) -> None:
+        self._place(name).write_bytes(content)
+        self.digests[name] = hashlib.sha256(content).hexdigest()
+
+    def write_lines(self, name: str, lines: Iterable[bytes]) -> int:
+        digest, number = hashlib.sha256(), 0
+        with self._place(name).open("wb") as file:
+            for line in lines:
+                number += 1
+                digest.update(line)
+                file.write(line)
+                self.media |= {found.decode() for found in _NAMES.findall(line)}
+                self.media |= {f"{ASKED}/{one.decode()}.png" for one in _DIGESTS.findall(line)}
+        self.digests[name] = digest.hexdigest()
+        return number
+
+    def _place(self, name: str) -> Path:
+        path = self._root / name
+        path.parent.mkdir(parents=True, exist_ok=True)
+        return path

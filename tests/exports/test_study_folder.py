@@ -1,0 +1,159 @@
+"""A study travels whole and without names; what is not whole is not taken in."""
+
+from __future__ import annotations
+
+import csv
+import hashlib
+import json
+import shutil
+from pathlib import Path
+
+import pytest
+from django.core.files.base import ContentFile
+from django.core.files.storage import default_storage
+from django.core.management import CommandError, call_command
+from pytest_django import Settings
+
+from arena.models import Study, Vote
+from arena.services.ratings import rate
+from arena.services.studies import close_study
+from augment.models import Augmentation, GenerationJob
+from tests.study_rows import a_study, matchups_of, vote
+
+pytestmark = pytest.mark.django_db(transaction=True)
+
+PNG = b"\x89PNG picture"
+
+
+@pytest.fixture
+def study(tmp_path: Path, settings: Settings) -> Study:
+    """Closed and rated; Eva has changed her mind once, Finn has left pairs open."""
+    settings.MEDIA_ROOT = tmp_path / "media"
+    made = a_study()
+    first, second, third, *_ = matchups_of(made, "eva")
+    earlier = vote(first, "left", comment="hm; =1+1")
+    vote(first, "right", supersedes=earlier.key)
+    vote(second, "skip", reason="unclear")
+    vote(third, "equal", aids={"zoom"})
+    vote(matchups_of(made, "finn")[0], "left")
+    for row in Augmentation.objects.all():
+        default_storage.save(row.image, ContentFile(PNG))
+    GenerationJob.objects.update(state=GenerationJob.State.FINISHED)
+    close_study(study=made)
+    made.refresh_from_db()
+    rate(study=made, rounds=20)
+    return made
+
+
+def export(study: Study, out: Path) -> dict[str, bytes]:
+    call_command("export", "study", study.name, "--out", str(out))
+    return tree(out)
+
+
+def tree(folder: Path) -> dict[str, bytes]:
+    files = (path for path in folder.rglob("*") if path.is_file())
+    return {path.relative_to(folder).as_posix(): path.read_bytes() for path in files}
+
+
+def empty() -> None:
+    for row in Augmentation.objects.all():
+        default_storage.delete(row.image)
+    call_command("flush", interactive=False, verbosity=0)
+
+
+def test_export_import_and_export_give_the_same_folder(study: Study, tmp_path: Path) -> None:
+    first = export(study, tmp_path / "first")
+    empty()
+    call_command("import", "study", str(tmp_path / "first"))
+    again = Study.objects.get(name=study.name)
+    assert export(again, tmp_path / "second") == first
+    assert {expert.username for expert in again.experts.all()} == {"expert-0001", "expert-0002"}
+
+
+def test_only_pseudonyms_travel(study: Study, tmp_path: Path) -> None:
+    pseudonyms = {expert.person.pseudonym for expert in study.experts.all()}
+    files = export(study, tmp_path / "out")
+    for secret in (b'"eva"', b'"finn"', b"pbkdf2", b"md5$"):
+        assert [name for name, content in files.items() if secret in content] == []
+    assert all(name.encode() in files["pairs.csv"] for name in pseudonyms)
+
+
+def test_every_vote_and_every_pair_without_one_is_a_line(study: Study, tmp_path: Path) -> None:
+    files = export(study, tmp_path / "out")
+    lines = list(csv.DictReader(files["pairs.csv"].decode().splitlines()))
+    assert len(lines) == study.matchups.count() + 1, "one was changed"
+    voted = [line for line in lines if line["vote"]]
+    assert sorted(line["outcome"] for line in voted) == ["equal", "left", "left", "right", "skip"]
+    (changed,) = (line for line in lines if line["supersedes"])
+    assert changed["supersedes"] in {line["vote"] for line in voted}
+    (skipped,) = (line for line in lines if line["outcome"] == "skip")
+    assert skipped["skip_reason"] == "unclear"
+    assert {line["aids"] for line in voted} == {"", "zoom"}
+    assert not any(line["comment"].startswith("=") for line in lines)
+    codes = {str(row.code) for row in Augmentation.objects.all()}
+    assert {line["augmentation_a"] for line in lines} <= codes
+
+
+def test_the_manifest_names_every_file_with_its_hash(study: Study, tmp_path: Path) -> None:
+    files = export(study, tmp_path / "out")
+    manifest = json.loads(files.pop("manifest.json"))
+    assert manifest["members"] == {
+        name: hashlib.sha256(content).hexdigest() for name, content in files.items()
+    }
+    assert manifest["study"]["seed"] == study.seed
+    pictures = {name for name in files if name.startswith("media/")}
+    assert pictures == {f"media/{row.image}" for row in Augmentation.objects.all()}
+    code = study.snapshots.get().code
+    assert {f"ratings/{code}/leaderboard.csv", f"ratings/{code}/votes.csv"} <= files.keys()
+    assert {"contestants.json", "augmentations.csv", "README.md"} <= files.keys()
+
+
+def test_an_open_study_is_not_exported(study: Study, tmp_path: Path) -> None:
+    Study.objects.update(state=Study.State.OPEN)
+    with pytest.raises(CommandError, match="is open"):
+        export(study, tmp_path / "out")
+    assert not (tmp_path / "out").exists()
+
+
+def test_nothing_is_overwritten_and_nothing_half_written_stays(
+    study: Study, tmp_path: Path
+) -> None:
+    (tmp_path / "out").mkdir()
+    with pytest.raises(CommandError, match="is there already"):
+        export(study, tmp_path / "out")
+    GenerationJob.objects.update(state=GenerationJob.State.RUNNING)
+    with pytest.raises(CommandError, match="still runs"):
+        export(study, tmp_path / "new")
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["media", "out"]
+
+
+SPOILT: dict[str, tuple[str, bytes | None]] = {
+    "pairs.csv has another content": ("pairs.csv", b"other"),
+    "arena.vote.jsonl is missing": ("rows/arena.vote.jsonl", None),
+    "more.txt is not named": ("more.txt", b""),
+    "no manifest.json": ("manifest.json", b"{}"),
+    "format is not": ("manifest.json", b'{"format": "scenario-arena-backup"}'),
+}
+
+
+def test_a_folder_that_is_not_whole_is_refused(study: Study, tmp_path: Path) -> None:
+    whole = tmp_path / "out"
+    export(study, whole)
+    empty()
+    for says, (name, content) in SPOILT.items():
+        spoilt = tmp_path / "spoilt"
+        shutil.copytree(whole, spoilt)
+        (spoilt / name).unlink(missing_ok=True)
+        if content is not None:
+            (spoilt / name).write_bytes(content)
+        with pytest.raises(CommandError, match=says):
+            call_command("import", "study", str(spoilt))
+        shutil.rmtree(spoilt)
+    assert not Study.objects.exists()
+
+
+def test_it_is_taken_in_by_an_empty_installation_alone(study: Study, tmp_path: Path) -> None:
+    export(study, tmp_path / "out")
+    with pytest.raises(CommandError, match="An empty installation is needed"):
+        call_command("import", "study", str(tmp_path / "out"))
+    assert Vote.objects.count() == 5
