@@ -112,14 +112,8 @@ class CubicBezier:
         """Position and direction of travel at s, d to the left; the ends are extended straight."""
         t = self.parameters_at([s_m])
         heading_rad = float(self.headings(t)[0])
-        x_m, y_m = self.points(t)[0]
         over_m = s_m - min(max(s_m, 0.0), self.length_m)
-        cos, sin = math.cos(heading_rad), math.sin(heading_rad)
-        return Pose(
-            x_m=float(x_m) + over_m * cos - d_m * sin,
-            y_m=float(y_m) + over_m * sin + d_m * cos,
-            heading_rad=heading_rad,
-        )
+        return _pose_off(self.points(t)[0], heading_rad, over_m, d_m)
 
     def project(self, x_m: float, y_m: float) -> Projection:
         """The nearest place on the curve; of equally near ones the first."""
@@ -245,17 +239,22 @@ def travel_pose(line: Polyline, s_m: float, d_m: float = 0.0) -> Pose:
     through the end and the two points that follow a reach apart. The ends are extended straight.
     """
     heading_rad = _travel_heading(line, min(max(s_m, 0.0), line.length_m))
-    x_m, y_m = line.points_at(np.array([s_m]))[0]
     over_m = s_m - min(max(s_m, 0.0), line.length_m)
+    return _pose_off(line.points_at(np.array([s_m]))[0], heading_rad, over_m, d_m)
+
+
+# Private
+
+
+def _pose_off(point_m: FloatArray, heading_rad: float, over_m: float, d_m: float) -> Pose:
+    """The pose so far past a point (2,) in the direction of travel, and d to the left."""
+    x_m, y_m = point_m
     cos, sin = math.cos(heading_rad), math.sin(heading_rad)
     return Pose(
         x_m=float(x_m) + over_m * cos - d_m * sin,
         y_m=float(y_m) + over_m * sin + d_m * cos,
         heading_rad=heading_rad,
     )
-
-
-# Private
 
 
 def _travel_heading(line: Polyline, s_m: float) -> float:

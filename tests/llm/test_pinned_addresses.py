@@ -12,7 +12,7 @@ from augment.errors import ModelFault, NotSent
 from augment.llm import wire_network
 from augment.llm.openai_wire import OpenAIWire
 from tests.llm.raw_server import speaking, whole
-from tests.llm.test_hostile_servers import ASKED, BODY
+from tests.llm.hostile import ASKED, BODY
 
 KEY = "sk-planted-4f7a9c0d1e2b3a"
 PROXIES = ("HTTP_PROXY", "http_proxy", "HTTPS_PROXY", "https_proxy", "ALL_PROXY", "all_proxy")
