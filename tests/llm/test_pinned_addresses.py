@@ -11,8 +11,8 @@ import pytest
 from augment.errors import ModelFault, NotSent
 from augment.llm import wire_network
 from augment.llm.openai_wire import OpenAIWire
-from tests.llm.raw_server import speaking, whole
 from tests.llm.hostile import ASKED, BODY
+from tests.llm.raw_server import speaking, whole
 
 KEY = "sk-planted-4f7a9c0d1e2b3a"
 PROXIES = ("HTTP_PROXY", "http_proxy", "HTTPS_PROXY", "https_proxy", "ALL_PROXY", "all_proxy")
