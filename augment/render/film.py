@@ -1,6 +1,7 @@
 """A drive as a moving picture or as a strip of stills, drawn from its trace alone.
 
-The window follows the ego; several drives of one scene lie beneath each other, in step.
+The window follows the ego and says the time. Drives of one scene lie beneath each other, in step;
+on a strip each has a column.
 """
 
 from __future__ import annotations
@@ -11,7 +12,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from PIL import Image, ImageDraw
+from PIL import Image, ImageDraw, ImageFont
 
 from augment.geometry.boxes import corners
 from augment.geometry.frames import Pose
@@ -24,7 +25,9 @@ FINENESS = 2
 EVERY_STEPS = 2
 FRAME_MS = 200
 STILLS = 6
-GAP_PX = 6
+GAP_PX = 3
+TEXT_PX = 18
+SCALE_M = 10.0
 _SCALE = PX_PER_M * FINENESS
 _CENTRE_SHARE = 0.35
 """How much of the window lies behind the ego."""
@@ -60,13 +63,13 @@ def animation(traces: Sequence[Trace], *, file_format: str) -> bytes:
 
 
 def strip(traces: Sequence[Trace]) -> bytes:
-    """Six moments of every drive beneath each other, first to last, as one PNG."""
+    """Six moments beneath each other, first to last, a column for every drive, as one PNG."""
     scenes = [_Drawn(trace) for trace in traces]
     last = max(scene.steps for scene in scenes) - 1
     moments = [round(last * number / (STILLS - 1)) for number in range(STILLS)]
-    rows = [_stacked([scene.frame(moment) for scene in scenes]) for moment in moments]
+    columns = [_stacked([scene.frame(moment) for moment in moments]) for scene in scenes]
     stream = io.BytesIO()
-    _stacked(rows, gap_px=2 * GAP_PX).save(stream, format="PNG")
+    _beside(columns).save(stream, format="PNG")
     return stream.getvalue()
 
 
@@ -94,6 +97,7 @@ class _Drawn:
 
     def frame(self, step: int) -> Image.Image:
         """The window at one step; at the last one beyond the end."""
+        time_s = step * float(self._trace["step_s"])
         step = min(step, self.steps - 1)
         x, y = self._trace["ego"]["poses"][step][:2]
         left = x - WINDOW_M[0] * _CENTRE_SHARE
@@ -111,7 +115,9 @@ class _Drawn:
         ego = self._trace["ego"]
         mark = _Box(ego["poses"][step], ego["length_m"], ego["width_m"])
         self._mark(pen, mark, palette.EGO_MARK, corner)
-        return made.reduce(FINENESS)
+        finished = made.reduce(FINENESS)
+        _say_time_and_scale(finished, time_s)
+        return finished
 
     def _mark(
         self,
@@ -164,18 +170,42 @@ def _pose_at(one: dict[str, Any], step: int) -> list[float] | None:
     return poses[at] if 0 <= at < len(poses) else None
 
 
+def _say_time_and_scale(frame: Image.Image, time_s: float) -> None:
+    """The time in the upper left corner, ten metres in the lower left one."""
+    pen = ImageDraw.Draw(frame)
+    font = ImageFont.load_default(TEXT_PX)
+    bottom = frame.height - 14
+    pen.rectangle((14, bottom - 3, 14 + SCALE_M * PX_PER_M, bottom), fill=palette.INK)
+    for at, text in [((14, 26), f"{time_s:.1f} s"), ((14, bottom - 8), f"{SCALE_M:.0f} m")]:
+        pen.text(
+            at, text, fill=palette.INK, font=font, anchor="ls",
+            stroke_width=2, stroke_fill=palette.PAPER,
+        )  # fmt: skip
+
+
 def _flat(points: FloatArray) -> list[tuple[float, float]]:
     return [(float(x), float(y)) for x, y in points]
 
 
-def _stacked(pictures: list[Image.Image], gap_px: int = GAP_PX) -> Image.Image:
-    """Pictures of one width beneath each other."""
+def _stacked(pictures: list[Image.Image]) -> Image.Image:
+    """Pictures of one size beneath each other, with a line between."""
     if len(pictures) == 1:
         return pictures[0]
-    height = sum(picture.height for picture in pictures) + gap_px * (len(pictures) - 1)
-    made = Image.new("RGB", (pictures[0].width, height), palette.PAPER)
-    top = 0
-    for picture in pictures:
-        made.paste(picture, (0, top))
-        top += picture.height + gap_px
+    width, height = pictures[0].size
+    made = Image.new("RGB", (width, _with_gaps(height, len(pictures))), palette.ROAD_EDGE)
+    for number, picture in enumerate(pictures):
+        made.paste(picture, (0, number * (height + GAP_PX)))
     return made
+
+
+def _beside(pictures: list[Image.Image]) -> Image.Image:
+    """Pictures of one size beside each other, with a line between."""
+    width, height = pictures[0].size
+    made = Image.new("RGB", (_with_gaps(width, len(pictures)), height), palette.ROAD_EDGE)
+    for number, picture in enumerate(pictures):
+        made.paste(picture, (number * (width + GAP_PX), 0))
+    return made
+
+
+def _with_gaps(length_px: int, count: int) -> int:
+    return count * length_px + (count - 1) * GAP_PX

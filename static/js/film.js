@@ -19,6 +19,7 @@ export class View {
     canvas.width = Math.round(this.width * dots);
     canvas.height = Math.round(this.height * dots);
     this.pen.setTransform(dots, 0, 0, dots, 0, 0);
+    this.pen.lineJoin = "round";
   }
 
   // From metres to the canvas: following the ego at a fixed scale, or the whole drive.
@@ -131,11 +132,20 @@ export class View {
     this.pen.font = "600 14px sans-serif";
     this.pen.fillStyle = braking ? colours.low : colours.ink;
     const mark = braking ? " ■" : "";
-    this.pen.fillText(`${(step * this.trace.step_s).toFixed(1)} s   ${speed.toFixed(1)} m/s${mark}`, 14, 26);
+    const said = `${(step * this.trace.step_s).toFixed(1)} s   ${speed.toFixed(1)} m/s${mark}`;
+    this.say(said, 26, colours);
     // A scale of 10 m.
     const y = this.height - 14;
     this.pen.fillRect(14, y, 10 * this.scale, 3);
-    this.pen.fillText("10 m", 14, y - 6);
+    this.say("10 m", y - 6, colours);
+  }
+
+  // Words that can be read on any ground.
+  say(words, y, colours) {
+    this.pen.strokeStyle = colours.ground;
+    this.pen.lineWidth = 4;
+    this.pen.strokeText(words, 14, y);
+    this.pen.fillText(words, 14, y);
   }
 }
 

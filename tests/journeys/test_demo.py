@@ -6,9 +6,12 @@ import csv
 import json
 import re
 import signal
+import sqlite3
 import struct
 import subprocess
 import sys
+from collections import Counter
+from contextlib import closing
 from pathlib import Path
 
 import pytest
@@ -55,6 +58,31 @@ def test_its_pictures_are_plain_pngs_of_the_agreed_size(demo_home: Home) -> None
 def test_the_careless_contestant_loses_to_the_reference(demo_home: Home) -> None:
     rating = {row["slug"]: float(row["elo"]) for row in standings(demo_home)}
     assert rating["sim-careless-otm"] < rating["reference"]
+
+
+def test_it_drives_ten_scenarios_and_prints_their_table(demo_home: Home) -> None:
+    with closing(sqlite3.connect(demo_home.folder / "db.sqlite3")) as database:
+        rows = database.execute(
+            "SELECT scenario.type, scenario.slug, drive.subject, drive.state, "
+            "LENGTH(drive.trace) > 0, drive.nuplan_score "
+            "FROM augment_simulation drive "
+            "JOIN augment_scenario scenario ON scenario.id = drive.scenario_id"
+        ).fetchall()
+    assert len({slug for _, slug, *_ in rows}) == 10
+    assert Counter(kind for kind, *_ in rows) == dict.fromkeys({kind for kind, *_ in rows}, 4)
+    assert {subject for _, _, subject, *_ in rows} == {"unmodified", "reference"}
+    # A slow computer drives the rest while the demo is served; none may have failed.
+    done = [row for row in rows if row[3] == "done"]
+    assert done
+    assert all(has_trace and 0.0 <= score <= 1.0 for *_, has_trace, score in done)
+    assert "failed" not in {state for _, _, _, state, *_ in rows}
+    told = (demo_home.folder / "demo.log").read_text()
+    table = told.partition("Mean driving score of PDM-Closed")[2]
+    lines = re.findall(
+        r"^  (Unmodified scene|Reference) +(\d+\.\d) % of (\d+) drives$", table, re.M
+    )
+    assert [name for name, *_ in lines][:1] == ["Unmodified scene"]
+    assert sum(int(count) for *_, count in lines) <= len(done)
 
 
 def test_a_second_run_uses_what_is_there(demo_home: Home, tmp_path: Path) -> None:

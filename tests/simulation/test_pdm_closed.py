@@ -9,11 +9,14 @@ import numpy as np
 import pytest
 
 from augment.scene.entities import Area, AreaKind, TrafficAgent
+from augment.scene.modification import Modification
 from augment.simulation.braking import brake, must_brake
+from augment.simulation.drive import run
 from augment.simulation.pdm_closed import PdmClosed
 from augment.simulation.planning import Plan, Situation
 from augment.simulation.proposals import ORIGINAL_OFFSETS_M, PAPER_OFFSETS_M, Quirks
 from augment.simulation.road import Road
+from augment.simulation.setting import DriveSetting
 from augment.simulation.states import FloatArray, start_state
 from augment.simulation.walkers import objects_of
 from tests.scenes import cone, pedestrian, vehicle
@@ -144,6 +147,13 @@ def test_who_hardly_moves_is_hit_rather_than_hits(speed: float, collision: float
     assert judged.parts["collision"].tolist() == [collision]
 
 
+def test_waiting_scores_more_than_overtaking_on_the_oncoming_lane() -> None:
+    # At best half of everything against no progress, but time to collision and comfort in full.
+    states = np.stack([states_along(np.zeros(41)), states_along(np.full(41, 1.2), y_m=3.5)])
+    judged = planner().judge(states, objects_of([vehicle("A", 12.0, 0.0)], speeds=True))
+    assert judged.scores == pytest.approx([7.0 / 12.0, 0.5])
+
+
 def test_progress_is_a_share_of_the_best_valid_one() -> None:
     states = np.stack([states_along(np.full(41, speed)) for speed in (2.0, 4.0, 8.0)])
     parked = objects_of([vehicle("A", 30.0, 0.0)], speeds=True)  # 32 m are too far
@@ -234,3 +244,19 @@ def test_equal_scores_take_the_lowest_number() -> None:
     assert one.proposals.chosen == int(np.flatnonzero(one.proposals.scores > best - 1e-9)[0])
     assert np.array_equal(one.poses, two.poses)
     assert math.isfinite(best)
+
+
+@pytest.mark.parametrize("offsets", [ORIGINAL_OFFSETS_M, PAPER_OFFSETS_M])
+@pytest.mark.parametrize(("speed", "brakes"), [(4.5, True), (9.0, False)])
+def test_one_walker_who_steps_out_late_makes_a_slow_ego_brake(
+    offsets: tuple[float, ...], speed: float, brakes: bool
+) -> None:
+    # 1.9 m/s, the pace of interPlan's longest walk, from beside the lane, 2.2 s ahead; the
+    # planner takes the walker for standing. Above 5 m/s it never brakes so, whatever comes.
+    at_m = 2.2 * speed
+    walker = pedestrian("P", at_m, -2.2, (at_m, 26.6))
+    scene = street(speed_mps=speed, limit_mps=1.1 * speed)
+    setting = DriveSetting(scene=scene, modification=Modification(added=(walker,)))
+    drive = run(setting, PdmClosed(offsets), steps=20)
+    assert any(plan.braking for plan in drive.plans) == brakes
+    assert (drive.states[-1, 3] < 0.5 * speed) == brakes

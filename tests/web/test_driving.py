@@ -163,15 +163,23 @@ def test_a_drive_stands_beside_the_scene_before_its_change() -> None:
 
 
 @pytest.mark.parametrize(
-    ("form", "kind", "frames"), [("gif", "GIF", 7), ("apng", "PNG", 7), ("png", "PNG", 1)]
+    ("form", "kind", "frames", "size"),
+    [
+        # Before and after beneath each other and in step; a strip has a column of six for each.
+        ("gif", "GIF", 7, (672, 2 * 288 + 3)),
+        ("apng", "PNG", 7, (672, 2 * 288 + 3)),
+        ("png", "PNG", 1, (2 * 672 + 3, 6 * 288 + 5 * 3)),
+    ],
 )
-def test_a_drive_can_be_taken_away_as_pictures(form: str, kind: str, frames: int) -> None:
+def test_a_drive_can_be_taken_away_as_pictures(
+    form: str, kind: str, frames: int, size: tuple[int, int]
+) -> None:
     row = driven(launched())[-1]
     answer = signed_in(people()["analyst"]).get(reverse("drive-file", args=[row.code, form]))
     picture = Image.open(io.BytesIO(answer.content))
     assert picture.format == kind
     assert getattr(picture, "n_frames", 1) == frames
-    assert picture.width == 672
+    assert picture.size == size
 
 
 def test_what_is_not_driven_yet_has_no_files() -> None:
