@@ -13,29 +13,44 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from arena.rating.bootstrap import Unit
-from arena.rating.leaderboard import Leaderboard, Line, Method, rate
+from arena.rating.leaderboard import Intervals, Leaderboard, Line, Method, Order, rate
+from arena.rating.printed import HEADS as PAPERS_HEADS
 from arena.rating.printed import (
     escape,
     interval_text,
     latex_table,
     notes_by_reason,
+    places_text,
     rank_text,
     rating_text,
 )
+from arena.rating.rules import unit_for
 from arena.rating.votes_file import VotesFile, VotesFileUnreadable, columns_of, read_votes
 from arena.services.cells import csv_text
 from augment.sentences import escape_controls
 
-HELP = "Rate votes from a CSV file: columns model_a, model_b, winner, and maybe judge and item."
+HELP = (
+    "Rate votes from a file (CSV, JSON lines, Parquet): columns model_a, model_b, winner, and "
+    "maybe judge and item."
+)
 RESAMPLES = {
     "vote": Unit.VOTE,
     "judge": Unit.EXPERT,
     "item": Unit.SCENARIO,
     "two-way": Unit.TWO_WAY,
 }
-METHODS = {"bt": Method.BRADLEY_TERRY, "elo": Method.ELO}
-METHOD_TEXTS = {"bt": "Bradley-Terry on the Elo scale", "elo": "online Elo, median over resamples"}
+METHODS = {one.value: one for one in Method}
+METHOD_TEXTS = {
+    "bt": "Bradley-Terry on the Elo scale",
+    "davidson": "Davidson's tie model on the Elo scale",
+    "elo": "online Elo, median over resamples",
+}
+INTERVALS = {"closed": Intervals.CLOSED_FORM, "resamples": Intervals.RESAMPLES}
+MOST_PAIRS = 100_000
+"""Above so many pairs JSON holds only those that are told apart."""
 _CLUSTERS = {"vote": (), "judge": ("judge",), "item": ("item",), "two-way": ("judge", "item")}
 ROUNDS, ROUNDS_OF_MANY, MANY_VOTES = 10_000, 1000, 500_000
 MOST_ROUNDS = 100_000
@@ -66,10 +81,26 @@ class RatedCsv:
     @property
     def method_text(self) -> str:
         """How the numbers came about."""
-        return (
-            f"{METHOD_TEXTS[self.board.method]}; 95 % intervals by {self.board.rounds} resamples "
-            f"({self.resample}), seed {self.board.seed}; {self.board.votes} votes"
+        found = (
+            f"in closed form (moderated sandwich by {self.resample}, Student's t)"
+            if self.board.intervals is Intervals.CLOSED_FORM
+            else f"by {self.board.rounds} resamples ({self.resample})"
         )
+        return (
+            f"{METHOD_TEXTS[self.board.method]}; 95 % intervals {found}, "
+            f"seed {self.board.seed}; {self.board.votes} votes"
+        )
+
+    @property
+    def cross_check(self) -> float | None:
+        """By how many points the bounds of the plain sandwich differ at most."""
+        gaps = [
+            max(abs(line.check_lower - line.lower), abs(line.check_upper - line.upper))
+            for line in self.board.lines
+            if line.lower is not None and line.upper is not None
+            if line.check_lower is not None and line.check_upper is not None
+        ]
+        return max(gaps, default=None)
 
 
 def main(arguments: Sequence[str]) -> int:
@@ -90,12 +121,30 @@ def main(arguments: Sequence[str]) -> int:
 
 def add_arguments(parser: ArgumentParser) -> None:
     """Which file, and how."""
-    parser.add_argument("file", metavar="FILE", help="UTF-8; winner is model_a, model_b or tie")
-    parser.add_argument("--method", choices=METHODS, default="bt", help="bt is Bradley-Terry")
+    parser.add_argument(
+        "file", metavar="FILE", help="UTF-8 or UTF-16; winner is model_a, model_b or tie"
+    )
+    parser.add_argument(
+        "--method",
+        choices=METHODS,
+        default="bt",
+        help="bt is Bradley-Terry, davidson its model of ties",
+    )
     parser.add_argument(
         "--resample",
         choices=RESAMPLES,
-        help="what the bootstrap draws; two-way where judge and item are there, else vote",
+        help="what hangs together: two-way where judge and item are there, else what there is",
+    )
+    parser.add_argument(
+        "--intervals",
+        choices=INTERVALS,
+        help="closed form, or resamples; right for the method unless given",
+    )
+    parser.add_argument(
+        "--order",
+        choices=[one.value for one in Order],
+        default=Order.SHUFFLED.value,
+        help="online Elo's point: the median over shuffled rounds, or the order of the lines",
     )
     parser.add_argument(
         "--rounds",
@@ -111,6 +160,8 @@ def run(
     file: str,
     method: str = "bt",
     resample: str | None = None,
+    intervals: str | None = None,
+    order: str = "shuffled",
     rounds: int | None = None,
     seed: int = 0,
     format: str = "table",
@@ -124,6 +175,8 @@ def run(
         raise CsvNotRated(f"rounds go from 1 to {MOST_ROUNDS}, not {rounds}")
     if seed < 0:
         raise CsvNotRated(f"a seed is 0 or more, not {seed}")
+    if method == "elo" and intervals == "closed":
+        raise CsvNotRated("elo has no intervals in closed form, only resamples")
     path = Path(file)
     try:
         chosen, notes = _resample(columns_of(path), method, resample)
@@ -137,9 +190,10 @@ def run(
         votes.comparisons,
         method=METHODS[method],
         unit=RESAMPLES[chosen],
+        intervals=INTERVALS[intervals] if intervals else None,
+        order=Order(order),
         rounds=rounds or (ROUNDS_OF_MANY if many else ROUNDS),
         seed=seed,
-        details=False,
     )
     rated = RatedCsv(board=board, resample=chosen, notes=_notes(board, votes, notes))
     return FORMATS[format](rated)
@@ -158,12 +212,19 @@ def _resample(columns: Sequence[str], method: str, wanted: str | None) -> tuple[
                 f"line 1: there is no column {missing[0]!r}, which --resample {wanted} needs"
             )
         return wanted, []
-    if len(columns) == len(_CLUSTERS["two-way"]):
-        return "two-way", []
-    return "vote", [
-        "The file does not name both judge and item: single votes are resampled as if they were "
-        "independent, and if they are not, the intervals are too narrow."
-    ]
+    unit = unit_for(judges="judge" in columns, items="item" in columns)
+    chosen = next(name for name, one in RESAMPLES.items() if one is unit)
+    return chosen, [_MISSING[chosen]] if chosen in _MISSING else []
+
+
+_MISSING = {
+    "vote": "The file does not name both judge and item: single votes are resampled as if they "
+    "were independent, and if they are not, the intervals are too narrow.",
+    "judge": "The file names no item: votes of one judge hang together, and if those on one item "
+    "do as well, the intervals are too narrow.",
+    "item": "The file names no judge: votes on one item hang together, and if those of one judge "
+    "do as well, the intervals are too narrow.",
+}
 
 
 def _notes(board: Leaderboard, votes: VotesFile, notes: list[str]) -> tuple[str, ...]:
@@ -180,11 +241,18 @@ def _in_their_words(warning: str) -> str:
     return warning.replace("expert", "judge").replace("scenario", "item")
 
 
+COLUMNS = ("model", "rank", "rating", "lower", "upper", "votes", "note", "rank_best", "rank_worst")
+"""Those of CSV and JSON; a new one comes at the end."""
+_CHECKS = ("check_lower", "check_upper")
+
 # --- Formats -------------------------------------------------------------------------------------
 
 
-def _cells(rated: RatedCsv) -> Iterator[tuple[str, str, str, str, str]]:
-    """Model, rank, rating, interval, votes."""
+HEADS = (*PAPERS_HEADS, "95% ranks")
+
+
+def _cells(rated: RatedCsv) -> Iterator[tuple[str, ...]]:
+    """Model, rank, rating, interval, votes, rank set."""
     for line in rated.standings:
         yield (
             line.name,
@@ -192,11 +260,12 @@ def _cells(rated: RatedCsv) -> Iterator[tuple[str, str, str, str, str]]:
             rating_text(line.rating),
             interval_text(line.rating, line.lower, line.upper),
             str(line.votes),
+            places_text(line.rank_best, line.rank_worst),
         )
 
 
 def _table(rated: RatedCsv) -> str:
-    rows = [("Model", "Rank", "Elo", "95% CI", "Votes"), *_cells(rated)]
+    rows = [HEADS, *_cells(rated)]
     rows = [(escape_controls(" ".join(row[0].split())), *row[1:]) for row in rows]
     widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
     lines = [
@@ -206,10 +275,40 @@ def _table(rated: RatedCsv) -> str:
         )
         for row in rows
     ]
+    lines = [lines[0], *_under_their_groups(rated, lines[1:])]
     ties = rated.board.tie_share
     said = [] if ties is None else [f"{rated.method_text}; {ties:.1%} ties."]
     missing = [" ".join(f"{line}.".split()) for line in rated.missing]
+    said += _judged(rated)
     return "\n".join([*lines, "", *missing, *said, *rated.notes]) + "\n"
+
+
+def _under_their_groups(rated: RatedCsv, lines: list[str]) -> Iterator[str]:
+    """The lines of models, with a head over each group where they were never compared."""
+    parts = [line.part for line in rated.standings]
+    several = len({part for part in parts if part >= 0}) > 1
+    for place, (part, line) in enumerate(zip(parts, lines, strict=True)):
+        if several and (place == 0 or part != parts[place - 1]):
+            yield f"group {part + 1}, rated by itself:" if part >= 0 else "not rated:"
+        yield line
+
+
+def _judged(rated: RatedCsv) -> list[str]:
+    """How many pairs are told apart, and how far the cross-check differs."""
+    said = []
+    found = rated.board.told_apart
+    if found is not None:
+        models = len(rated.board.lines)
+        said.append(
+            f"{int(found.above.sum())} of {models * (models - 1) // 2} pairs are told apart with "
+            "all of them judged at once, at 5 % for the whole table."
+        )
+    if rated.cross_check is not None:
+        said.append(
+            f"Bounds by the plain sandwich differ from these by at most {rated.cross_check:.0f} "
+            "points."
+        )
+    return said
 
 
 def _csv(rated: RatedCsv) -> str:
@@ -217,11 +316,8 @@ def _csv(rated: RatedCsv) -> str:
     for note in rated.notes:
         print(escape_controls(note), file=sys.stderr)
     return csv_text(
-        ("model", "rank", "rating", "lower", "upper", "votes", "note"),
-        (
-            (line.name, line.rank, line.rating, line.lower, line.upper, line.votes, line.note)
-            for line in rated.standings
-        ),
+        COLUMNS,
+        ([_value(line, column) for column in COLUMNS] for line in rated.standings),
     )
 
 
@@ -231,6 +327,7 @@ def _json(rated: RatedCsv) -> str:
     document: dict[str, Any] = {
         "method": board.method.value,
         "resample": rated.resample,
+        "intervals": board.intervals.value,
         "rounds": board.rounds,
         "degenerate_rounds": board.degenerate_rounds,
         "seed": board.seed,
@@ -239,18 +336,11 @@ def _json(rated: RatedCsv) -> str:
         "status": board.status.value,
         "notes": list(rated.notes),
         "standings": [
-            {
-                "model": line.name,
-                "rank": line.rank,
-                "rating": _rounded(line.rating),
-                "lower": _rounded(line.lower),
-                "upper": _rounded(line.upper),
-                "votes": line.votes,
-                "note": line.note,
-            }
+            {column: _value(line, column, digits=4) for column in (*COLUMNS, *_CHECKS)}
             | ({"part": line.part} if len(parts) > 1 else {})
             for line in rated.standings
         ],
+        "pairs": _pairs(board),
     }
     return json.dumps(document, indent=2, ensure_ascii=False) + "\n"
 
@@ -258,7 +348,35 @@ def _json(rated: RatedCsv) -> str:
 def _latex(rated: RatedCsv) -> str:
     rows = ((escape(name), *rest) for name, *rest in _cells(rated))
     comments = (rated.method_text, *rated.notes)
-    return latex_table(rows, comments=comments, notes=rated.missing)
+    return latex_table(rows, comments=comments, heads=HEADS, notes=rated.missing)
+
+
+def _pairs(board: Leaderboard) -> list[dict[str, Any]] | None:
+    """Pairs with p-values adjusted for all of them; None where these were not judged."""
+    found = board.told_apart
+    if found is None:
+        return None
+    low, high = np.triu_indices(len(board.lines), 1)
+    if len(low) > MOST_PAIRS:
+        apart = (found.above | found.above.T)[low, high]
+        low, high = low[apart], high[apart]
+    return [
+        {
+            "a": board.lines[i].name,
+            "b": board.lines[j].name,
+            "difference": _rounded(float(found.difference[i, j])),
+            "p_adjusted": _rounded(float(found.p_value[i, j])),
+            "told_apart": bool(found.above[i, j] or found.above[j, i]),
+        }
+        for i, j in zip(low.tolist(), high.tolist(), strict=True)
+        if not np.isnan(found.p_value[i, j])
+    ]
+
+
+def _value(line: Line, column: str, *, digits: int | None = None) -> object:
+    """What a line has in a column of CSV and JSON."""
+    value = getattr(line, "name" if column == "model" else column)
+    return round(value, digits) if digits is not None and isinstance(value, float) else value
 
 
 def _rounded(value: float | None) -> float | None:

@@ -92,6 +92,7 @@ def _kinds(votes: Comparisons) -> tuple[NDArray[np.unsignedinteger], IntArray, F
     ends = np.repeat([counts.low, counts.high], 3, axis=1)
     gain = np.tile([1.0, 0.0, -1.0], len(counts.low))
     kind_of = np.repeat(counts.pair_of * 3 + counts.outcome_of, votes.count)
+    kind_of.sort()  # so that no order of lines counts
     return kind_of.astype(np.min_scalar_type(len(gain))), ends, gain
 
 

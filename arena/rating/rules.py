@@ -37,6 +37,15 @@ def default_intervals(method: Method, unit: Unit) -> Intervals:
     return Intervals.CLOSED_FORM
 
 
+def unit_for(*, judges: bool, items: bool) -> Unit:
+    """What hangs together in votes of which judges, items or both are known."""
+    if judges and items:
+        return Unit.TWO_WAY
+    if judges:
+        return Unit.EXPERT
+    return Unit.SCENARIO if items else Unit.VOTE
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Rules:
     """How to rate."""

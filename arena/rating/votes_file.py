@@ -1,4 +1,4 @@
-"""Votes from a CSV file with the columns model_a, model_b, winner, and maybe judge and item.
+"""Votes from a file with the columns model_a, model_b, winner, and maybe judge and item.
 
 A quick pass reads blocks of lines into numbers and only notices that something is wrong; a slow
 one, line by line, then finds where and says it. Millions of lines take seconds and little memory:
@@ -9,15 +9,16 @@ from __future__ import annotations
 
 import csv
 from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 from itertools import islice
 from pathlib import Path
-from typing import TextIO
 
 import numpy as np
 from numpy.typing import NDArray
 
 from arena.rating.comparisons import LOSS, TIE, WIN, Comparisons, IntArray
+from arena.rating.tabular import TextTable, fitted, open_table
 
 NEEDED = ("model_a", "model_b", "winner")
 OPTIONAL = ("judge", "item")
@@ -56,16 +57,15 @@ def columns_of(path: Path) -> tuple[str, ...]:
     Raises:
         VotesFileUnreadable: The first line does not name the needed columns, each once.
     """
-    with _opened(path) as lines:
-        header = _header(csv.reader(lines, strict=True))
-    return tuple(name for name in OPTIONAL if name in header)
+    with open_votes(path) as table:
+        return tuple(name for name in OPTIONAL if name in table.header)
 
 
 def read_votes(path: Path, *, clusters: Sequence[str]) -> VotesFile:
     """Read all votes.
 
     Args:
-        path: UTF-8 with or without a mark at its start.
+        path: CSV, JSON lines or Parquet; text in UTF-8 or UTF-16.
         clusters: Which of the optional columns to read; every line must fill them.
 
     Raises:
@@ -76,38 +76,74 @@ def read_votes(path: Path, *, clusters: Sequence[str]) -> VotesFile:
     names = [_Codes() for _ in range(1 + len(clusters))]
     try:
         rows, counts = _read(path, wanted, names)
+    except VotesFileUnreadable:
+        raise
     except (ValueError, KeyError, csv.Error) as error:
         _explain(path, wanted)
         raise VotesFileUnreadable(f"{path}: {error}") from error
     return _as_votes(rows, counts, clusters, names)
 
 
-class _Codes(dict[str, int]):
-    """Numbers names as they come."""
+@contextmanager
+def open_votes(path: Path) -> Iterator[TextTable]:
+    """The table of a file that has the needed columns, each once.
 
-    def __missing__(self, name: str) -> int:
-        number = self[name] = len(self)
+    Raises:
+        VotesFileUnreadable: It has not, or can't be read at all.
+    """
+    try:
+        opened = open_table(path, (*NEEDED, *OPTIONAL))
+        table = opened.__enter__()
+    except (StopIteration, RuntimeError):
+        raise VotesFileUnreadable(f"line 1: the file is empty; {_columns_text()}") from None
+    except (csv.Error, ValueError) as error:
+        raise VotesFileUnreadable(f"line 1: {error}; {_columns_text()}") from error
+    try:
+        _check_header(table.header)
+        yield table
+    finally:
+        opened.__exit__(None, None, None)
+
+
+class _Codes(dict[str, int]):
+    """Numbers names as they come, without the spaces around them."""
+
+    def __init__(self) -> None:
+        self.names: list[str] = []
+
+    def __missing__(self, cell: str) -> int:
+        name = cell.strip()
+        if is_missing(name):
+            raise ValueError("a cell is empty")
+        if name == cell:
+            self.names.append(name)
+            number = len(self.names) - 1
+        else:
+            number = self[name]
+        self[cell] = number
         return number
 
 
-def _opened(path: Path) -> TextIO:
-    return path.open(encoding="utf-8-sig", newline="")
+class _Winners(dict[str, int]):
+    """Half points of the first by the winner's name."""
+
+    def __missing__(self, cell: str) -> int:
+        number = self[cell] = _HALF_POINTS[cell.strip()]
+        return number
 
 
-def _header(reader: Iterator[list[str]]) -> list[str]:
-    try:
-        header = [name.strip() for name in next(reader)]
-    except StopIteration:
-        raise VotesFileUnreadable(f"line 1: the file is empty; {_columns_text()}") from None
-    except (csv.Error, UnicodeDecodeError) as error:
-        raise VotesFileUnreadable(f"line 1: {error}; {_columns_text()}") from error
+def is_missing(name: str) -> bool:
+    """Whether a cell says nothing: empty, or what other programs write for that."""
+    return not name or name.lower() == "nan"
+
+
+def _check_header(header: Sequence[str]) -> None:
     for name in NEEDED:
         if name not in header:
             raise VotesFileUnreadable(f"line 1: there is no column {name!r}; {_columns_text()}")
     twice = [name for name in (*NEEDED, *OPTIONAL) if header.count(name) > 1]
     if twice:
         raise VotesFileUnreadable(f"line 1: the column {twice[0]!r} is there twice")
-    return header
 
 
 def _columns_text() -> str:
@@ -119,24 +155,20 @@ def _columns_text() -> str:
 
 def _read(path: Path, wanted: Sequence[str], names: list[_Codes]) -> tuple[Rows, IntArray]:
     """(R, 3 + clusters) first, second, outcome in half points, clusters; (R,) how often."""
-    coders = [names[0], names[0], _HALF_POINTS, *names[1:]]
+    coders = [names[0], names[0], _Winners(), *names[1:]]
     parts: list[tuple[Rows, IntArray]] = [
         (np.empty((0, len(wanted)), np.int32), np.empty(0, np.int64))
     ]
     pending = 0
-    with _opened(path) as lines:
-        reader = csv.reader(lines, strict=True)
-        header = _header(reader)
-        places = [header.index(name) for name in wanted]
-        while block := list(islice(reader, _LINES_AT_ONCE)):
-            rows = _coded(block, len(header), places, coders)
+    with open_votes(path) as table:
+        places = [table.header.index(name) for name in wanted]
+        while block := list(islice(table.rows, _LINES_AT_ONCE)):
+            rows = _coded(block, len(table.header), places, coders)
             parts.append((rows, np.ones(len(rows), dtype=np.int64)))
             pending += len(rows)
             if pending > _ROWS_BEFORE_GROUPING and len(wanted) == len(NEEDED):
                 parts = [_grouped(parts)]
                 pending = 0
-    if any("" in codes for codes in names):
-        raise ValueError("a cell is empty")
     if len(wanted) == len(NEEDED):
         return _grouped(parts)
     # With judges and items hardly two votes are equal.
@@ -152,6 +184,8 @@ def _coded(
         block = [row for row in block if row]
     if not block:
         return np.empty((0, len(places)), dtype=np.int32)
+    if any(len(row) > width for row in block):
+        block = [fitted(row, width) for row in block]
     columns = list(zip(*block, strict=True))
     if len(columns) != width:
         raise ValueError("a line has another number of cells")
@@ -200,7 +234,7 @@ def _as_votes(
     }
     nobody = np.zeros(len(rows), dtype=np.int64)
     votes = Comparisons(
-        names=tuple(sorted(names[0])),
+        names=tuple(sorted(names[0].names)),
         first=places[0][rows[:, 0]],
         second=places[0][rows[:, 1]],
         score=rows[:, 2] / 2.0,
@@ -222,9 +256,9 @@ def _repeats(rows: Rows, counts: IntArray) -> int:
 
 def _alphabetical(codes: _Codes) -> IntArray:
     """(n,) from the number of a name to its place in the alphabet."""
-    places = np.empty(len(codes), dtype=np.int64)
-    for place, name in enumerate(sorted(codes)):
-        places[codes[name]] = place
+    order = sorted(range(len(codes.names)), key=codes.names.__getitem__)
+    places = np.empty(len(order), dtype=np.int64)
+    places[order] = np.arange(len(order))
     return places
 
 
@@ -233,31 +267,31 @@ def _alphabetical(codes: _Codes) -> IntArray:
 
 def _explain(path: Path, wanted: Sequence[str]) -> None:
     """Raise for the first line that is wrong, and say what is allowed."""
-    with _opened(path) as lines:
-        reader = csv.reader(lines, strict=True)
-        header = _header(reader)
-        places = {name: header.index(name) for name in wanted}
-        before = reader.line_num
+    with open_votes(path) as table:
+        places = {name: table.header.index(name) for name in wanted}
+        before = table.lines_read()
         while True:
             try:
-                row = next(reader, None)
-            except (csv.Error, UnicodeDecodeError) as error:
+                row = next(table.rows, None)
+            except (csv.Error, ValueError) as error:
                 raise VotesFileUnreadable(f"line {before + 1}: {error}") from error
             if row is None:
                 return
-            if row and (wrong := _wrong(row, len(header), places)):
+            if row and (wrong := _wrong(row, len(table.header), places)):
                 raise VotesFileUnreadable(f"line {before + 1}: {wrong}")
-            before = reader.line_num
+            before = table.lines_read()
 
 
 def _wrong(row: list[str], width: int, places: dict[str, int]) -> str:
     """What is wrong with a line, empty if nothing is."""
+    row = fitted(row, width)
     if len(row) != width:
         return f"there are {len(row)} cells, in the first line {width}"
-    cells = {name: row[place] for name, place in places.items()}
-    empty = [name for name, cell in cells.items() if not cell]
+    cells = {name: row[place].strip() for name, place in places.items()}
+    empty = [name for name, cell in cells.items() if is_missing(cell)]
     if empty:
-        return f"{empty[0]} is empty"
+        found = cells[empty[0]]
+        return f"{empty[0]} is {found!r}, which is no name" if found else f"{empty[0]} is empty"
     if cells["winner"] not in WINNERS:
         return f"the winner {cells['winner']!r} is none of {', '.join(WINNERS)}"
     if cells["model_a"] == cells["model_b"]:

@@ -16,7 +16,7 @@ from arena.queries.judged import is_imported, last_vote_of
 from arena.queries.vote_sets import Filters
 from arena.rating.bootstrap import Unit
 from arena.rating.leaderboard import Method
-from arena.rating.rules import Intervals, default_intervals
+from arena.rating.rules import Intervals, default_intervals, unit_for
 from arena.services.snapshots import compute, keep, note_progress
 from arena.services.turns import in_turn
 from augment.errors import Conflict, UnknownName
@@ -224,8 +224,8 @@ def _default_unit(study: Study, method: Method) -> Unit:
     if not is_imported(study):
         return Unit.TWO_WAY
     votes = ImportedVote.objects.filter(file__study=study)
-    unnamed = votes.filter(judge="").exists() or votes.filter(item="").exists()
-    return Unit.VOTE if unnamed else Unit.TWO_WAY
+    judges, items = (not votes.filter(**{name: ""}).exists() for name in ("judge", "item"))
+    return unit_for(judges=judges, items=items)
 
 
 def _check_draws(method: Method, unit: Unit, rounds: int, seed: int) -> None:

@@ -83,7 +83,7 @@ def trust(arrays: VoteArrays, votes: VoteSet, board: Leaderboard, *, seed: int) 
 def board_remarks(board: Leaderboard) -> BoardRemarks:
     """What a rating says beside its lines."""
     names = [line.name for line in board.lines]
-    found = board.separation if _knows_what_hangs_together(board) else None
+    found = board.told_apart
     return BoardRemarks(
         reasons=board.reasons,
         warnings=board.warnings,
@@ -102,12 +102,6 @@ def board_remarks(board: Leaderboard) -> BoardRemarks:
         else tuple((names[i], names[j]) for i, j in np.argwhere(found.above).tolist()),
         p_values=None if found is None else _p_values(names, found),
     )
-
-
-def _knows_what_hangs_together(board: Leaderboard) -> bool:
-    """Whether "at 5 % for the whole table" holds: resamples take too much for certain."""
-    alone = board.experts <= 1 and board.scenarios <= 1
-    return board.intervals is Intervals.CLOSED_FORM or alone
 
 
 def _p_values(names: list[str], found: Separation) -> tuple[PairP, ...]:

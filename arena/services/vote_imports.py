@@ -7,7 +7,6 @@ by the next one.
 
 from __future__ import annotations
 
-import csv
 import hashlib
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -21,7 +20,7 @@ from django.utils import timezone
 
 from arena.errors import VotesUnreadable
 from arena.models import ImportedVote, Study, VoteFile
-from arena.rating.votes_file import VotesFileUnreadable, columns_of, read_votes
+from arena.rating.votes_file import VotesFileUnreadable, columns_of, open_votes, read_votes
 from arena.services.turns import in_turn
 from augment.errors import Conflict
 from augment.services.events import log_event
@@ -53,8 +52,8 @@ def import_votes(
     """Keep all votes of a file; on any fault nothing is kept.
 
     Args:
-        path: CSV in UTF-8 with the columns model_a, model_b and winner, and maybe judge and item;
-            others are passed over.
+        path: CSV, JSON lines or Parquet with the columns model_a, model_b and winner, and maybe
+            judge and item; others are passed over.
         name: Of the study, unique.
         is_simulated: The votes are made up: every page and file of them says so.
         actor: Who imports, for the log.
@@ -183,25 +182,24 @@ def _taken(name: str) -> Conflict:
 
 def _rows(path: Path, file: VoteFile) -> Iterator[tuple[ImportedVote, bool]]:
     """One row a line, and whether it is marked as simulated; the file has been checked before."""
-    with path.open(encoding="utf-8-sig", newline="") as lines:
-        reader = csv.reader(lines, strict=True)
-        place = {column.strip(): index for index, column in enumerate(next(reader))}
-        for cells in reader:
+    with open_votes(path) as table:
+        place = {column: index for index, column in enumerate(table.header)}
+        for cells in table.rows:
             if not cells:
                 continue
             found = {
-                column: cells[place[column]] if column in place else ""
+                column: cells[place[column]].strip() if column in place else ""
                 for column in ("model_a", "model_b", "winner", "judge", "item", SIMULATED)
             }
             for column, cell in found.items():
                 if len(cell) > LONGEST_CELL:
                     raise VotesUnreadable(
-                        f"line {reader.line_num}: {column} has {len(cell)} signs, "
+                        f"line {table.lines_read()}: {column} has {len(cell)} signs, "
                         f"{LONGEST_CELL} are allowed"
                     )
             row = ImportedVote(
                 file=file,
-                line=reader.line_num,
+                line=table.lines_read(),
                 first=found["model_a"],
                 second=found["model_b"],
                 outcome=ImportedVote.Outcome(found["winner"]),

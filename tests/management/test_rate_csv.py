@@ -11,10 +11,12 @@ import sys
 from pathlib import Path
 from typing import Any
 
+import pyarrow
 import pytest
 from django.core.management import CommandError, call_command
+from pyarrow import parquet
 
-from arena.management.rate_csv import CsvNotRated, run
+from arena.management.rate_csv import COLUMNS, CsvNotRated, run
 from tests.house.source import ROOT
 
 HEAD = "model_a,model_b,winner"
@@ -60,7 +62,7 @@ WITH_CLUSTERS = f"{HEAD},judge,item"
 def test_json_has_standings_best_first(votes: Any) -> None:
     found = document(votes(*PLAIN))
     assert [list(row) for row in found["standings"]] == [
-        ["model", "rank", "rating", "lower", "upper", "votes", "note"]
+        [*COLUMNS, "check_lower", "check_upper"]
     ] * 3
     ratings = [row["rating"] for row in found["standings"]]
     assert ratings == sorted(ratings, reverse=True)
@@ -115,8 +117,8 @@ def test_the_same_seed_gives_the_same_text_and_the_order_of_lines_does_not_count
 
 def test_the_table_names_the_method_beneath(votes: Any) -> None:
     lines = run(file=votes(*PLAIN), rounds=100, seed=2).splitlines()
-    assert lines[0].split() == ["Model", "Rank", "Elo", "95%", "CI", "Votes"]
-    assert re.fullmatch(r"c +1 +\d+ +-\d+/\+\d+ +35", lines[1])
+    assert lines[0].split() == ["Model", "Rank", "Elo", "95%", "CI", "Votes", "95%", "ranks"]
+    assert re.fullmatch(r"c +1 +\d+ +-\d+/\+\d+ +35 +1–3", lines[1])
     assert "Bradley-Terry" in lines[5]
     assert "100 resamples (vote), seed 2; 90 votes; 15.6% ties" in lines[5]
 
@@ -125,7 +127,7 @@ def test_csv_cells_are_no_formulas(votes: Any, capsys: pytest.CaptureFixture[str
     lines = [line.replace("a,", "=1+1,").replace(",a,", ",=1+1,") for line in PLAIN]
     said = run(file=votes(*lines), rounds=100, format="csv")
     rows = list(csv.DictReader(io.StringIO(said)))
-    assert list(rows[0]) == ["model", "rank", "rating", "lower", "upper", "votes", "note"]
+    assert list(rows[0]) == list(COLUMNS)
     assert {row["model"] for row in rows} >= {"'=1+1"}
     assert "does not name both" in capsys.readouterr().err
 
@@ -133,7 +135,9 @@ def test_csv_cells_are_no_formulas(votes: Any, capsys: pytest.CaptureFixture[str
 def test_latex_has_the_form_of_the_papers_table(votes: Any) -> None:
     said = run(file=votes(*[line.replace("c", "c_50%") for line in PLAIN]), format="latex")
     assert r"\textbf{Model} & \textbf{Rank} & \textbf{Elo}~$\uparrow$ & \textbf{95\% CI}" in said
-    rows = re.findall(r"^    (\S+) & (\d+) & (\d+) & (-\d+/\+\d+) & (\d+)\\\\$", said, re.M)
+    rows = re.findall(
+        r"^    (\S+) & (\d+) & (\d+) & (-\d+/\+\d+) & (\d+) & [\d-]+\\\\$", said, re.M
+    )
     assert len(rows) == 3
     assert r"c\_50\%" in {row[0] for row in rows}
 
@@ -150,6 +154,89 @@ def test_a_mark_quotes_other_columns_blank_lines_and_windows_ends_do_not_matter(
     assert document(file, rounds=100)["standings"] == plain
 
 
+@pytest.mark.parametrize(
+    ("separator", "encoding"),
+    [(";", "utf-8"), ("\t", "utf-16"), ("|", "utf-16-le"), (",", "utf-16-be"), (";", "utf-16")],
+)
+def test_separators_and_utf_16_are_recognised(
+    votes: Any, tmp_path: Path, separator: str, encoding: str
+) -> None:
+    plain = document(votes(*PLAIN), rounds=100)["standings"]
+    path = tmp_path / "other.csv"
+    text = "\n".join([HEAD, *PLAIN]).replace(",", separator) + "\n"
+    path.write_bytes(text.encode(encoding))
+    assert document(str(path), rounds=100)["standings"] == plain
+
+
+def test_spaces_around_names_and_empty_columns_at_the_end_do_not_count(votes: Any) -> None:
+    plain = document(votes(*PLAIN), rounds=100)["standings"]
+    lines = [f" {line.replace(',', ' ,')},," if n % 2 else line for n, line in enumerate(PLAIN)]
+    assert document(votes(*lines, head=f"{HEAD},"), rounds=100)["standings"] == plain
+
+
+def test_a_cell_of_a_column_that_is_passed_over_may_be_long(votes: Any) -> None:
+    lines = [f"{PLAIN[0]},{'x' * 200_000}", *(f"{line}," for line in PLAIN[1:])]
+    plain = document(votes(*PLAIN), rounds=100)["standings"]
+    assert document(votes(*lines, head=f"{HEAD},comment"), rounds=100)["standings"] == plain
+
+
+@pytest.mark.parametrize("kind", ["jsonl", "parquet"])
+def test_json_lines_and_parquet_are_read(votes: Any, tmp_path: Path, kind: str) -> None:
+    plain = document(votes(*PLAIN), rounds=100)["standings"]
+    rows = [dict(zip(HEAD.split(","), line.split(","), strict=True)) for line in PLAIN]
+    path = tmp_path / "votes"
+    if kind == "parquet":
+        parquet.write_table(pyarrow.Table.from_pylist(rows), path)
+    else:
+        path.write_text("\n".join(json.dumps(row | {"more": 1}) for row in rows))
+    assert document(str(path), rounds=100)["standings"] == plain
+
+
+def test_a_wrong_line_of_json_is_named(tmp_path: Path) -> None:
+    path = tmp_path / "votes.jsonl"
+    good = json.dumps({"model_a": "a", "model_b": "b", "winner": "tie"})
+    path.write_text(f"{good}\n{good}\nnothing\n")
+    with pytest.raises(CsvNotRated, match="line 3: no JSON object"):
+        run(file=str(path))
+
+
+def test_a_file_with_a_judge_and_no_item_is_clustered_by_judge(votes: Any) -> None:
+    lines = [line.rpartition(",")[0] for line in clustered()]
+    found = document(votes(*lines, head=f"{HEAD},judge"), rounds=100)
+    assert (found["resample"], found["intervals"]) == ("judge", "closed form")
+    assert "names no item" in found["notes"][0]
+
+
+def test_davidson_rank_sets_pairs_and_cross_check_are_offered(votes: Any) -> None:
+    file = votes(*clustered(900), head=WITH_CLUSTERS)
+    found = document(file, method="davidson", rounds=100)
+    assert found["method"] == "davidson"
+    found = document(file, rounds=100)
+    assert [pair["a"] + pair["b"] for pair in found["pairs"]] == ["ab", "ac", "bc"]
+    assert all(0.0 < pair["p_adjusted"] <= 1.0 for pair in found["pairs"])
+    for line in found["standings"]:
+        assert 1 <= line["rank_best"] <= line["rank_worst"] <= 3
+        assert line["check_lower"] <= line["rating"] <= line["check_upper"]
+    said = run(file=file, rounds=100)
+    assert "of 3 pairs are told apart with all of them judged at once" in said
+    assert "Bounds by the plain sandwich differ" in said
+
+
+def test_groups_that_were_never_compared_stand_apart_in_the_table(votes: Any) -> None:
+    other = [line.replace("a,", "x,").replace("b,", "y,").replace("c,", "z,") for line in PLAIN]
+    lines = run(file=votes(*PLAIN, *other), rounds=100).splitlines()
+    assert [n for n, line in enumerate(lines) if "rated by itself:" in line] == [1, 5]
+
+
+def test_online_elo_does_not_depend_on_the_order_of_lines_unless_asked_to(votes: Any) -> None:
+    def standings(lines: list[str], order: str) -> Any:
+        return document(votes(*lines), method="elo", order=order, rounds=40)["standings"]
+
+    turned = list(reversed(PLAIN))
+    assert standings(PLAIN, "shuffled") == standings(turned, "shuffled")
+    assert standings(PLAIN, "recorded") != standings(turned, "recorded")
+
+
 def test_names_may_hold_commas_quotes_and_line_breaks(votes: Any) -> None:
     lines = [line.replace("b,", '"b, ""the\nother""",') for line in PLAIN]
     found = document(votes(*lines), rounds=50)
@@ -163,6 +250,9 @@ def test_names_may_hold_commas_quotes_and_line_breaks(votes: Any) -> None:
         (["a,b,TIE"], "line 2: the winner 'TIE' is none of"),
         (["a,b,"], "line 2: winner is empty"),
         (["a,b,tie", "", "a,,tie"], "line 4: model_b is empty"),
+        (["a,b,tie", "a, NaN ,tie"], "line 3: model_b is 'NaN', which is no name"),
+        (["a,b,tie", " a ,a,tie"], "line 3: 'a' is compared with itself"),
+        (["a,b,tie", "a,b,tie,,x"], "line 3: there are 5 cells, in the first line 3"),
         (["a,b,tie", "a,a,model_a"], "line 3: 'a' is compared with itself"),
         (["a,b,tie", "a,b"], "line 3: there are 2 cells, in the first line 3"),
         (['"a\nx",b,tie', "a,b,nobody"], "line 4: the winner 'nobody'"),

@@ -5,6 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from arena.rating.bootstrap import Unit
+from arena.rating.leaderboard import Intervals, rate
 from tests.benchmarks.coverage_study import DEFAULT, PAPERS, PLAIN, RESAMPLED, Found, study
 from tests.benchmarks.worlds import THRESHOLDS, World, paper_ratings
 
@@ -69,3 +71,19 @@ def test_the_effects_of_a_world_show_in_its_votes() -> None:
     of_pair = np.minimum(votes.first, votes.second) + np.maximum(votes.first, votes.second) == 1
     means = [score[of_pair & (votes.expert == one)].mean() for one in range(4)]
     assert np.ptp(means) > 0.3
+
+
+@pytest.mark.parametrize(("experts", "shown"), [(3, False), (4, False), (5, True)])
+def test_no_pair_is_marked_where_experts_are_too_few_to_judge_all_at_once(
+    experts: int, shown: bool
+) -> None:
+    world = World(ratings=np.linspace(700.0, 1300.0, 5), experts=experts, votes_per_expert=60)
+    board = rate(world.votes(np.random.default_rng(1)), rounds=100)
+    assert (board.told_apart is not None) == shown
+
+
+def test_resamples_of_votes_that_hang_together_mark_no_pair() -> None:
+    votes = World(ratings=EQUAL, experts=9, votes_per_expert=40).votes(np.random.default_rng(1))
+    for unit in (Unit.VOTE, Unit.TWO_WAY):
+        board = rate(votes, unit=unit, intervals=Intervals.RESAMPLES, rounds=50)
+        assert board.told_apart is None
