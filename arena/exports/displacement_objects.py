@@ -8,7 +8,7 @@ import json
 from collections.abc import Collection, Sequence
 
 from arena.exports.formats import Format, formats
-from arena.exports.parquet import NUMBER, TEXT, YES_NO, parquet_bytes
+from arena.exports.parquet import NUMBER, TEXT, WHOLE, YES_NO, parquet_bytes
 from arena.services.cells import cell
 from augment.models import GenerationJob
 from augment.services.judging.displaced_objects import DisplacedObject, ObjectPosition, objects_of
@@ -20,7 +20,7 @@ COLUMNS = {
     "scenario": TEXT, "type": TEXT, "contestant": TEXT, "name": TEXT, "model": TEXT,
     "variant": TEXT, "simulated": YES_NO, "augmentation": TEXT, "state": TEXT, "object": TEXT,
     "class": TEXT, "reference": TEXT, "reference_x_m": NUMBER, "reference_y_m": NUMBER,
-    "generated": TEXT, "x_m": NUMBER, "y_m": NUMBER, "distance_m": NUMBER,
+    "generated": TEXT, "x_m": NUMBER, "y_m": NUMBER, "distance_m": NUMBER, "sample": WHOLE,
 }  # fmt: skip
 """What each column holds. `object` is matched, missing or surplus; `contestant` is the slug,
 `augmentation` the code; places are in the ego frame; what does not exist is empty."""
@@ -89,6 +89,7 @@ def _row(one: DisplacedObject) -> tuple[object, ...]:
         *_place(one.reference),
         *_place(one.generated),
         None if one.distance_m is None else round(one.distance_m, 4),
+        row.sample,
     )
 
 

@@ -127,6 +127,7 @@ def _single(one: Measured) -> dict[str, Any]:
         "scenario": one.row.scenario.slug,
         "type": one.row.scenario.type,
         "contestant": one.row.contestant.slug,
+        "sample": one.row.sample,
         "state": one.row.state,
         "missing": list(one.displacement.missing),
         "surplus": list(one.displacement.surplus),

@@ -137,17 +137,22 @@ def _in_order(
     rng: np.random.Generator,
 ) -> tuple[list[_Item], int]:
     """The items with the largest gap that can be kept, also to what was shown before."""
-    last = [grid.scenarios.index(name) for name in before[-rules.scenario_gap :]]
+    bases = [int(base) for base in grid.bases]
+    last = [bases[grid.scenarios.index(name)] for name in before[-rules.scenario_gap :]]
     for gap in range(rules.scenario_gap, -1, -1):
         for _ in range(5):
-            order = _try_order(items, last[len(last) - min(gap, len(last)) :], gap, rng)
+            order = _try_order(items, last[len(last) - min(gap, len(last)) :], gap, rng, bases)
             if order is not None:
                 return order, gap
     raise AssertionError("without a gap any order will do")
 
 
 def _try_order(
-    items: Sequence[_Item], last: list[int], gap: int, rng: np.random.Generator
+    items: Sequence[_Item],
+    last: list[int],
+    gap: int,
+    rng: np.random.Generator,
+    bases: Sequence[int],
 ) -> list[_Item] | None:
     """The fullest allowed scenario first; a repeat only after what it shows. None if it sticks."""
     waiting: dict[int, list[_Item]] = {}
@@ -158,12 +163,12 @@ def _try_order(
     recent, order = list(last), list[_Item]()
     for _ in items:
         barred = set(recent[-gap:]) if gap else set()
-        open_ = [place for place in waiting if waiting[place] and place not in barred]
+        open_ = [place for place in waiting if waiting[place] and bases[place] not in barred]
         if not open_:
             return None
         place = max(open_, key=lambda place: len(waiting[place]) + rng.random())
         order.append(waiting[place].pop())
-        recent.append(place)
+        recent.append(bases[place])
     return order
 
 

@@ -51,6 +51,7 @@ def put_in_order(
     gap: int,
     distance: int,
     rng: np.random.Generator,
+    bases: IntArray | None = None,
 ) -> tuple[list[list[Slot]], int]:
     """Each expert's units and extras in order, and the gap that all orders keep.
 
@@ -60,14 +61,18 @@ def put_in_order(
         gap: Others wanted between two showings of a scenario.
         distance: Places wanted between a unit and its repeat.
         rng: Shuffles.
+        bases: (S,) columns with the same number are samples of one scenario, which are kept apart
+            like one column; None for all different.
     """
     counts = chosen.sum(axis=1)
+    if bases is None:
+        bases = np.arange(counts.shape[1])
     for row, more in zip(counts, extras, strict=True):
         for scenario in [scenario for _, scenario in more.repeated] + list(more.checks):
             row[scenario] += 1
-    held = min(largest_gap(row, gap) for row in counts)
+    held = min(largest_gap(_summed(row, bases), gap) for row in counts)
     return [
-        _order(mine, more, row, held, distance, rng)
+        _order(mine, more, row, held, distance, rng, bases)
         for mine, more, row in zip(chosen, extras, counts, strict=True)
     ], held
 
@@ -79,6 +84,7 @@ def _order(
     gap: int,
     distance: int,
     rng: np.random.Generator,
+    bases: IntArray,
 ) -> list[Slot]:
     """One expert's order; where a repeat comes too early, others are tried and the best kept."""
     waiting = [
@@ -89,13 +95,35 @@ def _order(
     best: list[Slot] = []
     nearest = -1
     for _ in range(TRIES if more.repeated else 1):
-        slots = _filled(waiting, more, sequence(counts, gap, rng), distance, rng)
+        columns = _columns(sequence(_summed(counts, bases), gap, rng), counts, bases, rng)
+        slots = _filled(waiting, more, columns, distance, rng)
         gaps = [index - slot.of for index, slot in enumerate(slots) if slot.of is not None]
         if min(gaps, default=distance) > nearest:
             best, nearest = slots, min(gaps, default=distance)
         if nearest >= distance:
             break
     return best
+
+
+def _summed(counts: IntArray, bases: IntArray) -> IntArray:
+    """Showings of each scenario, over its samples."""
+    return np.bincount(bases, weights=counts, minlength=int(bases.max()) + 1).astype(np.int64)
+
+
+def _columns(
+    scenarios: list[int], counts: IntArray, bases: IntArray, rng: np.random.Generator
+) -> list[int]:
+    """Which column each place of a scenario goes to: its only one, or its samples by lot."""
+    if len(set(bases.tolist())) == len(bases):
+        return scenarios
+    waiting = {
+        int(base): [
+            int(c)
+            for c in rng.permutation(np.repeat(np.arange(len(bases)), counts * (bases == base)))
+        ]
+        for base in set(bases.tolist())
+    }
+    return [waiting[scenario].pop() for scenario in scenarios]
 
 
 def _filled(

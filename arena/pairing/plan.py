@@ -52,7 +52,9 @@ def plan(rules: PlanRules) -> MatchupPlan:
     rng = np.random.default_rng(rules.seed)
     chosen, probability = _chosen(rules, grid, rng)
     extras = [_extras(rules, grid, mine, rng) for mine in chosen]
-    orders, gap = put_in_order(chosen, extras, rules.scenario_gap, rules.repeat_distance, rng)
+    orders, gap = put_in_order(
+        chosen, extras, rules.scenario_gap, rules.repeat_distance, rng, grid.bases
+    )
     mains = [
         [(slot.pair, slot.scenario) for slot in order if slot.kind == MAIN] for order in orders
     ]

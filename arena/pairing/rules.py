@@ -7,11 +7,25 @@ from itertools import combinations
 
 import numpy as np
 
-from arena.pairing.arrays import BoolArray
+from arena.pairing.arrays import BoolArray, IntArray
 from arena.pairing.order import MAIN
 
 DEFAULT_SCENARIO_GAP = 5
 """How many other matchups an expert judges before a scenario comes again."""
+
+
+_SAMPLE = "#"
+"""Between a scenario and the number of a sample; no slug has one."""
+
+
+def place_of(scenario: str, sample: int) -> str:
+    """The name of one sample of a scenario, where each is judged on its own."""
+    return f"{scenario}{_SAMPLE}{sample}"
+
+
+def scenario_of(place: str) -> str:
+    """The scenario of a place: itself, or what its sample is one of."""
+    return place.partition(_SAMPLE)[0]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -19,6 +33,8 @@ class Entry:
     """What can be shown: a contestant's picture of a scenario.
 
     Attributes:
+        scenario: Or one sample of it, by `place_of`.
+        sample: Which of the contestant's answers it is.
         picture: Names the picture's content; two entries with the same picture look the same, so
             they are never shown against each other.
     """
@@ -26,6 +42,7 @@ class Entry:
     scenario: str
     contestant: str
     picture: str
+    sample: int = 1
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -125,6 +142,13 @@ class Grid:
     pairs: tuple[tuple[str, str], ...]
     showable: BoolArray
     identical: tuple[tuple[str, str, str], ...]
+
+    @property
+    def bases(self) -> IntArray:
+        """(S,) which columns are samples of one scenario: those with the same number."""
+        names = [scenario_of(place) for place in self.scenarios]
+        known = {name: number for number, name in enumerate(dict.fromkeys(names))}
+        return np.array([known[name] for name in names], dtype=np.int64)
 
 
 def grid_of(entries: tuple[Entry, ...]) -> Grid:

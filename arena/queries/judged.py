@@ -14,6 +14,7 @@ from django.db.models import Max, Q
 
 from arena.models import ImportedVote, Person, Study, Vote
 from arena.pairing.order import MAIN
+from arena.pairing.rules import scenario_of
 from augment.models import Contestant
 
 AUTOMATIC = "automatic"
@@ -117,11 +118,12 @@ def automatic_ties(study: Study) -> list[Judged]:
     types = dict(study.scenarios.values_list("slug", "type"))
     return [
         Judged(
-            judge=AUTOMATIC, judge_name="Identical pictures", item=item, type=types[item],
+            judge=AUTOMATIC, judge_name="Identical pictures", item=scenario_of(place),
+            type=types[scenario_of(place)],
             kind=AUTOMATIC, left=left, right=right, outcome=Vote.Outcome.EQUAL.value,
             both_miss=False, is_simulated=False, ms_visible=None, matchup=None, repeat_of=None,
         )
-        for item, left, right in study.rules.get("identical", [])
+        for place, left, right in study.rules.get("identical", [])
     ]  # fmt: skip
 
 

@@ -12,13 +12,14 @@ from arena.errors import NothingToPlan, StudyNotOpen
 from arena.models import Matchup, Study
 from arena.pairing.following import follow_on
 from arena.pairing.later import deal, units_of
-from arena.pairing.rules import PlannedMatchup, grid_of
+from arena.pairing.rules import PlannedMatchup, grid_of, place_of
 from arena.queries.people import experts as expert_accounts
 from arena.services.plans import (
     next_batch,
     pictures_of,
     planned_so_far,
     rules_of,
+    shows_all_samples,
     store,
     votes_left,
 )
@@ -145,7 +146,7 @@ def _open_rows(study: Study, giver: User) -> list[Matchup]:
     )
     rows = list(
         untouched.select_for_update(of=("self",))
-        .select_related("scenario", "left__contestant", "right__contestant")
+        .select_related("study", "scenario", "left__contestant", "right__contestant")
         .order_by("position")
     )
     still = set(untouched.values_list("pk", flat=True))
@@ -153,10 +154,13 @@ def _open_rows(study: Study, giver: User) -> list[Matchup]:
 
 
 def _as_planned(row: Matchup) -> PlannedMatchup:
+    scenario = row.scenario.slug
+    if shows_all_samples(row.study):
+        scenario = place_of(scenario, 1 if row.kind == Matchup.Kind.CHECK else row.right.sample)
     return PlannedMatchup(
         expert="",
         position=row.position,
-        scenario=row.scenario.slug,
+        scenario=scenario,
         left=row.left.contestant.slug,
         right=row.right.contestant.slug,
         draw_probability=row.draw_probability,

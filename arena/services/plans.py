@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Iterable, Sequence
+from collections.abc import Collection, Iterable, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -13,6 +13,7 @@ from django.db.models import F, Max, QuerySet
 from arena.errors import NothingToPlan
 from arena.models import Matchup, Study
 from arena.pairing.plan import Check, Entry, PlannedMatchup, PlanRules
+from arena.pairing.rules import place_of, scenario_of
 from arena.queries.showings import view_of
 from augment.models import Augmentation, Contestant, Scenario
 from augment.sentences import Sentence, sentence
@@ -20,7 +21,7 @@ from augment.services.scenarios.descriptions import Description, descriptions
 from augment.services.scenarios.pictures import window_of
 
 Cells = dict[tuple[str, str], Augmentation]
-"""By scenario and contestant, the augmentation whose picture is shown."""
+"""By place (a scenario, or one sample of it) and contestant, the augmentation that is shown."""
 
 SoFar = dict[str, list[PlannedMatchup]]
 """Every expert's showings as they are stored, by position."""
@@ -44,14 +45,16 @@ def rules_of(study: Study) -> PlanRules:
     )
 
 
-def latest_pictures(contestants: list[Contestant], scenarios: list[Scenario]) -> Cells:
-    """The augmentation that finished last, per scenario and contestant; all must exist.
+def refuse_missing(
+    contestants: list[Contestant],
+    scenarios: list[Scenario],
+    cells: Collection[tuple[str, str]],
+) -> None:
+    """Do nothing where everybody has a picture of every scenario.
 
     Raises:
         NothingToPlan: Pictures are missing; the text names them.
     """
-    found = _showable(scenarios).filter(contestant__in=contestants)
-    cells = _by_cell(found.order_by(F("finished_at").asc(nulls_first=True), "pk"))
     missing = [
         sentence(
             "%(contestant)s on %(scenario)s", contestant=contestant.slug, scenario=scenario.slug
@@ -62,12 +65,11 @@ def latest_pictures(contestants: list[Contestant], scenarios: list[Scenario]) ->
     ]
     if missing:
         raise NothingToPlan(_no_pictures(missing))
-    return cells
 
 
 def check_pictures(scenarios: list[Scenario]) -> tuple[tuple[Check, ...], Cells]:
     """What attention checks there can be: the latest reference against the latest broken one."""
-    found = _showable(scenarios).filter(
+    found = showable(scenarios).filter(
         contestant__kind__in=[Kind.REFERENCE, Kind.CHECK], state=Augmentation.State.DONE
     )
     latest: dict[tuple[str, str], Augmentation] = {}
@@ -127,15 +129,33 @@ def enough_checks(scenarios: list[Scenario], *, wanted: int) -> tuple[tuple[Chec
 def pictures_of(study: Study) -> Cells:
     """The pictures that the study was opened with; later ones of the same contestants stay out."""
     rules = rules_of(study)
-    wanted = {(entry.scenario, entry.contestant): entry.picture for entry in rules.entries}
+    wanted = {(entry.scenario, entry.contestant): entry for entry in rules.entries}
     scenarios = list(study.scenarios.only("slug"))
-    _, cells = check_pictures(scenarios)
-    rows = _showable(scenarios).filter(contestant__in=study.contestants.all()).order_by("pk")
+    _, cells = placed_checks(*check_pictures(scenarios), shows_all=shows_all_samples(study))
+    rows = showable(scenarios).filter(contestant__in=study.contestants.all()).order_by("pk")
     for row in rows:
-        cell = (row.scenario.slug, row.contestant.slug)
-        if wanted.get(cell) == row.image:
+        cell = (_place(study, row), row.contestant.slug)
+        entry = wanted.get(cell)
+        if entry is not None and (entry.picture, entry.sample) == (row.image, row.sample):
             cells[cell] = row
     return cells
+
+
+def shows_all_samples(study: Study) -> bool:
+    """Whether each sample of a scenario is judged on its own."""
+    return bool(study.rules.get("samples") == "all")
+
+
+def placed_checks(
+    checks: tuple[Check, ...], cells: Cells, *, shows_all: bool
+) -> tuple[tuple[Check, ...], Cells]:
+    """Attention checks at the places of a plan: where samples are apart, with the first one."""
+    if not shows_all:
+        return checks, cells
+    return (
+        tuple(replace(check, scenario=place_of(check.scenario, 1)) for check in checks),
+        {(place_of(scenario, 1), who): row for (scenario, who), row in cells.items()},
+    )
 
 
 def store(
@@ -167,7 +187,7 @@ def store(
             study=study,
             expert=by_name[one.expert],
             position=one.position,
-            scenario=places[one.scenario],
+            scenario=places[scenario_of(one.scenario)],
             left=left,
             right=right,
             left_image=left.image,
@@ -208,9 +228,13 @@ def planned_so_far(study: Study) -> SoFar:
     rows = study.matchups.order_by("expert__username", "position").values_list(
         *("expert__username", "position", "scenario__slug", "left__contestant__slug"),
         *("right__contestant__slug", "draw_probability", "kind", "repeat_of__position"),
+        "right__sample",
     )
     found: SoFar = defaultdict(list)
-    for expert, position, scenario, left, right, chance, kind, repeats in rows:
+    for expert, position, slug, left, right, chance, kind, repeats, sample in rows:
+        scenario = slug
+        if shows_all_samples(study):
+            scenario = place_of(slug, 1 if kind == Matchup.Kind.CHECK else sample)
         found[expert].append(
             PlannedMatchup(
                 expert=expert,
@@ -236,23 +260,28 @@ _PLAIN = (
 """Rules that are kept as they are; studies opened before a rule existed go without it."""
 
 
-def _showable(scenarios: list[Scenario]) -> QuerySet[Augmentation]:
+def showable(scenarios: list[Scenario]) -> QuerySet[Augmentation]:
+    """Every augmentation of these scenarios that has a picture to judge."""
     return (
         Augmentation.objects.filter(scenario__in=scenarios, state__in=Augmentation.SHOWABLE)
         .exclude(image="")
         .select_related("scenario", "contestant")
-        .only("image", "scenario__slug", "contestant__slug", "contestant__kind")
+        .only(
+            *("image", "sample", "options", "job", "scenario__slug"),
+            *("contestant__slug", "contestant__kind"),
+        )
     )
 
 
-def _by_cell(rows: QuerySet[Augmentation]) -> Cells:
-    return {(row.scenario.slug, row.contestant.slug): row for row in rows}
+def _place(study: Study, row: Augmentation) -> str:
+    slug = row.scenario.slug
+    return place_of(slug, row.sample) if shows_all_samples(study) else slug
 
 
 def _places(planned: Sequence[PlannedMatchup], cells: Cells) -> dict[str, Scenario]:
     """The scenarios with what their views are worked out from."""
-    slugs = {one.scenario for one in planned}
-    keys = {cell.scenario_id for (slug, _), cell in cells.items() if slug in slugs}
+    named = {one.scenario for one in planned}
+    keys = {cell.scenario_id for (place, _), cell in cells.items() if place in named}
     rows = Scenario.objects.filter(pk__in=keys).select_related("base_scene")
     return {row.slug: row for row in rows.defer("base_scene__recording")}
 
@@ -277,7 +306,7 @@ def _frames(
     for one in planned:
         for cell in _sides(one, cells):
             shown.setdefault(one.scenario, {})[window_of(cell.image)] = cell
-    mixed = [slug for slug, windows in sorted(shown.items()) if len(windows) > 1]
+    mixed = [scenario_of(name) for name, windows in sorted(shown.items()) if len(windows) > 1]
     if mixed:
         raise NothingToPlan(
             sentence(
@@ -287,7 +316,10 @@ def _frames(
                 scenarios=tuple(mixed[:MOST_NAMED]),
             )
         )
-    return {slug: _frame(places[slug], *windows.popitem()) for slug, windows in shown.items()}
+    return {
+        name: _frame(places[scenario_of(name)], *windows.popitem())
+        for name, windows in shown.items()
+    }
 
 
 def _frame(place: Scenario, window: str, cell: Augmentation) -> _Frame:

@@ -6,6 +6,7 @@ from collections import defaultdict
 from dataclasses import dataclass
 
 from arena.errors import NothingToPlan
+from arena.pairing.rules import scenario_of
 from arena.services.plans import MOST_NAMED, Cells
 from augment.models import Simulation
 from augment.sentences import sentence
@@ -37,7 +38,7 @@ def replays_of(cells: Cells) -> Replays:
     """
     wanted: defaultdict[str, set[int]] = defaultdict(set)
     for (scenario, _), cell in cells.items():
-        wanted[scenario].add(cell.pk)
+        wanted[scenario_of(scenario)].add(cell.pk)
     driven = _driven({cell.pk for cell in cells.values()})
     usual: Way = (Options().planner, Options().offsets, Options().is_reactive)
     whole = {

@@ -12,20 +12,22 @@ from django.utils import timezone
 
 from arena.errors import StudyNotOpen
 from arena.models import Study
-from arena.pairing.plan import Entry, MatchupPlan, PlanRules, plan
+from arena.pairing.plan import Check, Entry, MatchupPlan, PlanRules, plan
 from arena.queries.people import experts as expert_accounts
 from arena.services.plans import (
     Cells,
     enough_checks,
-    latest_pictures,
+    placed_checks,
     rules_of,
     store,
 )
 from arena.services.replays import Replays, replays_of
+from arena.services.shown_pictures import SampleRule, StudyPictures, choose_pictures
 from augment.errors import Conflict, UnknownName
 from augment.models import Contestant, Scenario
 from augment.sentences import sentence
 from augment.services.events import log_event
+from augment.services.running.choosing import find_job
 from augment.services.texts import one_line
 
 __all__ = ["PlanOptions", "close_study", "open_study", "rules_of"]
@@ -41,6 +43,8 @@ class PlanOptions:
     Attributes:
         check_share: Needs as many scenarios with pictures for an attention check; see
             `enough_checks`.
+        samples: Which samples of a cell are shown.
+        jobs: Names or codes of the jobs whose augmentations are shown; none for every job.
     """
 
     repeat_share: float = 0.0
@@ -51,6 +55,8 @@ class PlanOptions:
     allow_both_miss: bool = False
     allow_text: bool = False
     allow_replay: bool = False
+    samples: SampleRule = SampleRule.ONE
+    jobs: tuple[str, ...] = ()
 
 
 _OF_THE_PLAN = ("appearances", "pair_votes", "repeat_share", "check_share", "adaptive_share")
@@ -94,11 +100,13 @@ def open_study(
     contestant_rows, scenario_rows = _contestants(contestants), _scenarios(scenarios)
     expert_rows = _experts(experts)
     _refuse_simulated(contestant_rows, expert_rows, unless=allow_simulated)
-    wanted = round(given.check_share * votes_per_expert)
-    checks, broken = enough_checks(scenario_rows, wanted=wanted)
-    shown = latest_pictures(contestant_rows, scenario_rows)
+    checks, broken = _checks_for(given, scenario_rows, votes_per_expert)
+    jobs = [find_job(job) for job in given.jobs]
+    shown = choose_pictures(
+        contestant_rows, scenario_rows, seed=seed, rule=given.samples, jobs=jobs
+    )
     rules = PlanRules(
-        entries=_entries(shown),
+        entries=_entries(shown.cells),
         experts=tuple(expert.username for expert in expert_rows),
         votes_per_expert=votes_per_expert,
         seed=seed,
@@ -106,12 +114,12 @@ def open_study(
         **{name: getattr(given, name) for name in _OF_THE_PLAN},
     )
     planned = plan(rules)
-    played = replays_of(broken | shown) if given.allow_replay else None
-    study = _insert(name, _frozen_rules(rules, planned, played), given, rules, allow_simulated)
+    played = replays_of(broken | shown.cells) if given.allow_replay else None
+    frozen = _frozen_rules(rules, planned, played) | _frozen_pictures(given, shown)
+    study = _insert(name, frozen, given, rules, allow_simulated)
     _enrol(study, contestant_rows, scenario_rows, expert_rows)
-    store(study, planned.matchups, broken | shown, expert_rows)
-    after = {"name": name, "matchups": len(planned.matchups), "seed": seed}
-    log_event(actor=actor, verb="open", object_kind="study", object_code=study.code, after=after)
+    store(study, planned.matchups, broken | shown.cells, expert_rows)
+    _log_opening(study, matchups=len(planned.matchups), actor=actor)
     return study
 
 
@@ -206,9 +214,17 @@ def _refuse_simulated(contestants: list[Contestant], experts: list[User], *, unl
         )
 
 
+def _checks_for(
+    given: PlanOptions, scenarios: list[Scenario], votes: int
+) -> tuple[tuple[Check, ...], Cells]:
+    """The attention checks that are asked for, where the plan shows them."""
+    found = enough_checks(scenarios, wanted=round(given.check_share * votes))
+    return placed_checks(*found, shows_all=given.samples is SampleRule.ALL)
+
+
 def _entries(shown: Cells) -> tuple[Entry, ...]:
     return tuple(
-        Entry(scenario=scenario, contestant=contestant, picture=cell.image)
+        Entry(scenario=scenario, contestant=contestant, picture=cell.image, sample=cell.sample)
         for (scenario, contestant), cell in sorted(shown.items())
     )
 
@@ -250,6 +266,25 @@ def _enrol(
     study.contestants.set(contestants)
     study.scenarios.set(scenarios)
     study.experts.set(experts)
+
+
+def _frozen_pictures(given: PlanOptions, shown: StudyPictures) -> dict[str, Any]:
+    """Which pictures are shown: the rule for samples, the jobs they come from, the options."""
+    return {
+        "samples": given.samples.value,
+        "jobs": [{"code": str(job.code), "name": job.name} for job in shown.jobs],
+        "options": dict(sorted(shown.options.items())),
+    }
+
+
+def _log_opening(study: Study, *, matchups: int, actor: User | None) -> None:
+    log_event(
+        actor=actor,
+        verb="open",
+        object_kind="study",
+        object_code=study.code,
+        after={"name": study.name, "matchups": matchups, "seed": study.seed},
+    )
 
 
 def _taken(name: str) -> Conflict:

@@ -36,6 +36,7 @@ class Shell:
 _SECTIONS: dict[str, tuple[Promise, frozenset[str]]] = {
     "home": (_("Home"), frozenset({"home"})),
     "scenarios": (_("Scenarios"), frozenset({"scenarios", "scenario"})),
+    "contestants": (_("Contestants"), frozenset({"contestants", "contestant"})),
     "jobs": (_("Jobs"), frozenset({"jobs", "job-new", "job", "faults", "augmentation"})),
     "studies": (
         _("Studies"),
@@ -49,8 +50,8 @@ _SECTIONS: dict[str, tuple[Promise, frozenset[str]]] = {
 }
 _MENU = {
     "expert": ("home",),
-    "analyst": ("home", "scenarios", "jobs", "studies"),
-    "admin": ("home", "scenarios", "jobs", "studies"),
+    "analyst": ("home", "scenarios", "contestants", "jobs", "studies"),
+    "admin": ("home", "scenarios", "contestants", "jobs", "studies"),
 }
 
 

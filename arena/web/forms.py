@@ -19,6 +19,7 @@ from augment.services.running.caps import Caps
 from augment.services.running.estimates import JobEstimate, estimate
 from augment.services.running.feasible import find_obstacle, keys_missing
 from augment.services.wording import translate
+from augment.variants.options import MOST_SAMPLES
 
 
 class ThemeForm(forms.Form):
@@ -154,7 +155,12 @@ def _offer(row: Contestant) -> Offer:
 class LaunchForm(ChoiceForm, CapsForm):
     """A new job."""
 
+    samples = forms.IntegerField(min_value=1, max_value=MOST_SAMPLES, initial=1, required=False)
     is_fresh = forms.BooleanField(required=False)
+
+    def clean_samples(self) -> int:
+        """An empty field is one sample."""
+        return self.cleaned_data["samples"] or 1
 
     @property
     def offers(self) -> list[Offer]:
@@ -167,7 +173,8 @@ class LaunchForm(ChoiceForm, CapsForm):
         chosen = [self.cleaned_data.get(name, []) for name in ("contestants", "scenarios")]
         for name in ("name", "contestants", "scenarios"):
             self.errors.pop(name, None)
-        return estimate(*chosen) if all(chosen) else None
+        samples = self.cleaned_data.get("samples", 1)
+        return estimate(*chosen, samples=samples) if all(chosen) else None
 
 
 class VoteForm(forms.Form):

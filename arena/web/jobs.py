@@ -27,6 +27,7 @@ from arena.web.questions import Confirmation, ask, is_sure
 from augment.errors import AugmentError, QueueFault, UnknownName
 from augment.models import Augmentation, Contestant, GenerationJob
 from augment.services.endpoints import contestants
+from augment.services.judging.repeatability import repeatability
 from augment.services.judging.scenario_export import FORMATS
 from augment.services.running import caps
 from augment.services.running import jobs as service
@@ -63,7 +64,9 @@ def new_job_page(request: HttpRequest) -> HttpResponse:
     chosen_set = scenarios.set_asked(request.GET.get("set"))
     form = LaunchForm(
         request.POST or None,
-        contestants=list(Contestant.objects.select_related("endpoint").order_by("name")),
+        contestants=list(
+            Contestant.objects.filter(retired_at=None).select_related("endpoint").order_by("name")
+        ),
         groups=scenarios.by_type(chosen_set),
     )
     if "estimate" in request.POST:
@@ -97,6 +100,10 @@ def job_page(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
     else:  # a page that shows itself anew every two seconds measures nothing
         context["scenario_formats"] = FORMATS
         context["displacement"] = section(request, job)
+        if job.samples > 1:
+            is_checked = request.GET.get("checks") == "1"
+            context["repeats"] = repeatability(job, with_checks=is_checked)
+            context["is_checked"] = is_checked
         context["driving"] = driving_section(request, job)
         context["tool_calls"] = tool_calls_by_contestant(job)
     return render(request, "jobs/job.html", context)
@@ -218,6 +225,7 @@ def _launch(request: HttpRequest, form: LaunchForm) -> GenerationJob:
             contestants=form.cleaned_data["contestants"],
             scenarios=form.cleaned_data["scenarios"],
             caps=form.caps(),
+            samples=form.cleaned_data["samples"],
             is_fresh=form.cleaned_data["is_fresh"],
             actor=cast(User, request.user),
         )

@@ -15,6 +15,7 @@ from django.views.decorators.http import require_safe
 from arena.queries import scenarios
 from arena.queries.modifications import modification_lines
 from arena.web.access import STAFF, allow_only
+from arena.web.asking import asking_of
 from arena.web.pictures import picture_response
 from augment.errors import QueueFault
 from augment.models import Augmentation, Scenario, Simulation
@@ -84,6 +85,7 @@ def augmentation_page(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
         "checked": measured,
         "drawing": _drawing(request, augmentation, measured),
         "tries": tries,
+        "asking": asking_of(augmentation.contestant, augmentation.options),
         "totals": totals_of(tries),
     }
     return render(request, "jobs/augmentation.html", context)

@@ -28,7 +28,7 @@ from arena.web.questions import ask, is_sure, wants_to_change
 from arena.web.study_forms import HandOverForm, StudyForm
 from arena.web.study_questions import closing, handing_over, opening
 from augment.errors import AugmentError
-from augment.models import Contestant
+from augment.models import Contestant, GenerationJob
 from augment.services.wording import translate
 
 
@@ -47,11 +47,13 @@ def new_study_page(request: HttpRequest) -> HttpResponse:
         request.POST or None,
         contestants=list(
             Contestant.objects.exclude(kind=Contestant.Kind.CHECK)
+            .filter(retired_at=None)
             .select_related("endpoint")
             .order_by("name")
         ),
         groups=scenarios.by_type(),
         experts=by_pseudonym(experts()),
+        jobs=list(GenerationJob.objects.all()),
         initial={"checks": usual_checks()},
     )
     if request.method == "POST" and form.is_valid() and not wants_to_change(request):
@@ -149,4 +151,6 @@ def _shown_rules(study: Study) -> dict[str, Any] | None:
         "checks": 100 * rules.check_share if rules.checks else 0,
         "adaptive": 100 * rules.adaptive_share,
         "gap": study.rules["scenario_gap_kept"],
+        "jobs": study.rules.get("jobs", []),
+        "samples": study.rules.get("samples", "one"),
     }

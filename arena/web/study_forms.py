@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 from django import forms
@@ -10,8 +11,10 @@ from django.utils.translation import gettext_lazy as _
 
 from arena.errors import NothingToPlan
 from arena.pairing.target_lines import Appearances, PairVotes, read_targets
+from arena.services.shown_pictures import SampleRule
 from arena.services.studies import PlanOptions
 from arena.web.forms import ChoiceForm
+from augment.models import GenerationJob
 from augment.services.wording import translate
 
 
@@ -36,16 +39,33 @@ class StudyForm(ChoiceForm):
     allow_text = forms.BooleanField(required=False)
     allow_replay = forms.BooleanField(required=False)
     allow_simulated = forms.BooleanField(required=False)
+    samples = forms.ChoiceField(
+        choices=[(one.value, one.value) for one in SampleRule], required=False
+    )
+    jobs = forms.MultipleChoiceField(required=False)
 
-    def __init__(self, *args: Any, experts: list[User], **kwargs: Any) -> None:
+    def __init__(
+        self,
+        *args: Any,
+        experts: list[User],
+        jobs: Sequence[GenerationJob] = (),
+        **kwargs: Any,
+    ) -> None:
         super().__init__(*args, **kwargs)
         self.accounts = experts
+        self.all_jobs = jobs
+        self._offer("jobs", [(str(job.code), job.name) for job in jobs])
         self._offer("experts", [(user.get_username(), user.get_username()) for user in experts])
 
     @property
     def chosen_experts(self) -> list[str]:
         """For the template."""
         return self.chosen("experts")
+
+    @property
+    def chosen_jobs(self) -> list[str]:
+        """For the template."""
+        return self.chosen("jobs")
 
     def clean_targets(self) -> tuple[Appearances, PairVotes]:
         """The targets, read."""
@@ -68,6 +88,8 @@ class StudyForm(ChoiceForm):
             allow_both_miss=entered["allow_both_miss"],
             allow_text=entered["allow_text"],
             allow_replay=entered["allow_replay"],
+            samples=SampleRule(entered["samples"] or SampleRule.ONE),
+            jobs=tuple(entered["jobs"]),
         )
         given = {name: entered[name] for name in (*names, "allow_simulated")}
         return given | {"options": options}

@@ -7,6 +7,7 @@ from django.urls import URLPattern, path
 
 from arena.web import (
     authorships,
+    contestants,
     displacement,
     driving,
     health,
@@ -40,6 +41,9 @@ urlpatterns: list[URLPattern] = [
     path("scenarios/<uuid:code>/intent/", intents.set_intent, name="set-intent"),
     path("scenarios/<uuid:code>/intent.json", intents.intent_file, name="intent"),
     path("pictures/<slug:kind>/<uuid:code>.png", scenarios.picture, name="picture"),
+    path("contestants/", contestants.contestants_page, name="contestants"),
+    path("contestants/<uuid:code>/", contestants.contestant_page, name="contestant"),
+    path("contestants/<uuid:code>/retired/", contestants.set_retired, name="contestant-retired"),
     path("jobs/", jobs.jobs_page, name="jobs"),
     path("jobs/new/", jobs.new_job_page, name="job-new"),
     path("jobs/<uuid:code>/", jobs.job_page, name="job"),

@@ -20,7 +20,11 @@ function refresh() {
   sum.hidden = false;
   sum.querySelector("[data-contestants]").textContent = contestants;
   sum.querySelector("[data-scenarios]").textContent = scenarios;
-  sum.querySelector("[data-total]").textContent = contestants * scenarios;
+  // Studies have the same page without samples.
+  const entered = form.querySelector("[name=samples]");
+  const samples = entered ? Math.max(1, parseInt(entered.value, 10) || 1) : 1;
+  if (entered) sum.querySelector("[data-samples]").textContent = samples;
+  sum.querySelector("[data-total]").textContent = contestants * scenarios * samples;
 }
 
 // The estimate of a new job comes with the page that its button would bring.

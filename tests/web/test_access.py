@@ -39,6 +39,8 @@ PAGES: dict[str, tuple[int, int, int]] = {
     "augmentation": (200, 200, 403),
     "transcript": (200, 200, 403),
     "asked-image": (404, 404, 403),
+    "contestants": (200, 200, 403),
+    "contestant": (200, 200, 403),
     "scenarios": (200, 200, 403),
     "scenario": (200, 200, 403),
     "intent": (200, 200, 403),
@@ -60,6 +62,7 @@ PAGES: dict[str, tuple[int, int, int]] = {
 }
 ACTIONS: dict[str, tuple[int, int, int]] = {
     "job-retry": (302, 403, 403),
+    "contestant-retired": (302, 403, 403),
     "job-simulate": (302, 403, 403),
     "invite": (200, 403, 403),
     "revoke": (302, 403, 403),
@@ -85,6 +88,8 @@ def address(name: str, here: World) -> str:
     shown = here.study.matchups.filter(expert=here.expert).get(position=1)
     arguments: dict[str, dict[str, object]] = {
         "job": {"code": here.job.code},
+        "contestant": {"code": here.augmentation.contestant.code},
+        "contestant-retired": {"code": here.augmentation.contestant.code},
         "job-progress": {"code": here.job.code},
         "job-retry": {"code": here.job.code},
         "job-simulate": {"code": here.job.code},

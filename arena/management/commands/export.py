@@ -12,6 +12,12 @@ from django.utils.text import slugify
 
 from arena.errors import ArenaError, StudyStillOpen
 from arena.exports import displacement_writers, driving_writers, faults, tool_calls
+from arena.exports.augmentations import (
+    AUGMENTATION_FORMATS,
+    REPEAT_FORMATS,
+    augmentation_rows,
+    repeat_rows,
+)
 from arena.exports.bundle import bundle
 from arena.exports.displacement_objects import BY_OBJECT, OBJECT_FORMATS, object_rows
 from arena.exports.displacement_table import displacement_table
@@ -75,6 +81,8 @@ class Command(TerminalCommand):
             "faults": self._faults,
             "driving": self._driving,
             "tool-calls": self._tool_calls,
+            "augmentations": self._augmentations,
+            "repeats": self._repeats,
         }
         try:
             content, suffix, is_text = write[options["what"]](options)
@@ -132,6 +140,15 @@ class Command(TerminalCommand):
         table = displacement_table(find_job(options["job"]), by=By(options["by"]), types=types)
         return chosen.write(table), chosen.suffix, chosen.is_text
 
+    def _augmentations(self, options: dict[str, Any]) -> Written:
+        chosen = format_named(AUGMENTATION_FORMATS, options["format"])
+        rows = augmentation_rows(find_job(options["job"]))
+        return chosen.write(rows), chosen.suffix, chosen.is_text
+
+    def _repeats(self, options: dict[str, Any]) -> Written:
+        chosen = format_named(REPEAT_FORMATS, options["format"])
+        return chosen.write(repeat_rows(find_job(options["job"]))), chosen.suffix, chosen.is_text
+
     def _faults(self, options: dict[str, Any]) -> Written:
         chosen = format_named(faults.FORMATS, options["format"])
         table = faults.fault_table(find_job(options["job"]))
@@ -166,7 +183,7 @@ class Command(TerminalCommand):
         job = find_job(options["job"])
         sheet = sheet_of(
             job.name,
-            grid(job),
+            grid(job, sample=options["sample"]),
             scenarios=options["scenarios"],
             contestants=options["contestants"],
         )
@@ -279,6 +296,7 @@ def _kinds_of_jobs(kinds: Any) -> list[ArgumentParser]:
     samples.add_argument(
         "--format", help=f"one of {', '.join(SHEET_FORMATS)}; else the file's ending says it"
     )
+    samples.add_argument("--sample", type=int, default=1, help="which one of each cell")
     modifications = kinds.add_parser("modifications", help="what a job's contestants made")
     modifications.add_argument("job", help="its name or its code")
     modifications.add_argument(
@@ -305,8 +323,18 @@ def _kinds_of_jobs(kinds: Any) -> list[ArgumentParser]:
     calls = kinds.add_parser("tool-calls", help="calls of the function: tried, understood, mended")
     calls.add_argument("job", help="its name or its code")
     calls.add_argument("--format", default="csv", help=f"one of {', '.join(tool_calls.FORMATS)}")
-    scenarios = _kind_of_scenarios(kinds)
-    return [displacement, samples, modifications, scenarios, labels, driving, calls]
+    others = [displacement, samples, modifications, labels, driving, calls]
+    return [*others, *_kinds_of_rows(kinds), _kind_of_scenarios(kinds)]
+
+
+def _kinds_of_rows(kinds: Any) -> list[ArgumentParser]:
+    rows = kinds.add_parser("augmentations", help="one row for each augmentation of a job")
+    rows.add_argument("job", help="its name or its code")
+    rows.add_argument("--format", default="csv", help=f"one of {', '.join(AUGMENTATION_FORMATS)}")
+    repeats = kinds.add_parser("repeats", help="what varies between the samples of a job")
+    repeats.add_argument("job", help="its name or its code")
+    repeats.add_argument("--format", default="csv", help=f"one of {', '.join(REPEAT_FORMATS)}")
+    return [rows, repeats]
 
 
 def _kind_of_scenarios(kinds: Any) -> ArgumentParser:

@@ -11,10 +11,16 @@ from arena.errors import ArenaError
 from arena.models import Study
 from arena.pairing.target_lines import read_targets
 from arena.queries.inventory import CHECK_PERCENT, usual_checks
+from arena.services.shown_pictures import SampleRule
 from arena.services.studies import PlanOptions, open_study
 from augment.errors import AugmentError
 from augment.services.running.choosing import resolve_contestants, resolve_scenarios
 from augment.services.terminal import TerminalCommand
+
+SAMPLES = {
+    "one": "of several samples one for each scenario, drawn by the seed",
+    "all": "every sample, each on its own",
+}
 
 
 class Command(TerminalCommand):
@@ -66,6 +72,25 @@ class Command(TerminalCommand):
             action="store_true",
             help="let experts read a text description of what was changed",
         )
+        self._add_picture_arguments(parser)
+
+    def _add_picture_arguments(self, parser: CommandParser) -> None:
+        """Whose pictures take part."""
+        parser.add_argument(
+            "--samples",
+            choices=[one.value for one in SampleRule],
+            default=SampleRule.ONE.value,
+            help="where contestants were asked several times: one of each scenario, drawn by the "
+            "seed, or all, each against the same sample of the others",
+        )
+        parser.add_argument(
+            "--jobs",
+            nargs="+",
+            default=[],
+            metavar="JOB",
+            help="names or codes of the jobs whose augmentations are shown; default: all, the "
+            "latest of each cell",
+        )
         parser.add_argument(
             "--replay",
             action="store_true",
@@ -99,6 +124,8 @@ class Command(TerminalCommand):
                     allow_both_miss=options["both_miss"],
                     allow_text=options["text"],
                     allow_replay=options["replay"],
+                    samples=SampleRule(options["samples"]),
+                    jobs=tuple(options["jobs"]),
                 ),
             )
         except (ArenaError, AugmentError) as error:
@@ -122,6 +149,8 @@ class Command(TerminalCommand):
             f"Opened {study.name!r} ({study.code}): {study.matchups.count()} matchups for "
             f"{len(rules['experts'])} experts."
         )
+        names = ", ".join(repr(job["name"]) for job in rules["jobs"])
+        self.stdout.write(f"It shows augmentations of {names}; {SAMPLES[rules['samples']]}.")
         kinds = Counter(study.matchups.values_list("kind", flat=True))
         self.stdout.write(
             f"{kinds['main']} votes, {kinds['repeat']} hidden repeats, {kinds['check']} attention "

@@ -49,6 +49,13 @@ class Command(TerminalCommand):
             help="slugs, or all, catalogue, paper, hard, paraphrases",
         )
         parser.add_argument("--name", help="what people call the job")
+        parser.add_argument(
+            "--samples",
+            type=int,
+            default=1,
+            metavar="K",
+            help="ask every contestant K times about every scenario; default: 1",
+        )
         add_cap_arguments(parser)
         parser.add_argument(
             "--fresh", action="store_true", help="ask anew what models answered in other jobs"
@@ -83,7 +90,9 @@ class Command(TerminalCommand):
     def _estimate(self, options: dict[str, Any]) -> None:
         ensure_builtin()
         found = estimate(
-            resolve_contestants(options["contestants"]), resolve_scenarios(options["scenarios"])
+            resolve_contestants(options["contestants"]),
+            resolve_scenarios(options["scenarios"]),
+            samples=options["samples"],
         )
         self.stdout.write(f"{found.rows} to run, {found.asking_rows} of them ask models.")
         for line in found.lines:
@@ -106,6 +115,7 @@ class Command(TerminalCommand):
                 contestants=resolve_contestants(options["contestants"]),
                 scenarios=resolve_scenarios(options["scenarios"]),
                 caps=caps_of(options),
+                samples=options["samples"],
                 is_fresh=options["fresh"],
             )
             transaction.on_commit(lambda: enqueue_job(job.pk))

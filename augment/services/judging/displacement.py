@@ -170,7 +170,7 @@ def _rows() -> QuerySet[Augmentation]:
     return (
         Augmentation.objects.select_related("scenario", "contestant")
         .defer("notes", "scenario__instruction")
-        .order_by("scenario__slug", "contestant__slug")
+        .order_by("scenario__slug", "contestant__slug", "sample")
     )
 
 

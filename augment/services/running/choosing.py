@@ -17,10 +17,12 @@ ALL = "all"
 
 
 def resolve_contestants(given: Sequence[str]) -> list[str]:
-    """The slugs; `all` stands for every contestant that a job can run."""
+    """The slugs; `all` stands for every contestant that a job can run and nobody retired."""
     if list(given) != [ALL]:
         return list(given)
-    return list(Contestant.objects.filter(RUNNABLE).values_list("slug", flat=True))
+    return list(
+        Contestant.objects.filter(RUNNABLE, retired_at=None).values_list("slug", flat=True)
+    )
 
 
 def resolve_scenarios(given: Sequence[str]) -> list[str]:

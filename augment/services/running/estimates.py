@@ -117,7 +117,9 @@ class JobEstimate:
         return int(self.asking_rows * usd / self.usd)
 
 
-def estimate(contestants: Sequence[str], scenarios: Sequence[str]) -> JobEstimate:
+def estimate(
+    contestants: Sequence[str], scenarios: Sequence[str], *, samples: int = 1
+) -> JobEstimate:
     """What a job of these would use; slugs that nobody knows are left out.
 
     Raises:
@@ -130,13 +132,14 @@ def estimate(contestants: Sequence[str], scenarios: Sequence[str]) -> JobEstimat
     where = Scenario.objects.filter(slug__in=scenarios).order_by("slug")
     count = where.count()
     asking = [row for row in who if row.endpoint is not None]
-    samples = _spread(list(where.values_list("pk", flat=True))) if asking else []
-    prompts = _Prompts(Scenario.objects.select_related("base_scene").filter(pk__in=samples))
+    measured = _spread(list(where.values_list("pk", flat=True))) if asking else []
+    prompts = _Prompts(Scenario.objects.select_related("base_scene").filter(pk__in=measured))
+    asked = count * samples
     return JobEstimate(
-        rows=len(who) * count,
+        rows=len(who) * asked,
         scenarios=count,
         contestants=len(who),
-        lines=tuple(_line(row, count, prompts) for row in asking) if count else (),
+        lines=tuple(_line(row, asked, prompts) for row in asking) if count else (),
     )
 
 

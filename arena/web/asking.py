@@ -1,0 +1,84 @@
+"""The options of a contestant as people read them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+from django.utils.translation import gettext as _
+from django.utils.translation import gettext_lazy
+
+from augment.models import Contestant
+from augment.services.endpoints.treatments import left_out, options_of
+from augment.variants.options import NAMES
+
+LABELS = {
+    "temperature": gettext_lazy("Temperature"),
+    "seed": gettext_lazy("Seed"),
+    "reasoning_effort": gettext_lazy("Reasoning effort"),
+    "max_output_tokens": gettext_lazy("Longest answer"),
+    "protocol": gettext_lazy("Calls of the function"),
+    "rounds": gettext_lazy("Rounds at most"),
+    "accepted_from": gettext_lazy("Content from a mean rating of"),
+    "radius_m": gettext_lazy("Radius"),
+    "prompt_version": gettext_lazy("Prompt version"),
+    "picture_px": gettext_lazy("Width of the viewer’s picture"),
+}
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class OptionLine:
+    """One option.
+
+    Attributes:
+        is_chosen: Whether somebody chose it when the contestant was added.
+        left_out: Roles whose models do not take it.
+    """
+
+    label: str
+    value: str
+    is_chosen: bool
+    left_out: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Asking:
+    """All options that a contestant has."""
+
+    lines: tuple[OptionLine, ...]
+    is_frozen: bool
+
+
+def asking_of(contestant: Contestant, made_with: dict[str, Any] | None = None) -> Asking | None:
+    """How a contestant asks, None where it asks no model.
+
+    Args:
+        contestant: Who.
+        made_with: The options that an augmentation was made with, where one is shown.
+    """
+    if contestant.endpoint is None:
+        return None
+    options = made_with or options_of(contestant).to_document()
+    lacking = left_out(contestant)
+    return Asking(
+        lines=tuple(
+            OptionLine(
+                label=str(LABELS[name]),
+                value=_value(name, options[name]),
+                is_chosen=name in contestant.options,
+                left_out=tuple(_(role) for role, names in lacking.items() if name in names),
+            )
+            for name in NAMES
+            if name in options
+        ),
+        is_frozen=contestant.frozen_options is not None,
+    )
+
+
+def _value(name: str, value: object) -> str:
+    if isinstance(value, float):
+        value = f"{value:g}"
+    if name == "protocol":
+        return _("natively") if value == "native" else _("in the answer")
+    units = {"max_output_tokens": _("%s tokens"), "radius_m": "%s m", "picture_px": "%s px"}
+    return units.get(name, "%s") % value

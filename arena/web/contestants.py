@@ -1,0 +1,71 @@
+"""Pages of contestants: who they are, how they ask, and who is retired."""
+
+from __future__ import annotations
+
+import uuid
+from typing import cast
+
+from django.contrib import messages
+from django.contrib.auth.models import User
+from django.db.models import Count
+from django.http import HttpRequest, HttpResponse
+from django.shortcuts import get_object_or_404, redirect, render
+from django.utils.translation import gettext as _
+from django.views.decorators.http import require_POST, require_safe
+
+from arena.web.access import ADMIN, STAFF, allow_only
+from arena.web.asking import asking_of
+from augment.errors import AugmentError
+from augment.models import Contestant, GenerationJob
+from augment.services.endpoints import contestants
+from augment.services.endpoints.respondents import respondents_of
+from augment.services.endpoints.retirement import retire, take_back
+from augment.services.wording import translate
+
+
+@allow_only(*STAFF)
+@require_safe
+def contestants_page(request: HttpRequest) -> HttpResponse:
+    """Everybody, those who are retired at the end."""
+    contestants.ensure_builtin()
+    rows = Contestant.objects.exclude(kind=Contestant.Kind.CHECK).select_related("endpoint")
+    found = list(rows.annotate(made=Count("augmentations")).order_by("name"))
+    context = {
+        "active": [row for row in found if row.retired_at is None],
+        "retired": [row for row in found if row.retired_at is not None],
+    }
+    return render(request, "contestants/list.html", context)
+
+
+@allow_only(*STAFF)
+@require_safe
+def contestant_page(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
+    """One contestant in full."""
+    row = get_object_or_404(Contestant.objects.select_related("endpoint"), code=code)
+    context: dict[str, object] = {
+        "contestant": row,
+        "jobs": GenerationJob.objects.filter(contestants=row),
+        "studies": row.studies.all(),
+    }
+    try:
+        context |= {"asking": asking_of(row), "respondents": respondents_of(row)}
+    except AugmentError as error:  # a role's endpoint is gone, or the variant
+        messages.warning(request, translate(error))
+    return render(request, "contestants/contestant.html", context)
+
+
+@allow_only(ADMIN)
+@require_POST
+def set_retired(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
+    """Retire it, or take that back."""
+    row = get_object_or_404(Contestant, code=code)
+    actor = cast(User, request.user)
+    if request.POST.get("retired") == "no":
+        take_back(row, actor=actor)
+        messages.success(request, _("“%(name)s” is offered again.") % {"name": row.name})
+    else:
+        retire(row, actor=actor)
+        messages.success(
+            request, _("“%(name)s” is retired. What it made stays.") % {"name": row.name}
+        )
+    return redirect("contestant", code=code)

@@ -1,0 +1,197 @@
+"""Which samples a study shows, of which jobs, and that a contestant has one set of options."""
+
+from __future__ import annotations
+
+import uuid
+from itertools import pairwise
+
+import pytest
+from django.core.management import call_command
+from django.urls import reverse
+from django.utils import timezone
+
+from arena.errors import NothingToPlan
+from arena.models import Matchup, Study
+from arena.pairing.plan import plan
+from arena.queries.judged import automatic_ties
+from arena.services.handing_over import hand_over
+from arena.services.shown_pictures import SampleRule, drawn
+from arena.services.studies import PlanOptions, open_study, rules_of
+from augment.errors import Conflict
+from augment.models import Augmentation, Contestant, GenerationJob, Scenario
+from tests.jobs.test_options import Scripted, add, run
+from tests.llm.json_server import serving
+from tests.study_rows import contestant, expert, scenario
+from tests.web.cast import people, signed_in
+
+pytestmark = pytest.mark.django_db
+
+WHO = ("ann", "bob", "cid")
+DRAWN = [2, 0, 2, 1, 2, 1]
+
+
+def sampled(samples: int = 3, places: int = 6, name: str = "big", **columns: object) -> None:
+    """A job of three contestants with so many samples of each scenario."""
+    job = GenerationJob.objects.create(name=name, samples=samples)
+    for slug in WHO:
+        if not Contestant.objects.filter(slug=slug).exists():
+            contestant(slug)
+    for number in range(places):
+        if not Scenario.objects.filter(slug=f"place-{number}").exists():
+            scenario(f"place-{number}")
+    Augmentation.objects.bulk_create(
+        Augmentation(
+            job=job,
+            scenario=place,
+            contestant=who,
+            sample=sample,
+            state=Augmentation.State.DONE,
+            modification={},
+            image=f"bev/{uuid.uuid4().hex}.png",
+            finished_at=timezone.now(),
+            **columns,
+        )
+        for place in Scenario.objects.order_by("slug")[:places]
+        for who in Contestant.objects.filter(slug__in=WHO)
+        for sample in range(1, samples + 1)
+    )
+
+
+def opened(seed: int = 7, votes: int = 9, places: int = 6, **rules: object) -> Study:
+    for username in ("eva", "finn"):
+        expert(username)
+    return open_study(
+        name="Round 1",
+        contestants=WHO,
+        scenarios=[f"place-{number}" for number in range(places)],
+        experts=["eva", "finn"],
+        votes_per_expert=votes,
+        seed=seed,
+        options=PlanOptions(**rules),  # type: ignore[arg-type]
+    )
+
+
+def shown(study: Study) -> set[tuple[str, int, int]]:
+    rows = study.matchups.values_list("scenario__slug", "left__sample", "right__sample")
+    return set(rows)
+
+
+def test_one_sample_of_each_scenario_is_drawn_by_the_seed() -> None:
+    # The rule is written down in docs/running-a-study.md; these were worked out with sha256sum.
+    assert [drawn(7, f"place-{n}", 3) for n in range(6)] == DRAWN
+    sampled()
+    found = shown(opened())
+    assert found == {(f"place-{n}", DRAWN[n] + 1, DRAWN[n] + 1) for n in range(6)}
+
+
+def test_the_same_rules_give_the_same_plan_with_all_samples_kept_apart() -> None:
+    sampled()
+    study = Study.objects.get(pk=opened(votes=27, samples=SampleRule.ALL).pk)
+    assert shown(study) == {(f"place-{n}", k, k) for n in range(6) for k in (1, 2, 3)}
+    stored = study.matchups.order_by("expert__username", "position")
+    assert [
+        (row.expert.username, f"{row.scenario.slug}#{row.left.sample}", row.left.contestant.slug)
+        for row in stored.select_related("expert", "scenario", "left__contestant")
+    ] == [(one.expert, one.scenario, one.left) for one in plan(rules_of(study)).matchups]
+    # One scenario is one scenario, whichever of its samples is shown.
+    kept = study.rules["scenario_gap_kept"]
+    assert kept == 4
+    for username in ("eva", "finn"):
+        order = list(
+            stored.filter(expert__username=username).values_list("scenario__slug", flat=True)
+        )
+        for width in range(1, kept + 1):
+            assert all(a != b for a, b in zip(order, order[width:], strict=False))
+
+
+def test_samples_are_handed_over_as_they_are() -> None:
+    sampled(samples=2)
+    study = opened(votes=6, samples=SampleRule.ALL)
+    hand_over(study=study, username="eva", to=["finn"])
+    assert all(left == right for _, left, right in shown(study))
+    mine = study.matchups.filter(expert__username="finn").order_by("position")
+    assert mine.count() == 12
+    assert len(set(mine.values_list("left", "right"))) == 12
+    slugs = list(mine.values_list("scenario__slug", flat=True))
+    assert all(a != b for a, b in pairwise(slugs))
+
+
+def test_identical_samples_are_one_tie_of_their_scenario() -> None:
+    sampled(samples=2)
+    Augmentation.objects.filter(sample=2, scenario__slug="place-0").exclude(
+        contestant__slug="cid"
+    ).update(image="bev/same.png")
+    study = opened(votes=6, samples=SampleRule.ALL)
+    assert study.rules["identical"] == [["place-0#2", "ann", "bob"]]
+    (tie,) = automatic_ties(study)
+    assert (tie.item, tie.left, tie.right) == ("place-0", "ann", "bob")
+
+
+def test_a_sample_that_somebody_lacks_is_named() -> None:
+    sampled(samples=2)
+    Augmentation.objects.filter(
+        contestant__slug="bob", scenario__slug="place-1", sample=2
+    ).delete()
+    with pytest.raises(NothingToPlan, match="bob on place-1, sample 2"):
+        opened(samples=SampleRule.ALL)
+
+
+def test_options_are_not_mixed_under_one_contestant() -> None:
+    sampled(samples=1, name="cool", options={"temperature": 0.2, "seed": 1})
+    sampled(samples=1, name="hot", places=3, options={"temperature": 0.9, "seed": 1})
+    with pytest.raises(Conflict) as refused:
+        opened()
+    said = str(refused.value)
+    assert "pictures of ann were made with different options (temperature)" in said
+    assert "in the jobs cool, hot" in said
+    assert not Study.objects.exists()
+
+
+def test_a_study_shows_the_jobs_that_it_names(capsys: pytest.CaptureFixture[str]) -> None:
+    sampled(samples=1, name="cool", options={"temperature": 0.2})
+    sampled(samples=1, name="hot", options={"temperature": 0.9})
+    for username in ("eva", "finn"):
+        expert(username)
+    call_command(
+        *("open_study", "Round 1", "--contestants", *WHO, "--scenarios", "all", "--experts"),
+        *("eva", "finn", "--votes-per-expert", "6", "--seed", "1", "--jobs", "cool"),
+    )
+    assert "It shows augmentations of 'cool'" in capsys.readouterr().out
+    study = Study.objects.get()
+    assert {row.left.job.name for row in study.matchups.all()} == {"cool"}
+    assert [job["name"] for job in study.rules["jobs"]] == ["cool"]
+    assert study.rules["options"]["ann"] == {"temperature": 0.2}
+    page = signed_in(people()["admin"]).get(reverse("study", args=[study.code]))
+    assert "Shown are augmentations of" in page.content.decode()
+
+
+def test_two_contestants_that_differ_in_protocol_alone_meet_in_one_study() -> None:
+    expert("eva")
+    with serving(Scripted()) as server:
+        for protocol in ("prompt", "native"):
+            add(server, protocol, "fc", protocol=protocol, temperature=0.3)
+        prompt_row, native_row = sorted(run("prompt", "native"), key=lambda row: row.sample)[:2]
+        bodies = {"tools" in body for body in server.bodies}
+    assert bodies == {True, False}
+    native, prompt = (
+        Contestant.objects.get(slug=slug).frozen_options for slug in ("native", "prompt")
+    )
+    assert native is not None
+    assert prompt is not None
+    assert {name for name in native if native[name] != prompt[name]} == {"protocol"}
+    # Their cars stand apart, so that there is something to judge.
+    assert {prompt_row.state, native_row.state} == {Augmentation.State.DONE}
+    study = open_study(
+        name="Protocols",
+        contestants=["prompt", "native"],
+        scenarios=["street"],
+        experts=["eva"],
+        votes_per_expert=1,
+        seed=1,
+    )
+    matchup = Matchup.objects.get(study=study)
+    assert {matchup.left.contestant.slug, matchup.right.contestant.slug} == {"prompt", "native"}
+    assert {name: one["protocol"] for name, one in study.rules["options"].items()} == {
+        "prompt": "prompt",
+        "native": "native",
+    }
