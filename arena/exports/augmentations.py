@@ -8,7 +8,7 @@ import json
 from collections.abc import Sequence
 from typing import Any
 
-from arena.exports.formats import Format, formats, rounded
+from arena.exports.formats import Format, formats, round_value
 from arena.exports.parquet import NUMBER, TEXT, WHOLE, YES_NO, parquet_bytes
 from arena.services.cells import cell
 from augment.llm.costs import NANO_USD
@@ -86,7 +86,7 @@ REPEAT_FORMATS: dict[str, Format[Rows]] = formats(
 def _row(job: GenerationJob, line: AugmentationLine) -> tuple[object, ...]:
     row, who, found, spent = line.row, line.row.contestant, line.displacement, line.spending
     distances = [] if found is None else found.distances_m
-    mean = rounded(sum(distances) / len(distances)) if distances else None
+    mean = round_value(sum(distances) / len(distances)) if distances else None
     options = None if row.options is None else json.dumps(row.options, sort_keys=True)
     usd = None if spent is None or spent.nano_usd is None else spent.nano_usd / NANO_USD
     return (
@@ -108,7 +108,7 @@ def _repeat_row(line: RepeatLine) -> tuple[object, ...]:
     return (
         *(line.slug, line.name, line.is_simulated, samples),
         *(part for one in spreads for part in _parts(one)),
-        rounded(line.within_m),
+        round_value(line.within_m),
     )
 
 

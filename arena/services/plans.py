@@ -69,7 +69,7 @@ def refuse_missing(
 
 def check_pictures(scenarios: list[Scenario]) -> tuple[tuple[Check, ...], Cells]:
     """What attention checks there can be: the latest reference against the latest broken one."""
-    found = showable(scenarios).filter(
+    found = find_showable(scenarios).filter(
         contestant__kind__in=[Kind.REFERENCE, Kind.CHECK], state=Augmentation.State.DONE
     )
     latest: dict[tuple[str, str], Augmentation] = {}
@@ -132,7 +132,7 @@ def pictures_of(study: Study) -> Cells:
     wanted = {(entry.scenario, entry.contestant): entry for entry in rules.entries}
     scenarios = list(study.scenarios.only("slug"))
     _, cells = placed_checks(*check_pictures(scenarios), shows_all=shows_all_samples(study))
-    rows = showable(scenarios).filter(contestant__in=study.contestants.all()).order_by("pk")
+    rows = find_showable(scenarios).filter(contestant__in=study.contestants.all()).order_by("pk")
     for row in rows:
         cell = (_place(study, row), row.contestant.slug)
         entry = wanted.get(cell)
@@ -260,7 +260,7 @@ _PLAIN = (
 """Rules that are kept as they are; studies opened before a rule existed go without it."""
 
 
-def showable(scenarios: list[Scenario]) -> QuerySet[Augmentation]:
+def find_showable(scenarios: list[Scenario]) -> QuerySet[Augmentation]:
     """Every augmentation of these scenarios that has a picture to judge."""
     return (
         Augmentation.objects.filter(scenario__in=scenarios, state__in=Augmentation.SHOWABLE)

@@ -18,7 +18,7 @@ from django.db.models import F
 
 from arena.errors import NothingToPlan
 from arena.pairing.rules import place_of
-from arena.services.plans import Cells, refuse_missing, showable
+from arena.services.plans import Cells, find_showable, refuse_missing
 from augment.errors import Conflict
 from augment.models import Augmentation, Contestant, GenerationJob, Scenario
 from augment.sentences import Sentence, sentence
@@ -27,7 +27,7 @@ from augment.sentences import Sentence, sentence
 class SampleRule(StrEnum):
     """Which samples of a cell take part.
 
-    ONE: one of each scenario, drawn by the study's seed (`drawn`). ALL: every one, each against
+    ONE: one of each scenario, by the study's seed (`draw_sample`). ALL: every one, each against
     the same sample of the others.
     """
 
@@ -71,7 +71,7 @@ def choose_pictures(
         NothingToPlan: Pictures are missing; the text names them.
         Conflict: A contestant's pictures were made with different options.
     """
-    found = showable(scenarios).filter(contestant__in=contestants)
+    found = find_showable(scenarios).filter(contestant__in=contestants)
     if jobs:
         found = found.filter(job__in=jobs)
     rows = found.select_related("scenario", "contestant", "job")
@@ -91,7 +91,7 @@ def choose_pictures(
     )
 
 
-def drawn(seed: int, scenario: str, samples: int) -> int:
+def draw_sample(seed: int, scenario: str, samples: int) -> int:
     """Which of so many samples of a scenario a study shows, from 0.
 
     The first eight bytes of the SHA-256 of "seed/scenario", modulo the number of samples: the same
@@ -108,7 +108,7 @@ _Latest = dict[tuple[str, str], dict[int, Augmentation]]
 
 def _one(latest: _Latest, seed: int) -> Cells:
     return {
-        (scenario, contestant): found[sorted(found)[drawn(seed, scenario, len(found))]]
+        (scenario, contestant): found[sorted(found)[draw_sample(seed, scenario, len(found))]]
         for (scenario, contestant), found in latest.items()
     }
 

@@ -15,7 +15,7 @@ from arena.models import Matchup, Study
 from arena.pairing.plan import plan
 from arena.queries.judged import automatic_ties
 from arena.services.handing_over import hand_over
-from arena.services.shown_pictures import SampleRule, drawn
+from arena.services.shown_pictures import SampleRule, draw_sample
 from arena.services.studies import PlanOptions, open_study, rules_of
 from augment.errors import Conflict
 from augment.models import Augmentation, Contestant, GenerationJob, Scenario
@@ -78,7 +78,7 @@ def shown(study: Study) -> set[tuple[str, int, int]]:
 
 def test_one_sample_of_each_scenario_is_drawn_by_the_seed() -> None:
     # The rule is written down in docs/running-a-study.md; these were worked out with sha256sum.
-    assert [drawn(7, f"place-{n}", 3) for n in range(6)] == DRAWN
+    assert [draw_sample(7, f"place-{n}", 3) for n in range(6)] == DRAWN
     sampled()
     found = shown(opened())
     assert found == {(f"place-{n}", DRAWN[n] + 1, DRAWN[n] + 1) for n in range(6)}
