@@ -9,8 +9,7 @@ from django.utils.translation import gettext as _
 from django.utils.translation import gettext_lazy
 
 from augment.models import Contestant
-from augment.services.endpoints.treatments import left_out, options_of
-from augment.variants.options import NAMES
+from augment.services.endpoints.treatments import OPTIONS, left_out, options_of
 
 LABELS = {
     "temperature": gettext_lazy("Temperature"),
@@ -68,7 +67,7 @@ def asking_of(contestant: Contestant, made_with: dict[str, Any] | None = None) -
                 is_chosen=name in contestant.options,
                 left_out=tuple(_(role) for role, names in lacking.items() if name in names),
             )
-            for name in NAMES
+            for name in OPTIONS
             if name in options
         ),
         is_frozen=contestant.frozen_options is not None,
