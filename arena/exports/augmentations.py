@@ -11,11 +11,9 @@ from typing import Any
 from arena.exports.formats import Format, formats, round_value
 from arena.exports.parquet import NUMBER, TEXT, WHOLE, YES_NO, parquet_bytes
 from arena.services.cells import cell
-from augment.llm.costs import NANO_USD
-from augment.metrics.repeats import Spread
 from augment.models import GenerationJob
 from augment.services.judging.augmentation_rows import AugmentationLine, augmentation_lines
-from augment.services.judging.repeatability import RepeatLine, repeatability
+from augment.services.judging.repeatability import RepeatLine, Spread, repeatability
 
 COLUMNS = {
     "job": TEXT, "scenario": TEXT, "type": TEXT, "contestant": TEXT, "name": TEXT, "model": TEXT,
@@ -88,7 +86,7 @@ def _row(job: GenerationJob, line: AugmentationLine) -> tuple[object, ...]:
     distances = [] if found is None else found.distances_m
     mean = round_value(sum(distances) / len(distances)) if distances else None
     options = None if row.options is None else json.dumps(row.options, sort_keys=True)
-    usd = None if spent is None or spent.nano_usd is None else spent.nano_usd / NANO_USD
+    usd = None if spent is None else spent.usd
     return (
         *(job.name, row.scenario.slug, row.scenario.type, who.slug, who.name, who.model),
         *(who.variant, who.is_simulated, row.sample, options, str(row.code), row.state),

@@ -18,8 +18,8 @@ from augment.services.judging.fault_guess import FaultClass
 from augment.services.running.caps import Caps
 from augment.services.running.estimates import JobEstimate, estimate
 from augment.services.running.feasible import find_obstacle, keys_missing
+from augment.services.running.jobs import HIGHEST_SAMPLES
 from augment.services.wording import translate
-from augment.variants.options import MOST_SAMPLES
 
 
 class ThemeForm(forms.Form):
@@ -155,7 +155,7 @@ def _offer(row: Contestant) -> Offer:
 class LaunchForm(ChoiceForm, CapsForm):
     """A new job."""
 
-    samples = forms.IntegerField(min_value=1, max_value=MOST_SAMPLES, initial=1, required=False)
+    samples = forms.IntegerField(min_value=1, max_value=HIGHEST_SAMPLES, initial=1, required=False)
     is_fresh = forms.BooleanField(required=False)
 
     def clean_samples(self) -> int:

@@ -24,9 +24,17 @@ from augment.sentences import Sentence, sentence
 from augment.services.endpoints.known_models import profile_of
 from augment.services.endpoints.respondents import Respondent, respondents_of
 from augment.services.events import log_event
-from augment.variants.options import ContestantOptions, complete_options, options_from_document
+from augment.variants.options import (
+    NAMES,
+    ContestantOptions,
+    complete_options,
+    options_from_document,
+)
 from augment.variants.recipes import find_recipe
 from augment.variants.transcript import ModelRole
+
+OPTIONS = NAMES
+"""Of a contestant, in the order in which they are shown."""
 
 _SENT = frozenset({"temperature", "seed", "reasoning_effort", *LengthName})
 """Parameters that some endpoints refuse and that contestants send."""

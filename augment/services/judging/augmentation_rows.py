@@ -10,6 +10,7 @@ from django.db.models.functions import Coalesce
 
 from augment.checks import Severity
 from augment.errors import InvalidDocument, InvalidModification
+from augment.llm.costs import NANO_USD
 from augment.metrics.displacement import Displacement
 from augment.models import Augmentation, GenerationJob, ModelCall
 from augment.services.judging.checks import findings_of
@@ -28,6 +29,11 @@ class Spending:
     calls: int
     tokens: int | None
     nano_usd: int | None
+
+    @property
+    def usd(self) -> float | None:
+        """The same in dollars."""
+        return None if self.nano_usd is None else self.nano_usd / NANO_USD
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

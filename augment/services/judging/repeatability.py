@@ -6,10 +6,11 @@ from collections import defaultdict
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
-from augment.llm.costs import NANO_USD
 from augment.metrics.repeats import Spread, spread_of, within_sd
 from augment.models import Augmentation, GenerationJob
 from augment.services.judging.augmentation_rows import AugmentationLine, augmentation_lines
+
+__all__ = ["RepeatLine", "Spread", "repeatability"]
 
 MISSES = (Augmentation.State.UNREADABLE, Augmentation.State.REFUSED)
 
@@ -103,5 +104,5 @@ def _mean(values: Sequence[float]) -> float | None:
 
 def _usd(lines: Iterable[AugmentationLine]) -> float | None:
     asked = [line.spending for line in lines if line.spending is not None]
-    known = [one.nano_usd for one in asked if one.nano_usd is not None]
-    return sum(known) / NANO_USD if asked and len(known) == len(asked) else None
+    known = [one.usd for one in asked if one.usd is not None]
+    return sum(known) if asked and len(known) == len(asked) else None

@@ -29,6 +29,9 @@ _Row = TypeVar("_Row", Contestant, Scenario)
 
 NO_CAPS = Caps()
 
+HIGHEST_SAMPLES = MOST_SAMPLES
+"""Of one cell of a job."""
+
 OPEN = (GenerationJob.State.RUNNING, GenerationJob.State.STOPPED_AT_CAP)
 """States of jobs that are not over."""
 
