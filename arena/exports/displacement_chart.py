@@ -66,7 +66,7 @@ def box_plot(table: DisplacementTable, *, file_format: str) -> bytes:
 def is_far(lines: list[ChartLine]) -> bool:
     """Whether outliers lie so far out that a linear axis would show little else."""
     whiskers: list[float] = [line.stats["whishi"] for line in lines if line.stats]
-    outliers: list[float] = [one for line in lines if line.stats for one in line.stats["fliers"]]
+    outliers: list[float] = [stat for line in lines if line.stats for stat in line.stats["fliers"]]
     longest = max([*whiskers, LINEAR_UP_TO_M])
     return max([*outliers, 0.0]) > FAR * longest
 
@@ -199,7 +199,7 @@ def _scale(axes: Axes, lines: list[ChartLine]) -> None:
     if is_far(lines):
         axes.set_xscale("symlog", linthresh=LINEAR_UP_TO_M, linscale=1.0)
         ticks = [one for one in (0, 0.5, 1, 2, 5, 10, 20, 50, 100, 200, 500) if one <= furthest]
-        axes.set_xticks(ticks, [f"{one:g}" for one in ticks], fontsize=8)
+        axes.set_xticks(ticks, [f"{tick:g}" for tick in ticks], fontsize=8)
         axes.minorticks_off()
         axes.set_xlim(-0.03, furthest * 1.25)
     else:

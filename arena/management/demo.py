@@ -136,7 +136,10 @@ def generate(
         time.sleep(0.2)
     states = Augmentation.State
     outcomes = (states.DONE, states.UNREADABLE, states.REFUSED, states.FAILED)
-    say("Augmentations: " + ", ".join(f"{now.by_state[one]} {one.value}" for one in outcomes))
+    say(
+        "Augmentations: "
+        + ", ".join(f"{now.by_state[outcome]} {outcome.value}" for outcome in outcomes)
+    )
     if now.failed:
         reasons = job.augmentations.filter(state=Augmentation.State.FAILED)
         raise DemoFailed("; ".join(sorted(set(reasons.values_list("reason", flat=True)))))

@@ -38,12 +38,12 @@ def units_of(grid: Grid, showings: Sequence[PlannedMatchup]) -> list[Wanted]:
     places = {scenario: column for column, scenario in enumerate(grid.scenarios)}
     return [
         Wanted(
-            pair=pairs[frozenset((one.left, one.right))],
-            scenario=places[one.scenario],
-            chance=one.draw_probability,
+            pair=pairs[frozenset((showing.left, showing.right))],
+            scenario=places[showing.scenario],
+            chance=showing.draw_probability,
         )
-        for one in showings
-        if one.kind == MAIN
+        for showing in showings
+        if showing.kind == MAIN
     ]
 
 

@@ -128,7 +128,7 @@ def vote_set(study: Study, *, filters: Filters, last: int | None) -> VoteSet:
     entrants = entrants_of(study, lines)
     automatic = automatic_ties(study) if filters.automatic_ties else []
     _check(filters, [*lines, *automatic])
-    simulated = {one.slug for one in entrants if one.is_simulated}
+    simulated = {entrant.slug for entrant in entrants if entrant.is_simulated}
     judged = [
         (line, _why_not(line, filters, simulated, study.allow_simulated))
         for line in [*lines, *automatic]

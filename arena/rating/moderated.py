@@ -93,13 +93,13 @@ class Spread:
             base=self.base[places],
             components=tuple(
                 Component(
-                    covariance=one.covariance[places],
-                    common=one.common[places],
-                    own_share=one.own_share[members],
-                    own_degrees=one.own_degrees[members],
-                    degrees=one.degrees[members],
+                    covariance=component.covariance[places],
+                    common=component.common[places],
+                    own_share=component.own_share[members],
+                    own_degrees=component.own_degrees[members],
+                    degrees=component.degrees[members],
                 )
-                for one in self.components
+                for component in self.components
             ),
         )
 
@@ -142,8 +142,8 @@ def spread_of(
     if not components:
         known = np.full(len(base), _FAR)
         return Spread(covariance=base, degrees=known, common=base, base=base, components=())
-    found = sum((one.covariance for one in components[1:]), components[0].covariance)
-    common = sum((one.common for one in components[1:]), components[0].common)
+    found = sum((component.covariance for component in components[1:]), components[0].covariance)
+    common = sum((component.common for component in components[1:]), components[0].common)
     if len(components) > 1:
         found, common = found - base, common - base
     found = _at_least(without_negative_parts(found), LEAST * base)
@@ -158,7 +158,9 @@ def spread_of(
 
 def satterthwaite(variance: FloatArray, components: tuple[Component, ...]) -> FloatArray:
     """(C,) degrees of freedom of variances (C,) that are sums of the components'."""
-    of_parts = sum(one.covariance.diagonal() ** 2 / one.degrees for one in components)
+    of_parts = sum(
+        component.covariance.diagonal() ** 2 / component.degrees for component in components
+    )
     return np.asarray(variance**2 / np.maximum(of_parts, 1e-300))
 
 

@@ -91,7 +91,7 @@ def _drawn(spread: Spread, low: IntArray, high: IntArray, rounds: int, seed: int
     root = _root(spread.common)
     least = LEAST * _of_pairs(spread.base, low, high)
     taken_off = max(len(spread.components) - 1, 0) * _of_pairs(spread.base, low, high)
-    clusters = sum(one.own_degrees.max(initial=1.0) for one in spread.components)
+    clusters = sum(component.own_degrees.max(initial=1.0) for component in spread.components)
     at_once = int(max(1, _NUMBERS_AT_ONCE // (contestants * (contestants + clusters))))
     blocks = []
     for first in range(0, rounds, at_once):
@@ -100,8 +100,8 @@ def _drawn(spread: Spread, low: IntArray, high: IntArray, rounds: int, seed: int
         variance = np.zeros((number, len(low)))
         if not spread.components:
             variance += _of_pairs(spread.covariance, low, high)
-        for one in spread.components:
-            variance += _variances(one, low, high, number, rng)
+        for component in spread.components:
+            variance += _variances(component, low, high, number, rng)
         variance = np.maximum(variance - taken_off, least)
         gaps = np.abs(ratings[:, low] - ratings[:, high])
         blocks.append((gaps / np.sqrt(np.maximum(variance, 1e-300))).T)

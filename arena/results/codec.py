@@ -49,9 +49,9 @@ def _document(value: Any, version: int) -> Any:
         return value.as_document()
     if is_dataclass(value):
         return {
-            one.name: _document(found, version)
-            for one in fields(value)
-            if _is_known(one, found := getattr(value, one.name), version)
+            field.name: _document(found, version)
+            for field in fields(value)
+            if _is_known(field, found := getattr(value, field.name), version)
         }
     if isinstance(value, dict):
         return {str(key): _document(found, version) for key, found in value.items()}

@@ -89,9 +89,9 @@ def by_type(arrays: VoteArrays, board: Leaderboard) -> tuple[TypeRating, ...]:
 def displacement(study: Study) -> tuple[DisplacementSummary, ...]:
     """How far each contestant's shown augmentations are from the references."""
     by_slug: dict[str, list[Any]] = {}
-    for one in of_rows(shown_augmentations(study)):
-        if one.displacement is not None:
-            by_slug.setdefault(one.row.contestant.slug, []).append(one.displacement)
+    for row in of_rows(shown_augmentations(study)):
+        if row.displacement is not None:
+            by_slug.setdefault(row.row.contestant.slug, []).append(row.displacement)
     totals = ((slug, summarise(found)) for slug, found in sorted(by_slug.items()))
     return tuple(
         DisplacementSummary(
@@ -109,7 +109,7 @@ def displacement(study: Study) -> tuple[DisplacementSummary, ...]:
 
 def cost(study: Study, entrants: Sequence[Entrant]) -> tuple[ScenarioCost, ...]:
     """What each contestant that asks a language model takes per scenario."""
-    rows = [one.contestant for one in entrants if one.contestant is not None]
+    rows = [entrant.contestant for entrant in entrants if entrant.contestant is not None]
     spent = spent_on(shown_augmentations(study))
     classes = model_classes(rows)
     return tuple(

@@ -35,7 +35,7 @@ def with_and_without(votes: VoteSet, filters: Filters, board: Leaderboard) -> Ow
     others = [vote for vote in votes.with_own if not _is_own(vote, filters)]
     rest = votes.with_own if filters.leave_out_own else others
     other = rate(
-        vote_arrays([one.slug for one in votes.entrants], rest).comparisons,
+        vote_arrays([entrant.slug for entrant in votes.entrants], rest).comparisons,
         method=board.method,
         rounds=min(board.rounds, OTHER_ROUNDS),
         unit=board.unit,

@@ -52,7 +52,7 @@ def compute(snapshot: Snapshot, report: Report) -> Computed:
     """
     report(5)
     votes = _vote_set(snapshot)
-    arrays = vote_arrays([one.slug for one in votes.entrants], votes.counted)
+    arrays = vote_arrays([entrant.slug for entrant in votes.entrants], votes.counted)
     report(20)
     board = rate(
         arrays.comparisons,
@@ -153,7 +153,9 @@ def _results(
         displacement=() if from_file else breakdowns.displacement(study),
         cost=() if from_file else breakdowns.cost(study, votes.entrants),
         models={
-            one.slug: one.contestant.model for one in votes.entrants if one.contestant is not None
+            entrant.slug: entrant.contestant.model
+            for entrant in votes.entrants
+            if entrant.contestant is not None
         },
         judges=judges,
     )
@@ -161,7 +163,9 @@ def _results(
 
 def _any_simulated(votes: tuple[Judged, ...], entrants: tuple[Entrant, ...]) -> bool:
     """Whether something in the table is simulated, be it a line without votes."""
-    return any(one.is_simulated for one in entrants) or any(vote.is_simulated for vote in votes)
+    return any(entrant.is_simulated for entrant in entrants) or any(
+        vote.is_simulated for vote in votes
+    )
 
 
 def _store_lines(snapshot: Snapshot, board: Leaderboard, entrants: tuple[Entrant, ...]) -> None:

@@ -121,7 +121,7 @@ def _line(group: Group, at: Scale, end_m: float) -> BoxLine:
 
 
 def _drawn(box: BoxSummary, at: Scale, end_m: float) -> Drawn:
-    inside = [one for one in box.outliers_m if one <= end_m]
+    inside = [outlier for outlier in box.outliers_m if outlier <= end_m]
     return Drawn(
         low=at(box.low_m),
         q1=at(box.q1_m),

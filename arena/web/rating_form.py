@@ -59,7 +59,7 @@ class RatingForm(forms.Form):
     intervals = forms.ChoiceField(
         choices=[
             ("", INTERVAL_LABELS[""]),
-            *((one.value, INTERVAL_LABELS[one.value]) for one in Intervals),
+            *((interval.value, INTERVAL_LABELS[interval.value]) for interval in Intervals),
         ],
         required=False,
     )

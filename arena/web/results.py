@@ -66,7 +66,7 @@ def results_page(request: HttpRequest, code: uuid.UUID, tab: str = "table") -> H
         "imported": is_imported(study),
         "snapshot": snapshot,
         "ratings": ratings,
-        "under_way": [one for one in ratings if one.state != Snapshot.State.READY],
+        "under_way": [rating for rating in ratings if rating.state != Snapshot.State.READY],
         "tab": chosen,
         "tabs": [one for one in TABS if is_staff or not one.staff],
         "is_staff": is_staff,
@@ -184,7 +184,7 @@ def _chosen(request: HttpRequest, study: Study, ratings: list[Snapshot]) -> Snap
     """The rating that the address names, else the newest one that is ready; with its results."""
     code = asked_rating(request)
     if code is None:
-        ready = [one for one in ratings if one.state == Snapshot.State.READY]
+        ready = [rating for rating in ratings if rating.state == Snapshot.State.READY]
         code = ready[0].code if ready else None
     if code is None:
         return None

@@ -45,7 +45,9 @@ def pairs(snapshot: Snapshot, table: LeaderboardTable) -> Context:
     place = {row.slug: n for n, row in enumerate(table.rows)}
     above = snapshot.results.board.above
     apart = None if above is None else {frozenset(pair) for pair in above}
-    p_values = {frozenset((one.a, one.b)): one.p for one in snapshot.results.board.p_values or ()}
+    p_values = {
+        frozenset((value.a, value.b)): value.p for value in snapshot.results.board.p_values or ()
+    }
     lines = [_pair(pair, names, place, apart, p_values) for pair in found]
     lines.sort(key=lambda line: (place[line["a"].slug], place[line["b"].slug]))
     return {

@@ -163,7 +163,7 @@ def allowed_by(code: Code, places: Places, *, bin_m: float) -> tuple[NDArray[np.
 def _refuse_others(intent: Intent | None) -> None:
     requests = () if intent is None else intent.requests
     asked = [name for kind, name in _UNKNOWN.items() if any(_are(kind, requests))]
-    bodies = {one.body for one in requests if isinstance(one, VehicleRequest)}
+    bodies = {request.body for request in requests if isinstance(request, VehicleRequest)}
     asked += ["bicycles"] if Body.BICYCLE in bodies else []
     if asked:
         raise CannotPlace(

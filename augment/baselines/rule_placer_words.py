@@ -108,9 +108,9 @@ def _cone_conventions(request: ConesRequest) -> Iterator[str]:
 
 
 def _crash_conventions(request: CrashRequest) -> Iterator[str]:
-    if not any(one.turn_deg is not None for one in request.others):
+    if not any(other.turn_deg is not None for other in request.others):
         yield "the angles between them"
-    if not request.others or any(one.gap is None for one in request.others):
+    if not request.others or any(other.gap is None for other in request.others):
         yield "as near as they come without sharing ground"
 
 

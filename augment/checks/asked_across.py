@@ -145,7 +145,7 @@ def _cones(asked: Asked, party: Party, request: ConesRequest, band: Band) -> Ite
     """A line by its side of the lane, all other shapes by their middle and their first cone."""
     cones = sorted(party.placed, key=asked.ahead_m)
     everyone = (*cones, *party.workers)
-    lefts = [asked.left_m(one) - band.left_m for one in cones]
+    lefts = [asked.left_m(cone) - band.left_m for cone in cones]
     middle_m = sum(lefts) / len(lefts)
     sign = _sign(asked, request.spot.lateral)
     if request.shape is Shape.LINE and sign and not request.both_sides:
@@ -158,7 +158,7 @@ def _cones(asked: Asked, party: Party, request: ConesRequest, band: Band) -> Ite
         yield Finding(
             kind=FindingKind.ASKED_ACROSS,
             severity=severity_of(fits=wanted.off_m(middle_m) <= across_m),
-            agents=tuple(one.id for one in everyone),
+            agents=tuple(agent.id for agent in everyone),
             measured={"left_m": middle_m, "asked_low_m": edge_m, "asked_high_m": edge_m},
             template=(
                 f"The line of cones is {{left_m:.2f}} m to the {side_of(middle_m)} of the lane "
@@ -192,7 +192,7 @@ def _taper_side(cones: Sequence[TrafficAgent], lefts: Sequence[float], start: fl
     return Finding(
         kind=FindingKind.ASKED_SIDE,
         severity=severity_of(fits=begins * start > 0.0),
-        agents=tuple(one.id for one in cones),
+        agents=tuple(cone.id for cone in cones),
         measured={"first_left_m": lefts[0], "last_left_m": lefts[-1]},
         template=(
             f"The taper begins at the {side_of(begins)} of the lane with {{agents[0]}}; "
@@ -208,7 +208,7 @@ def _in_lane(
     return Finding(
         kind=FindingKind.ASKED_ACROSS,
         severity=severity_of(fits=beyond_m <= asked.tolerances.edge_m),
-        agents=tuple(one.id for one in agents),
+        agents=tuple(agent.id for agent in agents),
         measured={"left_m": left_m, "lane_width_m": band.width_m},
         template=(
             f"{what} is {{left_m:.2f}} m to the {side_of(left_m)} of the centre of the lane that "
@@ -222,7 +222,7 @@ def _other_side(agents: Sequence[TrafficAgent], left_m: float, wanted: _Wanted) 
     return Finding(
         kind=FindingKind.ASKED_SIDE,
         severity=severity_of(fits=False),
-        agents=tuple(one.id for one in agents),
+        agents=tuple(agent.id for agent in agents),
         measured={"left_m": left_m, "asked_low_m": wanted.low_m, "asked_high_m": wanted.high_m},
         template=(
             f"{{agents[0]}} is {{left_m:.2f}} m to the {side_of(left_m)} of the lane centre; the "

@@ -49,7 +49,7 @@ def _finding(asked: Asked, party: Party, span_m: tuple[float, float]) -> Finding
     return Finding(
         kind=FindingKind.ASKED_DISTANCE,
         severity=severity_of(fits=off_m <= allowed_m),
-        agents=(first.id, *(one.id for one in party.everyone if one is not first)),
+        agents=(first.id, *(agent.id for agent in party.everyone if agent is not first)),
         belongs_m=asked.route.position(belongs_m, asked.left_m(first)),
         measured={
             "along_m": measured_m,

@@ -31,7 +31,7 @@ def _vehicle(asked: Asked, request: VehicleRequest, agent: TrafficAgent) -> Iter
     turn_deg = math.degrees(difference(agent.heading_rad, band.tangent_rad))
     turns = (turn_deg, turn_deg + 180.0) if _facing(request) is Facing.ACROSS else (turn_deg,)
     wanted_deg = _FACING_DEG[_facing(request)] + request.turn_deg
-    off_deg = min(abs(_difference_deg(one, wanted_deg)) for one in turns)
+    off_deg = min(abs(_difference_deg(turn, wanted_deg)) for turn in turns)
     yield Finding(
         kind=FindingKind.ASKED_HEADING,
         severity=severity_of(fits=off_deg <= asked.tolerances.heading_deg),

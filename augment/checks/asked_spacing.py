@@ -54,12 +54,12 @@ def _are_apart(cones: Sequence[TrafficAgent]) -> bool:
 
 
 def _spacing(asked: Asked, cones: Sequence[TrafficAgent], wanted: Length) -> Finding:
-    gaps_m = [min(apart_m(one, other) for other in cones if other is not one) for one in cones]
+    gaps_m = [min(apart_m(cone, other) for other in cones if other is not cone) for cone in cones]
     gap_m = median(gaps_m)
     return Finding(
         kind=FindingKind.ASKED_SPACING,
         severity=severity_of(fits=fits_gap(asked, gap_m, wanted)),
-        agents=tuple(one.id for one in cones),
+        agents=tuple(cone.id for cone in cones),
         measured={"gap_m": gap_m, "asked_m": (wanted.low_m + wanted.high_m) / 2.0},
         template="The cones stand {gap_m:.1f} m apart; {asked_m:.1f} m are asked for.",
     )

@@ -72,7 +72,7 @@ def asked_motion(asked: Asked) -> Iterator[Finding]:
 
 def find_unasked(asked: Asked) -> Iterator[Finding]:
     """Agents of the scene that were moved or removed, and nobody asked for that."""
-    moved = [(one.id, "moved", asked.to_move) for one in asked.modification.moved]
+    moved = [(agent.id, "moved", asked.to_move) for agent in asked.modification.moved]
     removed = [(name, "removed", asked.to_remove) for name in asked.modification.removed]
     for name, done, wanted in (*moved, *removed):
         if name in wanted:
@@ -87,7 +87,7 @@ def find_unasked(asked: Asked) -> Iterator[Finding]:
 
 def asked_changes(asked: Asked) -> Iterator[Finding]:
     """Agents of the scene that are to be moved or removed, and were not."""
-    moved = frozenset(one.id for one in asked.modification.moved)
+    moved = frozenset(agent.id for agent in asked.modification.moved)
     removed = frozenset(asked.modification.removed)
     left_alone = [(name, "moved") for name in sorted(asked.to_move - moved)]
     left_alone += [(name, "removed") for name in sorted(asked.to_remove - removed)]
@@ -102,7 +102,7 @@ def asked_changes(asked: Asked) -> Iterator[Finding]:
 
 def find_attempted(asked: Asked) -> Iterator[Finding]:
     """Whatever is done about a wish that can't be met."""
-    touched = [one.id for one in asked.modification.changed] + [*asked.modification.removed]
+    touched = [agent.id for agent in asked.modification.changed] + [*asked.modification.removed]
     why = asked.unmet.replace("{", "{{").replace("}", "}}")
     if why and touched:
         yield Finding(

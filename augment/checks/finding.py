@@ -130,7 +130,7 @@ class Finding:
         known = {} if names is None else names
         sizes = {name: abs(value) for name, value in self.measured.items() if value is not None}
         return self.template.format(
-            agents=[known.get(one, one) for one in self.agents],
-            lanes=[known.get(one, one) for one in self.lanes],
+            agents=[known.get(agent, agent) for agent in self.agents],
+            lanes=[known.get(lane, lane) for lane in self.lanes],
             **sizes,
         )

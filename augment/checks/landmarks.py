@@ -59,19 +59,21 @@ def resolve_landmarks(intent: Intent, lanes: LanesAcross) -> Intent:
     """
     return replace(
         intent,
-        requests=tuple(replace(one, spot=_resolved(one.spot, lanes)) for one in intent.requests),
-        moves=tuple(replace(one, spot=_resolved(one.spot, lanes)) for one in intent.moves),
+        requests=tuple(
+            replace(request, spot=_resolved(request.spot, lanes)) for request in intent.requests
+        ),
+        moves=tuple(replace(move, spot=_resolved(move.spot, lanes)) for move in intent.moves),
     )
 
 
 def list_absent(intent: Intent, lanes: LanesAcross) -> tuple[str, ...]:
     """In words what the intent names and the scene does not have."""
     spots = [one.spot for one in (*intent.requests, *intent.moves)]
-    picks = [one.landmark for one in spots if one.landmark is not None]
-    picks += [*(one.who for one in intent.moves), *intent.removals]
-    marks = [one.mark for one in spots if one.mark is not None]
-    absent = [name_of_pick(one) for one in picks if not find_picked(lanes, one)]
-    return (*absent, *(str(one) for one in marks if find_mark(lanes, one) is None))
+    picks = [spot.landmark for spot in spots if spot.landmark is not None]
+    picks += [*(move.who for move in intent.moves), *intent.removals]
+    marks = [spot.mark for spot in spots if spot.mark is not None]
+    absent = [name_of_pick(pick) for pick in picks if not find_picked(lanes, pick)]
+    return (*absent, *(str(mark) for mark in marks if find_mark(lanes, mark) is None))
 
 
 def name_of_pick(pick: Pick) -> str:

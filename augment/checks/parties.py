@@ -91,7 +91,7 @@ def match_to_requests(
         for number, one in enumerate(intent.requests)
         for place in _places(number, one, added)
     ]
-    spots = [middle_of(one.spot, lanes) for one in intent.requests]
+    spots = [middle_of(request.spot, lanes) for request in intent.requests]
     near = sorted(
         (math.dist(spots[place.party], (agent.x_m, agent.y_m)), number, index)
         for number, place in enumerate(wanted)

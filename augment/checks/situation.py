@@ -75,7 +75,7 @@ class ChangedScene:
     @cached_property
     def crashed(self) -> frozenset[str]:
         """Changed vehicles that stand so close to another changed one that they look crashed."""
-        cars = [one for one in self.changed if one.type in VEHICLES and is_stopped(one)]
+        cars = [agent for agent in self.changed if agent.type in VEHICLES and is_stopped(agent)]
         if len(cars) < 2:
             return frozenset()
         gaps = gaps_m(np.array([self.boxes[car.id].corners_m for car in cars]))

@@ -46,9 +46,9 @@ class Heard:
 
 def read_conversation(request: ChatRequest) -> Heard:
     """What the conversation says about the answer that is due; by default a modifier's."""
-    told = next((one.text for one in request.messages if one.role == "system"), "")
+    told = next((message.text for message in request.messages if message.role == "system"), "")
     part = _OPENINGS.get(told.partition("\n")[0], ModelRole.MODIFIER)
-    feedback = [one.text for one in request.messages if _is_feedback(one)]
+    feedback = [message.text for message in request.messages if _is_feedback(message)]
     start = max((n for n, one in enumerate(request.messages) if _is_feedback(one)), default=0)
     since = request.messages[start:]
     native = request.tools is not None

@@ -52,7 +52,7 @@ def write_ratings(problems: Sequence[Problem]) -> str:
     low = {"compliance": 2, "realism": 3, "logical_consistency": 2}
     high = dict.fromkeys(low, 5)
     block = {"ratings": low if problems else high, "feedback": list(problems)}
-    told = "; ".join(one["problem"] for one in problems) or "Nothing is to be corrected."
+    told = "; ".join(problem["problem"] for problem in problems) or "Nothing is to be corrected."
     return (
         "Summary: A road with the ego on it, and what the user wished for.\n\n"
         "Questions:\n1. Is everything where it was wished for?\n2. Does it face the right way?\n"
@@ -78,7 +78,7 @@ def write_verdict(problems: Sequence[Problem]) -> str:
 def describe_picture(request: ChatRequest) -> str:
     """A viewer's answer to each question: what picture it was given, and nothing it can't see."""
     last = request.messages[-1]
-    sizes = [image.size_px for one in request.messages for image in one.images]
+    sizes = [image.size_px for message in request.messages for image in message.images]
     count = len(re.findall(r"^[0-9]+\. ", last.text, re.MULTILINE)) or 1
     if not sizes:
         return "There is no picture."

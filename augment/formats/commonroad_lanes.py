@@ -56,9 +56,9 @@ def write_lanes(root: ET.Element, cell: Cell, ids: Ids, report: LossReport) -> N
         for limit in sorted({w.speed_limit_mps for w in ways if w.speed_limit_mps is not None})
     }
     lights = {
-        one.id: ids.fresh()
-        for one in scene.connectors
-        if one.traffic_light is not TrafficLight.NONE
+        connector.id: ids.fresh()
+        for connector in scene.connectors
+        if connector.traffic_light is not TrafficLight.NONE
     }
     off = {}
     for way in ways:
@@ -71,9 +71,9 @@ def write_lanes(root: ET.Element, cell: Cell, ids: Ids, report: LossReport) -> N
         _add_crosswalk(root, area, ids)
     for limit, sign in signs.items():
         _add_sign(root, limit, sign)
-    for one in scene.connectors:
-        if one.id in lights:
-            _add_light(root, one, lights[one.id], steps=len(cell.motion.times_s))
+    for connector in scene.connectors:
+        if connector.id in lights:
+            _add_light(root, connector, lights[connector.id], steps=len(cell.motion.times_s))
     _add_intersections(root, scene, ids)
     _report(scene, crossings, report)
 
@@ -207,7 +207,9 @@ def _add_light(root: ET.Element, connector: LaneConnector, light: int, *, steps:
 
 def _add_intersections(root: ET.Element, scene: Scene, ids: Ids) -> None:
     """Connectors that share a lane at either end belong to one intersection."""
-    for group in _grouped([one for one in scene.connectors if one.from_lane is not None]):
+    for group in _grouped(
+        [connector for connector in scene.connectors if connector.from_lane is not None]
+    ):
         by_lane: dict[str, list[LaneConnector]] = defaultdict(list)
         for one in group:
             by_lane[str(one.from_lane)].append(one)
@@ -216,16 +218,16 @@ def _add_intersections(root: ET.Element, scene: Scene, ids: Ids) -> None:
             incoming = add(made, "incoming", id=str(ids.fresh()))
             add(incoming, "incomingLanelet", ref=str(ids.of(lane)))
             for side in _SIDE_ORDER:
-                for one in connectors:
-                    if _SIDES[one.turn_type] == side:
-                        add(incoming, side, ref=str(ids.of(one.id)))
+                for connector in connectors:
+                    if _SIDES[connector.turn_type] == side:
+                        add(incoming, side, ref=str(ids.of(connector.id)))
 
 
 def _grouped(connectors: Sequence[LaneConnector]) -> list[list[LaneConnector]]:
     groups: list[tuple[set[str], list[LaneConnector]]] = []
-    for one in connectors:
-        ends = {f"from {one.from_lane}", f"to {one.to_lane or one.id}"}
-        joined, others = [one], []
+    for connector in connectors:
+        ends = {f"from {connector.from_lane}", f"to {connector.to_lane or connector.id}"}
+        joined, others = [connector], []
         for names, members in groups:
             if names & ends:
                 ends |= names
@@ -241,11 +243,17 @@ def _report(scene: Scene, crossings: Sequence[Area], report: LossReport) -> None
     for kind in AreaKind:
         names = [a.id for a in scene.areas if a.kind is kind and a.id not in written]
         report.lose_of(names, f"left out: a {kind} area of this shape can't be a lanelet")
-    names = [one.id for one in scene.connectors if one.turn_type is TurnType.U_TURN]
+    names = [
+        connector.id for connector in scene.connectors if connector.turn_type is TurnType.U_TURN
+    ]
     report.lose_of(names, "a U-turn becomes a turn to the left")
-    names = [one.id for one in scene.connectors if one.from_lane is None]
+    names = [connector.id for connector in scene.connectors if connector.from_lane is None]
     report.lose_of(names, "its turn type is not said: no lane leads into it")
-    names = [one.id for one in scene.connectors if one.traffic_light is TrafficLight.UNKNOWN]
+    names = [
+        connector.id
+        for connector in scene.connectors
+        if connector.traffic_light is TrafficLight.UNKNOWN
+    ]
     report.lose_of(names, "a light of unknown state becomes one that is off")
-    if any(one.traffic_light is not TrafficLight.NONE for one in scene.connectors):
+    if any(connector.traffic_light is not TrafficLight.NONE for connector in scene.connectors):
         report.lose("lights stay as they are at t0; how they go on is not known")

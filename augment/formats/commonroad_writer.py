@@ -62,12 +62,12 @@ def _write_one(cell: Cell, report: LossReport) -> dict[str, bytes]:
     add(root, "scenarioTags")
     ids = Ids()
     write_lanes(root, cell, ids, report)
-    statics = [one for one in cell.motion.others if _is_static(one)]
-    for one in statics:
-        _add_static(root, one, ids, report)
-    for one in cell.motion.others:
-        if one not in statics:
-            _add_dynamic(root, one, ids, report)
+    statics = [other for other in cell.motion.others if _is_static(other)]
+    for static in statics:
+        _add_static(root, static, ids, report)
+    for other in cell.motion.others:
+        if other not in statics:
+            _add_dynamic(root, other, ids, report)
     _add_problem(root, cell, ids)
     _report(cell, report)
     ET.indent(root)
@@ -194,11 +194,11 @@ def _report(cell: Cell, report: LossReport) -> None:
         (AgentType.BARRIER, "a barrier becomes a roadBoundary, which readers take for scenery"),
         (AgentType.GENERIC_OBJECT, "becomes an obstacle of unknown type"),
     ):
-        names = [one.agent.id for one in cell.motion.others if one.agent.type is kind]
+        names = [other.agent.id for other in cell.motion.others if other.agent.type is kind]
         report.lose_of(names, said)
     names = [agent.id for agent in scene.agents if agent.walk_to_m is not None]
     report.lose_of(names, "the walk is written as motion alone, not as its end point")
-    fast = [one.agent.id for one in cell.motion.others if _is_static(one) and _moves(one)]
+    fast = [other.agent.id for other in cell.motion.others if _is_static(other) and _moves(other)]
     report.lose_of(fast, "moves, but things of this type can only stand there", changes_scene=True)
     if scene.traffic_side is TrafficSide.LEFT:
         report.lose("that people drive on the left is not said")

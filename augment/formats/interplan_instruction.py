@@ -25,10 +25,10 @@ _LEADS = {
 
 def instruction_of(kind: ScenarioType, reference: Modification) -> str:
     """The sentences from which a reader could put the same objects to the same places."""
-    cones = [one for one in reference.added if one.type is AgentType.TRAFFIC_CONE]
-    others = [one for one in reference.added if one.type is not AgentType.TRAFFIC_CONE]
+    cones = [agent for agent in reference.added if agent.type is AgentType.TRAFFIC_CONE]
+    others = [agent for agent in reference.added if agent.type is not AgentType.TRAFFIC_CONE]
     parts = [_cones(cones)] if cones else []
-    parts += [_thing(one, kind) for one in others]
+    parts += [_thing(other, kind) for other in others]
     return f"{_LEADS[kind]}: {'; '.join(parts)}."
 
 
@@ -36,7 +36,7 @@ def instruction_of(kind: ScenarioType, reference: Modification) -> str:
 
 
 def _cones(cones: list[TrafficAgent]) -> str:
-    ahead, left = [one.x_m for one in cones], [one.y_m for one in cones]
+    ahead, left = [cone.x_m for cone in cones], [cone.y_m for cone in cones]
     if len(cones) == 1:
         return f"a traffic cone {_place((ahead[0], left[0]))}"
     first, last = (min(ahead), min(left)), (max(ahead), max(left))

@@ -17,12 +17,12 @@ def report_motion(cell: Cell, report: LossReport, *, can_trigger: bool = False) 
     motion = cell.motion
     if motion.ego.source is MotionSource.HELD_SPEED:
         report.lose("the ego was not recorded; it is let hold its speed along its lane")
-    names = [one.agent.id for one in motion.others if one.source is MotionSource.HELD_SPEED]
+    names = [other.agent.id for other in motion.others if other.source is MotionSource.HELD_SPEED]
     report.lose_of(names, "not recorded; let hold the speed of t0 along the lane, or straight on")
-    walkers = [one for one in motion.others if one.agent.walk_to_m is not None]
+    walkers = [other for other in motion.others if other.agent.walk_to_m is not None]
     if cell.drive is not None:
         return
-    names = [one.agent.id for one in walkers if one.stands]
+    names = [walker.agent.id for walker in walkers if walker.stands]
     report.lose_of(
         names,
         f"has a walk but stands: the ego never comes within {SETS_OUT_WITHIN_M:g} m",
@@ -30,11 +30,11 @@ def report_motion(cell: Cell, report: LossReport, *, can_trigger: bool = False) 
     )
     if can_trigger:
         return
-    for one in walkers:
-        if not one.stands:
-            at_s = motion.times_s[int((one.states[:, 3] > 0.0).argmax())]
+    for walker in walkers:
+        if not walker.stands:
+            at_s = motion.times_s[int((walker.states[:, 3] > 0.0).argmax())]
             report.lose(
-                f"{one.agent.id} sets out {at_s:g} s after t0, whatever the ego does; "
+                f"{walker.agent.id} sets out {at_s:g} s after t0, whatever the ego does; "
                 f"with us it does when the ego is within {SETS_OUT_WITHIN_M:g} m"
             )
 

@@ -102,7 +102,11 @@ class _Network:
         self.ids = {way.id: number for number, way in enumerate(ways, start=1)}
         self.left_out: list[str] = []
         self.pairs: list[tuple[str, str]] = []
-        self.inside = {one.id: one for one in scene.connectors if self._is_connecting(one)}
+        self.inside = {
+            connector.id: connector
+            for connector in scene.connectors
+            if self._is_connecting(connector)
+        }
         self.junctions = self._grouped()
         self.of_road = {
             one.id: junction for junction, group in self.junctions.items() for one in group
@@ -260,9 +264,9 @@ def _junction(
 ) -> Any:
     junction = xodr.Junction(f"Junction{number - _FIRST_JUNCTION + 1}", number)
     lane = _lane_number(side)
-    for one in members:
+    for member in members:
         connection = xodr.Connection(
-            network.ids[str(one.from_lane)], network.ids[one.id], xodr.ContactPoint.start
+            network.ids[str(member.from_lane)], network.ids[member.id], xodr.ContactPoint.start
         )
         connection.add_lanelink(lane, lane)
         junction.add_connection(connection)
@@ -279,11 +283,15 @@ def _report(scene: Scene, lines: dict[str, ReferenceLine], report: LossReport) -
         )
     names = [lane.id for lane in scene.lanes if lane.left_neighbor or lane.right_neighbor]
     report.lose_of(names, "that lanes lie side by side is not said: each is a road of its own")
-    names = [one.id for one in scene.connectors if one.traffic_light is not TrafficLight.NONE]
+    names = [
+        connector.id
+        for connector in scene.connectors
+        if connector.traffic_light is not TrafficLight.NONE
+    ]
     report.lose_of(names, "the map has no lights")
     names = [area.id for area in scene.areas]
     report.lose_of(names, "areas are left out of the map")
-    names = [one.id for one in scene.connectors]
+    names = [connector.id for connector in scene.connectors]
     report.lose_of(names, "turn types are not said, only the lines")
 
 

@@ -63,13 +63,13 @@ def _scenario(cell: Cell, road_file: str) -> bytes:
     motion = cell.motion
     everyone = (motion.ego, *motion.others)
     entities = xosc.Entities()
-    for one in everyone:
-        entities.add_scenario_object(one.agent.id, _entity(xosc, one.agent))
+    for agent in everyone:
+        entities.add_scenario_object(agent.agent.id, _entity(xosc, agent.agent))
     board = xosc.StoryBoard(_init(xosc, everyone), _at(xosc, "end", float(motion.times_s[-1])))
     maneuvers = [
-        (one.agent.id, maneuver)
-        for one in everyone
-        if (maneuver := _maneuver(xosc, cell, one)) is not None
+        (agent.agent.id, maneuver)
+        for agent in everyone
+        if (maneuver := _maneuver(xosc, cell, agent)) is not None
     ]
     for name, maneuver in maneuvers:
         group = xosc.ManeuverGroup(f"{name} group")
@@ -134,12 +134,12 @@ def _init(xosc: Any, everyone: Sequence[Movement]) -> Any:
     """Where and how fast everybody is at t0; who comes later is not there yet."""
     init = xosc.Init()
     now = xosc.TransitionDynamics(xosc.DynamicsShapes.step, xosc.DynamicsDimension.time, 0.0)
-    for one in everyone:
-        if appears_later(one):
+    for agent in everyone:
+        if appears_later(agent):
             continue
-        name, state = one.agent.id, one.states[0]
-        init.add_init_action(name, xosc.TeleportAction(_position(xosc, one.agent, state)))
-        if one.agent.type not in _THINGS:
+        name, state = agent.agent.id, agent.states[0]
+        init.add_init_action(name, xosc.TeleportAction(_position(xosc, agent.agent, state)))
+        if agent.agent.type not in _THINGS:
             init.add_init_action(name, xosc.AbsoluteSpeedAction(float(state[3]), now))
     return init
 
@@ -238,9 +238,9 @@ def _at(xosc: Any, name: str, at_s: float) -> Any:
 
 def _report(cell: Cell, report: LossReport) -> None:
     report_motion(cell, report, can_trigger=True)
-    names = [one.agent.id for one in cell.motion.others if has_gaps(one)]
+    names = [other.agent.id for other in cell.motion.others if has_gaps(other)]
     report.lose_of(names, "goes and comes back; goes straight on in between")
     for kind in (AgentType.TRAFFIC_CONE, AgentType.CONSTRUCTION_SIGN, AgentType.GENERIC_OBJECT):
-        names = [one.agent.id for one in cell.motion.others if one.agent.type is kind]
+        names = [other.agent.id for other in cell.motion.others if other.agent.type is kind]
         report.lose_of(names, f"a {kind} becomes an obstacle")
     report.lose("heights, masses and axles are not known; usual ones are written")

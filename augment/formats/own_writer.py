@@ -42,7 +42,7 @@ def _recording(cell: Cell) -> Recording:
     return Recording(
         times_s=motion.times_s,
         ego=motion.ego.states,
-        tracks=tuple(_track(one) for one in motion.others if one.source in _SEEN),
+        tracks=tuple(_track(other) for other in motion.others if other.source in _SEEN),
     )
 
 

@@ -88,7 +88,10 @@ class Log:
         x_m, y_m, heading_rad, _ = self.ego[frame].tolist()
         if not np.isfinite(self.ego[frame]).all():
             raise InvalidDocument(self.what, [("frame", f"{frame} has no ego in it")])
-        for name, states in (("ego", self.ego), *((one.name, one.states) for one in self.tracks)):
+        for name, states in (
+            ("ego", self.ego),
+            *((track.name, track.states) for track in self.tracks),
+        ):
             if (np.abs(states) > FURTHEST_M).any():
                 raise InvalidDocument(self.what, [(name, f"has a number over {FURTHEST_M:.0e}")])
         return Pose(x_m=x_m, y_m=y_m, heading_rad=wrap(heading_rad))
@@ -149,10 +152,10 @@ def scene_at(
 
 def far_notes(log: Log, frame: int, road: MapExtract) -> list[Note]:
     """What of the map and of who is there lies too far from the ego, and whose box was none."""
-    sizeless = sum(not _has_size(one) for one in log.tracks)
+    sizeless = sum(not _has_size(track) for track in log.tracks)
     notes = [Note(kind=SceneNoteKind.SOME_BOX_SIZES, number=sizeless, of=len(log.tracks))]
     notes = notes if sizeless else []
-    away_m = [np.hypot(*(one.states[frame, :2] - log.ego[frame, :2])) for one in log.tracks]
+    away_m = [np.hypot(*(track.states[frame, :2] - log.ego[frame, :2])) for track in log.tracks]
     number = road.far + sum(bool(distance_m > RADIUS_M) for distance_m in away_m)
     if number:
         notes.append(Note(kind=SceneNoteKind.FAR_PARTS_LEFT_OUT, number=number, value=RADIUS_M))

@@ -297,7 +297,7 @@ def _connector(
         width_m=_mean_width(chain),
         traffic_light=_light(chain, None if way.before is None else strips[way.before]),
         turn_type=(chain[0].segment.turn if len(chain) == 1 else None) or turn_type_of(line),
-        speed_limit_mps=max((one for one in limits if one is not None), default=None),
+        speed_limit_mps=max((limit for limit in limits if limit is not None), default=None),
         left_boundary=_edge([strip.left for strip in chain]),
         right_boundary=_edge([strip.right for strip in chain]),
     )

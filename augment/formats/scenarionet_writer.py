@@ -148,7 +148,7 @@ def _report(cell: Cell, report: LossReport) -> None:
     for kind in AgentType:
         if kind in _SAME_TYPE or kind is AgentType.EGO_VEHICLE:
             continue
-        names = [one.agent.id for one in cell.motion.others if one.agent.type is kind]
+        names = [other.agent.id for other in cell.motion.others if other.agent.type is kind]
         report.lose_of(names, f"a {kind} becomes a {_TYPES[kind]}")
     for area_kind in AreaKind:
         if area_kind not in _AREAS:
@@ -166,12 +166,16 @@ def _report(cell: Cell, report: LossReport) -> None:
 def _report_map(scene: Scene, report: LossReport) -> None:
     for turn in TurnType:
         names = [
-            one.id
-            for one in scene.connectors
-            if one.turn_type is turn is not turn_type_of(one.centerline)
+            connector.id
+            for connector in scene.connectors
+            if connector.turn_type is turn is not turn_type_of(connector.centerline)
         ]
         report.lose_of(names, f"the turn type {turn} is not said, and the line looks otherwise")
-    names = [one.id for one in scene.connectors if one.traffic_light is TrafficLight.NONE]
+    names = [
+        connector.id
+        for connector in scene.connectors
+        if connector.traffic_light is TrafficLight.NONE
+    ]
     report.lose_of(names, "that it has no light is not said")
     ways: list[AnyLane] = [*scene.lanes, *scene.connectors]
     if any(way.left_boundary or way.right_boundary for way in ways):

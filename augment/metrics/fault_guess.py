@@ -27,10 +27,10 @@ def first_guess(findings: Iterable[Finding]) -> frozenset[FaultClass]:
     also follow from a wrong heading. Two that are both misplaced and overlap do so on their own
     account.
     """
-    faults = [one for one in findings if one.is_fault]
+    faults = [finding for finding in findings if finding.is_fault]
     misplaced = _names(faults, FaultClass.POSITION)
-    turned = {one for one in _names(faults, FaultClass.HEADING) if one not in misplaced}
-    return frozenset(one.fault for one in faults if not _follows(one, misplaced, turned))
+    turned = {name for name in _names(faults, FaultClass.HEADING) if name not in misplaced}
+    return frozenset(fault.fault for fault in faults if not _follows(fault, misplaced, turned))
 
 
 def _names(faults: Iterable[Finding], fault: FaultClass) -> set[str]:

@@ -47,12 +47,12 @@ class Summary:
 
 def summarise(displacements: Sequence[Displacement]) -> Summary:
     """All matched objects of all augmentations; each object counts once."""
-    distances_m = [value for one in displacements for value in one.distances_m]
+    distances_m = [value for displacement in displacements for value in displacement.distances_m]
     return Summary(
         augmentations=len(displacements),
         n=len(distances_m),
-        missing=sum(len(one.missing) for one in displacements),
-        surplus=sum(len(one.surplus) for one in displacements),
+        missing=sum(len(displacement.missing) for displacement in displacements),
+        surplus=sum(len(displacement.surplus) for displacement in displacements),
         box=box_of(distances_m) if distances_m else None,
     )
 
@@ -78,5 +78,5 @@ def box_of(values_m: Sequence[float]) -> BoxSummary:
         median_m=median,
         q3_m=q3,
         high_m=high,
-        outliers_m=tuple(float(one) for one in values[~inside]),
+        outliers_m=tuple(float(value) for value in values[~inside]),
     )

@@ -95,7 +95,10 @@ def entry_to_document(entry: CatalogueEntry) -> dict[str, Any]:
     English and an instruction without paraphrases go without saying.
     """
     language = {} if entry.language == ENGLISH else {"language": entry.language}
-    others = [{"language": one.language, "text": one.text} for one in entry.paraphrases]
+    others = [
+        {"language": paraphrase.language, "text": paraphrase.text}
+        for paraphrase in entry.paraphrases
+    ]
     return {
         "format": SCENARIO_FORMAT,
         "version": VERSION,
@@ -136,7 +139,8 @@ def entry_from_document(document: object) -> CatalogueEntry:
         intent=intent,
         language=given.language,
         paraphrases=tuple(
-            Wording(language=one.language, text=one.text) for one in given.paraphrases
+            Wording(language=paraphrase.language, text=paraphrase.text)
+            for paraphrase in given.paraphrases
         ),
     )
 

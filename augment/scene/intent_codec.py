@@ -258,10 +258,12 @@ def intent_to_document(intent: Intent) -> dict[str, Any]:
 
 def intent_to_parts(intent: Intent) -> dict[str, Any]:
     """The requests, and whatever else the intent says."""
-    requests = [{"kind": _KINDS[type(one)], **_written(one)} for one in intent.requests]
+    requests = [
+        {"kind": _KINDS[type(request)], **_written(request)} for request in intent.requests
+    ]
     others = {
-        "moves": [_written(one) for one in intent.moves],
-        "removals": [_written(one) for one in intent.removals],
+        "moves": [_written(move) for move in intent.moves],
+        "removals": [_written(removal) for removal in intent.removals],
         "route": "" if intent.route is TurnType.STRAIGHT else intent.route.value,
         "unmet": intent.unmet,
         "beyond": list(intent.beyond),
@@ -286,7 +288,7 @@ def intent_from_parts(given: IntentParts) -> Intent:
         InvalidDocument: They contradict each other.
     """
     intent = Intent(
-        requests=tuple(_request(one) for one in given.requests),
+        requests=tuple(_request(request) for request in given.requests),
         moves=_value(given.moves),
         removals=_value(given.removals),
         route=given.route,
@@ -364,7 +366,7 @@ def _written(value: Any) -> Any:
         return [_written(one) for one in value]
     if not hasattr(value, "__dataclass_fields__"):
         return value
-    kept = ((one.name, getattr(value, one.name), one.default) for one in fields(value))
+    kept = ((field.name, getattr(value, field.name), field.default) for field in fields(value))
     always = "body" if isinstance(value, (VehicleRequest, CrashRequest)) else ""
     return {
         name: _written(part) for name, part, default in kept if part != default or name == always

@@ -45,7 +45,7 @@ def list_statements(intent: Intent) -> tuple[Sentence, ...]:
     for move in intent.moves:
         who = state_pick(move.who)
         made += [sentence("%(what)s: %(fact)s", what=who, fact=one) for one in _move_facts(move)]
-    made += [sentence("%(who)s: goes", who=state_pick(one)) for one in intent.removals]
+    made += [sentence("%(who)s: goes", who=state_pick(removal)) for removal in intent.removals]
     if intent.route in _ROUTES:
         made.append(_ROUTES[intent.route])
     if intent.unmet:

@@ -172,7 +172,7 @@ def read(document: object, model: type[Read], *, what: str, format_name: str) ->
 
 def problems_of(fault: ValidationError) -> list[tuple[str, str]]:
     """Each fault that pydantic found, as its path and a sentence."""
-    return [(path(*one["loc"]), _sentence(one)) for one in fault.errors(include_url=False)]
+    return [(path(*error["loc"]), _sentence(error)) for error in fault.errors(include_url=False)]
 
 
 def path(*steps: int | str) -> str:

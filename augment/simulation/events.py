@@ -44,11 +44,11 @@ def events_of(drive: Drive, score: Score) -> tuple[DriveEvent, ...]:
     """All events in the order of time."""
     found = [
         DriveEvent(
-            moment=one.moment,
-            kind=EventKind.COLLISION if one.at_fault else EventKind.TOUCHED,
-            object_id=one.object_id,
+            moment=collision.moment,
+            kind=EventKind.COLLISION if collision.at_fault else EventKind.TOUCHED,
+            object_id=collision.object_id,
         )
-        for one in score.collisions
+        for collision in score.collisions
     ]
     outside = _series(score, "drivable_area_compliance", "outside_m") >= OFF_ROAD_M
     found += [DriveEvent(moment=n, kind=EventKind.OFF_ROAD) for n in _starts(outside)]

@@ -53,7 +53,9 @@ class Road:
         self.route = find_route(scene, self.graph, recording)
         self.beside = beside_route(scene, self.graph, self.route)
         self.red = frozenset(
-            one.id for one in scene.connectors if one.traffic_light is TrafficLight.RED
+            connector.id
+            for connector in scene.connectors
+            if connector.traffic_light is TrafficLight.RED
         )
         self.limits_mps = self._limits()
         line = np.vstack([self.graph.lanes[name].centerline.points_m for name in self.route])

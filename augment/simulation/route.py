@@ -53,7 +53,9 @@ def beside_route(scene: Scene, graph: LaneGraph, route: tuple[str, ...]) -> froz
                 found.add(name)
                 waiting.append(lanes[name])
     joining = {
-        one.id for one in scene.connectors if one.from_lane in found and one.to_lane in found
+        connector.id
+        for connector in scene.connectors
+        if connector.from_lane in found and connector.to_lane in found
     }
     return frozenset(found | joining)
 

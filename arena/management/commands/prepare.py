@@ -21,6 +21,6 @@ class Command(TerminalCommand):
         call_command("migrate", interactive=False, verbosity=0)
         settings.STATIC_ROOT.mkdir(parents=True, exist_ok=True)
         call_command("collectstatic", interactive=False, verbosity=0)
-        drawn = sum(one.pictures for one in redraw_pictures())
+        drawn = sum(picture.pictures for picture in redraw_pictures())
         if drawn:
             self.stdout.write(f"Pictures of an earlier version drawn anew: {drawn}")

@@ -35,7 +35,7 @@ class Command(TerminalCommand):
         )
         parser.add_argument(
             "--intervals",
-            choices=[one.value for one in Intervals],
+            choices=[interval.value for interval in Intervals],
             help="closed form (the default where votes hang together) or resamples",
         )
         parser.add_argument(

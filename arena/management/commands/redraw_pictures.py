@@ -15,10 +15,11 @@ class Command(TerminalCommand):
 
     def handle(self, *args: Any, **options: Any) -> None:
         """Draw, and say what."""
-        for one in redraw_pictures():
-            if one.needed_by:
+        for picture in redraw_pictures():
+            if picture.needed_by:
                 self.stdout.write(
-                    f"{one.scenario}: kept, the study '{one.needed_by}' is open and shows them"
+                    f"{picture.scenario}: kept, the study '{picture.needed_by}' is open and "
+                    "shows them"
                 )
             else:
-                self.stdout.write(f"{one.scenario}: {one.pictures} drawn anew")
+                self.stdout.write(f"{picture.scenario}: {picture.pictures} drawn anew")

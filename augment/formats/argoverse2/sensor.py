@@ -78,7 +78,7 @@ class ArgoverseSensor:
 
 def map_notes(city: MapFile, road: MapExtract) -> tuple[Note, ...]:
     """What maps of Argoverse 2 don't say."""
-    bicycle_lanes = sum(one.lane_type == "BIKE" for one in city.lane_segments.values())
+    bicycle_lanes = sum(segment.lane_type == "BIKE" for segment in city.lane_segments.values())
     notes = [
         Note(kind=SceneNoteKind.NO_SPEED_LIMITS),
         Note(kind=SceneNoteKind.NO_LIGHTS),

@@ -88,9 +88,9 @@ def network_of(root: Element, step: int) -> RoadNetwork:
         for key, one in roads.items()
     )
     areas = tuple(
-        (AREA_OF[kind], np.vstack([one.left, one.right[::-1]]))
-        for one in lanelets.values()
-        for kind in sorted(one.kinds & AREA_OF.keys())[:1]
+        (AREA_OF[kind], np.vstack([lanelet.left, lanelet.right[::-1]]))
+        for lanelet in lanelets.values()
+        for kind in sorted(lanelet.kinds & AREA_OF.keys())[:1]
     )
     notes = _notes(segments, areas, bool(inside), lights, other_signs, lanelets)
     city = RoadMap(what=WHAT, place="lanelet", segments=segments, areas=areas)
@@ -160,7 +160,11 @@ def _inside(root: Element, lanelets: dict[int, Lanelet]) -> dict[int, TurnType |
                 inside |= dict.fromkeys(references(incoming, name), turn)
     inside = {key: turn for key, turn in inside.items() if key in lanelets}
     # Where the file says itself what is an intersection, no bend has to tell.
-    waiting = [] if any("intersection" in one.kinds for one in lanelets.values()) else list(inside)
+    waiting = (
+        []
+        if any("intersection" in lanelet.kinds for lanelet in lanelets.values())
+        else list(inside)
+    )
     while waiting:
         for key in lanelets[waiting.pop()].successors:
             one = lanelets.get(key)
@@ -228,7 +232,7 @@ def _notes(
     lanelets: dict[int, Lanelet],
 ) -> tuple[Note, ...]:
     notes = []
-    unlimited = sum(one.speed_limit_mps is None for one in segments)
+    unlimited = sum(segment.speed_limit_mps is None for segment in segments)
     if segments and unlimited == len(segments):
         notes.append(Note(kind=SceneNoteKind.NO_SPEED_LIMITS))
     elif unlimited:
@@ -238,7 +242,7 @@ def _notes(
         notes.append(Note(kind=SceneNoteKind.NO_INTERSECTIONS))
     if lights:
         notes.append(Note(kind=SceneNoteKind.LIGHTS_REPEATED, number=len(lights)))
-    bicycle_lanes = sum("bicycleLane" in one.kinds for one in lanelets.values())
+    bicycle_lanes = sum("bicycleLane" in lanelet.kinds for lanelet in lanelets.values())
     if bicycle_lanes:
         notes.append(Note(kind=SceneNoteKind.BICYCLE_LANES_LEFT_OUT, number=bicycle_lanes))
     if other_signs:

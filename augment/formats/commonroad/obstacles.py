@@ -191,16 +191,16 @@ def _size(element: Element, place: str) -> tuple[float, float] | None:
     shape = element.first("shape")
     if shape is None:
         return None
-    for one in shape.children:
-        if one.name == "rectangle":
-            length, width = one.first("length"), one.first("width")
+    for child in shape.children:
+        if child.name == "rectangle":
+            length, width = child.first("length"), child.first("width")
             if length is None or width is None:
                 raise fault(place, "a rectangle needs a length and a width")
             return real(length.text, place), real(width.text, place)
-        if one.name == "circle" and (radius := one.first("radius")) is not None:
+        if child.name == "circle" and (radius := child.first("radius")) is not None:
             return 2.0 * real(radius.text, place), 2.0 * real(radius.text, place)
-        if one.name == "polygon":
-            points = points_of(one, place)
+        if child.name == "polygon":
+            points = points_of(child, place)
             if len(points) >= 3:
                 length_m, width_m = np.ptp(points, axis=0).tolist()
                 return length_m, width_m

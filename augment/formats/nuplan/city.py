@@ -302,7 +302,7 @@ def _route_notes(route: tuple[str, ...], blocks: set[str]) -> list[Note]:
 
 def _notes(city: RoadMap, count: _Count) -> tuple[Note, ...]:
     notes, total = [], len(city.segments)
-    unlimited = sum(one.speed_limit_mps is None for one in city.segments)
+    unlimited = sum(segment.speed_limit_mps is None for segment in city.segments)
     if total and unlimited == total:
         notes.append(Note(kind=SceneNoteKind.NO_SPEED_LIMITS))
     elif unlimited:

@@ -98,7 +98,7 @@ def place_of(tables: Tables) -> LogPlace:
     rows = tables.rows("SELECT location, map_version, logfile FROM log LIMIT 1")
     if not rows:
         raise InvalidDocument(WHAT, [("log", "has no row")])
-    location, version, logfile = (str(one or "") for one in rows[0])
+    location, version, logfile = (str(row or "") for row in rows[0])
     return LogPlace(location=location, version=version, logfile=logfile)
 
 
@@ -170,7 +170,9 @@ def mission_at(tables: Tables, token: str) -> Mission:
     roadblocks = re.split(r"[\s,]+", str(scenes[0][0] or "")) if scenes else []
     goal = _numbers(scenes[0][1:], "ego_pose") if scenes and scenes[0][1] is not None else None
     return Mission(
-        roadblocks=tuple(one[:20] for one in roadblocks[:MOST_ROADBLOCKS] if one),
+        roadblocks=tuple(
+            roadblock[:20] for roadblock in roadblocks[:MOST_ROADBLOCKS] if roadblock
+        ),
         goal_m=None if goal is None else (goal[0], goal[1]),
         tags=tuple(str(one)[:80] for (one,) in tags),
     )
@@ -190,7 +192,7 @@ def _whole(value: object, place: str) -> int:
 def _numbers(values: Sequence[Any], place: str) -> list[float]:
     """Finite numbers; NULL counts as 0."""
     try:
-        found = [0.0 if one is None else float(one) for one in values]
+        found = [0.0 if value is None else float(value) for value in values]
     except (TypeError, ValueError, OverflowError):
         raise InvalidDocument(WHAT, [(place, "has a value that is no number")]) from None
     if not all(map(math.isfinite, found)):

@@ -222,9 +222,9 @@ def _notes(
     if assumed:
         kind = SceneNoteKind.LANE_WIDTHS_ASSUMED
         notes.append(Note(kind=kind, number=assumed, of=count, value=USUAL_M))
-    if not any(one.successors or one.predecessors for one in city.segments):
+    if not any(segment.successors or segment.predecessors for segment in city.segments):
         notes.append(Note(kind=SceneNoteKind.NO_CONNECTIVITY))
-    if not any(one.crosses for one in city.segments):
+    if not any(segment.crosses for segment in city.segments):
         notes.append(Note(kind=SceneNoteKind.NO_INTERSECTIONS))
     if not has_lights:
         notes.append(Note(kind=SceneNoteKind.NO_LIGHTS))
@@ -245,7 +245,7 @@ def _notes(
 
 def _limit_notes(city: RoadMap, meaningless: int) -> list[Note]:
     notes, count = [], len(city.segments)
-    unlimited = sum(one.speed_limit_mps is None for one in city.segments)
+    unlimited = sum(segment.speed_limit_mps is None for segment in city.segments)
     if meaningless:
         kind = SceneNoteKind.SPEED_LIMITS_IGNORED
         notes.append(Note(kind=kind, number=meaningless, value=round(MEANINGLESS_KMH / 3.6, 1)))

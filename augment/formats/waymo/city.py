@@ -138,9 +138,9 @@ def _parts(
     scenario: ScenarioMessage, boundaries: list[BoundaryMessage]
 ) -> list[tuple[int, int, FloatArray]]:
     return [
-        (one.start, one.end, scenario.edges[one.feature])
-        for one in boundaries
-        if one.feature in scenario.edges
+        (boundary.start, boundary.end, scenario.edges[boundary.feature])
+        for boundary in boundaries
+        if boundary.feature in scenario.edges
     ]
 
 
@@ -166,7 +166,7 @@ def _notes(
     controlled: set[int],
 ) -> tuple[Note, ...]:
     notes, count = [], len(segments)
-    unlimited = sum(one.speed_limit_mps is None for one in segments)
+    unlimited = sum(segment.speed_limit_mps is None for segment in segments)
     if count and unlimited == count:
         notes.append(Note(kind=SceneNoteKind.NO_SPEED_LIMITS))
     elif unlimited:

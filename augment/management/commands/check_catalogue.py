@@ -36,10 +36,10 @@ class Command(TerminalCommand):
             found = check_catalogue(folder=options["folder"], sets=sets_of(options))
         except AugmentError as error:
             raise CommandError(str(error)) from error
-        width = max((len(one.slug) for one in found.scenarios), default=8)
+        width = max((len(scenario.slug) for scenario in found.scenarios), default=8)
         self.stdout.write(f"{'scenario':{width}}  statements  result")
-        for one in found.scenarios:
-            self.stdout.write(_line(one, width))
+        for scenario in found.scenarios:
+            self.stdout.write(_line(scenario, width))
         reasons = _reasons(found)
         if reasons:
             raise CommandError("\n".join(reasons))
@@ -52,5 +52,7 @@ def _line(one: ScenarioCheck, width: int) -> str:
 
 
 def _reasons(found: CatalogueCheck) -> list[str]:
-    own = [f"{one.slug}: {reason}" for one in found.scenarios for reason in one.reasons]
+    own = [
+        f"{scenario.slug}: {reason}" for scenario in found.scenarios for reason in scenario.reasons
+    ]
     return [*own, *found.reasons]

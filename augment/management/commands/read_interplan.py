@@ -39,12 +39,12 @@ class Command(TerminalCommand):
         try:
             found = references_from_interplan(options["file"], scenes=_scenes(options["scene"]))
             options["out"].mkdir(parents=True, exist_ok=True)
-            for one in found.entries:
-                document = modification_to_document(one.modification)
-                file = options["out"] / f"{one.id}.json"
+            for entry in found.entries:
+                document = modification_to_document(entry.modification)
+                file = options["out"] / f"{entry.id}.json"
                 file.write_text(json.dumps(document, indent=2) + "\n", encoding="utf-8")
-                left_out = f"; left out: {', '.join(one.left_out)}" if one.left_out else ""
-                self.stdout.write(f"{file}: {one.type} on {one.scene}{left_out}")
+                left_out = f"; left out: {', '.join(entry.left_out)}" if entry.left_out else ""
+                self.stdout.write(f"{file}: {entry.type} on {entry.scene}{left_out}")
         except AugmentError as error:
             raise CommandError(str(error)) from error
         except OSError as error:

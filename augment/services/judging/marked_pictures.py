@@ -30,7 +30,7 @@ _STAMP = "SIMULATED"
 def order_faults(found: Iterable[Finding]) -> list[Finding]:
     """The faults in the order of their numbers, from 1: the wrong ones, then the doubtful."""
     faults = list(found)
-    return [one for severity in _ORDER for one in faults if one.severity is severity]
+    return [fault for severity in _ORDER for fault in faults if fault.severity is severity]
 
 
 def marked_name(row: Augmentation, found: Iterable[Finding]) -> str:
@@ -47,7 +47,9 @@ def marked_name(row: Augmentation, found: Iterable[Finding]) -> str:
         "modification": row.modification,
         "reference": row.scenario.reference,
         "simulated": row.contestant.is_simulated,
-        "faults": [[one.severity, one.agents, one.belongs_m, one.sentence()] for one in faults],
+        "faults": [
+            [fault.severity, fault.agents, fault.belongs_m, fault.sentence()] for fault in faults
+        ],
     }
     digest = hashlib.sha256(json.dumps(shown, sort_keys=True).encode()).hexdigest()
     return f"marked/{digest}.png"

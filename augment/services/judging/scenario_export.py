@@ -62,8 +62,8 @@ class Exported:
     @property
     def warnings(self) -> tuple[str, ...]:
         """What whoever passes the files on has to know."""
-        bound = [one.scene for one in self.sources if one.is_non_commercial]
-        unknown = [one.scene for one in self.sources if one.is_non_commercial is None]
+        bound = [source.scene for source in self.sources if source.is_non_commercial]
+        unknown = [source.scene for source in self.sources if source.is_non_commercial is None]
         lines = []
         if bound:
             lines.append(

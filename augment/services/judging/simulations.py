@@ -158,12 +158,12 @@ def document_of(drove: Drive, scores: dict[ScoreKind, Score]) -> dict[str, Any]:
         "expert": {"kind": score.expert.kind.value, "progress_m": score.expert.progress_m},
         "collisions": [
             {
-                "time_s": round(one.moment * 0.1, 1),
-                "object": one.object_id,
-                "contact": one.contact.name.lower(),
-                "at_fault": one.at_fault,
+                "time_s": round(collision.moment * 0.1, 1),
+                "object": collision.object_id,
+                "contact": collision.contact.name.lower(),
+                "at_fault": collision.at_fault,
             }
-            for one in score.collisions
+            for collision in score.collisions
         ],
         "criticality": asdict(criticality(drove, score.collisions)),
         "metrics": {

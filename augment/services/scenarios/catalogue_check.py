@@ -113,7 +113,7 @@ def _unheld(entry: CatalogueEntry) -> Iterator[str]:
 
 def _unparaphrased(entry: CatalogueEntry) -> Iterator[str]:
     """Too few paraphrases, or the same twice."""
-    given = [entry.instruction, *(one.text for one in entry.paraphrases)]
+    given = [entry.instruction, *(paraphrase.text for paraphrase in entry.paraphrases)]
     if 1 < len(given) <= FEWEST_PARAPHRASES:
         yield f"it has {len(given) - 1} paraphrases; {FEWEST_PARAPHRASES} are the fewest"
     if len({" ".join(one.casefold().split()) for one in given}) < len(given):
