@@ -9,7 +9,7 @@ Notation: B rounds, C contestants, P pairs.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from scipy.special import expit
@@ -28,12 +28,23 @@ class FitTest:
         freedom: Pairs minus contestants plus one; 0 leaves nothing to test.
         p_value: The share of simulated X2 that are as large, None without freedom.
         rounds: Simulated votings that determined ratings.
+        cycles: Of three contestants of whom each beat the next: how many there are.
+        triples: Of three contestants who all met without an even score.
+        cycles_foreseen: The mean number of cycles in simulated votings, by chance alone.
     """
 
     statistic: float
     freedom: int
     p_value: float | None
     rounds: int
+    cycles: int | None = field(default=None, metadata={"since": 3})
+    triples: int | None = field(default=None, metadata={"since": 3})
+    cycles_foreseen: float | None = field(default=None, metadata={"since": 3})
+
+    @property
+    def cyclic_share(self) -> float | None:
+        """The share of triples that are cycles."""
+        return self.cycles / self.triples if self.triples and self.cycles is not None else None
 
 
 def fit_test(votes: Comparisons, strengths: FloatArray, *, rounds: int, seed: int) -> FitTest:
@@ -50,8 +61,10 @@ def fit_test(votes: Comparisons, strengths: FloatArray, *, rounds: int, seed: in
     tie_share = _tie_share(counts, strengths)
     statistic = float(_pearson(counts, games[None], scores[None], strengths[None], tie_share)[0])
     freedom = len(counts.low) - len(strengths) + 1
+    cycles, triples = count_cycles(counts, len(strengths), scores[None])
+    seen_cycles = {"cycles": int(cycles[0]), "triples": int(triples[0])}
     if freedom <= 0:
-        return FitTest(statistic=statistic, freedom=0, p_value=None, rounds=0)
+        return FitTest(statistic=statistic, freedom=0, p_value=None, rounds=0, **seen_cycles)
     drawn = _simulated(counts, strengths, tie_share, rounds, np.random.default_rng(seed))
     all_games = np.broadcast_to(games, drawn.shape)
     fine = are_determined(
@@ -72,7 +85,31 @@ def fit_test(votes: Comparisons, strengths: FloatArray, *, rounds: int, seed: in
         freedom=freedom,
         p_value=(1 + above) / (1 + len(seen)),
         rounds=len(seen),
+        cycles_foreseen=float(count_cycles(counts, len(strengths), drawn)[0].mean()),
+        **seen_cycles,
     )
+
+
+def count_cycles(
+    counts: PairCounts, contestants: int, scores: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    """(B,), (B,): intransitive triples, and all triples in which no pair is even or missing.
+
+    Args:
+        counts: Who met, and how often.
+        contestants: C.
+        scores: (B, P) what `low` scored.
+    """
+    cycles, triples = np.zeros((2, len(scores)))
+    half = 0.5 * counts.games
+    for number, score in enumerate(scores):
+        beats = np.zeros((contestants, contestants))
+        beats[counts.low, counts.high] = score > half
+        beats[counts.high, counts.low] = score < half
+        decided = beats + beats.T
+        cycles[number] = ((beats @ beats) * beats.T).sum() / 3.0
+        triples[number] = ((decided @ decided) * decided).sum() / 6.0
+    return np.rint(cycles), np.rint(triples)
 
 
 # --- Private -----------------------------------------------------------------------------------

@@ -1,4 +1,4 @@
-"""How well experts agree: Krippendorff's alpha and pairwise percent agreement, with intervals.
+"""How well experts agree: Krippendorff's alpha, Gwet's AC1, percent agreement, with intervals.
 
 A unit is what can be judged twice: two contestants on one scenario. Values are oriented by the
 contestants' numbers, never by the side, or a preference for a side would count as disagreement.
@@ -10,7 +10,7 @@ Notation: B rounds, U units, S scenarios, V votes; the three values are low won,
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from enum import StrEnum
 
 import numpy as np
@@ -36,6 +36,8 @@ class Agreement:
     Attributes:
         alpha: Krippendorff's, values as names.
         alpha_interval: The same with a win twice as far from a loss as from a tie.
+        ac1: Gwet's, values as names: chance is what raters would share who guess on hard units
+            alone, so many votes of one kind do not push it towards zero as they do alpha.
         percent: The share of pairs of judgements of one unit that are equal, 0 to 1.
         units: With two judgements or more.
         judgements: On those units.
@@ -46,6 +48,7 @@ class Agreement:
     percent: Estimate
     units: int
     judgements: int
+    ac1: Estimate = field(default=Estimate(value=None), metadata={"since": 3})
 
 
 def agreement(votes: Comparisons, *, rounds: int, seed: int) -> Agreement:
@@ -65,8 +68,9 @@ def agreement(votes: Comparisons, *, rounds: int, seed: int) -> Agreement:
             alpha=nothing, alpha_interval=nothing, percent=nothing, units=0, judgements=0
         )
     found, cluster = np.unique(scenario, return_inverse=True)
-    sums = np.zeros((len(found), VALUES * VALUES + 2))
-    np.add.at(sums, cluster, np.hstack([_coincidences(table), _equal_pairs(table)]))
+    by_unit = np.hstack([_coincidences(table), _shares(table), _equal_pairs(table)])
+    sums = np.zeros((len(found), by_unit.shape[1]))
+    np.add.at(sums, cluster, by_unit)
     rng = np.random.default_rng(seed)
     chance = np.full(len(found), 1.0 / len(found))
     drawn = rng.multinomial(len(found), chance, size=rounds) @ sums
@@ -78,7 +82,17 @@ def agreement(votes: Comparisons, *, rounds: int, seed: int) -> Agreement:
         percent=_estimate(_percent, DifferenceMetric.NOMINAL, whole, drawn, several),
         units=len(table),
         judgements=int(table.sum()),
+        ac1=_estimate(_ac1, DifferenceMetric.NOMINAL, whole, drawn, several),
     )
+
+
+def gwet_ac1(table: IntArray) -> float | None:
+    """AC1 of a table (U, K) of values by unit; None if no unit was judged twice.
+
+    Source: K. L. Gwet, Computing inter-rater reliability in the presence of high agreement (2008).
+    """
+    paired = table[table.sum(axis=1) >= 2]
+    return float(_ac1_of(_shares(paired).sum(axis=0)[None])[0]) if len(paired) else None
 
 
 def unit_table(votes: Comparisons) -> tuple[IntArray, IntArray]:
@@ -117,6 +131,26 @@ def _equal_pairs(table: IntArray) -> FloatArray:
     total = table.sum(axis=1)
     equal = (table * (table - 1)).sum(axis=1)
     return np.stack([equal, total * (total - 1)], axis=1).astype(np.float64)
+
+
+def _shares(table: IntArray) -> FloatArray:
+    """(U, K + 2): the share of each value, the share of equal pairs, and one, for every unit."""
+    total = table.sum(axis=1, keepdims=True)
+    equal = (table * (table - 1)).sum(axis=1, keepdims=True) / (total * (total - 1))
+    return np.hstack([table / total, equal, np.ones((len(table), 1))])
+
+
+def _ac1(sums: FloatArray, _: DifferenceMetric) -> FloatArray:
+    """(B,) of sums as `agreement` makes them."""
+    return _ac1_of(sums[:, VALUES * VALUES : -2])
+
+
+def _ac1_of(sums: FloatArray) -> FloatArray:
+    """(B,) of sums (B, K + 2) of what units share."""
+    means = sums[:, :-1] / sums[:, -1:]
+    values, seen = means[:, :-1], means[:, -1]
+    by_chance = (values * (1.0 - values)).sum(axis=1) / (values.shape[1] - 1)
+    return np.asarray((seen - by_chance) / (1.0 - by_chance))
 
 
 def _alpha(sums: FloatArray, metric: DifferenceMetric) -> FloatArray:

@@ -9,7 +9,13 @@ from hypothesis import strategies as st
 
 from arena.rating.comparisons import LOSS, TIE, WIN, Comparison, Comparisons
 from arena.rating.raters import raters
-from arena.rating.reliability import DifferenceMetric, agreement, krippendorff_alpha
+from arena.rating.reliability import (
+    DifferenceMetric,
+    agreement,
+    gwet_ac1,
+    krippendorff_alpha,
+    unit_table,
+)
 from arena.rating.repeats import repeat_consistency
 from arena.rating.shares import share, wilson
 from tests.rating.votes import named, simulated
@@ -167,3 +173,34 @@ def test_repeats_count_what_stayed_and_what_turned() -> None:
     assert found.by_expert == {0: (2, 1), 1: (2, 1)}
     with pytest.raises(ValueError, match="4 votes, 3 repeats"):
         repeat_consistency(first, again[:3], np.zeros(4, dtype=np.int64))
+
+
+def test_ac1_is_gwets_own_example() -> None:
+    """Gwet 2008: 118 of 125 persons are called healthy by both, 7 by one; kappa is -0.02."""
+    table = np.array([[2, 0]] * 118 + [[1, 1]] * 7)
+    by_chance = 2 * (243 / 250) * (7 / 250)
+    assert gwet_ac1(table) == pytest.approx((118 / 125 - by_chance) / (1 - by_chance))
+    assert gwet_ac1(table) == pytest.approx(0.9408, abs=1e-4)
+
+
+@given(table=tables)
+def test_ac1_is_agreement_beyond_guesses_on_hard_units(table: list[tuple[int, int, int]]) -> None:
+    pairs = [
+        [(one, other) for i, one in enumerate(row) for j, other in enumerate(row) if i != j]
+        for row in ([v for v in range(3) for _ in range(n[v])] for n in table)
+    ]
+    seen = np.mean([np.mean([one == other for one, other in unit]) for unit in pairs])
+    share = np.mean([np.array(row) / sum(row) for row in table], axis=0)
+    by_chance = sum(x * (1 - x) for x in share) / 2
+    assert gwet_ac1(np.array(table)) == pytest.approx((seen - by_chance) / (1 - by_chance))
+    assert gwet_ac1(np.array([[1, 0, 0]])) is None
+
+
+def test_agreement_carries_ac1_with_an_interval() -> None:
+    votes = simulated([1100.0, 1000.0], 400, 1, experts=4, scenarios=20)
+    found = agreement(votes, rounds=200, seed=1)
+    table = np.array([row for row in unit_table(votes)[0] if row.sum() >= 2])
+    assert found.ac1.value == pytest.approx(gwet_ac1(table))
+    assert found.ac1.lower is not None
+    assert found.ac1.upper is not None
+    assert found.ac1.lower < found.ac1.value < found.ac1.upper

@@ -1,13 +1,15 @@
 from __future__ import annotations
 
+import itertools
+
 import numpy as np
 import pytest
 import statsmodels.api as sm
 
 from arena.rating.bootstrap import Unit
 from arena.rating.bradley_terry import ELO_PER_LOGIT
-from arena.rating.comparisons import Comparison, Comparisons
-from arena.rating.fit_test import fit_test
+from arena.rating.comparisons import Comparison, Comparisons, count_pairs
+from arena.rating.fit_test import count_cycles, fit_test
 from arena.rating.influence import (
     fewest_votes_to_change_first,
     rank_changes,
@@ -208,3 +210,32 @@ def test_win_rates_count_both_ways() -> None:
     assert found.votes[0, 1] == found.votes[1, 0] == 7
     assert found.scores[0, 1] == pytest.approx(0.5)
     assert np.isnan(found.scores[0, 2])
+
+
+# --- Cycles ------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("seed", range(10))
+def test_cycles_are_counted_by_trying_every_three(seed: int) -> None:
+    votes = simulated([1000.0] * 6, 40, seed)
+    counts = count_pairs(votes)
+    lead = np.zeros((6, 6))
+    lead[counts.low, counts.high] = counts.scores - 0.5 * counts.games
+    lead -= lead.T
+    cycles = triples = 0
+    for a, b, c in itertools.combinations(range(6), 3):
+        ends = [lead[a, b], lead[b, c], lead[c, a]]
+        triples += all(ends)
+        cycles += all(one > 0 for one in ends) or all(one < 0 for one in ends)
+    found = count_cycles(counts, 6, counts.scores[None])
+    assert (found[0].tolist(), found[1].tolist()) == ([cycles], [triples])
+
+
+def test_a_test_of_fit_has_the_cycles_and_what_chance_gives() -> None:
+    votes = named(
+        versus("a", "b", 30, 0, 10) + versus("b", "c", 30, 0, 10) + versus("c", "a", 30, 0, 10)
+    )
+    found = fit_test(votes, fit(votes), rounds=200, seed=1)
+    assert (found.cycles, found.triples, found.cyclic_share) == (1, 1, 1.0)
+    # Of three fair coins two of eight falls make a cycle.
+    assert found.cycles_foreseen == pytest.approx(0.25, abs=0.1)
