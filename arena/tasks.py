@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from celery import shared_task
 
+from arena.exports.scenario_files import write_file
 from arena.services import ratings
 from augment.tasks import open_broker
 
@@ -26,3 +27,19 @@ def send_snapshot(snapshot_pk: int) -> None:
     """
     with open_broker() as broker:
         compute_snapshot.apply_async((snapshot_pk,), connection=broker, retry=False)
+
+
+@shared_task(name="arena.write_scenario_file", acks_late=True, ignore_result=True)
+def write_scenario_file(file_pk: int) -> None:
+    """Write a zip of a job's scenarios, unless it is ready already."""
+    write_file(file_pk=file_pk)
+
+
+def send_scenario_file(file_pk: int) -> None:
+    """Ask a worker to write a zip; for transaction.on_commit.
+
+    Raises:
+        QueueFault: No broker, or it refuses; the row waits until it is sent again.
+    """
+    with open_broker() as broker:
+        write_scenario_file.apply_async((file_pk,), connection=broker, retry=False)

@@ -7,6 +7,7 @@ from arena.models.invitations import Invitation, token_digest
 from arena.models.labels import FaultLabel, LabellingRound, LabelTask
 from arena.models.people import Person
 from arena.models.ratings import EarlyLook, ImportedVote, Snapshot, Standing, VoteFile
+from arena.models.scenario_files import ScenarioFile
 from arena.models.studies import Matchup, Study
 from arena.models.tokens import fresh_token
 from arena.models.votes import AIDS, OUTCOME_LETTERS, Report, Vote
@@ -24,6 +25,7 @@ __all__ = [
     "Matchup",
     "Person",
     "Report",
+    "ScenarioFile",
     "Snapshot",
     "Standing",
     "Study",

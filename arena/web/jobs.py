@@ -24,11 +24,11 @@ from arena.web.displacement import section
 from arena.web.driving import section as driving_section
 from arena.web.forms import CapsForm, LaunchForm
 from arena.web.questions import Confirmation, ask, is_sure
+from arena.web.scenario_files import rows_of
 from augment.errors import AugmentError, QueueFault, UnknownName
 from augment.models import Augmentation, Contestant, GenerationJob
 from augment.services.endpoints import contestants
 from augment.services.judging.repeatability import repeatability
-from augment.services.judging.scenario_export import FORMATS
 from augment.services.running import caps
 from augment.services.running import jobs as service
 from augment.services.running.caps import Caps
@@ -98,7 +98,7 @@ def job_page(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
     if found.is_moving:
         context["workforce"] = workforce()
     else:  # a page that shows itself anew every two seconds measures nothing
-        context["scenario_formats"] = FORMATS
+        context["scenario_files"] = rows_of(job)
         context["displacement"] = section(request, job)
         if job.samples > 1:
             is_checked = request.GET.get("checks") == "1"

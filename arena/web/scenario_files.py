@@ -1,47 +1,73 @@
-"""What a job made, as scenarios in a standard format: one zip a format."""
+"""What a job made, as scenarios in a standard format: one zip a format, written by a worker."""
 
 from __future__ import annotations
 
 import uuid
+from functools import partial
+from typing import cast
 
 from django.contrib import messages
-from django.http import Http404, HttpRequest, HttpResponse
+from django.contrib.auth.models import User
+from django.core.files.storage import default_storage
+from django.db import transaction
+from django.http import FileResponse, Http404, HttpRequest, HttpResponse
 from django.shortcuts import get_object_or_404, redirect
-from django.utils.text import slugify
+from django.urls import reverse
 from django.utils.translation import gettext as _
-from django.views.decorators.http import require_safe
+from django.views.decorators.http import require_POST, require_safe
 
-from arena.exports.scenarios import scenario_zip, zip_name
+from arena import tasks
 from arena.exports.zips import CONTENT_TYPE
+from arena.models import ScenarioFile
+from arena.services.scenario_files import ask_for_file, files_of
 from arena.web.access import STAFF, allow_only
-from augment.errors import AugmentError
+from augment.errors import AugmentError, QueueFault
 from augment.models import GenerationJob
-from augment.services.judging.scenario_export import FORMATS, export_job
+from augment.services.judging.scenario_export import FORMATS
 from augment.services.wording import translate
 
-MOST = 300
-"""So many are written while somebody waits; more take the command."""
+
+def rows_of(job: GenerationJob) -> list[tuple[str, ScenarioFile | None]]:
+    """Each format with its newest zip, for a job's page."""
+    found = files_of(job)
+    return [(form, found.get(form)) for form in FORMATS]
+
+
+@allow_only(*STAFF)
+@require_POST
+def ask(request: HttpRequest, code: uuid.UUID, form: str) -> HttpResponse:
+    """Leave a zip of all scenarios of a job to a worker; twice does no harm."""
+    job = get_object_or_404(GenerationJob, code=code)
+    if form not in FORMATS:
+        raise Http404
+    try:
+        with transaction.atomic():
+            row = ask_for_file(job=job, file_format=form, actor=cast(User, request.user))
+            transaction.on_commit(partial(_send, request, row.pk))
+    except AugmentError as error:
+        messages.error(request, translate(error))
+    return redirect(reverse("job", args=[code]) + "#scenario-files")
 
 
 @allow_only(*STAFF)
 @require_safe
-def export(request: HttpRequest, code: uuid.UUID, form: str) -> HttpResponse:
-    """All scenarios of a job in one zip with a manifest."""
-    job = get_object_or_404(GenerationJob, code=code)
-    if form not in FORMATS:
-        raise Http404
-    if job.augmentations.exclude(modification=None).count() > MOST:
-        text = _("More than %(most)s scenarios: write them with “manage.py export scenarios”.")
-        messages.error(request, text % {"most": MOST})
-        return redirect("job", code=code)
+def download(request: HttpRequest, code: uuid.UUID) -> FileResponse:
+    """A zip that is ready."""
+    row = get_object_or_404(ScenarioFile, code=code, state=ScenarioFile.State.READY)
     try:
-        exported = export_job(job, file_format=form)
-    except AugmentError as error:
+        content = default_storage.open(row.stored)
+    except FileNotFoundError:
+        raise Http404 from None
+    return FileResponse(content, as_attachment=True, filename=row.name, content_type=CONTENT_TYPE)
+
+
+# --- Private -----------------------------------------------------------------------------------
+
+
+def _send(request: HttpRequest, file_pk: int) -> None:
+    try:
+        tasks.send_scenario_file(file_pk)
+    except QueueFault as error:
         messages.error(request, translate(error))
-        return redirect("job", code=code)
-    name = zip_name(exported, slugify(job.name) or str(job.code))
-    return HttpResponse(
-        scenario_zip(exported),
-        content_type=CONTENT_TYPE,
-        headers={"Content-Disposition": f'attachment; filename="{name}"'},
-    )
+    else:
+        messages.success(request, _("A worker writes the file; it is offered here when ready."))

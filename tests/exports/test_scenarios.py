@@ -10,11 +10,14 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from django.core.files.storage import default_storage
 from django.core.management import call_command
 from django.core.management.base import CommandError
 from django.test import Client
 from django.urls import reverse
 
+from arena.models import ScenarioFile
+from arena.tasks import write_scenario_file
 from augment.formats.writers import WRITERS
 from augment.models import Augmentation, BaseScene, Contestant, GenerationJob
 from augment.scene.catalogue import ScenarioType
@@ -125,21 +128,65 @@ def test_strict_writes_nothing_once_something_would_change(
     assert not list(tmp_path.glob("*.zip"))
 
 
-def test_the_jobs_page_links_to_a_zip_of_each_format(
-    job: GenerationJob, admin_client: Client, monkeypatch: pytest.MonkeyPatch
+def ask_for(client: Client, job: GenerationJob, form: str) -> None:
+    """Press the button, and be the worker that it asks."""
+    client.post(reverse("scenarios-write", args=[job.code, form]))
+    for row in ScenarioFile.objects.filter(state=ScenarioFile.State.QUEUED):
+        write_scenario_file(row.pk)
+
+
+def page_of(client: Client, job: GenerationJob) -> str:
+    return client.get(reverse("job", args=[job.code])).content.decode()
+
+
+def test_a_worker_writes_the_zip_that_the_jobs_page_offers(
+    job: GenerationJob, admin_client: Client
 ) -> None:
-    page = admin_client.get(reverse("job", args=[job.code])).content.decode()
     for form in WRITERS:
-        address = reverse("scenarios-export", args=[job.code, form])
-        assert f'href="{address}"' in page
-    answer = admin_client.get(reverse("scenarios-export", args=[job.code, "commonroad"]))
+        assert reverse("scenarios-write", args=[job.code, form]) in page_of(admin_client, job)
+    admin_client.post(reverse("scenarios-write", args=[job.code, "commonroad"]))
+    row = ScenarioFile.objects.get()
+    assert "waits for a worker" in page_of(admin_client, job)
+    assert admin_client.get(reverse("scenarios-export", args=[row.code])).status_code == 404
+    admin_client.post(reverse("scenarios-write", args=[job.code, "commonroad"]))
+    assert ScenarioFile.objects.count() == 1, "one that waits is asked for once more"
+    write_scenario_file(row.pk)
+    page = page_of(admin_client, job)
+    assert "Not for commercial use." in page
+    assert "must not be used commercially: junction" in page
+    answer = admin_client.get(reverse("scenarios-export", args=[row.code]))
     assert "round-1-commonroad-non-commercial.zip" in answer["Content-Disposition"]
-    with zipfile.ZipFile(BytesIO(answer.content)) as archive:
+    content = b"".join(answer)
+    row.refresh_from_db()
+    assert (row.size_bytes, row.digest) == (len(content), hashlib.sha256(content).hexdigest())
+    with zipfile.ZipFile(BytesIO(content)) as archive:
         assert "park--rule.xml" in archive.namelist()
-    monkeypatch.setattr("arena.web.scenario_files.MOST", 0)
-    answer = admin_client.get(reverse("scenarios-export", args=[job.code, "json"]))
-    assert answer.status_code == 302
-    assert admin_client.get(f"/jobs/{job.code}/scenarios-xodr.zip").status_code == 404
+
+
+def test_a_message_that_comes_twice_changes_nothing_and_a_new_zip_replaces_the_old(
+    job: GenerationJob,
+    admin_client: Client,
+    django_capture_on_commit_callbacks: Any,
+) -> None:
+    ask_for(admin_client, job, "json")
+    first = ScenarioFile.objects.get()
+    write_scenario_file(first.pk)
+    assert ScenarioFile.objects.get().finished_at == first.finished_at
+    with django_capture_on_commit_callbacks(execute=True):
+        ask_for(admin_client, job, "json")
+    (second,) = ScenarioFile.objects.all()
+    assert second.pk != first.pk
+    assert not default_storage.exists(first.stored)
+    assert default_storage.exists(second.stored)
+
+
+def test_what_cannot_be_written_says_why(job: GenerationJob, admin_client: Client) -> None:
+    job.augmentations.exclude(modification=None).delete()
+    ask_for(admin_client, job, "json")
+    assert "failed: Round 1 has no modification that could be written." in page_of(
+        admin_client, job
+    )
+    assert admin_client.post(f"/jobs/{job.code}/scenarios-xodr/").status_code == 404
 
 
 @pytest.mark.parametrize(

@@ -2,15 +2,18 @@ from __future__ import annotations
 
 import json
 import shutil
+from importlib import import_module
 from io import StringIO
 from pathlib import Path
 
 import pytest
+from django.apps import apps
 from django.core.management import call_command
 from django.core.management.base import CommandError
 
 from augment.models import BaseScene, Event
 from augment.scene.codec import scene_to_document
+from augment.services.scenarios.scenes import content_hash
 from tests.formats.av2_logs import write_log
 from tests.scenes import junction
 
@@ -134,3 +137,22 @@ def test_a_log_becomes_a_scene_every_few_seconds(tmp_path: Path) -> None:
 def test_a_time_or_a_number_that_is_none_is_refused(tmp_path: Path, arguments: tuple[str]) -> None:
     with pytest.raises(CommandError, match="is no"):
         run_log("av2", tmp_path, "--slug", "x", *arguments)
+
+
+def test_a_scene_of_the_catalogue_is_not_imported_again(tmp_path: Path) -> None:
+    call_command("load_catalogue", stdout=StringIO())
+    row = BaseScene.objects.order_by("slug")[0]
+    file = tmp_path / "scene.json"
+    file.write_text(json.dumps(row.document | {"name": "another"}))
+    assert f"The same scene is stored already, as '{row.slug}'" in refused(
+        "json", file, "--slug", "another"
+    )
+
+
+def test_scenes_without_a_content_hash_get_theirs() -> None:
+    document = scene_to_document(junction())
+    old = BaseScene.objects.create(slug="old", document=document, source="json", provenance="x")
+    migration = import_module("augment.migrations.0013_content_hashes")
+    migration.fill_in(apps, None)
+    old.refresh_from_db()
+    assert old.content_hash == content_hash(document)

@@ -28,7 +28,7 @@ PAGES: dict[str, tuple[int, int, int]] = {
     "metrics": (200, 401, 401),
     "displacement-export": (200, 200, 403),
     "tool-calls-export": (200, 200, 403),
-    "scenarios-export": (302, 302, 403),  # no result can be written
+    "scenarios-export": (404, 404, 403),  # nothing was written yet
     "drives": (200, 200, 403),
     "driving-export": (200, 200, 403),
     "drive": (200, 200, 403),
@@ -64,6 +64,7 @@ ACTIONS: dict[str, tuple[int, int, int]] = {
     "job-retry": (302, 403, 403),
     "contestant-retired": (302, 403, 403),
     "job-simulate": (302, 403, 403),
+    "scenarios-write": (302, 302, 403),
     "invite": (200, 403, 403),
     "revoke": (302, 403, 403),
     "author": (302, 403, 403),
@@ -99,7 +100,8 @@ def address(name: str, here: World) -> str:
         "job-resume": {"code": here.job.code},
         "displacement-export": {"code": here.job.code, "form": "csv"},
         "tool-calls-export": {"code": here.job.code, "form": "csv"},
-        "scenarios-export": {"code": here.job.code, "form": "json"},
+        "scenarios-export": {"code": STRANGER},
+        "scenarios-write": {"code": here.job.code, "form": "json"},
         "faults": {"code": here.job.code},
         "faults-export": {"code": here.job.code, "form": "csv"},
         "label": {"code": here.job.code},

@@ -29,7 +29,12 @@ from augment.scene.intent import IntentOrigin
 from augment.scene.intent_codec import intent_to_document
 from augment.scene.modification import without_traffic
 from augment.services.events import log_event
-from augment.services.scenarios.scenes import add_scenario, check_reference, check_slug
+from augment.services.scenarios.scenes import (
+    add_scenario,
+    check_reference,
+    check_slug,
+    content_hash,
+)
 
 SOURCE = "authored"
 
@@ -180,7 +185,12 @@ def _store_scene(scene: Scene, actor: User | None) -> str:
     document = scene_to_document(scene)
     row, is_new = BaseScene.objects.get_or_create(
         slug=scene.name,
-        defaults={"document": document, "source": SOURCE, "provenance": scene.provenance},
+        defaults={
+            "document": document,
+            "source": SOURCE,
+            "provenance": scene.provenance,
+            "content_hash": content_hash(document),
+        },
     )
     if is_new:
         _log(actor, "add", "scene", row, slug=row.slug, source=SOURCE)
@@ -200,7 +210,8 @@ def _store_scene(scene: Scene, actor: User | None) -> str:
             f"{', '.join(own)}."
         )
     row.document, row.provenance = document, scene.provenance
-    row.save(update_fields=["document", "provenance"])
+    row.content_hash = content_hash(document)
+    row.save(update_fields=["document", "provenance", "content_hash"])
     row.scenarios.update(original_image="")
     _log(actor, "change", "scene", row, slug=row.slug, source=SOURCE)
     return "change"

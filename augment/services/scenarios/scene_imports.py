@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
-import json
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
@@ -20,7 +18,7 @@ from augment.scene.codec import scene_to_document
 from augment.scene.notes import notes_to_document
 from augment.scene.recording_codec import recording_to_document
 from augment.services.events import log_event
-from augment.services.scenarios.scenes import SLUG_LENGTH, check_slug
+from augment.services.scenarios.scenes import SLUG_LENGTH, check_slug, content_hash
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -113,13 +111,6 @@ def import_log(
             continue
         row = _keep(reading, document, reader=reader, path=path, slug=name, actor=actor)
         yield ImportedMoment(moment=moment, row=row, is_new=True)
-
-
-def content_hash(document: dict[str, Any]) -> str:
-    """What two scenes have in common that differ in name alone."""
-    content = {key: value for key, value in document.items() if key not in ("name", "provenance")}
-    text = json.dumps(content, sort_keys=True, separators=(",", ":"), allow_nan=False)
-    return hashlib.sha256(text.encode()).hexdigest()
 
 
 def keep_reading(

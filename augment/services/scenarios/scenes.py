@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+import json
 import re
 from typing import Any
 
@@ -140,6 +141,13 @@ def reference_of(scenario: Scenario) -> Modification | None:
 def intent_of(scenario: Scenario) -> Intent | None:
     """What the instruction asks for, None where nobody has written it down."""
     return None if scenario.intent is None else intent_from_document(scenario.intent)
+
+
+def content_hash(document: dict[str, Any]) -> str:
+    """What two scene documents have in common that differ in name and provenance alone."""
+    content = {key: value for key, value in document.items() if key not in ("name", "provenance")}
+    text = json.dumps(content, sort_keys=True, separators=(",", ":"), allow_nan=False)
+    return hashlib.sha256(text.encode()).hexdigest()
 
 
 def seed_of(slug: str) -> int:
