@@ -13,9 +13,10 @@ from django.db import transaction
 from django.utils import timezone
 
 from arena.models import ScenarioFile
-from augment.formats.writers import writer_named
+from augment.errors import UnknownName
 from augment.models import GenerationJob
 from augment.services.events import log_event
+from augment.services.judging.scenario_export import FORMATS
 
 State = ScenarioFile.State
 LONGEST_FAULT = 500
@@ -30,7 +31,8 @@ def ask_for_file(
     Raises:
         UnknownName: No such format.
     """
-    writer_named(file_format)
+    if file_format not in FORMATS:
+        raise UnknownName("format", file_format, list(FORMATS))
     waiting = ScenarioFile.objects.filter(
         job=job, format=file_format, state__in=[State.QUEUED, State.RUNNING]
     )
