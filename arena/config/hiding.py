@@ -5,7 +5,7 @@ from __future__ import annotations
 import logging
 import re
 
-_KEY_IN_ADDRESS = re.compile(r"(/(?:invitation|i)/)[A-Za-z0-9_-]+")
+_KEY_IN_ADDRESS = re.compile(r"(/(?:invitation|i|first|welcome)/)[A-Za-z0-9_-]+")
 
 
 class HideKeys(logging.Filter):

@@ -145,6 +145,7 @@ AUTHENTICATION_BACKENDS = [
     "axes.backends.AxesStandaloneBackend",  # refuses before a password is looked at
     "arena.queries.accounts.AccountBackend",
 ]
+PASSWORD_RESET_TIMEOUT = 14 * 24 * 3600  # how long a link to set a password works
 AUTH_PASSWORD_VALIDATORS = [
     {"NAME": "django.contrib.auth.password_validation.MinimumLengthValidator"},
     {"NAME": "django.contrib.auth.password_validation.CommonPasswordValidator"},

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import re
+from dataclasses import dataclass
 
 from django.contrib.auth.models import AnonymousUser, User
-from django.db.models import QuerySet
+from django.db.models import Q, QuerySet
 
 ROLES = ("admin", "analyst", "expert")
 """The groups of accounts, the most powerful first."""
@@ -45,3 +46,36 @@ def natural_order(name: str) -> list[tuple[bool, int, str]]:
     """What to sort names by so that numbers in them count as numbers."""
     parts = re.split(r"(\d+)", name)
     return [(part.isdecimal(), int(part) if part.isdecimal() else 0, part) for part in parts]
+
+
+def has_admin() -> bool:
+    """Whether anybody can administrate."""
+    active = User.objects.filter(is_active=True)
+    return active.filter(Q(is_superuser=True) | Q(groups__name="admin")).exists()
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class AccountLine:
+    """One account as an admin sees it."""
+
+    user: User
+    role: str | None
+    has_password: bool
+
+
+def list_accounts() -> list[AccountLine]:
+    """Every account but those that the machine votes for, by role and pseudonym; two queries."""
+    found = User.objects.filter(person__is_simulated=False).select_related("person")
+    lines = []
+    for user in found.prefetch_related("groups"):
+        names = {group.name for group in user.groups.all()}
+        role = "admin" if user.is_superuser else next((one for one in ROLES if one in names), None)
+        lines.append(AccountLine(user=user, role=role, has_password=user.has_usable_password()))
+    places = {role: place for place, role in enumerate(ROLES)}
+    return sorted(
+        lines,
+        key=lambda line: (
+            places.get(line.role or "", len(places)),
+            natural_order(line.user.person.pseudonym),
+        ),
+    )

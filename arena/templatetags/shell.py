@@ -47,11 +47,12 @@ _SECTIONS: dict[str, tuple[Promise, frozenset[str]]] = {
             }
         ),
     ),
+    "people": (_("People"), frozenset({"people", "person-link", "person-forget"})),
 }
 _MENU = {
     "expert": ("home",),
     "analyst": ("home", "scenarios", "contestants", "jobs", "studies"),
-    "admin": ("home", "scenarios", "contestants", "jobs", "studies"),
+    "admin": ("home", "scenarios", "contestants", "jobs", "studies", "people"),
 }
 
 

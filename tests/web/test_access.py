@@ -41,6 +41,9 @@ PAGES: dict[str, tuple[int, int, int]] = {
     "asked-image": (404, 404, 403),
     "contestants": (200, 200, 403),
     "contestant": (200, 200, 403),
+    "people": (200, 403, 403),
+    "person-forget": (200, 403, 403),  # a question
+    "password": (200, 200, 200),
     "scenarios": (200, 200, 403),
     "scenario": (200, 200, 403),
     "intent": (200, 200, 403),
@@ -66,6 +69,8 @@ ACTIONS: dict[str, tuple[int, int, int]] = {
     "job-simulate": (302, 403, 403),
     "scenarios-write": (302, 302, 403),
     "invite": (200, 403, 403),
+    "person-link": (200, 403, 403),
+    "person-change": (302, 403, 403),
     "revoke": (302, 403, 403),
     "author": (302, 403, 403),
     "author-back": (302, 403, 403),
@@ -82,12 +87,24 @@ ACTIONS: dict[str, tuple[int, int, int]] = {
     "language": (302, 302, 302),
     "vote-report": (403, 403, 404),
 }
-OPEN_TO_THE_WORLD = {"login", "logout", "invitation", "healthz", "readyz", "metrics"}
+OPEN_TO_THE_WORLD = {
+    "login",
+    "logout",
+    "invitation",
+    "healthz",
+    "readyz",
+    "metrics",
+    "first",
+    "welcome",
+}
 
 
 def address(name: str, here: World) -> str:
     shown = here.study.matchups.filter(expert=here.expert).get(position=1)
     arguments: dict[str, dict[str, object]] = {
+        "person-link": {"code": here.expert.person.code},
+        "person-change": {"code": here.expert.person.code},
+        "person-forget": {"code": here.expert.person.code},
         "job": {"code": here.job.code},
         "contestant": {"code": here.augmentation.contestant.code},
         "contestant-retired": {"code": here.augmentation.contestant.code},

@@ -30,7 +30,7 @@ PAIRS = (
 
 ROWS = (
     "augmentation", "job", "scenario", "type", "contestant", "sample", "state", "reason",
-    "is_accepted", "picture", "modification_sha256", "finished_at",
+    "picture", "modification_sha256", "finished_at",
 )  # fmt: skip
 
 
@@ -103,15 +103,11 @@ def _augmentation(row: Augmentation) -> tuple[str, ...]:
     document = _json(row.modification)
     cells = (
         *(row.code, row.job.name, row.scenario.slug, row.scenario.type, row.contestant.slug),
-        *(row.sample, row.state, row.reason, _accepted(row), row.image),
+        *(row.sample, row.state, row.reason, row.image),
         "" if row.modification is None else hashlib.sha256(document).hexdigest(),
         row.finished_at.isoformat() if row.finished_at else "",
     )
     return tuple(_text(value) for value in cells)
-
-
-def _accepted(row: Augmentation) -> object:
-    return getattr(row, "is_accepted", None)
 
 
 def _contestants(closure: Closure) -> QuerySet[Contestant]:

@@ -10,6 +10,7 @@ from django.core.management import call_command
 from django.core.management.base import CommandError, CommandParser
 
 from arena.errors import ArenaError
+from arena.services.first_start import make_first_link_token
 from arena.serving.hold import hold_alone
 from arena.serving.ledger import Ledger
 from arena.serving.stack import Web, background, web_server
@@ -63,10 +64,19 @@ class Command(TerminalCommand):
             try:
                 supervisor.start()
                 self.stdout.write(f"\nScenario Arena is at {web.address}  (Ctrl-C stops it)\n")
+                self._offer_first_link(web)
                 supervisor.watch()
             finally:
                 self.stdout.write("Stopping ...")
                 supervisor.stop()
+
+    def _offer_first_link(self, web: Web) -> None:
+        token = make_first_link_token()
+        if token is not None:
+            address = f"{web.address.rstrip('/')}/first/{token}/"
+            self.stdout.write(
+                f"Nobody is admin yet. Make the first one here, within a day:\n{address}\n"
+            )
 
     def _say(self, name: str, line: str) -> None:
         self.stdout.write(f"{name:8} | {line}")

@@ -1,0 +1,175 @@
+"""Accounts without a shell: the first admin, links, pauses, roles, and being forgotten."""
+
+from __future__ import annotations
+
+import logging
+import re
+
+import pytest
+from django.contrib.auth.models import User
+from django.contrib.sessions.models import Session
+from django.test import Client
+from django.urls import reverse
+
+from arena.config.hiding import HideKeys
+from arena.models import Vote
+from arena.services.accounts import make_welcome_token
+from arena.services.first_start import LINK_LIVES_S, make_first_link_token
+from augment.models import Event
+from tests.study_rows import a_study, matchups_of, vote
+from tests.web.cast import people, signed_in
+
+pytestmark = pytest.mark.django_db
+
+PASSWORD = "nine lives of a cat"
+TWICE = {"new_password1": PASSWORD, "new_password2": PASSWORD}
+
+
+def can_sign_in(username: str, password: str) -> bool:
+    answer = Client().post(reverse("login"), {"username": username, "password": password})
+    return answer.status_code == 302
+
+
+def first(token: str, **given: str) -> tuple[int, str]:
+    answer = Client().post(reverse("first", args=[token]), {"username": "ada", **TWICE, **given})
+    return answer.status_code, answer.content.decode()
+
+
+def test_the_first_admin_is_made_by_the_printed_link_once() -> None:
+    token = make_first_link_token()
+    assert token is not None
+    client = Client()
+    assert client.get(reverse("first", args=[token])).status_code == 200
+    answer = client.post(reverse("first", args=[token]), {"username": "ada", **TWICE})
+    assert answer.status_code == 302
+    assert client.get(reverse("people")).status_code == 200, "signed in, and an admin"
+    assert make_first_link_token() is None
+    assert first(token, username="eve")[0] == 410
+    assert not User.objects.filter(username="eve").exists()
+
+
+@pytest.mark.parametrize(
+    ("given", "says"),
+    [
+        ({"new_password2": "another"}, "match"),
+        ({"new_password1": "short", "new_password2": "short"}, "too short"),
+        ({"username": "with blank"}, "valid username"),
+    ],
+)
+def test_what_can_not_be_taken_is_said_beside_its_field(given: dict[str, str], says: str) -> None:
+    token = make_first_link_token()
+    assert token is not None
+    status, text = first(token, **given)
+    assert status == 200
+    assert says in text
+    assert not User.objects.exists()
+
+
+def test_a_forged_or_old_first_link_opens_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
+    token = make_first_link_token()
+    assert token is not None
+    assert first(token[:-1] + ("A" if token[-1] != "A" else "B"))[0] == 410
+    monkeypatch.setattr("arena.services.first_start.LINK_LIVES_S", -LINK_LIVES_S)
+    assert first(token)[0] == 410
+
+
+def test_an_admin_makes_an_account_whose_owner_sets_the_password() -> None:
+    admin = signed_in(people()["admin"])
+    answer = admin.post(reverse("people"), {"username": "grace", "role": "analyst"})
+    (link,) = re.findall(r"http://testserver(/welcome/[^/\"]+/)", answer.content.decode())
+    guest = Client()
+    assert "grace" in guest.get(link).content.decode()
+    assert guest.post(link, TWICE).status_code == 302
+    assert guest.get(reverse("jobs")).status_code == 200, "signed in, and an analyst"
+    assert Client().get(link).status_code == 410, "it works once"
+    assert can_sign_in("grace", PASSWORD)
+
+
+@pytest.mark.parametrize("token", ["", "x", "-", "0" * 32, "0" * 32 + "-abc-def", "ä-b-c"])
+def test_what_is_no_link_is_over(token: str) -> None:
+    assert Client().get(f"/welcome/{token or '-'}/").status_code == 410
+
+
+def test_a_taken_name_is_said_and_the_form_stays_filled() -> None:
+    accounts = people()
+    answer = signed_in(accounts["admin"]).post(
+        reverse("people"), {"username": "the-expert", "role": "expert", "pseudonym": "Nina"}
+    )
+    text = answer.content.decode()
+    assert "is taken" in text
+    assert 'value="Nina"' in text
+
+
+def change(actor: User, user: User, **given: str) -> None:
+    signed_in(actor).post(reverse("person-change", args=[user.person.code]), given)
+    user.refresh_from_db()
+
+
+def test_a_paused_account_is_signed_out_and_can_go_on_later() -> None:
+    accounts = people()
+    expert = accounts["expert"]
+    theirs = signed_in(expert)
+    change(accounts["admin"], expert, act="pause")
+    assert theirs.get(reverse("home")).status_code == 302
+    assert Session.objects.count() == 1, "the admin's own"
+    assert not can_sign_in("the-expert", "a password")
+    change(accounts["admin"], expert, act="resume")
+    assert can_sign_in("the-expert", "a password")
+
+
+def test_a_role_is_changed_for_another_and_logged() -> None:
+    accounts = people()
+    expert = accounts["expert"]
+    change(accounts["admin"], expert, role="analyst")
+    assert signed_in(expert).get(reverse("jobs")).status_code == 200
+    (event,) = Event.objects.filter(verb="change role")
+    assert (event.before, event.after) == ({"role": "expert"}, {"role": "analyst"})
+    change(accounts["admin"], expert, role="king")
+    assert {group.name for group in expert.groups.all()} == {"analyst"}
+
+
+def test_nobody_pauses_demotes_or_forgets_themselves() -> None:
+    admin = people()["admin"]
+    change(admin, admin, act="pause")
+    change(admin, admin, role="expert")
+    signed_in(admin).post(reverse("person-forget", args=[admin.person.code]), {"sure": "1"})
+    admin.refresh_from_db()
+    assert (admin.username, admin.is_active, admin.is_superuser) == ("the-admin", True, True)
+
+
+def test_who_is_forgotten_leaves_votes_and_no_name() -> None:
+    study, admin = a_study(), people()["admin"]
+    eva = study.experts.get(username="eva")
+    vote(matchups_of(study, "eva")[0], "left")
+    pseudonym = eva.person.pseudonym
+    url = reverse("person-forget", args=[eva.person.code])
+    client = signed_in(admin)
+    assert client.post(url).status_code == 200, "a question first"
+    assert User.objects.filter(username="eva").exists()
+    client.post(url, {"sure": "1"})
+    eva.refresh_from_db()
+    eva.person.refresh_from_db()
+    assert eva.username.startswith("gone-")
+    assert eva.person.pseudonym != pseudonym
+    assert not eva.is_active
+    assert Vote.objects.filter(expert=eva).count() == 1
+    assert "eva" not in client.get(reverse("people")).content.decode()
+
+
+def test_ones_own_password_needs_the_old_one() -> None:
+    expert = people()["expert"]
+    here, there = signed_in(expert), signed_in(expert)
+    url = reverse("password")
+    assert here.post(url, {"old_password": "wrong", **TWICE}).status_code == 200
+    assert here.post(url, {"old_password": "a password", **TWICE}).status_code == 302
+    assert here.get(reverse("home")).status_code == 200
+    assert there.get(reverse("home")).status_code == 302, "other devices are signed out"
+
+
+def test_no_log_keeps_such_a_link() -> None:
+    token = make_welcome_token(people()["expert"])
+    record = logging.LogRecord(
+        "x", 20, "f", 1, "GET /welcome/%s/ /first/%s/", (token, "abc"), None
+    )
+    HideKeys().filter(record)
+    assert record.getMessage() == "GET /welcome/.../ /first/.../"
