@@ -22,11 +22,11 @@ def client_address(request: HttpRequest) -> str | None:
         if len(parts) >= settings.PROXIES:
             seen = parts[-settings.PROXIES].strip()
     try:
-        found = ip_address(seen)
+        address = ip_address(seen)
     except ValueError:
         return None
-    if isinstance(found, IPv6Address):
-        if found.ipv4_mapped is not None:
-            return str(found.ipv4_mapped)
-        return str(ip_network((found.packed, 64), strict=False).network_address)
-    return str(found)
+    if isinstance(address, IPv6Address):
+        if address.ipv4_mapped is not None:
+            return str(address.ipv4_mapped)
+        return str(ip_network((address.packed, 64), strict=False).network_address)
+    return str(address)

@@ -64,10 +64,10 @@ def names(name: str, *, default: tuple[str, ...]) -> list[str]:
     """A list of at least one name, separated by commas."""
 
     def parse(raw: str) -> tuple[str, ...]:
-        found = tuple(part.strip() for part in raw.split(",") if part.strip())
-        if not found:
+        parts = tuple(part.strip() for part in raw.split(",") if part.strip())
+        if not parts:
             raise ValueError(raw)
-        return found
+        return parts
 
     return list(read(name, default, parse, "names separated by commas are needed"))
 
@@ -76,12 +76,12 @@ def origins(name: str) -> list[str]:
     """Addresses of other servers with their scheme, separated by commas; none by default."""
 
     def parse(raw: str) -> list[str]:
-        found = [part.strip() for part in raw.split(",") if part.strip()]
-        for part in found:
+        parts = [part.strip() for part in raw.split(",") if part.strip()]
+        for part in parts:
             address = urlsplit(part)
             if address.scheme not in {"http", "https"} or not address.hostname:
                 raise ValueError(part)
-        return found
+        return parts
 
     return read(name, [], parse, "use https://NAME, more than one separated by commas")
 
@@ -102,11 +102,11 @@ def key_variables(name: str) -> list[str]:
     """Names of environment variables with keys of language models, separated by commas."""
 
     def parse(raw: str) -> list[str]:
-        found = [part.strip() for part in raw.split(",") if part.strip()]
-        for part in found:
+        parts = [part.strip() for part in raw.split(",") if part.strip()]
+        for part in parts:
             if not part.isidentifier() or part.startswith("ARENA_") or part in _OWN:
                 raise ValueError(part)
-        return found
+        return parts
 
     own = ", ".join(_OWN)
     return read(name, [], parse, f"names are needed, none of ARENA_*, {own}, separated by commas")
@@ -155,10 +155,10 @@ def database(name: str, *, default: Path) -> dict[str, object]:
     def parse(raw: str) -> dict[str, object]:
         if urlsplit(raw).scheme not in {"sqlite", "postgres", "postgresql"}:
             raise ValueError(raw)
-        found = dict(dj_database_url.parse(raw))
-        if found["NAME"] in {"", ":memory:"}:  # every process would have one of its own
+        parts = dict(dj_database_url.parse(raw))
+        if parts["NAME"] in {"", ":memory:"}:  # every process would have one of its own
             raise ValueError(raw)
-        return found
+        return parts
 
     allowed = "use sqlite:///PATH or postgresql://USER:PASSWORD@HOST:PORT/NAME"
     standard: dict[str, object] = {

@@ -79,12 +79,12 @@ def _lines(table: DisplacementTable) -> Iterator[ChartLine]:
         yield from (_measured(group) for group in table.groups)
         return
     published = {name: list(boxes) for name, boxes in groupby(table.published, _variant)}
-    found = {name: list(some) for name, some in groupby(table.groups, _heading)}
-    names = [*(name for name in VARIANTS if name in published or name in found)]
-    names += [name for name in found if name not in names]
+    groups_by_heading = {name: list(some) for name, some in groupby(table.groups, _heading)}
+    names = [*(name for name in VARIANTS if name in published or name in groups_by_heading)]
+    names += [name for name in groups_by_heading if name not in names]
     for name in names:
         yield ChartLine(label=name, is_heading=True)
-        yield from (_measured(group) for group in found.get(name, ()))
+        yield from (_measured(group) for group in groups_by_heading.get(name, ()))
         yield from (_from_paper(box) for box in published.get(name, ()))
 
 
@@ -97,20 +97,20 @@ def _variant(box: PublishedBox) -> str:
 
 
 def _measured(group: Group) -> ChartLine:
-    found = group.summary
-    note = f"n {found.n}"
-    if found.missing:
-        note += f", {found.missing} missing"
-    if found.surplus:
-        note += f", {found.surplus} surplus"
+    summary = group.summary
+    note = f"n {summary.n}"
+    if summary.missing:
+        note += f", {summary.missing} missing"
+    if summary.surplus:
+        note += f", {summary.surplus} surplus"
     colour = SIMULATED if group.is_simulated else MARK
-    if found.box is None:
+    if summary.box is None:
         return ChartLine(
             label=shown_name(group.contestant, group.is_simulated),
             note=note,
             colour=colour,
         )
-    box = found.box
+    box = summary.box
     stats = {
         "med": box.median_m,
         "q1": box.q1_m,

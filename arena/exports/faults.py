@@ -120,9 +120,9 @@ def fault_table(job: GenerationJob) -> FaultTable:
     Of several experts on one augmentation a fault counts where more than half of them see it.
     """
     labels = list(labels_of(job))
-    found: defaultdict[int, list[FaultLabel]] = defaultdict(list)
+    lines_by_row: defaultdict[int, list[FaultLabel]] = defaultdict(list)
     for label in labels:
-        found[label.augmentation_id].append(label)
+        lines_by_row[label.augmentation_id].append(label)
     rows = job.augmentations.select_related("contestant").only(
         "state", "job", "contestant__name", "contestant__slug", "contestant__kind"
     )
@@ -131,8 +131,8 @@ def fault_table(job: GenerationJob) -> FaultTable:
         by_contestant[row.contestant].append(row)
     return FaultTable(
         job=job.name,
-        lines=tuple(_line(who, own, found) for who, own in by_contestant.items()),
-        agreement=tuple(_agreement(fault, labels, found) for fault in FaultClass),
+        lines=tuple(_line(who, own, lines_by_row) for who, own in by_contestant.items()),
+        agreement=tuple(_agreement(fault, labels, lines_by_row) for fault in FaultClass),
     )
 
 

@@ -71,12 +71,12 @@ class Plot:
 
 def plots(snapshot: Snapshot, table: LeaderboardTable) -> dict[str, Plot]:
     """Every chart that has points, by the name that files and pages know it by."""
-    found = {
+    by_name = {
         "width": _width(table),
         "displacement": _displacement(snapshot, table),
         **_cost(snapshot, table),
     }
-    return {name: plot for name, plot in found.items() if plot.points}
+    return {name: plot for name, plot in by_name.items() if plot.points}
 
 
 # --- Private -----------------------------------------------------------------------------------
@@ -112,21 +112,21 @@ def _displacement(snapshot: Snapshot, table: LeaderboardTable) -> Plot:
 def _cost(snapshot: Snapshot, table: LeaderboardTable) -> dict[str, Plot]:
     metres = {line.slug: line.median_m for line in snapshot.results.displacement}
     costs = {line.slug: line for line in snapshot.results.cost}
-    found = {}
+    by_name = {}
     for what, label, unit in (("usd", USD, " USD"), ("tokens", TOKENS, "")):
         rows = [
             (n, row, spent, cost.model_class)
             for n, row in enumerate(table.rows, start=1)
             if (cost := costs.get(row.slug)) and (spent := getattr(cost, what))
         ]
-        found[f"elo-{what}"] = Plot(
+        by_name[f"elo-{what}"] = Plot(
             across=label,
             up=ELO,
             points=[_rated(n, row, x, group) for n, row, x, group in rows if row.elo is not None],
             unit=unit,
             is_log=True,
         )
-        found[f"displacement-{what}"] = Plot(
+        by_name[f"displacement-{what}"] = Plot(
             across=label,
             up=METRES,
             points=[
@@ -138,7 +138,7 @@ def _cost(snapshot: Snapshot, table: LeaderboardTable) -> dict[str, Plot]:
             is_log=True,
             from_zero=True,
         )
-    return found
+    return by_name
 
 
 def _rated(number: int, row: Row, x: float, group: str = "") -> Given:

@@ -27,14 +27,14 @@ class Chart(Protocol):
 def charts(snapshot: Snapshot) -> Mapping[str, Chart]:
     """Every chart beside the table's own that a rating has, by name."""
     table = leaderboard_table(snapshot)
-    found: dict[str, Chart] = {}
+    by_name: dict[str, Chart] = {}
     if snapshot.results.pairs:
-        found["pairs"] = partial(heat_chart, table.rows, snapshot.results.pairs)
+        by_name["pairs"] = partial(heat_chart, table.rows, snapshot.results.pairs)
     if snapshot.results.types:
-        found["types"] = partial(type_charts, snapshot.results.types, table)
+        by_name["types"] = partial(type_charts, snapshot.results.types, table)
     for name, plot in plots(snapshot, table).items():
-        found[name] = partial(scatter_chart, plot)
-    return found
+        by_name[name] = partial(scatter_chart, plot)
+    return by_name
 
 
 def chart_bytes(snapshot: Snapshot, *, name: str, file_format: str) -> bytes:

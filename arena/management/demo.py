@@ -121,7 +121,7 @@ def generate(
         name=JOB, contestants=resolve_contestants([ALL]), scenarios=scenarios
     )
     enqueue_job(job.pk)
-    ended, told, moved_at = -1, -1, time.monotonic()
+    ended, last_said, moved_at = -1, -1, time.monotonic()
     while (now := count_rows(job)).under_way:
         look()
         if now.settled != ended:
@@ -130,9 +130,9 @@ def generate(
             raise DemoFailed(
                 f"In the job {JOB!r} nothing ended for {STUCK_S:.0f} s: {ended} of {now.total}."
             )
-        if ended // A_LINE_EVERY > told // A_LINE_EVERY:
+        if ended // A_LINE_EVERY > last_said // A_LINE_EVERY:
             say(f"  {ended} of {now.total} augmentations")
-            told = ended
+            last_said = ended
         time.sleep(0.2)
     states = Augmentation.State
     outcomes = (states.DONE, states.UNREADABLE, states.REFUSED, states.FAILED)

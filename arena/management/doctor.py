@@ -52,15 +52,15 @@ Ailments = Iterator[Ailment]
 
 def examine() -> list[Ailment]:
     """Everything; what needs the database is left out where there is none."""
-    found = [*_folders(), *_settings(), *_database()]
-    if any(finding.part == "database" and finding.level is Level.BROKEN for finding in found):
-        return [*found, *_broker()]
+    ailments = [*_folders(), *_settings(), *_database()]
+    if any(finding.part == "database" and finding.level is Level.BROKEN for finding in ailments):
+        return [*ailments, *_broker()]
     for look in NEED_THE_DATABASE:
         try:
-            found.extend(look())
+            ailments.extend(look())
         except DatabaseError as error:
-            found.append(Ailment(Level.BROKEN, "database", str(error), "See its own log."))
-    return found
+            ailments.append(Ailment(Level.BROKEN, "database", str(error), "See its own log."))
+    return ailments
 
 
 def _folders() -> Ailments:
@@ -102,15 +102,15 @@ def _settings() -> Ailments:
 
 
 def _database() -> Ailments:
-    found = look_at_database()
+    state = look_at_database()
     kind = connection.vendor
-    if not found.is_ok:
+    if not state.is_ok:
         remedy = (
             "Run `manage.py prepare`."
-            if found.state == "unprepared"
+            if state.state == "unprepared"
             else "Check DATABASE_URL and that the server runs."
         )
-        yield Ailment(Level.BROKEN, "database", f"{found.state}: {found.detail}", remedy)
+        yield Ailment(Level.BROKEN, "database", f"{state.state}: {state.detail}", remedy)
         return
     yield Ailment(Level.FINE, "database", f"{kind} answers and has the tables of this release")
 
@@ -123,25 +123,25 @@ def _clock() -> Ailments:
 
 
 def _broker() -> Ailments:
-    found = look_at_broker()
-    if found.is_ok:
+    state = look_at_broker()
+    if state.is_ok:
         yield Ailment(Level.FINE, "broker", "takes messages")
     elif settings.REDIS_IS_PRIVATE:
         text = "the private Redis is not running"
         yield Ailment(Level.BROKEN, "broker", text, "`manage.py serve` starts it.")
     else:
-        yield Ailment(Level.BROKEN, "broker", found.detail, "Check REDIS_URL and the server.")
+        yield Ailment(Level.BROKEN, "broker", state.detail, "Check REDIS_URL and the server.")
 
 
 def _workers() -> Ailments:
-    found = look_at_workers()
-    if found.is_ok:
-        yield Ailment(Level.FINE, "workers", found.detail)
+    state = look_at_workers()
+    if state.is_ok:
+        yield Ailment(Level.FINE, "workers", state.detail)
         return
     is_needed = GenerationJob.objects.filter(state=GenerationJob.State.RUNNING).exists()
-    level = Level.BROKEN if is_needed or found.state == "stuck" else Level.DOUBTFUL
+    level = Level.BROKEN if is_needed or state.state == "stuck" else Level.DOUBTFUL
     remedy = "Start `manage.py serve`, or `celery --app arena.config worker` where it is split."
-    yield Ailment(level, "workers", found.detail, remedy)
+    yield Ailment(level, "workers", state.detail, remedy)
 
 
 def _accounts() -> Ailments:

@@ -59,8 +59,8 @@ def gains(
     weight = chance * (1.0 - chance)
     along = covariance[:, first] - covariance[:, second]
     spread = along[first, np.arange(len(pairs))] - along[second, np.arange(len(pairs))]
-    found: FloatArray = weight * (along**2).sum(axis=0) / (1.0 + weight * spread)
-    return found
+    information: FloatArray = weight * (along**2).sum(axis=0) / (1.0 + weight * spread)
+    return information
 
 
 def draw_units(

@@ -26,10 +26,10 @@ def read_targets(lines: Iterable[str]) -> tuple[Appearances, PairVotes]:
         text = line.strip()
         if not text:
             continue
-        if found := _OF_TWO.fullmatch(text):
-            of_two.append((found[1], found[2], int(found[3])))
-        elif found := _OF_ONE.fullmatch(text):
-            of_one.append((found[1], int(found[2])))
+        if match := _OF_TWO.fullmatch(text):
+            of_two.append((match[1], match[2], int(match[3])))
+        elif match := _OF_ONE.fullmatch(text):
+            of_one.append((match[1], int(match[2])))
         else:
             raise NothingToPlan(
                 sentence(

@@ -84,10 +84,10 @@ def model_classes(contestants: Collection[Contestant]) -> dict[int, str]:
     asked = [row for row in contestants if row.endpoint_id is not None]
     wanted = Q(endpoint__in={row.endpoint_id for row in asked})
     known = {
-        (endpoint, model): EndpointModel.ModelClass(found).value
-        for endpoint, model, found in EndpointModel.objects.filter(wanted)
+        (endpoint, model): EndpointModel.ModelClass(classes).value
+        for endpoint, model, classes in EndpointModel.objects.filter(wanted)
         .exclude(model_class="")
         .values_list("endpoint", "model", "model_class")
     }
-    found = {row.pk: known.get((row.endpoint_id or 0, row.model)) for row in asked}
-    return {pk: name for pk, name in found.items() if name is not None}
+    classes = {row.pk: known.get((row.endpoint_id or 0, row.model)) for row in asked}
+    return {pk: name for pk, name in classes.items() if name is not None}

@@ -89,8 +89,8 @@ def coverage(study: Study) -> Coverage:
 
 def reports_of(study: Study) -> QuerySet[Report]:
     """What experts reported, the youngest first."""
-    found = Report.objects.filter(matchup__study=study).order_by("-at", "-pk")
-    return found.select_related("expert__person", "matchup__scenario").defer(
+    reports = Report.objects.filter(matchup__study=study).order_by("-at", "-pk")
+    return reports.select_related("expert__person", "matchup__scenario").defer(
         "matchup__scenario__reference"
     )
 

@@ -27,8 +27,8 @@ def options_of(row: Simulation) -> Options:
 def before_of(row: Simulation) -> Simulation | None:
     """The same scene before the change, driven the same way; None until that is done."""
     rows = options_of(row).of(Simulation.objects.filter(scenario_id=row.scenario_id))
-    found = rows.filter(subject=Simulation.Subject.UNMODIFIED, state=Simulation.State.DONE)
-    return found.exclude(pk=row.pk).first()
+    drives = rows.filter(subject=Simulation.Subject.UNMODIFIED, state=Simulation.State.DONE)
+    return drives.exclude(pk=row.pk).first()
 
 
 def cells_of(job: GenerationJob, options: Options) -> DriveCells:

@@ -44,10 +44,10 @@ def labelling_of(*, expert: User, code: UUID) -> LabellingProgress:
     Raises:
         NotYours: There is none with that code, or the expert takes no part in it.
     """
-    found = _counted(LabellingRound.objects.filter(code=code, tasks__expert=expert))
-    if not found:
+    progress = _counted(LabellingRound.objects.filter(code=code, tasks__expert=expert))
+    if not progress:
         raise NotYours("You do not take part in this labelling.")
-    return found[0]
+    return progress[0]
 
 
 def next_task(*, labelling: LabellingRound, expert: User) -> LabelTask | None:

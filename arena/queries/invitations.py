@@ -59,10 +59,10 @@ def invitation_by_token(token: str, *, locked: bool = False) -> Invitation:
     rows = Invitation.objects.select_related("study", "expert__person", "invited_by")
     if locked:
         rows = rows.select_for_update(of=("self",))
-    found = rows.filter(token_sha256=token_digest(token)).first()
-    if found is None:
+    invitation = rows.filter(token_sha256=token_digest(token)).first()
+    if invitation is None:
         raise NotYours("No invitation has this address.")
-    return found
+    return invitation
 
 
 def expert_lines(study: Study, now: datetime) -> list[ExpertLine]:

@@ -37,8 +37,8 @@ def drives_of_pair(*, user: User, code: UUID) -> dict[str, dict[str, Any]] | Non
         state=Simulation.State.DONE,
         **{name: played[name] for name in ("planner", "offsets", "is_reactive")},
     )
-    found = {row.augmentation_id: row for row in drives.defer("document")}
-    if len(found) < 2:
+    drive_by_picture = {row.augmentation_id: row for row in drives.defer("document")}
+    if len(drive_by_picture) < 2:
         return None
     sides = {"a": matchup.left_id, "b": matchup.right_id}
-    return {side: blind_drive(found[key]) for side, key in sides.items()}
+    return {side: blind_drive(drive_by_picture[key]) for side, key in sides.items()}

@@ -91,11 +91,11 @@ def snapshot_to_export(study: Study, code: UUID | None = None) -> Snapshot:
     Raises:
         NoSnapshot: The study has not been rated yet, or not by that rating.
     """
-    found = snapshot_coded(study, code)
-    if found is None:
+    snapshot = snapshot_coded(study, code)
+    if snapshot is None:
         what = "no rating yet" if code is None else f"no rating {code}"
         raise NoSnapshot(f"The study {study.name!r} has {what}. Rate it first.")
-    return found
+    return snapshot
 
 
 def log_of(study: Study, *, most: int) -> list[Event]:

@@ -29,8 +29,8 @@ def picture_shown(*, user: User, token: str) -> str:
         Q(left_token=token) | Q(right_token=token) | Q(original_token=token)
     )
     unread = ("left__modification", "right__modification", "descriptions")
-    found = rows.select_related("left", "right").defer(*unread)
-    matchup = found.order_by().first()
+    shown = rows.select_related("left", "right").defer(*unread)
+    matchup = shown.order_by().first()
     if matchup is None:
         return _picture_to_label(user=user, token=token)
     if matchup.expert_id != user.pk and role_of(user) != "admin":
@@ -91,10 +91,10 @@ def as_shown(matchup: Matchup, wording: Wording) -> dict[str, Any]:
 
 def _picture_to_label(*, user: User, token: str) -> str:
     rows = LabelTask.objects.filter(Q(token=token) | Q(original_token=token))
-    found = rows.select_related("augmentation__scenario").defer(
+    tasks = rows.select_related("augmentation__scenario").defer(
         "augmentation__modification", "augmentation__scenario__reference"
     )
-    task = found.first()
+    task = tasks.first()
     if task is None or (task.expert_id != user.pk and role_of(user) != "admin"):
         raise NotYours(_NOT_SHOWN)
     if task.token == token:

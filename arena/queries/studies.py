@@ -23,10 +23,10 @@ def voting_study(*, expert: User, code: UUID | str) -> Study:
     Raises:
         NotYours: There is none with that code, or the expert does not take part in it.
     """
-    found = expert.studies.filter(code=code).first()
-    if found is None:
+    study = expert.studies.filter(code=code).first()
+    if study is None:
         raise NotYours("You do not take part in this study.")
-    return found
+    return study
 
 
 def longest_instructions(study: Study) -> list[str]:
@@ -44,8 +44,8 @@ def study_named(name_or_code: str) -> Study:
     wanted = Q(name=name_or_code)
     with suppress(ValueError):  # most names are not codes
         wanted |= Q(code=UUID(name_or_code))
-    found = Study.objects.filter(wanted).first()
-    if found is None:
+    study = Study.objects.filter(wanted).first()
+    if study is None:
         names = Study.objects.values_list("name", flat=True)
         raise UnknownName("study", name_or_code, sorted(names))
-    return found
+    return study

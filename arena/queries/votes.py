@@ -84,8 +84,8 @@ def matchup_of(*, expert: User, code: UUID | str) -> Matchup:
     Raises:
         NotYours: It is somebody else's or does not exist; the text does not tell which.
     """
-    found = Matchup.objects.filter(expert=expert, code=code).select_related("study", "scenario")
-    matchup = found.first()
+    matchups = Matchup.objects.filter(expert=expert, code=code).select_related("study", "scenario")
+    matchup = matchups.first()
     if matchup is None:
         raise NotYours("This matchup is not yours.")
     return matchup
@@ -98,9 +98,9 @@ def current_votes(study: Study) -> QuerySet[Vote]:
 
 def recent_votes(*, study: Study, expert: User, n: int = 10) -> list[Vote]:
     """The expert's last current votes, the latest matchup first."""
-    found = current_votes(study).filter(expert=expert).select_related("matchup__scenario")
-    found = found.defer("matchup__scenario__reference")
-    return list(found.order_by("-matchup__position")[:n])
+    votes = current_votes(study).filter(expert=expert).select_related("matchup__scenario")
+    votes = votes.defer("matchup__scenario__reference")
+    return list(votes.order_by("-matchup__position")[:n])
 
 
 def voting_progress(*, study: Study, expert: User) -> VotingProgress:

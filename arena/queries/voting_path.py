@@ -167,9 +167,9 @@ def study_now(*, study_pk: int, expert_pk: int, since: datetime) -> StudyNow:
 def upcoming(*, study: Study, expert: User, n: int) -> list[Matchup]:
     """The next matchups of this expert, at most n, with what a browser needs of them."""
     values = {"study": study.pk, "expert": expert.pk, "n": n}
-    found = []
+    matchups = []
     for matchup, (instruction,) in instances(Matchup, _MATCHUP, _COMING, values):
         shown = (matchup.scenario_id, instruction)
         matchup.scenario = Scenario.from_db(connection.alias, ("id", "instruction"), shown)
-        found.append(matchup)
-    return found
+        matchups.append(matchup)
+    return matchups

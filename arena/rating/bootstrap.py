@@ -204,12 +204,12 @@ class _Tables:
         self, weight: NDArray[np.float32]
     ) -> tuple[NDArray[np.float32], NDArray[np.float32], NDArray[np.float32]]:
         """(P, B) games, (P, B) scores, (B,) ties for weights (K, B)."""
-        found = np.empty((2, self.pairs, weight.shape[1]), dtype=np.float32)
+        counts_f4 = np.empty((2, self.pairs, weight.shape[1]), dtype=np.float32)
         for first in range(0, self.pairs, self._at_once):
             table = self._table(first) if self._only is None else self._only
             for kind in range(2):
-                np.matmul(table[kind], weight, out=found[kind, first : first + self._at_once])
-        return found[0], found[1], self._ties @ weight
+                np.matmul(table[kind], weight, out=counts_f4[kind, first : first + self._at_once])
+        return counts_f4[0], counts_f4[1], self._ties @ weight
 
     def _table(self, first: int) -> NDArray[np.float32]:
         """(2, pairs from `first`, K)."""

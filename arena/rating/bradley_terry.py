@@ -57,11 +57,11 @@ class Meetings:
 
     def sums(self, of_low: FloatArray, of_high: FloatArray) -> FloatArray:
         """(C, B): a pair's first value counts for its low contestant, the second for its high."""
-        found = np.zeros((self.contestants, of_low.shape[1]))
+        totals = np.zeros((self.contestants, of_low.shape[1]))
         if len(self.low):
             values = np.concatenate([of_low, of_high])[self._by_end]
-            found[self._present] = np.add.reduceat(values, self._starts, axis=0)
-        return found
+            totals[self._present] = np.add.reduceat(values, self._starts, axis=0)
+        return totals
 
     def totals(self, values: FloatArray) -> FloatArray:
         """(C, B): a pair's value counts for both."""

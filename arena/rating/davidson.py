@@ -161,13 +161,13 @@ def _curvature(
     last = met.contestants
     weight = games * (expected - 0.25 * tied - expected**2)
     both = games * tied * (0.5 - expected)
-    found = np.zeros((games.shape[1], last + 1, last + 1))
-    found[:, met.low, met.high] = -weight.T
-    found[:, met.high, met.low] = -weight.T
+    curvature = np.zeros((games.shape[1], last + 1, last + 1))
+    curvature[:, met.low, met.high] = -weight.T
+    curvature[:, met.high, met.low] = -weight.T
     diagonal = np.arange(last)
     of_contestants = met.totals(weight).T
-    found[:, diagonal, diagonal] = of_contestants
-    found[:, :last, :last] += of_contestants.mean(axis=1)[:, None, None] / last * together
-    found[:, :last, last] = found[:, last, :last] = met.sums(both, -both).T
-    found[:, last, last] = (games * tied * (1.0 - tied)).sum(axis=0)
-    return found
+    curvature[:, diagonal, diagonal] = of_contestants
+    curvature[:, :last, :last] += of_contestants.mean(axis=1)[:, None, None] / last * together
+    curvature[:, :last, last] = curvature[:, last, :last] = met.sums(both, -both).T
+    curvature[:, last, last] = (games * tied * (1.0 - tied)).sum(axis=0)
+    return curvature

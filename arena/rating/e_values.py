@@ -94,15 +94,15 @@ def compute_e_values(votes: Comparisons) -> dict[int, Bet]:
         return {}
     strengths, error = fitted
     without = without_each_expert(decided, strengths)
-    found = {}
+    bets = {}
     for expert in np.flatnonzero(~np.isnan(without).any(axis=1)).tolist():
         own = decided.expert == expert
         if number := int(own.sum()):
             # The error without an expert is that of all, wider by how many votes are missing.
             missing = len(decided) / (len(decided) - number)
             unknown = error * missing + np.diag(np.full(len(error), _TASTE**2))
-            found[expert] = _bet(select_votes(decided, own), without[expert], unknown)
-    return found
+            bets[expert] = _bet(select_votes(decided, own), without[expert], unknown)
+    return bets
 
 
 # --- Private -----------------------------------------------------------------------------------

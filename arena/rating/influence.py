@@ -141,10 +141,10 @@ def _greedy(
         taken = np.stack(
             [np.bincount(sequence[:number], minlength=counts.outcomes.size) for number in numbers]
         ).astype(np.float64)
-        found = _first_that_does(counts, strengths, leader, taken)
-        if found is None:
+        pair = _first_that_does(counts, strengths, leader, taken)
+        if pair is None:
             return None
-        place, rival = found
+        place, rival = pair
         low, high = (int(numbers[place - 1]) if place else low), int(numbers[place])
     return None if rival is None else (high, rival)
 

@@ -172,8 +172,8 @@ def clusters_of(votes: Comparisons, unit: Unit) -> list[tuple[int, IntArray]]:
         Unit.SCENARIO: (votes.scenario,),
         Unit.TWO_WAY: (votes.expert, votes.scenario),
     }
-    found = [renumber_codes(codes) for codes in wanted[unit]]
-    return [(len(codes), of_row) for codes, of_row in found if len(codes) > 1]
+    codes_by_unit = [renumber_codes(codes) for codes in wanted[unit]]
+    return [(len(codes), of_row) for codes, of_row in codes_by_unit if len(codes) > 1]
 
 
 def prior_degrees(own: FloatArray, common: FloatArray, degrees: FloatArray) -> float:

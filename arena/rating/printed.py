@@ -74,11 +74,11 @@ def notes_by_reason(notes: Iterable[tuple[str, str]]) -> list[str]:
     Args:
         notes: Names and what is missing in their lines, empty where nothing is.
     """
-    found: dict[str, list[str]] = {}
+    names_by_note: dict[str, list[str]] = {}
     for name, note in notes:
         if note:
-            found.setdefault(note, []).append(name)
-    return [f"{', '.join(names)}: {note}" for note, names in found.items()]
+            names_by_note.setdefault(note, []).append(name)
+    return [f"{', '.join(names)}: {note}" for note, names in names_by_note.items()]
 
 
 def latex_table(

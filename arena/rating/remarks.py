@@ -14,12 +14,12 @@ from augment.sentences import Sentence, sentence
 
 def _clusters(votes: Comparisons, unit: Unit) -> dict[str, int]:
     """How many of what is drawn there are."""
-    found = {}
+    numbers = {}
     if unit in (Unit.EXPERT, Unit.TWO_WAY):
-        found["expert"] = len(renumber_codes(votes.expert)[0])
+        numbers["expert"] = len(renumber_codes(votes.expert)[0])
     if unit in (Unit.SCENARIO, Unit.TWO_WAY):
-        found["scenario"] = len(renumber_codes(votes.scenario)[0])
-    return found
+        numbers["scenario"] = len(renumber_codes(votes.scenario)[0])
+    return numbers
 
 
 def few_clusters(votes: Comparisons, unit: Unit) -> int | None:

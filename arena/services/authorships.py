@@ -48,11 +48,11 @@ def take_back_author(*, authorship: Authorship, actor: User | None = None) -> No
 
     Twice changes nothing more.
     """
-    found = Authorship.objects.select_for_update(of=("self",)).filter(pk=authorship.pk).first()
-    if found is None:
+    held = Authorship.objects.select_for_update(of=("self",)).filter(pk=authorship.pk).first()
+    if held is None:
         return
-    _log("take back author", found, actor)
-    found.delete()
+    _log("take back author", held, actor)
+    held.delete()
 
 
 def _log(verb: str, row: Authorship, actor: User | None) -> None:

@@ -140,13 +140,13 @@ def _experts(usernames: Sequence[str]) -> list[User]:
     for username in usernames:
         if username not in known:
             raise UnknownName("expert", username, sorted(known))
-    found = [known[username] for username in sorted(set(usernames))]
-    simulated = [user.username for user in found if user.person.is_simulated]
+    experts = [known[username] for username in sorted(set(usernames))]
+    simulated = [user.username for user in experts if user.person.is_simulated]
     if simulated:
         raise Conflict(
             sentence("Simulated experts label nothing: %(names)s.", names=tuple(simulated))
         )
-    return found
+    return experts
 
 
 def _planned(labelling: LabellingRound, expert: User) -> list[LabelTask]:

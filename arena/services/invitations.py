@@ -92,22 +92,22 @@ def accept(*, token: str) -> Invitation:
         NotYours: No link has this token.
         LinkOver: It expired, was taken back, or its account may not be let in any more.
     """
-    found = invitation_by_token(token, locked=True)
+    invitation = invitation_by_token(token, locked=True)
     now = timezone.now()
-    if found.state(now) not in Invitation.ALIVE or not may_be_let_in(found.expert):
+    if invitation.state(now) not in Invitation.ALIVE or not may_be_let_in(invitation.expert):
         raise LinkOver("This link lets nobody in any more.")
-    is_first = found.used_at is None
+    is_first = invitation.used_at is None
     if is_first:
-        found.used_at = now
-        found.save(update_fields=["used_at"])
+        invitation.used_at = now
+        invitation.save(update_fields=["used_at"])
     log_event(
-        actor=found.expert,
+        actor=invitation.expert,
         verb="accept",
         object_kind="invitation",
-        object_code=found.code,
+        object_code=invitation.code,
         after={"is_first": is_first},
     )
-    return found
+    return invitation
 
 
 @transaction.atomic

@@ -90,8 +90,8 @@ def _chosen(keys: Mapping[str, str]) -> dict[str, str]:
     """The keys that are not the usual first ones, in small letters."""
     if unknown := sorted(set(keys) - set(USUAL_KEYS)):
         raise InvalidPreference("keys", f"Unknown action: {', '.join(unknown)}.")
-    found = {action: key.lower() for action, key in keys.items()}
-    for action, key in found.items():
+    lower = {action: key.lower() for action, key in keys.items()}
+    for action, key in lower.items():
         if len(key) != 1 or not key.isprintable() or key.isspace():
             raise InvalidPreference(
                 "keys",
@@ -102,9 +102,9 @@ def _chosen(keys: Mapping[str, str]) -> dict[str, str]:
                 ),
             )
     shown = {
-        action: found.get(action, usual[0])
+        action: lower.get(action, usual[0])
         for action, usual in USUAL_KEYS.items()
-        if action in found or action not in SOMETIMES
+        if action in lower or action not in SOMETIMES
     }
     for key, times in Counter(shown.values()).items():
         if times > 1:
@@ -114,4 +114,4 @@ def _chosen(keys: Mapping[str, str]) -> dict[str, str]:
             raise InvalidPreference(
                 "keys", sentence("'%(key)s' would do two things: %(both)s.", key=key, both=both)
             )
-    return {action: key for action, key in found.items() if key != USUAL_KEYS[action][0]}
+    return {action: key for action, key in lower.items() if key != USUAL_KEYS[action][0]}

@@ -36,13 +36,13 @@ def next_pairs(*, study: Study, expert: User, n: int) -> list[Matchup]:
     """
     if study.state != Study.State.OPEN:
         return []
-    found = upcoming(study=study, expert=expert, n=n)
-    if len(found) < n and plan_batch(study=study, expert=expert):
-        found = upcoming(study=study, expert=expert, n=n)
-    if any(matchup.served_at is None for matchup in found):
+    coming = upcoming(study=study, expert=expert, n=n)
+    if len(coming) < n and plan_batch(study=study, expert=expert):
+        coming = upcoming(study=study, expert=expert, n=n)
+    if any(matchup.served_at is None for matchup in coming):
         with transaction.atomic():
-            mark_served(matchups=found)
-    return found
+            mark_served(matchups=coming)
+    return coming
 
 
 def plan_batch(*, study: Study, expert: User) -> int:

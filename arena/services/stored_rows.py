@@ -40,10 +40,10 @@ def applied_migrations() -> list[str]:
 
 def find_tables() -> list[type[models.Model]]:
     """Every table that is kept, those between two tables included, by label."""
-    found = apps.get_models(include_auto_created=True)
+    tables = apps.get_models(include_auto_created=True)
     kept = (
         model
-        for model in found
+        for model in tables
         if model._meta.managed and not model._meta.proxy and label_of(model) not in LEFT_OUT
     )
     return sorted(kept, key=label_of)

@@ -188,10 +188,10 @@ def _lock(expert: User, code: UUID) -> HeldMatchup:
     The lock makes two votes on one matchup wait for each other, and the closing of the study for
     both. Who has opened the study's results votes in it no longer.
     """
-    found = held_matchup(code=code, expert_pk=expert.pk)
-    if found is None:
+    matchup = held_matchup(code=code, expert_pk=expert.pk)
+    if matchup is None:
         raise NotYours("This matchup is not yours.")
-    return found
+    return matchup
 
 
 def _insert(matchup: HeldMatchup, expert: User, decision: Decision, old: Vote | None) -> Vote:

@@ -86,12 +86,12 @@ def end_orphans(folder: Path, say: Callable[[str], None]) -> int:
             continue
         if _living(supervisor) is not None:
             continue
-        found = _orphans(children, secret)
-        if found:
-            names = ", ".join(f"{process.pid}" for process in found)
-            say(f"An earlier run was killed and left {len(found)} processes: ending {names}.")
-            _end(found)
-        ended += len(found)
+        orphans = _orphans(children, secret)
+        if orphans:
+            names = ", ".join(f"{process.pid}" for process in orphans)
+            say(f"An earlier run was killed and left {len(orphans)} processes: ending {names}.")
+            _end(orphans)
+        ended += len(orphans)
         path.unlink(missing_ok=True)
     return ended
 

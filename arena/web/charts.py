@@ -148,7 +148,7 @@ def bars(
         share = (min(max(value, first), last) - first) / (last - first)
         return round(BAR_LEFT + (BAR_RIGHT - BAR_LEFT) * share, 1)
 
-    found = {
+    by_key = {
         key: Bar(
             low_x=BAR_LEFT if low is None else at(low),
             x=None if middle is None else at(middle),
@@ -158,7 +158,7 @@ def bars(
         )
         for key, low, middle, high in known
     }
-    return Bars(first=first, last=last, by_key=found)
+    return Bars(first=first, last=last, by_key=by_key)
 
 
 def _title(line: Row) -> str:

@@ -39,10 +39,10 @@ GONE = 410
 def invitation_page(request: HttpRequest, token: str) -> HttpResponse:
     """Who invited whom to what. Only the button signs in: mail scanners open links, too."""
     try:
-        found = invitation_by_token(token)
+        invitation = invitation_by_token(token)
     except NotYours as error:
         raise Http404 from error
-    answer = _let_in(request, token) if request.method == "POST" else _landing(request, found)
+    answer = _let_in(request, token) if request.method == "POST" else _landing(request, invitation)
     # The address is the key: no request names it as where it came from, and no search engine keeps
     # it. (With "no-referrer" browsers hide the origin of the form as well, and it is refused.)
     answer["Referrer-Policy"] = "strict-origin"
@@ -122,15 +122,15 @@ def _over(request: HttpRequest, found: Invitation) -> HttpResponse:
 
 def _let_in(request: HttpRequest, token: str) -> HttpResponse:
     try:
-        found = accept(token=token)
+        invitation = accept(token=token)
     except LinkOver:
         return _over(request, invitation_by_token(token))
-    login(request, found.expert, backend=BACKEND)
-    request.session[SESSION_KEY] = str(found.code)
+    login(request, invitation.expert, backend=BACKEND)
+    request.session[SESSION_KEY] = str(invitation.code)
     request.session.set_expiry(SESSION_S)
-    is_open = found.study.state == Study.State.OPEN
-    answer = redirect("vote", code=found.study.code) if is_open else redirect("home")
-    return with_own_language(answer, found.expert)
+    is_open = invitation.study.state == Study.State.OPEN
+    answer = redirect("vote", code=invitation.study.code) if is_open else redirect("home")
+    return with_own_language(answer, invitation.expert)
 
 
 def _host(invitation: Invitation) -> str | None:

@@ -172,12 +172,12 @@ def address_of(study: Study, snapshot: Snapshot, tab: str) -> str:
 
 
 def _tab(name: str, *, is_staff: bool) -> Tab:
-    found = next((tab for tab in TABS if tab.name == name), None)
-    if found is None:
+    known = next((tab for tab in TABS if tab.name == name), None)
+    if known is None:
         raise Http404
-    if found.staff and not is_staff:
+    if known.staff and not is_staff:
         raise PermissionDenied
-    return found
+    return known
 
 
 def _chosen(request: HttpRequest, study: Study, ratings: list[Snapshot]) -> Snapshot | None:
@@ -189,7 +189,7 @@ def _chosen(request: HttpRequest, study: Study, ratings: list[Snapshot]) -> Snap
     if code is None:
         return None
     rows = Snapshot.objects.select_related("study", "made_by__person")
-    found = rows.filter(study=study, code=code, state=Snapshot.State.READY).first()
-    if found is None:
+    snapshot = rows.filter(study=study, code=code, state=Snapshot.State.READY).first()
+    if snapshot is None:
         raise Http404
-    return found
+    return snapshot

@@ -18,25 +18,25 @@ def both_versions(snapshot: Snapshot, table: LeaderboardTable) -> Context | None
 
     None where there are no such votes, or an older rating never looked.
     """
-    found = snapshot.results.own_votes
-    if found is None:
+    own_votes = snapshot.results.own_votes
+    if own_votes is None:
         return None
-    lines = {line.slug: line for line in found.lines}
+    lines = {line.slug: line for line in own_votes.lines}
     names = {row.slug: row.name for row in table.rows}
     return {
-        "kept": found,
+        "kept": own_votes,
         "lines": [_both_ways(lines[row.slug], row) for row in table.rows],
-        "reasons": sentences_of(found.reasons, names),
-        "places": found.largest and found.largest.places,
-        "who": [names[slug] for slug in found.largest.slugs] if found.largest else [],
+        "reasons": sentences_of(own_votes.reasons, names),
+        "places": own_votes.largest and own_votes.largest.places,
+        "who": [names[slug] for slug in own_votes.largest.slugs] if own_votes.largest else [],
     }
 
 
 def with_authors(snapshot: Snapshot, panel: Sequence[PanelRater]) -> list[Context]:
     """The experts' panel with who was author then, and the number of votes on their own."""
     authors = {judge for judge, _ in Filters.of_document(snapshot.filters).authors}
-    found = snapshot.results.own_votes
-    own = found.by_judge if found else {}
+    own_votes = snapshot.results.own_votes
+    own = own_votes.by_judge if own_votes else {}
     return [
         {
             "rater": rater,

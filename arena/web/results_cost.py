@@ -18,11 +18,11 @@ _CLASSES = (gettext_noop("Frontier"), gettext_noop("Utility"), gettext_noop("Ope
 
 def displacement(snapshot: Snapshot, table: LeaderboardTable) -> Context:
     """Elo against the distance from the references."""
-    found = {line.slug: line for line in snapshot.results.displacement}
+    by_slug = {line.slug: line for line in snapshot.results.displacement}
     lines = [
-        {"number": n, "row": row, "far": found[row.slug]}
+        {"number": n, "row": row, "far": by_slug[row.slug]}
         for n, row in enumerate(table.rows, start=1)
-        if row.slug in found
+        if row.slug in by_slug
     ]
     return {"lines": lines, "chart": scatter(plots(snapshot, table).get("displacement"))}
 
@@ -43,13 +43,13 @@ def cost(snapshot: Snapshot, table: LeaderboardTable) -> Context:
         for n, row in enumerate(table.rows, start=1)
         if row.slug in spent
     ]
-    found = plots(snapshot, table)
+    charts = plots(snapshot, table)
     return {
         "lines": lines,
-        "metres_by_money": scatter(found.get("displacement-usd"), width=NARROW),
-        "metres_by_tokens": scatter(found.get("displacement-tokens"), width=NARROW),
-        "by_money": scatter(found.get("elo-usd"), width=NARROW),
-        "by_tokens": scatter(found.get("elo-tokens"), width=NARROW),
+        "metres_by_money": scatter(charts.get("displacement-usd"), width=NARROW),
+        "metres_by_tokens": scatter(charts.get("displacement-tokens"), width=NARROW),
+        "by_money": scatter(charts.get("elo-usd"), width=NARROW),
+        "by_tokens": scatter(charts.get("elo-tokens"), width=NARROW),
         "keys": [
             {"group": group, "is_simulated": simulated, "label": labels.get(group, "")}
             for group, simulated in sorted(

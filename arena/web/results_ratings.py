@@ -148,10 +148,10 @@ def _half_width(bounds: Mapping[str, Bounds]) -> float | None:
 
 def _cross_check(snapshot: Snapshot, table: LeaderboardTable) -> float | None:
     """By how many points the bounds in closed form differ at most."""
-    found = snapshot.results.board.check
+    check = snapshot.results.board.check
     gaps = [
-        max(abs(found[row.slug][0] - row.lower), abs(found[row.slug][1] - row.upper))
+        max(abs(check[row.slug][0] - row.lower), abs(check[row.slug][1] - row.upper))
         for row in table.rows
-        if row.slug in found and row.lower is not None and row.upper is not None
+        if row.slug in check and row.lower is not None and row.upper is not None
     ]
     return max(gaps, default=None)

@@ -33,7 +33,7 @@ def votes_page(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
     if first is None or second is None or first is second:
         raise Http404
     number = request.GET.get("page", "1")
-    found = votes_on_pair(
+    votes = votes_on_pair(
         snapshot,
         first=first.slug,
         second=second.slug,
@@ -45,7 +45,7 @@ def votes_page(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
         "snapshot": snapshot,
         "first": first,
         "second": second,
-        "found": found,
+        "found": votes,
         "judges": snapshot.results.judges,
         "back": address_of(study, snapshot, "pairs"),
     }

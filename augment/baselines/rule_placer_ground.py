@@ -202,8 +202,8 @@ class PlacingGround:
         sign = math.copysign(1.0, distance_m)
         while high - low > 0.1:
             middle = (low + high) / 2.0
-            found = self.route.lane_position(sign * middle)
-            low, high = (low, middle) if found is None else (middle, high)
+            position = self.route.lane_position(sign * middle)
+            low, high = (low, middle) if position is None else (middle, high)
         return low, "ahead of" if sign > 0.0 else "behind"
 
     def _oncoming(self, place: LanePosition) -> str | None:

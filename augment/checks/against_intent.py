@@ -68,13 +68,13 @@ def check_against_intent(
     Raises:
         InvalidModification: The modification does not fit the scene.
     """
-    found = findings_on(ground, modification)
+    findings = findings_on(ground, modification)
     lanes = None if intent is None else LanesAcross.of(ground, intent.route)
     if intent is None or lanes is None:
-        return found
+        return findings
     asked = _asked(modification, intent, lanes, tolerances)
     held = [one for check in ASKED_CHECKS for one in check(asked)]
-    return (*held, *_settled(found, held, asked))
+    return (*held, *_settled(findings, held, asked))
 
 
 def _asked(

@@ -25,12 +25,12 @@ def asked_crash(asked: Asked) -> Iterator[Finding]:
         if not isinstance(request, CrashRequest) or not party.is_exact:
             continue
         order = in_order(party, request, asked.route)
-        found = pairs(order, request)
-        if any(pair.gap_m < pair.one.width_m for pair in found):
+        in_pairs = pairs(order, request)
+        if any(pair.gap_m < pair.one.width_m for pair in in_pairs):
             continue
         if request.facing not in (None, Facing.WITH_LANE):
             yield from _facing(asked, request, order[0])
-        for pair in found:
+        for pair in in_pairs:
             yield _gap(pair, asked)
             if pair.off_deg is not None:
                 yield _turn(pair, asked)

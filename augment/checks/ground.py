@@ -82,16 +82,16 @@ class Ground:
     def _reached(self, lane_id: str, start_m: float, *, forwards: bool) -> dict[str, float]:
         """Dijkstra over whole lanes: the signed distance from the ego to each lane's start."""
         lengths = {name: lane.centerline.length_m for name, lane in self.graph.lanes.items()}
-        found: dict[str, float] = {}
+        starts_m: dict[str, float] = {}
         queue = [(abs(start_m), lane_id, start_m)]
         while queue:
             _, here, begins_m = heapq.heappop(queue)
-            if here in found:
+            if here in starts_m:
                 continue
-            found[here] = begins_m
+            starts_m[here] = begins_m
             following = self.graph.successors(here) if forwards else self.graph.predecessors(here)
             for name in following:
                 next_m = begins_m + lengths[here] if forwards else begins_m - lengths[name]
-                if name not in found and -REACH_M - lengths[name] < next_m < REACH_M:
+                if name not in starts_m and -REACH_M - lengths[name] < next_m < REACH_M:
                     heapq.heappush(queue, (abs(next_m), name, next_m))
-        return found
+        return starts_m

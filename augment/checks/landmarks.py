@@ -31,12 +31,12 @@ _VEHICLES = (AgentType.VEHICLE, AgentType.BUS)
 def find_picked(lanes: LanesAcross, pick: Pick) -> tuple[TrafficAgent, ...]:
     """Who is meant: one, or all of `every`; empty where nobody fits."""
     sign = 1.0 if pick.relation is Relation.AHEAD else -1.0
-    found = []
+    agents = []
     for agent in lanes.route.scene.agents:
         place = lanes.route.locate_agent(agent)
         if sign * place.ahead_m > 0.0 and _fits(lanes, pick, agent, place):
-            found.append((sign * place.ahead_m, agent.id, agent))
-    ordered = tuple(agent for _, _, agent in sorted(found, key=lambda one: one[:2]))
+            agents.append((sign * place.ahead_m, agent.id, agent))
+    ordered = tuple(agent for _, _, agent in sorted(agents, key=lambda one: one[:2]))
     return ordered if pick.every else ordered[pick.ordinal - 1 : pick.ordinal]
 
 
@@ -140,8 +140,8 @@ def _ahead_m(spot: Spot, lanes: LanesAcross) -> float | None:
     if spot.mark is not None:
         return find_mark(lanes, spot.mark)
     assert spot.landmark is not None
-    found = find_picked(lanes, spot.landmark)
-    return lanes.route.locate_agent(found[0]).ahead_m if found else None
+    picked = find_picked(lanes, spot.landmark)
+    return lanes.route.locate_agent(picked[0]).ahead_m if picked else None
 
 
 def _crosswalk_m(lanes: LanesAcross) -> float | None:
@@ -149,14 +149,14 @@ def _crosswalk_m(lanes: LanesAcross) -> float | None:
     route = lanes.route
     ahead_m = np.arange(0.0, route.line.length_m - route.ego_s_m, _STEP_M)
     points = route.line.points_at(route.ego_s_m + ahead_m)
-    found = []
+    stations_m = []
     for area in lanes.route.scene.areas:
         if area.kind is not AreaKind.CROSSWALK:
             continue
         inside = np.flatnonzero(_inside(points, np.array(area.boundary_m)))
         if len(inside):
-            found.append(float(ahead_m[inside].mean()))
-    return min(found, default=None)
+            stations_m.append(float(ahead_m[inside].mean()))
+    return min(stations_m, default=None)
 
 
 def _inside(points_m: FloatArray, boundary_m: FloatArray) -> NDArray[np.bool_]:

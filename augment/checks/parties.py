@@ -187,8 +187,8 @@ def _party(
     lanes: LanesAcross,
 ) -> Party:
     own = [(number, place) for number, place in enumerate(wanted) if place.party == party]
-    found = [(place, added[taken[number]]) for number, place in own if number in taken]
-    right = [(place.role, agent) for place, agent in found if _suits(place, agent)]
+    answering = [(place, added[taken[number]]) for number, place in own if number in taken]
+    right = [(place.role, agent) for place, agent in answering if _suits(place, agent)]
     left = [place.role for number, place in own if number not in taken]
     return Party(
         request=request,
@@ -199,7 +199,9 @@ def _party(
             )
         ),
         workers=tuple(agent for role, agent in right if role is Role.WORKER),
-        mistyped=tuple((agent, place.role) for place, agent in found if not _suits(place, agent)),
+        mistyped=tuple(
+            (agent, place.role) for place, agent in answering if not _suits(place, agent)
+        ),
         missing=tuple((role, left.count(role)) for role in dict.fromkeys(left)),
         spare=tuple(
             agent

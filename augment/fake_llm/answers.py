@@ -89,10 +89,10 @@ def _steps(scene: Scene, modification: Modification) -> list[str]:
     route = EgoRoute.of(scene, graph)
     steps: list[str] = []
     for agent in modification.changed:
-        found = graph.nearest(agent.x_m, agent.y_m)
-        if found is None:
+        nearest = graph.nearest(agent.x_m, agent.y_m)
+        if nearest is None:
             continue
-        lane_id, place = found
+        lane_id, place = nearest
         line = graph.lanes[lane_id].centerline
         x_m, y_m = line.position(place.s_m)
         where = _ahead(graph, route, lane_id, place.s_m)

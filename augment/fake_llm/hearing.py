@@ -46,13 +46,13 @@ class Heard:
 
 def read_conversation(request: ChatRequest) -> Heard:
     """What the conversation says about the answer that is due; by default a modifier's."""
-    told = next((message.text for message in request.messages if message.role == "system"), "")
-    part = _OPENINGS.get(told.partition("\n")[0], ModelRole.MODIFIER)
+    system = next((message.text for message in request.messages if message.role == "system"), "")
+    part = _OPENINGS.get(system.partition("\n")[0], ModelRole.MODIFIER)
     feedback = [message.text for message in request.messages if _is_feedback(message)]
     start = max((n for n, one in enumerate(request.messages) if _is_feedback(one)), default=0)
     since = request.messages[start:]
     native = request.tools is not None
-    offered = request.tool_choice != "none" if native else '{"call": "pose_on_lane"' in told
+    offered = request.tool_choice != "none" if native else '{"call": "pose_on_lane"' in system
     over = read_text("calls_are_over.md") in request.messages[-1].text
     asked_again = request.messages[-1].text.startswith(read_text("re_ask.md").partition("\n")[0])
     return Heard(
@@ -70,19 +70,19 @@ def _is_feedback(message: SpokenMessage) -> bool:
 
 
 def _results(messages: Sequence[SpokenMessage]) -> list[dict[str, object] | None]:
-    found: list[dict[str, object] | None] = []
+    results: list[dict[str, object] | None] = []
     for message in messages:
         if message.role == "tool":
-            found.append(_result(message.text))
+            results.append(_result(message.text))
         elif message.role == "user" and message.text.startswith(_RESULT):
             lines = re.findall(r"^[0-9]+\. (\{.*\})$", message.text, re.MULTILINE)
-            found += [_result(line) for line in lines]
-    return found
+            results += [_result(line) for line in lines]
+    return results
 
 
 def _result(written: str) -> dict[str, object] | None:
     try:
-        found = json.loads(written)
+        result = json.loads(written)
     except ValueError:
         return None
-    return None if not isinstance(found, dict) or "error" in found else found
+    return None if not isinstance(result, dict) or "error" in result else result

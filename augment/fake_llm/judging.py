@@ -39,12 +39,12 @@ def problems_of(task: Task) -> list[Problem]:
     made = [agent_of(name, vector[:8]) for name, vector in added]
     if len(made) != len(right):
         return [_problem(f"{len(made)} agents were added, {len(right)} were asked for.", "Count.")]
-    found: list[Problem] = []
+    problems: list[Problem] = []
     for agent in made:
         meant = min(right, key=lambda one: _distance_m(one, agent))
         right.remove(meant)
-        found += _differences(agent, meant)
-    return found
+        problems += _differences(agent, meant)
+    return problems
 
 
 def write_ratings(problems: Sequence[Problem]) -> str:
@@ -52,11 +52,13 @@ def write_ratings(problems: Sequence[Problem]) -> str:
     low = {"compliance": 2, "realism": 3, "logical_consistency": 2}
     high = dict.fromkeys(low, 5)
     block = {"ratings": low if problems else high, "feedback": list(problems)}
-    told = "; ".join(problem["problem"] for problem in problems) or "Nothing is to be corrected."
+    feedback = (
+        "; ".join(problem["problem"] for problem in problems) or "Nothing is to be corrected."
+    )
     return (
         "Summary: A road with the ego on it, and what the user wished for.\n\n"
         "Questions:\n1. Is everything where it was wished for?\n2. Does it face the right way?\n"
-        f"3. Is the number right?\n\nAnswers:\n1. to 3. {told}\n\nRatings: See below.\n\n"
+        f"3. Is the number right?\n\nAnswers:\n1. to 3. {feedback}\n\nRatings: See below.\n\n"
         f"Review:\n```json\n{json.dumps(block)}\n```\n"
     )
 

@@ -35,10 +35,10 @@ def with_results(
 
 
 def _arguments(graph: LaneGraph, ego: TrafficAgent, agent: TrafficAgent) -> dict[str, object]:
-    found = graph.nearest(agent.x_m, agent.y_m)
-    if found is None:
+    nearest = graph.nearest(agent.x_m, agent.y_m)
+    if nearest is None:
         return {"lane": "Lane1", "start": _LANE, "distance_m": 0.0}
-    lane_id, place = found
+    lane_id, place = nearest
     start, distance_m = _LANE, place.s_m
     if lane_id == ego.lane_id:
         start = ego.id
@@ -53,11 +53,11 @@ def _arguments(graph: LaneGraph, ego: TrafficAgent, agent: TrafficAgent) -> dict
 
 def _placed(graph: LaneGraph, agent: TrafficAgent, result: dict[str, object]) -> TrafficAgent:
     """The agent at the pose, turned against the lane as before; its walk goes along."""
-    found = graph.nearest(agent.x_m, agent.y_m)
-    if found is None:
+    nearest = graph.nearest(agent.x_m, agent.y_m)
+    if nearest is None:
         return agent
     x_m, y_m, heading_rad = (float(str(result[n])) for n in ("x_m", "y_m", "heading_rad"))
-    lane_rad = graph.lane(found[0]).centerline.heading_at(found[1].s_m)
+    lane_rad = graph.lane(nearest[0]).centerline.heading_at(nearest[1].s_m)
     walk = agent.walk_to_m
     if walk is not None:
         walk = (walk[0] + x_m - agent.x_m, walk[1] + y_m - agent.y_m)

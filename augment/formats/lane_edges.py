@@ -32,8 +32,8 @@ def nearest_on(points: FloatArray, line: FloatArray) -> FloatArray:
     along = ((points[:, None] - start) * step).sum(axis=2) / square
     feet = start + np.clip(along, 0.0, 1.0)[:, :, None] * step
     away = np.hypot(*np.moveaxis(points[:, None] - feet, 2, 0))
-    found: FloatArray = feet[np.arange(len(points)), away.argmin(axis=1)]
-    return found
+    nearest: FloatArray = feet[np.arange(len(points)), away.argmin(axis=1)]
+    return nearest
 
 
 def edge_of(line: FloatArray, parts: Iterable[tuple[int, int, FloatArray]]) -> FloatArray:

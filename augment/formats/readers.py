@@ -55,16 +55,16 @@ def recognise(path: Path) -> Reader:
     if not path.exists():
         raise InvalidDocument("input", [(str(path), "is not there")])
     try:
-        found = [reader for reader in READERS.values() if reader.recognises(path)]
+        readers = [reader for reader in READERS.values() if reader.recognises(path)]
     except OSError as fault:
         raise InvalidDocument("input", [(str(path), fault.strerror or str(fault))]) from None
-    if len(found) == 1:
-        return found[0]
-    if not found and _is_123d(path):
+    if len(readers) == 1:
+        return readers[0]
+    if not readers and _is_123d(path):
         text = "looks like a 123D log, which is not read (docs/formats.md says why)"
         raise InvalidDocument("input", [(str(path), text)])
     known = ", ".join(f"{reader.name}: {reader.title}" for reader in READERS.values())
-    said = "none of the formats" if not found else " and ".join(one.name for one in found)
+    said = "none of the formats" if not readers else " and ".join(one.name for one in readers)
     raise InvalidDocument("input", [(str(path), f"looks like {said}; name one of {known}")])
 
 

@@ -244,7 +244,7 @@ def _light(connector: LaneConnector, steps: int) -> dict[str, Any]:
 
 def _map_features(scene: Scene) -> dict[str, dict[str, Any]]:
     graph = LaneGraph(scene)
-    found: dict[str, dict[str, Any]] = {}
+    features: dict[str, dict[str, Any]] = {}
     ways: list[AnyLane] = [*scene.lanes, *scene.connectors]
     for way in ways:
         is_lane = isinstance(way, Lane)
@@ -260,11 +260,11 @@ def _map_features(scene: Scene) -> dict[str, dict[str, Any]]:
         }
         if way.speed_limit_mps is not None:
             feature["speed_limit_kmh"] = way.speed_limit_mps * 3.6
-        found[way.id] = feature
+        features[way.id] = feature
     for area in scene.areas:
         if area.kind in _AREAS:
-            found[area.id] = {"type": _AREAS[area.kind], "polygon": _ring(area)}
-    return found
+            features[area.id] = {"type": _AREAS[area.kind], "polygon": _ring(area)}
+    return features
 
 
 def _named(name: str | None) -> list[str]:

@@ -86,13 +86,13 @@ def addresses_of(
         OSError, UnicodeError: Nobody knows the name.
     """
     entries = resolve(host, None, type=socket.SOCK_STREAM)
-    found = list(dict.fromkeys(str(entry[4][0]) for entry in entries))
-    for text in found if checks else ():
+    addresses = list(dict.fromkeys(str(entry[4][0]) for entry in entries))
+    for text in addresses if checks else ():
         address = _address(text)
         if address is None or _is_forbidden(address):
             problem = f"{host} leads to {text}, {_FORBIDDEN}"
             raise InvalidDocument("endpoint", [("base_url", problem)])
-    return found
+    return addresses
 
 
 # --- Private -----------------------------------------------------------------------------------
@@ -127,13 +127,13 @@ def _split(base_url: str) -> SplitResult | None:
 def _address(host: str) -> IPv4Address | IPv6Address | None:
     """The number that a host is written as, also in the short and hexadecimal forms of C."""
     try:
-        found = ip_address(host.partition("%")[0])
+        address = ip_address(host.partition("%")[0])
     except ValueError:
         try:
             return IPv4Address(socket.inet_aton(host))
         except OSError:
             return None
-    return found
+    return address
 
 
 def _is_forbidden(address: IPv4Address | IPv6Address) -> bool:

@@ -119,10 +119,10 @@ def _refused(message: str, code: str, param: str, sent: Collection[str]) -> str 
     large is no parameter that is not taken.
     """
     named = [param.partition(".")[0]] if param else re.findall(r"\w+", message)
-    found = next((name for name in named if name in _DROPPABLE and name in sent), None)
-    if found in _LENGTHS and code not in _NOT_TAKEN and not _SAYS_UNKNOWN.search(message):
+    refused = next((name for name in named if name in _DROPPABLE and name in sent), None)
+    if refused in _LENGTHS and code not in _NOT_TAKEN and not _SAYS_UNKNOWN.search(message):
         return None
-    return found
+    return refused
 
 
 def _message_code_and_param(body: object) -> tuple[str, str, str]:

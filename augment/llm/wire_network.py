@@ -82,22 +82,22 @@ class Network:
 
     def _addresses(self, host: str, watch: Watch) -> list[str]:
         """Looked up in a thread of its own, because a look can't be ended."""
-        found: list[list[str] | InvalidDocument | OSError | UnicodeError] = []
+        outcomes: list[list[str] | InvalidDocument | OSError | UnicodeError] = []
 
         def look() -> None:
             try:
-                found.append(addresses_of(host, resolve=self._resolve, checks=self._checks))
+                outcomes.append(addresses_of(host, resolve=self._resolve, checks=self._checks))
             except (InvalidDocument, OSError, UnicodeError) as error:
-                found.append(error)
+                outcomes.append(error)
 
         thread = threading.Thread(target=look, name="look up a name", daemon=True)
         thread.start()
         thread.join(_connect_s(watch))
-        if not found:
+        if not outcomes:
             raise TimeoutError(f"{host} could not be looked up in time")
-        if isinstance(found[0], Exception):
-            raise found[0]
-        return found[0]
+        if isinstance(outcomes[0], Exception):
+            raise outcomes[0]
+        return outcomes[0]
 
 
 class Stream:

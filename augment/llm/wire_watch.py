@@ -125,5 +125,5 @@ class Watches:
 
     def now(self) -> Watch:
         """The watch over this thread's call."""
-        found: Watch = self._local.watch
-        return found
+        watch: Watch = self._local.watch
+        return watch

@@ -98,8 +98,8 @@ def displacement(generated: Modification | None, reference: Modification) -> Dis
     matches: list[Match] = []
     for object_class in ObjectClass:
         wanted = _of_class(reference.changed, object_class)
-        found = _of_class(placed, object_class)
-        matches += _matched(wanted, found, object_class)
+        agents = _of_class(placed, object_class)
+        matches += _matched(wanted, agents, object_class)
     taken = {match.reference for match in matches}
     used = {match.generated for match in matches}
     return Displacement(

@@ -60,9 +60,9 @@ def _stored(
     connection: BaseDatabaseWrapper, models: Iterable[type[Model]]
 ) -> list[type[AppendOnly]]:
     """Those of the models that are append-only and have a table already."""
-    found = [model for model in models if issubclass(model, AppendOnly)]
-    kept = connection.introspection.table_names() if found else []
-    return [model for model in found if model._meta.db_table in kept]
+    tables = [model for model in models if issubclass(model, AppendOnly)]
+    kept = connection.introspection.table_names() if tables else []
+    return [model for model in tables if model._meta.db_table in kept]
 
 
 def _for_sqlite(model: type[AppendOnly]) -> list[str]:

@@ -144,12 +144,12 @@ def _refuse(constant: str) -> object:
 
 
 def _once(pairs: list[tuple[str, object]]) -> dict[str, object]:
-    found: dict[str, object] = {}
+    fields: dict[str, object] = {}
     for key, value in pairs:
-        if key in found:
+        if key in fields:
             raise _Broken(f"the key {key[:40]!a} stands twice in one object")
-        found[key] = value
-    return found
+        fields[key] = value
+    return fields
 
 
 _DECODER = json.JSONDecoder(parse_constant=_refuse, object_pairs_hook=_once)

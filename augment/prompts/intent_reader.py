@@ -24,9 +24,9 @@ _MOST_PROBLEMS = 8
 
 def reader_messages(instruction: str) -> tuple[Message, ...]:
     """The rules with the JSON schema, and the sentence."""
-    told = fill_text("reader.md", schema=_schema())
+    system = fill_text("reader.md", schema=_schema())
     task = fill_text("reader_task.md", quoted=quote(instruction))
-    return Message(speaker=Speaker.SYSTEM, text=told), said_by_user(task)
+    return Message(speaker=Speaker.SYSTEM, text=system), said_by_user(task)
 
 
 def read_intent(answer: str) -> Intent:

@@ -172,11 +172,11 @@ class _Reader:
 
     def _match(self, pattern: re.Pattern[str]) -> str | None:
         self._skip()
-        found = pattern.match(self.text, self.at, self._end)
-        if found is None:
+        match = pattern.match(self.text, self.at, self._end)
+        if match is None:
             return None
-        self.at = found.end()
-        return found.group()
+        self.at = match.end()
+        return match.group()
 
     def _skip(self) -> None:
         space = _SPACE.match(self.text, self.at, self._end)

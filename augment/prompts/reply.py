@@ -102,8 +102,8 @@ def notes_of(answer: str) -> str:
     heads = r"Insights|Summary|Modification Dict|Modification Calculations|Modified Vectors"
     parts = re.split(rf"^[ \t#*_]*({heads})[ \t#*_]*:[ \t*_]*", answer, flags=re.MULTILINE)
     bodies = dict(zip(parts[1::2], parts[2::2], strict=True))
-    told = [bodies.get("Insights", "").strip(), bodies.get("Summary", "").strip()]
-    return "\n\n".join(part for part in told if part)[:LONGEST_NOTES]
+    notes = [bodies.get("Insights", "").strip(), bodies.get("Summary", "").strip()]
+    return "\n\n".join(part for part in notes if part)[:LONGEST_NOTES]
 
 
 def _misplaced(block: _Block, scene: Scene, radius_m: float) -> list[str]:

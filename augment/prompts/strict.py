@@ -32,8 +32,8 @@ def validate(kind: type[_Kind], found: object) -> _Kind:
 
 def _sentences(error: ValidationError) -> list[str]:
     """What pydantic found, each with its path and without echoing what the model wrote."""
-    found = []
+    sentences = []
     for fault in error.errors(include_url=False, include_input=False, include_context=False)[:8]:
         path = ".".join(ascii(part).strip("'")[:40] for part in fault["loc"]) or "the block"
-        found.append(f"{path}: {fault['msg']}")
-    return found
+        sentences.append(f"{path}: {fault['msg']}")
+    return sentences

@@ -155,10 +155,10 @@ class Canvas:
         cells = np.floor(np.asarray(points_px) * DENSITY).astype(np.int64)
         size = np.array(self._image.size)
         within = ((cells >= 0) & (cells < size)).all(axis=1)
-        found = np.zeros(len(cells), dtype=bool)
+        inside = np.zeros(len(cells), dtype=bool)
         pixels = np.asarray(self._image)[cells[within, 1], cells[within, 0]]
-        found[within] = np.isin(pixels, [_INKS[colour] for colour in colours])
-        return found
+        inside[within] = np.isin(pixels, [_INKS[colour] for colour in colours])
+        return inside
 
     def png(self, *, halved: bool = False) -> bytes:
         """The finished picture: the same drawing gives the same bytes, and no metadata.

@@ -90,17 +90,17 @@ def inks() -> dict[Colour, int]:
 
     The numbers go by the order of this file, so the same drawing gives the same bytes.
     """
-    found: dict[Colour, int] = {}
+    counts: dict[Colour, int] = {}
     for value in globals().values():
         if isinstance(value, MarkStyle):
             for colour in (value.fill, value.outline, value.detail, value.hatch):
                 if colour is not None:
-                    found.setdefault(colour, len(found))
+                    counts.setdefault(colour, len(counts))
         elif _is_colour(value):
-            found.setdefault(value, len(found))
+            counts.setdefault(value, len(counts))
     for step in TEXT_RAMP:
-        found.setdefault(step, len(found))
-    return found
+        counts.setdefault(step, len(counts))
+    return counts
 
 
 def _is_colour(value: object) -> bool:

@@ -89,14 +89,14 @@ def stripes(
     across = polygon @ normal
     middle = (across.min() + across.max()) / 2.0
     count = math.ceil((across.max() - across.min()) / 2.0 / period)
-    found = []
+    polygons = []
     for index in range(-count, count):
         centre = middle + (index + 0.5) * period
         piece = _half(polygon, normal, centre - width / 2.0)
         piece = _half(piece, -normal, -(centre + width / 2.0))
         if len(piece) >= 3:
-            found.append(piece)
-    return found
+            polygons.append(piece)
+    return polygons
 
 
 def long_axis(polygon: FloatArray) -> tuple[float, float, float]:

@@ -126,8 +126,8 @@ class BezierLane:
 
     def project(self, x_m: float, y_m: float) -> Projection:
         """The nearest place on the lane; of equally near ones the first."""
-        found = [(piece, piece.curve.project(x_m, y_m)) for piece in self.pieces]
-        piece, place = min(found, key=lambda item: item[1].distance_m)
+        projections = [(piece, piece.curve.project(x_m, y_m)) for piece in self.pieces]
+        piece, place = min(projections, key=lambda item: item[1].distance_m)
         return Projection(
             s_m=piece.lane_station(place.s_m), d_m=place.d_m, distance_m=place.distance_m
         )

@@ -86,11 +86,11 @@ class LaneGraph:
         self, x_m: float, y_m: float, *, among: Iterable[str] | None = None
     ) -> tuple[str, Projection] | None:
         """The lane whose centreline comes nearest to the point, None on a map without lanes."""
-        found = [
+        projections = [
             (lane_id, self.lanes[lane_id].centerline.project(x_m, y_m))
             for lane_id in (self.lanes if among is None else among)
         ]
-        return min(found, key=lambda item: item[1].distance_m) if found else None
+        return min(projections, key=lambda item: item[1].distance_m) if projections else None
 
     def place(self, lane_id: str, s_m: float, d_m: float = 0.0) -> LanePosition:
         """The place s along one lane and d to its left."""

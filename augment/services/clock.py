@@ -27,9 +27,9 @@ def database_now() -> datetime:
     text, parameters = Query(None).get_compiler(connection=connection).compile(DATABASE_TIME)
     with connection.cursor() as cursor:
         cursor.execute(f"SELECT {text}", parameters)
-        found = cursor.fetchone()[0]
-    if isinstance(found, datetime):
-        return found
-    read = parse_datetime(found)  # SQLite has texts
+        now = cursor.fetchone()[0]
+    if isinstance(now, datetime):
+        return now
+    read = parse_datetime(now)  # SQLite has texts
     assert read is not None
     return read.replace(tzinfo=UTC)

@@ -90,7 +90,7 @@ def _distance(drive: Drive, moment: int) -> float:
 
 def _encroachment(drive: Drive) -> float:
     """The least |time of the ego - time of the other| at one place, over crossing ways."""
-    found = math.inf
+    least_s = math.inf
     mine = drive.boxes
     for moments, boxes in _tracks(drive.objects).values():
         if np.ptp(boxes[:, :2], axis=0).max() < 1.0:
@@ -104,8 +104,8 @@ def _encroachment(drive: Drive) -> float:
         hit = meet(mine[ego], boxes[other])
         if hit.any():
             lag = np.abs(ego[hit] - moments[other[hit]]).min() * STEP_S
-            found = min(found, float(lag))
-    return found
+            least_s = min(least_s, float(lag))
+    return least_s
 
 
 def _tracks(rows: list[Objects]) -> dict[str, tuple[FloatArray, FloatArray]]:

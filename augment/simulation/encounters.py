@@ -29,7 +29,7 @@ def collisions(drive: Drive) -> tuple[Collision, ...]:
 
     Who touches the ego at the very start is left out: nobody drove there.
     """
-    found: list[Collision] = []
+    met: list[Collision] = []
     known: set[str] = set()
     astray = off_one_way(drive)
     for moment, objects in enumerate(drive.objects):
@@ -49,7 +49,7 @@ def collisions(drive: Drive) -> tuple[Collision, ...]:
         )
         guilty = at_fault(contacts, np.full(len(hit), astray[moment]))
         for number, contact, fault in zip(hit, contacts, guilty, strict=True):
-            found.append(
+            met.append(
                 Collision(
                     moment=moment,
                     object_id=objects.ids[number],
@@ -58,7 +58,7 @@ def collisions(drive: Drive) -> tuple[Collision, ...]:
                     at_fault=bool(fault),
                 )
             )
-    return tuple(found)
+    return tuple(met)
 
 
 def off_one_way(drive: Drive) -> BoolArray:

@@ -42,7 +42,7 @@ class DriveEvent:
 
 def events_of(drive: Drive, score: Score) -> tuple[DriveEvent, ...]:
     """All events in the order of time."""
-    found = [
+    events = [
         DriveEvent(
             moment=collision.moment,
             kind=EventKind.COLLISION if collision.at_fault else EventKind.TOUCHED,
@@ -51,14 +51,14 @@ def events_of(drive: Drive, score: Score) -> tuple[DriveEvent, ...]:
         for collision in score.collisions
     ]
     outside = _series(score, "drivable_area_compliance", "outside_m") >= OFF_ROAD_M
-    found += [DriveEvent(moment=n, kind=EventKind.OFF_ROAD) for n in _starts(outside)]
+    events += [DriveEvent(moment=n, kind=EventKind.OFF_ROAD) for n in _starts(outside)]
     braking = np.array([plan.braking for plan in drive.plans], dtype=np.bool_)
-    found += [DriveEvent(moment=n, kind=EventKind.EMERGENCY_BRAKE) for n in _starts(braking)]
+    events += [DriveEvent(moment=n, kind=EventKind.EMERGENCY_BRAKE) for n in _starts(braking)]
     hard = drive.states[:, ACCELERATION] <= HARD_BRAKING_MPS2
-    found += [DriveEvent(moment=n, kind=EventKind.HARD_BRAKING) for n in _starts(hard)]
+    events += [DriveEvent(moment=n, kind=EventKind.HARD_BRAKING) for n in _starts(hard)]
     if drive.at_map_end:
-        found.append(DriveEvent(moment=len(drive.states) - 1, kind=EventKind.MAP_END))
-    return tuple(sorted(found, key=lambda event: (event.moment, event.kind)))
+        events.append(DriveEvent(moment=len(drive.states) - 1, kind=EventKind.MAP_END))
+    return tuple(sorted(events, key=lambda event: (event.moment, event.kind)))
 
 
 def _starts(holds: BoolArray) -> list[int]:

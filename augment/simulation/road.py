@@ -110,10 +110,10 @@ class Road:
         """Which ways (W,) lie under which points (N, 2): (N, W); an edge counts as outside."""
         import shapely
 
-        found = np.zeros((len(points_m), len(self.names)), dtype=np.bool_)
+        covers = np.zeros((len(points_m), len(self.names)), dtype=np.bool_)
         points, ways = self._tree.query(shapely.points(points_m), predicate="within")
-        found[points, ways] = True
-        return found
+        covers[points, ways] = True
+        return covers
 
     def on_one_way(self, corners_m: FloatArray) -> BoolArray:
         """Which boxes (N, 4, 2) lie on one way, or on one and what follows it, (N,)."""
@@ -224,15 +224,15 @@ def _rim(way: AnyLane, end: int) -> FloatArray:
 
 def _of_same_direction(way: AnyLane, road: Road) -> set[str]:
     """Neighbours of a lane that end where it ends and lead nowhere either."""
-    found: set[str] = set()
+    names: set[str] = set()
     waiting = [way]
     while waiting:
         lane = waiting.pop()
         for name in (getattr(lane, "left_neighbor", None), getattr(lane, "right_neighbor", None)):
-            if name in road.graph.lanes and name not in found and not road.graph.successors(name):
-                found.add(name)
+            if name in road.graph.lanes and name not in names and not road.graph.successors(name):
+                names.add(name)
                 waiting.append(road.graph.lanes[name])
-    return found
+    return names
 
 
 def _union(pieces: NDArray[np.object_]) -> BaseGeometry:

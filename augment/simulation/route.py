@@ -45,19 +45,19 @@ def find_route(scene: Scene, graph: LaneGraph, recording: Recording | None) -> t
 def beside_route(scene: Scene, graph: LaneGraph, route: tuple[str, ...]) -> frozenset[str]:
     """Ids of the route's ways, their neighbours of the same direction, and what joins these."""
     lanes = {lane.id: lane for lane in scene.lanes}
-    found = set(route)
+    names = set(route)
     waiting = [lanes[name] for name in route if name in lanes]
     while waiting:
         for name in _neighbours(waiting.pop()):
-            if name in lanes and name not in found:
-                found.add(name)
+            if name in lanes and name not in names:
+                names.add(name)
                 waiting.append(lanes[name])
     joining = {
         connector.id
         for connector in scene.connectors
-        if connector.from_lane in found and connector.to_lane in found
+        if connector.from_lane in names and connector.to_lane in names
     }
-    return frozenset(found | joining)
+    return frozenset(names | joining)
 
 
 # Private

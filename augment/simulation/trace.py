@@ -80,13 +80,13 @@ def _objects(setting: DriveSetting, drive: Drive, changed: set[str]) -> list[dic
     types = {agent.id: agent.type.value for agent in setting.after.agents}
     if setting.recording is not None:
         types |= {track.agent_id: track.type for track in setting.recording.tracks}
-    found: dict[str, dict[str, Any]] = {}
+    by_name: dict[str, dict[str, Any]] = {}
     for moment, objects in enumerate(drive.objects):
         rows = _poses(objects.boxes, objects.speeds_mps)
         for name, kind, box, pose in zip(
             objects.ids, objects.kinds, objects.boxes, rows, strict=True
         ):
-            one = found.setdefault(
+            one = by_name.setdefault(
                 name,
                 {
                     "id": name,
@@ -101,11 +101,11 @@ def _objects(setting: DriveSetting, drive: Drive, changed: set[str]) -> list[dic
             gap = moment - one["first"] - len(one["poses"])
             one["poses"] += [None] * gap + [pose]
     whole = len(drive.objects)
-    for one in found.values():
+    for one in by_name.values():
         still = all(pose == one["poses"][0] for pose in one["poses"])
         if still and one["first"] == 0 and len(one["poses"]) == whole:
             one["poses"] = one["poses"][:1]
-    return list(found.values())
+    return list(by_name.values())
 
 
 def _plans(drive: Drive) -> list[dict[str, Any]]:

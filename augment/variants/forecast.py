@@ -47,18 +47,18 @@ def calls_of(recipe: Recipe) -> dict[ModelRole, CallRange]:
     has_tool = recipe.tools is not Tools.NONE
     # The answer with the first call too many, and the one that it is asked for.
     a_round = again + (limits.calls.calls + 1 if has_tool else 0)
-    found = {
+    calls = {
         ModelRole.MODIFIER: CallRange(least=1, usual=1 + has_tool, most=rounds * a_round),
     }
     match recipe.review:
         case Review.TEXT:
-            found[ModelRole.REVIEWER] = CallRange(least=1, usual=1, most=rounds * again)
+            calls[ModelRole.REVIEWER] = CallRange(least=1, usual=1, most=rounds * again)
         case Review.VISUAL:
-            found[ModelRole.ENGINEER] = CallRange(least=2, usual=2, most=2 * rounds * again)
-            found[ModelRole.VIEWER] = CallRange(least=1, usual=1, most=rounds * again)
+            calls[ModelRole.ENGINEER] = CallRange(least=2, usual=2, most=2 * rounds * again)
+            calls[ModelRole.VIEWER] = CallRange(least=1, usual=1, most=rounds * again)
         case Review.NONE | Review.GEOMETRIC:
             pass
-    return found
+    return calls
 
 
 def most_tokens(recipe: Recipe, first: Mapping[ModelRole, int]) -> dict[ModelRole, TokenUse]:
@@ -73,15 +73,15 @@ def most_tokens(recipe: Recipe, first: Mapping[ModelRole, int]) -> dict[ModelRol
     longest = limits.max_tokens * (2 if limits.re_asks else 1)
     turn = longest + PROGRAM_TOKENS
     rounds = 1 if recipe.review is Review.NONE else 1 + limits.regenerations
-    found = {}
+    by_role = {}
     for role, calls in calls_of(recipe).items():
         # The modifier's conversation goes on through all rounds; a review is one of its own, and
         # holds what the others said of the round.
         talks = 1 if role is ModelRole.MODIFIER else rounds
         turns = calls.most // talks
         start = first[role] + (0 if role is ModelRole.MODIFIER else turn)
-        found[role] = TokenUse(
+        by_role[role] = TokenUse(
             prompt=talks * (turns * start + turn * turns * (turns - 1) // 2),
             completion=calls.most * longest,
         )
-    return found
+    return by_role

@@ -27,10 +27,10 @@ def review_geometry(
         ground: Of the submission's scene.
         intent: What the instruction asks for, None where nobody has written it down.
     """
-    found = check_against_intent(ground, submission.modification, intent)
-    told = [one for severity in _TOLD for one in found if one.severity is severity]
-    wrong = sum(one.severity is Severity.WRONG for one in told)
-    doubtful = len(told) - wrong
+    findings = check_against_intent(ground, submission.modification, intent)
+    shown = [one for severity in _TOLD for one in findings if one.severity is severity]
+    wrong = sum(one.severity is Severity.WRONG for one in shown)
+    doubtful = len(shown) - wrong
     insists = doubtful > 0 and submission.modification == submission.earlier
     accepted = wrong == 0 and (doubtful == 0 or insists)
     names = short_names(submission.scene)
@@ -39,7 +39,7 @@ def review_geometry(
         is_accepted=accepted,
         score=(-float(wrong), -float(doubtful)),
         feedback=tuple(
-            f"{one.severity.value.capitalize()}: {one.sentence(known)}" for one in told
+            f"{one.severity.value.capitalize()}: {one.sentence(known)}" for one in shown
         ),
         is_measured=True,
         summary=f"{wrong} findings wrong, {doubtful} doubtful",
@@ -47,7 +47,7 @@ def review_geometry(
             "wrong": wrong,
             "doubtful": doubtful,
             "accepted": accepted,
-            "findings": [_document(one, known) for one in found],
+            "findings": [_document(one, known) for one in findings],
         },
     )
 

@@ -33,7 +33,7 @@ class Command(TerminalCommand):
         """Import the file and say what it held."""
         path: Path = options["file"]
         try:
-            found = import_votes(
+            imported = import_votes(
                 path=path,
                 name=options["name"] or path.stem,
                 is_simulated=options["simulated"],
@@ -41,6 +41,6 @@ class Command(TerminalCommand):
         except (ArenaError, AugmentError) as error:
             raise CommandError(str(error)) from error
         self.stdout.write(
-            f"Imported {found.votes} votes on {found.contestants} contestants as "
-            f"{found.study.name!r} ({found.study.code})."
+            f"Imported {imported.votes} votes on {imported.contestants} contestants as "
+            f"{imported.study.name!r} ({imported.study.code})."
         )

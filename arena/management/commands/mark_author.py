@@ -54,8 +54,8 @@ def _check_contestant(study: Study, slug: str) -> None:
 
 
 def _expert(study: Study, username: str) -> User:
-    found = study.experts.filter(username=username).first()
-    if found is None:
+    expert = study.experts.filter(username=username).first()
+    if expert is None:
         known = study.experts.order_by("username").values_list("username", flat=True)
         raise UnknownName("expert", username, list(known))
-    return found
+    return expert

@@ -90,11 +90,11 @@ def _rows_at(stamps: NDArray[np.int64], wanted: NDArray[np.int64]) -> NDArray[np
     """The rows (T,) of the poses at exactly the sweeps' time stamps."""
     order = np.argsort(stamps, kind="stable")
     places = np.searchsorted(stamps[order], wanted)
-    found = np.zeros(len(wanted), dtype=bool)
+    is_wanted = np.zeros(len(wanted), dtype=bool)
     inside = places < len(stamps)
-    found[inside] = stamps[order][places[inside]] == wanted[inside]
-    if not found.all():
-        first = wanted[~found][0]
+    is_wanted[inside] = stamps[order][places[inside]] == wanted[inside]
+    if not is_wanted.all():
+        first = wanted[~is_wanted][0]
         raise InvalidDocument(WHAT, [(POSES, f"has no pose at the annotated time {first} ns")])
     return order[places]
 

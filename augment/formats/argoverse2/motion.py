@@ -130,11 +130,11 @@ def _is_scenario(path: Path) -> bool:
 
 
 def _scenario_file(path: Path) -> Path:
-    found = sorted(path.glob("scenario_*.parquet")) if path.is_dir() else [path]
-    if len(found) != 1:
-        text = f"{len(found)} such files in {path}; there must be one"
+    files = sorted(path.glob("scenario_*.parquet")) if path.is_dir() else [path]
+    if len(files) != 1:
+        text = f"{len(files)} such files in {path}; there must be one"
         raise InvalidDocument(WHAT, [("scenario_*.parquet", text)])
-    return found[0]
+    return files[0]
 
 
 def _read(file: Path, ego_id: str) -> MotionFile:

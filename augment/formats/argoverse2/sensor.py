@@ -100,14 +100,14 @@ def map_file_in(folder: Path, what: str) -> Path:
     Raises:
         InvalidDocument: There is none, or several.
     """
-    found = sorted(folder.glob("log_map_archive_*.json"))
-    if len(found) != 1:
-        text = "no such file" if not found else f"{len(found)} such files; there must be one"
+    files = sorted(folder.glob("log_map_archive_*.json"))
+    if len(files) != 1:
+        text = "no such file" if not files else f"{len(files)} such files; there must be one"
         in_map = folder.name == "map"
         place = "map/log_map_archive_*.json" if in_map else "log_map_archive_*.json"
         where = folder.parent if in_map else folder
         raise InvalidDocument(what, [(place, f"{text} in {where}")])
-    return found[0]
+    return files[0]
 
 
 def city_of(map_file: Path) -> str:

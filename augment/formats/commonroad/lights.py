@@ -62,7 +62,7 @@ def lights_of(root: Element) -> dict[int, Light]:
     Raises:
         InvalidDocument: A colour or a duration breaks the format.
     """
-    found = {}
+    lights = {}
     for element in root.all("trafficLight"):
         light_id = whole(element.attributes.get("id"), "trafficLight")
         place = f"trafficLight {light_id}"
@@ -74,13 +74,13 @@ def lights_of(root: Element) -> dict[int, Light]:
             given = cycle.first("timeOffset")
             offset = 0 if given is None else whole(given.text, f"{place}.timeOffset")
         direction, active = element.first("direction"), element.first("active")
-        found[light_id] = Light(
+        lights[light_id] = Light(
             cycle=tuple(parts),
             offset=offset,
             direction="" if direction is None else direction.text.strip(),
             is_active=active is None or active.text.strip() != "false",
         )
-    return found
+    return lights
 
 
 def _part(element: Element, place: str) -> tuple[TrafficLight, int]:

@@ -129,14 +129,14 @@ def _is_near(points: FloatArray, center: FloatArray) -> bool:
 
 def _centerlines(layers: Layers, center: FloatArray) -> dict[str, FloatArray]:
     """Those within reach, by the segment's name."""
-    found = {}
+    lines = {}
     columns = ("lane_fid", "lane_connector_fid")
     for (lane, connector), points in layers.read("baseline_paths", columns):
         if _is_near(points, center):
             if lane is None and connector is None:
                 continue  # a path of neither, which nothing refers to
-            found[_name(lane) if lane is not None else _connector_name(connector)] = points
-    return found
+            lines[_name(lane) if lane is not None else _connector_name(connector)] = points
+    return lines
 
 
 def _name(fid: Any) -> str:

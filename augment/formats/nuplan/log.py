@@ -192,12 +192,12 @@ def _whole(value: object, place: str) -> int:
 def _numbers(values: Sequence[Any], place: str) -> list[float]:
     """Finite numbers; NULL counts as 0."""
     try:
-        found = [0.0 if value is None else float(value) for value in values]
+        numbers = [0.0 if value is None else float(value) for value in values]
     except (TypeError, ValueError, OverflowError):
         raise InvalidDocument(WHAT, [(place, "has a value that is no number")]) from None
-    if not all(map(math.isfinite, found)):
+    if not all(map(math.isfinite, numbers)):
         raise InvalidDocument(WHAT, [(place, "has a value that is not finite")])
-    return found
+    return numbers
 
 
 def _frames(tables: Tables, token: str) -> list[tuple[Any, ...]]:

@@ -125,13 +125,13 @@ def map_of(path: Path, place: LogPlace) -> Path:
             raise InvalidDocument(WHAT, [("log", f"{name[:40]!r} is no name of a map")])
     cities = dict.fromkeys(one for one in (place.location, place.version) if one.strip("."))
     for folder in path.resolve().parents:
-        found = [
+        maps = [
             file for city in cities for file in sorted((folder / "maps" / city).glob("*/map.gpkg"))
         ]
-        if len(found) > 1:
+        if len(maps) > 1:
             raise InvalidDocument(WHAT, [(str(folder / "maps"), "has several maps of this city")])
-        if found:
-            return found[0]
+        if maps:
+            return maps[0]
     text = f"has no map of {place.location} beside or above it: maps/{place.location}/*/map.gpkg"
     raise InvalidDocument(WHAT, [(str(path), text)])
 
@@ -150,11 +150,11 @@ def _mission_notes(mission: Mission, origin: Pose) -> Iterator[Note]:
 def _token(tables: Tables, item: str | None) -> str:
     if item is None or item.startswith(TAG):
         tag = None if item is None else item.removeprefix(TAG)
-        found = tokens_of(tables, tag)
-        if not found:
+        tokens = tokens_of(tables, tag)
+        if not tokens:
             text = "the log has no frame" if tag is None else f"no frame has the tag {tag!r}"
             raise InvalidDocument(WHAT, [("item", text)])
-        return found[0][0]
+        return tokens[0][0]
     if not _TOKEN.fullmatch(item.lower()):
         raise InvalidDocument(
             WHAT, [("item", f"{item[:40]!r} is neither a token of 16 hex digits nor tag:TYPE")]

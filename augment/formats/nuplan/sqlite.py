@@ -71,8 +71,8 @@ class Tables:
         Raises:
             InvalidDocument: As above.
         """
-        found = self._connection.execute(query, tuple(values))
-        for number, row in enumerate(found):
+        rows = self._connection.execute(query, tuple(values))
+        for number, row in enumerate(rows):
             if number >= MOST_ROWS:
                 raise InvalidDocument(WHAT, [(self._name, f"more than {MOST_ROWS} rows at once")])
             yield row

@@ -197,7 +197,7 @@ def _lights(states: object, frame: int) -> dict[str, TrafficLight]:
     """The state by lane at a step."""
     if not isinstance(states, dict):
         raise InvalidDocument(WHAT, [("dynamic_map_states", "is no dictionary")])
-    found = {}
+    lights = {}
     for key, light in states.items():
         if not isinstance(light, dict):
             continue
@@ -211,8 +211,8 @@ def _lights(states: object, frame: int) -> dict[str, TrafficLight]:
             known = ", ".join(_LIGHTS)
             text = f"unknown state {str(shown)[:40]!r}; known endings: {known}"
             raise InvalidDocument(WHAT, [(f"dynamic_map_states.{key}", text)])
-        found[str(light.get("lane", key))] = _LIGHTS[word]
-    return found
+        lights[str(light.get("lane", key))] = _LIGHTS[word]
+    return lights
 
 
 def _notes(

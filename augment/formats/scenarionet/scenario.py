@@ -130,8 +130,8 @@ def _with_told_side(road: MapExtract, metadata: dict[str, Any]) -> MapExtract:
 
 
 def _licence(data_set: str) -> str | None:
-    found = [text for name, text in DATA_LICENCES.items() if name in data_set.lower()]
-    return found[0] if found else None
+    licences = [text for name, text in DATA_LICENCES.items() if name in data_set.lower()]
+    return licences[0] if licences else None
 
 
 def _description(path: Path) -> dict[str, Any]:

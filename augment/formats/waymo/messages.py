@@ -162,12 +162,12 @@ def _track(block: bytes) -> TrackMessage:
 
 
 def _lights(block: bytes) -> dict[int, int]:
-    found = {}
+    lights = {}
     for number, value in read_fields(block):
         if number == 1:
             fields = {inner: one for inner, one in read_fields(block_of(value)) if inner in (1, 2)}
-            found[whole_of(fields.get(1, 0))] = whole_of(fields.get(2, 0))
-    return found
+            lights[whole_of(fields.get(1, 0))] = whole_of(fields.get(2, 0))
+    return lights
 
 
 def _add_feature(made: ScenarioMessage, block: bytes) -> None:

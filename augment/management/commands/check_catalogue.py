@@ -33,17 +33,17 @@ class Command(TerminalCommand):
     def handle(self, *args: Any, **options: Any) -> None:
         """Print a line for each scenario, then the reasons."""
         try:
-            found = check_catalogue(folder=options["folder"], sets=sets_of(options))
+            checked = check_catalogue(folder=options["folder"], sets=sets_of(options))
         except AugmentError as error:
             raise CommandError(str(error)) from error
-        width = max((len(scenario.slug) for scenario in found.scenarios), default=8)
+        width = max((len(scenario.slug) for scenario in checked.scenarios), default=8)
         self.stdout.write(f"{'scenario':{width}}  statements  result")
-        for scenario in found.scenarios:
+        for scenario in checked.scenarios:
             self.stdout.write(_line(scenario, width))
-        reasons = _reasons(found)
+        reasons = _reasons(checked)
         if reasons:
             raise CommandError("\n".join(reasons))
-        self.stdout.write(f"{len(found.scenarios)} scenarios are as their intents ask for.")
+        self.stdout.write(f"{len(checked.scenarios)} scenarios are as their intents ask for.")
 
 
 def _line(one: ScenarioCheck, width: int) -> str:

@@ -258,9 +258,9 @@ def add_simulated(
 
 def _endpoint(label: str, actor: User | None) -> Endpoint:
     """The endpoint of that label; OpenAI's own appears where its key is at hand."""
-    found = Endpoint.objects.filter(label=label).first()
-    if found is not None:
-        return found
+    endpoint = Endpoint.objects.filter(label=label).first()
+    if endpoint is not None:
+        return endpoint
     if label == OPENAI and os.environ.get(OPENAI_KEY):
         return ensure_endpoint(
             label=OPENAI, base_url=OPENAI_URL, key_variable=OPENAI_KEY, actor=actor

@@ -31,7 +31,7 @@ def listed_price(*, base_url: str, model: str, now: datetime) -> ListedPrice | N
     import genai_prices
 
     try:
-        found = genai_prices.calc_price(
+        price = genai_prices.calc_price(
             genai_prices.Usage(input_tokens=1, output_tokens=1),
             model,
             provider_api_url=base_url,
@@ -39,16 +39,16 @@ def listed_price(*, base_url: str, model: str, now: datetime) -> ListedPrice | N
         )
     except (LookupError, ValueError):
         return None
-    prices = vars(found.model_price)
+    prices = vars(price.model_price)
     in_usd, up_to = _base_of(prices.get("input_mtok"))
     out_usd, _ = _base_of(prices.get("output_mtok"))
     if (
         in_usd is None
         or out_usd is None
-        or not _is_whole_host(found.provider.api_pattern, base_url)
+        or not _is_whole_host(price.provider.api_pattern, base_url)
     ):
         return None
-    source = f"genai-prices {version('genai-prices')}: {found.provider.id}/{found.model.id}"
+    source = f"genai-prices {version('genai-prices')}: {price.provider.id}/{price.model.id}"
     if up_to is not None:
         source += f", prompts up to {up_to} tokens"
     return ListedPrice(in_usd=in_usd, out_usd=out_usd, source=source[:200])

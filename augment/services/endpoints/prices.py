@@ -19,10 +19,10 @@ def price_of(endpoint: Endpoint, model: str) -> Price | None:
 
 def list_unpriced_models(contestants: Iterable[Contestant]) -> list[str]:
     """What the contestants ask models whose price is unknown, as "model at endpoint"."""
-    found = {
+    unpriced = {
         str(respondent)
         for row in contestants
         for respondent in respondents_of(row).values()
         if price_of(respondent.endpoint, respondent.model) is None
     }
-    return sorted(found)
+    return sorted(unpriced)

@@ -165,8 +165,10 @@ def left_out(contestant: Contestant) -> dict[str, list[str]]:
         role.value: document_of(profile_of(endpoint=one.endpoint, model=one.model))
         for role, one in respondents_of(contestant).items()
     }
-    found = {role: sorted(chosen & set(sent["refused"])) for role, sent in sorted(sends.items())}
-    return {role: names for role, names in found.items() if names}
+    refused_by_role = {
+        role: sorted(chosen & set(sent["refused"])) for role, sent in sorted(sends.items())
+    }
+    return {role: names for role, names in refused_by_role.items() if names}
 
 
 def loosen_unanswered(contestants: Iterable[Contestant]) -> int:

@@ -61,13 +61,13 @@ def check_augmentation(row: Augmentation) -> Checked | None:
     if row.modification is None:
         return None
     try:
-        found = findings_of(row)
+        findings = findings_of(row)
     except (InvalidDocument, InvalidModification) as error:
         return Checked(problem=str(error))
-    facts = [one for one in found if not one.is_fault]
-    name = marked_name(row, found)
+    facts = [one for one in findings if not one.is_fault]
+    name = marked_name(row, findings)
     return Checked(
-        lines=tuple(_line(one) for one in (*order_faults(found), *facts)),
+        lines=tuple(_line(one) for one in (*order_faults(findings), *facts)),
         is_against_intent=row.scenario.intent is not None,
         picture=name,
         is_drawn=is_drawn(name),

@@ -74,8 +74,8 @@ def draw_marked(*, augmentation_pk: int) -> str:
     )
     if row.modification is None:
         return ""
-    found = findings_of(row)
-    name = marked_name(row, found)
+    findings = findings_of(row)
+    name = marked_name(row, findings)
     if not name or is_drawn(name):
         return name
     scene = scene_of(row.scenario)
@@ -90,7 +90,7 @@ def draw_marked(*, augmentation_pk: int) -> str:
                 is_wrong=one.severity is Severity.WRONG,
                 belongs_m=one.belongs_m,
             )
-            for number, one in enumerate(order_faults(found), start=1)
+            for number, one in enumerate(order_faults(findings), start=1)
         ],
         stamp=_STAMP if row.contestant.is_simulated else "",
     )

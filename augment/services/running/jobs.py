@@ -233,8 +233,8 @@ def _scenarios(slugs: Sequence[str]) -> list[Scenario]:
 
 def _in_order(rows: QuerySet[_Row], slugs: Sequence[str], what: str) -> list[_Row]:
     """The rows of those slugs in the given order, each once."""
-    found = {row.slug: row for row in rows.filter(slug__in=slugs)}
+    by_slug = {row.slug: row for row in rows.filter(slug__in=slugs)}
     for slug in slugs:
-        if slug not in found:
+        if slug not in by_slug:
             raise UnknownName(what, slug, list(rows.values_list("slug", flat=True)))
-    return [found[slug] for slug in dict.fromkeys(slugs)]
+    return [by_slug[slug] for slug in dict.fromkeys(slugs)]

@@ -89,11 +89,11 @@ class FailureGroup:
 def list_jobs() -> list[JobCounts]:
     """All jobs, the youngest first; two queries."""
     jobs = list(GenerationJob.objects.select_related("launched_by__person"))
-    found: defaultdict[int, Counter[str]] = defaultdict(Counter)
+    counts: defaultdict[int, Counter[str]] = defaultdict(Counter)
     rows = Augmentation.objects.order_by().values_list("job_id", "state")
     for job_id, state, number in rows.annotate(number=Count("pk")):
-        found[job_id][state] = number
-    return [_counts(job, found[job.pk]) for job in jobs]
+        counts[job_id][state] = number
+    return [_counts(job, counts[job.pk]) for job in jobs]
 
 
 def count_rows(job: GenerationJob) -> JobCounts:

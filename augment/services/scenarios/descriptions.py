@@ -33,8 +33,8 @@ def descriptions(
     """
     scene = cache(lambda key: scene_of(scenarios[key]))
     rows = Augmentation.objects.filter(pk__in=set(augmentations)).order_by()
-    found = {}
+    by_pk = {}
     for key, scenario, document in rows.values_list("pk", "scenario", "modification"):
         change = Modification() if document is None else modification_from_document(document)
-        found[key] = [asdict(line) for line in describe(scene(scenario), change)]
-    return found
+        by_pk[key] = [asdict(line) for line in describe(scene(scenario), change)]
+    return by_pk

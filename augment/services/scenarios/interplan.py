@@ -83,13 +83,13 @@ def references_from_interplan(path: Path, *, scenes: Mapping[str, str] | None = 
         token: without_traffic(scene_from_document(stored[slug].document))
         for token, slug in scenes.items()
     }
-    found = read_document(document, known)
-    tokens = [*dict.fromkeys(entry.id.partition("-")[0] for entry in found.entries)]
-    there = sorted({*tokens, *found.passed_over})
+    file = read_document(document, known)
+    tokens = [*dict.fromkeys(entry.id.partition("-")[0] for entry in file.entries)]
+    there = sorted({*tokens, *file.passed_over})
     for token in given:
         if token not in there:
             raise UnknownName("base token", token, there)
-    if not found.entries:
+    if not file.entries:
         raise InvalidDocument(
             WHAT,
             [
@@ -100,7 +100,7 @@ def references_from_interplan(path: Path, *, scenes: Mapping[str, str] | None = 
                 )
             ],
         )
-    return found
+    return file
 
 
 def refuse_changes(losses: Sequence[Loss], *, where: str) -> None:

@@ -141,17 +141,17 @@ def modification_file_in(folder: Path) -> Path:
         return folder
     if not folder.is_dir():
         raise InvalidDocument(WHAT, [(str(folder), "is not a folder")])
-    found = [
+    files = [
         file
         for ending in ("*.yaml", "*.yml")
         for file in sorted(folder.rglob(ending))
         if file.is_file() and file.stat().st_size <= MAX_CHARACTERS and KEY in file.read_bytes()
     ]
-    if len(found) != 1:
-        named = ", ".join(str(file.relative_to(folder)) for file in found[:5])
-        text = f"holds {len(found)} YAML files with {KEY.decode()}, there must be one: {named}"
+    if len(files) != 1:
+        named = ", ".join(str(file.relative_to(folder)) for file in files[:5])
+        text = f"holds {len(files)} YAML files with {KEY.decode()}, there must be one: {named}"
         raise InvalidDocument(WHAT, [(str(folder), text.rstrip(": "))])
-    return found[0]
+    return files[0]
 
 
 # Private

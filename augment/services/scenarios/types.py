@@ -16,8 +16,8 @@ LONGEST_LABEL = 60
 def type_choices() -> list[tuple[str, str]]:
     """Every type with its label: the five in their order, then one's own by their slugs."""
     own = Scenario.objects.exclude(type_label="").order_by("type")
-    found = dict(own.values_list("type", "type_label"))
-    return [*((one.value, one.label) for one in ScenarioType), *found.items()]
+    labels = dict(own.values_list("type", "type_label"))
+    return [*((one.value, one.label) for one in ScenarioType), *labels.items()]
 
 
 def type_label(name: str) -> str:
