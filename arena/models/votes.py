@@ -12,7 +12,7 @@ from django.utils.translation import gettext_lazy as _
 from arena.models.studies import Matchup
 from augment.models import AppendOnly, Augmentation
 
-AIDS = ("zoom", "original", "ruler", "flip", "text", "replay")
+AIDS = ("zoom", "original", "ruler", "flip", "text", "replay", "blink", "difference")
 """What an expert may look with; a vote names those that were used."""
 
 _AID_SETS = [
@@ -62,7 +62,7 @@ class Vote(AppendOnly):
     )
     comment = models.TextField(blank=True, max_length=1000)
     aids = models.CharField(
-        max_length=40, blank=True, help_text="aids used, in a fixed order, joined by blanks"
+        max_length=80, blank=True, help_text="aids used, in a fixed order, joined by blanks"
     )
     winner = models.ForeignKey(
         Augmentation, null=True, blank=True, on_delete=models.PROTECT, related_name="wins"

@@ -22,6 +22,8 @@ USUAL_KEYS: dict[str, tuple[str, ...]] = {
     "zoom": ("z",),
     "reset": ("0",),
     "ruler": ("m",),
+    "blink": ("x",),
+    "difference": ("v",),
     "text": ("t",),
     "replay": ("d",),
     "legend": ("l",),
@@ -41,6 +43,8 @@ KEY_LABELS = {
     "zoom": gettext_noop("Zoom"),
     "reset": gettext_noop("Zoom back"),
     "ruler": gettext_noop("Ruler"),
+    "blink": gettext_noop("Blink"),
+    "difference": gettext_noop("Difference"),
     "text": gettext_noop("Text description"),
     "replay": gettext_noop("Drives"),
     "legend": gettext_noop("Legend"),
@@ -48,8 +52,9 @@ KEY_LABELS = {
 }
 """Action -> what the page calls it, in English."""
 
-SOMETIMES = ("text", "replay")
-"""Actions that only some studies have: their usual key gives way to one that was chosen."""
+SOMETIMES = ("text", "replay", "blink", "difference")
+"""Actions that only some studies have, or that came later than the keys of some accounts: their
+usual key gives way to one that was chosen."""
 
 SWITCHES: dict[str, bool] = {"single_keys": True, "legend": True, "keep_zoom": False}
 """What can be on or off, and how it is at first."""

@@ -18,6 +18,7 @@ from arena.queries.studies import longest_instructions
 from arena.queries.votes import VotingProgress, recent_votes, voting_progress
 from arena.queries.voting_keys import (
     KEY_LABELS,
+    SOMETIMES,
     USUAL_KEYS,
     VotingPreferences,
     voting_preferences,
@@ -109,6 +110,7 @@ def vote_context(study: Study, expert: User, *, change: str) -> dict[str, Any] |
         "report_reasons": Report.Reason.choices,
         "looks": _looks(study),
         "key_labels": _key_labels(study),
+        "sometimes": SOMETIMES,
     }
     context["given"] = {
         "study": str(study.code),
@@ -207,6 +209,8 @@ def _looks(study: Study) -> list[tuple[str, str]]:
         "original": _("Original"),
         "zoom": _("Zoom"),
         "ruler": _("Ruler"),
+        "blink": _("Blink"),
+        "difference": pgettext("a way to look", "Differ"),
         "text": pgettext("a way to look", "Text"),
         "replay": _("Drives"),
         "legend": _("Legend"),

@@ -7,12 +7,19 @@ const form = at("keys");
 const { preferences, urls } = given;
 const told = at("keys-told");
 
-export function showHelp() {
+const styled = new Promise((done) => {
+  const link = Object.assign(document.createElement("link"), { rel: "stylesheet", href: help.dataset.style });
+  link.onload = link.onerror = done;
+  document.head.append(link);
+});
+
+export async function showHelp() {
   for (const field of form.elements) {
     if (field.type === "checkbox") field.checked = preferences[field.name];
     else if (field.name) field.value = preferences.keys[field.name][0] ?? "";
   }
   told.textContent = "";
+  await styled;
   if (!help.open) help.showModal();
 }
 

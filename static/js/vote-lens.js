@@ -29,10 +29,17 @@ export class Lens {
   isRuling = false;
   isFlipped = false;
   isPinned = false;
+  // "blink", "difference": what stands in the panels instead of the pair's own pictures.
+  stands = "";
+  hasScale = false;
 
   constructor(panels, text, changed) {
     Object.assign(this, { panels, text, changed, scenes: panels.map((panel) => panel.firstElementChild) });
     panels.forEach((panel, place) => this.#listen(panel, this.scenes[place]));
+  }
+
+  get scale() {
+    return this.#scale;
   }
 
   get isZoomed() {
@@ -44,6 +51,7 @@ export class Lens {
     this.#pair = pair;
     this.#at = this.#from = null;
     this.isFlipped = this.isPinned = this.isRuling = false;
+    this.stands = "";
     this.aids.clear();
     this.scenes.forEach((scene, place) => scene.replaceChildren(pair.images[place], overlay(pair.shown)));
     if (keepsZoom && this.isZoomed) this.aids.add("zoom");
@@ -74,9 +82,21 @@ export class Lens {
     const { originals, images } = this.#pair;
     if (!originals || isFlipped === this.isFlipped) return;
     [this.isFlipped, this.isPinned] = [isFlipped, isPinned];
-    this.scenes.forEach((scene, place) => scene.firstChild.replaceWith((isFlipped ? originals : images)[place]));
+    this.put(isFlipped ? originals : images);
     if (isFlipped) this.aids.add(isPinned ? "original" : "flip");
+  }
+
+  // Other pictures in the same places; what they are, "" for the pair's own.
+  put(pictures, stands = "") {
+    this.stands = stands;
+    if (stands) this.isFlipped = this.isPinned = false;
+    this.scenes.forEach((scene, place) => scene.firstChild.replaceWith(pictures[place]));
+    if (stands) this.aids.add(stands);
     this.changed(this);
+  }
+
+  get pair() {
+    return this.#pair;
   }
 
   rule(isOn) {
@@ -126,6 +146,8 @@ export class Lens {
     const moved = `translate(${this.#x * 100}%, ${this.#y * 100}%) scale(${this.#scale})`;
     for (const scene of this.scenes) scene.style.transform = this.isZoomed ? moved : "";
     for (const panel of this.panels) panel.classList.toggle("is-zoomed", this.isZoomed);
+    // Zoomed pictures have their own scale out of sight.
+    if (this.isZoomed || this.hasScale) import("./vote-scale.js").then(({ draw }) => draw(this), () => {});
     this.changed(this);
   }
 

@@ -64,8 +64,9 @@ export function drawComment(comment) {
 
 export function drawLens(lens) {
   const states = { original: lens.isFlipped, zoom: lens.isZoomed, ruler: lens.isRuling };
+  for (const name of ["blink", "difference"]) states[name] = lens.stands === name;
   for (const [name, isOn] of Object.entries(states)) at(name).ariaPressed = isOn;
-  const said = lens.isFlipped ? text("original") : lens.reading;
+  const said = lens.isFlipped ? text("original") : lens.reading || (lens.stands && text(lens.stands));
   for (const reading of all(".reading")) reading.textContent = said;
 }
 

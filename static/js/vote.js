@@ -210,12 +210,19 @@ const actions = {
   reset: () => lens.reset(),
   ruler: () => lens.rule(true),
   text: () => lists && page.toggleText() && lens.aids.add("text"),
-  replay: () => import("./vote-replay.js").then(({ toggleReplay }) => toggleReplay(lens.aids), () => page.note(text("unreachable"))),
+  replay: () => late(import("./vote-replay.js"), ({ toggleReplay }) => toggleReplay(lens.aids)),
+  blink: () => compare("blink", true),
+  difference: () => compare("difference"),
   legend: () => ask(urls.preferences, { legend: page.toggleLegend() }),
   help: () => import("./vote-help.js").then(({ showHelp }) => showHelp(), () => open(at("help-link").href)),
   again: () => pairs.fill(),
   close: page.closePop,
 };
+// What is loaded when it is asked for first.
+const late = (module, use) => module.then(use, () => page.note(text("unreachable")));
+// What stands in the panels, true or false; without it the other way round.
+const compare = (...how) => late(import("./vote-compare.js"), ({ show }) => show(lens, ...how));
+
 // Actions that go without a pair as well; key codes and what their release ends.
 const always = new Set(["undo", "leave", "legend", "help", "again"]);
 const held = new Map();
@@ -242,6 +249,7 @@ addEventListener("keydown", (event) => {
   if (!action || repeat || (!onScreen && !always.has(action))) return;
   actions[action]();
   if (action === "original") held.set(code, () => lens.isPinned || lens.flip(false));
+  if (action === "blink") held.set(code, () => compare("blink", false));
   if (action === "ruler") held.set(code, () => lens.rule(false));
 });
 
@@ -269,6 +277,7 @@ document.addEventListener("click", (event) => {
   const { do: action, vote: key } = pressed.dataset;
   if (key) undo(votes.find((vote) => vote.key === key));
   else if (action === "ruler") lens.rule(!lens.isRuling);
+  else if (action === "blink") compare("blink");
   else actions[action === "original" ? "pin" : action]();
 });
 
@@ -294,7 +303,10 @@ function elsewhere() {
 async function start() {
   form.inert = true;
   page.drawKeys();
-  document.body.classList.add("is-live");
+  // On small windows both pictures keep in sight beside it.
+  const { classList, style } = document.body;
+  new ResizeObserver(() => style.setProperty("--ask", `${at("ask").offsetHeight}px`)).observe(at("ask"));
+  classList.add("is-live");
   if (!(await hold(given.outbox, elsewhere))) return elsewhere();
   const waiting = outbox.entries.filter(({ to }) => to === "votes").map((entry) => voteOf(entry));
   const byMatchup = new Map([...votes.reverse(), ...waiting].map((vote) => [vote.shown.matchup, vote]));

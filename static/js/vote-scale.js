@@ -1,0 +1,25 @@
+// A scale bar over each zoomed picture, whose own one is out of sight; loaded with the first zoom.
+import { text } from "./vote-page.js";
+
+const UNITS_M = [0.5, 1, 2, 5, 10];
+const LEAST_PX = 48;
+const LOOK = "position:absolute;left:.5rem;bottom:.5rem;border:solid #212529;border-width:0 2px 3px;background:#ffffffd9;color:#212529;font-size:.75rem;text-align:center;pointer-events:none";
+let bars = null;
+
+export function draw(lens) {
+  bars ??= lens.panels.map((panel) => {
+    const bar = document.createElement("span");
+    bar.className = "bar";
+    bar.style.cssText = LOOK;
+    return panel.appendChild(bar);
+  });
+  lens.hasScale = true;
+  const { px_per_m, width } = lens.pair.shown;
+  for (const [place, panel] of lens.panels.entries()) {
+    const metre = (panel.clientWidth / width) * px_per_m * lens.scale;
+    const unit = UNITS_M.find((metres) => metres * metre >= LEAST_PX) ?? 20;
+    bars[place].hidden = !lens.isZoomed;
+    bars[place].textContent = text("metres", unit);
+    bars[place].style.width = `${unit * metre}px`;
+  }
+}
