@@ -170,13 +170,13 @@ def test_its_key_can_be_changed_and_gives_way_to_another(told: Booth) -> None:
     page = told.enter()
     page.keyboard.press("h")
     own = page.locator("#keys")
-    own.locator("input[name=text]").fill("x")
+    own.locator("input[name=text]").fill("k")
     own.get_by_role("button", name="Save").click()
     expect(page.locator("#keys-told")).to_have_text("Saved.")
     page.keyboard.press("Escape")
     page.keyboard.press("t")
     expect(page.locator("#text > div")).to_be_hidden()
-    page.keyboard.press("x")
+    page.keyboard.press("k")
     expect(page.locator("#text > div")).to_be_visible()
 
 

@@ -6,7 +6,7 @@ from django.db import migrations, models
 
 class Migration(migrations.Migration):
     dependencies = [
-        ("arena", "0012_pictures_as_shown"),
+        ("arena", "0014_scenario_files"),
         ("augment", "0011_options_and_samples"),
         migrations.swappable_dependency(settings.AUTH_USER_MODEL),
     ]
