@@ -38,7 +38,6 @@ from augment.scene.entities import (
 )
 from augment.scene.intent import Intent
 
-_USUAL_WIDTH_M = 3.5
 _FINE_M = 0.5
 _SHORTEST_PIECE_M = 1.0
 _JOINT_M = 0.1
@@ -118,7 +117,6 @@ def _task(text: str) -> Task:
     """The task in a text; remembered, because a conversation brings it again with every call."""
     agents = [agent_of(name, vector) for name, vector in list_of(text, "Agents").items()]
     lanes = tuple(_lane(name, vector) for name, vector in list_of(text, "Lanes").items())
-    widths = {lane.id: lane.width_m for lane in lanes}
     side = re.search(r"^Traffic drives on the (left|right)-hand side", text, re.MULTILINE)
     first_new = re.search(r"^The first new agent is Agent(\d+)\.$", text, re.MULTILINE)
     if side is None or first_new is None:
@@ -132,8 +130,7 @@ def _task(text: str) -> Task:
         agents=tuple(agent for agent in agents if agent.type is not AgentType.EGO_VEHICLE),
         lanes=_joined(lanes),
         connectors=tuple(
-            _connector(name, vector, widths)
-            for name, vector in list_of(text, "Lane connectors").items()
+            _connector(name, vector) for name, vector in list_of(text, "Lane connectors").items()
         ),
         areas=tuple(
             Area(id=name, kind=AreaKind(vector[0]), boundary_m=tuple(map(_point, vector[1])))
@@ -204,16 +201,15 @@ def _lane(name: str, vector: Sequence[Any]) -> Lane:
     )
 
 
-def _connector(name: str, vector: Sequence[Any], widths: dict[str, float]) -> LaneConnector:
-    before, after, _, turn, _, points = vector
+def _connector(name: str, vector: Sequence[Any]) -> LaneConnector:
+    before, after, _, turn, width, _, points = vector
     ends = [None if end is None else str(end) for end in (before, after)]
     return LaneConnector(
         id=name,
         from_lane=ends[0],
         to_lane=ends[1],
         centerline=_line(points),
-        # The paper's table gives a connector no width; it is as wide as what it joins.
-        width_m=next((widths[end] for end in ends if end in widths), _USUAL_WIDTH_M),
+        width_m=float(str(width)),
         turn_type=TurnType(str(turn)),
     )
 

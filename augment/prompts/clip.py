@@ -1,6 +1,6 @@
 """Cutting a map down to what lies around the ego.
 
-Frame: ego frame. P points of a line or boundary.
+Frame: ego frame. P points of a boundary.
 """
 
 from __future__ import annotations
@@ -8,40 +8,28 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from augment.geometry.polyline import Polyline
-
 FloatArray = NDArray[np.float64]
 
-_LOOK_EVERY_M = 0.5
 
-
-def line_within(line: Polyline, radius_m: float) -> Polyline | None:
-    """The part of the line that `span_within` names, None where there is none."""
-    span = span_within(line, radius_m)
-    return None if span is None else line.between(*span)
-
-
-def span_within(line: Polyline, radius_m: float) -> tuple[float, float] | None:
-    """From where a line first comes within the radius of the origin to where it last does.
-
-    Two arc lengths; None where it never does, or for no more than a moment.
-    """
-    stations_m = np.append(np.arange(0.0, line.length_m, _LOOK_EVERY_M), line.length_m)
-    inside = stations_m[np.hypot(*line.points_at(stations_m).T) <= radius_m]
-    if len(inside) < 2:
-        return None
-    return float(inside[0]), float(inside[-1])
-
-
-def boundary_within(boundary_m: FloatArray, radius_m: float) -> FloatArray:
-    """A boundary (P, 2) cut to the square |x|, |y| <= radius; empty where they do not meet."""
+def boundary_within(
+    boundary_m: FloatArray, box_m: tuple[float, float, float, float]
+) -> FloatArray:
+    """A boundary (P, 2) cut to a box: least x, least y, most x, most y; empty where they part."""
     points = np.asarray(boundary_m, dtype=np.float64)
-    for axis in (0, 1):
-        for sign in (1.0, -1.0):
-            points = _cut(points, sign * points[:, axis] - radius_m)
-            if len(points) < 3:
-                return np.empty((0, 2))
+    for side, limit_m in enumerate(box_m):
+        axis, sign = side % 2, -1.0 if side < 2 else 1.0
+        points = _cut(points, sign * (points[:, axis] - limit_m))
+        if len(points) < 3:
+            return np.empty((0, 2))
     return points
+
+
+def distance_to_area_m(boundary_m: FloatArray, points_m: FloatArray) -> float:
+    """From the nearest of points (N, 2) to an area with a boundary (P, 2), 0 inside."""
+    import shapely
+
+    area = shapely.make_valid(shapely.Polygon(boundary_m))
+    return float(shapely.distance(area, shapely.MultiPoint(points_m)))
 
 
 def simplify_boundary(boundary_m: FloatArray, tolerance_m: float) -> FloatArray:

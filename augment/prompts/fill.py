@@ -143,6 +143,7 @@ def _modifier(form: Form) -> str:
         "modifier.md",
         input_format=input_format(form.lanes),
         distances=read_text(f"distances_{manner}.md"),
+        rules=read_text("rules.md"),
         tools=tools,
         calculations=read_text(f"calculations_{manner}.md"),
         example=read_text(f"example_{form.lanes}.md"),

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
+from augment.checks.tolerances import USUAL, Tolerances
 from augment.llm.messages import Message, Speaker
 from augment.prompts.fill import input_format
 from augment.prompts.texts import (
@@ -25,22 +26,38 @@ CANNOT_SEE = "cannot see"
 
 
 def reviewer_messages(
-    scene: Scene, instruction: str, modification: Modification, *, radius_m: float
+    scene: Scene,
+    instruction: str,
+    modification: Modification,
+    *,
+    radius_m: float,
+    earlier: Sequence[str] = (),
 ) -> tuple[Message, ...]:
-    """What the text reviewer is asked: scene, wish and changed vectors, no reasoning."""
-    told = fill_text(
-        "reviewer.md", input_format=input_format(), problems=read_text("common_problems.md")
-    )
-    task = _task(scene, instruction, modification, radius_m)
+    """What the text reviewer is asked: scene, wish and changed vectors, no reasoning.
+
+    Args:
+        scene: The scene before the change.
+        instruction: The user's wish.
+        modification: What is reviewed.
+        radius_m: How far around the ego the scene is written down.
+        earlier: The feedback that the editor was given in earlier rounds.
+    """
+    told = fill_text("reviewer.md", **_rules(), problems=read_text("common_problems.md"))
+    task = _task(scene, instruction, modification, radius_m, earlier)
     return Message(speaker=Speaker.SYSTEM, text=told), said_by_user(task)
 
 
 def engineer_messages(
-    scene: Scene, instruction: str, modification: Modification, *, radius_m: float
+    scene: Scene,
+    instruction: str,
+    modification: Modification,
+    *,
+    radius_m: float,
+    earlier: Sequence[str] = (),
 ) -> tuple[Message, ...]:
-    """What the engineer is asked first: for questions to the viewer."""
-    told = fill_text("engineer.md", input_format=input_format())
-    task = _task(scene, instruction, modification, radius_m)
+    """What the engineer is asked first: for questions to the viewer; arguments as above."""
+    told = fill_text("engineer.md", **_rules(), drawn=read_text("drawn.md"))
+    task = _task(scene, instruction, modification, radius_m, earlier)
     return Message(speaker=Speaker.SYSTEM, text=told), said_by_user(task)
 
 
@@ -48,7 +65,7 @@ def viewer_messages(questions: Sequence[str], png: bytes) -> tuple[Message, ...]
     """What the viewer is asked: the questions, about one picture."""
     task = fill_text("viewer_task.md", questions=number_lines(questions))
     return (
-        Message(speaker=Speaker.SYSTEM, text=read_text("viewer.md")),
+        Message(speaker=Speaker.SYSTEM, text=fill_text("viewer.md", drawn=read_text("drawn.md"))),
         said_by_user(task, images=(png,)),
     )
 
@@ -78,10 +95,42 @@ def viewer_re_ask_messages(messages: tuple[Message, ...], answer: str) -> tuple[
     return (*messages, model_message(answer), said_by_user(read_text("viewer_re_ask.md")))
 
 
-def _task(scene: Scene, instruction: str, modification: Modification, radius_m: float) -> str:
+def _rules() -> dict[str, str]:
+    """What the editor was told and what is a deviation from it, the same for every reviewer."""
+    return {
+        "input_format": input_format(),
+        "distances": read_text("distances_walked.md"),
+        "rules": read_text("rules.md"),
+        "tolerances": tolerances_text(USUAL),
+    }
+
+
+def tolerances_text(allowed: Tolerances) -> str:
+    """From when on a deviation is a problem: what the program's own checks go by."""
+    return fill_text(
+        "tolerances.md",
+        distance_m=f"{allowed.distance_m:g}",
+        distance_percent=f"{100.0 * allowed.distance_share:g}",
+        across_m=f"{allowed.across_m:g}",
+        middle_m=f"{allowed.middle_m:g}",
+        heading_deg=f"{allowed.heading_deg:g}",
+        spacing_m=f"{allowed.spacing_m:g}",
+        spacing_percent=f"{100.0 * allowed.spacing_share:g}",
+    )
+
+
+def _task(
+    scene: Scene,
+    instruction: str,
+    modification: Modification,
+    radius_m: float,
+    earlier: Sequence[str],
+) -> str:
+    told = "\n".join(earlier)
     return fill_text(
         "review_task.md",
         scene=scene_text(scene, radius_m=radius_m),
         quoted=quote(instruction),
         changes=changes_text(scene, modification),
+        earlier=fill_text("earlier_feedback.md", quoted=quote(told)) if earlier else "",
     )

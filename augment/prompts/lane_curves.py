@@ -16,7 +16,7 @@ import numpy as np
 from augment.geometry.bezier import travel_pose
 from augment.geometry.frames import Pose
 from augment.geometry.polyline import Projection
-from augment.prompts.clip import span_within
+from augment.prompts.extent import shown_spans
 from augment.prompts.names import ShortNames
 from augment.scene.bezier_lanes import BezierLane, bezier_lane, piece_ids
 from augment.scene.entities import Scene
@@ -68,13 +68,9 @@ class LaneCurve:
 
 
 def lane_curves(scene: Scene, names: ShortNames, radius_m: float) -> dict[str, LaneCurve]:
-    """All lanes and connectors within the radius, by short id, in the order of the scene."""
+    """All lanes and connectors that a prompt shows, by short id, in the order of the scene."""
     graph = LaneGraph(scene)
-    spans = {
-        lane.id: span
-        for lane in graph.lanes.values()
-        if (span := span_within(lane.centerline, radius_m)) is not None
-    }
+    spans = shown_spans(scene, radius_m)
     begins = {key for key, (start_m, _) in spans.items() if start_m < 1e-6}
     ends = {
         key

@@ -57,9 +57,13 @@ class Ratings(Strict):
 _Feedback = Annotated[list[Correction], Field(max_length=MOST_FEEDBACK)]
 
 
+_Remarks = Annotated[list[_Words], Field(max_length=MOST_FEEDBACK)]
+
+
 class _RatedBlock(Strict):
     ratings: Ratings
     feedback: _Feedback
+    remarks: _Remarks = []
 
 
 class _QuestionBlock(Strict):
@@ -71,6 +75,7 @@ class _QuestionBlock(Strict):
 class _VerdictBlock(Strict):
     verdict: Literal["accept", "feedback"]
     feedback: _Feedback
+    remarks: _Remarks = []
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -78,11 +83,13 @@ class RatedReview:
     """What the text reviewer found.
 
     Attributes:
+        remarks: What is too small to be corrected, for the record: nobody is told.
         summary, questions, answers: His own words, for the record; empty where he left them out.
     """
 
     ratings: Ratings
     feedback: tuple[Correction, ...]
+    remarks: tuple[str, ...]
     summary: str
     questions: str
     answers: str
@@ -90,9 +97,10 @@ class RatedReview:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class EngineerVerdict:
-    """What the engineer decided: with feedback it is not accepted."""
+    """What the engineer decided: with feedback it is not accepted; remarks change nothing."""
 
     feedback: tuple[Correction, ...]
+    remarks: tuple[str, ...] = ()
 
     @property
     def is_accepted(self) -> bool:
@@ -120,6 +128,7 @@ def read_ratings(answer: str, *, accepted_from: float) -> RatedReview:
     return RatedReview(
         ratings=block.ratings,
         feedback=tuple(block.feedback),
+        remarks=tuple(block.remarks),
         summary=parts.get("Summary", ""),
         questions=parts.get("Questions", ""),
         answers=parts.get("Answers", ""),
@@ -147,7 +156,7 @@ def read_verdict(answer: str) -> EngineerVerdict:
     if (block.verdict == "accept") == bool(block.feedback):
         rule = 'feedback: must be empty with "accept" and must not be empty with "feedback"'
         raise ReplyUnreadable([rule])
-    return EngineerVerdict(feedback=tuple(block.feedback))
+    return EngineerVerdict(feedback=tuple(block.feedback), remarks=tuple(block.remarks))
 
 
 def read_sight(answer: str, count: int) -> dict[int, str]:

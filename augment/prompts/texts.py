@@ -16,11 +16,14 @@ QUOTE = "> "
 
 LONGEST_ECHO = 20_000
 
+VECTORS_VERSION = 2
+"""Raised with every change to what of a scene is written down, or how: no text shows that."""
+
 
 @cache
 def prompt_version() -> str:
-    """Twelve hexadecimal digits that change with every change to any prompt text."""
-    digest = hashlib.sha256()
+    """Twelve hexadecimal digits that change with every change to any prompt text or form."""
+    digest = hashlib.sha256(b"vectors %d\0" % VECTORS_VERSION)
     for entry in sorted(files(__package__).joinpath("text").iterdir(), key=lambda e: e.name):
         digest.update(entry.name.encode() + b"\0" + entry.read_bytes() + b"\0")
     return digest.hexdigest()[:12]

@@ -1,21 +1,23 @@
 """A scene as the paper's table of input vectors: separate lists for each kind of entity.
 
 Frame: ego frame, metres to two decimals, radians to three. Lanes are centrelines sampled every
-5 m, or the control points of cubic Bezier pieces. Only what lies within a radius of the ego is
-written down.
+5 m, or the control points of cubic Bezier pieces. Only what a wish can concern is written down
+(`extent.py` has the rule).
 """
 
 from __future__ import annotations
 
 import json
 import math
+import re
 from collections.abc import Callable, Mapping
 from enum import StrEnum
 
 import numpy as np
 
 from augment.geometry.polyline import Polyline
-from augment.prompts.clip import boundary_within, line_within, simplify_boundary
+from augment.prompts.clip import boundary_within, distance_to_area_m, simplify_boundary
+from augment.prompts.extent import BESIDE_M, Extent, extent_of, shown_spans
 from augment.prompts.lane_curves import control_points
 from augment.prompts.names import ShortNames, number_of, short_names
 from augment.scene.bezier_lanes import bezier_lane
@@ -31,6 +33,8 @@ Coordinates = Callable[[Polyline], list[object]]
 
 _COMPASS = ("East", "Northeast", "North", "Northwest", "West", "Southwest", "South", "Southeast")
 _BOUNDARY_TOLERANCE_M = 0.1
+_WHOLE = re.compile(r"(?<=[0-9])\.0(?=[],])")
+"""The end of a whole number; ids and words of ours have no dot."""
 
 
 def polyline_coordinates(line: Polyline) -> list[object]:
@@ -94,9 +98,16 @@ def agent_vectors(scene: Scene, names: ShortNames, radius_m: float) -> dict[str,
     """Type, centre x and y, heading, width, length, velocity, lane id, by agent id."""
     return {
         names.agents[agent.id]: agent_vector(agent, names)
-        for agent in scene.everyone
-        if math.hypot(agent.x_m, agent.y_m) <= radius_m
+        for agent in shown_agents(scene, radius_m)
     }
+
+
+def shown_agents(scene: Scene, radius_m: float) -> tuple[TrafficAgent, ...]:
+    """The ego, and the agents with their centres in the region that is shown."""
+    extent = extent_of(scene, radius_m)
+    places = np.array([(agent.x_m, agent.y_m) for agent in scene.agents]).reshape(-1, 2)
+    inside = extent.holds(places)
+    return scene.ego, *(agent for agent, is_in in zip(scene.agents, inside, strict=True) if is_in)
 
 
 def agent_vector(agent: TrafficAgent, names: ShortNames) -> Vector:
@@ -120,11 +131,13 @@ def lane_vectors(
     coordinates: Coordinates = polyline_coordinates,
 ) -> dict[str, Vector]:
     """Lane number, travel direction, direction relative to the ego, width, limit, coordinates."""
-    shown = ((lane, line_within(lane.centerline, radius_m)) for lane in scene.lanes)
+    spans = shown_spans(scene, radius_m)
     return {
-        names.lanes[lane.id]: _lane_vector(lane, line, names, coordinates)
-        for lane, line in shown
-        if line is not None
+        names.lanes[lane.id]: _lane_vector(
+            lane, lane.centerline.between(*spans[lane.id]), names, coordinates
+        )
+        for lane in scene.lanes
+        if lane.id in spans
     }
 
 
@@ -134,18 +147,21 @@ def connector_vectors(
     radius_m: float,
     coordinates: Coordinates = polyline_coordinates,
 ) -> dict[str, Vector]:
-    """From lane, to lane, light, turn, speed limit, coordinates, by connector id."""
-    shown = ((lane, line_within(lane.centerline, radius_m)) for lane in scene.connectors)
+    """From lane, to lane, light, turn, width, speed limit, coordinates, by connector id."""
+    spans = shown_spans(scene, radius_m)
     return {
-        names.lanes[lane.id]: _connector_vector(lane, line, names, coordinates)
-        for lane, line in shown
-        if line is not None
+        names.lanes[lane.id]: _connector_vector(
+            lane, lane.centerline.between(*spans[lane.id]), names, coordinates
+        )
+        for lane in scene.connectors
+        if lane.id in spans
     }
 
 
 def area_vectors(scene: Scene, names: ShortNames, radius_m: float) -> dict[str, Vector]:
     """Kind and boundary points, by area id."""
-    cut = ((area, _boundary(area, radius_m)) for area in scene.areas)
+    extent = extent_of(scene, radius_m)
+    cut = ((area, _boundary(area, extent)) for area in scene.areas)
     return {names.areas[area.id]: [area.kind.value, points] for area, points in cut if points}
 
 
@@ -190,14 +206,18 @@ def _connector_vector(
         None if lane.to_lane is None else names.lanes.get(lane.to_lane),
         lane.traffic_light.value,
         lane.turn_type.value,
+        _metres(lane.width_m),
         _speed_limit(lane.speed_limit_mps),
         coordinates(line),
     ]
 
 
-def _boundary(area: Area, radius_m: float) -> list[list[float]]:
-    points = boundary_within(np.array(area.boundary_m, dtype=np.float64), radius_m)
+def _boundary(area: Area, extent: Extent) -> list[list[float]]:
+    points = boundary_within(np.array(area.boundary_m, dtype=np.float64), extent.box_m)
     if len(points) < 3:
+        return []
+    routes = extent.routes_m
+    if routes is not None and distance_to_area_m(points, routes) > BESIDE_M:
         return []
     return [[_metres(x), _metres(y)] for x, y in simplify_boundary(points, _BOUNDARY_TOLERANCE_M)]
 
@@ -211,5 +231,10 @@ def _metres(value: float) -> float:
 
 
 def _listed(vectors: Mapping[str, Vector]) -> str:
-    lines = [f"{json.dumps(name)}: {json.dumps(vector)}" for name, vector in vectors.items()]
+    # A blank before a number is a token of its own to most models, so coordinates have none.
+    lines = [f"{json.dumps(name)}: {_vector_text(vector)}" for name, vector in vectors.items()]
     return "{" + ",\n ".join(lines) + "}"
+
+
+def _vector_text(vector: Vector) -> str:
+    return _WHOLE.sub("", json.dumps(vector, separators=(",", ":")))

@@ -29,7 +29,7 @@ from augment.geometry.frames import Pose
 from augment.prompts.calls import TOOL
 from augment.prompts.lane_curves import LaneCurve, lane_curves
 from augment.prompts.names import ShortNames, short_names
-from augment.prompts.vectors import DEFAULT_RADIUS_M
+from augment.prompts.vectors import DEFAULT_RADIUS_M, shown_agents
 from augment.scene.bezier_lanes import BezierLane, LanePiece
 from augment.scene.entities import Scene, TrafficAgent
 from augment.variants.pose_call import LANE_START, PoseCall, read_call
@@ -133,8 +133,7 @@ class PoseTool:
         """The shown agents by short id."""
         return {
             self._names.agents[agent.id]: agent
-            for agent in self.scene.everyone
-            if math.hypot(agent.x_m, agent.y_m) <= self.radius_m
+            for agent in shown_agents(self.scene, self.radius_m)
         }
 
     @cached_property

@@ -124,6 +124,9 @@ def _reviewed(
         instruction=instruction,
         modification=draft.read.modification,
         earlier=rounds[-1].read.modification if rounds else None,
+        told=tuple(
+            entry for one in rounds if one.verdict is not None for entry in one.verdict.feedback
+        ),
     )
     number, kind = len(rounds) + 1, modifier.recipe.review.value
     note = partial(modifier.respondents.transcript.note, NoteKind.REVIEW)

@@ -29,6 +29,7 @@ def review_text(submission: Submission, respondents: Respondents, limits: Limits
         submission.instruction,
         submission.modification,
         radius_m=limits.radius_m,
+        earlier=submission.told,
     )
     inquiry = Inquiry(
         respondents=respondents,
@@ -63,6 +64,7 @@ def _verdict(review: RatedReview, accepted_from: float) -> Verdict:
             "ratings": ratings.model_dump(),
             "mean": round(ratings.mean, 4),
             "feedback": [entry.model_dump() for entry in review.feedback],
+            "remarks": list(review.remarks),
             "summary": review.summary,
             "questions": review.questions,
             "answers": review.answers,

@@ -15,12 +15,14 @@ class Submission:
     Attributes:
         scene: The scene before the change.
         earlier: The modification of the round before, None in the first.
+        told: What the modifier was told in the rounds before, in order.
     """
 
     scene: Scene
     instruction: str
     modification: Modification
     earlier: Modification | None = None
+    told: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -44,6 +44,7 @@ def review_picture(submission: Submission, respondents: Respondents, limits: Lim
         submission.instruction,
         submission.modification,
         radius_m=limits.radius_m,
+        earlier=submission.told,
     )
     try:
         questions, asked, reply = engineer.read(messages, read_questions)
@@ -67,6 +68,7 @@ def review_picture(submission: Submission, respondents: Respondents, limits: Lim
             "answers": {str(number): said for number, said in sorted(seen.items())},
             "accepted": verdict.is_accepted,
             "feedback": [entry.model_dump() for entry in verdict.feedback],
+            "remarks": list(verdict.remarks),
         },
     )
 

@@ -10,7 +10,8 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from augment.geometry.polyline import Polyline
-from augment.prompts.clip import boundary_within, line_within, simplify_boundary
+from augment.prompts.clip import boundary_within, simplify_boundary
+from augment.prompts.extent import Extent, extent_of
 from augment.prompts.names import short_names
 from augment.prompts.vectors import (
     agent_vectors,
@@ -58,6 +59,7 @@ def test_a_connector_is_from_to_light_turn_limit_and_points() -> None:
         "Lane2",
         "green",
         "straight",
+        3.5,
         None,
         [[20.0, 0.0], [25.0, 0.0], [30.0, 0.0], [35.0, 0.0], [36.0, 0.0]],
     ]
@@ -130,32 +132,31 @@ def test_a_name_out_of_a_file_never_reaches_the_prompt() -> None:
     )
     text = scene_text(street)
     assert "Ignore" not in text
-    assert '"Agent3": ["VEHICLE", 9.0, 0.0, 0.0, 2.0, 4.8, 0.0, "Lane2"]' in text
-    assert '"Agent2": ["VEHICLE", 19.0, 0.0, 0.0, 2.0, 4.8, 0.0, null]' in text
+    assert '"Agent3": ["VEHICLE",9,0,0,2,4.8,0,"Lane2"]' in text
+    assert '"Agent2": ["VEHICLE",19,0,0,2,4.8,0,null]' in text
     assert "The first new agent is Agent4." in text
 
 
 def test_a_line_is_shown_from_its_first_to_its_last_point_within() -> None:
-    line = line_within(Polyline([(-100.0, 0.0), (100.0, 0.0)]), 30.0)
-    assert line is not None
-    assert line.points_m.tolist() == [[-30.0, 0.0], [30.0, 0.0]]
-    assert line_within(Polyline([(-100.0, 40.0), (100.0, 40.0)]), 30.0) is None
+    near = Extent(radius_m=30.0, routes_m=None)
+    assert near.span(Polyline([(-100.0, 0.0), (100.0, 0.0)])) == (70.0, 130.0)
+    assert near.span(Polyline([(-100.0, 40.0), (100.0, 40.0)])) is None
 
 
 def test_a_bent_line_within_the_radius_keeps_its_very_end() -> None:
     line = curve(20.0).lanes[0].centerline
-    assert line_within(line, 500.0) == line
+    assert Extent(radius_m=500.0, routes_m=None).span(line) == (0.0, line.length_m)
 
 
 def test_a_boundary_is_cut_and_loses_points_that_say_nothing() -> None:
     square = np.array([[0, 0], [50, 0], [50, 50], [0, 50]], dtype=float)
-    assert sorted(map(tuple, boundary_within(square, 10.0))) == [
+    assert sorted(map(tuple, boundary_within(square, (-10.0, -10.0, 10.0, 10.0)))) == [
         (0.0, 0.0),
         (0.0, 10.0),
         (10.0, 0.0),
         (10.0, 10.0),
     ]
-    assert boundary_within(square + 100.0, 10.0).shape == (0, 2)
+    assert boundary_within(square + 100.0, (-10.0, -10.0, 10.0, 10.0)).shape == (0, 2)
     dotted = np.array([[0, 0], [5, 0.05], [10, 0], [10, 10], [0, 10]], dtype=float)
     assert simplify_boundary(dotted, 0.1).tolist() == [[0, 0], [10, 0], [10, 10], [0, 10]]
 
@@ -214,9 +215,10 @@ def test_the_areas_of_every_prompt_keep_ten_centimetres(slug: str) -> None:
     shown = whole_scene(slug)
     names = short_names(shown)
     written = area_vectors(shown, names, 80.0)
+    assert written
     for area in shown.areas:
-        cut = boundary_within(np.array(area.boundary_m), 80.0)
-        if len(cut) >= 3:
+        cut = boundary_within(np.array(area.boundary_m), extent_of(shown, 80.0).box_m)
+        if names.areas[area.id] in written:
             _, points = written[names.areas[area.id]]
             # Rounded to a centimetre, each point moves by 0.007 m at most.
             assert distances_m(dense(cut), np.array(points)).max() <= 0.1 + 0.0075

@@ -7,6 +7,7 @@ import pytest
 from augment.errors import ModelFault
 from augment.llm.messages import Reply
 from augment.llm.scripted import ScriptedClient
+from augment.prompts.texts import read_text
 from augment.scene.intent import Facing
 from augment.variants.pipeline import OutcomeStatus
 from augment.variants.respondents import RespondentClient
@@ -39,7 +40,7 @@ def test_the_reviewer_gets_vectors_and_no_reasoning() -> None:
     told, task = play.client.requests[1].messages
     assert "Common problems" in told.text
     assert "One road, two lanes" not in task.text  # the modifier's insights
-    assert '"Agent2": ["VEHICLE", 21.4, 0.0, 0.0, 2.0, 4.8, 0.0, "Lane1"]' in task.text
+    assert '"Agent2": ["VEHICLE",21.4,0,0,2,4.8,0,"Lane1"]' in task.text
     assert "> Add a parked car 21.4 m ahead." in task.text
     assert '"Lane1": [1, "Eastwards"' in task.text
 
@@ -236,3 +237,36 @@ def test_findings_are_told_under_the_prompts_names() -> None:
     told = play.client.requests[1].messages[-1].text
     assert "Agent2" in told
     assert "recorded" not in told
+
+
+def test_in_a_second_round_the_reviewer_gets_what_was_told_before() -> None:
+    play = Play("tqa", [car(21.4), rating(2, 2, 2, "It is too near."), car(25.0), HIGH])
+    first, second = (play.client.requests[number].messages[1].text for number in (1, 3))
+    assert "Earlier feedback" not in first
+    assert "> It is too near. Reason: Because. Corrective action: Move it." in second
+
+
+def test_remarks_start_no_correction_and_are_kept() -> None:
+    remark = HIGH.replace('"feedback": []', '"feedback": [], "remarks": ["A bit far."]')
+    assert remark != HIGH
+    play = Play("tqa", [car(21.4), remark])
+    assert play.roles == "mr"
+    assert play.notes("review")[0]["remarks"] == ["A bit far."]
+    asked = questions()
+    accepted = verdict().replace('"feedback": []', '"feedback": [], "remarks": ["A bit far."]')
+    seen = "1. yes\n2. yes\n3. yes"
+    play = Play("vqa", [car(21.4), asked, seen, accepted])
+    assert play.roles == "meve"
+    assert play.notes("review")[0]["remarks"] == ["A bit far."]
+
+
+def test_reviewers_are_told_the_rules_of_the_editor_and_what_is_a_problem() -> None:
+    rules = read_text("rules.md")
+    for play in (
+        Play("tqa", [car(21.4), HIGH]),
+        Play("vqa", [car(21.4), questions(), "1. yes", verdict()]),
+    ):
+        editor, reviewer = (play.client.requests[number].messages[0].text for number in (0, 1))
+        assert rules in editor
+        assert rules in reviewer
+        assert "off by more than 2.5 m and by more than 5 %" in reviewer

@@ -1,0 +1,165 @@
+"""How much of a scene is written down: what a wish about the ego's drive can concern.
+
+The rule, for whoever asks: within the radius of the ego, and within `BESIDE_M` of where the ego
+can get on its lanes and those beside them within `DRIVEN_M`, turning off wherever it can, or comes
+from within `BEHIND_M`. A lane is
+shown from where it first comes into that region to where it last leaves it. Of connectors that
+run from the same lane to the same lane in the same place the first is shown. Where the map has no
+lane for the ego only the radius counts.
+
+Frame: ego frame. N points.
+"""
+
+from __future__ import annotations
+
+import heapq
+import math
+from dataclasses import dataclass
+from functools import lru_cache
+
+import numpy as np
+from numpy.typing import NDArray
+
+from augment.geometry.polyline import Polyline
+from augment.scene.ego_route import EgoRoute
+from augment.scene.entities import Lane, LaneConnector, Scene
+from augment.scene.lane_graph import AnyLane
+
+FloatArray = NDArray[np.float64]
+BoolArray = NDArray[np.bool_]
+
+BESIDE_M = 25.0
+BEHIND_M = 20.0
+DRIVEN_M = 80.0
+SAME_WITHIN_M = 0.5
+"""Connectors between the same lanes that part nowhere further than this are one to a reader."""
+
+_LOOK_EVERY_M = 0.5
+_ROUTE_EVERY_M = 2.5
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Extent:
+    """The region that a prompt shows.
+
+    Attributes:
+        routes_m: Points (R, 2) along where the ego can get; None where its lane is unknown.
+    """
+
+    radius_m: float
+    routes_m: FloatArray | None
+
+    def holds(self, points_m: FloatArray) -> BoolArray:
+        """Which of the points (N, 2) lie in the region, (N,)."""
+        points = np.asarray(points_m, dtype=np.float64).reshape(-1, 2)
+        inside: BoolArray = np.hypot(*points.T) <= self.radius_m
+        if self.routes_m is not None and inside.any():
+            gaps = points[inside][:, None, :] - self.routes_m[None, :, :]
+            nearest = np.sqrt((gaps * gaps).sum(axis=2).min(axis=1))
+            inside[inside] = nearest <= BESIDE_M
+        return inside
+
+    def span(self, line: Polyline) -> tuple[float, float] | None:
+        """From where a line first comes into the region to where it last leaves it.
+
+        Two arc lengths; None where it never does, or for no more than a moment.
+        """
+        stations_m = np.append(np.arange(0.0, line.length_m, _LOOK_EVERY_M), line.length_m)
+        inside = stations_m[self.holds(line.points_at(stations_m))]
+        return (float(inside[0]), float(inside[-1])) if len(inside) >= 2 else None
+
+    @property
+    def box_m(self) -> tuple[float, float, float, float]:
+        """Least x, least y, most x, most y of the region."""
+        radius = self.radius_m
+        if self.routes_m is None:
+            return -radius, -radius, radius, radius
+        low, high = self.routes_m.min(axis=0) - BESIDE_M, self.routes_m.max(axis=0) + BESIDE_M
+        low, high = np.maximum(low, -radius), np.minimum(high, radius)
+        return float(low[0]), float(low[1]), float(high[0]), float(high[1])
+
+
+@lru_cache(maxsize=32)
+def extent_of(scene: Scene, radius_m: float) -> Extent:
+    """The region of a scene that prompts and the tool show."""
+    if math.isinf(radius_m):
+        return Extent(radius_m=radius_m, routes_m=None)
+    route = EgoRoute.of(scene)
+    if route is None:
+        return Extent(radius_m=radius_m, routes_m=None)
+    lines = [
+        line.between(start_m, start_m + DRIVEN_M)
+        for lane_id, start_m in _reached(route).items()
+        for line in [route.graph.lane(lane_id).centerline]
+        if line.length_m - start_m > _ROUTE_EVERY_M
+    ]
+    behind = max(0.0, route.ego_s_m - BEHIND_M)
+    lines.append(route.line.between(behind, route.ego_s_m + _ROUTE_EVERY_M))
+    points = np.vstack([line.resampled(_ROUTE_EVERY_M).points_m for line in lines])
+    near = np.hypot(*points.T) <= radius_m + BESIDE_M
+    return Extent(radius_m=radius_m, routes_m=points[near])
+
+
+@lru_cache(maxsize=32)
+def shown_spans(scene: Scene, radius_m: float) -> dict[str, tuple[float, float]]:
+    """From where to where each lane and connector is shown, by its id, in the scene's order."""
+    lanes: list[AnyLane] = [*scene.lanes, *scene.connectors]
+    if math.isinf(radius_m):
+        return {lane.id: (0.0, lane.centerline.length_m) for lane in lanes}
+    extent = extent_of(scene, radius_m)
+    shown: dict[str, tuple[float, float]] = {}
+    connectors: list[LaneConnector] = []
+    for lane in lanes:
+        span = extent.span(lane.centerline)
+        if span is None:
+            continue
+        if isinstance(lane, LaneConnector):
+            if any(_is_the_same(lane, other) for other in connectors):
+                continue
+            connectors.append(lane)
+        shown[lane.id] = span
+    return shown
+
+
+# Private
+
+
+def _reached(route: EgoRoute) -> dict[str, float]:
+    """From where on the ego can drive each lane that it can get to, by id: Dijkstra's search."""
+    graph = route.graph
+    found: dict[str, float] = {}
+    queue = [(0.0, route.lane_id, route.lane_s_m)]
+    while queue:
+        driven_m, here, start_m = heapq.heappop(queue)
+        if here in found or driven_m > DRIVEN_M:
+            continue
+        found[here] = start_m
+        lane = graph.lane(here)
+        beside = (lane.left_neighbor, lane.right_neighbor) if isinstance(lane, Lane) else ()
+        x_m, y_m = lane.centerline.position(start_m)
+        for other in beside:
+            if other in graph.lanes:
+                place = graph.lane(other).centerline.project(x_m, y_m)
+                heapq.heappush(queue, (driven_m, other, place.s_m))
+        end_m = driven_m + lane.centerline.length_m - start_m
+        for following in graph.successors(here):
+            heapq.heappush(queue, (end_m, following, 0.0))
+    return found
+
+
+def _is_the_same(one: LaneConnector, other: LaneConnector) -> bool:
+    """Whether two connectors lead the same way; their lights, limits and turns agree too."""
+    said = (one.from_lane, one.to_lane, one.turn_type, one.traffic_light, one.speed_limit_mps)
+    if said != (
+        other.from_lane,
+        other.to_lane,
+        other.turn_type,
+        other.traffic_light,
+        other.speed_limit_mps,
+    ):
+        return False
+    shares = np.linspace(0.0, 1.0, 9)
+    places = (
+        line.points_at(shares * line.length_m) for line in (one.centerline, other.centerline)
+    )
+    return bool(np.hypot(*np.subtract(*places).T).max() <= SAME_WITHIN_M)

@@ -1,0 +1,101 @@
+"""The worked example of the modifier's prompt is true: its scene, its results and its answer.
+
+python -m tests.prompts.test_example writes the scene's lists anew.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from augment.geometry.polyline import Polyline
+from augment.prompts.calls import calls_in
+from augment.prompts.reply import notes_of, read_reply
+from augment.prompts.texts import read_text
+from augment.prompts.vectors import LaneFormat, scene_text
+from augment.scene.entities import Lane, LaneConnector, Scene, TurnType
+from augment.variants.pose_tool import PoseTool
+from tests.scenes import EGO, scene
+
+TEXTS = Path(__file__).parents[2] / "augment" / "prompts" / "text"
+WIDTH_M = 3.4
+TURN_RAD = 0.4
+
+
+def bend() -> Polyline:
+    """12 m of a bend to the left with a radius of 30 m from (10, 0) on."""
+    angles = np.linspace(0.0, TURN_RAD, 41)
+    return Polyline(np.column_stack([10.0 + 30.0 * np.sin(angles), 30.0 - 30.0 * np.cos(angles)]))
+
+
+def beyond() -> Polyline:
+    start = bend().points_m[-1]
+    step = np.array([math.cos(TURN_RAD), math.sin(TURN_RAD)])
+    return Polyline([start, start + 15.0 * step])
+
+
+def example() -> Scene:
+    """A road with one lane that is straight, bends on a connector, and goes on."""
+
+    def lane(name: str, line: Polyline) -> Lane:
+        return Lane(id=name, centerline=line, width_m=WIDTH_M, speed_limit_mps=11.0)
+
+    return scene(
+        ego=EGO,
+        lanes=(
+            lane("Lane1", Polyline([(-20.0, 0.0), (10.0, 0.0)])),
+            lane("Lane2", beyond()),
+        ),
+        connectors=(
+            LaneConnector(
+                id="Connector1",
+                from_lane="Lane1",
+                to_lane="Lane2",
+                centerline=bend(),
+                width_m=WIDTH_M,
+                turn_type=TurnType.STRAIGHT,
+                speed_limit_mps=11.0,
+            ),
+        ),
+        areas=(),
+    )
+
+
+@pytest.mark.parametrize("lanes", list(LaneFormat))
+def test_the_lists_of_the_example_are_those_of_its_scene(lanes: LaneFormat) -> None:
+    assert read_text(f"example_{lanes}.md") == scene_text(example(), lanes=lanes)
+
+
+def test_the_results_of_the_example_are_those_of_the_tool() -> None:
+    work, tool = read_text("work_called.md"), PoseTool(example())
+    calls = calls_in(work.partition("Insights:")[0])
+    results = [json.loads(line) for line in re.findall(r"^1\. (\{.*\})$", work, re.MULTILINE)]
+    assert len(calls) == 2
+    assert [tool.answer(call.arguments) for call in calls] == results
+
+
+@pytest.mark.parametrize("work", ["walked", "called", "native"])
+def test_the_answer_of_the_example_is_read_and_right(work: str) -> None:
+    text = read_text(f"work_{work}.md")
+    answer = text[text.index("Insights:") :]
+    car, walker = read_reply(answer, example()).modification.added
+    assert notes_of(answer).startswith("A road with a single lane")
+    tool = PoseTool(example())
+    for agent, distance_m, lateral_m in ((car, 17.5, -0.6), (walker, 21.5, -2.5)):
+        place = tool.pose_on_lane("Lane1", "Agent1", distance_m, lateral_m)
+        assert agent.lane_id == place.lane
+        assert math.dist((agent.x_m, agent.y_m), (place.pose.x_m, place.pose.y_m)) < 0.15
+    assert walker.walk_to_m is not None
+    way = math.atan2(walker.walk_to_m[1] - walker.y_m, walker.walk_to_m[0] - walker.x_m)
+    assert walker.heading_rad == pytest.approx(way, abs=0.01)
+
+
+if __name__ == "__main__":
+    for form in LaneFormat:
+        text = scene_text(example(), lanes=form)
+        (TEXTS / f"example_{form}.md").write_text(f"{text}\n", encoding="utf-8")
