@@ -13,7 +13,7 @@ from arena.exports.parquet import NUMBER, TEXT, WHOLE, YES_NO, parquet_bytes
 from arena.services.cells import cell
 from augment.models import GenerationJob
 from augment.services.judging.augmentation_rows import AugmentationLine, augmentation_lines
-from augment.services.judging.repeatability import RepeatLine, Spread, repeatability
+from augment.services.judging.repeatability import RepeatLine, SampleSpread, repeatability
 
 COLUMNS = {
     "job": TEXT, "scenario": TEXT, "type": TEXT, "contestant": TEXT, "name": TEXT, "model": TEXT,
@@ -101,7 +101,7 @@ def _row(job: GenerationJob, line: AugmentationLine) -> tuple[object, ...]:
 
 
 def _repeat_row(line: RepeatLine) -> tuple[object, ...]:
-    spreads: list[Spread | None] = [getattr(line, name) for name in MEASURES]
+    spreads: list[SampleSpread | None] = [getattr(line, name) for name in MEASURES]
     samples = max((len(one.values) for one in spreads if one is not None), default=0)
     return (
         *(line.slug, line.name, line.is_simulated, samples),
@@ -110,7 +110,7 @@ def _repeat_row(line: RepeatLine) -> tuple[object, ...]:
     )
 
 
-def _parts(spread: Spread | None) -> tuple[Any, Any, Any]:
+def _parts(spread: SampleSpread | None) -> tuple[Any, Any, Any]:
     if spread is None:
         return None, None, None
     values = " ".join(f"{value:.6g}" for value in spread.values)

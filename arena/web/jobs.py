@@ -33,6 +33,7 @@ from augment.services.running import caps
 from augment.services.running import jobs as service
 from augment.services.running.caps import Caps
 from augment.services.running.costs import costs_of
+from augment.services.running.matrix import matrix_text
 from augment.services.running.summary import count_rows, failure_groups, list_jobs
 from augment.services.running.tool_calls import (
     tool_calls_by_augmentation,
@@ -69,6 +70,8 @@ def new_job_page(request: HttpRequest) -> HttpResponse:
         ),
         groups=scenarios.by_type(chosen_set),
     )
+    if "matrix" in request.POST:
+        return _matrix(request, form)
     if "estimate" in request.POST:
         return _estimated(request, form, chosen_set)
     if request.method == "POST" and form.is_valid():
@@ -216,6 +219,26 @@ def _estimated(request: HttpRequest, form: LaunchForm, chosen_set: str) -> HttpR
         if found is not None and cap is not None:
             context["rows_within"] = found.rows_within(cap)
     return render(request, "jobs/new.html", context)
+
+
+def _matrix(request: HttpRequest, form: LaunchForm) -> HttpResponse:
+    """What is chosen as a file for `generate --matrix`; a name is not needed for it."""
+    form.is_valid()
+    form.errors.pop("name", None)
+    if form.errors:
+        return render(request, "jobs/new.html", {"form": form}, status=422)
+    chosen = form.cleaned_data
+    text = matrix_text(
+        chosen["contestants"],
+        chosen["scenarios"],
+        samples=chosen["samples"],
+        name=chosen.get("name", ""),
+    )
+    return HttpResponse(
+        text,
+        content_type="application/yaml; charset=utf-8",
+        headers={"Content-Disposition": 'attachment; filename="matrix.yaml"'},
+    )
 
 
 def _launch(request: HttpRequest, form: LaunchForm) -> GenerationJob:

@@ -10,7 +10,7 @@ import numpy as np
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Spread:
+class SampleSpread:
     """One number a sample, over everything that was asked in it.
 
     Attributes:
@@ -24,12 +24,12 @@ class Spread:
     values: tuple[float, ...]
 
 
-def spread_of(values: Sequence[float]) -> Spread | None:
+def spread_of(values: Sequence[float]) -> SampleSpread | None:
     """Mean and standard deviation between samples, None without values."""
     if not values:
         return None
     sd = float(np.std(values, ddof=1)) if len(values) > 1 else None
-    return Spread(mean=float(np.mean(values)), sd=sd, values=tuple(values))
+    return SampleSpread(mean=float(np.mean(values)), sd=sd, values=tuple(values))
 
 
 def within_sd(groups: Iterable[Sequence[float]]) -> float | None:

@@ -13,24 +13,31 @@ from augment.formats.json_file import read_json
 from augment.scene.catalogue import ScenarioType
 from augment.scene.codec import modification_from_document, modification_to_document
 from augment.scene.intent_codec import intent_from_document, intent_to_document
+from augment.services.scenarios.bulk import NEEDED, OPTIONAL, add_scenarios, read_rows
 from augment.services.scenarios.scenes import add_scenario
 from augment.services.terminal import TerminalCommand
 
 
 class Command(TerminalCommand):
-    """`manage.py add_scenario --scene SLUG --type TYPE --instruction TEXT`."""
+    """`manage.py add_scenario --scene SLUG --type TYPE --instruction TEXT`, or `--file FILE`."""
 
     help = "Add a scenario: a scene, its type, an instruction and, if given, a reference."
 
     def add_arguments(self, parser: ArgumentParser) -> None:
         """Say what the command takes."""
         types = ", ".join(member.value for member in ScenarioType)
-        parser.add_argument("--scene", required=True, help="the slug of a stored scene")
-        parser.add_argument("--type", required=True, help=f"one of {types}, or a slug of your own")
+        parser.add_argument(
+            "--file",
+            type=Path,
+            help="many at once, all or none: .csv with a line of names, or .yaml with a list; "
+            f"{', '.join(NEEDED)}, and {', '.join(OPTIONAL)} where they are known",
+        )
+        parser.add_argument("--scene", help="the slug of a stored scene")
+        parser.add_argument("--type", help=f"one of {types}, or a slug of your own")
         parser.add_argument(
             "--type-label", help="what people read for a type of your own; made from its slug"
         )
-        parser.add_argument("--instruction", required=True, help="what is to be changed")
+        parser.add_argument("--instruction", help="what is to be changed")
         parser.add_argument(
             "--slug", help="the scenario's name; made up from the others if absent"
         )
@@ -49,6 +56,12 @@ class Command(TerminalCommand):
 
     def handle(self, *args: Any, **options: Any) -> None:
         """Add, and say under which name."""
+        if options["file"] is not None:
+            self._add_many(options)
+            return
+        missing = [f"--{name}" for name in NEEDED if options[name] is None]
+        if missing:
+            raise CommandError(f"{', '.join(missing)} is needed, or --file FILE instead of all.")
         try:
             scenario = add_scenario(
                 scene=options["scene"],
@@ -67,6 +80,18 @@ class Command(TerminalCommand):
         self.stdout.write(
             f"Added scenario {scenario.slug} {with_reference} a reference{with_intent}."
         )
+
+    def _add_many(self, options: dict[str, Any]) -> None:
+        given = [f"--{name.replace('_', '-')}" for name in (*NEEDED, *OPTIONAL) if options[name]]
+        if given:
+            raise CommandError(f"--file says all of it; it goes without {', '.join(given)}.")
+        try:
+            made = add_scenarios(read_rows(options["file"]), folder=options["file"].parent)
+        except AugmentError as fault:
+            raise CommandError(str(fault)) from fault
+        for scenario in made:
+            self.stdout.write(f"Added scenario {scenario.slug}.")
+        self.stdout.write(f"{len(made)} scenarios.")
 
 
 def _reference(file: Path | None) -> dict[str, Any] | None:

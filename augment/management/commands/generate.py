@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 from argparse import ArgumentParser
+from pathlib import Path
 from typing import Any
 
 from django.core.management.base import CommandError
@@ -11,6 +12,7 @@ from django.db import transaction
 from django.utils import timezone
 
 from augment.errors import AugmentError
+from augment.formats.yaml_file import read_yaml_file
 from augment.management.arguments import add_cap_arguments, caps_of
 from augment.models import Augmentation, GenerationJob
 from augment.services.endpoints.contestants import ensure_builtin
@@ -18,6 +20,7 @@ from augment.services.running import jobs
 from augment.services.running.budget import limit_of
 from augment.services.running.choosing import resolve_contestants, resolve_scenarios
 from augment.services.running.estimates import estimate
+from augment.services.running.matrix import WHAT, Matrix, load_matrix
 from augment.services.running.summary import (
     JobCounts,
     contestant_lines,
@@ -35,24 +38,29 @@ STOPPED = 3
 
 
 class Command(TerminalCommand):
-    """generate --contestants A B --scenarios X Y [--cap USD] [--wait]."""
+    """generate --contestants A B --scenarios X Y | --matrix FILE [--cap USD] [--wait]."""
 
     help = "Run contestants on scenarios; workers do it, `manage.py serve` starts them."
 
     def add_arguments(self, parser: ArgumentParser) -> None:
         """What to run, and whether to wait."""
-        parser.add_argument("--contestants", nargs="+", required=True, help="slugs, or all")
+        parser.add_argument(
+            "--matrix",
+            type=Path,
+            metavar="FILE",
+            help="YAML with models x variants x options, scenarios and samples instead of the "
+            "arguments for these; checked as a whole before anything runs",
+        )
+        parser.add_argument("--contestants", nargs="+", help="slugs, or all")
         parser.add_argument(
             "--scenarios",
             nargs="+",
-            required=True,
             help="slugs, or all, catalogue, paper, hard, paraphrases",
         )
         parser.add_argument("--name", help="what people call the job")
         parser.add_argument(
             "--samples",
             type=int,
-            default=1,
             metavar="K",
             help="ask every contestant K times about every scenario; default: 1",
         )
@@ -61,7 +69,10 @@ class Command(TerminalCommand):
             "--fresh", action="store_true", help="ask anew what models answered in other jobs"
         )
         parser.add_argument(
-            "--estimate", action="store_true", help="say what it would use, and launch nothing"
+            "--estimate",
+            "--dry-run",
+            action="store_true",
+            help="say what it would use, and launch and keep nothing",
         )
         parser.add_argument("--wait", action="store_true", help="stay until the job is over")
         parser.add_argument(
@@ -70,9 +81,12 @@ class Command(TerminalCommand):
 
     def handle(self, *args: Any, **options: Any) -> None:
         """Launch the job, then wait if asked to."""
+        _refuse_both(options)
         try:
             if options["estimate"]:
-                self._estimate(options)
+                with transaction.atomic():
+                    self._estimate(options)
+                    transaction.set_rollback(True)
                 return
             check_broker()
             job = self._launch(options)
@@ -88,12 +102,10 @@ class Command(TerminalCommand):
             self.report(job)
 
     def _estimate(self, options: dict[str, Any]) -> None:
-        ensure_builtin()
-        found = estimate(
-            resolve_contestants(options["contestants"]),
-            resolve_scenarios(options["scenarios"]),
-            samples=options["samples"],
-        )
+        runs = self._runs(options)
+        found = estimate(runs.contestants, runs.scenarios, samples=runs.samples)
+        for slug in runs.made:
+            self.stdout.write(f"Would be added: {slug}.")
         self.stdout.write(f"{found.rows} to run, {found.asking_rows} of them ask models.")
         for line in found.lines:
             least, usual, most = line.calls
@@ -105,21 +117,42 @@ class Command(TerminalCommand):
                 f"{line.slug}: calls {usual} expected ({least} to {most}), tokens "
                 f"{line.tokens_in} in, {line.tokens_out} out, {money} ({basis})"
             )
+        if len(found.lines) > 1:
+            least, usual, most = found.calls
+            unknown = f", of {len(found.unpriced)} contestants unknown" if found.unpriced else ""
+            self.stdout.write(
+                f"In all: calls {usual} expected ({least} to {most}), tokens {found.tokens_in} "
+                f"in, {found.tokens_out} out, {found.usd:.4f} USD expected, {found.usd_most:.2f} "
+                f"at most{unknown}"
+            )
 
     def _launch(self, options: dict[str, Any]) -> GenerationJob:
-        ensure_builtin()
-        name = options["name"] or f"Job of {timezone.now():%Y-%m-%d %H:%M} UTC"
         with transaction.atomic():
+            runs = self._runs(options)
+            usual = f"Job of {timezone.now():%Y-%m-%d %H:%M} UTC"
             job = jobs.launch(
-                name=name,
-                contestants=resolve_contestants(options["contestants"]),
-                scenarios=resolve_scenarios(options["scenarios"]),
+                name=options["name"] or runs.name or usual,
+                contestants=runs.contestants,
+                scenarios=runs.scenarios,
                 caps=caps_of(options),
-                samples=options["samples"],
+                samples=runs.samples,
                 is_fresh=options["fresh"],
             )
             transaction.on_commit(lambda: enqueue_job(job.pk))
         return job
+
+    def _runs(self, options: dict[str, Any]) -> Matrix:
+        """What is to run, of the file or of the arguments."""
+        if options["matrix"] is not None:
+            return load_matrix(read_yaml_file(options["matrix"], what=WHAT))
+        ensure_builtin()
+        return Matrix(
+            name=None,
+            contestants=tuple(resolve_contestants(options["contestants"])),
+            scenarios=tuple(resolve_scenarios(options["scenarios"])),
+            samples=1 if options["samples"] is None else options["samples"],
+            made=(),
+        )
 
     def wait(self, job: GenerationJob, timeout_s: float) -> None:
         """Show the progress until nothing is under way.
@@ -186,6 +219,20 @@ class Command(TerminalCommand):
         if failures:
             number = sum(group.number for group in failures)
             raise CommandError(f"{number} failed; see the reasons above.", returncode=1)
+
+
+def _refuse_both(options: dict[str, Any]) -> None:
+    """Either the file says what runs, or the arguments do.
+
+    Raises:
+        CommandError: Both do, or neither.
+    """
+    arguments = ("contestants", "scenarios", "samples")
+    named = [f"--{name}" for name in arguments if options[name] is not None]
+    if options["matrix"] is not None and named:
+        raise CommandError(f"--matrix says what runs; it goes without {', '.join(named)}.")
+    if options["matrix"] is None and not (options["contestants"] and options["scenarios"]):
+        raise CommandError("Name --contestants and --scenarios, or --matrix FILE.")
 
 
 def is_stopped(job: GenerationJob) -> bool:

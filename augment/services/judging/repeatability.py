@@ -6,11 +6,11 @@ from collections import defaultdict
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
-from augment.metrics.repeats import Spread, spread_of, within_sd
+from augment.metrics.repeats import SampleSpread, spread_of, within_sd
 from augment.models import Augmentation, GenerationJob
 from augment.services.judging.augmentation_rows import AugmentationLine, augmentation_lines
 
-__all__ = ["RepeatLine", "Spread", "repeatability"]
+__all__ = ["RepeatLine", "SampleSpread", "repeatability"]
 
 MISSES = (Augmentation.State.UNREADABLE, Augmentation.State.REFUSED)
 
@@ -30,14 +30,14 @@ class RepeatLine:
     slug: str
     name: str
     is_simulated: bool
-    displacement_m: Spread | None
+    displacement_m: SampleSpread | None
     within_m: float | None
-    missed: Spread | None
-    usd: Spread | None
-    wrong: Spread | None
+    missed: SampleSpread | None
+    usd: SampleSpread | None
+    wrong: SampleSpread | None
 
     @property
-    def missed_percent(self) -> Spread | None:
+    def missed_percent(self) -> SampleSpread | None:
         """The share in percent, for people."""
         if self.missed is None:
             return None
@@ -83,7 +83,7 @@ def _line(lines: Sequence[AugmentationLine]) -> RepeatLine:
     )
 
 
-def _spread(values: Iterable[float | None]) -> Spread | None:
+def _spread(values: Iterable[float | None]) -> SampleSpread | None:
     """None where a sample has no value: the rest would be another comparison."""
     known = list(values)
     return None if None in known else spread_of([one for one in known if one is not None])

@@ -1,0 +1,138 @@
+"""Many scenarios from one file, all of them or none.
+
+In: rows of a CSV or YAML file. Out: stored scenarios; or every error with the row it is in.
+"""
+
+from __future__ import annotations
+
+import csv
+import io
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from django.contrib.auth.models import User
+from django.db import transaction
+
+from augment.errors import AugmentError, InvalidDocument
+from augment.formats.json_file import read_json
+from augment.formats.yaml_file import MAX_CHARACTERS, read_yaml_file
+from augment.models import Scenario
+from augment.scene.codec import modification_from_document, modification_to_document
+from augment.scene.intent_codec import intent_from_document, intent_to_document
+from augment.services.scenarios.scenes import add_scenario
+
+WHAT = "list of scenarios"
+NEEDED = ("scene", "type", "instruction")
+OPTIONAL = ("slug", "type_label", "keep_traffic", "reference", "intent")
+MOST_ROWS = 10_000
+_YES_NO = {
+    "": False,
+    "no": False,
+    "false": False,
+    "0": False,
+    "yes": True,
+    "true": True,
+    "1": True,
+}
+
+
+def read_rows(file: Path) -> list[dict[str, Any]]:
+    """The rows of a file by its ending: .csv with a line of names, or .yaml with a list.
+
+    Raises:
+        InvalidDocument: It is neither, or can't be read.
+    """
+    if file.suffix.lower() in (".yaml", ".yml"):
+        found = read_yaml_file(file, what=WHAT)
+    elif file.suffix.lower() == ".csv":
+        found = _csv_rows(file)
+    else:
+        raise InvalidDocument(WHAT, [(file.name, "its name must end in .csv, .yaml or .yml")])
+    if not isinstance(found, list) or not all(isinstance(row, dict) for row in found):
+        raise InvalidDocument(WHAT, [("", "a list of mappings is needed")])
+    if not 1 <= len(found) <= MOST_ROWS:
+        raise InvalidDocument(WHAT, [("", f"{len(found)} rows; 1 to {MOST_ROWS} are read")])
+    return found
+
+
+@transaction.atomic
+def add_scenarios(
+    rows: list[dict[str, Any]], *, folder: Path, actor: User | None = None
+) -> list[Scenario]:
+    """The scenarios of these rows, in their order.
+
+    Args:
+        rows: With NEEDED, and OPTIONAL where it is known; `reference` and `intent` name files.
+        folder: In which those lie.
+        actor: Who adds them.
+
+    Raises:
+        InvalidDocument: With every error and its row, counted from 1; nothing was added.
+    """
+    problems: list[tuple[str, str]] = []
+    made: list[Scenario] = []
+    for number, row in enumerate(rows, start=1):
+        try:
+            with transaction.atomic():
+                made.append(add_scenario(**_read(row, folder), actor=actor))
+        except InvalidDocument as error:
+            problems += [
+                (f"row {number}.{path}" if path else f"row {number}", str(text))
+                for path, text in error.problems
+            ]
+        except AugmentError as error:
+            problems.append((f"row {number}", str(error)))
+    if problems:
+        raise InvalidDocument(WHAT, problems)
+    return made
+
+
+# --- Private -----------------------------------------------------------------------------------
+
+
+def _csv_rows(file: Path) -> list[dict[str, Any]]:
+    try:
+        if file.stat().st_size > MAX_CHARACTERS:
+            raise InvalidDocument(WHAT, [(file.name, f"at most {MAX_CHARACTERS} bytes are read")])
+        text = file.read_text(encoding="utf-8-sig")
+    except OSError as fault:
+        raise InvalidDocument(WHAT, [(str(file), fault.strerror or "can't be read")]) from None
+    except UnicodeDecodeError as fault:
+        raise InvalidDocument(WHAT, [(file.name, f"is not UTF-8: {fault.reason}")]) from None
+    try:
+        reader = csv.DictReader(io.StringIO(text, newline=""), strict=True)
+        return [{str(name): value for name, value in row.items()} for row in reader]
+    except csv.Error as fault:
+        raise InvalidDocument(WHAT, [(file.name, f"is no CSV: {fault}")]) from None
+
+
+def _read(row: Mapping[str, Any], folder: Path) -> dict[str, Any]:
+    """A row as `add_scenario` takes it."""
+    known = (*NEEDED, *OPTIONAL)
+    problems = [
+        (name, f"is no column; there are {', '.join(known)}") for name in row if name not in known
+    ]
+    given = {name: value for name, value in row.items() if value not in (None, "")}
+    problems += [(name, "is missing") for name in NEEDED if name not in given]
+    problems += [
+        (name, f"{value!r} must be text")
+        for name, value in given.items()
+        if name != "keep_traffic" and not isinstance(value, str)
+    ]
+    keep = str(given.pop("keep_traffic", "")).strip().lower()
+    if keep not in _YES_NO:
+        problems.append(("keep_traffic", f"{keep!r} must be yes or no"))
+    if problems:
+        raise InvalidDocument("scenario", problems)
+    if "reference" in given:
+        change = modification_from_document(_document(given["reference"], folder, "modification"))
+        given["reference"] = modification_to_document(change)
+    if "intent" in given:
+        intent = intent_from_document(_document(given["intent"], folder, "intent"))
+        given["intent"] = intent_to_document(intent)
+    return given | {"keep_traffic": _YES_NO[keep]}
+
+
+def _document(name: str, folder: Path, what: str) -> object:
+    return read_json(folder / name, what=what)
