@@ -6,6 +6,7 @@ from django.contrib.auth import views as auth
 from django.urls import URLPattern, path
 
 from arena.web import (
+    analyses,
     authorships,
     contestants,
     displacement,
@@ -62,6 +63,12 @@ urlpatterns: list[URLPattern] = [
         "jobs/<uuid:code>/displacement.<slug:form>",
         displacement.export,
         name="displacement-export",
+    ),
+    path("jobs/<uuid:code>/analyses/", analyses.page, name="analyses"),
+    path(
+        "jobs/<uuid:code>/analyses-<slug:part>.<slug:form>",
+        analyses.export,
+        name="analyses-export",
     ),
     path(
         "jobs/<uuid:code>/tool-calls.<slug:form>",

@@ -23,6 +23,8 @@ SPARED_BY_TOOL = frozenset({"straight-line", "ego-heading"})
 
 _UNREADABLE_SHARE = 0.1
 _RIGHT_SHARE = 0.25
+_REAL_TURN_RAD = math.radians(30.0)
+"""From the ego's heading to the lane's; no place of the paper set lies past so much."""
 _NOTICEABLE_M = 1.0
 _NOTICEABLE_RAD = 0.15
 
@@ -92,15 +94,25 @@ def bend(
         spared: Mistakes that are not made.
     """
     setting = _setting(scene, rng)
-    if setting is None or not right.added:
+    if setting is None or not right.changed:
         return Bent(modification=right, mistake="none")
-    shaky = _shifted(right.added, setting, rng.uniform(-1.5, 1.5))
+    shaky = _shifted(right.changed, setting, rng.uniform(-1.5, 1.5))
     made = {n: mistake(shaky, setting) for n, mistake in MISTAKES.items() if n not in spared}
     possible = sorted(name for name, agents in made.items() if _differs(agents, shaky))
     if not possible or rng.random() < _RIGHT_SHARE:
-        return Bent(modification=replace(right, added=shaky), mistake="none")
+        return Bent(modification=_with(right, shaky), mistake="none")
     name = rng.choice(possible)
-    return Bent(modification=replace(right, added=made[name]), mistake=name)
+    return Bent(modification=_with(right, made[name]), mistake=name)
+
+
+def _with(right: Modification, agents: Agents) -> Modification:
+    """The modification with its added and moved agents as they are now."""
+    moved = {agent.id for agent in right.moved}
+    return replace(
+        right,
+        added=tuple(agent for agent in agents if agent.id not in moved),
+        moved=tuple(agent for agent in agents if agent.id in moved),
+    )
 
 
 def straight_line(agents: Agents, setting: _Setting) -> Agents:
@@ -119,6 +131,18 @@ def ego_heading(agents: Agents, setting: _Setting) -> Agents:
         for agent in agents
         for place in [setting.route.locate_agent(agent)]
     )
+
+
+def lay_straight(scene: Scene, right: Modification) -> Modification:
+    """Whatever lies past a real turn of the lane is laid out straight ahead of the ego."""
+    setting = _setting(scene, random.Random(0))
+    if setting is None:
+        return right
+    made = (
+        straight_line((agent,), setting)[0] if _is_past_turn(agent, setting.route) else agent
+        for agent in right.changed
+    )
+    return _with(right, tuple(made))
 
 
 def neighbour_lane(agents: Agents, setting: _Setting) -> Agents:
@@ -202,6 +226,10 @@ def _at(agent: TrafficAgent, x_m: float, y_m: float, heading_rad: float) -> Traf
     if walk is not None:
         walk = (walk[0] + x_m - agent.x_m, walk[1] + y_m - agent.y_m)
     return replace(agent, x_m=x_m, y_m=y_m, heading_rad=heading_rad, walk_to_m=walk)
+
+
+def _is_past_turn(agent: TrafficAgent, route: EgoRoute) -> bool:
+    return abs(wrap(route.locate_agent(agent).tangent_rad)) > _REAL_TURN_RAD
 
 
 def _differs(agents: Agents, others: Agents) -> bool:

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 
 from augment.baselines.rule_placer import place
 from augment.errors import CannotPlace
-from augment.fake_llm import answers, careless, judging, tool_use
+from augment.fake_llm import answers, careless, judging, misreading, tool_use
 from augment.fake_llm.hearing import Heard, read_conversation
 from augment.fake_llm.requests import ChatRequest
 from augment.fake_llm.sight import (
@@ -20,6 +21,7 @@ from augment.fake_llm.sight import (
     list_of,
     task_of,
 )
+from augment.scene.intent import Intent
 from augment.scene.intent_codec import intent_to_parts
 from augment.scene.modification import Modification
 from augment.variants.transcript import ModelRole
@@ -42,6 +44,7 @@ class Character:
     """A manner of playing every role.
 
     Attributes:
+        hear: What it takes the wish to be, given the task and what was heard.
         bend: What becomes of a right modification, given the task and what was heard.
         spoil: What becomes of a modifier's finished answer.
         judge: What a reviewer finds.
@@ -51,6 +54,7 @@ class Character:
         never_stops: Whether it calls as long as it may, and longer.
     """
 
+    hear: Callable[[Task, Heard], Intent | None] = lambda task, _: task.intent
     bend: Callable[[Task, Modification, Heard], Modification] = lambda task, right, _: right
     spoil: Callable[[Task, str, Heard], str] = lambda task, text, _: text
     judge: Callable[[Task], list[judging.Problem]] = judging.problems_of
@@ -95,7 +99,7 @@ class Character:
         if self.first_calls and understood.may_call and not understood.called:
             return _calling(understood, self.first_calls)
         try:
-            right = place(task.scene, task.intent).modification
+            right = _placed(task, self.hear(task, understood))
         except CannotPlace as refused:
             return Said(text=answers.write_refusal(task, _why(task, refused)))
         made = self.bend(task, answers.renumber_added(right, task.first_new), understood)
@@ -107,6 +111,14 @@ class Character:
         made = tool_use.with_results(task.scene, made, results)
         text = answers.write_answer(task, made, _summary(task))
         return Said(text=self.spoil(task, text, understood))
+
+
+def _placed(task: Task, taken_for: Intent | None) -> Modification:
+    """What is placed for the wish as it was heard; what can't be placed is heard rightly."""
+    if taken_for != task.intent:
+        with suppress(CannotPlace):
+            return place(task.scene, taken_for).modification
+    return place(task.scene, task.intent).modification
 
 
 def _why(task: Task, refusal: CannotPlace) -> str:
@@ -136,11 +148,20 @@ def _summary(task: Task) -> str:
     return f"The user wants: {' '.join(task.instruction.split())}"
 
 
+def _misheard(task: Task, understood: Heard) -> Intent | None:
+    if task.intent is None:
+        return None
+    rng = careless.dice(f"{_all_told(task, understood)}\nas it was heard")
+    return misreading.misread(task.intent, rng)
+
+
 def _careless(task: Task, right: Modification, understood: Heard) -> Modification:
     rng = careless.dice(_all_told(task, understood))
     if careless.is_unreadable(rng):
         return right
     spared = careless.SPARED_BY_TOOL if understood.called or understood.may_call else frozenset()
+    if not spared:
+        right = careless.lay_straight(task.scene, right)
     return careless.bend(task.scene, right, rng, spared).modification
 
 
@@ -178,7 +199,7 @@ def _perhaps(problems: Sequence[judging.Problem]) -> str:
 
 
 GOOD = Character()
-CARELESS = Character(bend=_careless, spoil=_mumbled, judge=_overlooking)
+CARELESS = Character(hear=_misheard, bend=_careless, spoil=_mumbled, judge=_overlooking)
 LEARNING = Character(bend=_learning)
 STUBBORN = Character(bend=_stubborn)
 NONNUMERIC = Character(rate=_in_words, decide=_perhaps)

@@ -2,7 +2,7 @@
 
 Scene -> prompt -> answer -> Modification, and back with a review's findings where the recipe has
 a review (rounds.py). An answer that nobody can read and a refusal are outcomes of the model and
-count as such; a broken wire is nobody's outcome and is raised.
+count as such; whoever changes nothing refuses. A broken wire is nobody's outcome and is raised.
 """
 
 from __future__ import annotations
@@ -31,6 +31,9 @@ class OutcomeStatus(StrEnum):
     DONE = "done"
     UNREADABLE = "unreadable"
     REFUSED = "refused"
+
+
+LEFT_ALONE = "The modifier left the scene as it is and did not say why."
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -102,6 +105,8 @@ def run(
     except ModelRefused as refused:
         return _without(OutcomeStatus.REFUSED, str(refused))
     read = result.kept.read
+    if read.modification.is_empty:
+        return _without(OutcomeStatus.REFUSED, read.notes or LEFT_ALONE)
     return Outcome(
         modification=read.modification,
         notes="\n\n".join(part for part in (read.notes, result.remark) if part),

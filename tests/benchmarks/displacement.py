@@ -6,19 +6,21 @@ refuses is missing; the last table counts only the objects of scenarios that all
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+import hashlib
+from collections.abc import Sequence
 
-from augment.baselines import quantised, rule_placer
 from augment.baselines.registry import PLACERS, PlaceIntent
 from augment.errors import CannotPlace
 from augment.metrics.displacement import Displacement, displacement
 from augment.metrics.summary import summarise
 from augment.scene.catalogue import ScenarioType
 from augment.scene.modification import Modification
-from augment.services.scenarios.scenes import seed_of
 from tests.fixtures.shelf import SLUGS, entry, shown_scene
 
-Placing = Callable[..., rule_placer.Placement | quantised.QuantisedPlacement]
+
+def seed_of(slug: str) -> int:
+    """The seed of a scenario as jobs have it (`services.scenarios.scenes`, which needs Django)."""
+    return int.from_bytes(hashlib.sha256(slug.encode()).digest()[:4], "big")
 
 
 def made(place: PlaceIntent, slug: str, seed: int = 0) -> Modification | None:

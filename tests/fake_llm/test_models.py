@@ -123,9 +123,8 @@ def test_what_is_not_understood_is_said_and_changes_nothing(
     server: FakeServer, model: str
 ) -> None:
     made = outcome(server, model, scene(), "Paint the sky green.")
-    assert made.modification is not None
-    assert made.modification.is_empty
-    assert "I did not understand the instruction" in made.notes
+    assert (made.status, made.modification) == ("refused", None)
+    assert "I did not understand the instruction" in made.reason
 
 
 def test_the_answer_has_five_sections_with_computed_numbers(server: FakeServer) -> None:
@@ -142,4 +141,4 @@ def test_the_answer_has_five_sections_with_computed_numbers(server: FakeServer) 
 
 def test_a_scene_with_the_ego_off_every_lane_is_answered(server: FakeServer) -> None:
     nowhere = scene(lanes=(), areas=(), ego=replace(scene().ego, lane_id=None))
-    assert outcome(server, "fake-careless", nowhere, WISH).status in {"done", "unreadable"}
+    assert outcome(server, "fake-careless", nowhere, WISH).status == "refused"

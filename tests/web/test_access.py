@@ -29,6 +29,9 @@ PAGES: dict[str, tuple[int, int, int]] = {
     "displacement-export": (200, 200, 403),
     "tool-calls-export": (200, 200, 403),
     "scenarios-export": (404, 404, 403),  # nothing was written yet
+    "analyses": (200, 200, 403),
+    "analyses-export": (200, 200, 403),
+    "scenarios-export": (302, 302, 403),  # no result can be written
     "drives": (200, 200, 403),
     "driving-export": (200, 200, 403),
     "drive": (200, 200, 403),
@@ -119,6 +122,9 @@ def address(name: str, here: World) -> str:
         "tool-calls-export": {"code": here.job.code, "form": "csv"},
         "scenarios-export": {"code": STRANGER},
         "scenarios-write": {"code": here.job.code, "form": "json"},
+        "analyses": {"code": here.job.code},
+        "analyses-export": {"code": here.job.code, "part": "pairs", "form": "csv"},
+        "scenarios-export": {"code": here.job.code, "form": "json"},
         "faults": {"code": here.job.code},
         "faults-export": {"code": here.job.code, "form": "csv"},
         "label": {"code": here.job.code},

@@ -11,7 +11,7 @@ from django.core.management.base import CommandError, CommandParser
 from django.utils.text import slugify
 
 from arena.errors import ArenaError, StudyStillOpen
-from arena.exports import displacement_writers, driving_writers, faults, tool_calls
+from arena.exports import analyses, displacement_writers, driving_writers, faults, tool_calls
 from arena.exports.augmentations import (
     AUGMENTATION_FORMATS,
     REPEAT_FORMATS,
@@ -38,6 +38,7 @@ from arena.queries.results import snapshot_to_export
 from arena.queries.studies import study_named
 from arena.services.early_looks import log_early_look
 from augment.errors import AugmentError, Conflict, UnknownName
+from augment.services.judging.analyses import analyse_job
 from augment.services.judging.displacement import By, types_named
 from augment.services.judging.driving_scores import options_driven, scores_of_job
 from augment.services.judging.scenario_export import FORMATS as SCENARIO_FORMATS
@@ -83,6 +84,7 @@ class Command(TerminalCommand):
             "tool-calls": self._tool_calls,
             "augmentations": self._augmentations,
             "repeats": self._repeats,
+            "analyses": self._analyses,
         }
         try:
             content, suffix, is_text = write[options["what"]](options)
@@ -158,6 +160,13 @@ class Command(TerminalCommand):
         chosen = format_named(tool_calls.FORMATS, options["format"])
         lines = tool_calls_by_augmentation(find_job(options["job"]))
         return chosen.write(lines), chosen.suffix, chosen.is_text
+
+    def _analyses(self, options: dict[str, Any]) -> Written:
+        chosen = format_named(analyses.ANALYSIS_FORMATS, options["format"])
+        if options["part"] not in analyses.PARTS:
+            raise UnknownName("part", options["part"], list(analyses.PARTS))
+        table = analyses.analysis_table(analyse_job(find_job(options["job"])), options["part"])
+        return chosen.write(table), chosen.suffix, chosen.is_text
 
     def _driving(self, options: dict[str, Any]) -> Written:
         chosen = format_named(driving_writers.FORMATS, options["format"])
@@ -334,7 +343,13 @@ def _kinds_of_rows(kinds: Any) -> list[ArgumentParser]:
     repeats = kinds.add_parser("repeats", help="what varies between the samples of a job")
     repeats.add_argument("job", help="its name or its code")
     repeats.add_argument("--format", default="csv", help=f"one of {', '.join(REPEAT_FORMATS)}")
-    return [rows, repeats]
+    found = kinds.add_parser("analyses", help="pairs of contestants, wordings, refusals")
+    found.add_argument("job", help="its name or its code")
+    found.add_argument("--part", required=True, help=f"one of {', '.join(analyses.PARTS)}")
+    found.add_argument(
+        "--format", default="csv", help=f"one of {', '.join(analyses.ANALYSIS_FORMATS)}"
+    )
+    return [rows, repeats, found]
 
 
 def _kind_of_scenarios(kinds: Any) -> ArgumentParser:

@@ -1,0 +1,118 @@
+from __future__ import annotations
+
+import csv
+import io
+import json
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+from django.core.management import CommandError, call_command
+from django.urls import reverse
+
+from augment.models import Augmentation, Contestant, GenerationJob, Scenario
+from augment.scene.codec import modification_to_document
+from augment.scene.intent import Intent
+from augment.scene.intent_codec import intent_to_document
+from augment.scene.modification import Modification
+from augment.services.scenarios.pictures import store
+from augment.services.scenarios.scenes import reference_of
+from tests.jobs import rows
+from tests.web.cast import people, png, signed_in
+
+pytestmark = pytest.mark.django_db
+
+State = Augmentation.State
+UNMET = intent_to_document(Intent(unmet="There is no tram."))
+
+
+def a_job() -> GenerationJob:
+    """Ann is 1 m off in seven scenarios and 3 m in a paraphrase, Ben 2 m; one can't be met.
+
+    Ann refuses that one and one more; Ben overlooks it, and his answer is unreadable.
+    """
+    job = GenerationJob.objects.create(name="Round 1")
+    ann, ben = (rows.add_kind(name, Contestant.Kind.RULE) for name in ("ann", "ben"))
+    for number in range(7):
+        scenario = rows.add_scenario(f"wish-{number}")
+        answer(job, scenario, ann, 1.0)
+        answer(job, scenario, ben, 2.0 + 0.1 * number)
+    anew = rows.add_scenario(
+        "wish-0-p1", paraphrase_of=Scenario.objects.get(slug="wish-0"), language="de"
+    )
+    answer(job, anew, ann, 3.0)
+    never = rows.add_scenario("never", intent=UNMET, intent_origin="authored")
+    more = rows.add_scenario("more")
+    for scenario in (never, more):
+        answer(job, scenario, ann, None, State.REFUSED)
+    answer(job, never, ben, None, State.UNREADABLE)
+    return job
+
+
+def answer(
+    job: GenerationJob,
+    scenario: Scenario,
+    contestant: Contestant,
+    off_m: float | None,
+    state: State = State.DONE,
+) -> None:
+    document = None
+    if off_m is not None:
+        reference = reference_of(scenario)
+        assert reference is not None
+        moved = tuple(replace(one, x_m=one.x_m + off_m) for one in reference.added)
+        document = modification_to_document(Modification(added=moved))
+    Augmentation.objects.create(
+        job=job,
+        scenario=scenario,
+        contestant=contestant,
+        state=state,
+        modification=document,
+        image=store(png()),
+    )
+
+
+def exported(job: GenerationJob, part: str, tmp_path: Path) -> list[dict[str, str]]:
+    out = tmp_path / f"{part}.csv"
+    call_command("export", "analyses", str(job.code), "--part", part, "--out", str(out))
+    return list(csv.DictReader(io.StringIO(out.read_text())))
+
+
+def test_pairs_wordings_and_refusals_come_as_files(tmp_path: Path) -> None:
+    job = a_job()
+    (pair,) = exported(job, "pairs", tmp_path)
+    assert (pair["first"], pair["second"], pair["scenarios"]) == ("ann", "ben", "7")
+    assert float(pair["median_difference_m"]) == pytest.approx(-1.3, abs=0.001)
+    assert float(pair["p_wilcoxon"]) == pytest.approx(2 / 2**7)
+    (reworded,) = exported(job, "wordings", tmp_path)
+    assert (reworded["contestant"], reworded["wordings"]) == ("ann", "2")
+    assert float(reworded["within_m"]) == pytest.approx(2**0.5, abs=0.001)
+    ann, ben = exported(job, "refusals", tmp_path)
+    assert (ann["right"], ann["wrong"], ann["precision"], ann["recall"]) == ("1", "1", "0.5", "1")
+    assert (ben["right"], ben["overlooked"], ben["precision"], ben["recall"]) == (
+        "0",
+        "1",
+        "",
+        "0",
+    )
+    out = tmp_path / "pairs.json"
+    call_command(
+        "export", "analyses", str(job.code), "--part", "pairs", "--format", "json",
+        "--out", str(out),
+    )  # fmt: skip
+    assert json.loads(out.read_text())["rows"][0]["scenarios"] == 7
+    with pytest.raises(CommandError, match="pairs, wordings, refusals"):
+        exported(job, "elephants", tmp_path)
+
+
+def test_the_page_shows_all_three_and_an_empty_job_says_so() -> None:
+    staff = signed_in(people()["admin"])
+    shown = staff.get(reverse("analyses", args=[a_job().code])).content.decode()
+    assert "-1.30" in shown
+    assert "0.0156" in shown
+    assert all(f'id="{part}"' in shown for part in ("pairs", "wordings", "refusals"))
+    empty = GenerationJob.objects.create(name="Nothing")
+    shown = staff.get(reverse("analyses", args=[empty.code])).content.decode()
+    assert "No two contestants" in shown
+    assert "Nobody has refused" in shown
+    assert staff.get(reverse("analyses-export", args=[empty.code, "x", "csv"])).status_code == 404

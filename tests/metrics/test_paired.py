@@ -1,0 +1,95 @@
+from __future__ import annotations
+
+from itertools import product
+
+import numpy as np
+import pytest
+from scipy.stats import bootstrap
+from statsmodels.stats.multitest import multipletests
+
+from augment.metrics.paired import adjust_holm, compare_all, find_p_by_signed_ranks
+from augment.metrics.refusals import score_refusals
+from augment.metrics.robustness import measure_robustness
+
+DIFFERENCES = (0.9, -0.2, 1.4, 2.2, -0.5, 3.1, 0.7, 1.1)
+
+
+def p_by_enumeration(differences: tuple[float, ...]) -> float:
+    """All sign patterns are alike: how many have a rank sum as far from the middle as this."""
+    ranks = np.argsort(np.argsort(np.abs(differences))) + 1
+    middle = ranks.sum() / 2.0
+    found = abs(sum(r for r, d in zip(ranks, differences, strict=True) if d > 0) - middle)
+    sums = [
+        sum(r for r, is_up in zip(ranks, signs, strict=True) if is_up)
+        for signs in product((True, False), repeat=len(ranks))
+    ]
+    return float(np.mean([abs(one - middle) >= found - 1e-9 for one in sums]))
+
+
+def test_the_test_is_the_exact_one_where_there_are_few() -> None:
+    found = find_p_by_signed_ranks(np.array([0.0, *DIFFERENCES, 0.0]))
+    assert found == pytest.approx(p_by_enumeration(DIFFERENCES))
+
+
+def test_too_few_unequal_pairs_are_not_tested() -> None:
+    assert find_p_by_signed_ranks(np.array([1.0, 2.0, 3.0, 4.0, 5.0, 0.0])) is None
+    assert find_p_by_signed_ranks(np.array([1.0, 2.0, 3.0, 4.0, 5.0, 6.0])) == 2 / 2**6
+
+
+@pytest.mark.parametrize(
+    "p_values", [(0.01, 0.04, 0.03, 0.5), (0.2, 0.2, 0.9), (0.001,), (0.04, 0.04, 0.04, 0.0001)]
+)
+def test_holm_is_statsmodels(p_values: tuple[float, ...]) -> None:
+    expected = multipletests(p_values, method="holm")[1]
+    assert adjust_holm(p_values) == pytest.approx(list(expected))
+
+
+def test_what_was_not_tested_does_not_count_for_holm() -> None:
+    assert adjust_holm([None, 0.02, None, 0.03]) == [None, 0.04, None, 0.04]
+    assert adjust_holm([]) == []
+
+
+def test_pairs_are_made_over_shared_scenarios_and_say_which_is_nearer() -> None:
+    base = {f"s{n}": 1.0 for n in range(len(DIFFERENCES))}
+    far = {f"s{n}": 1.0 + one for n, one in enumerate(DIFFERENCES)} | {"alone": 99.0}
+    (found,) = compare_all({"near": base, "far": far}, seed=3)
+    assert (found.first, found.second, found.scenarios) == ("far", "near", 8)
+    assert found.median_m == pytest.approx(np.median(DIFFERENCES))
+    expected = bootstrap(
+        (np.array(DIFFERENCES),),
+        np.median,
+        method="percentile",
+        n_resamples=10_000,
+        rng=np.random.default_rng(5),
+    ).confidence_interval
+    assert (found.low_m, found.high_m) == pytest.approx((expected.low, expected.high), abs=0.12)
+    assert found.p == found.p_holm == pytest.approx(p_by_enumeration(DIFFERENCES))
+    assert compare_all({"near": base, "far": far}, seed=3) == (found,)
+    assert compare_all({"near": {"a": 1.0}, "far": {"b": 1.0}}, seed=3) == ()
+
+
+def test_the_spread_over_wordings_is_within_scenarios_alone() -> None:
+    """Two scenarios far apart, each with a variance of 1: (1 + 1 + 1 + 1) / (2 + 2) by hand."""
+    found = measure_robustness({"a": [1.0, 2.0, 3.0], "b": [11.0, 12.0, 13.0], "c": [50.0]})
+    assert found is not None
+    assert (found.scenarios, found.wordings) == (2, 6)
+    assert (found.within_m, found.median_range_m) == pytest.approx((1.0, 2.0))
+    assert measure_robustness({"a": [1.0], "b": []}) is None
+
+
+@pytest.mark.parametrize(
+    ("answers", "precision", "recall"),
+    [
+        ([(True, True), (True, False), (False, True), (False, False)], 0.5, 0.5),
+        ([(True, True), (True, True), (False, False)], 1.0, 1.0),
+        ([(False, True), (False, True)], None, 0.0),
+        ([(True, False)], 0.0, None),
+        ([], None, None),
+    ],
+)
+def test_refusals_are_counted_by_what_they_refuse(
+    answers: list[tuple[bool, bool]], precision: float | None, recall: float | None
+) -> None:
+    found = score_refusals(answers)
+    assert (found.precision, found.recall) == (precision, recall)
+    assert found.right + found.wrong + found.overlooked + found.rest == len(answers)
