@@ -31,7 +31,6 @@ PAGES: dict[str, tuple[int, int, int]] = {
     "scenarios-export": (404, 404, 403),  # nothing was written yet
     "analyses": (200, 200, 403),
     "analyses-export": (200, 200, 403),
-    "scenarios-export": (302, 302, 403),  # no result can be written
     "drives": (200, 200, 403),
     "driving-export": (200, 200, 403),
     "drive": (200, 200, 403),
@@ -124,7 +123,6 @@ def address(name: str, here: World) -> str:
         "scenarios-write": {"code": here.job.code, "form": "json"},
         "analyses": {"code": here.job.code},
         "analyses-export": {"code": here.job.code, "part": "pairs", "form": "csv"},
-        "scenarios-export": {"code": here.job.code, "form": "json"},
         "faults": {"code": here.job.code},
         "faults-export": {"code": here.job.code, "form": "csv"},
         "label": {"code": here.job.code},
