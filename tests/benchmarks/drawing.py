@@ -1,0 +1,156 @@
+"""What a picture costs, how much of it is blank and how large people are in it.
+
+`REALDATA_DIR=... python -m tests.benchmarks.drawing`: the catalogue's references and, where there
+are recorded scenes, these, in one process; matplotlib draws the same boxes and lanes beside it.
+"""
+
+from __future__ import annotations
+
+import io
+import os
+import statistics
+import time
+from collections.abc import Callable, Iterator
+from dataclasses import replace
+from functools import partial
+from pathlib import Path
+
+import django
+import numpy as np
+from PIL import Image
+
+from augment.formats.readers import READERS, recognise
+from augment.geometry.boxes import corners
+from augment.render import bev, palette
+from augment.render.camera import Camera, camera_for
+from augment.render.marks import PERSON_PX
+from augment.render.shapes import ribbon
+from augment.scene.entities import AgentType, Scene, TrafficAgent
+from augment.scene.modification import Modification, without_traffic
+
+ROUNDS = 5
+PANEL_PX = 618.0
+"""How wide a picture is on the voting page in a window of 1280 x 720."""
+PERSON_M = 0.8
+
+
+def main() -> None:
+    """Print the tables."""
+    print(f"load average {os.getloadavg()[0]:.1f}\n")
+    print("| pictures | n | blank, median | person on the page (px) | kB, median |")
+    print("|---|---|---|---|---|")
+    shown = list(_catalogue())
+    recorded = list(_recorded())
+    for name, those in (("catalogue", shown), ("recorded", [one for _, one in recorded])):
+        drawn = [(camera_for(scene, change), scene, change) for scene, change in those]
+        pngs = [
+            bev.draw(scene, change or Modification(), camera) for camera, scene, change in drawn
+        ]
+        if pngs:
+            blank = statistics.median(map(_blank_share, pngs))
+            size = statistics.median(len(png) / 1000.0 for png in pngs)
+            people = min(_person_px(camera) for camera, _, _ in drawn)
+            print(f"| {name} | {len(pngs)} | {blank:.0%} | {people:.1f} | {size:.0f} |")
+    print(
+        "\n| recorded scene | boxes | cold (ms) | warm, one moved (ms) | warm, one added (ms) |",
+        end="",
+    )
+    print(" matplotlib (ms) |\n|---|---|---|---|---|---|")
+    for name, (scene, _) in recorded:
+        camera = camera_for(scene, None)
+        near = scene.agents[0]
+        added = Modification(added=(_standing(near),))
+        draw = partial(bev.draw, scene, added, camera)
+        print(
+            f"| {name} | {len(scene.agents) + 1} "
+            f"| {_ms(draw, before=_forget):.0f} "
+            f"| {_ms(draw, before=bev._unchanged.cache_clear):.0f} "
+            f"| {_ms(draw):.0f} "
+            f"| {_ms(partial(_by_matplotlib, scene, camera)):.0f} |"
+        )
+
+
+def _catalogue() -> Iterator[tuple[Scene, Modification | None]]:
+    os.environ.setdefault("DJANGO_SETTINGS_MODULE", "arena.config.settings")
+    django.setup()
+    from augment.services.scenarios.catalogue import read_catalogue
+
+    scenes, entries = read_catalogue(Path(__file__).parents[2] / "fixtures")
+    for entry in entries:
+        whole = scenes[entry.scene]
+        yield whole if entry.keep_traffic else without_traffic(whole), entry.reference
+
+
+def _recorded() -> Iterator[tuple[str, tuple[Scene, None]]]:
+    folder = os.environ.get("REALDATA_DIR", "")
+    if not folder:
+        return
+    for path in sorted(Path(folder).glob("*/*")):
+        if not any(reader.recognises(path) for reader in READERS.values()):
+            continue
+        reader = recognise(path)
+        moment = next(iter(reader.moments(path, every_s=60.0)))
+        reading = reader.read(path, item=moment.item, frame=moment.frame, name="recorded")
+        yield reader.title, (reading.scene, None)
+
+
+def _blank_share(png: bytes) -> float:
+    """Pixels of paper alone; a ground of its own is as empty, so it counts as well."""
+    pixels = np.asarray(Image.open(io.BytesIO(png)).convert("RGB"))
+    empty = [(pixels == colour).all(axis=2) for colour in (palette.PAPER, palette.BEYOND)]
+    return float((empty[0] | empty[1]).mean())
+
+
+def _person_px(camera: Camera) -> float:
+    return max(PERSON_PX, PERSON_M * camera.px_per_m) * PANEL_PX / camera.width_px
+
+
+def _standing(near: TrafficAgent) -> TrafficAgent:
+    return replace(near, id="New1", speed_mps=0.0)
+
+
+def _forget() -> None:
+    bev._flat.cache_clear()
+    bev._unchanged.cache_clear()
+
+
+def _ms(draw: Callable[[], object], *, before: Callable[[], None] = lambda: None) -> float:
+    """The median of the processor time."""
+    spent = []
+    for _ in range(ROUNDS + 1):
+        before()
+        start = time.process_time()
+        draw()
+        spent.append(time.process_time() - start)
+    return 1000.0 * statistics.median(spent[1:])
+
+
+def _by_matplotlib(scene: Scene, camera: Camera) -> bytes:
+    """Lanes, areas, boxes and the picture's size: less than ours draws."""
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.collections import PolyCollection
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(camera.width_px / 100.0, camera.height_px / 100.0), dpi=200)
+    FigureCanvasAgg(figure)
+    axes = figure.add_axes((0.0, 0.0, 1.0, 1.0))
+    axes.set_axis_off()
+    axes.set_xlim(camera.x_min_m, camera.x_max_m)
+    axes.set_ylim(camera.y_min_m, camera.y_max_m)
+    lanes = [*scene.lanes, *scene.connectors]
+    axes.add_collection(
+        PolyCollection([np.array(one.boundary_m) for one in scene.areas], facecolor="0.9")
+    )
+    axes.add_collection(PolyCollection([ribbon(lane) for lane in lanes], facecolor="0.85"))
+    for lane in lanes:
+        axes.plot(*lane.centerline.points_m.T, "--", color="0.5", linewidth=0.7)
+    boxes = [corners(one.pose, one.length_m, one.width_m) for one in scene.everyone]
+    colours = ["r" if one.type is AgentType.EGO_VEHICLE else "0.6" for one in scene.everyone]
+    axes.add_collection(PolyCollection(boxes, facecolor=colours, edgecolor="k"))
+    stream = io.BytesIO()
+    figure.savefig(stream, format="png")
+    return stream.getvalue()
+
+
+if __name__ == "__main__":
+    main()
