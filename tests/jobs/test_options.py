@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import base64
+import importlib
 import json
 import struct
 from collections.abc import Callable
 from typing import Any
 
 import pytest
+from django.apps import apps
 from django.core.management import CommandError, call_command
 
 from augment.errors import Conflict, InvalidDocument
@@ -268,6 +270,25 @@ def test_who_ran_with_other_prompts_is_not_run_with_these() -> None:
         assert (row.state, len(server.bodies)) == (Augmentation.State.FAILED, 1)
         contestants.add_like(slug="b", like="a", name="B")
         run("b")
+
+
+def test_who_ran_before_there_were_options_keeps_what_it_ran_with() -> None:
+    migration = importlib.import_module("augment.migrations.0011_options_and_samples")
+    with serving(Scripted()) as server:
+        add(server, "a", "fc", protocol="native")
+        EndpointModel.objects.update(native_tools=True)
+        (row,) = run("a")
+    before = row.options
+    Contestant.objects.update(options={}, frozen_options=None)
+    Augmentation.objects.update(options=None)
+    EndpointModel.objects.update(native_tools=False)
+    ModelCall.objects.update(prompt_version="0123456789ab")
+    migration.freeze_what_ran(apps, None)
+    row.refresh_from_db()
+    assert before is not None
+    assert row.options == before | {"prompt_version": "0123456789ab"}
+    assert Contestant.objects.get().frozen_options == row.options
+    assert options_of(Contestant.objects.get()).protocol is ToolProtocol.NATIVE
 
 
 def test_the_command_takes_every_option_and_keeps_contestants_apart(
