@@ -62,7 +62,7 @@ def open_table(path: Path, wanted: Sequence[str]) -> Iterator[TextTable]:
             yield _separated(lines, _separator(beginning, wanted))
 
 
-def fitted(row: Row, width: int) -> Row:
+def fit_row(row: Row, width: int) -> Row:
     """The row without empty cells behind its last column."""
     while len(row) > width and not row[-1].strip():
         row = row[:-1]

@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from arena.rating.comparisons import LOSS, TIE, WIN, Comparisons, IntArray
-from arena.rating.tabular import TextTable, fitted, open_table
+from arena.rating.tabular import TextTable, fit_row, open_table
 
 NEEDED = ("model_a", "model_b", "winner")
 OPTIONAL = ("judge", "item")
@@ -185,7 +185,7 @@ def _coded(
     if not block:
         return np.empty((0, len(places)), dtype=np.int32)
     if any(len(row) > width for row in block):
-        block = [fitted(row, width) for row in block]
+        block = [fit_row(row, width) for row in block]
     columns = list(zip(*block, strict=True))
     if len(columns) != width:
         raise ValueError("a line has another number of cells")
@@ -284,7 +284,7 @@ def _explain(path: Path, wanted: Sequence[str]) -> None:
 
 def _wrong(row: list[str], width: int, places: dict[str, int]) -> str:
     """What is wrong with a line, empty if nothing is."""
-    row = fitted(row, width)
+    row = fit_row(row, width)
     if len(row) != width:
         return f"there are {len(row)} cells, in the first line {width}"
     cells = {name: row[place].strip() for name, place in places.items()}
