@@ -36,7 +36,7 @@ def _preparing(found: Inventory) -> list[Step]:
             title=_("Load the catalogue"),
             detail=_("%(n)s scenarios are here.") % {"n": found.scenarios}
             if found.scenarios
-            else _("No scenario yet. Run: manage.py load_catalogue"),
+            else _("No scenario yet. What comes with the project is loaded by a button."),
             done=found.scenarios > 0,
             link="scenarios",
             action=_("Scenarios"),
@@ -45,10 +45,10 @@ def _preparing(found: Inventory) -> list[Step]:
             title=_("Have at least two contestants"),
             detail=_("%(n)s contestants are registered.") % {"n": found.contestants}
             if found.contestants
-            else _("None yet. Run: manage.py add_contestant"),
+            else _("None yet. A model at an endpoint, or one of those that ask nobody."),
             done=found.contestants >= 2,
-            link="",
-            action="",
+            link="contestants",
+            action=_("Contestants"),
         ),
         Step(
             title=_("Run a job"),

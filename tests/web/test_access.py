@@ -42,6 +42,7 @@ PAGES: dict[str, tuple[int, int, int]] = {
     "transcript": (200, 200, 403),
     "asked-image": (404, 404, 403),
     "contestants": (200, 200, 403),
+    "contestant-new": (200, 403, 403),
     "contestant": (200, 200, 403),
     "people": (200, 403, 403),
     "person-forget": (200, 403, 403),  # a question
@@ -68,6 +69,7 @@ PAGES: dict[str, tuple[int, int, int]] = {
 ACTIONS: dict[str, tuple[int, int, int]] = {
     "job-retry": (302, 403, 403),
     "contestant-retired": (302, 403, 403),
+    "catalogue-load": (302, 403, 403),
     "job-simulate": (302, 403, 403),
     "scenarios-write": (302, 302, 403),
     "invite": (200, 403, 403),

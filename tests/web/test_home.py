@@ -50,7 +50,7 @@ def test_an_analyst_sees_progress_of_running_studies_and_results_of_closed_ones(
 
 def test_an_admin_is_led_from_an_empty_house_to_the_first_job() -> None:
     admin = people()["admin"]
-    assert "manage.py load_catalogue" in home(admin)
+    assert "is loaded by a button" in home(admin)
     world()
     shown = home(admin)
     assert "From a scenario to a rated table" in shown

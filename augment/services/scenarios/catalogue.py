@@ -10,11 +10,12 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TypeVar
 
+from django.conf import settings
 from django.contrib.auth.models import User
 from django.db import transaction
 from django.db.models import QuerySet
 
-from augment.errors import Conflict, InvalidDocument, InvalidModification
+from augment.errors import Conflict, InvalidDocument, InvalidModification, UnknownName
 from augment.formats.json_file import read_json
 from augment.models import Augmentation, BaseScene, Scenario
 from augment.scene.catalogue import CatalogueSet
@@ -97,6 +98,20 @@ def load_catalogue(
         scenarios_changed=scenario_steps.count("change"),
         scenarios_unchanged=scenario_steps.count("keep"),
     )
+
+
+def load_own_catalogue(*, sets: Sequence[str], actor: User) -> CatalogueReport:
+    """What comes with the project, by the names of its sets.
+
+    Raises:
+        UnknownName: There is no such set.
+    """
+    known = [one.value for one in CatalogueSet]
+    for name in sets:
+        if name not in known:
+            raise UnknownName("set", name, known)
+    folder = settings.BASE_DIR / "fixtures"
+    return load_catalogue(folder=folder, actor=actor, sets=[CatalogueSet(one) for one in sets])
 
 
 def folder_of(folder: Path, one: CatalogueSet) -> Path:

@@ -1,0 +1,39 @@
+"""The button that loads what comes with the project."""
+
+from __future__ import annotations
+
+from typing import cast
+
+from django.contrib import messages
+from django.contrib.auth.models import User
+from django.http import HttpRequest, HttpResponse
+from django.shortcuts import redirect
+from django.utils.translation import gettext as _
+from django.views.decorators.http import require_POST
+
+from arena.web.access import ADMIN, allow_only
+from augment.errors import AugmentError
+from augment.services.endpoints.contestants import ensure_builtin
+from augment.services.scenarios.catalogue import load_own_catalogue
+from augment.services.wording import translate
+
+
+@allow_only(ADMIN)
+@require_POST
+def load_scenarios(request: HttpRequest) -> HttpResponse:
+    """Load one set of the catalogue, all of it or nothing, and those who ask nobody."""
+    actor = cast(User, request.user)
+    try:
+        report = load_own_catalogue(sets=[request.POST.get("set", "")], actor=actor)
+    except AugmentError as error:
+        messages.error(request, translate(error))
+    else:
+        ensure_builtin()
+        done = _("Scenarios: %(added)s added, %(changed)s changed, %(unchanged)s as they were.")
+        numbers = {
+            "added": report.scenarios_added,
+            "changed": report.scenarios_changed,
+            "unchanged": report.scenarios_unchanged,
+        }
+        messages.success(request, done % numbers)
+    return redirect("scenarios")

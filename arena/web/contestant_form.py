@@ -1,0 +1,136 @@
+"""The page on which a contestant is entered."""
+
+from __future__ import annotations
+
+from typing import Any, cast
+
+from django import forms
+from django.contrib import messages
+from django.contrib.auth.models import User
+from django.http import HttpRequest, HttpResponse
+from django.shortcuts import redirect, render
+from django.utils.translation import gettext as _
+from django.utils.translation import gettext_lazy
+from django.views.decorators.http import require_http_methods
+
+from arena.web.access import ADMIN, allow_only
+from augment.errors import AugmentError
+from augment.models import Endpoint
+from augment.services.endpoints.entering import (
+    OPTION_NAMES,
+    PROTOCOLS,
+    REASONING_EFFORTS,
+    VARIANTS,
+    EnteredEndpoint,
+    enter_contestant,
+)
+from augment.services.wording import translate
+
+NEW = ""
+"""What the choice of an endpoint says where a new one is entered."""
+
+
+class ContestantForm(forms.Form):
+    """A model, a variant, and how it asks; options that are left empty stay open."""
+
+    slug = forms.SlugField(max_length=80, label=gettext_lazy("Slug"))
+    name = forms.CharField(
+        max_length=120, required=False, label=gettext_lazy("Name (made of model and variant)")
+    )
+    variant = forms.ChoiceField(
+        choices=[(name, name) for name in VARIANTS], label=gettext_lazy("Variant")
+    )
+    model = forms.CharField(max_length=120, label=gettext_lazy("Model id on the endpoint"))
+    endpoint = forms.ChoiceField(required=False, label=gettext_lazy("Endpoint"))
+    label = forms.SlugField(
+        max_length=80, required=False, label=gettext_lazy("Label of the new endpoint")
+    )
+    base_url = forms.CharField(
+        max_length=200, required=False, label=gettext_lazy("Its address, up to /v1")
+    )
+    key_variable = forms.CharField(
+        max_length=80,
+        required=False,
+        label=gettext_lazy("Environment variable of the workers that holds its key"),
+    )
+    is_simulated = forms.BooleanField(
+        required=False, label=gettext_lazy("A stand-in: what it answers counts as simulated")
+    )
+    temperature = forms.FloatField(required=False, label=gettext_lazy("Temperature"))
+    seed = forms.IntegerField(required=False, label=gettext_lazy("Seed"))
+    reasoning_effort = forms.ChoiceField(
+        required=False,
+        choices=[("", "–"), *((word, word) for word in REASONING_EFFORTS)],
+        label=gettext_lazy("Reasoning effort"),
+    )
+    max_output_tokens = forms.IntegerField(
+        required=False, label=gettext_lazy("Tokens of one answer, at most")
+    )
+    protocol = forms.ChoiceField(
+        required=False,
+        choices=[("", "–"), *((word, word) for word in PROTOCOLS)],
+        label=gettext_lazy("Tool protocol"),
+    )
+    rounds = forms.IntegerField(required=False, label=gettext_lazy("Rounds, at most"))
+
+    def __init__(self, data: Any = None) -> None:
+        super().__init__(data)
+        field = cast(forms.ChoiceField, self.fields["endpoint"])
+        known = Endpoint.objects.values_list("label", flat=True)
+        field.choices = [(NEW, _("A new one")), *((label, label) for label in known)]
+
+    def clean(self) -> dict[str, Any]:
+        """A known endpoint, or a new one with its address."""
+        found = super().clean() or {}
+        if not found.get("endpoint") and not (found.get("label") and found.get("base_url")):
+            raise forms.ValidationError(_("Choose an endpoint, or give label and address."))
+        return found
+
+    def entered_endpoint(self) -> EnteredEndpoint:
+        """Where the model is, once the form is valid."""
+        found = self.cleaned_data
+        if found["endpoint"]:
+            return EnteredEndpoint(label=found["endpoint"])
+        return EnteredEndpoint(
+            label=found["label"],
+            base_url=found["base_url"],
+            key_variable=found["key_variable"],
+            is_simulated=found["is_simulated"],
+        )
+
+    def options(self) -> dict[str, object]:
+        """Those that were filled in."""
+        given = {name: self.cleaned_data.get(name) for name in OPTION_NAMES}
+        return {name: value for name, value in given.items() if value not in (None, "")}
+
+
+@allow_only(ADMIN)
+@require_http_methods(["GET", "HEAD", "POST"])
+def new_contestant_page(request: HttpRequest) -> HttpResponse:
+    """The form, filled in as it was where something can't be taken."""
+    form = ContestantForm(request.POST if request.method == "POST" else None)
+    if request.method == "POST" and form.is_valid():
+        chosen = form.cleaned_data
+        try:
+            row = enter_contestant(
+                slug=chosen["slug"],
+                name=chosen["name"],
+                variant=chosen["variant"],
+                model=chosen["model"],
+                endpoint=form.entered_endpoint(),
+                options=form.options(),
+                actor=cast(User, request.user),
+            )
+        except AugmentError as error:
+            form.add_error(None, translate(error))
+        else:
+            messages.success(request, _("“%(name)s” is added.") % {"name": row.name})
+            return redirect("contestant", code=row.code)
+    of_options = [form[name] for name in OPTION_NAMES if name in form.fields]
+    context = {
+        "form": form,
+        "who": [form[name] for name in ("slug", "name", "variant", "model")],
+        "where": [form[name] for name in ("endpoint", "label", "base_url", "key_variable")],
+        "of_options": of_options,
+    }
+    return render(request, "contestants/new.html", context)
