@@ -5,8 +5,7 @@ from __future__ import annotations
 import json
 import platform
 from dataclasses import asdict
-
-import numpy
+from importlib import metadata
 
 from arena.exports.zips import zip_bytes
 from arena.services.vote_rows import digest_of
@@ -14,6 +13,8 @@ from augment.services.judging.scenario_export import Exported
 
 MANIFEST = "manifest.json"
 WARNING = "WARNING.txt"
+WRITTEN_WITH = ("numpy", "scenariogeneration", "shapely", "PyYAML")
+"""What the bytes of the files depend on besides our own code."""
 
 
 def scenario_zip(exported: Exported) -> bytes:
@@ -46,7 +47,8 @@ def _manifest(exported: Exported, files: dict[str, bytes]) -> bytes:
         "lost": [asdict(loss) for loss in written.losses],
         "refused": [asdict(loss) for loss in written.refused],
         "missing": [asdict(loss) for loss in exported.missing],
-        "versions": {"python": platform.python_version(), "numpy": numpy.__version__},
+        "versions": {"python": platform.python_version()}
+        | {name: metadata.version(name) for name in WRITTEN_WITH},
         "files": {
             name: {"sha256": digest_of(content), "bytes": len(content)}
             for name, content in sorted(files.items())

@@ -89,6 +89,7 @@ def test_every_format_comes_as_one_zip_with_its_manifest(
         assert set(archive.namelist()) == {*manifest["files"], "manifest.json"}
         assert b"commercial" in archive.read("WARNING.txt")
     assert manifest["scenarios_in"] == form
+    assert {"python", "numpy", "scenariogeneration"} <= manifest["versions"].keys()
     assert manifest["sources"][0]["is_non_commercial"] is True
     assert manifest["missing"][0]["text"] == "there is no modification: refused"
     assert not manifest["refused"]

@@ -15,8 +15,8 @@ from augment.errors import InvalidDocument
 from augment.formats.waymo.crc32c import masked_crc32c
 
 WHAT = "Waymo Open Motion file"
-LONGEST_RECORD = 8 * 1024 * 1024
-"""A scenario takes one to four megabytes; with lidar it is another file."""
+LONGEST_RECORD = 12 * 1024 * 1024
+"""A scenario takes one to four megabytes, a very crowded one eight; lidar is in other files."""
 
 _HEAD = struct.Struct("<QI")
 _FOOT = struct.Struct("<I")
