@@ -29,7 +29,6 @@ from augment.errors import CannotPlace
 from augment.geometry.boxes import Box, overlap
 from augment.scene.entities import AgentType, Scene, TrafficAgent, TurnType
 from augment.scene.intent import (
-    Body,
     ConesRequest,
     CrashRequest,
     Intent,
@@ -40,6 +39,9 @@ from augment.scene.intent import (
     VehicleRequest,
     WalkRequest,
     resolve_anchors,
+)
+from augment.scene.intent_words import (
+    Body,
 )
 from augment.scene.modification import Modification, apply
 

@@ -15,10 +15,12 @@ from augment.scene.entities import AgentType, TrafficAgent
 from augment.scene.intent import (
     ConesRequest,
     LaneChoice,
+    Side,
+)
+from augment.scene.intent_words import (
     LateralTarget,
     Post,
     Shape,
-    Side,
 )
 from augment.scene.lane_graph import LanePosition
 from augment.scene.sizes import LENGTH_WIDTH_M

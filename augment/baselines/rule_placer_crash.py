@@ -20,7 +20,15 @@ from augment.geometry.angles import wrap
 from augment.geometry.boxes import Box, overlap
 from augment.geometry.frames import Pose
 from augment.scene.entities import Scene, TrafficAgent
-from augment.scene.intent import Bearing, Body, CrashedCar, CrashRequest, Facing
+from augment.scene.intent import (
+    CrashedCar,
+    CrashRequest,
+)
+from augment.scene.intent_words import (
+    Bearing,
+    Body,
+    Facing,
+)
 
 _GAP_M = 0.05
 _MOST_SHARED = 0.1

@@ -12,14 +12,16 @@ from augment.geometry.angles import wrap
 from augment.geometry.frames import Pose
 from augment.scene.entities import AgentType, TrafficAgent
 from augment.scene.intent import (
-    Body,
-    Facing,
     LaneChoice,
     Lateral,
-    LateralTarget,
-    Nearness,
     Side,
     VehicleRequest,
+)
+from augment.scene.intent_words import (
+    Body,
+    Facing,
+    LateralTarget,
+    Nearness,
 )
 from augment.scene.lane_graph import LanePosition
 from augment.scene.sizes import LENGTH_WIDTH_M

@@ -21,12 +21,14 @@ from augment.scene.intent import (
     CrashRequest,
     LaneChoice,
     Lateral,
-    LateralTarget,
-    Nearness,
-    Shape,
     Side,
     VehicleRequest,
     WalkRequest,
+)
+from augment.scene.intent_words import (
+    LateralTarget,
+    Nearness,
+    Shape,
 )
 from augment.scene.sizes import LENGTH_WIDTH_M
 

@@ -11,7 +11,13 @@ from augment.checks.finding import Finding, FindingKind
 from augment.checks.tolerances import CRASH_M, USUAL
 from augment.geometry.angles import difference
 from augment.scene.entities import TrafficAgent
-from augment.scene.intent import CrashRequest, Facing, LaneChoice
+from augment.scene.intent import (
+    CrashRequest,
+    LaneChoice,
+)
+from augment.scene.intent_words import (
+    Facing,
+)
 
 
 def asked_crash(asked: Asked) -> Iterator[Finding]:

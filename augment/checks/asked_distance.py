@@ -15,9 +15,11 @@ from augment.scene.intent import (
     ConesRequest,
     CrashRequest,
     Relation,
-    Shape,
     VehicleRequest,
     WalkRequest,
+)
+from augment.scene.intent_words import (
+    Shape,
 )
 
 

@@ -9,7 +9,12 @@ from augment.checks.asked import Asked, severity_of, side_of
 from augment.checks.finding import Finding, FindingKind
 from augment.geometry.angles import difference
 from augment.scene.entities import TrafficAgent
-from augment.scene.intent import Facing, VehicleRequest
+from augment.scene.intent import (
+    VehicleRequest,
+)
+from augment.scene.intent_words import (
+    Facing,
+)
 
 
 def asked_heading(asked: Asked) -> Iterator[Finding]:

@@ -12,7 +12,13 @@ from augment.checks.tolerances import USUAL
 from augment.geometry.angles import difference
 from augment.scene.ego_route import EgoRoute
 from augment.scene.entities import TrafficAgent
-from augment.scene.intent import Bearing, CrashedCar, CrashRequest
+from augment.scene.intent import (
+    CrashedCar,
+    CrashRequest,
+)
+from augment.scene.intent_words import (
+    Bearing,
+)
 
 MOST_ORDERED = 5
 _MISPLACED = 10.0

@@ -11,7 +11,6 @@ from augment.checks.lanes_across import LanesAcross
 from augment.checks.tolerances import LONG_VEHICLE_M
 from augment.scene.entities import AgentType, Point, TrafficAgent
 from augment.scene.intent import (
-    Body,
     ConesRequest,
     CrashRequest,
     Intent,
@@ -20,6 +19,9 @@ from augment.scene.intent import (
     Spot,
     VehicleRequest,
     WalkRequest,
+)
+from augment.scene.intent_words import (
+    Body,
 )
 
 

@@ -14,7 +14,6 @@ from typing import TypeVar
 
 from augment.scene.entities import TurnType
 from augment.scene.intent import (
-    Body,
     ConesRequest,
     CrashRequest,
     Intent,
@@ -25,6 +24,9 @@ from augment.scene.intent import (
     Spot,
     VehicleRequest,
     WalkRequest,
+)
+from augment.scene.intent_words import (
+    Body,
 )
 
 Asked = TypeVar("Asked", VehicleRequest, WalkRequest, ConesRequest, CrashRequest, Move)

@@ -8,7 +8,9 @@ from django.db import models
 from django.db.models import Q
 
 from augment.scene.catalogue import CatalogueSet, ScenarioType
-from augment.scene.intent import IntentOrigin
+from augment.scene.intent_words import (
+    IntentOrigin,
+)
 
 SLUG_HELP = "lower-case letters, digits and hyphens"
 

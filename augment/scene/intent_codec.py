@@ -16,28 +16,30 @@ from pydantic import BaseModel, Field, Strict, model_validator
 from augment.errors import InvalidDocument
 from augment.scene.entities import TurnType
 from augment.scene.intent import (
-    Bearing,
-    Body,
     ConesRequest,
     CrashedCar,
     CrashRequest,
-    Facing,
     Intent,
     LaneChoice,
     Lateral,
-    LateralTarget,
     Length,
     Move,
-    Nearness,
-    Post,
     Relation,
     Request,
-    Setting,
-    Shape,
     Side,
     Spot,
     VehicleRequest,
     WalkRequest,
+)
+from augment.scene.intent_words import (
+    Bearing,
+    Body,
+    Facing,
+    LateralTarget,
+    Nearness,
+    Post,
+    Setting,
+    Shape,
 )
 from augment.scene.landmarks import MapPlace, Pick, Sight
 from augment.scene.schema import VERSION, Document, Id, read

@@ -18,7 +18,13 @@ from augment.baselines.quantised_code import Action, Code, Direction, Quadrant, 
 from augment.baselines.registry import PLACERS
 from augment.errors import CannotPlace
 from augment.scene.entities import AgentType, TrafficAgent
-from augment.scene.intent import Intent, Shape, Side
+from augment.scene.intent import (
+    Intent,
+    Side,
+)
+from augment.scene.intent_words import (
+    Shape,
+)
 from tests.benchmarks.displacement import made, measured
 from tests.fixtures.shelf import SLUGS
 from tests.intents import cones, parked, walk

@@ -11,7 +11,14 @@ import pytest
 from augment.geometry.boxes import Box, overlap
 from augment.geometry.polyline import Polyline
 from augment.scene.entities import AgentType, Area, AreaKind, Lane
-from augment.scene.intent import CrashedCar, Setting, Shape, Side
+from augment.scene.intent import (
+    CrashedCar,
+    Side,
+)
+from augment.scene.intent_words import (
+    Setting,
+    Shape,
+)
 from tests.baselines.placing import added, refusal
 from tests.intents import LEFT_EDGE, cones, crash, metres, towards, walk
 from tests.scenes import curve, scene

@@ -11,15 +11,17 @@ from augment.checks import Finding, FindingKind, Ground, Severity
 from augment.checks.against_intent import check_against_intent
 from augment.scene.entities import AgentType, TrafficAgent, TrafficSide
 from augment.scene.intent import (
-    Body,
     CrashedCar,
-    Facing,
     Intent,
     LaneChoice,
-    LateralTarget,
-    Shape,
     Side,
     Spot,
+)
+from augment.scene.intent_words import (
+    Body,
+    Facing,
+    LateralTarget,
+    Shape,
 )
 from augment.scene.modification import Modification
 from tests.intents import (

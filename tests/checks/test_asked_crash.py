@@ -11,14 +11,16 @@ from augment.checks import FindingKind, Ground
 from augment.checks.against_intent import check_against_intent
 from augment.scene.entities import TrafficAgent
 from augment.scene.intent import (
-    Bearing,
     CrashedCar,
     CrashRequest,
-    Facing,
     Intent,
     Length,
     Relation,
     Spot,
+)
+from augment.scene.intent_words import (
+    Bearing,
+    Facing,
 )
 from augment.scene.modification import Modification
 from tests.scenes import scene, vehicle

@@ -8,8 +8,10 @@ from typing import Any
 from augment.models import Augmentation, BaseScene, Contestant, Endpoint, GenerationJob, Scenario
 from augment.scene.codec import modification_to_document, scene_to_document
 from augment.scene.entities import Scene
-from augment.scene.intent import Shape
 from augment.scene.intent_codec import intent_to_document
+from augment.scene.intent_words import (
+    Shape,
+)
 from augment.scene.modification import Modification
 from augment.services.running import jobs, leases
 from tests.intents import cones

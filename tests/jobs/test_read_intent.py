@@ -19,8 +19,10 @@ from augment.llm.client import ChatClient
 from augment.llm.messages import Reply
 from augment.llm.scripted import ScriptedClient
 from augment.models import Event, IntentReading, ModelCall, Scenario
-from augment.scene.intent import Shape
 from augment.scene.intent_codec import intent_to_document, intent_to_parts
+from augment.scene.intent_words import (
+    Shape,
+)
 from augment.services.endpoints import contestants
 from augment.services.running.caps import Caps
 from augment.services.running.intent_readings import read_intent

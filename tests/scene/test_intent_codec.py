@@ -9,22 +9,14 @@ from hypothesis import strategies as st
 
 from augment.errors import InvalidDocument
 from augment.scene.intent import (
-    Bearing,
-    Body,
     ConesRequest,
     CrashedCar,
     CrashRequest,
-    Facing,
     Intent,
     LaneChoice,
     Lateral,
-    LateralTarget,
     Length,
-    Nearness,
-    Post,
     Relation,
-    Setting,
-    Shape,
     Side,
     Spot,
     VehicleRequest,
@@ -37,6 +29,16 @@ from augment.scene.intent_codec import (
     intent_to_document,
 )
 from augment.scene.intent_statements import list_statements
+from augment.scene.intent_words import (
+    Bearing,
+    Body,
+    Facing,
+    LateralTarget,
+    Nearness,
+    Post,
+    Setting,
+    Shape,
+)
 from tests.fixtures.shelf import SLUGS, entry
 from tests.intents import metres, parked
 

@@ -8,7 +8,9 @@ from augment.errors import ModelFault
 from augment.llm.messages import Reply
 from augment.llm.scripted import ScriptedClient
 from augment.prompts.texts import read_text
-from augment.scene.intent import Facing
+from augment.scene.intent_words import (
+    Facing,
+)
 from augment.variants.pipeline import OutcomeStatus
 from augment.variants.respondents import RespondentClient
 from augment.variants.transcript import ModelRole

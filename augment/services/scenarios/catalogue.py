@@ -26,8 +26,10 @@ from augment.scene.codec import (
     scene_to_document,
 )
 from augment.scene.entities import Scene
-from augment.scene.intent import IntentOrigin
 from augment.scene.intent_codec import intent_to_document
+from augment.scene.intent_words import (
+    IntentOrigin,
+)
 from augment.scene.modification import without_traffic
 from augment.services.events import log_event
 from augment.services.scenarios.scenes import (

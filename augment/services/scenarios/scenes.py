@@ -18,8 +18,13 @@ from augment.scene.codec import (
     scene_from_document,
 )
 from augment.scene.entities import Scene
-from augment.scene.intent import Intent, IntentOrigin
+from augment.scene.intent import (
+    Intent,
+)
 from augment.scene.intent_codec import intent_from_document, intent_to_document
+from augment.scene.intent_words import (
+    IntentOrigin,
+)
 from augment.scene.lane_graph import LaneGraph
 from augment.scene.modification import Modification, check_fits, without_traffic
 from augment.services.events import log_event
