@@ -14,22 +14,20 @@ from typing import TypeVar
 
 from augment.scene.entities import TurnType
 from augment.scene.intent import (
-    ConesRequest,
-    CrashRequest,
     Intent,
     LaneChoice,
     Length,
     Move,
     Relation,
+    Request,
     Spot,
     VehicleRequest,
-    WalkRequest,
 )
 from augment.scene.intent_words import (
     Body,
 )
 
-Asked = TypeVar("Asked", VehicleRequest, WalkRequest, ConesRequest, CrashRequest, Move)
+Asked = TypeVar("Asked", bound=Request | Move)
 
 _ATTEMPT_SHARE = 0.6
 """So many of the wishes that can't be met are carried out somehow."""

@@ -26,6 +26,7 @@ from augment.render.camera import Camera, camera_for
 from augment.render.marks import PERSON_PX
 from augment.render.shapes import ribbon
 from augment.scene.entities import AgentType, Scene, TrafficAgent
+from augment.scene.lane_graph import AnyLane
 from augment.scene.modification import Modification, without_traffic
 
 ROUNDS = 5
@@ -137,7 +138,7 @@ def _by_matplotlib(scene: Scene, camera: Camera) -> bytes:
     axes.set_axis_off()
     axes.set_xlim(camera.x_min_m, camera.x_max_m)
     axes.set_ylim(camera.y_min_m, camera.y_max_m)
-    lanes = [*scene.lanes, *scene.connectors]
+    lanes: list[AnyLane] = [*scene.lanes, *scene.connectors]
     axes.add_collection(
         PolyCollection([np.array(one.boundary_m) for one in scene.areas], facecolor="0.9")
     )

@@ -201,6 +201,7 @@ def test_agreement_carries_ac1_with_an_interval() -> None:
     found = agreement(votes, rounds=200, seed=1)
     table = np.array([row for row in unit_table(votes)[0] if row.sum() >= 2])
     assert found.ac1.value == pytest.approx(gwet_ac1(table))
+    assert found.ac1.value is not None
     assert found.ac1.lower is not None
     assert found.ac1.upper is not None
     assert found.ac1.lower < found.ac1.value < found.ac1.upper
