@@ -61,12 +61,12 @@ def engineer_messages(
     return Message(speaker=Speaker.SYSTEM, text=told), said_by_user(task)
 
 
-def viewer_messages(questions: Sequence[str], png: bytes) -> tuple[Message, ...]:
-    """What the viewer is asked: the questions, about one picture."""
+def viewer_messages(questions: Sequence[str], pictures: Sequence[bytes]) -> tuple[Message, ...]:
+    """What the viewer is asked: the questions, about the pictures (PNG)."""
     task = fill_text("viewer_task.md", questions=number_lines(questions))
     return (
         Message(speaker=Speaker.SYSTEM, text=fill_text("viewer.md", drawn=read_text("drawn.md"))),
-        said_by_user(task, images=(png,)),
+        said_by_user(task, images=tuple(pictures)),
     )
 
 

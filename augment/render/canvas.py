@@ -167,15 +167,17 @@ class Canvas:
             halved: Give one pixel for each of the picture's, blended, in full colour: for those
                 who pay by the pixel.
         """
+        image = self._finished()
+        if halved:
+            image = image.convert("RGB").reduce(DENSITY)
+        return _packed(image)
+
+    def _finished(self) -> Image.Image:
+        """With its texts."""
         finished = self.copy()
         for write in self._texts:
             write(finished)
-        image = finished._image
-        if halved:
-            image = image.convert("RGB").reduce(DENSITY)
-        stream = io.BytesIO()
-        image.save(stream, format="PNG", compress_level=_COMPRESS_LEVEL)
-        return stream.getvalue()
+        return finished._image
 
     def _smooth(self, at_px: tuple[float, float], text: str, size_px: int, anchor: str) -> None:
         """Ink with soft edges: its steps towards paper are colours of the palette."""
@@ -231,6 +233,22 @@ class MetricCanvas:
         """A point in pixels."""
         x, y = self.camera.to_pixels(np.array([[x_m, y_m]]))[0]
         return float(x), float(y)
+
+
+def stack_png(above: Canvas, below: Canvas) -> bytes:
+    """Two pictures of one width as one, one above the other, halved as `Canvas.png` says."""
+    images = [one._finished().convert("RGB").reduce(DENSITY) for one in (above, below)]
+    height_px = sum(image.height for image in images)
+    whole = Image.new("RGB", (images[0].width, height_px), palette.PAPER)
+    whole.paste(images[0], (0, 0))
+    whole.paste(images[1], (0, images[0].height))
+    return _packed(whole)
+
+
+def _packed(image: Image.Image) -> bytes:
+    stream = io.BytesIO()
+    image.save(stream, format="PNG", compress_level=_COMPRESS_LEVEL)
+    return stream.getvalue()
 
 
 def text_width_px(text: str, size_px: int) -> float:

@@ -19,7 +19,7 @@ from augment.scene.modification import Modification
 from augment.variants.modifier import form_of
 from augment.variants.recipes import LaneFormat, Recipe, Review
 from augment.variants.transcript import ModelRole
-from augment.variants.visual_qa import picture
+from augment.variants.visual_qa import pictures
 
 CHARACTERS_PER_TOKEN = 2.6
 """Measured on number-heavy text over common vocabularies: an estimate, no bound."""
@@ -120,7 +120,7 @@ def shown_prompt(
             messages = ask(scene, instruction, modification, radius_m=radius_m)
         case ModelRole.VIEWER:
             messages = fill_review.viewer_messages(
-                questions, picture(scene, modification, width_px=recipe.limits.picture_px)
+                questions, pictures(scene, modification, width_px=recipe.limits.picture_px)
             )
     return Shown(messages=messages, tools=(), fit=None)
 

@@ -15,8 +15,8 @@ from augment.prompts import fill_review
 from augment.prompts.names import short_names
 from augment.prompts.review import read_questions, read_sight, read_verdict
 from augment.prompts.texts import model_message
-from augment.render.bev import draw
 from augment.render.camera import WIDTH_PX, camera_for
+from augment.render.reviewed import draw_for_review
 from augment.scene.entities import Scene
 from augment.scene.modification import Modification
 from augment.variants.recipes import Limits
@@ -73,20 +73,22 @@ def review_picture(submission: Submission, respondents: Respondents, limits: Lim
     )
 
 
-def picture(scene: Scene, modification: Modification, *, width_px: int = WIDTH_PX) -> bytes:
-    """What the viewer is shown: a PNG with ids, metres and the change."""
+def pictures(
+    scene: Scene, modification: Modification, *, width_px: int = WIDTH_PX
+) -> tuple[bytes, ...]:
+    """What the viewer is shown: a PNG with ids, metres and the change, and the change enlarged."""
     shown, change = _under_short_names(scene, modification)
-    return draw(shown, change, camera_for(shown, change).at_width(width_px), labels=True)
+    return draw_for_review(shown, change, camera_for(shown, change).at_width(width_px))
 
 
 def _seen(
     submission: Submission, questions: tuple[str, ...], inquiry: Inquiry, width_px: int
 ) -> dict[int, str]:
-    png = picture(submission.scene, submission.modification, width_px=width_px)
+    shown = pictures(submission.scene, submission.modification, width_px=width_px)
     inquiry = replace(
         inquiry, again=lambda told, said, _: fill_review.viewer_re_ask_messages(told, said)
     )
-    messages = fill_review.viewer_messages(questions, png)
+    messages = fill_review.viewer_messages(questions, shown)
     seen, _, _ = inquiry.read(messages, partial(read_sight, count=len(questions)))
     return seen
 

@@ -72,8 +72,8 @@ def test_every_recipe_shows_one_of_these_prompts() -> None:
         form = form_of(one)
         assert (form.lanes, form.calling) in {("polyline", "none"), ("bezier", "in_prompt")}
         if one.review is Review.VISUAL:
-            (_, task) = viewer_messages(["a?", "b?", "c?"], b"png")
-            assert task.images == (b"png",)
+            (_, task) = viewer_messages(["a?", "b?", "c?"], [b"one", b"two"])
+            assert task.images == (b"one", b"two")
 
 
 if __name__ == "__main__":

@@ -44,7 +44,7 @@ def test_the_reviewer_gets_vectors_and_no_reasoning() -> None:
     assert "One road, two lanes" not in task.text  # the modifier's insights
     assert '"Agent2": ["VEHICLE",21.4,0,0,2,4.8,0,"Lane1"]' in task.text
     assert "> Add a parked car 21.4 m ahead." in task.text
-    assert '"Lane1": [1, "Eastwards"' in task.text
+    assert '"Lane1": [1,"Eastwards"' in task.text
 
 
 def test_the_best_rated_of_three_rounds_counts_and_each_is_on_record() -> None:
