@@ -43,10 +43,7 @@ def write_big_log(folder: Path, megabytes: int) -> Path:
     base.execute("PRAGMA synchronous = OFF")
     base.execute("PRAGMA journal_mode = OFF")
     for name in ("lidar_pc", "ego_pose", "lidar_box"):
-        columns = [row[1] for row in base.execute(f"PRAGMA table_info({name})")]
-        base.execute(f"DROP TABLE {name}")
-        rest = ", ".join(columns[1:])
-        base.execute(f"CREATE TABLE {name} (token BLOB NOT NULL PRIMARY KEY, {rest})")
+        base.execute(f"DELETE FROM {name}")
     for number in range(BOXES):
         base.execute(
             "INSERT INTO track VALUES (?, ?, 1.9, 4.6, 1.5)", (token(70 + number), token(50))
@@ -70,11 +67,13 @@ def _add_frame(base: sqlite3.Connection, step: int, east: float, north: float) -
         (frame, pose, token(7), stamp),
     )
     base.execute(
-        "INSERT INTO ego_pose VALUES (?, ?, ?, ?, 0, 1, 0, 0, 0, 5, 0, 0, ?)",
+        "INSERT INTO ego_pose VALUES "
+        "(?, ?, ?, ?, 0, 1, 0, 0, 0, 5, 0, 0, 0, 0, 0, 0, 0, 0, 32611, ?)",
         (pose, stamp, x, north, token(1)),
     )
     base.executemany(
-        "INSERT INTO lidar_box VALUES (?, ?, ?, ?, ?, 0, 1.9, 4.6, 1.5, 5, 0, 0, 0, 1)",
+        "INSERT INTO lidar_box VALUES "
+        "(?, ?, ?, NULL, NULL, ?, ?, 0, 1.9, 4.6, 1.5, 5, 0, 0, 0, 1)",
         [
             (
                 _random(f"box {step} {one}"),

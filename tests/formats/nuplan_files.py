@@ -23,6 +23,40 @@ CITIES = {
 }
 REAR_AXLE_TO_CENTER_M = 1.461
 
+_ONLY = "token BLOB NOT NULL"
+_XYZ = "x FLOAT, y FLOAT, z FLOAT"
+COLUMNS = {
+    "log": f"{_ONLY}, vehicle_name VARCHAR(64), date VARCHAR(64), timestamp INTEGER, "
+    "logfile VARCHAR(64), location VARCHAR(64), map_version VARCHAR(64)",
+    "camera": f"{_ONLY}, log_token BLOB, channel VARCHAR(64), model VARCHAR(64), "
+    "translation BLOB, rotation BLOB, intrinsic BLOB, distortion BLOB, width INTEGER, "
+    "height INTEGER",
+    "lidar": f"{_ONLY}, log_token BLOB, channel VARCHAR(64), model VARCHAR(64), "
+    "translation BLOB, rotation BLOB",
+    "image": f"{_ONLY}, next_token BLOB, prev_token BLOB, ego_pose_token BLOB, "
+    "camera_token BLOB, filename_jpg VARCHAR(128), timestamp INTEGER",
+    "lidar_pc": f"{_ONLY}, next_token BLOB, prev_token BLOB, ego_pose_token BLOB NOT NULL, "
+    "lidar_token BLOB, scene_token BLOB, filename VARCHAR(128), timestamp INTEGER",
+    "ego_pose": f"{_ONLY}, timestamp INTEGER, {_XYZ}, qw FLOAT, qx FLOAT, qy FLOAT, qz FLOAT, "
+    "vx FLOAT, vy FLOAT, vz FLOAT, acceleration_x FLOAT, acceleration_y FLOAT, "
+    "acceleration_z FLOAT, angular_rate_x FLOAT, angular_rate_y FLOAT, angular_rate_z FLOAT, "
+    "epsg INTEGER, log_token BLOB",
+    "lidar_box": f"{_ONLY}, lidar_pc_token BLOB NOT NULL, track_token BLOB NOT NULL, "
+    f"next_token BLOB, prev_token BLOB, {_XYZ}, width FLOAT, length FLOAT, height FLOAT, "
+    "vx FLOAT, vy FLOAT, vz FLOAT, yaw FLOAT, confidence FLOAT",
+    "track": f"{_ONLY}, category_token BLOB, width FLOAT, length FLOAT, height FLOAT",
+    "category": f"{_ONLY}, name VARCHAR(64), description TEXT",
+    "scene": f"{_ONLY}, log_token BLOB, name TEXT, goal_ego_pose_token BLOB, roadblock_ids TEXT",
+    "scenario_tag": f"{_ONLY}, lidar_pc_token BLOB NOT NULL, type TEXT, agent_track_token BLOB",
+    "traffic_light_status": f"{_ONLY}, lidar_pc_token BLOB NOT NULL, "
+    "lane_connector_id INTEGER, status VARCHAR(8)",
+}
+"""The twelve tables as they are published, tokens as their only index."""
+UNREAD = frozenset(
+    ["next_token", "prev_token", "epsg"]
+    + [f"{name}_{axis}" for name in ("acceleration", "angular_rate") for axis in "xyz"]
+)
+
 
 def token(number: int) -> bytes:
     return struct.pack(">Q", number)
@@ -146,23 +180,15 @@ def write_log(root: Path, city: str, steps: int = 21) -> Path:
     file = root / "made.db"
     base = sqlite3.connect(file)
     base.execute("PRAGMA synchronous = OFF")
-    for table, columns in {
-        "log": "token, vehicle_name, date, timestamp, logfile, location, map_version",
-        "lidar_pc": "token, next_token, prev_token, ego_pose_token, lidar_token, scene_token, "
-        "filename, timestamp",
-        "ego_pose": "token, timestamp, x, y, z, qw, qx, qy, qz, vx, vy, vz, log_token",
-        "lidar_box": "token, lidar_pc_token, track_token, x, y, z, width, length, height, "
-        "vx, vy, vz, yaw, confidence",
-        "track": "token, category_token, width, length, height",
-        "category": "token, name, description",
-        "scene": "token, log_token, name, goal_ego_pose_token, roadblock_ids",
-        "scenario_tag": "token, lidar_pc_token, type, agent_track_token",
-        "traffic_light_status": "token, lidar_pc_token, lane_connector_id, status",
-    }.items():
-        base.execute(f"CREATE TABLE {table} ({columns})")
+    for table, columns in COLUMNS.items():
+        base.execute(f"CREATE TABLE {table} ({columns}, PRIMARY KEY (token))")
 
     def add(table: str, *row: object) -> None:
-        base.execute(f"INSERT INTO {table} VALUES ({', '.join('?' * len(row))})", row)
+        """A row; what nobody reads (neighbours in time, accelerations) is left NULL."""
+        every = [one.split()[0] for one in COLUMNS[table].split(", ")]
+        names = [one for one in every if one not in UNREAD]
+        marks = ", ".join("?" * len(row))
+        base.execute(f"INSERT INTO {table} ({', '.join(names)}) VALUES ({marks})", row)
 
     add("log", token(1), "g", "2021", 0, "2021.05.12_made", city, city)
     add("category", token(50), "vehicle", "")
@@ -173,7 +199,7 @@ def write_log(root: Path, city: str, steps: int = 21) -> Path:
     for step in range(steps):
         time, x = 1_000_000 + 50_000 * step, east + 0.5 * step
         frame = token(100 + step)
-        add("lidar_pc", frame, None, None, token(1000 + step), None, token(7), "", time)
+        add("lidar_pc", frame, token(1000 + step), None, token(7), "", time)
         pose = (x, north, 0.0, 1.0, 0.0, 0.0, 0.0, 10.0, 0.0, 0.0)
         add("ego_pose", token(1000 + step), time, *pose, token(1))
         box = (east + 21.461, north, 0.0, 1.9, 4.6, 1.5, 3.0, 4.0, 0.0, 0.0, 1.0)

@@ -108,7 +108,12 @@ def test_any_value_in_any_column_of_a_database_is_read_or_refused(
             st.sampled_from(sorted(folder.rglob("*.db")) + sorted(folder.rglob("*.gpkg")))
         )
         base = sqlite3.connect(file)
-        tables = [row[0] for row in base.execute("SELECT name FROM sqlite_master ORDER BY name")]
+        tables = [
+            row[0]
+            for row in base.execute(
+                "SELECT name FROM sqlite_master WHERE type = 'table' ORDER BY name"
+            )
+        ]
         table = data.draw(st.sampled_from(tables))
         columns = [row[1] for row in base.execute(f"PRAGMA table_info({table})")]
         change = f"UPDATE {table} SET {data.draw(st.sampled_from(columns))} = "

@@ -167,6 +167,20 @@ def test_feature_ids_may_be_texts_and_logs_may_name_the_city_otherwise(log: Path
     assert found == wanted
 
 
+def test_every_frame_with_a_tag_can_be_taken(log: Path) -> None:
+    base = sqlite3.connect(log)
+    row = (token(5001), token(115), "high_magnitude_speed", None)
+    base.execute("INSERT INTO scenario_tag VALUES (?, ?, ?, ?)", row)
+    base.commit()
+    base.close()
+    for item, wanted in (("", 110), (":0", 110), (":1", 115)):
+        found = read(log, f"tag:high_magnitude_speed{item}").moment.item
+        assert found == token(wanted).hex()
+    assert "2 frames have the tag 'high_magnitude_speed', from 0 on; not 2" in fault_of(
+        log, "tag:high_magnitude_speed:2"
+    )
+
+
 def test_moments_are_tokens(log: Path) -> None:
     found = [one.item for one in NuPlan().moments(log, every_s=0.5)]
     assert found == [token(100).hex(), token(110).hex(), token(120).hex()]

@@ -2,7 +2,8 @@
 
 A path is a log's .db; its map lies under a folder `maps` beside it or above it, as the data set
 is laid out: maps/<location>/<version>/map.gpkg. `item` is the token of a lidar_pc, or
-`tag:<scenario type>` for the first frame that has the tag; `frame` counts tenths of a second on.
+`tag:<scenario type>` for the first frame that has the tag, `tag:<scenario type>:<number>` for
+another of them, counted from 0.
 """
 
 from __future__ import annotations
@@ -149,14 +150,25 @@ def _mission_notes(mission: Mission, origin: Pose) -> Iterator[Note]:
 
 def _token(tables: Tables, item: str | None) -> str:
     if item is None or item.startswith(TAG):
-        tag = None if item is None else item.removeprefix(TAG)
-        tokens = tokens_of(tables, tag)
-        if not tokens:
+        tag, number = (None, 0) if item is None else _tag(item)
+        found = tokens_of(tables, tag)
+        if not found:
             text = "the log has no frame" if tag is None else f"no frame has the tag {tag!r}"
             raise InvalidDocument(WHAT, [("item", text)])
-        return tokens[0][0]
+        if number >= len(found):
+            text = f"{len(found)} frames have the tag {tag!r}, from 0 on; not {number}"
+            raise InvalidDocument(WHAT, [("item", text)])
+        return found[number][0]
     if not _TOKEN.fullmatch(item.lower()):
         raise InvalidDocument(
             WHAT, [("item", f"{item[:40]!r} is neither a token of 16 hex digits nor tag:TYPE")]
         )
     return item.lower()
+
+
+def _tag(item: str) -> tuple[str, int]:
+    """The type after "tag:", and which of its frames: "tag:TYPE" or "tag:TYPE:3"."""
+    name, _, number = item.removeprefix(TAG).rpartition(":")
+    if name and number.isdecimal() and len(number) < 10:
+        return name, int(number)
+    return item.removeprefix(TAG), 0
