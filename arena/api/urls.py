@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from django.urls import URLPattern, path
 
+from arena.api.contestants import ContestantsView
 from arena.api.jobs import JobProgressView
 from arena.api.matchups import MatchupsView
 from arena.api.preferences import PreferencesView
@@ -11,6 +12,7 @@ from arena.api.reports import ReportsView
 from arena.api.votes import VotesView
 
 urlpatterns: list[URLPattern] = [
+    path("contestants", ContestantsView.as_view(), name="api-contestants"),
     path("jobs/<uuid:code>/progress", JobProgressView.as_view(), name="job-progress"),
     path("matchups", MatchupsView.as_view(), name="api-matchups"),
     path("preferences", PreferencesView.as_view(), name="api-preferences"),

@@ -47,7 +47,7 @@ def transcript_of(augmentation: Augmentation) -> dict[str, Any]:
             "type": scenario.type,
             "instruction": scenario.instruction,
         },
-        "contestant": _contestant(augmentation.contestant),
+        "contestant": contestant_document(augmentation.contestant),
         "job": {
             "code": str(job.code),
             "name": job.name,
@@ -60,10 +60,8 @@ def transcript_of(augmentation: Augmentation) -> dict[str, Any]:
     }
 
 
-# --- Private -----------------------------------------------------------------------------------
-
-
-def _contestant(contestant: Contestant) -> dict[str, Any]:
+def contestant_document(contestant: Contestant) -> dict[str, Any]:
+    """A contestant in full, ready for JSON: who it is, and how it asks."""
     endpoint = contestant.endpoint
     return {
         "slug": contestant.slug,
@@ -84,6 +82,9 @@ def _contestant(contestant: Contestant) -> dict[str, Any]:
             "is_simulated": endpoint.is_simulated,
         },
     }
+
+
+# --- Private -----------------------------------------------------------------------------------
 
 
 def _totals(tries: list[Try]) -> dict[str, Any]:

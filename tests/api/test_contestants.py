@@ -1,0 +1,30 @@
+from __future__ import annotations
+
+import pytest
+from django.urls import reverse
+
+from augment.models import EndpointModel
+from augment.services.endpoints import contestants
+from augment.variants.options import ContestantOptions
+from tests.web.cast import people, signed_in
+
+pytestmark = pytest.mark.django_db
+
+
+def test_a_contestant_is_told_in_full_to_staff_alone() -> None:
+    contestants.ensure_endpoint(label="here", base_url="http://127.0.0.1:1/v1")
+    contestants.add_contestant(
+        slug="one",
+        variant="otm",
+        endpoint="here",
+        model="m",
+        options=ContestantOptions(temperature=0.7),
+    )
+    EndpointModel.objects.update(temperature=False)
+    accounts = people()
+    address = reverse("api-contestants")
+    assert signed_in(accounts["expert"]).get(address).status_code == 403
+    (found,) = signed_in(accounts["analyst"]).get(address).json()
+    assert (found["slug"], found["retired_at"]) == ("one", None)
+    assert (found["options"], found["frozen_options"]) == ({"temperature": 0.7}, None)
+    assert found["left_out"] == {"modifier": ["temperature"]}
