@@ -16,6 +16,7 @@ from typing import TypeVar
 import numpy as np
 
 from arena.rating.comparisons import BoolArray, FloatArray, IntArray, PairCounts
+from arena.rating.reach import are_all_together
 from augment.sentences import Sentence, sentence
 
 _NUMBERS_AT_ONCE = 4_000_000
@@ -81,9 +82,13 @@ def diagnose(
         said = sentence("There are no votes to rate.")
         return Diagnosis(status=Status.NO_VOTES, explanation=(said,))
     games, scores = counts.games[:, None], counts.scores[:, None]
-    scored = _scored(len(names), counts.low, counts.high, games, scores)
-    apart = _groups(_closure(scored | scored.transpose(0, 2, 1))[0])
-    reached = _closure(scored)[0]
+    if are_all_together(len(names), counts):  # else matrices of all contestants are multiplied
+        reached: BoolArray = np.broadcast_to(np.bool_(True), (len(names), len(names)))
+        scored, apart = reached[None], _groups(reached)
+    else:
+        scored = _scored(len(names), counts.low, counts.high, games, scores)
+        apart = _groups(_closure(scored | scored.transpose(0, 2, 1))[0])
+        reached = _closure(scored)[0]
     parts = tuple(map(tuple, apart if bounded_anyway else _groups(reached)))
     groups = tuple(map(tuple, apart))
     if len(parts) > 1:
@@ -140,7 +145,7 @@ class Determined:
         scores: FloatArray,
     ) -> None:
         self._contestants, self._low, self._high = contestants, low, high
-        self._tree = _tree(contestants, low, high, np.minimum(scores, games - scores))
+        self._tree = heaviest_tree(contestants, low, high, np.minimum(scores, games - scores))
 
     def among(self, games: FloatArray, scores: FloatArray) -> BoolArray:
         """(B,) for rounds of games and scores (P, B)."""
@@ -192,7 +197,7 @@ def are_determined(
     return everywhere.among(games.T, scores.T)
 
 
-def _tree(contestants: int, low: IntArray, high: IntArray, weight: FloatArray) -> IntArray:
+def heaviest_tree(contestants: int, low: IntArray, high: IntArray, weight: FloatArray) -> IntArray:
     """The pairs of the heaviest tree (Kruskal 1956), over pairs of weight above zero."""
     group = np.arange(contestants)
     chosen: list[int] = []

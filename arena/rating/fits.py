@@ -15,8 +15,9 @@ from arena.rating.bootstrap import Rounds, resample
 from arena.rating.bradley_terry import Meetings, to_elo
 from arena.rating.comparisons import BoolArray, Comparisons, FloatArray, PairCounts, tally
 from arena.rating.components import Loose, loose
-from arena.rating.connectivity import Determined
+from arena.rating.connectivity import Determined, heaviest_tree
 from arena.rating.pulls import Pulls, bradley_terry_pulls, davidson_pulls
+from arena.rating.reach import loose_rounds, rounds_to_draw
 from arena.rating.rules import Intervals, Method, Order, Rules
 
 
@@ -132,14 +133,22 @@ def _same_everywhere(
     votes: Comparisons, counts: PairCounts, rules: Rules, rating: FloatArray
 ) -> tuple[FloatArray, Loose]:
     """The data's ratings (C,) in every round: only who is determined differs."""
-
-    def whole(drawn: Rounds) -> FloatArray:
-        return np.repeat(rating[:, None], drawn.games.shape[1], axis=1)
-
-    def apart(drawn: Rounds, together: BoolArray) -> FloatArray:
-        return whole(drawn)
-
-    return _samples(votes, counts, rules, whole, apart)
+    tree = heaviest_tree(
+        len(votes.names),
+        counts.low,
+        counts.high,
+        np.minimum(counts.scores, counts.games - counts.scores),
+    )
+    fine, rest = loose_rounds(
+        votes,
+        counts,
+        tree,
+        rating,
+        unit=rules.unit,
+        rounds=rounds_to_draw(votes, counts, rules.rounds),
+        seed=rules.seed,
+    )
+    return np.repeat(rating[:, None], fine, axis=1), rest
 
 
 def _samples(

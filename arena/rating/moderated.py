@@ -49,6 +49,7 @@ class Component:
 
     Attributes:
         covariance: (C, C) moderated.
+        plain: (C, C) what the plain sandwich has: the squares, corrected for what the fit takes.
         common: (C, C) what it would be if all contestants were disagreed about alike.
         own_share: (C,) the weight of a contestant's own square, 0 to 1.
         own_degrees: (C,) degrees of freedom of that square: effective clusters less one.
@@ -56,6 +57,7 @@ class Component:
     """
 
     covariance: FloatArray
+    plain: FloatArray
     common: FloatArray
     own_share: FloatArray
     own_degrees: FloatArray
@@ -71,6 +73,7 @@ class Spread:
         degrees: (C,) of Student's t for a rating.
         common: (C, C) the covariance if contestants were disagreed about alike.
         base: (C, C) that of independent cells, or votes.
+        plain: (C, C) by the plain sandwich, in which each contestant stands for itself.
         components: By kind of cluster; none for votes that count as independent.
     """
 
@@ -78,6 +81,7 @@ class Spread:
     degrees: FloatArray
     common: FloatArray
     base: FloatArray
+    plain: FloatArray
     components: tuple[Component, ...]
 
     def among(self, members: IntArray) -> Self:
@@ -91,9 +95,11 @@ class Spread:
             degrees=self.degrees[members],
             common=self.common[places],
             base=self.base[places],
+            plain=self.plain[places],
             components=tuple(
                 Component(
                     covariance=component.covariance[places],
+                    plain=component.plain[places],
                     common=component.common[places],
                     own_share=component.own_share[members],
                     own_degrees=component.own_degrees[members],
@@ -131,6 +137,7 @@ def spread_of(
     pulls = pulls.relative_to(reference)
     kinds = clusters_of(votes, unit)
     base = pulls.by_row()
+    cells = np.empty(0, dtype=np.int64)
     if len(kinds) > 1:
         cells, cell_of = renumber_codes(kinds[0][1] * kinds[1][0] + kinds[1][1])
         base = pulls.by_cluster(cell_of, len(cells))
@@ -141,10 +148,14 @@ def spread_of(
         base = np.zeros_like(base)  # there is but one of what differs: nothing can be said
     if not components:
         known = np.full(len(base), _FAR)
-        return Spread(covariance=base, degrees=known, common=base, base=base, components=())
+        return Spread(
+            covariance=base, degrees=known, common=base, base=base, plain=base, components=()
+        )
     found = sum((component.covariance for component in components[1:]), components[0].covariance)
     common = sum((component.common for component in components[1:]), components[0].common)
+    plain = sum((component.plain for component in components[1:]), components[0].plain)
     if len(components) > 1:
+        plain = plain - base * len(cells) / max(len(cells) - 1, 1)
         found, common = found - base, common - base
     found = _at_least(without_negative_parts(found), LEAST * base)
     return Spread(
@@ -152,6 +163,7 @@ def spread_of(
         degrees=satterthwaite(found.diagonal(), components),
         common=common,
         base=base,
+        plain=without_negative_parts(plain),
         components=components,
     )
 
@@ -206,7 +218,9 @@ def _component(
     weight = np.where(reference, 1.0 / np.maximum(base.diagonal(), 1e-9) ** 2, 0.0)
     # Chance makes this as often too small as too large: cut off at zero it would be too large.
     effect = float((weight * surplus).sum()) / max(float((weight * room).sum()), 1e-300)
-    common = _at_least(without_negative_parts(base + effect * effects), LEAST * base)
+    common = base + effect * effects
+    if effect < 0.0:
+        common = _at_least(without_negative_parts(common), LEAST * base)
     degrees = left / uneven
     with np.errstate(invalid="ignore", divide="ignore"):
         own = np.where(left > 0.0, raw.diagonal() / left, 0.0)
@@ -217,6 +231,7 @@ def _component(
     everybody = float(degrees[reference].sum()) * (1.0 - 1.0 / reference.sum())
     return Component(
         covariance=mine[:, None] * raw * mine + others[:, None] * common * others,
+        plain=raw * clusters / (clusters - 1),
         common=common,
         own_share=share,
         own_degrees=degrees,

@@ -154,7 +154,12 @@ def _by_rounds(
         elif fit.samples.shape[1] > 1:
             covariance = np.cov(fit.samples)
     judged = _separation(fit.rating, everywhere)
-    return _with_intervals(votes, rules, fit, everywhere, (lower, upper), judged, covariance)
+    plain = None
+    if rules.details and rules.method is Method.BRADLEY_TERRY and fit.pulls is not None:
+        found = sandwich.covariance(votes, fit.pulls, rules.unit)
+        plain = sandwich.relative_to(found, everywhere.reference)
+    ends = (lower, upper)
+    return _with_intervals(votes, rules, fit, everywhere, ends, judged, covariance, plain)
 
 
 def _in_closed_form(
@@ -173,7 +178,9 @@ def _in_closed_form(
         fit.rating[members], spread.among(members), rounds=rules.rounds, seed=rules.seed
     ).among(members, len(fit.rating))
     bounds = (fit.rating - below, fit.rating + above)
-    return _with_intervals(votes, rules, fit, everywhere, bounds, judged, spread.covariance)
+    return _with_intervals(
+        votes, rules, fit, everywhere, bounds, judged, spread.covariance, spread.plain
+    )
 
 
 def _with_intervals(
@@ -184,6 +191,7 @@ def _with_intervals(
     bounds: tuple[FloatArray, FloatArray],
     judged: Separation | None,
     covariance: FloatArray | None,
+    plain: FloatArray | None,
 ) -> Rated:
     lower, upper = bounds
     rank = shown_ranks(lower, upper, average=float(fit.rating[everywhere.reference].mean()))
@@ -193,8 +201,9 @@ def _with_intervals(
     unbounded = np.isnan(lower) & np.isnan(upper)
     best[unbounded] = worst[unbounded] = 0
     check = None
-    if rules.details and fit.pulls is not None and rules.method is Method.BRADLEY_TERRY:
-        check = _cross_check(votes, rules, fit, everywhere)
+    if rules.details and plain is not None and rules.method is Method.BRADLEY_TERRY:
+        few = remarks.few_clusters(votes, rules.unit)
+        check = np.asarray(sandwich.factor(few) * np.sqrt(np.maximum(plain.diagonal(), 0.0)))
         check[np.isnan(lower) | np.isnan(upper)] = np.nan
     degenerate, drawn = fit.loose.values.shape[1], everywhere.values.shape[1]
     notes = remarks.notes_on_bounds(lower, upper, rank)
@@ -216,15 +225,6 @@ def _with_intervals(
         warnings=_notes_on_method(rules)
         + remarks.warnings(votes, rules=rules, rounds=drawn, degenerate=degenerate),
     )
-
-
-def _cross_check(votes: Comparisons, rules: Rules, fit: Fitted, everywhere: Placed) -> FloatArray:
-    """(C,) half-widths by the plain sandwich, in which each contestant stands for itself."""
-    assert fit.pulls is not None
-    covariance = sandwich.covariance(votes, fit.pulls, rules.unit)
-    spread = sandwich.relative_to(covariance, everywhere.reference)
-    few = remarks.few_clusters(votes, rules.unit)
-    return np.asarray(sandwich.factor(few) * np.sqrt(spread.diagonal()))
 
 
 def _separation(rating: FloatArray, everywhere: Placed) -> Separation | None:

@@ -7,16 +7,25 @@ clusters.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from itertools import pairwise
 from typing import Self
 
 import numpy as np
 
 from arena.rating import davidson
 from arena.rating.bradley_terry import ELO_PER_LOGIT, Meetings
-from arena.rating.comparisons import TIE, BoolArray, Comparisons, FloatArray, IntArray
+from arena.rating.comparisons import (
+    TIE,
+    BoolArray,
+    Comparisons,
+    FloatArray,
+    IntArray,
+    renumber_codes,
+)
 
 _NUMBERS_AT_ONCE = 2_000_000
+_WORTH_TRYING = 200
+_FEW_ENDS = 12
+"""Clusters that pull at so few are squared entry by entry where contestants are many."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -69,23 +78,14 @@ class Pulls:
     def by_cluster(self, cluster_of: IntArray, clusters: int) -> FloatArray:
         """(C, C) squared points: the pulls of each of G clusters added up and squared."""
         size = len(self.inverse)
+        ends = [self.first, self.second]
         pull = self.surprise * self.count
-        found = np.zeros((size, size))
-        at_once = max(1, _NUMBERS_AT_ONCE // size)
-        order = np.argsort(cluster_of, kind="stable")
-        bounds = np.searchsorted(cluster_of[order], np.arange(0, clusters + at_once, at_once))
-        for block, (begin, end) in enumerate(pairwise(bounds)):
-            rows = order[begin:end]
-            place = (cluster_of[rows] - block * at_once) * size
-            room = min(at_once, clusters - block * at_once) * size
-            pulls = np.bincount(place + self.first[rows], weights=pull[rows], minlength=room)
-            pulls -= np.bincount(place + self.second[rows], weights=pull[rows], minlength=room)
-            if self.besides is not None:
-                more = self.besides[rows] * self.count[rows]
-                pulls += np.bincount(place + size - 1, weights=more, minlength=room)
-            of_clusters = pulls.reshape(-1, size)
-            found += of_clusters.T @ of_clusters
-        return self._of_ratings(found)
+        pulls = [pull, -pull]
+        if self.besides is not None:
+            ends.append(np.full(len(pull), size - 1))
+            pulls.append(self.besides * self.count)
+        place = np.tile(cluster_of, len(ends)) * size + np.concatenate(ends)
+        return self._of_ratings(_squares(place, np.concatenate(pulls), clusters, size))
 
     def concentration(self, cluster_of: IntArray, clusters: int) -> FloatArray:
         """(C,) how unevenly a contestant's information comes from the clusters.
@@ -94,7 +94,7 @@ class Pulls:
         """
         weight = self.information * self.count
         place = np.concatenate([self.first, self.second]) * clusters + np.tile(cluster_of, 2)
-        met, of_row = np.unique(place, return_inverse=True)
+        met, of_row = renumber_codes(place)
         given = np.bincount(of_row, weights=np.tile(weight, 2))
         total = np.bincount(met // clusters, weights=given, minlength=self.contestants)
         shares = given / total[met // clusters]
@@ -141,7 +141,57 @@ def davidson_pulls(
 def without_negative_parts(matrix: FloatArray) -> FloatArray:
     """Few clusters can make a difference of sums negative in some direction: that is cut off."""
     matrix = 0.5 * (matrix + matrix.T)
+    if len(matrix) > _WORTH_TRYING and _is_positive(matrix):
+        return matrix
     values, directions = np.linalg.eigh(matrix)
     if values[0] >= 0.0:
         return matrix
     return np.asarray((directions * np.maximum(values, 0.0)) @ directions.T)
+
+
+def _squares(place: IntArray, pulls: FloatArray, clusters: int, size: int) -> FloatArray:
+    """(K, K) the sum over clusters of their summed pulls times themselves.
+
+    Args:
+        place: The cluster of each pull, times K, plus whom it pulls at.
+        pulls: How much.
+        clusters: G.
+        size: K.
+    """
+    if clusters * size <= _NUMBERS_AT_ONCE:
+        sums = np.bincount(place, weights=pulls, minlength=clusters * size).reshape(-1, size)
+        return np.asarray(sums.T @ sums)
+    order = np.argsort(place, kind="stable")
+    starts = np.flatnonzero(np.diff(place[order], prepend=-1))
+    met, value = place[order[starts]], np.add.reduceat(pulls[order], starts)
+    cluster, end = met // size, met % size
+    begin = np.flatnonzero(np.diff(cluster, prepend=-1))
+    number = np.diff(begin, append=len(met))
+    found: FloatArray = np.zeros(size * size)
+    for ends in np.unique(number[number <= _FEW_ENDS]).tolist():
+        rows = begin[number == ends][:, None] + np.arange(ends)
+        both = end[rows][:, :, None] * size + end[rows][:, None, :]
+        products = value[rows][:, :, None] * value[rows][:, None, :]
+        found += np.bincount(both.ravel(), weights=products.ravel(), minlength=size * size)
+    large = np.flatnonzero(number > _FEW_ENDS)
+    at_once = max(1, _NUMBERS_AT_ONCE // size)
+    square: FloatArray = found.reshape(size, size)
+    for first in range(0, len(large), at_once):
+        some = large[first : first + at_once]
+        of_some = np.zeros((len(some), size))
+        for row, one in enumerate(some.tolist()):
+            entries = slice(begin[one], begin[one] + number[one])
+            of_some[row, end[entries]] = value[entries]
+        square += of_some.T @ of_some
+    return square
+
+
+def _is_positive(matrix: FloatArray) -> bool:
+    """Whether no direction is negative: a factorisation tells it in a tenth of the time."""
+    size = len(matrix)
+    mean = float(matrix.diagonal().mean())
+    try:
+        np.linalg.cholesky(matrix + mean / size + 1e-9 * mean * np.eye(size))
+    except np.linalg.LinAlgError:
+        return False
+    return True

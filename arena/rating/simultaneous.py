@@ -54,7 +54,7 @@ def judge_pairs(rating: FloatArray, spread: Spread, *, rounds: int, seed: int) -
     single = 2.0 * t_above(size, np.minimum(spread.degrees[low], spread.degrees[high]))
     by_holm = holm(single)
     if contestants <= MOST_DRAWN:
-        number = min(rounds, MOST_ROUNDS, max(500, _MOST_KEPT // max(len(low), 1)))
+        number = min(rounds, MOST_ROUNDS, max(500, _MOST_KEPT // (10 * max(len(low), 1))))
         drawn = _drawn(spread, low, high, number, seed)
         adjusted, critical = _step_down(size, drawn)
     else:

@@ -1,0 +1,181 @@
+"""Who is determined in resampled rounds: for intervals in closed form, also with many contestants.
+
+A round puts everybody in one component with whoever has the most votes, above it, below it, or
+says nothing of them. Scores are followed from that contestant forwards and backwards, along the
+pairs that there are: no matrix of all contestants is made.
+
+Notation: C contestants, P pairs, B and N rounds, which are the last axis, R rows.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from arena.rating.bootstrap import Unit, resample
+from arena.rating.comparisons import (
+    BoolArray,
+    Comparisons,
+    FloatArray,
+    IntArray,
+    PairCounts,
+    renumber_codes,
+    tally,
+)
+from arena.rating.components import Loose
+
+FEWEST_ROUNDS = 200
+_FEW = 12
+"""Among more contestants it hardly happens that all components of a round are single."""
+_WORK = 1_500_000_000
+_MISSED = 0.8
+"""A score by one more expert and scenario is missing from 6 of 10 rounds; 0.8 is on the safe side,
+because experts may share scenarios."""
+_NEVER = 1e-4
+
+
+def rounds_to_draw(votes: Comparisons, counts: PairCounts, rounds: int) -> int:
+    """How many of the rounds: fewer where one takes long, 200 at least."""
+    experts, scenarios = (len(renumber_codes(one)[0]) for one in (votes.expert, votes.scenario))
+    each = max(2 * experts * scenarios * len(counts.low), 1)
+    each = min(each, 50 * (len(votes) + 3 * len(counts.low)))
+    return min(rounds, max(FEWEST_ROUNDS, _WORK // each))
+
+
+def reached_from(start: int, contestants: int, source: IntArray, target: IntArray) -> BoolArray:
+    """(C,) who is reached from a contestant along edges."""
+    reached = np.zeros(contestants, dtype=np.bool_)
+    reached[start] = True
+    number = 1
+    while True:
+        reached[target[reached[source]]] = True
+        if (now := int(reached.sum())) == number:
+            return reached
+        number = now
+
+
+def are_all_together(contestants: int, counts: PairCounts) -> bool:
+    """Whether everybody scored against everybody else through some chain."""
+    source, target = _edges(counts.low, counts.high, counts.games, counts.scores)
+    return bool(
+        reached_from(0, contestants, source, target).all()
+        and reached_from(0, contestants, target, source).all()
+    )
+
+
+def loose_rounds(
+    votes: Comparisons,
+    counts: PairCounts,
+    tree: IntArray,
+    rating: FloatArray,
+    *,
+    unit: Unit,
+    rounds: int,
+    seed: int,
+) -> tuple[int, Loose]:
+    """How many rounds determine everybody, and what the others say.
+
+    Args:
+        votes: Of contestants who are all determined by them.
+        counts: The same, by pair.
+        tree: Pairs that join everybody, those with the most scores either way.
+        rating: (C,) of the data, which is that of every round.
+        unit: What is drawn.
+        rounds: How many.
+        seed: Of the draws.
+    """
+    contestants = len(votes.names)
+    if _is_certain(votes, counts, tree, contestants):
+        return rounds, Loose.none(contestants)
+    by_votes = np.argsort(-tally(votes).sum(axis=1), kind="stable")
+    in_main: list[BoolArray] = []
+    sides: list[IntArray] = []
+    outer: list[IntArray] = []
+    fine = 0
+    for block in resample(votes, counts, unit=unit, rounds=rounds, seed=seed):
+        games, scores = block.games, block.scores
+        known = np.zeros(games.shape[1], dtype=np.bool_)
+        if len(tree) == contestants - 1:
+            of_tree = scores[tree]
+            known = np.asarray(((of_tree > 0) & (of_tree < games[tree])).all(axis=0))
+        fine += int(known.sum())
+        for number in np.flatnonzero(~known).tolist():
+            edges = _edges(counts.low, counts.high, games[:, number], scores[:, number])
+            above, below = _around_the_largest(by_votes, *edges)
+            if below.all() and above.all():
+                fine += 1
+                continue
+            in_main.append(below & above)
+            sides.append(1 * above - 1 * below)
+            outer.append(_outermost(contestants, *edges))
+    if not sides:
+        return fine, Loose.none(contestants)
+    main = np.array(in_main).T
+    return fine, Loose(
+        values=np.repeat(rating[:, None], main.shape[1], axis=1),
+        in_main=main & (main.sum(axis=0) > 1),
+        side=np.array(sides, dtype=np.int8).T,
+        side_of_all=np.array(outer, dtype=np.int8).T,
+    )
+
+
+# --- Private -----------------------------------------------------------------------------------
+
+
+def _around_the_largest(
+    by_votes: IntArray, source: IntArray, target: IntArray
+) -> tuple[BoolArray, BoolArray]:
+    """(C,), (C,): who reaches the largest component, and whom it reaches; it does both itself."""
+    contestants = len(by_votes)
+    left = np.ones(contestants, dtype=np.bool_)
+    largest, found = 0, (left, left)
+    for start in by_votes.tolist():
+        if left.sum() <= largest:
+            break
+        if not left[start]:
+            continue
+        below = reached_from(start, contestants, source, target)
+        above = reached_from(start, contestants, target, source)
+        together = below & above
+        left &= ~together
+        if (size := int(together.sum())) > largest:
+            largest, found = size, (above, below)
+    return found
+
+
+def _outermost(contestants: int, source: IntArray, target: IntArray) -> IntArray:
+    """(C,) 1 for who reaches everybody without being reached by all, -1 for the opposite."""
+    ways = ((source, target), (target, source))
+    over, under = (
+        [reached_from(one, contestants, *way).all() for one in range(contestants)]
+        if contestants <= _FEW
+        else [False] * contestants
+        for way in ways
+    )
+    return np.asarray(1 * np.array(over) - 1 * np.array(under), dtype=np.int64)
+
+
+def _edges(
+    low: IntArray, high: IntArray, games: FloatArray, scores: FloatArray
+) -> tuple[IntArray, IntArray]:
+    """Who scored against whom."""
+    up, down = scores > 0, scores < games
+    return np.concatenate([low[up], high[down]]), np.concatenate([high[up], low[down]])
+
+
+def _is_certain(votes: Comparisons, counts: PairCounts, tree: IntArray, contestants: int) -> bool:
+    """Whether hardly a round can fail: every pair of the tree has scores of many, both ways."""
+    if len(tree) < contestants - 1:
+        return False
+    fewest = np.full((2, len(counts.low)), np.iinfo(np.int64).max)
+    for way, scored in enumerate((counts.outcome_of < 2, counts.outcome_of > 0)):
+        for codes in (votes.expert, votes.scenario):
+            number, of_row = renumber_codes(codes)
+            met = np.unique(counts.pair_of[scored] * len(number) + of_row[scored])
+            different = np.bincount(met // len(number), minlength=len(counts.low))
+            if len(number) > 1:
+                fewest[way] = np.minimum(fewest[way], different)
+        if (fewest[way] == np.iinfo(np.int64).max).any():
+            fewest[way] = np.bincount(
+                counts.pair_of[scored], weights=votes.count[scored], minlength=len(counts.low)
+            ).astype(np.int64)
+    return bool((_MISSED ** fewest[:, tree].astype(np.float64)).sum() < _NEVER)

@@ -1,0 +1,72 @@
+"""Who is determined, by following scores along pairs, against matrices of all contestants."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from arena.rating.bootstrap import Unit
+from arena.rating.comparisons import FloatArray, count_pairs
+from arena.rating.connectivity import are_determined, heaviest_tree
+from arena.rating.leaderboard import Intervals, rate
+from arena.rating.pulls import _squares
+from arena.rating.reach import are_all_together, loose_rounds, rounds_to_draw
+from tests.rating.votes import simulated
+
+SPREAD = [1400.0, 1200.0, 1100.0, 1000.0, 900.0, 600.0]
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_everybody_is_together_where_ford_says_so(seed: int) -> None:
+    votes = simulated(SPREAD, 25, seed)
+    counts = count_pairs(votes)
+    wanted = are_determined(
+        contestants=6,
+        low=counts.low,
+        high=counts.high,
+        games=counts.games[None],
+        scores=counts.scores[None],
+    )
+    assert are_all_together(6, counts) == wanted[0]
+
+
+@pytest.mark.parametrize("unit", Unit)
+def test_bounds_are_open_for_those_for_whom_resamples_leave_them_open(unit: Unit) -> None:
+    """The same who by intervals of resamples, where every round is rated."""
+    for seed in range(12):
+        votes = simulated(SPREAD, 90, seed, ties=0.1)
+        boards = [
+            rate(votes, unit=unit, intervals=way, rounds=600, seed=seed) for way in Intervals
+        ]
+        ends = [
+            [(line.lower is None, line.upper is None) for line in board.lines] for board in boards
+        ]
+        assert ends[0] == ends[1], seed
+        assert boards[0].degenerate_rounds == boards[1].degenerate_rounds
+
+
+def test_many_scores_of_many_experts_need_no_resamples() -> None:
+    votes = simulated([1000.0, 1010.0, 990.0], 6000, 1, experts=90, scenarios=90)
+    counts = count_pairs(votes)
+    weight: FloatArray = np.minimum(counts.scores, counts.games - counts.scores)
+    tree = heaviest_tree(3, counts.low, counts.high, weight)
+    rules = {"unit": Unit.TWO_WAY, "rounds": 10**9, "seed": 1}
+    fine, rest = loose_rounds(votes, counts, tree, np.zeros(3), **rules)  # type: ignore[arg-type]
+    assert (fine, rest.values.shape) == (10**9, (3, 0))
+
+
+def test_fewer_rounds_are_drawn_where_one_takes_long() -> None:
+    small, large = simulated(SPREAD, 500, 1), simulated(SPREAD, 200_000, 1, experts=5000)
+    assert rounds_to_draw(small, count_pairs(small), 10_000) == 10_000
+    assert 200 <= rounds_to_draw(large, count_pairs(large), 10_000) < 10_000
+
+
+@pytest.mark.parametrize(("clusters", "size"), [(40, 6), (70_000, 40)])
+def test_squares_of_clusters_are_those_of_their_sums(clusters: int, size: int) -> None:
+    rng = np.random.default_rng(1)
+    place = rng.integers(0, clusters, 3000) * size + rng.integers(0, size, 3000)
+    place[:900] = 7 * size + rng.integers(0, size, 900)  # one cluster pulls at nearly all
+    pulls = rng.normal(size=3000)
+    sums = np.zeros((clusters, size))
+    np.add.at(sums.reshape(-1), place, pulls)
+    assert _squares(place, pulls, clusters, size) == pytest.approx(sums.T @ sums)
