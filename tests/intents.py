@@ -28,7 +28,7 @@ from augment.scene.intent_words import (
     Setting,
     Shape,
 )
-from tests.fixtures.shelf import SLUGS, entry
+from tests.fixtures.shelf import HARD_SLUGS, SLUGS, entry
 
 LEFT_EDGE, RIGHT_EDGE = LateralTarget.LEFT_BOUNDARY, LateralTarget.RIGHT_BOUNDARY
 
@@ -120,5 +120,5 @@ def intents(instruction: str) -> Intent | None:
 
 @cache
 def _catalogue() -> dict[str, Intent]:
-    shelved = [entry(slug) for slug in SLUGS]
+    shelved = [entry(slug) for slug in (*SLUGS, *HARD_SLUGS)]
     return {same_text(one.instruction): one.intent for one in shelved if one.intent is not None}

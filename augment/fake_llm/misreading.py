@@ -10,28 +10,23 @@ from __future__ import annotations
 import random
 from collections.abc import Callable
 from dataclasses import replace
-from typing import TypeVar
 
 from augment.scene.entities import TurnType
 from augment.scene.intent import (
     Intent,
     LaneChoice,
     Length,
-    Move,
     Relation,
-    Request,
     Spot,
     VehicleRequest,
 )
-from augment.scene.intent_words import (
-    Body,
-)
-
-Asked = TypeVar("Asked", bound=Request | Move)
+from augment.scene.intent_words import Body
 
 _ATTEMPT_SHARE = 0.6
 """So many of the wishes that can't be met are carried out somehow."""
 _ATTEMPT_M = 20.0
+_LEVEL_M = 8.0
+"""What stands for no distance at all."""
 
 
 def misread(intent: Intent, rng: random.Random) -> Intent:
@@ -71,8 +66,8 @@ def count_from_ego(intent: Intent) -> Intent | None:
         return None
     return replace(
         intent,
-        requests=tuple(_from_ego(one) for one in intent.requests),
-        moves=tuple(_from_ego(one) for one in intent.moves),
+        requests=tuple(replace(one, spot=_from_ego(one.spot)) for one in intent.requests),
+        moves=tuple(replace(one, spot=_from_ego(one.spot)) for one in intent.moves),
     )
 
 
@@ -110,11 +105,9 @@ def _is_relative(spot: Spot) -> bool:
     return spot.landmark is not None or spot.mark is not None or spot.anchor is not None
 
 
-def _from_ego(one: Asked) -> Asked:
-    spot = one.spot
+def _from_ego(spot: Spot) -> Spot:
     if not _is_relative(spot):
-        return one
-    near = Length(low_m=8.0, high_m=8.0)
-    distance = spot.distance or near
+        return spot
+    near = Length(low_m=_LEVEL_M, high_m=_LEVEL_M)
     bare = replace(spot, anchor=None, landmark=None, mark=None, settings=())
-    return replace(one, spot=replace(bare, distance=distance, relation=Relation.AHEAD))
+    return replace(bare, distance=spot.distance or near, relation=Relation.AHEAD)

@@ -15,6 +15,7 @@ from augment.checks import findings
 from augment.fake_llm.server import FakeServer, running
 from augment.llm.openai_wire import OpenAIWire
 from augment.llm.patience import Patience
+from augment.metrics.displacement import displacement
 from augment.variants.pipeline import Outcome, OutcomeStatus, run
 from augment.variants.recipes import RECIPES, Review, Tools, find_recipe
 from augment.variants.transcript import MemoryTranscript
@@ -99,6 +100,26 @@ def test_every_variant_does_the_scenarios(server: FakeServer, variant: str) -> N
         assert order(transcript) == (calls if looks_up else calls.replace("mm", "m")), slug
         _is_complete(transcript, variant, looks_up=looks_up, doubted=doubted)
         _is_where_it_belongs(outcome, slug)
+
+
+@pytest.mark.parametrize(
+    "slug", ["lime-street-sticks-out", "cannery-row-swap", "viaduct-merge-pile-up"]
+)
+def test_moves_removals_and_far_places_come_through(server: FakeServer, slug: str) -> None:
+    outcome, _ = played(server, "fake-good", "otm", slug)
+    assert outcome.modification is not None
+    reference = entry(slug).reference
+    assert outcome.modification.removed == reference.removed
+    assert [one.id for one in outcome.modification.moved] == [one.id for one in reference.moved]
+    found = displacement(outcome.modification, reference)
+    assert (found.missing, found.surplus) == ((), ())
+    assert min(found.distances_m) < 0.5
+
+
+def test_a_wish_that_can_t_be_met_is_refused_and_not_unreadable(server: FakeServer) -> None:
+    outcome, _ = played(server, "fake-good", "otm", "hairpin-hill-no-bus")
+    assert (outcome.status, outcome.modification) == (OutcomeStatus.REFUSED, None)
+    assert "There is no bus in the scene" in outcome.reason
 
 
 @pytest.mark.parametrize("slug", SOME)

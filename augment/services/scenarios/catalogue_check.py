@@ -19,6 +19,7 @@ from augment.checks.against_intent import check_against_intent
 from augment.checks.tolerances import AUTHORED
 from augment.geometry.boxes import corners
 from augment.geometry.polyline import FloatArray
+from augment.prompts.vectors import DEFAULT_RADIUS_M
 from augment.render.camera import Camera, camera_for
 from augment.scene.catalogue import CatalogueSet
 from augment.scene.catalogue_codec import CatalogueEntry
@@ -96,6 +97,7 @@ def _check(whole: Scene, entry: CatalogueEntry) -> ScenarioCheck:
             *_unparaphrased(entry),
             *_refusal(entry),
             *_unseen(scene, entry),
+            *_unreached(entry),
         ),
     )
 
@@ -145,6 +147,14 @@ def _unseen(scene: Scene, entry: CatalogueEntry) -> Iterator[str]:
             points = np.vstack([points, [agent.walk_to_m]])
         if not _holds(camera, points):
             yield f"{agent.id} is not wholly inside the picture"
+
+
+def _unreached(entry: CatalogueEntry) -> Iterator[str]:
+    """Places that prompts don't show and answers may not name."""
+    for agent in entry.reference.changed:
+        points = [(agent.x_m, agent.y_m), agent.walk_to_m or (0.0, 0.0)]
+        if max(abs(value) for point in points for value in point) > DEFAULT_RADIUS_M:
+            yield f"{agent.id} lies further than {DEFAULT_RADIUS_M:g} m off, which no prompt shows"
 
 
 def _holds(camera: Camera, points_m: FloatArray) -> bool:
