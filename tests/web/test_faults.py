@@ -41,7 +41,11 @@ def test_a_page_allows_nothing_but_its_own_files() -> None:
     assert "unsafe" not in policy
 
 
-@pytest.mark.parametrize("path", sorted(TEMPLATES.rglob("*.*")), ids=lambda path: path.name)
+SHOWN = [path for path in sorted(TEMPLATES.rglob("*.*")) if path.suffix != ".md"]
+"""A text file of an export is no page: there nothing is to be escaped."""
+
+
+@pytest.mark.parametrize("path", SHOWN, ids=lambda path: path.name)
 def test_no_template_has_anything_inline_or_unescaped(path: Path) -> None:
     text = path.read_text()
     assert not re.search(r"\sstyle=|<style|\son\w+=|<script(?![^>]*\ssrc=)", text)
