@@ -47,7 +47,7 @@ def plan(rules: PlanRules) -> MatchupPlan:
     Raises:
         NothingToPlan: The rules can't be met; the text has the numbers.
     """
-    grid = grid_of(rules.entries)
+    grid = grid_of(rules.entries, rules.alike)
     check_rules(rules, grid)
     rng = np.random.default_rng(rules.seed)
     chosen, probability = _chosen(rules, grid, rng)

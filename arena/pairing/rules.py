@@ -72,6 +72,8 @@ class PlanRules:
         adaptive_share: The last share of the quota, which is planned in batches by the votes.
         uniform_share: The share of the adaptive draws that is uniform over the pairs.
         batch_size: Votes of one expert that are planned at once in the adaptive part.
+        alike: (scenario, contestant, contestant) that nobody can tell apart, whose pictures
+            differ all the same; settled as a tie like identical ones.
     """
 
     entries: tuple[Entry, ...]
@@ -88,6 +90,7 @@ class PlanRules:
     adaptive_share: float = 0.0
     uniform_share: float = 0.2
     batch_size: int = 20
+    alike: tuple[tuple[str, str, str], ...] = ()
 
     @property
     def votes_later(self) -> int:
@@ -151,8 +154,9 @@ class Grid:
         return np.array([known[name] for name in names], dtype=np.int64)
 
 
-def grid_of(entries: tuple[Entry, ...]) -> Grid:
-    """The units that can be shown, and the identical pairs that can't."""
+def grid_of(entries: tuple[Entry, ...], alike: tuple[tuple[str, str, str], ...] = ()) -> Grid:
+    """The units that can be shown, and the identical and alike pairs that can't."""
+    settled = {(scenario, *sorted((one, other))) for scenario, one, other in alike}
     pictures = {(entry.scenario, entry.contestant): entry.picture for entry in entries}
     scenarios = tuple(sorted({entry.scenario for entry in entries}))
     contestants = sorted({entry.contestant for entry in entries})
@@ -164,7 +168,7 @@ def grid_of(entries: tuple[Entry, ...]) -> Grid:
             a, b = pictures.get((scenario, first)), pictures.get((scenario, second))
             if a is None or b is None:
                 continue
-            if a == b:
+            if a == b or (scenario, first, second) in settled:
                 identical.append((scenario, first, second))
             else:
                 showable[row, column] = True

@@ -59,7 +59,11 @@ def hand_over(
         raise _not_open(study)
     giver, takers = _giver(study, username), _takers(study, username, to)
     rules, number = rules_of(study), next_batch(study)
-    grid, cells, known = grid_of(rules.entries), pictures_of(study), planned_so_far(study)
+    grid, cells, known = (
+        grid_of(rules.entries, rules.alike),
+        pictures_of(study),
+        planned_so_far(study),
+    )
     rng = np.random.default_rng([rules.seed, number])
     open_rows = _open_rows(study, giver)
     names = [taker.username for taker in takers]

@@ -62,7 +62,7 @@ def plan_batch(*, study: Study, expert: User) -> int:
         if not left or held.state != Study.State.OPEN or _waiting(held, expert) >= MOST_AHEAD:
             return 0
         rules, number = rules_of(held), next_batch(held)
-        grid, known = grid_of(rules.entries), planned_so_far(held)
+        grid, known = grid_of(rules.entries, rules.alike), planned_so_far(held)
         mine = known[expert.username]
         scores, last_vote, votes = _scores(held, contestants_of(grid))
         ratings, covariance = ratings_so_far(scores)

@@ -27,6 +27,7 @@ from augment.errors import Conflict, UnknownName
 from augment.models import Contestant, Scenario
 from augment.sentences import sentence
 from augment.services.events import log_event
+from augment.services.judging.alike import alike_pairs
 from augment.services.running.choosing import find_job
 from augment.services.texts import one_line
 
@@ -54,6 +55,7 @@ class PlanOptions:
     pair_votes: tuple[tuple[str, str, int], ...] = ()
     allow_both_miss: bool = False
     allow_text: bool = False
+    settle_alike: bool = False
     allow_replay: bool = False
     samples: SampleRule = SampleRule.ONE
     jobs: tuple[str, ...] = ()
@@ -111,6 +113,7 @@ def open_study(
         votes_per_expert=votes_per_expert,
         seed=seed,
         checks=checks,
+        alike=alike_pairs(shown.cells) if given.settle_alike else (),
         **{name: getattr(given, name) for name in _OF_THE_PLAN},
     )
     planned = plan(rules)

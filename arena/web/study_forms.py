@@ -37,6 +37,7 @@ class StudyForm(ChoiceForm):
     targets = forms.CharField(required=False, max_length=20_000)
     allow_both_miss = forms.BooleanField(required=False)
     allow_text = forms.BooleanField(required=False)
+    show_alike = forms.BooleanField(required=False)
     allow_replay = forms.BooleanField(required=False)
     allow_simulated = forms.BooleanField(required=False)
     samples = forms.ChoiceField(
@@ -87,6 +88,7 @@ class StudyForm(ChoiceForm):
             pair_votes=pair_votes,
             allow_both_miss=entered["allow_both_miss"],
             allow_text=entered["allow_text"],
+            settle_alike=not entered["show_alike"],
             allow_replay=entered["allow_replay"],
             samples=SampleRule(entered["samples"] or SampleRule.ONE),
             jobs=tuple(entered["jobs"]),

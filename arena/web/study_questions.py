@@ -30,6 +30,8 @@ def opening(rules: dict[str, Any]) -> Confirmation:
         kinds = Counter(study.matchups.values_list("kind", flat=True))
         later = sum(study.votes_to_plan.values())
         people = study.experts.count()
+        settled = len(study.rules["identical"])
+        alike = len(study.rules["alike"])
         sides = study.contestants.count(), study.scenarios.count()
         transaction.set_rollback(True)
     votes = kinds[Kind.MAIN] + later
@@ -50,6 +52,14 @@ def opening(rules: dict[str, Any]) -> Confirmation:
         _("On top of the votes: hidden repeats %(repeats)s, attention checks %(checks)s.")
         % numbers,
     ]
+    if settled:
+        facts.append(
+            _(
+                "Pairs that are settled as ties and shown to nobody: %(settled)s; within 0.15 m "
+                "and 2° in every object: %(alike)s, identical pictures among them."
+            )
+            % {"settled": settled, "alike": alike}
+        )
     if later:
         facts.append(_("Votes that are planned later, by those before: %(n)s.") % {"n": later})
     if rules["allow_simulated"]:

@@ -98,6 +98,12 @@ class Command(TerminalCommand):
             "picture of a scenario was driven",
         )
         parser.add_argument(
+            "--show-alike",
+            action="store_true",
+            help="also show pairs that differ by at most 0.15 m and 2 degrees in every object; "
+            "without it they are settled as ties, which ratings count or leave out",
+        )
+        parser.add_argument(
             "--allow-simulated",
             action="store_true",
             help="let simulated contestants and experts take part; everything then says so",
@@ -123,6 +129,7 @@ class Command(TerminalCommand):
                     pair_votes=pair_votes,
                     allow_both_miss=options["both_miss"],
                     allow_text=options["text"],
+                    settle_alike=not options["show_alike"],
                     allow_replay=options["replay"],
                     samples=SampleRule(options["samples"]),
                     jobs=tuple(options["jobs"]),
@@ -162,4 +169,6 @@ class Command(TerminalCommand):
                 f"{rules['scenario_gap']}: there are too few scenarios for more."
             )
         if rules["identical"]:
-            self.stdout.write(f"{len(rules['identical'])} identical pairs are never shown.")
+            self.stdout.write(
+                f"{len(rules['identical'])} pairs that nobody can tell apart are never shown."
+            )
