@@ -31,7 +31,6 @@ from arena.pairing.rules import (
     MatchupPlan,
     PlannedMatchup,
     PlanRules,
-    grid_of,
 )
 from arena.pairing.targets import choose_wanted, share_out
 from arena.pairing.units import choose_units, draw_probability
@@ -47,7 +46,7 @@ def plan(rules: PlanRules) -> MatchupPlan:
     Raises:
         NothingToPlan: The rules can't be met; the text has the numbers.
     """
-    grid = grid_of(rules.entries, rules.alike)
+    grid = rules.grid
     check_rules(rules, grid)
     rng = np.random.default_rng(rules.seed)
     chosen, probability = _chosen(rules, grid, rng)

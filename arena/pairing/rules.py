@@ -93,6 +93,11 @@ class PlanRules:
     alike: tuple[tuple[str, str, str], ...] = ()
 
     @property
+    def grid(self) -> Grid:
+        """What can be shown of the entries."""
+        return grid_of(self.entries, self.alike)
+
+    @property
     def votes_later(self) -> int:
         """Votes of each expert that the adaptive part plans."""
         return round(self.adaptive_share * self.votes_per_expert)

@@ -12,7 +12,7 @@ from arena.errors import NothingToPlan, StudyNotOpen
 from arena.models import Matchup, Study
 from arena.pairing.following import follow_on
 from arena.pairing.later import deal, units_of
-from arena.pairing.rules import PlannedMatchup, grid_of, place_of
+from arena.pairing.rules import PlannedMatchup, place_of
 from arena.queries.people import experts as expert_accounts
 from arena.services.plans import (
     next_batch,
@@ -59,11 +59,7 @@ def hand_over(
         raise _not_open(study)
     giver, takers = _giver(study, username), _takers(study, username, to)
     rules, number = rules_of(study), next_batch(study)
-    grid, cells, known = (
-        grid_of(rules.entries, rules.alike),
-        pictures_of(study),
-        planned_so_far(study),
-    )
+    grid, cells, known = rules.grid, pictures_of(study), planned_so_far(study)
     rng = np.random.default_rng([rules.seed, number])
     open_rows = _open_rows(study, giver)
     names = [taker.username for taker in takers]

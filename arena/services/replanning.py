@@ -12,7 +12,6 @@ from arena.pairing.adaptive import contestants_of, draw_units, ratings_so_far
 from arena.pairing.arrays import FloatArray
 from arena.pairing.following import follow_on
 from arena.pairing.later import judges, units_of
-from arena.pairing.rules import grid_of
 from arena.queries.voting_path import upcoming
 from arena.services.plans import (
     next_batch,
@@ -62,7 +61,7 @@ def plan_batch(*, study: Study, expert: User) -> int:
         if not left or held.state != Study.State.OPEN or _waiting(held, expert) >= MOST_AHEAD:
             return 0
         rules, number = rules_of(held), next_batch(held)
-        grid, known = grid_of(rules.entries, rules.alike), planned_so_far(held)
+        grid, known = rules.grid, planned_so_far(held)
         mine = known[expert.username]
         scores, last_vote, votes = _scores(held, contestants_of(grid))
         ratings, covariance = ratings_so_far(scores)

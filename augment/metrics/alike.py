@@ -18,20 +18,20 @@ _SHOWN_S = 1.0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Tolerance:
+class Likeness:
     """Up to which difference two objects look the same, the limits included."""
 
     distance_m: float = 0.15
     heading_rad: float = math.radians(2.0)
 
 
-def are_alike(one: Modification, other: Modification, within: Tolerance | None = None) -> bool:
+def are_alike(one: Modification, other: Modification, within: Likeness | None = None) -> bool:
     """Whether every object of either change has a counterpart in the other within a tolerance.
 
     Place, size, end of a walk and motion in a second are held against the distance. What is
     moved and what is removed must be the same.
     """
-    limits = within or Tolerance()
+    limits = within or Likeness()
     moved = [{agent.id: agent for agent in change.moved} for change in (one, other)]
     return (
         set(one.removed) == set(other.removed)
@@ -41,7 +41,7 @@ def are_alike(one: Modification, other: Modification, within: Tolerance | None =
     )
 
 
-def _all_matched(one: list[TrafficAgent], other: list[TrafficAgent], limits: Tolerance) -> bool:
+def _all_matched(one: list[TrafficAgent], other: list[TrafficAgent], limits: Likeness) -> bool:
     """Whether a one-to-one matching within the tolerance exists."""
     from scipy.optimize import linear_sum_assignment
 
@@ -54,7 +54,7 @@ def _all_matched(one: list[TrafficAgent], other: list[TrafficAgent], limits: Tol
     return not apart[rows, columns].any()
 
 
-def _look_alike(one: TrafficAgent, other: TrafficAgent, limits: Tolerance) -> bool:
+def _look_alike(one: TrafficAgent, other: TrafficAgent, limits: Likeness) -> bool:
     if one.type is not other.type or (one.walk_to_m is None) != (other.walk_to_m is None):
         return False
     gaps_m = [
