@@ -346,9 +346,11 @@ def _json(rated: RatedCsv) -> str:
 
 
 def _latex(rated: RatedCsv) -> str:
-    rows = ((escape(name), *rest) for name, *rest in _cells(rated))
+    in_paper = rated.board.intervals is Intervals.RESAMPLES  # whose table has no rank sets
+    heads = PAPERS_HEADS if in_paper else HEADS
+    rows = ((escape(name), *rest)[: len(heads)] for name, *rest in _cells(rated))
     comments = (rated.method_text, *rated.notes)
-    return latex_table(rows, comments=comments, heads=HEADS, notes=rated.missing)
+    return latex_table(rows, comments=comments, heads=heads, notes=rated.missing)
 
 
 def _pairs(board: Leaderboard) -> list[dict[str, Any]] | None:

@@ -135,9 +135,7 @@ def test_csv_cells_are_no_formulas(votes: Any, capsys: pytest.CaptureFixture[str
 def test_latex_has_the_form_of_the_papers_table(votes: Any) -> None:
     said = run(file=votes(*[line.replace("c", "c_50%") for line in PLAIN]), format="latex")
     assert r"\textbf{Model} & \textbf{Rank} & \textbf{Elo}~$\uparrow$ & \textbf{95\% CI}" in said
-    rows = re.findall(
-        r"^    (\S+) & (\d+) & (\d+) & (-\d+/\+\d+) & (\d+) & [\d-]+\\\\$", said, re.M
-    )
+    rows = re.findall(r"^    (\S+) & (\d+) & (\d+) & (-\d+/\+\d+) & (\d+)\\\\$", said, re.M)
     assert len(rows) == 3
     assert r"c\_50\%" in {row[0] for row in rows}
 
