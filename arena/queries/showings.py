@@ -16,6 +16,13 @@ from arena.queries.people import role_of
 from augment.models import Scenario
 from augment.services.scenarios.pictures import camera_of
 
+VIEW_OF_OLD: dict[str, Any] = {
+    **{"px_per_m": 20.0, "ego_px": [300.0, 400.0]},
+    **{"width": 1200, "height": 800},
+}
+"""The window of all pictures before windows were fitted to scenarios and views were kept. (Where a
+reference did not fit it was wider; such a picture's ruler is wrong until the study is over.)"""
+
 _NOT_SHOWN = "This picture is not shown to you."
 
 
@@ -59,8 +66,8 @@ def view_of(scenario: Scenario) -> dict[str, Any]:
 
 
 def view_shown(matchup: Matchup) -> dict[str, Any]:
-    """The view kept with a matchup; matchups planned before it was kept have it worked out."""
-    return view_of(matchup.scenario) if matchup.view is None else matchup.view
+    """The view kept with a matchup; those planned before it was kept have the one of then."""
+    return VIEW_OF_OLD if matchup.view is None else matchup.view
 
 
 def as_shown(matchup: Matchup, wording: Wording) -> dict[str, Any]:
