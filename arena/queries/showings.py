@@ -21,7 +21,7 @@ VIEW_OF_OLD: dict[str, Any] = {
     **{"width": 1200, "height": 800},
 }
 """The window of all pictures before windows were fitted to scenarios and views were kept. (Where a
-reference did not fit it was wider; such a picture's ruler is wrong until the study is over.)"""
+reference did not fit it was wider: the ruler of such a picture measures too little.)"""
 
 _NOT_SHOWN = "This picture is not shown to you."
 

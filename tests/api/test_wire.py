@@ -48,7 +48,7 @@ def test_without_a_picture_of_the_scene_before_there_is_no_address_of_it(study: 
 def test_a_matchup_planned_before_views_were_kept_has_the_view_of_then(study: Study) -> None:
     study.matchups.update(view=None)
     shown = signed_in("eva").get(f"/api/v1/matchups?study={study.code}").json()
-    assert (shown[0]["px_per_m"], shown[0]["ego_px"]) == (20.0, [300.0, 300.0])
+    assert (shown[0]["px_per_m"], shown[0]["ego_px"]) == (20.0, [300.0, 400.0])
 
 
 def test_n_asks_for_fewer_or_more(study: Study) -> None:
