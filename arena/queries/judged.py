@@ -118,7 +118,7 @@ def automatic_ties(study: Study) -> list[Judged]:
     types = dict(study.scenarios.values_list("slug", "type"))
     return [
         Judged(
-            judge=AUTOMATIC, judge_name="Identical pictures", item=scenario_of(place),
+            judge=AUTOMATIC, judge_name="Pictures alike", item=scenario_of(place),
             type=types[scenario_of(place)],
             kind=AUTOMATIC, left=left, right=right, outcome=Vote.Outcome.EQUAL.value,
             both_miss=False, is_simulated=False, ms_visible=None, matchup=None, repeat_of=None,
