@@ -17,8 +17,8 @@ from pytest_django import Settings
 from arena.models import Study, Vote
 from arena.services.ratings import rate
 from arena.services.studies import close_study
-from augment.models import Augmentation, GenerationJob
-from tests.study_rows import a_study, matchups_of, vote
+from augment.models import Augmentation, GenerationJob, Scenario
+from tests.study_rows import a_study, matchups_of, scenario, vote
 
 pytestmark = pytest.mark.django_db(transaction=True)
 
@@ -27,15 +27,21 @@ PNG = b"\x89PNG picture"
 
 @pytest.fixture
 def study(tmp_path: Path, settings: Settings) -> Study:
-    """Closed and rated; Eva has changed her mind once, Finn has left pairs open."""
+    """Closed and rated; Eva has changed her mind once, Finn has left pairs open.
+
+    One of its scenarios says in other words what stands in none of them.
+    """
     settings.MEDIA_ROOT = tmp_path / "media"
     made = a_study()
+    Scenario.objects.filter(slug="place-0").update(paraphrase_of=scenario("said-first"))
     first, second, third, *_ = matchups_of(made, "eva")
     earlier = vote(first, "left", comment="hm; =1+1")
     vote(first, "right", supersedes=earlier.key)
     vote(second, "skip", reason="unclear")
     vote(third, "equal", aids={"zoom"})
     vote(matchups_of(made, "finn")[0], "left")
+    drawn = Augmentation.objects.latest("pk")
+    Augmentation.objects.filter(pk=drawn.pk).update(image=f"bev/2-0a1b2c3d/{'0' * 64}.png")
     for row in Augmentation.objects.all():
         default_storage.save(row.image, ContentFile(PNG))
     GenerationJob.objects.update(state=GenerationJob.State.FINISHED)

@@ -20,7 +20,7 @@ pytestmark = pytest.mark.django_db
 PLACES_M = {"ann": 20.0, "bob": 20.1, "cid": 20.3}
 
 
-def opened(**options: bool) -> Study:
+def opened(*, settle_alike: bool = False) -> Study:
     cast = cast_of(scenarios=4, experts=("eva",))
     for row in Augmentation.objects.select_related("contestant"):
         car = vehicle("New1", PLACES_M[row.contestant.slug], 0.0)
@@ -30,8 +30,8 @@ def opened(**options: bool) -> Study:
         name="Round 1",
         votes_per_expert=8,
         seed=7,
-        options=PlanOptions(**options),
-        **cast,  # type: ignore[arg-type]
+        options=PlanOptions(settle_alike=settle_alike),
+        **cast,
     )
 
 

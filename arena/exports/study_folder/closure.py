@@ -67,7 +67,10 @@ class Closure:
     def tables(self) -> Iterator[Rows]:
         """The rows of each table, those first that others name."""
         contestants = Contestant.objects.filter(self._of("contestants"))
-        scenarios = Scenario.objects.filter(self._of("scenarios"))
+        named = Scenario.objects.filter(self._of("scenarios"))
+        # A paraphrase comes with what it says in other words.
+        originals = named.exclude(paraphrase_of=None).values("paraphrase_of")
+        scenarios = Scenario.objects.filter(Q(pk__in=named.values("pk")) | Q(pk__in=originals))
         attempts = Attempt.objects.filter(augmentation__job__in=self.jobs)
         readings = IntentReading.objects.filter(
             pk__in=ModelCall.objects.filter(copies__attempt__in=attempts).values("reading")

@@ -134,7 +134,7 @@ def _contestant(found: Contestant) -> dict[str, Any]:
 def _scenarios(closure: Closure) -> QuerySet[Scenario]:
     jobs = Scenario.objects.filter(jobs__in=closure.jobs)
     found = (jobs | closure.study.scenarios.all()).distinct()
-    return found.select_related("base_scene").order_by("slug")
+    return found.select_related("base_scene", "paraphrase_of").order_by("slug")
 
 
 def _scenario(found: Scenario) -> dict[str, Any]:
@@ -146,6 +146,9 @@ def _scenario(found: Scenario) -> dict[str, Any]:
         "source": found.base_scene.source,
         "provenance": found.base_scene.provenance,
         "keep_traffic": found.keep_traffic,
+        "set": found.catalogue_set,
+        "language": found.language,
+        "paraphrase_of": found.paraphrase_of.slug if found.paraphrase_of else None,
         "instruction": found.instruction,
         "reference": found.reference,
         "intent": found.intent,

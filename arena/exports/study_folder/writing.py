@@ -29,7 +29,7 @@ ROWS, MEDIA = "rows/", "media/"
 PACKAGES = ("django", "numpy", "scipy", "pillow", "openai")
 """Whose versions may change a result."""
 
-_NAMES = re.compile(rb"[a-z_]+/[0-9a-f]{16,64}\.png")
+_NAMES = re.compile(rb"[a-z_]+/(?:[0-9a-z-]+/)?[0-9a-f]{16,64}\.png")
 _DIGESTS = re.compile(rb'sha256[":= ]+([0-9a-f]{64})')
 ASKED = "asked"
 """Where the pictures lie that reviewers were sent; a request names them by their hash."""
