@@ -24,7 +24,14 @@ from django.db import connection
 from augment.errors import QueueFault, QueueRefused, QueueUnreachable
 from augment.services.clock import DATABASE_TIME, Moment
 from augment.services.judging import marked_pictures, simulations
-from augment.services.running import jobs, leases, runner, stopping, workers
+from augment.services.running import (
+    intent_readings,
+    jobs,
+    leases,
+    runner,
+    stopping,
+    workers,
+)
 
 logger = logging.getLogger(__name__)
 
@@ -59,6 +66,24 @@ def run_simulation(simulation_pk: int) -> None:
     if stopping.is_stop_requested():
         raise Reject("this worker stops", requeue=True)
     simulations.drive(simulation_pk=simulation_pk)
+
+
+@shared_task(name="augment.read_intent", acks_late=True, ignore_result=True)
+def read_intent(reading_pk: int) -> None:
+    """Have a model read an instruction, unless somebody has done so for this row."""
+    if stopping.is_stop_requested():
+        raise Reject("this worker stops", requeue=True)
+    intent_readings.read_planned(reading_pk)
+
+
+def enqueue_reading(reading_pk: int) -> None:
+    """Have an instruction read; for transaction.on_commit.
+
+    Raises:
+        QueueFault: No broker, or it refuses; the reading fails after a while.
+    """
+    with open_broker() as broker:
+        read_intent.apply_async((reading_pk,), connection=broker, retry=False)
 
 
 def enqueue_simulations(ids: Iterable[int]) -> None:
@@ -154,6 +179,7 @@ def recover(*, now: Moment = DATABASE_TIME, at_start: bool = False) -> None:
     stale_after = timedelta(seconds=settings.STALE_AFTER_S)
     leases.take_back_stale(now=now, older_than=stale_after)
     jobs.finish_if_over(now=now)
+    intent_readings.give_up_stale(now=now)
     if at_start:
         older_than = timedelta(0)
     elif _messages_waiting():

@@ -4,19 +4,24 @@ from __future__ import annotations
 
 import json
 import uuid
+from typing import cast
 
 from django.contrib import messages
+from django.contrib.auth.models import User
+from django.db import transaction
 from django.http import Http404, HttpRequest, HttpResponse, JsonResponse
 from django.shortcuts import get_object_or_404, redirect
 from django.utils.translation import gettext as _
 from django.views.decorators.http import require_POST, require_safe
 
 from arena.web.access import ADMIN, STAFF, allow_only
-from augment.errors import AugmentError, Conflict
-from augment.models import Scenario
+from augment.errors import AugmentError, Conflict, QueueFault
+from augment.models import EndpointModel, Scenario
 from augment.sentences import sentence
+from augment.services.running.intent_readings import plan_reading
 from augment.services.scenarios.intents import accept_reading, enter_intent
 from augment.services.wording import translate
+from augment.tasks import enqueue_reading
 
 LONGEST_FILE = 200_000
 
@@ -49,6 +54,38 @@ def set_intent(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
     else:
         messages.success(request, _("The intent is set. It counts from now on."))
     return redirect("scenario", code=code)
+
+
+@allow_only(ADMIN)
+@require_POST
+def read_instruction(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
+    """Have a model read the instruction; a worker asks it, and what it read waits on this page."""
+    scenario = get_object_or_404(Scenario, code=code)
+    reader = EndpointModel.objects.select_related("endpoint").filter(code=_reader(request)).first()
+    if reader is None:
+        messages.error(request, _("Choose a model."))
+        return redirect("scenario", code=code)
+    try:
+        with transaction.atomic():
+            reading = plan_reading(
+                scenario=scenario.slug,
+                endpoint=reader.endpoint.label,
+                model=reader.model,
+                actor=cast(User, request.user),
+            )
+        enqueue_reading(reading.pk)
+    except (AugmentError, QueueFault) as error:
+        messages.error(request, translate(error))
+    else:
+        messages.success(request, _("%(model)s reads it now.") % {"model": reader.model})
+    return redirect("scenario", code=code)
+
+
+def _reader(request: HttpRequest) -> uuid.UUID | None:
+    try:
+        return uuid.UUID(request.POST.get("reader", ""))
+    except ValueError:
+        return None
 
 
 def _document(request: HttpRequest) -> object:

@@ -18,13 +18,13 @@ from arena.web.access import STAFF, allow_only
 from arena.web.asking import asking_of
 from arena.web.pictures import picture_response
 from augment.errors import QueueFault
-from augment.models import Augmentation, Scenario, Simulation
+from augment.models import Augmentation, EndpointModel, Scenario, Simulation
 from augment.services.judging.displacement import of_augmentation
 from augment.services.judging.findings import Checked, check_augmentation
 from augment.services.running.transcript_export import transcript_of
 from augment.services.running.transcript_steps import totals_of, tries_of
 from augment.services.running.transcripts import IMAGES
-from augment.services.scenarios.intents import statements_of, waiting_reading
+from augment.services.scenarios.intents import last_reading, statements_of, waiting_reading
 from augment.services.scenarios.scene_notes import notes_of
 from augment.services.wording import translate
 from augment.tasks import enqueue_marks
@@ -64,6 +64,10 @@ def scenario_page(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
         "reading_statements": [
             translate(one) for one in statements_of(None if reading is None else reading.document)
         ],
+        "last_reading": last_reading(scenario),
+        "readers": EndpointModel.objects.select_related("endpoint").order_by(
+            "endpoint__label", "model"
+        ),
         "notes": [translate(note) for note in notes_of(scenario.base_scene)],
         "augmentations": scenarios.augmentations_of(scenario),
     }

@@ -51,6 +51,7 @@ urlpatterns: list[URLPattern] = [
     path("scenarios/load/", catalogue.load_scenarios, name="catalogue-load"),
     path("scenarios/<uuid:code>/", scenarios.scenario_page, name="scenario"),
     path("scenarios/<uuid:code>/intent/", intents.set_intent, name="set-intent"),
+    path("scenarios/<uuid:code>/read/", intents.read_instruction, name="intent-read"),
     path("scenarios/<uuid:code>/intent.json", intents.intent_file, name="intent"),
     path("pictures/<slug:kind>/<uuid:code>.png", scenarios.picture, name="picture"),
     path("contestants/", contestants.contestants_page, name="contestants"),

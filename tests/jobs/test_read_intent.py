@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from collections.abc import Iterator
 from contextlib import contextmanager
+from datetime import timedelta
 from decimal import Decimal
 from io import StringIO
 from pathlib import Path
@@ -12,6 +13,7 @@ from pathlib import Path
 import pytest
 from django.core.management import call_command
 from django.core.management.base import CommandError
+from pytest_django import Settings
 
 from augment.errors import Conflict, ModelFault, UnknownName
 from augment.fake_llm.server import running
@@ -25,7 +27,12 @@ from augment.scene.intent_words import (
 )
 from augment.services.endpoints import contestants
 from augment.services.running.caps import Caps
-from augment.services.running.intent_readings import read_intent
+from augment.services.running.intent_readings import (
+    give_up_stale,
+    plan_reading,
+    read_intent,
+    read_planned,
+)
 from augment.services.scenarios.intents import accept_reading
 from tests.intents import cones, intents
 from tests.jobs.rows import add_scenario
@@ -168,3 +175,27 @@ def calls() -> list[ModelCall]:
 def test_the_command_does_one_thing_at_a_time(arguments: tuple[str, ...]) -> None:
     with pytest.raises(CommandError, match=r"Give one of|go together"):
         run(*arguments)
+
+
+def test_a_worker_asks_for_a_planned_reading_once() -> None:
+    add_scenario("street", intent=None, intent_origin="")
+    contestants.ensure_endpoint(label="here", base_url="http://127.0.0.1:1/v1")
+    row = plan_reading(scenario="street", endpoint="here", model="m")
+    read_planned(row.pk)  # nobody listens there
+    row.refresh_from_db()
+    assert row.state == State.FAILED
+    calls = row.calls.count()
+    IntentReading.objects.update(state=State.RUNNING, reason="")
+    read_planned(row.pk)
+    assert row.calls.count() == calls, "a message that comes twice asks nobody again"
+
+
+def test_a_reading_whose_worker_is_gone_fails_after_a_while(settings: Settings) -> None:
+    add_scenario("street", intent=None, intent_origin="")
+    contestants.ensure_endpoint(label="here", base_url="http://127.0.0.1:1/v1")
+    row = plan_reading(scenario="street", endpoint="here", model="m")
+    longest = timedelta(seconds=settings.LLM_QUEUE_S + 6 * settings.LLM_TIMEOUT_S)
+    assert give_up_stale(now=row.created_at + longest) == 0
+    assert give_up_stale(now=row.created_at + longest + timedelta(seconds=1)) == 1
+    row.refresh_from_db()
+    assert (row.state, "worker" in row.reason) == (State.FAILED, True)

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from contextlib import AbstractContextManager
+from contextlib import AbstractContextManager, suppress
 from dataclasses import dataclass
+from datetime import timedelta
 from typing import Any
 
 from django.conf import settings
@@ -25,6 +26,7 @@ from augment.llm.fingerprint import image_reference, request_hash
 from augment.llm.messages import Reply, Request
 from augment.models import Endpoint, IntentReading, ModelCall, Scenario
 from augment.scene.intent_codec import intent_to_document
+from augment.services.clock import DATABASE_TIME, Moment
 from augment.services.endpoints.call_limits import Queue
 from augment.services.endpoints.client import EndpointClient
 from augment.services.endpoints.prices import price_of
@@ -68,26 +70,80 @@ def read_intent(
         Conflict: A cap can't be, or there is one in USD and nobody knows the price.
         KeyMissing: The key's variable is not set here.
     """
-    row, site = _scenario(scenario), _endpoint(endpoint)
-    price = price_of(site, model)
-    if caps.usd is not None and price is None:
-        raise Conflict("A cap in USD needs the price of the model, and nobody knows it.")
-    columns = caps.columns()
-    if client is None:
-        wire = wire_to(site)
-        client = EndpointClient(wire, site, Queue(longest_s=settings.LLM_QUEUE_S))
-    reading = IntentReading.objects.create(
-        scenario=row, endpoint=site, model=model, asked_by=actor, **columns
+    reading = plan_reading(
+        scenario=scenario, endpoint=endpoint, model=model, caps=caps, actor=actor
     )
-    _ask(reading, client, price, is_fresh=is_fresh)
+    return ask_planned(reading, is_fresh=is_fresh, client=client)
+
+
+def plan_reading(
+    *,
+    scenario: str,
+    endpoint: str,
+    model: str,
+    caps: Caps = USUAL_CAPS,
+    actor: User | None = None,
+) -> IntentReading:
+    """The row of a reading that nobody has been asked for yet.
+
+    Raises:
+        UnknownName: No such scenario or endpoint.
+        Conflict: A cap can't be, or there is one in USD and nobody knows the price.
+    """
+    row, site = _scenario(scenario), _endpoint(endpoint)
+    if caps.usd is not None and price_of(site, model) is None:
+        raise Conflict("A cap in USD needs the price of the model, and nobody knows it.")
+    return IntentReading.objects.create(
+        scenario=row, endpoint=site, model=model, asked_by=actor, **caps.columns()
+    )
+
+
+def ask_planned(
+    reading: IntentReading,
+    *,
+    is_fresh: bool = False,
+    client: AbstractContextManager[ChatClient] | None = None,
+) -> IntentReading:
+    """Ask the model; why nothing was read stands in the row.
+
+    Raises:
+        KeyMissing: The key's variable is not set here, where a client has to be made.
+    """
+    site = reading.endpoint
+    if client is None:
+        try:
+            wire = wire_to(site)
+        except AugmentError as fault:
+            reading.state, reading.reason = State.FAILED, make_storable(str(fault))
+            reading.save(update_fields=["state", "reason"])
+            raise
+        client = EndpointClient(wire, site, Queue(longest_s=settings.LLM_QUEUE_S))
+    _ask(reading, client, price_of(site, reading.model), is_fresh=is_fresh)
     log_event(
-        actor=actor,
+        actor=reading.asked_by,
         verb="read intent",
         object_kind="scenario",
-        object_code=row.code,
-        after={"model": model, "endpoint": site.label, "state": reading.state},
+        object_code=reading.scenario.code,
+        after={"model": reading.model, "endpoint": site.label, "state": reading.state},
     )
     return reading
+
+
+def read_planned(reading_pk: int) -> None:
+    """What a worker does: ask, unless somebody has asked for this reading already."""
+    rows = IntentReading.objects.select_related("scenario", "endpoint", "asked_by")
+    reading = rows.filter(pk=reading_pk, state=State.RUNNING, calls=None).first()
+    if reading is None:
+        return
+    with suppress(AugmentError):  # it stands in the row
+        ask_planned(reading)
+
+
+def give_up_stale(*, now: Moment = DATABASE_TIME) -> int:
+    """Fail readings whose worker must be dead, or whose message was lost; returns how many."""
+    longest = timedelta(seconds=settings.LLM_QUEUE_S + 6 * settings.LLM_TIMEOUT_S)
+    stale = IntentReading.objects.filter(state=State.RUNNING, created_at__lt=now - longest)
+    return stale.update(state=State.FAILED, reason="The worker ended, or none ever took it.")
 
 
 class ReadingTranscript:

@@ -73,6 +73,11 @@ def waiting_reading(scenario: Scenario) -> IntentReading | None:
     return last if last is not None and last.state == State.READ else None
 
 
+def last_reading(scenario: Scenario) -> IntentReading | None:
+    """The last reading, whatever became of it."""
+    return scenario.readings.select_related("endpoint").first()
+
+
 def statements_of(document: object) -> tuple[Sentence, ...]:
     """What an intent document says, as short statements; none where there is no document.
 
