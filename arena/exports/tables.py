@@ -16,20 +16,9 @@ from arena.rating.printed import (
     rank_text,
     rating_text,
 )
-from arena.rating.rules import Intervals
+from arena.rating.rules import METHOD_TEXTS, UNIT_TEXTS, Intervals
 from augment.sentences import Sentence, sentence
 
-METHODS = {
-    "bt": "Bradley-Terry on the Elo scale",
-    "davidson": "Davidson's tie model on the Elo scale",
-    "elo": "online Elo, median over resamples",
-}
-UNITS = {
-    "vote": "votes",
-    "scenario": "scenarios",
-    "expert": "experts",
-    "two-way": "experts and scenarios",
-}
 SIMULATED = " (simulated)"
 SIMULATED_TABLE = "Simulated: votes or contestants of this table are made by the machine."
 EARLY_LOOK = sentence("Early look: the study was still open.")
@@ -149,7 +138,7 @@ class LeaderboardTable:
     @property
     def method_text(self) -> str:
         """How the numbers came about, in one line."""
-        return f"{METHODS[self.method]}, {intervals_text(self)}, seed {self.seed}"
+        return f"{METHOD_TEXTS[self.method]}, {intervals_text(self)}, seed {self.seed}"
 
     @property
     def intervals_note(self) -> dict[str, str]:
@@ -181,7 +170,7 @@ class LeaderboardTable:
 
 def intervals_text(table: LeaderboardTable) -> str:
     """How intervals were found."""
-    unit = UNITS[table.unit]
+    unit = UNIT_TEXTS[table.unit]
     if table.is_closed_form:
         return f"95 % intervals in closed form, by {unit} (moderated sandwich, Student's t)"
     return f"95 % intervals by {table.rounds} resamples of {unit}"

@@ -27,7 +27,7 @@ from arena.rating.printed import (
     rank_text,
     rating_text,
 )
-from arena.rating.rules import unit_for
+from arena.rating.rules import METHOD_TEXTS, unit_for
 from arena.rating.votes_file import VotesFile, VotesFileUnreadable, columns_of, read_votes
 from arena.services.cells import csv_text
 from augment.sentences import escape_controls
@@ -43,11 +43,6 @@ RESAMPLES = {
     "two-way": Unit.TWO_WAY,
 }
 METHODS = {one.value: one for one in Method}
-METHOD_TEXTS = {
-    "bt": "Bradley-Terry on the Elo scale",
-    "davidson": "Davidson's tie model on the Elo scale",
-    "elo": "online Elo, median over resamples",
-}
 INTERVALS = {"closed": Intervals.CLOSED_FORM, "resamples": Intervals.RESAMPLES}
 MOST_PAIRS = 100_000
 """Above so many pairs JSON holds only those that are told apart."""

@@ -66,3 +66,19 @@ class Rules:
             raise ValueError(f"online Elo resamples single votes only, not by {self.unit}")
         if self.method is Method.ELO and self.intervals is Intervals.CLOSED_FORM:
             raise ValueError("online Elo has no intervals in closed form, only resamples")
+
+
+METHOD_TEXTS = {
+    "bt": "Bradley-Terry on the Elo scale",
+    "davidson": "Davidson's tie model on the Elo scale",
+    "elo": "online Elo, median over resamples",
+}
+"""What a method is called in files and on a terminal, by its value."""
+
+UNIT_TEXTS = {
+    "vote": "votes",
+    "scenario": "scenarios",
+    "expert": "experts",
+    "two-way": "experts and scenarios",
+}
+"""What is drawn anew, by the unit's value, in the same places."""

@@ -61,7 +61,9 @@ def set_intent(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
 def read_instruction(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
     """Have a model read the instruction; a worker asks it, and what it read waits on this page."""
     scenario = get_object_or_404(Scenario, code=code)
-    reader = EndpointModel.objects.select_related("endpoint").filter(code=_reader(request)).first()
+    chosen = _reader(request)
+    known = EndpointModel.objects.select_related("endpoint")
+    reader = None if chosen is None else known.filter(code=chosen).first()
     if reader is None:
         messages.error(request, _("Choose a model."))
         return redirect("scenario", code=code)
