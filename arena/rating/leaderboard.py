@@ -94,12 +94,16 @@ class Leaderboard:
     def told_apart(self) -> Separation | None:
         """The pairs where "at 5 % for the whole table" holds: docs/coverage.md.
 
-        Not with fewer than five experts or scenarios, nor by resamples that take too much for
-        certain.
+        Not with fewer than five experts or scenarios, nor where votes of one expert or scenario
+        hang together and the unit takes them for independent, nor by resamples that take too much
+        for certain.
         """
-        clusters = [number for number in (self.experts, self.scenarios) if number > 1]
-        by_formula = self.intervals is Intervals.CLOSED_FORM
-        holds = min(clusters, default=0) >= FEWEST_TO_JUDGE if by_formula else not clusters
+        clusters = {Unit.EXPERT: self.experts, Unit.SCENARIO: self.scenarios}
+        there = {unit: number for unit, number in clusters.items() if number > 1}
+        if self.intervals is not Intervals.CLOSED_FORM:
+            return None if there else self.separation
+        seen = there if self.unit is Unit.TWO_WAY else {self.unit}
+        holds = there.keys() <= set(seen) and min(there.values(), default=0) >= FEWEST_TO_JUDGE
         return self.separation if holds else None
 
     @property

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -87,3 +89,21 @@ def test_resamples_of_votes_that_hang_together_mark_no_pair() -> None:
     for unit in (Unit.VOTE, Unit.TWO_WAY):
         board = rate(votes, unit=unit, intervals=Intervals.RESAMPLES, rounds=50)
         assert board.told_apart is None
+
+
+@pytest.mark.parametrize("unit", Unit)
+def test_a_unit_that_takes_hanging_votes_for_independent_marks_no_pair(unit: Unit) -> None:
+    """Six equals, six experts of strong tastes: by single votes four pairs were marked."""
+    world = World(ratings=np.full(6, 1000.0), expert_sd=200.0, experts=6, votes_per_expert=100)
+    votes = world.votes(np.random.default_rng(1))
+    board = rate(votes, unit=unit, intervals=Intervals.CLOSED_FORM, rounds=50)
+    assert (board.experts, board.scenarios > 1) == (6, True)
+    assert (board.told_apart is not None) == (unit is Unit.TWO_WAY)
+
+
+@pytest.mark.parametrize("unit", Unit)
+def test_a_unit_marks_pairs_where_nothing_else_hangs_together(unit: Unit) -> None:
+    world = World(ratings=np.linspace(700.0, 1300.0, 5), experts=6, votes_per_expert=60)
+    votes = replace(world.votes(np.random.default_rng(1)), scenario=np.zeros(360, dtype=int))
+    board = rate(votes, unit=unit, intervals=Intervals.CLOSED_FORM, rounds=50)
+    assert (board.told_apart is not None) == (unit in (Unit.EXPERT, Unit.TWO_WAY))
