@@ -92,3 +92,15 @@ def test_what_can_not_be_taken_is_said_and_nothing_is_kept(
     assert 'value="qwen3"' in text, "the form stays filled in"
     assert not Contestant.objects.filter(slug__in=["qwen-fc", "two words"]).exists()
     assert not Endpoint.objects.exists()
+
+
+@pytest.mark.parametrize("base_url", ["http://127.0.0.1:9/v1", "http://127.0.0.1:11434/v1"])
+def test_a_new_endpoint_never_moves_the_one_that_has_its_label(
+    client: Client, base_url: str
+) -> None:
+    enter(client)
+    text = enter(client, slug="second", base_url=base_url)
+    assert "There is an endpoint “local” already" in text
+    assert 'value="qwen3"' in text, "the form stays filled in"
+    assert Endpoint.objects.get().base_url == "http://127.0.0.1:11434/v1"
+    assert not Contestant.objects.filter(slug="second").exists()

@@ -8,7 +8,9 @@ from dataclasses import dataclass
 from django.contrib.auth.models import User
 from django.db import transaction
 
-from augment.models import Contestant
+from augment.errors import Conflict
+from augment.models import Contestant, Endpoint
+from augment.sentences import sentence
 from augment.services.endpoints.contestants import add_contestant, ensure_endpoint
 from augment.variants.options import EFFORTS, NAMES, ToolProtocol, options_from_document
 from augment.variants.recipes import RECIPES
@@ -47,15 +49,17 @@ def enter_contestant(
         name: What people read; empty to have it made from model and variant.
         variant: The name of a recipe.
         model: The model id on the endpoint.
-        endpoint: Made, or moved to that address, where an address is given.
+        endpoint: Made where an address is given; one that is there is never moved.
         options: By name; what is missing stays open.
         actor: Who enters it.
 
     Raises:
         AugmentError: Something can't be used; the sentence says what and what is allowed.
+        Conflict: There is an endpoint of that label already, and an address was given.
     """
     chosen = options_from_document(options)
     if endpoint.base_url:
+        _refuse_known(endpoint.label)
         ensure_endpoint(
             label=endpoint.label,
             base_url=endpoint.base_url,
@@ -72,3 +76,18 @@ def enter_contestant(
         options=chosen,
         actor=actor,
     )
+
+
+# --- Private -----------------------------------------------------------------------------------
+
+
+def _refuse_known(label: str) -> None:
+    """Raise Conflict where an endpoint is called so: others ask it at the address it has."""
+    if Endpoint.objects.filter(label=label).exists():
+        raise Conflict(
+            sentence(
+                "There is an endpoint “%(label)s” already. Choose it from the list, or give the "
+                "new one another label.",
+                label=label,
+            )
+        )
