@@ -6,18 +6,25 @@ import csv
 import hashlib
 import json
 import shutil
+from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import pytest
+from django.apps import apps
+from django.contrib.auth.hashers import make_password
+from django.contrib.auth.models import User
 from django.core.files.base import ContentFile
 from django.core.files.storage import default_storage
 from django.core.management import CommandError, call_command
 from pytest_django import Settings
 
+from arena.exports.study_folder.closure import TRAVELLING, close_over
 from arena.models import Study, Vote
 from arena.services.ratings import rate
+from arena.services.stored_rows import as_line, columns_of, label_of
 from arena.services.studies import close_study
-from augment.models import Augmentation, GenerationJob, Scenario
+from augment.models import Augmentation, Contestant, Endpoint, GenerationJob, Scenario
 from tests.study_rows import a_study, matchups_of, scenario, vote
 
 pytestmark = pytest.mark.django_db(transaction=True)
@@ -163,3 +170,63 @@ def test_it_is_taken_in_by_an_empty_installation_alone(study: Study, tmp_path: P
     with pytest.raises(CommandError, match="An empty installation is needed"):
         call_command("import", "study", str(tmp_path / "out"))
     assert Vote.objects.count() == 5
+
+
+def test_a_contestant_of_two_jobs_travels_once(study: Study, tmp_path: Path) -> None:
+    for job in GenerationJob.objects.all():
+        job.contestants.set(study.contestants.all())
+    first = export(study, tmp_path / "first")
+    lines = first["rows/augment.contestant.jsonl"].splitlines()
+    assert len(lines) == len(set(lines))
+    empty()
+    call_command("import", "study", str(tmp_path / "first"))
+    assert export(Study.objects.get(), tmp_path / "second") == first
+
+
+def test_the_tables_that_travel_are_those_that_are_taken_in(study: Study) -> None:
+    written = {label_of(rows.model) for rows in close_over(study).tables()}
+    assert written == TRAVELLING
+
+
+def craft(folder: Path, label: str, change: Callable[[dict[str, Any]], dict[str, Any]]) -> None:
+    """Change the rows of a table as somebody would who also recomputes the hash."""
+    path = folder / f"rows/{label}.jsonl"
+    columns = [column.attname for column in columns_of(apps.get_model(label))]
+    lines = path.read_text().splitlines() if path.exists() else []
+    rows = [change(dict(zip(columns, json.loads(line), strict=True))) for line in lines]
+    path.write_bytes(b"".join(as_line(list(row.values())) for row in rows))
+    manifest = json.loads((folder / "manifest.json").read_text())
+    manifest["members"][f"rows/{label}.jsonl"] = hashlib.sha256(path.read_bytes()).hexdigest()
+    manifest["rows"][label] = len(rows)
+    (folder / "manifest.json").write_text(json.dumps(manifest))
+
+
+def test_nobody_of_a_folder_rules_and_no_key_is_sent_to_it(study: Study, tmp_path: Path) -> None:
+    endpoint = Endpoint.objects.create(
+        label="away", base_url="https://away.example/v1", key_variable="OPENAI_API_KEY"
+    )
+    Contestant.objects.filter(pk=study.contestants.all()[0].pk).update(
+        kind=Contestant.Kind.LLM, variant="zero-shot", endpoint=endpoint, model="m"
+    )
+    folder = tmp_path / "out"
+    export(study, folder)
+    assert b"OPENAI_API_KEY" not in (folder / "rows/augment.endpoint.jsonl").read_bytes()
+    empty()
+    powers = {"is_staff": True, "is_superuser": True, "password": make_password("a password")}
+    craft(folder, "auth.user", lambda row: row | powers)
+    craft(folder, "augment.endpoint", lambda row: row | {"key_variable": "OPENAI_API_KEY"})
+    call_command("import", "study", str(folder))
+    for user in User.objects.all():
+        assert (user.is_staff, user.is_superuser) == (False, False)
+        assert not user.has_usable_password()
+    assert Endpoint.objects.get().key_variable == ""
+
+
+def test_a_folder_with_tables_that_no_study_has_is_refused(study: Study, tmp_path: Path) -> None:
+    folder = tmp_path / "out"
+    export(study, folder)
+    empty()
+    craft(folder, "auth.user_groups", lambda row: row)
+    with pytest.raises(CommandError, match=r"no study has: auth\.user_groups"):
+        call_command("import", "study", str(folder))
+    assert not Study.objects.exists()

@@ -15,13 +15,14 @@ from django.core.files.base import ContentFile
 from django.core.files.storage import default_storage
 from django.core.management import CommandError, call_command
 from django.db import connection
+from django.db.migrations.recorder import MigrationRecorder
 from pytest_django import Settings
 
 from arena.management.backups.archive import MANIFEST, ZipSource, read_manifest
 from arena.management.backups.taking import take_backup
 from arena.models import Vote
 from arena.services.ratings import rate
-from arena.services.stored_rows import find_tables, frozen_rows, label_of
+from arena.services.stored_rows import applied_migrations, find_tables, frozen_rows, label_of
 from arena.services.studies import close_study
 from augment.models import Event
 from augment.services.events import log_event
@@ -114,6 +115,21 @@ def test_no_installation_with_rows_is_restored_into(tmp_path: Path) -> None:
     take_backup(path, now=NOW, say=quiet)
     with pytest.raises(CommandError, match=r"empty installation.*arena\.vote"):
         call_command("restore", str(path))
+
+
+def test_a_database_of_an_earlier_release_is_left_as_it_is(tmp_path: Path) -> None:
+    path = tmp_path / "b.zip"
+    take_backup(path, now=NOW, say=quiet)
+    recorder = MigrationRecorder(connection)
+    app, name = applied_migrations()[-1].split(".")
+    recorder.record_unapplied(app, name)
+    try:
+        with pytest.raises(CommandError, match="tables of another release"):
+            call_command("restore", str(path))
+        assert (app, name) not in recorder.applied_migrations()
+    finally:
+        recorder.record_unapplied(app, name)
+        recorder.record_applied(app, name)
 
 
 def change(path: Path, mend: Callable[[dict[str, bytes]], None]) -> None:

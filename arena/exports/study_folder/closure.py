@@ -45,6 +45,23 @@ from augment.models import (
 LONG_AGO = "2000-01-01T00:00:00+00:00"
 """When an account was made is nobody's business."""
 
+TRAVELLING = frozenset(
+    {
+        *("auth.user", "arena.person", "augment.basescene", "augment.scenario"),
+        *("augment.endpoint", "augment.endpointmodel", "augment.contestant"),
+        *("augment.generationjob", "augment.generationjob_contestants"),
+        *("augment.generationjob_scenarios", "augment.augmentation", "augment.attempt"),
+        *("augment.intentreading", "augment.modelcall", "augment.transcriptnote"),
+        *("augment.simulation", "arena.study", "arena.study_contestants"),
+        *("arena.study_scenarios", "arena.study_experts", "arena.matchup", "arena.vote"),
+        *("arena.report", "arena.authorship", "arena.earlylook", "arena.votefile"),
+        *("arena.importedvote", "arena.snapshot", "arena.standing"),
+        *("arena.labellinground", "arena.labellinground_experts", "arena.labeltask"),
+        "arena.faultlabel",
+    }
+)
+"""The tables of a study; a folder that brings others is none of ours."""
+
 Rows = QuerySet[Any]
 
 
@@ -66,7 +83,9 @@ class Closure:
 
     def tables(self) -> Iterator[Rows]:
         """The rows of each table, those first that others name."""
-        contestants = Contestant.objects.filter(self._of("contestants"))
+        # Through their keys: a join with the jobs would give one of two jobs twice.
+        taking_part = Contestant.objects.filter(self._of("contestants"))
+        contestants = Contestant.objects.filter(pk__in=taking_part.values("pk"))
         named = Scenario.objects.filter(self._of("scenarios"))
         # A paraphrase comes with what it says in other words.
         originals = named.exclude(paraphrase_of=None).values("paraphrase_of")
@@ -208,6 +227,8 @@ def _hide(
             **{"is_staff": False, "is_superuser": False, "last_login": None},
             "date_joined": LONG_AGO,
         }
+    elif model is Endpoint:
+        row["key_variable"] = ""  # whose keys are sent where is for each host to say
     elif model is Person:
         row["preferences"] = {}
     elif model is Attempt:

@@ -6,14 +6,17 @@ from collections.abc import Callable, Iterable
 from pathlib import Path
 
 from django.conf import settings
+from django.contrib.auth.hashers import make_password
 from django.contrib.auth.models import Group, User
 from django.core.files.base import ContentFile
 from django.core.files.storage import default_storage
 from django.core.management import call_command
-from django.db import DatabaseError, models, transaction
+from django.db import DatabaseError, connection, models, transaction
+from django.db.migrations.recorder import MigrationRecorder
 
 from arena.errors import ArenaError
 from arena.exports.files import write_whole
+from arena.exports.study_folder.closure import TRAVELLING
 from arena.exports.study_folder.writing import FORMAT as STUDY
 from arena.management.backups.archive import (
     MEDIA,
@@ -27,6 +30,8 @@ from arena.management.backups.archive import (
     read_manifest,
 )
 from arena.services import stored_rows
+from arena.serving.readiness import find_unapplied_migrations
+from augment.models import Endpoint
 
 EXPERTS = "expert"
 """The role of every account of a study's folder."""
@@ -69,17 +74,26 @@ def import_study(folder: Path, *, say: Callable[[str], None]) -> Manifest:
     """
     source = FolderSource(folder)
     manifest = read_manifest(source, wanted=STUDY)
+    if strange := sorted(manifest.rows.keys() - TRAVELLING):
+        raise BackupUnreadable(f"This has tables that no study has: {', '.join(strange)}.")
     by_label = {stored_rows.label_of(model): model for model in stored_rows.find_tables()}
-    if unknown := sorted(manifest.rows.keys() - by_label.keys()):
-        raise BackupUnreadable(f"This study has tables that nobody knows: {', '.join(unknown)}.")
 
     def write() -> None:
         _write_rows(source, manifest, [by_label[label] for label in manifest.rows])
-        group, _ = Group.objects.get_or_create(name=EXPERTS)
-        group.user_set.set(User.objects.all())
+        _take_powers()
 
     _restore(source, manifest, write, say)
     return manifest
+
+
+def _take_powers() -> None:
+    """Whatever a folder says: nobody of it rules here, and no key of ours goes to its servers."""
+    User.objects.update(
+        is_staff=False, is_superuser=False, password=make_password(None), last_login=None
+    )
+    group, _ = Group.objects.get_or_create(name=EXPERTS)
+    group.user_set.set(User.objects.all())
+    Endpoint.objects.update(key_variable="")
 
 
 def _restore(
@@ -87,6 +101,12 @@ def _restore(
 ) -> None:
     """Pictures and rows, or neither."""
     _check_release(manifest)
+    missing = find_unapplied_migrations()
+    if missing and MigrationRecorder(connection).applied_migrations():
+        raise ArenaError(
+            "An empty installation is needed, and this one has tables of another release. "
+            "Point DATABASE_URL to a new database."
+        )
     call_command("migrate", interactive=False, verbosity=0)
     if filled := stored_rows.find_filled_tables():
         raise ArenaError(
