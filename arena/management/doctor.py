@@ -16,9 +16,9 @@ from enum import StrEnum
 from pathlib import Path
 
 from django.conf import settings
-from django.contrib.auth.models import User
 from django.db import DatabaseError, connection
 
+from arena.queries.people import find_admins
 from arena.serving.readiness import look_at_broker, look_at_database, look_at_workers
 from augment.errors import KeyMissing, KeyNotAllowed
 from augment.models import Contestant, Endpoint, EndpointModel, GenerationJob
@@ -145,7 +145,7 @@ def _workers() -> Ailments:
 
 
 def _accounts() -> Ailments:
-    admins = User.objects.filter(is_active=True, groups__name="admin").count()
+    admins = find_admins().count()
     if not admins:
         text = "nobody is admin, so nobody can set anything up"
         yield Ailment(Level.DOUBTFUL, "accounts", text, "`manage.py add_person NAME --role admin`")

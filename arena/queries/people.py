@@ -8,6 +8,8 @@ from dataclasses import dataclass
 from django.contrib.auth.models import AnonymousUser, User
 from django.db.models import Q, QuerySet
 
+from arena.models import Person
+
 ROLES = ("admin", "analyst", "expert")
 """The groups of accounts, the most powerful first."""
 
@@ -48,10 +50,25 @@ def natural_order(name: str) -> list[tuple[bool, int, str]]:
     return [(part.isdecimal(), int(part) if part.isdecimal() else 0, part) for part in parts]
 
 
+def find_admins() -> QuerySet[User]:
+    """Who can administrate."""
+    ruling = Q(is_superuser=True) | Q(groups__name="admin")
+    return User.objects.filter(ruling, is_active=True).distinct()
+
+
 def has_admin() -> bool:
     """Whether anybody can administrate."""
-    active = User.objects.filter(is_active=True)
-    return active.filter(Q(is_superuser=True) | Q(groups__name="admin")).exists()
+    return find_admins().exists()
+
+
+def forgotten_name(person: Person) -> str:
+    """The username of an account whose identity was forgotten; nobody else has it."""
+    return f"gone-{person.code.hex[:12]}"
+
+
+def is_forgotten(user: User) -> bool:
+    """Whether the identity of an account was forgotten; it stays so."""
+    return user.username == forgotten_name(user.person)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -61,6 +78,7 @@ class AccountLine:
     user: User
     role: str | None
     has_password: bool
+    is_forgotten: bool
 
 
 def list_accounts() -> list[AccountLine]:
@@ -70,7 +88,14 @@ def list_accounts() -> list[AccountLine]:
     for user in found.prefetch_related("groups"):
         names = {group.name for group in user.groups.all()}
         role = "admin" if user.is_superuser else next((one for one in ROLES if one in names), None)
-        lines.append(AccountLine(user=user, role=role, has_password=user.has_usable_password()))
+        lines.append(
+            AccountLine(
+                user=user,
+                role=role,
+                has_password=user.has_usable_password(),
+                is_forgotten=is_forgotten(user),
+            )
+        )
     places = {role: place for place, role in enumerate(ROLES)}
     return sorted(
         lines,

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import uuid
 
+from axes.models import AccessAttempt, AccessFailureLog, AccessLog
 from django.contrib.auth.models import Group, User
 from django.contrib.auth.tokens import default_token_generator
 from django.contrib.sessions.models import Session
@@ -11,23 +12,27 @@ from django.db import transaction
 from django.utils import timezone
 
 from arena.errors import LinkOver
-from arena.models import Invitation, Person
-from arena.queries.people import ROLES, role_of
+from arena.models import Invitation, Person, Study
+from arena.queries.people import ROLES, forgotten_name, has_admin, is_forgotten, role_of
 from augment.errors import Conflict, UnknownName
 from augment.sentences import sentence
 from augment.services.events import log_event
 
 
-def make_welcome_token(user: User) -> str:
+@transaction.atomic
+def make_welcome_token(user: User, *, actor: User) -> str:
     """What a link ends with by which somebody sets a password; it works once, for 14 days.
 
-    It is bound to the password and the last login, so that using it ends it.
+    It is bound to the password and the last login, so that using it ends it. The newest link of
+    an account without a password is the only one that works.
 
     Raises:
         Conflict: The account is paused or simulated.
     """
     if not user.is_active or user.person.is_simulated:
         raise Conflict(sentence("%(name)s can't sign in.", name=user.get_username()))
+    _end_links(user)
+    _log(user, actor, "make link", None, None)
     return f"{user.person.code.hex}-{default_token_generator.make_token(user)}"
 
 
@@ -54,15 +59,20 @@ def set_active(*, user: User, is_active: bool, actor: User) -> None:
     """Pause an account, or let it go on; a paused one is signed out everywhere.
 
     Raises:
-        Conflict: It is one's own.
+        Conflict: It is one's own or forgotten, or the actor administrates no more.
     """
     _must_be_another(user, actor)
+    _hold_admins(actor)
     if user.is_active == is_active:
         return
+    if is_active and is_forgotten(user):
+        raise Conflict(sentence("This account is forgotten; nobody can sign in to it again."))
+    _end_links(user)
     user.is_active = is_active
     user.save(update_fields=["is_active"])
     if not is_active:
         _sign_out(user)
+    _keep_an_admin()
     _log(user, actor, "resume" if is_active else "pause", None, None)
 
 
@@ -72,15 +82,18 @@ def set_role(*, user: User, role: str, actor: User) -> None:
 
     Raises:
         UnknownName: There is no such role.
-        Conflict: It is one's own.
+        Conflict: It is one's own, or the actor administrates no more.
     """
     if role not in ROLES:
         raise UnknownName("role", role, list(ROLES))
     _must_be_another(user, actor)
+    _hold_admins(actor)
+    _end_links(user)
     before = role_of(User.objects.get(pk=user.pk))
     user.groups.set([Group.objects.get_or_create(name=role)[0]])
     user.is_staff = user.is_superuser = role == "admin"
     user.save(update_fields=["is_staff", "is_superuser"])
+    _keep_an_admin()
     _log(user, actor, "change role", {"role": before}, {"role": role})
 
 
@@ -91,10 +104,11 @@ def forget_identity(*, user: User, actor: User) -> None:
     Ratings that are frozen keep the pseudonym that stood there when they were made.
 
     Raises:
-        Conflict: It is one's own.
+        Conflict: It is one's own, or the actor administrates no more.
     """
     _must_be_another(user, actor)
-    name = f"gone-{user.person.code.hex[:12]}"
+    _hold_admins(actor)
+    known_as, name = user.get_username(), forgotten_name(user.person)
     User.objects.filter(pk=user.pk).update(
         username=name, first_name="", last_name="", email="", is_active=False, last_login=None
     )
@@ -103,8 +117,53 @@ def forget_identity(*, user: User, actor: User) -> None:
     user.save(update_fields=["password"])
     Person.objects.filter(user=user).update(pseudonym=f"Former person {name[5:]}", preferences={})
     Invitation.objects.filter(expert=user, revoked_at=None).update(revoked_at=timezone.now())
+    _rename_in_plans(known_as, name)
+    for failures in (AccessAttempt, AccessFailureLog, AccessLog):
+        failures.objects.filter(username=known_as).delete()
     _sign_out(user)
+    _keep_an_admin()
     _log(user, actor, "forget identity", None, None)
+
+
+def _rename_in_plans(known_as: str, name: str) -> None:
+    """Studies keep in their rules whom they were planned for, by name."""
+    for study in Study.objects.select_for_update().order_by("pk"):
+        experts = study.rules.get("experts", [])
+        if known_as not in experts and known_as not in study.votes_to_plan:
+            continue
+        named = {known_as: name}
+        if experts:
+            study.rules["experts"] = [named.get(one, one) for one in experts]
+        study.votes_to_plan = {
+            named.get(one, one): votes for one, votes in study.votes_to_plan.items()
+        }
+        study.save(update_fields=["rules", "votes_to_plan"])
+
+
+def _hold_admins(actor: User) -> None:
+    """Let one change of accounts end before the next one begins.
+
+    Else two admins who demote each other at once would leave none.
+
+    Raises:
+        Conflict: The actor is an admin no more.
+    """
+    Group.objects.get_or_create(name="admin")
+    Group.objects.select_for_update(no_key=True).get(name="admin")
+    if role_of(User.objects.get(pk=actor.pk)) != "admin":
+        raise Conflict(sentence("You are not an admin any more."))
+
+
+def _keep_an_admin() -> None:
+    if not has_admin():
+        raise Conflict(sentence("Nobody would be left to administrate."))
+
+
+def _end_links(user: User) -> None:
+    """End the links of an account without a password; they are bound to what stands for it."""
+    if not user.has_usable_password():
+        user.set_unusable_password()
+        user.save(update_fields=["password"])
 
 
 def _must_be_another(user: User, actor: User) -> None:

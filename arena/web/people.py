@@ -205,7 +205,7 @@ def _account(code: uuid.UUID) -> User:
 
 def _link_page(request: HttpRequest, user: User) -> HttpResponse:
     try:
-        token = make_welcome_token(user)
+        token = make_welcome_token(user, actor=cast(User, request.user))
     except (ArenaError, AugmentError) as error:
         messages.error(request, translate(error))
         return redirect("people")

@@ -140,6 +140,20 @@ def test_nothing_is_overwritten_and_nothing_half_written_stays(
     assert sorted(path.name for path in tmp_path.iterdir()) == ["media", "out"]
 
 
+def test_a_name_that_is_no_account_any_more_gets_a_number(study: Study, tmp_path: Path) -> None:
+    rules = study.rules | {"experts": ["eva", "zoe", "finn"], "note": "eva"}
+    Study.objects.update(rules=rules, votes_to_plan={"zoe": 2, "eva": 0})
+    first = export(study, tmp_path / "first")
+    assert not [name for name, content in first.items() if b'"zoe"' in content]
+    told = json.loads(first["manifest.json"])["study"]["rules"]
+    assert told["experts"] == ["expert-0001", "former-0001", "expert-0002"]
+    assert told["note"] == "eva", "rules may hold the same word for something else"
+    empty()
+    call_command("import", "study", str(tmp_path / "first"))
+    assert Study.objects.get().votes_to_plan == {"former-0001": 2, "expert-0001": 0}
+    assert export(Study.objects.get(), tmp_path / "second") == first
+
+
 SPOILT: dict[str, tuple[str, bytes | None]] = {
     "pairs.csv has another content": ("pairs.csv", b"other"),
     "arena.vote.jsonl is missing": ("rows/arena.vote.jsonl", None),

@@ -65,6 +65,13 @@ def test_programs_read_it_as_json(capsys: pytest.CaptureFixture[str]) -> None:
     assert {entry["part"] for entry in found} >= {"database", "broker", "workers", "accounts"}
 
 
+def test_a_superuser_without_a_group_can_administrate() -> None:
+    User.objects.all().delete()
+    assert "accounts" in wrong()
+    User.objects.create_superuser("ops", password="a password")
+    assert "accounts" not in wrong()
+
+
 def test_a_database_of_another_release(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(readiness, "find_unapplied_migrations", lambda: ["arena.0999_new"])
     readiness._is_prepared.clear()

@@ -6,15 +6,19 @@ import logging
 import re
 
 import pytest
+from axes.models import AccessAttempt
 from django.contrib.auth.models import User
 from django.contrib.sessions.models import Session
 from django.test import Client
 from django.urls import reverse
 
 from arena.config.hiding import HideKeys
-from arena.models import Vote
-from arena.services.accounts import make_welcome_token
+from arena.models import Study, Vote
+from arena.queries.people import find_admins
+from arena.services.accounts import forget_identity, make_welcome_token, set_active, set_role
 from arena.services.first_start import LINK_LIVES_S, make_first_link_token
+from arena.services.people import create_person
+from augment.errors import Conflict
 from augment.models import Event
 from tests.study_rows import a_study, matchups_of, vote
 from tests.web.cast import people, signed_in
@@ -141,6 +145,8 @@ def test_who_is_forgotten_leaves_votes_and_no_name() -> None:
     study, admin = a_study(), people()["admin"]
     eva = study.experts.get(username="eva")
     vote(matchups_of(study, "eva")[0], "left")
+    Study.objects.update(votes_to_plan={"eva": 3, "finn": 4})
+    AccessAttempt.objects.create(username="eva", failures_since_start=1)
     pseudonym = eva.person.pseudonym
     url = reverse("person-forget", args=[eva.person.code])
     client = signed_in(admin)
@@ -154,6 +160,51 @@ def test_who_is_forgotten_leaves_votes_and_no_name() -> None:
     assert not eva.is_active
     assert Vote.objects.filter(expert=eva).count() == 1
     assert "eva" not in client.get(reverse("people")).content.decode()
+    assert Study.objects.get().rules["experts"] == [eva.username, "finn"]
+    assert Study.objects.get().votes_to_plan == {eva.username: 3, "finn": 4}
+    assert not AccessAttempt.objects.exists()
+
+
+def test_who_is_forgotten_stays_so() -> None:
+    accounts = people()
+    expert, admin = accounts["expert"], accounts["admin"]
+    forget_identity(user=expert, actor=admin)
+    change(admin, expert, act="resume")
+    assert not expert.is_active
+    text = signed_in(admin).get(reverse("people")).content.decode()
+    assert "Forgotten" in text
+    assert reverse("person-change", args=[expert.person.code]) not in text
+
+
+def test_two_admins_who_demote_each_other_leave_one() -> None:
+    ada, bob = (create_person(username=name, password=None, role="admin") for name in ("a", "b"))
+    set_role(user=bob, role="expert", actor=ada)
+    for act in (
+        lambda: set_role(user=ada, role="expert", actor=bob),
+        lambda: set_active(user=ada, is_active=False, actor=bob),
+        lambda: forget_identity(user=ada, actor=bob),
+    ):
+        with pytest.raises(Conflict, match="not an admin any more"):
+            act()
+    assert list(find_admins()) == [ada]
+
+
+def is_open(token: str) -> bool:
+    return Client().get(reverse("welcome", args=[token])).status_code == 200
+
+
+def test_the_newest_link_of_who_has_no_password_is_the_only_one() -> None:
+    admin = people()["admin"]
+    grace = create_person(username="grace", password=None, role="expert")
+    first, second = (make_welcome_token(grace, actor=admin) for _ in range(2))
+    assert (is_open(first), is_open(second)) == (False, True)
+    assert Event.objects.filter(verb="make link", actor=admin).count() == 2
+    set_role(user=grace, role="analyst", actor=admin)
+    assert not is_open(second), "whoever had the link would get the new role"
+    third = make_welcome_token(grace, actor=admin)
+    set_active(user=grace, is_active=False, actor=admin)
+    set_active(user=grace, is_active=True, actor=admin)
+    assert not is_open(third)
 
 
 def test_ones_own_password_needs_the_old_one() -> None:
@@ -167,7 +218,8 @@ def test_ones_own_password_needs_the_old_one() -> None:
 
 
 def test_no_log_keeps_such_a_link() -> None:
-    token = make_welcome_token(people()["expert"])
+    accounts = people()
+    token = make_welcome_token(accounts["expert"], actor=accounts["admin"])
     record = logging.LogRecord(
         "x", 20, "f", 1, "GET /welcome/%s/ /first/%s/", (token, "abc"), None
     )

@@ -139,17 +139,23 @@ class Closure:
         yield LabelTask.objects.filter(labelling__in=labellings)
         yield FaultLabel.objects.filter(task__labelling__in=labellings)
 
-    def rename(self, document: Any) -> Any:
-        """A stored document with the names that accounts get, wherever one is named."""
-        match document:
-            case dict():
-                return {self.rename(key): self.rename(one) for key, one in document.items()}
-            case list():
-                return [self.rename(one) for one in document]
-            case str():
-                return self.names.get(document, document)
-            case _:
-                return document
+    def renamed_rules(self) -> dict[str, Any]:
+        """The rules with the names that accounts get."""
+        names = self._names_in_plans()
+        experts = [names[name] for name in self.study.rules.get("experts", [])]
+        return self.study.rules | ({"experts": experts} if "experts" in self.study.rules else {})
+
+    def renamed_votes_to_plan(self) -> dict[str, int]:
+        """How many votes are planned later, by the names that accounts get."""
+        names = self._names_in_plans()
+        return {names[name]: votes for name, votes in self.study.votes_to_plan.items()}
+
+    def _names_in_plans(self) -> dict[str, str]:
+        """Whom the plan names; who does not travel, or is nobody any more, gets a number."""
+        named = {*self.study.rules.get("experts", []), *self.study.votes_to_plan}
+        former = sorted(named - self.names.keys())
+        numbered = {name: f"former-{place:04}" for place, name in enumerate(former, start=1)}
+        return self.names | numbered
 
     def _of(self, name: str) -> Q:
         """What the study names, its jobs work on, or its pairs show."""
@@ -236,5 +242,5 @@ def _hide(
     elif model is Augmentation:
         row |= {"claim": None, "heartbeat_at": None}
     elif model is Study:
-        for name in ("votes_to_plan", "rules"):
-            row[name] = closure.rename(row[name])
+        row["rules"] = closure.renamed_rules()
+        row["votes_to_plan"] = closure.renamed_votes_to_plan()

@@ -98,7 +98,7 @@ def _manifest(closure: Closure, counts: dict[str, int], digests: dict[str, str])
             "name": study.name,
             "code": str(study.code),
             "seed": study.seed,
-            "rules": closure.rename(study.rules),
+            "rules": closure.renamed_rules(),
             "opened_at": study.opened_at.isoformat() if study.opened_at else None,
             "closed_at": study.closed_at.isoformat() if study.closed_at else None,
             "allow_simulated": study.allow_simulated,
