@@ -67,7 +67,10 @@ def _start(scene: Scene, graph: LaneGraph) -> str:
     ego = scene.ego
     own = find_ego_lane(scene, graph)
     if own is not None:
-        return own
+        beside = graph.lane(own).centerline.project(ego.x_m, ego.y_m)
+        # A lane that the ego names but does not stand on leads it nowhere.
+        if beside.distance_m <= max(_NEAR_M, graph.lane(own).width_m / 2.0):
+            return own
     aligned = [
         name
         for name, way in graph.lanes.items()

@@ -49,10 +49,10 @@ urlpatterns = [
     path("api/v1/plain", view),
     path("", include("arena.config.urls")),
 ]
-handler400 = "arena.config.faults.unreadable"
-handler403 = "arena.config.faults.refused"
-handler404 = "arena.config.faults.missing"
-handler500 = "arena.config.faults.broken"
+handler400 = "arena.config.faults.answer_unreadable"
+handler403 = "arena.config.faults.answer_refused"
+handler404 = "arena.config.faults.answer_missing"
+handler500 = "arena.config.faults.answer_broken"
 
 
 def client_of(role: str = "admin", **options: Any) -> Client:

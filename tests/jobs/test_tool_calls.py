@@ -40,7 +40,7 @@ def test_calls_are_counted_per_contestant_in_the_page_and_the_files(
     Augmentation.objects.update(state=Augmentation.State.FAILED)
     page = signed_in(people()["analyst"]).get(f"/jobs/{job.code}/").content.decode()
     assert 'id="tool-calls"' in page
-    assert '<td class="number">4</td><td class="number">3</td><td class="number">1</td>' in page
+    assert '<td class="num">4</td><td class="num">3</td><td class="num">1</td>' in page
 
     call_command("export", "tool-calls", str(job.code), out="-")
     rows = list(csv.DictReader(io.StringIO(capsys.readouterr().out)))

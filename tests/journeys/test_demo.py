@@ -104,7 +104,7 @@ def test_its_study_travels_whole(demo_home: Home, tmp_path: Path) -> None:
     compared = subprocess.run(["diff", "-r", str(first), str(second)], capture_output=True)
     assert compared.stdout == b""
     assert len(list((first / "transcripts").iterdir())) >= 20
-    assert len(list((first / "media" / "bev").iterdir())) >= 20
+    assert len(list((first / "media" / "bev").rglob("*.png"))) >= 20
 
 
 def test_ctrl_c_in_the_middle_ends_it_at_once(migrated: Path, tmp_path: Path) -> None:

@@ -145,8 +145,8 @@ def test_a_reference_has_to_fit_the_scene() -> None:
 def test_unknown_names_are_refused_with_the_known_ones() -> None:
     with pytest.raises(UnknownName, match=r"scene 'road'\. Known: street"):
         scenario(scene="road")
-    with pytest.raises(UnknownName, match="jaywalking_pedestrian"):
-        scenario(type="jaywalker")
+    with pytest.raises(InvalidDocument, match="jaywalking_pedestrian"):
+        scenario(type="Jay Walker")
     with pytest.raises(InvalidDocument, match="instruction"):
         scenario(instruction="  ")
     scenario(slug="mine")

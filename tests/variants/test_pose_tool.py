@@ -52,7 +52,7 @@ def test_the_answer_carries_what_an_agent_of_the_block_needs() -> None:
         "heading_rad": 0.0,
         "heading_deg": 0.0,
         "lane": "Lane1",
-        "along_m": 65.0,
+        "along_m": 60.0,
         "remaining_m": 5.0,
         "lane_width_m": 3.5,
         "edge_left_m": 1.75,
@@ -129,7 +129,7 @@ def test_a_road_without_an_edge_nearby_has_none() -> None:
 
 
 def test_a_distance_runs_on_straight_over_connectors_and_back_again() -> None:
-    ahead = JUNCTION.pose_on_lane("Lane1", "lane", 90.0)
+    ahead = JUNCTION.pose_on_lane("Lane1", "lane", 85.0)
     assert ahead.route == ("Lane1", "Connector1", "Lane2")
     assert ahead.lane == "Lane2"
     assert ahead.along_m == pytest.approx(4.0)
@@ -194,7 +194,7 @@ def test_ids_from_other_peoples_files_go_by_their_short_forms() -> None:
         ({"start": "Agent7"}, "no agent 'Agent7'. Is Agent1 meant? Known: Agent1. Or start at"),
         ({"lane": "Lane2", "start": "Agent1"}, "36.0 m before the beginning of it. To start from"),
         ({"distance_m": 300}, "(Lane1 -> Connector1 -> Lane2): from this start distance_m can be"),
-        ({"distance_m": -300}, "begin 250.00 m short of that (Lane1): from this start distance_m"),
+        ({"distance_m": -300}, "begin 255.00 m short of that (Lane1): from this start distance_m"),
         ({"distance_m": "20"}, "distance_m must be a number, without quotes"),
         ({"distance_m": True}, "distance_m must be a number"),
         ({"distance_m": math.nan}, "distance_m must be between -1000 and 1000"),

@@ -24,8 +24,8 @@ urlpatterns = [
     path("broken/", csrf_exempt(broken)),
     path("", include("arena.config.urls")),
 ]
-handler404 = "arena.config.faults.missing"
-handler500 = "arena.config.faults.broken"
+handler404 = "arena.config.faults.answer_missing"
+handler500 = "arena.config.faults.answer_broken"
 
 
 @pytest.mark.parametrize(

@@ -37,7 +37,7 @@ def rated() -> Study:
 def test_the_page_for_our_own_fault_has_the_styles_of_the_others() -> None:
     names = [
         set(re.findall(r"css/\w+\.css", (TEMPLATES / name).read_text()))
-        for name in ("base.html", "500.html")
+        for name in ("base.html", "alone.html")
     ]
     assert names[0] <= names[1]
 

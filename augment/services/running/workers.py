@@ -6,6 +6,7 @@ import logging
 from collections.abc import Callable
 from dataclasses import dataclass
 from datetime import datetime, timedelta
+from threading import Lock
 from types import TracebackType
 from typing import Self
 
@@ -83,15 +84,18 @@ class Presence:
     def __init__(self, name: str) -> None:
         self._name = name[:120]
         self._pk: int | None = None
+        self._making = Lock()
 
     def beat(self) -> None:
         """Say that it lives."""
-        if not self._update(seen_at=DATABASE_TIME):
-            _forget_old()
-            made = Worker.objects.create(
-                name=self._name, started_at=DATABASE_TIME, seen_at=DATABASE_TIME
-            )
-            self._pk = made.pk
+        # Two threads of a worker beat; at its start both would make a row, and one never ended.
+        with self._making:
+            if not self._update(seen_at=DATABASE_TIME):
+                _forget_old()
+                made = Worker.objects.create(
+                    name=self._name, started_at=DATABASE_TIME, seen_at=DATABASE_TIME
+                )
+                self._pk = made.pk
 
     def recovered(self) -> None:
         """Say that it has brought back what was lost."""
