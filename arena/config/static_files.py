@@ -28,9 +28,9 @@ class ModuleStorage(CompressedManifestStaticFilesStorage):  # type: ignore[misc]
 def as_served(name: str, text: str) -> str:
     """A script or style sheet of ours without comment lines, empty lines and indentation.
 
-    A style sheet goes without blanks and semicolons around its braces, and without blanks
-    behind its commas and around its >. Ours have no text that spans lines, and style sheets none with one of these signs;
-    tests keep it so.
+    A style sheet goes without blanks and semicolons around its braces as well, and without blanks
+    behind its commas and around its >. Ours have no text that spans lines, and style sheets none
+    with one of these signs; tests keep it so.
     """
     lean = _INDENT.sub("", _COMMENT.sub("", text))
     return _AROUND_RULES.sub("", lean) if name.endswith(".css") else lean
