@@ -50,7 +50,8 @@ def test_comments_and_indentation_are_not_served() -> None:
 
 
 def test_style_sheets_go_without_blanks_around_braces_and_behind_commas() -> None:
-    style = "/* About. */\na, b > i { c: d e; f: g; }\n@media (h: 1) {\n  /* gone */\n  i { j: k; }\n}\n"
+    style = "/* About. */\na, b > i { c: d e; f: g; }\n"
+    style += "@media (h: 1) {\n  /* gone */\n  i { j: k; }\n}\n"
     assert as_served("a.css", style) == "a,b>i{c: d e;f: g}@media (h: 1){\ni{j: k}}"
 
 
