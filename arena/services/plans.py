@@ -8,17 +8,17 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 from django.contrib.auth.models import User
-from django.db.models import F, Max, QuerySet
+from django.db.models import F, Max, Q, QuerySet
 
 from arena.errors import NothingToPlan
 from arena.models import Matchup, Study
 from arena.pairing.plan import Check, Entry, PlannedMatchup, PlanRules
 from arena.pairing.rules import place_of, scenario_of
-from arena.queries.showings import view_of
+from arena.queries.showings import VIEW_OF_OLD, view_of
 from augment.models import Augmentation, Contestant, Scenario
 from augment.sentences import Sentence, sentence
 from augment.services.scenarios.descriptions import Description, descriptions
-from augment.services.scenarios.pictures import window_of
+from augment.services.scenarios.pictures import camera_of, window_of
 
 Cells = dict[tuple[str, str], Augmentation]
 """By place (a scenario, or one sample of it) and contestant, the augmentation that is shown."""
@@ -301,7 +301,8 @@ def _frames(
     """By scenario; both sides of every pair are drawn in one window, or nothing is planned.
 
     Raises:
-        NothingToPlan: Some are of an earlier version, or of before the reference was changed.
+        NothingToPlan: Some are of an earlier version, or of before the reference was changed; or
+            nobody knows any more where metres lie in them.
     """
     shown: dict[str, dict[str, Augmentation]] = {}
     for one in planned:
@@ -309,14 +310,7 @@ def _frames(
             shown.setdefault(one.scenario, {})[window_of(cell.image)] = cell
     mixed = [scenario_of(name) for name, windows in sorted(shown.items()) if len(windows) > 1]
     if mixed:
-        raise NothingToPlan(
-            sentence(
-                "The pictures of %(scenarios)s show different windows, so they can’t stand side "
-                "by side. Close the open studies that show them and run “manage.py "
-                "redraw_pictures”.",
-                scenarios=tuple(mixed[:MOST_NAMED]),
-            )
-        )
+        raise _other_windows(mixed)
     return {
         name: _frame(places[scenario_of(name)], *windows.popitem())
         for name, windows in shown.items()
@@ -324,15 +318,35 @@ def _frames(
 
 
 def _frame(place: Scenario, window: str, cell: Augmentation) -> _Frame:
-    """As the pictures need it: what an earlier version drew was shown before, if at all."""
-    now = _Frame(view_of(place), place.original_image)
-    if window == window_of(place.original_image):
-        return now
-    earlier = Matchup.objects.filter(scenario=place, left_image=cell.image, view__isnull=False)
+    """As the pictures need it, whatever version drew them: today's window, or one shown before.
+
+    Raises:
+        NothingToPlan: Nobody knows any more where metres lie in such a picture.
+    """
+    original = place.original_image
+    if window_of(original) != window:
+        original = ""
+    if window == camera_of(place).key:
+        return _Frame(view_of(place), original)
+    shows = Q(left_image=cell.image) | Q(right_image=cell.image)
+    earlier = Matchup.objects.filter(shows, scenario=place, view__isnull=False)
     before = earlier.order_by("pk").first()
     if before is not None and before.view is not None:
         return _Frame(before.view, before.original_image)
-    return replace(now, original_image="")
+    if window:
+        raise _other_windows([place.slug])
+    return _Frame(VIEW_OF_OLD, original)
+
+
+def _other_windows(scenarios: list[str]) -> NothingToPlan:
+    return NothingToPlan(
+        sentence(
+            "The pictures of %(scenarios)s show different windows, so they can’t stand side "
+            "by side. Close the open studies that show them and run “manage.py "
+            "redraw_pictures”.",
+            scenarios=tuple(scenarios[:MOST_NAMED]),
+        )
+    )
 
 
 def _descriptions(

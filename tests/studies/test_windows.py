@@ -6,7 +6,8 @@ import pytest
 from django.core.management import call_command
 
 from arena.errors import NothingToPlan
-from arena.models import Study
+from arena.models import Matchup, Study
+from arena.queries.showings import VIEW_OF_OLD, view_of
 from arena.services.redrawing import redraw_pictures
 from arena.services.studies import close_study, open_study
 from augment.models import Augmentation, Scenario
@@ -18,14 +19,14 @@ from tests.study_rows import cast_of
 pytestmark = pytest.mark.django_db
 
 
-def drawn_before() -> None:
-    """All pictures as if an earlier version had drawn them."""
+def drawn_before(folder: str = "bev") -> None:
+    """All pictures as if an earlier version had drawn them; names once said no window."""
     for row in Augmentation.objects.all():
         Augmentation.objects.filter(pk=row.pk).update(
-            image=f"bev/1-0ld/{row.pk}.png",
+            image=f"{folder}/{row.pk}.png",
             modification=modification_to_document(Modification()),
         )
-    Scenario.objects.update(original_image="bev/1-0ld/original.png")
+    Scenario.objects.update(original_image=f"{folder}/original.png")
 
 
 def opened(name: str, **cast: object) -> Study:
@@ -48,6 +49,7 @@ def test_pictures_of_two_windows_are_never_paired() -> None:
             for name in (matchup.left_image, matchup.right_image, matchup.original_image)
         }
         assert windows == {camera_of(matchup.scenario).key}
+        assert matchup.view == view_of(matchup.scenario)
     assert not any(found.pictures for found in redraw_pictures())
 
 
@@ -55,9 +57,36 @@ def test_a_study_keeps_the_pictures_that_were_shown() -> None:
     cast = cast_of(contestants=("ann", "bob"), scenarios=2, experts=("eva",))
     drawn_before()
     study = opened("before", **cast)
+    assert {row.original_image for row in study.matchups.all()} == {"bev/original.png"}
+    assert [row.view for row in study.matchups.all()] == [VIEW_OF_OLD] * 2
+    assert view_of(Scenario.objects.first()) != VIEW_OF_OLD  # type: ignore[arg-type]
     shown = set(study.matchups.values_list("left_image", "right_image", "original_image"))
     assert {found.needed_by for found in redraw_pictures()} == {"before"}
     close_study(study=study)
     assert sum(found.pictures for found in redraw_pictures()) == 4
-    assert not Augmentation.objects.filter(image__startswith="bev/1-0ld").exists()
+    assert not Augmentation.objects.filter(image__regex=r"^bev/[^/]+$").exists()
     assert set(study.matchups.values_list("left_image", "right_image", "original_image")) == shown
+
+
+def test_pictures_of_a_former_window_keep_the_view_that_they_were_shown_with() -> None:
+    cast = cast_of(contestants=("ann", "bob"), scenarios=2, experts=("eva",))
+    drawn_before("bev/1-0ld")
+    with pytest.raises(NothingToPlan, match="redraw_pictures"):
+        opened("unknown", **cast)
+    drawn_before()
+    opened("first", **cast)
+    then = VIEW_OF_OLD | {"px_per_m": 12.5}
+    drawn_before("bev/1-0ld")
+    Matchup.objects.update(view=then, original_image="shown.png")
+    ann, bob = "bev/1-0ld/a.png", "bev/1-0ld/b.png"
+    Augmentation.objects.filter(contestant__slug="ann").update(image=ann)
+    Augmentation.objects.filter(contestant__slug="bob").update(image=bob)
+    Matchup.objects.update(left_image=ann, right_image=bob)
+    for number, sides in enumerate(((ann, bob), (bob, ann))):
+        Matchup.objects.filter(study__name="first").update(
+            left_image=sides[0], right_image=sides[1]
+        )
+        again = opened(f"again {number}", **cast)
+        found = [(row.view, row.original_image) for row in again.matchups.all()]
+        assert found == [(then, "shown.png")] * 2
+        again.matchups.all().delete()
