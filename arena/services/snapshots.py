@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import platform
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy
 import scipy
 from django.db import transaction
 
 from arena.models import Snapshot, Standing
-from arena.queries.judged import Entrant, Judged, is_imported
+from arena.queries.judged import AUTOMATIC, Entrant, Judged, is_imported
 from arena.queries.vote_sets import Filters, VoteSet, vote_set
 from arena.rating.bootstrap import Unit
 from arena.rating.leaderboard import Intervals, Leaderboard, Method, rate
@@ -62,6 +62,9 @@ def compute(snapshot: Snapshot, report: Report) -> Computed:
         intervals=Intervals(snapshot.intervals),
         seed=snapshot.seed,
     )
+    if any(vote.kind == AUTOMATIC for vote in votes.counted):
+        # Nobody judged those ties: who judged them is no expert that could outvote others.
+        board = replace(board, experts=board.experts - 1)
     report(60)
     judges = {vote.judge: vote.judge_name for vote in votes.counted}
     snapshot.results = _results(snapshot, votes, arrays, board, judges)

@@ -103,6 +103,22 @@ def test_votes_after_the_frozen_one_do_not_count_nor_supersede() -> None:
     assert found.left_out == {}
 
 
+@pytest.mark.parametrize(("experts", "marks"), [(4, False), (5, True)])
+def test_who_judged_automatic_ties_is_no_expert(experts: int, marks: bool) -> None:
+    study = a_study(experts=tuple(f"expert-{n}" for n in range(experts)), votes_per_expert=6)
+    study.rules["identical"] = [["place-0", "ann", "bob"]]
+    study.save()
+    for number, matchup in enumerate(study.matchups.order_by("pk")):
+        vote(matchup, ("left", "right", "equal")[number % 3])
+    close_study(study=study)
+    study.refresh_from_db()
+    for ties in (False, True):
+        snapshot = rate(study=study, filters=Filters(automatic_ties=ties), rounds=50)
+        board = snapshot.results.board
+        assert board.experts == experts
+        assert (board.above is not None) == marks
+
+
 def test_identical_pictures_are_a_tie_only_on_demand() -> None:
     study = a_study(votes_per_expert=2)
     study.rules["identical"] = [["place-0", "ann", "bob"]]
