@@ -1,8 +1,8 @@
 """How much of a scene is written down: what a wish about the ego's drive can concern.
 
 The rule, for whoever asks: within the radius of the ego, and within `BESIDE_M` of where the ego
-can get on its lanes and those beside them within `DRIVEN_M`, turning off wherever it can, or comes
-from within `BEHIND_M`. A lane is
+can get on its lanes and those beside them within `DRIVEN_M`, or within the radius where that is
+more, turning off wherever it can, or comes from within `BEHIND_M`. A lane is
 shown from where it first comes into that region to where it last leaves it. Of connectors that
 run from the same lane to the same lane in the same place the first is shown. Where the map has no
 lane for the ego only the radius counts.
@@ -87,9 +87,10 @@ def extent_of(scene: Scene, radius_m: float) -> Extent:
     route = EgoRoute.of(scene)
     if route is None:
         return Extent(radius_m=radius_m, routes_m=None)
+    driven_m = max(DRIVEN_M, radius_m)
     lines = [
-        line.between(start_m, start_m + DRIVEN_M)
-        for lane_id, start_m in _reached(route).items()
+        line.between(start_m, start_m + driven_m)
+        for lane_id, start_m in _reached(route, driven_m).items()
         for line in [route.graph.lane(lane_id).centerline]
         if line.length_m - start_m > _ROUTE_EVERY_M
     ]
@@ -124,14 +125,14 @@ def shown_spans(scene: Scene, radius_m: float) -> dict[str, tuple[float, float]]
 # Private
 
 
-def _reached(route: EgoRoute) -> dict[str, float]:
+def _reached(route: EgoRoute, within_m: float) -> dict[str, float]:
     """From where on the ego can drive each lane that it can get to, by id: Dijkstra's search."""
     graph = route.graph
     found: dict[str, float] = {}
     queue = [(0.0, route.lane_id, route.lane_s_m)]
     while queue:
         driven_m, here, start_m = heapq.heappop(queue)
-        if here in found or driven_m > DRIVEN_M:
+        if here in found or driven_m > within_m:
             continue
         found[here] = start_m
         lane = graph.lane(here)

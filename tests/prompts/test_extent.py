@@ -45,6 +45,14 @@ def test_a_crossing_street_is_cut_where_the_wish_ends_and_goes_far_ahead() -> No
     assert "Lane4" not in spans
 
 
+def test_a_larger_radius_shows_what_lies_further_down_the_ego_s_way() -> None:
+    long = scene(lanes=(lane("Lane1", (-50.0, 0.0), (300.0, 0.0)),), areas=())
+    ahead = scene(lanes=long.lanes, areas=(), agents=(vehicle("Agent2", 140.0, 0.0),))
+    ends = [shown_spans(long, radius)["Lane1"][1] - 50.0 for radius in (60.0, 80.0, 160.0)]
+    assert ends == pytest.approx([60.0, 80.0, 160.0], abs=0.5)
+    assert "Agent2" in agent_vectors(ahead, short_names(ahead), 160.0)
+
+
 def test_where_the_ego_can_turn_off_is_shown_as_far_as_it_can_drive() -> None:
     spans = shown_spans(junction(), 80.0)
     start_m, end_m = spans["Lane3"]

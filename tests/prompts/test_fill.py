@@ -1,11 +1,15 @@
 from __future__ import annotations
 
+import hashlib
 import re
 
 import pytest
 
 from augment.llm.messages import Speaker
 from augment.prompts import fill
+from augment.prompts.texts import VECTORS_VERSION
+from augment.prompts.vectors import LaneFormat, scene_text
+from tests.fixtures.shelf import SLUGS, shown_scene
 from tests.scenes import junction, scene
 
 WISH = "Add a parked car 21.4 m ahead of the ego.\nIt stands 0.5 m left of the lane centre."
@@ -40,6 +44,20 @@ def test_no_line_of_an_instruction_ends_its_quotation(wish: str) -> None:
 def test_the_version_is_twelve_digits_of_the_texts() -> None:
     assert re.fullmatch("[0-9a-f]{12}", fill.prompt_version())
     assert fill.prompt_version() == fill.prompt_version()
+
+
+def test_the_form_of_a_scene_is_pinned_to_its_version() -> None:
+    """Whoever changes the form raises VECTORS_VERSION: stored answers are told apart by it."""
+    text = "\n".join(
+        scene_text(place, lanes=lanes)
+        for place in (scene(), junction(), shown_scene(SLUGS[0]))
+        for lanes in LaneFormat
+    )
+    digest = hashlib.sha256(text.encode()).hexdigest()
+    assert (VECTORS_VERSION, digest) == (
+        3,
+        "bf0d346558b8330504514ec3e79b362c4e776619a0b1ac3c322a82499ffc222d",
+    )
 
 
 def test_the_prompt_names_the_five_sections_in_order() -> None:
