@@ -272,6 +272,25 @@ def test_who_ran_with_other_prompts_is_not_run_with_these() -> None:
         run("b")
 
 
+def test_a_contestant_like_another_one_asks_as_that_one_did() -> None:
+    """Whatever has become known of the model, and whatever the defaults are by now."""
+    with serving(Scripted()) as server:
+        add(server, "a", "fc", temperature=0.7)
+        run("a")
+        ran = options_of(Contestant.objects.get(slug="a")).to_document()
+        old = ran | {"radius_m": 60.0, "max_output_tokens": 900, "prompt_version": "0" * 12}
+        Contestant.objects.filter(slug="a").update(frozen_options=old)
+        EndpointModel.objects.update(native_tools=True)
+        made = contestants.add_like(slug="b", like="a")
+        run("b")
+    made.refresh_from_db()
+    assert made.frozen_options == old | {"prompt_version": prompt_version()}
+    assert made.frozen_options["protocol"] == "prompt"
+    assert made.name == "m FC (temperature 0.7) at here"
+    other = contestants.add_like(slug="c", like="a", changes={"variant": "otm"})
+    assert other.options == {"temperature": 0.7, "radius_m": 60.0, "max_output_tokens": 900}
+
+
 def test_who_ran_before_there_were_options_keeps_what_it_ran_with() -> None:
     migration = importlib.import_module("augment.migrations.0011_options_and_samples")
     with serving(Scripted()) as server:
@@ -316,7 +335,10 @@ def test_the_command_takes_every_option_and_keeps_contestants_apart(
         with pytest.raises(CommandError, match=r"temperature.*from 0 to 2"):
             call_command("add_contestant", "c", *asked, "--temperature=2.1")
         with pytest.raises(CommandError, match="otm has no review, so it has one round"):
-            call_command("add_contestant", "c", "--like=a", "--variant=otm")
+            call_command("add_contestant", "c", "--like=a", "--variant=otm", "--rounds=2")
+        call_command("add_contestant", "c", "--like=a", "--variant=otm")
+        left = made.options.keys() - Contestant.objects.get(slug="c").options.keys()
+        assert left == {"protocol", "rounds", "accepted_from"}
 
 
 @pytest.mark.parametrize(

@@ -20,7 +20,12 @@ from augment.services.endpoints.respondents import Respondent, check_roles, docu
 from augment.services.events import log_event
 from augment.services.scenarios.scenes import check_slug
 from augment.services.texts import one_line
-from augment.variants.options import ContestantOptions, check_options, options_from_document
+from augment.variants.options import (
+    ContestantOptions,
+    check_options,
+    names_for,
+    options_from_document,
+)
 from augment.variants.recipes import Recipe, find_recipe, spell_variant
 from augment.variants.transcript import ModelRole
 
@@ -116,6 +121,7 @@ def add_contestant(
     name: str | None = None,
     roles: Mapping[ModelRole, tuple[str | None, str]] | None = None,
     options: ContestantOptions | None = None,
+    spoken: ContestantOptions | None = None,
     actor: User | None = None,
 ) -> Contestant:
     """A language model that runs one variant; a simulated one where the endpoint is simulated.
@@ -134,6 +140,7 @@ def add_contestant(
         roles: Who else plays a reviewer's role: the label of an endpoint (None: the contestant's
             own) and the model id there.
         options: How it asks; what is open is fixed at its first run.
+        spoken: Those of the options that a name made here tells; None for all.
         actor: Who adds it.
 
     Raises:
@@ -149,7 +156,8 @@ def add_contestant(
     respondents = (Respondent(endpoint=address, model=model), *others.values())
     chosen = options or ContestantOptions()
     check_options(recipe, chosen)
-    title = _title(slug, model, recipe, others, address, chosen) if name is None else name
+    told = chosen if spoken is None else spoken
+    title = _title(slug, model, recipe, others, address, told) if name is None else name
     simulated = any(respondent.endpoint.is_simulated for respondent in respondents)
     wanted = {
         "name": one_line("name", title, what="contestant"),
@@ -178,6 +186,9 @@ def add_like(
 ) -> Contestant:
     """A contestant as another one, but for what is given; it asks with the installed prompts.
 
+    What the other one ran with counts, be it a default of then; options that another variant has
+    no use for stay behind. A name made here tells only what somebody chose.
+
     Args:
         slug: Of the new one.
         like: Of the one that is followed.
@@ -201,14 +212,20 @@ def add_like(
         raise Conflict(f"{like} asks no language model; there is nothing to be like.")
     before = {"variant": row.variant, "endpoint": row.endpoint.label, "model": row.model}
     kept = {ModelRole(role): (one["endpoint"], one["model"]) for role, one in row.roles.items()}
-    open_again = {name: value for name, value in row.options.items() if name != "prompt_version"}
-    chosen = open_again | (options or ContestantOptions()).to_document()
+    wanted = before | dict(changes or {})
+    usable = set(names_for(find_recipe(wanted["variant"]))) - {"prompt_version"}
+    asked = (options or ContestantOptions()).to_document()
+    chosen, ran = (
+        options_from_document({k: v for k, v in copied.items() if k in usable} | asked)
+        for copied in (row.options, (row.frozen_options or {}) | row.options)
+    )
     return add_contestant(
         slug=slug,
-        **(before | dict(changes or {})),
+        **wanted,
         name=name,
         roles=kept | dict(roles or {}),
-        options=options_from_document(chosen),
+        options=ran,
+        spoken=chosen,
         actor=actor,
     )
 
