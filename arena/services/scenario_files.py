@@ -20,6 +20,8 @@ from augment.services.judging.scenario_export import FORMATS
 
 State = ScenarioFile.State
 LONGEST_FAULT = 500
+FOLDER = "scenario-files"
+"""Where the zips lie, among the pictures; a backup leaves them out, they can be made again."""
 
 
 @transaction.atomic
@@ -70,7 +72,7 @@ def keep_file(
         warnings: What whoever passes it on has to know.
         marked: Whether data that must not be used commercially is in it.
     """
-    stored = f"scenario-files/{row.code}.zip"
+    stored = f"{FOLDER}/{row.code}.zip"
     if default_storage.exists(stored):  # a worker that died left it
         default_storage.delete(stored)
     kept = default_storage.save(stored, ContentFile(content))

@@ -22,10 +22,11 @@ LEFT_OUT = frozenset(
     {
         *("sessions.session", "arena.session"),
         *("axes.accessattempt", "axes.accesslog", "axes.accessfailurelog"),
-        *("axes.accessattemptexpiration", "augment.worker"),
+        *("axes.accessattemptexpiration", "augment.worker", "arena.scenariofile"),
     }
 )
-"""What means nothing after a restore: who was signed in, who was locked out, who worked."""
+"""What means nothing after a restore: who was signed in, who was locked out, who worked, and zips
+that are made again when somebody asks for them."""
 
 MADE_BY_MIGRATING = ("auth.permission", "contenttypes.contenttype", "auth.group")
 """What an empty installation has already; a restore puts the backup's in its place."""

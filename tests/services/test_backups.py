@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import hashlib
 import json
+import re
 import threading
 import uuid
 import zipfile
@@ -22,10 +24,12 @@ from arena.management.backups.archive import MANIFEST, ZipSource, read_manifest
 from arena.management.backups.taking import take_backup
 from arena.models import Vote
 from arena.services.ratings import rate
+from arena.services.scenario_files import ask_for_file, keep_file
 from arena.services.stored_rows import applied_migrations, find_tables, frozen_rows, label_of
 from arena.services.studies import close_study
-from augment.models import Event
+from augment.models import Event, GenerationJob
 from augment.services.events import log_event
+from augment.services.judging.scenario_export import FORMATS
 from tests.study_rows import a_study, matchups_of, vote
 
 pytestmark = pytest.mark.django_db(transaction=True)
@@ -196,6 +200,120 @@ def test_a_row_that_does_not_fit_takes_everything_back(tmp_path: Path) -> None:
         call_command("restore", str(path))
     assert not Vote.objects.exists()
     assert not default_storage.exists("bev/one.png")
+
+
+def with_rows(found: dict[str, bytes], label: str, content: bytes) -> None:
+    """Other rows, with their hash and number."""
+    name, manifest = f"rows/{label}.jsonl", json.loads(found[MANIFEST])
+    found[name] = content
+    members = manifest["members"] | {name: hashlib.sha256(content).hexdigest()}
+    rows = manifest["rows"] | {label: len(content.splitlines())}
+    with_manifest(found, members=members, rows=rows)
+
+
+def no_matchups(found: dict[str, bytes]) -> None:
+    with_rows(found, "arena.matchup", b"")
+
+
+def no_times(found: dict[str, bytes]) -> None:
+    rows = found["rows/augment.event.jsonl"]
+    with_rows(found, "augment.event", re.sub(rb'"20\d\d-[^"]+"', b'"soon"', rows))
+
+
+@pytest.mark.parametrize(
+    ("mend", "says"), [(no_matchups, "don't fit each other"), (no_times, "can't be stored")]
+)
+def test_rows_that_fit_no_table_take_everything_back(
+    tmp_path: Path, mend: Callable[[dict[str, bytes]], None], says: str
+) -> None:
+    a_full_house()
+    path = tmp_path / "b.zip"
+    take_backup(path, now=NOW, say=quiet)
+    change(path, mend)
+    empty()
+    with pytest.raises(CommandError, match=says):
+        call_command("restore", str(path))
+    assert not Vote.objects.exists()
+    assert not default_storage.exists("bev/one.png")
+
+
+def test_a_key_that_can_not_be_written_takes_everything_back(
+    tmp_path: Path, settings: Settings
+) -> None:
+    key = settings.VAR_DIR / "secret_key"
+    key.write_text("a key")
+    a_full_house()
+    take_backup(tmp_path / "b.zip", now=NOW, say=quiet)
+    empty()
+    key.unlink()
+    key.mkdir()
+    with pytest.raises(CommandError, match="Nothing was restored"):
+        call_command("restore", str(tmp_path / "b.zip"))
+    assert not Vote.objects.exists()
+    assert not default_storage.exists("bev/one.png")
+
+
+FLAGS, METHOD = 8, 10
+"""Where they stand in the entry of a member, in bytes."""
+
+
+def spoil(path: Path, member: str, at: int, value: int) -> None:
+    content = bytearray(path.read_bytes())
+    entry = content.rindex(member.encode()) - 46
+    assert content[entry : entry + 4] == b"PK\x01\x02"
+    content[entry + at] = value
+    path.write_bytes(content)
+
+
+def break_content(path: Path, member: str) -> None:
+    with zipfile.ZipFile(path) as archive:
+        found = archive.getinfo(member)
+    content = bytearray(path.read_bytes())
+    start = found.header_offset + 30 + len(member) + 20  # the 20: sizes of a large file
+    content[start : start + 8] = b"\xff" * 8
+    path.write_bytes(content)
+
+
+@pytest.mark.parametrize(
+    "harm",
+    [
+        lambda path: spoil(path, "rows/auth.group.jsonl", FLAGS, 1),
+        lambda path: spoil(path, "rows/auth.group.jsonl", METHOD, 97),
+        lambda path: break_content(path, "rows/auth.group.jsonl"),
+        lambda path: spoil(path, MANIFEST, FLAGS, 1),
+        lambda path: spoil(path, MANIFEST, METHOD, 97),
+    ],
+)
+def test_what_a_zip_can_not_give_is_said(tmp_path: Path, harm: Callable[[Path], None]) -> None:
+    path = tmp_path / "b.zip"
+    take_backup(path, now=NOW, say=quiet)
+    harm(path)
+    with pytest.raises(CommandError, match=r"not whole|no backup"):
+        call_command("restore", str(path))
+
+
+@pytest.mark.parametrize("name", ["media/a//b.png", "media/./b.png", "/b.png", "media/../b"])
+def test_a_member_has_one_way_to_be_named(tmp_path: Path, name: str) -> None:
+    def add(found: dict[str, bytes]) -> None:
+        found[name] = b""
+        members = json.loads(found[MANIFEST])["members"]
+        with_manifest(found, members=members | {name: hashlib.sha256(b"").hexdigest()})
+
+    path = tmp_path / "b.zip"
+    take_backup(path, now=NOW, say=quiet)
+    change(path, add)
+    with pytest.raises(CommandError, match="at a place of none"):
+        call_command("restore", str(path))
+
+
+def test_zips_that_can_be_made_again_stay_out(tmp_path: Path) -> None:
+    job = GenerationJob.objects.create(name="a job")
+    row = ask_for_file(job=job, file_format=next(iter(FORMATS)))
+    keep_file(row, name="a.zip", content=b"zip", warnings=(), marked=False)
+    take_backup(tmp_path / "b.zip", now=NOW, say=quiet)
+    names = contents(tmp_path / "b.zip").keys()
+    assert "rows/augment.generationjob.jsonl" in names
+    assert not [name for name in names if "scenario-files" in name or "scenariofile" in name]
 
 
 def test_every_table_is_in_it_but_those_that_mean_nothing_later() -> None:

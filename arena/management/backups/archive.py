@@ -11,6 +11,7 @@ from __future__ import annotations
 import hashlib
 import json
 import zipfile
+import zlib
 from collections.abc import Iterable
 from dataclasses import dataclass, field
 from pathlib import Path, PurePosixPath
@@ -21,6 +22,8 @@ from arena.errors import ArenaError
 FORMAT, VERSION = "scenario-arena-backup", 1
 MANIFEST, SECRET_KEY = "manifest.json", "secret_key"
 ROWS, MEDIA = "rows/", "media/"
+UNREADABLE = (zipfile.BadZipFile, zlib.error, EOFError, RuntimeError, NotImplementedError)
+"""What a member says that is broken, locked with a password, or packed in a way of others."""
 CHUNK = 1 << 20
 SMALL = 1 << 24
 """A manifest is far below this; a longer one is none of ours."""
@@ -148,7 +151,7 @@ def read_manifest(source: MemberSource, *, wanted: str = FORMAT) -> Manifest:
             with source.open(name) as file:
                 while part := file.read(CHUNK):
                     digest.update(part)
-        except (zipfile.BadZipFile, EOFError) as error:
+        except UNREADABLE as error:
             raise BackupUnreadable(f"This is not whole: {name}: {error}.") from error
         if digest.hexdigest() != expected:
             raise BackupUnreadable(f"This is not whole: {name} has another content.")
@@ -175,13 +178,14 @@ def _parse_manifest(source: MemberSource, wanted: str) -> Manifest:
             rows={str(label): int(number) for label, number in document["rows"].items()},
             members={str(name): str(digest) for name, digest in document["members"].items()},
         )
-    except (KeyError, TypeError, ValueError, AttributeError, OSError) as error:
+    except (*UNREADABLE, KeyError, TypeError, ValueError, AttributeError, OSError) as error:
         text = f"This is no backup and no study: no {MANIFEST} that can be read."
         raise BackupUnreadable(text) from error
 
 
 def _check_place(name: str) -> None:
     """Raise for what would be written outside of the media."""
-    parts = PurePosixPath(name).parts
-    if name.startswith("/") or ".." in parts or "\\" in name or "\0" in name:
+    path = PurePosixPath(name)
+    is_plain = str(path) == name  # else two names could lead to one file
+    if not is_plain or path.is_absolute() or ".." in path.parts or "\\" in name or "\0" in name:
         raise BackupUnreadable(f"A member is at a place of none: {name!r}.")

@@ -8,10 +8,11 @@ from pathlib import Path
 from django.conf import settings
 from django.contrib.auth.hashers import make_password
 from django.contrib.auth.models import Group, User
+from django.core.exceptions import ValidationError
 from django.core.files.base import ContentFile
 from django.core.files.storage import default_storage
 from django.core.management import call_command
-from django.db import DatabaseError, connection, models, transaction
+from django.db import DatabaseError, IntegrityError, connection, models, transaction
 from django.db.migrations.recorder import MigrationRecorder
 
 from arena.errors import ArenaError
@@ -32,6 +33,9 @@ from arena.management.backups.archive import (
 from arena.services import stored_rows
 from arena.serving.readiness import find_unapplied_migrations
 from augment.models import Endpoint
+
+REFUSED = (DatabaseError, ValidationError)
+"""What a table says to values that are none of its."""
 
 EXPERTS = "expert"
 """The role of every account of a study's folder."""
@@ -56,11 +60,12 @@ def restore_backup(path: Path, *, say: Callable[[str], None]) -> Manifest:
         def write() -> None:
             stored_rows.empty_what_migrating_made()
             _write_rows(source, manifest, tables)
+            _settle()
+            if SECRET_KEY in manifest.members:
+                with source.open(SECRET_KEY) as key:
+                    write_whole(settings.VAR_DIR / SECRET_KEY, key.read(), mode=0o600)
 
         _restore(source, manifest, write, say)
-        if SECRET_KEY in manifest.members:
-            with source.open(SECRET_KEY) as key:
-                write_whole(settings.VAR_DIR / SECRET_KEY, key.read(), mode=0o600)
     return manifest
 
 
@@ -81,6 +86,7 @@ def import_study(folder: Path, *, say: Callable[[str], None]) -> Manifest:
     def write() -> None:
         _write_rows(source, manifest, [by_label[label] for label in manifest.rows])
         _take_powers()
+        _settle()
 
     _restore(source, manifest, write, say)
     return manifest
@@ -119,7 +125,6 @@ def _restore(
         say(f"pictures: {len(written)}")
         with transaction.atomic():
             write()
-            stored_rows.reset_sequences()
     except BaseException:
         for name in written:
             default_storage.delete(name)
@@ -156,6 +161,15 @@ def _write_media(source: MemberSource, manifest: Manifest, written: list[str]) -
         default_storage.save(name, ContentFile(content))
 
 
+def _settle() -> None:
+    """Hold the rows against each other now, not when all is kept already."""
+    try:
+        connection.check_constraints()
+    except IntegrityError as error:
+        raise BackupUnreadable(f"Its rows don't fit each other: {error}") from error
+    stored_rows.reset_sequences()
+
+
 def _write_rows(
     source: MemberSource, manifest: Manifest, tables: Iterable[type[models.Model]]
 ) -> None:
@@ -164,7 +178,7 @@ def _write_rows(
         try:
             with source.open(f"{ROWS}{label}.jsonl") as lines:
                 number = stored_rows.write_rows(model, lines)
-        except (ValueError, TypeError, KeyError, OSError, DatabaseError) as error:
+        except (ValueError, TypeError, KeyError, OSError, *REFUSED) as error:
             raise BackupUnreadable(f"The rows of {label} can't be stored: {error}") from error
         if number != manifest.rows[label]:
             raise BackupUnreadable(f"{label} has {number} rows, not {manifest.rows[label]}.")

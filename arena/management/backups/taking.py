@@ -15,6 +15,7 @@ from django.db import connection
 
 from arena.errors import ArenaError
 from arena.management.backups.archive import MEDIA, ROWS, SECRET_KEY, Manifest, add_member
+from arena.services.scenario_files import FOLDER as SCENARIO_FILES
 from arena.services.stored_rows import (
     applied_migrations,
     find_tables,
@@ -54,13 +55,14 @@ def take_backup(path: Path, *, now: datetime, say: Callable[[str], None]) -> Man
 
 
 def find_media(folder: str = "") -> Iterator[str]:
-    """The names of all pictures, whatever keeps them."""
+    """The names of all pictures, whatever keeps them; zips that can be made again are none."""
     folders, files = default_storage.listdir(folder)
     for name in sorted(files):
         if not name.startswith("."):  # half a file of a worker that was killed
             yield f"{folder}{name}"
     for name in sorted(folders):
-        yield from find_media(f"{folder}{name}/")
+        if f"{folder}{name}" != SCENARIO_FILES:
+            yield from find_media(f"{folder}{name}/")
 
 
 def _fill(archive: zipfile.ZipFile, now: datetime, say: Callable[[str], None]) -> Manifest:
