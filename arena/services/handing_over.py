@@ -22,6 +22,7 @@ from arena.services.plans import (
     shows_all_samples,
     store,
     votes_left,
+    without_lost_checks,
 )
 from augment.errors import Conflict, UnknownName
 from augment.sentences import sentence, word
@@ -58,8 +59,9 @@ def hand_over(
     if study.state != Study.State.OPEN:
         raise _not_open(study)
     giver, takers = _giver(study, username), _takers(study, username, to)
-    rules, number = rules_of(study), next_batch(study)
-    grid, cells, known = rules.grid, pictures_of(study), planned_so_far(study)
+    cells, known, number = pictures_of(study), planned_so_far(study), next_batch(study)
+    rules = without_lost_checks(rules_of(study), cells)
+    grid = rules.grid
     rng = np.random.default_rng([rules.seed, number])
     open_rows = _open_rows(study, giver)
     names = [taker.username for taker in takers]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Collection, Iterable, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -68,14 +68,30 @@ def refuse_missing(
         raise NothingToPlan(_no_pictures(missing))
 
 
-def check_pictures(scenarios: list[Scenario]) -> tuple[tuple[Check, ...], Cells]:
-    """What attention checks there can be: the latest reference against the latest broken one."""
+def windows_of(entries: Iterable[Entry]) -> dict[str, str]:
+    """By scenario, the window that its pictures in a study show: of the first sample, if apart."""
+    found: dict[str, str] = {}
+    for entry in sorted(entries, key=lambda one: one.scenario):
+        found.setdefault(scenario_of(entry.scenario), window_of(entry.picture))
+    return found
+
+
+def check_pictures(
+    scenarios: list[Scenario], windows: Mapping[str, str]
+) -> tuple[tuple[Check, ...], Cells]:
+    """What attention checks there can be: the latest reference against the latest broken one.
+
+    Args:
+        scenarios: Of the study.
+        windows: By scenario; pictures of another window stay out.
+    """
     found = find_showable(scenarios).filter(
         contestant__kind__in=[Kind.REFERENCE, Kind.CHECK], state=Augmentation.State.DONE
     )
     latest: dict[tuple[str, str], Augmentation] = {}
     for row in found.order_by(F("finished_at").asc(nulls_first=True), "pk"):
-        latest[row.scenario.slug, row.contestant.kind] = row
+        if windows.get(row.scenario.slug) == window_of(row.image):
+            latest[row.scenario.slug, row.contestant.kind] = row
     checks: list[Check] = []
     cells: Cells = {}
     for scenario in sorted({slug for slug, _ in latest}):
@@ -88,17 +104,20 @@ def check_pictures(scenarios: list[Scenario]) -> tuple[tuple[Check, ...], Cells]
     return tuple(checks), cells
 
 
-def enough_checks(scenarios: list[Scenario], *, wanted: int) -> tuple[tuple[Check, ...], Cells]:
+def enough_checks(
+    scenarios: list[Scenario], *, windows: Mapping[str, str], wanted: int
+) -> tuple[tuple[Check, ...], Cells]:
     """What `check_pictures` gives, if that is as much as a study asks for.
 
     Args:
         scenarios: Of the study; an expert sees at most one check of each.
+        windows: By scenario, as `check_pictures` takes them.
         wanted: How many each expert is to see.
 
     Raises:
         NothingToPlan: There are too few; the text says what to do.
     """
-    checks, cells = check_pictures(scenarios) if wanted else ((), {})
+    checks, cells = check_pictures(scenarios, windows) if wanted else ((), {})
     if len(checks) >= wanted:
         return checks, cells
     ready = {check.scenario for check in checks}
@@ -132,7 +151,8 @@ def pictures_of(study: Study) -> Cells:
     rules = rules_of(study)
     wanted = {(entry.scenario, entry.contestant): entry for entry in rules.entries}
     scenarios = list(study.scenarios.only("slug"))
-    _, cells = placed_checks(*check_pictures(scenarios), shows_all=shows_all_samples(study))
+    found = check_pictures(scenarios, windows_of(rules.entries))
+    _, cells = placed_checks(*found, shows_all=shows_all_samples(study))
     rows = find_showable(scenarios).filter(contestant__in=study.contestants.all()).order_by("pk")
     for row in rows:
         cell = (_place(study, row), row.contestant.slug)
@@ -140,6 +160,16 @@ def pictures_of(study: Study) -> Cells:
         if entry is not None and (entry.picture, entry.sample) == (row.image, row.sample):
             cells[cell] = row
     return cells
+
+
+def without_lost_checks(rules: PlanRules, cells: Cells) -> PlanRules:
+    """The rules with those attention checks that still have both of their pictures."""
+    kept = tuple(
+        check
+        for check in rules.checks
+        if {(check.scenario, check.good), (check.scenario, check.broken)} <= cells.keys()
+    )
+    return replace(rules, checks=kept)
 
 
 def shows_all_samples(study: Study) -> bool:

@@ -20,6 +20,7 @@ from arena.services.plans import (
     rules_of,
     store,
     votes_left,
+    without_lost_checks,
 )
 from arena.services.vote_writes import mark_served
 from augment.services.events import log_event
@@ -60,8 +61,9 @@ def plan_batch(*, study: Study, expert: User) -> int:
         left = votes_left(held, expert)
         if not left or held.state != Study.State.OPEN or _waiting(held, expert) >= MOST_AHEAD:
             return 0
-        rules, number = rules_of(held), next_batch(held)
-        grid, known = rules.grid, planned_so_far(held)
+        cells, known, number = pictures_of(held), planned_so_far(held), next_batch(held)
+        rules = without_lost_checks(rules_of(held), cells)
+        grid = rules.grid
         mine = known[expert.username]
         scores, last_vote, votes = _scores(held, contestants_of(grid))
         ratings, covariance = ratings_so_far(scores)
@@ -77,7 +79,7 @@ def plan_batch(*, study: Study, expert: User) -> int:
             rng,
         )
         planned, gap = follow_on(rules, grid, expert.username, mine, units, rng)
-        store(held, planned, pictures_of(held), [expert], batch=number)
+        store(held, planned, cells, [expert], batch=number)
         # Where every unit is known to the expert, the rest of the quota can't be filled.
         rest = left - len(units) if units else 0
         held.votes_to_plan = {**held.votes_to_plan, expert.username: rest}

@@ -20,6 +20,7 @@ from arena.services.plans import (
     placed_checks,
     rules_of,
     store,
+    windows_of,
 )
 from arena.services.replays import Replays, replays_of
 from arena.services.shown_pictures import SampleRule, StudyPictures, choose_pictures
@@ -102,13 +103,14 @@ def open_study(
     contestant_rows, scenario_rows = _contestants(contestants), _scenarios(scenarios)
     expert_rows = _experts(experts)
     _refuse_simulated(contestant_rows, expert_rows, unless=allow_simulated)
-    checks, broken = _checks_for(given, scenario_rows, votes_per_expert)
     jobs = [find_job(job) for job in given.jobs]
     shown = choose_pictures(
         contestant_rows, scenario_rows, seed=seed, rule=given.samples, jobs=jobs
     )
+    entries = _entries(shown.cells)
+    checks, broken = _checks_for(given, scenario_rows, entries, votes_per_expert)
     rules = PlanRules(
-        entries=_entries(shown.cells),
+        entries=entries,
         experts=tuple(expert.username for expert in expert_rows),
         votes_per_expert=votes_per_expert,
         seed=seed,
@@ -218,10 +220,11 @@ def _refuse_simulated(contestants: list[Contestant], experts: list[User], *, unl
 
 
 def _checks_for(
-    given: PlanOptions, scenarios: list[Scenario], votes: int
+    given: PlanOptions, scenarios: list[Scenario], entries: tuple[Entry, ...], votes: int
 ) -> tuple[tuple[Check, ...], Cells]:
     """The attention checks that are asked for, where the plan shows them."""
-    found = enough_checks(scenarios, wanted=round(given.check_share * votes))
+    wanted = round(given.check_share * votes)
+    found = enough_checks(scenarios, windows=windows_of(entries), wanted=wanted)
     return placed_checks(*found, shows_all=given.samples is SampleRule.ALL)
 
 

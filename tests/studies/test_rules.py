@@ -11,7 +11,9 @@ from django.core.management import CommandError, call_command
 from arena.errors import NothingToPlan
 from arena.models import Study
 from arena.pairing.plan import plan
+from arena.services.handing_over import hand_over
 from arena.services.plans import pictures_of
+from arena.services.replanning import plan_batch
 from arena.services.studies import PlanOptions, open_study, rules_of
 from augment.errors import UnknownName
 from augment.models import Augmentation, Contestant, Scenario
@@ -195,3 +197,35 @@ def test_the_command_opens_a_study_with_its_rules_and_says_what_it_planned() -> 
     assert not Study.objects.get().allow_text
     with pytest.raises(CommandError, match="is no target"):
         call_command(*given, "--targets", "ann lots")
+
+
+def test_checks_drawn_in_another_window_stay_out_of_an_open_study() -> None:
+    study = opened(with_checks(), votes=12, check_share=0.5, adaptive_share=0.5)
+    eva = study.experts.get(username="eva")
+    shown = {place for place, who in pictures_of(study) if who == "attention-check"}
+    assert len(shown) == 8
+    for row in Augmentation.objects.filter(contestant__kind="check")[:4]:
+        Augmentation.objects.filter(pk=row.pk).update(image=f"bev/1-new/{row.pk}.png")
+    kept = {place for place, who in pictures_of(study) if who == "attention-check"}
+    assert len(kept) == 4
+    old = study.matchups.filter(expert=eva, kind="check")
+    had = set(old.values_list("scenario__slug", flat=True))
+    assert plan_batch(study=study, expert=eva) > 0
+    new = old.filter(batch__gt=0)
+    assert {row.scenario.slug for row in new} <= kept - had
+    giver = hand_over(study=study, username="eva", to=["finn"])
+    assert sum(giver.values()) > 0
+
+
+def test_checks_are_opened_with_pictures_of_the_window_of_the_others() -> None:
+    cast = with_checks()
+    old = Augmentation.objects.filter(contestant__kind="check").order_by("pk")
+    names = {row.image for row in old}
+    for row in old:
+        late = picture(row.scenario, row.contestant, image=f"bev/1-new/{row.pk}.png")
+        assert late.finished_at is not None
+    study = opened(cast, check_share=0.25)
+    checks = study.matchups.filter(kind="check").select_related("left__contestant")
+    drawn = {r.left_image if r.left.contestant.kind == "check" else r.right_image for r in checks}
+    assert drawn
+    assert drawn <= names
