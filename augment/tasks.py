@@ -38,6 +38,9 @@ logger = logging.getLogger(__name__)
 RESEND_AFTER = timedelta(minutes=10)
 """A message that waits longer than this may be lost; a second one does no harm."""
 
+QUEUE_BEFORE = "celery"
+"""What earlier releases called the queue of everything."""
+
 BATCH = 100
 """So many messages are sent before the rows say so; a crash between sends them twice."""
 
@@ -180,16 +183,11 @@ def recover(*, now: Moment = DATABASE_TIME, at_start: bool = False) -> None:
     leases.take_back_stale(now=now, older_than=stale_after)
     jobs.finish_if_over(now=now)
     intent_readings.give_up_stale(now=now)
-    if at_start:
-        older_than = timedelta(0)
-    elif _messages_waiting():
-        older_than = RESEND_AFTER
-    else:
-        # Nothing is on its way, so what was sent a while ago and still waits is lost.
-        older_than = stale_after
-    enqueue(leases.find_unsent(now=now, older_than=older_than))
+    lost_after = timedelta(0) if at_start else _lost_after(run_augmentation)
+    enqueue(leases.find_unsent(now=now, older_than=lost_after))
     simulations.requeue_stale(now=now, older_than=stale_after)
-    enqueue_simulations(simulations.find_unsent(now=now, older_than=older_than))
+    lost_after = timedelta(0) if at_start else _lost_after(run_simulation)
+    enqueue_simulations(simulations.find_unsent(now=now, older_than=lost_after))
 
 
 @worker_ready.connect
@@ -253,10 +251,19 @@ def _fault(broker: Any, error: Exception) -> QueueFault:
     return QueueUnreachable(address)
 
 
-def _messages_waiting() -> int:
-    """How many messages no worker has taken yet, on all queues."""
+def _lost_after(task: Any) -> timedelta:
+    """How old a message of a task is that must be lost, as its row still waits.
+
+    Where nothing waits in its queue, nothing is on its way.
+    """
+    queue = current_app.amqp.router.route({}, task.name)["queue"].name
+    if _messages_waiting({queue, QUEUE_BEFORE}):
+        return RESEND_AFTER
+    return timedelta(seconds=settings.STALE_AFTER_S)
+
+
+def _messages_waiting(queues: Iterable[str]) -> int:
+    """How many messages of these queues no worker has taken yet."""
     with open_broker() as broker:
-        queues = current_app.amqp.queues
-        return sum(
-            int(broker.default_channel.queue_declare(queue=name).message_count) for name in queues
-        )
+        declare = broker.default_channel.queue_declare
+        return sum(int(declare(queue=name).message_count) for name in queues)

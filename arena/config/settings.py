@@ -228,11 +228,13 @@ CELERY_BROKER_CONNECTION_RETRY_ON_STARTUP = True
 CELERY_TASK_ALWAYS_EAGER = False
 # Asking models is waiting, drawing and driving is computing: each can have workers of its own.
 CELERY_TASK_DEFAULT_QUEUE = "models"
-CELERY_TASK_QUEUES: dict[str, dict[str, str]] = {"models": {}, "drawing": {}}
+# The last is what messages of earlier releases may still wait in.
+CELERY_TASK_QUEUES: dict[str, dict[str, str]] = {"models": {}, "drawing": {}, "celery": {}}
 CELERY_TASK_ROUTES = {
     "augment.draw_marks": {"queue": "drawing"},
     "augment.run_simulation": {"queue": "drawing"},
     "arena.compute_snapshot": {"queue": "drawing"},
+    "arena.write_scenario_file": {"queue": "drawing"},
 }
 CELERY_BROKER_TRANSPORT_OPTIONS = {"visibility_timeout": 3600, "socket_connect_timeout": 5}
 CELERY_TIMEZONE = "UTC"

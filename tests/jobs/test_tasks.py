@@ -26,10 +26,9 @@ State = Augmentation.State
 class Broker:
     """A broker in memory, and how many messages wait there."""
 
-    def purge(self) -> None:
+    def purge(self, queue: str = "models") -> None:
         with current_app.connection_for_write() as connection:
             channel = connection.default_channel
-            queue = current_app.conf.task_default_queue
             channel.queue_declare(queue=queue)
             channel.queue_purge(queue)
 
@@ -115,6 +114,26 @@ def test_recover_takes_back_and_sends_what_a_dead_worker_held(broker: Broker) ->
     assert row.state == State.QUEUED
     assert row.sent_at is not None
     assert len(broker) == 1
+
+
+def test_messages_of_another_kind_keep_nothing_that_is_lost_waiting(broker: Broker) -> None:
+    row = only_row(launch())
+    now = timezone.now()
+    leases.mark_sent(ids=[row.pk], now=now - timedelta(minutes=1))
+    tasks.draw_marks.delay(row.pk)
+    tasks.recover(now=now)
+    assert len(broker) == 1
+    broker.purge("drawing")
+
+
+def test_what_waits_where_an_earlier_release_sent_it_is_on_its_way(broker: Broker) -> None:
+    row = only_row(launch())
+    now = timezone.now()
+    leases.mark_sent(ids=[row.pk], now=now - timedelta(minutes=1))
+    tasks.run_augmentation.apply_async((row.pk,), queue="celery")
+    tasks.recover(now=now)
+    assert len(broker) == 0
+    broker.purge("celery")
 
 
 def test_recover_leaves_alone_what_is_on_its_way(broker: Broker) -> None:

@@ -116,5 +116,8 @@ def test_drawing_and_driving_wait_in_a_queue_of_their_own() -> None:
         return str(current_app.amqp.router.route({}, task)["queue"].name)
 
     assert queue_of("augment.run_augmentation") == "models"
-    for task in ("augment.draw_marks", "augment.run_simulation", "arena.compute_snapshot"):
+    for task in (
+        *("augment.draw_marks", "augment.run_simulation"),
+        *("arena.compute_snapshot", "arena.write_scenario_file"),
+    ):
         assert queue_of(task) == "drawing"

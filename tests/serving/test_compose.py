@@ -2,6 +2,10 @@
 
 from __future__ import annotations
 
+import os
+import re
+import subprocess
+import sys
 from typing import Any
 
 import pytest
@@ -47,19 +51,55 @@ def test_each_has_as_long_to_stop_as_serve_gives_it(services: dict[str, Any]) ->
 
 
 def test_every_queue_has_a_worker_that_is_probed(services: dict[str, Any]) -> None:
-    taken = {}
+    taken: list[str] = []
     for name in ("worker", "render-worker"):
         words = services[name]["command"].split()
-        queue = words[words.index("--queues") + 1]
-        taken[queue] = services[name]["healthcheck"]["test"][1]
-        assert words[words.index("--hostname") + 1] == f"{queue}@%h"
-    assert taken.keys() == settings.CELERY_TASK_QUEUES.keys()
-    assert all(f"--destination {queue}@$$HOSTNAME" in probe for queue, probe in taken.items())
+        queues = words[words.index("--queues") + 1].split(",")
+        taken += queues
+        assert words[words.index("--hostname") + 1] == f"{queues[0]}@%h"
+        probe = services[name]["healthcheck"]["test"][1]
+        assert f"--destination {queues[0]}@$$HOSTNAME" in probe
+    assert sorted(taken) == sorted(settings.CELERY_TASK_QUEUES)
 
 
 def test_the_web_server_is_probed_at_an_address_of_ours(services: dict[str, Any]) -> None:
     assert "http://localhost:8000/readyz" in services["web"]["healthcheck"]["test"][-1]
     assert reverse("readyz") == "/readyz"
+
+
+PASSED_ON = (
+    *("ARENA_HOSTS", "ARENA_HTTPS", "ARENA_ORIGINS", "ARENA_PROXIES"),
+    *("ARENA_LOG_FORM", "ARENA_LOG_LEVEL", "ARENA_METRICS_TOKEN"),
+)
+
+
+@pytest.mark.parametrize("given", [{}, {"ARENA_HOSTS": "arena.example.org", "ARENA_PROXIES": "1"}])
+def test_what_the_env_file_says_reaches_everybody(
+    services: dict[str, Any], given: dict[str, str]
+) -> None:
+    def fill(found: re.Match[str]) -> str:
+        return given.get(found[1]) or found[2]
+
+    settings_of = {
+        name: re.sub(r"\$\{(\w+):-([^}]*)\}", fill, services["web"]["environment"][name])
+        for name in PASSED_ON
+    }
+    program = (
+        "from arena.config import settings as s; "
+        "print(s.ALLOWED_HOSTS, s.HTTPS, s.CSRF_TRUSTED_ORIGINS, s.PROXIES, s.LOG_FORM, "
+        "s.LOG_LEVEL, repr(s.METRICS_TOKEN))"
+    )
+    said = subprocess.run(
+        [sys.executable, "-c", program],
+        env={**os.environ, **settings_of},
+        cwd=ROOT,
+        capture_output=True,
+        text=True,
+        check=True,
+    ).stdout
+    host = given.get("ARENA_HOSTS", "127.0.0.1")
+    proxies = given.get("ARENA_PROXIES", "0")
+    assert said == f"['{host}', 'localhost'] False [] {proxies} line INFO ''\n"
 
 
 def test_everybody_serves_with_the_same_worker_class(services: dict[str, Any]) -> None:
