@@ -146,23 +146,30 @@ def enqueue_job(job_pk: int) -> int:
     return enqueue(leases.find_unsent(older_than=RESEND_AFTER, job_pk=job_pk))
 
 
-def check_broker() -> None:
-    """Raise QueueFault unless a broker can be reached."""
-    with open_broker():
+def check_broker(*, within_s: float = 5) -> None:
+    """Raise QueueFault unless a broker can be reached and answers within so many seconds."""
+    with open_broker(within_s=within_s):
         pass
 
 
 @contextmanager
-def open_broker() -> Iterator[Any]:
+def open_broker(*, within_s: float = 5) -> Iterator[Any]:
     """A connection that works, tried once; what breaks inside the block is named as well.
+
+    Args:
+        within_s: How long it may take to connect, and to answer.
 
     Raises:
         QueueUnreachable: No broker.
         QueueRefused: It takes no messages.
     """
     with current_app.connection_for_write() as broker:
+        broker.transport_options |= {
+            "socket_connect_timeout": within_s,
+            "socket_timeout": within_s,
+        }
         try:
-            broker.ensure_connection(max_retries=1, interval_start=0, timeout=5)
+            broker.ensure_connection(max_retries=1, interval_start=0, timeout=within_s)
             yield broker
         except (run_augmentation.OperationalError, redis.RedisError) as error:
             raise _fault(broker, error) from error

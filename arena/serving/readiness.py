@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import threading
+import time
 from collections.abc import Callable
 from dataclasses import dataclass
 
@@ -12,6 +13,10 @@ from django.db.migrations.executor import MigrationExecutor
 from augment.errors import QueueFault
 from augment.services.running.workers import workforce
 from augment.tasks import check_broker
+
+BROKER_WITHIN_S = 1.0
+HELD_FOR_S = 5.0
+"""A probe is asked by everybody and signs in nobody: it must not be dear."""
 
 _is_prepared = threading.Event()
 """Set once every migration was seen applied: they don't go away under a running process."""
@@ -51,7 +56,7 @@ def find_unapplied_migrations() -> list[str]:
 def look_at_broker() -> PartState:
     """Whether messages to workers can be sent."""
     try:
-        check_broker()
+        check_broker(within_s=BROKER_WITHIN_S)
     except QueueFault as error:
         return PartState("broker", False, "unreachable", str(error))
     return PartState("broker", True, "ok")
@@ -73,7 +78,45 @@ def look_at_workers() -> PartState:
     return PartState("workers", True, "ok", f"{found.living} running")
 
 
-PARTS: tuple[Callable[[], PartState], ...] = (look_at_database, look_at_broker, look_at_workers)
+class HeldLook:
+    """An answer that is held for a while, so that many who ask cost no more than one.
+
+    Args:
+        look: Who is asked.
+        for_s: For how long an answer is held.
+        clock: Seconds that only ever grow.
+    """
+
+    def __init__(
+        self,
+        look: Callable[[], PartState],
+        *,
+        for_s: float,
+        clock: Callable[[], float] = time.monotonic,
+    ) -> None:
+        self._look, self._for_s, self._clock = look, for_s, clock
+        self._lock = threading.Lock()
+        self._held: tuple[float, PartState] | None = None
+
+    def __call__(self) -> PartState:
+        """The answer, at most so old; who asks meanwhile waits for the one look."""
+        with self._lock:
+            if self._held is None or self._clock() - self._held[0] >= self._for_s:
+                state = self._look()
+                self._held = self._clock(), state
+            return self._held[1]
+
+    def forget(self) -> None:
+        """Look anew when asked the next time."""
+        with self._lock:
+            self._held = None
+
+
+HELD = (
+    HeldLook(look_at_broker, for_s=HELD_FOR_S),
+    HeldLook(look_at_workers, for_s=HELD_FOR_S),
+)
+PARTS: tuple[Callable[[], PartState], ...] = (look_at_database, *HELD)
 
 
 def look_at_parts() -> tuple[PartState, ...]:

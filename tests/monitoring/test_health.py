@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import socket
 from collections.abc import Iterator
 
 import pytest
@@ -13,8 +14,11 @@ from prometheus_client.parser import text_string_to_metric_families
 from pytest_django import Settings
 
 from arena.serving import readiness
+from arena.serving.readiness import HeldLook, PartState
+from augment.errors import QueueUnreachable
 from augment.models import Worker
 from augment.services.clock import DATABASE_TIME
+from augment.tasks import check_broker
 from tests.study_rows import a_study, matchups_of, vote
 from tests.web.cast import people, signed_in
 
@@ -35,6 +39,12 @@ def no_broker() -> Iterator[None]:
     current_app.conf.broker_url = "redis+socket:///nowhere/redis.sock"
     yield
     current_app.conf.broker_url = before
+
+
+@pytest.fixture(autouse=True)
+def _nothing_held() -> None:
+    for held in readiness.HELD:
+        held.forget()
 
 
 def a_worker() -> None:
@@ -62,6 +72,40 @@ def test_without_broker_and_workers_people_can_still_vote(no_broker: None) -> No
     expected = {"status": "degraded", "parts": parts}
     assert ask("/readyz") == (200, expected)
     assert ask("/readyz?strict") == (503, expected)
+
+
+def test_many_who_ask_cost_one_look_in_five_seconds() -> None:
+    now, looked = 100.0, []
+
+    def look() -> PartState:
+        looked.append(now)
+        return PartState("broker", True, f"at {now:g}")
+
+    held = HeldLook(look, for_s=5, clock=lambda: now)
+    assert [held().state, held().state] == ["at 100", "at 100"]
+    now = 104.9
+    assert held().state == "at 100"
+    now = 105.0
+    assert held().state == "at 105"
+    assert looked == [100.0, 105.0]
+
+
+def test_broker_and_workers_are_not_asked_for_every_probe(broker: None) -> None:
+    a_worker()
+    assert ask("/readyz?strict")[0] == 200
+    Worker.objects.all().delete()
+    current_app.conf.broker_url = "redis+socket:///nowhere/redis.sock"
+    assert ask("/readyz?strict")[0] == 200
+    for held in readiness.HELD:
+        held.forget()
+    assert ask("/readyz?strict")[0] == 503
+
+
+def test_a_broker_that_takes_calls_and_never_answers_is_unreachable(broker: None) -> None:
+    with socket.create_server(("127.0.0.1", 0)) as silent:
+        current_app.conf.broker_url = f"redis://127.0.0.1:{silent.getsockname()[1]}/0"
+        with pytest.raises(QueueUnreachable):
+            check_broker(within_s=0.1)
 
 
 def test_without_the_tables_of_this_release_nobody_is_sent_here(
