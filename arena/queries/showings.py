@@ -13,8 +13,8 @@ from arena.errors import NotYours
 from arena.models import LabelTask, Matchup
 from arena.queries.descriptions import Wording, describe_in_words
 from arena.queries.people import role_of
-from augment.models import Scenario
-from augment.services.scenarios.pictures import camera_of
+from augment.models import Augmentation, Scenario
+from augment.services.scenarios.pictures import camera_of, window_of
 
 VIEW_OF_OLD: dict[str, Any] = {
     **{"px_per_m": 20.0, "ego_px": [300.0, 400.0]},
@@ -96,6 +96,12 @@ def as_shown(matchup: Matchup, wording: Wording) -> dict[str, Any]:
     return shown
 
 
+def original_beside(augmentation: Augmentation) -> str:
+    """The picture before the change, "" where it shows another window than that after it."""
+    original = augmentation.scenario.original_image
+    return original if window_of(original) == window_of(augmentation.image) else ""
+
+
 def _picture_to_label(*, user: User, token: str) -> str:
     rows = LabelTask.objects.filter(Q(token=token) | Q(original_token=token))
     tasks = rows.select_related("augmentation__scenario").defer(
@@ -106,4 +112,7 @@ def _picture_to_label(*, user: User, token: str) -> str:
         raise NotYours(_NOT_SHOWN)
     if task.token == token:
         return task.augmentation.image
-    return task.augmentation.scenario.original_image
+    original = original_beside(task.augmentation)
+    if not original:
+        raise NotYours(_NOT_SHOWN)
+    return original

@@ -185,7 +185,11 @@ def _contestants(slugs: Sequence[str]) -> list[Contestant]:
 
 def _scenarios(slugs: Sequence[str]) -> list[Scenario]:
     known = {row.slug: row for row in Scenario.objects.only("slug")}
-    return [_named("scenario", slug, known) for slug in sorted(set(slugs))]
+    chosen = [_named("scenario", slug, known) for slug in sorted(set(slugs))]
+    # Held, so that no picture is drawn anew between its choice and the opening.
+    held = Scenario.objects.filter(pk__in=[row.pk for row in chosen])
+    list(held.select_for_update(no_key=True).order_by("pk").values_list("pk"))
+    return chosen
 
 
 def _experts(usernames: Sequence[str]) -> list[User]:

@@ -20,6 +20,7 @@ from arena.exports.formats import format_named
 from arena.models import FaultLabel, LabellingRound
 from arena.queries import faults
 from arena.queries.people import by_pseudonym, experts, role_of
+from arena.queries.showings import original_beside
 from arena.services.faults import close_labelling, open_labelling, save_label
 from arena.web.access import ADMIN, EXPERT, STAFF, allow_only
 from arena.web.forms import LabelForm, LabellingForm
@@ -44,7 +45,10 @@ def label_page(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
     except NotYours as error:
         raise Http404 from error
     task = faults.next_task(labelling=progress.labelling, expert=expert)
-    context = {"progress": progress, "task": task, "faults": list(FaultClass)}
+    context = {
+        **{"progress": progress, "task": task, "faults": list(FaultClass)},
+        "has_original": task is not None and bool(original_beside(task.augmentation)),
+    }
     return render(request, "label/label.html" if task else "label/done.html", context)
 
 

@@ -2,18 +2,24 @@
 
 from __future__ import annotations
 
+from io import StringIO
+from pathlib import Path
+from typing import Any
+
 import pytest
 from django.core.management import call_command
 
 from arena.errors import NothingToPlan
 from arena.models import Matchup, Study
 from arena.queries.showings import VIEW_OF_OLD, view_of
+from arena.services.faults import close_labelling, open_labelling
 from arena.services.redrawing import redraw_pictures
 from arena.services.studies import close_study, open_study
 from augment.models import Augmentation, Scenario
 from augment.scene.codec import modification_to_document
 from augment.scene.modification import Modification
 from augment.services.scenarios.pictures import camera_of, original_picture, window_of
+from augment.services.scenarios.redrawing import redraw
 from tests.study_rows import cast_of
 
 pytestmark = pytest.mark.django_db
@@ -90,3 +96,61 @@ def test_pictures_of_a_former_window_keep_the_view_that_they_were_shown_with() -
         found = [(row.view, row.original_image) for row in again.matchups.all()]
         assert found == [(then, "shown.png")] * 2
         again.matchups.all().delete()
+
+
+def test_who_opens_a_study_while_others_are_drawn_keeps_its_pictures() -> None:
+    cast = cast_of(contestants=("ann", "bob"), scenarios=2, experts=("eva",))
+    drawn_before()
+    drawing = redraw_pictures()
+    assert next(drawing).scenario == "place-0"
+    cast["scenarios"] = ["place-1"]
+    open_study(name="meanwhile", votes_per_expert=1, seed=7, **cast)
+    assert [found.needed_by for found in drawing] == ["meanwhile"]
+    shown = Augmentation.objects.filter(scenario__slug="place-1").values_list("image", flat=True)
+    assert {window_of(name) for name in shown} == {""}
+
+
+def test_who_opens_a_study_while_its_own_are_drawn_keeps_them_too() -> None:
+    cast = cast_of(contestants=("ann", "bob"), scenarios=1, experts=("eva",))
+    drawn_before()
+    place = Scenario.objects.get()
+
+    def meanwhile() -> bool:
+        open_study(name="now", votes_per_expert=1, seed=7, **cast)
+        return not Study.objects.exists()
+
+    before = set(Augmentation.objects.values_list("image", flat=True))
+    assert redraw(place, is_free=meanwhile) is None
+    assert set(Augmentation.objects.values_list("image", flat=True)) == before
+    assert Scenario.objects.get().original_image == "bev/original.png"
+
+
+def test_pictures_that_somebody_has_to_label_are_kept_until_the_labelling_is_over() -> None:
+    cast_of(contestants=("ann",), scenarios=2, experts=("eva",))
+    drawn_before()
+    row = Augmentation.objects.get(scenario__slug="place-1")
+    labelling = open_labelling(name="faults", job=row.job, experts=["eva"], seed=1)
+    found = list(redraw_pictures())
+    assert [(one.scenario, one.pictures, one.needed_by) for one in found] == [
+        ("place-0", 1, ""),
+        ("place-1", 0, "faults"),
+    ]
+    close_labelling(labelling=labelling)
+    assert [(one.scenario, one.pictures) for one in redraw_pictures()] == [("place-1", 1)]
+
+
+@pytest.mark.parametrize("command", ["redraw_pictures", "prepare"])
+def test_one_that_can_not_be_drawn_does_not_stop_the_others(
+    command: str, settings: Any, tmp_path: Path
+) -> None:
+    settings.STATIC_ROOT = tmp_path
+    cast_of(contestants=("ann",), scenarios=3, experts=())
+    drawn_before()
+    bad = Augmentation.objects.filter(scenario__slug="place-0")
+    bad.update(modification={"add": "a car"})
+    said, wrong = StringIO(), StringIO()
+    call_command(command, stdout=said, stderr=wrong)
+    assert "place-1: 1 drawn anew" in said.getvalue()
+    assert "place-2: 1 drawn anew" in said.getvalue()
+    assert "place-0: kept as they are. This modification can't be read" in wrong.getvalue()
+    assert window_of(bad.get().image) == ""

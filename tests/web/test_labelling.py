@@ -8,7 +8,7 @@ from django.urls import reverse
 
 from arena.models import FaultLabel, LabellingRound
 from arena.services.faults import open_labelling
-from augment.models import GenerationJob, Scenario
+from augment.models import Augmentation, GenerationJob, Scenario
 from augment.services.scenarios.pictures import store
 from tests.exports.test_displacement import a_job
 from tests.study_rows import expert
@@ -78,6 +78,21 @@ def test_pictures_go_out_to_their_expert_alone(labelling: LabellingRound, eva: U
         assert signed_in(eva).get(url).getvalue().startswith(b"\x89PNG")
         assert signed_in(finn).get(url).status_code == 404
     assert signed_in(finn).get(reverse("label", args=[labelling.code])).status_code == 404
+
+
+def test_the_scene_before_stays_out_where_it_shows_another_window(
+    labelling: LabellingRound, eva: User
+) -> None:
+    page, task = reverse("label", args=[labelling.code]), labelling.tasks.get(position=1)
+    url = reverse("matchup-image", args=[task.original_token])
+    assert task.original_token in signed_in(eva).get(page).content.decode()
+    Scenario.objects.update(original_image=store(png(6), folder="bev/1-new"))
+    assert task.original_token not in signed_in(eva).get(page).content.decode()
+    assert signed_in(eva).get(url).status_code == 404
+    Augmentation.objects.filter(pk=task.augmentation_id).update(
+        image=store(png(7), folder="bev/1-new")
+    )
+    assert signed_in(eva).get(url).getvalue().startswith(b"\x89PNG")
 
 
 def test_an_admin_opens_a_labelling_and_an_analyst_reads_it(job: GenerationJob, eva: User) -> None:

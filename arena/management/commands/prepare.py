@@ -21,6 +21,8 @@ class Command(TerminalCommand):
         call_command("migrate", interactive=False, verbosity=0)
         settings.STATIC_ROOT.mkdir(parents=True, exist_ok=True)
         call_command("collectstatic", interactive=False, verbosity=0)
-        drawn = sum(picture.pictures for picture in redraw_pictures())
-        if drawn:
-            self.stdout.write(f"Pictures of an earlier version drawn anew: {drawn}")
+        for found in redraw_pictures():
+            if found.fault:
+                self.stderr.write(found.says)
+            elif found.pictures:
+                self.stdout.write(f"Pictures of an earlier version: {found.says}")

@@ -15,11 +15,5 @@ class Command(TerminalCommand):
 
     def handle(self, *args: Any, **options: Any) -> None:
         """Draw, and say what."""
-        for picture in redraw_pictures():
-            if picture.needed_by:
-                self.stdout.write(
-                    f"{picture.scenario}: kept, the study '{picture.needed_by}' is open and "
-                    "shows them"
-                )
-            else:
-                self.stdout.write(f"{picture.scenario}: {picture.pictures} drawn anew")
+        for found in redraw_pictures():
+            (self.stderr if found.fault else self.stdout).write(found.says)

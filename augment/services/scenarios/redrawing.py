@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 from django.db import transaction
 
 from augment.models import Augmentation, Scenario
@@ -16,13 +18,18 @@ from augment.services.scenarios.pictures import (
 from augment.services.scenarios.scenes import scene_of
 
 
-def redraw(scenario: Scenario) -> int:
+def redraw(scenario: Scenario, *, is_free: Callable[[], bool] = lambda: True) -> int | None:
     """Draw what was drawn in another window than today's; the old files stay where they are.
 
     Call it from a worker or a command, not in a request.
 
+    Args:
+        scenario: Whose pictures are drawn.
+        is_free: Asked once all are drawn, with the scenario held: whether nobody needs the old
+            ones, which drawing may have taken too long for.
+
     Returns:
-        How many augmentations have a new picture.
+        How many augmentations have a new picture; None where the old ones are needed.
 
     Raises:
         InvalidDocument: What is stored can't be read.
@@ -36,6 +43,9 @@ def redraw(scenario: Scenario) -> int:
     scene = scene_of(scenario)
     drawn = [(row, picture_of(scenario, scene, _shown(row))) for row in outdated]
     with transaction.atomic():
+        Scenario.objects.select_for_update(no_key=True).get(pk=scenario.pk)
+        if not is_free():
+            return None
         original_picture(scenario)
         for row, name in drawn:
             Augmentation.objects.filter(pk=row.pk, image=row.image).update(image=name)
