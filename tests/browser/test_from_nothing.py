@@ -44,7 +44,7 @@ def test_an_empty_house_ends_at_a_table(model: FakeServer, tmp_path: Path) -> No
         # Playwright wants a thread without an event loop.
         table = pool.submit(_work, home, address, model.url).result()
     assert r"\toprule" in table
-    for name in ("Reference", "Rule placer", "fake-good"):
+    for name in ("Reference", "Rule placer", "fake-careless"):
         assert name in table
 
 
@@ -88,13 +88,13 @@ def _set_password(page: Page) -> None:
 
 def _enter_contestant(page: Page, address: str, model: str) -> None:
     page.goto(f"{address}/contestants/new/")
-    given = {"slug": "good-otm", "model": "fake-good", "label": "stand-in", "base_url": model}
+    given = {"slug": "careless-otm", "model": "fake-careless", "label": "stand-in", "base_url": model}
     for name, value in given.items():
         page.fill(f"[name={name}]", value)
     page.select_option("[name=variant]", "otm")
     page.check("[name=is_simulated]")
     page.click("button.main.big")
-    expect(page.locator("p.mono", has_text="good-otm")).to_be_visible()
+    expect(page.locator("p.mono", has_text="careless-otm")).to_be_visible()
 
 
 def _run_job(page: Page, address: str) -> None:
@@ -106,7 +106,7 @@ def _run_job(page: Page, address: str) -> None:
 
 
 def _choose(page: Page) -> None:
-    for slug in ("reference", "rule-placer", "good-otm"):
+    for slug in ("reference", "rule-placer", "careless-otm"):
         page.check(f"[name=contestants][value={slug}]")
     page.locator("[name=types][value=nudge_around_parked_vehicle]").check()
 
