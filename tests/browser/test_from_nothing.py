@@ -88,7 +88,12 @@ def _set_password(page: Page) -> None:
 
 def _enter_contestant(page: Page, address: str, model: str) -> None:
     page.goto(f"{address}/contestants/new/")
-    given = {"slug": "careless-otm", "model": "fake-careless", "label": "stand-in", "base_url": model}
+    given = {
+        "slug": "careless-otm",
+        "model": "fake-careless",
+        "label": "stand-in",
+        "base_url": model,
+    }
     for name, value in given.items():
         page.fill(f"[name={name}]", value)
     page.select_option("[name=variant]", "otm")
