@@ -6,6 +6,7 @@ import csv
 import hashlib
 import json
 import shutil
+import uuid
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -17,6 +18,7 @@ from django.contrib.auth.models import User
 from django.core.files.base import ContentFile
 from django.core.files.storage import default_storage
 from django.core.management import CommandError, call_command
+from django.utils import timezone
 from pytest_django import Settings
 
 from arena.exports.study_folder.closure import TRAVELLING, close_over
@@ -24,8 +26,8 @@ from arena.models import Study, Vote
 from arena.services.ratings import rate
 from arena.services.stored_rows import as_line, columns_of, label_of
 from arena.services.studies import close_study
-from augment.models import Augmentation, Contestant, Endpoint, GenerationJob, Scenario
-from tests.study_rows import a_study, matchups_of, scenario, vote
+from augment.models import Augmentation, Contestant, Endpoint, GenerationJob, Scenario, Simulation
+from tests.study_rows import a_study, hang, matchups_of, scenario, vote
 
 pytestmark = pytest.mark.django_db(transaction=True)
 
@@ -48,7 +50,7 @@ def study(tmp_path: Path, settings: Settings) -> Study:
     vote(third, "equal", aids={"zoom"})
     vote(matchups_of(made, "finn")[0], "left")
     drawn = Augmentation.objects.latest("pk")
-    Augmentation.objects.filter(pk=drawn.pk).update(image=f"bev/2-0a1b2c3d/{'0' * 64}.png")
+    hang(drawn, f"bev/2-0a1b2c3d/{'0' * 64}.png")
     for row in Augmentation.objects.all():
         default_storage.save(row.image, ContentFile(PNG))
     GenerationJob.objects.update(state=GenerationJob.State.FINISHED)
@@ -152,6 +154,34 @@ def test_a_name_that_is_no_account_any_more_gets_a_number(study: Study, tmp_path
     call_command("import", "study", str(tmp_path / "first"))
     assert Study.objects.get().votes_to_plan == {"former-0001": 2, "expert-0001": 0}
     assert export(Study.objects.get(), tmp_path / "second") == first
+
+
+def test_a_picture_that_is_gone_is_named_and_nothing_is_written(
+    study: Study, tmp_path: Path
+) -> None:
+    image = Augmentation.objects.latest("pk").image
+    default_storage.delete(image)
+    with pytest.raises(CommandError, match=f"{image} of this study is missing"):
+        export(study, tmp_path / "out")
+    assert not (tmp_path / "out").exists()
+
+
+def test_only_drives_that_are_over_travel(study: Study, tmp_path: Path) -> None:
+    drives = [
+        Simulation.objects.create(
+            scenario=study.scenarios.all()[0],
+            subject=Simulation.Subject.UNMODIFIED,
+            planner=f"{state} planner",
+            offsets="paper",
+            state=state,
+            claim=uuid.uuid4() if state == "running" else None,
+            heartbeat_at=timezone.now() if state == "running" else None,
+        )
+        for state in ("queued", "running", "failed")
+    ]
+    rows = export(study, tmp_path / "out")["rows/augment.simulation.jsonl"]
+    assert str(drives[-1].code).encode() in rows
+    assert len(rows.splitlines()) == 1
 
 
 SPOILT: dict[str, tuple[str, bytes | None]] = {

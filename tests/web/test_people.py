@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import logging
 import re
+from collections.abc import Callable
 
 import pytest
 from axes.models import AccessAttempt
@@ -179,11 +180,12 @@ def test_who_is_forgotten_stays_so() -> None:
 def test_two_admins_who_demote_each_other_leave_one() -> None:
     ada, bob = (create_person(username=name, password=None, role="admin") for name in ("a", "b"))
     set_role(user=bob, role="expert", actor=ada)
-    for act in (
+    acts: tuple[Callable[[], None], ...] = (
         lambda: set_role(user=ada, role="expert", actor=bob),
         lambda: set_active(user=ada, is_active=False, actor=bob),
         lambda: forget_identity(user=ada, actor=bob),
-    ):
+    )
+    for act in acts:
         with pytest.raises(Conflict, match="not an admin any more"):
             act()
     assert list(find_admins()) == [ada]

@@ -120,7 +120,7 @@ class Closure:
         yield Simulation.objects.filter(
             Q(augmentation__job__in=self.jobs)
             | Q(augmentation=None, scenario__in=scenarios.values("pk"))
-        )
+        ).exclude(state__in=Simulation.UNDER_WAY)
         yield Study.objects.filter(pk=self.study.pk)
         yield Study.contestants.through._default_manager.filter(study=self.study)
         yield Study.scenarios.through._default_manager.filter(study=self.study)
@@ -143,7 +143,7 @@ class Closure:
         """The rules with the names that accounts get."""
         names = self._names_in_plans()
         experts = [names[name] for name in self.study.rules.get("experts", [])]
-        return self.study.rules | ({"experts": experts} if "experts" in self.study.rules else {})
+        return {**self.study.rules, **({"experts": experts} if experts else {})}
 
     def renamed_votes_to_plan(self) -> dict[str, int]:
         """How many votes are planned later, by the names that accounts get."""
@@ -184,8 +184,10 @@ def close_over(study: Study) -> Closure:
         new = set(found) - closure.jobs
     people = _people(closure)
     # In the order of their names, so that whatever is ordered by name stays as it is.
-    named = User.objects.filter(pk__in=people).order_by("username").values_list("pk", "username")
-    for place, (pk, username) in enumerate(named, start=1):
+    # Sorted here: databases order letters each in its own way.
+    named = User.objects.filter(pk__in=people).values_list("pk", "username")
+    in_order = sorted(named, key=lambda one: one[1])
+    for place, (pk, username) in enumerate(in_order, start=1):
         closure.accounts[pk] = closure.names[username] = f"expert-{place:04}"
     return closure
 

@@ -16,7 +16,7 @@ from arena.exports.displacement_objects import object_rows
 from arena.exports.study_folder.closure import Closure
 from arena.models import Matchup, Snapshot, Vote
 from arena.services.cells import csv_text
-from augment.models import Augmentation, BaseScene, Contestant, GenerationJob, Scenario
+from augment.models import Augmentation, Contestant, GenerationJob, Scenario
 from augment.services.running.transcript_export import transcript_of
 
 File = tuple[str, bytes]
@@ -40,9 +40,11 @@ def files_for_people(closure: Closure) -> Iterator[File]:
     augmentations = _augmentations(closure)
     yield "augmentations.csv", csv_text(ROWS, map(_augmentation, augmentations)).encode()
     yield "contestants.json", _json([_contestant(found) for found in _contestants(closure)])
-    for scenario in _scenarios(closure):
+    scenarios = _scenarios(closure)
+    for scenario in scenarios:
         yield f"scenarios/{scenario.slug}.json", _json(_scenario(scenario))
-    for scene in BaseScene.objects.filter(scenarios__in=_scenarios(closure)).distinct():
+    scenes = {scenario.base_scene for scenario in scenarios}
+    for scene in sorted(scenes, key=lambda one: one.slug):
         yield f"scenes/{scene.slug}.json", _json(scene.document)
     for job in GenerationJob.objects.filter(pk__in=closure.jobs).order_by("pk"):
         yield f"objects/{job.code}.csv", objects_csv(object_rows(job))
@@ -65,9 +67,9 @@ def _pairs(closure: Closure) -> Iterator[tuple[object, ...]]:
             *("left__contestant", "right__contestant"),
         )
         .prefetch_related("votes__supersedes")
-        .order_by("expert__person__pseudonym", "position")
     )
-    for matchup in found.iterator(chunk_size=500):
+    # Sorted here: databases order letters each in its own way.
+    for matchup in sorted(found, key=lambda one: (one.expert.person.pseudonym, one.position)):
         shown = (
             matchup.code,
             matchup.expert.person.pseudonym,
@@ -110,9 +112,10 @@ def _augmentation(row: Augmentation) -> tuple[str, ...]:
     return tuple(_text(value) for value in cells)
 
 
-def _contestants(closure: Closure) -> QuerySet[Contestant]:
+def _contestants(closure: Closure) -> list[Contestant]:
     jobs = Contestant.objects.filter(jobs__in=closure.jobs)
-    return (jobs | closure.study.contestants.all()).distinct().order_by("slug")
+    found = (jobs | closure.study.contestants.all()).distinct()
+    return sorted(found.select_related("endpoint"), key=lambda one: one.slug)
 
 
 def _contestant(found: Contestant) -> dict[str, Any]:
@@ -131,10 +134,10 @@ def _contestant(found: Contestant) -> dict[str, Any]:
     }
 
 
-def _scenarios(closure: Closure) -> QuerySet[Scenario]:
+def _scenarios(closure: Closure) -> list[Scenario]:
     jobs = Scenario.objects.filter(jobs__in=closure.jobs)
     found = (jobs | closure.study.scenarios.all()).distinct()
-    return found.select_related("base_scene", "paraphrase_of").order_by("slug")
+    return sorted(found.select_related("base_scene", "paraphrase_of"), key=lambda one: one.slug)
 
 
 def _scenario(found: Scenario) -> dict[str, Any]:

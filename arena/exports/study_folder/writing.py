@@ -19,7 +19,13 @@ from arena.errors import ArenaError
 from arena.exports.study_folder.closure import Closure, close_over, travelling_rows
 from arena.exports.study_folder.tables import files_for_people
 from arena.models import Study
-from arena.services.stored_rows import applied_migrations, as_line, frozen_rows, label_of
+from arena.services.stored_rows import (
+    applied_migrations,
+    as_line,
+    columns_of,
+    frozen_rows,
+    label_of,
+)
 from augment.models import GenerationJob
 
 FORMAT, VERSION = "scenario-arena-study", 1
@@ -31,6 +37,7 @@ PACKAGES = ("django", "numpy", "scipy", "pillow", "openai")
 
 _NAMES = re.compile(rb"[a-z_]+/(?:[0-9a-z-]+/)?[0-9a-f]{16,64}\.png")
 _DIGESTS = re.compile(rb'sha256[":= ]+([0-9a-f]{64})')
+PICTURE_COLUMNS = frozenset({"image", "original_image", "left_image", "right_image"})
 ASKED = "asked"
 """Where the pictures lie that reviewers were sent; a request names them by their hash."""
 
@@ -44,7 +51,8 @@ def write_study(study: Study, out: Path, *, say: Callable[[str], None]) -> None:
         say: Told what was written.
 
     Raises:
-        ArenaError: The study is open, a job of it still runs, or the folder is there.
+        ArenaError: The study is open, a job of it still runs, a picture of it is missing, or the
+            folder is there.
         OSError: It can't be written; nothing is left of it.
     """
     if out.exists():
@@ -71,12 +79,10 @@ def _fill(study: Study, folder: Path, say: Callable[[str], None]) -> None:
     counts: dict[str, int] = {}
     for rows in closure.tables():
         label = label_of(rows.model)
-        counts[label] = writer.write_lines(f"{ROWS}{label}.jsonl", _lines(closure, rows))
+        lines = _lines(closure, rows, writer.named)
+        counts[label] = writer.write_lines(f"{ROWS}{label}.jsonl", lines)
     say(f"rows: {sum(counts.values())} of {len(counts)} tables")
-    for name in sorted(writer.media):
-        if default_storage.exists(name):
-            with default_storage.open(name) as file:
-                writer.write(f"{MEDIA}{name}", file.read())
+    _write_media(writer)
     for name, content in files_for_people(closure):
         writer.write(name, content)
     context = {"study": study, "tables": counts, "jobs": len(closure.jobs)}
@@ -85,8 +91,22 @@ def _fill(study: Study, folder: Path, say: Callable[[str], None]) -> None:
     (folder / MANIFEST).write_bytes(_manifest(closure, counts, writer.digests))
 
 
-def _lines(closure: Closure, rows: Any) -> Iterator[bytes]:
-    return (as_line(row) for row in travelling_rows(closure, rows))
+def _lines(closure: Closure, rows: Any, named: set[str]) -> Iterator[bytes]:
+    """The lines of a table; the pictures that its columns name are added to `named`."""
+    columns = enumerate(columns_of(rows.model))
+    places = [place for place, column in columns if column.attname in PICTURE_COLUMNS]
+    for row in travelling_rows(closure, rows):
+        named |= {row[place] for place in places if row[place]}
+        yield as_line(row)
+
+
+def _write_media(writer: _Folder) -> None:
+    for name in sorted(writer.media | writer.named):
+        if default_storage.exists(name):
+            with default_storage.open(name) as file:
+                writer.write(f"{MEDIA}{name}", file.read())
+        elif name in writer.named:
+            raise ArenaError(f"The picture {name} of this study is missing in ARENA_MEDIA_DIR.")
 
 
 def _manifest(closure: Closure, counts: dict[str, int], digests: dict[str, str]) -> bytes:
@@ -112,12 +132,17 @@ def _manifest(closure: Closure, counts: dict[str, int], digests: dict[str, str])
 
 
 class _Folder:
-    """Files with their hashes, and the names of pictures that were seen in the rows."""
+    """Files with their hashes, and the names of pictures in the rows.
+
+    Those of `named` stand in columns of their own and must be there; those of `media` look like
+    names wherever they stand, and may be none.
+    """
 
     def __init__(self, root: Path) -> None:
         self._root = root
         self.digests: dict[str, str] = {}
         self.media: set[str] = set()
+        self.named: set[str] = set()
 
     def write(self, name: str, content: bytes) -> None:
         self._place(name).write_bytes(content)
