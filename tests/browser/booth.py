@@ -38,10 +38,10 @@ def furnish(*, scenarios: int = 6, votes: int = 9) -> Study:
 
 
 def hang(study: Study) -> Study:
-    """Small pictures for all of a study, twice as wide as high, as its scene needs them."""
+    """Small pictures for all of a study, in the shape of the window that its plan names."""
     for number, augmentation in enumerate(Augmentation.objects.order_by("pk")):
-        study_rows.hang(augmentation, store(png(number % 256, width=4, height=2)))
-    study.matchups.update(original_image=store(png(255, width=4, height=2)))
+        study_rows.hang(augmentation, store(png(number % 256, width=3, height=2)))
+    study.matchups.update(original_image=store(png(255, width=3, height=2)))
     return study
 
 

@@ -113,7 +113,7 @@ def test_the_page_works_without_a_script_and_says_where_one_is() -> None:
     assert re.findall(r'name="report" value="(\w+)"', shown) == Report.Reason.values
     assert re.search(r'<span id="place">1</span> of 9', shown)
     assert following(here).scenario.instruction in shown
-    assert shown.count('width="1200" height="600"') == 2
+    assert shown.count('width="1200" height="800"') == 2
 
 
 def test_every_showing_has_a_key_of_its_own_and_is_never_cached() -> None:
