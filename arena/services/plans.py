@@ -4,32 +4,25 @@ from __future__ import annotations
 
 from collections import defaultdict
 from collections.abc import Collection, Iterable, Mapping, Sequence
-from dataclasses import dataclass, replace
-from typing import Any
+from dataclasses import replace
 
 from django.contrib.auth.models import User
-from django.db.models import F, Max, Q, QuerySet
+from django.db.models import F, Max, QuerySet
 
 from arena.errors import NothingToPlan
 from arena.models import Matchup, Study
 from arena.pairing.plan import Check, Entry, PlannedMatchup, PlanRules
 from arena.pairing.rules import place_of, scenario_of
-from arena.queries.showings import VIEW_OF_OLD, view_of
+from arena.services.frames import MOST_NAMED, Cells, find_frames, sides_of
 from augment.models import Augmentation, Contestant, Scenario
 from augment.sentences import Sentence, sentence
 from augment.services.scenarios.descriptions import Description, descriptions
-from augment.services.scenarios.pictures import camera_of, window_of
-
-Cells = dict[tuple[str, str], Augmentation]
-"""By place (a scenario, or one sample of it) and contestant, the augmentation that is shown."""
+from augment.services.scenarios.pictures import window_of
 
 SoFar = dict[str, list[PlannedMatchup]]
 """Every expert's showings as they are stored, by position."""
 
 Kind = Contestant.Kind
-
-MOST_NAMED = 8
-"""So many missing pictures are named, the others counted."""
 
 
 def rules_of(study: Study) -> PlanRules:
@@ -211,7 +204,7 @@ def store(
     """
     by_name = {expert.username: expert for expert in experts}
     places = _places(planned, cells)
-    frames = _frames(planned, cells, places)
+    frames = find_frames(planned, cells, places)
     texts = _descriptions(study, planned, cells, places)
     rows = [
         Matchup(
@@ -231,7 +224,7 @@ def store(
             draw_probability=one.draw_probability,
         )
         for one in planned
-        for left, right in [_sides(one, cells)]
+        for left, right in [sides_of(one, cells)]
     ]
     Matchup.objects.bulk_create([row for row in rows if row.kind != _REPEAT], batch_size=500)
     again = [(row, one) for row, one in zip(rows, planned, strict=True) if one.repeats is not None]
@@ -317,82 +310,16 @@ def _places(planned: Sequence[PlannedMatchup], cells: Cells) -> dict[str, Scenar
     return {row.slug: row for row in rows.defer("base_scene__recording")}
 
 
-@dataclass(frozen=True, slots=True)
-class _Frame:
-    """What all showings of a scenario share: where metres lie, the scene before any change."""
-
-    view: dict[str, Any]
-    original_image: str
-
-
-def _frames(
-    planned: Sequence[PlannedMatchup], cells: Cells, places: dict[str, Scenario]
-) -> dict[str, _Frame]:
-    """By scenario; both sides of every pair are drawn in one window, or nothing is planned.
-
-    Raises:
-        NothingToPlan: Some are of an earlier version, or of before the reference was changed; or
-            nobody knows any more where metres lie in them.
-    """
-    shown: dict[str, dict[str, Augmentation]] = {}
-    for one in planned:
-        for cell in _sides(one, cells):
-            shown.setdefault(one.scenario, {})[window_of(cell.image)] = cell
-    mixed = [scenario_of(name) for name, windows in sorted(shown.items()) if len(windows) > 1]
-    if mixed:
-        raise _other_windows(mixed)
-    return {
-        name: _frame(places[scenario_of(name)], *windows.popitem())
-        for name, windows in shown.items()
-    }
-
-
-def _frame(place: Scenario, window: str, cell: Augmentation) -> _Frame:
-    """As the pictures need it, whatever version drew them: today's window, or one shown before.
-
-    Raises:
-        NothingToPlan: Nobody knows any more where metres lie in such a picture.
-    """
-    original = place.original_image
-    if window_of(original) != window:
-        original = ""
-    if window == camera_of(place).key:
-        return _Frame(view_of(place), original)
-    shows = Q(left_image=cell.image) | Q(right_image=cell.image)
-    earlier = Matchup.objects.filter(shows, scenario=place, view__isnull=False)
-    before = earlier.order_by("pk").first()
-    if before is not None and before.view is not None:
-        return _Frame(before.view, before.original_image)
-    if window:
-        raise _other_windows([place.slug])
-    return _Frame(VIEW_OF_OLD, original)
-
-
-def _other_windows(scenarios: list[str]) -> NothingToPlan:
-    return NothingToPlan(
-        sentence(
-            "The pictures of %(scenarios)s show different windows, so they can’t stand side "
-            "by side. Close the open studies that show them and run “manage.py "
-            "redraw_pictures”.",
-            scenarios=tuple(scenarios[:MOST_NAMED]),
-        )
-    )
-
-
 def _descriptions(
     study: Study, planned: Sequence[PlannedMatchup], cells: Cells, places: dict[str, Scenario]
 ) -> dict[int, Description] | None:
     """What every picture shows, by the key of its augmentation; None where nobody may read it."""
     if not study.allow_text:
         return None
-    shown = {cell.pk for one in planned for cell in _sides(one, cells)}
+    shown = {cell.pk for one in planned for cell in sides_of(one, cells)}
     return descriptions(
         augmentations=shown, scenarios={place.pk: place for place in places.values()}
     )
-
-
-def _sides(one: PlannedMatchup, cells: Cells) -> tuple[Augmentation, Augmentation]:
-    return cells[one.scenario, one.left], cells[one.scenario, one.right]
 
 
 def _mains(study: Study, experts: list[int]) -> dict[tuple[int, int], int]:

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 from arena.errors import NothingToPlan
 from arena.pairing.rules import scenario_of
-from arena.services.plans import MOST_NAMED, Cells
+from arena.services.frames import MOST_NAMED, Cells
 from augment.models import Simulation
 from augment.sentences import sentence
 from augment.services.judging.simulations import Options

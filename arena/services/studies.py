@@ -14,8 +14,8 @@ from arena.errors import StudyNotOpen
 from arena.models import Study
 from arena.pairing.plan import Check, Entry, MatchupPlan, PlanRules, plan
 from arena.queries.people import experts as expert_accounts
+from arena.services.frames import Cells
 from arena.services.plans import (
-    Cells,
     enough_checks,
     placed_checks,
     rules_of,

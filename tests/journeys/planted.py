@@ -67,7 +67,7 @@ def text_with_ids(get_response: Next) -> Next:
     return answer
 
 
-def drawn(shade: int, *, width: int = 1200, height: int = 600) -> bytes:
+def drawn(shade: int, *, width: int = 1200, height: int = 800) -> bytes:
     """A picture as large as the renderer's."""
     return png(shade, width=width, height=height)
 

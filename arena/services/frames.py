@@ -1,0 +1,91 @@
+"""What all showings of a scenario share: one window for both sides, and the scene before."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from django.db.models import Q
+
+from arena.errors import NothingToPlan
+from arena.models import Matchup
+from arena.pairing.plan import PlannedMatchup
+from arena.pairing.rules import scenario_of
+from arena.queries.showings import VIEW_OF_OLD, view_of
+from augment.models import Augmentation, Scenario
+from augment.sentences import sentence
+from augment.services.scenarios.pictures import camera_of, window_of
+
+Cells = dict[tuple[str, str], Augmentation]
+"""By place (a scenario, or one sample of it) and contestant, the augmentation that is shown."""
+
+MOST_NAMED = 8
+"""So many missing pictures are named, the others counted."""
+
+
+@dataclass(frozen=True, slots=True)
+class ScenarioFrame:
+    """What all showings of a scenario share: where metres lie, the scene before any change."""
+
+    view: dict[str, Any]
+    original_image: str
+
+
+def find_frames(
+    planned: Sequence[PlannedMatchup], cells: Cells, places: dict[str, Scenario]
+) -> dict[str, ScenarioFrame]:
+    """By scenario; both sides of every pair are drawn in one window, or nothing is planned.
+
+    Raises:
+        NothingToPlan: Some are of an earlier version, or of before the reference was changed; or
+            nobody knows any more where metres lie in them.
+    """
+    shown: dict[str, dict[str, Augmentation]] = {}
+    for one in planned:
+        for cell in sides_of(one, cells):
+            shown.setdefault(one.scenario, {})[window_of(cell.image)] = cell
+    mixed = [scenario_of(name) for name, windows in sorted(shown.items()) if len(windows) > 1]
+    if mixed:
+        raise _other_windows(mixed)
+    return {
+        name: _frame(places[scenario_of(name)], *windows.popitem())
+        for name, windows in shown.items()
+    }
+
+
+def _frame(place: Scenario, window: str, cell: Augmentation) -> ScenarioFrame:
+    """As the pictures need it, whatever version drew them: today's window, or one shown before.
+
+    Raises:
+        NothingToPlan: Nobody knows any more where metres lie in such a picture.
+    """
+    original = place.original_image
+    if window_of(original) != window:
+        original = ""
+    if window == camera_of(place).key:
+        return ScenarioFrame(view_of(place), original)
+    shows = Q(left_image=cell.image) | Q(right_image=cell.image)
+    earlier = Matchup.objects.filter(shows, scenario=place, view__isnull=False)
+    before = earlier.order_by("pk").first()
+    if before is not None and before.view is not None:
+        return ScenarioFrame(before.view, before.original_image)
+    if window:
+        raise _other_windows([place.slug])
+    return ScenarioFrame(VIEW_OF_OLD, original)
+
+
+def _other_windows(scenarios: list[str]) -> NothingToPlan:
+    return NothingToPlan(
+        sentence(
+            "The pictures of %(scenarios)s show different windows, so they can’t stand side "
+            "by side. Close the open studies that show them and run “manage.py "
+            "redraw_pictures”.",
+            scenarios=tuple(scenarios[:MOST_NAMED]),
+        )
+    )
+
+
+def sides_of(one: PlannedMatchup, cells: Cells) -> tuple[Augmentation, Augmentation]:
+    """What is shown on the left and on the right."""
+    return cells[one.scenario, one.left], cells[one.scenario, one.right]
