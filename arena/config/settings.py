@@ -295,6 +295,7 @@ LOGGING = {
         "django.server": {"handlers": ["console"], "propagate": False},
         "axes": {"level": "WARNING"},
         "fontTools": {"level": "WARNING"},
+        "matplotlib": {"level": "WARNING"},
         "httpx2": {"level": "WARNING"},
     },
 }
