@@ -56,7 +56,8 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     items.sort(key=lambda item: item.get_closest_marker("slow") is None)
     for item in items:
         folder = item.path.relative_to(Path(__file__).parent).parts[0]
-        if folder in FOLDERS and item.get_closest_marker("django_db"):
+        is_about_sqlite = item.get_closest_marker("sqlite") is not None
+        if folder in FOLDERS and item.get_closest_marker("django_db") and not is_about_sqlite:
             item.add_marker(pytest.mark.postgres)
 
 

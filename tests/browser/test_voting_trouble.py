@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import pytest
 from django.contrib.sessions.models import Session
-from django.db import connection
 from playwright.sync_api import BrowserContext, Dialog, Page, Route, expect
 from pytest_django import Settings
 
@@ -199,8 +198,6 @@ def test_a_vote_that_came_too_fast_is_sent_again_later(booth: Booth) -> None:
 def test_a_vote_behind_a_long_writer_waits_in_the_browser_and_is_sent_again(
     booth: Booth, settings: Settings
 ) -> None:
-    if connection.vendor == "postgresql":
-        pytest.skip("there the limit is that of the web server's connections")
     settings.VOTE_WAIT_S = 0.1
     page = booth.enter()
     booth.look_ahead(page)

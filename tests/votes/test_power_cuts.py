@@ -13,9 +13,7 @@ from tests.study_rows import a_study, matchups_of, vote
 
 pytestmark = [
     pytest.mark.django_db(transaction=True),
-    pytest.mark.skipif(
-        connection.vendor != "sqlite", reason="PostgreSQL writes its log through by itself"
-    ),
+    pytest.mark.sqlite,  # PostgreSQL writes its log through by itself
 ]
 
 FULL = 2

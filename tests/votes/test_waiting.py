@@ -28,9 +28,8 @@ from tests.study_rows import a_study, matchups_of
 pytestmark = pytest.mark.django_db(transaction=True)
 
 SHORT_S = 0.2
-only_sqlite = pytest.mark.skipif(
-    connection.vendor != "sqlite", reason="PostgreSQL lets votes on different pairs pass by"
-)
+only_sqlite = pytest.mark.sqlite
+"""PostgreSQL lets votes on different pairs pass by."""
 
 
 @pytest.fixture(autouse=True)
