@@ -28,8 +28,8 @@ from augment.services.endpoints.contestants import (
     REFERENCE,
     add_contestant,
     ensure_builtin,
-    ensure_endpoint,
 )
+from augment.services.endpoints.known_endpoints import ensure_endpoint
 from augment.services.judging.driving_scores import scores_of_job
 from augment.services.judging.simulations import NUPLAN, Options, plan_scenario
 from augment.services.running.choosing import ALL, resolve_contestants

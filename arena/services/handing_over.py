@@ -14,6 +14,7 @@ from arena.pairing.following import follow_on
 from arena.pairing.later import deal, units_of
 from arena.pairing.rules import PlannedMatchup, place_of
 from arena.queries.people import experts as expert_accounts
+from arena.services.attention_checks import without_lost_checks
 from arena.services.plans import (
     next_batch,
     pictures_of,
@@ -22,7 +23,6 @@ from arena.services.plans import (
     shows_all_samples,
     store,
     votes_left,
-    without_lost_checks,
 )
 from augment.errors import Conflict, UnknownName
 from augment.sentences import sentence, word

@@ -1,28 +1,24 @@
-"""Plans as rows: which pictures take part, and how planned showings are stored."""
+"""Plans as rows: the rules that a study was opened with, and its planned showings."""
 
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Collection, Iterable, Mapping, Sequence
-from dataclasses import replace
+from collections.abc import Iterable, Sequence
 
 from django.contrib.auth.models import User
-from django.db.models import F, Max, QuerySet
+from django.db.models import Max
 
-from arena.errors import NothingToPlan
 from arena.models import Matchup, Study
 from arena.pairing.plan import Check, Entry, PlannedMatchup, PlanRules
 from arena.pairing.rules import place_of, scenario_of
-from arena.services.frames import MOST_NAMED, Cells, find_frames, sides_of
-from augment.models import Augmentation, Contestant, Scenario
-from augment.sentences import Sentence, sentence
+from arena.services.attention_checks import check_pictures, placed_checks
+from arena.services.frames import Cells, find_frames, sides_of
+from arena.services.showable import find_showable, windows_of
+from augment.models import Augmentation, Scenario
 from augment.services.scenarios.descriptions import Description, descriptions
-from augment.services.scenarios.pictures import window_of
 
 SoFar = dict[str, list[PlannedMatchup]]
 """Every expert's showings as they are stored, by position."""
-
-Kind = Contestant.Kind
 
 
 def rules_of(study: Study) -> PlanRules:
@@ -36,106 +32,6 @@ def rules_of(study: Study) -> PlanRules:
         checks=tuple(Check(**check) for check in kept.get("checks", ())),
         alike=tuple((place, one, other) for place, one, other in kept.get("alike", ())),
         **{name: kept[name] for name in _PLAIN if name in kept},
-    )
-
-
-def refuse_missing(
-    contestants: list[Contestant],
-    scenarios: list[Scenario],
-    cells: Collection[tuple[str, str]],
-) -> None:
-    """Do nothing where everybody has a picture of every scenario.
-
-    Raises:
-        NothingToPlan: Pictures are missing; the text names them.
-    """
-    missing = [
-        sentence(
-            "%(contestant)s on %(scenario)s", contestant=contestant.slug, scenario=scenario.slug
-        )
-        for contestant in contestants
-        for scenario in scenarios
-        if (scenario.slug, contestant.slug) not in cells
-    ]
-    if missing:
-        raise NothingToPlan(_no_pictures(missing))
-
-
-def windows_of(entries: Iterable[Entry]) -> dict[str, str]:
-    """By scenario, the window that its pictures in a study show: of the first sample, if apart."""
-    found: dict[str, str] = {}
-    for entry in sorted(entries, key=lambda one: one.scenario):
-        found.setdefault(scenario_of(entry.scenario), window_of(entry.picture))
-    return found
-
-
-def check_pictures(
-    scenarios: list[Scenario], windows: Mapping[str, str]
-) -> tuple[tuple[Check, ...], Cells]:
-    """What attention checks there can be: the latest reference against the latest broken one.
-
-    Args:
-        scenarios: Of the study.
-        windows: By scenario; pictures of another window stay out.
-    """
-    found = find_showable(scenarios).filter(
-        contestant__kind__in=[Kind.REFERENCE, Kind.CHECK], state=Augmentation.State.DONE
-    )
-    latest: dict[tuple[str, str], Augmentation] = {}
-    for row in found.order_by(F("finished_at").asc(nulls_first=True), "pk"):
-        if windows.get(row.scenario.slug) == window_of(row.image):
-            latest[row.scenario.slug, row.contestant.kind] = row
-    checks: list[Check] = []
-    cells: Cells = {}
-    for scenario in sorted({slug for slug, _ in latest}):
-        good, broken = latest.get((scenario, Kind.REFERENCE)), latest.get((scenario, Kind.CHECK))
-        if good is None or broken is None or good.image == broken.image:
-            continue
-        names = good.contestant.slug, broken.contestant.slug
-        checks.append(Check(scenario=scenario, good=names[0], broken=names[1]))
-        cells |= {(scenario, names[0]): good, (scenario, names[1]): broken}
-    return tuple(checks), cells
-
-
-def enough_checks(
-    scenarios: list[Scenario], *, windows: Mapping[str, str], wanted: int
-) -> tuple[tuple[Check, ...], Cells]:
-    """What `check_pictures` gives, if that is as much as a study asks for.
-
-    Args:
-        scenarios: Of the study; an expert sees at most one check of each.
-        windows: By scenario, as `check_pictures` takes them.
-        wanted: How many each expert is to see.
-
-    Raises:
-        NothingToPlan: There are too few; the text says what to do.
-    """
-    checks, cells = check_pictures(scenarios, windows) if wanted else ((), {})
-    if len(checks) >= wanted:
-        return checks, cells
-    ready = {check.scenario for check in checks}
-    with_reference = Scenario.objects.filter(
-        pk__in=[row.pk for row in scenarios], reference__isnull=False
-    )
-    missing = [row.slug for row in with_reference if row.slug not in ready]
-    if len(ready) + len(missing) >= wanted:
-        raise NothingToPlan(
-            sentence(
-                "Attention checks wanted for each expert: %(wanted)s; scenarios with pictures for "
-                "one: %(found)s. Generate the contestant reference and run “manage.py draw_checks "
-                "all”, which draws the broken pictures, then open the study; or ask for 0 %%.",
-                wanted=wanted,
-                found=len(checks),
-            )
-        )
-    raise NothingToPlan(
-        sentence(
-            "Attention checks wanted for each expert: %(wanted)s; each needs a scenario of its "
-            "own with a reference, and the study has %(most)s. Ask for fewer, or choose more "
-            "scenarios.",
-            wanted=wanted,
-            most=len(ready) + len(missing),
-        )
     )
 
 
@@ -155,31 +51,9 @@ def pictures_of(study: Study) -> Cells:
     return cells
 
 
-def without_lost_checks(rules: PlanRules, cells: Cells) -> PlanRules:
-    """The rules with those attention checks that still have both of their pictures."""
-    kept = tuple(
-        check
-        for check in rules.checks
-        if {(check.scenario, check.good), (check.scenario, check.broken)} <= cells.keys()
-    )
-    return replace(rules, checks=kept)
-
-
 def shows_all_samples(study: Study) -> bool:
     """Whether each sample of a scenario is judged on its own."""
     return bool(study.rules.get("samples") == "all")
-
-
-def placed_checks(
-    checks: tuple[Check, ...], cells: Cells, *, shows_all: bool
-) -> tuple[tuple[Check, ...], Cells]:
-    """Attention checks at the places of a plan: where samples are apart, with the first one."""
-    if not shows_all:
-        return checks, cells
-    return (
-        tuple(replace(check, scenario=place_of(check.scenario, 1)) for check in checks),
-        {(place_of(scenario, 1), who): row for (scenario, who), row in cells.items()},
-    )
 
 
 def store(
@@ -284,19 +158,6 @@ _PLAIN = (
 """Rules that are kept as they are; studies opened before a rule existed go without it."""
 
 
-def find_showable(scenarios: list[Scenario]) -> QuerySet[Augmentation]:
-    """Every augmentation of these scenarios that has a picture to judge."""
-    return (
-        Augmentation.objects.filter(scenario__in=scenarios, state__in=Augmentation.SHOWABLE)
-        .exclude(image="")
-        .select_related("scenario", "contestant")
-        .only(
-            *("image", "sample", "options", "job", "scenario__slug"),
-            *("contestant__slug", "contestant__kind"),
-        )
-    )
-
-
 def _place(study: Study, row: Augmentation) -> str:
     slug = row.scenario.slug
     return place_of(slug, row.sample) if shows_all_samples(study) else slug
@@ -328,15 +189,3 @@ def _mains(study: Study, experts: list[int]) -> dict[tuple[int, int], int]:
         (expert, position): pk
         for expert, position, pk in rows.values_list("expert", "position", "pk")
     }
-
-
-def _no_pictures(missing: list[Sentence]) -> Sentence:
-    if len(missing) <= MOST_NAMED:
-        return sentence(
-            "There is no picture yet of %(cells)s. Generate them first.", cells=tuple(missing)
-        )
-    return sentence(
-        "There is no picture yet of %(cells)s and %(number)s more. Generate them first.",
-        cells=tuple(missing[:MOST_NAMED]),
-        number=len(missing) - MOST_NAMED,
-    )

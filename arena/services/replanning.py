@@ -13,6 +13,7 @@ from arena.pairing.arrays import FloatArray
 from arena.pairing.following import follow_on
 from arena.pairing.later import judges, units_of
 from arena.queries.voting_path import upcoming
+from arena.services.attention_checks import without_lost_checks
 from arena.services.plans import (
     next_batch,
     pictures_of,
@@ -20,7 +21,6 @@ from arena.services.plans import (
     rules_of,
     store,
     votes_left,
-    without_lost_checks,
 )
 from arena.services.vote_writes import mark_served
 from augment.services.events import log_event

@@ -14,15 +14,11 @@ from arena.errors import StudyNotOpen
 from arena.models import Study
 from arena.pairing.plan import Check, Entry, MatchupPlan, PlanRules, plan
 from arena.queries.people import experts as expert_accounts
+from arena.services.attention_checks import enough_checks, placed_checks
 from arena.services.frames import Cells
-from arena.services.plans import (
-    enough_checks,
-    placed_checks,
-    rules_of,
-    store,
-    windows_of,
-)
+from arena.services.plans import rules_of, store
 from arena.services.replays import Replays, replays_of
+from arena.services.showable import windows_of
 from arena.services.shown_pictures import SampleRule, StudyPictures, choose_pictures
 from augment.errors import Conflict, UnknownName
 from augment.models import Contestant, Scenario

@@ -5,6 +5,7 @@ from django.urls import reverse
 
 from augment.models import EndpointModel
 from augment.services.endpoints import contestants
+from augment.services.endpoints.known_endpoints import ensure_endpoint
 from augment.variants.options import ContestantOptions
 from tests.web.cast import people, signed_in
 
@@ -12,7 +13,7 @@ pytestmark = pytest.mark.django_db
 
 
 def test_a_contestant_is_told_in_full_to_staff_alone() -> None:
-    contestants.ensure_endpoint(label="here", base_url="http://127.0.0.1:1/v1")
+    ensure_endpoint(label="here", base_url="http://127.0.0.1:1/v1")
     contestants.add_contestant(
         slug="one",
         variant="otm",

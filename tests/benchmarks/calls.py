@@ -13,7 +13,8 @@ from django.utils import timezone
 from augment.llm.messages import Message, Request, Speaker
 from augment.llm.patience import Patience
 from augment.models import EndpointModel
-from augment.services.endpoints.contestants import add_contestant, ensure_endpoint
+from augment.services.endpoints.contestants import add_contestant
+from augment.services.endpoints.known_endpoints import ensure_endpoint
 from augment.services.running import jobs, leases, runner
 from augment.services.running.caps import Caps
 from augment.services.running.transcripts import RowTranscript

@@ -74,7 +74,7 @@ def main() -> None:
 def _catalogue() -> Iterator[tuple[Scene, Modification | None]]:
     os.environ.setdefault("DJANGO_SETTINGS_MODULE", "arena.config.settings")
     django.setup()
-    from augment.services.scenarios.catalogue import read_catalogue
+    from augment.services.scenarios.catalogue_files import read_catalogue
 
     scenes, entries = read_catalogue(Path(__file__).parents[2] / "fixtures")
     for entry in entries:

@@ -8,13 +8,14 @@ from django.core.management import CommandError, call_command
 from augment.errors import Conflict, InvalidDocument, KeyMissing, UnknownName
 from augment.models import Contestant, Endpoint, Event
 from augment.services.endpoints import contestants, keys
+from augment.services.endpoints.known_endpoints import ensure_endpoint
 
 pytestmark = pytest.mark.django_db
 LOCAL = "http://127.0.0.1:11434/v1"
 
 
 def local(*, is_simulated: bool = False, key_variable: str = "") -> Endpoint:
-    return contestants.ensure_endpoint(
+    return ensure_endpoint(
         label="local", base_url=LOCAL, is_simulated=is_simulated, key_variable=key_variable
     )
 
@@ -59,7 +60,7 @@ def test_a_model_on_a_simulated_endpoint_is_simulated() -> None:
 
 def test_the_same_model_elsewhere_is_told_apart_by_its_endpoint() -> None:
     local()
-    contestants.ensure_endpoint(label="cloud", base_url="http://127.0.0.1:10/v1")
+    ensure_endpoint(label="cloud", base_url="http://127.0.0.1:10/v1")
     here, there = add(), add(slug="llama-there", endpoint="cloud")
     assert (here.name, there.name) == ("llama3.1:70b OTM", "llama3.1:70b OTM at cloud")
     assert add() == here
@@ -131,7 +132,7 @@ def test_a_key_in_place_of_its_variable_is_refused_and_not_repeated() -> None:
 
 def test_an_endpoint_that_moves_is_logged_before_and_after() -> None:
     local()
-    contestants.ensure_endpoint(label="local", base_url="http://127.0.0.1:9/v1/")
+    ensure_endpoint(label="local", base_url="http://127.0.0.1:9/v1/")
     endpoint = Endpoint.objects.get()
     assert endpoint.base_url == "http://127.0.0.1:9/v1"
     event = Event.objects.filter(verb="change").get()
@@ -161,7 +162,7 @@ def test_an_endpoint_does_not_become_simulated() -> None:
 )
 def test_link_local_and_metadata_addresses_are_refused(base_url: str) -> None:
     with pytest.raises(InvalidDocument, match="link-local or metadata"):
-        contestants.ensure_endpoint(label="local", base_url=base_url)
+        ensure_endpoint(label="local", base_url=base_url)
     assert not Endpoint.objects.exists()
 
 
@@ -170,13 +171,13 @@ def test_link_local_and_metadata_addresses_are_refused(base_url: str) -> None:
 )
 def test_what_is_no_web_address_is_refused(base_url: str) -> None:
     with pytest.raises(InvalidDocument, match="an address such as"):
-        contestants.ensure_endpoint(label="local", base_url=base_url)
+        ensure_endpoint(label="local", base_url=base_url)
 
 
 @pytest.mark.parametrize("base_url", ["https://me:secret@x/v1", "https://x/v1?key=secret"])
 def test_an_address_carries_no_secret(base_url: str) -> None:
     with pytest.raises(InvalidDocument, match="don't belong") as caught:
-        contestants.ensure_endpoint(label="local", base_url=base_url)
+        ensure_endpoint(label="local", base_url=base_url)
     assert "secret" not in str(caught.value)
 
 

@@ -21,6 +21,7 @@ from augment.scene.intent import Intent
 from augment.scene.intent_codec import intent_from_document
 from augment.scene.lane_graph import LaneGraph
 from augment.services.endpoints import contestants
+from augment.services.endpoints.known_endpoints import ensure_endpoint
 from augment.services.running import jobs, runner
 from augment.services.scenarios.scene_imports import import_scene
 from augment.services.scenarios.scenes import add_scenario, scene_of
@@ -72,7 +73,7 @@ def test_the_stand_in_edits_a_scene_of_each_format(
     ahead_m = AHEAD_M.get(name, USUAL_M)
     recorded = import_scene(path=made(name, tmp_path), slug="recorded")
     assert recorded.source == name
-    contestants.ensure_endpoint(label="stand-in", base_url=server.url, is_simulated=True)
+    ensure_endpoint(label="stand-in", base_url=server.url, is_simulated=True)
     contestants.add_contestant(
         slug="stand-in", variant="otm", endpoint="stand-in", model="fake-good"
     )

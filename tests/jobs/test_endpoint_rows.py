@@ -14,6 +14,7 @@ from django.urls import reverse
 
 from augment.models import Endpoint, EndpointModel, Event
 from augment.services.endpoints import contestants
+from augment.services.endpoints.known_endpoints import ensure_endpoint
 
 pytestmark = pytest.mark.django_db
 LOCAL = "http://127.0.0.1:11434/v1"
@@ -49,7 +50,7 @@ def problems(page: Any) -> str:
 
 
 def test_a_contestant_brings_its_model_which_is_unknown() -> None:
-    contestants.ensure_endpoint(label="local", base_url=LOCAL)
+    ensure_endpoint(label="local", base_url=LOCAL)
     for variant in ("otm", "otm"):
         contestants.add_contestant(
             slug="llama", variant=variant, endpoint="local", model="llama3.1"

@@ -10,7 +10,8 @@ from django.core.management import call_command
 
 from augment.errors import Conflict
 from augment.models import Contestant, EndpointModel, GenerationJob
-from augment.services.endpoints.contestants import add_contestant, ensure_endpoint
+from augment.services.endpoints.contestants import add_contestant
+from augment.services.endpoints.known_endpoints import ensure_endpoint
 from augment.services.running import jobs, runner
 from augment.services.running.estimates import estimate
 from augment.services.running.feasible import find_obstacle, keys_missing

@@ -12,8 +12,8 @@ from django.urls import reverse
 
 from augment.errors import Conflict, InvalidDocument, KeyMissing, KeyNotAllowed
 from augment.models import Augmentation, Contestant, Endpoint, Event
-from augment.services.endpoints import contestants
 from augment.services.endpoints.keys import key_of, may_hold_key, move_of
+from augment.services.endpoints.known_endpoints import ensure_endpoint
 from augment.services.running import jobs, runner
 from augment.services.running.feasible import find_obstacle, keys_missing
 from tests.jobs.models import add_llama, llama_job
@@ -52,7 +52,7 @@ def test_which_variables_may_hold_a_key(settings: Any, variable: str, may: bool)
 @pytest.mark.parametrize("variable", SECRETS)
 def test_a_variable_that_is_not_for_keys_can_not_be_entered(variable: str) -> None:
     with pytest.raises(InvalidDocument, match=f"{variable} may not be sent to an endpoint"):
-        contestants.ensure_endpoint(label="thief", base_url=URL, key_variable=variable)
+        ensure_endpoint(label="thief", base_url=URL, key_variable=variable)
     with pytest.raises(CommandError, match="ends in _API_KEY"):
         call_command(
             *("add_contestant", "thief", "--variant", "otm", "--endpoint", "thief"),
@@ -91,7 +91,7 @@ def test_a_contestant_with_such_a_variable_is_refused_at_launch() -> None:
 
 def test_a_listed_variable_is_read(settings: Any, monkeypatch: pytest.MonkeyPatch) -> None:
     settings.KEY_VARIABLES = ["LAB_TOKEN"]
-    endpoint = contestants.ensure_endpoint(label="lab", base_url=URL, key_variable="LAB_TOKEN")
+    endpoint = ensure_endpoint(label="lab", base_url=URL, key_variable="LAB_TOKEN")
     with pytest.raises(KeyMissing):
         key_of(endpoint)
     monkeypatch.setenv("LAB_TOKEN", "sk-lab")

@@ -17,6 +17,7 @@ from augment.errors import Conflict, InvalidDocument
 from augment.models import Augmentation, Contestant, EndpointModel, GenerationJob, ModelCall
 from augment.prompts.texts import prompt_version
 from augment.services.endpoints import contestants
+from augment.services.endpoints.known_endpoints import ensure_endpoint
 from augment.services.endpoints.known_models import tell_sight
 from augment.services.endpoints.treatments import left_out, options_of
 from augment.services.running import jobs, runner
@@ -66,7 +67,7 @@ class Scripted(JsonServer):
 
 
 def add(server: Scripted, slug: str, variant: str = "otm", **options: object) -> Contestant:
-    contestants.ensure_endpoint(label="here", base_url=server.url)
+    ensure_endpoint(label="here", base_url=server.url)
     server.script = SCRIPTS[variant]
     made = contestants.add_contestant(
         slug=slug,
@@ -206,7 +207,7 @@ def test_samples_without_a_seed_are_asked_anew_too() -> None:
 def test_another_option_never_reuses_an_answer_and_the_same_does() -> None:
     with serving(Scripted()) as server:
         for slug, rounds in (("two", 2), ("also-two", 2), ("three", 3)):
-            contestants.ensure_endpoint(label="here", base_url=server.url)
+            ensure_endpoint(label="here", base_url=server.url)
             server.script = SCRIPTS["tqa"]
             contestants.add_contestant(
                 slug=slug,

@@ -25,7 +25,7 @@ from augment.scene.intent_codec import intent_to_document, intent_to_parts
 from augment.scene.intent_words import (
     Shape,
 )
-from augment.services.endpoints import contestants
+from augment.services.endpoints.known_endpoints import ensure_endpoint
 from augment.services.running.caps import Caps
 from augment.services.running.intent_readings import (
     give_up_stale,
@@ -53,7 +53,7 @@ def reading(
 ) -> IntentReading:
     if not Scenario.objects.exists():
         add_scenario("street", intent=None, intent_origin="")
-        contestants.ensure_endpoint(label="here", base_url="http://127.0.0.1:1/v1")
+        ensure_endpoint(label="here", base_url="http://127.0.0.1:1/v1")
     return read_intent(
         scenario="street",
         endpoint="here",
@@ -145,7 +145,7 @@ def run(*arguments: str) -> str:
 def test_the_command_reads_through_the_wire_shows_statements_and_accepts(tmp_path: Path) -> None:
     add_scenario("street", intent=None, intent_origin="")
     with running(intents=intents) as server:
-        contestants.ensure_endpoint(label="stand-in", base_url=server.url)
+        ensure_endpoint(label="stand-in", base_url=server.url)
         said = run("--endpoint", "stand-in", "--model", "fake-good")
     assert "- cones: 20 m ahead of the ego\n" in said
     assert "It does not count yet." in said
@@ -159,7 +159,7 @@ def test_the_command_reads_through_the_wire_shows_statements_and_accepts(tmp_pat
 def test_the_stand_in_says_that_it_reads_no_english() -> None:
     add_scenario("street", instruction="Paint the sky green.", intent=None, intent_origin="")
     with running(intents=intents) as server:
-        contestants.ensure_endpoint(label="stand-in", base_url=server.url)
+        ensure_endpoint(label="stand-in", base_url=server.url)
         with pytest.raises(CommandError, match="Nothing was read"):
             run("--endpoint", "stand-in", "--model", "fake-good")
     assert all("I am a stand-in and read no English" in (one.answer or "") for one in calls())
@@ -179,7 +179,7 @@ def test_the_command_does_one_thing_at_a_time(arguments: tuple[str, ...]) -> Non
 
 def test_a_worker_asks_for_a_planned_reading_once() -> None:
     add_scenario("street", intent=None, intent_origin="")
-    contestants.ensure_endpoint(label="here", base_url="http://127.0.0.1:1/v1")
+    ensure_endpoint(label="here", base_url="http://127.0.0.1:1/v1")
     row = plan_reading(scenario="street", endpoint="here", model="m")
     read_planned(row.pk)  # nobody listens there
     row.refresh_from_db()
@@ -192,7 +192,7 @@ def test_a_worker_asks_for_a_planned_reading_once() -> None:
 
 def test_a_reading_whose_worker_is_gone_fails_after_a_while(settings: Settings) -> None:
     add_scenario("street", intent=None, intent_origin="")
-    contestants.ensure_endpoint(label="here", base_url="http://127.0.0.1:1/v1")
+    ensure_endpoint(label="here", base_url="http://127.0.0.1:1/v1")
     row = plan_reading(scenario="street", endpoint="here", model="m")
     longest = timedelta(seconds=settings.LLM_QUEUE_S + 6 * settings.LLM_TIMEOUT_S)
     assert give_up_stale(now=row.created_at + longest) == 0

@@ -24,6 +24,7 @@ from augment.models import (
     ModelCall,
 )
 from augment.services.endpoints import contestants
+from augment.services.endpoints.known_endpoints import ensure_endpoint
 from augment.services.running import jobs, runner
 from augment.services.running.caps import Caps
 from augment.services.running.feasible import find_obstacle
@@ -51,8 +52,8 @@ def opened(endpoint: Endpoint) -> AbstractContextManager[ChatClient]:
 
 
 def add(variant: str, **roles: tuple[str | None, str]) -> Contestant:
-    contestants.ensure_endpoint(label="here", base_url="http://127.0.0.1:1/v1")
-    contestants.ensure_endpoint(label="there", base_url="http://127.0.0.1:2/v1")
+    ensure_endpoint(label="here", base_url="http://127.0.0.1:1/v1")
+    ensure_endpoint(label="there", base_url="http://127.0.0.1:2/v1")
     return contestants.add_contestant(
         slug="one",
         variant=variant,
@@ -97,9 +98,7 @@ def test_a_role_that_nobody_plays_is_refused() -> None:
 
 
 def test_a_simulated_reviewer_makes_a_simulated_contestant() -> None:
-    contestants.ensure_endpoint(
-        label="stand-in", base_url="http://127.0.0.1:3/v1", is_simulated=True
-    )
+    ensure_endpoint(label="stand-in", base_url="http://127.0.0.1:3/v1", is_simulated=True)
     assert add("tqa", reviewer=("stand-in", "fake-good")).is_simulated
 
 
@@ -168,8 +167,8 @@ def test_a_cap_in_money_needs_the_price_of_every_role() -> None:
 
 def test_each_role_is_asked_at_its_own_endpoint(server: FakeServer) -> None:
     with running(intents=intents) as other:
-        contestants.ensure_endpoint(label="a", base_url=server.url, is_simulated=True)
-        contestants.ensure_endpoint(label="b", base_url=other.url, is_simulated=True)
+        ensure_endpoint(label="a", base_url=server.url, is_simulated=True)
+        ensure_endpoint(label="b", base_url=other.url, is_simulated=True)
         contestants.add_contestant(
             slug="two",
             variant="fc+vqa",
@@ -204,7 +203,7 @@ def test_each_role_is_asked_at_its_own_endpoint(server: FakeServer) -> None:
 def test_a_run_that_was_answered_before_is_replayed_with_its_native_calls(
     server: FakeServer,
 ) -> None:
-    contestants.ensure_endpoint(label="a", base_url=server.url, is_simulated=True)
+    ensure_endpoint(label="a", base_url=server.url, is_simulated=True)
     contestants.add_contestant(slug="two", variant="fc", endpoint="a", model="fake-good")
     EndpointModel.objects.update(native_tools=True)
     add_scenario("street-1")
@@ -221,7 +220,7 @@ def test_a_run_that_was_answered_before_is_replayed_with_its_native_calls(
 
 
 def test_the_command_takes_models_and_endpoints() -> None:
-    contestants.ensure_endpoint(label="there", base_url="http://127.0.0.1:2/v1")
+    ensure_endpoint(label="there", base_url="http://127.0.0.1:2/v1")
     out = io.StringIO()
     call_command(
         *("add_contestant", "one", "--variant", "vqa", "--model", "text-model"),

@@ -14,6 +14,7 @@ from augment.errors import ParameterRefused
 from augment.llm.profile import ModelProfile
 from augment.models import Augmentation, Contestant, Endpoint, EndpointModel, Event, ModelCall
 from augment.services.endpoints import contestants, probe
+from augment.services.endpoints.known_endpoints import ensure_endpoint
 from augment.services.endpoints.respondents import respondents_of
 from augment.services.endpoints.treatments import document_of, profile_from_document, treatment_of
 from augment.services.running import jobs, runner
@@ -45,7 +46,7 @@ class Model(JsonServer):
 
 
 def job_at(server: Model, variant: str = "fc") -> None:
-    contestants.ensure_endpoint(label="here", base_url=server.url)
+    ensure_endpoint(label="here", base_url=server.url)
     contestants.add_contestant(slug="one", variant=variant, endpoint="here", model="m")
     add_scenario("first")
     add_scenario("second")
@@ -209,7 +210,7 @@ def test_a_profile_comes_back_from_its_document() -> None:
 
 
 def test_each_role_has_its_own() -> None:
-    contestants.ensure_endpoint(label="here", base_url="http://127.0.0.1:1/v1")
+    ensure_endpoint(label="here", base_url="http://127.0.0.1:1/v1")
     one = contestants.add_contestant(
         slug="one",
         variant="fc+tqa",

@@ -11,7 +11,7 @@ from django.urls import reverse
 from augment.errors import InvalidDocument
 from augment.formats.yaml_file import read_yaml
 from augment.models import Contestant, Event, GenerationJob
-from augment.services.endpoints.contestants import ensure_endpoint
+from augment.services.endpoints.known_endpoints import ensure_endpoint
 from augment.services.running.matrix import load_matrix, matrix_text
 from tests.jobs.rows import add_scenario
 from tests.web.cast import people, signed_in

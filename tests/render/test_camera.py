@@ -16,7 +16,7 @@ from augment.render import palette
 from augment.render.bev import draw
 from augment.render.camera import MARGIN_M, Camera, camera_for
 from augment.scene.modification import Modification, without_traffic
-from augment.services.scenarios.catalogue import read_catalogue
+from augment.services.scenarios.catalogue_files import read_catalogue
 from tests import scenes
 from tests.render.pictures import opened
 

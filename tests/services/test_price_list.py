@@ -7,6 +7,7 @@ import pytest
 
 from augment.models import EndpointModel
 from augment.services.endpoints import contestants
+from augment.services.endpoints.known_endpoints import ensure_endpoint
 from augment.services.endpoints.price_list import listed_price
 
 NOW = datetime(2026, 11, 20, tzinfo=UTC)
@@ -73,7 +74,7 @@ def test_a_new_contestant_brings_the_listed_price_once(monkeypatch: pytest.Monke
 
 @pytest.mark.django_db
 def test_a_stand_in_costs_nobody_knows_what() -> None:
-    contestants.ensure_endpoint(label="openai", base_url=OPENAI, is_simulated=True)
+    ensure_endpoint(label="openai", base_url=OPENAI, is_simulated=True)
     add("fake")
     known = EndpointModel.objects.get()
     assert (known.price_in_usd, known.price_out_usd) == (None, None)

@@ -8,6 +8,7 @@ from django.urls import reverse
 
 from augment.models import Contestant, EndpointModel, Event
 from augment.services.endpoints import contestants
+from augment.services.endpoints.known_endpoints import ensure_endpoint
 from augment.services.running.choosing import resolve_contestants
 from augment.variants.options import ContestantOptions
 from tests.web.cast import people, signed_in
@@ -16,7 +17,7 @@ pytestmark = pytest.mark.django_db
 
 
 def add(slug: str = "one") -> Contestant:
-    contestants.ensure_endpoint(label="here", base_url="http://127.0.0.1:1/v1")
+    ensure_endpoint(label="here", base_url="http://127.0.0.1:1/v1")
     return contestants.add_contestant(
         slug=slug,
         variant="fc+tqa",

@@ -13,7 +13,7 @@ from augment.scene.intent_codec import intent_to_document
 from augment.scene.intent_words import (
     Shape,
 )
-from augment.services.endpoints import contestants
+from augment.services.endpoints.known_endpoints import ensure_endpoint
 from tests.intents import cones
 from tests.jobs.rows import add_scenario
 from tests.web.cast import people, signed_in
@@ -52,7 +52,7 @@ def test_the_page_shows_what_the_instruction_asks_for(staff: Client) -> None:
 
 def test_what_a_model_read_is_shown_and_counts_once_accepted(staff: Client) -> None:
     scenario = add_scenario("street", intent=None, intent_origin="")
-    endpoint = contestants.ensure_endpoint(label="here", base_url="http://127.0.0.1:1/v1")
+    endpoint = ensure_endpoint(label="here", base_url="http://127.0.0.1:1/v1")
     IntentReading.objects.create(
         scenario=scenario, endpoint=endpoint, model="m", state="read", document=RING
     )
@@ -96,7 +96,7 @@ def test_an_admin_has_an_instruction_read_by_a_worker(
     staff: Client, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     scenario = add_scenario("street", intent=None, intent_origin="")
-    endpoint = contestants.ensure_endpoint(label="here", base_url="http://127.0.0.1:1/v1")
+    endpoint = ensure_endpoint(label="here", base_url="http://127.0.0.1:1/v1")
     reader = EndpointModel.objects.create(endpoint=endpoint, model="m")
     sent: list[int] = []
     monkeypatch.setattr("arena.web.intents.enqueue_reading", sent.append)
@@ -109,7 +109,7 @@ def test_an_admin_has_an_instruction_read_by_a_worker(
 
 def test_what_went_wrong_with_a_reading_is_said(staff: Client) -> None:
     scenario = add_scenario("street", intent=None, intent_origin="")
-    endpoint = contestants.ensure_endpoint(label="here", base_url="http://127.0.0.1:1/v1")
+    endpoint = ensure_endpoint(label="here", base_url="http://127.0.0.1:1/v1")
     IntentReading.objects.create(
         scenario=scenario, endpoint=endpoint, model="m", state="failed", reason="it was silent"
     )

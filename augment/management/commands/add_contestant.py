@@ -17,8 +17,8 @@ from augment.services.endpoints.contestants import (
     add_like,
     add_simulated,
     ensure_builtin,
-    ensure_endpoint,
 )
+from augment.services.endpoints.known_endpoints import ensure_endpoint
 from augment.services.endpoints.treatments import left_out
 from augment.services.terminal import TerminalCommand
 from augment.variants.transcript import ModelRole

@@ -11,7 +11,8 @@ from django.db import transaction
 from augment.errors import Conflict
 from augment.models import Contestant, Endpoint
 from augment.sentences import sentence
-from augment.services.endpoints.contestants import add_contestant, ensure_endpoint
+from augment.services.endpoints.contestants import add_contestant
+from augment.services.endpoints.known_endpoints import ensure_endpoint
 from augment.variants.options import EFFORTS, NAMES, ToolProtocol, options_from_document
 from augment.variants.recipes import RECIPES
 

@@ -27,7 +27,7 @@ from augment.scene.entities import Scene
 from augment.scene.intent_codec import intent_to_parts
 from augment.scene.intent_statements import list_statements
 from augment.scene.modification import without_traffic
-from augment.services.scenarios.catalogue import folder_of, read_catalogue
+from augment.services.scenarios.catalogue_files import folder_of, read_catalogue
 
 MOST_ON_ONE_SCENE = 8
 

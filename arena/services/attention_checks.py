@@ -1,0 +1,111 @@
+"""Attention checks of a plan: a reference against a broken picture of the same scenario."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+
+from django.db.models import F
+
+from arena.errors import NothingToPlan
+from arena.pairing.plan import Check, PlanRules
+from arena.pairing.rules import place_of
+from arena.services.frames import Cells
+from arena.services.showable import find_showable
+from augment.models import Augmentation, Contestant, Scenario
+from augment.sentences import sentence
+from augment.services.scenarios.pictures import window_of
+
+Kind = Contestant.Kind
+
+
+def check_pictures(
+    scenarios: list[Scenario], windows: Mapping[str, str]
+) -> tuple[tuple[Check, ...], Cells]:
+    """What attention checks there can be: the latest reference against the latest broken one.
+
+    Args:
+        scenarios: Of the study.
+        windows: By scenario; pictures of another window stay out.
+    """
+    found = find_showable(scenarios).filter(
+        contestant__kind__in=[Kind.REFERENCE, Kind.CHECK], state=Augmentation.State.DONE
+    )
+    latest: dict[tuple[str, str], Augmentation] = {}
+    for row in found.order_by(F("finished_at").asc(nulls_first=True), "pk"):
+        if windows.get(row.scenario.slug) == window_of(row.image):
+            latest[row.scenario.slug, row.contestant.kind] = row
+    checks: list[Check] = []
+    cells: Cells = {}
+    for scenario in sorted({slug for slug, _ in latest}):
+        good, broken = latest.get((scenario, Kind.REFERENCE)), latest.get((scenario, Kind.CHECK))
+        if good is None or broken is None or good.image == broken.image:
+            continue
+        names = good.contestant.slug, broken.contestant.slug
+        checks.append(Check(scenario=scenario, good=names[0], broken=names[1]))
+        cells |= {(scenario, names[0]): good, (scenario, names[1]): broken}
+    return tuple(checks), cells
+
+
+def enough_checks(
+    scenarios: list[Scenario], *, windows: Mapping[str, str], wanted: int
+) -> tuple[tuple[Check, ...], Cells]:
+    """What `check_pictures` gives, if that is as much as a study asks for.
+
+    Args:
+        scenarios: Of the study; an expert sees at most one check of each.
+        windows: By scenario, as `check_pictures` takes them.
+        wanted: How many each expert is to see.
+
+    Raises:
+        NothingToPlan: There are too few; the text says what to do.
+    """
+    checks, cells = check_pictures(scenarios, windows) if wanted else ((), {})
+    if len(checks) >= wanted:
+        return checks, cells
+    ready = {check.scenario for check in checks}
+    with_reference = Scenario.objects.filter(
+        pk__in=[row.pk for row in scenarios], reference__isnull=False
+    )
+    missing = [row.slug for row in with_reference if row.slug not in ready]
+    if len(ready) + len(missing) >= wanted:
+        raise NothingToPlan(
+            sentence(
+                "Attention checks wanted for each expert: %(wanted)s; scenarios with pictures for "
+                "one: %(found)s. Generate the contestant reference and run “manage.py draw_checks "
+                "all”, which draws the broken pictures, then open the study; or ask for 0 %%.",
+                wanted=wanted,
+                found=len(checks),
+            )
+        )
+    raise NothingToPlan(
+        sentence(
+            "Attention checks wanted for each expert: %(wanted)s; each needs a scenario of its "
+            "own with a reference, and the study has %(most)s. Ask for fewer, or choose more "
+            "scenarios.",
+            wanted=wanted,
+            most=len(ready) + len(missing),
+        )
+    )
+
+
+def placed_checks(
+    checks: tuple[Check, ...], cells: Cells, *, shows_all: bool
+) -> tuple[tuple[Check, ...], Cells]:
+    """Attention checks at the places of a plan: where samples are apart, with the first one."""
+    if not shows_all:
+        return checks, cells
+    return (
+        tuple(replace(check, scenario=place_of(check.scenario, 1)) for check in checks),
+        {(place_of(scenario, 1), who): row for (scenario, who), row in cells.items()},
+    )
+
+
+def without_lost_checks(rules: PlanRules, cells: Cells) -> PlanRules:
+    """The rules with those attention checks that still have both of their pictures."""
+    kept = tuple(
+        check
+        for check in rules.checks
+        if {(check.scenario, check.good), (check.scenario, check.broken)} <= cells.keys()
+    )
+    return replace(rules, checks=kept)

@@ -1,0 +1,73 @@
+"""Which pictures can be shown at all, what is missing, and which windows they show."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Iterable
+
+from django.db.models import QuerySet
+
+from arena.errors import NothingToPlan
+from arena.pairing.plan import Entry
+from arena.pairing.rules import scenario_of
+from arena.services.frames import MOST_NAMED
+from augment.models import Augmentation, Contestant, Scenario
+from augment.sentences import Sentence, sentence
+from augment.services.scenarios.pictures import window_of
+
+
+def find_showable(scenarios: list[Scenario]) -> QuerySet[Augmentation]:
+    """Every augmentation of these scenarios that has a picture to judge."""
+    return (
+        Augmentation.objects.filter(scenario__in=scenarios, state__in=Augmentation.SHOWABLE)
+        .exclude(image="")
+        .select_related("scenario", "contestant")
+        .only(
+            *("image", "sample", "options", "job", "scenario__slug"),
+            *("contestant__slug", "contestant__kind"),
+        )
+    )
+
+
+def refuse_missing(
+    contestants: list[Contestant],
+    scenarios: list[Scenario],
+    cells: Collection[tuple[str, str]],
+) -> None:
+    """Do nothing where everybody has a picture of every scenario.
+
+    Raises:
+        NothingToPlan: Pictures are missing; the text names them.
+    """
+    missing = [
+        sentence(
+            "%(contestant)s on %(scenario)s", contestant=contestant.slug, scenario=scenario.slug
+        )
+        for contestant in contestants
+        for scenario in scenarios
+        if (scenario.slug, contestant.slug) not in cells
+    ]
+    if missing:
+        raise NothingToPlan(_no_pictures(missing))
+
+
+def windows_of(entries: Iterable[Entry]) -> dict[str, str]:
+    """By scenario, the window that its pictures in a study show: of the first sample, if apart."""
+    found: dict[str, str] = {}
+    for entry in sorted(entries, key=lambda one: one.scenario):
+        found.setdefault(scenario_of(entry.scenario), window_of(entry.picture))
+    return found
+
+
+# --- Private -----------------------------------------------------------------------------------
+
+
+def _no_pictures(missing: list[Sentence]) -> Sentence:
+    if len(missing) <= MOST_NAMED:
+        return sentence(
+            "There is no picture yet of %(cells)s. Generate them first.", cells=tuple(missing)
+        )
+    return sentence(
+        "There is no picture yet of %(cells)s and %(number)s more. Generate them first.",
+        cells=tuple(missing[:MOST_NAMED]),
+        number=len(missing) - MOST_NAMED,
+    )
