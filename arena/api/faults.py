@@ -42,5 +42,10 @@ def answer_busy(request: HttpRequest) -> JsonResponse:
     return _fault(503, "busy", translate(DatabaseBusy()))
 
 
+def answer_without_media(request: HttpRequest) -> JsonResponse:
+    """503: what keeps the pictures does not answer; the log says why."""
+    return _fault(503, "no_pictures", _("Pictures can’t be reached just now. Try again later."))
+
+
 def _fault(status: int, code: str, message: str) -> JsonResponse:
     return JsonResponse({"error": {"code": code, "message": message}}, status=status)

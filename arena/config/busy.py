@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Callable
 from typing import Any
 
@@ -14,10 +15,13 @@ from django.http.response import HttpResponseBase
 from arena.config import faults
 from arena.errors import DatabaseBusy
 from arena.services.turns import is_lock_fault, limit_waiting
+from augment.errors import MediaFault
+
+logger = logging.getLogger(__name__)
 
 
 class BusyMiddleware:
-    """Answers 503 where a lock was not to be had in time; what was asked can be asked again."""
+    """Answers 503 where a lock or the storage of pictures was not to be had; ask again later."""
 
     def __init__(self, get_response: Callable[[HttpRequest], HttpResponseBase]) -> None:
         self.get_response = get_response
@@ -30,6 +34,9 @@ class BusyMiddleware:
         """Tell it from faults of ours, which stay what they are."""
         if isinstance(exception, DatabaseBusy) or is_lock_fault(exception):
             return faults.answer_busy(request)
+        if isinstance(exception, MediaFault):
+            logger.error("%s", exception)
+            return faults.answer_without_media(request)
         return None
 
 

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import os
+import re
 from collections.abc import Callable
 from pathlib import Path
-from typing import TypeVar
-from urllib.parse import urlsplit
+from typing import Any, TypeVar
+from urllib.parse import parse_qsl, urlsplit
 
 import dj_database_url
 from django.core.exceptions import ImproperlyConfigured
@@ -15,7 +16,7 @@ from arena.config import private
 
 T = TypeVar("T")
 
-_OWN = ("DATABASE_URL", "REDIS_URL")
+_OWN = ("DATABASE_URL", "REDIS_URL", "AWS_SECRET_ACCESS_KEY", "AWS_SESSION_TOKEN")
 """Secrets of the product itself, beside those called ARENA_..."""
 
 _TRUE, _FALSE = {"1", "true", "yes", "on"}, {"0", "false", "no", "off", ""}
@@ -144,6 +145,41 @@ def folder(name: str, *, default: Path) -> Path:
         return path
 
     return read(name, default, parse, "a folder is needed that can be written to")
+
+
+def media(name: str) -> dict[str, Any]:
+    """Where pictures are kept, as Django's STORAGES wants it: a folder unless a bucket is named.
+
+    s3://BUCKET, s3://BUCKET/PREFIX, both with ?endpoint=https://HOST:PORT&region=REGION.
+    """
+    folder: dict[str, Any] = {"BACKEND": "arena.config.storage.WholeFiles"}
+
+    def parse(raw: str) -> dict[str, Any]:
+        if not raw:  # what a compose file passes on where nothing is set
+            return folder
+        address = urlsplit(raw)
+        wanted = dict(parse_qsl(address.query, strict_parsing=True)) if address.query else {}
+        endpoint = urlsplit(wanted.get("endpoint", "https://given"))
+        if (
+            address.scheme != "s3"
+            or not re.fullmatch(r"[a-z0-9][a-z0-9.-]{1,61}[a-z0-9]", address.netloc)
+            or not wanted.keys() <= {"endpoint", "region"}
+            or endpoint.scheme not in {"http", "https"}
+            or not endpoint.hostname
+        ):
+            raise ValueError(raw)
+        options = {
+            "bucket_name": address.netloc,
+            "location": address.path.strip("/"),
+            "endpoint_url": wanted.get("endpoint"),
+            "region_name": wanted.get("region"),
+        }
+        return {"BACKEND": "arena.config.s3_media.S3Media", "OPTIONS": options}
+
+    allowed = (
+        "use s3://BUCKET/PREFIX?endpoint=https://HOST:PORT&region=REGION, all but BUCKET optional"
+    )
+    return read(name, folder, parse, allowed)
 
 
 def database(name: str, *, default: Path) -> dict[str, object]:

@@ -47,6 +47,14 @@ def answer_busy(request: HttpRequest) -> HttpResponse:
     return answer
 
 
+def answer_without_media(request: HttpRequest) -> HttpResponse:
+    """503."""
+    build = wire.answer_without_media if _is_of_the_wire(request) else pages.answer_without_media
+    answer = build(request)
+    answer.headers["Retry-After"] = str(DatabaseBusy.retry_after_s)
+    return answer
+
+
 def _is_of_the_wire(request: HttpRequest) -> bool:
     """By its address, or because a program asks for JSON (a transcript, say) and for no page."""
     if request.path_info.startswith("/api/"):

@@ -12,6 +12,7 @@ import secrets
 import tempfile
 from datetime import timedelta
 from pathlib import Path
+from typing import Any
 
 from csp.constants import NONE, SELF
 
@@ -202,8 +203,8 @@ private.mend_folder(MEDIA_ROOT, around=BASE_DIR)
 STATIC_ROOT = VAR_DIR / "static"
 STATIC_URL = "static/"
 STATICFILES_DIRS = [BASE_DIR / "static"]
-STORAGES = {
-    "default": {"BACKEND": "arena.config.storage.WholeFiles"},
+STORAGES: dict[str, dict[str, Any]] = {
+    "default": env.media("ARENA_MEDIA_URL"),
     "staticfiles": {"BACKEND": "arena.config.static_files.ModuleStorage"},
 }
 WHITENOISE_KEEP_ONLY_HASHED_FILES = True

@@ -9,6 +9,7 @@ from django.core.files.storage import FileSystemStorage
 
 from arena.config import private
 from arena.exports.files import write_whole
+from augment.errors import MediaFault
 
 
 class WholeFiles(FileSystemStorage):
@@ -26,6 +27,10 @@ class WholeFiles(FileSystemStorage):
 
     def _save(self, name: str, content: File[bytes]) -> str:
         path = Path(self.path(name))
-        private.make_folder(path.parent)
-        write_whole(path, content.read(), mode=private.FILE)
+        try:
+            private.make_folder(path.parent)
+            write_whole(path, content.read(), mode=private.FILE)
+        except OSError as fault:  # a full disk, a folder that somebody took away
+            cause = fault.strerror or str(fault)
+            raise MediaFault("write", name, str(self.location), cause) from fault
         return name

@@ -9,6 +9,7 @@ from __future__ import annotations
 import os
 import shutil
 import tempfile
+import uuid
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from datetime import UTC, datetime
@@ -16,11 +17,13 @@ from enum import StrEnum
 from pathlib import Path
 
 from django.conf import settings
+from django.core.files.base import ContentFile
+from django.core.files.storage import FileSystemStorage, default_storage
 from django.db import DatabaseError, connection
 
 from arena.queries.people import find_admins
 from arena.serving.readiness import look_at_broker, look_at_database, look_at_workers
-from augment.errors import KeyMissing, KeyNotAllowed
+from augment.errors import KeyMissing, KeyNotAllowed, MediaFault
 from augment.models import Contestant, Endpoint, EndpointModel, GenerationJob
 from augment.services.clock import database_now
 from augment.services.endpoints.keys import key_of
@@ -52,7 +55,7 @@ Ailments = Iterator[Ailment]
 
 def examine() -> list[Ailment]:
     """Everything; what needs the database is left out where there is none."""
-    ailments = [*_folders(), *_settings(), *_database()]
+    ailments = [*_folders(), *_bucket(), *_settings(), *_database()]
     if any(finding.part == "database" and finding.level is Level.BROKEN for finding in ailments):
         return [*ailments, *_broker()]
     for look in NEED_THE_DATABASE:
@@ -64,7 +67,10 @@ def examine() -> list[Ailment]:
 
 
 def _folders() -> Ailments:
-    for part, folder in (("var", settings.VAR_DIR), ("media", Path(settings.MEDIA_ROOT))):
+    folders = [("var", settings.VAR_DIR)]
+    if isinstance(default_storage, FileSystemStorage):
+        folders.append(("media", Path(settings.MEDIA_ROOT)))
+    for part, folder in folders:
         if not folder.exists():
             yield Ailment(Level.FINE, part, f"{folder} is made when something is kept there")
             continue
@@ -86,6 +92,26 @@ def _folders() -> Ailments:
     if not any(settings.STATIC_ROOT.glob("*")):
         text = "no static files are collected: pages have no style"
         yield Ailment(Level.BROKEN, "static", text, "Run `manage.py prepare`.")
+
+
+def _bucket() -> Ailments:
+    """Write, read and delete a small file where pictures lie in no folder of this machine."""
+    if isinstance(default_storage, FileSystemStorage):
+        return
+    remedy = "Check ARENA_MEDIA_URL, AWS_ACCESS_KEY_ID, AWS_SECRET_ACCESS_KEY and the bucket."
+    content = os.urandom(16)
+    try:
+        name = default_storage.save(f"doctor/{uuid.uuid4()}", ContentFile(content))
+        with default_storage.open(name) as file:
+            is_the_same = file.read() == content
+        default_storage.delete(name)
+    except (MediaFault, FileNotFoundError) as fault:
+        yield Ailment(Level.BROKEN, "media", str(fault), remedy)
+        return
+    if is_the_same:
+        yield Ailment(Level.FINE, "media", "the bucket takes files and gives them back")
+    else:
+        yield Ailment(Level.BROKEN, "media", "the bucket gives back something else", remedy)
 
 
 def _settings() -> Ailments:

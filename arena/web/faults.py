@@ -30,6 +30,11 @@ def answer_busy(request: HttpRequest) -> HttpResponse:
     return HttpResponse(render_to_string("503.html"), status=503)
 
 
+def answer_without_media(request: HttpRequest) -> HttpResponse:
+    """503: what keeps the pictures does not answer; the log says why."""
+    return HttpResponse(render_to_string("503.html", {"lacks_pictures": True}), status=503)
+
+
 def answer_forged(request: HttpRequest, reason: str = "") -> HttpResponse:
     """403 for a form whose token is missing or old; nothing of it was kept."""
     return render(request, "403_csrf.html", status=403)

@@ -127,6 +127,23 @@ class DatabaseLocked(AugmentError):
         super().__init__(f"The database was locked for too long: {what}.")
 
 
+class MediaFault(AugmentError):
+    """Pictures can't be kept or read just now. What models answered is kept: mend it and retry.
+
+    Args:
+        deed: What was to be done with the file: read, write, look for, list, delete.
+        name: The file.
+        place: The folder or bucket.
+        cause: What the folder or bucket said.
+    """
+
+    def __init__(self, deed: str, name: str, place: str, cause: str) -> None:
+        super().__init__(
+            f"The storage of pictures failed: could not {deed} {name or 'anything'} in {place}: "
+            f"{cause}"
+        )
+
+
 class BudgetSpent(AugmentError):
     """The next call could pass the cap of its job. Stop; raising the cap lets the job go on.
 

@@ -53,6 +53,11 @@ def start(**environment: str | None) -> subprocess.CompletedProcess[str]:
         ("ARENA_MEDIA_DIR", str(ROOT / "manage.py"), "a folder is needed"),
         ("ARENA_MEDIA_DIR", str(ROOT / "manage.py" / "below"), "a folder is needed"),
         ("ARENA_VAR_DIR", "", "a folder is needed"),
+        ("ARENA_MEDIA_URL", "https://bucket", "use s3://BUCKET/PREFIX"),
+        ("ARENA_MEDIA_URL", "s3://", "use s3://BUCKET/PREFIX"),
+        ("ARENA_MEDIA_URL", "s3://Bucket_1", "use s3://BUCKET/PREFIX"),
+        ("ARENA_MEDIA_URL", "s3://bucket?zone=eu", "use s3://BUCKET/PREFIX"),
+        ("ARENA_MEDIA_URL", "s3://bucket?endpoint=minio:9000", "use s3://BUCKET/PREFIX"),
     ],
 )
 def test_a_wrong_value_stops_the_start(name: str, value: str, allowed: str) -> None:

@@ -89,7 +89,7 @@ def _fill(archive: zipfile.ZipFile, now: datetime, say: Callable[[str], None]) -
 
 
 def _has_media() -> bool:
-    return default_storage.exists("") or not hasattr(default_storage, "location")
+    return default_storage.exists("")  # a bucket always is
 
 
 def _counting(lines: Iterable[bytes], counts: dict[str, int], label: str) -> Iterator[bytes]:

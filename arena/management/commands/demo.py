@@ -86,7 +86,7 @@ class Command(TerminalCommand):
             *drives,
             "",
             f"Tables:   {', '.join(str(_short(path)) for path in board.files)}",
-            f"Pictures: {_short(settings.MEDIA_ROOT)}/bev/",
+            f"Pictures: {_pictures()}/bev/",
             f"The demo took {took_s:.0f} s.",
         ]
         if serve:
@@ -115,6 +115,13 @@ def _look_at(supervisor: Supervisor) -> None:
     supervisor.insist_on_steadiness()
     if supervisor.is_stopping:
         raise KeyboardInterrupt
+
+
+def _pictures() -> str:
+    media = settings.STORAGES["default"].get("OPTIONS", {})
+    if "bucket_name" not in media:
+        return str(_short(settings.MEDIA_ROOT))
+    return f"s3://{media['bucket_name']}/{media['location']}".rstrip("/")
 
 
 def _short(path: Path) -> Path:

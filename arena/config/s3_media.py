@@ -1,0 +1,86 @@
+"""Pictures in a bucket that speaks S3, so that workers and web servers need no common folder."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import Any
+
+from boto3.exceptions import Boto3Error
+from botocore.config import Config
+from botocore.exceptions import BotoCoreError, ClientError
+from django.core.files.base import ContentFile, File
+from storages.backends.s3 import S3Storage
+
+from augment.errors import MediaFault
+
+CLIENT = Config(
+    signature_version="s3v4",
+    s3={"addressing_style": "path"},  # what MinIO, Ceph, Garage and AWS all understand
+    connect_timeout=5,
+    read_timeout=30,
+    retries={"mode": "standard", "total_max_attempts": 4},
+)
+"""Standard retries wait longer each time: a bucket that is gone for a moment costs no picture."""
+
+
+class S3Media(S3Storage):  # type: ignore[misc] # it has no types
+    """Files of a bucket. An object is there whole or not at all, and the last writer wins.
+
+    Nobody reads the bucket but the product: pages hand pictures out themselves, to whom they are
+    to be shown. What a bucket answers to a fault becomes a MediaFault, as a folder's does.
+    """
+
+    def __init__(self, **options: Any) -> None:
+        """Take bucket_name, location, endpoint_url and region_name; the keys stand in AWS_..."""
+        super().__init__(
+            file_overwrite=True,
+            default_acl=None,
+            querystring_auth=True,
+            client_config=CLIENT,
+            **options,
+        )
+
+    def exists(self, name: str) -> bool:
+        """Whether there is such a file; the bucket itself always counts as being there."""
+        with self._faults_named("look for", name):
+            return not name or bool(super().exists(name))
+
+    def size(self, name: str) -> int:
+        """How many bytes it has.
+
+        Raises:
+            FileNotFoundError: There is none.
+        """
+        with self._faults_named("look for", name):
+            return int(super().size(name))
+
+    def delete(self, name: str) -> None:
+        """Remove it, if it is there."""
+        with self._faults_named("delete", name):
+            super().delete(name)
+
+    def listdir(self, name: str) -> tuple[list[str], list[str]]:
+        """The names of what lies directly beneath a place: folders and files."""
+        with self._faults_named("list", name):
+            folders, files = super().listdir(name)
+        return folders, files
+
+    def _open(self, name: str, mode: str = "rb") -> File[bytes]:
+        if mode != "rb":
+            raise ValueError(f"Files in a bucket are opened with 'rb', not {mode!r}.")
+        # Read at once: a fault while a page is being sent could only cut the page off.
+        with self._faults_named("read", name), super()._open(name, mode) as file:
+            return ContentFile(file.read(), name=name)
+
+    def _save(self, name: str, content: File[bytes]) -> str:
+        with self._faults_named("write", name):
+            return str(super()._save(name, content))
+
+    @contextmanager
+    def _faults_named(self, deed: str, name: str) -> Iterator[None]:
+        try:
+            yield
+        except (BotoCoreError, ClientError, Boto3Error) as fault:
+            place = f"s3://{self.bucket_name}/{self.location}".rstrip("/")
+            raise MediaFault(deed, name, place, str(fault)) from fault

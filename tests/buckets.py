@@ -1,0 +1,62 @@
+"""A server of this machine that speaks S3, with an empty bucket in it."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import dataclass
+from unittest import mock
+from urllib.request import Request, urlopen
+
+import boto3
+from moto.server import ThreadedMotoServer
+
+KEYS = {"AWS_ACCESS_KEY_ID": "tests", "AWS_SECRET_ACCESS_KEY": "no secret"}
+BUCKET = "pictures"
+REGION = "eu-central-1"
+
+
+@dataclass(frozen=True, slots=True)
+class Bucket:
+    """Where it is, as a program of ours is told, and what lies in it."""
+
+    endpoint: str
+
+    @property
+    def environment(self) -> Mapping[str, str]:
+        url = f"s3://{BUCKET}/arena?endpoint={self.endpoint}&region={REGION}"
+        return {"ARENA_MEDIA_URL": url, **KEYS}
+
+    @property
+    def client(self):  # type: ignore[no-untyped-def] # boto3 has no types
+        return boto3.client(
+            "s3",
+            endpoint_url=self.endpoint,
+            region_name=REGION,
+            aws_access_key_id=KEYS["AWS_ACCESS_KEY_ID"],
+            aws_secret_access_key=KEYS["AWS_SECRET_ACCESS_KEY"],
+        )
+
+    def names(self) -> list[str]:
+        listed = self.client.list_objects_v2(Bucket=BUCKET).get("Contents", [])
+        return sorted(entry["Key"] for entry in listed)
+
+
+@contextmanager
+def bucket() -> Iterator[Bucket]:
+    """One that is gone, with all that lay in it, when the block is left."""
+    server = ThreadedMotoServer(ip_address="127.0.0.1", port=0, verbose=False)
+    with mock.patch.dict(os.environ, KEYS):
+        server.start()
+        try:
+            host, port = server.get_host_and_port()
+            made = Bucket(f"http://{host}:{port}")
+            # All servers of a process share what they keep.
+            urlopen(Request(f"{made.endpoint}/moto-api/reset", method="POST"), timeout=30).close()
+            made.client.create_bucket(
+                Bucket=BUCKET, CreateBucketConfiguration={"LocationConstraint": REGION}
+            )
+            yield made
+        finally:
+            server.stop()
