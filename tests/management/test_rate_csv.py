@@ -1,62 +1,21 @@
-"""Votes from elsewhere: which files are taken, what is said of the others, what is printed."""
+"""Votes from elsewhere: how they are rated, and what is printed."""
 
 from __future__ import annotations
 
 import csv
 import io
-import json
 import re
 import subprocess
 import sys
-from pathlib import Path
 from typing import Any
 
-import pyarrow
 import pytest
 from django.core.management import CommandError, call_command
-from pyarrow import parquet
 
-from arena.management.rate_csv import COLUMNS, CsvNotRated, run
+from arena.management.rate_csv import CsvNotRated, run
+from arena.management.rated_csv import COLUMNS
 from tests.house.source import ROOT
-
-HEAD = "model_a,model_b,winner"
-PLAIN = [
-    *["a,b,model_a"] * 30,
-    *["a,b,tie"] * 5,
-    *["b,a,model_a"] * 20,
-    *["b,c,tie (bothbad)"] * 9,
-    *["c,b,model_b"] * 12,
-    *["c,a,model_a"] * 14,
-]
-
-
-@pytest.fixture
-def votes(tmp_path: Path) -> Any:
-    def written(*lines: str, head: str = HEAD, start: str = "", end: str = "\n") -> str:
-        path = tmp_path / "votes.csv"
-        path.write_bytes((start + end.join([head, *lines]) + end).encode())
-        return str(path)
-
-    return written
-
-
-def document(file: str, **options: Any) -> dict[str, Any]:
-    loaded: dict[str, Any] = json.loads(run(file=file, format="json", **options))
-    return loaded
-
-
-def clustered(number: int = 400) -> list[str]:
-    winners = ["model_a", "tie", "model_b", "model_a", "model_b"]
-    pairs = ["a,b", "b,c", "c,a", "b,a"]
-    return [
-        f"{pairs[n % 4]},{winners[(n * n) % 5]},j{(n * 7) % 23},i{n % 29}" for n in range(number)
-    ]
-
-
-WITH_CLUSTERS = f"{HEAD},judge,item"
-
-
-# --- What comes out ------------------------------------------------------------------------------
+from tests.management.votes import HEAD, PLAIN, WITH_CLUSTERS, clustered, document
 
 
 def test_json_has_standings_best_first(votes: Any) -> None:
@@ -140,64 +99,6 @@ def test_latex_has_the_form_of_the_papers_table(votes: Any) -> None:
     assert r"c\_50\%" in {row[0] for row in rows}
 
 
-# --- Which files are taken -----------------------------------------------------------------------
-
-
-def test_a_mark_quotes_other_columns_blank_lines_and_windows_ends_do_not_matter(
-    votes: Any,
-) -> None:
-    plain = document(votes(*PLAIN), rounds=100)["standings"]
-    same = [f'x,"{line.replace(",", chr(34) + "," + chr(34))}"' for line in PLAIN]
-    file = votes(*same, "", head=f"more,{HEAD}", start="﻿", end="\r\n")
-    assert document(file, rounds=100)["standings"] == plain
-
-
-@pytest.mark.parametrize(
-    ("separator", "encoding"),
-    [(";", "utf-8"), ("\t", "utf-16"), ("|", "utf-16-le"), (",", "utf-16-be"), (";", "utf-16")],
-)
-def test_separators_and_utf_16_are_recognised(
-    votes: Any, tmp_path: Path, separator: str, encoding: str
-) -> None:
-    plain = document(votes(*PLAIN), rounds=100)["standings"]
-    path = tmp_path / "other.csv"
-    text = "\n".join([HEAD, *PLAIN]).replace(",", separator) + "\n"
-    path.write_bytes(text.encode(encoding))
-    assert document(str(path), rounds=100)["standings"] == plain
-
-
-def test_spaces_around_names_and_empty_columns_at_the_end_do_not_count(votes: Any) -> None:
-    plain = document(votes(*PLAIN), rounds=100)["standings"]
-    lines = [f" {line.replace(',', ' ,')},," if n % 2 else line for n, line in enumerate(PLAIN)]
-    assert document(votes(*lines, head=f"{HEAD},"), rounds=100)["standings"] == plain
-
-
-def test_a_cell_of_a_column_that_is_passed_over_may_be_long(votes: Any) -> None:
-    lines = [f"{PLAIN[0]},{'x' * 200_000}", *(f"{line}," for line in PLAIN[1:])]
-    plain = document(votes(*PLAIN), rounds=100)["standings"]
-    assert document(votes(*lines, head=f"{HEAD},comment"), rounds=100)["standings"] == plain
-
-
-@pytest.mark.parametrize("kind", ["jsonl", "parquet"])
-def test_json_lines_and_parquet_are_read(votes: Any, tmp_path: Path, kind: str) -> None:
-    plain = document(votes(*PLAIN), rounds=100)["standings"]
-    rows = [dict(zip(HEAD.split(","), line.split(","), strict=True)) for line in PLAIN]
-    path = tmp_path / "votes"
-    if kind == "parquet":
-        parquet.write_table(pyarrow.Table.from_pylist(rows), path)
-    else:
-        path.write_text("\n".join(json.dumps(row | {"more": 1}) for row in rows))
-    assert document(str(path), rounds=100)["standings"] == plain
-
-
-def test_a_wrong_line_of_json_is_named(tmp_path: Path) -> None:
-    path = tmp_path / "votes.jsonl"
-    good = json.dumps({"model_a": "a", "model_b": "b", "winner": "tie"})
-    path.write_text(f"{good}\n{good}\nnothing\n")
-    with pytest.raises(CsvNotRated, match="line 3: no JSON object"):
-        run(file=str(path))
-
-
 def test_a_file_with_a_judge_and_no_item_is_clustered_by_judge(votes: Any) -> None:
     lines = [line.rpartition(",")[0] for line in clustered()]
     found = document(votes(*lines, head=f"{HEAD},judge"), rounds=100)
@@ -233,79 +134,6 @@ def test_online_elo_does_not_depend_on_the_order_of_lines_unless_asked_to(votes:
     turned = list(reversed(PLAIN))
     assert standings(PLAIN, "shuffled") == standings(turned, "shuffled")
     assert standings(PLAIN, "recorded") != standings(turned, "recorded")
-
-
-def test_names_may_hold_commas_quotes_and_line_breaks(votes: Any) -> None:
-    lines = [line.replace("b,", '"b, ""the\nother""",') for line in PLAIN]
-    found = document(votes(*lines), rounds=50)
-    assert 'b, "the\nother"' in {row["model"] for row in found["standings"]}
-
-
-@pytest.mark.parametrize(
-    ("lines", "sentence"),
-    [
-        (["a,b,model_a", "a,b,both"], "line 3: the winner 'both' is none of model_a, model_b, "),
-        (["a,b,TIE"], "line 2: the winner 'TIE' is none of"),
-        (["a,b,"], "line 2: winner is empty"),
-        (["a,b,tie", "", "a,,tie"], "line 4: model_b is empty"),
-        (["a,b,tie", "a, NaN ,tie"], "line 3: model_b is 'NaN', which is no name"),
-        (["a,b,tie", " a ,a,tie"], "line 3: 'a' is compared with itself"),
-        (["a,b,tie", "a,b,tie,,x"], "line 3: there are 5 cells, in the first line 3"),
-        (["a,b,tie", "a,a,model_a"], "line 3: 'a' is compared with itself"),
-        (["a,b,tie", "a,b"], "line 3: there are 2 cells, in the first line 3"),
-        (['"a\nx",b,tie', "a,b,nobody"], "line 4: the winner 'nobody'"),
-        (["a,b,tie", '"a,b,tie'], "line 3: unexpected end of data"),
-    ],
-)
-def test_a_wrong_line_is_named_with_what_is_allowed(
-    votes: Any, lines: list[str], sentence: str
-) -> None:
-    with pytest.raises(CsvNotRated, match=re.escape(sentence)):
-        run(file=votes(*lines))
-
-
-def test_a_wrong_line_far_down_has_its_number(votes: Any) -> None:
-    with pytest.raises(CsvNotRated, match="line 45002: the winner 'left' is none of"):
-        run(file=votes(*PLAIN * 500, "a,b,left", *PLAIN))
-
-
-@pytest.mark.parametrize(
-    ("head", "sentence"),
-    [
-        ("model_a,model_b,outcome", "line 1: there is no column 'winner'; needed are model_a, "),
-        ("model_a,model_b,winner,winner", "line 1: the column 'winner' is there twice"),
-    ],
-)
-def test_a_missing_or_double_column_is_named(votes: Any, head: str, sentence: str) -> None:
-    with pytest.raises(CsvNotRated, match=sentence):
-        run(file=votes("a,b,tie", head=head))
-
-
-def test_an_empty_file_a_missing_one_and_foreign_letters_are_errors(tmp_path: Path) -> None:
-    path = tmp_path / "votes.csv"
-    with pytest.raises(CsvNotRated, match="No such file"):
-        run(file=str(path))
-    path.write_bytes(b"")
-    with pytest.raises(CsvNotRated, match="line 1: the file is empty; needed are model_a"):
-        run(file=str(path))
-    path.write_bytes(f"{HEAD}\na,b,tie\nb\xfc,b,tie\n".encode("latin-1"))
-    with pytest.raises(CsvNotRated, match="can't decode byte 0xfc"):
-        run(file=str(path))
-
-
-def test_a_column_that_is_resampled_must_be_there_and_filled(votes: Any) -> None:
-    with pytest.raises(CsvNotRated, match="no column 'judge', which --resample judge needs"):
-        run(file=votes(*PLAIN), resample="judge")
-    file = votes("a,b,tie,j,i", "a,b,tie,,i", head=WITH_CLUSTERS)
-    with pytest.raises(CsvNotRated, match="line 3: judge is empty"):
-        run(file=file)
-    assert document(file, resample="vote", rounds=10)["votes"] == 2
-
-
-@pytest.mark.parametrize("options", [{"rounds": 0}, {"rounds": 100_001}, {"seed": -1}])
-def test_options_out_of_range_are_errors(votes: Any, options: dict[str, Any]) -> None:
-    with pytest.raises(CsvNotRated, match="not "):
-        run(file=votes(*PLAIN), **options)
 
 
 def test_votes_that_repeat_one_are_counted_and_named(votes: Any) -> None:
@@ -346,6 +174,21 @@ def test_django_takes_the_same_way(votes: Any) -> None:
     assert said.getvalue() == run(file=file, rounds=50, format="json")
     with pytest.raises(CommandError, match="line 2"):
         call_command("rate_csv", votes("a,b,x"))
+
+
+@pytest.mark.parametrize(
+    "options",
+    [{"intervals": "resamples"}, {"method": "elo", "order": "recorded"}],
+    ids=lambda options: " ".join(options),
+)
+def test_django_passes_every_option_on(votes: Any, options: dict[str, Any]) -> None:
+    said = io.StringIO()
+    file = votes(*clustered(), head=WITH_CLUSTERS)
+    call_command("rate_csv", file, rounds=50, format="json", stdout=said, **options)
+    assert said.getvalue() == run(file=file, rounds=50, format="json", **options)
+    assert said.getvalue() != run(
+        file=file, rounds=50, format="json", method=options.get("method", "bt")
+    )
 
 
 def manage(*arguments: str) -> subprocess.CompletedProcess[str]:

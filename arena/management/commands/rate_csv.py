@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from inspect import signature
 from typing import Any
 
 from django.core.management.base import CommandError, CommandParser
@@ -22,9 +23,10 @@ class Command(TerminalCommand):
 
     def handle(self, *args: Any, **options: Any) -> None:
         """Rate, then print."""
-        names = ("file", "method", "resample", "rounds", "seed", "format")
         try:
-            said = rate_csv.run(**{name: options[name] for name in names})
+            said = rate_csv.run(
+                **{name: options[name] for name in signature(rate_csv.run).parameters}
+            )
         except rate_csv.CsvNotRated as error:
             raise CommandError(str(error)) from error
         self.stdout.write_data(said)

@@ -1,0 +1,91 @@
+"""Exports of a study's rating: its table, its votes and its charts."""
+
+from __future__ import annotations
+
+from typing import Any
+from uuid import UUID
+
+from arena.errors import StudyStillOpen
+from arena.exports.bundle import bundle
+from arena.exports.formats import format_named
+from arena.exports.rating_charts import CONTENT_TYPES, chart_bytes
+from arena.exports.tables import leaderboard_table
+from arena.exports.votes import VOTE_FORMATS, vote_table
+from arena.exports.writers import FORMATS
+from arena.exports.zips import ZIP
+from arena.management.exporting.kinds import (
+    Chosen,
+    ExportedFile,
+    Say,
+    add_format,
+    add_kind,
+    fill,
+)
+from arena.models import Snapshot, Study
+from arena.queries.results import snapshot_to_export
+from arena.queries.studies import study_named
+from arena.services.early_looks import log_early_look
+
+
+def add_studies(kinds: Any) -> None:
+    """What can be written of a study's newest rating, or of an older one."""
+    leaderboard = add_kind(
+        kinds, "leaderboard", write_leaderboard, of="study", help="the newest rating of a study"
+    )
+    leaderboard.add_argument(
+        "--format", default="csv", help=f"one of {', '.join([*FORMATS, ZIP])}"
+    )
+    votes = add_kind(
+        *(kinds, "votes", write_votes),
+        of="study",
+        help="the votes of the newest rating, with pseudonyms",
+    )
+    add_format(votes, VOTE_FORMATS)
+    chart = add_kind(
+        *(kinds, "chart", write_chart),
+        of="study",
+        help="a chart of the newest rating beside the table's",
+    )
+    chart.add_argument(
+        "--chart", required=True, help="pairs, types, width, displacement, elo-usd, ..."
+    )
+    chart.add_argument("--format", default="svg", help=f"one of {', '.join(CONTENT_TYPES)}")
+    for kind in (leaderboard, votes, chart):
+        kind.add_argument("--rating", type=UUID, help="the code of an older rating")
+        kind.add_argument(
+            "--early", action="store_true", help="export from an open study; this is logged"
+        )
+
+
+def write_leaderboard(options: Chosen, say: Say) -> ExportedFile:
+    """The table in one format, or everything of the rating as one zip."""
+    if options["format"] == ZIP:
+        return ExportedFile(bundle(_snapshot(options)), ZIP, False)
+    chosen = format_named(FORMATS, options["format"])
+    return fill(chosen, leaderboard_table(_snapshot(options)))
+
+
+def write_votes(options: Chosen, say: Say) -> ExportedFile:
+    """The votes that the rating counted."""
+    chosen = format_named(VOTE_FORMATS, options["format"])
+    return fill(chosen, vote_table(_snapshot(options)))
+
+
+def write_chart(options: Chosen, say: Say) -> ExportedFile:
+    """One chart of the rating."""
+    form = options["format"]
+    snapshot = _snapshot(options)
+    content = chart_bytes(snapshot, name=options["chart"], file_format=form)
+    return ExportedFile(content, form, form == "svg")
+
+
+def _snapshot(options: Chosen) -> Snapshot:
+    """The rating that is asked for; looking into an open study is written to the log."""
+    study = study_named(options["study"])
+    snapshot = snapshot_to_export(study, options["rating"])
+    if study.state == Study.State.OPEN:
+        if not options["early"]:
+            raise StudyStillOpen(study.name)
+        what = f"{options['what']} as {options['format']}"
+        log_early_look(study=study, actor=None, what=what)
+    return snapshot

@@ -1,0 +1,143 @@
+"""Votes from elsewhere: which files are taken, and what is said of the others."""
+
+from __future__ import annotations
+
+import json
+import re
+from pathlib import Path
+from typing import Any
+
+import pyarrow
+import pytest
+from pyarrow import parquet
+
+from arena.management.rate_csv import CsvNotRated, run
+from tests.management.votes import HEAD, PLAIN, WITH_CLUSTERS, document
+
+
+def test_a_mark_quotes_other_columns_blank_lines_and_windows_ends_do_not_matter(
+    votes: Any,
+) -> None:
+    plain = document(votes(*PLAIN), rounds=100)["standings"]
+    same = [f'x,"{line.replace(",", chr(34) + "," + chr(34))}"' for line in PLAIN]
+    file = votes(*same, "", head=f"more,{HEAD}", start="﻿", end="\r\n")
+    assert document(file, rounds=100)["standings"] == plain
+
+
+@pytest.mark.parametrize(
+    ("separator", "encoding"),
+    [(";", "utf-8"), ("\t", "utf-16"), ("|", "utf-16-le"), (",", "utf-16-be"), (";", "utf-16")],
+)
+def test_separators_and_utf_16_are_recognised(
+    votes: Any, tmp_path: Path, separator: str, encoding: str
+) -> None:
+    plain = document(votes(*PLAIN), rounds=100)["standings"]
+    path = tmp_path / "other.csv"
+    text = "\n".join([HEAD, *PLAIN]).replace(",", separator) + "\n"
+    path.write_bytes(text.encode(encoding))
+    assert document(str(path), rounds=100)["standings"] == plain
+
+
+def test_spaces_around_names_and_empty_columns_at_the_end_do_not_count(votes: Any) -> None:
+    plain = document(votes(*PLAIN), rounds=100)["standings"]
+    lines = [f" {line.replace(',', ' ,')},," if n % 2 else line for n, line in enumerate(PLAIN)]
+    assert document(votes(*lines, head=f"{HEAD},"), rounds=100)["standings"] == plain
+
+
+def test_a_cell_of_a_column_that_is_passed_over_may_be_long(votes: Any) -> None:
+    lines = [f"{PLAIN[0]},{'x' * 200_000}", *(f"{line}," for line in PLAIN[1:])]
+    plain = document(votes(*PLAIN), rounds=100)["standings"]
+    assert document(votes(*lines, head=f"{HEAD},comment"), rounds=100)["standings"] == plain
+
+
+@pytest.mark.parametrize("kind", ["jsonl", "parquet"])
+def test_json_lines_and_parquet_are_read(votes: Any, tmp_path: Path, kind: str) -> None:
+    plain = document(votes(*PLAIN), rounds=100)["standings"]
+    rows = [dict(zip(HEAD.split(","), line.split(","), strict=True)) for line in PLAIN]
+    path = tmp_path / "votes"
+    if kind == "parquet":
+        parquet.write_table(pyarrow.Table.from_pylist(rows), path)
+    else:
+        path.write_text("\n".join(json.dumps(row | {"more": 1}) for row in rows))
+    assert document(str(path), rounds=100)["standings"] == plain
+
+
+def test_a_wrong_line_of_json_is_named(tmp_path: Path) -> None:
+    path = tmp_path / "votes.jsonl"
+    good = json.dumps({"model_a": "a", "model_b": "b", "winner": "tie"})
+    path.write_text(f"{good}\n{good}\nnothing\n")
+    with pytest.raises(CsvNotRated, match="line 3: no JSON object"):
+        run(file=str(path))
+
+
+def test_names_may_hold_commas_quotes_and_line_breaks(votes: Any) -> None:
+    lines = [line.replace("b,", '"b, ""the\nother""",') for line in PLAIN]
+    found = document(votes(*lines), rounds=50)
+    assert 'b, "the\nother"' in {row["model"] for row in found["standings"]}
+
+
+@pytest.mark.parametrize(
+    ("lines", "sentence"),
+    [
+        (["a,b,model_a", "a,b,both"], "line 3: the winner 'both' is none of model_a, model_b, "),
+        (["a,b,TIE"], "line 2: the winner 'TIE' is none of"),
+        (["a,b,"], "line 2: winner is empty"),
+        (["a,b,tie", "", "a,,tie"], "line 4: model_b is empty"),
+        (["a,b,tie", "a, NaN ,tie"], "line 3: model_b is 'NaN', which is no name"),
+        (["a,b,tie", " a ,a,tie"], "line 3: 'a' is compared with itself"),
+        (["a,b,tie", "a,b,tie,,x"], "line 3: there are 5 cells, in the first line 3"),
+        (["a,b,tie", "a,a,model_a"], "line 3: 'a' is compared with itself"),
+        (["a,b,tie", "a,b"], "line 3: there are 2 cells, in the first line 3"),
+        (['"a\nx",b,tie', "a,b,nobody"], "line 4: the winner 'nobody'"),
+        (["a,b,tie", '"a,b,tie'], "line 3: unexpected end of data"),
+    ],
+)
+def test_a_wrong_line_is_named_with_what_is_allowed(
+    votes: Any, lines: list[str], sentence: str
+) -> None:
+    with pytest.raises(CsvNotRated, match=re.escape(sentence)):
+        run(file=votes(*lines))
+
+
+def test_a_wrong_line_far_down_has_its_number(votes: Any) -> None:
+    with pytest.raises(CsvNotRated, match="line 45002: the winner 'left' is none of"):
+        run(file=votes(*PLAIN * 500, "a,b,left", *PLAIN))
+
+
+@pytest.mark.parametrize(
+    ("head", "sentence"),
+    [
+        ("model_a,model_b,outcome", "line 1: there is no column 'winner'; needed are model_a, "),
+        ("model_a,model_b,winner,winner", "line 1: the column 'winner' is there twice"),
+    ],
+)
+def test_a_missing_or_double_column_is_named(votes: Any, head: str, sentence: str) -> None:
+    with pytest.raises(CsvNotRated, match=sentence):
+        run(file=votes("a,b,tie", head=head))
+
+
+def test_an_empty_file_a_missing_one_and_foreign_letters_are_errors(tmp_path: Path) -> None:
+    path = tmp_path / "votes.csv"
+    with pytest.raises(CsvNotRated, match="No such file"):
+        run(file=str(path))
+    path.write_bytes(b"")
+    with pytest.raises(CsvNotRated, match="line 1: the file is empty; needed are model_a"):
+        run(file=str(path))
+    path.write_bytes(f"{HEAD}\na,b,tie\nb\xfc,b,tie\n".encode("latin-1"))
+    with pytest.raises(CsvNotRated, match="can't decode byte 0xfc"):
+        run(file=str(path))
+
+
+def test_a_column_that_is_resampled_must_be_there_and_filled(votes: Any) -> None:
+    with pytest.raises(CsvNotRated, match="no column 'judge', which --resample judge needs"):
+        run(file=votes(*PLAIN), resample="judge")
+    file = votes("a,b,tie,j,i", "a,b,tie,,i", head=WITH_CLUSTERS)
+    with pytest.raises(CsvNotRated, match="line 3: judge is empty"):
+        run(file=file)
+    assert document(file, resample="vote", rounds=10)["votes"] == 2
+
+
+@pytest.mark.parametrize("options", [{"rounds": 0}, {"rounds": 100_001}, {"seed": -1}])
+def test_options_out_of_range_are_errors(votes: Any, options: dict[str, Any]) -> None:
+    with pytest.raises(CsvNotRated, match="not "):
+        run(file=votes(*PLAIN), **options)
