@@ -22,6 +22,7 @@ _TONES = {
     "done": "good",
     "finished": "good",
     "stopped_at_cap": "warn",
+    "paused": "warn",
     "unreadable": "warn",
     "refused": "warn",
     "failed": "bad",
@@ -32,7 +33,7 @@ _TONES = {
 }
 _WORDS = (
     *(_("Waiting"), _("Running"), _("Done"), _("Unreadable answer"), _("Refused"), _("Failed")),
-    *(_("Cancelled"), _("Finished"), _("Stopped at cap"), _("Ready")),
+    *(_("Cancelled"), _("Finished"), _("Stopped at cap"), _("Paused"), _("Ready")),
     *(_("Draft"), _("Open"), _("Closed")),
     *(
         _("Jaywalker"),
@@ -94,7 +95,13 @@ def job_mark(counts: JobCounts) -> Mark:
         if counts.failed == counts.total:
             return Mark(tone="bad", icon="icons/failed.svg", label=gettext("Failed"))
         return Mark(tone="warn", icon="icons/failed.svg", label=gettext("Finished in part"))
+    if job.state == states.FINISHED and not counts.done and counts.total:
+        label = gettext("Finished without a modification")
+        return Mark(tone="warn", icon="icons/unreadable.svg", label=label)
     running = counts.by_state[Augmentation.State.RUNNING]
+    if job.state == states.PAUSED and running:
+        label = ngettext("Pausing, %(n)s still runs", "Pausing, %(n)s still run", running)
+        return Mark(tone="busy", icon="icons/paused.svg", label=label % {"n": running})
     if job.state == states.CANCELLED and running:
         label = ngettext("Cancelled, %(n)s still runs", "Cancelled, %(n)s still run", running)
         return Mark(tone="busy", icon="icons/cancelled.svg", label=label % {"n": running})
@@ -135,6 +142,25 @@ def segments(by_state: dict[Augmentation.State, int]) -> list[BarSegment]:
             )
         start += width
     return found
+
+
+@register.filter
+def rate(per_minute: float) -> str:
+    """How many a minute: a whole number where there are ten or more."""
+    return f"{per_minute:.0f}" if per_minute >= 9.95 else f"{per_minute:.1f}"
+
+
+@register.filter
+def duration(seconds: float) -> str:
+    """How long something will take, as coarse as such a forecast is."""
+    minutes = seconds / 60.0
+    if minutes < 1.0:
+        return gettext("a minute")
+    if minutes < 90.0:
+        return gettext("%(n)s min") % {"n": round(minutes)}
+    if minutes < 36.0 * 60.0:
+        return gettext("%(n)s h") % {"n": f"{minutes / 60.0:.1f}"}
+    return gettext("%(n)s days") % {"n": f"{minutes / 1440.0:.1f}"}
 
 
 @register.simple_tag

@@ -11,37 +11,37 @@ from django.contrib.auth.models import User
 from django.db import transaction
 from django.http import Http404, HttpRequest, HttpResponse
 from django.shortcuts import get_object_or_404, redirect, render
-from django.urls import reverse
 from django.utils.text import slugify
 from django.utils.translation import gettext as _
-from django.views.decorators.http import require_http_methods, require_POST, require_safe
+from django.views.decorators.http import require_http_methods, require_safe
 
 from arena.exports.formats import format_named
 from arena.exports.tool_calls import FORMATS as TOOL_CALL_FORMATS
-from arena.queries import jobs, scenarios
+from arena.queries import scenarios
+from arena.queries.job_grid import MARKS, VIEWS, Part, grid_part
 from arena.web.access import ADMIN, STAFF, allow_only
 from arena.web.displacement import section
 from arena.web.driving import section as driving_section
-from arena.web.forms import CapsForm, LaunchForm
-from arena.web.questions import Confirmation, ask, is_sure
+from arena.web.forms import LaunchForm
+from arena.web.job_actions import send_rows
+from arena.web.listing import choice_asked, page_asked, search_asked
 from arena.web.scenario_files import rows_of
-from augment.errors import AugmentError, QueueFault, UnknownName
+from augment.errors import AugmentError, UnknownName
 from augment.models import Augmentation, Contestant, GenerationJob
 from augment.services.endpoints import contestants
 from augment.services.judging.repeatability import repeatability
-from augment.services.running import caps
 from augment.services.running import jobs as service
-from augment.services.running.caps import Caps
+from augment.services.running.causes import SHOWN, failure_groups
 from augment.services.running.costs import costs_of
 from augment.services.running.matrix import matrix_text
-from augment.services.running.summary import count_rows, failure_groups, list_jobs
+from augment.services.running.pace import pace_of
+from augment.services.running.summary import count_rows, list_jobs
 from augment.services.running.tool_calls import (
     tool_calls_by_augmentation,
     tool_calls_by_contestant,
 )
 from augment.services.running.workers import workforce
 from augment.services.wording import translate
-from augment.tasks import enqueue_job
 
 State = Augmentation.State
 
@@ -86,30 +86,59 @@ def new_job_page(request: HttpRequest) -> HttpResponse:
     return render(request, "jobs/new.html", context, status=422 if form.errors else 200)
 
 
+MEASURED_AT_ONCE = 1000
+"""Of a job with more augmentations the page measures nothing until somebody asks for it."""
+
+_ASK_TO_MEASURE = frozenset({"measures", "by", "types", "checks"})
+
+
 @allow_only(*STAFF)
 @require_safe
 def job_page(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
-    """Progress, the grid, and failures by their reason."""
+    """Progress, a part of the grid, and failures by their cause."""
     job = get_object_or_404(GenerationJob.objects.select_related("launched_by__person"), code=code)
     found = count_rows(job)
     context: dict[str, object] = {
         "counts": found,
         "costs": costs_of(job),
-        "grid": jobs.grid(job),
+        "grid": grid_part(job, _part_asked(request)),
         "failures": failure_groups(job),
+        "shown_causes": SHOWN,
     }
-    if found.is_moving:
-        context["workforce"] = workforce()
-    else:  # a page that shows itself anew every two seconds measures nothing
-        context["scenario_files"] = rows_of(job)
-        context["displacement"] = section(request, job)
-        if job.samples > 1:
-            is_checked = request.GET.get("checks") == "1"
-            context["repeats"] = repeatability(job, with_checks=is_checked)
-            context["is_checked"] = is_checked
-        context["driving"] = driving_section(request, job)
-        context["tool_calls"] = tool_calls_by_contestant(job)
+    if found.is_moving:  # a page that shows itself anew every two seconds measures nothing
+        context |= {"workforce": workforce(), "pace": pace_of(found)}
+    elif found.total <= MEASURED_AT_ONCE or _ASK_TO_MEASURE & request.GET.keys():
+        context |= _measured(request, job)
+    else:
+        context["could_measure"] = True
     return render(request, "jobs/job.html", context)
+
+
+def _measured(request: HttpRequest, job: GenerationJob) -> dict[str, object]:
+    """What a job that does not move is measured by."""
+    measured: dict[str, object] = {
+        "scenario_files": rows_of(job),
+        "displacement": section(request, job),
+        "driving": driving_section(request, job),
+        "tool_calls": tool_calls_by_contestant(job),
+    }
+    if job.samples > 1:
+        is_checked = request.GET.get("checks") == "1"
+        measured["repeats"] = repeatability(job, with_checks=is_checked)
+        measured["is_checked"] = is_checked
+    return measured
+
+
+def _part_asked(request: HttpRequest) -> Part:
+    """Which part of the grid the address asks for; what it can't mean counts as not said."""
+    return Part(
+        view=VIEWS.get(request.GET.get("view", ""), MARKS),
+        row=page_asked(request, "row"),
+        column=page_asked(request, "column"),
+        sample=page_asked(request, "sample"),
+        state=choice_asked(request, "state", State.values),
+        search=search_asked(request),
+    )
 
 
 @allow_only(*STAFF)
@@ -126,83 +155,6 @@ def export_tool_calls(request: HttpRequest, code: uuid.UUID, form: str) -> HttpR
         chosen.write(tool_calls_by_augmentation(job)),
         content_type=chosen.content_type,
         headers={"Content-Disposition": f'attachment; filename="{name}"'},
-    )
-
-
-@allow_only(ADMIN)
-@require_POST
-def retry_job(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
-    """Queue again what failed."""
-    job = get_object_or_404(GenerationJob, code=code)
-    try:
-        with transaction.atomic():
-            service.retry_failed(job=job, actor=cast(User, request.user))
-            transaction.on_commit(partial(_send, request, job.pk))
-    except AugmentError as error:
-        messages.error(request, translate(error))
-    else:
-        messages.success(request, _("What failed is queued again."))
-    return redirect("job", code=code)
-
-
-@allow_only(ADMIN)
-@require_http_methods(["GET", "HEAD", "POST"])
-def cancel_job(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
-    """Start nothing new; what is done stays. There is no way back, so it asks first."""
-    job = get_object_or_404(GenerationJob, code=code)
-    if not is_sure(request):
-        if job.state not in service.OPEN:
-            return redirect("job", code=code)
-        return ask(request, _cancelling(job))
-    try:
-        service.cancel(job=job, actor=cast(User, request.user))
-    except AugmentError as error:
-        messages.error(request, translate(error))
-    else:
-        messages.success(request, _("Cancelled. What is done stays."))
-    return redirect("job", code=code)
-
-
-@allow_only(ADMIN)
-@require_POST
-def resume_job(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
-    """Raise the caps that are given, then go on with what is left."""
-    job = get_object_or_404(GenerationJob, code=code)
-    form = CapsForm(request.POST)
-    if not form.is_valid():
-        messages.error(request, _("A cap is a number; nothing was changed."))
-        return redirect("job", code=code)
-    try:
-        with transaction.atomic():
-            actor = cast(User, request.user)
-            if form.caps() != Caps():
-                job = caps.raise_cap(job, caps=form.caps(), actor=actor)
-            caps.resume(job, actor=actor)
-            transaction.on_commit(partial(_send, request, job.pk))
-    except AugmentError as error:
-        messages.error(request, translate(error))
-    else:
-        messages.success(request, _("What is left is queued again."))
-    return redirect("job", code=code)
-
-
-def _cancelling(job: GenerationJob) -> Confirmation:
-    """What is asked before a job is cancelled."""
-    found = count_rows(job).by_state
-    waiting, running = found[State.QUEUED], found[State.RUNNING]
-    settled = sum(found.values()) - waiting - running
-    facts = (
-        _("Augmentations that wait and are never made: %(n)s.") % {"n": waiting},
-        _("Running now, which end and keep their results: %(n)s.") % {"n": running},
-        _("Settled, which stay as they are: %(n)s.") % {"n": settled},
-        _("A cancelled job can’t go on; what is missing takes a new one."),
-    )
-    return Confirmation(
-        title=_("Cancel “%(name)s”?") % {"name": job.name},
-        facts=facts,
-        button=_("Cancel the job"),
-        back=reverse("job", args=[job.code]),
-        crumbs=((_("Jobs"), reverse("jobs")), (job.name, reverse("job", args=[job.code]))),
     )
 
 
@@ -252,13 +204,5 @@ def _launch(request: HttpRequest, form: LaunchForm) -> GenerationJob:
             is_fresh=form.cleaned_data["is_fresh"],
             actor=cast(User, request.user),
         )
-        transaction.on_commit(partial(_send, request, job.pk))
+        transaction.on_commit(partial(send_rows, request, job.pk))
     return job
-
-
-def _send(request: HttpRequest, job_pk: int) -> None:
-    """Put the job's rows on the queue; without a queue they wait, and the person is told."""
-    try:
-        enqueue_job(job_pk)
-    except QueueFault as error:
-        messages.warning(request, translate(error))

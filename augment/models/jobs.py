@@ -27,6 +27,10 @@ class GenerationJob(models.Model):
         CANCELLED = "cancelled", "Cancelled"
         FINISHED = "finished", "Finished"
         STOPPED_AT_CAP = "stopped_at_cap", "Stopped at cap"
+        PAUSED = "paused", "Paused"
+
+    HELD = (State.STOPPED_AT_CAP, State.PAUSED)
+    """States in which nothing is started until somebody resumes the job."""
 
     code = models.UUIDField(default=uuid.uuid4, unique=True, editable=False)
     name = models.CharField(max_length=120)
@@ -45,6 +49,11 @@ class GenerationJob(models.Model):
     )
     is_fresh = models.BooleanField(
         default=False, help_text="ask anew what was answered in other jobs before"
+    )
+    full_plan = models.JSONField(
+        null=True,
+        blank=True,
+        help_text="of a job that tries one scenario first: what was chosen for the whole one",
     )
     cap_nano_usd = models.PositiveBigIntegerField(null=True, blank=True)
     cap_calls = models.PositiveIntegerField(null=True, blank=True)
@@ -134,6 +143,9 @@ class Augmentation(models.Model):
     claim = models.UUIDField(null=True, blank=True, help_text="who works on it right now")
     heartbeat_at = models.DateTimeField(null=True, blank=True)
     sent_at = models.DateTimeField(null=True, blank=True, help_text="last put on the queue")
+    asked_anew_at = models.DateTimeField(
+        null=True, blank=True, help_text="answers from before are not used again for it"
+    )
     created_at = models.DateTimeField(auto_now_add=True)
     finished_at = models.DateTimeField(null=True, blank=True)
 

@@ -12,7 +12,7 @@ from augment.errors import EndpointBusy, LeaseLost, ModelFault, NotSent
 from augment.llm.costs import Price, WorstCase
 from augment.llm.messages import Reply
 from augment.models import Augmentation, EndpointModel, Event, GenerationJob, ModelCall
-from augment.services.running import budget, caps, jobs, leases, runner
+from augment.services.running import budget, caps, jobs, leases, pausing, runner
 from augment.services.running.budget import Room
 from augment.services.running.caps import Caps
 from augment.services.running.costs import costs_of
@@ -170,7 +170,7 @@ def test_a_stopped_attempt_is_replayed_from_its_answers_also_in_a_fresh_job() ->
     model = Model(after_a_second_look)
     assert ran(job, model).state == ROW.QUEUED
     caps.raise_cap(job, caps=Caps(calls=2))
-    caps.resume(job)
+    pausing.resume(job)
     assert ran(job, model).state == ROW.DONE
     assert len(model.requests) == len(set(model.requests)) == 2
     served = ModelCall.objects.get(served_from__isnull=False)

@@ -11,7 +11,7 @@ import pytest
 from django.db import connection
 
 from augment.models import Augmentation, GenerationJob, ModelCall
-from augment.services.running import caps, leases, runner
+from augment.services.running import caps, leases, pausing, runner
 from augment.services.running.caps import Caps
 from augment.services.running.summary import count_rows
 from tests.jobs.models import (
@@ -104,7 +104,7 @@ def test_eight_workers_stay_below_the_cap_and_resume_pays_for_nothing_twice(kind
     check_the_books(job)
 
     caps.raise_cap(job, caps=ALL[kind])
-    caps.resume(job)
+    pausing.resume(job)
     run_all(job, model, watcher)
 
     assert job.state == GenerationJob.State.FINISHED

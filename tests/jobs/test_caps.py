@@ -8,7 +8,7 @@ import pytest
 
 from augment.errors import Conflict, ModelFault
 from augment.models import Augmentation, Event, GenerationJob
-from augment.services.running import caps, jobs, runner
+from augment.services.running import caps, jobs, pausing, runner
 from augment.services.running.caps import Caps
 from augment.services.running.summary import count_rows
 from tests.jobs.models import Model, add_llama, llama_job
@@ -76,8 +76,10 @@ def test_caps_are_only_raised_and_only_where_there_are_any() -> None:
 
 
 def test_only_a_stopped_job_is_resumed() -> None:
-    with pytest.raises(Conflict, match="is running; only one that stopped at its cap"):
-        caps.resume(llama_job())
+    with pytest.raises(
+        Conflict, match="is running; only one that is paused or stopped at its cap"
+    ):
+        pausing.resume(llama_job())
 
 
 def test_a_stopped_job_can_be_cancelled() -> None:

@@ -13,7 +13,8 @@ from augment.errors import Conflict, InvalidDocument, UnknownName
 from augment.management.commands.generate import Command
 from augment.models import Augmentation, Contestant, Event, GenerationJob
 from augment.services.running import jobs, leases
-from augment.services.running.summary import count_rows, failure_groups
+from augment.services.running.causes import failure_groups
+from augment.services.running.summary import count_rows
 from tests.jobs.rows import NOON, add_kind, add_scenario, done, failed, launch, leased
 
 pytestmark = pytest.mark.django_db
@@ -119,7 +120,7 @@ def test_failures_stand_by_state_and_reason_faults_of_the_machine_first() -> Non
     assert found == [
         (State.FAILED, "the wire broke", 1), (State.UNREADABLE, "no block", 3),
     ]  # fmt: skip
-    assert len(asked) == 1
+    assert len(asked) == 2
     said = StringIO()
     with pytest.raises(CommandError, match="1 failed; see the reasons above"):
         Command(stdout=said).report(job)

@@ -11,7 +11,7 @@ from django.utils import timezone
 
 from augment.errors import Conflict
 from augment.models import GenerationJob
-from augment.services.running import caps, jobs, leases, runner
+from augment.services.running import jobs, leases, pausing, runner
 from augment.services.running.caps import Caps
 from augment.services.running.summary import count_rows
 from tests.jobs.models import Model, llama_job
@@ -44,7 +44,7 @@ def test_who_cancels_a_job_holds_what_waits_before_the_job() -> None:
 def test_who_resumes_a_job_holds_what_waits_before_the_job() -> None:
     job = llama_job(caps=Caps(tokens=5))
     runner.work_on(augmentation_pk=job.augmentations.get().pk, connect=Model())
-    assert held(lambda: caps.resume(job)) == [ROWS, JOB]
+    assert held(lambda: pausing.resume(job)) == [ROWS, JOB]
 
 
 def test_of_many_rows_the_first_is_held_first() -> None:

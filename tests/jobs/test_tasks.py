@@ -288,7 +288,7 @@ def test_a_stopped_job_is_sent_again_once_it_is_resumed(
 
 def test_a_job_that_runs_is_not_resumed(broker: Broker) -> None:
     job = llama_job(caps=Caps(calls=5))
-    with pytest.raises(CommandError, match="only one that stopped"):
+    with pytest.raises(CommandError, match="only one that is paused or stopped"):
         call_command("resume_job", str(job.code), "--cap-calls", "6", stdout=StringIO())
     job.refresh_from_db()
     assert job.cap_calls == 5

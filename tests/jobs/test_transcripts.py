@@ -19,7 +19,7 @@ from augment.errors import ModelFault
 from augment.llm.fingerprint import request_hash
 from augment.llm.messages import Message, Reply, Request, Speaker
 from augment.models import Augmentation, Endpoint, ModelCall, TranscriptNote
-from augment.services.running import caps, jobs, runner
+from augment.services.running import caps, jobs, pausing, runner
 from augment.services.running.caps import Caps
 from augment.services.running.transcript_export import transcript_of
 from augment.services.running.transcript_steps import messages_of, totals_of, tries_of
@@ -122,7 +122,7 @@ def test_a_call_from_the_store_names_its_source() -> None:
     model = Model(after_a_second_look)
     row = ran(only_row(job), model)
     caps.raise_cap(job, caps=Caps(calls=2))
-    caps.resume(job)
+    pausing.resume(job)
     document = transcript_of(ran(row, model))
     paid = document["attempts"][0]["steps"][0]
     copied, last = document["attempts"][1]["steps"]

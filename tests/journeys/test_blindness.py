@@ -102,6 +102,7 @@ def every_address(study: Study) -> list[str]:
             filled = re.sub(r"<slug:kind>", "augmentation", filled)
             filled = re.sub(r"<slug:tab>", "pairs", filled)
             filled = re.sub(r"<slug:digest>", "0" * 64, filled)
+            filled = re.sub(r"<slug:key>", "0" * 16, filled)
             assert "<" not in filled, f"say here what fills {pattern}"
             found.append("/" + filled)
     return [*sorted(set(found)), "/admin/", "/admin/augment/contestant/"]

@@ -68,6 +68,8 @@ PAGES: dict[str, tuple[int, int, int]] = {
 }
 ACTIONS: dict[str, tuple[int, int, int]] = {
     "job-retry": (302, 403, 403),
+    "job-retry-cause": (302, 403, 403),
+    "job-pause": (302, 403, 403),
     "contestant-retired": (302, 403, 403),
     "catalogue-load": (302, 403, 403),
     "job-simulate": (302, 403, 403),
@@ -115,6 +117,8 @@ def address(name: str, here: World) -> str:
         "contestant-retired": {"code": here.augmentation.contestant.code},
         "job-progress": {"code": here.job.code},
         "job-retry": {"code": here.job.code},
+        "job-retry-cause": {"code": here.job.code, "key": "0" * 16},
+        "job-pause": {"code": here.job.code},
         "job-simulate": {"code": here.job.code},
         "drives": {"code": here.job.code},
         "driving-export": {"code": here.job.code, "form": "csv"},

@@ -3,19 +3,26 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from datetime import timedelta
 
 import pytest
 from django.test import Client
 from django.urls import reverse
 
+from arena.templatetags.marks import job_mark
 from augment.models import Augmentation, GenerationJob, Worker
+from augment.services.clock import database_now
 from augment.services.running import jobs, leases
+from augment.services.running.causes import failure_groups
+from augment.services.running.pace import pace_of
+from augment.services.running.summary import count_rows
 from augment.services.running.workers import Presence
 from tests.jobs import rows
-from tests.web.cast import people, signed_in
+from tests.web.cast import people, signed_in, world
 
 pytestmark = pytest.mark.django_db
 
+State = Augmentation.State
 OnCommit = Callable[..., object]
 
 
@@ -86,6 +93,100 @@ def test_the_page_groups_failures_by_their_reason_and_retries_them() -> None:
     assert job.augmentations.filter(state=Augmentation.State.QUEUED).count() == 3
 
 
+def test_one_cause_is_retried_and_the_others_are_not() -> None:
+    job = rows.launch(scenarios=3)
+    reasons = ["HTTP 429: in 3 s", "HTTP 429: in 9 s", "the wire broke"]
+    for row, reason in zip(job.augmentations.all(), reasons, strict=True):
+        leases.settle(held=rows.leased(row), settlement=rows.failed(reason), now=rows.NOON)
+    admin, url = signed_in(people()["admin"]), reverse("job", args=[job.code])
+    shown = admin.get(url).content.decode()
+    assert "2 reasons that differ in numbers and ids alone" in shown
+    assert "Retry these 2" in shown
+    key = failure_groups(job)[0].key
+    admin.post(reverse("job-retry-cause", args=[job.code, key]))
+    assert job.augmentations.filter(state=State.QUEUED).count() == 2
+    assert "the wire broke" in admin.get(url).content.decode().lower()
+    gone = admin.post(reverse("job-retry-cause", args=[job.code, key]), follow=True)
+    assert "cause in this job" in gone.content.decode()
+
+
+def test_an_unreadable_answer_gets_its_second_chance_after_a_question_alone() -> None:
+    job = rows.launch(scenarios=2)
+    job.augmentations.update(state=State.UNREADABLE, reason="no block", image="bev/x.png")
+    admin = signed_in(people()["admin"])
+    url = reverse("job-retry-cause", args=[job.code, failure_groups(job)[0].key])
+    asked = admin.post(url).content.decode()
+    assert "Ask again for 2 unreadable answers?" in asked
+    assert "a second chance that the others did not have" in asked
+    assert job.augmentations.filter(state=State.UNREADABLE).count() == 2
+    admin.post(url, {"sure": "1"})
+    assert job.augmentations.filter(state=State.QUEUED, asked_anew_at__isnull=False).count() == 2
+
+
+def test_what_a_study_shows_is_not_asked_again() -> None:
+    here = world()
+    shown = here.study.matchups.order_by("pk")[0].left
+    job = shown.job
+    job.augmentations.filter(pk=shown.pk).update(state=State.UNREADABLE, reason="no block")
+    key = failure_groups(job)[0].key
+    answer = signed_in(people()["admin"]).post(
+        reverse("job-retry-cause", args=[job.code, key]), {"sure": "1"}, follow=True
+    )
+    assert "Experts are shown 1 of these 1" in answer.content.decode()
+    shown.refresh_from_db()
+    assert shown.state == State.UNREADABLE
+
+
+def test_a_job_is_paused_says_what_still_runs_and_is_resumed() -> None:
+    job = rows.launch(scenarios=3)
+    held = rows.leased(job.augmentations.all()[0])
+    admin, url = signed_in(people()["admin"]), reverse("job", args=[job.code])
+    answer = admin.post(reverse("job-pause", args=[job.code]), follow=True).content.decode()
+    assert "Pausing, 1 still runs" in answer
+    assert 'id="pause"' not in answer
+    leases.settle(held=held, settlement=rows.done(), now=rows.NOON)
+    shown = admin.get(url).content.decode()
+    assert "Paused" in shown
+    assert "js/job.js" not in shown, "nothing moves"
+    admin.post(reverse("job-resume", args=[job.code]))
+    job.refresh_from_db()
+    assert job.state == GenerationJob.State.RUNNING
+    assert (
+        "is paused or stopped"
+        in admin.post(reverse("job-resume", args=[job.code]), follow=True).content.decode()
+    )
+
+
+def test_a_moving_job_says_how_fast_it_goes_and_when_it_is_through() -> None:
+    job = rows.launch(scenarios=4)
+    admin, url = signed_in(people()["admin"]), reverse("job", args=[job.code])
+    assert "Nothing has ended in the last five minutes." in admin.get(url).content.decode()
+    now = database_now()
+    for row in job.augmentations.all()[:2]:
+        held = rows.leased(row, now - timedelta(minutes=2))
+        leases.settle(held=held, settlement=rows.done(), now=now - timedelta(minutes=1))
+    pace = pace_of(count_rows(job), now=now)
+    assert (pace.rows_per_minute, pace.calls_per_minute) == (1.0, 0.0)
+    assert pace.left_s == 120.0
+    assert "about 2 min left" in admin.get(url).content.decode()
+
+
+@pytest.mark.parametrize(
+    ("state", "words"),
+    [
+        (State.FAILED, "Failed"),
+        (State.UNREADABLE, "Finished without a modification"),
+        (State.REFUSED, "Finished without a modification"),
+    ],
+)
+def test_a_job_without_a_single_result_is_not_green(state: str, words: str) -> None:
+    job = rows.launch(scenarios=2)
+    job.augmentations.update(state=state)
+    GenerationJob.objects.update(state=GenerationJob.State.FINISHED)
+    mark = job_mark(count_rows(GenerationJob.objects.get()))
+    assert (mark.label, mark.tone == "good") == (words, False)
+
+
 def test_cancelling_keeps_what_is_done_and_says_so_twice() -> None:
     job = rows.launch(scenarios=2)
     first = job.augmentations.all()[0]
@@ -129,7 +230,7 @@ def test_the_job_page_asks_the_database_a_fixed_number_of_questions(
 ) -> None:
     job = rows.launch(scenarios=8, contestants=("reference",))
     admin = signed_in(people()["admin"])
-    with django_assert_max_num_queries(11):  # type: ignore[attr-defined]
+    with django_assert_max_num_queries(16):  # type: ignore[attr-defined]
         admin.get(reverse("job", args=[job.code]))
 
 

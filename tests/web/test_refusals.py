@@ -139,7 +139,10 @@ def test_jobs_refuse_in_german() -> None:
     admin = signed_in(people()["admin"])
     for name, german in (
         ("retry", "Im Job „Round 1“ ist nichts fehlgeschlagen; es gibt nichts zu wiederholen."),
-        ("resume", "Der Job „Round 1“ ist am Laufen; fortsetzen lässt sich nur einer, der an"),
+        (
+            "resume",
+            "Der Job „Round 1“ ist am Laufen; fortsetzen lässt sich nur einer, der angehalten",
+        ),
         ("cancel", "Abgebrochen. Was fertig ist, bleibt."),
         ("cancel", "Der Job „Round 1“ ist schon abgebrochen."),
     ):

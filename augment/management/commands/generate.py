@@ -18,6 +18,7 @@ from augment.models import Augmentation, GenerationJob
 from augment.services.endpoints.contestants import ensure_builtin
 from augment.services.running import jobs
 from augment.services.running.budget import limit_of
+from augment.services.running.causes import failure_groups
 from augment.services.running.choosing import resolve_contestants, resolve_scenarios
 from augment.services.running.estimates import estimate
 from augment.services.running.matrix import WHAT, Matrix, load_matrix
@@ -25,7 +26,6 @@ from augment.services.running.summary import (
     JobCounts,
     contestant_lines,
     count_rows,
-    failure_groups,
 )
 from augment.services.terminal import TerminalCommand
 from augment.tasks import check_broker, enqueue_job
@@ -34,7 +34,7 @@ POLL_S = 0.5
 HINT_AFTER_S = 10.0
 BAR_CELLS = 30
 STOPPED = 3
-"""Exit code of a wait that a cap has ended."""
+"""Exit code of a wait that a cap, or somebody who paused the job, has ended."""
 
 
 class Command(TerminalCommand):
@@ -168,12 +168,9 @@ class Command(TerminalCommand):
             if not counts.under_way:
                 self.stdout.write("" if self.stdout.isatty() else "Over.")
                 return
-            if is_stopped(job) and not counts.running:
-                raise CommandError(
-                    f"Stopped at its cap of {limit_of(job)} with {counts.queued} left; "
-                    f"`manage.py resume_job {job.code}` with a higher cap goes on.",
-                    returncode=STOPPED,
-                )
+            held = state_held(job)
+            if held and not counts.running:
+                raise CommandError(_held_sentence(job, held, counts), returncode=STOPPED)
             waited = time.monotonic() - started
             if waited > timeout_s:
                 raise CommandError(
@@ -235,7 +232,19 @@ def _refuse_both(options: dict[str, Any]) -> None:
         raise CommandError("Name --contestants and --scenarios, or --matrix FILE.")
 
 
-def is_stopped(job: GenerationJob) -> bool:
-    """Whether the job stands at its cap right now."""
-    states = GenerationJob.State
-    return GenerationJob.objects.filter(pk=job.pk, state=states.STOPPED_AT_CAP).exists()
+def state_held(job: GenerationJob) -> str:
+    """In which state the job waits to be resumed right now; empty where it does not."""
+    held = GenerationJob.objects.filter(pk=job.pk, state__in=GenerationJob.HELD)
+    return held.values_list("state", flat=True).first() or ""
+
+
+def _held_sentence(job: GenerationJob, state: str, counts: JobCounts) -> str:
+    if state == GenerationJob.State.PAUSED:
+        return (
+            f"Paused by somebody with {counts.queued} left; `manage.py resume_job {job.code}` "
+            "goes on."
+        )
+    return (
+        f"Stopped at its cap of {limit_of(job)} with {counts.queued} left; "
+        f"`manage.py resume_job {job.code}` with a higher cap goes on."
+    )

@@ -1,4 +1,4 @@
-"""Let a job that stopped at its cap go on."""
+"""Let a job that is paused or stopped at its cap go on."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from django.db import transaction
 
 from augment.errors import AugmentError
 from augment.management.arguments import add_cap_arguments, caps_of
-from augment.services.running import caps, jobs
+from augment.services.running import caps, jobs, pausing
 from augment.services.running.budget import limit_of
 from augment.services.running.choosing import find_job
 from augment.services.running.summary import count_rows
@@ -22,8 +22,8 @@ class Command(TerminalCommand):
     """resume_job JOB [--cap USD] [--cap-calls N] [--cap-tokens N]."""
 
     help = (
-        "Raise the caps of a job that stopped at one, and let it go on with what is left. What "
-        "was answered already is not asked again."
+        "Let a job that is paused or stopped at its cap go on with what is left, its caps raised "
+        "where they are given. What was answered already is not asked again."
     )
 
     def add_arguments(self, parser: ArgumentParser) -> None:
@@ -40,7 +40,7 @@ class Command(TerminalCommand):
             with transaction.atomic():
                 if wanted != jobs.NO_CAPS:
                     job = caps.raise_cap(job, caps=wanted)
-                job = caps.resume(job)
+                job = pausing.resume(job)
                 pk = job.pk
                 transaction.on_commit(lambda: enqueue_job(pk))
         except AugmentError as error:

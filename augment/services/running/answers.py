@@ -18,7 +18,12 @@ _COUNTS = ("prompt_tokens", "completion_tokens")
 
 
 def find_earlier_answer(
-    *, request_hash: str, augmentation_pk: int, attempt_pk: int, is_fresh: bool
+    *,
+    request_hash: str,
+    augmentation_pk: int,
+    attempt_pk: int,
+    is_fresh: bool,
+    since: datetime | None = None,
 ) -> ModelCall | None:
     """The last call that answered the same request, None where it is to be asked.
 
@@ -27,11 +32,14 @@ def find_earlier_answer(
         augmentation_pk: The row that asks; an attempt that was stopped is replayed for it.
         attempt_pk: The attempt that asks.
         is_fresh: Whether only that replay counts: each earlier answer once, none of this attempt.
+        since: The row is asked anew: as if fresh, and no answer from before counts.
     """
     calls = ModelCall.objects.filter(
         request_hash=request_hash, served_from=None, answer__isnull=False, fault=""
     )
-    if is_fresh:
+    if since is not None:
+        calls = calls.filter(started_at__gte=since)
+    if is_fresh or since is not None:
         calls = (
             calls.filter(attempt__augmentation=augmentation_pk)
             .exclude(attempt=attempt_pk)

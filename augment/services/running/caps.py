@@ -11,12 +11,11 @@ from django.db import transaction
 
 from augment.errors import Conflict
 from augment.llm.costs import nano_usd_of
-from augment.models import Augmentation, Contestant, GenerationJob
+from augment.models import Contestant, GenerationJob
 from augment.sentences import Sentence, sentence, word
 from augment.services.endpoints.prices import list_unpriced_models
 from augment.services.events import log_event
 from augment.services.running.budget import limit_of, limits_of
-from augment.services.running.leases import change_all
 
 State = GenerationJob.State
 
@@ -103,7 +102,7 @@ def raise_cap(job: GenerationJob, *, caps: Caps, actor: User | None = None) -> G
     if not columns:
         raise Conflict(sentence("Say which cap to raise, and to what."))
     job = GenerationJob.objects.select_for_update().get(pk=job.pk)
-    if job.state not in (State.RUNNING, State.STOPPED_AT_CAP):
+    if job.state not in (State.RUNNING, *GenerationJob.HELD):
         raise Conflict(over_already(job))
     before, limits = limit_of(job), limits_of(job)
     for name, value in columns.items():
@@ -130,37 +129,4 @@ def raise_cap(job: GenerationJob, *, caps: Caps, actor: User | None = None) -> G
         before={"cap": before},
         after={"cap": limit_of(job)},
     )
-    return job
-
-
-@transaction.atomic
-def resume(job: GenerationJob, *, actor: User | None = None) -> GenerationJob:
-    """Let a job that stopped at its cap go on with what waits; the door sends the messages.
-
-    Attempts that were stopped are replayed from the answers that they had, and pay for none twice.
-
-    Raises:
-        Conflict: The job is not stopped.
-    """
-    stopped = GenerationJob.objects.filter(pk=job.pk, state=State.STOPPED_AT_CAP)
-    waiting = Augmentation.objects.filter(job=job.pk, state=Augmentation.State.QUEUED)
-    again = change_all(waiting, sent_at=None)
-    if not stopped.update(state=State.RUNNING):
-        job.refresh_from_db()
-        raise Conflict(
-            sentence(
-                "Job '%(name)s' is %(state)s; only one that stopped at its cap can be resumed.",
-                name=job.name,
-                state=word(job.get_state_display().lower()),
-            )
-        )
-    log_event(
-        actor=actor,
-        verb="resume",
-        object_kind="job",
-        object_code=job.code,
-        before={"state": State.STOPPED_AT_CAP.value},
-        after={"state": State.RUNNING.value, "queued": again},
-    )
-    job.refresh_from_db()
     return job

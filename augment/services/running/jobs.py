@@ -32,7 +32,7 @@ NO_CAPS = Caps()
 HIGHEST_SAMPLES = MOST_SAMPLES
 """Of one cell of a job."""
 
-OPEN = (GenerationJob.State.RUNNING, GenerationJob.State.STOPPED_AT_CAP)
+OPEN = (GenerationJob.State.RUNNING, *GenerationJob.HELD)
 """States of jobs that are not over."""
 
 
@@ -125,19 +125,12 @@ def cancel(job: GenerationJob, actor: User | None = None) -> GenerationJob:
 def retry_failed(job: GenerationJob, actor: User | None = None) -> GenerationJob:
     """Let every failed row wait again; outcomes of the contestants themselves stay.
 
-    In a job that stopped at its cap they wait, with the others, until it is resumed.
+    In a job that is paused or stopped at its cap they wait, with the others, until it is resumed.
 
     Raises:
         Conflict: The job was cancelled, or nothing in it failed.
     """
-    states = GenerationJob.State
-    kept = Case(When(state=states.STOPPED_AT_CAP, then=F("state")), default=Value(states.RUNNING))
-    open_again = GenerationJob.objects.filter(pk=job.pk).exclude(state=states.CANCELLED)
-    if not open_again.update(state=kept, finished_at=None):
-        raise Conflict(
-            sentence("Job '%(name)s' was cancelled; launch a new one instead.", name=job.name)
-        )
-    loosen_unanswered(job.contestants.all())
+    open_again(job)
     failed = Augmentation.objects.filter(job=job, state=State.FAILED)
     again = failed.update(state=State.QUEUED, reason="", finished_at=None, sent_at=None)
     if not again:
@@ -157,8 +150,26 @@ def retry_failed(job: GenerationJob, actor: User | None = None) -> GenerationJob
     return job
 
 
+def open_again(job: GenerationJob) -> None:
+    """Let a job run on with what is about to wait again; one that is held stays so.
+
+    To be called in the transaction that lets its rows wait.
+
+    Raises:
+        Conflict: The job was cancelled.
+    """
+    states = GenerationJob.State
+    kept = Case(When(state__in=GenerationJob.HELD, then=F("state")), default=Value(states.RUNNING))
+    not_cancelled = GenerationJob.objects.filter(pk=job.pk).exclude(state=states.CANCELLED)
+    if not not_cancelled.update(state=kept, finished_at=None):
+        raise Conflict(
+            sentence("Job '%(name)s' was cancelled; launch a new one instead.", name=job.name)
+        )
+    loosen_unanswered(job.contestants.all())
+
+
 def finish_if_over(*, now: Moment = DATABASE_TIME, job_pk: int | None = None) -> int:
-    """Finish the job, or every running job, in which nothing is under way.
+    """Finish the job, or every running or paused job, in which nothing is under way.
 
     To be called after an outcome is committed, never in its transaction: two workers that end
     the last two rows at once would each still see the other's row under way.
@@ -166,13 +177,16 @@ def finish_if_over(*, now: Moment = DATABASE_TIME, job_pk: int | None = None) ->
     Returns:
         How many jobs were finished by this call.
     """
-    running = GenerationJob.objects.filter(state=GenerationJob.State.RUNNING)
+    running = GenerationJob.objects.filter(state__in=_MAY_END)
     if job_pk is not None:
         running = running.filter(pk=job_pk)
     return sum(_finish(pk, now) for pk in list(running.values_list("pk", flat=True)))
 
 
 # --- Private -----------------------------------------------------------------------------------
+
+_MAY_END = (GenerationJob.State.RUNNING, GenerationJob.State.PAUSED)
+"""A paused job whose last row was in flight has nothing left to resume."""
 
 
 @transaction.atomic
@@ -182,9 +196,7 @@ def _finish(job_pk: int, now: Moment) -> int:
     The lock comes first: a retry that is about to commit has changed the job's row, and its rows
     are to be seen as waiting again.
     """
-    running = GenerationJob.objects.select_for_update().filter(
-        pk=job_pk, state=GenerationJob.State.RUNNING
-    )
+    running = GenerationJob.objects.select_for_update().filter(pk=job_pk, state__in=_MAY_END)
     if not list(running.values_list("pk")):
         return 0
     if Augmentation.objects.filter(job=job_pk, state__in=Augmentation.UNDER_WAY).exists():

@@ -78,8 +78,8 @@ def take_lease(
 
     Returns:
         The lease, or None when the row does not wait (any more): somebody else has it, it is
-        done, it or its job was cancelled, the job stopped at its cap. A second delivery of a
-        message does nothing therefore.
+        done, it or its job was cancelled, the job is paused or stopped at its cap. A second
+        delivery of a message does nothing therefore.
     """
     token = uuid.uuid4()
     waiting = Augmentation.objects.filter(pk=augmentation_pk, state=Augmentation.State.QUEUED)
@@ -220,10 +220,10 @@ def find_unsent(
 ) -> list[int]:
     """Waiting rows, of one job or of all, without a message or with one that old.
 
-    What waits in a job that stopped at its cap waits for somebody to raise it.
+    What waits in a job that is paused or stopped at its cap waits for somebody to resume it.
     """
     waiting = Augmentation.objects.filter(state=Augmentation.State.QUEUED).exclude(
-        job__in=GenerationJob.objects.filter(state=GenerationJob.State.STOPPED_AT_CAP)
+        job__in=GenerationJob.objects.filter(state__in=GenerationJob.HELD)
     )
     if job_pk is not None:
         waiting = waiting.filter(job=job_pk)
@@ -265,8 +265,8 @@ def _cancelled_jobs() -> QuerySet[GenerationJob]:
 
 def _closed_jobs() -> QuerySet[GenerationJob]:
     """Jobs in which nothing is started any more, or not for now."""
-    states = GenerationJob.State
-    return GenerationJob.objects.filter(state__in=[states.CANCELLED, states.STOPPED_AT_CAP])
+    closed = (GenerationJob.State.CANCELLED, *GenerationJob.HELD)
+    return GenerationJob.objects.filter(state__in=closed)
 
 
 def _silent(*, now: Moment, older_than: timedelta) -> QuerySet[Augmentation]:

@@ -1,4 +1,4 @@
-"""What came out of a job: a line per contestant, and its failures by their reason."""
+"""What came out of a job: how many rows are in each state, and a line per contestant."""
 
 from __future__ import annotations
 
@@ -46,10 +46,15 @@ class JobCounts:
 
     @property
     def is_moving(self) -> bool:
-        """Whether anything will change by itself: not where all that is left waits at a cap."""
-        if self.job.state == GenerationJob.State.STOPPED_AT_CAP:
+        """Whether anything will change by itself: not where all that is left is held."""
+        if self.is_held:
             return self.running > 0
         return self.under_way > 0
+
+    @property
+    def is_held(self) -> bool:
+        """Whether nothing is started until somebody resumes the job."""
+        return self.job.state in GenerationJob.HELD
 
     @property
     def settled(self) -> int:
@@ -67,23 +72,14 @@ class JobCounts:
         return self.by_state[State.RUNNING]
 
     @property
+    def done(self) -> int:
+        """What has a modification."""
+        return self.by_state[State.DONE]
+
+    @property
     def failed(self) -> int:
         """What broke and may be tried again."""
         return self.by_state[State.FAILED]
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class FailureGroup:
-    """Augmentations without a modification that ended for the same reason."""
-
-    state: State
-    reason: str
-    augmentations: list[Augmentation]
-
-    @property
-    def number(self) -> int:
-        """How many there are."""
-        return len(self.augmentations)
 
 
 def list_jobs() -> list[JobCounts]:
@@ -112,21 +108,6 @@ def contestant_lines(job: GenerationJob) -> list[ContestantLine]:
         .annotate(total=Count("pk"), **counts)
     )
     return [ContestantLine(**group) for group in cast("list[dict[str, Any]]", list(groups))]
-
-
-def failure_groups(job: GenerationJob) -> list[FailureGroup]:
-    """What has no modification, grouped by state and reason; machine faults first."""
-    groups: defaultdict[tuple[State, str], list[Augmentation]] = defaultdict(list)
-    for cell in cells_of(job).filter(state__in=[State.FAILED, State.UNREADABLE, State.REFUSED]):
-        groups[State(cell.state), cell.reason].append(cell)
-    found = [
-        FailureGroup(state=state, reason=reason, augmentations=cells)
-        for (state, reason), cells in groups.items()
-    ]
-    return sorted(
-        found,
-        key=lambda group: (group.state != State.FAILED, -len(group.augmentations), group.reason),
-    )
 
 
 def cells_of(job: GenerationJob) -> QuerySet[Augmentation]:

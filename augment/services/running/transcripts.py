@@ -103,6 +103,7 @@ class RowTranscript:
             augmentation_pk=self._row.pk,
             attempt_pk=self._held.attempt_pk,
             is_fresh=self._row.job.is_fresh,
+            since=self._row.asked_anew_at,
         )
         if earlier is None:
             return None

@@ -1,0 +1,62 @@
+"""Letting the rows of one cause wait again, and only those."""
+
+from __future__ import annotations
+
+from django.contrib.auth.models import User
+from django.db import transaction
+
+from augment.errors import Conflict
+from augment.models import Augmentation, GenerationJob
+from augment.sentences import sentence
+from augment.services.clock import database_now
+from augment.services.events import log_event
+from augment.services.running.causes import rows_of_cause
+from augment.services.running.jobs import open_again
+from augment.services.running.leases import change_all
+
+State = Augmentation.State
+
+RETRIED = (State.FAILED, State.UNREADABLE)
+"""What may be tried again. Who declined has answered, and is not asked until it says yes."""
+
+
+@transaction.atomic
+def retry_cause(job: GenerationJob, *, key: str, actor: User | None = None) -> GenerationJob:
+    """Let the rows that ended for one cause wait again; the door sends the messages.
+
+    What failed goes on from the answers that it had. What was unreadable is asked anew, because
+    the same answer would be read the same way; the attempt that counted so far stays on record.
+
+    Args:
+        job: Whose rows they are.
+        key: Of the cause, as `failure_groups` gives it.
+        actor: Who wants it.
+
+    Raises:
+        UnknownName: No row has that cause (any more).
+        Conflict: The job was cancelled, or the contestants have refused.
+    """
+    state, cause, pks = rows_of_cause(job, key)
+    if state not in RETRIED:
+        raise Conflict(
+            sentence("Who refused has answered: it is not asked again. Launch a new job instead.")
+        )
+    waiting: dict[str, object] = {
+        "state": State.QUEUED,
+        "reason": "",
+        "finished_at": None,
+        "sent_at": None,
+    }
+    if state == State.UNREADABLE:
+        waiting |= {"image": "", "notes": "", "asked_anew_at": database_now()}
+    again = change_all(Augmentation.objects.filter(pk__in=pks, state=state), **waiting)
+    open_again(job)
+    log_event(
+        actor=actor,
+        verb="retry",
+        object_kind="job",
+        object_code=job.code,
+        after={"queued": again, "state": state.value, "cause": cause},
+    )
+    job.refresh_from_db()
+    return job

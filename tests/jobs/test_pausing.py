@@ -1,0 +1,104 @@
+"""A paused job starts nothing, loses nothing that runs, and goes on exactly with what is left."""
+
+from __future__ import annotations
+
+from datetime import timedelta
+
+import pytest
+
+from augment.errors import Conflict
+from augment.models import Augmentation, Event, GenerationJob
+from augment.services.running import jobs, leases, pausing, runner
+from augment.services.running.caps import Caps, raise_cap
+from augment.services.running.summary import count_rows
+from tests.jobs.models import Model, after_a_second_look, llama_job
+from tests.jobs.rows import NOON, done, failed, launch, leased, only_row
+
+pytestmark = pytest.mark.django_db
+State = Augmentation.State
+Job = GenerationJob.State
+
+
+def test_a_paused_job_starts_nothing_and_what_is_in_flight_keeps_its_result() -> None:
+    job = launch(scenarios=3)
+    first, second, third = job.augmentations.order_by("pk")
+    held = leased(first)
+    job = pausing.pause(job)
+    assert job.state == Job.PAUSED
+    assert Event.objects.get(verb="pause").after == {
+        "state": "paused", "waiting": 2, "in_flight": 1,
+    }  # fmt: skip
+    assert leases.take_lease(augmentation_pk=second.pk) is None
+    assert leases.find_unsent(older_than=timedelta(0)) == []
+    assert count_rows(job).is_moving, "one is in flight"
+    assert leases.settle(held=held, settlement=done())
+    assert not count_rows(job).is_moving
+    jobs.finish_if_over()
+    job = pausing.resume(job)
+    assert job.state == Job.RUNNING
+    assert Event.objects.get(verb="resume").before == {"state": "paused"}
+    assert leases.find_unsent(older_than=timedelta(0)) == [second.pk, third.pk]
+    first.refresh_from_db()
+    assert first.state == State.DONE
+
+
+def test_all_calls_of_what_is_in_flight_are_made_though_the_job_is_paused_between_them() -> None:
+    def pause_once() -> None:
+        if GenerationJob.objects.get().state == Job.RUNNING:
+            pausing.pause(GenerationJob.objects.get())
+
+    model = Model(after_a_second_look, looking_on=pause_once)
+    row = only_row(llama_job(caps=Caps(calls=9)))
+    assert runner.work_on(augmentation_pk=row.pk, connect=model)
+    row.refresh_from_db()
+    assert (row.state, len(model.requests)) == (State.DONE, 2)
+    assert GenerationJob.objects.get().state == Job.FINISHED, "nothing is left to resume"
+
+
+def test_a_paused_job_still_keeps_to_its_cap() -> None:
+    job = llama_job(caps=Caps(calls=1))
+
+    def pause_once() -> None:
+        if GenerationJob.objects.get().state == Job.RUNNING:
+            pausing.pause(GenerationJob.objects.get())
+
+    model = Model(after_a_second_look, looking_on=pause_once)
+    row = only_row(job)
+    runner.work_on(augmentation_pk=row.pk, connect=model)
+    row.refresh_from_db()
+    job.refresh_from_db()
+    assert (row.state, len(model.requests), job.state) == (State.QUEUED, 1, Job.PAUSED)
+    raise_cap(job, caps=Caps(calls=2))
+    pausing.resume(job)
+    runner.work_on(augmentation_pk=row.pk, connect=model)
+    row.refresh_from_db()
+    assert (row.state, len(model.requests)) == (State.DONE, 2), "the first answer is replayed"
+
+
+@pytest.mark.parametrize(
+    ("state", "sentence"),
+    [
+        (Job.PAUSED, "is paused already: it starts nothing"),
+        (Job.STOPPED_AT_CAP, "is stopped at cap already: it starts nothing"),
+        (Job.FINISHED, "is finished already"),
+        (Job.CANCELLED, "is cancelled already"),
+    ],
+)
+def test_only_a_running_job_is_paused(state: str, sentence: str) -> None:
+    job = launch()
+    GenerationJob.objects.update(state=state)
+    with pytest.raises(Conflict, match=sentence):
+        pausing.pause(job)
+    assert not Event.objects.filter(verb="pause").exists()
+
+
+def test_a_paused_job_can_be_cancelled_and_what_failed_in_it_waits_until_it_is_resumed() -> None:
+    job = launch(scenarios=2)
+    first = job.augmentations.order_by("pk")[0]
+    leases.settle(held=leased(first), settlement=failed(), now=NOON)
+    pausing.pause(job)
+    job = jobs.retry_failed(job)
+    assert (job.state, count_rows(job).queued) == (Job.PAUSED, 2)
+    assert jobs.cancel(job).state == Job.CANCELLED
+    with pytest.raises(Conflict, match="is cancelled; only one that is paused"):
+        pausing.resume(job)

@@ -1,0 +1,95 @@
+"""Rows without a modification, grouped by their cause, and one group tried again."""
+
+from __future__ import annotations
+
+import pytest
+
+from augment.errors import Conflict, UnknownName
+from augment.models import Augmentation, Event, GenerationJob, ModelCall
+from augment.services.running import jobs, leases, retrying, runner
+from augment.services.running.causes import cause_of, failure_groups
+from tests.jobs.models import Model, llama_job, reply
+from tests.jobs.rows import failed, launch, leased, only_row
+from tests.variants.answers import GOOD
+
+pytestmark = pytest.mark.django_db
+State = Augmentation.State
+
+
+@pytest.mark.parametrize(
+    ("reason", "other", "are_alike"),
+    [
+        ("HTTP 429: slow down, try in 3 s", "HTTP 429: slow down, try in 17.5 s", True),
+        ("HTTP 429: slow down", "HTTP 503: slow down", False),
+        ("request req_9f31ab20c4de77aa broke", "request req_0011ab20c4de77ff broke", True),
+        (
+            "no 3f2504e0-4f89-11d3-9a0c-0305e82c3301",
+            "no 3f2504e0-4f89-11d3-9a0c-0305e82c3302",
+            True,
+        ),
+        ("line 3 column 7: no block", "line 12 column 1: no block", True),
+        ("Lane3 is unknown", "Lane4 is unknown", False),
+        ("the wire broke", "the  wire\nbroke", True),
+        ("gpt-4 answered nothing", "gpt-5 answered nothing", False),
+    ],
+)
+def test_reasons_have_one_cause_where_only_numbers_and_ids_differ(
+    reason: str, other: str, are_alike: bool
+) -> None:
+    assert (cause_of(reason) == cause_of(other)) is are_alike
+
+
+def broken(job: GenerationJob, *reasons: str) -> None:
+    for row, reason in zip(job.augmentations.order_by("pk"), reasons, strict=True):
+        leases.settle(held=leased(row), settlement=failed(reason))
+    jobs.finish_if_over()
+
+
+def test_one_group_waits_again_and_the_others_stay() -> None:
+    job = launch(scenarios=4)
+    broken(job, "HTTP 429: in 3 s", "HTTP 429: in 4 s", "HTTP 429: in 4 s", "no picture")
+    many, one = failure_groups(job)
+    assert (many.number, many.variants, many.reason) == (3, 2, "HTTP 429: in 4 s")
+    assert len(many.augmentations) == 3
+    job = retrying.retry_cause(job, key=many.key)
+    assert job.state == GenerationJob.State.RUNNING
+    assert job.augmentations.filter(state=State.QUEUED, reason="").count() == 3
+    assert Event.objects.get(verb="retry").after == {
+        "queued": 3, "state": "failed", "cause": "HTTP 429: in # s",
+    }  # fmt: skip
+    assert [group.key for group in failure_groups(job)] == [one.key]
+    with pytest.raises(UnknownName, match="cause in this job"):
+        retrying.retry_cause(job, key=many.key)
+
+
+def test_an_unreadable_answer_is_asked_for_anew_and_not_served_again() -> None:
+    said = ["Sorry?", "Sorry, what?", GOOD]
+    model = Model(lambda request: reply(said.pop(0)))
+    job = llama_job()
+    row = only_row(job)
+    runner.work_on(augmentation_pk=row.pk, connect=model)
+    row.refresh_from_db()
+    assert row.state == State.UNREADABLE
+    (group,) = failure_groups(job)
+    retrying.retry_cause(job, key=group.key)
+    row.refresh_from_db()
+    assert (row.image, row.state) == ("", State.QUEUED)
+    runner.work_on(augmentation_pk=row.pk, connect=model)
+    row.refresh_from_db()
+    assert (row.state, len(model.requests)) == (State.DONE, 3)
+    assert not ModelCall.objects.exclude(served_from=None).exists()
+    assert list(row.attempts.values_list("outcome", flat=True)) == ["unreadable", "done"]
+
+
+def test_who_refused_is_not_asked_again_and_a_cancelled_job_stays_over() -> None:
+    job = launch(scenarios=2)
+    job.augmentations.update(state=State.REFUSED, reason="It is not safe.")
+    (group,) = failure_groups(job)
+    with pytest.raises(Conflict, match="Who refused has answered"):
+        retrying.retry_cause(job, key=group.key)
+    job.augmentations.update(state=State.FAILED)
+    GenerationJob.objects.update(state=GenerationJob.State.CANCELLED)
+    (group,) = failure_groups(job)
+    with pytest.raises(Conflict, match="was cancelled"):
+        retrying.retry_cause(job, key=group.key)
+    assert job.augmentations.filter(state=State.FAILED).count() == 2, "nothing is half done"
