@@ -13,7 +13,7 @@ import numpy as np
 
 from augment.formats.bounds import bounds_of
 from augment.formats.commonroad_xml import Ids, add, number
-from augment.formats.roads import width_between
+from augment.formats.strips import width_between
 from augment.formats.writing import Cell, LossReport
 from augment.geometry.polyline import FloatArray, Polyline
 from augment.scene.entities import (

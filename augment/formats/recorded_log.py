@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from augment.errors import InvalidDocument
 from augment.formats.reading import frame_in
 from augment.formats.road_map import FURTHEST_M, MapExtract
-from augment.formats.roads import RADIUS_M
+from augment.formats.strips import RADIUS_M
 from augment.geometry.angles import wrap
 from augment.geometry.frames import Pose
 from augment.scene.entities import AgentType, Origin, Scene, TrafficAgent

@@ -16,7 +16,8 @@ from augment.llm.messages import Message, Speaker
 from augment.prompts.blocks import last_object
 from augment.prompts.texts import fill_text, quote, said_by_user
 from augment.scene.intent import Intent
-from augment.scene.intent_codec import IntentParts, intent_from_parts
+from augment.scene.intent_codec import intent_from_parts
+from augment.scene.intent_document import IntentParts
 from augment.scene.schema import problems_of
 
 _MOST_PROBLEMS = 8

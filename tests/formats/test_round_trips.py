@@ -12,15 +12,11 @@ import numpy as np
 import pytest
 
 from augment.formats import commonroad_writer, scenarionet_writer
-from augment.formats.interplan import token_of
-from augment.formats.interplan_reader import read as read_interplan
-from augment.formats.interplan_writer import write as write_interplan
 from augment.formats.readers import READERS
 from augment.formats.reading import Reading
-from augment.formats.roads import RADIUS_M
+from augment.formats.strips import RADIUS_M
 from augment.formats.writing import Cell, Written
 from augment.geometry.polyline import Polyline
-from augment.scene.catalogue import ScenarioType
 from augment.scene.entities import (
     AgentType,
     Lane,
@@ -32,12 +28,12 @@ from augment.scene.entities import (
     TurnType,
 )
 from augment.scene.lane_graph import AnyLane
-from augment.scene.modification import Modification, without_traffic
+from augment.scene.modification import Modification
 from augment.scene.notes import SceneNoteKind
 from tests.fixtures.shelf import entry, whole_scene
 from tests.formats.cells import OF_EACH_TYPE, cell, crossing, recorded_street
-from tests.formats.round_trips import Change, agent_changes, changes
-from tests.scenes import cone, pedestrian, vehicle
+from tests.formats.round_trips import Change, changes
+from tests.scenes import vehicle
 
 WRITERS: dict[str, Callable[[Sequence[Cell]], Written]] = {
     "commonroad": commonroad_writer.write,
@@ -301,40 +297,3 @@ def test_the_ruler_finds_every_kind_of_change(tmp_path: Path) -> None:
     for aspect, other in spoilt(reading):
         found = [one for one in changes(given, other) if str(one) not in before]
         assert aspect in {one.aspect for one in found}, aspect
-
-
-# Modification -> interPlan -> modification: references are in test_interplan.py.
-
-ODD = {
-    "box": replace(vehicle("Agent9", 30.0, 0.5, 0.1), length_m=5.2),
-    "velocity": replace(vehicle("Agent9", 30.0, 0.5), speed_mps=3.0),
-    "class": replace(vehicle("Agent9", 30.0, 0.5), length_m=9.0),
-    "missing": replace(cone("Agent9", 30.0, 0.5), type=AgentType.BARRIER),
-    "heading": replace(cone("Agent9", 30.0, 0.5), heading_rad=0.5),
-    "walk": pedestrian("Agent9", 30.0, -4.0),
-    "short walk": replace(pedestrian("Agent9", 30.0, -4.0, (30.0, -3.0)), speed_mps=1.0 / 15.0),
-    "fast walk": replace(pedestrian("Agent9", 30.0, -4.0, (30.0, 8.0)), speed_mps=2.0),
-    "askew walk": replace(
-        pedestrian("Agent9", 30.0, -4.0, (30.0, 8.0)), heading_rad=1.5, speed_mps=0.8
-    ),
-    "hurried worker": replace(pedestrian("Agent9", 30.0, -4.0), speed_mps=1.0),
-}
-
-
-@pytest.mark.parametrize("kind", [ScenarioType.CONSTRUCTION_ZONE, ScenarioType.JAYWALKER])
-@pytest.mark.parametrize("odd", list(ODD))
-def test_what_interplan_changes_has_a_line_with_its_name(odd: str, kind: ScenarioType) -> None:
-    given = cell(added=(ODD[odd], cone("Agent10", 20.0, -1.0)), type=kind)
-    text, losses = write_interplan([given])
-    scene = without_traffic(given.scene)
-    (found,) = read_interplan(text, {token_of(scene.name): scene}).entries
-    wanted, got = given.modification.added, found.modification.added
-    assert len(got) == (1 if odd == "missing" else 2)
-    changed = {change.name for change in agent_changes(wanted, got)}
-    if odd != "walk" or kind is ScenarioType.JAYWALKER:
-        assert changed == {"Agent9"}
-    else:
-        assert changed == set()  # a worker who stands is what interPlan's step says
-    assert changed == {
-        name for name in ("Agent9", "Agent10") if any(name in x.text for x in losses)
-    }

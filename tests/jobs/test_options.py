@@ -3,95 +3,25 @@
 from __future__ import annotations
 
 import base64
-import importlib
 import json
 import struct
 from collections.abc import Callable
-from typing import Any
 
 import pytest
-from django.apps import apps
 from django.core.management import CommandError, call_command
 
 from augment.errors import Conflict, InvalidDocument
-from augment.models import Augmentation, Contestant, EndpointModel, GenerationJob, ModelCall
+from augment.models import Augmentation, Contestant, EndpointModel, ModelCall
 from augment.prompts.texts import prompt_version
 from augment.services.endpoints import contestants
 from augment.services.endpoints.known_endpoints import ensure_endpoint
-from augment.services.endpoints.known_models import tell_sight
 from augment.services.endpoints.treatments import left_out, options_of
-from augment.services.running import jobs, runner
-from augment.services.running.feasible import find_obstacle
 from augment.services.running.transcript_export import transcript_of
 from augment.variants.options import NAMES, ContestantOptions, ToolProtocol, options_from_document
-from tests.jobs.rows import add_scenario
-from tests.llm.json_server import JsonServer, serving
-from tests.scenes import cone, scene
-from tests.variants.playing import car, questions, rating, verdict
+from tests.jobs.scripted import SCRIPTS, Bodies, Scripted, add, run
+from tests.llm.json_server import serving
 
 pytestmark = pytest.mark.django_db
-
-CAR = car(21.4, id="Agent9")
-MEAN_3 = rating(3, 3, 3, "Too far left.")
-SCRIPTS = {
-    "otm": [CAR],
-    "fc": [CAR],
-    "tqa": [CAR, MEAN_3],
-    "vqa": [CAR, questions(), "1. yes\n2. yes\n3. yes", verdict()],
-}
-
-Bodies = list[dict[str, Any]]
-
-
-class Scripted(JsonServer):
-    """Says the same few things again and again, and keeps what it was sent."""
-
-    def __init__(self) -> None:
-        super().__init__()
-        self.refuses: set[str] = set()
-        self.script = [CAR]
-        self.bodies: Bodies = []
-
-    def answer(self, body: dict[str, Any]) -> tuple[int, dict[str, Any]]:
-        for name in sorted(self.refuses & body.keys()):
-            return 400, {
-                "error": {"message": "no", "code": "unsupported_parameter", "param": name}
-            }
-        said = self.script[len(self.bodies) % len(self.script)]
-        if said == CAR:  # another one in each round, so that no review is asked for twice
-            said = car(20.0 + len(self.bodies), id="Agent9")
-        self.bodies.append(body)
-        choice = {"finish_reason": "stop", "message": {"role": "assistant", "content": said}}
-        made = {"id": "1", "object": "chat.completion", "created": 0, "model": body["model"]}
-        return 200, made | {"choices": [{"index": 0} | choice]}
-
-
-def add(server: Scripted, slug: str, variant: str = "otm", **options: object) -> Contestant:
-    ensure_endpoint(label="here", base_url=server.url)
-    server.script = SCRIPTS[variant]
-    made = contestants.add_contestant(
-        slug=slug,
-        variant=variant,
-        endpoint="here",
-        model="m",
-        options=options_from_document(options),
-    )
-    assert made.endpoint is not None
-    tell_sight(endpoint=made.endpoint, model="m", sees=True)
-    return made
-
-
-def run(*slugs: str, samples: int = 1) -> list[Augmentation]:
-    """The rows of a job on one street, by contestant and sample."""
-    if not Augmentation.objects.exists():
-        far = scene(agents=(cone("far", 60.0, 0.0),))
-        add_scenario(
-            "street", scene=far, keep_traffic=True, reference=None, intent=None, intent_origin=""
-        )
-    job = jobs.launch(name="J", contestants=slugs, scenarios=["street"], samples=samples)
-    for row in job.augmentations.order_by("contestant__slug", "sample"):
-        runner.work_on(augmentation_pk=row.pk)
-    return list(job.augmentations.order_by("contestant__slug", "sample"))
 
 
 def every(name: str, value: object) -> Callable[[Bodies], bool]:
@@ -250,65 +180,6 @@ def test_a_temperature_that_is_refused_after_answers_is_a_fault_and_no_mixture()
         (row,) = [one for one in run("a", samples=2) if one.sample == 2]
     assert row.state == Augmentation.State.FAILED
     assert "does not take 'temperature' any more" in row.reason
-
-
-def test_who_ran_with_other_prompts_is_not_run_with_these() -> None:
-    with serving(Scripted()) as server:
-        add(server, "a")
-        run("a")
-        Contestant.objects.update(frozen_options={"prompt_version": "0" * 12})
-        assert "version 000000000000" in find_obstacle(Contestant.objects.get(slug="a"))
-        with pytest.raises(Conflict, match="add_contestant SLUG --like a"):
-            run("a")
-        row = Augmentation.objects.create(
-            job=GenerationJob.objects.get(),
-            scenario=Augmentation.objects.get().scenario,
-            contestant=Contestant.objects.get(),
-            sample=2,
-        )
-        runner.work_on(augmentation_pk=row.pk)
-        row.refresh_from_db()
-        assert (row.state, len(server.bodies)) == (Augmentation.State.FAILED, 1)
-        contestants.add_like(slug="b", like="a", name="B")
-        run("b")
-
-
-def test_a_contestant_like_another_one_asks_as_that_one_did() -> None:
-    """Whatever has become known of the model, and whatever the defaults are by now."""
-    with serving(Scripted()) as server:
-        add(server, "a", "fc", temperature=0.7)
-        run("a")
-        ran = options_of(Contestant.objects.get(slug="a")).to_document()
-        old = ran | {"radius_m": 60.0, "max_output_tokens": 900, "prompt_version": "0" * 12}
-        Contestant.objects.filter(slug="a").update(frozen_options=old)
-        EndpointModel.objects.update(native_tools=True)
-        made = contestants.add_like(slug="b", like="a")
-        run("b")
-    made.refresh_from_db()
-    assert made.frozen_options == old | {"prompt_version": prompt_version()}
-    assert made.frozen_options["protocol"] == "prompt"
-    assert made.name == "m FC (temperature 0.7) at here"
-    other = contestants.add_like(slug="c", like="a", changes={"variant": "otm"})
-    assert other.options == {"temperature": 0.7, "radius_m": 60.0, "max_output_tokens": 900}
-
-
-def test_who_ran_before_there_were_options_keeps_what_it_ran_with() -> None:
-    migration = importlib.import_module("augment.migrations.0011_options_and_samples")
-    with serving(Scripted()) as server:
-        add(server, "a", "fc", protocol="native")
-        EndpointModel.objects.update(native_tools=True)
-        (row,) = run("a")
-    before = row.options
-    Contestant.objects.update(options={}, frozen_options=None)
-    Augmentation.objects.update(options=None)
-    EndpointModel.objects.update(native_tools=False)
-    ModelCall.objects.update(prompt_version="0123456789ab")
-    migration.freeze_what_ran(apps, None)
-    row.refresh_from_db()
-    assert before is not None
-    assert row.options == before | {"prompt_version": "0123456789ab"}
-    assert Contestant.objects.get().frozen_options == row.options
-    assert options_of(Contestant.objects.get()).protocol is ToolProtocol.NATIVE
 
 
 def test_the_command_takes_every_option_and_keeps_contestants_apart(

@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import pytest
 from django.contrib.auth.models import User
+from pytest_django import Settings
 
 from arena.models import Study
 from tests.study_rows import a_study
@@ -17,3 +20,10 @@ def study() -> Study:
 @pytest.fixture
 def eva(study: Study) -> User:
     return User.objects.get(username="eva")
+
+
+@pytest.fixture
+def own_folders(tmp_path: Path, settings: Settings) -> None:
+    settings.MEDIA_ROOT = tmp_path / "media"
+    settings.VAR_DIR = tmp_path / "var"
+    (tmp_path / "var").mkdir()

@@ -19,7 +19,7 @@ from arena.services.shown_pictures import SampleRule, draw_sample
 from arena.services.studies import PlanOptions, open_study, rules_of
 from augment.errors import Conflict
 from augment.models import Augmentation, Contestant, GenerationJob, Scenario
-from tests.jobs.test_options import Scripted, add, run
+from tests.jobs.scripted import Scripted, add, run
 from tests.llm.json_server import serving
 from tests.study_rows import contestant, expert, scenario
 from tests.web.cast import people, signed_in

@@ -18,7 +18,7 @@ from augment.errors import InvalidDocument
 from augment.formats.argoverse2.log import WHAT
 from augment.formats.json_file import read_json
 from augment.formats.road_map import RoadMap, Segment
-from augment.formats.roads import MOST_SEGMENTS
+from augment.formats.strips import MOST_SEGMENTS
 from augment.scene.entities import AreaKind
 from augment.scene.schema import problems_of
 

@@ -21,7 +21,7 @@ from augment.formats.commonroad.fields import (
 )
 from augment.formats.commonroad.lights import Light, lights_of
 from augment.formats.road_map import FloatArray, RoadMap, Segment
-from augment.formats.roads import midline
+from augment.formats.strips import midline
 from augment.formats.xml_file import Element
 from augment.geometry.polyline import Polyline
 from augment.scene.directions import turn_type_of

@@ -19,7 +19,7 @@ from augment.formats.nuplan.geopackage import Layers
 from augment.formats.nuplan.mercator import FloatArray
 from augment.formats.nuplan.sqlite import WHAT, open_tables
 from augment.formats.road_map import RoadMap, Segment
-from augment.formats.roads import RADIUS_M
+from augment.formats.strips import RADIUS_M
 from augment.geometry.polyline import Polyline
 from augment.scene.directions import turn_type_of
 from augment.scene.entities import AreaKind, TrafficLight, TrafficSide, TurnType

@@ -1,0 +1,78 @@
+"""A contestant of chosen options at a server that says the same few things again and again."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from augment.models import Augmentation, Contestant
+from augment.services.endpoints import contestants
+from augment.services.endpoints.known_endpoints import ensure_endpoint
+from augment.services.endpoints.known_models import tell_sight
+from augment.services.running import jobs, runner
+from augment.variants.options import options_from_document
+from tests.jobs.rows import add_scenario
+from tests.llm.json_server import JsonServer
+from tests.scenes import cone, scene
+from tests.variants.playing import car, questions, rating, verdict
+
+CAR = car(21.4, id="Agent9")
+MEAN_3 = rating(3, 3, 3, "Too far left.")
+SCRIPTS = {
+    "otm": [CAR],
+    "fc": [CAR],
+    "tqa": [CAR, MEAN_3],
+    "vqa": [CAR, questions(), "1. yes\n2. yes\n3. yes", verdict()],
+}
+
+Bodies = list[dict[str, Any]]
+
+
+class Scripted(JsonServer):
+    """Says the same few things again and again, and keeps what it was sent."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.refuses: set[str] = set()
+        self.script = [CAR]
+        self.bodies: Bodies = []
+
+    def answer(self, body: dict[str, Any]) -> tuple[int, dict[str, Any]]:
+        for name in sorted(self.refuses & body.keys()):
+            return 400, {
+                "error": {"message": "no", "code": "unsupported_parameter", "param": name}
+            }
+        said = self.script[len(self.bodies) % len(self.script)]
+        if said == CAR:  # another one in each round, so that no review is asked for twice
+            said = car(20.0 + len(self.bodies), id="Agent9")
+        self.bodies.append(body)
+        choice = {"finish_reason": "stop", "message": {"role": "assistant", "content": said}}
+        made = {"id": "1", "object": "chat.completion", "created": 0, "model": body["model"]}
+        return 200, made | {"choices": [{"index": 0} | choice]}
+
+
+def add(server: Scripted, slug: str, variant: str = "otm", **options: object) -> Contestant:
+    ensure_endpoint(label="here", base_url=server.url)
+    server.script = SCRIPTS[variant]
+    made = contestants.add_contestant(
+        slug=slug,
+        variant=variant,
+        endpoint="here",
+        model="m",
+        options=options_from_document(options),
+    )
+    assert made.endpoint is not None
+    tell_sight(endpoint=made.endpoint, model="m", sees=True)
+    return made
+
+
+def run(*slugs: str, samples: int = 1) -> list[Augmentation]:
+    """The rows of a job on one street, by contestant and sample."""
+    if not Augmentation.objects.exists():
+        far = scene(agents=(cone("far", 60.0, 0.0),))
+        add_scenario(
+            "street", scene=far, keep_traffic=True, reference=None, intent=None, intent_origin=""
+        )
+    job = jobs.launch(name="J", contestants=slugs, scenarios=["street"], samples=samples)
+    for row in job.augmentations.order_by("contestant__slug", "sample"):
+        runner.work_on(augmentation_pk=row.pk)
+    return list(job.augmentations.order_by("contestant__slug", "sample"))
