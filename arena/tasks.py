@@ -10,7 +10,7 @@ from celery import shared_task
 
 from arena.exports.scenario_files import write_file
 from arena.services import ratings
-from augment.tasks import open_broker
+from augment.broker import open_broker
 
 
 @shared_task(name="arena.compute_snapshot", acks_late=True, ignore_result=True)

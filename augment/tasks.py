@@ -8,20 +8,19 @@ from __future__ import annotations
 
 import logging
 import os
-from collections.abc import Iterable, Iterator
-from contextlib import contextmanager
+from collections.abc import Iterable
 from datetime import timedelta
 from threading import Event, Thread
 from typing import Any
 
-import redis
 from celery import current_app, shared_task
 from celery.exceptions import Reject
 from celery.signals import worker_ready, worker_shutdown, worker_shutting_down
 from django.conf import settings
 from django.db import connection
 
-from augment.errors import QueueFault, QueueRefused, QueueUnreachable
+from augment import scene_tasks
+from augment.broker import open_broker, send
 from augment.services.clock import DATABASE_TIME, Moment
 from augment.services.judging import marked_pictures, simulations
 from augment.services.running import (
@@ -43,9 +42,6 @@ QUEUE_BEFORE = "celery"
 
 BATCH = 100
 """So many messages are sent before the rows say so; a crash between sends them twice."""
-
-REFUSALS = (redis.ResponseError, redis.AuthenticationError, redis.BusyLoadingError)
-"""What a Redis says that is there and takes no messages: full, read only, loading, locked."""
 
 
 @shared_task(name="augment.run_augmentation", bind=True, acks_late=True, ignore_result=True)
@@ -85,8 +81,7 @@ def enqueue_reading(reading_pk: int) -> None:
     Raises:
         QueueFault: No broker, or it refuses; the reading fails after a while.
     """
-    with open_broker() as broker:
-        read_intent.apply_async((reading_pk,), connection=broker, retry=False)
+    send(read_intent, reading_pk)
 
 
 def enqueue_simulations(ids: Iterable[int]) -> None:
@@ -112,8 +107,7 @@ def enqueue_marks(augmentation_pk: int) -> None:
     Raises:
         QueueFault: No broker, or it refuses.
     """
-    with open_broker() as broker:
-        draw_marks.apply_async((augmentation_pk,), connection=broker, retry=False)
+    send(draw_marks, augmentation_pk)
 
 
 def enqueue(ids: Iterable[int]) -> int:
@@ -146,35 +140,6 @@ def enqueue_job(job_pk: int) -> int:
     return enqueue(leases.find_unsent(older_than=RESEND_AFTER, job_pk=job_pk))
 
 
-def check_broker(*, within_s: float = 5) -> None:
-    """Raise QueueFault unless a broker can be reached and answers within so many seconds."""
-    with open_broker(within_s=within_s):
-        pass
-
-
-@contextmanager
-def open_broker(*, within_s: float = 5) -> Iterator[Any]:
-    """A connection that works, tried once; what breaks inside the block is named as well.
-
-    Args:
-        within_s: How long it may take to connect, and to answer.
-
-    Raises:
-        QueueUnreachable: No broker.
-        QueueRefused: It takes no messages.
-    """
-    with current_app.connection_for_write() as broker:
-        broker.transport_options |= {
-            "socket_connect_timeout": within_s,
-            "socket_timeout": within_s,
-        }
-        try:
-            broker.ensure_connection(max_retries=1, interval_start=0, timeout=within_s)
-            yield broker
-        except (run_augmentation.OperationalError, redis.RedisError) as error:
-            raise _fault(broker, error) from error
-
-
 def recover(*, now: Moment = DATABASE_TIME, at_start: bool = False) -> None:
     """Take back what dead workers held, finish what is over and send what has no message.
 
@@ -195,6 +160,7 @@ def recover(*, now: Moment = DATABASE_TIME, at_start: bool = False) -> None:
     simulations.requeue_stale(now=now, older_than=stale_after)
     lost_after = timedelta(0) if at_start else _lost_after(run_simulation)
     enqueue_simulations(simulations.find_unsent(now=now, older_than=lost_after))
+    scene_tasks.resend_lost(now=now)
 
 
 @worker_ready.connect
@@ -244,18 +210,6 @@ def _be_present(presence: workers.Presence) -> None:
             connection.close()
         ended.wait(settings.HEARTBEAT_S)
     connection.close()
-
-
-def _fault(broker: Any, error: Exception) -> QueueFault:
-    """What a failed message means: nobody there, or somebody who refuses."""
-    # The password is masked, and the mask is shown even where there is none.
-    address = broker.as_uri() if broker.password else broker.as_uri().replace(":**@", "")
-    first: BaseException | None = error
-    while first is not None:
-        if isinstance(first, REFUSALS):
-            return QueueRefused(address, str(first))
-        first = first.__cause__
-    return QueueUnreachable(address)
 
 
 def _lost_after(task: Any) -> timedelta:

@@ -209,6 +209,14 @@ STORAGES: dict[str, dict[str, Any]] = {
 }
 WHITENOISE_KEEP_ONLY_HASHED_FILES = True
 
+# Files by which somebody sends something; larger ones are let pass by unread.
+UPLOAD_MB = env.integer("ARENA_UPLOAD_MB", default=200, low=1, high=4096)
+FILE_UPLOAD_HANDLERS = [
+    "arena.config.uploads.BoundedUpload",
+    "django.core.files.uploadhandler.MemoryFileUploadHandler",
+    "django.core.files.uploadhandler.TemporaryFileUploadHandler",
+]
+
 # --- Background work ---------------------------------------------------------------------------
 
 # Without REDIS_URL every process of this folder meets on one socket, where `manage.py serve`
@@ -234,6 +242,10 @@ CELERY_TASK_QUEUES: dict[str, dict[str, str]] = {"models": {}, "drawing": {}, "c
 CELERY_TASK_ROUTES = {
     "augment.draw_marks": {"queue": "drawing"},
     "augment.run_simulation": {"queue": "drawing"},
+    "augment.read_upload": {"queue": "drawing"},
+    "augment.read_moment": {"queue": "drawing"},
+    "augment.draw_scene": {"queue": "drawing"},
+    "augment.draw_scenario": {"queue": "drawing"},
     "arena.compute_snapshot": {"queue": "drawing"},
     "arena.write_scenario_file": {"queue": "drawing"},
 }

@@ -8,7 +8,7 @@ from django.core.files.base import File
 from django.core.files.storage import FileSystemStorage
 
 from arena.config import private
-from arena.exports.files import write_whole
+from arena.exports.files import write_pieces
 from augment.errors import MediaFault
 
 
@@ -29,7 +29,7 @@ class WholeFiles(FileSystemStorage):
         path = Path(self.path(name))
         try:
             private.make_folder(path.parent)
-            write_whole(path, content.read(), mode=private.FILE)
+            write_pieces(path, content.chunks(), mode=private.FILE)
         except OSError as fault:  # a full disk, a folder that somebody took away
             cause = fault.strerror or str(fault)
             raise MediaFault("write", name, str(self.location), cause) from fault

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 import tempfile
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
@@ -20,7 +20,16 @@ def write_whole(path: Path, content: bytes, *, mode: int = 0o644) -> None:
     Raises:
         OSError: The folder does not exist or can't be written to; the old file stays.
     """
-    with _beside(path, content) as written:
+    write_pieces(path, [content], mode=mode)
+
+
+def write_pieces(path: Path, pieces: Iterable[bytes], *, mode: int = 0o644) -> None:
+    """The same for what is too large to be held at once.
+
+    Raises:
+        OSError: The folder does not exist or can't be written to; the old file stays.
+    """
+    with _beside(path, pieces) as written:
         written.chmod(mode)
         written.replace(path)
 
@@ -31,17 +40,17 @@ def write_once(path: Path, content: bytes) -> None:
     Raises:
         OSError: The folder does not exist or can't be written to.
     """
-    with _beside(path, content) as written, suppress(FileExistsError):
+    with _beside(path, [content]) as written, suppress(FileExistsError):
         os.link(written, path)
 
 
 @contextmanager
-def _beside(path: Path, content: bytes) -> Iterator[Path]:
-    """A file of this content in the folder of path, for its owner only; gone afterwards."""
+def _beside(path: Path, pieces: Iterable[bytes]) -> Iterator[Path]:
+    """A file of these pieces in the folder of path, for its owner only; gone afterwards."""
     handle, name = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.")
     try:
         with os.fdopen(handle, "wb") as file:
-            file.write(content)
+            file.writelines(pieces)
             file.flush()
             os.fsync(file.fileno())
         yield Path(name)

@@ -35,7 +35,10 @@ class Shell:
 
 _SECTIONS: dict[str, tuple[Promise, frozenset[str]]] = {
     "home": (_("Home"), frozenset({"home"})),
-    "scenarios": (_("Scenarios"), frozenset({"scenarios", "scenario"})),
+    "scenarios": (
+        _("Scenarios"),
+        frozenset({"scenarios", "scenario", "scenes", "scene", "upload"}),
+    ),
     "contestants": (_("Contestants"), frozenset({"contestants", "contestant"})),
     "jobs": (_("Jobs"), frozenset({"jobs", "job-new", "job", "faults", "augmentation"})),
     "studies": (

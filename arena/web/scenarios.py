@@ -18,7 +18,14 @@ from arena.web.access import STAFF, allow_only
 from arena.web.asking import asking_of
 from arena.web.pictures import picture_response
 from augment.errors import QueueFault
-from augment.models import Augmentation, EndpointModel, Scenario, Simulation
+from augment.models import (
+    Augmentation,
+    BaseScene,
+    EndpointModel,
+    Scenario,
+    Simulation,
+    UploadMoment,
+)
 from augment.services.judging.displacement import of_augmentation
 from augment.services.judging.findings import Checked, check_augmentation
 from augment.services.running.transcript_export import transcript_of
@@ -26,6 +33,7 @@ from augment.services.running.transcript_steps import totals_of, tries_of
 from augment.services.running.transcripts import IMAGES
 from augment.services.scenarios.intents import last_reading, statements_of, waiting_reading
 from augment.services.scenarios.scene_notes import notes_of
+from augment.services.scenarios.scene_pictures import SceneView, reference_picture, scene_picture
 from augment.services.wording import translate
 from augment.tasks import enqueue_marks
 
@@ -126,6 +134,14 @@ def picture(request: HttpRequest, kind: str, code: uuid.UUID) -> HttpResponseBas
     elif kind == "marked":
         found = check_augmentation(_augmentation(code))
         name = "" if found is None else found.picture
+    elif kind == "moment":
+        name = get_object_or_404(UploadMoment.objects.only("picture"), code=code).picture
+    elif kind == "reference":
+        rows = Scenario.objects.select_related("base_scene")
+        name = reference_picture(get_object_or_404(rows, code=code))
+    elif kind in list(SceneView):
+        rows_of_scenes = BaseScene.objects.defer("recording")
+        name = scene_picture(get_object_or_404(rows_of_scenes, code=code), SceneView(kind))
     else:
         raise Http404
     return picture_response(name)

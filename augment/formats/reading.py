@@ -7,7 +7,7 @@ is wrong with the file is raised as `InvalidDocument`.
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Protocol
 
@@ -25,10 +25,12 @@ class Moment:
         item: Which part of a file that holds several; None where there is one. A number of a
             record, a planning problem, a lidar_pc token.
         frame: The step of it, from 0.
+        time_s: Since the first step of its part; None where there is one step alone.
     """
 
     item: str | None = None
     frame: int = 0
+    time_s: float | None = field(default=None, compare=False)
 
     def __str__(self) -> str:
         return f"frame {self.frame}" if self.item is None else f"{self.item}, frame {self.frame}"

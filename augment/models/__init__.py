@@ -14,6 +14,7 @@ from augment.models.readings import IntentReading
 from augment.models.scenes import SLUG_HELP, BaseScene, Scenario
 from augment.models.simulations import Simulation
 from augment.models.triggers import after_migrations, before_migrations
+from augment.models.uploads import SceneUpload, UploadMoment
 from augment.models.workers import Worker
 
 __all__ = [
@@ -31,8 +32,10 @@ __all__ = [
     "IntentReading",
     "ModelCall",
     "Scenario",
+    "SceneUpload",
     "Simulation",
     "TranscriptNote",
+    "UploadMoment",
     "Worker",
     "after_migrations",
     "before_migrations",

@@ -96,6 +96,10 @@ class Camera:
         )
 
 
+AROUND_THE_EGO = Camera(x_min_m=-60.0, x_max_m=100.0, y_min_m=-60.0, y_max_m=60.0, px_per_m=10.0)
+"""The same for every scene, and wide: on it objects are placed by hand."""
+
+
 @dataclass(frozen=True, slots=True)
 class _Need:
     """What a window must hold, in whole metres: low and high corner."""

@@ -10,6 +10,7 @@ from django.core.management import CommandError, call_command
 from django.utils import timezone
 
 from augment import tasks
+from augment.broker import check_broker
 from augment.errors import QueueUnreachable
 from augment.management.commands.generate import Command
 from augment.models import Augmentation, GenerationJob
@@ -78,7 +79,7 @@ def test_without_a_broker_the_error_names_the_address_and_the_rows_wait(no_broke
 def test_the_address_of_a_broker_is_named_without_its_password(no_broker: None) -> None:
     current_app.conf.broker_url = "redis://:sekret@127.0.0.1:1/0"
     with pytest.raises(QueueUnreachable) as caught:
-        tasks.check_broker()
+        check_broker()
     assert "127.0.0.1:1" in str(caught.value)
     assert "sekret" not in str(caught.value)
 

@@ -15,10 +15,10 @@ from pytest_django import Settings
 
 from arena.serving import readiness
 from arena.serving.readiness import HeldLook, PartState
+from augment.broker import check_broker
 from augment.errors import QueueUnreachable
 from augment.models import Worker
 from augment.services.clock import DATABASE_TIME
-from augment.tasks import check_broker
 from tests.study_rows import a_study, matchups_of, vote
 from tests.web.cast import people, signed_in
 

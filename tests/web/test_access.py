@@ -12,7 +12,7 @@ from arena.services.authorships import mark_author
 from arena.services.invitations import invite
 from arena.services.studies import close_study
 from arena.web.urls import urlpatterns
-from augment.models import Simulation
+from augment.models import SceneUpload, Simulation, UploadMoment
 from tests.web.cast import World, people, signed_in, status, world
 
 pytestmark = pytest.mark.django_db
@@ -47,6 +47,9 @@ PAGES: dict[str, tuple[int, int, int]] = {
     "people": (200, 403, 403),
     "person-forget": (200, 403, 403),  # a question
     "password": (200, 200, 200),
+    "scenes": (200, 200, 403),
+    "scene": (200, 200, 403),
+    "upload": (200, 200, 403),
     "scenarios": (200, 200, 403),
     "scenario": (200, 200, 403),
     "intent": (200, 200, 403),
@@ -72,6 +75,11 @@ ACTIONS: dict[str, tuple[int, int, int]] = {
     "job-pause": (302, 403, 403),
     "contestant-retired": (302, 403, 403),
     "catalogue-load": (302, 403, 403),
+    "scene-send": (302, 302, 403),
+    "upload-show": (302, 302, 403),
+    "upload-again": (302, 302, 403),
+    "upload-remove": (302, 404, 403),  # gone by then
+    "moment-keep": (302, 302, 403),
     "job-simulate": (302, 403, 403),
     "scenarios-write": (302, 302, 403),
     "invite": (200, 403, 403),
@@ -137,6 +145,7 @@ def address(name: str, here: World) -> str:
         "augmentation": {"code": here.augmentation.code},
         "transcript": {"code": here.augmentation.code},
         "asked-image": {"digest": "0" * 64},
+        "scene": {"code": here.augmentation.scenario.base_scene.code},
         "scenario": {"code": here.augmentation.scenario.code},
         "intent": {"code": here.augmentation.scenario.code},
         "set-intent": {"code": here.augmentation.scenario.code},
@@ -159,6 +168,10 @@ def address(name: str, here: World) -> str:
         )
         form = {} if name == "drive" else {"form": "json"}
         arguments[name] = {"code": row.code, **form}
+    if name.startswith(("upload", "moment-")):
+        upload, _ = SceneUpload.objects.get_or_create(name="log.zip", size_bytes=1, state="failed")
+        moment, _ = UploadMoment.objects.get_or_create(upload=upload)
+        arguments[name] = {"code": moment.code if name == "moment-keep" else upload.code}
     if name == "revoke":
         made = invite(study=here.study, expert=here.expert)
         arguments["revoke"] = {"code": made.invitation.code}

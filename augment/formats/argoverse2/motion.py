@@ -80,8 +80,9 @@ class ArgoverseMotion:
         """Steps in which the ego is there."""
         log = _read(_scenario_file(path), EGO).log
         frames = np.flatnonzero(np.isfinite(log.ego).all(axis=1))
-        for index in frames_every(log.times_s[frames].tolist(), every_s):
-            yield Moment(frame=int(frames[index]))
+        times_s = log.times_s[frames].tolist()
+        for index in frames_every(times_s, every_s):
+            yield Moment(frame=int(frames[index]), time_s=times_s[index] - times_s[0])
 
     def read(self, path: Path, *, item: str | None, frame: int | None, name: str) -> Reading:
         """The scene at one step, and what was recorded to the end of the scenario."""

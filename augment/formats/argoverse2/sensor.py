@@ -37,8 +37,9 @@ class ArgoverseSensor:
     def moments(self, path: Path, *, every_s: float) -> Iterator[Moment]:
         """Sweeps that far apart."""
         _check_folder(path)
-        for frame in frames_every(read_log(path).times_s.tolist(), every_s):
-            yield Moment(frame=frame)
+        times_s = read_log(path).times_s.tolist()
+        for frame in frames_every(times_s, every_s):
+            yield Moment(frame=frame, time_s=times_s[frame] - times_s[0])
 
     def read(self, path: Path, *, item: str | None, frame: int | None, name: str) -> Reading:
         """The scene at one annotated sweep, and what was recorded to the end of the log."""

@@ -65,7 +65,8 @@ class CommonRoad:
             if one.type is AgentType.VEHICLE and not one.stands:
                 times_s = [state.step * step_s for state in one.states]
                 for index in frames_every(times_s, every_s):
-                    yield Moment(item=str(one.id), frame=one.states[index].step)
+                    step, time_s = one.states[index].step, times_s[index] - times_s[0]
+                    yield Moment(item=str(one.id), frame=step, time_s=time_s)
 
     def read(self, path: Path, *, item: str | None, frame: int | None, name: str) -> Reading:
         """The scene of one ego at one time step."""

@@ -61,7 +61,7 @@ class NuPlan:
             raise InvalidDocument(WHAT, [("lidar_pc", "has no row")])
         times_s = [(time - tokens[0][1]) * 1e-6 for _, time in tokens]
         for index in frames_every(times_s, every_s):
-            yield Moment(item=tokens[index][0])
+            yield Moment(item=tokens[index][0], time_s=times_s[index])
 
     def read(self, path: Path, *, item: str | None, frame: int | None, name: str) -> Reading:
         """The scene at one lidar_pc, and half a minute from there on."""

@@ -67,8 +67,10 @@ class ScenarioNet:
             log, _ = _log(_description(path if item is None else file_in(path, item)))
             seen = np.isfinite(log.ego).all(axis=1)
             frames = np.flatnonzero(seen)
-            for index in frames_every(log.times_s[seen].tolist(), every_s):
-                yield Moment(item=item, frame=int(frames[index]))
+            times_s = log.times_s[seen].tolist()
+            for index in frames_every(times_s, every_s):
+                time_s = times_s[index] - times_s[0]
+                yield Moment(item=item, frame=int(frames[index]), time_s=time_s)
 
     def read(self, path: Path, *, item: str | None, frame: int | None, name: str) -> Reading:
         """The scene at one step."""

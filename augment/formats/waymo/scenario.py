@@ -52,7 +52,8 @@ class WaymoMotion:
         for number, payload in read_records(path):
             times_s, _ = read_times(payload)
             for frame in frames_every(times_s, every_s):
-                yield Moment(item=str(number), frame=frame)
+                time_s = times_s[frame] - times_s[0]
+                yield Moment(item=str(number), frame=frame, time_s=time_s)
 
     def read(self, path: Path, *, item: str | None, frame: int | None, name: str) -> Reading:
         """The scene at one step of one record."""

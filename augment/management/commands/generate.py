@@ -11,6 +11,7 @@ from django.core.management.base import CommandError
 from django.db import transaction
 from django.utils import timezone
 
+from augment.broker import check_broker
 from augment.errors import AugmentError
 from augment.formats.yaml_file import read_yaml_file
 from augment.management.arguments import add_cap_arguments, caps_of
@@ -28,7 +29,7 @@ from augment.services.running.summary import (
     count_rows,
 )
 from augment.services.terminal import TerminalCommand
-from augment.tasks import check_broker, enqueue_job
+from augment.tasks import enqueue_job
 
 POLL_S = 0.5
 HINT_AFTER_S = 10.0

@@ -8,6 +8,7 @@ from typing import Any
 from django.core.management.base import CommandError
 from django.db import transaction
 
+from augment.broker import check_broker
 from augment.errors import AugmentError
 from augment.management.arguments import add_cap_arguments, caps_of
 from augment.services.running import caps, jobs, pausing
@@ -15,7 +16,7 @@ from augment.services.running.budget import limit_of
 from augment.services.running.choosing import find_job
 from augment.services.running.summary import count_rows
 from augment.services.terminal import TerminalCommand
-from augment.tasks import check_broker, enqueue_job
+from augment.tasks import enqueue_job
 
 
 class Command(TerminalCommand):

@@ -8,6 +8,7 @@ from typing import Any
 from django.core.management.base import CommandError
 from django.db import transaction
 
+from augment.broker import check_broker
 from augment.errors import AugmentError, UnknownName
 from augment.models import Scenario, Simulation
 from augment.services.judging import simulations
@@ -15,7 +16,7 @@ from augment.services.judging.driving_scores import DrivingScores, scores_of_job
 from augment.services.judging.simulations import SCORES, Options
 from augment.services.running.choosing import find_job
 from augment.services.terminal import TerminalCommand
-from augment.tasks import check_broker, enqueue_simulations
+from augment.tasks import enqueue_simulations
 
 
 class Command(TerminalCommand):

@@ -1,0 +1,36 @@
+"""How large a file may be that comes by a form, before any page has looked at it."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from django.conf import settings
+from django.core.files.uploadhandler import FileUploadHandler, SkipFile
+
+from arena.web.sending import FILE_TOO_LARGE
+
+
+class BoundedUpload(FileUploadHandler):
+    """Stands before the handlers that keep a file, and skips the rest of one that is too large.
+
+    The other fields of the form are read all the same, so that its page can say what was wrong.
+    """
+
+    _left = 0
+
+    def new_file(self, *arguments: Any, **named: Any) -> None:
+        """Begin to count."""
+        super().new_file(*arguments, **named)
+        self._left = settings.UPLOAD_MB * 1_000_000
+
+    def receive_data_chunk(self, raw_data: bytes, start: int) -> bytes:
+        """Hand the piece on, or skip what is left of the file."""
+        self._left -= len(raw_data)
+        if self._left < 0:
+            if self.request is not None:
+                self.request.META[FILE_TOO_LARGE] = True
+            raise SkipFile
+        return raw_data
+
+    def file_complete(self, file_size: int) -> None:
+        """Others keep it."""

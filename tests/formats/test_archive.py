@@ -1,0 +1,133 @@
+"""Zips from strangers: unpacked whole within bounds, or refused in a sentence."""
+
+from __future__ import annotations
+
+import stat
+import struct
+import zipfile
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from augment.errors import InvalidDocument
+from augment.formats.archive import ZipBounds, find_input, unpack_zip
+from augment.formats.readers import READERS
+from tests.formats.av2_logs import write_log
+
+SMALL = ZipBounds(entries=20, bytes=3_000_000, ratio=50)
+
+
+def packed(path: Path, files: dict[str, bytes], *, kind: int = stat.S_IFREG) -> Path:
+    with zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED) as made:
+        for name, content in files.items():
+            entry = zipfile.ZipInfo(name)
+            entry.compress_type = zipfile.ZIP_DEFLATED
+            entry.external_attr = (kind | 0o644) << 16
+            made.writestr(entry, content)
+    return path
+
+
+def folder_as_zip(path: Path, folder: Path) -> Path:
+    with zipfile.ZipFile(path, "w") as made:
+        for file in sorted(folder.rglob("*")):
+            made.write(file, file.relative_to(folder.parent))
+    return path
+
+
+def test_a_log_folder_comes_out_as_it_went_in(tmp_path: Path) -> None:
+    log = write_log(tmp_path / "log")
+    into = tmp_path / "into"
+    into.mkdir()
+    unpack_zip(folder_as_zip(tmp_path / "log.zip", log), into)
+    reader, path = find_input(into, list(READERS.values()))
+    assert (reader.name, path) == ("av2", into / "log")
+    for file in (one for one in log.rglob("*") if one.is_file()):
+        assert (into / "log" / file.relative_to(log)).read_bytes() == file.read_bytes()
+
+
+NAMES = ["../out", "/etc/passwd", "a/../../out", "c:\\out", "a\\b", "a:b", "x" * 300, "a\nb"]
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_no_name_leads_out_of_the_folder(tmp_path: Path, name: str) -> None:
+    refuse(tmp_path, packed(tmp_path / "z.zip", {"fine": b"1", name: b"2"}), "no name within")
+
+
+@pytest.mark.parametrize(
+    ("make", "problem"),
+    [
+        (lambda p: packed(p, {"a": b"\0" * 2_900_000}), "more than 50 times its size"),
+        (lambda p: packed(p, {f"{n}": b"1" for n in range(21)}), "21 entries, at most 20"),
+        (lambda p: packed(p, {f"{n}": bytes(200_000) for n in range(16)}), "unpacks to 3200000"),
+        (lambda p: packed(p, {"link": b"/etc/passwd"}, kind=stat.S_IFLNK), "link or a special"),
+        (lambda p: packed(p, {"pipe": b""}, kind=stat.S_IFIFO), "link or a special"),
+        (lambda p: packed(p, {"a": b"1", "A": b"2"}), "is there twice"),
+        (lambda p: packed(p, {}), "holds no file"),
+        (lambda p: garbage(p), "is broken"),
+        (lambda p: cut(packed(p, {"a": bytes(range(256)) * 50})), "is broken"),
+        (lambda p: wrong_checksum(packed(p, {"a": b"hello"})), "is broken"),
+        (lambda p: encrypted(packed(p, {"a": b"hello"})), "is encrypted"),
+        (lambda p: understated(packed(p, {"a": bytes(2_000)})), "broken|more than it says"),
+    ],
+)
+def test_what_breaks_the_rules_is_refused(
+    tmp_path: Path, make: Callable[[Path], Path], problem: str
+) -> None:
+    refuse(tmp_path, make(tmp_path / "z.zip"), problem)
+
+
+def refuse(tmp_path: Path, path: Path, problem: str) -> None:
+    into = tmp_path / "deep" / "into"
+    into.mkdir(parents=True)
+    with pytest.raises(InvalidDocument, match=problem):
+        unpack_zip(path, into, bounds=SMALL)
+    outside = {one.name for one in (tmp_path / "deep").iterdir()} | {
+        one.name for one in tmp_path.iterdir()
+    }
+    assert outside == {"into", "deep", "z.zip"}
+
+
+def garbage(path: Path) -> Path:
+    path.write_bytes(b"PK\x03\x04" + b"nothing" * 40)
+    return path
+
+
+def cut(path: Path) -> Path:
+    path.write_bytes(path.read_bytes()[:-30])
+    return path
+
+
+def wrong_checksum(path: Path) -> Path:
+    data = bytearray(path.read_bytes())
+    data[data.index(b"PK\x01\x02") + 16] ^= 0xFF
+    path.write_bytes(data)
+    return path
+
+
+def encrypted(path: Path) -> Path:
+    data = bytearray(path.read_bytes())
+    data[data.index(b"PK\x01\x02") + 8] |= 1
+    path.write_bytes(data)
+    return path
+
+
+def understated(path: Path) -> Path:
+    """The list of contents says 10 bytes where 2,000 come."""
+    data = bytearray(path.read_bytes())
+    struct.pack_into("<I", data, data.index(b"PK\x01\x02") + 24, 10)
+    path.write_bytes(data)
+    return path
+
+
+def test_several_recordings_are_named_and_nothing_is_chosen(tmp_path: Path) -> None:
+    for name in ("one", "two"):
+        write_log(tmp_path / "into" / name)
+    with pytest.raises(InvalidDocument, match=r"holds 2 recordings.*one \(av2\), two \(av2\)"):
+        find_input(tmp_path / "into", list(READERS.values()))
+
+
+def test_a_folder_without_a_recording_says_what_could_be_read(tmp_path: Path) -> None:
+    (tmp_path / "notes.txt").write_text("hello")
+    with pytest.raises(InvalidDocument, match="nothing in it is av2: "):
+        find_input(tmp_path, list(READERS.values()))

@@ -1,0 +1,197 @@
+"""A recording that comes by a page: kept, read by a worker, drawn, kept as a scene."""
+
+from __future__ import annotations
+
+import json
+import zipfile
+from datetime import timedelta
+from io import BytesIO
+from pathlib import Path
+
+import pytest
+from django.contrib.auth.models import User
+from django.core.files.base import ContentFile
+from django.core.files.storage import default_storage
+from django.utils import timezone
+
+from augment.errors import Conflict, InvalidDocument, UnknownName
+from augment.models import BaseScene, Event, SceneUpload, UploadMoment
+from augment.scene.codec import scene_to_document
+from augment.services.scenarios import upload_moments, uploads
+from tests.formats.av2_logs import write_log
+from tests.scenes import scene
+
+pytestmark = pytest.mark.django_db
+
+
+@pytest.fixture
+def log(tmp_path: Path) -> bytes:
+    folder, packed = write_log(tmp_path / "log"), BytesIO()
+    with zipfile.ZipFile(packed, "w") as made:
+        for file in sorted(folder.rglob("*")):
+            made.write(file, file.relative_to(tmp_path))
+    return packed.getvalue()
+
+
+def sent(content: bytes, name: str = "log.zip", source: str = "") -> SceneUpload:
+    return uploads.keep_upload(name=name, content=ContentFile(content), source=source)
+
+
+def read(row: SceneUpload) -> SceneUpload:
+    uploads.read_upload(row.pk)
+    row.refresh_from_db()
+    return row
+
+
+def looked_at(row: SceneUpload, frame: int) -> UploadMoment:
+    moment, is_new = upload_moments.ask_for_moment(row, item="", frame=frame)
+    assert is_new
+    upload_moments.work_on_moment(moment.pk)
+    moment.refresh_from_db()
+    return moment
+
+
+def test_a_zip_of_a_log_becomes_a_scene_at_the_moment_that_was_chosen(log: bytes) -> None:
+    ada = User.objects.create_user("ada")
+    row = read(sent(log))
+    assert (row.state, row.format, row.reason) == ("read", "av2", "")
+    assert [stop["frame"] for stop in row.tracks[0]["stops"]] == [0]  # 0.4 s of recording
+    row.tracks[0]["stops"].append({"item": "", "frame": 2, "time_s": 0.2, "place_m": None})
+    row.save()
+    moment = looked_at(row, 2)
+    assert (moment.state, moment.reason) == ("drawn", "")
+    with default_storage.open(moment.picture) as picture:
+        assert picture.read(4) == b"\x89PNG"
+    assert moment.report is not None
+    assert (moment.report["lanes"], moment.report["recorded_s"]) == (5, 0.2)
+    assert any("limit" in str(note) for note in upload_moments.sentences_of(moment))
+    upload_moments.ask_to_keep(moment, slug="by-the-page", actor=ada)
+    upload_moments.work_on_moment(moment.pk)
+    moment.refresh_from_db()
+    kept = BaseScene.objects.get(slug="by-the-page")
+    assert (moment.state, moment.scene) == ("kept", kept)
+    assert kept.recording is not None
+    assert len(kept.recording["times_s"]) == 3
+    assert "frame 2 of 5" in kept.provenance
+    event = Event.objects.get(verb="import")
+    assert event.after is not None
+    assert (event.actor, event.after["frame"]) == (ada, 2)
+
+
+def test_a_second_message_finds_nothing_to_do(log: bytes) -> None:
+    row = read(sent(log))
+    moment = looked_at(row, 0)
+    upload_moments.work_on_moment(moment.pk)
+    uploads.read_upload(row.pk)
+    row.refresh_from_db()
+    assert row.attempts == 1
+    again, is_new = upload_moments.ask_for_moment(row, item="", frame=0)
+    assert (again, is_new, again.attempts) == (moment, False, 1)
+
+
+@pytest.mark.parametrize(
+    ("content", "name", "reason"),
+    [
+        (b"hello", "notes.txt", "none of the formats"),
+        (b"PK\x03\x04 and nothing", "log.zip", "is broken"),
+        (b"{}", "scene.json", "none of the formats"),
+        (b'{"format": "scenario-arena/scene"', "scene.json", "scene.json"),
+    ],
+)
+def test_what_can_not_be_read_is_told_and_leaves_no_scene(
+    content: bytes, name: str, reason: str
+) -> None:
+    row = read(sent(content, name))
+    assert (row.state, row.tracks) == ("failed", [])
+    assert reason in row.reason
+    assert not BaseScene.objects.exists()
+
+
+def test_a_file_that_ends_worker_after_worker_is_given_up(log: bytes) -> None:
+    row = sent(log)
+    SceneUpload.objects.filter(pk=row.pk).update(state="running", attempts=2)
+    row = read(row)
+    assert row.state == "failed"
+    assert "2 workers ended" in row.reason
+    uploads.read_again(row)
+    assert read(row).state == "read"
+    with pytest.raises(Conflict, match="did not fail"):
+        uploads.read_again(row)
+
+
+def test_what_waits_too_long_is_sent_again(log: bytes) -> None:
+    row = sent(log)
+    uploads.mark_sent(row.pk)
+    assert uploads.find_lost() == []
+    later = timezone.now() + timedelta(minutes=11)
+    assert uploads.find_lost(now=later) == [row.pk]
+    moment, _ = upload_moments.ask_for_moment(read(row), item="", frame=0)
+    upload_moments.mark_sent(moment.pk)
+    assert upload_moments.find_lost(now=later) == [moment.pk]
+    assert uploads.find_lost(now=later) == []
+
+
+def test_the_same_scene_is_kept_once_and_a_taken_name_says_so(log: bytes) -> None:
+    BaseScene.objects.create(slug="taken", document={}, source="json", provenance="here")
+    row = read(sent(log))
+    moment = looked_at(row, 0)
+    upload_moments.ask_to_keep(moment, slug="taken")
+    upload_moments.work_on_moment(moment.pk)
+    moment.refresh_from_db()
+    assert moment.state == "drawn"
+    assert "called 'taken' already" in moment.reason
+    with pytest.raises(InvalidDocument, match="slug"):
+        upload_moments.ask_to_keep(moment, slug="Not A Slug")
+    for slug in ("first", "second"):
+        moment.state = "drawn"
+        moment.save()
+        upload_moments.ask_to_keep(moment, slug=slug)
+        upload_moments.work_on_moment(moment.pk)
+        moment.refresh_from_db()
+        assert moment.scene is not None
+        assert moment.scene.slug == "first"
+
+
+def test_only_moments_that_are_offered_are_read(log: bytes) -> None:
+    row = read(sent(log))
+    with pytest.raises(Conflict, match="no such moment"):
+        upload_moments.ask_for_moment(row, item="../x", frame=0)
+    assert not UploadMoment.objects.exists()
+
+
+def test_a_removed_file_is_gone_and_its_scenes_stay(log: bytes) -> None:
+    row = read(sent(log))
+    moment = looked_at(row, 0)
+    upload_moments.ask_to_keep(moment, slug="stays")
+    upload_moments.work_on_moment(moment.pk)
+    uploads.remove_upload(row)
+    assert not SceneUpload.objects.exists()
+    assert BaseScene.objects.filter(slug="stays").exists()
+
+
+def test_an_empty_file_or_an_unknown_format_stores_nothing() -> None:
+    with pytest.raises(Conflict, match="empty"):
+        sent(b"")
+    with pytest.raises(UnknownName, match="osm"):
+        sent(b"1", source="osm")
+    assert not SceneUpload.objects.exists()
+
+
+@pytest.mark.parametrize(
+    ("given", "kept"),
+    [
+        ("../../etc/passwd", "passwd"),
+        ("a b/ü?.json", "json"),
+        ("C:\\logs\\my log.zip", "my-log.zip"),
+        ("...", "file"),
+        ("x" * 200 + ".json", "x" * 60 + "x" * 35 + ".json"),
+    ],
+)
+def test_a_name_is_kept_in_plain_letters(given: str, kept: str) -> None:
+    assert uploads.plain_name(given) == kept
+
+
+def test_a_scene_in_our_own_json_is_one_moment(tmp_path: Path) -> None:
+    row = read(sent(json.dumps(scene_to_document(scene())).encode(), "street.json"))
+    assert (row.format, len(row.tracks), len(row.tracks[0]["stops"])) == ("json", 1, 1)
+    assert row.tracks[0]["stops"][0]["place_m"] == [0.0, 0.0]

@@ -1,0 +1,97 @@
+"""Sending a recording and choosing its moment, page by page; workers run in this process."""
+
+from __future__ import annotations
+
+import json
+
+import pytest
+from django.conf import LazySettings
+from django.core.files.uploadedfile import SimpleUploadedFile
+from django.test import Client
+from django.urls import reverse
+
+from augment.models import BaseScene, SceneUpload, UploadMoment
+from augment.scene.codec import scene_to_document
+from augment.services.scenarios import scene_pictures, upload_moments, uploads
+from tests.scenes import scene, vehicle
+from tests.web.cast import people, signed_in
+
+pytestmark = pytest.mark.django_db
+STREET = json.dumps(scene_to_document(scene(agents=(vehicle("Agent2", 20.0, 0.0),)))).encode()
+
+
+@pytest.fixture
+def analyst() -> Client:
+    return signed_in(people()["analyst"])
+
+
+@pytest.fixture(autouse=True)
+def working(monkeypatch: pytest.MonkeyPatch, django_capture_on_commit_callbacks: object) -> None:
+    """What is sent to a worker is done at once."""
+    monkeypatch.setattr("arena.web.uploads.enqueue_upload", uploads.read_upload)
+    monkeypatch.setattr("arena.web.uploads.enqueue_moment", upload_moments.work_on_moment)
+    monkeypatch.setattr("arena.web.scenes.enqueue_scene", scene_pictures.draw_scene)
+    monkeypatch.setattr("arena.web.sending.transaction.on_commit", lambda done: done())
+
+
+def send(client: Client, content: bytes = STREET, name: str = "street.json") -> str:
+    file = SimpleUploadedFile(name, content)
+    answer = client.post(reverse("scene-send"), {"file": file, "format": ""}, follow=True)
+    return answer.content.decode()
+
+
+def is_picture(client: Client, address: str) -> bool:
+    answer = client.get(address)
+    return b"".join(answer).startswith(b"\x89PNG")
+
+
+def test_from_a_file_to_a_scene(analyst: Client) -> None:
+    assert "Choose the moment" in send(analyst)
+    row = SceneUpload.objects.get()
+    shown = analyst.post(
+        reverse("upload-show", args=[row.code]), {"track": "0", "stop": "0"}, follow=True
+    ).content.decode()
+    moment = UploadMoment.objects.get()
+    picture = reverse("picture", args=["moment", moment.code])
+    assert picture in shown
+    assert is_picture(analyst, picture)
+    shown = analyst.post(
+        reverse("moment-keep", args=[moment.code]), {"slug": "main-street"}, follow=True
+    ).content.decode()
+    scene_row = BaseScene.objects.get()
+    page = reverse("scene", args=[scene_row.code])
+    assert (scene_row.slug, page in shown) == ("main-street", True)
+    analyst.get(page)
+    for view in ("kept", "cleared", "backdrop"):
+        assert is_picture(analyst, reverse("picture", args=[view, scene_row.code]))
+    assert "picture" in analyst.get(page).content.decode()
+
+
+def test_what_can_not_be_read_says_why(analyst: Client) -> None:
+    shown = send(analyst, b"hello", "notes.txt")
+    assert "It can’t be read." in shown
+    assert "none of the formats" in shown
+
+
+def test_a_file_that_is_too_large_is_not_kept(analyst: Client, settings: LazySettings) -> None:
+    settings.UPLOAD_MB = 1
+    shown = send(analyst, b" " * 1_000_001)
+    assert "at most 1 MB are taken" in shown
+    assert not SceneUpload.objects.exists()
+    assert "Choose the moment" in send(analyst, STREET + b" " * (1_000_000 - len(STREET)))
+
+
+def test_a_moment_that_is_not_there_is_told(analyst: Client) -> None:
+    send(analyst)
+    row = SceneUpload.objects.get()
+    for track, stop in (("0", "1"), ("1", "0"), ("0", "-1"), ("x", "0"), ("0", "")):
+        answer = analyst.post(
+            reverse("upload-show", args=[row.code]), {"track": track, "stop": stop}, follow=True
+        )
+        assert "no such moment" in answer.content.decode()
+    assert not UploadMoment.objects.exists()
+
+
+def test_without_a_file_nothing_is_kept(analyst: Client) -> None:
+    answer = analyst.post(reverse("scene-send"), {"format": ""}, follow=True)
+    assert "Choose a file." in answer.content.decode()
