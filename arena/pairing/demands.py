@@ -10,6 +10,9 @@ from arena.pairing.rules import Grid, PlanRules
 from arena.pairing.targets import votes_by_appearances
 from augment.sentences import Sentence, sentence
 
+MOST_OVERLAP = 0.8
+"""More can't be brought together where all pairs and scenarios stay balanced for everybody."""
+
 
 def check_rules(rules: PlanRules, grid: Grid) -> None:
     """Whether the rules make sense.
@@ -96,6 +99,7 @@ def _too_few(rules: PlanRules, grid: Grid, units: int) -> Sentence:
 def _check_shares(rules: PlanRules) -> None:
     shares = (
         (sentence("repeats"), rules.repeat_share, 0.5),
+        (sentence("what two experts judge"), rules.overlap_share, MOST_OVERLAP),
         (sentence("attention checks"), rules.check_share, 0.5),
         (sentence("the adaptive part"), rules.adaptive_share, 0.9),
     )
@@ -121,6 +125,8 @@ def _check_shares(rules: PlanRules) -> None:
 
 def _check_extras(rules: PlanRules, grid: Grid) -> None:
     _check_shares(rules)
+    if rules.overlap_share and len(rules.experts) < 2:
+        raise NothingToPlan(sentence("For pairs that two experts judge there must be two."))
     if rules.appearances and rules.pair_votes:
         raise NothingToPlan(sentence("Targets are given by contestant or by pair, not both."))
     if rules.adaptive_share and (rules.appearances or rules.pair_votes):

@@ -9,6 +9,7 @@ A unit is a scenario with a pair of contestants. The plan is made in five steps:
    an expert and over all experts, as far as there are enough units (units.py), unless the rules
    say how often a contestant or a pair is to be judged (targets.py),
 2. units are chosen that meet both quotas; what the first choice misses is mended by exchanges,
+   and so is what the rules want two experts to judge (overlap.py),
 3. hidden repeats and attention checks are drawn on top,
 4. each expert's units are put in an order that keeps a scenario away from itself (order.py),
 5. sides are dealt so that each pair is shown either way round equally often, to +-1; a repeat is
@@ -24,6 +25,7 @@ import numpy as np
 from arena.pairing.arrays import BoolArray, FloatArray
 from arena.pairing.demands import check_rules, pair_totals
 from arena.pairing.order import CHECK, MAIN, REPEAT, Extras, Slot, deal_sides, put_in_order
+from arena.pairing.overlap import bring_together
 from arena.pairing.rules import (
     Check,
     Entry,
@@ -73,9 +75,11 @@ def _chosen(
     experts, votes = len(rules.experts), rules.votes_at_once
     if not rules.appearances and not rules.pair_votes:
         chosen = choose_units(grid.showable, experts, votes, rng)
+        bring_together(chosen, grid.showable, rules.overlap_share, rng)
         return chosen, draw_probability(grid.showable, votes)
     totals = pair_totals(rules, grid)
     chosen = choose_wanted(grid.showable, share_out(totals, experts, rng), rng)
+    bring_together(chosen, grid.showable, rules.overlap_share, rng)
     places = np.maximum(grid.showable.sum(axis=1), 1)
     shares = np.where(grid.showable, (totals / totals.sum() / places)[:, None], 0.0)
     return chosen, shares

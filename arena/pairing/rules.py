@@ -67,6 +67,8 @@ class PlanRules:
             Empty for a balanced plan; not beside `appearances`.
         repeat_share: Hidden repeats as a share of the quota.
         repeat_distance: Matchups wanted between a pair and its repeat.
+        overlap_share: Of the units that are planned at once, those that two experts or more
+            judge at least.
         check_share: Attention checks as a share of the quota, as far as there are `checks`.
         checks: What can be checked with.
         adaptive_share: The last share of the quota, which is planned in batches by the votes.
@@ -85,6 +87,7 @@ class PlanRules:
     pair_votes: tuple[tuple[str, str, int], ...] = ()
     repeat_share: float = 0.0
     repeat_distance: int = 30
+    overlap_share: float = 0.0
     check_share: float = 0.0
     checks: tuple[Check, ...] = ()
     adaptive_share: float = 0.0

@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from itertools import combinations
 
 from django.db.models import Count, Exists, OuterRef, QuerySet
+from django.db.models.functions import Greatest, Least
 
 from arena.models import Matchup, Report, Study, Vote
 
@@ -32,12 +33,16 @@ class Coverage:
         pairs: The main matchups of each pair, the least judged first.
         kinds: Main matchups, hidden repeats and attention checks, named by their values.
         identical: Pairs with identical pictures, which nobody is shown.
+        units: Units of the main matchups: a pair on one picture each.
+        shared: Those that two experts or more are to judge.
     """
 
     contestants: tuple[Covered, ...]
     pairs: tuple[Covered, ...]
     kinds: tuple[Covered, ...]
     identical: int
+    units: int = 0
+    shared: int = 0
 
     @property
     def fewest(self) -> Covered | None:
@@ -46,7 +51,7 @@ class Coverage:
 
 
 def coverage(study: Study) -> Coverage:
-    """The plan of a study, in two queries."""
+    """The plan of a study, in three queries."""
     names = dict(study.contestants.order_by("name").values_list("pk", "name"))
     shown: Counter[int] = Counter()
     decided: Counter[int] = Counter()
@@ -72,7 +77,10 @@ def coverage(study: Study) -> Coverage:
         )
         for one, other in combinations(names, 2)
     )
+    units, shared = shared_units(study)
     return Coverage(
+        units=units,
+        shared=shared,
         contestants=tuple(
             Covered(name=name, planned=shown[pk], decided=decided[pk])
             for pk, name in names.items()
@@ -85,6 +93,15 @@ def coverage(study: Study) -> Coverage:
         ),
         identical=len(study.rules.get("identical", ())),
     )
+
+
+def shared_units(study: Study) -> tuple[int, int]:
+    """How many units the main matchups have, and how many two experts or more are to judge."""
+    mains = study.matchups.filter(kind=Matchup.Kind.MAIN).order_by()
+    sides = (Least("left", "right"), Greatest("left", "right"))
+    judged = mains.values(one=sides[0], other=sides[1]).annotate(n=Count("expert", distinct=True))
+    counts = list(judged.values_list("n", flat=True))
+    return len(counts), sum(number > 1 for number in counts)
 
 
 def reports_of(study: Study) -> QuerySet[Report]:

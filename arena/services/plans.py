@@ -153,7 +153,7 @@ def planned_so_far(study: Study) -> SoFar:
 _REPEAT = Matchup.Kind.REPEAT
 _PLAIN = (
     *("votes_per_expert", "seed", "scenario_gap", "repeat_share", "repeat_distance"),
-    *("check_share", "adaptive_share", "uniform_share", "batch_size"),
+    *("overlap_share", "check_share", "adaptive_share", "uniform_share", "batch_size"),
 )
 """Rules that are kept as they are; studies opened before a rule existed go without it."""
 

@@ -46,6 +46,7 @@ class PlanOptions:
     """
 
     repeat_share: float = 0.0
+    overlap_share: float = 0.0
     check_share: float = 0.0
     adaptive_share: float = 0.0
     appearances: tuple[tuple[str, int], ...] = ()
@@ -58,7 +59,10 @@ class PlanOptions:
     jobs: tuple[str, ...] = ()
 
 
-_OF_THE_PLAN = ("appearances", "pair_votes", "repeat_share", "check_share", "adaptive_share")
+_OF_THE_PLAN = (
+    *("appearances", "pair_votes", "repeat_share", "overlap_share", "check_share"),
+    "adaptive_share",
+)
 
 
 @transaction.atomic

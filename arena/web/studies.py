@@ -7,7 +7,7 @@ from typing import Any, cast
 
 from django.contrib import messages
 from django.contrib.auth.models import User
-from django.http import HttpRequest, HttpResponse
+from django.http import Http404, HttpRequest, HttpResponse
 from django.shortcuts import get_object_or_404, redirect, render
 from django.utils.translation import gettext as _
 from django.views.decorators.http import require_http_methods, require_POST, require_safe
@@ -30,6 +30,9 @@ from arena.web.study_questions import closing, handing_over, opening
 from augment.errors import AugmentError
 from augment.models import Contestant, GenerationJob
 from augment.services.wording import translate
+
+_PLANNED = ("votes_per_expert", "repeats", "checks", "overlap")
+"""What the planning page hands on to a new study."""
 
 
 @allow_only(*STAFF)
@@ -54,7 +57,7 @@ def new_study_page(request: HttpRequest) -> HttpResponse:
         groups=scenarios.by_type(),
         experts=by_pseudonym(experts()),
         jobs=list(GenerationJob.objects.all()),
-        initial={"checks": usual_checks()},
+        initial=_planned_numbers(request),
     )
     if request.method == "POST" and form.is_valid() and not wants_to_change(request):
         try:
@@ -139,6 +142,24 @@ def close(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
     return redirect("study", code=code)
 
 
+def _planned_numbers(request: HttpRequest) -> dict[str, Any]:
+    """What the address says of a study that somebody planned, or of one to be like it."""
+    initial: dict[str, Any] = {"checks": usual_checks()}
+    initial |= {name: request.GET[name] for name in _PLANNED if request.GET.get(name)}
+    code = request.GET.get("study")
+    if not code:
+        return initial
+    try:
+        study = get_object_or_404(Study, code=uuid.UUID(code))
+    except ValueError:
+        raise Http404 from None
+    return initial | {
+        "contestants": list(study.contestants.values_list("slug", flat=True)),
+        "scenarios": list(study.scenarios.values_list("slug", flat=True)),
+        "experts": list(study.experts.values_list("username", flat=True)),
+    }
+
+
 def _shown_rules(study: Study) -> dict[str, Any] | None:
     """The rules of the plan for the page, None for votes from a file, which nobody planned."""
     if "entries" not in study.rules:
@@ -149,6 +170,7 @@ def _shown_rules(study: Study) -> dict[str, Any] | None:
         "by_pair": bool(rules.pair_votes),
         "repeats": 100 * rules.repeat_share,
         "checks": 100 * rules.check_share if rules.checks else 0,
+        "overlap": 100 * rules.overlap_share,
         "adaptive": 100 * rules.adaptive_share,
         "gap": study.rules["scenario_gap_kept"],
         "jobs": study.rules.get("jobs", []),

@@ -33,6 +33,7 @@ class StudyForm(ChoiceForm):
     seed = forms.IntegerField(initial=1)
     repeats = _percent(initial=5, most=50)
     checks = _percent(initial=0, most=50)
+    overlap = _percent(initial=10, most=80)
     adaptive = _percent(initial=0, most=90)
     targets = forms.CharField(required=False, max_length=20_000)
     allow_both_miss = forms.BooleanField(required=False)
@@ -83,6 +84,7 @@ class StudyForm(ChoiceForm):
         options = PlanOptions(
             repeat_share=(entered["repeats"] or 0) / 100,
             check_share=(entered["checks"] or 0) / 100,
+            overlap_share=(entered["overlap"] or 0) / 100,
             adaptive_share=(entered["adaptive"] or 0) / 100,
             appearances=appearances,
             pair_votes=pair_votes,

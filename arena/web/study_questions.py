@@ -11,6 +11,7 @@ from django.urls import reverse
 from django.utils.translation import gettext as _
 
 from arena.models import Matchup, Study
+from arena.queries.coverage import shared_units
 from arena.queries.votes import tallies
 from arena.services.handing_over import hand_over
 from arena.services.studies import open_study
@@ -32,6 +33,7 @@ def opening(rules: dict[str, Any]) -> Confirmation:
         people = study.experts.count()
         settled = len(study.rules["identical"])
         alike = len(study.rules["alike"])
+        together = shared_units(study)
         sides = study.contestants.count(), study.scenarios.count()
         transaction.set_rollback(True)
     votes = kinds[Kind.MAIN] + later
@@ -52,6 +54,10 @@ def opening(rules: dict[str, Any]) -> Confirmation:
         _("On top of the votes: hidden repeats %(repeats)s, attention checks %(checks)s.")
         % numbers,
     ]
+    facts.append(
+        _("Pairs of a scenario that are judged: %(judged)s; by two experts or more: %(shared)s.")
+        % {"judged": together[0], "shared": together[1]}
+    )
     if settled:
         facts.append(
             _(

@@ -191,7 +191,7 @@ def controversial_lines(studies: int) -> Iterator[str]:
         yield f"| {experts} x 200 | " + " | ".join(cells) + " |"
 
 
-def _write(name: str, text: str) -> None:
+def write_table(name: str, text: str) -> None:
     """Replace what stands between the marks of a table."""
     begin, end = f"<!-- {name} -->\n", f"<!-- end of {name} -->"
     page = re.sub(
@@ -218,7 +218,7 @@ def main() -> None:
             print(line, flush=True)
             said.append(line)
         if asked.write:
-            _write(name, "\n".join(said))
+            write_table(name, "\n".join(said))
     print(f"{time.process_time() - began:.0f} s of processor")
 
 

@@ -55,6 +55,7 @@ PAGES: dict[str, tuple[int, int, int]] = {
     "intent": (200, 200, 403),
     "picture": (200, 200, 403),
     "studies": (200, 200, 403),
+    "study-plan": (200, 200, 403),
     "study-new": (200, 403, 403),
     "study": (200, 200, 403),
     "experts": (200, 403, 403),

@@ -9,6 +9,7 @@ from django.contrib.auth.models import User
 from django.urls import reverse
 
 from arena.models import Study
+from arena.queries.coverage import shared_units
 from arena.services.reports import report
 from tests import study_rows
 from tests.web.cast import people, signed_in
@@ -133,3 +134,17 @@ def test_an_admin_hands_over_what_an_expert_has_not_judged() -> None:
     nobody = admin.post(url, {"giver": "finn"}, follow=True)
     assert "Choose who takes over." in nobody.content.decode()
     assert signed_in(User.objects.get(username="the-analyst")).post(url).status_code == 403
+
+
+def test_pairs_that_two_experts_judge_are_planned_previewed_and_shown() -> None:
+    cast = study_rows.cast_of()
+    sent = {"name": "Round 1", **cast, "votes_per_expert": 9, "seed": 4, "overlap": 30}
+    admin = signed_in(people()["admin"])
+    asked = admin.post(reverse("study-new"), sent).content.decode()
+    assert "that are judged: 12; by two experts or more: 6." in asked
+    admin.post(reverse("study-new"), {**sent, "sure": "1"})
+    study = Study.objects.get()
+    assert study.rules["overlap_share"] == 0.3
+    assert shared_units(study) == (12, 6)
+    shown = admin.get(reverse("study", args=[study.code])).content.decode()
+    assert "6 of 12 pairs; 30 % were asked for" in shown

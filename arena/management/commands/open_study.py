@@ -10,6 +10,7 @@ from django.core.management.base import CommandError, CommandParser
 from arena.errors import ArenaError
 from arena.models import Study
 from arena.pairing.target_lines import read_targets
+from arena.queries.coverage import shared_units
 from arena.queries.inventory import CHECK_PERCENT, usual_checks
 from arena.services.shown_pictures import SampleRule
 from arena.services.studies import PlanOptions, open_study
@@ -54,6 +55,14 @@ class Command(TerminalCommand):
             metavar="PERCENT",
             help="attention checks, with pictures that draw_checks has drawn (default: "
             f"{CHECK_PERCENT} where it has drawn any, else 0)",
+        )
+        parser.add_argument(
+            "--overlap",
+            type=float,
+            default=0.0,
+            metavar="PERCENT",
+            help="of the judged pairs, those that two experts or more judge at least, so that "
+            "their agreement can be computed (at most 80)",
         )
         parser.add_argument(
             "--adaptive",
@@ -124,6 +133,7 @@ class Command(TerminalCommand):
                 options=PlanOptions(
                     repeat_share=options["repeats"] / 100,
                     check_share=self._checks(options["checks"]) / 100,
+                    overlap_share=options["overlap"] / 100,
                     adaptive_share=options["adaptive"] / 100,
                     appearances=appearances,
                     pair_votes=pair_votes,
@@ -163,6 +173,8 @@ class Command(TerminalCommand):
             f"{kinds['main']} votes, {kinds['repeat']} hidden repeats, {kinds['check']} attention "
             f"checks; {sum(study.votes_to_plan.values())} votes are planned later."
         )
+        judged, shared = shared_units(study)
+        self.stdout.write(f"{shared} of {judged} pairs of a scenario are judged by two or more.")
         if rules["scenario_gap_kept"] < rules["scenario_gap"]:
             self.stdout.write(
                 f"A scenario comes again after {rules['scenario_gap_kept']} others instead of "

@@ -1,0 +1,276 @@
+"""What a study will be able to tell, before its first vote: half-widths, power, votes needed.
+
+In: a `StudyDesign`. Out: half-widths, the gap that is found, and the votes that either needs. All
+of it is closed form, from the terms that the intervals of `moderated.py` are made of:
+
+- single votes: the sandwich of a balanced plan, H^-1 B H^-1, with contestants evenly spaced over
+  the spread and ties likelier between those close to each other;
+- what experts, and what scenarios, make of each contestant: its variance over the number of
+  clusters, plus what an uneven share of the pairs adds where a cluster has few votes;
+- Student's t with Satterthwaite's degrees of freedom of that sum.
+
+`docs/coverage.md` holds it against simulated studies. Everything is on the scale of the rated
+table, ties as half a win.
+
+Notation: C contestants, P pairs, E experts, S scenarios, V votes. Points are Elo points.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.special import ndtr, ndtri
+
+from arena.rating.bradley_terry import ELO_PER_LOGIT
+from arena.rating.comparisons import FloatArray, IntArray
+from arena.rating.estimate import LEVEL
+from arena.rating.moderated import MOST_PRIOR
+from arena.rating.simultaneous import CAUTION
+from arena.rating.student import t_quantile
+
+SURE = 1.0 - LEVEL
+"""The chance of an error that intervals and separations allow."""
+
+_RANGES = np.linspace(-9.0, 9.0, 1801)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class StudyDesign:
+    """A study that somebody thinks of.
+
+    Attributes:
+        contestants: C, 2 or more.
+        experts: E, 2 or more.
+        scenarios: S, 2 or more.
+        spread: Points from the worst to the best; the others lie evenly between.
+        tie_share: Of the votes, from 0 to below 1.
+        expert_sd: By how many points experts differ in what they make of a contestant.
+        scenario_sd: The same of scenarios.
+        overlap_share: Of the judged units, those that two experts judge.
+
+    Raises:
+        ValueError: Something is out of range; the text says what is allowed.
+    """
+
+    contestants: int
+    experts: int
+    scenarios: int
+    spread: float = 0.0
+    tie_share: float = 0.4
+    expert_sd: float = 0.0
+    scenario_sd: float = 0.0
+    overlap_share: float = 0.0
+
+    def __post_init__(self) -> None:
+        for name in ("contestants", "experts", "scenarios"):
+            if getattr(self, name) < 2:
+                raise ValueError(f"{name} must be 2 or more, not {getattr(self, name)}")
+        for name in ("spread", "expert_sd", "scenario_sd"):
+            if not 0.0 <= getattr(self, name) < math.inf:
+                raise ValueError(f"{name} must be 0 or more, not {getattr(self, name)}")
+        if not 0.0 <= self.overlap_share <= 1.0:
+            raise ValueError(f"overlap_share goes from 0 to 1, not {self.overlap_share}")
+        if not 0.0 <= self.tie_share < min(1.0, self.most_ties):
+            raise ValueError(
+                f"tie_share goes from 0 to below {min(1.0, self.most_ties):.2f} with a spread of "
+                f"{self.spread:g} points, not {self.tie_share}"
+            )
+
+    @property
+    def pairs(self) -> int:
+        """P."""
+        return self.contestants * (self.contestants - 1) // 2
+
+    @property
+    def units(self) -> int:
+        """P S: so many votes an expert can give at most, as nobody sees a unit twice."""
+        return self.pairs * self.scenarios
+
+    @property
+    def most_ties(self) -> float:
+        """The tie share at which the weaker one of a pair would never win."""
+        return float((2.0 * self._lower_scores()).mean())
+
+    def pairs_within(self, gap: float) -> int:
+        """How many pairs are at most so many points apart."""
+        return int((self.gaps() * ELO_PER_LOGIT <= gap + 1e-6).sum())
+
+    def gaps(self) -> FloatArray:
+        """(P,) logits between the pairs, in the order of np.triu_indices."""
+        strengths = np.linspace(0.0, self.spread, self.contestants) / ELO_PER_LOGIT
+        low, high = np.triu_indices(self.contestants, 1)
+        return np.asarray(strengths[high] - strengths[low])
+
+    def _lower_scores(self) -> FloatArray:
+        return np.asarray(1.0 / (1.0 + np.exp(self.gaps())))
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Expected:
+    """How sure the ratings of a design will be.
+
+    Attributes:
+        design: Whose.
+        covariance: (C, C) squared points.
+        degrees: Of Student's t.
+    """
+
+    design: StudyDesign
+    covariance: FloatArray
+    degrees: float
+
+    @property
+    def half_width(self) -> float:
+        """Points of a typical 95 % interval."""
+        typical = float(self.covariance.diagonal().mean())
+        return float(t_quantile(self.degrees)) * math.sqrt(typical)
+
+    @property
+    def widest(self) -> float:
+        """Points of the widest 95 % interval of a table: by chance some are wider."""
+        largest = math.sqrt(float(self.covariance.diagonal().max()))
+        by_chance = 1.0 + _largest_of(self.design.contestants) / math.sqrt(2.0 * self.degrees)
+        return float(t_quantile(self.degrees)) * largest * by_chance
+
+    def gap_found(self, *, power: float) -> float:
+        """How far apart, in points, two must be to be told apart with such a chance.
+
+        All pairs of the table are judged at once, at 5 % for all of them; those further apart are
+        found first, so the closer ones share the 5 %. An approximation: see docs/coverage.md.
+
+        Args:
+            power: From 0.5 to below 1.
+        """
+        variance = self.covariance.diagonal()
+        error = math.sqrt(float((variance[1:] + variance[:-1]
+                                 - 2.0 * self.covariance.diagonal(1)).mean()))  # fmt: skip
+        all_pairs = _level_of_all_pairs(self.design.contestants)
+        degrees = min(self.degrees, 2.0 * (self.design.experts - 1.0))
+        gap = 0.0
+        for _ in range(20):  # the gap says which pairs are closer, and these say the gap
+            closer = max(self.design.pairs_within(gap), self.design.contestants - 1)
+            level = min(all_pairs * self.design.pairs / closer, SURE) / CAUTION
+            limit = float(t_quantile(degrees, 1.0 - level / 2.0))
+            before, gap = gap, (limit + float(ndtri(power))) * error
+            if abs(gap - before) < 0.01:
+                break
+        return gap
+
+
+def expect(design: StudyDesign, votes: float) -> Expected:
+    """How sure ratings will be after so many votes of all experts, more than 0."""
+    contestants = design.contestants
+    centre = np.eye(contestants) - 1.0 / contestants
+    single = _by_single_votes(design, votes)
+    distinct = votes / (1.0 + design.overlap_share)
+    parts = (
+        (design.experts, design.expert_sd, votes / design.experts),
+        (design.scenarios, design.scenario_sd, distinct / design.scenarios),
+    )
+    covariance, weights = single.copy(), 0.0
+    at_widest = float(single.diagonal().max())
+    for clusters, effect, per_cluster in parts:
+        added = effect**2 * (1.0 / clusters + _uneven(design, per_cluster) / clusters) * centre
+        covariance = covariance + added
+        degrees = min(MOST_PRIOR + clusters - 1.0, (clusters - 1.0) * (contestants - 1.0))
+        weights += (at_widest + float(added[0, 0])) ** 2 / max(degrees, 1.0)
+    found = float(covariance.diagonal().max()) ** 2 / weights
+    return Expected(design=design, covariance=covariance, degrees=max(found, 1.0))
+
+
+def votes_per_expert_for(
+    design: StudyDesign, reached: Callable[[Expected], bool], *, most: int | None = None
+) -> int | None:
+    """The fewest votes per expert with which something is reached.
+
+    Args:
+        design: The study.
+        reached: Says it of what is expected; with more votes never less so.
+        most: Votes that an expert can give; by default as many as there are units.
+
+    Returns:
+        None where no number of votes of these experts on these scenarios reaches it.
+    """
+    low, high = 0, design.units if most is None else most
+    if not reached(expect(design, high * design.experts)):
+        return None
+    while high - low > 1:
+        middle = (low + high) // 2
+        if reached(expect(design, middle * design.experts)):
+            high = middle
+        else:
+            low = middle
+    return high
+
+
+def agreement_error(design: StudyDesign, votes: float) -> float | None:
+    """Half of the 95 % interval of the share in which two experts agree; None without overlap.
+
+    For a share of a half, where it is widest.
+    """
+    twice = votes * design.overlap_share / (1.0 + design.overlap_share)
+    return None if twice < 1.0 else float(ndtri(0.5 + LEVEL / 2.0)) * 0.5 / math.sqrt(twice)
+
+
+# --- Private -----------------------------------------------------------------------------------
+
+
+def _by_single_votes(design: StudyDesign, votes: float) -> FloatArray:
+    """(C, C) the covariance if each vote stood for itself, in squared points."""
+    low, high = (place.astype(np.int64) for place in np.triu_indices(design.contestants, 1))
+    expected = 1.0 / (1.0 + np.exp(design.gaps()))
+    ties = design.tie_share / design.most_ties * 2.0 * expected
+    each = votes / design.pairs
+    curvature = _laplacian(design.contestants, low, high, each * expected * (1.0 - expected))
+    surprise = each * (expected * (1.0 - expected) - ties / 4.0)
+    # The mean is fixed: its direction, of which votes say nothing, gets a curvature and loses it.
+    mean = np.full_like(curvature, 1.0 / design.contestants)
+    scale = float(curvature.trace()) / design.contestants
+    inverse = np.linalg.inv(curvature + scale * mean) - mean / scale
+    squares = _laplacian(design.contestants, low, high, surprise)
+    return np.asarray(inverse @ squares @ inverse * ELO_PER_LOGIT**2)
+
+
+def _laplacian(size: int, low: IntArray, high: IntArray, weights: FloatArray) -> FloatArray:
+    found = np.zeros((size, size))
+    found[low, high] = found[high, low] = -weights
+    np.fill_diagonal(found, -found.sum(axis=1))
+    return found
+
+
+def _uneven(design: StudyDesign, per_cluster: float) -> float:
+    """What a cluster's tastes weigh more because it has not every pair equally often.
+
+    The pairs of a cluster are drawn without putting back: with m of P pairs the variance of its
+    mean taste is (C - 2) (P - m) / ((P - 1) m) times larger than with all of them.
+    """
+    pairs = design.pairs
+    if per_cluster >= pairs or pairs < 2:
+        return 0.0
+    missing = (pairs - per_cluster) / (pairs - 1)
+    return (design.contestants - 2) * missing / max(per_cluster, 1e-9)
+
+
+def _largest_of(number: int) -> float:
+    """The mean of the largest of so many standard normal values."""
+    step = float(_RANGES[1] - _RANGES[0])
+    return float((1.0 - ndtr(_RANGES) ** number - ndtr(-_RANGES)).sum()) * step
+
+
+def _level_of_all_pairs(contestants: int) -> float:
+    """The chance of an error for each pair so that among equals all pairs share the 5 %.
+
+    By the range of C independent normal values (Tukey), whose distribution is one integral.
+    """
+    density = np.exp(-(_RANGES**2) / 2.0) / math.sqrt(2.0 * math.pi)
+    step = float(_RANGES[1] - _RANGES[0])
+    low, high = 0.0, 12.0
+    for _ in range(60):
+        middle = (low + high) / 2.0
+        inside = (ndtr(_RANGES) - ndtr(_RANGES - middle)) ** (contestants - 1)
+        chance = contestants * float((density * inside).sum()) * step
+        low, high = (middle, high) if chance < LEVEL else (low, middle)
+    return 2.0 * float(ndtr(-low / math.sqrt(2.0)))

@@ -1,0 +1,120 @@
+"""How many units two experts judge, by the rule and without it."""
+
+from __future__ import annotations
+
+import math
+from collections import Counter, defaultdict
+from dataclasses import replace
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from arena.errors import NothingToPlan
+from arena.pairing.order import MAIN
+from arena.pairing.plan import Entry, MatchupPlan, PlanRules, plan
+from tests.pairing.studies import appearances, check_extras, pair, paper_rules
+
+
+def twelve_by_forty(share: float, seed: int = 1) -> PlanRules:
+    """Nine contestants on fifty scenarios: 480 votes on 1,800 units."""
+    entries = tuple(
+        Entry(scenario=f"s{scenario:02}", contestant=f"c{one}", picture=f"{scenario} {one}")
+        for scenario in range(50)
+        for one in range(9)
+    )
+    experts = tuple(f"e{number:02}" for number in range(12))
+    return PlanRules(
+        entries=entries, experts=experts, votes_per_expert=40, seed=seed, overlap_share=share
+    )
+
+
+def shared(made: MatchupPlan) -> tuple[int, int]:
+    """Units that anybody judges, and those that two experts or more do."""
+    judges = defaultdict(set)
+    for one in made.matchups:
+        if one.kind == MAIN:
+            judges[one.scenario, pair(one)].add(one.expert)
+    return len(judges), sum(len(experts) > 1 for experts in judges.values())
+
+
+def quotas(made: MatchupPlan) -> Counter[tuple[str, object]]:
+    """Votes of every expert on every scenario and on every pair."""
+    found: Counter[tuple[str, object]] = Counter()
+    for one in made.matchups:
+        found[one.expert, one.scenario] += 1
+        found[one.expert, pair(one)] += 1
+    return found
+
+
+def test_without_the_rule_hardly_anything_is_judged_twice() -> None:
+    judged, twice = shared(plan(twelve_by_forty(0.0)))
+    assert judged > 470
+    assert twice < 10
+
+
+@pytest.mark.parametrize("share", [0.05, 0.1, 0.3, 0.6])
+def test_the_plan_honours_the_share_and_keeps_every_quota(share: float) -> None:
+    asked = twelve_by_forty(share)
+    made, plain = plan(asked), plan(replace(asked, overlap_share=0.0))
+    judged, twice = shared(made)
+    assert twice >= math.ceil(share * judged - 1e-9)
+    assert twice <= share * judged + 2  # no more than asked for: breadth comes first
+    assert quotas(made) == quotas(plain)
+    check_extras(asked, made)
+
+
+def test_the_same_seed_and_rules_give_the_same_plan() -> None:
+    assert plan(twelve_by_forty(0.2)) == plan(twelve_by_forty(0.2))
+    assert plan(twelve_by_forty(0.2)) != plan(twelve_by_forty(0.2, seed=2))
+
+
+def test_targets_are_met_as_well() -> None:
+    asked = paper_rules(1, votes=60, overlap_share=0.3)
+    made = plan(asked)
+    judged, twice = shared(made)
+    assert twice >= 0.3 * judged
+    assert appearances(made) == dict(asked.appearances)
+
+
+def test_a_plan_that_has_more_keeps_it() -> None:
+    """5,760 votes on 1,800 units: nearly every unit has three judges."""
+    assert plan(paper_rules(1, overlap_share=0.1)) == plan(paper_rules(1))
+
+
+@given(
+    st.integers(2, 5), st.integers(3, 8), st.integers(2, 4), st.integers(4, 20), st.floats(0, 0.8)
+)
+@settings(max_examples=60, deadline=None)
+def test_it_is_honoured_or_refused(
+    contestants: int, scenarios: int, experts: int, votes: int, share: float
+) -> None:
+    entries = tuple(
+        Entry(scenario=f"s{scenario}", contestant=f"c{one}", picture=f"{scenario} {one}")
+        for scenario in range(scenarios)
+        for one in range(contestants)
+    )
+    names = tuple(f"e{number}" for number in range(experts))
+    asked = PlanRules(
+        entries=entries, experts=names, votes_per_expert=votes, seed=1, overlap_share=share
+    )
+    try:
+        made = plan(asked)
+    except NothingToPlan:
+        return
+    judged, twice = shared(made)
+    assert twice >= share * judged - 1e-9
+    assert quotas(made) == quotas(plan(replace(asked, overlap_share=0.0)))
+
+
+@pytest.mark.parametrize(
+    ("wrong", "said"),
+    [
+        ({"overlap_share": 0.81}, "from 0 to 80%, not 81.0%"),
+        ({"overlap_share": 0.1, "experts": ("e1",)}, "there must be two"),
+        ({"overlap_share": 0.8, "votes_per_expert": 1}, "are to be judged by two experts"),
+    ],
+)
+def test_what_can_not_be_is_refused_with_numbers(wrong: dict[str, object], said: str) -> None:
+    with pytest.raises(NothingToPlan, match=said):
+        plan(replace(twelve_by_forty(0.0), **wrong))  # type: ignore[arg-type]

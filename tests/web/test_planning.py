@@ -1,0 +1,109 @@
+"""Planning a study by its page and its command, with and without a study at hand."""
+
+from __future__ import annotations
+
+from io import StringIO
+
+import pytest
+from django.core.management import CommandError, call_command
+from django.urls import reverse
+
+from arena.models import Study
+from arena.rating.prospects import prospect
+from arena.services.prospects import GUESSES, known_of
+from arena.services.ratings import rate
+from arena.services.studies import close_study
+from arena.web.planning_form import question_of
+from tests import study_rows
+from tests.web.cast import people, signed_in
+
+pytestmark = pytest.mark.django_db
+
+
+def _page(role: str = "admin", **asked: str | int) -> str:
+    person = people()[role]
+    answer = signed_in(person).get(reverse("study-plan"), asked)
+    return answer.content.decode()
+
+
+def _voted() -> Study:
+    """Two experts who do not agree on everything, with nine votes each."""
+    study = study_rows.a_study()
+    for number, matchup in enumerate(study.matchups.order_by("pk")):
+        slug = matchup.left.contestant.slug
+        good = "left" if slug == "ann" else "right"
+        odd = "right" if good == "left" else "left"
+        outcome = "equal" if number % 4 == 0 else odd if number % 3 == 0 else good
+        study_rows.vote(matchup, outcome, ms_visible=4000)
+    return study
+
+
+def test_the_page_is_usable_without_any_study() -> None:
+    shown = _page(votes_per_expert=100)
+    expected = prospect(question_of(dict(GUESSES)), 100)
+    assert f'<td class="num">{expected.minutes:.0f}</td>' in shown
+    assert f"±{expected.widest:.0f}" in shown
+    assert "No number of votes reaches it" in shown  # ±25 with effects so large
+
+
+def test_it_leads_to_a_new_study_that_is_filled_in() -> None:
+    study = study_rows.a_study()
+    admin = signed_in(people()["admin"])
+    asked: dict[str, str | int] = {"study": str(study.code), "votes_per_expert": 12, "repeats": 10}
+    shown = admin.get(reverse("study-plan"), asked).content.decode()
+    start = shown.index(reverse("study-new"))
+    address = shown[start : shown.index('"', start)].replace("&amp;", "&")
+    form = admin.get(address).content.decode()
+    assert 'name="votes_per_expert" type="number" min="1" max="10000" required value="12"' in form
+    assert 'name="repeats" type="number" min="0" max="50" step="any" value="10"' in form
+    for kind, slug in (("contestants", "ann"), ("experts", "eva"), ("scenarios", "place-0")):
+        assert f'name="{kind}" value="{slug}" checked' in form
+
+
+def test_an_open_study_gives_its_numbers_but_nothing_of_its_results() -> None:
+    study = _voted()
+    rate(study=study, early=True)
+    known = known_of(study, people()["analyst"])
+    assert not known.from_results
+    assert known.values == {"contestants": 3, "experts": 2, "scenarios": 6}
+
+
+def test_a_closed_and_rated_study_says_what_to_expect_of_the_next() -> None:
+    study = _voted()
+    study = close_study(study=study)
+    snapshot = rate(study=study)
+    known = known_of(study)
+    ratings = [line.rating for line in snapshot.standings.all() if line.rating is not None]
+    assert known.from_results
+    assert known.values["spread"] == round(max(ratings) - min(ratings))
+    assert known.values["ties"] == pytest.approx(100 * 5 / 18, abs=0.1)
+
+
+def test_what_can_not_be_is_said_at_its_field() -> None:
+    person = people()["analyst"]
+    answer = signed_in(person).get(reverse("study-plan"), {"spread": 2000, "ties": 60})
+    assert answer.status_code == 422
+    assert "can tie in less than" in answer.content.decode()
+
+
+def test_an_unknown_study_is_not_found() -> None:
+    person = people()["analyst"]
+    for code in ("no-code", "6f1a0b0e-0000-4000-8000-000000000000"):
+        assert signed_in(person).get(reverse("study-plan"), {"study": code}).status_code == 404
+
+
+def test_the_command_says_the_same_numbers() -> None:
+    out = StringIO()
+    call_command("plan_study", "--votes-per-expert", "100", stdout=out)
+    expected = prospect(question_of(dict(GUESSES)), 100)
+    said = out.getvalue()
+    assert f"100 votes per expert, 900 in all, {expected.minutes:.0f} minutes each" in said
+    assert "expert sd: 30 (guessed)" in said
+    assert "no number of votes reaches it" in said
+
+
+def test_the_command_refuses_what_can_not_be() -> None:
+    with pytest.raises(CommandError, match="tie_share goes from 0 to below"):
+        call_command("plan_study", "--spread", "2000", "--ties", "60")
+    with pytest.raises(CommandError, match="no study named 'none'"):
+        call_command("plan_study", "--like", "none")
