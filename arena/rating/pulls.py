@@ -1,6 +1,6 @@
 """What votes pull at contestants, added up by cluster and squared: the parts of every sandwich.
 
-Notation: R rows, C contestants, K parameters (C strengths, and what a model has besides), G
+Notation: R rows, C contestants, K parameters (C strengths, and Q that a model has besides), G
 clusters.
 """
 
@@ -38,7 +38,7 @@ class Pulls:
         surprise: (R,) what `first` scored above what was expected, in one vote; `second` the
             opposite.
         information: (R,) how much a vote of the row says of the difference of the two.
-        besides: (R,) the slope by a model's further parameter, in one vote; None without.
+        besides: (R, Q) the slopes by a model's further parameters, in one vote; None without.
         inverse: (K, K) of the likelihood's curvature, from slopes (columns) to strengths.
     """
 
@@ -68,11 +68,14 @@ class Pulls:
         found += found.T
         found[np.diag_indices(size)] = -found.sum(axis=1)
         if self.besides is not None:
-            both = self.surprise * self.besides * self.count
-            ends = np.bincount(self.first, weights=both, minlength=size)
-            ends -= np.bincount(self.second, weights=both, minlength=size)
-            found[-1, :-1] = found[:-1, -1] = ends[:-1]
-            found[-1, -1] = (self.besides**2 * self.count).sum()
+            start = size - self.besides.shape[1]
+            for number, slope in enumerate(self.besides.T, start=start):
+                both = self.surprise * slope * self.count
+                ends = np.bincount(self.first, weights=both, minlength=size)
+                ends -= np.bincount(self.second, weights=both, minlength=size)
+                found[number, :start] = found[:start, number] = ends[:start]
+            squares = self.besides.T @ (self.besides * self.count[:, None])
+            found[start:, start:] = squares
         return self._of_ratings(found)
 
     def by_cluster(self, cluster_of: IntArray, clusters: int) -> FloatArray:
@@ -82,8 +85,9 @@ class Pulls:
         pull = self.surprise * self.count
         pulls = [pull, -pull]
         if self.besides is not None:
-            ends.append(np.full(len(pull), size - 1))
-            pulls.append(self.besides * self.count)
+            start = size - self.besides.shape[1]
+            ends += [np.full(len(pull), number) for number in range(start, size)]
+            pulls += list(self.besides.T * self.count)
         place = np.tile(cluster_of, len(ends)) * size + np.concatenate(ends)
         return self._of_ratings(_squares(place, np.concatenate(pulls), clusters, size))
 
@@ -134,7 +138,7 @@ def davidson_pulls(
         surprise=votes.score - expected,
         information=expected - 0.25 * tied - expected**2,
         inverse=davidson.inverse_curvature(met, games, answer),
-        besides=(votes.score == TIE) - tied,
+        besides=((votes.score == TIE) - tied)[:, None],
     )
 
 
@@ -161,7 +165,7 @@ def _squares(place: IntArray, pulls: FloatArray, clusters: int, size: int) -> Fl
     if clusters * size <= _NUMBERS_AT_ONCE:
         sums = np.bincount(place, weights=pulls, minlength=clusters * size).reshape(-1, size)
         return np.asarray(sums.T @ sums)
-    order = np.argsort(place, kind="stable")
+    order = np.argsort(place)
     starts = np.flatnonzero(np.diff(place[order], prepend=-1))
     met, value = place[order[starts]], np.add.reduceat(pulls[order], starts)
     cluster, end = met // size, met % size

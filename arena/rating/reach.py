@@ -166,16 +166,19 @@ def _is_certain(votes: Comparisons, counts: PairCounts, tree: IntArray, contesta
     """Whether hardly a round can fail: every pair of the tree has scores of many, both ways."""
     if len(tree) < contestants - 1:
         return False
-    fewest = np.full((2, len(counts.low)), np.iinfo(np.int64).max)
-    for way, scored in enumerate((counts.outcome_of < 2, counts.outcome_of > 0)):
+    place = np.full(len(counts.low), -1, dtype=np.int64)
+    place[tree] = np.arange(len(tree))
+    rows = np.flatnonzero(place[counts.pair_of] >= 0)
+    pair_of, outcome_of = place[counts.pair_of[rows]], counts.outcome_of[rows]
+    fewest = np.full((2, len(tree)), np.iinfo(np.int64).max)
+    for way, scored in enumerate((outcome_of < 2, outcome_of > 0)):
         for codes in (votes.expert, votes.scenario):
             number, of_row = renumber_codes(codes)
-            met = np.unique(counts.pair_of[scored] * len(number) + of_row[scored])
-            different = np.bincount(met // len(number), minlength=len(counts.low))
+            met = np.unique(pair_of[scored] * len(number) + of_row[rows][scored])
+            different = np.bincount(met // len(number), minlength=len(tree))
             if len(number) > 1:
                 fewest[way] = np.minimum(fewest[way], different)
         if (fewest[way] == np.iinfo(np.int64).max).any():
-            fewest[way] = np.bincount(
-                counts.pair_of[scored], weights=votes.count[scored], minlength=len(counts.low)
-            ).astype(np.int64)
-    return bool((_MISSED ** fewest[:, tree].astype(np.float64)).sum() < _NEVER)
+            weights = votes.count[rows][scored]
+            fewest[way] = np.bincount(pair_of[scored], weights, len(tree)).astype(np.int64)
+    return bool((_MISSED ** fewest.astype(np.float64)).sum() < _NEVER)

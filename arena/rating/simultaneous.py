@@ -93,6 +93,7 @@ def _drawn(spread: Spread, low: IntArray, high: IntArray, rounds: int, seed: int
     taken_off = max(len(spread.components) - 1, 0) * _of_pairs(spread.base, low, high)
     clusters = sum(component.own_degrees.max(initial=1.0) for component in spread.components)
     at_once = int(max(1, _NUMBERS_AT_ONCE // (contestants * (contestants + clusters))))
+    roots = [_root(component.common) for component in spread.components]
     blocks = []
     for first in range(0, rounds, at_once):
         number = min(at_once, rounds - first)
@@ -100,8 +101,8 @@ def _drawn(spread: Spread, low: IntArray, high: IntArray, rounds: int, seed: int
         variance = np.zeros((number, len(low)))
         if not spread.components:
             variance += _of_pairs(spread.covariance, low, high)
-        for component in spread.components:
-            variance += _variances(component, low, high, number, rng)
+        for component, of_component in zip(spread.components, roots, strict=True):
+            variance += _variances(component, of_component, low, high, number, rng)
         variance = np.maximum(variance - taken_off, least)
         gaps = np.abs(ratings[:, low] - ratings[:, high])
         blocks.append((gaps / np.sqrt(np.maximum(variance, 1e-300))).T)
@@ -109,7 +110,12 @@ def _drawn(spread: Spread, low: IntArray, high: IntArray, rounds: int, seed: int
 
 
 def _variances(
-    one: Component, low: IntArray, high: IntArray, number: int, rng: np.random.Generator
+    one: Component,
+    root: FloatArray,
+    low: IntArray,
+    high: IntArray,
+    number: int,
+    rng: np.random.Generator,
 ) -> FloatArray:
     """(N, P) what a component would say of the pairs' variances if all were alike."""
     degrees = float(np.median(one.own_degrees))
@@ -118,7 +124,7 @@ def _variances(
         return np.asarray(np.broadcast_to(common, (number, len(low))))
     clusters = max(1, round(degrees))
     contestants = len(one.common)
-    pulls = rng.standard_normal((number, clusters, contestants)) @ _root(one.common)
+    pulls = rng.standard_normal((number, clusters, contestants)) @ root
     squares = np.matmul(pulls.transpose(0, 2, 1), pulls) / clusters
     seen = np.diagonal(squares, axis1=1, axis2=2) / np.maximum(one.common.diagonal(), 1e-300)
     mine, others = np.sqrt(one.own_share), np.sqrt(1.0 - one.own_share)
