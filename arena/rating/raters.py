@@ -56,11 +56,26 @@ def raters(votes: Comparisons, *, ms: FloatArray, without: FloatArray) -> tuple[
         without: (E, C) strengths by the votes of all others, not a number where those determine
             none; see `arena.rating.influence`.
     """
-    agreed, others = _agreement_with_others(votes)
+    agreed, others = agreement_with_others(votes)
     return tuple(
         _rater(votes, expert, ms, without[expert], agreed, others)
         for expert in np.unique(votes.expert).tolist()
     )
+
+
+def agreement_with_others(votes: Comparisons) -> tuple[FloatArray, BoolArray]:
+    """(V,) the share of the others' judgements of a unit that equal this; (V,) if there are any.
+
+    What the same expert said of the same unit again is not another's judgement.
+    """
+    counts = count_pairs(votes)
+    pairs = max(len(counts.low), 1)
+    experts = int(votes.expert.max(initial=0)) + 1
+    unit = votes.scenario * pairs + counts.pair_of
+    total = _how_many(unit) - _how_many(unit * experts + votes.expert)
+    value = unit * VALUES + counts.outcome_of
+    equal = _how_many(value) - _how_many(value * experts + votes.expert)
+    return np.asarray(equal / np.maximum(total, 1)), np.asarray(total > 0)
 
 
 # --- Private -----------------------------------------------------------------------------------
@@ -93,21 +108,6 @@ def _rater(
         favourites=_of(won_left[foreseen] == (lead[foreseen] > 0)),
         decided=int(foreseen.sum()),
     )
-
-
-def _agreement_with_others(votes: Comparisons) -> tuple[FloatArray, BoolArray]:
-    """(V,) the share of the others' judgements of a unit that equal this; (V,) if there are any.
-
-    What the same expert said of the same unit again is not another's judgement.
-    """
-    counts = count_pairs(votes)
-    pairs = max(len(counts.low), 1)
-    experts = int(votes.expert.max(initial=0)) + 1
-    unit = votes.scenario * pairs + counts.pair_of
-    total = _how_many(unit) - _how_many(unit * experts + votes.expert)
-    value = unit * VALUES + counts.outcome_of
-    equal = _how_many(value) - _how_many(value * experts + votes.expert)
-    return np.asarray(equal / np.maximum(total, 1)), np.asarray(total > 0)
 
 
 def _how_many(keys: IntArray) -> IntArray:

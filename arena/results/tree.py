@@ -14,17 +14,20 @@ from typing import Annotated, Any
 from pydantic import PlainValidator
 
 from arena.rating.e_values import Bet
+from arena.rating.estimate import Estimate
 from arena.rating.fit_test import FitTest
+from arena.rating.interactions import Interaction
 from arena.rating.position import SideBias
 from arena.rating.raters import Rater
 from arena.rating.reliability import Agreement
 from arena.rating.repeats import Repeats
+from arena.rating.session import Drift
 from augment.sentences import read_sentence
 
-VERSION = 3
-"""2 is without adjusted p-values and the measures that came with them; 1 is also without the order
-of the board and without notes in the lines of types; a rating of version 0 kept its standings
-alone."""
+VERSION = 4
+"""3 is without what depends on types, sides and the place in a session; 2 also without adjusted
+p-values and the measures that came with them; 1 also without the order of the board and without
+notes in the lines of types; a rating of version 0 kept its standings alone."""
 
 Bounds = tuple[float, float]
 
@@ -41,7 +44,7 @@ Kept = Annotated[str, PlainValidator(_read)]
 """A sentence; older ones are plain text."""
 
 
-_SINCE_2, _SINCE_3 = {"since": 2}, {"since": 3}
+_SINCE_2, _SINCE_3, _SINCE_4 = {"since": 2}, {"since": 3}, {"since": 4}
 """Of fields that documents of earlier versions do not have."""
 
 
@@ -138,6 +141,9 @@ class Trust:
     Attributes:
         tie_share: From 0 to 1.
         elo_order: Contestants by Bradley-Terry, with what online Elo makes of them.
+        by_side: Whether some contestants gain more than others by being on the left.
+        by_type: Whether some are stronger on some scenario types.
+        drifts: How experts change within a session.
     """
 
     tie_share: float | None = None
@@ -148,6 +154,9 @@ class Trust:
     removal: Overtaking | None = None
     elo_order: tuple[OnlinePlace, ...] | None = None
     fit: FitTest | None = None
+    by_side: Interaction | None = field(default=None, metadata=_SINCE_4)
+    by_type: Interaction | None = field(default=None, metadata=_SINCE_4)
+    drifts: tuple[Drift, ...] = field(default=(), metadata=_SINCE_4)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -237,7 +246,11 @@ class PairRecord:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class TypeStanding:
-    """A contestant among the votes on one scenario type; `few` are too few to read much from."""
+    """A contestant among the votes on one scenario type; `few` are too few to read much from.
+
+    Attributes:
+        pooled: Its rating there, drawn towards that on all types.
+    """
 
     slug: str
     rating: float | None
@@ -247,6 +260,7 @@ class TypeStanding:
     note: Kept | None = field(default=None, metadata=_SINCE_2)
     votes: int
     few: bool
+    pooled: Estimate = field(default=Estimate(value=None), metadata=_SINCE_4)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -298,6 +312,8 @@ class Results:
     """All of it; without arguments what a rating of version 0 kept.
 
     Attributes:
+        type_spread: By how many points contestants differ from type to type: the standard
+            deviation that pooled ratings of types rest on.
         models: What models contestants ask, by slug.
         judges: Pseudonyms by code.
     """
@@ -309,6 +325,7 @@ class Results:
     own_votes: OwnVotes | None = None
     pairs: tuple[PairRecord, ...] = ()
     types: tuple[TypeRating, ...] = ()
+    type_spread: Estimate | None = field(default=None, metadata=_SINCE_4)
     displacement: tuple[DisplacementSummary, ...] = ()
     cost: tuple[ScenarioCost, ...] = ()
     models: dict[str, str] = field(default_factory=dict)

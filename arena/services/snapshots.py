@@ -18,6 +18,7 @@ from arena.rating.leaderboard import Intervals, Leaderboard, Method, rate
 from arena.results.tree import VERSION as RESULTS_VERSION
 from arena.results.tree import Results
 from arena.services import breakdowns
+from arena.services.conditions import pooled_by_type
 from arena.services.own_votes import with_and_without
 from arena.services.trust import board_remarks, precision, trust
 from arena.services.vote_arrays import VoteArrays, vote_arrays
@@ -145,6 +146,7 @@ def _results(
     from_file = is_imported(study)
     filters = Filters.of_document(snapshot.filters)
     planned = breakdowns.planned_pairs(study, filters)
+    pooled, type_spread = pooled_by_type(arrays, board)
     return Results(
         version=RESULTS_VERSION,
         board=board_remarks(board),
@@ -152,7 +154,8 @@ def _results(
         claims=precision(arrays, board, unit=board.unit, seed=seed),
         own_votes=with_and_without(votes, filters, board),
         pairs=breakdowns.pairs(arrays.comparisons, votes.counted, planned),
-        types=breakdowns.by_type(arrays, board),
+        types=breakdowns.by_type(arrays, board, pooled),
+        type_spread=type_spread,
         displacement=() if from_file else breakdowns.displacement(study),
         cost=() if from_file else breakdowns.cost(study, votes.entrants),
         models={

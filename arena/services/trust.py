@@ -8,11 +8,19 @@ from typing import Any
 import numpy as np
 
 from arena.pairing.order import REPEAT
+from arena.queries.judged import AUTOMATIC
 from arena.queries.vote_sets import VoteSet
 from arena.rating import elo
 from arena.rating.bootstrap import Unit
 from arena.rating.bradley_terry import ELO_PER_LOGIT, MEAN_ELO
-from arena.rating.comparisons import Comparisons, FloatArray, restrict_to, select_votes, tally
+from arena.rating.comparisons import (
+    BoolArray,
+    Comparisons,
+    FloatArray,
+    restrict_to,
+    select_votes,
+    tally,
+)
 from arena.rating.e_values import Bet, compute_e_values, detection_limit
 from arena.rating.fit_test import fit_test
 from arena.rating.influence import (
@@ -20,6 +28,7 @@ from arena.rating.influence import (
     rank_changes,
     without_each_expert,
 )
+from arena.rating.interactions import side_interaction
 from arena.rating.leaderboard import Intervals, Leaderboard, Line, Method, rate
 from arena.rating.planning import design_effects, votes_until
 from arena.rating.position import side_bias
@@ -38,6 +47,7 @@ from arena.results.tree import (
     Trust,
     VotesWanted,
 )
+from arena.services.conditions import by_type, within_sessions
 from arena.services.vote_arrays import SCORES, VoteArrays
 
 AGREEMENT_ROUNDS = 1000
@@ -69,6 +79,9 @@ def trust(arrays: VoteArrays, votes: VoteSet, board: Leaderboard, *, seed: int) 
         side=side_bias(inner) if len(inner) else None,
         repeats=first if first.number else None,
         raters=_panel(arrays, inner, strengths, votes, first),
+        by_side=side_interaction(inner) if strengths is not None else None,
+        by_type=by_type(arrays, strengths, seed=seed),
+        drifts=within_sessions(arrays, strengths, np.flatnonzero(_are_first_looks(votes))),
     )
     if strengths is None:
         return found
@@ -236,6 +249,12 @@ def _panel(
         )
         for line in raters(inner, ms=arrays.ms, without=without)
     )
+
+
+def _are_first_looks(votes: VoteSet) -> BoolArray:
+    """(V,) whether a person saw the pair for the first time."""
+    seen = (vote.kind not in (REPEAT, AUTOMATIC) for vote in votes.counted)
+    return np.fromiter(seen, dtype=np.bool_, count=len(votes.counted))
 
 
 def _by_field(value: Rater | Bet) -> dict[str, Any]:

@@ -14,6 +14,7 @@ from django.utils.translation import gettext_lazy, gettext_noop
 from arena.exports.columns import Column
 from arena.exports.tables import Row
 from arena.rating.estimate import Estimate
+from arena.rating.printed import interval_text, rating_text
 from augment.models import Scenario
 from augment.services.scenarios.types import type_label as own_label
 from augment.services.wording import translate
@@ -179,6 +180,32 @@ def estimate_percent(found: Estimate | None) -> str:
 def estimate_points(found: Estimate | None) -> str:
     """The same in points, with its sign."""
     return _with_interval(found, lambda value: f"{value:+.0f}" if round(value) else "0")
+
+
+@register.filter
+def estimate_elo(found: Estimate | None) -> str:
+    """A rating in whole points, as the table prints intervals: 1012 -40/+38."""
+    if not found or found.value is None:
+        return "–"
+    return f"{rating_text(found.value)} {interval_text(found.value, found.lower, found.upper)}"
+
+
+@register.filter
+def estimate_share_change(found: Estimate | None) -> str:
+    """A change of a share in percentage points, with its sign."""
+    return _with_interval(found, lambda value: f"{100 * value:+.1f}")
+
+
+@register.filter
+def estimate_seconds(found: Estimate | None) -> str:
+    """A change of seconds, with its sign."""
+    return _with_interval(found, lambda value: f"{value:+.1f} s")
+
+
+@register.filter
+def seconds_text(value: float | None) -> str:
+    """Seconds with one digit after the point."""
+    return "–" if value is None else f"{value:.1f} s"
 
 
 @register.filter

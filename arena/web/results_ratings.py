@@ -9,10 +9,12 @@ from typing import Any
 
 from arena.exports.columns import ON_PAGE
 from arena.exports.heat import heat_map
+from arena.exports.pooled import with_pooled
 from arena.exports.tables import LeaderboardTable, Row, sentences_of
 from arena.models import Snapshot
 from arena.results.tree import Bounds, OnlinePlace, PairRecord, TypeStanding
 from arena.web.charts import bars, interval_chart
+from arena.web.results_conditions import interaction
 
 Context = dict[str, Any]
 """What a tab's template needs."""
@@ -62,7 +64,7 @@ def pairs(snapshot: Snapshot, table: LeaderboardTable) -> Context:
 def types(snapshot: Snapshot, table: LeaderboardTable) -> Context:
     """One small chart and table a scenario type, all on one axis."""
     names = by_slug(table)
-    lines = [line for part in snapshot.results.types for line in part.lines]
+    lines = [with_pooled(line) for part in snapshot.results.types for line in part.lines]
     ends = [end for line in lines for end in (line.lower, line.upper) if end is not None]
     span = (min(ends), max(ends)) if ends else None
     by_name = {row.slug: row.name for row in table.rows}
@@ -78,10 +80,18 @@ def types(snapshot: Snapshot, table: LeaderboardTable) -> Context:
                 "rows": rows,
                 "chart": interval_chart(rows, span),
                 "few": any(row.votes < FEW for row in rows),
+                "pooled": {
+                    line.slug: line.pooled for line in part.lines if line.pooled.value is not None
+                },
                 "reasons": sentences_of(reasons, by_name),
             }
         )
-    return {"parts": parts, "few_votes": FEW}
+    return {
+        "parts": parts,
+        "few_votes": FEW,
+        "by_type": interaction(snapshot.results.trust.by_type, table.rows),
+        "type_spread": snapshot.results.type_spread,
+    }
 
 
 def by_slug(table: LeaderboardTable) -> Mapping[str, Row]:
@@ -117,7 +127,8 @@ def _pair(
 
 
 def _row(line: TypeStanding, row: Row) -> Row:
-    """A contestant's line among the votes of one type."""
+    """A line among the votes of one type; with what it borrows where these are few."""
+    line = with_pooled(line)
     return replace(
         row,
         rank=line.rank,

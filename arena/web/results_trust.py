@@ -9,6 +9,7 @@ from arena.models import Snapshot
 from arena.queries.people import natural_order
 from arena.web.charts import bars
 from arena.web.results_authors import with_authors
+from arena.web.results_conditions import drifts, interaction
 from arena.web.results_ratings import Context
 from arena.web.scatter import scatter
 
@@ -25,6 +26,8 @@ def raters(snapshot: Snapshot, table: LeaderboardTable) -> Context:
         "panel": panel,
         "limit": next((line.bet.limit for line in lines if line.bet), None),
         "left_bars": bars(left, span=(0.0, 1.0)),
+        "by_side": interaction(snapshot.results.trust.by_side, table.rows),
+        "drifts": drifts(snapshot.results.trust.drifts),
     }
 
 

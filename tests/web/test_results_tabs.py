@@ -11,12 +11,14 @@ from django.test import Client
 from django.urls import reverse
 from pytest_django import DjangoAssertNumQueries
 
+from arena.exports.bundle import bundle_files
 from arena.models import EarlyLook, Matchup, Snapshot, Study
 from arena.queries.vote_sets import Filters
 from arena.rating.e_values import Manner
 from arena.results.tree import RaterBet
 from arena.services.ratings import plan_snapshot, rate
 from arena.services.studies import close_study
+from arena.templatetags.results import estimate_elo
 from arena.web.results_tabs import TABS
 from augment.models import Scenario
 from tests import study_rows
@@ -92,6 +94,32 @@ def test_types_stand_on_one_axis_with_a_warning_where_votes_are_few(
     for label in Scenario.Type.labels:
         assert str(label) in shown
     assert "Too few votes: lines marked with * have fewer than 30." in shown
+
+
+def test_pages_and_files_show_what_depends_on_types_sides_and_sessions(
+    study: Study, analyst: Client
+) -> None:
+    kept = study.snapshots.get().results
+    assert kept.trust.by_type is not None
+    assert kept.trust.by_side is not None
+    shown = page(analyst, study, "types")
+    assert f"{kept.trust.by_type.statistic:.1f} on {kept.trust.by_type.freedom} degrees" in shown
+    # Ten votes of a contestant on a type: many have no interval of their own, all a pooled one.
+    lines = [line for part in kept.types for line in part.lines]
+    assert any(line.lower is None or line.upper is None for line in lines)
+    assert all(line.pooled.lower is not None for line in lines)
+    assert "pooled with the other types" in shown
+    assert all(estimate_elo(line.pooled) in shown for line in lines)
+    shown = page(analyst, study, "raters")
+    assert f"{kept.trust.by_side.statistic:.1f} on {kept.trust.by_side.freedom} degrees" in shown
+    assert [one.measure for one in kept.trust.drifts][:2] == ["ties", "seconds"]
+    for one in kept.trust.drifts:
+        assert f'<td class="num">{one.votes}</td></tr>' in shown, one.measure
+    files = bundle_files(study.snapshots.get())
+    assert files["type_effects.csv"].count(b"\n") == 1 + 5 * 9
+    assert files["side_effects.csv"].count(b"\n") == 1 + 9
+    assert files["sessions.csv"].startswith(b"measure,votes,sessions,experts,first_quarter")
+    assert b",too_few,note,pooled_elo,pooled_lower,pooled_upper" in files["types.csv"]
 
 
 def test_raters_are_pseudonyms_with_repeats_and_checks(analyst: Client) -> None:

@@ -1,0 +1,140 @@
+"""Whether one number a contestant holds under every condition, and on either side.
+
+By side: every contestant may gain more or less than others by being on the left (Wald's test).
+Sides are drawn by lot for each showing, so votes of different showings can't hang together by
+their side: votes of one expert on one scenario are one cluster. By scenario type:
+`arena.rating.type_interaction`.
+
+Notation: R rows, C contestants.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.special import fdtrc
+
+from arena.rating.bootstrap import Unit
+from arena.rating.bradley_terry import ELO_PER_LOGIT
+from arena.rating.comparisons import Comparisons, FloatArray, renumber_codes
+from arena.rating.estimate import Estimate
+from arena.rating.logistic import fit_with_columns, parameter_covariance
+from arena.rating.ranking import holm
+from arena.rating.student import t_above, t_quantile
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Cell:
+    """By how many points a contestant differs from its own average under one condition.
+
+    Attributes:
+        condition: The scenario type; "left" for the side.
+        effect: Elo points with the interval of this cell alone.
+        p_value: Adjusted for all cells (Holm).
+    """
+
+    contestant: str
+    condition: str
+    votes: int
+    effect: Estimate
+    p_value: float | None = None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Interaction:
+    """A test of contestants against conditions, and the cells.
+
+    Attributes:
+        statistic: About as large as `freedom` where there is no interaction and votes are
+            independent without ties.
+        p_value: None where nothing can be told.
+        rounds: Of the permutations; 0 where the p-value is that of a distribution in closed form.
+    """
+
+    statistic: float
+    freedom: int
+    p_value: float | None
+    rounds: int
+    cells: tuple[Cell, ...] = ()
+
+
+def side_interaction(votes: Comparisons) -> Interaction | None:
+    """Whether some contestants gain more than others by being on the left.
+
+    Args:
+        votes: `first` was shown on the left.
+
+    Returns:
+        None where the votes do not determine it: some contestant was hardly on one of the sides.
+    """
+    contestants = len(votes.names)
+    if contestants < 3:
+        return None  # with two the gain of one is the gain of the other
+    columns = np.zeros((len(votes), contestants))
+    rows = np.arange(len(votes))
+    columns[rows, votes.first] = columns[rows, votes.second] = 1.0
+    fitted = fit_with_columns(votes, columns)
+    if fitted is None:
+        return None
+    contrast = 2.0 * (np.eye(contestants) - 1.0 / contestants)
+    effects = contrast @ fitted.coefficients * ELO_PER_LOGIT
+    shown = renumber_codes(votes.expert * (int(votes.scenario.max()) + 1) + votes.scenario)[1]
+    by_cell = replace(votes, expert=shown, scenario=np.zeros_like(shown))
+    unit = Unit.EXPERT if shown.max() > 0 else Unit.VOTE
+    whole = parameter_covariance(by_cell, fitted, unit)[contestants:, contestants:]
+    covariance = contrast @ whole @ contrast.T
+    statistic = float(effects @ np.linalg.pinv(covariance, rcond=1e-10, hermitian=True) @ effects)
+    freedom = contestants - 1
+    errors = np.sqrt(covariance.diagonal())
+    played = np.bincount(votes.first, votes.count, contestants)
+    played += np.bincount(votes.second, votes.count, contestants)
+    many = np.full(contestants, 1e7)
+    return Interaction(
+        statistic=statistic,
+        freedom=freedom,
+        p_value=_above(statistic, freedom, int(shown.max()) + 1),
+        rounds=0,
+        cells=cells_of(votes.names, ("left",) * contestants, played, effects, errors, many),
+    )
+
+
+def cells_of(
+    names: tuple[str, ...],
+    conditions: tuple[str, ...],
+    votes: FloatArray,
+    effects: FloatArray,
+    errors: FloatArray,
+    degrees: FloatArray,
+) -> tuple[Cell, ...]:
+    """The cells of (n,) effects in points with standard errors and degrees of freedom."""
+    known = ~np.isnan(effects) & (errors > 0.0)
+    single = 2.0 * t_above(np.abs(effects[known]) / errors[known], degrees[known])
+    adjusted = np.full(len(names), np.nan)
+    adjusted[known] = holm(single)
+    half = np.zeros(len(names))
+    half[known] = t_quantile(degrees[known]) * errors[known]
+    return tuple(
+        Cell(
+            contestant=name,
+            condition=condition,
+            votes=int(votes[number]),
+            effect=Estimate(
+                value=float(effects[number]),
+                lower=float(effects[number] - half[number]),
+                upper=float(effects[number] + half[number]),
+            )
+            if known[number]
+            else Estimate(value=None),
+            p_value=float(adjusted[number]) if known[number] else None,
+        )
+        for number, (name, condition) in enumerate(zip(names, conditions, strict=True))
+    )
+
+
+def _above(statistic: float, freedom: int, clusters: int) -> float | None:
+    """How likely Wald's statistic of so many clusters is as large by chance (Hotelling's T2)."""
+    rest = clusters - freedom
+    if rest < 1:
+        return None
+    return float(fdtrc(freedom, rest, statistic * rest / (freedom * (clusters - 1))))
