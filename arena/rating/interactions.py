@@ -87,7 +87,7 @@ def side_interaction(votes: Comparisons) -> Interaction | None:
     statistic = float(effects @ np.linalg.pinv(covariance, rcond=1e-10, hermitian=True) @ effects)
     freedom = contestants - 1
     errors = np.sqrt(covariance.diagonal())
-    played = np.bincount(votes.first, votes.count, contestants)
+    played: FloatArray = np.bincount(votes.first, votes.count, contestants).astype(np.float64)
     played += np.bincount(votes.second, votes.count, contestants)
     many = np.full(contestants, 1e7)
     return Interaction(

@@ -173,11 +173,11 @@ class _Rows:
         expected = 1.0 / (1.0 + np.exp(-lead))
         height = float((self.weight * (self.score * lead - np.logaddexp(0.0, lead))).sum())
         pull = self.weight * (self.score - expected)
-        slope = np.bincount(self.first, pull, contestants)
+        slope: FloatArray = np.bincount(self.first, pull, contestants).astype(np.float64)
         slope -= np.bincount(self.second, pull, contestants)
         information = self.weight * expected * (1.0 - expected)
         place = self.first * contestants + self.second
-        between = np.bincount(place, information, contestants**2)
+        between: FloatArray = np.bincount(place, information, contestants**2).astype(np.float64)
         between = between.reshape(contestants, contestants)
         curvature = -(between + between.T)
         curvature[np.diag_indices(contestants)] = -curvature.sum(axis=1)
@@ -247,7 +247,8 @@ def _step(
         step = np.zeros_like(place)
         step[0] = common @ slopes.sum(axis=0)
         log_size = -float(np.linalg.slogdet(common)[1])
-        return step, np.broadcast_to(common, curvatures.shape), log_size
+        everywhere = np.broadcast_to(common, curvatures.shape).astype(np.float64)
+        return step, everywhere, log_size
     own = np.linalg.inv(curvatures + penalty * np.eye(size))
     kept = penalty * own  # what is left of the common strengths where a type has its own
     of_common = curvatures @ kept
@@ -257,6 +258,6 @@ def _step(
     step = np.zeros_like(place)
     step[0] = common @ reduced.sum(axis=0)
     step[1:] = np.einsum("tij,tj->ti", own, pull - curvatures @ step[0])
-    covariance = own + kept @ common @ kept.transpose(0, 2, 1)
+    covariance = np.asarray(own + kept @ common @ kept.transpose(0, 2, 1), dtype=np.float64)
     log_size = -float(np.linalg.slogdet(common)[1]) - float(np.linalg.slogdet(own)[1].sum())
     return step, covariance, log_size

@@ -91,7 +91,8 @@ def _by_unit(
     contestants = len(votes.names)
     pull = votes.count * (votes.score - expected)
     weight = votes.count * expected * (1.0 - expected)
-    slopes = np.bincount(unit_of * contestants + votes.first, pull, units * contestants)
+    room = units * contestants
+    slopes = np.bincount(unit_of * contestants + votes.first, pull, room).astype(np.float64)
     slopes -= np.bincount(unit_of * contestants + votes.second, pull, units * contestants)
     size = contestants**2
     information = np.zeros(units * size)
@@ -169,10 +170,9 @@ def _type_cells(votes: Comparisons, of_row: IntArray, types: tuple[str, ...]) ->
         own = select_votes(votes, of_row == number)
         names += votes.names
         conditions += [name] * contestants
-        played.append(
-            np.bincount(own.first, own.count, contestants)
-            + np.bincount(own.second, own.count, contestants)
-        )
+        of_each = np.bincount(own.first, own.count, contestants)
+        of_each = of_each + np.bincount(own.second, own.count, contestants)
+        played.append(of_each.astype(np.float64))
         part = parts[number]
         if part is None or len(fine) < 2:
             unknown = np.full(contestants, np.nan)
