@@ -16,6 +16,7 @@ from arena.rating.bradley_terry import Meetings, to_elo
 from arena.rating.comparisons import BoolArray, Comparisons, FloatArray, PairCounts, tally
 from arena.rating.components import Loose, loose
 from arena.rating.connectivity import Determined, heaviest_tree
+from arena.rating.logistic import Coefficient, coefficients_of, fit_with_columns
 from arena.rating.pulls import Pulls, bradley_terry_pulls, davidson_pulls
 from arena.rating.reach import loose_rounds, rounds_to_draw
 from arena.rating.rules import Intervals, Method, Order, Rules
@@ -26,7 +27,8 @@ class Fitted:
     """Ratings of the data (C,), of the rounds that determine everybody (C, b), and the others.
 
     For intervals in closed form the rounds only say who is determined; their ratings are those of
-    the data.
+    the data. Without covariates, or where the votes do not determine what these are worth, there
+    are no coefficients.
     """
 
     rating: FloatArray
@@ -35,6 +37,7 @@ class Fitted:
     pulls: Pulls | None = None
     strengths: FloatArray | None = None
     tie_strength: float | None = None
+    coefficients: tuple[Coefficient, ...] | None = None
 
 
 def fit_votes(votes: Comparisons, counts: PairCounts, rules: Rules) -> Fitted | None:
@@ -63,6 +66,10 @@ def _elo(votes: Comparisons, rules: Rules) -> Fitted:
 
 
 def _bradley_terry(votes: Comparisons, counts: PairCounts, rules: Rules) -> Fitted:
+    if votes.covariates.shape[1]:
+        adjusted = _adjusted(votes, counts, rules)
+        if adjusted is not None:
+            return adjusted
     met = Meetings(contestants=len(votes.names), low=counts.low, high=counts.high)
     point = bradley_terry.newton(met, counts.games[:, None], counts.scores[:, None])[:, 0]
     curvature = bradley_terry.inverse_curvature(met, counts.games, point)
@@ -88,6 +95,23 @@ def _bradley_terry(votes: Comparisons, counts: PairCounts, rules: Rules) -> Fitt
 
     samples, rest = _samples(votes, counts, rules, whole, apart)
     return Fitted(rating=to_elo(point), samples=samples, loose=rest, pulls=pulls, strengths=point)
+
+
+def _adjusted(votes: Comparisons, counts: PairCounts, rules: Rules) -> Fitted | None:
+    """With covariates in the fit; None where the votes do not determine what these are worth."""
+    found = fit_with_columns(votes, votes.covariates)
+    if found is None:
+        return None
+    rating = to_elo(found.strengths)
+    samples, rest = _same_everywhere(votes, counts, rules, rating)
+    return Fitted(
+        rating=rating,
+        samples=samples,
+        loose=rest,
+        pulls=found.pulls,
+        strengths=found.strengths,
+        coefficients=coefficients_of(votes, found, rules.unit),
+    )
 
 
 def _davidson(votes: Comparisons, counts: PairCounts, rules: Rules) -> Fitted | None:

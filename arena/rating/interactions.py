@@ -25,7 +25,7 @@ from arena.rating.student import t_above, t_quantile
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Cell:
+class Effect:
     """By how many points a contestant differs from its own average under one condition.
 
     Attributes:
@@ -56,7 +56,7 @@ class Interaction:
     freedom: int
     p_value: float | None
     rounds: int
-    cells: tuple[Cell, ...] = ()
+    cells: tuple[Effect, ...] = ()
 
 
 def side_interaction(votes: Comparisons) -> Interaction | None:
@@ -106,7 +106,7 @@ def cells_of(
     effects: FloatArray,
     errors: FloatArray,
     degrees: FloatArray,
-) -> tuple[Cell, ...]:
+) -> tuple[Effect, ...]:
     """The cells of (n,) effects in points with standard errors and degrees of freedom."""
     known = ~np.isnan(effects) & (errors > 0.0)
     single = 2.0 * t_above(np.abs(effects[known]) / errors[known], degrees[known])
@@ -115,7 +115,7 @@ def cells_of(
     half = np.zeros(len(names))
     half[known] = t_quantile(degrees[known]) * errors[known]
     return tuple(
-        Cell(
+        Effect(
             contestant=name,
             condition=condition,
             votes=int(votes[number]),

@@ -31,6 +31,7 @@ from arena.rating.comparisons import (
 )
 from arena.rating.connectivity import Diagnosis, Status, diagnose
 from arena.rating.lines import Line, blank_lines, fill, rank_across
+from arena.rating.logistic import Coefficient
 from arena.rating.parts import Rated, rate_part
 from arena.rating.ranking import Separation
 from arena.rating.rules import Intervals, Method, Order, Rules, default_intervals
@@ -64,6 +65,8 @@ class Leaderboard:
             without intervals or where details were not asked for.
         separation: All pairs judged at once, matrices (C, C), NaN for those without votes. None
             where there are no intervals, several parts, or details were not asked for.
+        coefficients: Of the votes' covariates, in their order; none where these are not
+            determined, or in several parts.
     """
 
     lines: tuple[Line, ...]
@@ -84,6 +87,7 @@ class Leaderboard:
     degenerate_rounds: int = 0
     covariance: FloatArray | None = field(default=None, compare=False)
     separation: Separation | None = field(default=None, compare=False)
+    coefficients: tuple[Coefficient, ...] = ()
 
     @property
     def standings(self) -> tuple[Line, ...]:
@@ -132,7 +136,8 @@ def rate(
     status and the explanation say so.
 
     Args:
-        votes: What was voted; contestants without votes get a line without a rating.
+        votes: What was voted; contestants without votes get a line without a rating. With
+            covariates the ratings are those of contestants who are alike in them.
         method: Bradley-Terry, Davidson's tie model, or online Elo.
         rounds: Of the bootstrap; for intervals in closed form, of what is drawn to see who is
             determined and how far apart equals come to lie.
@@ -145,10 +150,15 @@ def rate(
         details: Also what costs extra: covariance, cross-check and separation.
 
     Raises:
-        ValueError: Fewer than one round, or online Elo with a unit other than votes.
+        ValueError: Fewer than one round, online Elo with a unit other than votes, or covariates
+            with another method than Bradley-Terry or with resampled intervals.
     """
     if unit is None:
         unit = Unit.VOTE if method is Method.ELO else Unit.TWO_WAY
+    if votes.covariates.shape[1]:
+        intervals = intervals or Intervals.CLOSED_FORM
+        if method is not Method.BRADLEY_TERRY or intervals is not Intervals.CLOSED_FORM:
+            raise ValueError("covariates need Bradley-Terry with intervals in closed form")
     rules = Rules(
         method=method,
         unit=unit,
@@ -205,6 +215,7 @@ def _rate(votes: Comparisons, rules: Rules) -> Leaderboard:
         separation=whole.separation.among(np.array(present), len(lines))
         if whole and whole.separation
         else None,
+        coefficients=whole.coefficients if whole else (),
     )
 
 

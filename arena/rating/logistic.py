@@ -9,14 +9,19 @@ logarithms of odds.
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from arena.rating import sandwich
 from arena.rating.bootstrap import Unit
+from arena.rating.bradley_terry import ELO_PER_LOGIT
 from arena.rating.comparisons import Comparisons, FloatArray
+from arena.rating.estimate import Estimate
+from arena.rating.moderated import clusters_of
 from arena.rating.pulls import Pulls
+from arena.rating.student import t_above, t_quantile
 
 _MOST_STEPS = 60
 _TOLERANCE = 1e-10
@@ -103,6 +108,42 @@ def parameter_covariance(votes: Comparisons, fitted: LogisticFit, unit: Unit) ->
     """(K, K) in squared Elo points, by the plain sandwich; coefficients times a point's worth."""
     everything = replace(fitted.pulls, contestants=len(fitted.inverse))
     return sandwich.covariance(votes, everything, unit)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Coefficient:
+    """What one unit of a covariate is worth.
+
+    Attributes:
+        points: Elo points, with its interval clustered as the ratings' are.
+        p_value: Of none; None where it can't be told.
+    """
+
+    points: Estimate
+    p_value: float | None
+
+
+def coefficients_of(
+    votes: Comparisons, fitted: LogisticFit, unit: Unit
+) -> tuple[Coefficient, ...]:
+    """The columns' coefficients in Elo points, by the plain sandwich and Student's t."""
+    covariance = parameter_covariance(votes, fitted, unit)
+    clusters = min((number for number, _ in clusters_of(votes, unit)), default=votes.votes)
+    degrees = float(max(clusters - 1, 1))
+    found = []
+    for place, value in enumerate(fitted.coefficients.tolist(), start=len(fitted.strengths)):
+        points, error = value * ELO_PER_LOGIT, math.sqrt(max(covariance[place, place], 0.0))
+        half = float(t_quantile(degrees)) * error
+        known = error > 0.0
+        found.append(
+            Coefficient(
+                points=Estimate(value=points, lower=points - half, upper=points + half)
+                if known
+                else Estimate(value=points),
+                p_value=2.0 * float(t_above(abs(points) / error, degrees)) if known else None,
+            )
+        )
+    return tuple(found)
 
 
 # --- Private -----------------------------------------------------------------------------------

@@ -15,6 +15,7 @@ from arena.rating.comparisons import Comparisons, FloatArray, count_pairs
 from arena.rating.components import Placed, open_interval, place_on_one_scale
 from arena.rating.connectivity import Status
 from arena.rating.fits import Fitted, fit_votes
+from arena.rating.logistic import Coefficient
 from arena.rating.moderated import Spread, spread_of
 from arena.rating.ranking import (
     Separation,
@@ -53,6 +54,7 @@ class Rated:
     covariance: FloatArray | None = None
     separation: Separation | None = None
     tie_strength: float | None = None
+    coefficients: tuple[Coefficient, ...] = ()
     degenerate: int = 0
     notes: tuple[Sentence | str, ...] = ()
     explanation: tuple[Sentence, ...] = ()
@@ -126,6 +128,7 @@ def _without_intervals(
     return Rated(
         rating=fit.rating,
         tie_strength=fit.tie_strength,
+        coefficients=fit.coefficients or (),
         degenerate=fit.loose.values.shape[1],
         notes=(note,) * len(fit.rating),
         explanation=explanation,
@@ -219,9 +222,10 @@ def _with_intervals(
         covariance=covariance if rules.details else None,
         separation=judged if rules.details else None,
         tie_strength=fit.tie_strength,
+        coefficients=fit.coefficients or (),
         degenerate=degenerate,
         notes=notes,
-        explanation=remarks.who_is_open(votes.names, notes),
+        explanation=_on_covariates(votes, fit) + remarks.who_is_open(votes.names, notes),
         warnings=_notes_on_method(rules)
         + remarks.warnings(votes, rules=rules, rounds=drawn, degenerate=degenerate),
     )
@@ -238,6 +242,11 @@ def _separation(rating: FloatArray, everywhere: Placed) -> Separation | None:
         samples = samples[:, fine]
     found = separation(rating[members], samples)
     return found.among(members, len(rating))
+
+
+def _on_covariates(votes: Comparisons, fit: Fitted) -> tuple[Sentence, ...]:
+    missing = votes.covariates.shape[1] > 0 and fit.coefficients is None
+    return (remarks.NOT_ADJUSTED,) if missing else ()
 
 
 def _notes_on_method(rules: Rules) -> tuple[Sentence, ...]:

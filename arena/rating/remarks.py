@@ -135,6 +135,11 @@ NO_DAVIDSON = sentence(
     "Bradley-Terry rates them."
 )
 
+NOT_ADJUSTED = sentence(
+    "The votes do not determine what was to be adjusted for: it is the same in all votes, or says "
+    "no more than who was shown. The ratings stand without it."
+)
+
 ALL_THE_SAME = {
     Unit.VOTE: sentence(
         "Every resample by vote gave the same ratings, so intervals can't be given: there is too "

@@ -22,7 +22,7 @@ from arena.rating.comparisons import (
     renumber_codes,
     select_votes,
 )
-from arena.rating.interactions import Cell, Interaction, cells_of
+from arena.rating.interactions import Effect, Interaction, cells_of
 from arena.rating.moderated import LEAST
 from arena.rating.pulls import Pulls, bradley_terry_pulls
 from arena.rating.reach import are_all_together
@@ -153,7 +153,9 @@ def _permuted(
 # --- Cells -------------------------------------------------------------------------------------
 
 
-def _type_cells(votes: Comparisons, of_row: IntArray, types: tuple[str, ...]) -> tuple[Cell, ...]:
+def _type_cells(
+    votes: Comparisons, of_row: IntArray, types: tuple[str, ...]
+) -> tuple[Effect, ...]:
     """A contestant's rating on a type less the mean over all types that determine everybody's."""
     contestants = len(votes.names)
     parts = [_one_type(select_votes(votes, of_row == number)) for number in range(len(types))]

@@ -9,7 +9,7 @@ from django.utils.functional import Promise
 from django.utils.translation import gettext_lazy as _
 
 from arena.exports.tables import Row
-from arena.rating.interactions import Cell, Interaction
+from arena.rating.interactions import Effect, Interaction
 from arena.rating.session import Drift
 
 Context = dict[str, Any]
@@ -61,7 +61,7 @@ def drifts(found: Sequence[Drift]) -> list[Context]:
 # --- Private -----------------------------------------------------------------------------------
 
 
-def _shown(cell: Cell | None) -> Mapping[str, Any]:
+def _shown(cell: Effect | None) -> Mapping[str, Any]:
     if cell is None:
         return {"cell": None, "is_sure": False}
     return {"cell": cell, "is_sure": cell.p_value is not None and cell.p_value < SURE}
