@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 import os
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
@@ -12,16 +13,36 @@ from urllib.request import Request, urlopen
 import boto3
 from moto.server import ThreadedMotoServer
 
+from tests.stack import free_port
+
 KEYS = {"AWS_ACCESS_KEY_ID": "tests", "AWS_SECRET_ACCESS_KEY": "no secret"}
 BUCKET = "pictures"
 REGION = "eu-central-1"
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(slots=True)
 class Bucket:
-    """Where it is, as a program of ours is told, and what lies in it."""
+    """Where it is, as a program of ours is told, and what lies in it.
 
-    endpoint: str
+    Stopped and started again it has what it had.
+    """
+
+    port: int
+    server: ThreadedMotoServer | None = None
+
+    @property
+    def endpoint(self) -> str:
+        return f"http://127.0.0.1:{self.port}"
+
+    def start(self) -> None:
+        logging.getLogger("werkzeug").setLevel(logging.ERROR)
+        self.server = ThreadedMotoServer(ip_address="127.0.0.1", port=self.port, verbose=False)
+        self.server.start()
+
+    def stop(self) -> None:
+        if self.server is not None:
+            self.server.stop()
+            self.server = None
 
     @property
     def environment(self) -> Mapping[str, str]:
@@ -46,12 +67,10 @@ class Bucket:
 @contextmanager
 def bucket() -> Iterator[Bucket]:
     """One that is gone, with all that lay in it, when the block is left."""
-    server = ThreadedMotoServer(ip_address="127.0.0.1", port=0, verbose=False)
     with mock.patch.dict(os.environ, KEYS):
-        server.start()
+        made = Bucket(free_port())
+        made.start()
         try:
-            host, port = server.get_host_and_port()
-            made = Bucket(f"http://{host}:{port}")
             # All servers of a process share what they keep.
             urlopen(Request(f"{made.endpoint}/moto-api/reset", method="POST"), timeout=30).close()
             made.client.create_bucket(
@@ -59,4 +78,4 @@ def bucket() -> Iterator[Bucket]:
             )
             yield made
         finally:
-            server.stop()
+            made.stop()

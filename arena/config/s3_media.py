@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import Any
@@ -13,6 +14,8 @@ from django.core.files.base import ContentFile, File
 from storages.backends.s3 import S3Storage
 
 from augment.errors import MediaFault
+
+logger = logging.getLogger(__name__)
 
 CLIENT = Config(
     signature_version="s3v4",
@@ -83,4 +86,13 @@ class S3Media(S3Storage):  # type: ignore[misc] # it has no types
             yield
         except (BotoCoreError, ClientError, Boto3Error) as fault:
             place = f"s3://{self.bucket_name}/{self.location}".rstrip("/")
-            raise MediaFault(deed, name, place, str(fault)) from fault
+            logger.error("Could not %s %s in %s: %s", deed, name or "anything", place, fault)
+            raise MediaFault(deed, place, _kind_of(fault)) from fault
+
+
+def _kind_of(fault: Exception) -> str:
+    """In a word: the code that the bucket answered, or what kept an answer away."""
+    first = fault.__cause__ if isinstance(fault, Boto3Error) and fault.__cause__ else fault
+    if isinstance(first, ClientError):
+        return str(first.response.get("Error", {}).get("Code", "refused"))
+    return type(first).__name__

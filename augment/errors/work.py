@@ -130,17 +130,18 @@ class DatabaseLocked(AugmentError):
 class MediaFault(AugmentError):
     """Pictures can't be kept or read just now. What models answered is kept: mend it and retry.
 
+    The text is the same for every file, so that rows which failed by one cause are retried as one;
+    which file it was stands in the log.
+
     Args:
         deed: What was to be done with the file: read, write, look for, list, delete.
-        name: The file.
         place: The folder or bucket.
-        cause: What the folder or bucket said.
+        cause: What the folder or bucket said, in a few words.
     """
 
-    def __init__(self, deed: str, name: str, place: str, cause: str) -> None:
+    def __init__(self, deed: str, place: str, cause: str) -> None:
         super().__init__(
-            f"The storage of pictures failed: could not {deed} {name or 'anything'} in {place}: "
-            f"{cause}"
+            f"The storage of pictures failed: could not {deed} a file in {place}: {cause}."
         )
 
 

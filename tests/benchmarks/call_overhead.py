@@ -14,7 +14,7 @@ import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -29,11 +29,12 @@ MODEL = "fake-good"
 
 
 @contextmanager
-def stand_in() -> Iterator[str]:
-    """A server in a process of its own; its base URL."""
+def stand_in(environment: Mapping[str, str] | None = None) -> Iterator[str]:
+    """A server in a process of its own, which looks up intents there; its base URL."""
     started = subprocess.Popen(
         [sys.executable, "manage.py", "fake_llm", "--port", "0"],
         cwd=ROOT,
+        env=dict(environment or os.environ),
         stdout=subprocess.PIPE,
         text=True,
     )

@@ -40,6 +40,17 @@ def test_without_any_redis_server_the_error_says_how_to_get_one(
         redis_server.find_redis_server()
 
 
+@pytest.mark.parametrize("name", ["redis-server", "valkey-server"])
+def test_what_speaks_redis_is_found_by_either_name(
+    name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    program = tmp_path / name
+    program.write_text("#!/bin/sh\n")
+    program.chmod(0o700)
+    monkeypatch.setenv("PATH", str(tmp_path))
+    assert redis_server.find_redis_server() == program
+
+
 @pytest.mark.parametrize("port", [-1, 0, 65_536])
 def test_a_number_that_is_no_port_is_refused(port: int) -> None:
     with pytest.raises(PortTaken, match=f"A port goes from 1 to 65535, not {port}"):
