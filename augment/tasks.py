@@ -22,6 +22,7 @@ from django.db import connection
 from augment import scene_tasks
 from augment.broker import open_broker, send
 from augment.services.clock import DATABASE_TIME, Moment
+from augment.services.endpoints import probing
 from augment.services.judging import marked_pictures, simulations
 from augment.services.running import (
     intent_readings,
@@ -73,6 +74,24 @@ def read_intent(reading_pk: int) -> None:
     if stopping.is_stop_requested():
         raise Reject("this worker stops", requeue=True)
     intent_readings.read_planned(reading_pk)
+
+
+@shared_task(name="augment.make_probe", acks_late=True, ignore_result=True)
+def make_probe(probe_pk: int) -> None:
+    """Ask a model what it can do, unless somebody has done so for this row."""
+    if stopping.is_stop_requested():
+        raise Reject("this worker stops", requeue=True)
+    probing.make_probe(probe_pk)
+
+
+def enqueue_probe(probe_pk: int) -> None:
+    """Have a model probed; for transaction.on_commit.
+
+    Raises:
+        QueueFault: No broker, or it refuses; the probe fails after a while.
+    """
+    with open_broker() as broker:
+        make_probe.apply_async((probe_pk,), connection=broker, retry=False)
 
 
 def enqueue_reading(reading_pk: int) -> None:
@@ -155,6 +174,7 @@ def recover(*, now: Moment = DATABASE_TIME, at_start: bool = False) -> None:
     leases.take_back_stale(now=now, older_than=stale_after)
     jobs.finish_if_over(now=now)
     intent_readings.give_up_stale(now=now)
+    probing.give_up_stale(now=now)
     lost_after = timedelta(0) if at_start else _lost_after(run_augmentation)
     enqueue(leases.find_unsent(now=now, older_than=lost_after))
     simulations.requeue_stale(now=now, older_than=stale_after)

@@ -49,6 +49,7 @@ _WORDS = (
     *(_("construction sign"), _("generic object")),
     *(_("modifier"), _("reviewer"), _("engineer"), _("viewer")),
     *(_("Lost"), _("Released"), _("Unreadable")),
+    *(_("Frontier"), _("Utility"), _("Open weight")),
     *(_("wrong"), _("doubtful"), _("position"), _("heading"), _("logic")),
 )
 """What rows call their states, types, kinds and roles. Files and commands keep the English words;

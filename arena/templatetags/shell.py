@@ -39,7 +39,15 @@ _SECTIONS: dict[str, tuple[Promise, frozenset[str]]] = {
         _("Scenarios"),
         frozenset({"scenarios", "scenario", "scenes", "scene", "upload"}),
     ),
-    "contestants": (_("Contestants"), frozenset({"contestants", "contestant"})),
+    "contestants": (
+        _("Contestants"),
+        frozenset(
+            {
+                *("contestants", "contestant", "contestant-new"),
+                *("endpoints", "endpoint", "endpoint-new", "endpoint-model"),
+            }
+        ),
+    ),
     "jobs": (_("Jobs"), frozenset({"jobs", "job-new", "job", "faults", "augmentation"})),
     "studies": (
         _("Studies"),

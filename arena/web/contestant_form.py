@@ -73,8 +73,8 @@ class ContestantForm(forms.Form):
     )
     rounds = forms.IntegerField(required=False, label=gettext_lazy("Rounds, at most"))
 
-    def __init__(self, data: Any = None) -> None:
-        super().__init__(data)
+    def __init__(self, data: Any = None, *, initial: dict[str, str] | None = None) -> None:
+        super().__init__(data, initial=initial)
         field = cast(forms.ChoiceField, self.fields["endpoint"])
         known = Endpoint.objects.values_list("label", flat=True)
         field.choices = [(NEW, _("A new one")), *((label, label) for label in known)]
@@ -108,7 +108,8 @@ class ContestantForm(forms.Form):
 @require_http_methods(["GET", "HEAD", "POST"])
 def new_contestant_page(request: HttpRequest) -> HttpResponse:
     """The form, filled in as it was where something can't be taken."""
-    form = ContestantForm(request.POST if request.method == "POST" else None)
+    asked = {name: request.GET.get(name, "") for name in ("endpoint", "model")}
+    form = ContestantForm(request.POST if request.method == "POST" else None, initial=asked)
     if request.method == "POST" and form.is_valid():
         chosen = form.cleaned_data
         try:

@@ -15,6 +15,7 @@ from typing import Any
 from urllib.parse import SplitResult, urlsplit
 
 from augment.errors import InvalidDocument
+from augment.sentences import sentence
 
 Resolve = Callable[..., list[Any]]
 """What `socket.getaddrinfo` does."""
@@ -52,7 +53,7 @@ def check_base_url(base_url: str) -> str:
     """
     problem = _problem(base_url)
     if problem:
-        raise InvalidDocument("endpoint", [("base_url", f"{problem}")])
+        raise InvalidDocument("endpoint", [("base_url", problem)])
     return base_url.rstrip("/")
 
 
@@ -104,13 +105,19 @@ def _problem(base_url: str) -> str | None:
     """What is wrong with the address, None when nothing is."""
     parts = _split(base_url)
     if parts is None or parts.scheme not in {"http", "https"} or not parts.hostname:
-        return "an address such as https://api.openai.com/v1 is needed"
+        return sentence("an address such as https://api.openai.com/v1 is needed")
     if parts.username or parts.password or parts.query or parts.fragment:
-        return "keys and passwords don't belong into the address; name a variable for the key"
+        return sentence(
+            "keys and passwords don't belong into the address; name a variable for the key"
+        )
     host = parts.hostname.rstrip(".").lower()
     address = _address(host)
     if host in _METADATA_NAMES or (address is not None and _is_forbidden(address)):
-        return f"{host} is {_FORBIDDEN}; no model is served from there"
+        return sentence(
+            "%(host)s is a link-local or metadata address, or one that stands for another; no "
+            "model is served from there",
+            host=host,
+        )
     return None
 
 

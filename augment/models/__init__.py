@@ -10,6 +10,7 @@ from augment.models.contestants import Contestant
 from augment.models.endpoints import CallLease, Endpoint, EndpointModel
 from augment.models.events import Event
 from augment.models.jobs import Attempt, Augmentation, GenerationJob
+from augment.models.probes import Probe
 from augment.models.readings import IntentReading
 from augment.models.scenes import SLUG_HELP, BaseScene, Scenario
 from augment.models.simulations import Simulation
@@ -31,6 +32,7 @@ __all__ = [
     "GenerationJob",
     "IntentReading",
     "ModelCall",
+    "Probe",
     "Scenario",
     "SceneUpload",
     "Simulation",

@@ -21,7 +21,7 @@ MARKED = (
     *(gettext_noop("job"), gettext_noop("labelling"), gettext_noop("name")),
     *(gettext_noop("draft"), gettext_noop("open"), gettext_noop("closed")),
     *(gettext_noop("running"), gettext_noop("finished"), gettext_noop("cancelled")),
-    *(gettext_noop("stopped at cap"), gettext_noop("paused")),
+    *(gettext_noop("stopped at cap"), gettext_noop("paused"), gettext_noop("endpoint")),
 )
 """What errors call things and states: marked here, as it stands there in values."""
 

@@ -12,7 +12,7 @@ from arena.services.authorships import mark_author
 from arena.services.invitations import invite
 from arena.services.studies import close_study
 from arena.web.urls import urlpatterns
-from augment.models import SceneUpload, Simulation, UploadMoment
+from augment.models import Endpoint, EndpointModel, SceneUpload, Simulation, UploadMoment
 from tests.web.cast import World, people, signed_in, status, world
 
 pytestmark = pytest.mark.django_db
@@ -44,6 +44,10 @@ PAGES: dict[str, tuple[int, int, int]] = {
     "contestants": (200, 200, 403),
     "contestant-new": (200, 403, 403),
     "contestant": (200, 200, 403),
+    "endpoints": (200, 200, 403),
+    "endpoint-new": (200, 403, 403),
+    "endpoint": (200, 200, 403),
+    "endpoint-model": (200, 200, 403),
     "people": (200, 403, 403),
     "person-forget": (200, 403, 403),  # a question
     "password": (200, 200, 200),
@@ -75,6 +79,8 @@ ACTIONS: dict[str, tuple[int, int, int]] = {
     "job-retry-cause": (302, 403, 403),
     "job-pause": (302, 403, 403),
     "contestant-retired": (302, 403, 403),
+    "endpoint-model-new": (302, 403, 403),
+    "endpoint-probe": (302, 403, 403),
     "catalogue-load": (302, 403, 403),
     "scene-send": (302, 302, 403),
     "upload-show": (302, 302, 403),
@@ -160,6 +166,13 @@ def address(name: str, here: World) -> str:
         "matchup-image": {"token": shown.left_token},
         "replay": {"code": shown.code},
     }
+    if name.startswith("endpoint") and name not in ("endpoints", "endpoint-new"):
+        site, _ = Endpoint.objects.get_or_create(
+            label="here", defaults={"base_url": "http://127.0.0.1:1/v1"}
+        )
+        model, _ = EndpointModel.objects.get_or_create(endpoint=site, model="m")
+        is_of_site = name in ("endpoint", "endpoint-model-new")
+        arguments[name] = {"code": site.code if is_of_site else model.code}
     if name in ("drive", "drive-file"):
         row, _ = Simulation.objects.get_or_create(
             scenario=here.augmentation.scenario,

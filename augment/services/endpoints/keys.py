@@ -15,6 +15,7 @@ from django.contrib.auth.models import User
 
 from augment.errors import InvalidDocument, KeyMissing, KeyNotAllowed
 from augment.models import Endpoint
+from augment.sentences import sentence
 from augment.services.events import log_event
 
 _A_NAME = re.compile(r"[A-Za-z_][A-Za-z0-9_]{0,79}")
@@ -39,11 +40,26 @@ def check_key_variable(variable: str) -> None:
         return
     problem = ""
     if not _A_NAME.fullmatch(variable):
-        problem = "the name of an environment variable is needed, not the key"
+        problem = sentence("the name of an environment variable is needed, not the key")
     elif not may_hold_key(variable):
-        problem = f"{variable} may not be sent to an endpoint: {RULE} is needed"
+        problem = sentence(
+            "%(variable)s may not be sent to an endpoint: a variable whose name ends in _API_KEY, "
+            "or one that ARENA_KEY_VARIABLES lists is needed",
+            variable=variable,
+        )
     if problem:
         raise InvalidDocument("endpoint", [("key_variable", problem)])
+
+
+def is_key_here(variable: str) -> bool:
+    """Whether this process has the key; workers elsewhere may have it all the same."""
+    return bool(os.environ.get(variable, "").strip())
+
+
+def list_key_variables() -> list[str]:
+    """Names, and only names, of the variables that may hold a key and are set or listed here."""
+    here = {name for name in os.environ if _FOR_KEYS.fullmatch(name)}
+    return sorted(here | set(settings.KEY_VARIABLES))
 
 
 def move_of(*, endpoint: Endpoint, base_url: str, key_variable: str) -> tuple[str, str] | None:

@@ -5,6 +5,7 @@ A fault that says nothing about the ability (a busy server) leaves the ability a
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import asdict, dataclass, field
 from datetime import datetime
 from decimal import Decimal
@@ -96,6 +97,7 @@ def probe(
     model: str,
     actor: User | None = None,
     patience: Patience | None = None,
+    on_finding: Callable[[ProbeFinding], None] = lambda found: None,
 ) -> ProbeReport:
     """Ask the questions and store what they show.
 
@@ -104,6 +106,7 @@ def probe(
         model: The model id there.
         actor: Who wants it.
         patience: How faults that may pass are waited for.
+        on_finding: Told what each question showed as soon as it is known.
 
     Raises:
         Endpoint.DoesNotExist: There is no endpoint of that label.
@@ -122,7 +125,7 @@ def probe(
                 reasoning_effort=row.reasoning_effort, max_output_tokens=row.max_output_tokens
             ),
         )
-        report = prober.report(questions_for(model), now=timezone.now())
+        report = prober.report(questions_for(model), now=timezone.now(), on_finding=on_finding)
     _store(row, report, actor)
     return report
 
@@ -141,10 +144,17 @@ class _Prober:
     profile: ModelProfile
     calls: int = 0
 
-    def report(self, questions: tuple[ProbeQuestion, ...], *, now: datetime) -> ProbeReport:
+    def report(
+        self,
+        questions: tuple[ProbeQuestion, ...],
+        *,
+        now: datetime,
+        on_finding: Callable[[ProbeFinding], None],
+    ) -> ProbeReport:
         report = ProbeReport(probed_at=now)
         for question in questions:
             report.findings.append(self._finding(question))
+            on_finding(report.findings[-1])
             if report.findings[0].latency_s is None:
                 break  # nobody answers: the other questions would say the same
         report.refused = sorted(self.profile.refused)

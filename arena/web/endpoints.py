@@ -1,0 +1,192 @@
+"""Pages of endpoints and their models: where they are, what they cost, what a probe saw."""
+
+from __future__ import annotations
+
+import uuid
+from functools import partial
+from typing import cast
+
+from django.contrib import messages
+from django.contrib.auth.models import User
+from django.core.exceptions import PermissionDenied
+from django.db import transaction
+from django.db.models import Count
+from django.http import HttpRequest, HttpResponse
+from django.shortcuts import get_object_or_404, redirect, render
+from django.utils.translation import gettext as _
+from django.views.decorators.http import require_http_methods, require_POST, require_safe
+
+from arena.queries.people import role_of
+from arena.queries.probes import probe_lines
+from arena.web.access import ADMIN, STAFF, allow_only
+from arena.web.endpoint_forms import EndpointPageForm, ModelPageForm, place_problems
+from augment.errors import AugmentError, InvalidDocument, QueueFault
+from augment.models import Endpoint, EndpointModel, Probe
+from augment.services.endpoints import editing
+from augment.services.endpoints.keys import is_key_here, list_key_variables
+from augment.services.endpoints.probing import plan_probe
+from augment.services.running.workers import workforce
+from augment.services.wording import translate
+from augment.tasks import enqueue_probe
+
+
+@allow_only(*STAFF)
+@require_safe
+def endpoints_page(request: HttpRequest) -> HttpResponse:
+    """Every endpoint with its limits, and whether its key is here."""
+    rows = Endpoint.objects.annotate(known=Count("models")).order_by("label")
+    lines = [
+        {"row": row, "has_key": not row.key_variable or is_key_here(row.key_variable)}
+        for row in rows
+    ]
+    return render(request, "endpoints/list.html", {"lines": lines})
+
+
+@allow_only(ADMIN)
+@require_http_methods(["GET", "HEAD", "POST"])
+def new_endpoint_page(request: HttpRequest) -> HttpResponse:
+    """A new endpoint."""
+    form = EndpointPageForm(request.POST if request.method == "POST" else None)
+    if request.method == "POST" and form.is_valid():
+        try:
+            row = editing.add_endpoint(
+                label=form.cleaned_data["label"],
+                facts=form.facts(),
+                is_simulated=form.cleaned_data["is_simulated"],
+                actor=cast(User, request.user),
+            )
+        except AugmentError as error:
+            _tell(form, error)
+        else:
+            messages.success(
+                request, _("“%(name)s” is added. Name its models now.") % {"name": row.label}
+            )
+            return redirect("endpoint", code=row.code)
+    context = {"form": form, "variables": list_key_variables()}
+    return render(request, "endpoints/new.html", context, status=422 if form.errors else 200)
+
+
+@allow_only(*STAFF)
+@require_http_methods(["GET", "HEAD", "POST"])
+def endpoint_page(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
+    """One endpoint with its models; admins change it here."""
+    row = get_object_or_404(Endpoint, code=code)
+    if request.method == "POST":
+        return _change(request, row)
+    return _shown(request, row, EndpointPageForm(row=row))
+
+
+@allow_only(ADMIN)
+@require_POST
+def add_model(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
+    """Note a model of an endpoint; its listed price comes with it."""
+    endpoint = get_object_or_404(Endpoint, code=code)
+    try:
+        row = editing.add_model(
+            endpoint, model=request.POST.get("model", ""), actor=cast(User, request.user)
+        )
+    except AugmentError as error:
+        messages.error(request, translate(error))
+        return redirect("endpoint", code=code)
+    return redirect("endpoint-model", code=row.code)
+
+
+@allow_only(*STAFF)
+@require_http_methods(["GET", "HEAD", "POST"])
+def model_page(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
+    """What is known of a model, and its last probe, line by line while it is made."""
+    row = get_object_or_404(EndpointModel.objects.select_related("endpoint"), code=code)
+    form = ModelPageForm(row=row)
+    if request.method == "POST":
+        _insist_on_admin(request)
+        form = ModelPageForm(request.POST, row=row)
+        if form.is_valid():
+            try:
+                editing.change_model(row, facts=form.facts(), actor=cast(User, request.user))
+            except AugmentError as error:
+                _tell(form, error)
+            else:
+                messages.success(
+                    request,
+                    _("Kept. It counts for contestants that have not run yet."),
+                )
+                return redirect("endpoint-model", code=code)
+    probe = row.probes.first()
+    is_live = probe is not None and probe.state in Probe.UNDER_WAY
+    context = {
+        "row": row,
+        "form": form,
+        "probe": probe,
+        "is_live": is_live,
+        "lines": probe_lines(row, probe),
+        "workforce": workforce() if is_live else None,
+    }
+    return render(request, "endpoints/model.html", context, status=422 if form.errors else 200)
+
+
+@allow_only(ADMIN)
+@require_POST
+def probe_model(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
+    """Have a worker ask the model what it can do."""
+    row = get_object_or_404(EndpointModel.objects.select_related("endpoint"), code=code)
+    try:
+        with transaction.atomic():
+            probe = plan_probe(row, actor=cast(User, request.user))
+            transaction.on_commit(partial(_send, request, probe.pk))
+    except AugmentError as error:
+        messages.error(request, translate(error))
+    return redirect("endpoint-model", code=code)
+
+
+# --- Private -----------------------------------------------------------------------------------
+
+
+def _change(request: HttpRequest, row: Endpoint) -> HttpResponse:
+    _insist_on_admin(request)
+    form = EndpointPageForm(request.POST, row=row)
+    if form.is_valid():
+        try:
+            editing.change_endpoint(
+                row,
+                facts=form.facts(),
+                may_move_key=form.cleaned_data["move_key"],
+                actor=cast(User, request.user),
+            )
+        except AugmentError as error:
+            _tell(form, error)
+        else:
+            messages.success(request, _("Kept. It counts for the next call."))
+            return redirect("endpoint", code=row.code)
+    return _shown(request, row, form)
+
+
+def _shown(request: HttpRequest, row: Endpoint, form: EndpointPageForm) -> HttpResponse:
+    context = {
+        "row": row,
+        "form": form,
+        "models": row.models.all(),
+        "contestants": row.contestants.filter(retired_at=None).order_by("name"),
+        "has_key": not row.key_variable or is_key_here(row.key_variable),
+        "variables": list_key_variables(),
+    }
+    return render(request, "endpoints/endpoint.html", context, status=422 if form.errors else 200)
+
+
+def _insist_on_admin(request: HttpRequest) -> None:
+    """Raise PermissionDenied where somebody may look and not change."""
+    if role_of(request.user) != ADMIN:
+        raise PermissionDenied
+
+
+def _tell(form: EndpointPageForm | ModelPageForm, error: AugmentError) -> None:
+    if isinstance(error, InvalidDocument):
+        place_problems(form, error)
+    else:
+        form.add_error(None, translate(error))
+
+
+def _send(request: HttpRequest, probe_pk: int) -> None:
+    try:
+        enqueue_probe(probe_pk)
+    except QueueFault as error:
+        messages.warning(request, translate(error))

@@ -1,0 +1,51 @@
+"""Probes of models that workers make, with what they have seen so far."""
+
+from __future__ import annotations
+
+import uuid
+
+from django.conf import settings
+from django.db import models
+
+from augment.models.endpoints import EndpointModel
+
+
+class Probe(models.Model):
+    """One round of questions to a model; its last report is also kept with the model."""
+
+    class State(models.TextChoices):
+        QUEUED = "queued", "Waiting"
+        RUNNING = "running", "Running"
+        DONE = "done", "Done"
+        FAILED = "failed", "Failed"
+
+    UNDER_WAY = (State.QUEUED, State.RUNNING)
+
+    code = models.UUIDField(default=uuid.uuid4, unique=True, editable=False)
+    model = models.ForeignKey(EndpointModel, on_delete=models.CASCADE, related_name="probes")
+    state = models.CharField(max_length=20, choices=State.choices, default=State.QUEUED)
+    findings = models.JSONField(default=list, help_text="one a question, as far as they are asked")
+    reason = models.TextField(blank=True, help_text="why it could not be made")
+    asked_by = models.ForeignKey(
+        settings.AUTH_USER_MODEL,
+        null=True,
+        blank=True,
+        on_delete=models.PROTECT,
+        related_name="+",
+    )
+    created_at = models.DateTimeField(auto_now_add=True)
+    started_at = models.DateTimeField(null=True, blank=True)
+    finished_at = models.DateTimeField(null=True, blank=True)
+
+    class Meta:
+        ordering = ("-created_at", "-pk")
+        constraints = (
+            models.UniqueConstraint(
+                name="one_probe_under_way_at_a_model",
+                fields=("model",),
+                condition=models.Q(state__in=("queued", "running")),
+            ),
+        )
+
+    def __str__(self) -> str:
+        return f"probe of {self.model}"

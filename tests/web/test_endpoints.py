@@ -1,0 +1,203 @@
+"""Endpoints, their models and prices by the pages; probes by a worker, line by line."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from datetime import timedelta
+from decimal import Decimal
+
+import pytest
+from django.test import Client
+from django.urls import reverse
+from django.utils import timezone
+
+from augment.errors import Conflict
+from augment.fake_llm.server import FakeServer, running
+from augment.models import Endpoint, EndpointModel, Event, Probe
+from augment.services.endpoints import editing, probing
+from tests.web.cast import people, signed_in
+
+pytestmark = pytest.mark.django_db
+
+GIVEN = {
+    "label": "here",
+    "base_url": "http://127.0.0.1:9/v1/",
+    "key_variable": "HERE_API_KEY",
+    "max_concurrency": "3",
+    "requests_per_minute": "60",
+}
+
+
+@pytest.fixture
+def admin() -> Client:
+    return signed_in(people()["admin"])
+
+
+@pytest.fixture
+def model() -> EndpointModel:
+    site = editing.add_endpoint(
+        label="here", facts=editing.EndpointFacts(base_url="http://127.0.0.1:9/v1")
+    )
+    return editing.add_model(site, model="m")
+
+
+def post(admin: Client, name: str, given: dict[str, str], **where: object) -> str:
+    address = reverse(name, kwargs=where)
+    return admin.post(address, given, follow=True).content.decode()
+
+
+def test_an_endpoint_is_added_with_its_limits_and_shows_no_key(
+    admin: Client, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("HERE_API_KEY", "sk-very-secret")
+    shown = post(admin, "endpoint-new", GIVEN)
+    row = Endpoint.objects.get()
+    assert (row.base_url, row.max_concurrency, row.requests_per_minute) == (
+        "http://127.0.0.1:9/v1", 3, 60,
+    )  # fmt: skip
+    assert "“here” is added." in shown
+    pages = [shown, admin.get(reverse("endpoints")).content.decode()]
+    assert all("HERE_API_KEY" in page and "sk-very-secret" not in page for page in pages)
+    assert "not set where pages are served" not in pages[1]
+    monkeypatch.delenv("HERE_API_KEY")
+    assert "not set where pages are served" in admin.get(reverse("endpoints")).content.decode()
+    told = Event.objects.get(verb="add", object_kind="endpoint").after or {}
+    assert told["max_concurrency"] == 3
+
+
+@pytest.mark.parametrize(
+    ("field", "value", "words"),
+    [
+        ("base_url", "ftp://x/v1", "An address such as https://api.openai.com/v1 is needed"),
+        ("base_url", "http://169.254.169.254/v1", "no model is served from there"),
+        ("base_url", "https://me:secret@x.example/v1", "Keys and passwords don&#x27;t belong"),
+        ("key_variable", "DJANGO_SECRET_KEY", "may not be sent to an endpoint"),
+        ("key_variable", "sk-abc", "The name of an environment variable is needed, not the key"),
+        ("max_concurrency", "0", "A whole number from 1 to 1000"),
+        ("requests_per_minute", "0", "A whole number from 1 to 1000000"),
+        ("label", "No Label", "Enter a valid"),
+    ],
+)
+def test_what_no_endpoint_can_be_is_refused_at_its_field(
+    admin: Client, field: str, value: str, words: str
+) -> None:
+    shown = post(admin, "endpoint-new", GIVEN | {field: value})
+    assert words in shown
+    assert not Endpoint.objects.exists()
+
+
+def test_a_key_goes_to_another_server_only_where_somebody_says_so(admin: Client) -> None:
+    post(admin, "endpoint-new", GIVEN)
+    row = Endpoint.objects.get()
+    moved = GIVEN | {"base_url": "https://models.example.org/v1"}
+    shown = post(admin, "endpoint", moved, code=row.code)
+    assert "would go to https://models.example.org:443" in shown
+    row.refresh_from_db()
+    assert row.base_url == "http://127.0.0.1:9/v1"
+    post(admin, "endpoint", moved | {"move_key": "on"}, code=row.code)
+    row.refresh_from_db()
+    assert row.base_url == "https://models.example.org/v1"
+    assert Event.objects.filter(verb="move key").count() == 1
+
+
+def test_a_second_endpoint_of_a_label_and_a_second_row_of_a_model_are_refused(
+    admin: Client, model: EndpointModel
+) -> None:
+    assert "already; choose another label" in post(admin, "endpoint-new", GIVEN)
+    shown = post(admin, "endpoint-model-new", {"model": "m"}, code=model.endpoint.code)
+    assert "here has the model m already." in shown
+    assert EndpointModel.objects.count() == 1
+
+
+def test_a_model_keeps_what_somebody_knows_and_no_half_of_a_price(
+    admin: Client, model: EndpointModel
+) -> None:
+    known = {"model_class": "open_weight", "vision": "no", "price_in_usd": "0.5"}
+    shown = post(admin, "endpoint-model", known, code=model.code)
+    assert "a price needs both halves, a date and a source" in shown.lower()
+    whole = known | {
+        "price_out_usd": "1.5", "price_as_of": "2026-11-20", "price_source": "our contract",
+    }  # fmt: skip
+    assert "Kept." in post(admin, "endpoint-model", whole, code=model.code)
+    model.refresh_from_db()
+    assert (model.vision, model.native_tools, model.model_class) == (False, None, "open_weight")
+    assert (model.price_in_usd, model.price_out_usd) == (Decimal("0.5"), Decimal("1.5"))
+    listed = admin.get(reverse("endpoint", args=[model.endpoint.code])).content.decode()
+    assert "$0.50" in listed
+    assert "Open weight" in listed
+    assert post(admin, "endpoint-model", whole | {"price_in_usd": "-1"}, code=model.code).count(
+        "a price is 0 or more".capitalize()
+    )
+
+
+def test_an_analyst_looks_and_changes_nothing(model: EndpointModel) -> None:
+    analyst = signed_in(people()["analyst"])
+    for name, code in (("endpoint", model.endpoint.code), ("endpoint-model", model.code)):
+        address = reverse(name, args=[code])
+        assert analyst.get(address).status_code == 200
+        assert analyst.post(address, GIVEN).status_code == 403
+
+
+# --- Probes --------------------------------------------------------------------------------------
+
+
+@pytest.fixture
+def stand_in() -> Iterator[FakeServer]:
+    with running() as serving:
+        yield serving
+
+
+def test_a_probe_is_asked_for_on_the_page_and_its_lines_appear_one_by_one(
+    admin: Client,
+    model: EndpointModel,
+    stand_in: FakeServer,
+    monkeypatch: pytest.MonkeyPatch,
+    django_capture_on_commit_callbacks: Callable[..., object],
+) -> None:
+    Endpoint.objects.update(base_url=stand_in.url, is_simulated=True)
+    EndpointModel.objects.update(model="fake-no-vision")
+    address = reverse("endpoint-model", args=[model.code])
+    with django_capture_on_commit_callbacks() as waiting:  # type: ignore[attr-defined]
+        admin.post(reverse("endpoint-probe", args=[model.code]))
+    assert len(waiting) == 1, "its message is sent once the row is stored"
+    probe = Probe.objects.get()
+    shown = admin.get(address).content.decode()
+    assert (shown.count("data-ability"), shown.count("waiting")) == (6, 6)
+    assert "js/live.js" in shown
+    seen: list[tuple[int, int]] = []
+    keep = probing._keep
+
+    def look(row: Probe, found: object) -> None:
+        keep(row, found)  # type: ignore[arg-type]
+        page = admin.get(address).content.decode()
+        seen.append((page.count("asked now"), page.count(">waiting")))
+
+    monkeypatch.setattr(probing, "_keep", look)
+    assert probing.make_probe(probe.pk)
+    assert [asked for asked, _ in seen] == [1, 1, 1, 1, 1, 0], "the next one is asked"
+    shown = admin.get(address).content.decode()
+    assert "js/live.js" not in shown
+    assert "Last report:" in shown
+    model.refresh_from_db()
+    assert (model.vision, model.native_tools) == (False, True)
+    assert not probing.make_probe(probe.pk), "a second message asks nothing"
+
+
+def test_a_probe_that_cannot_be_made_says_why(model: EndpointModel, admin: Client) -> None:
+    Endpoint.objects.update(key_variable="NOBODY_HAS_THIS_API_KEY")
+    probe = probing.plan_probe(model)
+    with pytest.raises(Conflict, match="is being probed already"):
+        probing.plan_probe(model)
+    assert probing.make_probe(probe.pk)
+    shown = admin.get(reverse("endpoint-model", args=[model.code])).content.decode()
+    assert "The probe could not be made." in shown
+    assert "NOBODY_HAS_THIS_API_KEY" in shown
+    assert probing.plan_probe(model).state == "queued", "it may be asked for again"
+
+
+def test_a_probe_whose_worker_died_is_given_up(model: EndpointModel) -> None:
+    probe = probing.plan_probe(model)
+    assert probing.give_up_stale() == 0
+    assert probing.give_up_stale(now=timezone.now() + timedelta(days=1)) == 1
+    probe.refresh_from_db()
+    assert (probe.state, probe.reason) == ("failed", "The worker ended, or none ever took it.")
