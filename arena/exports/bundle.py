@@ -84,6 +84,7 @@ def _manifest(snapshot: Snapshot, files: dict[str, bytes]) -> bytes:
                 "text": table.method_text,
                 "resampling_unit": table.unit,
                 **table.intervals_note,
+                **table.adjusted_note,
                 "rounds": table.rounds,
                 "seed": table.seed,
             },

@@ -112,6 +112,7 @@ class LeaderboardTable:
         early: The study was still open.
         notes: What else the method has to say about these votes.
         left_out: Votes that do not count, by reason.
+        covariates: What the ratings are adjusted for.
     """
 
     study: str
@@ -129,6 +130,7 @@ class LeaderboardTable:
     simulated: bool
     early: bool
     notes: tuple[str, ...] = ()
+    covariates: tuple[str, ...] = ()
 
     @property
     def status(self) -> str:
@@ -138,12 +140,18 @@ class LeaderboardTable:
     @property
     def method_text(self) -> str:
         """How the numbers came about, in one line."""
-        return f"{METHOD_TEXTS[self.method]}, {intervals_text(self)}, seed {self.seed}"
+        adjusted = f", adjusted for {', '.join(self.covariates)}" if self.covariates else ""
+        return f"{METHOD_TEXTS[self.method]}{adjusted}, {intervals_text(self)}, seed {self.seed}"
 
     @property
     def intervals_note(self) -> dict[str, str]:
         """How intervals were found, for documents; older ratings had no word for resamples."""
         return {"intervals": self.intervals} if self.is_closed_form else {}
+
+    @property
+    def adjusted_note(self) -> dict[str, list[str]]:
+        """What the ratings are adjusted for, for documents."""
+        return {"covariates": list(self.covariates)} if self.covariates else {}
 
     @property
     def is_closed_form(self) -> bool:
@@ -205,6 +213,7 @@ def leaderboard_table(snapshot: Snapshot) -> LeaderboardTable:
         simulated=snapshot.includes_simulated,
         early=snapshot.is_early,
         notes=sentences_of(board.warnings, names),
+        covariates=_covariates(snapshot),
     )
 
 
@@ -217,6 +226,12 @@ def sentences_of(kept: Sequence[str], names: Mapping[str, str]) -> tuple[str, ..
         for one in kept
         if one
     )
+
+
+def _covariates(snapshot: Snapshot) -> tuple[str, ...]:
+    """None where the votes do not determine what these are worth."""
+    found = snapshot.results.adjustment
+    return tuple(one.name for one in found.effects) if found else ()
 
 
 def _named(value: Any, names: Mapping[str, str]) -> Any:

@@ -64,6 +64,9 @@ class Snapshot(models.Model):
     intervals = models.CharField(
         max_length=20, default="resamples", help_text="closed form or resamples"
     )
+    covariates = models.JSONField(
+        default=list, help_text="what is adjusted for: side, objects, vehicles"
+    )
     seed = models.BigIntegerField()
     filters = models.JSONField(
         default=dict, help_text="which votes were asked for: types, experts, kinds, automatic_ties"

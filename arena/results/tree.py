@@ -193,7 +193,7 @@ class LargestMove:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class BothRanks:
-    """A contestant with and without the votes of authors."""
+    """A contestant in two versions of a rating, with and without something."""
 
     slug: str
     rank_with: int | None
@@ -224,6 +224,30 @@ class OwnVotes:
     largest: LargestMove | None
     lines: tuple[BothRanks, ...]
     by_judge: dict[str, int]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class CovariateEffect:
+    """What one unit of a covariate is worth, in Elo points, and how likely that is by chance."""
+
+    name: str
+    points: Estimate
+    p_value: float | None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Adjustment:
+    """What a rating was adjusted for, and what that changes.
+
+    Attributes:
+        effects: None where the votes do not determine them; then the table is not adjusted.
+        lines: With it and without it.
+        largest: None where nobody has a rank in both versions.
+    """
+
+    effects: tuple[CovariateEffect, ...]
+    lines: tuple[BothRanks, ...]
+    largest: LargestMove | None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -323,6 +347,7 @@ class Results:
     trust: Trust = field(default_factory=Trust)
     claims: Precision = field(default_factory=Precision)
     own_votes: OwnVotes | None = None
+    adjustment: Adjustment | None = field(default=None, metadata=_SINCE_4)
     pairs: tuple[PairRecord, ...] = ()
     types: tuple[TypeRating, ...] = ()
     type_spread: Estimate | None = field(default=None, metadata=_SINCE_4)

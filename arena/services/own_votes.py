@@ -12,7 +12,8 @@ from collections.abc import Sequence
 from arena.queries.judged import AUTOMATIC, Judged
 from arena.queries.vote_sets import Filters, VoteSet
 from arena.rating.leaderboard import Leaderboard, Line, rate
-from arena.results.tree import BothRanks, LargestMove, OwnVotes
+from arena.results.tree import BothRanks, OwnVotes
+from arena.services.covariates import largest_move, with_covariates
 from arena.services.vote_arrays import vote_arrays
 
 OTHER_ROUNDS = 10_000
@@ -21,21 +22,25 @@ costs. With as many rounds as the table has and the same seed, ranks differ by t
 by the draws."""
 
 
-def with_and_without(votes: VoteSet, filters: Filters, board: Leaderboard) -> OwnVotes | None:
+def with_and_without(
+    votes: VoteSet, filters: Filters, board: Leaderboard, covariates: Sequence[str] = ()
+) -> OwnVotes | None:
     """Rank and rating of everybody in both versions; None where no vote makes a difference.
 
     Args:
         votes: What is rated, and the votes of authors on their own contestants beside it.
         filters: They say who is author of what, and which version the table is.
         board: The table's rating.
+        covariates: What it is adjusted for.
     """
     own = [vote for vote in votes.with_own if _is_own(vote, filters)]
     if not own:
         return None
     others = [vote for vote in votes.with_own if not _is_own(vote, filters)]
     rest = votes.with_own if filters.leave_out_own else others
+    arrays = vote_arrays([entrant.slug for entrant in votes.entrants], rest)
     other = rate(
-        vote_arrays([entrant.slug for entrant in votes.entrants], rest).comparisons,
+        with_covariates(arrays.comparisons, rest, covariates),
         method=board.method,
         rounds=min(board.rounds, OTHER_ROUNDS),
         unit=board.unit,
@@ -53,7 +58,7 @@ def with_and_without(votes: VoteSet, filters: Filters, board: Leaderboard) -> Ow
         of_experts=len({vote.judge for vote in votes.with_own if vote.kind != AUTOMATIC}),
         rounds=other.rounds,
         reasons=other.reasons,
-        largest=_largest(lines),
+        largest=largest_move(lines),
         lines=lines,
         by_judge=dict(by_judge),
     )
@@ -74,17 +79,3 @@ def _both_ranks(full: Line, fewer: Line) -> BothRanks:
         rank_without=fewer.rank,
         rating_without=fewer.rating,
     )
-
-
-def _largest(lines: Sequence[BothRanks]) -> LargestMove | None:
-    """None where nobody has a rank in both versions."""
-    moves = {
-        line.slug: abs(line.rank_with - line.rank_without)
-        for line in lines
-        if line.rank_with is not None and line.rank_without is not None
-    }
-    if not moves:
-        return None
-    places = max(moves.values())
-    who = [slug for slug, moved in moves.items() if moved == places] if places else []
-    return LargestMove(places=places, slugs=tuple(who))

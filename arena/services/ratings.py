@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import logging
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import TypedDict, Unpack
 
@@ -17,6 +18,7 @@ from arena.queries.vote_sets import Filters
 from arena.rating.bootstrap import Unit
 from arena.rating.leaderboard import Method
 from arena.rating.rules import Intervals, default_intervals, unit_for
+from arena.services.covariates import COVARIATES, WITHOUT_PICTURES
 from arena.services.snapshots import compute, keep, note_progress
 from arena.services.turns import in_turn
 from augment.errors import Conflict, UnknownName
@@ -40,6 +42,7 @@ class Choices(TypedDict, total=False):
     seed: int
     unit: str | None
     intervals: str | None
+    covariates: Sequence[str]
     filters: Filters | None
     early: bool
     actor: User | None
@@ -73,6 +76,7 @@ def plan_snapshot(*, study: Study, **choices: Unpack[Choices]) -> Snapshot:
             two-way where the votes name experts and scenarios, else votes.
         intervals: "closed form" or "resamples"; None for the closed form, but resamples of single
             votes and for online Elo.
+        covariates: What to adjust for: "side", "objects", "vehicles".
         filters: Which votes count; None for all main ones. Who is author of what is added to them
             here, so that later marks do not change the rating.
         early: Rate a study that is still open; the snapshot and the log say so.
@@ -82,7 +86,8 @@ def plan_snapshot(*, study: Study, **choices: Unpack[Choices]) -> Snapshot:
         StudyStillOpen: The study is open and nobody asked to look early.
         UnknownName: There is no such method, unit or kind of intervals, or a filter names what
             does not occur.
-        Conflict: Rounds or seed are out of range, or online Elo is asked for another unit.
+        Conflict: Rounds or seed are out of range, online Elo is asked for another unit, or
+            covariates for another method than Bradley-Terry in closed form.
     """
     snapshot = _planned(study=study, **choices)
     snapshot.save()
@@ -150,6 +155,7 @@ def _planned(
     seed: int = 0,
     unit: str | None = None,
     intervals: str | None = None,
+    covariates: Sequence[str] = (),
     filters: Filters | None = None,
     early: bool = False,
     actor: User | None = None,
@@ -167,7 +173,8 @@ def _planned(
         method=chosen,
         rounds=rounds,
         resampling_unit=drawn,
-        intervals=_intervals(intervals, chosen, drawn),
+        intervals=_intervals(intervals, chosen, drawn, covariates),
+        covariates=_covariates(study, covariates),
         seed=seed,
         filters=replace(filters or Filters(), authors=authors_of(study)).as_document(),
         last_vote=last_vote_of(study),
@@ -208,7 +215,27 @@ def _unit(name: str) -> Unit:
     return Unit(name)
 
 
-def _intervals(name: str | None, method: Method, unit: Unit) -> Intervals:
+def _covariates(study: Study, names: Sequence[str]) -> list[str]:
+    """In the order in which they are known, each once."""
+    known = WITHOUT_PICTURES if is_imported(study) else COVARIATES
+    for name in names:
+        if name not in known:
+            raise UnknownName("covariate", name, list(known))
+    return [name for name in known if name in names]
+
+
+def _intervals(
+    name: str | None, method: Method, unit: Unit, covariates: Sequence[str]
+) -> Intervals:
+    if covariates:
+        if method is not Method.BRADLEY_TERRY or name == Intervals.RESAMPLES:
+            raise Conflict(
+                sentence(
+                    "Only Bradley-Terry with intervals in closed form can be adjusted for what "
+                    "was shown."
+                )
+            )
+        return Intervals.CLOSED_FORM
     if name is None:
         return default_intervals(method, unit)
     if name not in list(Intervals):

@@ -14,11 +14,13 @@ from arena.models import Snapshot, Standing
 from arena.queries.judged import AUTOMATIC, Entrant, Judged, is_imported
 from arena.queries.vote_sets import Filters, VoteSet, vote_set
 from arena.rating.bootstrap import Unit
+from arena.rating.comparisons import Comparisons
 from arena.rating.leaderboard import Intervals, Leaderboard, Method, rate
 from arena.results.tree import VERSION as RESULTS_VERSION
 from arena.results.tree import Results
 from arena.services import breakdowns
 from arena.services.conditions import pooled_by_type
+from arena.services.covariates import adjustment, with_covariates
 from arena.services.own_votes import with_and_without
 from arena.services.trust import board_remarks, precision, trust
 from arena.services.vote_arrays import VoteArrays, vote_arrays
@@ -55,20 +57,16 @@ def compute(snapshot: Snapshot, report: Report) -> Computed:
     votes = _vote_set(snapshot)
     arrays = vote_arrays([entrant.slug for entrant in votes.entrants], votes.counted)
     report(20)
-    board = rate(
-        arrays.comparisons,
-        method=Method(snapshot.method),
-        rounds=snapshot.rounds,
-        unit=Unit(snapshot.resampling_unit),
-        intervals=Intervals(snapshot.intervals),
-        seed=snapshot.seed,
-    )
+    plain = board = _rate(snapshot, arrays.comparisons)
+    if snapshot.covariates:
+        names = snapshot.covariates
+        board = _rate(snapshot, with_covariates(arrays.comparisons, votes.counted, names))
     if any(vote.kind == AUTOMATIC for vote in votes.counted):
         # Nobody judged those ties: who judged them is no expert that could outvote others.
         board = replace(board, experts=board.experts - 1)
     report(60)
     judges = {vote.judge: vote.judge_name for vote in votes.counted}
-    snapshot.results = _results(snapshot, votes, arrays, board, judges)
+    snapshot.results = _results(snapshot, votes, arrays, board, plain, judges)
     report(90)
     snapshot.votes_sha256 = digest_of(votes_csv(vote_rows(votes.counted, judges)))
     snapshot.votes_counted = len(votes.counted)
@@ -130,6 +128,17 @@ def votes_version_of(snapshot: Snapshot) -> int:
 # --- Private -----------------------------------------------------------------------------------
 
 
+def _rate(snapshot: Snapshot, comparisons: Comparisons) -> Leaderboard:
+    return rate(
+        comparisons,
+        method=Method(snapshot.method),
+        rounds=snapshot.rounds,
+        unit=Unit(snapshot.resampling_unit),
+        intervals=Intervals(snapshot.intervals),
+        seed=snapshot.seed,
+    )
+
+
 def _vote_set(snapshot: Snapshot) -> VoteSet:
     filters = Filters.of_document(snapshot.filters)
     return vote_set(snapshot.study, filters=filters, last=snapshot.last_vote)
@@ -140,6 +149,7 @@ def _results(
     votes: VoteSet,
     arrays: VoteArrays,
     board: Leaderboard,
+    plain: Leaderboard,
     judges: dict[str, str],
 ) -> Results:
     study, seed = snapshot.study, snapshot.seed
@@ -150,9 +160,10 @@ def _results(
     return Results(
         version=RESULTS_VERSION,
         board=board_remarks(board),
-        trust=trust(arrays, votes, board, seed=seed),
+        trust=trust(arrays, votes, plain, seed=seed),
         claims=precision(arrays, board, unit=board.unit, seed=seed),
-        own_votes=with_and_without(votes, filters, board),
+        own_votes=with_and_without(votes, filters, board, snapshot.covariates),
+        adjustment=adjustment(snapshot.covariates, board, plain),
         pairs=breakdowns.pairs(arrays.comparisons, votes.counted, planned),
         types=breakdowns.by_type(arrays, board, pooled),
         type_spread=type_spread,

@@ -191,6 +191,12 @@ def estimate_elo(found: Estimate | None) -> str:
 
 
 @register.filter
+def estimate_tenths(found: Estimate | None) -> str:
+    """Points with one digit after the point and their sign."""
+    return _with_interval(found, "{:+.1f}".format)
+
+
+@register.filter
 def estimate_share_change(found: Estimate | None) -> str:
     """A change of a share in percentage points, with its sign."""
     return _with_interval(found, lambda value: f"{100 * value:+.1f}")

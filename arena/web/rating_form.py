@@ -9,9 +9,11 @@ from django.utils.translation import gettext_lazy as _
 
 from arena.models import Snapshot
 from arena.pairing.order import MAIN, REPEAT
+from arena.queries.judged import is_imported
 from arena.queries.vote_sets import Filters
 from arena.rating.bootstrap import Unit
 from arena.rating.leaderboard import Intervals, Method
+from arena.services.covariates import COVARIATES, WITHOUT_PICTURES
 from arena.services.ratings import DEFAULT_ROUNDS, MOST_ROUNDS
 from augment.services.scenarios.types import type_choices
 
@@ -33,6 +35,13 @@ INTERVAL_LABELS = {
     "": _("right for the method"),
     "closed form": _("in closed form"),
     "resamples": _("by resamples"),
+}
+
+
+COVARIATE_LABELS = {
+    "side": _("being on the left"),
+    "objects": _("the number of objects"),
+    "vehicles": _("the number of vehicles"),
 }
 
 
@@ -69,6 +78,9 @@ class RatingForm(forms.Form):
     seed = forms.IntegerField(min_value=0, max_value=2**63 - 1, initial=0, required=False)
     types = forms.MultipleChoiceField(choices=type_choices, required=False)
     experts = AnyOf(required=False)
+    adjust = forms.MultipleChoiceField(
+        choices=[(name, COVARIATE_LABELS[name]) for name in COVARIATES], required=False
+    )
     with_repeats = forms.BooleanField(required=False)
     automatic_ties = forms.BooleanField(required=False)
     leave_out_own = forms.BooleanField(required=False)
@@ -80,6 +92,9 @@ class RatingForm(forms.Form):
         for name in ("method", "unit", "intervals", "rounds", "seed"):
             self.fields[name].widget.attrs["class"] = "input"
         named = snapshot.results.judges if snapshot is not None else {}
+        imported = snapshot is not None and is_imported(snapshot.study)
+        known = WITHOUT_PICTURES if imported else COVARIATES
+        self.adjustable = [(name, COVARIATE_LABELS[name]) for name in known]
         self.judges = sorted(named.items(), key=lambda item: item[1])
 
     def wanted(self) -> dict[str, Any]:
@@ -90,6 +105,7 @@ class RatingForm(forms.Form):
             "method": asked["method"] or Method.BRADLEY_TERRY.value,
             "unit": asked["unit"] or None,
             "intervals": asked["intervals"] or None,
+            "covariates": asked["adjust"],
             "rounds": asked["rounds"] or DEFAULT_ROUNDS,
             "seed": asked["seed"] or 0,
             "filters": Filters(

@@ -25,7 +25,7 @@ def both_versions(snapshot: Snapshot, table: LeaderboardTable) -> Context | None
     names = {row.slug: row.name for row in table.rows}
     return {
         "kept": own_votes,
-        "lines": [_both_ways(lines[row.slug], row) for row in table.rows],
+        "lines": [in_both_versions(lines[row.slug], row) for row in table.rows],
         "reasons": sentences_of(own_votes.reasons, names),
         "places": own_votes.largest and own_votes.largest.places,
         "who": [names[slug] for slug in own_votes.largest.slugs] if own_votes.largest else [],
@@ -56,7 +56,7 @@ def for_experts(table: LeaderboardTable) -> LeaderboardTable:
     return replace(table, left_out=left_out)
 
 
-def _both_ways(line: BothRanks, row: Row) -> Context:
+def in_both_versions(line: BothRanks, row: Row) -> Context:
     """A contestant's line of both versions, and whether its rank differs."""
     first, second = line.rank_with, line.rank_without
     return {

@@ -12,6 +12,7 @@ from arena.exports.writers import plain_text
 from arena.queries.studies import study_named
 from arena.queries.vote_sets import Filters
 from arena.rating.rules import Intervals
+from arena.services.covariates import COVARIATES
 from arena.services.ratings import DEFAULT_ROUNDS, rate
 from augment.errors import AugmentError
 from augment.services.terminal import TerminalCommand
@@ -39,6 +40,14 @@ class Command(TerminalCommand):
             help="closed form (the default where votes hang together) or resamples",
         )
         parser.add_argument(
+            "--adjust",
+            nargs="+",
+            default=[],
+            choices=COVARIATES,
+            metavar="WHAT",
+            help="rate contestants as if alike in: side, objects, vehicles",
+        )
+        parser.add_argument(
             "--leave-out-own",
             action="store_true",
             help="votes of authors on their own contestants do not count",
@@ -57,6 +66,7 @@ class Command(TerminalCommand):
                 seed=options["seed"],
                 unit=options["unit"],
                 intervals=options["intervals"],
+                covariates=options["adjust"],
                 filters=Filters(leave_out_own=options["leave_out_own"]),
                 early=options["early"],
             )

@@ -1,0 +1,119 @@
+"""What a rating can adjust for, as columns beside its votes: the side, and how much was shown."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from arena.queries.judged import Judged
+from arena.rating.comparisons import Comparisons, FloatArray
+from arena.rating.leaderboard import Leaderboard, Line
+from arena.results.tree import Adjustment, BothRanks, CovariateEffect, LargestMove
+from augment.models import Augmentation
+from augment.scene.entities import AgentType
+
+SIDE, OBJECTS, VEHICLES = "side", "objects", "vehicles"
+COVARIATES = (SIDE, OBJECTS, VEHICLES)
+"""Being on the left; by how many more objects, or vehicles, a picture marks as added or moved."""
+WITHOUT_PICTURES = (SIDE,)
+"""What is known of votes from a file."""
+
+_VEHICLES = {AgentType.VEHICLE.value, AgentType.BUS.value}
+_AT_ONCE = 500
+
+
+def with_covariates(
+    comparisons: Comparisons, votes: Sequence[Judged], names: Sequence[str]
+) -> Comparisons:
+    """The same votes with what to adjust for, seen from the left.
+
+    Args:
+        comparisons: Of these votes, a row each.
+        votes: In the same order.
+        names: Of COVARIATES.
+    """
+    if not names:
+        return comparisons
+    columns: dict[str, FloatArray] = {SIDE: np.ones(len(votes))}
+    if set(names) - {SIDE}:
+        counts = _counts({code for vote in votes for code in (vote.left_code, vote.right_code)})
+        nothing = (0, 0)
+        both = np.array(
+            [
+                np.subtract(
+                    counts.get(vote.left_code, nothing), counts.get(vote.right_code, nothing)
+                )
+                for vote in votes
+            ],
+            dtype=np.float64,
+        ).reshape(-1, 2)
+        columns |= {OBJECTS: both[:, 0], VEHICLES: both[:, 1]}
+    return replace(comparisons, covariates=np.column_stack([columns[name] for name in names]))
+
+
+def adjustment(names: Sequence[str], board: Leaderboard, plain: Leaderboard) -> Adjustment | None:
+    """What adjusting changes; None where nobody asked for it.
+
+    Args:
+        names: What was adjusted for.
+        board: With it.
+        plain: Without it.
+    """
+    if not names:
+        return None
+    lines = tuple(_both(*both) for both in zip(board.lines, plain.lines, strict=True))
+    return Adjustment(
+        effects=tuple(
+            CovariateEffect(name=name, points=one.points, p_value=one.p_value)
+            for name, one in zip(names, board.coefficients, strict=False)
+        ),
+        lines=lines,
+        largest=largest_move(lines),
+    )
+
+
+def largest_move(lines: Sequence[BothRanks]) -> LargestMove | None:
+    """By how many ranks somebody moves; None where nobody has a rank in both versions."""
+    moves = {
+        line.slug: abs(line.rank_with - line.rank_without)
+        for line in lines
+        if line.rank_with is not None and line.rank_without is not None
+    }
+    if not moves:
+        return None
+    places = max(moves.values())
+    who = [slug for slug, moved in moves.items() if moved == places] if places else []
+    return LargestMove(places=places, slugs=tuple(who))
+
+
+# --- Private -----------------------------------------------------------------------------------
+
+
+def _both(adjusted: Line, plain: Line) -> BothRanks:
+    return BothRanks(
+        slug=adjusted.name,
+        rank_with=adjusted.rank,
+        rating_with=adjusted.rating,
+        rank_without=plain.rank,
+        rating_without=plain.rating,
+    )
+
+
+def _counts(codes: set[str]) -> dict[str, tuple[int, int]]:
+    """Objects and vehicles that an augmentation adds or moves, by its code."""
+    found: dict[str, tuple[int, int]] = {}
+    known = sorted(code for code in codes if code)
+    for first in range(0, len(known), _AT_ONCE):
+        rows = Augmentation.objects.filter(code__in=known[first : first + _AT_ONCE])
+        for code, document in rows.values_list("code", "modification"):
+            found[str(code)] = _of_document(document)
+    return found
+
+
+def _of_document(document: dict[str, Any] | None) -> tuple[int, int]:
+    """An empty modification changes nothing."""
+    changed = [*(document or {}).get("add", []), *(document or {}).get("move", [])]
+    return len(changed), sum(agent["type"] in _VEHICLES for agent in changed)
