@@ -10,11 +10,13 @@ from argparse import ArgumentParser, RawDescriptionHelpFormatter
 from collections.abc import Sequence
 from pathlib import Path
 
+from arena.management.rated_by import by_label
 from arena.management.rated_csv import FORMATS, RatedCsv
 from arena.rating.bootstrap import Unit
 from arena.rating.leaderboard import Intervals, Leaderboard, Method, Order, rate
 from arena.rating.rules import unit_for
-from arena.rating.votes_file import VotesFile, VotesFileUnreadable, columns_of, read_votes
+from arena.rating.votes_file import VotesFile, read_votes
+from arena.rating.votes_table import SIDE, VotesFileUnreadable, columns_of
 from augment.sentences import escape_controls
 
 HELP = (
@@ -87,6 +89,18 @@ def add_arguments(parser: ArgumentParser) -> None:
         help=f"of the bootstrap; {ROUNDS}, above {MANY_VOTES} votes {ROUNDS_OF_MANY}",
     )
     parser.add_argument("--seed", type=int, default=0)
+    parser.add_argument(
+        "--adjust",
+        nargs="+",
+        default=(),
+        metavar="WHAT",
+        help="rate models as if alike in: side, or NAME of columns NAME_a and NAME_b of numbers",
+    )
+    parser.add_argument(
+        "--by",
+        metavar="COLUMN",
+        help="also by what this column says, each value drawn towards all (table and json)",
+    )
     parser.add_argument("--format", choices=FORMATS, default="table")
 
 
@@ -99,6 +113,8 @@ def run(
     order: str = "shuffled",
     rounds: int | None = None,
     seed: int = 0,
+    adjust: Sequence[str] = (),
+    by: str | None = None,
     format: str = "table",
 ) -> str:
     """What to print for a file.
@@ -112,10 +128,13 @@ def run(
         raise CsvNotRated(f"a seed is 0 or more, not {seed}")
     if method == "elo" and intervals == "closed":
         raise CsvNotRated("elo has no intervals in closed form, only resamples")
+    _check_columns(method, intervals, adjust, by, format)
     path = Path(file)
     try:
-        chosen, notes = _resample(columns_of(path), method, resample)
-        votes = read_votes(path, clusters=_CLUSTERS[chosen])
+        columns = columns_of(path)
+        chosen, notes = _resample(columns, method, resample)
+        _check_there(columns, adjust, by)
+        votes = read_votes(path, clusters=_CLUSTERS[chosen], covariates=adjust, label=by)
     except VotesFileUnreadable as error:
         raise CsvNotRated(f"{path}: {error}") from error
     except OSError as error:
@@ -130,8 +149,33 @@ def run(
         rounds=rounds or (ROUNDS_OF_MANY if many else ROUNDS),
         seed=seed,
     )
-    rated = RatedCsv(board=board, resample=chosen, notes=_notes(board, votes, notes))
+    rated = RatedCsv(
+        board=board,
+        resample=chosen,
+        notes=_notes(board, votes, notes),
+        covariates=tuple(adjust),
+        by=by_label(votes, board, by) if by else None,
+    )
     return FORMATS[format](rated)
+
+
+def _check_columns(
+    method: str, intervals: str | None, adjust: Sequence[str], by: str | None, format: str
+) -> None:
+    if adjust and (method != "bt" or intervals == "resamples"):
+        raise CsvNotRated("--adjust needs --method bt with intervals in closed form")
+    if len(set(adjust)) < len(adjust):
+        raise CsvNotRated("--adjust names something twice")
+    if by and (method == "elo" or format not in ("table", "json")):
+        raise CsvNotRated("--by needs --method bt or davidson and --format table or json")
+
+
+def _check_there(columns: Sequence[str], adjust: Sequence[str], by: str | None) -> None:
+    needed = [f"{name}_{end}" for name in adjust if name != SIDE for end in "ab"]
+    for name in [*needed, *([by] if by else [])]:
+        if name not in columns:
+            asked = "--by" if name == by else "--adjust"
+            raise VotesFileUnreadable(f"line 1: there is no column {name!r}, which {asked} needs")
 
 
 def _resample(columns: Sequence[str], method: str, wanted: str | None) -> tuple[str, list[str]]:

@@ -10,7 +10,9 @@ from typing import Any
 
 import numpy as np
 
+from arena.management.rated_by import ByLabel, by_document, by_lines
 from arena.rating.leaderboard import Intervals, Leaderboard, Line
+from arena.rating.logistic import Coefficient
 from arena.rating.printed import HEADS as PAPERS_HEADS
 from arena.rating.printed import (
     escape,
@@ -40,6 +42,8 @@ class RatedCsv:
     board: Leaderboard
     resample: str
     notes: tuple[str, ...]
+    covariates: tuple[str, ...] = ()
+    by: ByLabel | None = None
 
     @property
     def standings(self) -> list[Line]:
@@ -59,10 +63,16 @@ class RatedCsv:
             if self.board.intervals is Intervals.CLOSED_FORM
             else f"by {self.board.rounds} resamples ({self.resample})"
         )
+        adjusted = f", adjusted for {', '.join(self.covariates)}" if self.coefficients else ""
         return (
-            f"{METHOD_TEXTS[self.board.method]}; 95 % intervals {found}, "
+            f"{METHOD_TEXTS[self.board.method]}{adjusted}; 95 % intervals {found}, "
             f"seed {self.board.seed}; {self.board.votes} votes"
         )
+
+    @property
+    def coefficients(self) -> list[tuple[str, Coefficient]]:
+        """What is adjusted for; none where the votes do not determine what it is worth."""
+        return list(zip(self.covariates, self.board.coefficients, strict=False))
 
     @property
     def cross_check(self) -> float | None:
@@ -105,6 +115,9 @@ def _table(rated: RatedCsv) -> str:
     said = [] if ties is None else [f"{rated.method_text}; {ties:.1%} ties."]
     missing = [" ".join(f"{line}.".split()) for line in rated.missing]
     said += _judged(rated)
+    said += [_adjusted(name, one) for name, one in rated.coefficients]
+    if rated.by is not None:
+        said = [*by_lines(rated.by), *said]
     return "\n".join([*lines, "", *missing, *said, *rated.notes]) + "\n"
 
 
@@ -134,6 +147,14 @@ def _judged(rated: RatedCsv) -> list[str]:
             "points."
         )
     return said
+
+
+def _adjusted(name: str, one: Coefficient) -> str:
+    points, p_value = one.points, one.p_value
+    if points.lower is None or p_value is None:
+        return f"{name}: {points.value:+.1f} points for one."
+    said = f"{points.value:+.1f} points for one, 95 % {points.lower:+.1f} to {points.upper:+.1f}"
+    return f"{name}: {said}, p {p_value:.2g}."
 
 
 def _csv(rated: RatedCsv) -> str:
@@ -167,6 +188,19 @@ def _json(rated: RatedCsv) -> str:
         ],
         "pairs": _pairs(board),
     }
+    if rated.covariates:
+        document["covariates"] = [
+            {
+                "name": name,
+                "points": _rounded(one.points.value),
+                "lower": _rounded(one.points.lower),
+                "upper": _rounded(one.points.upper),
+                "p": _rounded(one.p_value),
+            }
+            for name, one in rated.coefficients
+        ]
+    if rated.by is not None:
+        document["by"] = by_document(rated.by)
     return json.dumps(document, indent=2, ensure_ascii=False) + "\n"
 
 

@@ -1,28 +1,34 @@
 """Votes from a file with the columns model_a, model_b, winner, and maybe judge and item.
 
 A quick pass reads blocks of lines into numbers and only notices that something is wrong; a slow
-one, line by line, then finds where and says it. Millions of lines take seconds and little memory:
-no text is kept but the names.
+one, line by line (`arena.rating.votes_table`), then finds where and says it. Millions of lines
+take seconds and little memory: no text is kept but the names.
 """
 
 from __future__ import annotations
 
 import csv
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from itertools import islice
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
-from arena.rating.comparisons import LOSS, TIE, WIN, Comparisons, IntArray
-from arena.rating.tabular import TextTable, fit_row, open_table
-
-NEEDED = ("model_a", "model_b", "winner")
-OPTIONAL = ("judge", "item")
-WINNERS = {"model_a": WIN, "model_b": LOSS, "tie": TIE, "tie (bothbad)": TIE}
+from arena.rating.comparisons import Comparisons, IntArray
+from arena.rating.tabular import fit_row
+from arena.rating.votes_table import (
+    NEEDED,
+    OPTIONAL,
+    SIDE,
+    WINNERS,
+    VotesFileUnreadable,
+    explain,
+    is_missing,
+    line_of,
+    open_votes,
+)
 
 _LINES_AT_ONCE = 20_000
 _ROWS_BEFORE_GROUPING = 500_000
@@ -30,10 +36,6 @@ _LARGEST_KEY = 2**62
 
 Rows = NDArray[np.int32]
 _HALF_POINTS = {winner: round(2 * score) for winner, score in WINNERS.items()}
-
-
-class VotesFileUnreadable(ValueError):
-    """The file is not what it should be; the text has the line and what is allowed."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -45,64 +47,81 @@ class VotesFile:
             for is one judge or item for all; without either, equal votes are in one row.
         repeats: How many votes repeat an earlier one of the same judge, item and pair; None where
             these were not asked for.
+        labels: What the label column says, in alphabetical order.
+        label_of: (R,) the place of each row's label there; None where none was asked for.
     """
 
     comparisons: Comparisons
     repeats: int | None
+    labels: tuple[str, ...] = ()
+    label_of: IntArray | None = None
 
 
-def columns_of(path: Path) -> tuple[str, ...]:
-    """The optional columns that the file has.
-
-    Raises:
-        VotesFileUnreadable: The first line does not name the needed columns, each once.
-    """
-    with open_votes(path) as table:
-        return tuple(name for name in OPTIONAL if name in table.header)
-
-
-def read_votes(path: Path, *, clusters: Sequence[str]) -> VotesFile:
+def read_votes(
+    path: Path,
+    *,
+    clusters: Sequence[str],
+    covariates: Sequence[str] = (),
+    label: str | None = None,
+) -> VotesFile:
     """Read all votes.
 
     Args:
         path: CSV, JSON lines or Parquet; text in UTF-8 or UTF-16.
         clusters: Which of the optional columns to read; every line must fill them.
+        covariates: What else may say who wins: `side`, or a name NAME with columns NAME_a and
+            NAME_b of numbers, of which the difference counts.
+        label: A column to tell votes apart by.
 
     Raises:
         VotesFileUnreadable: A column is missing, a winner is unknown, a cell that is needed is
-            empty, a model meets itself, or a line has more or fewer cells than the first.
+            empty or no number, a model meets itself, or a line has more or fewer cells than the
+            first.
     """
-    wanted = (*NEEDED, *clusters)
-    names = [_Codes() for _ in range(1 + len(clusters))]
+    numbers = [f"{name}_{end}" for name in covariates if name != SIDE for end in "ab"]
+    more = (*clusters, *numbers, *([label] if label else []))
+    wanted = (*NEEDED, *more)
+    names = [_Codes() for _ in range(1 + len(more))]
     try:
         rows, counts = _read(path, wanted, names)
     except VotesFileUnreadable:
         raise
     except (ValueError, KeyError, csv.Error) as error:
-        _explain(path, wanted)
+        explain(path, wanted)
         raise VotesFileUnreadable(f"{path}: {error}") from error
-    return _as_votes(rows, counts, clusters, names)
+    many = 1 + len(clusters)
+    found = _as_votes(rows[:, : 2 + many], counts, clusters, names[:many])
+    if covariates:
+        first = 3 + len(clusters)
+        values = {
+            name: _numbers(path, name, codes)[rows[:, place]]
+            for place, (name, codes) in enumerate(
+                zip(numbers, names[1 + len(clusters) :], strict=False), start=first
+            )
+        }
+        columns = [
+            np.ones(len(rows)) if name == SIDE else values[f"{name}_a"] - values[f"{name}_b"]
+            for name in covariates
+        ]
+        votes = replace(found.comparisons, covariates=np.column_stack(columns))
+        found = replace(found, comparisons=votes)
+    if label is None:
+        return found
+    places = _alphabetical(names[-1])
+    return replace(found, labels=tuple(sorted(names[-1].names)), label_of=places[rows[:, -1]])
 
 
-@contextmanager
-def open_votes(path: Path) -> Iterator[TextTable]:
-    """The table of a file that has the needed columns, each once.
-
-    Raises:
-        VotesFileUnreadable: It has not, or can't be read at all.
-    """
-    try:
-        opened = open_table(path, (*NEEDED, *OPTIONAL))
-        table = opened.__enter__()
-    except (StopIteration, RuntimeError):
-        raise VotesFileUnreadable(f"line 1: the file is empty; {_columns_text()}") from None
-    except (csv.Error, ValueError) as error:
-        raise VotesFileUnreadable(f"line 1: {error}; {_columns_text()}") from error
-    try:
-        _check_header(table.header)
-        yield table
-    finally:
-        opened.__exit__(None, None, None)
+def _numbers(path: Path, column: str, codes: _Codes) -> NDArray[np.float64]:
+    """(n,) what the names of a column are as numbers."""
+    values = np.empty(len(codes.names))
+    for place, name in enumerate(codes.names):
+        try:
+            values[place] = float(name)
+        except ValueError:
+            raise VotesFileUnreadable(
+                f"line {line_of(path, column, name)}: {column} is {name!r}, which is no number"
+            ) from None
+    return values
 
 
 class _Codes(dict[str, int]):
@@ -130,24 +149,6 @@ class _Winners(dict[str, int]):
     def __missing__(self, cell: str) -> int:
         number = self[cell] = _HALF_POINTS[cell.strip()]
         return number
-
-
-def is_missing(name: str) -> bool:
-    """Whether a cell says nothing: empty, or what other programs write for that."""
-    return not name or name.lower() == "nan"
-
-
-def _check_header(header: Sequence[str]) -> None:
-    for name in NEEDED:
-        if name not in header:
-            raise VotesFileUnreadable(f"line 1: there is no column {name!r}; {_columns_text()}")
-    twice = [name for name in (*NEEDED, *OPTIONAL) if header.count(name) > 1]
-    if twice:
-        raise VotesFileUnreadable(f"line 1: the column {twice[0]!r} is there twice")
-
-
-def _columns_text() -> str:
-    return f"needed are {', '.join(NEEDED)}, allowed besides {' and '.join(OPTIONAL)}"
 
 
 # --- The quick pass ------------------------------------------------------------------------------
@@ -260,40 +261,3 @@ def _alphabetical(codes: _Codes) -> IntArray:
     places = np.empty(len(order), dtype=np.int64)
     places[order] = np.arange(len(order))
     return places
-
-
-# --- The slow pass -------------------------------------------------------------------------------
-
-
-def _explain(path: Path, wanted: Sequence[str]) -> None:
-    """Raise for the first line that is wrong, and say what is allowed."""
-    with open_votes(path) as table:
-        places = {name: table.header.index(name) for name in wanted}
-        before = table.lines_read()
-        while True:
-            try:
-                row = next(table.rows, None)
-            except (csv.Error, ValueError) as error:
-                raise VotesFileUnreadable(f"line {before + 1}: {error}") from error
-            if row is None:
-                return
-            if row and (wrong := _wrong(row, len(table.header), places)):
-                raise VotesFileUnreadable(f"line {before + 1}: {wrong}")
-            before = table.lines_read()
-
-
-def _wrong(row: list[str], width: int, places: dict[str, int]) -> str:
-    """What is wrong with a line, empty if nothing is."""
-    row = fit_row(row, width)
-    if len(row) != width:
-        return f"there are {len(row)} cells, in the first line {width}"
-    cells = {name: row[place].strip() for name, place in places.items()}
-    empty = [name for name, cell in cells.items() if is_missing(cell)]
-    if empty:
-        found = cells[empty[0]]
-        return f"{empty[0]} is {found!r}, which is no name" if found else f"{empty[0]} is empty"
-    if cells["winner"] not in WINNERS:
-        return f"the winner {cells['winner']!r} is none of {', '.join(WINNERS)}"
-    if cells["model_a"] == cells["model_b"]:
-        return f"{cells['model_a']!r} is compared with itself"
-    return ""

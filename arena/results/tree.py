@@ -9,9 +9,6 @@ asked, or that the version which rated did not know of it yet.
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import Annotated, Any
-
-from pydantic import PlainValidator
 
 from arena.rating.e_values import Bet
 from arena.rating.estimate import Estimate
@@ -22,7 +19,8 @@ from arena.rating.raters import Rater
 from arena.rating.reliability import Agreement
 from arena.rating.repeats import Repeats
 from arena.rating.session import Drift
-from augment.sentences import read_sentence
+from arena.results.both_versions import Adjustment, OwnVotes
+from arena.results.kept import Kept
 
 VERSION = 4
 """3 is without what depends on types, sides and the place in a session; 2 also without adjusted
@@ -30,18 +28,6 @@ p-values and the measures that came with them; 1 also without the order of the b
 notes in the lines of types; a rating of version 0 kept its standings alone."""
 
 Bounds = tuple[float, float]
-
-
-def _read(kept: Any) -> str:
-    if isinstance(kept, dict):
-        return read_sentence(kept)
-    if not isinstance(kept, str):
-        raise ValueError(f"a sentence or plain text is allowed, not {kept!r}")
-    return kept
-
-
-Kept = Annotated[str, PlainValidator(_read)]
-"""A sentence; older ones are plain text."""
 
 
 _SINCE_2, _SINCE_3, _SINCE_4 = {"since": 2}, {"since": 3}, {"since": 4}
@@ -181,73 +167,6 @@ class Precision:
     independent: dict[str, Bounds] = field(default_factory=dict)
     design_effect: float | None = None
     planning: tuple[VotesWanted, ...] = ()
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class LargestMove:
-    """By how many ranks somebody moves at most, and who does."""
-
-    places: int
-    slugs: tuple[str, ...]
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class BothRanks:
-    """A contestant in two versions of a rating, with and without something."""
-
-    slug: str
-    rank_with: int | None
-    rating_with: float | None
-    rank_without: int | None
-    rating_without: float | None
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class OwnVotes:
-    """The rating with and without the votes of authors on their own contestants.
-
-    Attributes:
-        left_out: Whether the table leaves them out.
-        votes, experts: How many there are, and by how many.
-        of_experts: How many experts there are in all.
-        rounds: Of the version that the table does not show; `reasons` are about that one.
-        largest: None where nobody has a rank in both versions.
-        by_judge: Their number by the judge's code.
-    """
-
-    left_out: bool
-    votes: int
-    experts: int
-    of_experts: int
-    rounds: int
-    reasons: tuple[Kept, ...]
-    largest: LargestMove | None
-    lines: tuple[BothRanks, ...]
-    by_judge: dict[str, int]
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class CovariateEffect:
-    """What one unit of a covariate is worth, in Elo points, and how likely that is by chance."""
-
-    name: str
-    points: Estimate
-    p_value: float | None
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Adjustment:
-    """What a rating was adjusted for, and what that changes.
-
-    Attributes:
-        effects: None where the votes do not determine them; then the table is not adjusted.
-        lines: With it and without it.
-        largest: None where nobody has a rank in both versions.
-    """
-
-    effects: tuple[CovariateEffect, ...]
-    lines: tuple[BothRanks, ...]
-    largest: LargestMove | None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -11,7 +11,7 @@ import numpy as np
 from arena.queries.judged import Judged
 from arena.rating.comparisons import Comparisons, FloatArray
 from arena.rating.leaderboard import Leaderboard, Line
-from arena.results.tree import Adjustment, BothRanks, CovariateEffect, LargestMove
+from arena.results.both_versions import Adjustment, BothRanks, CovariateEffect, LargestMove
 from augment.models import Augmentation
 from augment.scene.entities import AgentType
 

@@ -12,7 +12,7 @@ from collections.abc import Sequence
 from arena.queries.judged import AUTOMATIC, Judged
 from arena.queries.vote_sets import Filters, VoteSet
 from arena.rating.leaderboard import Leaderboard, Line, rate
-from arena.results.tree import BothRanks, OwnVotes
+from arena.results.both_versions import BothRanks, OwnVotes
 from arena.services.covariates import largest_move, with_covariates
 from arena.services.vote_arrays import vote_arrays
 

@@ -28,7 +28,6 @@ from arena.rating.influence import (
     rank_changes,
     without_each_expert,
 )
-from arena.rating.interactions import side_interaction
 from arena.rating.leaderboard import Intervals, Leaderboard, Line, Method, rate
 from arena.rating.planning import design_effects, votes_until
 from arena.rating.position import side_bias
@@ -36,6 +35,7 @@ from arena.rating.ranking import Separation
 from arena.rating.raters import Rater, raters
 from arena.rating.reliability import agreement
 from arena.rating.repeats import Repeats, repeat_consistency
+from arena.rating.side_interaction import side_interaction
 from arena.results.tree import (
     BoardRemarks,
     OnlinePlace,

@@ -20,7 +20,8 @@ from django.utils import timezone
 
 from arena.errors import VotesUnreadable
 from arena.models import ImportedVote, Study, VoteFile
-from arena.rating.votes_file import VotesFileUnreadable, columns_of, open_votes, read_votes
+from arena.rating.votes_file import read_votes
+from arena.rating.votes_table import OPTIONAL, VotesFileUnreadable, columns_of, open_votes
 from arena.services.turns import in_turn
 from augment.errors import Conflict
 from augment.services.events import log_event
@@ -99,7 +100,8 @@ def _checked(path: Path) -> tuple[int, str]:
     """How many contestants a sound file has, and its SHA-256."""
     try:
         columns = columns_of(path)
-        return len(read_votes(path, clusters=columns).comparisons.names), _sha256(path)
+        clusters = [name for name in OPTIONAL if name in columns]
+        return len(read_votes(path, clusters=clusters).comparisons.names), _sha256(path)
     except VotesFileUnreadable as error:
         raise VotesUnreadable(str(error)) from error
     except OSError as error:

@@ -35,7 +35,7 @@ from arena.services.early_looks import open_early
 from arena.services.ratings import is_big, plan_snapshot, rate
 from arena.web.access import ADMIN, ANALYST, EXPERT, STAFF, allow_only
 from arena.web.rating_form import RatingForm
-from arena.web.results_adjustment import adjusted
+from arena.web.results_adjustment import show_adjustment
 from arena.web.results_authors import both_versions, for_experts
 from arena.web.results_tabs import TABS, Tab
 from augment.errors import AugmentError
@@ -82,7 +82,7 @@ def results_page(request: HttpRequest, code: uuid.UUID, tab: str = "table") -> H
         else:
             table = for_experts(table)
         context |= {"table": table, "early_look": EARLY_LOOK}
-        context["adjusted"] = adjusted(snapshot, table)
+        context["adjusted"] = show_adjustment(snapshot, table)
         context |= chosen.fill(snapshot, table)
     return render(request, "results/page.html", context)
 

@@ -9,7 +9,7 @@ from arena.web.results_authors import in_both_versions
 from arena.web.results_ratings import Context
 
 
-def adjusted(snapshot: Snapshot, table: LeaderboardTable) -> Context | None:
+def show_adjustment(snapshot: Snapshot, table: LeaderboardTable) -> Context | None:
     """Effects and both versions of the table; None where nothing was to be adjusted for."""
     found = snapshot.results.adjustment
     if found is None:

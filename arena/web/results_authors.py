@@ -9,7 +9,8 @@ from arena.exports.tables import LeaderboardTable, Row, sentences_of
 from arena.models import Snapshot
 from arena.queries.vote_sets import Filters, LeftOut
 from arena.rating.printed import rating_text
-from arena.results.tree import BothRanks, PanelRater
+from arena.results.both_versions import BothRanks
+from arena.results.tree import PanelRater
 from arena.web.results_ratings import Context
 
 

@@ -21,7 +21,7 @@ from arena.queries.judged import Entrant, Judged, last_vote_of
 from arena.queries.result_votes import votes_on_pair
 from arena.queries.vote_sets import Filters, VoteSet, vote_set
 from arena.rating.leaderboard import rate as rate_votes
-from arena.results.tree import OwnVotes
+from arena.results.both_versions import OwnVotes
 from arena.services.authorships import mark_author, take_back_author
 from arena.services.own_votes import OTHER_ROUNDS, with_and_without
 from arena.services.ratings import compute_snapshot, plan_snapshot, rate

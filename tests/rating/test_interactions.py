@@ -11,8 +11,8 @@ from scipy.stats import t
 
 from arena.rating.bradley_terry import ELO_PER_LOGIT
 from arena.rating.comparisons import Comparisons, FloatArray, IntArray, select_votes
-from arena.rating.interactions import side_interaction
 from arena.rating.moderated import LEAST
+from arena.rating.side_interaction import side_interaction
 from arena.rating.type_interaction import type_interaction
 from tests.rating.votes import fit, simulated
 
