@@ -13,7 +13,6 @@ from arena.rating.comparisons import Comparisons, FloatArray
 from arena.rating.leaderboard import Leaderboard, Line
 from arena.results.both_versions import Adjustment, BothRanks, CovariateEffect, LargestMove
 from augment.models import Augmentation
-from augment.scene.entities import AgentType
 
 SIDE, OBJECTS, VEHICLES = "side", "objects", "vehicles"
 COVARIATES = (SIDE, OBJECTS, VEHICLES)
@@ -21,7 +20,8 @@ COVARIATES = (SIDE, OBJECTS, VEHICLES)
 WITHOUT_PICTURES = (SIDE,)
 """What is known of votes from a file."""
 
-_VEHICLES = {AgentType.VEHICLE.value, AgentType.BUS.value}
+_VEHICLES = {"VEHICLE", "BUS"}
+"""Of the types that a modification's document knows."""
 _AT_ONCE = 500
 
 
