@@ -16,6 +16,7 @@ from pytest_django import Settings
 from xdist.scheduler import LoadScopeScheduling
 
 from tests.append_only import empty_with_triggers
+from tests.brokers import MEMORY, NOWHERE, Broker, broker_at
 from tests.on_postgres import FOLDERS
 from tests.processes import MIGRATED, copy_database, machine
 from tests.stack import SMALL_DEMO, Home
@@ -126,3 +127,21 @@ def demo_home(tmp_path_factory: pytest.TempPathFactory) -> Home:
     home = Home.at(tmp_path_factory.mktemp("demo"))
     (home.folder / "demo.log").write_text(home.must(*SMALL_DEMO))
     return home
+
+
+@pytest.fixture
+def broker() -> Iterator[Broker]:
+    """A broker in memory, with nothing waiting."""
+    with broker_at(MEMORY):
+        made = Broker()
+        made.purge()
+        yield made
+    with broker_at(MEMORY):  # the test may have looked elsewhere meanwhile
+        made.purge()
+
+
+@pytest.fixture
+def no_broker() -> Iterator[None]:
+    """An address where nobody listens."""
+    with broker_at(NOWHERE):
+        yield

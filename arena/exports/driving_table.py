@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from augment.models import Simulation
 from augment.sentences import sentence
 from augment.services.judging.driving_scores import DrivingLine, DrivingScores
 from augment.services.scenarios.types import type_choices
@@ -95,8 +94,3 @@ class DrivingTable:
             offsets=how.offsets,
             traffic="reactive" if how.is_reactive else "replayed",
         )
-
-
-def is_contestant(line: DrivingLine) -> bool:
-    """Whether it is a contestant's line."""
-    return line.subject == Simulation.Subject.AUGMENTATION

@@ -6,32 +6,12 @@ Unknown is None, never zero; a contestant that asks no language model has no lin
 from __future__ import annotations
 
 from collections.abc import Collection
-from dataclasses import dataclass
 
-from django.db.models import BigIntegerField, Case, Count, F, Q, Sum, When
-from django.db.models.functions import Coalesce
+from django.db.models import Q
 
 from arena.models import Study
-from augment.models import Augmentation, Contestant, EndpointModel, ModelCall
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Spent:
-    """One contestant's calls over all augmentations that the study shows.
-
-    An answer from the store counts as what it had cost when it was asked for: the question is
-    what the contestant costs, not what this study did.
-
-    Attributes:
-        augmentations: How many of them asked a model.
-        tokens: Prompt and completion, None where a call does not say.
-        nano_usd: None where the price of a call is unknown.
-    """
-
-    augmentations: int
-    calls: int
-    tokens: int | None
-    nano_usd: int | None
+from augment.models import Contestant, EndpointModel
+from augment.services.endpoints.spending import CONTESTANT, Spending, sum_spending
 
 
 def shown_augmentations(study: Study) -> frozenset[int]:
@@ -40,43 +20,9 @@ def shown_augmentations(study: Study) -> frozenset[int]:
     return frozenset(pk for pair in rows for pk in pair)
 
 
-def spent_on(augmentations: Collection[int]) -> dict[int, Spent]:
-    """By the contestant's primary key; one query. What was never sent is no call."""
-    tokens = Coalesce(
-        F("served_from__prompt_tokens") + F("served_from__completion_tokens"),
-        F("prompt_tokens") + F("completion_tokens"),
-        # An endpoint that answered with an error used none, and that is known.
-        Case(When(is_cost_estimated=False, served_from=None, then=F("spent_tokens"))),
-        output_field=BigIntegerField(),
-    )
-    money = Coalesce("served_from__cost_nano_usd", "cost_nano_usd")
-    ended = [state.value for state in Augmentation.SHOWABLE]
-    rows = (
-        ModelCall.objects.filter(
-            Q(sent_at__isnull=False) | Q(served_from__isnull=False),
-            attempt__augmentation__in=augmentations,
-            attempt__outcome__in=ended,
-        )
-        .order_by()
-        .values(who=F("attempt__augmentation__contestant"))
-        .annotate(
-            augmentations=Count("attempt__augmentation", distinct=True),
-            calls=Count("pk"),
-            tokens=Sum(tokens),
-            with_tokens=Count(tokens),
-            money=Sum(money),
-            with_money=Count(money),
-        )
-    )
-    return {
-        row["who"]: Spent(
-            augmentations=row["augmentations"],
-            calls=row["calls"],
-            tokens=row["tokens"] if row["with_tokens"] == row["calls"] else None,
-            nano_usd=row["money"] if row["with_money"] == row["calls"] else None,
-        )
-        for row in rows
-    }
+def spent_on(augmentations: Collection[int]) -> dict[int, Spending]:
+    """By the contestant's primary key, over all augmentations that a study shows; one query."""
+    return sum_spending(Q(attempt__augmentation__in=augmentations), by=CONTESTANT)
 
 
 def model_classes(contestants: Collection[Contestant]) -> dict[int, str]:

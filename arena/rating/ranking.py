@@ -138,17 +138,38 @@ def separation(rating: FloatArray, samples: FloatArray) -> Separation:
     beyond = len(largest) - np.searchsorted(np.sort(largest), size, side="left")
     adjusted = ((1.0 + beyond) / (1.0 + len(largest))).astype(np.float64)
     normal = np.array([math.erfc(value / math.sqrt(2.0)) for value in size])
-    differs = size > critical
-    above = np.zeros((contestants, contestants), dtype=bool)
-    above[low, high] = differs & (gap > 0)
-    above[high, low] = differs & (gap < 0)
-    return Separation(
-        above=above,
-        p_value=square_of(contestants, low, high, adjusted, 1.0),
-        holm=square_of(contestants, low, high, holm(normal), 1.0),
+    return gather_pairs(
+        rating,
+        differs=size > critical,
+        p_value=adjusted,
+        holm=holm(normal),
         critical=critical,
-        difference=rating[:, None] - rating[None, :],
-        error=square_of(contestants, low, high, error, 0.0),
+        error=error,
+    )
+
+
+def gather_pairs(
+    rating: FloatArray,
+    *,
+    differs: BoolArray,
+    p_value: FloatArray,
+    holm: FloatArray,
+    critical: float,
+    error: FloatArray,
+) -> Separation:
+    """What was found for pairs (P,), in the order of `np.triu_indices`, as squares (C, C)."""
+    contestants = len(rating)
+    low, high = np.triu_indices(contestants, 1)
+    difference = rating[:, None] - rating[None, :]
+    apart = np.zeros((contestants, contestants), dtype=bool)
+    apart[low, high] = apart[high, low] = differs
+    return Separation(
+        above=apart & (difference > 0.0),
+        p_value=_square_of(contestants, low, high, p_value, 1.0),
+        holm=_square_of(contestants, low, high, holm, 1.0),
+        critical=critical,
+        difference=difference,
+        error=_square_of(contestants, low, high, error, 0.0),
     )
 
 
@@ -178,7 +199,7 @@ def _largest_deviations(
     return largest
 
 
-def square_of(
+def _square_of(
     contestants: int, low: IntArray, high: IntArray, values: FloatArray, diagonal: float
 ) -> FloatArray:
     """(C, C), symmetric, of what pairs have (P,)."""

@@ -17,7 +17,7 @@ import numpy as np
 from arena.rating.comparisons import FloatArray, IntArray
 from arena.rating.estimate import LEVEL
 from arena.rating.moderated import LEAST, Component, Spread
-from arena.rating.ranking import Separation, holm, square_of
+from arena.rating.ranking import Separation, gather_pairs, holm
 from arena.rating.student import t_above
 
 CAUTION = 1.8
@@ -61,16 +61,8 @@ def judge_pairs(rating: FloatArray, spread: Spread, *, rounds: int, seed: int) -
         adjusted, critical = by_holm, float("nan")
     adjusted = np.minimum(CAUTION * adjusted, 1.0)
     differs = adjusted <= 1.0 - LEVEL
-    above = np.zeros((contestants, contestants), dtype=bool)
-    above[low, high] = differs & (gap > 0)
-    above[high, low] = differs & (gap < 0)
-    return Separation(
-        above=above,
-        p_value=square_of(contestants, low, high, adjusted, 1.0),
-        holm=square_of(contestants, low, high, by_holm, 1.0),
-        critical=critical,
-        difference=rating[:, None] - rating[None, :],
-        error=square_of(contestants, low, high, error, 0.0),
+    return gather_pairs(
+        rating, differs=differs, p_value=adjusted, holm=by_holm, critical=critical, error=error
     )
 
 

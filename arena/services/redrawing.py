@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from arena.models import LabelTask, Study
 from augment.errors import AugmentError
 from augment.models import Scenario
-from augment.services.scenarios.redrawing import redraw
+from augment.services.scenarios.redrawing import is_outdated, redraw
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -52,10 +52,12 @@ def redraw_pictures() -> Iterator[Redrawn]:
 
 
 def _redrawn(pk: int, slug: str) -> Redrawn:
-    if needed_by := _needed_by(pk):
-        return Redrawn(scenario=slug, needed_by=needed_by)
     scenario = Scenario.objects.select_related("base_scene").get(pk=pk)
     try:
+        if not is_outdated(scenario):
+            return Redrawn(scenario=slug)
+        if needed_by := _needed_by(pk):
+            return Redrawn(scenario=slug, needed_by=needed_by)
         pictures = redraw(scenario, is_free=lambda: not _needed_by(pk))
     except AugmentError as error:
         return Redrawn(scenario=slug, fault=str(error))

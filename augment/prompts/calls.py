@@ -39,7 +39,6 @@ _OBJECT = rf"""\{{\s*["'](?P<key>{"|".join((*_NAMES, *_ARGUMENTS, TOOL))})["']\s
 _PYTHON = r"(?<![\w.])(?P<name>\w{0,40}?(?:pose_|_pose)\w{0,40})[ \t]{0,3}\("
 _OPENING = re.compile(f"{_OBJECT}|{_PYTHON}")
 _EXACT = re.compile(r'\{\s*"call"\s*:')
-_ALONE_BEFORE = re.compile(r"(?:^|\n)[ \t`]*\Z")
 _ALONE_BEHIND = re.compile(r"[ \t`]*(?:\n|\Z)")
 
 

@@ -25,11 +25,6 @@ class Metric:
     parts: dict[str, float] = field(default_factory=dict)
     series: dict[str, FloatArray] = field(default_factory=dict)
 
-    @property
-    def is_multiplier(self) -> bool:
-        """Whether the whole score is multiplied by it."""
-        return self.weight is None
-
 
 def combine(metrics: tuple[Metric, ...]) -> float:
     """The product of the multipliers times the weighted mean of the others, 0 to 1."""

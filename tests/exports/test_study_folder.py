@@ -18,15 +18,27 @@ from django.contrib.auth.models import User
 from django.core.files.base import ContentFile
 from django.core.files.storage import default_storage
 from django.core.management import CommandError, call_command
+from django.db import connection
+from django.test.utils import CaptureQueriesContext
 from django.utils import timezone
 from pytest_django import Settings
 
 from arena.exports.study_folder.closure import TRAVELLING, close_over
+from arena.exports.study_folder.tables import files_for_people
 from arena.models import Study, Vote
 from arena.services.ratings import rate
 from arena.services.stored_rows import as_line, columns_of, label_of
 from arena.services.studies import close_study
-from augment.models import Augmentation, Contestant, Endpoint, GenerationJob, Scenario, Simulation
+from augment.models import (
+    Attempt,
+    Augmentation,
+    Contestant,
+    Endpoint,
+    GenerationJob,
+    ModelCall,
+    Scenario,
+    Simulation,
+)
 from tests.study_rows import a_study, hang, matchups_of, scenario, vote
 
 pytestmark = pytest.mark.django_db(transaction=True)
@@ -164,6 +176,30 @@ def test_a_picture_that_is_gone_is_named_and_nothing_is_written(
     with pytest.raises(CommandError, match=f"{image} of this study is missing"):
         export(study, tmp_path / "out")
     assert not (tmp_path / "out").exists()
+
+
+def test_transcripts_are_read_in_the_same_queries_however_many_there_are(study: Study) -> None:
+    def queries() -> int:
+        with CaptureQueriesContext(connection) as asked:
+            files = dict(files_for_people(close_over(study)))
+        written = [name for name in files if name.startswith("transcripts/")]
+        assert len(written) == ModelCall.objects.values("attempt__augmentation").count()
+        return len(asked)
+
+    first, *others = Augmentation.objects.all()
+    call_a_model(first)
+    with_one = queries()
+    for row in others:
+        call_a_model(row)
+    assert queries() == with_one
+
+
+def call_a_model(row: Augmentation) -> None:
+    now = timezone.now()
+    attempt = Attempt.objects.create(augmentation=row, number=1, started_at=now)
+    ModelCall.objects.create(
+        attempt=attempt, number=1, role="modifier", request={}, started_at=now
+    )
 
 
 def test_only_drives_that_are_over_travel(study: Study, tmp_path: Path) -> None:

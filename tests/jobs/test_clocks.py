@@ -3,11 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
 from datetime import UTC, datetime, timedelta
 
 import pytest
-from celery import current_app
 from django.db import connection
 from django.utils import timezone
 
@@ -16,6 +14,7 @@ from augment.models import Augmentation, CallLease
 from augment.services.clock import DATABASE_TIME, database_now
 from augment.services.endpoints import call_limits
 from augment.services.running import leases
+from tests.brokers import MEMORY, broker_at
 from tests.jobs.models import add_llama
 from tests.jobs.rows import STALE, launch, only_row
 
@@ -37,16 +36,8 @@ def skew(monkeypatch: pytest.MonkeyPatch) -> Skew:
 
 @pytest.fixture(autouse=True)
 def _broker() -> Iterator[None]:
-    with memory_broker():
+    with broker_at(MEMORY):
         yield
-
-
-@contextmanager
-def memory_broker() -> Iterator[None]:
-    before = current_app.conf.broker_url
-    current_app.conf.broker_url = "memory://"
-    yield
-    current_app.conf.broker_url = before
 
 
 def taken() -> tuple[Augmentation, leases.Lease]:

@@ -1,6 +1,5 @@
 from __future__ import annotations
 
-from collections.abc import Iterator
 from datetime import timedelta
 from io import StringIO
 
@@ -17,47 +16,12 @@ from augment.models import Augmentation, GenerationJob
 from augment.services.running import leases, runner
 from augment.services.running.caps import Caps
 from augment.services.running.summary import count_rows
+from tests.brokers import Broker
 from tests.jobs.models import Model, add_llama, llama_job
 from tests.jobs.rows import add_kind, add_scenario, done, failed, launch, leased, only_row
 
 pytestmark = pytest.mark.django_db
 State = Augmentation.State
-
-
-class Broker:
-    """A broker in memory, and how many messages wait there."""
-
-    def purge(self, queue: str = "models") -> None:
-        with current_app.connection_for_write() as connection:
-            channel = connection.default_channel
-            channel.queue_declare(queue=queue)
-            channel.queue_purge(queue)
-
-    def __len__(self) -> int:
-        with current_app.connection_for_write() as connection:
-            declared = connection.default_channel.queue_declare(
-                queue=current_app.conf.task_default_queue
-            )
-            return int(declared.message_count)
-
-
-@pytest.fixture
-def broker() -> Iterator[Broker]:
-    before = current_app.conf.broker_url
-    current_app.conf.broker_url = "memory://"
-    made = Broker()
-    made.purge()
-    yield made
-    made.purge()
-    current_app.conf.broker_url = before
-
-
-@pytest.fixture
-def no_broker() -> Iterator[None]:
-    before = current_app.conf.broker_url
-    current_app.conf.broker_url = "redis+socket:///nowhere/redis.sock"
-    yield
-    current_app.conf.broker_url = before
 
 
 def test_a_job_is_sent_once(broker: Broker) -> None:

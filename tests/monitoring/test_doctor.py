@@ -18,6 +18,7 @@ from arena.services.people import create_person
 from arena.serving import readiness
 from augment.models import Endpoint, GenerationJob, Worker
 from augment.services.clock import DATABASE_TIME
+from tests.brokers import MEMORY, broker_at
 
 pytestmark = pytest.mark.django_db
 
@@ -34,10 +35,8 @@ def _sound(tmp_path: Path, settings: Settings) -> Iterator[None]:
     create_person(username="root", password="a password", role="admin")
     now = dict.fromkeys(("started_at", "seen_at", "recovered_at"), DATABASE_TIME)
     Worker.objects.create(name="w 1", **now)
-    before = current_app.conf.broker_url
-    current_app.conf.broker_url = "memory://"
-    yield
-    current_app.conf.broker_url = before
+    with broker_at(MEMORY):
+        yield
 
 
 def wrong() -> dict[str, Level]:

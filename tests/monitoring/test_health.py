@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import socket
-from collections.abc import Iterator
 
 import pytest
 from celery import current_app
@@ -19,26 +18,11 @@ from augment.broker import check_broker
 from augment.errors import QueueUnreachable
 from augment.models import Worker
 from augment.services.clock import DATABASE_TIME
+from tests.brokers import Broker
 from tests.study_rows import a_study, matchups_of, vote
 from tests.web.cast import people, signed_in
 
 pytestmark = pytest.mark.django_db
-
-
-@pytest.fixture
-def broker() -> Iterator[None]:
-    before = current_app.conf.broker_url
-    current_app.conf.broker_url = "memory://"
-    yield
-    current_app.conf.broker_url = before
-
-
-@pytest.fixture
-def no_broker() -> Iterator[None]:
-    before = current_app.conf.broker_url
-    current_app.conf.broker_url = "redis+socket:///nowhere/redis.sock"
-    yield
-    current_app.conf.broker_url = before
 
 
 @pytest.fixture(autouse=True)
@@ -61,7 +45,7 @@ def test_a_process_that_answers_is_healthy_whatever_else_is_gone(no_broker: None
     assert ask("/healthz") == (200, {"status": "ok"})
 
 
-def test_a_whole_installation_is_ready(broker: None) -> None:
+def test_a_whole_installation_is_ready(broker: Broker) -> None:
     a_worker()
     parts = {"database": "ok", "broker": "ok", "workers": "ok"}
     assert ask("/readyz?strict") == (200, {"status": "ok", "parts": parts})
@@ -90,7 +74,7 @@ def test_many_who_ask_cost_one_look_in_five_seconds() -> None:
     assert looked == [100.0, 105.0]
 
 
-def test_broker_and_workers_are_not_asked_for_every_probe(broker: None) -> None:
+def test_broker_and_workers_are_not_asked_for_every_probe(broker: Broker) -> None:
     a_worker()
     assert ask("/readyz?strict")[0] == 200
     Worker.objects.all().delete()
@@ -101,7 +85,7 @@ def test_broker_and_workers_are_not_asked_for_every_probe(broker: None) -> None:
     assert ask("/readyz?strict")[0] == 503
 
 
-def test_a_broker_that_takes_calls_and_never_answers_is_unreachable(broker: None) -> None:
+def test_a_broker_that_takes_calls_and_never_answers_is_unreachable(broker: Broker) -> None:
     with socket.create_server(("127.0.0.1", 0)) as silent:
         current_app.conf.broker_url = f"redis://127.0.0.1:{silent.getsockname()[1]}/0"
         with pytest.raises(QueueUnreachable):
@@ -109,7 +93,7 @@ def test_a_broker_that_takes_calls_and_never_answers_is_unreachable(broker: None
 
 
 def test_without_the_tables_of_this_release_nobody_is_sent_here(
-    broker: None, monkeypatch: pytest.MonkeyPatch
+    broker: Broker, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(readiness, "find_unapplied_migrations", lambda: ["arena.0999_new"])
     readiness._is_prepared.clear()
@@ -120,7 +104,7 @@ def test_without_the_tables_of_this_release_nobody_is_sent_here(
 
 
 def test_without_a_database_nobody_is_sent_here(
-    broker: None, monkeypatch: pytest.MonkeyPatch
+    broker: Broker, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     def unreachable() -> list[str]:
         raise OperationalError("password of arena at 10.0.0.7")
@@ -132,7 +116,7 @@ def test_without_a_database_nobody_is_sent_here(
     assert "10.0.0.7" not in str(document)
 
 
-def test_probes_are_not_sent_to_https(settings: Settings, broker: None) -> None:
+def test_probes_are_not_sent_to_https(settings: Settings, broker: Broker) -> None:
     settings.SECURE_SSL_REDIRECT = True
     assert Client().get("/healthz").status_code == 200
     assert Client().get("/login/").status_code == 301

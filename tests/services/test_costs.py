@@ -6,10 +6,11 @@ from collections.abc import Iterator
 
 import pytest
 
-from arena.queries.costs import Spent, spent_on
+from arena.queries.costs import spent_on
 from augment.errors import ModelFault
 from augment.llm.messages import Reply, Request
 from augment.models import Augmentation, Contestant, GenerationJob
+from augment.services.endpoints.spending import Spending
 from augment.services.running import jobs, runner
 from tests.jobs.models import Model, llama_job, reply
 from tests.jobs.rows import only_row
@@ -20,7 +21,7 @@ pytestmark = pytest.mark.django_db
 BUSY = ModelFault("busy", retryable=True, status=503, retry_after_s=0.001)
 
 
-def spent(job: GenerationJob, model: Model) -> Spent:
+def spent(job: GenerationJob, model: Model) -> Spending:
     row = only_row(job)
     runner.work_on(augmentation_pk=row.pk, connect=model)
     row.refresh_from_db()
@@ -41,7 +42,7 @@ def once_busy() -> Model:
 
 def test_an_error_of_the_endpoint_is_a_call_that_used_nothing() -> None:
     found = spent(llama_job(price="1"), once_busy())
-    assert found == Spent(augmentations=1, calls=2, tokens=3020, nano_usd=3_020_000)
+    assert found == Spending(augmentations=1, calls=2, tokens=3020, nano_usd=3_020_000)
 
 
 def test_an_answer_from_the_store_counts_as_what_it_had_cost() -> None:
@@ -49,7 +50,7 @@ def test_an_answer_from_the_store_counts_as_what_it_had_cost() -> None:
     spent(first, Model())
     again = jobs.launch(name="Again", contestants=["llama"], scenarios=["street-1"])
     found = spent(again, Model())
-    assert found == Spent(augmentations=1, calls=1, tokens=3020, nano_usd=3_020_000)
+    assert found == Spending(augmentations=1, calls=1, tokens=3020, nano_usd=3_020_000)
 
 
 def test_usage_that_nobody_told_is_unknown_also_in_a_copy() -> None:

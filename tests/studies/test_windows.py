@@ -35,6 +35,12 @@ def drawn_before(folder: str = "bev") -> None:
     Scenario.objects.update(original_image=f"{folder}/original.png")
 
 
+def look_otherwise(contestant: str) -> None:
+    """Its pictures as if they showed something else, in the same window."""
+    for row in Augmentation.objects.filter(contestant__slug=contestant):
+        Augmentation.objects.filter(pk=row.pk).update(image=row.image.replace(".png", "x.png"))
+
+
 def opened(name: str, **cast: object) -> Study:
     return open_study(name=name, votes_per_expert=2, seed=7, **cast)  # type: ignore[arg-type]
 
@@ -47,8 +53,7 @@ def test_pictures_of_two_windows_are_never_paired() -> None:
     with pytest.raises(NothingToPlan, match="redraw_pictures"):
         opened("mixed", **cast)
     call_command("redraw_pictures")
-    for row in Augmentation.objects.filter(contestant__slug="bob"):
-        Augmentation.objects.filter(pk=row.pk).update(image=row.image.replace(".png", "x.png"))
+    look_otherwise("bob")
     for matchup in opened("redrawn", **cast).matchups.all():
         windows = {
             window_of(name)
@@ -72,6 +77,15 @@ def test_a_study_keeps_the_pictures_that_were_shown() -> None:
     assert sum(found.pictures for found in redraw_pictures()) == 4
     assert not Augmentation.objects.filter(image__regex=r"^bev/[^/]+$").exists()
     assert set(study.matchups.values_list("left_image", "right_image", "original_image")) == shown
+
+
+def test_pictures_that_are_as_they_should_be_are_not_said_to_be_kept() -> None:
+    cast = cast_of(contestants=("ann", "bob"), scenarios=2, experts=("eva",))
+    drawn_before()
+    call_command("redraw_pictures")
+    look_otherwise("bob")
+    opened("now", **cast)
+    assert list(redraw_pictures()) == []
 
 
 def test_pictures_of_a_former_window_keep_the_view_that_they_were_shown_with() -> None:

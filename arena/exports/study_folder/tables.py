@@ -17,7 +17,8 @@ from arena.exports.study_folder.closure import Closure
 from arena.models import Matchup, Snapshot, Vote
 from arena.services.cells import csv_text
 from augment.models import Augmentation, Contestant, GenerationJob, Scenario
-from augment.services.running.transcript_export import transcript_of
+from augment.services.running.transcript_export import record_of
+from augment.services.running.transcript_steps import Try, tries_by_augmentation
 
 File = tuple[str, bytes]
 
@@ -34,6 +35,10 @@ ROWS = (
 )  # fmt: skip
 
 
+_AT_ONCE = 100
+"""So many transcripts are held in memory; each may have some hundred thousand characters."""
+
+
 def files_for_people(closure: Closure) -> Iterator[File]:
     """Every file but the rows, the pictures and the README, in a fixed order."""
     yield "pairs.csv", csv_text(PAIRS, _pairs(closure)).encode()
@@ -48,15 +53,23 @@ def files_for_people(closure: Closure) -> Iterator[File]:
         yield f"scenes/{scene.slug}.json", _json(scene.document)
     for job in GenerationJob.objects.filter(pk__in=closure.jobs).order_by("pk"):
         yield f"objects/{job.code}.csv", objects_csv(object_rows(job))
-    for augmentation in augmentations:
-        yield f"modifications/{augmentation.code}.json", _json(augmentation.modification)
-        if augmentation.attempts.filter(calls__isnull=False).exists():
-            yield f"transcripts/{augmentation.code}.json", _json(_transcript(augmentation))
+    for start in range(0, len(augmentations), _AT_ONCE):
+        yield from _made(augmentations[start : start + _AT_ONCE])
     ready = closure.study.snapshots.filter(state=Snapshot.State.READY).order_by("made_at", "pk")
     for snapshot in ready:
         for name, content in sorted(bundle_files(snapshot).items()):
             if name != RATING_MANIFEST:
                 yield f"ratings/{snapshot.code}/{name}", content
+
+
+def _made(augmentations: list[Augmentation]) -> Iterator[File]:
+    """What each has made, and the transcript of whom a model was asked for."""
+    tries = tries_by_augmentation([augmentation.pk for augmentation in augmentations])
+    for augmentation in augmentations:
+        yield f"modifications/{augmentation.code}.json", _json(augmentation.modification)
+        own = tries.get(augmentation.pk, [])
+        if any(step.call for one in own for step in one.steps):
+            yield f"transcripts/{augmentation.code}.json", _json(_record(augmentation, own))
 
 
 def _pairs(closure: Closure) -> Iterator[tuple[object, ...]]:
@@ -159,12 +172,12 @@ def _scenario(found: Scenario) -> dict[str, Any]:
     }
 
 
-def _transcript(augmentation: Augmentation) -> dict[str, Any]:
+def _record(augmentation: Augmentation, tries: list[Try]) -> dict[str, Any]:
     """The transcript without its pictures, which stand under media, and without a machine."""
-    document = transcript_of(augmentation)
+    document = record_of(augmentation, tries)
     for attempt in document["attempts"]:
         attempt["worker"] = ""
-    return document | {"images": sorted(document["images"])}
+    return document
 
 
 def _text(value: object) -> str:

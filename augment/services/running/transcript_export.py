@@ -24,8 +24,13 @@ FORMAT, VERSION = "scenario-arena/transcript", 3
 
 
 def transcript_of(augmentation: Augmentation) -> dict[str, Any]:
-    """The whole record, ready for JSON. Unknown is null, never zero."""
-    tries = tries_of(augmentation)
+    """The whole record with its images, ready for JSON. Unknown is null, never zero."""
+    record = record_of(augmentation, tries_of(augmentation))
+    return record | {"images": {digest: _image(digest) for digest in record["images"]}}
+
+
+def record_of(augmentation: Augmentation, tries: list[Try]) -> dict[str, Any]:
+    """The same with the images' names alone, from attempts that are read already."""
     scenario, job = augmentation.scenario, augmentation.job
     return {
         "format": FORMAT,
@@ -148,14 +153,15 @@ def _call(call: ModelCall) -> dict[str, Any]:
     }
 
 
-def _images(tries: list[Try]) -> dict[str, str | None]:
-    """Every image that a request refers to, by its SHA-256; null where the file is gone."""
+def _images(tries: list[Try]) -> list[str]:
+    """The SHA-256 of every image that a request refers to."""
     calls = [step.call for one in tries for step in one.steps if step.call is not None]
-    digests = sorted({digest for call in calls for digest in images_in(call.request)})
-    return {digest: _image(f"{IMAGES}/{digest}.png") for digest in digests}
+    return sorted({digest for call in calls for digest in images_in(call.request)})
 
 
-def _image(name: str) -> str | None:
+def _image(digest: str) -> str | None:
+    """What is stored under that name; None where the file is gone."""
+    name = f"{IMAGES}/{digest}.png"
     if not default_storage.exists(name):
         return None
     with default_storage.open(name) as file:

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator
+from collections import defaultdict
+from collections.abc import Collection, Iterator
 from dataclasses import dataclass
 from decimal import Decimal
 from textwrap import indent
@@ -105,11 +106,19 @@ class Totals:
 
 def tries_of(augmentation: Augmentation) -> list[Try]:
     """Every attempt, the first one first; three queries."""
+    return tries_by_augmentation([augmentation.pk]).get(augmentation.pk, [])
+
+
+def tries_by_augmentation(augmentations: Collection[int]) -> dict[int, list[Try]]:
+    """The attempts of several by the primary key; three queries. Who has none has no entry."""
     calls = Prefetch(
         "calls", ModelCall.objects.select_related("served_from__attempt__augmentation")
     )
-    attempts = augmentation.attempts.prefetch_related(calls, "notes")
-    return [Try(attempt=attempt, steps=list(_steps(attempt))) for attempt in attempts]
+    attempts = Attempt.objects.filter(augmentation__in=augmentations)
+    found: dict[int, list[Try]] = defaultdict(list)
+    for attempt in attempts.prefetch_related(calls, "notes"):
+        found[attempt.augmentation_id].append(Try(attempt=attempt, steps=list(_steps(attempt))))
+    return dict(found)
 
 
 def totals_of(tries: list[Try]) -> Totals:

@@ -35,12 +35,11 @@ def redraw(scenario: Scenario, *, is_free: Callable[[], bool] = lambda: True) ->
         InvalidDocument: What is stored can't be read.
         InvalidModification: A modification does not fit the scene.
     """
-    key = camera_of(scenario).key
+    if not is_outdated(scenario):
+        return 0
+    scene, key = scene_of(scenario), camera_of(scenario).key
     rows = scenario.augmentations.exclude(image="").only("image", "state", "modification")
     outdated = [row for row in rows if window_of(row.image) != key]
-    if not outdated and (not scenario.original_image or window_of(scenario.original_image) == key):
-        return 0
-    scene = scene_of(scenario)
     drawn = [(row, picture_of(scenario, scene, _shown(row))) for row in outdated]
     with transaction.atomic():
         Scenario.objects.select_for_update(no_key=True).get(pk=scenario.pk)
@@ -50,6 +49,18 @@ def redraw(scenario: Scenario, *, is_free: Callable[[], bool] = lambda: True) ->
         for row, name in drawn:
             Augmentation.objects.filter(pk=row.pk, image=row.image).update(image=name)
     return len(drawn)
+
+
+def is_outdated(scenario: Scenario) -> bool:
+    """Whether any of its pictures shows another window than today's.
+
+    Raises:
+        InvalidDocument: The stored scene or reference can't be read.
+    """
+    key = camera_of(scenario).key
+    images = scenario.augmentations.exclude(image="").values_list("image", flat=True)
+    own = [scenario.original_image] if scenario.original_image else []
+    return any(window_of(image) != key for image in (*own, *images))
 
 
 def _shown(row: Augmentation) -> Modification:
