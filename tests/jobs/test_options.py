@@ -9,6 +9,7 @@ from collections.abc import Callable
 
 import pytest
 from django.core.management import CommandError, call_command
+from pytest_django import DjangoAssertNumQueries
 
 from augment.errors import Conflict, InvalidDocument
 from augment.models import Augmentation, Contestant, EndpointModel, ModelCall
@@ -170,6 +171,15 @@ def test_what_the_model_does_not_take_is_left_out_and_said() -> None:
     assert not {"temperature", "seed"} & answered.keys()
     # Known from the beginning where a probe has seen it.
     assert left_out(contestants.add_like(slug="b", like="a", name="b")) == left_out(one)
+
+
+def test_who_chose_nothing_that_could_be_refused_costs_no_query(
+    django_assert_num_queries: DjangoAssertNumQueries,
+) -> None:
+    with serving(Scripted()) as server:
+        one = add(server, "a", "fc", radius_m=60.0)
+    with django_assert_num_queries(0):
+        assert left_out(one) == {}
 
 
 def test_a_temperature_that_is_refused_after_answers_is_a_fault_and_no_mixture() -> None:

@@ -154,11 +154,12 @@ def other_prompts(slug: str, options: ContestantOptions) -> Sentence | None:
 def left_out(contestant: Contestant) -> dict[str, list[str]]:
     """By role, the chosen options that its model does not take and that are not sent therefore.
 
-    Of a contestant that has not run yet: as far as it is known now.
+    Of a contestant that has not run yet: as far as it is known now. Costs a query for each of its
+    roles then, and none where nothing of the kind was chosen.
     """
-    chosen = {"temperature", "seed", "reasoning_effort"} & options_of(
-        contestant
-    ).to_document().keys()
+    # Never of what is completed at the first run: no default of ours is one of these.
+    options = contestant.frozen_options or contestant.options
+    chosen = {"temperature", "seed", "reasoning_effort"} & options.keys()
     if not chosen:
         return {}
     sends = contestant.sends or {
