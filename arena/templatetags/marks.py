@@ -13,6 +13,7 @@ from django.utils.translation import gettext_noop as _
 from arena.models import Study
 from augment.models import Augmentation, GenerationJob
 from augment.services.running.summary import JobCounts
+from augment.services.wording import translate
 
 register = template.Library()
 
@@ -143,6 +144,12 @@ def segments(by_state: dict[Augmentation.State, int]) -> list[BarSegment]:
             )
         start += width
     return found
+
+
+@register.filter
+def said(sentence: str) -> str:
+    """What a service tells, in the language of whoever reads it."""
+    return translate(sentence)
 
 
 @register.filter

@@ -16,10 +16,6 @@ from arena.services.decisions import LONGEST_COMMENT, Decision, decision_of
 from augment.models import Contestant
 from augment.services.judging.fault_guess import FaultClass
 from augment.services.running.caps import Caps
-from augment.services.running.estimates import JobEstimate, estimate
-from augment.services.running.feasible import find_obstacle, keys_missing
-from augment.services.running.jobs import HIGHEST_SAMPLES
-from augment.services.wording import translate
 
 
 class ThemeForm(forms.Form):
@@ -144,37 +140,6 @@ class CapsForm(forms.Form):
         return Caps(
             usd=entered["cap_usd"], calls=entered["cap_calls"], tokens=entered["cap_tokens"]
         )
-
-
-def _offer(row: Contestant) -> Offer:
-    why_not = find_obstacle(row)
-    missing = () if why_not else tuple(keys_missing(row))
-    return Offer(row=row, obstacle=translate(why_not), keys_missing=missing)
-
-
-class LaunchForm(ChoiceForm, CapsForm):
-    """A new job."""
-
-    samples = forms.IntegerField(min_value=1, max_value=HIGHEST_SAMPLES, initial=1, required=False)
-    is_fresh = forms.BooleanField(required=False)
-
-    def clean_samples(self) -> int:
-        """An empty field is one sample."""
-        return self.cleaned_data["samples"] or 1
-
-    @property
-    def offers(self) -> list[Offer]:
-        """Contestants that no job can run say why."""
-        return [_offer(row) for row in self.offered]
-
-    def estimated(self) -> JobEstimate | None:
-        """What the job would use, as far as it is chosen; nothing has to be named or capped."""
-        self.is_valid()
-        chosen = [self.cleaned_data.get(name, []) for name in ("contestants", "scenarios")]
-        for name in ("name", "contestants", "scenarios"):
-            self.errors.pop(name, None)
-        samples = self.cleaned_data.get("samples", 1)
-        return estimate(*chosen, samples=samples) if all(chosen) else None
 
 
 class VoteForm(forms.Form):

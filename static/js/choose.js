@@ -2,7 +2,7 @@
 const form = document.querySelector("[data-choose]");
 
 function members(group) {
-  return [...group.querySelectorAll("input[type=checkbox]:not([data-all])")];
+  return [...group.querySelectorAll("input[type=checkbox]:not([data-all]):not(:disabled)")];
 }
 
 function refresh() {
@@ -15,7 +15,9 @@ function refresh() {
   }
   const sum = form.querySelector("[data-sum]");
   if (!sum) return;
-  const contestants = form.querySelectorAll("[name=contestants]:checked").length;
+  const contestants = form.querySelectorAll(
+    "[name=contestants]:checked, [name=cells]:checked",
+  ).length;
   const scenarios = form.querySelectorAll("[name=scenarios]:checked").length;
   sum.hidden = false;
   sum.querySelector("[data-contestants]").textContent = contestants;

@@ -130,7 +130,8 @@ def test_file_and_arguments_do_not_mix(tmp_path: Path) -> None:
 
 def test_what_is_written_is_read_again() -> None:
     loaded = load_matrix(read_yaml(WHOLE, what="matrix"))
-    text = matrix_text(loaded.contestants, loaded.scenarios, samples=2, name="Again: #1")
+    rows = list(Contestant.objects.filter(slug__in=loaded.contestants).select_related("endpoint"))
+    text = matrix_text(rows, loaded.scenarios, samples=2, name="Again: #1")
     Contestant.objects.filter(endpoint__isnull=False).delete()
     again = load_matrix(read_yaml(text, what="matrix"))
     assert set(again.contestants) == set(loaded.contestants)

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from decimal import ROUND_UP, Decimal
 
-from django.db.models import Count, Sum
+from django.db.models import Count, Q, Sum
 
 from augment.llm.costs import Price, usd_of, worst_case
 from augment.llm.messages import Request
@@ -15,6 +16,7 @@ from augment.scene.modification import Modification
 from augment.services.endpoints.prices import price_of
 from augment.services.endpoints.respondents import Respondent, respondents_of
 from augment.services.endpoints.treatments import options_of
+from augment.services.running.reuse import count_answered, latency_of, seconds_for
 from augment.services.scenarios.scenes import reference_of, scene_of
 from augment.variants.forecast import TokenUse, calls_of, most_tokens
 from augment.variants.options import recipe_with
@@ -41,6 +43,7 @@ class ContestantEstimate:
         usd: As expected, None where a price is unknown.
         usd_most: Where every answer is as long as it may be and every round is used.
         seen: So many earlier augmentations the expectation rests on; 0 for a guess.
+        answered: So many of the rows have their answers in the store already.
     """
 
     slug: str
@@ -52,16 +55,29 @@ class ContestantEstimate:
     usd: Decimal | None
     usd_most: Decimal | None
     seen: int
+    answered: int = 0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class JobEstimate:
-    """A job before it is launched: lines of those that ask language models, and all rows."""
+    """A job before it is launched: lines of those that ask language models, and all rows.
+
+    Attributes:
+        seconds: For the calls that are expected, with every endpoint as busy as it may be.
+        is_time_guessed: Whether a model among them has never been asked yet.
+    """
 
     rows: int
     scenarios: int
     contestants: int
     lines: tuple[ContestantEstimate, ...]
+    seconds: float = 0.0
+    is_time_guessed: bool = False
+
+    @property
+    def answered(self) -> int:
+        """Augmentations whose answers are there already."""
+        return sum(line.answered for line in self.lines)
 
     @property
     def asking_rows(self) -> int:
@@ -126,20 +142,45 @@ def estimate(
         UnknownName: A contestant's variant is none of ours any more.
         Conflict: An endpoint that a contestant names is gone.
     """
-    who = list(
-        Contestant.objects.filter(slug__in=contestants).select_related("endpoint").order_by("slug")
-    )
+    who = Contestant.objects.filter(slug__in=contestants).select_related("endpoint")
+    return estimate_rows(list(who.order_by("slug")), scenarios, samples=samples)
+
+
+def estimate_rows(
+    who: Sequence[Contestant],
+    scenarios: Sequence[str],
+    *,
+    samples: int = 1,
+    is_fresh: bool = False,
+) -> JobEstimate:
+    """The same of contestants, be they stored or not.
+
+    Args:
+        who: Contestants, each once.
+        scenarios: Slugs.
+        samples: So often each is asked about each.
+        is_fresh: Whether what was answered before is asked anew.
+    """
     where = Scenario.objects.filter(slug__in=scenarios).order_by("slug")
     count = where.count()
     asking = [row for row in who if row.endpoint is not None]
     measured = _spread(list(where.values_list("pk", flat=True))) if asking else []
     prompts = _Prompts(Scenario.objects.select_related("base_scene").filter(pk__in=measured))
     asked = count * samples
+    answered: Counter[int] = Counter()
+    if not is_fresh:
+        answered = count_answered(asking, scenarios, samples=samples)
+    lines = tuple(_line(row, asked, answered[row.pk], prompts) for row in asking if count)
+    load = [
+        (row, line.calls[1], latency_of(row)) for row, line in zip(asking, lines, strict=False)
+    ]
     return JobEstimate(
         rows=len(who) * asked,
         scenarios=count,
         contestants=len(who),
-        lines=tuple(_line(row, asked, prompts) for row in asking) if count else (),
+        lines=lines,
+        seconds=seconds_for(load),
+        is_time_guessed=any(not latency.calls for _, calls, latency in load if calls),
     )
 
 
@@ -180,7 +221,7 @@ class _Prompts:
         return about + PICTURE_TOKENS * pictures, most
 
 
-def _line(row: Contestant, count: int, prompts: _Prompts) -> ContestantEstimate:
+def _line(row: Contestant, count: int, answered: int, prompts: _Prompts) -> ContestantEstimate:
     recipe = recipe_with(find_recipe(row.variant), options_of(row))
     respondents = respondents_of(row)
     calls = calls_of(recipe)
@@ -196,20 +237,22 @@ def _line(row: Contestant, count: int, prompts: _Prompts) -> ContestantEstimate:
             for role, one in calls.items()
         }
     most = most_tokens(recipe, {role: prompts.tokens(recipe, role)[1] for role in calls})
+    left = count - answered
     return ContestantEstimate(
         slug=row.slug,
         name=row.name,
         rows=count,
         calls=(
-            count * sum(one.least for one in calls.values()),
-            round(count * usual_calls),
+            left * sum(one.least for one in calls.values()),
+            round(left * usual_calls),
             count * sum(one.most for one in calls.values()),
         ),
-        tokens_in=count * sum(use.prompt for use in used.values()),
-        tokens_out=count * sum(use.completion for use in used.values()),
-        usd=_usd(used, prices, count),
+        tokens_in=left * sum(use.prompt for use in used.values()),
+        tokens_out=left * sum(use.completion for use in used.values()),
+        usd=_usd(used, prices, left),
         usd_most=_usd(most, prices, count),
         seen=seen,
+        answered=answered,
     )
 
 
@@ -232,10 +275,22 @@ def _usd(
 def _seen(row: Contestant) -> tuple[dict[ModelRole, TokenUse], float, int]:
     """By role what one augmentation used on average, its calls, and over how many that is.
 
+    Of one that is not stored yet: from all that ask the same model in the same variant.
+
     Counted are augmentations that came to an end and asked for everything they needed; those that
     were answered from the store would make the next ones look too cheap.
     """
-    ended = Augmentation.objects.filter(contestant=row).exclude(
+    alike = (
+        Q(contestant=row)
+        if row.pk
+        else Q(
+            contestant__endpoint=row.endpoint,
+            contestant__model=row.model,
+            contestant__variant=row.variant,
+            contestant__roles=row.roles,
+        )
+    )
+    ended = Augmentation.objects.filter(alike).exclude(
         state__in=(
             *Augmentation.UNDER_WAY,
             Augmentation.State.FAILED,

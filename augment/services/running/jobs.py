@@ -45,6 +45,7 @@ def launch(
     caps: Caps = NO_CAPS,
     samples: int = 1,
     is_fresh: bool = False,
+    full_plan: dict[str, Any] | None = None,
     actor: User | None = None,
 ) -> GenerationJob:
     """Write a job and its waiting rows, one per contestant, scenario and sample.
@@ -58,6 +59,7 @@ def launch(
         caps: What it may use at most.
         samples: So often every contestant is asked about every scenario.
         is_fresh: Whether language models are asked anew what they answered in other jobs before.
+        full_plan: Of a job that tries one scenario first: what was chosen for the whole one.
         actor: Who launches it, None for the machine.
 
     Raises:
@@ -78,6 +80,7 @@ def launch(
         launched_by_id=actor.pk if actor else None,
         samples=samples,
         is_fresh=is_fresh,
+        full_plan=full_plan,
         **check_caps(caps, who),
     )
     job.contestants.set(who)

@@ -18,6 +18,7 @@ from django.db import transaction
 from pydantic import Field, ValidationError
 
 from augment.errors import AugmentError, InvalidDocument
+from augment.formats.yaml_file import read_yaml
 from augment.models import Contestant, Scenario
 from augment.scene.schema import Document, problems_of
 from augment.services.endpoints.contestants import add_contestant, ensure_builtin
@@ -136,15 +137,30 @@ def load_matrix(document: object, *, actor: User | None = None) -> Matrix:
     )
 
 
+def read_matrix(text: str, *, actor: User | None = None) -> Matrix:
+    """The matrix of a YAML file's text; contestants that are missing are made.
+
+    Raises:
+        InvalidDocument: With every error and its place; nothing was made.
+    """
+    return load_matrix(read_yaml(text, what=WHAT), actor=actor)
+
+
 def matrix_text(
-    contestants: Sequence[str], scenarios: Sequence[str], *, samples: int = 1, name: str = ""
+    contestants: Sequence[Contestant],
+    scenarios: Sequence[str],
+    *,
+    samples: int = 1,
+    name: str = "",
 ) -> str:
-    """The YAML of what is chosen, to be read by `load_matrix` here or elsewhere."""
-    rows = Contestant.objects.filter(slug__in=contestants).select_related("endpoint")
+    """The YAML of what is chosen, to be read by `load_matrix` here or elsewhere.
+
+    Contestants that are not stored yet are written like the others: whoever reads it makes them.
+    """
     lines = ["# Read by: manage.py generate --matrix FILE", f"name: {json.dumps(name)}"]
     lines = lines if name else lines[:1]
     lines += [f"samples: {samples}", "contestants:"]
-    for row in rows.order_by("slug"):
+    for row in sorted(contestants, key=lambda one: one.slug):
         if row.endpoint is None:
             lines.append(f"  - {json.dumps(row.slug)}")
             continue
@@ -162,6 +178,26 @@ def matrix_text(
     lines.append("scenarios:")
     lines += [f"  - {json.dumps(slug)}" for slug in scenarios]
     return "\n".join(lines) + "\n"
+
+
+def pick_slug(wanted: ContestantDocument, options: ContestantOptions) -> str:
+    """The slug of the contestant that is just so, else a free one made of what it is."""
+    same = Contestant.objects.filter(
+        endpoint__label=wanted.endpoint, model=wanted.model, variant=wanted.variant.lower()
+    )
+    for row in same.order_by("retired_at", "pk"):
+        roles = {name: one.model_dump() for name, one in wanted.roles.items()}
+        if (row.roles, row.options) == (roles, options.to_document()) and not row.retired_at:
+            return row.slug
+    parts = [wanted.model, wanted.variant, *(one.model for one in wanted.roles.values())]
+    stem = re.sub(r"[^a-z0-9]+", "-", "-".join([*parts, options.slug()]).lower()).strip("-")
+    stem = stem[: SLUG_LENGTH - 4].strip("-") or "contestant"
+    taken = set(Contestant.objects.filter(slug__startswith=stem).values_list("slug", flat=True))
+    number, slug = 1, stem
+    while slug in taken:
+        number += 1
+        slug = f"{stem}-{number}"
+    return slug
 
 
 # --- Private -----------------------------------------------------------------------------------
@@ -216,7 +252,7 @@ def _found(
         roles = {ModelRole(role): one for role, one in wanted.roles.items()}
         options = options_from_document(wanted.options)
         check_options(find_recipe(wanted.variant), options)
-        slug = wanted.slug if is_named else _slug_of(wanted, options)
+        slug = wanted.slug if is_named else pick_slug(wanted, options)
         with transaction.atomic():
             made = add_contestant(
                 slug=slug,
@@ -234,26 +270,6 @@ def _found(
         problems.append((where, str(error)))
     else:
         yield made.slug
-
-
-def _slug_of(wanted: ContestantDocument, options: ContestantOptions) -> str:
-    """The slug of the contestant that is just so, else a free one made of what it is."""
-    same = Contestant.objects.filter(
-        endpoint__label=wanted.endpoint, model=wanted.model, variant=wanted.variant.lower()
-    )
-    for row in same.order_by("retired_at", "pk"):
-        roles = {name: one.model_dump() for name, one in wanted.roles.items()}
-        if (row.roles, row.options) == (roles, options.to_document()) and not row.retired_at:
-            return row.slug
-    parts = [wanted.model, wanted.variant, *(one.model for one in wanted.roles.values())]
-    stem = re.sub(r"[^a-z0-9]+", "-", "-".join([*parts, options.slug()]).lower()).strip("-")
-    stem = stem[: SLUG_LENGTH - 4].strip("-") or "contestant"
-    taken = set(Contestant.objects.filter(slug__startswith=stem).values_list("slug", flat=True))
-    number, slug = 1, stem
-    while slug in taken:
-        number += 1
-        slug = f"{stem}-{number}"
-    return slug
 
 
 def _scenarios(names: Sequence[str], problems: _Problems) -> tuple[str, ...]:

@@ -120,7 +120,7 @@ def _attempt(one: Try) -> dict[str, Any]:
 
 def _step(step: TranscriptStep) -> dict[str, Any]:
     if step.call is not None:
-        return _call(step.call)
+        return _call(step.call) | {"changes": [str(one) for one in step.changes]}
     assert step.note is not None
     return {"kind": step.note.kind, "document": _same_order(step.note.document)}
 

@@ -15,6 +15,8 @@ from django.db.models import Prefetch
 from augment.llm.cutting import shorten
 from augment.llm.fingerprint import IMAGE_SCHEME
 from augment.models import Attempt, Augmentation, ModelCall, TranscriptNote
+from augment.sentences import Sentence
+from augment.services.running.call_changes import changes_of
 
 LONGEST_SHOWN = 100_000
 """Of one text of a record on a page, in characters; the document has all of it."""
@@ -39,10 +41,15 @@ class SaidMessage:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class TranscriptStep:
-    """A call or, where that is None, a note."""
+    """A call or, where that is None, a note.
+
+    Attributes:
+        changes: Of a call: where it was other than chosen because of its endpoint or model.
+    """
 
     call: ModelCall | None = None
     note: TranscriptNote | None = None
+    changes: tuple[Sentence, ...] = ()
 
     @property
     def messages(self) -> list[SaidMessage]:
@@ -114,10 +121,12 @@ def tries_by_augmentation(augmentations: Collection[int]) -> dict[int, list[Try]
     calls = Prefetch(
         "calls", ModelCall.objects.select_related("served_from__attempt__augmentation")
     )
+    options = {row.pk: row.options for row in augmentations}
     attempts = Attempt.objects.filter(augmentation__in=augmentations)
     found: dict[int, list[Try]] = defaultdict(list)
     for attempt in attempts.prefetch_related(calls, "notes"):
-        found[attempt.augmentation_id].append(Try(attempt=attempt, steps=list(_steps(attempt))))
+        steps = list(_steps(attempt, options[attempt.augmentation_id]))
+        found[attempt.augmentation_id].append(Try(attempt=attempt, steps=steps))
     return dict(found)
 
 
@@ -152,13 +161,17 @@ def images_in(request: dict[str, Any]) -> list[str]:
 # --- Private -----------------------------------------------------------------------------------
 
 
-def _steps(attempt: Attempt) -> Iterator[TranscriptStep]:
+def _steps(attempt: Attempt, options: dict[str, Any] | None) -> Iterator[TranscriptStep]:
     """Each note behind the call after which it was made."""
     notes = list(attempt.notes.all())
     yield from (TranscriptStep(note=note) for note in notes if note.after_call == 0)
+    before: ModelCall | None = None
     for call in attempt.calls.all():
-        yield TranscriptStep(call=call)
-        yield from (TranscriptStep(note=note) for note in notes if note.after_call == call.number)
+        after = [note for note in notes if note.after_call == call.number]
+        changes = changes_of(call, options=options, before=before, notes=after)
+        yield TranscriptStep(call=call, changes=changes)
+        yield from (TranscriptStep(note=note) for note in after)
+        before = call
 
 
 def _message(message: dict[str, Any]) -> SaidMessage:

@@ -1,0 +1,248 @@
+"""A new job by its page: the matrix, the estimate, one try first, the matrix file."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable
+from decimal import Decimal
+from typing import Any
+
+import pytest
+from django.core.files.uploadedfile import SimpleUploadedFile
+from django.test import Client
+from django.urls import reverse
+
+from augment.models import Contestant, Endpoint, EndpointModel, Event, GenerationJob, ModelCall
+from augment.services.running import jobs, runner
+from augment.services.running.caps import Caps
+from augment.services.running.estimates import estimate
+from augment.services.running.reuse import GUESSED_LATENCY_S
+from tests.jobs import rows
+from tests.jobs.models import COMPLETION_TOKENS, PROMPT_TOKENS, Model, llama_job
+from tests.web.cast import people, signed_in
+
+pytestmark = pytest.mark.django_db
+OTM, VQA, FC = "otm|here|seer", "vqa|here|seer", "fc|here|seer"
+
+
+@pytest.fixture
+def admin() -> Client:
+    return signed_in(people()["admin"])
+
+
+@pytest.fixture
+def models() -> Endpoint:
+    site = Endpoint.objects.create(label="here", base_url="http://127.0.0.1:9/v1")
+    EndpointModel.objects.create(endpoint=site, model="seer", vision=True)
+    EndpointModel.objects.create(endpoint=site, model="blind", vision=False)
+    EndpointModel.objects.create(endpoint=site, model="unknown")
+    for slug in ("one", "two"):
+        rows.add_scenario(slug)
+    return site
+
+
+def send(admin: Client, **given: Any) -> str:
+    sent = {"name": "Round 2", "scenarios": ["one", "two"], **given}
+    return admin.post(reverse("job-new"), sent, follow=True).content.decode()
+
+
+def test_impossible_cells_are_disabled_and_say_why_in_the_text(
+    admin: Client, models: Endpoint
+) -> None:
+    shown = admin.get(reverse("job-new")).content.decode()
+    boxes = dict(re.findall(r'name="cells" value="([^"]+)"( disabled)?', shown))
+    assert {key for key, off in boxes.items() if off} == {
+        f"{variant}|here|{model}"
+        for variant in ("vqa", "fc+vqa")
+        for model in ("blind", "unknown")
+    }  # fmt: skip
+    assert shown.count("needs vision, and it sees text alone") == 2
+    assert shown.count("nobody knows whether it sees pictures: probe it") == 2
+    assert "is not one of the available choices" in send(admin, cells=["vqa|here|blind"])
+    assert not GenerationJob.objects.exists()
+
+
+def test_a_cell_becomes_its_contestant_once_and_other_options_another(
+    admin: Client, models: Endpoint
+) -> None:
+    send(admin, cells=[OTM, FC])
+    send(admin, cells=[OTM])
+    assert Contestant.objects.filter(endpoint=models).count() == 2
+    send(admin, cells=[OTM], temperature="0.7", rounds="2", protocol="native")
+    warm = Contestant.objects.get(endpoint=models, options={"temperature": 0.7})
+    assert (warm.variant, warm.kind) == ("otm", "llm"), "otm has no use for rounds or a protocol"
+    first, second, third = GenerationJob.objects.order_by("pk")
+    assert first.augmentations.count() == 4
+    assert set(second.contestants.all()) < set(first.contestants.all())
+    assert list(third.contestants.all()) == [warm]
+
+
+@pytest.mark.parametrize(
+    ("given", "words"),
+    [
+        ({}, "Choose at least one contestant."),
+        ({"cells": ["otm|here"]}, "is not one of the available choices"),
+        ({"cells": [OTM], "temperature": "3"}, "must be a number from 0 to 2"),
+        ({"cells": [OTM], "scenarios": []}, "Choose at least one scenario."),
+    ],
+)
+def test_what_can_not_be_launched_is_said_and_nothing_is_made(
+    admin: Client, models: Endpoint, given: dict[str, object], words: str
+) -> None:
+    assert words in send(admin, **given)
+    assert not GenerationJob.objects.exists()
+    assert not Contestant.objects.filter(endpoint=models).exists()
+
+
+def test_an_estimate_of_cells_makes_no_contestant_and_calls_a_guess_one(
+    admin: Client, models: Endpoint
+) -> None:
+    shown = send(admin, cells=[OTM], estimate="1")
+    assert "a guess: a model among these was never asked" in shown
+    assert "their numbers are a guess" in shown or "its numbers are a guess" in shown
+    assert not Contestant.objects.filter(endpoint=models).exists()
+    assert not Event.objects.filter(object_kind="contestant").exists()
+
+
+def ran() -> GenerationJob:
+    """Two scenarios answered by llama, at 2 seconds a call."""
+    job = llama_job(scenarios=2, price="1")
+    for row in job.augmentations.all():
+        runner.work_on(augmentation_pk=row.pk, connect=Model())
+    ModelCall.objects.update(latency_s=2.0)
+    return job
+
+
+def test_what_is_answered_already_is_reused_and_counts_for_nothing() -> None:
+    ran()
+    rows.add_scenario("street-3")
+    where = ["street-1", "street-2", "street-3"]
+    found = estimate(["llama"], where)
+    assert (found.rows, found.answered, found.calls[1]) == (3, 2, 1)
+    assert (found.tokens_in, found.tokens_out) == (PROMPT_TOKENS, COMPLETION_TOKENS)
+    assert found.usd == Decimal(PROMPT_TOKENS + COMPLETION_TOKENS) / 10**6
+    twice = estimate(["llama"], where, samples=2)
+    assert (twice.answered, twice.calls[1]) == (2, 4), "a second sample was never asked"
+    ModelCall.objects.update(prompt_version="000000000000")
+    assert estimate(["llama"], where).answered == 0, "other prompts, other requests"
+
+
+def test_asked_anew_nothing_is_reused(admin: Client) -> None:
+    ran()
+    given = {"contestants": ["llama"], "scenarios": ["street-1", "street-2"], "estimate": "1"}
+    assert "Answered already" in send(admin, **given)
+    assert "Answered already" not in send(admin, **given, is_fresh="on")
+
+
+def test_the_time_is_that_of_recorded_calls_at_the_endpoints_limits() -> None:
+    ran()
+    for number in range(3, 43):
+        rows.add_scenario(f"street-{number}")
+    where = [f"street-{number}" for number in range(3, 43)]
+    found = estimate(["llama"], where)
+    assert (found.seconds, found.is_time_guessed) == (40 * 2.0 / 4, False)
+    Endpoint.objects.update(requests_per_minute=30)
+    assert estimate(["llama"], where).seconds == 80.0, "two seconds between starts"
+    ModelCall.objects.update(latency_s=None)
+    Endpoint.objects.update(requests_per_minute=None)
+    guess = estimate(["llama"], where)
+    assert (guess.seconds, guess.is_time_guessed) == (40 * GUESSED_LATENCY_S / 4, True)
+
+
+def test_one_scenario_is_tried_first_and_the_rest_is_remembered(
+    admin: Client, models: Endpoint
+) -> None:
+    shown = send(admin, cells=[OTM, VQA], samples="3", cap_usd="", cap_calls="500", **{"try": "1"})
+    job = GenerationJob.objects.get()
+    assert (job.name, job.samples, job.cap_calls) == ("Round 2, first try", 1, 500)
+    assert job.augmentations.count() == 2, "one scenario, two contestants, one sample"
+    assert "Launch all of it" in shown
+    address = f"{reverse('job-new')}?like={job.code}&amp;all=1"
+    assert f'href="{address}"' in shown
+    form = admin.get(address.replace("&amp;", "&")).content.decode()
+    assert 'value="Round 2"' in form
+    ticked = re.findall(r'name="(contestants|scenarios)" value="([^"]+)" checked', form)
+    slugs = set(job.contestants.values_list("slug", flat=True))
+    assert {value for name, value in ticked if name == "contestants"} == slugs
+    assert {value for name, value in ticked if name == "scenarios"} == {"one", "two"}
+    assert 'name="samples" inputmode="numeric" value="3"' in form
+    assert 'name="cap_calls" inputmode="numeric" value="500"' in form
+
+
+def test_a_duplicate_fills_the_form_with_what_the_job_had(admin: Client, models: Endpoint) -> None:
+    rows.add_kind("reference")
+    job = jobs.launch(
+        name="Old", contestants=["reference"], scenarios=["two"], caps=Caps(tokens=7), samples=2,
+        is_fresh=True,
+    )  # fmt: skip
+    form = admin.get(f"{reverse('job-new')}?like={job.code}").content.decode()
+    for part in (
+        'value="Old (2)"',
+        'name="contestants" value="reference" checked',
+        'name="scenarios" value="two" checked',
+        'name="cap_tokens" inputmode="numeric" value="7"',
+        'name="is_fresh" value="on" checked',
+    ):
+        assert part in form
+    assert 'name="scenarios" value="one" checked' not in form
+    for nobody in ("no-code", "00000000-0000-0000-0000-000000000000"):
+        assert admin.get(f"{reverse('job-new')}?like={nobody}").status_code == 200
+
+
+# --- The matrix file -----------------------------------------------------------------------------
+
+
+def upload(admin: Client, text: str | bytes) -> tuple[int, str]:
+    data = text if isinstance(text, bytes) else text.encode()
+    file = SimpleUploadedFile("matrix.yaml", data)
+    answer = admin.post(reverse("job-new"), {"read": "1", "file": file})
+    return answer.status_code, answer.content.decode()
+
+
+def test_the_file_that_the_page_writes_fills_the_page_again(
+    admin: Client, models: Endpoint
+) -> None:
+    sent = {"name": "Round 2", "cells": [OTM], "scenarios": ["two"], "samples": "2", "matrix": "1"}
+    written = admin.post(reverse("job-new"), sent | {"temperature": "0.5"})
+    assert written.headers["Content-Type"].startswith("application/yaml")
+    assert not Contestant.objects.filter(endpoint=models).exists(), "writing makes nobody"
+    status, form = upload(admin, written.content)
+    made = Contestant.objects.get(endpoint=models)
+    assert (status, made.options) == (200, {"temperature": 0.5})
+    assert f"“{made.slug}” is added." in form
+    assert f'name="contestants" value="{made.slug}" checked' in form
+    assert 'name="scenarios" value="two" checked' in form
+    assert 'value="Round 2"' in form
+    assert not GenerationJob.objects.exists(), "reading launches nothing"
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("scenarios: [nowhere]\ncontestants: [reference]", "is no scenario"),
+        ("scenarios: [one", "This matrix can&#x27;t be read"),
+        (b"\xff\xfe\x00", "The file is not UTF-8."),
+        ("a: 1\n" * 300_000, "The file is too long for a matrix"),
+        ("", "matrix"),
+    ],
+)
+def test_a_file_that_is_no_matrix_is_refused_with_its_place(
+    admin: Client, models: Endpoint, text: str | bytes, words: str
+) -> None:
+    rows.add_kind("reference")
+    before = Contestant.objects.count()
+    status, shown = upload(admin, text)
+    assert (status, words in shown) == (422, True)
+    assert Contestant.objects.count() <= before + 4, "only the built-in ones"
+
+
+def test_the_page_asks_as_many_questions_for_forty_models_as_for_ten(
+    admin: Client, models: Endpoint, django_assert_max_num_queries: Callable[..., object]
+) -> None:
+    EndpointModel.objects.bulk_create(
+        EndpointModel(endpoint=models, model=f"m{number}") for number in range(40)
+    )
+    admin.get(reverse("job-new"))
+    with django_assert_max_num_queries(40):  # type: ignore[attr-defined]
+        shown = admin.get(reverse("job-new")).content.decode()
+    assert shown.count('name="cells"') == 43 * 8
