@@ -56,18 +56,18 @@ def _redrawn(pk: int, slug: str) -> Redrawn:
     try:
         if not is_outdated(scenario):
             return Redrawn(scenario=slug)
-        if needed_by := _needed_by(pk):
+        if needed_by := find_judged_now(pk):
             return Redrawn(scenario=slug, needed_by=needed_by)
-        pictures = redraw(scenario, is_free=lambda: not _needed_by(pk))
+        pictures = redraw(scenario, is_free=lambda: not find_judged_now(pk))
     except AugmentError as error:
         return Redrawn(scenario=slug, fault=str(error))
     if pictures is None:
-        return Redrawn(scenario=slug, needed_by=_needed_by(pk))
+        return Redrawn(scenario=slug, needed_by=find_judged_now(pk))
     return Redrawn(scenario=slug, pictures=pictures)
 
 
-def _needed_by(scenario: int) -> str:
-    """Who shows its pictures to somebody who has still to judge them."""
+def find_judged_now(scenario: int) -> str:
+    """The open study or labelling that shows its pictures to somebody, empty for none."""
     studies = Study.objects.filter(state=Study.State.OPEN, scenarios=scenario).order_by("pk")
     tasks = LabelTask.objects.filter(
         augmentation__scenario=scenario, label=None, labelling__closed_at=None

@@ -37,7 +37,7 @@ _SECTIONS: dict[str, tuple[Promise, frozenset[str]]] = {
     "home": (_("Home"), frozenset({"home"})),
     "scenarios": (
         _("Scenarios"),
-        frozenset({"scenarios", "scenario", "scenes", "scene", "upload"}),
+        frozenset({"scenarios", "scenario", "scenes", "scene", "upload", "reference-edit"}),
     ),
     "contestants": (
         _("Contestants"),
@@ -48,7 +48,10 @@ _SECTIONS: dict[str, tuple[Promise, frozenset[str]]] = {
             }
         ),
     ),
-    "jobs": (_("Jobs"), frozenset({"jobs", "job-new", "job", "faults", "augmentation"})),
+    "jobs": (
+        _("Jobs"),
+        frozenset({"jobs", "job-new", "job", "faults", "augmentation", "correct"}),
+    ),
     "studies": (
         _("Studies"),
         frozenset(

@@ -14,9 +14,11 @@ from django.views.decorators.http import require_safe
 
 from arena.queries import scenarios
 from arena.queries.modifications import modification_lines
+from arena.services.references import why_not_editable
 from arena.web.access import STAFF, allow_only
 from arena.web.asking import asking_of
 from arena.web.pictures import picture_response
+from arena.web.sending import looks_again, send_later
 from augment.errors import QueueFault
 from augment.models import (
     Augmentation,
@@ -26,6 +28,7 @@ from augment.models import (
     Simulation,
     UploadMoment,
 )
+from augment.scene_tasks import enqueue_scenario
 from augment.services.judging.displacement import of_augmentation
 from augment.services.judging.findings import Checked, check_augmentation
 from augment.services.running.transcript_export import transcript_of
@@ -33,7 +36,12 @@ from augment.services.running.transcript_steps import totals_of, tries_of
 from augment.services.running.transcripts import IMAGES
 from augment.services.scenarios.intents import last_reading, statements_of, waiting_reading
 from augment.services.scenarios.scene_notes import notes_of
-from augment.services.scenarios.scene_pictures import SceneView, reference_picture, scene_picture
+from augment.services.scenarios.scene_pictures import (
+    SceneView,
+    is_drawn,
+    reference_picture,
+    scene_picture,
+)
 from augment.services.wording import translate
 from augment.tasks import enqueue_marks
 
@@ -62,10 +70,19 @@ def scenario_page(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
         Scenario.objects.select_related("base_scene", "paraphrase_of"), code=code
     )
     reading = waiting_reading(scenario)
+    is_waiting = not scenario.original_image or (
+        scenario.reference is not None and not is_drawn(reference_picture(scenario))
+    )
+    look = looks_again(request, waits=is_waiting)
+    if look == 1:
+        send_later(request, enqueue_scenario, scenario.pk)
     context = {
         "scenario": scenario,
         "paraphrases": scenario.paraphrases.all(),
-        "reference_code": scenarios.reference_pictures().get(scenario.pk),
+        "has_picture": is_drawn(reference_picture(scenario)),
+        "reference_version": reference_picture(scenario)[-16:-4],
+        "look": look,
+        "why_not_editable": translate(why_not_editable(scenario)),
         "lines": modification_lines(scenario.reference),
         "statements": [translate(one) for one in statements_of(scenario.intent)],
         "reading": reading,
@@ -92,6 +109,7 @@ def augmentation_page(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
     context = {
         "augmentation": augmentation,
         "lines": modification_lines(augmentation.modification),
+        "corrections": augmentation.corrections.select_related("contestant", "made_by"),
         "drive": augmentation.simulations.filter(state=Simulation.State.DONE).first(),
         "measured": of_augmentation(augmentation),
         "checked": measured,
@@ -167,6 +185,7 @@ def _send_marks(request: HttpRequest, augmentation_pk: int) -> None:
 
 def _augmentation(code: uuid.UUID) -> Augmentation:
     rows = Augmentation.objects.select_related(
-        "job", "scenario__base_scene", "contestant__endpoint"
+        *("job", "scenario__base_scene", "contestant__endpoint", "made_by"),
+        "corrects__contestant",
     ).defer("scenario__base_scene__recording")
     return get_object_or_404(rows, code=code)

@@ -24,7 +24,7 @@ def was_too_large(request: HttpRequest) -> bool:
     return bool(request.META.get(FILE_TOO_LARGE))
 
 
-def send_later(request: HttpRequest, send: Callable[[int], None], pk: int) -> None:
+def send_later(request: HttpRequest, send: Callable[[int], object], pk: int) -> None:
     """Send a message with the key of a row once what was written is committed."""
     transaction.on_commit(partial(_send, request, send, pk))
 
@@ -41,7 +41,7 @@ def looks_again(request: HttpRequest, *, waits: bool) -> int:
     return looked + 1 if waits and looked < LOOKS else 0
 
 
-def _send(request: HttpRequest, send: Callable[[int], None], pk: int) -> None:
+def _send(request: HttpRequest, send: Callable[[int], object], pk: int) -> None:
     try:
         send(pk)
     except QueueFault as error:

@@ -139,6 +139,22 @@ class Augmentation(models.Model):
         help_text='what a simulated contestant did wrong: {"class": ..., "fault": ...}; its true '
         "label, for analysts alone",
     )
+    corrects = models.ForeignKey(
+        "self",
+        null=True,
+        blank=True,
+        on_delete=models.SET_NULL,
+        related_name="corrections",
+        help_text="what a person corrected by it",
+    )
+    made_by = models.ForeignKey(
+        settings.AUTH_USER_MODEL,
+        null=True,
+        blank=True,
+        on_delete=models.PROTECT,
+        related_name="+",
+        help_text="whose hand made the modification; null where no person did",
+    )
     image = models.CharField(max_length=120, blank=True, help_text="name in the media storage")
     claim = models.UUIDField(null=True, blank=True, help_text="who works on it right now")
     heartbeat_at = models.DateTimeField(null=True, blank=True)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 from augment.checks import Finding, Severity
@@ -64,14 +65,19 @@ def check_augmentation(row: Augmentation) -> Checked | None:
         findings = findings_of(row)
     except (InvalidDocument, InvalidModification) as error:
         return Checked(problem=str(error))
-    facts = [one for one in findings if not one.is_fault]
     name = marked_name(row, findings)
     return Checked(
-        lines=tuple(_line(one) for one in (*order_faults(findings), *facts)),
+        lines=list_lines(findings),
         is_against_intent=row.scenario.intent is not None,
         picture=name,
         is_drawn=is_drawn(name),
     )
+
+
+def list_lines(findings: Sequence[Finding]) -> tuple[FindingLine, ...]:
+    """The findings as lines: the wrong, the doubtful, then plain measurements."""
+    facts = [one for one in findings if not one.is_fault]
+    return tuple(_line(one) for one in (*order_faults(findings), *facts))
 
 
 def _line(one: Finding) -> FindingLine:

@@ -1,0 +1,55 @@
+"""References that people draw: never while somebody still has to judge pictures beside them."""
+
+from __future__ import annotations
+
+from django.contrib.auth.models import User
+
+from arena.services.redrawing import find_judged_now
+from augment.errors import Conflict
+from augment.models import Scenario
+from augment.sentences import sentence
+from augment.services.scenarios import references
+
+
+def set_reference(scenario: Scenario, document: object, *, actor: User | None = None) -> Scenario:
+    """Give a scenario this reference; the window of its pictures may become another one.
+
+    Raises:
+        InvalidDocument: The document breaks its format.
+        InvalidModification: It does not fit the scene.
+        Conflict: The scenario is the catalogue's, an open study or labelling shows it, or nothing
+            changes.
+    """
+    _refuse_judged(scenario)
+    return references.set_reference(scenario, document, actor=actor)
+
+
+def drop_reference(scenario: Scenario, *, actor: User | None = None) -> Scenario:
+    """Leave a scenario without a reference.
+
+    Raises:
+        Conflict: As above, or it has none.
+    """
+    _refuse_judged(scenario)
+    return references.drop_reference(scenario, actor=actor)
+
+
+def why_not_editable(scenario: Scenario) -> str:
+    """Why the reference of a scenario can't be changed now, empty where it can."""
+    try:
+        references.refuse_catalogue(scenario)
+        _refuse_judged(scenario)
+    except Conflict as conflict:
+        return conflict.args[0]  # type: ignore[no-any-return]
+    return ""
+
+
+def _refuse_judged(scenario: Scenario) -> None:
+    if needed_by := find_judged_now(scenario.pk):
+        raise Conflict(
+            sentence(
+                "“%(name)s” is open and shows this scenario: its reference stays until that is "
+                "over.",
+                name=needed_by,
+            )
+        )

@@ -1,0 +1,121 @@
+"""What a person made of an augmentation, as an augmentation of a contestant of kind human.
+
+The row is written with its modification and waits; a worker leases it as any other, draws it and
+settles it. The one that was corrected stays as it is.
+"""
+
+from __future__ import annotations
+
+from django.contrib.auth.models import User
+from django.db import transaction
+
+from augment.errors import Conflict
+from augment.models import Augmentation, Contestant, GenerationJob
+from augment.scene.codec import modification_from_document
+from augment.scene.modification import Modification
+from augment.sentences import sentence
+from augment.services.events import log_event
+from augment.services.scenarios.editing import edit_to_document, read_edit
+from augment.services.scenarios.scenes import check_slug
+from augment.services.texts import LONGEST_NOTES, check_prose, one_line
+
+BY_HAND = "by-hand"
+NAME = "Corrected by hand"
+
+Kind = Contestant.Kind
+
+
+@transaction.atomic
+def keep_correction(
+    original: Augmentation,
+    document: object,
+    *,
+    slug: str = BY_HAND,
+    name: str = "",
+    notes: str = "",
+    actor: User | None = None,
+) -> Augmentation:
+    """A waiting row of a job of its own; the door sends its message.
+
+    Args:
+        original: What is corrected; it stays as it is.
+        document: The modification as it should be.
+        slug: Of the contestant that it counts for; made if there is none.
+        name: What a new contestant is called.
+        notes: Why it was corrected, or nothing.
+        actor: Whose hand it was.
+
+    Raises:
+        InvalidDocument: The document, the slug, the name or the notes break their format.
+        InvalidModification: The modification does not fit the scene.
+        Conflict: Nothing was changed, nothing is left, or somebody who is no person has the slug.
+    """
+    modification = _corrected(original, document)
+    if notes:
+        check_prose("notes", notes, what="correction", longest=LONGEST_NOTES)
+    contestant = _person(slug, name)
+    job = GenerationJob.objects.create(
+        name=f"By hand: {original.scenario.slug}", launched_by_id=actor.pk if actor else None
+    )
+    job.contestants.set([contestant])
+    job.scenarios.set([original.scenario])
+    row = Augmentation.objects.create(
+        job=job,
+        scenario=original.scenario,
+        contestant=contestant,
+        modification=edit_to_document(modification),
+        notes=notes.strip(),
+        corrects=original,
+        made_by_id=actor.pk if actor else None,
+    )
+    _log_correction(row, original, actor)
+    return row
+
+
+def human_contestants() -> list[Contestant]:
+    """Those that corrections can count for."""
+    return list(Contestant.objects.filter(kind=Kind.HUMAN, retired_at=None))
+
+
+def starting_document(original: Augmentation) -> dict[str, object]:
+    """The modification that a correction begins with."""
+    if original.modification is None:
+        return edit_to_document(Modification())
+    return edit_to_document(modification_from_document(original.modification))
+
+
+def _corrected(original: Augmentation, document: object) -> Modification:
+    modification = read_edit(original.scenario, document)
+    if modification.is_empty:
+        raise Conflict(sentence("Nothing is added, moved or removed: there is nothing to keep."))
+    if original.modification is not None:
+        before = read_edit(original.scenario, original.modification)
+        if modification == before:
+            raise Conflict(sentence("Nothing was corrected: it is as it was."))
+    return modification
+
+
+def _log_correction(row: Augmentation, original: Augmentation, actor: User | None) -> None:
+    log_event(
+        actor=actor,
+        verb="correct",
+        object_kind="augmentation",
+        object_code=original.code,
+        before={"modification": original.modification},
+        after={
+            "augmentation": str(row.code),
+            "contestant": row.contestant.slug,
+            "modification": row.modification,
+        },
+    )
+
+
+def _person(slug: str, name: str) -> Contestant:
+    check_slug(slug, what="contestant")
+    found = Contestant.objects.filter(slug=slug).first()
+    if found is None:
+        shown = one_line("name", name or (NAME if slug == BY_HAND else slug), what="contestant")
+        return Contestant.objects.create(slug=slug, name=shown, kind=Kind.HUMAN)
+    if found.kind != Kind.HUMAN:
+        raise Conflict(sentence("“%(name)s” is no person; choose another slug.", name=found.name))
+    return found

@@ -1,0 +1,137 @@
+"""What a person needs to change a scene by hand: its agents, the picture below them, the sizes.
+
+In: a scenario. Out: one JSON document for a page. Back: a modification whose lanes are those under
+its agents, whatever the page said.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from functools import lru_cache
+from typing import Any
+
+from augment.geometry.angles import difference, wrap
+from augment.models import BaseScene, Scenario
+from augment.render.camera import AROUND_THE_EGO
+from augment.scene.codec import (
+    modification_from_document,
+    modification_to_document,
+    scene_from_document,
+)
+from augment.scene.entities import AgentType, Scene, TrafficAgent
+from augment.scene.lane_graph import LaneGraph
+from augment.scene.modification import Modification, without_traffic
+from augment.scene.sizes import LENGTH_WIDTH_M
+from augment.services.scenarios.scenes import check_reference, content_hash
+
+PLACED = tuple(one for one in AgentType if one is not AgentType.EGO_VEHICLE)
+_HALF_TURN_RAD = math.pi
+_SNAP_WITHIN_M = 15.0
+
+
+def editor_document(scenario: Scenario) -> dict[str, Any]:
+    """The picture's window, who is there before the change, and the classes that can be placed.
+
+    Raises:
+        InvalidDocument: The stored scene can't be read.
+    """
+    scene = editable_scene(scenario)
+    camera = AROUND_THE_EGO
+    return {
+        "camera": {
+            "x_min_m": camera.x_min_m,
+            "y_max_m": camera.y_max_m,
+            "px_per_m": camera.px_per_m,
+            "width_px": camera.width_px,
+            "height_px": camera.height_px,
+        },
+        "agents": modification_to_document(Modification(moved=scene.agents))["move"],
+        "sizes": {
+            one.value: {"length_m": LENGTH_WIDTH_M[one][0], "width_m": LENGTH_WIDTH_M[one][1]}
+            for one in PLACED
+        },
+    }
+
+
+def read_edit(scenario: Scenario, document: object) -> Modification:
+    """The modification of a document, each of its agents on the lane that lies under it.
+
+    Raises:
+        InvalidDocument: It breaks its format.
+        InvalidModification: It does not fit the scene.
+    """
+    scene, graph = _scene_of(scenario)
+    given = modification_from_document(document)
+    placed = replace(
+        given,
+        added=tuple(_on_its_lane(agent, graph) for agent in given.added),
+        moved=tuple(_on_its_lane(agent, graph) for agent in given.moved),
+    )
+    check_reference(scene, placed)
+    return placed
+
+
+def snap(scenario: Scenario, modification: Modification, agent_id: str) -> Modification:
+    """The modification with one agent on the nearest centreline, facing along it or against it.
+
+    Nothing happens to an agent that is not changed, or further than 15 m from every lane.
+    """
+    _, graph = _scene_of(scenario)
+    return replace(
+        modification,
+        added=tuple(_snapped(one, graph, agent_id) for one in modification.added),
+        moved=tuple(_snapped(one, graph, agent_id) for one in modification.moved),
+    )
+
+
+def editable_scene(scenario: Scenario) -> Scene:
+    """The scene that is changed, read once for as long as several edits follow each other.
+
+    Raises:
+        InvalidDocument: The stored scene can't be read.
+    """
+    return _scene_of(scenario)[0]
+
+
+def edit_to_document(modification: Modification) -> dict[str, Any]:
+    """The modification as pages and rows have it."""
+    return modification_to_document(modification)
+
+
+# --- Private -----------------------------------------------------------------------------------
+
+
+def _scene_of(scenario: Scenario) -> tuple[Scene, LaneGraph]:
+    hashes = BaseScene.objects.values_list("content_hash", flat=True)
+    content = hashes.get(pk=scenario.base_scene_id) or content_hash(scenario.base_scene.document)
+    return _read_scene(scenario.base_scene_id, content, scenario.keep_traffic)
+
+
+@lru_cache(maxsize=8)
+def _read_scene(scene_pk: int, content: str, keeps_traffic: bool) -> tuple[Scene, LaneGraph]:
+    row = BaseScene.objects.only("document").get(pk=scene_pk)
+    scene = scene_from_document(row.document)
+    scene = scene if keeps_traffic else without_traffic(scene)
+    return scene, LaneGraph(scene)
+
+
+def _on_its_lane(agent: TrafficAgent, graph: LaneGraph) -> TrafficAgent:
+    return replace(agent, lane_id=graph.under(agent.x_m, agent.y_m, agent.heading_rad))
+
+
+def _snapped(agent: TrafficAgent, graph: LaneGraph, agent_id: str) -> TrafficAgent:
+    if agent.id != agent_id:
+        return agent
+    lane_id = graph.under(agent.x_m, agent.y_m, agent.heading_rad)
+    if lane_id is None:
+        nearest = graph.nearest(agent.x_m, agent.y_m)
+        if nearest is None or nearest[1].distance_m > _SNAP_WITHIN_M:
+            return agent
+        lane_id = nearest[0]
+    line = graph.lane(lane_id).centerline
+    pose = line.pose_at(line.project(agent.x_m, agent.y_m).s_m)
+    is_against = abs(difference(pose.heading_rad, agent.heading_rad)) > _HALF_TURN_RAD / 2.0
+    heading = wrap(pose.heading_rad + _HALF_TURN_RAD) if is_against else pose.heading_rad
+    snapped = replace(agent, x_m=pose.x_m, y_m=pose.y_m, heading_rad=heading)
+    return _on_its_lane(snapped, graph)

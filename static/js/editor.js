@@ -1,0 +1,311 @@
+// Placing objects by hand: mouse, touch and keys on the picture, numbers beside it. The server
+// checks every change; it puts agents on the centreline and says on which lane they are.
+import { Edit } from "./editor-state.js";
+import { Stage } from "./editor-view.js";
+
+const form = document.getElementById("edit");
+const words = form.dataset;
+const field = form.elements.modification;
+const read = (id) => JSON.parse(document.getElementById(id).textContent);
+const scene = read("scene");
+const edit = new Edit(scene, read("modification"));
+const svg = form.querySelector("svg.stage");
+const stage = new Stage(svg, scene, words.picture);
+const numbers = form.querySelector("[data-numbers]");
+const list = form.querySelector("[data-list]");
+const said = form.querySelector("[data-findings]");
+const degrees = 180 / Math.PI;
+let armed = false;
+let isDirty = false;
+let asked = 0;
+let timer = 0;
+
+// --- Showing ------------------------------------------------------------------------------------
+
+function show() {
+  stage.draw(edit);
+  field.value = JSON.stringify(edit.document, null, 2);
+  const rows = edit.everyone().filter(([agent, was]) => was !== "kept" || agent.id === edit.selected);
+  showList(rows);
+  form.querySelector("[data-empty]").hidden = rows.length > 0;
+  form.querySelector("[data-undo]").disabled = !edit.past.length;
+  form.querySelector("[data-redo]").disabled = !edit.future.length;
+  showNumbers();
+}
+
+// Entries stay in their places: one that is pressed while a number is taken over is pressed still.
+function showList(rows) {
+  while (list.children.length > rows.length) list.lastChild.remove();
+  while (list.children.length < rows.length) {
+    const button = document.createElement("button");
+    button.type = "button";
+    button.className = "button";
+    list.appendChild(document.createElement("li")).append(button);
+  }
+  rows.forEach(([agent, was], index) => {
+    const button = list.children[index].firstChild;
+    const kind = form.elements.type.querySelector(`[value="${agent.type}"]`).textContent;
+    button.dataset.pick = agent.id;
+    button.setAttribute("aria-pressed", String(agent.id === edit.selected));
+    button.textContent = `${agent.id} · ${kind} · ${words[was]}`;
+  });
+}
+
+function showNumbers() {
+  const [agent, was] = edit.find(edit.selected);
+  numbers.hidden = !agent;
+  if (!agent) return;
+  numbers.querySelector("[data-name]").textContent = agent.id;
+  for (const name of ["restore", "remove"]) {
+    const isGone = was === "removed";
+    numbers.querySelector(`[data-do=${name}]`).hidden = name === "restore" ? was !== "moved" && !isGone : isGone;
+  }
+  for (const input of numbers.querySelectorAll("[data-field]")) {
+    input.disabled = was === "removed";
+    if (document.activeElement !== input) input.value = shown(agent, input.dataset.field);
+  }
+}
+
+// A field of an agent as its input has it.
+function shown(agent, name) {
+  const [walk_x_m, walk_y_m] = agent.walk_to_m ?? [];
+  const value = { ...agent, heading_deg: agent.heading_rad * degrees, walk_x_m, walk_y_m }[name];
+  return typeof value === "number" ? String(Math.round(value * 1000) / 1000) : (value ?? "");
+}
+
+// --- Changing -----------------------------------------------------------------------------------
+
+function changed() {
+  isDirty = true;
+  show();
+  clearTimeout(timer);
+  timer = setTimeout(() => check().catch(fail), 250);
+}
+
+// What the server makes of it; with an id, that agent on the nearest centreline.
+async function check(snapped = "") {
+  const mine = ++asked;
+  const answer = await fetch(words.check, {
+    method: "POST",
+    headers: { "Content-Type": "application/json", "X-CSRFToken": form.elements.csrfmiddlewaretoken.value },
+    body: JSON.stringify({ modification: edit.document, snap: snapped }),
+  });
+  if (!answer.ok) throw new Error(String(answer.status));
+  const found = await answer.json();
+  if (mine !== asked) return;
+  if (snapped && found.modification) {
+    edit.begin();
+    edit.change = Edit.read(found.modification);
+    isDirty = true;
+    show();
+  }
+  tell(found);
+}
+
+function tell(found) {
+  const lines = found.problem ? [{ severity: "wrong", label: words.wrong, sentence: found.problem }] : found.lines;
+  const items = lines.map(({ severity, label, sentence }) => {
+    const item = document.createElement("li");
+    const badge = document.createElement("span");
+    badge.className = `badge is-${{ wrong: "bad", doubtful: "warn" }[severity] ?? "quiet"}`;
+    badge.textContent = label;
+    item.append(badge, ` ${sentence}`);
+    return item;
+  });
+  said.replaceChildren(...items);
+  form.querySelector("[data-fine]").hidden = Boolean(found.problem) || lines.some((one) => one.severity !== "fact");
+}
+
+function fail() {
+  tell({ problem: words.failed, lines: [] });
+}
+
+function act(what) {
+  const id = edit.selected;
+  if (what === "undo" ? edit.undo() : what === "redo" ? edit.redo() : true) {
+    if (what === "remove" && id) edit.remove(id);
+    if (what === "restore" && id) edit.restore(id);
+    if (what === "copy" && id) edit.copy(id);
+    if (what === "snap") return id ? check(id).catch(fail) : undefined;
+    if (what === "ahead") edit.add(form.elements.type.value, 20, 0);
+    changed();
+  }
+  return undefined;
+}
+
+function arm(on) {
+  armed = on;
+  form.querySelector("[data-arm]").setAttribute("aria-pressed", String(on));
+  svg.classList.toggle("is-armed", on);
+}
+
+// --- Mouse and touch ----------------------------------------------------------------------------
+
+let drag = null;
+
+svg.addEventListener("pointerdown", (event) => {
+  if (event.button) return;
+  const at = stage.at(event);
+  const handle = event.target.closest("[data-handle]")?.dataset.handle;
+  const id = event.target.closest("[data-agent]")?.dataset.agent;
+  if (armed) {
+    edit.add(form.elements.type.value, round(at.x), round(-at.y));
+    arm(false);
+    changed();
+    return;
+  }
+  svg.setPointerCapture(event.pointerId);
+  if (handle) drag = { what: handle, id: edit.selected, isNew: true };
+  else if (id) {
+    edit.selected = id;
+    const [agent, was] = edit.find(id);
+    drag = was === "removed" ? null : { what: "move", id, dx: agent.x_m - at.x, dy: agent.y_m + at.y, isNew: true, x: at.x, y: at.y };
+    show();
+  } else drag = { what: "pan", x: event.clientX, y: event.clientY };
+});
+
+svg.addEventListener("pointermove", (event) => {
+  if (!drag) return;
+  const at = stage.at(event);
+  if (drag.what === "pan") {
+    stage.pan((drag.x - event.clientX) * stage.unit, (drag.y - event.clientY) * stage.unit);
+    [drag.x, drag.y] = [event.clientX, event.clientY];
+    return;
+  }
+  // A press that trembles is no drag.
+  if (drag.isNew && drag.what === "move" && Math.hypot(at.x - drag.x, at.y - drag.y) < 4 * stage.unit) return;
+  if (drag.isNew) edit.begin();
+  drag.isNew = false;
+  const [agent] = edit.find(drag.id);
+  if (drag.what === "move") edit.shift(drag.id, round(at.x + drag.dx), round(drag.dy - at.y));
+  if (drag.what === "turn") edit.set(drag.id, { heading_rad: Math.atan2(-at.y - agent.y_m, at.x - agent.x_m) });
+  if (drag.what === "walk") edit.walk(drag.id, [round(at.x), round(-at.y)]);
+  show();
+});
+
+for (const name of ["pointerup", "pointercancel"]) {
+  svg.addEventListener(name, () => {
+    const moved = drag && drag.what !== "pan" && !drag.isNew;
+    drag = null;
+    if (moved) changed();
+    else show();
+  });
+}
+
+svg.addEventListener("wheel", (event) => {
+  event.preventDefault();
+  stage.zoom(event.deltaY > 0 ? 1.15 : 1 / 1.15, stage.at(event));
+  stage.draw(edit);
+}, { passive: false });
+
+function round(value) {
+  return Math.round(value * 100) / 100;
+}
+
+// --- Keys and numbers ---------------------------------------------------------------------------
+
+svg.addEventListener("keydown", (event) => {
+  const far = event.shiftKey ? 1 : 0.1;
+  const steps = { ArrowUp: [0, far], ArrowDown: [0, -far], ArrowLeft: [-far, 0], ArrowRight: [far, 0] };
+  const [agent, was] = edit.find(edit.selected);
+  const turn = { "[": 5, "]": -5, "{": 1, "}": -1 }[event.key];
+  if (event.key === "Escape") {
+    arm(false);
+    edit.selected = null;
+    show();
+  } else if (event.key === "+" || event.key === "-") {
+    stage.zoom(event.key === "+" ? 0.8 : 1.25);
+    stage.draw(edit);
+  } else if (!agent || was === "removed" || event.ctrlKey || event.metaKey) return;
+  else if (steps[event.key]) {
+    edit.begin();
+    edit.shift(agent.id, round(agent.x_m + steps[event.key][0]), round(agent.y_m + steps[event.key][1]));
+    changed();
+  } else if (turn) {
+    edit.begin();
+    edit.set(agent.id, { heading_rad: agent.heading_rad + turn / degrees });
+    changed();
+  } else if (event.key === "Delete" || event.key === "Backspace") act("remove");
+  else if (event.key === "s") act("snap");
+  else return;
+  event.preventDefault();
+});
+
+form.addEventListener("keydown", (event) => {
+  if (!(event.ctrlKey || event.metaKey) || event.target.matches("input, textarea")) return;
+  if (event.key !== "z" && event.key !== "y") return;
+  event.preventDefault();
+  act(event.key === "y" || event.shiftKey ? "redo" : "undo");
+});
+
+numbers.addEventListener("change", (event) => {
+  const input = event.target.closest("[data-field]");
+  const [agent] = edit.find(edit.selected);
+  if (!input || !agent) return;
+  const name = input.dataset.field;
+  if (input.value === shown(agent, name)) return undefined;
+  const value = name === "type" ? input.value : input.value === "" ? undefined : Number(input.value);
+  if (Number.isNaN(value) || (value === undefined && !name.startsWith("walk"))) return show();
+  edit.begin();
+  if (name === "heading_deg") edit.set(agent.id, { heading_rad: value / degrees });
+  else if (name === "type") edit.set(agent.id, { type: value, ...scene.sizes[value] });
+  else if (name.startsWith("walk")) {
+    const [x, y] = agent.walk_to_m ?? [agent.x_m, agent.y_m];
+    const walk = name === "walk_x_m" ? [value, y] : [x, value];
+    edit.walk(agent.id, value === undefined ? undefined : walk);
+  } else if (name === "x_m" || name === "y_m") {
+    edit.shift(agent.id, name === "x_m" ? value : agent.x_m, name === "y_m" ? value : agent.y_m);
+  } else edit.set(agent.id, { [name]: value });
+  return changed();
+});
+
+// Enter in a number takes the number over; it does not save the page.
+numbers.addEventListener("keydown", (event) => {
+  if (event.key !== "Enter" || !event.target.matches("[data-field]")) return;
+  event.preventDefault();
+  event.target.dispatchEvent(new Event("change", { bubbles: true }));
+});
+
+form.addEventListener("click", (event) => {
+  const button = event.target.closest("button");
+  if (!button) return;
+  const { pick, zoom } = button.dataset;
+  if (pick) {
+    edit.selected = pick;
+    show();
+    svg.focus({ preventScroll: true });
+  } else if (button.dataset.do) act(button.dataset.do);
+  else if (zoom) {
+    if (zoom === "all") stage.show(stage.whole);
+    else stage.zoom(Number(zoom));
+    stage.draw(edit);
+  } else if (button.matches("[data-arm]")) arm(!armed);
+});
+
+field.addEventListener("change", () => {
+  try {
+    const change = Edit.read(JSON.parse(field.value));
+    edit.begin();
+    edit.change = change;
+    edit.selected = null;
+    changed();
+  } catch {
+    tell({ problem: words.nojson, lines: [] });
+  }
+});
+
+form.addEventListener("submit", () => {
+  isDirty = false;
+});
+addEventListener("beforeunload", (event) => {
+  if (isDirty) event.preventDefault();
+});
+new ResizeObserver(() => {
+  const [x, y, width] = stage.box;
+  stage.show([x, y, width, (width * svg.clientHeight) / (svg.clientWidth || 1)]);
+  stage.draw(edit);
+}).observe(svg);
+
+form.classList.add("is-live");
+show();
+check().catch(fail);

@@ -1,0 +1,219 @@
+"""Changing a scene by hand: lanes, snapping, what is refused; corrections on their whole way."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from django.contrib.auth.models import User
+from django.core.files.storage import default_storage
+
+from arena.models import Study
+from arena.services import references as guarded
+from augment.errors import Conflict, InvalidDocument, InvalidModification
+from augment.models import Augmentation, Contestant, Event, Scenario
+from augment.render.bev import draw
+from augment.render.camera import AROUND_THE_EGO
+from augment.scene.codec import modification_to_document
+from augment.scene.entities import TrafficAgent
+from augment.scene.intent import Intent
+from augment.scene.intent_codec import intent_to_document
+from augment.scene.modification import Modification
+from augment.services.judging.displacement import of_augmentation
+from augment.services.judging.edits import check_edit
+from augment.services.judging.findings import check_augmentation
+from augment.services.running import by_hand, runner
+from augment.services.scenarios.editing import editor_document, read_edit
+from augment.services.scenarios.references import drop_reference, set_reference
+from augment.services.scenarios.scene_pictures import (
+    SceneView,
+    draw_scenario,
+    is_drawn,
+    reference_picture,
+    scene_picture,
+)
+from augment.services.scenarios.scenes import reference_of
+from tests.jobs.rows import add_kind, add_scenario, launch
+from tests.render.pictures import at_camera_size
+from tests.scenes import pedestrian, scene, vehicle
+from tests.study_rows import a_study
+
+pytestmark = pytest.mark.django_db
+CAR = vehicle("Added1", 20.0, 0.4, 0.1)
+
+
+def document(*added: TrafficAgent, **parts: tuple[object, ...]) -> dict[str, object]:
+    return modification_to_document(Modification(added=added, **parts))  # type: ignore[arg-type]
+
+
+def test_what_is_placed_lies_in_the_picture_where_the_page_says() -> None:
+    """The page's transform (metres to pixels) finds the box that the renderer drew, to a pixel."""
+    here = add_scenario("street", reference=None)
+    camera = editor_document(here)["camera"]
+    placed = replace(vehicle("Added1", 30.0, -10.0), length_m=10.0, width_m=4.0)
+    drawn = at_camera_size(
+        draw(scene(), Modification(added=(placed,)), AROUND_THE_EGO), AROUND_THE_EGO
+    )
+    empty = at_camera_size(draw(scene(), Modification(), AROUND_THE_EGO), AROUND_THE_EGO)
+    assert drawn.shape[:2] == (camera["height_px"], camera["width_px"])
+    rows, columns = np.nonzero((drawn != empty).any(axis=2))
+    left = (25.0 - camera["x_min_m"]) * camera["px_per_m"]
+    top = (camera["y_max_m"] - -8.0) * camera["px_per_m"]
+    found = (columns.min(), columns.max() + 1, rows.min(), rows.max() + 1)
+    assert found == pytest.approx((left, left + 100.0, top, top + 40.0), abs=2.0)
+
+
+def test_a_placed_agent_is_on_the_lane_that_lies_under_it() -> None:
+    here = add_scenario("street", reference=None)
+    lost = replace(vehicle("Added2", 20.0, 30.0), lane_id="Lane1")
+    made = read_edit(here, document(replace(CAR, lane_id="Lane2"), lost))
+    assert [agent.lane_id for agent in made.added] == ["Lane1", None]
+
+
+@pytest.mark.parametrize(
+    ("agent", "x_m", "y_m", "heading_rad"),
+    [
+        (CAR, 20.0, 0.0, 0.0),
+        (vehicle("Added1", 20.0, 0.4, 3.0), 20.0, 0.0, math.pi),  # against its lane
+        (vehicle("Added1", 20.0, 3.0, 3.0), 20.0, 3.5, math.pi),  # along the other one
+        (vehicle("Added1", 20.0, 12.0, 0.2), 20.0, 3.5, 0.0),  # beside the road
+        (vehicle("Added1", 20.0, 30.0, 0.2), 20.0, 30.0, 0.2),  # too far from every lane
+    ],
+)
+def test_an_agent_is_put_on_the_centreline(
+    agent: TrafficAgent, x_m: float, y_m: float, heading_rad: float
+) -> None:
+    here = add_scenario("street", reference=None)
+    found = check_edit(here, document(agent), snapped="Added1").modification
+    assert found is not None
+    [snapped] = found["add"]
+    assert (snapped["x_m"], snapped["y_m"]) == pytest.approx((x_m, y_m))
+    turn = math.remainder(snapped["heading_rad"] - heading_rad, 2.0 * math.pi)
+    assert turn == pytest.approx(0.0, abs=1e-6)
+
+
+def test_the_checks_speak_before_anything_is_kept() -> None:
+    here = add_scenario("street", reference=None)
+    found = check_edit(here, document(CAR, vehicle("Added2", 21.0, 0.4)))
+    assert found.is_against_intent
+    assert found.lines[0].severity == "wrong"
+    assert any("overlap" in line.sentence for line in found.lines)
+    assert "is not a field" in check_edit(here, {**document(CAR), "more": 1}).problem
+    assert "Agent9 is not in the scene" in check_edit(here, document(removed=("Agent9",))).problem
+    assert not Event.objects.exists()
+
+
+def test_a_drawn_reference_is_kept_drawn_and_told() -> None:
+    ada = User.objects.create_user("ada")
+    here = add_scenario("street", reference=None)
+    set_reference(here, document(CAR), actor=ada)
+    here.refresh_from_db()
+    kept = reference_of(here)
+    assert kept is not None
+    assert kept.added == (replace(CAR, lane_id="Lane1"),)
+    event = Event.objects.get()
+    assert (event.actor, event.verb, event.before) == (ada, "set reference", {"reference": None})
+    draw_scenario(here.pk)
+    here.refresh_from_db()
+    assert is_drawn(reference_picture(here))
+    assert is_drawn(here.original_image)
+    assert is_drawn(scene_picture(here.base_scene, SceneView.BACKDROP))
+    drop_reference(here, actor=ada)
+    here.refresh_from_db()
+    assert (here.reference, reference_picture(here)) == (None, "")
+    with pytest.raises(Conflict, match="has no reference"):
+        drop_reference(here)
+
+
+def test_a_reference_that_can_not_be_is_refused_and_the_old_one_stays() -> None:
+    here = add_scenario("street")
+    before = here.reference
+    with pytest.raises(Conflict, match="Nothing is added"):
+        set_reference(here, document())
+    with pytest.raises(InvalidModification, match="Agent7"):
+        set_reference(here, document(moved=(vehicle("Agent7", 1.0, 1.0),)))
+    with pytest.raises(InvalidDocument, match="modification"):
+        set_reference(here, [])
+    here.refresh_from_db()
+    assert here.reference == before
+    Scenario.objects.filter(pk=here.pk).update(
+        intent=intent_to_document(Intent(unmet="there is no bridge"))
+    )
+    set_reference(here, document())
+    Scenario.objects.filter(pk=here.pk).update(catalogue_set="paper")
+    with pytest.raises(Conflict, match="catalogue's own"):
+        set_reference(here, document(CAR))
+
+
+def test_the_reference_of_a_scenario_that_is_being_judged_stays() -> None:
+    study = a_study()
+    here = study.scenarios.first()
+    assert here is not None
+    with pytest.raises(Conflict, match="is open and shows this scenario"):
+        guarded.set_reference(here, document(CAR))
+    assert "is open" in guarded.why_not_editable(here)
+    Study.objects.update(state="closed")
+    guarded.set_reference(here, document(CAR))
+
+
+def original() -> Augmentation:
+    row = launch().augmentations.get()
+    runner.work_on(augmentation_pk=row.pk)
+    row.refresh_from_db()
+    return row
+
+
+def test_a_correction_goes_the_whole_way_and_leaves_the_original() -> None:
+    ada, first = User.objects.create_user("ada"), original()
+    before = Augmentation.objects.filter(pk=first.pk).values().get()
+    walker = pedestrian("Added1", 24.0, -3.0, (24.0, 3.0))
+    start = by_hand.starting_document(first)
+    wanted = {**start, "add": [start["add"][0], document(walker)["add"][0]]}  # type: ignore[index]
+    made = by_hand.keep_correction(first, wanted, notes="the second cone is wrong", actor=ada)
+    assert made.state == Augmentation.State.QUEUED
+    assert runner.work_on(augmentation_pk=made.pk, worker="here")
+    made.refresh_from_db()
+    made = Augmentation.objects.select_related(
+        "scenario__base_scene", "contestant", "corrects", "job"
+    ).get(pk=made.pk)
+    assert (made.state, made.contestant.kind) == ("done", Contestant.Kind.HUMAN)
+    assert (made.corrects, made.made_by, made.job.launched_by) == (first, ada, ada)
+    assert made.job.state == "finished"
+    assert default_storage.exists(made.image)
+    assert made.image != first.image
+    checked, measured = check_augmentation(made), of_augmentation(made)
+    assert checked is not None
+    assert checked.lines
+    assert measured.displacement is not None
+    assert len(measured.displacement.matches) == 1
+    assert Augmentation.objects.filter(pk=first.pk).values().get() == before
+    event = Event.objects.get(verb="correct")
+    assert event.after is not None
+    assert (event.actor, event.object_code) == (ada, str(first.code))
+    assert event.after["contestant"] == "by-hand"
+
+
+def test_a_second_correction_stands_beside_the_first() -> None:
+    first = original()
+    for x_m in (20.0, 22.0):
+        row = by_hand.keep_correction(first, document(vehicle("Added1", x_m, 0.0)))
+        runner.work_on(augmentation_pk=row.pk)
+    assert first.corrections.filter(state="done", contestant__slug="by-hand").count() == 2
+
+
+def test_a_correction_that_is_none_writes_nothing() -> None:
+    first = original()
+    rows = Augmentation.objects.count()
+    add_kind("a-machine", Contestant.Kind.RULE)
+    for given, slug, problem in (
+        (by_hand.starting_document(first), "by-hand", "Nothing was corrected"),
+        (document(), "by-hand", "nothing to keep"),
+        (document(CAR), "a-machine", "is no person"),
+        (document(CAR), "Not a slug", "slug"),
+    ):
+        with pytest.raises((Conflict, InvalidDocument), match=problem):
+            by_hand.keep_correction(first, given, slug=slug)
+    assert Augmentation.objects.count() == rows
+    assert not Contestant.objects.filter(kind=Contestant.Kind.HUMAN).exists()

@@ -1,0 +1,136 @@
+"""The pages on which references are drawn and augmentations corrected."""
+
+from __future__ import annotations
+
+import html
+import json
+import re
+
+import pytest
+from django.test import Client
+from django.urls import reverse
+
+from augment.models import Augmentation, Scenario
+from augment.scene.codec import modification_to_document
+from augment.scene.modification import Modification
+from augment.services.running import runner
+from augment.services.scenarios.scene_pictures import draw_scenario, draw_scene
+from tests.jobs.rows import add_scenario, launch
+from tests.scenes import scene, vehicle
+from tests.web.cast import people, signed_in
+
+pytestmark = pytest.mark.django_db
+CAR = json.dumps(modification_to_document(Modification(added=(vehicle("Added1", 20.0, 0.4),))))
+
+
+@pytest.fixture
+def analyst(monkeypatch: pytest.MonkeyPatch) -> Client:
+    """Signed in; what is sent to a worker is done at once."""
+    monkeypatch.setattr("arena.web.editing.enqueue_scene", draw_scene)
+    monkeypatch.setattr("arena.web.editing.enqueue_scenario", draw_scenario)
+    monkeypatch.setattr("arena.web.scenarios.enqueue_scenario", draw_scenario)
+    monkeypatch.setattr("arena.web.editing.enqueue_job", run_job)
+    monkeypatch.setattr("arena.web.sending.transaction.on_commit", lambda done: done())
+    return signed_in(people()["analyst"])
+
+
+def run_job(job_pk: int) -> None:
+    for row in Augmentation.objects.filter(job=job_pk):
+        runner.work_on(augmentation_pk=row.pk)
+
+
+def busy(slug: str = "street") -> Scenario:
+    traffic = (vehicle("Agent2", 40.0, 3.5, 3.14),)
+    return add_scenario(slug, scene=scene(agents=traffic), reference=None, keep_traffic=True)
+
+
+def given(shown: str, name: str) -> object:
+    found = re.search(rf'<script id="{name}" type="application/json">(.*?)</script>', shown)
+    assert found is not None
+    return json.loads(found.group(1))
+
+
+def test_the_page_gets_the_traffic_and_the_picture_once_it_is_drawn(analyst: Client) -> None:
+    here = busy()
+    url = reverse("reference-edit", args=[here.code])
+    assert "A worker is drawing it." in analyst.get(url).content.decode()
+    shown = analyst.get(url).content.decode()
+    assert "editor.js" in shown or "js/editor" in shown
+    found = given(shown, "scene")
+    assert isinstance(found, dict)
+    assert [agent["id"] for agent in found["agents"]] == ["Agent2"]
+    assert found["sizes"]["TRAFFIC_CONE"] == {"length_m": 0.5, "width_m": 0.5}
+    assert given(shown, "modification") is None
+    assert html.escape(here.instruction) in shown
+
+
+def test_a_drawn_reference_is_kept_and_shown(analyst: Client) -> None:
+    here = busy()
+    url = reverse("reference-edit", args=[here.code])
+    shown = analyst.post(url, {"modification": CAR}, follow=True).content.decode()
+    assert "The reference is kept" in shown
+    assert reverse("picture", args=["reference", here.code]) in shown
+    here.refresh_from_db()
+    assert here.reference is not None
+    assert here.reference["add"][0]["lane_id"] == "Lane1"
+    analyst.post(reverse("reference-drop", args=[here.code]))
+    here.refresh_from_db()
+    assert here.reference is None
+
+
+@pytest.mark.parametrize(
+    ("text", "problem"),
+    [
+        ("", "no JSON"),
+        ("{", "no JSON"),
+        (CAR.replace("Added1", "Agent2"), "Agent2 is in the scene already"),
+        (CAR.replace("VEHICLE", "TRAM"), "add[0].type"),
+    ],
+)
+def test_a_refused_reference_stays_on_the_page(analyst: Client, text: str, problem: str) -> None:
+    here = busy()
+    answer = analyst.post(reverse("reference-edit", args=[here.code]), {"modification": text})
+    assert answer.status_code == 422
+    assert problem in answer.content.decode()
+    here.refresh_from_db()
+    assert here.reference is None
+
+
+def test_the_checks_answer_while_one_draws(analyst: Client) -> None:
+    here = busy()
+    url = reverse("edit-check", args=[here.code])
+
+    def ask(**body: object) -> dict[str, object]:
+        answer = analyst.post(url, json.dumps(body), content_type="application/json")
+        found: dict[str, object] = answer.json()
+        return found
+
+    found = ask(modification=json.loads(CAR), snap="Added1")
+    assert found["problem"] == ""
+    assert found["modification"]["add"][0]["y_m"] == 0.0  # type: ignore[index]
+    assert "lines" in found
+    assert "Agent8" in str(ask(modification={**json.loads(CAR), "remove": ["Agent8"]})["problem"])
+    assert "expected an object" in str(ask()["problem"])
+    here.refresh_from_db()
+    assert here.reference is None
+
+
+def test_an_augmentation_is_corrected_and_both_say_so(analyst: Client) -> None:
+    row = launch().augmentations.get()
+    runner.work_on(augmentation_pk=row.pk)
+    url = reverse("correct", args=[row.code])
+    page = reverse("augmentation", args=[row.code])
+    assert url in analyst.get(page).content.decode()
+    assert given(analyst.get(url).content.decode(), "modification") is not None
+    refused = analyst.post(url, {"modification": CAR, "contestant": "Not A Slug"})
+    assert refused.status_code == 422
+    shown = analyst.post(
+        url, {"modification": CAR, "contestant": "by-hand", "notes": "too far left"}, follow=True
+    ).content.decode()
+    made = Augmentation.objects.get(corrects=row)
+    assert (made.state, made.contestant.kind, made.notes) == ("done", "human", "too far left")
+    assert "Corrected by hand by the-analyst" in shown
+    assert page in shown
+    picture = analyst.get(reverse("picture", args=["augmentation", made.code]))
+    assert b"".join(picture).startswith(b"\x89PNG")
+    assert reverse("augmentation", args=[made.code]) in analyst.get(page).content.decode()
