@@ -112,16 +112,17 @@ class Totals:
 
 
 def tries_of(augmentation: Augmentation) -> list[Try]:
-    """Every attempt, the first one first; three queries."""
+    """Every attempt, the first one first; four queries."""
     return tries_by_augmentation([augmentation.pk]).get(augmentation.pk, [])
 
 
 def tries_by_augmentation(augmentations: Collection[int]) -> dict[int, list[Try]]:
-    """The attempts of several by the primary key; three queries. Who has none has no entry."""
+    """The attempts of several by the primary key; four queries. Who has none has no entry."""
     calls = Prefetch(
         "calls", ModelCall.objects.select_related("served_from__attempt__augmentation")
     )
-    options = {row.pk: row.options for row in augmentations}
+    rows = Augmentation.objects.filter(pk__in=augmentations)
+    options = dict(rows.values_list("pk", "options"))
     attempts = Attempt.objects.filter(augmentation__in=augmentations)
     found: dict[int, list[Try]] = defaultdict(list)
     for attempt in attempts.prefetch_related(calls, "notes"):
