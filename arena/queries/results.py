@@ -105,6 +105,15 @@ def log_of(study: Study, *, most: int) -> list[Event]:
     return list(rows.order_by("-at", "-pk")[:most])
 
 
+def names_in_log(study: Study) -> dict[str, str]:
+    """Pseudonyms by code and by account; one query."""
+    names: dict[str, str] = {}
+    who = study.experts.values_list("person__code", "username", "person__pseudonym")
+    for code, username, pseudonym in who:
+        names[str(code)] = names[username] = pseudonym
+    return names
+
+
 def _still_judges(user: User, study: Study) -> bool:
     """Whether an open study of this expert has a contestant of this one."""
     is_open = user.studies.filter(state=Study.State.OPEN)

@@ -42,9 +42,15 @@ def picture_shown(*, user: User, token: str) -> str:
         return _picture_to_label(user=user, token=token)
     if matchup.expert_id != user.pk and role_of(user) != "admin":
         raise NotYours(_NOT_SHOWN)
-    if matchup.original_token == token:
+    sides = {matchup.original_token: "original", matchup.left_token: "left"}
+    return picture_of_side(matchup, sides.get(token, "right"))
+
+
+def picture_of_side(matchup: Matchup, side: str) -> str:
+    """The media name of a picture as it was shown: "left", "right" or "original"."""
+    if side == "original":
         return matchup.original_image
-    if matchup.left_token == token:
+    if side == "left":
         return matchup.left_image or matchup.left.image
     return matchup.right_image or matchup.right.image
 

@@ -130,7 +130,7 @@ def vote_set(study: Study, *, filters: Filters, last: int | None) -> VoteSet:
     _check(filters, [*lines, *automatic])
     simulated = {entrant.slug for entrant in entrants if entrant.is_simulated}
     judged = [
-        (line, _why_not(line, filters, simulated, study.allow_simulated))
+        (line, why_left_out(line, filters, simulated, study.allow_simulated))
         for line in [*lines, *automatic]
     ]
     left_out = Counter(reason.value for _, reason in judged if reason is not None)
@@ -149,12 +149,7 @@ def vote_set(study: Study, *, filters: Filters, last: int | None) -> VoteSet:
     )
 
 
-# --- Which count -------------------------------------------------------------------------------
-
-_RATED = (Vote.Outcome.LEFT.value, Vote.Outcome.EQUAL.value, Vote.Outcome.RIGHT.value)
-
-
-def _why_not(
+def why_left_out(
     line: Judged, filters: Filters, simulated: set[str], allow_simulated: bool
 ) -> LeftOut | None:
     """Why a vote does not count, None if it does."""
@@ -171,6 +166,11 @@ def _why_not(
         (LeftOut.OWN, filters.leave_out_own and filters.is_own(line.judge, line.left, line.right)),
     )
     return next((reason for reason, holds in reasons if holds), None)
+
+
+# --- Which count -------------------------------------------------------------------------------
+
+_RATED = (Vote.Outcome.LEFT.value, Vote.Outcome.EQUAL.value, Vote.Outcome.RIGHT.value)
 
 
 def _check(filters: Filters, lines: Sequence[Judged]) -> None:

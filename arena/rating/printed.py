@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 
 UNKNOWN = "--"
+MINUS = "\N{MINUS SIGN}"
 
 _ESCAPES = {
     "\\": r"\textbackslash{}",
@@ -66,6 +67,11 @@ def interval_text(rating: float | None, lower: float | None, upper: float | None
     if down and up:
         return f"{down:+d}/{up:+d}"
     return f"-{max(rating - lower, 0.1):.1f}/+{max(upper - rating, 0.1):.1f}"
+
+
+def with_minus(text: str) -> str:
+    """A printed number as a page shows it: a real minus sign, a dash where it is unknown."""
+    return "–" if text == UNKNOWN else text.replace("-", MINUS)
 
 
 def notes_by_reason(notes: Iterable[tuple[str, str]]) -> list[str]:

@@ -29,7 +29,7 @@ _WIDTHS = {1: 10, VERSION: len(COLUMNS)}
 
 Row = tuple[str | int | bool | None, ...]
 
-_WINNERS = {
+WINNERS = {
     Vote.Outcome.LEFT.value: "model_a",
     Vote.Outcome.EQUAL.value: "tie",
     Vote.Outcome.RIGHT.value: "model_b",
@@ -53,7 +53,7 @@ def vote_rows(votes: Iterable[Judged], names: Mapping[str, str]) -> Iterator[Row
         yield (
             vote.left,
             vote.right,
-            BOTH_BAD if vote.both_miss else _WINNERS[vote.outcome],
+            BOTH_BAD if vote.both_miss else WINNERS[vote.outcome],
             names.get(vote.judge, vote.judge),
             vote.item,
             vote.type,

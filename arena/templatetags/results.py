@@ -2,19 +2,19 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Callable
-from typing import Any
 
 from django import template
+from django.utils.formats import get_format
 from django.utils.functional import Promise
 from django.utils.translation import gettext as _
 from django.utils.translation import gettext_lazy, gettext_noop
 
 from arena.exports.columns import Column
 from arena.exports.tables import Row
+from arena.models import Vote
 from arena.rating.estimate import Estimate
-from arena.rating.printed import interval_text, rating_text
+from arena.rating.printed import interval_text, rating_text, with_minus
 from augment.models import Scenario
 from augment.services.scenarios.types import type_label as own_label
 from augment.services.wording import translate
@@ -127,7 +127,31 @@ def unit_label(name: str) -> str:
 @register.filter
 def printed(row: Row, column: Column) -> str:
     """What stands in a column of the table."""
-    return column.text(row)
+    return minus(column.text(row))
+
+
+_AIDS: dict[str, str | Promise] = {
+    "zoom": gettext_lazy("zoom"),
+    "original": gettext_lazy("the scene before the edit, kept"),
+    "ruler": gettext_lazy("the ruler"),
+    "flip": gettext_lazy("the scene before the edit, held"),
+    "text": gettext_lazy("the text description"),
+    "replay": gettext_lazy("the drives"),
+    "blink": gettext_lazy("blinking"),
+    "difference": gettext_lazy("the difference"),
+}
+
+
+@register.filter
+def aid_labels(aids: str) -> str:
+    """What an expert looked with."""
+    return ", ".join(str(_AIDS.get(name, name)) for name in aids.split())
+
+
+@register.filter
+def skip_reason(reason: str) -> str:
+    """Why a pair was skipped."""
+    return str(dict(Vote.SkipReason.choices).get(reason, reason))
 
 
 @register.filter
@@ -141,19 +165,26 @@ def e_value(value: float) -> str:
     """One digit behind the point below ten; far up only how far."""
     if value >= 1000.0:
         return _("over 1,000")
-    return f"{value:.1f}" if value < 10.0 else f"{value:.0f}"
+    return _decimal(value, 1 if value < 10.0 else 0)
 
 
 @register.filter
 def p_value(value: float) -> str:
     """Two digits; below a hundredth only that."""
-    return "< 0.01" if value < 0.01 else f"= {value:.2f}"
+    sign, shown = ("<", 0.01) if value < 0.01 else ("=", value)
+    return f"{sign} {_decimal(shown, 2)}"
+
+
+@register.filter
+def p_cell(value: float) -> str:
+    """The same under a head that says p."""
+    return p_value(value).removeprefix("= ")
 
 
 @register.filter
 def seconds(milliseconds: float) -> str:
     """One digit after the point."""
-    return f"{milliseconds / 1000:.1f}"
+    return _decimal(milliseconds / 1000, 1)
 
 
 @register.filter
@@ -167,7 +198,7 @@ def dollars(amount: float) -> str:
 @register.filter
 def estimate(found: Estimate | None) -> str:
     """A number with its interval: 0.31 (0.28 to 0.34)."""
-    return _with_interval(found, "{:.2f}".format)
+    return _with_interval(found, lambda value: minus(f"{value:z.2f}"))
 
 
 @register.filter
@@ -179,7 +210,7 @@ def estimate_percent(found: Estimate | None) -> str:
 @register.filter
 def estimate_points(found: Estimate | None) -> str:
     """The same in points, with its sign."""
-    return _with_interval(found, lambda value: f"{value:+.0f}" if round(value) else "0")
+    return _with_interval(found, lambda value: minus(f"{value:+.0f}") if round(value) else "0")
 
 
 @register.filter
@@ -187,37 +218,49 @@ def estimate_elo(found: Estimate | None) -> str:
     """A rating in whole points, as the table prints intervals: 1012 -40/+38."""
     if not found or found.value is None:
         return "–"
-    return f"{rating_text(found.value)} {interval_text(found.value, found.lower, found.upper)}"
+    bounds = interval_text(found.value, found.lower, found.upper)
+    return f"{minus(rating_text(found.value))} {minus(bounds)}"
 
 
 @register.filter
 def estimate_tenths(found: Estimate | None) -> str:
     """Points with one digit after the point and their sign."""
-    return _with_interval(found, "{:+.1f}".format)
+    return _with_interval(found, _change)
 
 
 @register.filter
 def estimate_share_change(found: Estimate | None) -> str:
     """A change of a share in percentage points, with its sign."""
-    return _with_interval(found, lambda value: f"{100 * value:+.1f}")
+    return _with_interval(found, lambda value: _change(100 * value))
 
 
 @register.filter
 def estimate_seconds(found: Estimate | None) -> str:
     """A change of seconds, with its sign."""
-    return _with_interval(found, lambda value: f"{value:+.1f} s")
+    return _with_interval(found, lambda value: f"{_change(value)} s")
 
 
 @register.filter
 def seconds_text(value: float | None) -> str:
     """Seconds with one digit after the point."""
-    return "–" if value is None else f"{value:.1f} s"
+    return "–" if value is None else f"{_decimal(value, 1)} s"
 
 
 @register.filter
-def json_line(document: dict[str, Any] | None) -> str:
-    """What a line of the log says, on one line."""
-    return "" if document is None else json.dumps(document, ensure_ascii=False)
+def minus(text: str) -> str:
+    """A printed number with a real minus sign and the decimal sign of the page's language."""
+    return with_minus(text).replace(".", get_format("DECIMAL_SEPARATOR"))
+
+
+def _change(value: float) -> str:
+    """With its sign and one digit after the point; no sign where that is none."""
+    text = f"{value:+z.1f}"
+    return minus(text.removeprefix("+") if float(text) == 0.0 else text)
+
+
+def _decimal(value: float, places: int) -> str:
+    """Rounded, with the decimal sign of the page's language; Django's own way cuts off."""
+    return f"{value:.{places}f}".replace(".", get_format("DECIMAL_SEPARATOR"))
 
 
 def _with_interval(found: Estimate | None, written: Callable[[float], str]) -> str:
@@ -233,7 +276,7 @@ def _with_interval(found: Estimate | None, written: Callable[[float], str]) -> s
 @register.filter
 def percent_one(share: float | None) -> str:
     """A share from 0 to 1 in percent with one decimal; a dash where nobody knows."""
-    return "–" if share is None else f"{100.0 * share:.1f}"
+    return "–" if share is None else _decimal(100.0 * share, 1)
 
 
 _METRICS: dict[str, str | Promise] = {

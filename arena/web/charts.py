@@ -9,6 +9,7 @@ from django.utils.translation import gettext as _
 
 from arena.exports.plot_axes import interval_ticks, known_ends, shorten_name
 from arena.exports.tables import Row
+from arena.rating.printed import with_minus
 
 WIDTH = 760.0
 LEFT, RIGHT = 210.0, 676.0
@@ -164,10 +165,11 @@ def bars(
 def _title(line: Row) -> str:
     """What the chart says of a line when asked."""
     if line.elo is None or line.lower is None or line.upper is None:
-        return f"{line.model}: {line.elo_text} ({line.interval_text})"
+        numbers = f"{with_minus(line.elo_text)} ({with_minus(line.interval_text)})"
+        return f"{line.model}: {numbers}"
     return _("%(name)s: %(rating)s, 95 %% from %(low)s to %(high)s") % {
         "name": line.model,
-        "rating": f"{line.elo:.0f}",
-        "low": f"{line.lower:.0f}",
-        "high": f"{line.upper:.0f}",
+        "rating": with_minus(f"{line.elo:.0f}"),
+        "low": with_minus(f"{line.lower:.0f}"),
+        "high": with_minus(f"{line.upper:.0f}"),
     }

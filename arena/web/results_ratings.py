@@ -28,6 +28,7 @@ def standings(snapshot: Snapshot, table: LeaderboardTable) -> Context:
     moves = [line.moves for line in trust.raters if line.moves is not None]
     names = by_slug(table)
     removal = trust.removal
+    claims, check = snapshot.results.claims, _cross_check(snapshot, table)
     return {
         "columns": ON_PAGE,
         "bars": bars([(row.slug, row.lower, row.elo, row.upper) for row in table.rows]),
@@ -35,8 +36,11 @@ def standings(snapshot: Snapshot, table: LeaderboardTable) -> Context:
         "removal": removal,
         "rival": removal and names[removal.rival].name,
         "disagreements": _disagreements(trust.elo_order or (), names),
-        "independent": _half_width(snapshot.results.claims.independent),
-        "check": _cross_check(snapshot, table),
+        "independent": _half_width(claims.independent),
+        "design_effect": _said_effect(claims.design_effect),
+        "check": None if check is None else round(check),
+        "ties": round((trust.tie_share or 0.0) * snapshot.votes_counted),
+        "has_places": any(row.rank_best != row.rank_worst for row in table.rows),
     }
 
 
@@ -56,6 +60,7 @@ def pairs(snapshot: Snapshot, table: LeaderboardTable) -> Context:
         "heat": heat_map(found, table.rows),
         "lines": lines,
         "few": FEW,
+        "any_few": any(0 < line["votes"] < FEW for line in lines),
         "has_p_values": bool(p_values),
         "told_apart": None if apart is None else len(apart),
     }
@@ -68,7 +73,7 @@ def types(snapshot: Snapshot, table: LeaderboardTable) -> Context:
     ends = [end for line in lines for end in (line.lower, line.upper) if end is not None]
     span = (min(ends), max(ends)) if ends else None
     by_name = {row.slug: row.name for row in table.rows}
-    parts = []
+    parts: list[Context] = []
     for part in snapshot.results.types:
         rows = [_row(line, names[line.slug]) for line in part.lines if line.votes]
         if not snapshot.results.board.order:  # of an earlier version
@@ -79,7 +84,6 @@ def types(snapshot: Snapshot, table: LeaderboardTable) -> Context:
                 "kept": part,
                 "rows": rows,
                 "chart": interval_chart(rows, span),
-                "few": any(row.votes < FEW for row in rows),
                 "pooled": {
                     line.slug: line.pooled for line in part.lines if line.pooled.value is not None
                 },
@@ -89,6 +93,7 @@ def types(snapshot: Snapshot, table: LeaderboardTable) -> Context:
     return {
         "parts": parts,
         "few_votes": FEW,
+        "any_few": any(row.votes < FEW for part in parts for row in part["rows"]),
         "by_type": interaction(snapshot.results.trust.by_type, table.rows),
         "type_spread": snapshot.results.type_spread,
     }
@@ -149,6 +154,11 @@ def _disagreements(order: Sequence[OnlinePlace], names: Mapping[str, Row]) -> li
         for place, line in enumerate(order, start=1)
         if line.place != place
     ]
+
+
+def _said_effect(effect: float | None) -> float | None:
+    """How many votes weigh as much as one, None where it would be said to be one."""
+    return None if effect is None or round(effect, 1) <= 1.0 else round(effect, 1)
 
 
 def _half_width(bounds: Mapping[str, Bounds]) -> float | None:

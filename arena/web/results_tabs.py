@@ -10,7 +10,7 @@ from django.utils.translation import gettext_lazy as _
 
 from arena.exports.tables import LeaderboardTable
 from arena.models import Snapshot
-from arena.queries.results import log_of, snapshots_of
+from arena.queries.results import log_of, names_in_log, snapshots_of
 from arena.web.driving import driving
 from arena.web.results_cost import cost, displacement
 from arena.web.results_ratings import Context, pairs, standings, types
@@ -44,6 +44,8 @@ def log(snapshot: Snapshot, table: LeaderboardTable) -> Context:
     study = snapshot.study
     return {
         "events": log_of(study, most=LOG_LINES),
+        "names": {row.slug: row.model for row in table.rows} | names_in_log(study),
+        "most": LOG_LINES,
         "ratings": list(snapshots_of(study).defer("results").select_related("made_by__person")),
     }
 

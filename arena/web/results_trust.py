@@ -6,7 +6,9 @@ from arena.exports.heat import heat_map
 from arena.exports.plots import plots
 from arena.exports.tables import LeaderboardTable
 from arena.models import Snapshot
+from arena.queries.judged import AUTOMATIC
 from arena.queries.people import natural_order
+from arena.results.tree import PanelRater
 from arena.web.charts import bars
 from arena.web.results_authors import with_authors
 from arena.web.results_conditions import drifts, interaction
@@ -16,15 +18,19 @@ from arena.web.scatter import scatter
 
 def raters(snapshot: Snapshot, table: LeaderboardTable) -> Context:
     """Agreement, repeats, sides, and the panel of experts."""
-    lines = snapshot.results.trust.raters
+    kept = snapshot.results.trust.raters
+    lines = [line for line in kept if line.judge != AUTOMATIC]
     left = [(line.judge, line.left.lower, line.left.value, line.left.upper) for line in lines]
     panel = sorted(
-        with_authors(snapshot, lines), key=lambda line: natural_order(line["rater"].name)
+        (line | _counts(line["rater"]) for line in with_authors(snapshot, lines)),
+        key=lambda line: natural_order(line["rater"].name),
     )
     return {
         "trust": snapshot.results.trust,
         "panel": panel,
         "limit": next((line.bet.limit for line in lines if line.bet), None),
+        "automatic": sum(line.votes for line in kept if line.judge == AUTOMATIC),
+        "automatic_judge": AUTOMATIC,
         "left_bars": bars(left, span=(0.0, 1.0)),
         "by_side": interaction(snapshot.results.trust.by_side, table.rows),
         "drifts": drifts(snapshot.results.trust.drifts),
@@ -35,10 +41,26 @@ def coverage(snapshot: Snapshot, table: LeaderboardTable) -> Context:
     """Votes against the plan, widths against votes, and how many votes narrower ones need."""
     pairs = snapshot.results.pairs
     plot = plots(snapshot, table).get("width")
+    rows = table.rows
     return {
         "claims": snapshot.results.claims,
         "chart": scatter(plot),
-        "points": plot.points if plot else (),
+        "points": [(point, rows[point.number - 1]) for point in plot.points] if plot else [],
         "heat": heat_map(pairs, table.rows),
         "planned": sum(pair.planned or 0 for pair in pairs),
+    }
+
+
+# --- Private -----------------------------------------------------------------------------------
+
+
+def _counts(rater: PanelRater) -> Context:
+    """How many votes the shares of an expert stand for; of the favourites only where all do."""
+    ties = round(rater.ties * rater.votes)
+    decided = rater.votes - ties
+    left = rater.left.value
+    return {
+        "ties": ties,
+        "left": None if left is None else round(left * decided),
+        "all_foreseen": rater.decided == decided,
     }

@@ -1,52 +1,139 @@
-"""The votes on one pair of a rating, with both pictures and now with names."""
+"""The votes behind the numbers of a rating: lists, files, and a vote with the pair as shown."""
 
 from __future__ import annotations
 
 import uuid
+from typing import Any
+from urllib.parse import urlencode
 
-from django.http import Http404, HttpRequest, HttpResponse
-from django.shortcuts import render
+from django.http import Http404, HttpRequest, HttpResponse, HttpResponseBase, StreamingHttpResponse
+from django.shortcuts import get_object_or_404, render
+from django.utils.text import slugify
 from django.views.decorators.http import require_safe
 
 from arena.errors import NoSnapshot
-from arena.exports.tables import leaderboard_table
+from arena.exports.tables import LeaderboardTable, leaderboard_table
+from arena.exports.vote_lists import vote_list_csv
+from arena.models import Matchup, Snapshot, Study
+from arena.queries.descriptions import describe_in_words
 from arena.queries.judged import is_imported
-from arena.queries.result_votes import votes_on_pair
 from arena.queries.results import snapshot_to_export
+from arena.queries.showings import picture_of_side
+from arena.queries.single_votes import vote_in
+from arena.queries.vote_lists import neighbours, vote_page
+from arena.queries.vote_search import VoteSearch
 from arena.web.access import STAFF, allow_only
-from arena.web.results import address_of, asked_rating, get_readable_study
-from arena.web.results_ratings import by_slug
+from arena.web.pictures import picture_response
+from arena.web.results import asked_rating, get_readable_study
+from arena.web.vote_search_form import VoteSearchForm
+from augment.services.wording import translate_all
 
 
 @allow_only(*STAFF)
 @require_safe
 def votes_page(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
-    """What was judged of two contestants; `a` and `b` are slugs."""
+    """One page of the votes that the address looks for."""
+    study, snapshot, table = _rating(request, code)
+    form = _form(request, snapshot, table)
+    context = _context(study, snapshot, form) | {"search": None}
+    if not form.is_valid():
+        return render(request, "results/votes.html", context, status=422)
+    search = form.search()
+    number = request.GET.get("page", "1")
+    context |= {
+        "search": search,
+        "found": vote_page(snapshot, search, int(number) if number.isdecimal() else 1),
+        "query": _query(snapshot, search),
+    }
+    return render(request, "results/votes.html", context)
+
+
+@allow_only(*STAFF)
+@require_safe
+def votes_file(request: HttpRequest, code: uuid.UUID) -> HttpResponseBase:
+    """All votes that the address looks for, as CSV."""
+    study, snapshot, table = _rating(request, code)
+    form = _form(request, snapshot, table)
+    if not form.is_valid():
+        context = _context(study, snapshot, form) | {"search": None}
+        return render(request, "results/votes.html", context, status=422)
+    name = f"{slugify(study.name) or 'study'}-votes-list.csv"
+    return StreamingHttpResponse(
+        vote_list_csv(snapshot, form.search()),
+        content_type="text/csv; charset=utf-8",
+        headers={"Content-Disposition": f'attachment; filename="{name}"'},
+    )
+
+
+@allow_only(*STAFF)
+@require_safe
+def single_vote_page(request: HttpRequest, code: uuid.UUID, vote: uuid.UUID) -> HttpResponse:
+    """One vote: the pair as it was shown, what was decided how, and who drew what."""
+    study, snapshot, table = _rating(request, code)
+    form = _form(request, snapshot, table)
+    search = form.search() if form.is_valid() else VoteSearch()
+    found = vote_in(snapshot, vote)
+    if found is None:
+        raise Http404
+    matchup = found.vote.matchup
+    described = matchup.descriptions and [
+        describe_in_words(side, translate_all) for side in matchup.descriptions
+    ]
+    context = _context(study, snapshot, form) | {
+        "search": search,
+        "query": _query(snapshot, search),
+        "found": found,
+        "vote": found.vote,
+        "matchup": matchup,
+        "described": described,
+        "beside": neighbours(snapshot, search, found.vote),
+    }
+    return render(request, "results/vote.html", context)
+
+
+@allow_only(*STAFF)
+@require_safe
+def shown_picture(
+    request: HttpRequest, code: uuid.UUID, matchup: uuid.UUID, side: str
+) -> HttpResponseBase:
+    """A picture as an expert of the study was shown it: left, right, or before the change."""
+    study = get_readable_study(request, code)
+    rows = Matchup.objects.select_related("left", "right").only(
+        "left_image", "right_image", "original_image", "left__image", "right__image"
+    )
+    shown = get_object_or_404(rows, study=study, code=matchup)
+    if side not in ("left", "right", "original"):
+        raise Http404
+    return picture_response(picture_of_side(shown, side))
+
+
+# --- Private -----------------------------------------------------------------------------------
+
+
+def _rating(request: HttpRequest, code: uuid.UUID) -> tuple[Study, Snapshot, LeaderboardTable]:
     study = get_readable_study(request, code)
     try:
         snapshot = snapshot_to_export(study, asked_rating(request))
     except NoSnapshot as error:
         raise Http404 from error
-    table = leaderboard_table(snapshot)
-    names = by_slug(table)
-    first, second = (names.get(request.GET.get(side, "")) for side in ("a", "b"))
-    if first is None or second is None or first is second:
-        raise Http404
-    number = request.GET.get("page", "1")
-    votes = votes_on_pair(
-        snapshot,
-        first=first.slug,
-        second=second.slug,
-        page=int(number) if number.isdigit() else 1,
-        imported=is_imported(study),
-    )
-    context = {
+    return study, snapshot, leaderboard_table(snapshot)
+
+
+def _form(request: HttpRequest, snapshot: Snapshot, table: LeaderboardTable) -> VoteSearchForm:
+    names = {row.slug: row.model for row in table.rows}
+    return VoteSearchForm(request.GET.dict(), snapshot=snapshot, names=names)
+
+
+def _context(study: Study, snapshot: Snapshot, form: VoteSearchForm) -> dict[str, Any]:
+    return {
         "study": study,
         "snapshot": snapshot,
-        "first": first,
-        "second": second,
-        "found": votes,
-        "judges": snapshot.results.judges,
-        "back": address_of(study, snapshot, "pairs"),
+        "form": form,
+        "imported": is_imported(study),
+        "is_staff": True,
     }
-    return render(request, "results/votes.html", context)
+
+
+def _query(snapshot: Snapshot, search: VoteSearch) -> str:
+    """What an address says of the rating and of what is looked for."""
+    return urlencode({"rating": str(snapshot.code), **search.as_query()})

@@ -144,6 +144,21 @@ urlpatterns: list[URLPattern] = [
     path("studies/<uuid:code>/results/", results.results_page, name="results"),
     path("studies/<uuid:code>/results/open/", results.open_results_early, name="results-open"),
     path("studies/<uuid:code>/results/votes/", results_votes.votes_page, name="results-votes"),
+    path(
+        "studies/<uuid:code>/results/votes.csv",
+        results_votes.votes_file,
+        name="results-votes-file",
+    ),
+    path(
+        "studies/<uuid:code>/results/votes/<uuid:vote>/",
+        results_votes.single_vote_page,
+        name="results-vote",
+    ),
+    path(
+        "studies/<uuid:code>/results/shown/<uuid:matchup>/<slug:side>.png",
+        results_votes.shown_picture,
+        name="shown-picture",
+    ),
     path("studies/<uuid:code>/results/<slug:tab>/", results.results_page, name="results-tab"),
     path("studies/<uuid:code>/results.<slug:form>", results_files.export, name="results-export"),
     path(

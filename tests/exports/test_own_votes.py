@@ -18,7 +18,8 @@ from arena.exports.bundle import bundle
 from arena.models import Snapshot, Study
 from arena.pairing.order import MAIN
 from arena.queries.judged import Entrant, Judged, last_vote_of
-from arena.queries.result_votes import votes_on_pair
+from arena.queries.vote_lists import vote_page
+from arena.queries.vote_search import VoteSearch
 from arena.queries.vote_sets import Filters, VoteSet, vote_set
 from arena.rating.leaderboard import rate as rate_votes
 from arena.results.both_versions import OwnVotes
@@ -166,8 +167,8 @@ def test_pairs_their_plan_and_their_cells_leave_them_out_alike(study: Study) -> 
     mark(study)
     snapshot = rate(study=study, rounds=10, filters=WITHOUT)
     for pair in snapshot.results.pairs:
-        cell = votes_on_pair(snapshot, first=pair.a, second=pair.b, page=1, imported=False)
-        assert cell.page.paginator.count == pair.votes == pair.planned, pair
+        cell = vote_page(snapshot, VoteSearch(contestant=pair.a, opponent=pair.b), 1)
+        assert cell.total == pair.votes == pair.planned, pair
 
 
 def test_the_zip_has_both_versions_but_never_who_is_author(study: Study) -> None:

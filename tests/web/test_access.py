@@ -68,6 +68,9 @@ PAGES: dict[str, tuple[int, int, int]] = {
     "results": (200, 200, 403),  # a page that asks whether to look early
     "results-tab": (200, 200, 403),
     "results-votes": (403, 403, 403),
+    "results-votes-file": (403, 403, 403),
+    "results-vote": (403, 403, 403),
+    "shown-picture": (403, 403, 403),
     "results-votes-export": (403, 403, 403),
     "results-export": (403, 403, 403),
     "results-chart": (403, 403, 403),
@@ -169,6 +172,8 @@ def address(name: str, here: World) -> str:
         "results-export": {"code": here.study.code, "form": "csv"},
         "results-chart": {"code": here.study.code, "name": "pairs", "form": "svg"},
         "results-votes-export": {"code": here.study.code, "form": "csv"},
+        "results-vote": {"code": here.study.code, "vote": STRANGER},
+        "shown-picture": {"code": here.study.code, "matchup": shown.code, "side": "left"},
         "results-tab": {"code": here.study.code, "tab": "pairs"},
         "rating-again": {"code": here.study.code, "rating": STRANGER},
         "matchup-image": {"token": shown.left_token},
@@ -201,7 +206,7 @@ def address(name: str, here: World) -> str:
         marked = mark_author(study=here.study, expert=here.expert, contestant="ann")
         arguments["author-back"] = {"code": marked.code}
     own = ("study", "experts", "invite", "author", "study-close", "study-hand-over", "study-rate")
-    results = ("results", "results-votes", "results-open")
+    results = ("results", "results-votes", "results-votes-file", "results-open")
     is_of_study = name in own + results or name.startswith("vote")
     found = {"code": here.study.code} if is_of_study else arguments.get(name, {})
     return reverse(name, kwargs=found)

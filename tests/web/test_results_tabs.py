@@ -67,7 +67,7 @@ def test_beneath_the_table_stands_how_far_to_trust_it(study: Study, analyst: Cli
         "Leaving one expert out",
         "would put",
         "If votes were independent",
-        "Cross-check:",
+        "Cross-check by the plain sandwich",
         "Test of fit:",
     ):
         assert said in shown, said
@@ -77,14 +77,11 @@ def test_the_heat_map_leads_to_the_votes_with_both_pictures(study: Study, analys
     shown = page(analyst, study, "pairs")
     assert shown.count('class="h') >= 72
     snapshot = study.snapshots.get()
-    query = {"rating": str(snapshot.code), "a": "interplan", "b": "llama-otm"}
-    assert f"?rating={snapshot.code}&amp;a=interplan&amp;b=llama-otm" in shown
+    query = {"rating": str(snapshot.code), "contestant": "interplan", "opponent": "llama-otm"}
+    assert f"?rating={snapshot.code}&amp;contestant=interplan&amp;opponent=llama-otm" in shown
     cell = analyst.get(reverse("results-votes", args=[study.code]), query).content.decode()
     pair = next(p for p in snapshot.results.pairs if {p.a, p.b} == {"interplan", "llama-otm"})
     assert cell.count("<img") == 2 * pair.votes
-    for wrong in ({"a": "interplan", "b": "interplan"}, {"a": "interplan", "b": "nobody"}):
-        missing = analyst.get(reverse("results-votes", args=[study.code]), wrong)
-        assert missing.status_code == 404
 
 
 def test_types_stand_on_one_axis_with_a_warning_where_votes_are_few(
@@ -93,7 +90,7 @@ def test_types_stand_on_one_axis_with_a_warning_where_votes_are_few(
     shown = page(analyst, study, "types")
     for label in Scenario.Type.labels:
         assert str(label) in shown
-    assert "Too few votes: lines marked with * have fewer than 30." in shown
+    assert "Lines marked with * have fewer than 30 votes: too few to read much from." in shown
 
 
 def test_pages_and_files_show_what_depends_on_types_sides_and_sessions(
@@ -142,7 +139,7 @@ def test_raters_are_pseudonyms_with_repeats_and_checks(analyst: Client) -> None:
     assert first.expert.person.pseudonym in shown
     assert "eva" not in shown
     assert "of 1 hidden repeat answered alike" in shown
-    assert "0 / 1" in shown
+    assert ">1</a>" in shown.partition("0 / ")[2][:250]
 
 
 @pytest.mark.parametrize(
@@ -237,7 +234,12 @@ def test_an_open_study_shows_a_gate_then_its_results_to_who_opened_them() -> Non
     analyst.post(reverse("study-rate", args=[study.code]))
     shown = analyst.get(address).content.decode()
     assert "you opened its results early" in shown
+    assert "Early look" not in shown, "one note says that the study is open"
+    early = study.snapshots.get()
+    close_study(study=study)
+    shown = analyst.get(address, {"rating": str(early.code)}).content.decode()
     assert "Early look: the study was still open." in shown
+    Study.objects.filter(pk=study.pk).update(state=Study.State.OPEN)
     assert "still open" in admin.get(address).content.decode(), "each opens for themselves"
 
 

@@ -1,0 +1,294 @@
+"""The votes behind a number of a rating: one page of them, all of them, or the ones beside one.
+
+In: a snapshot and what is looked for. Out: votes with the mark that says why one does not count,
+as `vote_sets` says it; the database finds them, so that a page costs the same for any number.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from uuid import UUID
+
+from django.db.models import Exists, F, OuterRef, Q, QuerySet
+
+from arena.models import ImportedVote, Snapshot, Vote
+from arena.pairing.order import CHECK, REPEAT
+from arena.queries.judged import AUTOMATIC, Judged, automatic_ties, is_imported
+from arena.queries.listed_votes import (
+    ListedVote,
+    imported_votes,
+    of_automatic,
+    of_imported,
+    of_votes,
+)
+from arena.queries.vote_marks import RATED, made_up_contestants, marked_votes, own_votes, users_of
+from arena.queries.vote_search import (
+    AUTOMATIC_TIE,
+    COUNTED,
+    EVERY,
+    LEFT_OUT,
+    SoughtOutcome,
+    SoughtPart,
+    VoteSearch,
+)
+from arena.queries.vote_sets import Filters, LeftOut, why_left_out
+from arena.rating.raters import FAST_MS
+from augment.models import Augmentation, Contestant
+
+PER_PAGE = 25
+CHUNK = 2000
+"""So many votes are read at once for a file."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class VotePage:
+    """One page of votes; `number` counts from 1."""
+
+    votes: Sequence[ListedVote]
+    number: int
+    pages: int
+    total: int
+
+    @property
+    def first(self) -> int:
+        """The place of the first vote of this page, from 1."""
+        return (self.number - 1) * PER_PAGE + 1
+
+    @property
+    def before(self) -> int | None:
+        """The page before."""
+        return self.number - 1 if self.number > 1 else None
+
+    @property
+    def after(self) -> int | None:
+        """The next page."""
+        return self.number + 1 if self.number < self.pages else None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Neighbours:
+    """Where a vote stands among those looked for, from 1; `place` is None where it is none."""
+
+    before: UUID | None
+    after: UUID | None
+    place: int | None
+    total: int
+
+
+def vote_page(snapshot: Snapshot, search: VoteSearch, page: int) -> VotePage:
+    """One page; beyond the last is the last. Five queries at most.
+
+    Args:
+        snapshot: With its study.
+        search: What is looked for.
+        page: From 1.
+    """
+    found = _Found(snapshot, search)
+    total = found.count()
+    pages = max(-(-total // PER_PAGE), 1)
+    number = min(max(page, 1), pages)
+    start = (number - 1) * PER_PAGE
+    return VotePage(
+        votes=found.part(start, min(start + PER_PAGE, total)),
+        number=number,
+        pages=pages,
+        total=total,
+    )
+
+
+def each_vote(snapshot: Snapshot, search: VoteSearch) -> Iterator[ListedVote]:
+    """All that are looked for, in the order of their pages."""
+    found = _Found(snapshot, search)
+    for start in range(0, found.count(), CHUNK):
+        yield from found.part(start, start + CHUNK)
+
+
+def neighbours(snapshot: Snapshot, search: VoteSearch, vote: Vote) -> Neighbours:
+    """The votes before and after one among those that are looked for; four queries."""
+    rows = votes_behind(snapshot, search)
+    keys = rows.values_list("key", flat=True)
+    place = rows.filter(pk__lte=vote.pk).count()
+    is_found = rows.filter(pk=vote.pk).exists()
+    return Neighbours(
+        before=keys.filter(pk__lt=vote.pk).order_by("-pk").first(),
+        after=keys.filter(pk__gt=vote.pk).order_by("pk").first(),
+        place=place if is_found else None,
+        total=rows.count(),
+    )
+
+
+def votes_behind(snapshot: Snapshot, search: VoteSearch) -> QuerySet[Vote]:
+    """The rows of a study of matchups, each with its `mark`; no order."""
+    rows = marked_votes(snapshot)
+    if search.mark == LEFT_OUT:
+        rows = rows.exclude(Q(mark=COUNTED))
+    elif search.mark != EVERY:
+        rows = rows.filter(Q(mark=search.mark))
+    if search.expert == AUTOMATIC:
+        return rows.none()
+    if search.expert:
+        rows = rows.filter(expert__in=users_of([search.expert]).values())
+    if search.scenario:
+        rows = rows.filter(matchup__scenario__slug=search.scenario)
+    if search.type:
+        rows = rows.filter(matchup__scenario__type=search.type)
+    if search.comment:
+        rows = rows.filter(comment__icontains=search.comment)
+    rows = rows.filter(_shows(search), _came_out(search))
+    return _PARTS[SoughtPart(search.part)](rows, snapshot) if search.part else rows
+
+
+def is_scenario_of(snapshot: Snapshot, slug: str) -> bool:
+    """Whether the study has a scenario of that name, be it in attention checks alone."""
+    study = snapshot.study
+    if is_imported(study):
+        return ImportedVote.objects.filter(file__study=study, item=slug).exists()
+    return study.matchups.filter(scenario__slug=slug).exists() or (
+        study.scenarios.filter(slug=slug).exists()
+    )
+
+
+def counted_votes(snapshot: Snapshot) -> QuerySet[Vote]:
+    """The rows that the rating is made of, without those of pairs that nobody was shown."""
+    return votes_behind(snapshot, VoteSearch())
+
+
+# --- What is found -----------------------------------------------------------------------------
+
+
+class _Found:
+    """Rows of the database, and after them the pairs that nobody can tell apart."""
+
+    def __init__(self, snapshot: Snapshot, search: VoteSearch) -> None:
+        self._snapshot = snapshot
+        self._imported = is_imported(snapshot.study)
+        self._automatic = [] if self._imported else _automatic(snapshot, search)
+        self._votes = None if self._imported else votes_behind(snapshot, search)
+        self._lines = imported_votes(snapshot, search) if self._imported else None
+        self._stored: int | None = None
+
+    def count(self) -> int:
+        return self._count_stored() + len(self._automatic)
+
+    def part(self, start: int, stop: int) -> list[ListedVote]:
+        """The votes from one place up to another, from 0."""
+        if self._lines is not None:
+            return of_imported(self._lines[start:stop], self._snapshot)
+        assert self._votes is not None
+        keys = list(self._votes.order_by("pk").values_list("pk", F("mark"))[start:stop])
+        listed = of_votes(keys, self._snapshot)
+        stored = self._count_stored()
+        rest = self._automatic[max(start - stored, 0) : max(stop - stored, 0)]
+        return listed + of_automatic(rest, self._snapshot)
+
+    def _count_stored(self) -> int:
+        if self._stored is None:
+            rows = self._votes if self._lines is None else self._lines
+            assert rows is not None
+            self._stored = rows.count()
+        return self._stored
+
+
+def _automatic(snapshot: Snapshot, search: VoteSearch) -> list[tuple[Judged, str]]:
+    """Pairs that nobody can tell apart, with their mark, by the same search."""
+    if search.comment or search.part or search.expert not in ("", AUTOMATIC):
+        return []
+    if search.outcome not in ("", SoughtOutcome.TIED, SoughtOutcome.EQUAL):
+        return []
+    filters = Filters.of_document(snapshot.filters)
+    simulated = set(made_up_contestants(snapshot.study).values_list("slug", flat=True))
+    found = []
+    for line in automatic_ties(snapshot.study):
+        reason = why_left_out(line, filters, simulated, snapshot.study.allow_simulated)
+        mark = (reason.value if reason else COUNTED) if filters.automatic_ties else AUTOMATIC_TIE
+        if _fits(line, mark, search):
+            found.append((line, mark))
+    return found
+
+
+def _fits(line: Judged, mark: str, search: VoteSearch) -> bool:
+    shown = {line.left, line.right}
+    wanted = {slug for slug in (search.contestant, search.opponent) if slug}
+    marks = {EVERY: True, LEFT_OUT: mark not in (COUNTED, AUTOMATIC_TIE)}
+    return (
+        wanted <= shown
+        and search.scenario in ("", line.item)
+        and search.type in ("", line.type)
+        and marks.get(search.mark, search.mark == mark)
+    )
+
+
+# --- The database's part -----------------------------------------------------------------------
+
+
+def _side(side: str, slug: str) -> Q:
+    """Who was shown on a side; a list of their pictures is quicker than a look at each vote's."""
+    own = Augmentation.objects.filter(contestant__slug=slug).values("pk")
+    return Q(**{f"shown_{side}__in": own}) if slug else Q()
+
+
+def _shows(search: VoteSearch) -> Q:
+    first, second = search.contestant, search.opponent
+    if not first and not second:
+        return Q()
+    return (_side("left", first) & _side("right", second)) | (
+        _side("right", first) & _side("left", second)
+    )
+
+
+def _came_out(search: VoteSearch) -> Q:
+    wanted, slug = search.outcome, search.contestant
+    if wanted in (SoughtOutcome.WON, SoughtOutcome.LOST):
+        on_left, on_right = ("left", "right") if wanted == SoughtOutcome.WON else ("right", "left")
+        return (_side("left", slug) & Q(outcome=on_left)) | (
+            _side("right", slug) & Q(outcome=on_right)
+        )
+    if wanted in (SoughtOutcome.TIED, SoughtOutcome.EQUAL):
+        return Q(outcome="equal")
+    if wanted == SoughtOutcome.DECIDED:
+        return Q(outcome__in=("left", "right"))
+    if wanted == SoughtOutcome.BOTH_MISS:
+        return Q(both_miss=True)
+    return Q(outcome=wanted) if wanted else Q()
+
+
+# --- Parts that a number of the results stands for ---------------------------------------------
+
+_Rows = QuerySet[Vote]
+
+
+def _first_votes(snapshot: Snapshot) -> _Rows:
+    """The vote that counts on what a hidden repeat shows again."""
+    return marked_votes(snapshot).filter(Q(mark=COUNTED), matchup=OuterRef("matchup__repeat_of"))
+
+
+def _repeats(rows: _Rows, snapshot: Snapshot) -> _Rows:
+    decided = rows.filter(matchup__kind=REPEAT, outcome__in=RATED)
+    current = decided.exclude(Q(mark=LeftOut.SUPERSEDED.value))
+    return current.filter(Exists(_first_votes(snapshot)))
+
+
+def _alike(rows: _Rows, snapshot: Snapshot) -> _Rows:
+    first = _first_votes(snapshot)
+    tied, won = first.filter(winner=None), first.filter(winner=OuterRef("winner"))
+    return _repeats(rows, snapshot).filter(
+        (Q(winner=None) & Exists(tied)) | (Q(winner__isnull=False) & Exists(won))
+    )
+
+
+def _own_votes(rows: _Rows, snapshot: Snapshot) -> _Rows:
+    return rows.filter(own_votes(Filters.of_document(snapshot.filters)))
+
+
+_PARTS: dict[SoughtPart, Callable[[_Rows, Snapshot], _Rows]] = {
+    SoughtPart.COMMENTED: lambda rows, _: rows.exclude(comment=""),
+    SoughtPart.FAST: lambda rows, _: rows.filter(ms_visible__lt=FAST_MS),
+    SoughtPart.OWN: _own_votes,
+    SoughtPart.REPEATS: _repeats,
+    SoughtPart.ALIKE: _alike,
+    SoughtPart.CHECKS: lambda rows, _: rows.filter(matchup__kind=CHECK),
+    SoughtPart.PASSED: lambda rows, _: rows.filter(
+        matchup__kind=CHECK, winner__contestant__kind=Contestant.Kind.REFERENCE
+    ),
+}

@@ -1,0 +1,80 @@
+"""Which votes of a rating somebody looks for: what stands in the address of a list of votes."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, fields
+from enum import StrEnum
+
+COUNTED, EVERY, LEFT_OUT, AUTOMATIC_TIE = "counted", "all", "left_out", "automatic"
+"""Marks beside the reasons of `vote_sets.LeftOut`: what counts, everything, all that does not, and
+pairs that nobody can tell apart where the rating does not count them."""
+
+
+class SoughtOutcome(StrEnum):
+    """How a vote came out; the first three are seen from the contestant that is looked for."""
+
+    WON = "won"
+    TIED = "tied"
+    LOST = "lost"
+    LEFT = "left"
+    EQUAL = "equal"
+    RIGHT = "right"
+    DECIDED = "decided"
+    BOTH_MISS = "both_miss"
+    SKIP = "skip"
+
+    @property
+    def needs_contestant(self) -> bool:
+        """Whether it says nothing without one."""
+        return self in (SoughtOutcome.WON, SoughtOutcome.TIED, SoughtOutcome.LOST)
+
+
+class SoughtPart(StrEnum):
+    """A part of the votes that a number of the results stands for."""
+
+    COMMENTED = "commented"
+    FAST = "fast"
+    OWN = "own"
+    REPEATS = "repeats"
+    ALIKE = "alike"
+    CHECKS = "checks"
+    PASSED = "passed"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class VoteSearch:
+    """What is looked for; empty is all.
+
+    Attributes:
+        contestant, opponent: Slugs of who was shown.
+        scenario: A slug, and `type` the type of scenarios.
+        expert: The code of a judge.
+        outcome: Of `SoughtOutcome`.
+        part: Of `SoughtPart`.
+        mark: Why votes do not count, or one of the words above.
+        comment: Words in the expert's comment.
+    """
+
+    contestant: str = ""
+    opponent: str = ""
+    scenario: str = ""
+    type: str = ""
+    expert: str = ""
+    outcome: str = ""
+    part: str = ""
+    mark: str = COUNTED
+    comment: str = ""
+
+    def as_query(self) -> dict[str, str]:
+        """What an address says of it: nothing of what is left as it is."""
+        found = {one.name: str(getattr(self, one.name)) for one in fields(self)}
+        return {name: text for name, text in found.items() if text != _DEFAULTS[name]}
+
+    @classmethod
+    def of_query(cls, query: Mapping[str, str]) -> VoteSearch:
+        """What `as_query` wrote; other words of the address are somebody else's."""
+        return cls(**{name: query[name] for name in _DEFAULTS if query.get(name)})
+
+
+_DEFAULTS = {one.name: str(one.default) for one in fields(VoteSearch)}

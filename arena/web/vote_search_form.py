@@ -1,0 +1,143 @@
+"""What is looked for among the votes of a rating, parsed from the address once."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from django import forms
+from django.utils.translation import gettext as _
+from django.utils.translation import gettext_lazy
+
+from arena.models import Snapshot
+from arena.queries.judged import AUTOMATIC, is_imported
+from arena.queries.people import natural_order
+from arena.queries.vote_lists import is_scenario_of
+from arena.queries.vote_search import (
+    AUTOMATIC_TIE,
+    COUNTED,
+    EVERY,
+    LEFT_OUT,
+    SoughtOutcome,
+    SoughtPart,
+    VoteSearch,
+)
+from augment.services.scenarios.types import type_choices
+
+OUTCOMES = {
+    SoughtOutcome.WON: gettext_lazy("The contestant won"),
+    SoughtOutcome.TIED: gettext_lazy("Tied"),
+    SoughtOutcome.LOST: gettext_lazy("The contestant lost"),
+    SoughtOutcome.LEFT: gettext_lazy("A is better"),
+    SoughtOutcome.EQUAL: gettext_lazy("Equal"),
+    SoughtOutcome.RIGHT: gettext_lazy("B is better"),
+    SoughtOutcome.DECIDED: gettext_lazy("A or B is better"),
+    SoughtOutcome.BOTH_MISS: gettext_lazy("Equal, both miss the instruction"),
+    SoughtOutcome.SKIP: gettext_lazy("Skipped"),
+}
+PARTS = {
+    SoughtPart.COMMENTED: gettext_lazy("With a comment"),
+    SoughtPart.FAST: gettext_lazy("Under 1 s"),
+    SoughtPart.OWN: gettext_lazy("By authors on their own contestants"),
+    SoughtPart.REPEATS: gettext_lazy("Hidden repeats of counted votes"),
+    SoughtPart.ALIKE: gettext_lazy("Hidden repeats answered alike"),
+    SoughtPart.CHECKS: gettext_lazy("Attention checks"),
+    SoughtPart.PASSED: gettext_lazy("Attention checks passed"),
+}
+MARKS = {
+    COUNTED: gettext_lazy("Counted"),
+    EVERY: gettext_lazy("All"),
+    LEFT_OUT: gettext_lazy("Left out"),
+    "superseded": gettext_lazy("Left out: changed later"),
+    "check": gettext_lazy("Left out: attention checks"),
+    "repeat": gettext_lazy("Left out: hidden repeats"),
+    "skip": gettext_lazy("Left out: skipped"),
+    "simulated": gettext_lazy("Left out: simulated"),
+    "filtered": gettext_lazy("Left out: not asked for"),
+    "own": gettext_lazy("Left out: by authors on their own contestants"),
+    AUTOMATIC_TIE: gettext_lazy("Not shown: nobody can tell the pictures apart"),
+}
+
+
+class VoteSearchForm(forms.Form):
+    """The filters of a list of votes, as they stand in the address."""
+
+    contestant = forms.ChoiceField(label=gettext_lazy("Contestant"), required=False)
+    opponent = forms.ChoiceField(label=gettext_lazy("Against"), required=False)
+    outcome = forms.ChoiceField(label=gettext_lazy("Outcome"), required=False)
+    type = forms.ChoiceField(label=gettext_lazy("Scenario type"), required=False)
+    scenario = forms.CharField(label=gettext_lazy("Scenario"), required=False, max_length=200)
+    expert = forms.ChoiceField(label=gettext_lazy("Expert"), required=False)
+    mark = forms.ChoiceField(label=gettext_lazy("Counts"), required=False)
+    part = forms.ChoiceField(label=gettext_lazy("Only"), required=False)
+    comment = forms.CharField(
+        label=gettext_lazy("Words in the comment"), required=False, max_length=200
+    )
+
+    def __init__(
+        self, query: Mapping[str, str], *, snapshot: Snapshot, names: Mapping[str, str]
+    ) -> None:
+        """Offer what the rating has; names of contestants by slug."""
+        data = {name: query.get(name, "") for name in self.base_fields}
+        data["mark"] = data["mark"] or COUNTED
+        super().__init__(data)
+        self._snapshot = snapshot
+        everybody = ("", _("all"))
+        contestants = [everybody, *names.items()]
+        self._offer("contestant", contestants)
+        self._offer("opponent", contestants)
+        self._offer("outcome", [everybody, *_choices(OUTCOMES)])
+        self._offer("type", [everybody, *type_choices()])
+        self._offer("expert", [everybody, *_experts(snapshot)])
+        self._offer("mark", _choices(MARKS))
+        self._offer("part", [everybody, *_choices(PARTS)])
+        if is_imported(snapshot.study):
+            for name in ("type", "part", "comment"):
+                del self.fields[name]
+
+    def clean_scenario(self) -> str:
+        """A scenario that occurs."""
+        slug: str = self.cleaned_data["scenario"].strip()
+        if slug and not is_scenario_of(self._snapshot, slug):
+            raise forms.ValidationError(
+                _("There is no scenario “%(name)s” in this study."), params={"name": slug}
+            )
+        return slug
+
+    def clean(self) -> dict[str, Any]:
+        """Refuse what says nothing."""
+        found: dict[str, Any] = super().clean() or {}
+        contestant, outcome = found.get("contestant"), found.get("outcome")
+        if contestant and contestant == found.get("opponent"):
+            self.add_error("opponent", _("Choose somebody else: nobody meets themselves."))
+        if outcome and not contestant and SoughtOutcome(outcome).needs_contestant:
+            if outcome == SoughtOutcome.TIED:
+                found["outcome"] = SoughtOutcome.EQUAL.value
+            else:
+                self.add_error("outcome", _("Choose the contestant who won or lost."))
+        return found
+
+    def search(self) -> VoteSearch:
+        """What is looked for, once the form is valid."""
+        return VoteSearch.of_query(self.cleaned_data)
+
+    def _offer(self, name: str, choices: list[tuple[str, Any]]) -> None:
+        field = self.fields[name]
+        assert isinstance(field, forms.ChoiceField)
+        field.choices = choices
+
+
+def _choices(labels: Mapping[Any, Any]) -> list[tuple[str, Any]]:
+    return [(str(value), label) for value, label in labels.items()]
+
+
+def _experts(snapshot: Snapshot) -> list[tuple[str, str]]:
+    """Pseudonyms as the rating kept them, and of the study's experts without a counted vote."""
+    names = {
+        str(code): name
+        for code, name in snapshot.study.experts.values_list("person__code", "person__pseudonym")
+    } | snapshot.results.judges
+    if AUTOMATIC in names:
+        names[AUTOMATIC] = _("nobody: never shown")
+    names.pop("", None)
+    return sorted(names.items(), key=lambda item: natural_order(item[1]))

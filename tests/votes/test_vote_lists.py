@@ -1,0 +1,164 @@
+"""The lists of votes behind the numbers of a rating: the database marks them as the rating did."""
+
+from __future__ import annotations
+
+from collections import Counter
+
+import pytest
+from django.contrib.auth.models import User
+from django.db.models import F
+
+from arena.models import Snapshot, Study, Vote
+from arena.queries.vote_lists import each_vote, neighbours, vote_page, votes_behind
+from arena.queries.vote_search import EVERY, LEFT_OUT, VoteSearch
+from arena.queries.vote_sets import Filters
+from arena.services.ratings import rate
+from augment.models import Scenario
+from tests.mixed_study import mixed_study
+
+pytestmark = pytest.mark.django_db
+
+
+@pytest.fixture
+def study() -> Study:
+    return mixed_study()
+
+
+def rated(study: Study, **filters: object) -> Snapshot:
+    return rate(study=study, rounds=10, filters=Filters(**filters))  # type: ignore[arg-type]
+
+
+def total(snapshot: Snapshot, **search: str) -> int:
+    return vote_page(snapshot, VoteSearch(**search), 1).total
+
+
+def code_of(username: str) -> str:
+    return str(User.objects.get(username=username).person.code)
+
+
+CHOICES: dict[str, dict[str, object]] = {
+    "all": {},
+    "one type": {"types": (Scenario.Type.OVERTAKE.value,)},
+    "with repeats": {"kinds": ("main", "repeat")},
+    "repeats alone": {"kinds": ("repeat",)},
+    "with automatic ties": {"automatic_ties": True},
+    "automatic ties of a type": {"automatic_ties": True, "types": (Scenario.Type.NUDGE.value,)},
+    "without own": {"leave_out_own": True},
+}
+
+
+@pytest.mark.parametrize("choice", CHOICES)
+@pytest.mark.parametrize("allow_simulated", [True, False])
+def test_the_database_gives_the_reasons_of_the_rating(
+    study: Study, choice: str, allow_simulated: bool
+) -> None:
+    study.allow_simulated = allow_simulated
+    study.save()
+    snapshot = rated(study, **CHOICES[choice])
+    marks = Counter(
+        votes_behind(snapshot, VoteSearch(mark=EVERY)).values_list(F("mark"), flat=True)
+    )
+    for vote in each_vote(snapshot, VoteSearch(mark=EVERY)):
+        if vote.code is None and vote.mark != "automatic":
+            marks[vote.mark] += 1
+    counted = marks.pop("counted", 0)
+    assert counted == snapshot.votes_counted
+    assert dict(marks) == snapshot.votes_left_out
+    assert total(snapshot) == snapshot.votes_counted
+    assert total(snapshot, mark=LEFT_OUT) == sum(snapshot.votes_left_out.values())
+    for reason, number in snapshot.votes_left_out.items():
+        assert total(snapshot, mark=reason) == number, reason
+
+
+def test_one_expert_alone_counts_and_the_other_is_not_asked_for(study: Study) -> None:
+    study.allow_simulated = True
+    study.save()
+    snapshot = rated(study, experts=(code_of("eva"),))
+    assert total(snapshot) == snapshot.votes_counted == 11
+    assert total(snapshot, expert=code_of("finn"), mark="filtered") == 11
+    assert total(snapshot, expert=code_of("finn")) == 0
+
+
+def test_what_comes_after_a_rating_is_none_of_its_votes(study: Study) -> None:
+    before = rated(study)
+    held = total(before, mark=EVERY)
+    first = Vote.objects.order_by("pk")[0]
+    Vote.objects.create(
+        key=first.matchup.code, matchup=first.matchup, expert=first.expert, outcome="equal",
+        shown_left=first.shown_left, shown_right=first.shown_right, supersedes=first,
+    )  # fmt: skip
+    assert total(before, mark=EVERY) == held
+    assert total(before, mark="superseded") == before.votes_left_out["superseded"] == 2
+    assert total(rated(study), mark="superseded") == 3
+
+
+def test_every_number_of_standings_pairs_and_raters_is_a_search(study: Study) -> None:
+    study.allow_simulated = True
+    study.save()
+    snapshot = rated(study, automatic_ties=True)
+    for line in snapshot.standings.all():
+        for outcome, number in (("won", line.wins), ("tied", line.ties), ("lost", line.losses)):
+            assert total(snapshot, contestant=line.slug, outcome=outcome) == number
+    for pair in snapshot.results.pairs:
+        search = {"contestant": pair.a, "opponent": pair.b}
+        for outcome, number in (("won", pair.wins), ("tied", pair.ties), ("lost", pair.losses)):
+            assert total(snapshot, outcome=outcome, **search) == number
+        assert total(snapshot, outcome="both_miss", **search) == pair.both_miss
+    for part in snapshot.results.types:
+        assert total(snapshot, type=part.type) == part.votes
+    for rater in snapshot.results.trust.raters:
+        assert total(snapshot, expert=rater.judge) == rater.votes
+        answered, passed = rater.checks
+        every = {"expert": rater.judge, "mark": EVERY}
+        assert total(snapshot, part="checks", **every | {"mark": "check"}) == answered
+        assert total(snapshot, part="passed", **every | {"mark": "check"}) == passed
+        repeated, alike = rater.repeats
+        assert total(snapshot, part="repeats", **every) == repeated
+        assert total(snapshot, part="alike", **every) == alike
+    kept = snapshot.results.trust.repeats
+    assert kept is not None
+    assert total(snapshot, part="repeats", mark=EVERY) == kept.number == 6
+    own = snapshot.results.own_votes
+    assert own is not None
+    assert total(snapshot, part="own") == own.votes
+
+
+def test_words_of_a_comment_and_quick_votes_are_found(study: Study) -> None:
+    study.allow_simulated = True
+    study.save()
+    snapshot = rated(study)
+    assert total(snapshot, comment="KERB") == total(snapshot, part="commented") == 6
+    assert total(snapshot, comment="moon") == 0
+    assert total(snapshot, part="fast") == 4
+
+
+def test_pages_hold_every_vote_once_and_automatic_ties_at_the_end(
+    study: Study, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("arena.queries.vote_lists.PER_PAGE", 7)
+    study.allow_simulated = True
+    study.save()
+    snapshot = rated(study, automatic_ties=True)
+    search = VoteSearch()
+    pages = [vote_page(snapshot, search, number) for number in range(1, 5)]
+    assert [page.number for page in pages] == [1, 2, 3, 4]
+    assert {page.pages for page in pages} == {4}
+    listed = [vote for page in pages for vote in page.votes]
+    assert listed == list(each_vote(snapshot, search))
+    assert len(listed) == snapshot.votes_counted == 24
+    assert [vote.kind for vote in listed].index("automatic") == 22
+    assert vote_page(snapshot, search, 99).number == 4
+
+
+def test_a_vote_knows_its_place_among_those_looked_for(study: Study) -> None:
+    study.allow_simulated = True
+    study.save()
+    snapshot = rated(study)
+    search = VoteSearch(contestant="ann", opponent="bob")
+    rows = list(votes_behind(snapshot, search).order_by("pk"))
+    beside = neighbours(snapshot, search, rows[1])
+    assert (beside.before, beside.after) == (rows[0].key, rows[2].key)
+    assert (beside.place, beside.total) == (2, len(rows))
+    stranger = votes_behind(snapshot, VoteSearch(contestant="cid")).order_by("pk").first()
+    assert stranger is not None
+    assert neighbours(snapshot, search, stranger).place is None

@@ -1,0 +1,233 @@
+"""From a number of the results to its votes, and from a vote to the pair as it was shown."""
+
+from __future__ import annotations
+
+import csv
+import io
+import re
+from html import unescape
+from urllib.parse import urlsplit
+
+import pytest
+from django.test import Client
+from django.urls import reverse
+from pytest_django import DjangoAssertNumQueries
+
+from arena.models import Matchup, Snapshot, Study, Vote
+from arena.queries.vote_sets import Filters
+from arena.services.ratings import rate
+from arena.web.results_tabs import TABS
+from augment.services.scenarios.pictures import store
+from tests.mixed_study import mixed_study
+from tests.study_rows import hang
+from tests.web.cast import people, png, signed_in
+
+pytestmark = pytest.mark.django_db
+
+LINK = re.compile(r'<a[^>]*href="([^"]*/results/votes/\?[^"]*)"([^>]*)>(.*?)</a>', re.S)
+FOUND = re.compile(r'<b id="found">(\d+) votes?</b>')
+
+
+@pytest.fixture
+def study() -> Study:
+    study = mixed_study()
+    study.allow_simulated = True
+    study.save()
+    return study
+
+
+@pytest.fixture
+def analyst() -> Client:
+    return signed_in(people()["analyst"])
+
+
+def listed(client: Client, study: Study, **search: str) -> str:
+    answer = client.get(reverse("results-votes", args=[study.code]), search)
+    assert answer.status_code == 200
+    return answer.content.decode()
+
+
+def number_of(page: str) -> int:
+    found = FOUND.search(page)
+    assert found is not None
+    return int(found[1])
+
+
+def links_of(page: str) -> dict[str, int | None]:
+    """How many votes each link promises: by what it says, or by what it stands for."""
+    found: dict[str, int | None] = {}
+    for address, attributes, text in LINK.findall(page):
+        stands_for = re.search(r'data-votes="(\d+)"', attributes)
+        said = re.sub(r"<[^>]*>", " ", text).strip()
+        if stands_for:
+            found[unescape(address)] = int(stands_for[1])
+            if said.isdecimal():
+                assert said == stands_for[1]
+        else:
+            found.setdefault(unescape(address), None)
+    return found
+
+
+@pytest.mark.parametrize(
+    "filters",
+    [Filters(automatic_ties=True), Filters(leave_out_own=True, kinds=("main", "repeat"))],
+)
+def test_every_number_leads_to_as_many_votes(
+    study: Study, analyst: Client, filters: Filters
+) -> None:
+    rate(study=study, rounds=10, filters=filters)
+    promised: dict[str, int | None] = {}
+    for tab in TABS:
+        shown = analyst.get(reverse("results-tab", args=[study.code, tab.name]))
+        promised |= links_of(shown.content.decode())
+    assert len(promised) > 50
+    wrong = {}
+    for address, number in promised.items():
+        answer = analyst.get(address)
+        assert answer.status_code == 200, address
+        found = number_of(answer.content.decode())
+        if number is not None and found != number:
+            wrong[urlsplit(address).query] = (number, found)
+    assert wrong == {}
+
+
+def test_the_filters_stand_in_the_address_and_in_the_form(study: Study, analyst: Client) -> None:
+    rate(study=study, rounds=10)
+    kept = Vote.objects.filter(comment__contains="kerb", winner__isnull=False)
+    slug = kept.values_list("winner__contestant__slug", flat=True)[0]
+    page = listed(analyst, study, contestant=slug, outcome="won", comment="kerb", mark="all")
+    assert f'<option value="{slug}" selected>' in page
+    assert 'value="kerb"' in page
+    assert number_of(page) == kept.filter(winner__contestant__slug=slug).count() > 0
+    assert number_of(listed(analyst, study, scenario="place-3")) > 0
+
+
+@pytest.mark.parametrize(
+    ("search", "said"),
+    [
+        ({"contestant": "nobody"}, "Select a valid choice. nobody is not one of the available"),
+        ({"contestant": "ann", "opponent": "ann"}, "nobody meets themselves"),
+        ({"outcome": "won"}, "Choose the contestant who won or lost."),
+        ({"scenario": "the-moon"}, "There is no scenario “the-moon” in this study."),
+        ({"mark": "purple"}, "Select a valid choice. purple is not one"),
+        ({"expert": "eva"}, "Select a valid choice. eva is not one"),
+    ],
+)
+def test_a_filter_that_means_nothing_is_explained(
+    study: Study, analyst: Client, search: dict[str, str], said: str
+) -> None:
+    rate(study=study, rounds=10)
+    for name in ("results-votes", "results-votes-file"):
+        answer = analyst.get(reverse(name, args=[study.code]), search)
+        assert answer.status_code == 422
+        assert said in " ".join(unescape(answer.content.decode()).split())
+
+
+def test_the_file_has_the_votes_of_the_list(study: Study, analyst: Client) -> None:
+    rate(study=study, rounds=10, filters=Filters(automatic_ties=True))
+    address = reverse("results-votes-file", args=[study.code])
+    pseudonyms = study.experts.values_list("person__pseudonym", flat=True)
+    for search in ({}, {"mark": "left_out"}, {"contestant": "ann", "outcome": "lost"}):
+        answer = analyst.get(address, search)
+        content = b"".join(answer).decode()
+        rows = list(csv.DictReader(io.StringIO(content)))
+        assert len(rows) == number_of(listed(analyst, study, **search)) > 0
+        assert {row["judge"] for row in rows} <= {"", *pseudonyms}
+    skipped = b"".join(analyst.get(address, {"mark": "skip"})).decode()
+    assert skipped.count(",skip,cannot_judge,") == 2
+
+
+def test_a_vote_shows_the_pair_as_it_was_shown(study: Study, analyst: Client) -> None:
+    rate(study=study, rounds=10)
+    vote = Vote.objects.filter(comment__contains="kerb").order_by("pk")[0]
+    shades = {"left": 10, "right": 200, "original": 90}
+    for side, row in (("left", vote.shown_left), ("right", vote.shown_right)):
+        hang(row, store(png(shades[side])))
+    Matchup.objects.filter(pk=vote.matchup_id).update(original_image=store(png(90)))
+    vote.shown_left.refresh_from_db()
+    type(vote.shown_left).objects.filter(pk=vote.shown_left_id).update(image="drawn-anew.png")
+    page = " ".join(
+        analyst.get(reverse("results-vote", args=[study.code, vote.key])).content.decode().split()
+    )
+    matchup = Matchup.objects.get(pk=vote.matchup_id)
+    for side, shade in shades.items():
+        address = reverse("shown-picture", args=[study.code, matchup.code, side])
+        assert address in page
+        assert b"".join(analyst.get(address)) == png(shade)
+    left, right = page.index("<b>A</b> is by"), page.index("<b>B</b> is by")
+    assert left < page.index(vote.shown_left.contestant.name, left) < right
+    assert page.index(vote.shown_right.contestant.name, right)
+    for said in (vote.matchup.scenario.instruction, "The car stands on the kerb.", "0.4 s"):
+        assert said in page, said
+    address = reverse("shown-picture", args=[study.code, matchup.code, "upside-down"])
+    assert analyst.get(address).status_code == 404
+
+
+def test_a_changed_vote_says_from_what_to_what(study: Study, analyst: Client) -> None:
+    rate(study=study, rounds=10)
+    later = Vote.objects.filter(supersedes__isnull=False).select_related("supersedes")[0]
+    assert later.supersedes is not None
+    for vote, other, said in (
+        (later, later.supersedes, "Changed from"),
+        (later.supersedes, later, "Changed to"),
+    ):
+        page = analyst.get(reverse("results-vote", args=[study.code, vote.key])).content.decode()
+        assert said in page
+        assert str(other.key) in page
+
+
+def test_one_walks_from_vote_to_vote_within_the_filters(study: Study, analyst: Client) -> None:
+    rate(study=study, rounds=10)
+    address = reverse("results-votes", args=[study.code])
+    page = listed(analyst, study, contestant="ann", opponent="bob")
+    total = number_of(page)
+    first = re.search(rf'href="({address}[0-9a-f-]+/\?[^"]*)"', page)
+    assert first is not None
+    here, seen = unescape(first[1]), []
+    while True:
+        shown = " ".join(analyst.get(here).content.decode().split())
+        seen.append(urlsplit(here).path)
+        assert f"Vote {len(seen)} of {total}" in shown
+        after = re.search(r'rel="next" href="([^"]*)"', shown)
+        if after is None:
+            break
+        here = unescape(after[1])
+    assert len(set(seen)) == total > 3
+
+
+def test_a_vote_given_after_the_rating_is_none_of_it(study: Study, analyst: Client) -> None:
+    snapshot = rate(study=study, rounds=10)
+    newest = Vote.objects.latest("pk")
+    Snapshot.objects.filter(pk=snapshot.pk).update(last_vote=newest.pk - 1)
+    assert analyst.get(reverse("results-vote", args=[study.code, newest.key])).status_code == 404
+
+
+def test_an_open_study_keeps_its_votes_until_an_early_look(analyst: Client) -> None:
+    study = mixed_study(close=False)
+    rate(study=study, rounds=10, early=True)
+    vote = Vote.objects.latest("pk")
+    addresses = [
+        reverse("results-votes", args=[study.code]),
+        reverse("results-votes-file", args=[study.code]),
+        reverse("results-vote", args=[study.code, vote.key]),
+        reverse("shown-picture", args=[study.code, vote.matchup.code, "left"]),
+    ]
+    hang(vote.shown_left, store(png(7)))
+    assert [analyst.get(address).status_code for address in addresses] == [403] * 4
+    eva = signed_in(vote.expert)
+    analyst.post(reverse("results-open", args=[study.code]))
+    for address in addresses:
+        answer = analyst.get(address)
+        b"".join(answer)
+        assert answer.status_code == 200, address
+        assert eva.get(address).status_code == 403
+
+
+def test_a_list_takes_as_many_queries_for_any_number_of_votes(
+    study: Study, analyst: Client, django_assert_max_num_queries: DjangoAssertNumQueries
+) -> None:
+    rate(study=study, rounds=10, filters=Filters(automatic_ties=True))
+    for search in ({"scenario": "place-3"}, {"mark": "all"}):
+        listed(analyst, study, **search)
+        with django_assert_max_num_queries(18):
+            listed(analyst, study, **search)
