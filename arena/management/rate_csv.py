@@ -5,11 +5,14 @@ manage.py comes here directly; `call_command("rate_csv")` takes the same way.
 
 from __future__ import annotations
 
+import os
 import sys
+import time
 from argparse import ArgumentParser, RawDescriptionHelpFormatter
 from collections.abc import Sequence
 from pathlib import Path
 
+from arena.management.progress_line import ProgressLine
 from arena.management.rated_by import by_label
 from arena.management.rated_csv import FORMATS, RatedCsv
 from arena.rating.bootstrap import Unit
@@ -47,11 +50,14 @@ def main(arguments: Sequence[str]) -> int:
     )
     add_arguments(parser)
     options = vars(parser.parse_args(arguments))
+    progress = ProgressLine(sys.stderr, time.monotonic)
     try:
-        said = run(**options)
+        said = run(**options, progress=progress)
     except CsvNotRated as error:
+        progress.end()
         print(escape_controls(f"CommandError: {error}"), file=sys.stderr)
         return 1
+    progress.end()
     sys.stdout.write(escape_controls(said) if sys.stdout.isatty() else said)
     return 0
 
@@ -116,6 +122,7 @@ def run(
     adjust: Sequence[str] = (),
     by: str | None = None,
     format: str = "table",
+    progress: ProgressLine | None = None,
 ) -> str:
     """What to print for a file.
 
@@ -134,7 +141,13 @@ def run(
         columns = columns_of(path)
         chosen, notes = _resample(columns, method, resample)
         _check_there(columns, adjust, by)
-        votes = read_votes(path, clusters=_CLUSTERS[chosen], covariates=adjust, label=by)
+        votes = read_votes(
+            path,
+            clusters=_CLUSTERS[chosen],
+            covariates=adjust,
+            label=by,
+            report=progress.read if progress else None,
+        )
     except VotesFileUnreadable as error:
         raise CsvNotRated(f"{path}: {error}") from error
     except OSError as error:
@@ -148,6 +161,8 @@ def run(
         order=Order(order),
         rounds=rounds or (ROUNDS_OF_MANY if many else ROUNDS),
         seed=seed,
+        workers=os.cpu_count() or 1,
+        report=progress.drawn if progress else None,
     )
     rated = RatedCsv(
         board=board,

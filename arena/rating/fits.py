@@ -17,9 +17,10 @@ from arena.rating.comparisons import BoolArray, Comparisons, FloatArray, PairCou
 from arena.rating.components import Loose, loose
 from arena.rating.connectivity import Determined, heaviest_tree
 from arena.rating.logistic import Coefficient, coefficients_of, fit_with_columns
+from arena.rating.many import ManyFitted, fit_many
 from arena.rating.pulls import Pulls, bradley_terry_pulls, davidson_pulls
 from arena.rating.reach import loose_rounds, rounds_to_draw
-from arena.rating.rules import Intervals, Method, Order, Rules
+from arena.rating.rules import LARGEST_DENSE, Intervals, Method, Order, Rules
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -38,6 +39,7 @@ class Fitted:
     strengths: FloatArray | None = None
     tie_strength: float | None = None
     coefficients: tuple[Coefficient, ...] | None = None
+    many: ManyFitted | None = None
 
 
 def fit_votes(votes: Comparisons, counts: PairCounts, rules: Rules) -> Fitted | None:
@@ -70,6 +72,11 @@ def _bradley_terry(votes: Comparisons, counts: PairCounts, rules: Rules) -> Fitt
         adjusted = _adjusted(votes, counts, rules)
         if adjusted is not None:
             return adjusted
+    if len(votes.names) > LARGEST_DENSE and rules.intervals is Intervals.CLOSED_FORM:
+        found = fit_many(len(votes.names), counts)
+        rating = to_elo(found.strengths)
+        samples, rest = _same_everywhere(votes, counts, rules, rating)
+        return Fitted(rating=rating, samples=samples, loose=rest, many=found)
     met = Meetings(contestants=len(votes.names), low=counts.low, high=counts.high)
     point = bradley_terry.newton(met, counts.games[:, None], counts.scores[:, None])[:, 0]
     curvature = bradley_terry.inverse_curvature(met, counts.games, point)
@@ -171,6 +178,8 @@ def _same_everywhere(
         unit=rules.unit,
         rounds=rounds_to_draw(votes, counts, rules.rounds),
         seed=rules.seed,
+        workers=rules.workers,
+        report=rules.report,
     )
     return np.repeat(rating[:, None], fine, axis=1), rest
 
@@ -201,7 +210,11 @@ def _samples(
     of_each = tally(votes).sum(axis=1).astype(np.float64)
     samples, rest = [np.empty((len(votes.names), 0))], [Loose.none(len(votes.names))]
     drawn = resample(votes, counts, unit=rules.unit, rounds=rules.rounds, seed=rules.seed)
+    done = 0
     for block in drawn:
+        done += block.games.shape[1]
+        if rules.report is not None:
+            rules.report(done, rules.rounds)
         fine = np.asarray(determined.among(block.games, block.scores))
         if fine.all():
             found = whole(block)

@@ -34,7 +34,7 @@ from arena.rating.lines import Line, blank_lines, fill, rank_across
 from arena.rating.logistic import Coefficient
 from arena.rating.parts import Rated, rate_part
 from arena.rating.ranking import Separation
-from arena.rating.rules import Intervals, Method, Order, Rules, default_intervals
+from arena.rating.rules import Intervals, Method, Order, Report, Rules, default_intervals
 from arena.rating.tiers import standing_order, tiers
 from augment.sentences import Sentence, sentence
 
@@ -127,6 +127,8 @@ def rate(
     k: float = elo.K,
     order: Order = Order.SHUFFLED,
     details: bool = True,
+    workers: int = 1,
+    report: Report | None = None,
 ) -> Leaderboard:
     """Rate all contestants that have votes, with 95 % intervals on the Elo scale, mean 1000.
 
@@ -147,7 +149,10 @@ def rate(
         seed: Of its draws; the same votes and seed give the same table.
         k: Points at stake in a vote, online Elo only.
         order: Online Elo's point: the median over shuffled rounds, or the recorded order.
-        details: Also what costs extra: covariance, cross-check and separation.
+        details: Also what costs extra: covariance, cross-check and separation. Above 2000
+            contestants neither covariance nor separation.
+        workers: Threads, where they help; the answer does not depend on how many.
+        report: Is told how many rounds are done.
 
     Raises:
         ValueError: Fewer than one round, online Elo with a unit other than votes, or covariates
@@ -162,12 +167,14 @@ def rate(
     rules = Rules(
         method=method,
         unit=unit,
-        intervals=intervals or default_intervals(method, unit),
+        intervals=intervals or default_intervals(method, unit, contestants=len(votes.names)),
         rounds=rounds,
         seed=seed,
         k=k,
         order=order,
         details=details,
+        workers=workers,
+        report=report,
     )
     return _rate(votes, rules)
 

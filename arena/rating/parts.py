@@ -11,11 +11,12 @@ import numpy as np
 
 from arena.rating import remarks, sandwich
 from arena.rating.bootstrap import Unit, interval
-from arena.rating.comparisons import Comparisons, FloatArray, count_pairs
+from arena.rating.comparisons import BoolArray, Comparisons, FloatArray, count_pairs
 from arena.rating.components import Placed, open_interval, place_on_one_scale
 from arena.rating.connectivity import Status
 from arena.rating.fits import Fitted, fit_votes
 from arena.rating.logistic import Coefficient
+from arena.rating.many import Variances, variances_of
 from arena.rating.moderated import Spread, spread_of
 from arena.rating.ranking import (
     Separation,
@@ -88,8 +89,11 @@ def rate_part(votes: Comparisons, rules: Rules, status: Status) -> Rated:
     if status is Status.ALL_TIES:
         return _without_intervals(found, rules, remarks.ONLY_TIES, ())
     everywhere = place_on_one_scale(found.rating, found.samples, found.loose)
-    spread = None
-    if rules.intervals is Intervals.CLOSED_FORM and found.pulls is not None:
+    spread: Spread | Variances | None = None
+    if found.many is not None:
+        reference = everywhere.reference
+        spread = variances_of(votes, found.many, rules.unit, reference, seed=rules.seed)
+    elif rules.intervals is Intervals.CLOSED_FORM and found.pulls is not None:
         spread = spread_of(votes, found.pulls, rules.unit, everywhere.reference)
     if _are_all_the_same(everywhere.values if spread is None else _ends(spread)):
         return _without_intervals(
@@ -103,12 +107,14 @@ def rate_part(votes: Comparisons, rules: Rules, status: Status) -> Rated:
         lost = found.loose.values.shape[1]
         said = remarks.why_no_interval(votes.names, lost=lost, rounds=rules.rounds)
         return _without_intervals(found, rules, remarks.TOO_FEW, said)
+    if isinstance(spread, Variances):
+        return _of_many(votes, rules, found, everywhere, bounds, spread)
     if spread is not None:
         return _in_closed_form(votes, rules, found, everywhere, bounds, spread)
     return _by_rounds(votes, rules, found, everywhere, bounds)
 
 
-def _ends(spread: Spread) -> FloatArray:
+def _ends(spread: Spread | Variances) -> FloatArray:
     """(C, 2) both ends of the intervals, around zero."""
     half = spread.half_widths()
     return np.stack([-half, half], axis=1)
@@ -162,7 +168,13 @@ def _by_rounds(
         found = sandwich.covariance(votes, fit.pulls, rules.unit)
         plain = sandwich.relative_to(found, everywhere.reference)
     ends = (lower, upper)
-    return _with_intervals(votes, rules, fit, everywhere, ends, judged, covariance, plain)
+    error = None if plain is None else _errors(plain)
+    return _with_intervals(votes, rules, fit, everywhere, ends, judged, covariance, error)
+
+
+def _errors(covariance: FloatArray) -> FloatArray:
+    """(C,) standard errors."""
+    return np.asarray(np.sqrt(np.maximum(covariance.diagonal(), 0.0)))
 
 
 def _in_closed_form(
@@ -181,8 +193,26 @@ def _in_closed_form(
         fit.rating[members], spread.among(members), rounds=rules.rounds, seed=rules.seed
     ).among(members, len(fit.rating))
     bounds = (fit.rating - below, fit.rating + above)
+    plain = _errors(spread.plain)
+    return _with_intervals(votes, rules, fit, everywhere, bounds, judged, spread.covariance, plain)
+
+
+def _of_many(
+    votes: Comparisons,
+    rules: Rules,
+    fit: Fitted,
+    everywhere: Placed,
+    open_bounds: tuple[FloatArray, FloatArray],
+    spread: Variances,
+) -> Rated:
+    """The same without covariances: places go by intervals that hold for all at once."""
+    half = spread.half_widths()
+    below, above = (np.where(np.isnan(bound), np.nan, half) for bound in open_bounds)
+    wide = spread.half_widths(alike=len(half))
+    shown = (fit.rating - wide)[:, None] > (fit.rating + wide)[None, :]
+    bounds = (fit.rating - below, fit.rating + above)
     return _with_intervals(
-        votes, rules, fit, everywhere, bounds, judged, spread.covariance, spread.plain
+        votes, rules, fit, everywhere, bounds, None, None, np.sqrt(spread.plain), shown
     )
 
 
@@ -194,19 +224,22 @@ def _with_intervals(
     bounds: tuple[FloatArray, FloatArray],
     judged: Separation | None,
     covariance: FloatArray | None,
-    plain: FloatArray | None,
+    plain_error: FloatArray | None,
+    apart: BoolArray | None = None,
 ) -> Rated:
     lower, upper = bounds
     rank = shown_ranks(lower, upper, average=float(fit.rating[everywhere.reference].mean()))
-    nobody = np.zeros((len(lower), len(lower)), dtype=bool)
-    shown = above_by_bounds(nobody if judged is None else judged.above, lower, upper)
+    if apart is None:
+        nobody = np.zeros((len(lower), len(lower)), dtype=bool)
+        apart = nobody if judged is None else judged.above
+    shown = above_by_bounds(apart, lower, upper)
     best, worst = rank_sets(shown)
     unbounded = np.isnan(lower) & np.isnan(upper)
     best[unbounded] = worst[unbounded] = 0
     check = None
-    if rules.details and plain is not None and rules.method is Method.BRADLEY_TERRY:
+    if rules.details and plain_error is not None and rules.method is Method.BRADLEY_TERRY:
         few = remarks.few_clusters(votes, rules.unit)
-        check = np.asarray(sandwich.factor(few) * np.sqrt(np.maximum(plain.diagonal(), 0.0)))
+        check = np.asarray(sandwich.factor(few) * plain_error)
         check[np.isnan(lower) | np.isnan(upper)] = np.nan
     degenerate, drawn = fit.loose.values.shape[1], everywhere.values.shape[1]
     notes = remarks.notes_on_bounds(lower, upper, rank)

@@ -9,6 +9,10 @@ Notation: C contestants, P pairs, B and N rounds, which are the last axis, R row
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
+from itertools import islice
+
 import numpy as np
 
 from arena.rating.bootstrap import Unit, resample
@@ -71,6 +75,8 @@ def loose_rounds(
     unit: Unit,
     rounds: int,
     seed: int,
+    workers: int = 1,
+    report: Callable[[int, int], None] | None = None,
 ) -> tuple[int, Loose]:
     """How many rounds determine everybody, and what the others say.
 
@@ -82,31 +88,43 @@ def loose_rounds(
         unit: What is drawn.
         rounds: How many.
         seed: Of the draws.
+        workers: Threads that follow the scores of rounds; the answer does not depend on them.
+        report: Is told how many rounds are done, and of how many.
     """
     contestants = len(votes.names)
     if _is_certain(votes, counts, tree, contestants):
         return rounds, Loose.none(contestants)
     by_votes = np.argsort(-tally(votes).sum(axis=1), kind="stable")
-    in_main: list[BoolArray] = []
-    sides: list[IntArray] = []
-    outer: list[IntArray] = []
-    fine = 0
-    for block in resample(votes, counts, unit=unit, rounds=rounds, seed=seed):
-        games, scores = block.games, block.scores
-        known = np.zeros(games.shape[1], dtype=np.bool_)
-        if len(tree) == contestants - 1:
-            of_tree = scores[tree]
-            known = np.asarray(((of_tree > 0) & (of_tree < games[tree])).all(axis=0))
-        fine += int(known.sum())
-        for number in np.flatnonzero(~known).tolist():
-            edges = _edges(counts.low, counts.high, games[:, number], scores[:, number])
-            above, below = _around_the_largest(by_votes, *edges)
-            if below.all() and above.all():
-                fine += 1
-                continue
-            in_main.append(below & above)
-            sides.append(1 * above - 1 * below)
-            outer.append(_outermost(contestants, *edges))
+    ways = _Ways(contestants, counts.low, counts.high)
+
+    def follow(alive: BoolArray) -> tuple[BoolArray, BoolArray, IntArray] | None:
+        above, below = _around_the_largest(by_votes, ways, alive)
+        if below.all() and above.all():
+            return None
+        return below & above, 1 * above - 1 * below, _outermost(contestants, ways, alive)
+
+    fine, found, done = 0, [], 0
+    drawn = resample(votes, counts, unit=unit, rounds=rounds, seed=seed)
+    with ThreadPoolExecutor(workers) as pool:
+        while some := list(islice(drawn, workers)):
+            unclear: list[BoolArray] = []
+            for block in some:
+                games, scores = block.games, block.scores
+                done += games.shape[1]
+                known = np.zeros(games.shape[1], dtype=np.bool_)
+                if len(tree) == contestants - 1:
+                    of_tree = scores[tree]
+                    known = np.asarray(((of_tree > 0) & (of_tree < games[tree])).all(axis=0))
+                fine += int(known.sum())
+                rest = np.flatnonzero(~known)
+                up, down = scores[:, rest] > 0, scores[:, rest] < games[:, rest]
+                unclear += list(np.concatenate([up, down]).T)
+            if report is not None:
+                report(done, rounds)
+            found += list(pool.map(follow, unclear) if workers > 1 else map(follow, unclear))
+    loose = [one for one in found if one is not None]
+    fine += len(found) - len(loose)
+    in_main, sides, outer = [list(column) for column in zip(*loose, strict=True)] or [[]] * 3
     if not sides:
         return fine, Loose.none(contestants)
     main = np.array(in_main).T
@@ -121,20 +139,62 @@ def loose_rounds(
 # --- Private -----------------------------------------------------------------------------------
 
 
+class _Ways:
+    """Who may have scored against whom: every pair both ways, first all from low to high."""
+
+    def __init__(self, contestants: int, low: IntArray, high: IntArray) -> None:
+        self.contestants = contestants
+        source, target = np.concatenate([low, high]), np.concatenate([high, low])
+        self._forwards = self._by_end(source, target)
+        self._backwards = self._by_end(target, source)
+
+    def below(self, start: int, alive: BoolArray) -> BoolArray:
+        """(C,) whom a contestant reaches by the ways (2 P,) that are alive."""
+        return self._follow(start, alive, *self._forwards)
+
+    def above(self, start: int, alive: BoolArray) -> BoolArray:
+        """(C,) who reaches a contestant."""
+        return self._follow(start, alive, *self._backwards)
+
+    @staticmethod
+    def _by_end(begin: IntArray, end: IntArray) -> tuple[IntArray, IntArray, IntArray, IntArray]:
+        order = np.argsort(end, kind="stable")
+        ends, starts = np.unique(end[order], return_index=True)
+        return order, begin[order], ends, starts
+
+    def _follow(
+        self,
+        start: int,
+        alive: BoolArray,
+        order: IntArray,
+        begin: IntArray,
+        ends: IntArray,
+        starts: IntArray,
+    ) -> BoolArray:
+        reached = np.zeros(self.contestants, dtype=np.bool_)
+        reached[start] = True
+        alive, number = alive.take(order), 1
+        while len(begin):
+            hit = np.logical_or.reduceat(alive & reached.take(begin), starts)
+            reached[ends[hit]] = True
+            if (now := int(reached.sum())) in (number, self.contestants):
+                break
+            number = now
+        return reached
+
+
 def _around_the_largest(
-    by_votes: IntArray, source: IntArray, target: IntArray
+    by_votes: IntArray, ways: _Ways, alive: BoolArray
 ) -> tuple[BoolArray, BoolArray]:
     """(C,), (C,): who reaches the largest component, and whom it reaches; it does both itself."""
-    contestants = len(by_votes)
-    left = np.ones(contestants, dtype=np.bool_)
+    left = np.ones(len(by_votes), dtype=np.bool_)
     largest, found = 0, (left, left)
     for start in by_votes.tolist():
         if left.sum() <= largest:
             break
         if not left[start]:
             continue
-        below = reached_from(start, contestants, source, target)
-        above = reached_from(start, contestants, target, source)
+        below, above = ways.below(start, alive), ways.above(start, alive)
         together = below & above
         left &= ~together
         if (size := int(together.sum())) > largest:
@@ -142,14 +202,13 @@ def _around_the_largest(
     return found
 
 
-def _outermost(contestants: int, source: IntArray, target: IntArray) -> IntArray:
+def _outermost(contestants: int, ways: _Ways, alive: BoolArray) -> IntArray:
     """(C,) 1 for who reaches everybody without being reached by all, -1 for the opposite."""
-    ways = ((source, target), (target, source))
+    if contestants > _FEW:
+        return np.zeros(contestants, dtype=np.int64)
     over, under = (
-        [reached_from(one, contestants, *way).all() for one in range(contestants)]
-        if contestants <= _FEW
-        else [False] * contestants
-        for way in ways
+        [follow(one, alive).all() for one in range(contestants)]
+        for follow in (ways.below, ways.above)
     )
     return np.asarray(1 * np.array(over) - 1 * np.array(under), dtype=np.int64)
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from enum import StrEnum
 
@@ -30,9 +31,16 @@ class Intervals(StrEnum):
     RESAMPLES = "resamples"
 
 
-def default_intervals(method: Method, unit: Unit) -> Intervals:
-    """In closed form wherever votes hang together; single votes are resampled as in the paper."""
-    if method is Method.ELO or unit is Unit.VOTE:
+LARGEST_DENSE = 2000
+"""Among more contestants no matrix of all of them is made: see `arena.rating.many`."""
+
+
+def default_intervals(method: Method, unit: Unit, *, contestants: int = 0) -> Intervals:
+    """In closed form wherever votes hang together; single votes are resampled as in the paper.
+
+    Among very many contestants those are in closed form as well: resamples would take hours.
+    """
+    if method is Method.ELO or (unit is Unit.VOTE and contestants <= LARGEST_DENSE):
         return Intervals.RESAMPLES
     return Intervals.CLOSED_FORM
 
@@ -44,6 +52,10 @@ def unit_for(*, judges: bool, items: bool) -> Unit:
     if judges:
         return Unit.EXPERT
     return Unit.SCENARIO if items else Unit.VOTE
+
+
+Report = Callable[[int, int], None]
+"""Is told how many rounds are done, and of how many."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -58,6 +70,8 @@ class Rules:
     k: float
     order: Order
     details: bool
+    workers: int = 1
+    report: Report | None = None
 
     def __post_init__(self) -> None:
         if self.rounds < 1:

@@ -8,7 +8,7 @@ take seconds and little memory: no text is kept but the names.
 from __future__ import annotations
 
 import csv
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from itertools import islice
 from pathlib import Path
@@ -63,6 +63,7 @@ def read_votes(
     clusters: Sequence[str],
     covariates: Sequence[str] = (),
     label: str | None = None,
+    report: Callable[[int], None] | None = None,
 ) -> VotesFile:
     """Read all votes.
 
@@ -72,6 +73,7 @@ def read_votes(
         covariates: What else may say who wins: `side`, or a name NAME with columns NAME_a and
             NAME_b of numbers, of which the difference counts.
         label: A column to tell votes apart by.
+        report: Is told how many votes are read.
 
     Raises:
         VotesFileUnreadable: A column is missing, a winner is unknown, a cell that is needed is
@@ -83,7 +85,7 @@ def read_votes(
     wanted = (*NEEDED, *more)
     names = [_Codes() for _ in range(1 + len(more))]
     try:
-        rows, counts = _read(path, wanted, names)
+        rows, counts = _read(path, wanted, names, report)
     except VotesFileUnreadable:
         raise
     except (ValueError, KeyError, csv.Error) as error:
@@ -154,19 +156,27 @@ class _Winners(dict[str, int]):
 # --- The quick pass ------------------------------------------------------------------------------
 
 
-def _read(path: Path, wanted: Sequence[str], names: list[_Codes]) -> tuple[Rows, IntArray]:
+def _read(
+    path: Path,
+    wanted: Sequence[str],
+    names: list[_Codes],
+    report: Callable[[int], None] | None,
+) -> tuple[Rows, IntArray]:
     """(R, 3 + clusters) first, second, outcome in half points, clusters; (R,) how often."""
     coders = [names[0], names[0], _Winners(), *names[1:]]
     parts: list[tuple[Rows, IntArray]] = [
         (np.empty((0, len(wanted)), np.int32), np.empty(0, np.int64))
     ]
-    pending = 0
+    pending = total = 0
     with open_votes(path) as table:
         places = [table.header.index(name) for name in wanted]
         while block := list(islice(table.rows, _LINES_AT_ONCE)):
             rows = _coded(block, len(table.header), places, coders)
             parts.append((rows, np.ones(len(rows), dtype=np.int64)))
             pending += len(rows)
+            total += len(rows)
+            if report is not None:
+                report(total)
             if pending > _ROWS_BEFORE_GROUPING and len(wanted) == len(NEEDED):
                 parts = [_grouped(parts)]
                 pending = 0

@@ -25,7 +25,11 @@ class Command(TerminalCommand):
         """Rate, then print."""
         try:
             said = rate_csv.run(
-                **{name: options[name] for name in signature(rate_csv.run).parameters}
+                **{
+                    name: options[name]
+                    for name in signature(rate_csv.run).parameters
+                    if name in options
+                }
             )
         except rate_csv.CsvNotRated as error:
             raise CommandError(str(error)) from error
