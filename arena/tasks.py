@@ -6,11 +6,20 @@ page of a rating that waits offers to send it once more).
 
 from __future__ import annotations
 
+import logging
+from threading import Thread
+
 from celery import shared_task
+from celery.signals import worker_ready
+from django.conf import settings
+from django.db import connection
 
 from arena.exports.scenario_files import write_file
-from arena.services import ratings
+from arena.services import looks, ratings
 from augment.broker import open_broker
+from augment.services.running import stopping, workers
+
+logger = logging.getLogger(__name__)
 
 
 @shared_task(name="arena.compute_snapshot", acks_late=True, ignore_result=True)
@@ -43,3 +52,19 @@ def send_scenario_file(file_pk: int) -> None:
     """
     with open_broker() as broker:
         write_scenario_file.apply_async((file_pk,), connection=broker, retry=False)
+
+
+@worker_ready.connect
+def start_watching(**_: object) -> None:
+    """Take the looks of stopping rules as they fall due, in a thread of the worker."""
+    Thread(target=_watch_until_stopped, name="looks", daemon=True).start()
+
+
+def _watch_until_stopped() -> None:
+    while not stopping.is_stop_requested():
+        with workers.Survived() as watch:
+            looks.take_due_looks()
+        if watch.fault is not None:
+            logger.warning("No look at the stopping rules: %s", watch.fault)
+        connection.close()
+        stopping.wait(settings.RECOVER_EVERY_S)

@@ -6,6 +6,8 @@ import json
 from collections.abc import Iterable, Sequence
 from typing import Any
 
+from arena.exports.hypotheses import COLUMNS as HYPOTHESIS_COLUMNS
+from arena.exports.hypotheses import hypothesis_row
 from arena.exports.rating_charts import CONTENT_TYPES as CHART_FORMATS
 from arena.exports.rating_charts import charts
 from arena.exports.tables import leaderboard_table
@@ -17,6 +19,7 @@ from arena.rating.interactions import Interaction
 from arena.results.codec import results_document
 from arena.results.tree import Results
 from arena.services.cells import csv_text
+from arena.services.preregistration import FILE_NAME, preregistration_bytes
 from arena.services.vote_rows import digest_of
 
 MANIFEST = "manifest.json"
@@ -63,6 +66,11 @@ def _files(snapshot: Snapshot) -> dict[str, bytes]:
         files["type_effects.csv"] = _cells(results.trust.by_type)
         files["side_effects.csv"] = _cells(results.trust.by_side)
         files["sessions.csv"] = _sessions(results)
+    frozen = preregistration_bytes(snapshot.study)
+    if frozen:
+        files[FILE_NAME] = frozen
+    if table.hypotheses:
+        files["hypotheses.csv"] = _csv(HYPOTHESIS_COLUMNS, map(hypothesis_row, table.hypotheses))
     files["statistics.json"] = _json(_public(results))
     return files
 
@@ -78,6 +86,9 @@ def _manifest(snapshot: Snapshot, files: dict[str, bytes]) -> bytes:
             "rated_at": snapshot.made_at.isoformat(),
             "simulated": table.simulated,
             "early": table.early,
+            "preregistration": {"file": FILE_NAME, "sha256": table.preregistration}
+            if table.preregistration
+            else None,
             "warnings": list(table.warnings),
             "method": {
                 "name": table.method,

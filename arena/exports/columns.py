@@ -84,6 +84,7 @@ COLUMNS = (
     _column("early", YES_NO, key="", of_table=True),
     _column("rank_best", WHOLE, unit=PLACE),
     _column("rank_worst", WHOLE, unit=PLACE),
+    _column("preregistration", key="", of_table=True),
     Column(value=attrgetter("ranks_text"), unit=PLACE, printed="95% ranks",
            text=attrgetter("ranks_text")),
 )  # fmt: skip

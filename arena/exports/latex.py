@@ -21,6 +21,7 @@ def latex(table: LeaderboardTable) -> str:
         comments=(
             f"{table.study}: {table.votes} votes; {table.method_text}",
             f"votes sha256 {table.votes_sha256}",
+            *((table.frozen_text,) if table.frozen_text else ()),
             *table.warnings,
         ),
         notes=table.missing,

@@ -17,6 +17,8 @@ from arena.rating.printed import (
     rating_text,
 )
 from arena.rating.rules import METHOD_TEXTS, UNIT_TEXTS, Intervals
+from arena.services.hypotheses import Answered, answer_hypotheses
+from arena.services.preregistration import preregistration_sha256
 from augment.sentences import Sentence, sentence
 
 SIMULATED = " (simulated)"
@@ -113,6 +115,8 @@ class LeaderboardTable:
         notes: What else the method has to say about these votes.
         left_out: Votes that do not count, by reason.
         covariates: What the ratings are adjusted for.
+        preregistration: The SHA-256 of the file that was frozen at the opening, empty without.
+        hypotheses: What was expected, and what the rating says of it.
     """
 
     study: str
@@ -131,6 +135,8 @@ class LeaderboardTable:
     early: bool
     notes: tuple[str, ...] = ()
     covariates: tuple[str, ...] = ()
+    preregistration: str = ""
+    hypotheses: tuple[Answered, ...] = ()
 
     @property
     def status(self) -> str:
@@ -164,6 +170,11 @@ class LeaderboardTable:
         marks = ((SIMULATED_TABLE, self.simulated), (EARLY_LOOK, self.early))
         said = [mark for mark, so in marks if so]
         return (*said, *((self.status,) if self.status else ()), *self.notes)
+
+    @property
+    def frozen_text(self) -> str:
+        """What was frozen before the first vote, in one line; empty without."""
+        return f"preregistered: sha256 {self.preregistration}" if self.preregistration else ""
 
     @property
     def missing(self) -> list[str]:
@@ -214,6 +225,8 @@ def leaderboard_table(snapshot: Snapshot) -> LeaderboardTable:
         early=snapshot.is_early,
         notes=sentences_of(board.warnings, names),
         covariates=_covariates(snapshot),
+        preregistration=preregistration_sha256(snapshot.study),
+        hypotheses=answer_hypotheses(snapshot),
     )
 
 

@@ -8,6 +8,7 @@ from typing import Any
 from arena.exports.charts import interval_chart
 from arena.exports.columns import IN_FILES, IN_JSON, PRINTED
 from arena.exports.formats import Format, drawings, formats, round_value
+from arena.exports.hypotheses import hypotheses_document, hypothesis_line
 from arena.exports.latex import latex
 from arena.exports.parquet import parquet_bytes
 from arena.exports.tables import LeaderboardTable, Row
@@ -41,6 +42,8 @@ def json_bytes(table: LeaderboardTable) -> bytes:
             "left_out": table.left_out,
             "sha256": table.votes_sha256,
         },
+        "preregistration": table.preregistration or None,
+        "hypotheses": hypotheses_document(table.hypotheses),
         "status": table.status,
         "standings": [_standing(table, row) for row in table.rows],
     }
@@ -68,6 +71,9 @@ def plain_text(table: LeaderboardTable) -> str:
     lines += ["", *(f"{line}." for line in table.missing)]
     lines.append(f"{table.votes} votes counted; left out: {left_out or 'none'}.")
     lines.append(f"{table.method_text}.")
+    if table.frozen_text:
+        lines.append(f"{table.frozen_text[0].upper()}{table.frozen_text[1:]}.")
+    lines += [hypothesis_line(one) for one in table.hypotheses]
     return "\n".join([*lines, *table.warnings])
 
 

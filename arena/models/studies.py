@@ -48,6 +48,15 @@ class Study(models.Model):
     allow_simulated = models.BooleanField(
         default=False, help_text="simulated contestants and votes count; everything then says so"
     )
+    preregistration = models.TextField(
+        blank=True, help_text="the file that was frozen at the opening, as it is downloaded"
+    )
+    looks = models.JSONField(
+        default=list, help_text="what the stopping rule saw, one entry a look; no contestant's"
+    )
+    entered = models.JSONField(
+        default=dict, help_text="what was entered of a draft, by field; empty once it is open"
+    )
     opened_at = models.DateTimeField(null=True, blank=True)
     closed_at = models.DateTimeField(null=True, blank=True)
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict
 from typing import Any
 
 from django.contrib.auth.models import User
@@ -16,7 +16,10 @@ from arena.pairing.plan import Check, Entry, MatchupPlan, PlanRules, plan
 from arena.queries.people import experts as expert_accounts
 from arena.services.attention_checks import enough_checks, placed_checks
 from arena.services.frames import Cells
+from arena.services.hypotheses import read_hypotheses
+from arena.services.plan_options import OF_THE_PLAN, PlanOptions
 from arena.services.plans import rules_of, store
+from arena.services.preregistration import preregister
 from arena.services.replays import Replays, replays_of
 from arena.services.showable import windows_of
 from arena.services.shown_pictures import SampleRule, StudyPictures, choose_pictures
@@ -32,37 +35,6 @@ __all__ = ["PlanOptions", "close_study", "open_study", "rules_of"]
 
 PLANNER = "balanced-2"
 """Name and version of the planner, kept with the rules so that a plan can be made again."""
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class PlanOptions:
-    """Rules of a plan beyond who takes part; see arena.pairing.rules for what they mean.
-
-    Attributes:
-        check_share: Needs as many scenarios with pictures for an attention check; see
-            `enough_checks`.
-        samples: Which samples of a cell are shown.
-        jobs: Names or codes of the jobs whose augmentations are shown; none for every job.
-    """
-
-    repeat_share: float = 0.0
-    overlap_share: float = 0.0
-    check_share: float = 0.0
-    adaptive_share: float = 0.0
-    appearances: tuple[tuple[str, int], ...] = ()
-    pair_votes: tuple[tuple[str, str, int], ...] = ()
-    allow_both_miss: bool = False
-    allow_text: bool = False
-    settle_alike: bool = False
-    allow_replay: bool = False
-    samples: SampleRule = SampleRule.ONE
-    jobs: tuple[str, ...] = ()
-
-
-_OF_THE_PLAN = (
-    *("appearances", "pair_votes", "repeat_share", "overlap_share", "check_share"),
-    "adaptive_share",
-)
 
 
 @transaction.atomic
@@ -96,7 +68,7 @@ def open_study(
         UnknownName: A contestant, scenario or expert does not exist.
         Conflict: The name is taken, the seed is out of range, or something simulated takes part
             unasked.
-        NothingToPlan: Pictures or drives are missing or too few, also of checks; the text says.
+        NothingToPlan: A hypothesis can't be read; pictures, drives or checks are missing.
     """
     name, given = _free_name(name), options or PlanOptions()
     _check_seed(seed)
@@ -116,7 +88,7 @@ def open_study(
         seed=seed,
         checks=checks,
         alike=alike_pairs(shown.cells) if given.settle_alike else (),
-        **{name: getattr(given, name) for name in _OF_THE_PLAN},
+        **{name: getattr(given, name) for name in OF_THE_PLAN},
     )
     planned = plan(rules)
     played = replays_of(broken | shown.cells) if given.allow_replay else None
@@ -124,7 +96,7 @@ def open_study(
     study = _insert(name, frozen, given, rules, allow_simulated)
     _enrol(study, contestant_rows, scenario_rows, expert_rows)
     store(study, planned.matchups, broken | shown.cells, expert_rows)
-    _log_opening(study, matchups=len(planned.matchups), actor=actor)
+    _conclude_opening(study, matchups=len(planned.matchups), actor=actor)
     return study
 
 
@@ -279,15 +251,23 @@ def _enrol(
 
 
 def _frozen_pictures(given: PlanOptions, shown: StudyPictures) -> dict[str, Any]:
-    """Which pictures are shown: the rule for samples, the jobs they come from, the options."""
-    return {
+    """Which pictures are shown: the rule for samples, the jobs they come from, the options.
+
+    Beside them what is expected of their contestants.
+
+    Raises:
+        NothingToPlan: A hypothesis can't be read.
+    """
+    contestants = sorted({contestant for _, contestant in shown.cells})
+    return given.frozen_aims(read_hypotheses(given.hypotheses, contestants)) | {
         "samples": given.samples.value,
         "jobs": [{"code": str(job.code), "name": job.name} for job in shown.jobs],
         "options": dict(sorted(shown.options.items())),
     }
 
 
-def _log_opening(study: Study, *, matchups: int, actor: User | None) -> None:
+def _conclude_opening(study: Study, *, matchups: int, actor: User | None) -> None:
+    preregister(study)
     log_event(
         actor=actor,
         verb="open",

@@ -56,6 +56,7 @@ _VERBS: dict[str, str | Promise] = {
     "rate early": gettext_lazy("rated early"),
     "rating failed": gettext_lazy("a rating failed"),
     "look early": gettext_lazy("looked at results early"),
+    "look": gettext_lazy("took a look of the stopping rule"),
     "hand over": gettext_lazy("handed over"),
     "plan batch": gettext_lazy("planned a batch"),
     "simulate votes": gettext_lazy("simulated votes"),

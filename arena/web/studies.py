@@ -9,6 +9,7 @@ from django.contrib import messages
 from django.contrib.auth.models import User
 from django.http import Http404, HttpRequest, HttpResponse
 from django.shortcuts import get_object_or_404, redirect, render
+from django.utils.text import slugify
 from django.utils.translation import gettext as _
 from django.views.decorators.http import require_http_methods, require_POST, require_safe
 
@@ -22,6 +23,9 @@ from arena.queries.people import by_pseudonym, experts
 from arena.queries.results import latest_snapshot
 from arena.queries.votes import tallies
 from arena.services.handing_over import hand_over
+from arena.services.hypotheses import hypotheses_of
+from arena.services.looks import stopping_progress
+from arena.services.preregistration import preregistration_bytes, preregistration_sha256
 from arena.services.studies import close_study, open_study, rules_of
 from arena.web.access import ADMIN, STAFF, allow_only
 from arena.web.questions import ask, is_sure, wants_to_change
@@ -91,8 +95,27 @@ def study_page(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
         "coverage": coverage(study),
         "reports": list(reports_of(study)),
         "accounts": by_pseudonym(experts()),
+        "hypotheses": hypotheses_of(study),
+        "frozen": preregistration_sha256(study),
+        "stopping": stopping_progress(study),
     }
     return render(request, "studies/study.html", context)
+
+
+@allow_only(*STAFF)
+@require_safe
+def preregistration_file(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
+    """What was frozen at the opening, byte for byte."""
+    study = get_object_or_404(Study, code=code)
+    content = preregistration_bytes(study)
+    if not content:
+        raise Http404
+    name = f"{slugify(study.name) or 'study'}-preregistration.json"
+    return HttpResponse(
+        content,
+        content_type="application/json",
+        headers={"Content-Disposition": f'attachment; filename="{name}"'},
+    )
 
 
 @allow_only(ADMIN)

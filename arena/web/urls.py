@@ -129,6 +129,11 @@ urlpatterns: list[URLPattern] = [
     path("studies/plan/", planning.planning_page, name="study-plan"),
     path("studies/new/", studies.new_study_page, name="study-new"),
     path("studies/<uuid:code>/", studies.study_page, name="study"),
+    path(
+        "studies/<uuid:code>/preregistration.json",
+        studies.preregistration_file,
+        name="preregistration",
+    ),
     path("studies/<uuid:code>/experts/", invitations.experts_page, name="experts"),
     path("studies/<uuid:code>/experts/invite/", invitations.invite_experts, name="invite"),
     path("invitations/<uuid:code>/revoke/", invitations.revoke_invitation, name="revoke"),

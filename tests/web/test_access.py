@@ -64,6 +64,7 @@ PAGES: dict[str, tuple[int, int, int]] = {
     "study-plan": (200, 200, 403),
     "study-new": (200, 403, 403),
     "study": (200, 200, 403),
+    "preregistration": (200, 200, 403),
     "experts": (200, 403, 403),
     "results": (200, 200, 403),  # a page that asks whether to look early
     "results-tab": (200, 200, 403),
@@ -205,7 +206,10 @@ def address(name: str, here: World) -> str:
     if name == "author-back":
         marked = mark_author(study=here.study, expert=here.expert, contestant="ann")
         arguments["author-back"] = {"code": marked.code}
-    own = ("study", "experts", "invite", "author", "study-close", "study-hand-over", "study-rate")
+    own = (
+        *("study", "preregistration", "experts", "invite", "author", "study-close"),
+        *("study-hand-over", "study-rate"),
+    )
     results = ("results", "results-votes", "results-votes-file", "results-open")
     is_of_study = name in own + results or name.startswith("vote")
     found = {"code": here.study.code} if is_of_study else arguments.get(name, {})

@@ -16,6 +16,7 @@ from arena.exports.displacement_objects import object_rows
 from arena.exports.study_folder.closure import Closure
 from arena.models import Matchup, Snapshot, Vote
 from arena.services.cells import csv_text
+from arena.services.preregistration import FILE_NAME, preregistration_bytes
 from augment.models import Augmentation, Contestant, GenerationJob, Scenario
 from augment.services.running.transcript_export import record_of
 from augment.services.running.transcript_steps import Try, tries_by_augmentation
@@ -45,6 +46,8 @@ def files_for_people(closure: Closure) -> Iterator[File]:
     augmentations = _augmentations(closure)
     yield "augmentations.csv", csv_text(ROWS, map(_augmentation, augmentations)).encode()
     yield "contestants.json", _json([_contestant(found) for found in _contestants(closure)])
+    if frozen := preregistration_bytes(closure.study):
+        yield FILE_NAME, frozen
     scenarios = _scenarios(closure)
     for scenario in scenarios:
         yield f"scenarios/{scenario.slug}.json", _json(_scenario(scenario))

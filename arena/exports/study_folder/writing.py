@@ -19,6 +19,7 @@ from arena.errors import ArenaError
 from arena.exports.study_folder.closure import Closure, close_over, travelling_rows
 from arena.exports.study_folder.tables import files_for_people
 from arena.models import Study
+from arena.services.preregistration import preregistration_sha256
 from arena.services.stored_rows import (
     applied_migrations,
     as_line,
@@ -122,6 +123,7 @@ def _manifest(closure: Closure, counts: dict[str, int], digests: dict[str, str])
             "opened_at": study.opened_at.isoformat() if study.opened_at else None,
             "closed_at": study.closed_at.isoformat() if study.closed_at else None,
             "allow_simulated": study.allow_simulated,
+            "preregistration": preregistration_sha256(study) or None,
         },
         "packages": {name: version(name) for name in PACKAGES},
         "migrations": applied_migrations(),
