@@ -92,6 +92,7 @@ class VotesView(ApiView):
         return Response(
             {
                 "saved": now.progress.voted,
+                "skipped": now.progress.skipped,
                 "total": now.progress.total,
                 "minutes_left": now.progress.minutes_left,
                 "next": [as_shown(matchup, translate_all) for matchup in coming],

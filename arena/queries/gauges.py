@@ -33,6 +33,7 @@ class Gauge:
 def read_gauges() -> list[Gauge]:
     """All of them: ten queries."""
     found = workforce()
+    votes = Vote.objects.exclude(outcome=Vote.Outcome.SKIP)
     return [
         Gauge("arena_workers", "Workers heard a moment ago", "", (("", found.living),)),
         Gauge("arena_recovery", "1 where lost work is brought back", "", (("", found.works),)),
@@ -42,7 +43,7 @@ def read_gauges() -> list[Gauge]:
         _count("arena_snapshots", "Ratings", Snapshot.objects.all(), "state"),
         _count("arena_studies", "Studies", Study.objects.all(), "state"),
         _count("arena_matchups", "Planned pairs", Matchup.objects.all(), "study__state"),
-        _count("arena_votes", "Votes kept", Vote.objects.all(), "matchup__study__state"),
+        _count("arena_votes", "Votes kept", votes, "matchup__study__state"),
         *_calls(),
     ]
 

@@ -75,9 +75,10 @@ def expert_lines(study: Study, now: datetime) -> list[ExpertLine]:
     pace: dict[int, list[int]] = defaultdict(list)
     last_vote: dict[int, datetime] = {}
     votes = Vote.objects.filter(matchup__study=study).order_by("at", "pk")
-    for expert, ms_visible, at in votes.values_list("expert", "ms_visible", "at"):
+    shown = ("expert", "outcome", "ms_visible", "at")
+    for expert, outcome, ms_visible, at in votes.values_list(*shown):
         last_vote[expert] = at
-        if ms_visible is not None:
+        if ms_visible is not None and outcome != Vote.Outcome.SKIP:
             pace[expert].append(ms_visible)
     newest = {
         row.expert_id: row

@@ -21,18 +21,19 @@ class VotingProgress:
     """How far an expert is.
 
     Attributes:
-        voted: Matchups that are decided, be it by a skip.
+        voted: Matchups with a vote; `skipped` those that were skipped instead.
         pace_ms: How long the expert's latest pairs were on screen on average, None before any.
     """
 
     total: int
     voted: int
+    skipped: int
     pace_ms: float | None
 
     @property
     def left(self) -> int:
-        """Matchups without a vote."""
-        return self.total - self.voted
+        """Matchups that still wait for a decision."""
+        return self.total - self.voted - self.skipped
 
     @property
     def minutes_left(self) -> int | None:
@@ -103,8 +104,25 @@ def recent_votes(*, study: Study, expert: User, n: int = 10) -> list[Vote]:
     return list(votes.order_by("-matchup__position")[:n])
 
 
+def skipped_pairs(*, study: Study, expert: User) -> list[Vote]:
+    """The expert's skips that count, by the place of their pairs; each can be voted on still."""
+    skips = current_votes(study).filter(expert=expert, outcome=Vote.Outcome.SKIP)
+    found = skips.select_related("matchup__scenario").defer("matchup__scenario__reference")
+    return list(found.order_by("matchup__position"))
+
+
+def skip_of(*, study: Study, expert: User, key: str) -> Vote | None:
+    """The expert's skip of that key, None where it counts no longer or the key is none."""
+    try:
+        asked = UUID(key)
+    except ValueError:
+        return None
+    skips = current_votes(study).filter(expert=expert, outcome=Vote.Outcome.SKIP)
+    return skips.filter(key=asked).select_related("matchup__scenario").first()
+
+
 def voting_progress(*, study: Study, expert: User) -> VotingProgress:
-    """How many of the expert's matchups are decided; one query."""
+    """How many of the expert's matchups have a vote, and how many were skipped; one query."""
     return voting_state(study_pk=study.pk, expert=expert, since=timezone.now()).progress
 
 
@@ -118,7 +136,9 @@ def voting_state(*, study_pk: int, expert: User, since: datetime) -> VotingState
     """
     now = study_now(study_pk=study_pk, expert_pk=expert.pk, since=since)
     total = now.total + now.study.votes_to_plan.get(expert.username, 0)
-    progress = VotingProgress(total=total, voted=now.voted, pace_ms=now.pace_ms)
+    progress = VotingProgress(
+        total=total, voted=now.voted, skipped=now.skipped, pace_ms=now.pace_ms
+    )
     return VotingState(study=now.study, progress=progress, just_now=now.just_now)
 
 

@@ -47,7 +47,12 @@ SELECT study.id, study.code, study.name, study.state, study.allow_both_miss, stu
        (SELECT COUNT(*) FROM arena_vote vote
         JOIN arena_matchup matchup ON matchup.id = vote.matchup_id
         WHERE matchup.study_id = study.id AND vote.expert_id = %(expert)s
-          AND vote.supersedes_id IS NULL) AS voted,
+          AND vote.supersedes_id IS NULL) AS decided,
+       (SELECT COUNT(*) FROM arena_vote vote
+        JOIN arena_matchup matchup ON matchup.id = vote.matchup_id
+        WHERE matchup.study_id = study.id AND vote.expert_id = %(expert)s
+          AND vote.outcome = 'skip' AND NOT EXISTS (
+            SELECT 1 FROM arena_vote later WHERE later.supersedes_id = vote.id)) AS skipped,
        (SELECT COUNT(*) FROM arena_vote vote
         WHERE vote.expert_id = %(expert)s AND vote.at > %(since)s) AS just_now,
        (SELECT AVG(CASE WHEN latest.ms_visible > %(longest)s THEN %(longest)s
@@ -126,7 +131,7 @@ class StudyNow:
     Attributes:
         study: With what `_STUDY` names; the rest is loaded when somebody asks for it.
         total: Matchups that are planned for the expert.
-        voted: Those that are decided.
+        voted: Those with a vote; `skipped` those that were skipped instead.
         just_now: Votes of the expert's account since the moment that was asked for.
         pace_ms: How long the latest pairs were on screen on average, None before any.
     """
@@ -134,6 +139,7 @@ class StudyNow:
     study: Study
     total: int
     voted: int
+    skipped: int
     just_now: int
     pace_ms: float | None
 
@@ -154,11 +160,12 @@ def study_now(*, study_pk: int, expert_pk: int, since: datetime) -> StudyNow:
         "votes": PACE_VOTES,
     }
     ((study, counts),) = instances(Study, _STUDY, _STATE, values)
-    total, voted, just_now, pace_ms = counts
+    total, decided, skipped, just_now, pace_ms = counts
     return StudyNow(
         study=study,
         total=total,
-        voted=voted,
+        voted=decided - skipped,
+        skipped=skipped,
         just_now=just_now,
         pace_ms=None if pace_ms is None else float(pace_ms),
     )

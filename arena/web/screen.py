@@ -15,7 +15,7 @@ from django.utils.translation import pgettext
 from arena.models import OUTCOME_LETTERS, Report, Study, Vote
 from arena.queries.showings import as_shown
 from arena.queries.studies import longest_instructions
-from arena.queries.votes import VotingProgress, recent_votes, voting_progress
+from arena.queries.votes import VotingProgress, recent_votes, skip_of, voting_progress
 from arena.queries.voting_keys import (
     KEY_LABELS,
     SOMETIMES,
@@ -55,6 +55,11 @@ class LastVote:
     shown: dict[str, Any]
 
     @property
+    def is_skip(self) -> bool:
+        """For what the page says of it."""
+        return self.outcome == "skip"
+
+    @property
     def is_left(self) -> bool:
         """For the buttons of the form."""
         return self.outcome == "left"
@@ -87,14 +92,16 @@ def vote_context(study: Study, expert: User, *, change: str) -> dict[str, Any] |
     Args:
         study: An open one.
         expert: Who votes in it.
-        change: The key of one of the expert's last votes, to show its pair again; anything else
-            shows the next pair.
+        change: The key of one of the expert's last votes, or of any pair that is skipped still,
+            to show it again; anything else shows the next pair.
     """
     matchups = next_pairs(study=study, expert=expert, n=AHEAD)
     pairs = [as_shown(matchup, translate_all) for matchup in matchups]
     context = over_context(study, expert)
     last = context["last"]
     changed = next((vote for vote in last if str(vote.key) == change), None)
+    if changed is None and (skip := skip_of(study=study, expert=expert, key=change)):
+        changed = _as_last(skip)
     if not pairs and changed is None:
         return None
     preferences = voting_preferences(expert)
@@ -119,7 +126,7 @@ def vote_context(study: Study, expert: User, *, change: str) -> dict[str, Any] |
         "alts": _alts(),
         "pairs": pairs,
         "last": [vote.as_json() for vote in last],
-        "change": str(changed.key) if changed else None,
+        "change": changed.as_json() if changed else None,
         "allow_both_miss": study.allow_both_miss,
         "preferences": _preferences(study, preferences),
         **_counts(context["progress"]),
@@ -141,18 +148,19 @@ def over_context(study: Study, expert: User) -> dict[str, Any]:
 
 
 def _last_votes(study: Study, expert: User) -> list[LastVote]:
-    return [
-        LastVote(
-            key=vote.key,
-            position=vote.matchup.position,
-            outcome=vote.outcome,
-            both_miss=vote.both_miss,
-            comment=vote.comment,
-            word=_word(vote),
-            shown=as_shown(vote.matchup, translate_all),
-        )
-        for vote in recent_votes(study=study, expert=expert, n=UNDOABLE)
-    ]
+    return [_as_last(vote) for vote in recent_votes(study=study, expert=expert, n=UNDOABLE)]
+
+
+def _as_last(vote: Vote) -> LastVote:
+    return LastVote(
+        key=vote.key,
+        position=vote.matchup.position,
+        outcome=vote.outcome,
+        both_miss=vote.both_miss,
+        comment=vote.comment,
+        word=_word(vote),
+        shown=as_shown(vote.matchup, translate_all),
+    )
 
 
 def _word(vote: Vote) -> str:
@@ -170,6 +178,7 @@ def _word(vote: Vote) -> str:
 def _counts(progress: VotingProgress) -> dict[str, Any]:
     return {
         "saved": progress.voted,
+        "skipped": progress.skipped,
         "total": progress.total,
         "minutes_left": progress.minutes_left,
     }

@@ -143,6 +143,7 @@ urlpatterns: list[URLPattern] = [
     path("studies/<uuid:code>/hand-over/", studies.hand_over_pairs, name="study-hand-over"),
     path("studies/<uuid:code>/vote/", voting.vote_page, name="vote"),
     path("studies/<uuid:code>/vote/help/", voting.help_page, name="vote-help"),
+    path("studies/<uuid:code>/vote/skipped/", voting.skipped_page, name="vote-skipped"),
     path("studies/<uuid:code>/vote/report/", voting.report_pair, name="vote-report"),
     path("i/<str:token>", voting.matchup_image, name="matchup-image"),
     path("d/<uuid:code>", voting.replay, name="replay"),

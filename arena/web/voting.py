@@ -18,6 +18,7 @@ from arena.models import Study
 from arena.queries.replays import drives_of_pair
 from arena.queries.showings import picture_shown
 from arena.queries.studies import voting_study
+from arena.queries.votes import skipped_pairs
 from arena.services.reports import report
 from arena.services.votes import receive_vote
 from arena.web.access import ADMIN, EXPERT, allow_only
@@ -48,6 +49,18 @@ def help_page(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
     """How to vote, for those without a script; with one it is a panel of the voting page."""
     study = _study_of(request, code)
     return render(request, "vote/help.html", over_context(study, cast(User, request.user)))
+
+
+@allow_only(EXPERT)
+@never_cache
+@require_safe
+def skipped_page(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
+    """The pairs that the expert skipped: each can be looked at again and voted on."""
+    study = _study_of(request, code)
+    expert = cast(User, request.user)
+    context = over_context(study, expert)
+    context["skips"] = skipped_pairs(study=study, expert=expert)
+    return render(request, "vote/skipped.html", context)
 
 
 @require_POST

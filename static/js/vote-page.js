@@ -52,7 +52,7 @@ export function drawPair({ instruction, position, text: lists }) {
 }
 
 export function drawReview(vote) {
-  at("question").textContent = vote ? text("changing", vote.position, wordOf(vote)) : text("question");
+  at("question").textContent = vote ? text(vote.outcome === "skip" ? "changing-skip" : "changing", vote.position, wordOf(vote)) : text("question");
   at("leave").hidden = !vote;
   const pressed = vote?.both_miss ? "both_miss" : vote?.outcome.toLowerCase();
   for (const button of all(".answers button")) button.ariaPressed = vote ? pressed === ACTIONS[button.value] : null;
@@ -96,8 +96,9 @@ export function drawSaved(waiting) {
   else late = setTimeout(tell, LATE_MS);
 }
 
-export function drawProgress({ saved, total, minutes_left: minutes }) {
+export function drawProgress({ saved, total, skipped, minutes_left: minutes }) {
   Object.assign(given, { saved, total });
+  Object.assign(at("skipped"), { hidden: !skipped, textContent: text("skipped", skipped) });
   at("bar").value = saved;
   at("minutes").textContent = minutes === null ? "" : text("minutes", Math.max(1, minutes));
   if (!at("saved").classList.contains("is-late")) drawSaved(0);

@@ -316,7 +316,9 @@ async function start() {
   page.drawLast(votes);
   pairs.take(given.pairs);
   outbox.start();
-  if (given.change) undo(votes.find(({ key }) => key === given.change));
+  const { change } = given;
+  // One that was skipped long ago is none of the last votes.
+  if (change) undo(byMatchup.get(change.shown.matchup) ?? change);
 }
 
 start();

@@ -107,7 +107,8 @@ def test_a_phone_shows_one_above_the_other_and_a_bar_to_tap(booth: Booth) -> Non
     ready(page)
     page.locator("#skip > summary").tap()
     page.get_by_role("button", name="Instruction unclear").tap()
-    expect(page.locator("#saved")).to_have_text("Saved 2. Nothing waiting.")
+    expect(page.locator("#skipped")).to_have_text("Skipped: 1")
+    expect(page.locator("#saved")).to_have_text("Saved 1. Nothing waiting.")
     assert booth.outcomes() == ["right", "skip"]
 
 

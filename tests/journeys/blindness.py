@@ -32,7 +32,7 @@ MATCHUP = {
 }
 """All that a matchup may say on the wire; its text has the fields a and b."""
 REPLY = {
-    *("saved", "total", "minutes_left", "next"),
+    *("saved", "skipped", "total", "minutes_left", "next"),
     *("key", "outcome", "both_miss", "reason", "comment"),
     *("error", "code", "message", "fields"),
 }

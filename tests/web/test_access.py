@@ -77,6 +77,7 @@ PAGES: dict[str, tuple[int, int, int]] = {
     "results-chart": (403, 403, 403),
     "vote": (403, 403, 404),
     "vote-help": (403, 403, 404),
+    "vote-skipped": (403, 403, 404),
     "matchup-image": (200, 403, 404),
     "replay": (404, 403, 404),  # the study plays no drives
 }

@@ -5,14 +5,17 @@ from __future__ import annotations
 import re
 
 import pytest
+from django.contrib.auth.models import User
 from django.urls import reverse
 
 from arena.queries import progress
 from arena.queries.coverage import coverage
+from arena.queries.gauges import read_gauges
 from arena.queries.inventory import take_inventory
-from arena.queries.votes import tallies
+from arena.queries.votes import tallies, voting_progress
 from tests import study_rows
-from tests.web.cast import people, signed_in
+from tests.web.ballots import ballot, page
+from tests.web.cast import people, signed_in, world
 
 pytestmark = pytest.mark.django_db
 
@@ -38,9 +41,55 @@ def test_a_skip_is_counted_apart_everywhere_and_a_vote_instead_of_it_counts() ->
         )
 
     assert counted() == ((1, 3, 2), (1, 2, 0), (1, 2, 0), (1, 1, 1))
+    state = voting_progress(study=study, expert=first.expert)
+    assert (state.voted, state.skipped, state.left) == (1, 2, 0)
     shown = signed_in(people()["analyst"]).get(reverse("study", args=[study.code]))
     text = " ".join(re.sub(r"<[^>]+>", " ", shown.content.decode()).split())
     assert "1 of 6 votes , 3 skipped" in text or "1 of 6 votes, 3 skipped" in text
     assert "Votes: 1 of 6." in text
     study_rows.vote(first, "left", supersedes=skipped.key)
     assert counted() == ((2, 2, 2), (2, 1, 0), (2, 1, 0), (2, 2, 2))
+
+
+def test_metrics_count_no_skip() -> None:
+    study = study_rows.a_study()
+    first, second, *_ = study_rows.matchups_of(study, "eva")
+    study_rows.vote(first)
+    study_rows.vote(second, "skip", reason="other")
+    (votes,) = (gauge for gauge in read_gauges() if gauge.name == "arena_votes")
+    assert votes.values == (("open", 1),)
+
+
+def test_a_skipped_pair_is_found_again_and_its_vote_stands_in_place_of_the_skip() -> None:
+    here = world()
+    eva, finn = signed_in(here.expert), signed_in(User.objects.get(username="finn"))
+    mine = study_rows.matchups_of(here.study, "eva")
+    skip = study_rows.vote(mine[0], "skip", reason="unclear", comment="Which lane?")
+    for matchup in [*mine[1:], *(study_rows.shown_again(one) for one in mine[1:5])]:
+        study_rows.vote(matchup)  # more than the page's last ten
+    address = reverse("vote-skipped", args=[here.study.code])
+    listed = eva.get(address).content.decode()
+    assert "Pair 1" in listed
+    assert "Instruction unclear" in listed
+    assert "Which lane?" in listed
+    assert f"?change={skip.key}" in listed
+    assert str(skip.key) not in finn.get(address).content.decode()
+    again = f"{page(here)}?change={skip.key}"
+    shown = eva.get(again).content.decode()
+    assert "You skipped pair 1." in shown
+    assert "You skipped pair 1." not in finn.get(again).content.decode()
+    sent = ballot(mine[0], "right", supersedes=skip.key)
+    assert eva.post(page(here), sent).status_code == 302
+    assert [vote.outcome for vote in mine[0].votes.filter(superseded_by=None)] == ["right"]
+    assert "You have skipped no pair" in eva.get(address).content.decode()
+
+
+def test_the_thanks_say_that_skipped_pairs_have_no_vote() -> None:
+    here = world()
+    for matchup in study_rows.matchups_of(here.study, "eva"):
+        study_rows.vote(matchup, "skip", reason="other")
+    thanks = signed_in(here.expert).get(page(here)).content.decode()
+    assert "0 answers saved" in thanks
+    assert "9 pairs are skipped and have no vote of yours." in thanks
+    home = signed_in(here.expert).get(reverse("home")).content.decode()
+    assert reverse("vote-skipped", args=[here.study.code]) in home

@@ -1,0 +1,44 @@
+"""Pairs that were skipped: listed, opened again, and no votes anywhere on the page."""
+
+from __future__ import annotations
+
+import pytest
+from playwright.sync_api import expect
+
+from tests.browser.booth import Booth, all_sent, let_bounce, press
+from tests.browser.test_voting_page import faults
+
+pytestmark = [pytest.mark.browser, pytest.mark.django_db(transaction=True)]
+
+
+def test_a_skip_moves_no_bar_and_its_pair_comes_back_from_the_list(booth: Booth) -> None:
+    page = booth.enter(bypass_csp=True)
+    press(page, "1")
+    page.keyboard.press("s")
+    page.keyboard.press("3")
+    expect(page.locator("#skipped")).to_have_text("Skipped: 1")
+    all_sent(page, 1)
+    assert page.locator("#bar").evaluate("bar => bar.value") == 1
+    page.locator("#skipped").click()
+    expect(page.get_by_role("heading", name="Skipped pairs")).to_be_visible()
+    assert faults(page) == []
+    page.get_by_role("link", name="Open pair 2 again").click()
+    expect(page.locator("#question")).to_have_text("You skipped pair 2. Choose now or go back.")
+    page.wait_for_selector("body.is-live #vote:not([inert]) #answers:not([inert])")
+    let_bounce(page)
+    page.keyboard.press("3")
+    all_sent(page, 2)
+    expect(page.locator("#skipped")).to_be_hidden()
+    expect(page.locator("#place")).to_have_text("3")
+    assert booth.outcomes() == ["left", "right"]
+
+
+def test_the_list_works_without_a_script(booth: Booth) -> None:
+    page = booth.enter(java_script_enabled=False)
+    page.locator("#skip > summary").click()
+    page.get_by_role("button", name="Instruction unclear").click()
+    page.get_by_role("link", name="Skipped: 1").click()
+    page.get_by_role("link", name="Open pair 1 again").click()
+    page.get_by_role("button", name="B is better").click()
+    assert booth.outcomes() == ["right"]
+    assert page.get_by_role("link", name="Skipped").count() == 0
