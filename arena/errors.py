@@ -121,3 +121,27 @@ class AlreadyLabelled(ArenaError):
 
 class LinkOver(ArenaError):
     """The invitation lets nobody in: it expired, was taken back or names no expert any more."""
+
+
+class TokenOver(ArenaError):
+    """An API token opens nothing: nobody has it, or it expired or was revoked."""
+
+
+class TooManyRequests(ArenaError):
+    """An API token was used more often than its role may; nothing was done.
+
+    Args:
+        most: Requests within the window.
+        retry_after_s: Its length: after so many seconds the next one is taken.
+    """
+
+    def __init__(self, most: int, retry_after_s: int) -> None:
+        self.retry_after_s = retry_after_s
+        super().__init__(
+            sentence(
+                "More than %(most)s requests within %(seconds)s s came with this token. Try again "
+                "in %(seconds)s s.",
+                most=most,
+                seconds=retry_after_s,
+            )
+        )

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from rest_framework.permissions import BasePermission
+from rest_framework.permissions import SAFE_METHODS, BasePermission
 from rest_framework.request import Request
 from rest_framework.views import APIView
 
@@ -15,6 +15,23 @@ class StaffOnly(BasePermission):
     def has_permission(self, request: Request, view: APIView) -> bool:
         """Whether the account may know of jobs."""
         return role_of(request.user) in ("admin", "analyst")
+
+
+class AdminsOnly(BasePermission):
+    """Who launches and changes."""
+
+    def has_permission(self, request: Request, view: APIView) -> bool:
+        """Whether the account administrates."""
+        return role_of(request.user) == "admin"
+
+
+class ReadersAndAdmins(BasePermission):
+    """Admins and analysts may read, admins alone may change."""
+
+    def has_permission(self, request: Request, view: APIView) -> bool:
+        """Whether the account may do what it asks for."""
+        allowed = ("admin", "analyst") if request.method in SAFE_METHODS else ("admin",)
+        return role_of(request.user) in allowed
 
 
 class ExpertsOnly(BasePermission):

@@ -14,29 +14,44 @@ from typing import Any
 from django.core.exceptions import PermissionDenied, RequestDataTooBig
 from django.http import Http404
 from django.utils.translation import gettext as _
+from django.views.decorators.cache import never_cache
+from django.views.decorators.http import conditional_page
 from rest_framework import exceptions
+from rest_framework.request import Request
 from rest_framework.response import Response
 from rest_framework.views import APIView
 
 from arena.api.parsing import SoundJSONParser
+from arena.api.schema import ArenaSchema
 from arena.errors import (
     AlreadyDecided,
     ArenaError,
     DatabaseBusy,
     InvalidPreference,
     InvalidVote,
+    LinkOver,
+    NoSnapshot,
     NotYours,
     StudyNotOpen,
+    StudyStillOpen,
+    TokenOver,
     TooFast,
+    TooManyRequests,
 )
 from arena.models import OUTCOME_LETTERS
 from augment.errors import AugmentError, Conflict
 from augment.services.wording import translate
 
 STATUS: tuple[tuple[type[Exception], int, str], ...] = (
+    (TokenOver, 401, "signed_out"),
+    (TooManyRequests, 429, "too_many_requests"),
     (NotYours, 404, "not_found"),
+    (NoSnapshot, 404, "not_found"),
+    (exceptions.NotFound, 404, "not_found"),
+    (LinkOver, 410, "link_over"),
     (Http404, 404, "not_found"),
     (StudyNotOpen, 410, "study_not_open"),
+    (StudyStillOpen, 403, "study_still_open"),
     (AlreadyDecided, 409, "already_decided"),
     (InvalidVote, 422, "invalid"),
     (InvalidPreference, 422, "invalid"),
@@ -61,9 +76,34 @@ STATUS: tuple[tuple[type[Exception], int, str], ...] = (
 
 
 class ApiView(APIView):
-    """What every resource shares: how a body is read and how errors look."""
+    """What every resource shares: how a body is read, how errors look, and what a GET is worth.
+
+    Every answer to a GET that may be kept has an ETag; the same one asked for again is 304.
+
+    Attributes:
+        is_never_cached: Whether its answers are nobody's to keep.
+        is_public: Whether it is for those who are not signed in.
+        may_miss: Whether a GET can find nothing, beside what its path names.
+        read_errors: Further statuses that a GET can have, for the document.
+    """
 
     parser_classes = (SoundJSONParser,)
+    schema = ArenaSchema()
+    is_never_cached = False
+    is_public = False
+    may_miss = False
+    read_errors: tuple[int, ...] = ()
+
+    @classmethod
+    def as_view(cls, **initkwargs: Any) -> Any:
+        """The view, with its conditional GETs."""
+        view = super().as_view(**initkwargs)
+        return never_cache(view) if cls.is_never_cached else conditional_page(view)
+
+    def finalize_response(self, request: Request, response: Any, *args: Any, **kwargs: Any) -> Any:
+        """The answer, which no cache between may keep."""
+        response.headers.setdefault("Cache-Control", "private, no-cache")
+        return super().finalize_response(request, response, *args, **kwargs)
 
     def handle_exception(self, exc: Exception) -> Response:
         """Turn an error of the table into its response; any other is raised again."""
@@ -79,8 +119,8 @@ def _response(exc: Exception) -> Response | None:
         if isinstance(exc, kind):
             headers = {}
             if status == 401:  # the browser can tell that it only has to sign in again
-                headers["WWW-Authenticate"] = "Session"
-            if isinstance(exc, (TooFast, DatabaseBusy)):
+                headers["WWW-Authenticate"] = "Bearer" if isinstance(exc, TokenOver) else "Session"
+            if isinstance(exc, (TooFast, TooManyRequests, DatabaseBusy)):
                 headers["Retry-After"] = str(exc.retry_after_s)
             error = {"code": code, "message": _message(exc), **_extras(exc)}
             return Response({"error": error}, status=status, headers=headers)

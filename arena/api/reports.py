@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 from django.contrib.auth.models import User
 from rest_framework import serializers
 from rest_framework.request import Request
@@ -10,6 +12,7 @@ from rest_framework.response import Response
 from arena.api.access import ExpertsOnly
 from arena.api.errors import ApiView
 from arena.api.fields import CodeField, StrictSerializer, TextField
+from arena.api.schema import describe
 from arena.models import Report
 from arena.services.decisions import LONGEST_COMMENT
 from arena.services.reports import report
@@ -24,11 +27,23 @@ class ReportBody(StrictSerializer):
     comment = TextField(required=False, allow_blank=True, default="", max_length=LONGEST_COMMENT)
 
 
+class SavedDocument(serializers.Serializer[Any]):
+    """That it is kept."""
+
+    saved = serializers.BooleanField()
+
+
 class ReportsView(ApiView):
     """Reports of the one who is signed in; they change no vote."""
 
     permission_classes = (ExpertsOnly,)
 
+    @describe(
+        "Report that something is wrong with a pair",
+        takes=ReportBody,
+        answers=SavedDocument,
+        name="report",
+    )
     def post(self, request: Request) -> Response:
         """Keep the report once, however often it arrives."""
         body = ReportBody(data=request.data)

@@ -6,8 +6,6 @@ from collections.abc import Sequence
 from typing import Any
 
 from django.contrib.auth.models import User
-from django.utils.decorators import method_decorator
-from django.views.decorators.cache import never_cache
 from rest_framework import serializers
 from rest_framework.request import Request
 from rest_framework.response import Response
@@ -15,7 +13,8 @@ from rest_framework.response import Response
 from arena.api.access import ExpertsOnly
 from arena.api.errors import ApiView
 from arena.api.fields import CodeField, FlagField, StrictSerializer, TextField, WholeNumberField
-from arena.api.matchups import AHEAD, MOST
+from arena.api.matchups import AHEAD, MOST, MatchupDocument
+from arena.api.schema import describe
 from arena.models import AIDS, OUTCOME_LETTERS, Matchup, Vote
 from arena.queries.showings import as_shown
 from arena.queries.studies import voting_study
@@ -62,12 +61,39 @@ class VotesQuery(StrictSerializer):
     n = serializers.IntegerField(min_value=1, max_value=MOST_VOTES, default=10)
 
 
-@method_decorator(never_cache, name="dispatch")
+class VoteDocument(serializers.Serializer[Any]):
+    """A vote of whoever asks, with its pair."""
+
+    key = serializers.UUIDField()
+    outcome = serializers.ChoiceField(choices=list(OUTCOMES))
+    both_miss = serializers.BooleanField()
+    reason = serializers.CharField()
+    comment = serializers.CharField()
+    matchup = MatchupDocument()
+
+
+class ReceivedDocument(serializers.Serializer[Any]):
+    """What a vote is answered with."""
+
+    saved = serializers.IntegerField(help_text="Pairs that are decided.")
+    total = serializers.IntegerField()
+    minutes_left = serializers.IntegerField(allow_null=True)
+    next = MatchupDocument(many=True)
+
+
 class VotesView(ApiView):
     """Votes of the one who is signed in; there is no way to name somebody else."""
 
     permission_classes = (ExpertsOnly,)
+    is_never_cached = True
+    may_miss = True
 
+    @describe(
+        "The expert's current votes, the latest pair first",
+        answers=VoteDocument(many=True),
+        query=VotesQuery,
+        name="listVotes",
+    )
     def get(self, request: Request) -> Response:
         """The expert's current votes, the latest matchup first."""
         query = VotesQuery(data=request.query_params.dict())
@@ -77,6 +103,7 @@ class VotesView(ApiView):
         votes = recent_votes(study=study, expert=expert, n=query.validated_data["n"])
         return Response([_as_given(vote) for vote in votes])
 
+    @describe("Vote", takes=VoteBody, answers=ReceivedDocument, name="vote")
     def post(self, request: Request) -> Response:
         """Store the vote once, however often it arrives."""
         given = dict(_BODY.run_validation(request.data))

@@ -16,7 +16,7 @@ from typing import Any
 
 from csp.constants import NONE, SELF
 
-from arena.config import env, private
+from arena.config import env, private, wire
 from arena.exports.files import write_once
 
 BASE_DIR = Path(__file__).resolve().parents[2]
@@ -160,12 +160,8 @@ USE_TZ = True
 TIME_ZONE = "UTC"
 DEFAULT_AUTO_FIELD = "django.db.models.BigAutoField"
 
-REST_FRAMEWORK = {
-    "DEFAULT_AUTHENTICATION_CLASSES": ["rest_framework.authentication.SessionAuthentication"],
-    "DEFAULT_PERMISSION_CLASSES": ["rest_framework.permissions.IsAuthenticated"],
-    "DEFAULT_RENDERER_CLASSES": ["rest_framework.renderers.JSONRenderer"],
-    "DEFAULT_PARSER_CLASSES": ["rest_framework.parsers.JSONParser"],
-}
+REST_FRAMEWORK = wire.REST_FRAMEWORK
+SPECTACULAR_SETTINGS = wire.SPECTACULAR_SETTINGS
 
 # --- Where things are kept ---------------------------------------------------------------------
 

@@ -1,7 +1,8 @@
-"""Rows of arena: people, invitations, studies, authors, matchups, votes, ratings, fault labels."""
+"""Rows of arena: people, tokens, invitations, studies, authors, votes, ratings, fault labels."""
 
 from __future__ import annotations
 
+from arena.models.api_tokens import ApiToken
 from arena.models.authorships import Authorship
 from arena.models.invitations import Invitation, token_digest
 from arena.models.labels import FaultLabel, LabellingRound, LabelTask
@@ -15,6 +16,7 @@ from arena.models.votes import AIDS, OUTCOME_LETTERS, Report, Vote
 __all__ = [
     "AIDS",
     "OUTCOME_LETTERS",
+    "ApiToken",
     "Authorship",
     "EarlyLook",
     "FaultLabel",

@@ -17,10 +17,14 @@ ROLES = ("admin", "analyst", "expert")
 def role_of(user: User | AnonymousUser) -> str | None:
     """The most powerful role of an account, None without one.
 
-    Costs a query, but for the account of the request (`arena.queries.accounts`).
+    Whoever came by an API token has the token's role. Costs a query, but for the account of the
+    request (`arena.queries.accounts`).
     """
     if not user.is_authenticated or not user.is_active:
         return None
+    if hasattr(user, "token_role"):
+        role: str = user.token_role
+        return role
     if user.is_superuser:
         return "admin"
     groups = getattr(user, "role_names", None)

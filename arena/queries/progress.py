@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 from django.contrib.auth.models import User
-from django.db.models import Count, Q
+from django.db.models import Count, Q, QuerySet
 
 from arena.models import Study, Vote
 
@@ -37,6 +38,26 @@ def of_studies() -> list[StudyProgress]:
     """Every study, the youngest first."""
     rows = Study.objects.select_related("vote_file").annotate(planned=_PLANNED, **_counted(Q()))
     return [_line(row) for row in rows]
+
+
+def studies_seen_by(user: User, *, is_staff: bool) -> QuerySet[Study]:
+    """Staff see every study, an expert those that they were invited to; no drafts."""
+    if is_staff:
+        return Study.objects.all()
+    return Study.objects.filter(experts=user).exclude(state=Study.State.DRAFT)
+
+
+def of_these(studies: Sequence[Study], *, expert: User | None = None) -> list[StudyProgress]:
+    """Some studies in their order, counted over all experts or over one's own; one query."""
+    own = Q() if expert is None else Q(matchups__expert=expert)
+    planned = Count("matchups", filter=own, distinct=True) if expert else _PLANNED
+    rows = Study.objects.filter(pk__in=[study.pk for study in studies])
+    found = {row.pk: row for row in rows.annotate(planned=planned, **_counted(own))}
+    later = None if expert is None else expert.username
+    return [
+        _line(found[study.pk], None if later is None else study.votes_to_plan.get(later, 0))
+        for study in studies
+    ]
 
 
 def of_expert(expert: User) -> list[StudyProgress]:

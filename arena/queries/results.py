@@ -8,7 +8,7 @@ from uuid import UUID
 from django.contrib.auth.models import User
 from django.db.models import Q, QuerySet
 
-from arena.errors import NoSnapshot
+from arena.errors import NoSnapshot, NotYours, StudyStillOpen
 from arena.models import EarlyLook, Snapshot, Study
 from arena.queries.people import role_of
 from augment.models import Event
@@ -50,6 +50,20 @@ def results_access(*, user: User, study: Study, role: str | None = None) -> Resu
         return ResultsAccess.NONE
     opened = EarlyLook.objects.filter(study=study, user=user).exists()
     return ResultsAccess.FULL if opened else ResultsAccess.EARLY
+
+
+def must_read_results(*, user: User, study: Study) -> None:
+    """Do nothing for whoever may read a study's results now.
+
+    Raises:
+        StudyStillOpen: They may open them early, by an act of its own.
+        NotYours: They may not.
+    """
+    access = results_access(user=user, study=study)
+    if access is ResultsAccess.EARLY:
+        raise StudyStillOpen(study.name)
+    if access is ResultsAccess.NONE:
+        raise NotYours("You may not read the results of this study.")
 
 
 def unread_studies(user: User) -> QuerySet[Study]:

@@ -6,15 +6,17 @@ import uuid
 
 from axes.models import AccessAttempt, AccessFailureLog, AccessLog
 from django.contrib.auth.models import Group, User
+from django.contrib.auth.password_validation import validate_password
 from django.contrib.auth.tokens import default_token_generator
 from django.contrib.sessions.models import Session
+from django.core.exceptions import ValidationError
 from django.db import transaction
 from django.utils import timezone
 
 from arena.errors import LinkOver
 from arena.models import Invitation, Person, Study
 from arena.queries.people import ROLES, forgotten_name, has_admin, is_forgotten, role_of
-from augment.errors import Conflict, UnknownName
+from augment.errors import Conflict, InvalidDocument, UnknownName
 from augment.sentences import sentence
 from augment.services.events import log_event
 
@@ -52,6 +54,36 @@ def find_welcomed(token: str) -> User:
     if not default_token_generator.check_token(person.user, rest):
         raise LinkOver("This link lets nobody in any more.")
     return person.user
+
+
+@transaction.atomic
+def accept_welcome(*, token: str, password: str) -> User:
+    """Set the password of the account that a link belongs to, which ends the link.
+
+    Raises:
+        LinkOver: The link does not work any more.
+        InvalidDocument: The password is too weak; the text says why.
+    """
+    user = find_welcomed(token)
+    # Held, so that of two who use the link at once the second one finds it used.
+    User.objects.select_for_update().get(pk=user.pk)
+    user = find_welcomed(token)
+    check_password_strength(password, user)
+    user.set_password(password)
+    user.save(update_fields=["password"])
+    return user
+
+
+def check_password_strength(password: str, user: User | None = None) -> None:
+    """Do nothing for a password that may be set.
+
+    Raises:
+        InvalidDocument: It is too weak; the text says why.
+    """
+    try:
+        validate_password(password, user)
+    except ValidationError as error:
+        raise InvalidDocument("person", [("password", " ".join(error.messages))]) from None
 
 
 @transaction.atomic

@@ -7,6 +7,7 @@ from django.urls import URLPattern, path
 
 from arena.web import (
     analyses,
+    api_tokens,
     authorships,
     catalogue,
     contestant_form,
@@ -50,6 +51,8 @@ urlpatterns: list[URLPattern] = [
     path("first/<str:token>/", people.first_page, name="first"),
     path("welcome/<str:token>/", people.welcome_page, name="welcome"),
     path("password/", people.password_page, name="password"),
+    path("tokens/", api_tokens.tokens_page, name="api-tokens"),
+    path("tokens/<uuid:code>/revoke/", api_tokens.revoke, name="api-token-revoke"),
     path("people/", people.people_page, name="people"),
     path("people/<uuid:code>/link/", people.make_link, name="person-link"),
     path("people/<uuid:code>/change/", people.change_person, name="person-change"),

@@ -54,6 +54,7 @@ PAGES: dict[str, tuple[int, int, int]] = {
     "scenes": (200, 200, 403),
     "scene": (200, 200, 403),
     "upload": (200, 200, 403),
+    "api-tokens": (200, 200, 200),
     "scenarios": (200, 200, 403),
     "scenario": (200, 200, 403),
     "intent": (200, 200, 403),
@@ -101,6 +102,7 @@ ACTIONS: dict[str, tuple[int, int, int]] = {
     "invite": (200, 403, 403),
     "person-link": (200, 403, 403),
     "person-change": (302, 403, 403),
+    "api-token-revoke": (404, 404, 404),  # somebody else's
     "revoke": (302, 403, 403),
     "author": (302, 403, 403),
     "author-back": (302, 403, 403),
@@ -136,6 +138,7 @@ def address(name: str, here: World) -> str:
         "person-link": {"code": here.expert.person.code},
         "person-change": {"code": here.expert.person.code},
         "person-forget": {"code": here.expert.person.code},
+        "api-token-revoke": {"code": STRANGER},
         "job": {"code": here.job.code},
         "contestant": {"code": here.augmentation.contestant.code},
         "contestant-retired": {"code": here.augmentation.contestant.code},

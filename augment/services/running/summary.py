@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter, defaultdict
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, cast
 
@@ -84,9 +85,13 @@ class JobCounts:
 
 def list_jobs() -> list[JobCounts]:
     """All jobs, the youngest first; two queries."""
-    jobs = list(GenerationJob.objects.select_related("launched_by__person"))
+    return count_each(list(GenerationJob.objects.select_related("launched_by__person")))
+
+
+def count_each(jobs: Sequence[GenerationJob]) -> list[JobCounts]:
+    """Several jobs; one query."""
     counts: defaultdict[int, Counter[str]] = defaultdict(Counter)
-    rows = Augmentation.objects.order_by().values_list("job_id", "state")
+    rows = Augmentation.objects.filter(job__in=jobs).order_by().values_list("job_id", "state")
     for job_id, state, number in rows.annotate(number=Count("pk")):
         counts[job_id][state] = number
     return [_counts(job, counts[job.pk]) for job in jobs]

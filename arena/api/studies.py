@@ -1,0 +1,214 @@
+"""Studies: opened, closed, and how far their votes are; never who leads."""
+
+from __future__ import annotations
+
+import uuid
+from typing import Any, cast
+
+from django.contrib.auth.models import User
+from django.shortcuts import get_object_or_404
+from rest_framework import serializers
+from rest_framework.permissions import BasePermission
+from rest_framework.request import Request
+from rest_framework.response import Response
+from rest_framework.views import APIView
+
+from arena.api.access import AdminsOnly, StaffOnly
+from arena.api.errors import ApiView
+from arena.api.fields import FlagField, StrictSerializer, TextField, WholeNumberField
+from arena.api.paging import PageQuery, answer_page, page_of, read_query
+from arena.api.schema import describe
+from arena.models import Study
+from arena.queries.people import role_of
+from arena.queries.progress import StudyProgress, of_these, studies_seen_by
+from arena.services.early_looks import open_early
+from arena.services.shown_pictures import SampleRule
+from arena.services.studies import PlanOptions, close_study, open_study
+
+STAFF = ("admin", "analyst")
+MOST_CHOSEN = 5_000
+MOST_VOTES = 10_000
+HIGHEST_SEED = 2**63 - 1
+
+
+class StudyReaders(BasePermission):
+    """Experts see their own studies; staff see all, and admins open new ones."""
+
+    def has_permission(self, request: Request, view: APIView) -> bool:
+        """Whether the account may do what it asks for."""
+        allowed = ("admin",) if request.method == "POST" else (*STAFF, "expert")
+        return role_of(request.user) in allowed
+
+
+class StudyQuery(PageQuery):
+    """Which studies."""
+
+    state = serializers.ChoiceField(choices=Study.State.values, required=False)
+
+
+class StudyDocument(serializers.Serializer[Any]):
+    """A study and how far its votes are; to an expert, their own."""
+
+    code = serializers.UUIDField(source="study.code")
+    name = serializers.CharField(source="study.name")
+    state = serializers.CharField(source="study.state")
+    planned = serializers.IntegerField(help_text="Pairs to be judged.")
+    voted = serializers.IntegerField()
+    skipped = serializers.IntegerField()
+    left = serializers.IntegerField()
+    opened_at = serializers.DateTimeField(source="study.opened_at", allow_null=True)
+    closed_at = serializers.DateTimeField(source="study.closed_at", allow_null=True)
+
+
+class WholeStudyDocument(StudyDocument):
+    """A study with who takes part, for staff."""
+
+    contestants = serializers.ListField(child=serializers.CharField(), help_text="Slugs.")
+    scenarios = serializers.ListField(child=serializers.CharField(), help_text="Slugs.")
+    experts = serializers.ListField(child=serializers.CharField(), help_text="Usernames.")
+    votes_per_expert = serializers.IntegerField(source="study.votes_per_expert")
+    seed = serializers.IntegerField(source="study.seed")
+    allow_both_miss = serializers.BooleanField(source="study.allow_both_miss")
+    allow_text = serializers.BooleanField(source="study.allow_text")
+    allow_replay = serializers.BooleanField(source="study.allow_replay")
+    allow_simulated = serializers.BooleanField(source="study.allow_simulated")
+
+
+class StudyBody(StrictSerializer):
+    """A new study; its rules are fixed from the moment it opens."""
+
+    name = TextField(max_length=120)
+    contestants = serializers.ListField(
+        child=TextField(max_length=80), max_length=MOST_CHOSEN, help_text="Slugs."
+    )
+    scenarios = serializers.ListField(
+        child=TextField(max_length=80), max_length=MOST_CHOSEN, help_text="Slugs."
+    )
+    experts = serializers.ListField(
+        child=TextField(max_length=150), max_length=MOST_CHOSEN, help_text="Usernames."
+    )
+    votes_per_expert = WholeNumberField(min_value=1, max_value=MOST_VOTES)
+    seed = WholeNumberField(required=False, default=1, min_value=0, max_value=HIGHEST_SEED)
+    repeat_share = serializers.FloatField(required=False, default=0, min_value=0, max_value=0.5)
+    check_share = serializers.FloatField(required=False, default=0, min_value=0, max_value=0.5)
+    adaptive_share = serializers.FloatField(required=False, default=0, min_value=0, max_value=0.9)
+    allow_both_miss = FlagField(required=False, default=False)
+    allow_text = FlagField(required=False, default=False)
+    allow_replay = FlagField(required=False, default=False)
+    allow_simulated = FlagField(required=False, default=False)
+    settle_alike = FlagField(required=False, default=False)
+    samples = serializers.ChoiceField(
+        choices=[rule.value for rule in SampleRule], required=False, default=SampleRule.ONE.value
+    )
+    jobs = serializers.ListField(
+        child=TextField(max_length=120),
+        required=False,
+        default=list,
+        max_length=MOST_CHOSEN,
+        help_text="Names or codes of the jobs whose augmentations are shown; none for all.",
+    )
+
+
+class StudiesView(ApiView):
+    """The studies, the youngest first."""
+
+    permission_classes = (StudyReaders,)
+
+    @describe(
+        "Studies, the youngest first",
+        answers=page_of(StudyDocument),
+        query=StudyQuery,
+        name="listStudies",
+    )
+    def get(self, request: Request) -> Response:
+        """An expert's own with their own progress, staff's all with everybody's."""
+        query, user = read_query(request, StudyQuery), cast(User, request.user)
+        is_staff = role_of(user) in STAFF
+        rows = studies_seen_by(user, is_staff=is_staff)
+        if "state" in query:
+            rows = rows.filter(state=query["state"])
+        expert = None if is_staff else user
+        return answer_page(
+            request, rows, query, StudyDocument, lines=lambda page: of_these(page, expert=expert)
+        )
+
+    @describe(
+        "Plan a study and open it",
+        takes=StudyBody,
+        answers=WholeStudyDocument,
+        status=201,
+        name="openStudy",
+    )
+    def post(self, request: Request) -> Response:
+        """Its experts can vote at once."""
+        body = StudyBody(data=request.data)
+        body.is_valid(raise_exception=True)
+        given = dict(body.validated_data)
+        given["samples"], given["jobs"] = SampleRule(given["samples"]), tuple(given["jobs"])
+        names = (
+            *("repeat_share", "check_share", "adaptive_share", "samples", "jobs"),
+            *("allow_both_miss", "allow_text", "allow_replay", "settle_alike"),
+        )
+        options = PlanOptions(**{name: given.pop(name) for name in names})
+        study = open_study(**given, options=options, actor=cast(User, request.user))
+        return Response(_whole(study), status=201)
+
+
+class StudyView(ApiView):
+    """One study."""
+
+    permission_classes = (StaffOnly,)
+
+    @describe("A study", answers=WholeStudyDocument, name="getStudy")
+    def get(self, request: Request, code: uuid.UUID) -> Response:
+        """With who takes part."""
+        return Response(_whole(get_study(code)))
+
+
+class CloseStudyView(ApiView):
+    """The end of a study."""
+
+    permission_classes = (AdminsOnly,)
+
+    @describe("Close a study", answers=WholeStudyDocument, name="closeStudy")
+    def post(self, request: Request, code: uuid.UUID) -> Response:
+        """No more votes are taken; there is no way back. Twice changes nothing."""
+        return Response(_whole(close_study(study=get_study(code), actor=cast(User, request.user))))
+
+
+class EarlyLookView(ApiView):
+    """Results before the end."""
+
+    permission_classes = (StaffOnly,)
+
+    @describe("Open the results of an open study", answers=StudyDocument, name="lookEarly")
+    def post(self, request: Request, code: uuid.UUID) -> Response:
+        """An act that is written to the log; who votes in the study votes no longer."""
+        study = get_study(code)
+        open_early(study=study, actor=cast(User, request.user))
+        return Response(StudyDocument(_progress(study)).data)
+
+
+def get_study(code: uuid.UUID) -> Study:
+    """The study of that code, 404 without one."""
+    return get_object_or_404(Study.objects.select_related("vote_file"), code=code)
+
+
+# --- Private -----------------------------------------------------------------------------------
+
+
+def _progress(study: Study) -> StudyProgress:
+    (found,) = of_these([study])
+    return found
+
+
+def _whole(study: Study) -> dict[str, Any]:
+    lists = {
+        "contestants": study.contestants.values_list("slug", flat=True),
+        "scenarios": study.scenarios.values_list("slug", flat=True),
+        "experts": study.experts.order_by("username").values_list("username", flat=True),
+    }
+    found = dict(StudyDocument(_progress(study)).data)
+    for name in WholeStudyDocument().fields.keys() - found.keys() - lists.keys():
+        found[name] = getattr(study, name)
+    return found | {name: list(values) for name, values in lists.items()}

@@ -1,0 +1,71 @@
+"""The OpenAPI document: valid, whole, the same as what is served, and readable by staff."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+from django.urls import reverse
+from drf_spectacular.drainage import GENERATOR_STATS
+from drf_spectacular.validation import validate_schema
+
+from arena.api.reference import make_document
+from arena.api.urls import urlpatterns
+from tests.web.cast import people, signed_in
+
+pytestmark = pytest.mark.django_db
+
+NOT_IN_IT = {"api-reference", "api-document"}
+
+
+def test_the_document_is_valid_and_made_without_a_warning(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    make_document.cache_clear()
+    with GENERATOR_STATS.silence():
+        GENERATOR_STATS.reset()
+        document = make_document()
+        assert not GENERATOR_STATS, capsys.readouterr().err
+    validate_schema(document)  # type: ignore[no-untyped-call]
+
+
+def test_every_address_is_in_it() -> None:
+    described = set(make_document()["paths"])
+    for pattern in urlpatterns:
+        if pattern.name not in NOT_IN_IT:
+            address = "/api/v1/" + str(pattern.pattern)
+            for kind in ("uuid", "slug", "str"):
+                address = address.replace(f"<{kind}:", "{")
+            assert address.replace(">", "}") in described
+
+
+def test_every_operation_tells_its_errors_in_the_one_shape() -> None:
+    for path, methods in make_document()["paths"].items():
+        for method, operation in methods.items():
+            answers = operation["responses"]
+            assert {"422", "429", "503"} <= set(answers), (method, path)
+            for status, answer in answers.items():
+                if status >= "400":
+                    shape = answer["content"]["application/json"]["schema"]
+                    assert shape == {"$ref": "#/components/schemas/ErrorBody"}, (path, status)
+
+
+def test_staff_read_it_as_a_page_and_programs_as_json() -> None:
+    accounts = people()
+    page = signed_in(accounts["analyst"]).get(reverse("api-reference"))
+    text = page.content.decode()
+    for path in make_document()["paths"]:
+        assert f"</b> {path}</code>" in text
+    assert "<script" not in text
+    assert " style=" not in text
+    assert signed_in(accounts["expert"]).get(reverse("api-reference")).status_code == 403
+    assert signed_in(accounts["expert"]).get(reverse("api-document")).status_code == 403
+    served = signed_in(accounts["analyst"]).get(reverse("api-document")).json()
+    assert served == json.loads(json.dumps(make_document(), default=str))
+
+
+def test_docs_name_every_address() -> None:
+    docs = (Path(__file__).parents[2] / "docs" / "api.md").read_text()
+    for path in make_document()["paths"]:
+        assert path.removeprefix("/api/v1") in docs, path

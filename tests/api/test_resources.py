@@ -1,0 +1,303 @@
+"""Resources are the pages' own: same services, roles and bytes; lists in pages with ETags."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import pytest
+from django.contrib.auth.models import User
+from django.db import connection
+from django.test import Client
+from django.test.utils import CaptureQueriesContext
+from django.urls import reverse
+
+from arena.api.urls import urlpatterns
+from arena.models import EarlyLook, Snapshot
+from arena.services.first_start import make_first_link_token
+from arena.services.ratings import rate
+from arena.services.studies import close_study, open_study
+from augment.models import Contestant, Event, GenerationJob
+from tests.api.asking import error_of
+from tests.api.tokens import program, program_of
+from tests.jobs import rows
+from tests.study_rows import (
+    a_study,
+    contestant,
+    expert,
+    matchups_of,
+    picture,
+    scenario,
+    vote,
+)
+from tests.web.cast import people, signed_in, world
+
+pytestmark = pytest.mark.django_db
+
+OF_EXPERTS = {
+    *("api-account", "api-first", "api-welcome", "api-studies", "api-matchups"),
+    *("api-picture", "api-preferences", "api-reports", "api-votes"),
+}
+API = "/api/v1/"
+
+
+def send(client: Client, path: str, **body: object) -> Any:
+    return client.post(API + path, body, content_type="application/json")
+
+
+def slugs(page: Any) -> list[str]:
+    return [row["slug"] for row in page.json()["results"]]
+
+
+# --- Lists -------------------------------------------------------------------------------------
+
+
+def test_pages_lose_no_row_and_repeat_none_while_rows_are_added() -> None:
+    study = a_study()
+    asking = program_of(people()["analyst"])
+    first = asking.get(API + "scenarios", {"limit": 4})
+    study.scenarios.filter(slug="place-0").update(slug="a-new-first-one")
+    second = asking.get(first.json()["next"])
+    assert slugs(first) == ["place-0", "place-1", "place-2", "place-3"]
+    assert slugs(second) == ["place-4", "place-5"]
+    assert second.json()["next"] is None
+
+
+def test_the_next_page_keeps_filters_and_tells_no_key() -> None:
+    here = world()
+    asking = program_of(people()["analyst"])
+    given: dict[str, Any] = {"job": str(here.job.code), "limit": 1}
+    page = asking.get(API + "augmentations", given).json()
+    assert f"job={here.job.code}" in page["next"]
+    assert f"after={page['results'][0]['code']}" in page["next"]
+    codes = {row["code"] for row in page["results"]}
+    codes |= {row["code"] for row in asking.get(page["next"]).json()["results"]}
+    assert codes == {str(row.code) for row in here.job.augmentations.all()}
+
+
+@pytest.mark.parametrize(
+    ("query", "field"),
+    [
+        ({"limit": 0}, "limit"),
+        ({"limit": 501}, "limit"),
+        ({"after": "9e107d9d-372b-4682-86d0-5c1f9f3b2b1e"}, "after"),
+        ({"after": "x"}, "after"),
+        ({"state": "lost"}, "state"),
+        ({"colour": "red"}, "colour"),
+    ],
+)
+def test_a_wrong_parameter_is_named(query: dict[str, Any], field: str) -> None:
+    asking = program_of(people()["analyst"])
+    error = error_of(asking.get(API + "jobs", query), 422, "invalid")
+    assert list(error["fields"]) == [field]
+
+
+def test_lists_are_filtered() -> None:
+    here = world()
+    asking = program_of(people()["analyst"])
+    assert slugs(asking.get(API + "contestants", {"slug": "ann"})) == ["ann"]
+    assert slugs(asking.get(API + "contestants", {"kind": "llm"})) == []
+    assert slugs(asking.get(API + "scenarios", {"set": "paper"})) == []
+    for state, number in (("running", 1), ("cancelled", 0)):
+        found = asking.get(API + "jobs", {"state": state}).json()["results"]
+        codes = [row["code"] for row in found if row["code"] == str(here.job.code)]
+        assert len(codes) == number
+
+
+def test_what_has_not_changed_is_304_and_what_has_is_not() -> None:
+    job = rows.launch(scenarios=2, contestants=("reference",))
+    asking = program_of(people()["analyst"])
+    for path in ("jobs", f"jobs/{job.code}", f"jobs/{job.code}/progress"):
+        tag = asking.get(API + path).headers["ETag"]
+        again = asking.get(API + path, headers={"If-None-Match": tag})
+        assert (again.status_code, again.content) == (304, b"")
+    job.augmentations.update(state="failed", reason="x")
+    assert asking.get(API + path, headers={"If-None-Match": tag}).status_code == 200
+
+
+@pytest.mark.parametrize(
+    "path", ["jobs", "augmentations", "scenarios", "contestants", "studies", "people"]
+)
+def test_a_list_asks_the_database_as_often_whatever_is_in_it(
+    path: str,
+) -> None:
+    accounts = people()
+    asking = program_of(accounts["admin"])
+    rows.launch(scenarios=1, contestants=("reference",))
+    study = a_study()
+    few = _queries(asking, path)
+    for number in range(3):
+        expert(f"new-{number}")
+        place, who = scenario(f"new-{number}"), contestant(f"new-{number}")
+        picture(place, who)
+    open_study(
+        name="Round 2",
+        contestants=list(study.contestants.values_list("slug", flat=True)),
+        scenarios=[f"place-{number}" for number in range(6)],
+        experts=["eva", "finn"],
+        votes_per_expert=9,
+        seed=1,
+    )
+    assert _queries(asking, path) == few
+
+
+def _queries(client: Client, path: str) -> int:
+    client.get(API + path)
+    with CaptureQueriesContext(connection) as seen:
+        assert client.get(API + path).status_code == 200
+    return len(seen)
+
+
+# --- Changes -----------------------------------------------------------------------------------
+
+
+def test_a_job_is_launched_by_the_pages_own_service(
+    django_capture_on_commit_callbacks: Any,
+) -> None:
+    rows.launch(scenarios=2, contestants=("reference",))
+    asking = program_of(people()["admin"])
+    known = slugs(asking.get(API + "scenarios"))
+    chosen = {"contestants": ["reference"], "scenarios": known}
+    with django_capture_on_commit_callbacks() as later:
+        answer = send(asking, "jobs", name="By API", samples=2, cap_calls=5, **chosen)
+    assert answer.status_code == 201, answer.content
+    assert len(later) == 1, "the messages are sent once all is written"
+    job = GenerationJob.objects.get(code=answer.json()["code"])
+    assert (job.name, job.samples, job.cap_calls) == ("By API", 2, 5)
+    assert job.augmentations.count() == answer.json()["total"] == 2 * len(known)
+    event = Event.objects.get(verb="launch", object_code=str(job.code))
+    assert event.actor is not None
+    error = error_of(send(asking, f"jobs/{job.code}/resume"), 409, "conflict")
+    assert "resumed" in error["message"]
+    assert send(asking, f"jobs/{job.code}/cancel").json()["state"] == "cancelled"
+    error_of(send(asking, f"jobs/{job.code}/cancel"), 409, "conflict")
+
+
+def test_nothing_is_launched_where_something_is_unknown() -> None:
+    asking = program_of(people()["admin"])
+    answer = send(asking, "jobs", name="x", contestants=["nobody"], scenarios=["nowhere"])
+    assert "nobody" in error_of(answer, 400, "refused")["message"]
+    assert not GenerationJob.objects.exists()
+
+
+def test_links_let_in_once_and_only_with_a_password_that_holds() -> None:
+    link = f"http://x/first/{make_first_link_token()}/"
+    given = {"link": link, "username": "ada"}
+    error_of(send(Client(), "first", **given, password="short"), 400, "refused")
+    made = send(Client(), "first", **given, password="nine lives of a cat")
+    admin = program(made.json()["token"])
+    error_of(send(Client(), "first", **given, password="nine lives of a cat"), 410, "link_over")
+    grace = send(admin, "people", username="grace", role="expert").json()
+    invited = {"link": grace["link"], "password": "a bird in the hand"}
+    error_of(send(Client(), "welcome", **(invited | {"password": "1"})), 400, "refused")
+    expert = program(send(Client(), "welcome", **invited).json()["token"])
+    assert expert.get(API + "account").json()["role"] == "expert"
+    error_of(send(Client(), "welcome", **invited), 410, "link_over")
+    assert User.objects.get(username="grace").check_password("a bird in the hand")
+
+
+# --- Blindness ---------------------------------------------------------------------------------
+
+
+def address(name: str) -> str:
+    here = {"code": "9e107d9d-372b-4682-86d0-5c1f9f3b2b1e", "name": "tool-calls", "form": "csv"}
+    found = next(pattern for pattern in urlpatterns if pattern.name == name)
+    wanted = found.pattern.converters
+    return reverse(name, kwargs={part: here.get(part, "x") for part in wanted})
+
+
+def test_an_expert_is_refused_everywhere_else_before_anything_is_looked_up() -> None:
+    asking = program_of(people()["expert"])
+    for pattern in urlpatterns:
+        assert pattern.name is not None
+        if pattern.name not in {*OF_EXPERTS, "api-reference"}:  # a page, for sessions
+            for method in (asking.get, asking.post):
+                status = method(address(pattern.name)).status_code
+                assert status in (403, 405), (pattern.name, status)
+
+
+def test_an_experts_studies_tell_of_no_contestant() -> None:
+    here = world()
+    expert = program_of(here.expert)
+    answer = expert.get(API + "studies")
+    (line,) = answer.json()["results"]
+    assert (line["planned"], line["voted"], line["left"]) == (9, 0, 9)
+    of_both = {"code", "name", "state", "opened_at", "closed_at"}
+    assert set(line) == of_both | {"planned", "voted", "skipped", "left"}
+    assert program_of(people()["expert"]).get(API + "studies").json()["results"] == []
+
+
+def test_an_analyst_reads_and_rates_and_changes_nothing_else() -> None:
+    here = world()
+    analyst = program_of(people()["analyst"])
+    for path in (f"jobs/{here.job.code}/cancel", f"studies/{here.study.code}/close", "people"):
+        error_of(send(analyst, path), 403, "forbidden")
+    close_study(study=here.study)
+    assert send(analyst, f"studies/{here.study.code}/snapshots", rounds=20).status_code == 201
+
+
+def test_results_of_an_open_study_need_an_early_look() -> None:
+    here, accounts = world(), people()
+    snapshot = rate(study=here.study, rounds=20, early=True)
+    asking = program_of(accounts["analyst"])
+    paths = [
+        f"studies/{here.study.code}/snapshots",
+        f"snapshots/{snapshot.code}",
+        f"snapshots/{snapshot.code}/exports/leaderboard.csv",
+    ]
+    for path in paths:
+        error_of(asking.get(API + path), 403, "study_still_open")
+    error_of(send(asking, paths[0]), 403, "study_still_open")
+    assert Snapshot.objects.count() == 1
+    assert send(asking, f"studies/{here.study.code}/early-look").status_code == 200
+    assert EarlyLook.objects.filter(user=accounts["analyst"]).count() == 1
+    for path in paths:
+        assert asking.get(API + path).status_code == 200
+    error_of(program_of(accounts["admin"]).get(API + paths[1]), 403, "study_still_open")
+
+
+def test_a_program_of_an_expert_sees_the_pictures_of_its_own_pairs_alone() -> None:
+    here = world()
+    own = here.study.matchups.filter(expert=here.expert)[0]
+    other = here.study.matchups.exclude(expert=here.expert)[0]
+    expert = program_of(here.expert)
+    (pair, *_) = expert.get(API + "matchups", {"study": str(here.study.code)}).json()
+    token = pair["a"].rpartition("/")[2]
+    assert token == own.left_token
+    picture = expert.get(f"{API}pictures/{token}")
+    assert picture.content.startswith(b"\x89PNG")
+    assert "ETag" not in picture.headers, "it would tell which pictures are alike"
+    error_of(expert.get(f"{API}pictures/{other.left_token}"), 404, "not_found")
+
+
+# --- Files -------------------------------------------------------------------------------------
+
+
+def test_files_have_the_bytes_of_the_pages() -> None:
+    here, admin = world(), people()["admin"]
+    for matchup in matchups_of(here.study, "eva"):
+        vote(matchup, "left")
+    snapshot = rate(study=close_study(study=here.study), rounds=20)
+    asking, page = program_of(admin), signed_in(admin)
+    for name, form in (("leaderboard", "latex"), ("votes", "csv"), ("pairs", "svg")):
+        program_file = asking.get(f"{API}snapshots/{snapshot.code}/exports/{name}.{form}")
+        part = {
+            "leaderboard": "results.",
+            "votes": "results-votes.",
+            "pairs": "results-charts/pairs.",
+        }
+        shown = page.get(f"/studies/{here.study.code}/{part[name]}{form}")
+        assert program_file.content == shown.content
+        assert program_file.headers["Content-Type"] == shown.headers["Content-Type"]
+    missing = asking.get(f"{API}snapshots/{snapshot.code}/exports/leaderboard.docx")
+    error_of(missing, 404, "not_found")
+    table = asking.get(f"{API}snapshots/{snapshot.code}").json()["table"]
+    assert {row["slug"] for row in table["rows"]} == set(
+        Contestant.objects.filter(studies=here.study).values_list("slug", flat=True)
+    )
+
+
+def test_a_transcript_by_the_wire_is_that_of_the_page() -> None:
+    here, admin = world(), people()["admin"]
+    path = f"augmentations/{here.augmentation.code}"
+    wire = program_of(admin).get(f"{API}{path}/transcript").json()
+    assert wire == signed_in(admin).get(f"/{path}/transcript.json").json()

@@ -1,0 +1,188 @@
+"""Tokens: made and revoked on a page, kept as a hash, never more than their owner."""
+
+from __future__ import annotations
+
+from datetime import timedelta
+
+import pytest
+from django.contrib.auth.models import User
+from django.test import Client
+from django.urls import reverse
+from django.utils import timezone
+
+from arena.models import ApiToken
+from arena.queries.api_tokens import effective_role
+from arena.services import api_tokens
+from arena.services.accounts import set_active, set_role
+from arena.services.api_tokens import make_api_token
+from augment.errors import AugmentError, UnknownName
+from augment.models import Event
+from tests.api.asking import error_of
+from tests.api.tokens import program, program_of, secret_of
+from tests.web.cast import people, signed_in
+
+pytestmark = pytest.mark.django_db
+
+ACCOUNT = "/api/v1/account"
+
+
+def role_at(client: Client) -> str | None:
+    answer = client.get(ACCOUNT)
+    return answer.json()["role"] if answer.status_code == 200 else None
+
+
+def test_the_page_shows_a_new_token_once_and_keeps_only_its_hash() -> None:
+    admin = people()["admin"]
+    page = signed_in(admin)
+    given = {"name": "nightly export", "role": "analyst", "days": "7"}
+    shown = page.post(reverse("api-tokens"), given).content.decode()
+    row = ApiToken.objects.get()
+    secret = shown.partition('id="secret" value="')[2].partition('"')[0]
+    assert secret.startswith(api_tokens.PREFIX)
+    assert role_at(program(secret)) == "analyst"
+    stored = [str(value) for value in ApiToken.objects.values_list().get()]
+    assert not any(secret in value for value in stored)
+    listed = page.get(reverse("api-tokens")).content.decode()
+    assert "nightly export" in listed
+    assert secret not in listed
+    assert row.expires_at - row.made_at == pytest.approx(
+        timedelta(days=7), abs=timedelta(minutes=1)
+    )
+
+
+def test_the_log_says_who_made_and_revoked_it_and_not_what_it_is() -> None:
+    admin = people()["admin"]
+    secret = secret_of(admin)
+    token = ApiToken.objects.get()
+    answer = signed_in(admin).post(reverse("api-token-revoke", args=[token.code]))
+    assert answer.status_code == 302
+    events = Event.objects.filter(object_kind="api token", object_code=str(token.code))
+    assert list(events.order_by("pk").values_list("verb", "actor")) == [
+        ("add", admin.pk),
+        ("revoke", admin.pk),
+    ]
+    assert secret not in str(list(events.values()))
+    error_of(program(secret).get(ACCOUNT), 401, "signed_out")
+
+
+def test_nobody_revokes_somebody_elses() -> None:
+    accounts = people()
+    secret = secret_of(accounts["analyst"])
+    token = ApiToken.objects.get()
+    answer = signed_in(accounts["admin"]).post(reverse("api-token-revoke", args=[token.code]))
+    assert answer.status_code == 404
+    assert role_at(program(secret)) == "analyst"
+
+
+@pytest.mark.parametrize(
+    ("owner", "role"), [("analyst", "admin"), ("expert", "analyst"), ("admin", "expert")]
+)
+def test_no_token_has_more_than_its_owner_and_staff_never_an_experts(
+    owner: str, role: str
+) -> None:
+    with pytest.raises(UnknownName):
+        make_api_token(owner=people()[owner], name="x", role=role, days=1)
+
+
+@pytest.mark.parametrize(
+    ("role", "owner", "opens"),
+    [
+        ("admin", "admin", "admin"),
+        ("analyst", "admin", "analyst"),
+        ("admin", "analyst", "analyst"),
+        ("analyst", "analyst", "analyst"),
+        ("admin", "expert", None),
+        ("analyst", "expert", None),
+        ("expert", "expert", "expert"),
+        ("expert", "analyst", None),
+        ("expert", "admin", None),
+        ("admin", None, None),
+    ],
+)
+def test_what_a_token_opens_follows_its_owner(
+    role: str, owner: str | None, opens: str | None
+) -> None:
+    assert effective_role(role, owner) == opens
+
+
+def test_a_demoted_owners_token_is_demoted_with_them() -> None:
+    accounts = people()
+    asking = program_of(accounts["admin"])
+    assert role_at(asking) == "admin"
+    another = api_admin()
+    set_role(user=accounts["admin"], role="analyst", actor=another)
+    assert role_at(asking) == "analyst"
+    set_role(user=accounts["admin"], role="expert", actor=another)
+    assert role_at(asking) is None
+
+
+def api_admin() -> User:
+    return User.objects.create_superuser("another")
+
+
+def test_a_paused_owners_token_opens_nothing() -> None:
+    accounts = people()
+    asking = program_of(accounts["analyst"])
+    set_active(user=accounts["analyst"], is_active=False, actor=accounts["admin"])
+    error_of(asking.get(ACCOUNT), 401, "signed_out")
+
+
+def test_a_token_ends_at_its_time() -> None:
+    secret = secret_of(people()["expert"])
+    ApiToken.objects.update(expires_at=timezone.now() + timedelta(seconds=60))
+    assert role_at(program(secret)) == "expert"
+    ApiToken.objects.update(expires_at=timezone.now())
+    error_of(program(secret).get(ACCOUNT), 401, "signed_out")
+
+
+@pytest.mark.parametrize("header", ["Bearer", "Bearer ", "Bearer nonsense", "bearer arena_x"])
+def test_a_wrong_token_is_401_even_beside_a_session(header: str) -> None:
+    client = signed_in(people()["admin"])
+    answer = client.get(ACCOUNT, headers={"Authorization": header})
+    error_of(answer, 401, "signed_out")
+    assert answer.headers["WWW-Authenticate"] == "Bearer"
+
+
+def test_a_token_needs_no_csrf_token_and_a_session_does() -> None:
+    admin = people()["admin"]
+    person = {"username": "grace", "role": "expert"}
+    browser = Client(enforce_csrf_checks=True)
+    browser.force_login(admin)
+    url = reverse("api-people")
+    error_of(browser.post(url, person, content_type="application/json"), 403, "forbidden")
+    made = program_of(admin).post(url, person, content_type="application/json")
+    assert made.status_code == 201, made.content
+
+
+def test_an_analysts_token_of_an_admin_changes_nothing() -> None:
+    asking = program_of(people()["admin"], "analyst")
+    answer = asking.post(
+        reverse("api-catalogue"), {"set": "paper"}, content_type="application/json"
+    )
+    error_of(answer, 403, "forbidden")
+    assert asking.get(reverse("api-jobs")).status_code == 200
+
+
+def test_use_is_remembered_and_limited_by_role(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(api_tokens.REQUESTS, "expert", 3)
+    accounts = people()
+    asking, other = program_of(accounts["expert"]), program_of(accounts["analyst"])
+    assert ApiToken.objects.exclude(last_used_at=None).count() == 0
+    assert [asking.get(ACCOUNT).status_code for _ in range(4)] == [200, 200, 200, 429]
+    refused = asking.get(ACCOUNT)
+    error_of(refused, 429, "too_many_requests")
+    assert refused.headers["Retry-After"] == "60"
+    assert other.get(ACCOUNT).status_code == 200, "another token has its own count"
+    ApiToken.objects.update(window_began_at=timezone.now() - timedelta(seconds=61))
+    assert asking.get(ACCOUNT).status_code == 200, "a new window"
+    assert ApiToken.objects.exclude(last_used_at=None).count() == 2
+
+
+@pytest.mark.parametrize(
+    "given", [{"name": ""}, {"name": "a\nb"}, {"days": 2}, {"days": 0}, {"days": 10_000}]
+)
+def test_what_a_token_can_not_be_says_why(given: dict[str, object]) -> None:
+    usual: dict[str, object] = {"name": "x", "role": "expert", "days": 1}
+    with pytest.raises(AugmentError):
+        make_api_token(owner=people()["expert"], **(usual | given))  # type: ignore[arg-type]
+    assert not ApiToken.objects.exists()
