@@ -1,0 +1,1 @@
+"""Programs that use the product from outside; nothing of it is imported here."""

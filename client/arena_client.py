@@ -1,0 +1,230 @@
+"""Scenario Arena from a program: one file, nothing but Python 3.11, to be copied where it is used.
+
+    arena = Arena("https://arena.example.org", token="arena_...")
+    for job in arena.list("jobs", state="running"):
+        print(job["name"], job["by_state"])
+
+What there is to ask for stands in the OpenAPI document, which staff read at
+/api/v1/reference/. `post` sends JSON, `get` and `list` read it, `download` gives a file's bytes.
+"""
+
+from __future__ import annotations
+
+import http.client
+import json
+import time
+import urllib.error
+import urllib.request
+import uuid
+from collections.abc import Callable, Iterator
+from typing import Any
+from urllib.parse import urlencode
+
+PREFIX = "/api/v1/"
+BUSY = (429, 503)
+KEYED = (PREFIX + "votes", PREFIX + "reports")
+"""What counts once however often it is sent, because its body has a key."""
+
+AGAIN_S = 1.0
+MOST_KEPT = 256
+"""So many answers are kept to be asked for only if they have changed."""
+
+
+class ApiError(Exception):
+    """The server refused; the text is its sentence.
+
+    Attributes:
+        status: Of the answer.
+        code: For programs: "conflict", "not_found".
+        fields: By field, what is wrong with it.
+    """
+
+    def __init__(self, status: int, error: dict[str, Any]) -> None:
+        self.status = status
+        self.code = str(error.get("code", ""))
+        self.fields: dict[str, Any] = error.get("fields", {})
+        wrong = "".join(f" {name}: {text}" for name, text in self.fields.items())
+        super().__init__(f"{status} {self.code}: {error.get('message', '')}{wrong}")
+
+
+class Arena:
+    """The API of one installation.
+
+    Args:
+        address: Of the installation, without a path.
+        token: Of the page “API tokens”; empty for `first` and `welcome`, which give one.
+        timeout_s: How long to wait for an answer.
+        patience_s: How long to go on asking a server that is busy or wants fewer requests.
+    """
+
+    def __init__(
+        self, address: str, token: str = "", *, timeout_s: float = 120, patience_s: float = 180
+    ) -> None:
+        self.address = address.rstrip("/")
+        self.token = token
+        self.timeout_s, self.patience_s = timeout_s, patience_s
+        self._kept: dict[str, tuple[str, Any]] = {}
+
+    # --- Any resource --------------------------------------------------------------------------
+
+    def get(self, path: str, **query: object) -> Any:
+        """What is at a path below /api/v1/, read; asked for again only if it has changed.
+
+        Raises:
+            ApiError: It was refused.
+        """
+        address = self._address(path, query)
+        tag, body = self._kept.get(address, ("", None))
+        answer = self._send("GET", address, headers={"If-None-Match": tag} if tag else {})
+        if answer.status == 304:
+            return body
+        body = json.loads(answer.body)
+        if answer.tag:
+            if len(self._kept) >= MOST_KEPT:
+                self._kept.clear()
+            self._kept[address] = (answer.tag, body)
+        return body
+
+    def list(self, path: str, **query: object) -> Iterator[dict[str, Any]]:
+        """Every row of a list, page after page.
+
+        Raises:
+            ApiError: It was refused.
+        """
+        page = self.get(path, **query)
+        while True:
+            yield from page["results"]
+            if page["next"] is None:
+                return
+            page = self.get(page["next"])
+
+    def post(self, path: str, **body: object) -> Any:
+        """What a change is answered with.
+
+        Raises:
+            ApiError: It was refused; nothing was changed.
+        """
+        headers = {"Content-Type": "application/json"}
+        data = json.dumps(body).encode()
+        return json.loads(self._send("POST", self._address(path, {}), data, headers).body)
+
+    def download(self, path: str, **query: object) -> bytes:
+        """The bytes of a file.
+
+        Raises:
+            ApiError: It was refused.
+        """
+        return self._send("GET", self._address(path, query)).body
+
+    # --- What takes more than one request ------------------------------------------------------
+
+    def first(self, link: str, *, username: str, password: str) -> Arena:
+        """Make the first admin by the link that `serve` prints; gives the API as that admin."""
+        made = self.post("first", link=link, username=username, password=password)
+        return self._as(made["token"])
+
+    def welcome(self, link: str, *, password: str) -> Arena:
+        """Set a new account's password by its link; gives the API as that account."""
+        return self._as(self.post("welcome", link=link, password=password)["token"])
+
+    def wait_for_job(self, code: str, *, every_s: float = 2, within_s: float = 3600) -> Any:
+        """The job once nothing of it is under way.
+
+        Raises:
+            TimeoutError: It still is.
+        """
+        return self._wait(f"jobs/{code}", lambda job: bool(job["is_over"]), every_s, within_s)
+
+    def wait_for_snapshot(self, code: str, *, every_s: float = 2, within_s: float = 3600) -> Any:
+        """The rating once it is ready or failed.
+
+        Raises:
+            TimeoutError: It is neither.
+        """
+        ended = ("ready", "failed")
+        return self._wait(
+            f"snapshots/{code}", lambda one: one["state"] in ended, every_s, within_s
+        )
+
+    def pairs(self, study: str) -> Iterator[dict[str, Any]]:
+        """The pairs that an expert still has to judge; decide each before the next one comes."""
+        while waiting := self.get("matchups", study=study, n=1):
+            yield from waiting
+
+    def picture(self, address: str) -> bytes:
+        """The PNG behind `a`, `b` or `original` of a pair."""
+        return self.download(f"pictures/{address.rpartition('/')[2]}")
+
+    def vote(self, pair: dict[str, Any], outcome: str, **more: object) -> Any:
+        """Decide a pair: "A", "B", "E" for equal, or "skip" with a reason.
+
+        It is sent again with the same key where the answer was lost, so that it counts once.
+        """
+        key = str(uuid.uuid4())
+        return self.post("votes", key=key, matchup=pair["matchup"], outcome=outcome, **more)
+
+    # --- Private -------------------------------------------------------------------------------
+
+    def _as(self, token: str) -> Arena:
+        return Arena(self.address, token, timeout_s=self.timeout_s, patience_s=self.patience_s)
+
+    def _address(self, path: str, query: dict[str, object]) -> str:
+        if not path.startswith(PREFIX):
+            path = PREFIX + path.removeprefix("/")
+        return self.address + path + ("?" + urlencode(query) if query else "")
+
+    def _wait(
+        self, path: str, is_over: Callable[[Any], bool], every_s: float, within_s: float
+    ) -> Any:
+        ends_at = time.monotonic() + within_s
+        while not is_over(found := self.get(path)):
+            if time.monotonic() >= ends_at:
+                raise TimeoutError(f"{path} is still under way after {within_s} s")
+            time.sleep(every_s)
+        return found
+
+    def _send(
+        self, method: str, address: str, data: bytes | None = None, headers: Any = None
+    ) -> _Answer:
+        sent = dict(headers or {})
+        if self.token:
+            sent["Authorization"] = f"Bearer {self.token}"
+        is_repeatable = method == "GET" or address.endswith(KEYED)
+        ends_at = time.monotonic() + self.patience_s
+        while True:
+            request = urllib.request.Request(address, data, sent, method=method)
+            try:
+                with urllib.request.urlopen(request, timeout=self.timeout_s) as answer:
+                    tag = answer.headers.get("ETag", "")
+                    return _Answer(answer.status, tag, answer.read())
+            except urllib.error.HTTPError as error:
+                if error.code == 304:
+                    return _Answer(304, "", b"")
+                wait_s = _wait_s(error)
+                if wait_s is None or time.monotonic() + wait_s > ends_at:
+                    raise ApiError(error.code, _error_in(error)) from None
+            except (OSError, http.client.HTTPException):  # no answer, or not all of it
+                wait_s = AGAIN_S
+                if not is_repeatable or time.monotonic() + wait_s > ends_at:
+                    raise
+            time.sleep(wait_s)
+
+
+class _Answer:
+    def __init__(self, status: int, tag: str, body: bytes) -> None:
+        self.status, self.tag, self.body = status, tag, body
+
+
+def _wait_s(error: urllib.error.HTTPError) -> float | None:
+    """How long to wait before the same is asked again, None where that would not help."""
+    given = error.headers.get("Retry-After", "")
+    return float(given) if error.code in BUSY and given.isdigit() else None
+
+
+def _error_in(error: urllib.error.HTTPError) -> dict[str, Any]:
+    body = error.read()
+    try:
+        found = json.loads(body)["error"]
+    except (ValueError, KeyError, TypeError):
+        return {"message": body[:200].decode(errors="replace")}
+    return found if isinstance(found, dict) else {}
