@@ -1,0 +1,188 @@
+"""Whatever the document allows or refuses, asked in every role: no fault of ours, nothing unsaid.
+
+Every answer must have a status, a content type and a body that the document knows. The examples
+are the same in every run; what one of them changes is taken back before the next.
+"""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from collections.abc import Iterator
+from typing import Any
+
+import pytest
+import schemathesis
+from django.contrib.auth.models import User
+from django.core.signals import request_finished, request_started
+from django.core.wsgi import get_wsgi_application
+from django.db import close_old_connections, transaction
+from hypothesis import HealthCheck, Phase, given, settings
+from hypothesis import strategies as st
+from rest_framework.response import Response
+from schemathesis import GenerationMode
+from schemathesis.checks import not_a_server_error
+from schemathesis.specs.openapi import checks
+
+from arena.api import studies
+from arena.models import ScenarioFile, Snapshot
+from arena.services.early_looks import open_early
+from arena.services.ratings import rate
+from augment.models import Contestant, Simulation
+from tests.api.tokens import secret_of
+from tests.study_rows import matchups_of, vote
+from tests.web.cast import World, people, world
+
+pytestmark = [pytest.mark.django_db, pytest.mark.slow]
+
+EXAMPLES = 4
+CHECKS: list[Any] = [
+    not_a_server_error,
+    checks.status_code_conformance,
+    checks.content_type_conformance,
+    checks.response_schema_conformance,
+]
+ROLES = ("anonymous", "expert", "analyst", "admin")
+OF_EXPERTS = {"getAccount", "listStudies", "listMatchups", "listVotes", "getShownPicture"}
+OF_EXPERTS |= {"keepPreferences", "report", "vote"}
+EXPORTS = {"jobs": ("tool-calls", "csv"), "snapshots": ("leaderboard", "latex")}
+READ_BY_STAFF = {
+    *("listJobs", "getJob", "exportJob", "listFailures", "listAugmentations", "getAugmentation"),
+    *("getTranscript", "listStudies", "getStudy", "getSnapshot", "exportSnapshot"),
+    *("listScenarios", "listContestants", "listEndpoints", "listSimulations", "rateStudy"),
+}
+
+Seen = dict[str, set[int]]
+
+
+@pytest.fixture(autouse=True)
+def one_connection() -> Iterator[None]:
+    """Let requests end without closing the database, as Django's own test client does."""
+    signals = (request_started, request_finished)
+    for signal in signals:
+        signal.disconnect(close_old_connections)
+    yield
+    for signal in signals:
+        signal.connect(close_old_connections)
+
+
+@pytest.fixture
+def here() -> World:
+    """A study with votes and a rating, seen early by its staff; a job; drives."""
+    found = world()
+    for matchup in matchups_of(found.study, "eva")[:4]:
+        vote(matchup, "left")
+    Simulation.objects.create(
+        scenario=found.augmentation.scenario,
+        subject=Simulation.Subject.UNMODIFIED,
+        planner="idm",
+        offsets="paper",
+    )
+    ScenarioFile.objects.create(job=found.job, format="json")
+    return found
+
+
+def codes(here: World) -> dict[str, object]:
+    """By the first word of an address, the code of a row that is there."""
+    return {
+        "scenarios": here.augmentation.scenario.code,
+        "contestants": Contestant.objects.get(slug="reference").code,
+        "jobs": here.job.code,
+        "augmentations": here.study.matchups.all()[0].left.code,
+        "simulations": Simulation.objects.get().code,
+        "scenario-files": ScenarioFile.objects.get().code,
+        "studies": here.study.code,
+        "snapshots": Snapshot.objects.get().code,
+    }
+
+
+def account(role: str, here: World) -> User | None:
+    if role == "anonymous":
+        return None
+    return here.expert if role == "expert" else people()[role]
+
+
+def ask_all(role: str, here: World, only: str | None = None) -> Seen:
+    """Ask for every operation, or for one, in a role; by its name, the statuses that came."""
+    user = account(role, here)
+    reader = user if role in ("analyst", "admin") else people()["analyst"]
+    assert reader is not None
+    headers = {} if user is None else {"Authorization": f"Bearer {secret_of(user)}"}
+    rate(study=here.study, rounds=20, early=True)
+    if role in ("analyst", "admin"):
+        assert user is not None
+        open_early(study=here.study, actor=user)
+    document = schemathesis.openapi.from_wsgi(
+        "/api/v1/openapi.json",
+        app=get_wsgi_application(),
+        headers={"Authorization": f"Bearer {secret_of(reader)}"},
+    )
+    known, token = codes(here), here.study.matchups.filter(expert=here.expert)[0].left_token
+    seen: Seen = defaultdict(set)
+    for result in document.get_all_operations():
+        operation: Any = result.ok()  # type: ignore[union-attr] # raises where it is none
+        name = operation.definition.raw["operationId"]
+        if only in (None, name):
+            seen[name] |= ask(operation, headers, known, token)
+    return seen
+
+
+def ask(operation: Any, headers: dict[str, str], known: dict[str, object], token: str) -> set[int]:
+    """Some requests to one operation, half of them about rows that are there."""
+    statuses: set[int] = set()
+    word = operation.path.removeprefix("/api/v1/").partition("/")[0]
+    right, wrong = (operation.as_strategy(mode) for mode in GenerationMode)
+
+    @settings(
+        max_examples=EXAMPLES,
+        derandomize=True,
+        database=None,
+        deadline=None,
+        phases=[Phase.generate],
+        suppress_health_check=list(HealthCheck),
+    )
+    @given(case=st.one_of(right, wrong), is_there=st.sampled_from([True, True, False]))
+    def send(case: Any, is_there: bool) -> None:
+        if is_there and "code" in (case.path_parameters or {}):
+            case.path_parameters["code"] = str(known[word])
+        if is_there and "name" in (case.path_parameters or {}):
+            case.path_parameters["name"], case.path_parameters["form"] = EXPORTS[word]
+        if is_there and isinstance(case.body, dict) and "job" in case.body:
+            case.body["job"] = str(known["jobs"])
+        if is_there and "token" in (case.path_parameters or {}):
+            case.path_parameters["token"] = token
+        with transaction.atomic():
+            answer = case.call(headers=headers)
+            transaction.set_rollback(True)
+        case.validate_response(answer, checks=CHECKS, headers=headers)
+        statuses.add(answer.status_code)
+
+    send()
+    return statuses
+
+
+@pytest.mark.parametrize("role", ROLES)
+def test_every_answer_is_one_that_the_document_knows(role: str, here: World) -> None:
+    seen = ask_all(role, here)
+    fine = {name for name, statuses in seen.items() if any(status < 300 for status in statuses)}
+    if role == "anonymous":
+        assert fine == set()
+        assert all(statuses <= {401, 400, 404, 410, 415, 422} for statuses in seen.values()), seen
+    elif role == "expert":
+        assert fine <= OF_EXPERTS, seen
+    else:
+        assert fine >= READ_BY_STAFF, seen
+        assert ("listPeople" in fine) is (role == "admin")
+
+
+def test_an_undocumented_status_would_be_noticed(
+    here: World, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The checks check: an answer that nobody described fails the test above."""
+
+    def answer(self: studies.StudiesView, request: Any) -> Response:
+        return Response({}, status=418)
+
+    monkeypatch.setattr(studies.StudiesView, "get", answer)
+    with pytest.raises(BaseExceptionGroup) as failed:
+        ask_all("admin", here, only="listStudies")
+    assert "418" in str(failed.value.exceptions)
