@@ -9,7 +9,7 @@ from django.db import migrations, models
 class Migration(migrations.Migration):
 
     dependencies = [
-        ('arena', '0016_covariates_of_ratings'),
+        ('arena', '0017_plans_of_studies'),
         migrations.swappable_dependency(settings.AUTH_USER_MODEL),
     ]
 
