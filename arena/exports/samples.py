@@ -110,6 +110,23 @@ def sheet_bytes(sheet: Sheet, *, file_format: str) -> bytes:
         return write_figure(figure, file_format)
 
 
+def stamp_simulated(axes: Axes, *, size: float = 24.0) -> None:
+    """A word across a picture that somebody may cut out of the sheet."""
+    axes.text(
+        0.5,
+        0.5,
+        "SIMULATED",
+        transform=axes.transAxes,
+        ha="center",
+        va="center",
+        rotation=25,
+        fontsize=size,
+        fontweight="bold",
+        color=SIMULATED,
+        alpha=0.3,
+    )
+
+
 # Private
 
 
@@ -125,28 +142,11 @@ def _picture(axes: Axes, cell: Augmentation | None) -> None:
         with default_storage.open(cell.image) as file:
             axes.imshow(imread(io.BytesIO(file.read()), format="png"))
         if cell.contestant.is_simulated:
-            _watermark(axes)
+            stamp_simulated(axes)
         if cell.state != Augmentation.State.DONE:
             axes.set_title(_word(cell), fontsize=7, color=SOFT, y=0.02, va="bottom")
         return
     axes.text(0.5, 0.5, _word(cell), ha="center", va="center", fontsize=8, color=SOFT)
-
-
-def _watermark(axes: Axes) -> None:
-    """A word across a picture that somebody may cut out of the sheet."""
-    axes.text(
-        0.5,
-        0.5,
-        "SIMULATED",
-        transform=axes.transAxes,
-        ha="center",
-        va="center",
-        rotation=25,
-        fontsize=24,
-        fontweight="bold",
-        color=SIMULATED,
-        alpha=0.3,
-    )
 
 
 def _word(cell: Augmentation | None) -> str:

@@ -72,6 +72,10 @@ PAGES: dict[str, tuple[int, int, int]] = {
     "results-votes": (403, 403, 403),
     "results-votes-file": (403, 403, 403),
     "results-vote": (403, 403, 403),
+    "results-disagreement": (403, 403, 403),
+    "results-worst": (403, 403, 403),
+    "results-sheet": (403, 403, 403),
+    "results-sheet-file": (403, 403, 403),
     "shown-picture": (403, 403, 403),
     "results-votes-export": (403, 403, 403),
     "results-export": (403, 403, 403),
@@ -214,7 +218,10 @@ def address(name: str, here: World) -> str:
         *("study", "preregistration", "experts", "invite", "author", "study-close"),
         *("study-hand-over", "study-rate"),
     )
-    results = ("results", "results-votes", "results-votes-file", "results-open")
+    results = (
+        *("results", "results-votes", "results-votes-file", "results-open"),
+        *("results-disagreement", "results-worst", "results-sheet", "results-sheet-file"),
+    )
     is_of_study = name in own + results or name.startswith("vote")
     found = {"code": here.study.code} if is_of_study else arguments.get(name, {})
     return reverse(name, kwargs=found)

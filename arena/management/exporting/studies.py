@@ -7,6 +7,7 @@ from uuid import UUID
 
 from arena.errors import StudyStillOpen
 from arena.exports.bundle import bundle
+from arena.exports.contact_sheet import contact_sheet, sheet_pdf
 from arena.exports.formats import format_named
 from arena.exports.rating_charts import CONTENT_TYPES, chart_bytes
 from arena.exports.tables import leaderboard_table
@@ -22,9 +23,11 @@ from arena.management.exporting.kinds import (
     fill,
 )
 from arena.models import Snapshot, Study
+from arena.queries.judged import is_imported
 from arena.queries.results import snapshot_to_export
 from arena.queries.studies import study_named
 from arena.services.early_looks import log_early_look
+from augment.errors import Conflict
 
 
 def add_studies(kinds: Any) -> None:
@@ -50,7 +53,13 @@ def add_studies(kinds: Any) -> None:
         "--chart", required=True, help="pairs, types, width, displacement, elo-usd, ..."
     )
     chart.add_argument("--format", default="svg", help=f"one of {', '.join(CONTENT_TYPES)}")
-    for kind in (leaderboard, votes, chart):
+    sheet = add_kind(
+        *(kinds, "contact-sheet", write_contact_sheet),
+        of="study",
+        help="every contestant's picture of every scenario with the votes on it, as PDF",
+    )
+    sheet.set_defaults(format="pdf")
+    for kind in (leaderboard, votes, chart, sheet):
         kind.add_argument("--rating", type=UUID, help="the code of an older rating")
         kind.add_argument(
             "--early", action="store_true", help="export from an open study; this is logged"
@@ -77,6 +86,16 @@ def write_chart(options: Chosen, say: Say) -> ExportedFile:
     snapshot = _snapshot(options)
     content = chart_bytes(snapshot, name=options["chart"], file_format=form)
     return ExportedFile(content, form, form == "svg")
+
+
+def write_contact_sheet(options: Chosen, say: Say) -> ExportedFile:
+    """All scenarios of the study, side by side."""
+    snapshot = _snapshot(options)
+    if is_imported(snapshot.study):
+        raise Conflict("Votes from a file have no pictures, so there is no contact sheet.")
+    scenarios = list(snapshot.study.scenarios.defer("reference").order_by("type", "slug"))
+    sheet = contact_sheet(snapshot, leaderboard_table(snapshot), scenarios)
+    return ExportedFile(sheet_pdf(sheet), "pdf", False)
 
 
 def _snapshot(options: Chosen) -> Snapshot:

@@ -4,12 +4,15 @@ from __future__ import annotations
 
 import hashlib
 
+import numpy as np
 from django.core.files.base import ContentFile
 from django.core.files.storage import default_storage
+from numpy.typing import NDArray
 
 from augment.models import Scenario
 from augment.render.bev import draw
 from augment.render.camera import Camera, camera_for
+from augment.render.shrunken import shrink
 from augment.scene.entities import Scene
 from augment.scene.modification import Modification
 from augment.services.scenarios.scenes import reference_of, scene_of
@@ -66,6 +69,14 @@ def picture_of(scenario: Scenario, scene: Scene, modification: Modification) -> 
     """
     camera = camera_for(scene, reference_of(scenario))
     return store(draw(scene, modification, camera), folder=f"{FOLDER}/{camera.key}")
+
+
+def shrunken_picture(name: str, widest: int) -> NDArray[np.uint8] | None:
+    """The colours (H, W, 3) of a stored picture, no wider than so many pixels; None without it."""
+    if not name or not default_storage.exists(name):
+        return None
+    with default_storage.open(name) as file:
+        return shrink(file.read(), widest)
 
 
 def store(png: bytes, *, folder: str = FOLDER) -> str:
