@@ -7,19 +7,24 @@ page of a rating that waits offers to send it once more).
 from __future__ import annotations
 
 import logging
+from collections.abc import Callable
 from threading import Thread
 
 from celery import shared_task
 from celery.signals import worker_ready
 from django.conf import settings
 from django.db import connection
+from django.utils import timezone
 
 from arena.exports.scenario_files import write_file
 from arena.services import looks, ratings
+from arena.services.webhooks import deliver_due, plan_deliveries
 from augment.broker import open_broker
 from augment.services.running import stopping, workers
 
 logger = logging.getLogger(__name__)
+
+TELL_EVERY_S = 5
 
 
 @shared_task(name="arena.compute_snapshot", acks_late=True, ignore_result=True)
@@ -57,14 +62,33 @@ def send_scenario_file(file_pk: int) -> None:
 @worker_ready.connect
 def start_watching(**_: object) -> None:
     """Take the looks of stopping rules as they fall due, in a thread of the worker."""
-    Thread(target=_watch_until_stopped, name="looks", daemon=True).start()
+    _start("looks", looks.take_due_looks, every_s=settings.RECOVER_EVERY_S)
 
 
-def _watch_until_stopped() -> None:
-    while not stopping.is_stop_requested():
-        with workers.Survived() as watch:
-            looks.take_due_looks()
-        if watch.fault is not None:
-            logger.warning("No look at the stopping rules: %s", watch.fault)
-        connection.close()
-        stopping.wait(settings.RECOVER_EVERY_S)
+@worker_ready.connect
+def start_telling(**_: object) -> None:
+    """Tell webhooks what happens, in a thread of the worker; of several, one sends a message."""
+    _start("webhooks", _tell, every_s=TELL_EVERY_S)
+
+
+# --- Private -----------------------------------------------------------------------------------
+
+
+def _tell() -> None:
+    plan_deliveries(timezone.now())
+    deliver_due(timezone.now())
+
+
+def _start(what: str, act: Callable[[], object], *, every_s: float) -> None:
+    """Do something again and again in a thread that ends with the worker."""
+
+    def go_on() -> None:
+        while not stopping.is_stop_requested():
+            with workers.Survived() as watch:
+                act()
+            if watch.fault is not None:
+                logger.warning("The %s of this worker broke: %s", what, watch.fault)
+            connection.close()
+            stopping.wait(every_s)
+
+    Thread(target=go_on, name=what, daemon=True).start()

@@ -12,6 +12,7 @@ from arena.models.scenario_files import ScenarioFile
 from arena.models.studies import Matchup, Study
 from arena.models.tokens import fresh_token
 from arena.models.votes import AIDS, OUTCOME_LETTERS, Report, Vote
+from arena.models.webhooks import Webhook, WebhookDelivery
 
 __all__ = [
     "AIDS",
@@ -33,6 +34,8 @@ __all__ = [
     "Study",
     "Vote",
     "VoteFile",
+    "Webhook",
+    "WebhookDelivery",
     "fresh_token",
     "token_digest",
 ]

@@ -64,6 +64,7 @@ def tokens_page(request: HttpRequest) -> HttpResponse:
         "lines": [(*line, ROLE_NAMES[line[0].role]) for line in api_tokens_of(user)],
         "limits": [(ROLE_NAMES[role], REQUESTS[role]) for role in roles],
         "is_staff": roles and roles[0] in STAFF,
+        "is_admin": ADMIN in roles,
     }
     status = 422 if form.errors else 200
     return render(request, "api/tokens.html", context, status=status)

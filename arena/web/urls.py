@@ -36,6 +36,7 @@ from arena.web import (
     studies,
     uploads,
     voting,
+    webhooks,
 )
 from arena.web.sign_in import SignIn
 
@@ -52,6 +53,11 @@ urlpatterns: list[URLPattern] = [
     path("first/<str:token>/", people.first_page, name="first"),
     path("welcome/<str:token>/", people.welcome_page, name="welcome"),
     path("password/", people.password_page, name="password"),
+    path("webhooks/", webhooks.webhooks_page, name="webhooks"),
+    path("webhooks/<uuid:code>/", webhooks.webhook_page, name="webhook"),
+    path("webhooks/<uuid:code>/change/", webhooks.change_webhook, name="webhook-change"),
+    path("webhooks/<uuid:code>/remove/", webhooks.forget_webhook, name="webhook-forget"),
+    path("deliveries/<uuid:code>/again/", webhooks.repeat_delivery, name="webhook-repeat"),
     path("tokens/", api_tokens.tokens_page, name="api-tokens"),
     path("tokens/<uuid:code>/revoke/", api_tokens.revoke, name="api-token-revoke"),
     path("people/", people.people_page, name="people"),

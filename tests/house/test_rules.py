@@ -13,7 +13,9 @@ from tests.house.source import ROOT, dotted, functions, imported, modules
 
 HEAVY = {
     "openai": ("augment.llm.openai_wire",),
-    "httpx2": ("augment.llm.openai_wire", "augment.llm.wire_transport"),
+    "httpx2": (
+        *("augment.llm.openai_wire", "augment.llm.wire_transport", "augment.llm.wire_notice"),
+    ),
     "httpcore2": ("augment.llm.wire_transport", "augment.llm.wire_network"),
     "genai_prices": ("augment.services.endpoints.price_list",),
     "shapely": (
