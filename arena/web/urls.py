@@ -8,6 +8,7 @@ from django.urls import URLPattern, path
 from arena.web import (
     analyses,
     api_tokens,
+    audit,
     authorships,
     catalogue,
     contestant_form,
@@ -135,6 +136,8 @@ urlpatterns: list[URLPattern] = [
     path("augmentations/<uuid:code>/correct/", editing.correct_page, name="correct"),
     path("augmentations/<uuid:code>/transcript.json", scenarios.transcript, name="transcript"),
     path("asked/<slug:digest>.png", scenarios.asked_image, name="asked-image"),
+    path("audit/", audit.audit_page, name="audit"),
+    path("audit.<slug:form>", audit.audit_file, name="audit-export"),
     path("studies/", studies.studies_page, name="studies"),
     path("studies/plan/", planning.planning_page, name="study-plan"),
     path("studies/new/", studies.new_study_page, name="study-new"),

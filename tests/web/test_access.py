@@ -48,6 +48,8 @@ PAGES: dict[str, tuple[int, int, int]] = {
     "endpoint-new": (200, 403, 403),
     "endpoint": (200, 200, 403),
     "endpoint-model": (200, 200, 403),
+    "audit": (200, 403, 403),
+    "audit-export": (200, 403, 403),
     "people": (200, 403, 403),
     "person-forget": (200, 403, 403),  # a question
     "password": (200, 200, 200),
@@ -187,6 +189,7 @@ def address(name: str, here: World) -> str:
         "set-intent": {"code": here.augmentation.scenario.code},
         "intent-read": {"code": here.augmentation.scenario.code},
         "picture": {"kind": "augmentation", "code": shown.left.code},
+        "audit-export": {"form": "csv"},
         "results-export": {"code": here.study.code, "form": "csv"},
         "results-chart": {"code": here.study.code, "name": "pairs", "form": "svg"},
         "results-votes-export": {"code": here.study.code, "form": "csv"},

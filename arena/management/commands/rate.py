@@ -13,6 +13,7 @@ from arena.queries.studies import study_named
 from arena.queries.vote_sets import Filters
 from arena.rating.rules import Intervals
 from arena.services.covariates import COVARIATES
+from arena.services.early_looks import log_early_look
 from arena.services.ratings import DEFAULT_ROUNDS, rate
 from augment.errors import AugmentError
 from augment.services.terminal import TerminalCommand
@@ -59,8 +60,9 @@ class Command(TerminalCommand):
     def handle(self, *args: Any, **options: Any) -> None:
         """Rate, then print the table."""
         try:
+            study = study_named(options["study"])
             snapshot = rate(
-                study=study_named(options["study"]),
+                study=study,
                 method=options["method"],
                 rounds=options["rounds"],
                 seed=options["seed"],
@@ -72,4 +74,6 @@ class Command(TerminalCommand):
             )
         except (ArenaError, AugmentError) as error:
             raise CommandError(str(error)) from error
+        if snapshot.is_early:
+            log_early_look(study=study, actor=None, what="rating, printed")
         self.stdout.write(plain_text(leaderboard_table(snapshot)))

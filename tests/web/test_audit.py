@@ -1,0 +1,199 @@
+"""The log of administrative acts, and every door through which results could be seen early."""
+
+from __future__ import annotations
+
+import csv
+import io
+import json
+import re
+from io import StringIO
+from pathlib import Path
+
+import pytest
+from django.conf import settings
+from django.core.management import CommandError, call_command
+from django.test import Client
+from django.urls import reverse
+
+from arena.models import EarlyLook, Snapshot, Study
+from arena.services.ratings import rate
+from arena.services.studies import close_study
+from augment.models import Event
+from augment.services.events import log_event
+from tests import study_rows
+from tests.web.cast import people, signed_in
+
+pytestmark = pytest.mark.django_db
+
+
+def _page(client: Client, **asked: str) -> str:
+    return client.get(reverse("audit"), asked).content.decode()
+
+
+def _acts() -> tuple[Client, Study]:
+    """An opening by the machine, a closing by an admin, and something done to a scene."""
+    accounts = people()
+    study = close_study(study=study_rows.a_study(), actor=accounts["admin"])
+    log_event(
+        actor=accounts["analyst"], verb="import", object_kind="scene", object_code="a-street",
+        after={"notes": "=1+1"},
+    )  # fmt: skip
+    return signed_in(accounts["admin"]), study
+
+
+def test_acts_are_filtered_by_who_what_which_and_when() -> None:
+    client, study = _acts()
+    admin = Event.objects.get(verb="close").actor
+    assert admin is not None
+    everything = _page(client)
+    assert all(word in everything for word in ("a-street", str(study.code), "the machine"))
+    rows = {
+        "actor": (str(admin.person.code), "closed"),
+        "verb": ("close", "closed"),
+        "kind": ("scene", "a-street"),
+        "object": ("Round 1", str(study.code)),
+    }
+    for name, (value, shown) in rows.items():
+        body = _page(client, **{name: value}).partition("<tbody>")[2]
+        assert shown in body, name
+        assert ("a-street" in body) == (name == "kind"), name
+    assert "Nothing like that was done" in _page(client, since="2999-01-01")
+    assert "Nothing like that was done" in _page(client, until="1999-01-01")
+    assert client.get(reverse("audit"), {"since": "yesterday"}).status_code == 422
+
+
+def test_it_is_paged_and_the_filters_stay() -> None:
+    client, _ = _acts()
+    for number in range(60):
+        log_event(actor=None, verb="probe", object_kind="endpoint", object_code=number)
+    body = _page(client, verb="probe")
+    assert body.count("<tr>") == 51
+    assert "verb=probe&amp;page=2" in body or "page=2&amp;verb=probe" in body
+    assert _page(client, verb="probe", page="2").count("<tr>") == 11
+
+
+def test_it_is_exported_as_csv_and_as_json_lines() -> None:
+    client, study = _acts()
+    asked = {"kind": "scene"}
+    text = client.get(reverse("audit-export", args=["csv"]), asked).content.decode()
+    (row,) = csv.DictReader(io.StringIO(text))
+    assert (row["verb"], row["object_code"], row["actor"]) == ("import", "a-street", "Analyst 1")
+    assert json.loads(row["after"]) == {"notes": "=1+1"}
+    lines = client.get(reverse("audit-export", args=["jsonl"])).content.decode().splitlines()
+    assert len(lines) == Event.objects.count()
+    assert {json.loads(line)["object_code"] for line in lines} >= {"a-street", str(study.code)}
+    assert client.get(reverse("audit-export", args=["xlsx"])).status_code == 404
+
+
+# --- Early looks -------------------------------------------------------------------------------
+
+GIVES_RESULTS = re.compile(
+    r"\b(leaderboard_table|bundle|chart_bytes|vote_table|vote_list_csv|snapshot_to_export"
+    r"|write_study|plan_snapshot|answer_hypotheses|known_of)\("
+    r"|services\.ratings import .*\brate\b"
+)
+DOORS = {
+    "arena/api/exports.py": "by get_snapshot, which asks must_read_results",
+    "arena/api/snapshots.py": "asks must_read_results",
+    "arena/management/commands/export.py": "refuses open studies",
+    "arena/management/commands/plan_study.py": "reads closed studies alone",
+    "arena/management/commands/rate.py": "--early, logged",
+    "arena/management/demo.py": "rates a study that it has closed",
+    "arena/management/exporting/studies.py": "--early, logged",
+    "arena/web/planning.py": "reads what the reader may read",
+    "arena/web/results.py": "the gate",
+    "arena/web/results_files.py": "behind the gate",
+    "arena/web/results_galleries.py": "behind the gate",
+    "arena/web/results_votes.py": "behind the gate",
+}
+"""Every module of pages, API, admin and commands that makes something of results, and why nobody
+sees those of an open study through it without an early look."""
+
+
+def test_every_door_to_results_is_on_the_list() -> None:
+    root = Path(settings.BASE_DIR)
+    folders = ("arena/web", "arena/api", "arena/admin", "arena/management", "arena/templatetags")
+    found = {
+        str(path.relative_to(root))
+        for folder in folders
+        for path in (root / folder).rglob("*.py")
+        if GIVES_RESULTS.search(path.read_text())
+    }
+    assert found == set(DOORS)
+
+
+TABS = ("table", "pairs", "types", "raters", "coverage", "displacement", "cost", "log")
+GATED = ("results", *TABS)
+"""What answers with the question whether to look early."""
+
+
+def _pages(study: Study, rating: Snapshot) -> dict[str, str]:
+    """Every address that tells of the results of a study."""
+    code = study.code
+    return {
+        "results": reverse("results", args=[code]),
+        **{tab: reverse("results-tab", args=[code, tab]) for tab in TABS},
+        "votes": reverse("results-votes", args=[code]),
+        **{
+            form: reverse("results-export", args=[code, form])
+            for form in ("csv", "json", "latex", "parquet", "zip")
+        },
+        "votes.csv": reverse("results-votes-export", args=[code, "csv"]),
+        "api list": reverse("api-snapshots", args=[code]),
+        "api rating": reverse("api-snapshot", args=[rating.code]),
+        "api file": reverse("api-snapshot-file", args=[rating.code, "leaderboard", "csv"]),
+        "pairs.svg": reverse("results-chart", args=[code, "pairs", "svg"]),
+    }
+
+
+def _rated_while_open() -> tuple[Study, dict[str, str]]:
+    study = study_rows.a_study()
+    for number, one in enumerate(study.matchups.order_by("pk")):
+        study_rows.vote(one, ("left", "equal", "right")[number % 3])
+    snapshot = rate(study=study, early=True)
+    return study, _pages(study, snapshot)
+
+
+def test_no_page_shows_results_of_an_open_study_before_an_early_look() -> None:
+    study, pages = _rated_while_open()
+    accounts = people()
+    for role in ("admin", "analyst"):
+        client = signed_in(accounts[role])
+        for name, address in pages.items():
+            answer = client.get(address)
+            shown = answer.content.decode(errors="replace")
+            if answer.status_code == 200:  # the gate, which asks whether to look early
+                assert name in GATED, (role, name)
+                assert 'class="standings"' not in shown, (role, name)
+            else:
+                assert answer.status_code in (403, 409), (role, name)
+    assert not EarlyLook.objects.exists()
+    analyst = signed_in(accounts["analyst"])
+    analyst.post(reverse("results-open", args=[study.code]))
+    look = Event.objects.get(verb="look early")
+    assert (look.actor, look.object_code) == (accounts["analyst"], str(study.code))
+    assert {name: analyst.get(address).status_code for name, address in pages.items()} == (
+        dict.fromkeys(pages, 200)
+    )
+    admin = signed_in(accounts["admin"])
+    assert admin.get(pages["csv"]).status_code == 403
+
+
+@pytest.mark.parametrize(
+    ("command", "what"),
+    [
+        (("rate", "Round 1"), "rating, printed"),
+        (("export", "leaderboard", "Round 1"), "leaderboard as csv"),
+        (("export", "votes", "Round 1"), "votes as csv"),
+    ],
+)
+def test_a_command_shows_them_only_on_purpose_and_that_is_logged(
+    command: tuple[str, ...], what: str, tmp_path: Path
+) -> None:
+    _rated_while_open()
+    more = () if command[0] == "rate" else ("--out", str(tmp_path / "file.csv"))
+    with pytest.raises(CommandError):
+        call_command(*command, *more, stdout=StringIO())
+    assert not Event.objects.filter(verb="look early").exists()
+    call_command(*command, *more, "--early", stdout=StringIO())
+    assert Event.objects.get(verb="look early").after == {"what": what}
