@@ -9,7 +9,7 @@ from celery import shared_task
 
 from augment.broker import send
 from augment.services.clock import DATABASE_TIME, Moment
-from augment.services.scenarios import scene_pictures, upload_moments, uploads
+from augment.services.scenarios import prompts, scene_pictures, upload_moments, uploads
 
 
 @shared_task(name="augment.read_upload", acks_late=True, ignore_result=True)
@@ -72,6 +72,21 @@ def enqueue_scenario(scenario_pk: int) -> None:
         QueueFault: No broker, or it refuses.
     """
     send(draw_scenario, scenario_pk)
+
+
+@shared_task(name="augment.draw_prompts", acks_late=True, ignore_result=True)
+def draw_prompts(scenario_pk: int) -> None:
+    """Draw what viewers would be shown of a scenario, unless it is there."""
+    prompts.draw_prompts(scenario_pk)
+
+
+def enqueue_prompts(scenario_pk: int) -> None:
+    """Have the pictures of prompts drawn; for transaction.on_commit.
+
+    Raises:
+        QueueFault: No broker, or it refuses.
+    """
+    send(draw_prompts, scenario_pk)
 
 
 def resend_lost(*, now: Moment = DATABASE_TIME) -> None:

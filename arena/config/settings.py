@@ -242,6 +242,7 @@ CELERY_TASK_ROUTES = {
     "augment.read_moment": {"queue": "drawing"},
     "augment.draw_scene": {"queue": "drawing"},
     "augment.draw_scenario": {"queue": "drawing"},
+    "augment.draw_prompts": {"queue": "drawing"},
     "arena.compute_snapshot": {"queue": "drawing"},
     "arena.write_scenario_file": {"queue": "drawing"},
 }

@@ -33,11 +33,12 @@ class Shell:
     links: list[Link]
 
 
+_NEW = ("scenario-new", "scenarios-bulk", "prompts")
 _SECTIONS: dict[str, tuple[Promise, frozenset[str]]] = {
     "home": (_("Home"), frozenset({"home"})),
     "scenarios": (
         _("Scenarios"),
-        frozenset({"scenarios", "scenario", "scenes", "scene", "upload", "reference-edit"}),
+        frozenset({"scenarios", "scenario", "scenes", "scene", "upload", "reference-edit", *_NEW}),
     ),
     "contestants": (
         _("Contestants"),

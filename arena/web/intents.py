@@ -38,7 +38,7 @@ def intent_file(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
     return answer
 
 
-@allow_only(ADMIN)
+@allow_only(*STAFF)
 @require_POST
 def set_intent(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
     """Accept the last reading, or take the intent of the file that came along."""

@@ -45,7 +45,7 @@ def scene_page(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
         "scene": row,
         "counts": counts_of(row),
         "notes": [translate(note) for note in notes_of(row)],
-        "scenarios": row.scenarios.only("code", "slug", "instruction"),
+        "scenarios": row.scenarios.only("base_scene", "code", "slug", "instruction"),
         "is_drawn": drawn,
         "look": look,
     }

@@ -90,6 +90,7 @@ def shown_prompt(
     *,
     native_tools: bool = False,
     questions: Sequence[str] = EXAMPLE_QUESTIONS,
+    images: tuple[bytes, ...] | None = None,
 ) -> Shown:
     """What that role is asked first.
 
@@ -101,6 +102,7 @@ def shown_prompt(
         modification: What reviewers judge.
         native_tools: Whether the modifier calls natively.
         questions: What the viewer is asked.
+        images: What the viewer is shown, as `pictures` drew it before; None to draw it.
     """
     radius_m = recipe.limits.radius_m
     if role is ModelRole.MODIFIER:
@@ -119,9 +121,9 @@ def shown_prompt(
             ask = fill_review.engineer_messages
             messages = ask(scene, instruction, modification, radius_m=radius_m)
         case ModelRole.VIEWER:
-            messages = fill_review.viewer_messages(
-                questions, pictures(scene, modification, width_px=recipe.limits.picture_px)
-            )
+            if images is None:
+                images = pictures(scene, modification, width_px=recipe.limits.picture_px)
+            messages = fill_review.viewer_messages(questions, images)
     return Shown(messages=messages, tools=(), fit=None)
 
 

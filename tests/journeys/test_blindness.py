@@ -100,6 +100,7 @@ def every_address(study: Study) -> list[str]:
             filled = re.sub(r"<slug:part>", "pairs", filled)
             filled = re.sub(r"<slug:form>", "csv", filled)
             filled = re.sub(r"<slug:kind>", "augmentation", filled)
+            filled = re.sub(r"<int:number>", "0", filled)
             filled = re.sub(r"<slug:tab>", "pairs", filled)
             filled = re.sub(r"<slug:side>", "left", filled)
             filled = re.sub(r"<slug:digest>", "0" * 64, filled)

@@ -8,6 +8,7 @@ from __future__ import annotations
 import csv
 import io
 from collections.abc import Mapping
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -26,6 +27,8 @@ WHAT = "list of scenarios"
 NEEDED = ("scene", "type", "instruction")
 OPTIONAL = ("slug", "type_label", "keep_traffic", "reference", "intent")
 MOST_ROWS = 10_000
+MOST_ROWS_AT_ONCE = 300
+"""On a page: adding them holds the database for some seconds."""
 _YES_NO = {
     "": False,
     "no": False,
@@ -56,6 +59,56 @@ def read_rows(file: Path) -> list[dict[str, Any]]:
     return found
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class RowReport:
+    """What became of one row.
+
+    Attributes:
+        number: From 1.
+        slug: Of its scenario, empty where there is none.
+        problems: The columns that are wrong, and why; an empty name is the whole row.
+    """
+
+    number: int
+    slug: str = ""
+    problems: tuple[tuple[str, str], ...] = ()
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class BulkReport:
+    """What became of a file: all of its rows were added, or none.
+
+    Attributes:
+        is_kept: Whether they were.
+    """
+
+    rows: tuple[RowReport, ...]
+    is_kept: bool
+
+    @property
+    def faults(self) -> tuple[RowReport, ...]:
+        """The rows that can't be added."""
+        return tuple(row for row in self.rows if row.problems)
+
+
+def report_rows(
+    rows: list[dict[str, Any]], *, folder: Path, keeps: bool, actor: User | None = None
+) -> BulkReport:
+    """Add the scenarios of these rows, all or none, and say of each what became of it.
+
+    Args:
+        rows: As `add_scenarios` takes them.
+        folder: In which the files lie that they name.
+        keeps: False to try only: nothing is added then.
+        actor: Who adds them.
+    """
+    with transaction.atomic():
+        reports = [_report(number, row, folder, actor)[0] for number, row in enumerate(rows, 1)]
+        is_kept = keeps and not any(one.problems for one in reports)
+        transaction.set_rollback(not is_kept)
+    return BulkReport(rows=tuple(reports), is_kept=is_kept)
+
+
 @transaction.atomic
 def add_scenarios(
     rows: list[dict[str, Any]], *, folder: Path, actor: User | None = None
@@ -70,25 +123,33 @@ def add_scenarios(
     Raises:
         InvalidDocument: With every error and its row, counted from 1; nothing was added.
     """
-    problems: list[tuple[str, str]] = []
-    made: list[Scenario] = []
-    for number, row in enumerate(rows, start=1):
-        try:
-            with transaction.atomic():
-                made.append(add_scenario(**_read(row, folder), actor=actor))
-        except InvalidDocument as error:
-            problems += [
-                (f"row {number}.{path}" if path else f"row {number}", str(text))
-                for path, text in error.problems
-            ]
-        except AugmentError as error:
-            problems.append((f"row {number}", str(error)))
+    found = [_report(number, row, folder, actor) for number, row in enumerate(rows, start=1)]
+    problems = [
+        (f"row {report.number}.{path}" if path else f"row {report.number}", text)
+        for report, _ in found
+        for path, text in report.problems
+    ]
     if problems:
         raise InvalidDocument(WHAT, problems)
-    return made
+    return [made for _, made in found if made is not None]
 
 
 # --- Private -----------------------------------------------------------------------------------
+
+
+def _report(
+    number: int, row: dict[str, Any], folder: Path, actor: User | None
+) -> tuple[RowReport, Scenario | None]:
+    """One row in a transaction of its own within that of the file."""
+    try:
+        with transaction.atomic():
+            made = add_scenario(**_read(row, folder), actor=actor)
+    except InvalidDocument as error:
+        problems = tuple((path, str(text)) for path, text in error.problems)
+        return RowReport(number=number, problems=problems), None
+    except AugmentError as error:
+        return RowReport(number=number, problems=(("", str(error)),)), None
+    return RowReport(number=number, slug=made.slug), made
 
 
 def _csv_rows(file: Path) -> list[dict[str, Any]]:
@@ -135,4 +196,7 @@ def _read(row: Mapping[str, Any], folder: Path) -> dict[str, Any]:
 
 
 def _document(name: str, folder: Path, what: str) -> object:
+    """The JSON of a file beside the list; nothing outside of that folder is opened."""
+    if not (folder / name).resolve().is_relative_to(folder.resolve()):
+        raise InvalidDocument(what, [(name, "lies outside of the folder of the list")])
     return read_json(folder / name, what=what)

@@ -2,17 +2,37 @@
 
 from __future__ import annotations
 
+import hashlib
+import json
+from dataclasses import dataclass
+from typing import Any
+
+from django.core.files.base import ContentFile
+from django.core.files.storage import default_storage
+
 from augment.errors import Conflict, UnknownName
 from augment.models import Scenario
+from augment.prompts.texts import prompt_version
+from augment.render.camera import LOOK
 from augment.scene.modification import Modification
-from augment.services.scenarios.scenes import reference_of, scene_of
-from augment.variants.recipes import Tools, find_recipe
+from augment.services.scenarios.pictures import store
+from augment.services.scenarios.scenes import content_hash, reference_of, scene_of
+from augment.variants.recipes import RECIPES, Tools, find_recipe
 from augment.variants.showing import Shown, roles_of, shown_prompt
 from augment.variants.transcript import ModelRole
+from augment.variants.visual_qa import pictures
+
+FOLDER = "prompts"
+"""Where pictures lie that a viewer would be shown."""
 
 
 def prompt_of(
-    *, scenario: str, variant: str, role: ModelRole, native_tools: bool = False
+    *,
+    scenario: str,
+    variant: str,
+    role: ModelRole,
+    native_tools: bool = False,
+    images: tuple[bytes, ...] | None = None,
 ) -> Shown:
     """The first messages to that role; reviewers judge the scenario's reference.
 
@@ -21,6 +41,7 @@ def prompt_of(
         variant: The name of a recipe, in any case.
         role: Whose messages.
         native_tools: Whether the modifier calls natively.
+        images: What the viewer is shown, where it is drawn already.
 
     Raises:
         UnknownName: No such scenario or variant.
@@ -43,4 +64,132 @@ def prompt_of(
         row.instruction,
         reference_of(row) or Modification(),
         native_tools=native_tools,
+        images=images,
     )
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PromptChoice:
+    """A variant, and the roles whose first messages can be shown.
+
+    Attributes:
+        calls: Whether its modifier can call a tool natively.
+    """
+
+    slug: str
+    title: str
+    roles: tuple[str, ...]
+    calls: bool
+
+
+def list_choices() -> list[PromptChoice]:
+    """Every variant."""
+    return [
+        PromptChoice(
+            slug=recipe.slug,
+            title=recipe.title,
+            roles=tuple(role.value for role in roles_of(recipe)),
+            calls=recipe.tools is not Tools.NONE,
+        )
+        for recipe in RECIPES.values()
+    ]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Preview:
+    """The first messages of a role, for a page; None while a worker has still to draw.
+
+    Attributes:
+        images: Names of pictures in the media storage, in the order of the messages.
+    """
+
+    shown: Shown | None
+    images: tuple[str, ...] = ()
+    version: str = ""
+
+    def to_document(self) -> dict[str, Any]:
+        """Messages and tools as the body of the request has them."""
+        if self.shown is None:
+            return {}
+        document: dict[str, Any] = {"messages": [one.to_document() for one in self.shown.messages]}
+        if self.shown.tools:
+            document["tools"] = [json.loads(tool) for tool in self.shown.tools]
+        return document
+
+
+def preview_prompt(
+    scenario: Scenario, *, variant: str, role: str, native_tools: bool = False
+) -> Preview:
+    """What would be sent, without asking or drawing anything.
+
+    Raises:
+        UnknownName: No such variant or role.
+        Conflict: Nobody plays that role, or it is to call natively and has no tool.
+    """
+    if role not in list(ModelRole):
+        raise UnknownName("role", role, [one.value for one in ModelRole])
+    names: tuple[str, ...] = ()
+    images: tuple[bytes, ...] | None = None
+    if role == ModelRole.VIEWER and ModelRole.VIEWER in roles_of(find_recipe(variant)):
+        names = _drawn(scenario, variant)
+        if not names:
+            return Preview(shown=None)
+        images = tuple(_bytes(name) for name in names)
+    shown = prompt_of(
+        scenario=scenario.slug,
+        variant=variant,
+        role=ModelRole(role),
+        native_tools=native_tools,
+        images=images,
+    )
+    return Preview(shown=shown, images=names, version=prompt_version())
+
+
+def draw_prompts(scenario_pk: int) -> None:
+    """What a worker does: the pictures that viewers are shown of a scenario's reference.
+
+    Raises:
+        InvalidDocument: The stored scene or reference can't be read.
+    """
+    row = Scenario.objects.select_related("base_scene").get(pk=scenario_pk)
+    for recipe in RECIPES.values():
+        if ModelRole.VIEWER not in roles_of(recipe) or _drawn(row, recipe.slug):
+            continue
+        found = pictures(
+            scene_of(row), reference_of(row) or Modification(), width_px=recipe.limits.picture_px
+        )
+        names = [store(png, folder=FOLDER) for png in found]
+        listed = ContentFile(json.dumps(names).encode())
+        default_storage.save(_list_name(row, recipe.slug), listed)
+
+
+# --- Private -----------------------------------------------------------------------------------
+
+
+def _list_name(scenario: Scenario, variant: str) -> str:
+    """The file that names the pictures; its own name says what is on them."""
+    scene = scenario.base_scene
+    shown = [
+        LOOK,
+        prompt_version(),
+        scene.content_hash or content_hash(scene.document),
+        scenario.keep_traffic,
+        scenario.reference,
+        find_recipe(variant).limits.picture_px,
+    ]
+    digest = hashlib.sha256(json.dumps(shown, sort_keys=True).encode()).hexdigest()
+    return f"{FOLDER}/{digest}.json"
+
+
+def _drawn(scenario: Scenario, variant: str) -> tuple[str, ...]:
+    """The names of a viewer's pictures, none where they are not drawn yet."""
+    name = _list_name(scenario, variant)
+    if not default_storage.exists(name):
+        return ()
+    return tuple(json.loads(_bytes(name)))
+
+
+def _bytes(name: str) -> bytes:
+    with default_storage.open(name) as file:
+        found: bytes = file.read()
+    return found

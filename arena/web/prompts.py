@@ -1,0 +1,98 @@
+"""What a variant would send for a scenario, on a page, before anything is sent."""
+
+from __future__ import annotations
+
+import json
+import uuid
+
+from django.http import Http404, HttpRequest, HttpResponse, HttpResponseBase
+from django.shortcuts import get_object_or_404, render
+from django.views.decorators.http import require_safe
+
+from arena.web.access import STAFF, allow_only
+from arena.web.pictures import picture_response
+from arena.web.sending import looks_again, send_later
+from augment.errors import AugmentError, UnknownName
+from augment.models import Scenario
+from augment.scene_tasks import enqueue_prompts
+from augment.services.scenarios.prompts import Preview, list_choices, preview_prompt
+from augment.services.wording import translate
+
+
+@allow_only(*STAFF)
+@require_safe
+def prompts_page(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
+    """The exact messages of a variant's role, with about how many tokens they are."""
+    scenario = _scenario(code)
+    problem, found = "", Preview(shown=None)
+    try:
+        found = _preview(request, scenario)
+    except AugmentError as error:
+        problem = translate(error)
+    look = looks_again(request, waits=found.shown is None and not problem)
+    if look == 1:
+        send_later(request, enqueue_prompts, scenario.pk)
+    variant = request.GET.get("variant", "otm")
+    choices = list_choices()
+    context = {
+        "scenario": scenario,
+        "choices": choices,
+        "chosen": next((one for one in choices if one.slug == variant), None),
+        "role": request.GET.get("role", "modifier"),
+        "is_native": "native" in request.GET,
+        "preview": found,
+        "size": len(_written(found).encode()),
+        "problem": problem,
+        "query": request.GET.urlencode(),
+        "look": look,
+    }
+    return render(request, "scenarios/prompts.html", context)
+
+
+@allow_only(*STAFF)
+@require_safe
+def prompt_file(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
+    """Messages and tools as they would be sent, as JSON."""
+    scenario = _scenario(code)
+    try:
+        found = _preview(request, scenario)
+    except UnknownName as error:
+        raise Http404 from error
+    except AugmentError as error:
+        return HttpResponse(translate(error), status=422, content_type="text/plain; charset=utf-8")
+    if found.shown is None:
+        raise Http404
+    answer = HttpResponse(_written(found), content_type="application/json")
+    answer["Content-Disposition"] = f'attachment; filename="prompt-{scenario.slug}.json"'
+    return answer
+
+
+@allow_only(*STAFF)
+@require_safe
+def prompt_image(request: HttpRequest, code: uuid.UUID, number: int) -> HttpResponseBase:
+    """A picture that the viewer of a variant would be shown."""
+    try:
+        found = _preview(request, _scenario(code))
+    except AugmentError as error:
+        raise Http404 from error
+    if number >= len(found.images):
+        raise Http404
+    return picture_response(found.images[number])
+
+
+def _scenario(code: uuid.UUID) -> Scenario:
+    rows = Scenario.objects.select_related("base_scene").defer("base_scene__recording")
+    return get_object_or_404(rows, code=code)
+
+
+def _preview(request: HttpRequest, scenario: Scenario) -> Preview:
+    return preview_prompt(
+        scenario,
+        variant=request.GET.get("variant", "otm"),
+        role=request.GET.get("role", "modifier"),
+        native_tools="native" in request.GET,
+    )
+
+
+def _written(found: Preview) -> str:
+    return json.dumps(found.to_document(), ensure_ascii=False)

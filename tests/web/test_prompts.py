@@ -1,0 +1,93 @@
+"""The page that shows what a variant would send, held against what the wire then carries."""
+
+from __future__ import annotations
+
+import html
+import re
+from collections.abc import Iterator
+from typing import Any
+
+import pytest
+from django.test import Client
+from django.urls import reverse
+
+from augment.models import ModelCall, Scenario
+from augment.services.scenarios.prompts import draw_prompts
+from tests.jobs.rows import add_scenario
+from tests.jobs.scripted import Scripted, add, run
+from tests.llm.json_server import serving
+from tests.web.cast import people, signed_in
+
+pytestmark = pytest.mark.django_db
+
+
+@pytest.fixture
+def server() -> Iterator[Scripted]:
+    with serving(Scripted()) as started:
+        yield started
+
+
+@pytest.fixture
+def analyst(monkeypatch: pytest.MonkeyPatch) -> Client:
+    """Signed in; what is sent to a worker is done at once."""
+    monkeypatch.setattr("arena.web.prompts.enqueue_prompts", draw_prompts)
+    monkeypatch.setattr("arena.web.sending.transaction.on_commit", lambda done: done())
+    return signed_in(people()["analyst"])
+
+
+def previewed(client: Client, scenario: Scenario, **asked: str) -> dict[str, Any]:
+    found: dict[str, Any] = client.get(reverse("prompt-file", args=[scenario.code]), asked).json()
+    return found
+
+
+@pytest.mark.parametrize(
+    ("variant", "options"), [("otm", {}), ("fc", {}), ("fc", {"protocol": "native"}), ("tqa", {})]
+)
+def test_the_page_shows_what_the_wire_then_carries(
+    analyst: Client, server: Scripted, variant: str, options: dict[str, object]
+) -> None:
+    add(server, "asked", variant, **options)
+    [row] = run("asked")
+    asked = {"variant": variant} | ({"native": "1"} if options else {})
+    found = previewed(analyst, row.scenario, **asked)
+    sent = server.bodies[0]
+    assert found["messages"] == sent["messages"]
+    assert found.get("tools") == sent.get("tools")
+    page = analyst.get(reverse("prompts", args=[row.scenario.code]), asked).content.decode()
+    shown = [
+        html.unescape(one) for one in re.findall(r"<pre data-message>(.*?)</pre>", page, re.S)
+    ]
+    assert shown == [message["content"] for message in sent["messages"]]
+    assert re.search(r"About [\d,]+ tokens of text", page)
+
+
+def test_a_viewer_s_picture_is_drawn_by_a_worker_and_nobody_is_asked(analyst: Client) -> None:
+    here = add_scenario("street")
+    asked = {"variant": "vqa", "role": "viewer"}
+    url = reverse("prompts", args=[here.code])
+    assert "A worker is drawing it." in analyst.get(url, asked).content.decode()
+    shown = analyst.get(url, asked).content.decode()
+    assert "In which lane does each blue object stand?" in html.unescape(shown)
+    picture = analyst.get(reverse("prompt-image", args=[here.code, 0]), asked)
+    png = b"".join(picture)
+    assert png.startswith(b"\x89PNG")
+    parts = previewed(analyst, here, **asked)["messages"][-1]["content"]
+    assert sum(part["type"] == "image_url" for part in parts) >= 1
+    assert not ModelCall.objects.exists()
+
+
+@pytest.mark.parametrize(
+    ("asked", "problem"),
+    [
+        ({"variant": "xyz"}, "xyz"),
+        ({"variant": "otm", "role": "viewer"}, "Nobody plays the viewer"),
+        ({"variant": "otm", "native": "1"}, "calls no function"),
+        ({"variant": "otm", "role": "king"}, "Known: modifier"),
+    ],
+)
+def test_what_no_variant_sends_is_said(
+    analyst: Client, asked: dict[str, str], problem: str
+) -> None:
+    here = add_scenario("street")
+    page = analyst.get(reverse("prompts", args=[here.code]), asked).content.decode()
+    assert problem in html.unescape(page)

@@ -1,0 +1,158 @@
+"""New scenarios by a page: one beside its scene, or many from a file."""
+
+from __future__ import annotations
+
+import json
+
+import pytest
+from django.core.files.uploadedfile import SimpleUploadedFile
+from django.test import Client
+from django.urls import reverse
+
+from augment.models import BaseScene, Scenario
+from augment.scene.codec import modification_to_document
+from augment.scene.intent_codec import intent_to_document
+from augment.scene.intent_words import Shape
+from augment.scene.modification import Modification
+from augment.services.scenarios.scene_pictures import draw_scenario, draw_scene
+from tests.intents import cones
+from tests.jobs.rows import add_scenario
+from tests.scenes import cone
+from tests.web.cast import people, signed_in
+
+pytestmark = pytest.mark.django_db
+RING = json.dumps(intent_to_document(cones(25.0, 8, Shape.RING)))
+CHANGE = json.dumps(modification_to_document(Modification(added=(cone("Added1", 9.0, 0.0),))))
+ROWS = """scene,type,type_label,instruction,slug,reference
+street-scene,cut_in,Cut-in,Let a car cut in.,one,
+street-scene,jaywalking_pedestrian,,Let somebody cross.,two,change.json
+"""
+
+
+@pytest.fixture
+def analyst(monkeypatch: pytest.MonkeyPatch) -> Client:
+    """Signed in; what is sent to a worker is done at once."""
+    monkeypatch.setattr("arena.web.scenario_form.enqueue_scene", draw_scene)
+    monkeypatch.setattr("arena.web.scenario_form.enqueue_scenario", draw_scenario)
+    monkeypatch.setattr("arena.web.sending.transaction.on_commit", lambda done: done())
+    return signed_in(people()["analyst"])
+
+
+@pytest.fixture
+def scene() -> BaseScene:
+    return add_scenario("street").base_scene
+
+
+def send(client: Client, scene: BaseScene, **fields: str) -> tuple[str, Scenario | None]:
+    given = {"type": "cut_in", "instruction": "Let a car cut in.", **fields}
+    answer = client.post(reverse("scenario-new", args=[scene.code]), given, follow=True)
+    made = Scenario.objects.exclude(slug="street").first()
+    return answer.content.decode(), made
+
+
+def test_the_picture_of_the_scene_stands_beside_the_form(
+    analyst: Client, scene: BaseScene
+) -> None:
+    url = reverse("scenario-new", args=[scene.code])
+    assert "A worker is drawing it." in analyst.get(url).content.decode()
+    shown = analyst.get(url).content.decode()
+    for view in ("kept", "cleared"):
+        assert reverse("picture", args=[view, scene.code]) in shown
+    assert url in analyst.get(reverse("scene", args=[scene.code])).content.decode()
+
+
+def test_a_scenario_of_a_type_of_one_s_own_with_an_intent_by_fields(
+    analyst: Client, scene: BaseScene
+) -> None:
+    shown, made = send(
+        analyst,
+        scene,
+        type="",
+        own_type="parked_bus",
+        own_label="Parked bus",
+        slug="my-bus",
+        keep_traffic="on",
+        i_kind="vehicles",
+        i_count="2",
+        i_distance_m="20.5",
+        i_relation="ahead",
+        i_lane="own",
+        i_body="bus",
+        i_speed_mps="0",
+    )
+    assert made is not None
+    assert (made.slug, made.type, made.type_label) == ("my-bus", "parked_bus", "Parked bus")
+    assert (made.keep_traffic, made.intent_origin) == (True, "entered")
+    assert made.intent is not None
+    [request] = made.intent["requests"]
+    assert (request["kind"], request["body"], request["count"]) == ("vehicles", "bus", 2)
+    assert request["spot"]["distance"] == {"low_m": 20.5}
+    assert "my-bus" in shown
+    assert reverse("picture", args=["original", made.code]) in shown
+
+
+def test_an_intent_as_json_goes_before_the_fields(analyst: Client, scene: BaseScene) -> None:
+    _, made = send(
+        analyst, scene, type="jaywalking_pedestrian", intent=RING, i_kind="walk", i_start="left"
+    )
+    assert made is not None
+    assert made.intent == json.loads(RING)
+    assert made.slug == "street-scene-jaywalker-1"
+
+
+@pytest.mark.parametrize(
+    ("fields", "problem"),
+    [
+        ({"type": "", "own_type": "Cut In"}, "must be one of"),
+        ({"type": "jaywalking_pedestrian", "slug": "street"}, "called &#x27;street&#x27; already"),
+        ({"type": "jaywalking_pedestrian", "intent": "["}, "The intent is no JSON"),
+        ({"type": "jaywalking_pedestrian", "intent": "{}"}, "format"),
+        ({"type": "jaywalking_pedestrian", "i_kind": "walk", "i_count": "x"}, "is no number"),
+        ({"type": "jaywalking_pedestrian", "i_kind": "tram"}, "tram"),
+        ({"type": "jaywalking_pedestrian", "instruction": " "}, "required"),
+    ],
+)
+def test_what_can_not_be_is_told_and_nothing_is_lost(
+    analyst: Client, scene: BaseScene, fields: dict[str, str], problem: str
+) -> None:
+    shown, made = send(analyst, scene, **{"own_label": "kept in its field", **fields})
+    assert made is None
+    assert problem in shown
+    assert "kept in its field" in shown
+
+
+def upload(client: Client, text: str, name: str = "many.csv", **fields: object) -> str:
+    given = {"file": SimpleUploadedFile(name, text.encode()), **fields}
+    return client.post(reverse("scenarios-bulk"), given).content.decode()
+
+
+@pytest.mark.usefixtures("scene")
+def test_a_file_is_tried_then_added(analyst: Client) -> None:
+    change = SimpleUploadedFile("change.json", CHANGE.encode())
+    shown = upload(analyst, ROWS, documents=change, **{"try": "1"})
+    assert "All rows can be added" in shown
+    assert Scenario.objects.count() == 1
+    change.seek(0)
+    assert "2 scenarios are added." in upload(analyst, ROWS, documents=change)
+    assert Scenario.objects.get(slug="two").reference is not None
+
+
+@pytest.mark.usefixtures("scene")
+@pytest.mark.parametrize("name", ["change.json", "../../secret.json", "/etc/passwd"])
+def test_one_wrong_row_keeps_all_out_and_each_row_is_told(analyst: Client, name: str) -> None:
+    shown = upload(analyst, ROWS.replace("change.json", name))
+    assert "Nothing was added" in shown
+    assert shown.count("badge is-bad") == 1
+    assert "Fine" in shown
+    assert Scenario.objects.count() == 1
+    if name != "change.json":
+        assert "lies outside of the folder of the list" in shown
+
+
+@pytest.mark.usefixtures("scene")
+def test_a_file_that_is_no_list_is_told(analyst: Client) -> None:
+    assert "must end in .csv" in upload(analyst, "hello", "many.txt")
+    many = "scene,type,instruction\n" + "street-scene,cut_in,x\n" * 301
+    assert "301 rows are too many for a page" in upload(analyst, many)
+    answer = analyst.post(reverse("scenarios-bulk"))
+    assert "Choose a CSV or YAML file." in answer.content.decode()
