@@ -40,6 +40,7 @@ def standings(snapshot: Snapshot, table: LeaderboardTable) -> Context:
         "design_effect": _said_effect(claims.design_effect),
         "check": None if check is None else round(check),
         "ties": round((trust.tie_share or 0.0) * snapshot.votes_counted),
+        "all_tied": is_all_tied(snapshot),
         "has_places": any(row.rank_best != row.rank_worst for row in table.rows),
     }
 
@@ -97,6 +98,11 @@ def types(snapshot: Snapshot, table: LeaderboardTable) -> Context:
         "by_type": interaction(snapshot.results.trust.by_type, table.rows),
         "type_spread": snapshot.results.type_spread,
     }
+
+
+def is_all_tied(snapshot: Snapshot) -> bool:
+    """Whether every vote is a tie: then much of what could be said says nothing."""
+    return snapshot.results.trust.tie_share == 1.0
 
 
 def by_slug(table: LeaderboardTable) -> Mapping[str, Row]:

@@ -12,7 +12,7 @@ from arena.results.tree import PanelRater
 from arena.web.charts import bars
 from arena.web.results_authors import with_authors
 from arena.web.results_conditions import drifts, interaction
-from arena.web.results_ratings import Context
+from arena.web.results_ratings import Context, is_all_tied
 from arena.web.scatter import scatter
 
 
@@ -27,6 +27,7 @@ def raters(snapshot: Snapshot, table: LeaderboardTable) -> Context:
     )
     return {
         "trust": snapshot.results.trust,
+        "all_tied": is_all_tied(snapshot),
         "panel": panel,
         "limit": next((line.bet.limit for line in lines if line.bet), None),
         "automatic": sum(line.votes for line in kept if line.judge == AUTOMATIC),
