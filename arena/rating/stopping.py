@@ -23,12 +23,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.special import ndtr, ndtri
+from scipy.special import ndtr, stdtr, stdtrit
 
 from arena.rating.comparisons import FloatArray
 from arena.rating.estimate import LEVEL
 from arena.rating.leaderboard import Leaderboard
-from arena.rating.student import t_quantile
 
 LOOKS, MOST_LOOKS = 5, 20
 _POINTS = 601
@@ -112,14 +111,16 @@ def widest_half_width(board: Leaderboard, level: float) -> float | None:
     """
     if board.covariance is None:
         return None
-    widths = []
-    for line, variance in zip(board.lines, board.covariance.diagonal(), strict=True):
-        if line.lower is None or line.upper is None or not variance > 0.0:
-            return None
-        factor = (line.upper - line.lower) / 2.0 / math.sqrt(variance)
-        degrees = _degrees_of(factor)
-        widths.append(float(t_quantile(degrees, 1.0 - level / 2.0)) * math.sqrt(variance))
-    return max(widths, default=None)
+    bounds = [(line.lower, line.upper) for line in board.lines]
+    if not bounds or any(lower is None or upper is None for lower, upper in bounds):
+        return None
+    variance = board.covariance.diagonal()
+    if not bool((variance > 0.0).all()):
+        return None
+    lower, upper = np.array(bounds, dtype=np.float64).T
+    degrees = _degrees_of((upper - lower) / 2.0 / np.sqrt(variance))
+    factor = stdtrit(degrees, 1.0 - level / 2.0)
+    return float((factor * np.sqrt(variance)).max())
 
 
 # --- Private -----------------------------------------------------------------------------------
@@ -148,13 +149,11 @@ def _carried_on(
     return after, np.asarray(found * weights)
 
 
-def _degrees_of(factor: float) -> float:
-    """The degrees of freedom at which a 95 % interval has so many standard errors."""
-    if factor <= -float(ndtri(_AREAS / 2.0)) + 1e-6:
-        return 1e7
-    low, high = 0.0, math.log(1e7)
-    for _ in range(60):
+def _degrees_of(factor: FloatArray) -> FloatArray:
+    """(C,) degrees of freedom at which 95 % intervals have so many standard errors (C,)."""
+    low, high = np.zeros(len(factor)), np.full(len(factor), math.log(1e7))
+    for _ in range(40):
         middle = (low + high) / 2.0
-        wide = float(t_quantile(math.exp(middle))) > factor
-        low, high = (middle, high) if wide else (low, middle)
-    return math.exp(high)
+        wide = stdtr(np.exp(middle), factor) < 0.5 + LEVEL / 2.0
+        low, high = np.where(wide, middle, low), np.where(wide, high, middle)
+    return np.asarray(np.exp(high))

@@ -14,6 +14,7 @@ from arena.models import Matchup, Study
 from arena.queries.coverage import shared_units
 from arena.queries.votes import tallies
 from arena.services.handing_over import hand_over
+from arena.services.prospects import GUESSES, usual_seconds
 from arena.services.studies import open_study
 from arena.web.questions import Confirmation
 
@@ -57,6 +58,12 @@ def opening(rules: dict[str, Any]) -> Confirmation:
     facts.append(
         _("Pairs of a scenario that are judged: %(judged)s; by two experts or more: %(shared)s.")
         % {"judged": together[0], "shared": together[1]}
+    )
+    seconds = usual_seconds() or GUESSES["seconds"]
+    each = (votes + kinds[Kind.REPEAT] + kinds[Kind.CHECK]) / people
+    facts.append(
+        _("Minutes for each expert: about %(minutes)s, at %(seconds)s s a pair.")
+        % {"minutes": round(each * seconds / 60), "seconds": f"{seconds:g}"}
     )
     if settled:
         facts.append(

@@ -38,6 +38,7 @@ from arena.web import (
     scenes,
     studies,
     uploads,
+    vote_uploads,
     voting,
     webhooks,
 )
@@ -151,6 +152,7 @@ urlpatterns: list[URLPattern] = [
     path("audit.<slug:form>", audit.audit_file, name="audit-export"),
     path("studies/", studies.studies_page, name="studies"),
     path("studies/plan/", planning.planning_page, name="study-plan"),
+    path("studies/import/", vote_uploads.upload_votes_page, name="import-votes"),
     path("studies/new/", studies.new_study_page, name="study-new"),
     path("studies/<uuid:code>/", studies.study_page, name="study"),
     path(

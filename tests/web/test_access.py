@@ -73,6 +73,7 @@ PAGES: dict[str, tuple[int, int, int]] = {
     "picture": (200, 200, 403),
     "studies": (200, 200, 403),
     "study-plan": (200, 200, 403),
+    "import-votes": (200, 403, 403),
     "study-new": (200, 403, 403),
     "study": (200, 200, 403),
     "preregistration": (200, 200, 403),

@@ -1,0 +1,66 @@
+"""Votes that come as a file by a page."""
+
+from __future__ import annotations
+
+import pytest
+from django.core.files.uploadedfile import SimpleUploadedFile
+from django.http import HttpResponse
+from django.urls import reverse
+
+from arena.models import ImportedVote, Study
+from arena.web import vote_uploads
+from augment.models import Event
+from tests.web.cast import people, signed_in
+
+pytestmark = pytest.mark.django_db
+
+FINE = b"model_a,model_b,winner,judge,item\nann,bob,model_a,j1,i1\nbob,ann,tie,j2,i2\n"
+
+
+def _send(content: bytes, *, file: str = "votes.csv", name: str = "Elsewhere") -> HttpResponse:
+    admin = people()["admin"]
+    sent = {"name": name, "file": SimpleUploadedFile(file, content)}
+    answer = signed_in(admin).post(reverse("import-votes"), sent)
+    assert isinstance(answer, HttpResponse)
+    return answer
+
+
+def test_a_file_becomes_a_closed_study_of_whoever_sent_it() -> None:
+    answer = _send(FINE)
+    study = Study.objects.get()
+    assert answer.headers["Location"] == reverse("results", args=[study.code])
+    assert (study.name, study.state, ImportedVote.objects.count()) == ("Elsewhere", "closed", 2)
+    event = Event.objects.get(verb="import votes")
+    assert event.actor is not None
+    assert event.actor.username == "the-admin"
+
+
+@pytest.mark.parametrize(
+    ("content", "said"),
+    [
+        (b"model_a,model_b,winner\nann,bob,nobody\n", "line 2"),
+        (b"model_a,winner\nann,tie\n", "model_b"),
+        (b"", 'role="alert"'),
+    ],
+)
+def test_what_can_not_be_read_is_said_with_its_place_and_nothing_is_kept(
+    content: bytes, said: str
+) -> None:
+    answer = _send(content)
+    assert answer.status_code == 422
+    assert said in answer.content.decode()
+    assert 'value="Elsewhere"' in answer.content.decode()
+    assert not Study.objects.exists()
+
+
+def test_a_file_that_is_too_large_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(vote_uploads, "MOST_MB", 0)
+    answer = _send(FINE)
+    assert answer.status_code == 422
+    assert "more than 0 MB" in answer.content.decode()
+    assert not Study.objects.exists()
+
+
+def test_a_name_that_climbs_out_of_its_folder_stays_in_it() -> None:
+    _send(b"model_a,model_b,winner\nann,bob,tie\n", file="../../etc/passwd")
+    assert Study.objects.get().vote_file.name == "passwd"
