@@ -20,8 +20,8 @@ from augment.scene.intent import Intent, Length, Spot, from_ego
 from augment.scene.landmarks import LaneChoice, MapPlace, Pick, Relation, Side, Sight
 
 _STANDS_BELOW_MPS = 0.5
-_BESIDE_M = 20.0
-"""Who is further from the route is on another road."""
+_BESIDE_M = 15.0
+"""Who is further from the route is on another road; prompts show as much beside it."""
 _ON_A_SIDE_M = 1.0
 _STEP_M = 0.1
 _ALONG_RAD, _AGAINST_RAD = math.radians(45.0), math.radians(135.0)

@@ -20,9 +20,9 @@ from numpy.typing import NDArray
 
 from augment.fake_llm.requests import SpokenMessage
 from augment.geometry.angles import difference
-from augment.geometry.bezier import CubicBezier
 from augment.geometry.frames import Pose
 from augment.geometry.polyline import Polyline
+from augment.prompts.lane_curves import curve_from
 from augment.prompts.texts import QUOTE
 from augment.scene.entities import (
     AgentType,
@@ -220,7 +220,7 @@ def _line(coordinates: list[Any]) -> Polyline:
         return smooth(np.array(coordinates, dtype=np.float64))
     pieces = []
     for control in coordinates:
-        curve = CubicBezier(control)
+        curve = curve_from(control)
         count = max(2, math.ceil(curve.length_m / _FINE_M) + 1)
         pieces.append(curve.points(curve.parameters_at(np.linspace(0.0, curve.length_m, count))))
     return Polyline(np.vstack([pieces[0], *(piece[1:] for piece in pieces[1:])]))

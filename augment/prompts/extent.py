@@ -1,11 +1,13 @@
 """How much of a scene is written down: what a wish about the ego's drive can concern.
 
-The rule, for whoever asks: within the radius of the ego, and within `BESIDE_M` of where the ego
-can get on its lanes and those beside them within `DRIVEN_M`, or within the radius where that is
-more, turning off wherever it can, or comes from within `BEHIND_M`. A lane is
-shown from where it first comes into that region to where it last leaves it. Of connectors that
-run from the same lane to the same lane in the same place the first is shown. Where the map has no
-lane for the ego only the radius counts.
+The rule, for whoever asks: within the radius of the ego, behind it within half of that, and
+within `BESIDE_M` of where the ego can get on its lanes and those beside them by driving
+`DRIVEN_M` (or the radius where that is more), turning off wherever it can, or comes from within
+`BEHIND_M`. A connector that it enters on the way is followed to its end, and what comes after it
+for `PAST_M`. A lane is shown from where it first comes into that region to where it last leaves
+it, unless that is less than `LEAST_M` of a longer one. Connectors are shown that come within
+`CROSSED_M` of where the ego can drive, and of those that run from the same lane to the same lane
+in the same place the first. Where the map has no lane for the ego only the radius counts.
 
 Frame: ego frame. N points.
 """
@@ -28,9 +30,14 @@ from augment.scene.lane_graph import AnyLane
 FloatArray = NDArray[np.float64]
 BoolArray = NDArray[np.bool_]
 
-BESIDE_M = 25.0
+BESIDE_M = 15.0
 BEHIND_M = 20.0
 DRIVEN_M = 80.0
+PAST_M = 25.0
+"""So far the ways out of an intersection are followed that the ego enters near the end."""
+CROSSED_M = 5.0
+"""What leads through an intersection further from all ways of the ego does not meet it there."""
+LEAST_M = 5.0
 SAME_WITHIN_M = 0.5
 """Connectors between the same lanes that part nowhere further than this are one to a reader."""
 
@@ -53,20 +60,34 @@ class Extent:
         """Which of the points (N, 2) lie in the region, (N,)."""
         points = np.asarray(points_m, dtype=np.float64).reshape(-1, 2)
         inside: BoolArray = np.hypot(*points.T) <= self.radius_m
+        if self.routes_m is not None:
+            inside &= points[:, 0] >= -behind_m(self.radius_m)
         if self.routes_m is not None and inside.any():
             gaps = points[inside][:, None, :] - self.routes_m[None, :, :]
             nearest = np.sqrt((gaps * gaps).sum(axis=2).min(axis=1))
             inside[inside] = nearest <= BESIDE_M
         return inside
 
+    def comes_near(self, line: Polyline) -> bool:
+        """Whether a line comes within `CROSSED_M` of where the ego can drive."""
+        if self.routes_m is None:
+            return True
+        points = line.resampled(_ROUTE_EVERY_M).points_m
+        gaps = points[:, None, :] - self.routes_m[None, :, :]
+        return bool((gaps * gaps).sum(axis=2).min() <= CROSSED_M**2)
+
     def span(self, line: Polyline) -> tuple[float, float] | None:
         """From where a line first comes into the region to where it last leaves it.
 
-        Two arc lengths; None where it never does, or for no more than a moment.
+        Two arc lengths; None where it never does, or for less than `LEAST_M` of a longer line.
         """
         stations_m = np.append(np.arange(0.0, line.length_m, _LOOK_EVERY_M), line.length_m)
         inside = stations_m[self.holds(line.points_at(stations_m))]
-        return (float(inside[0]), float(inside[-1])) if len(inside) >= 2 else None
+        if len(inside) < 2:
+            return None
+        start_m, end_m = float(inside[0]), float(inside[-1])
+        is_whole = end_m - start_m > line.length_m - _LOOK_EVERY_M
+        return (start_m, end_m) if is_whole or end_m - start_m >= LEAST_M else None
 
     @property
     def box_m(self) -> tuple[float, float, float, float]:
@@ -75,8 +96,13 @@ class Extent:
         if self.routes_m is None:
             return -radius, -radius, radius, radius
         low, high = self.routes_m.min(axis=0) - BESIDE_M, self.routes_m.max(axis=0) + BESIDE_M
-        low, high = np.maximum(low, -radius), np.minimum(high, radius)
+        low, high = np.maximum(low, (-behind_m(radius), -radius)), np.minimum(high, radius)
         return float(low[0]), float(low[1]), float(high[0]), float(high[1])
+
+
+def behind_m(radius_m: float) -> float:
+    """How far behind the ego a region goes that follows the lanes."""
+    return radius_m / 2.0
 
 
 @lru_cache(maxsize=32)
@@ -89,10 +115,10 @@ def extent_of(scene: Scene, radius_m: float) -> Extent:
         return Extent(radius_m=radius_m, routes_m=None)
     driven_m = max(DRIVEN_M, radius_m)
     lines = [
-        line.between(start_m, start_m + driven_m)
-        for lane_id, start_m in _reached(route, driven_m).items()
+        line.between(start_m, end_m)
+        for lane_id, (start_m, end_m) in _reached(route, driven_m).items()
         for line in [route.graph.lane(lane_id).centerline]
-        if line.length_m - start_m > _ROUTE_EVERY_M
+        if min(line.length_m, end_m) - start_m > _ROUTE_EVERY_M
     ]
     behind = max(0.0, route.ego_s_m - BEHIND_M)
     lines.append(route.line.between(behind, route.ego_s_m + _ROUTE_EVERY_M))
@@ -115,6 +141,8 @@ def shown_spans(scene: Scene, radius_m: float) -> dict[str, tuple[float, float]]
         if span is None:
             continue
         if isinstance(lane, LaneConnector):
+            if not extent.comes_near(lane.centerline):
+                continue
             if any(_is_the_same(lane, other) for other in connectors):
                 continue
             connectors.append(lane)
@@ -125,26 +153,31 @@ def shown_spans(scene: Scene, radius_m: float) -> dict[str, tuple[float, float]]
 # Private
 
 
-def _reached(route: EgoRoute, within_m: float) -> dict[str, float]:
-    """From where on the ego can drive each lane that it can get to, by id: Dijkstra's search."""
+def _reached(route: EgoRoute, within_m: float) -> dict[str, tuple[float, float]]:
+    """From where to where the ego can drive on each lane that it can get to, by id.
+
+    Dijkstra's search; a connector that is entered is left, too.
+    """
     graph = route.graph
-    found: dict[str, float] = {}
-    queue = [(0.0, route.lane_id, route.lane_s_m)]
+    found: dict[str, tuple[float, float]] = {}
+    queue = [(0.0, within_m, route.lane_id, route.lane_s_m)]
     while queue:
-        driven_m, here, start_m = heapq.heappop(queue)
-        if here in found or driven_m > within_m:
+        driven_m, ends_m, here, start_m = heapq.heappop(queue)
+        if here in found or driven_m > ends_m:
             continue
-        found[here] = start_m
         lane = graph.lane(here)
+        leaves_m = driven_m + lane.centerline.length_m - start_m
+        if isinstance(lane, LaneConnector) and driven_m <= within_m:
+            ends_m = max(ends_m, leaves_m + PAST_M)
+        found[here] = (start_m, start_m + ends_m - driven_m)
         beside = (lane.left_neighbor, lane.right_neighbor) if isinstance(lane, Lane) else ()
         x_m, y_m = lane.centerline.position(start_m)
         for other in beside:
             if other in graph.lanes:
                 place = graph.lane(other).centerline.project(x_m, y_m)
-                heapq.heappush(queue, (driven_m, other, place.s_m))
-        end_m = driven_m + lane.centerline.length_m - start_m
+                heapq.heappush(queue, (driven_m, ends_m, other, place.s_m))
         for following in graph.successors(here):
-            heapq.heappush(queue, (end_m, following, 0.0))
+            heapq.heappush(queue, (leaves_m, ends_m, following, 0.0))
     return found
 
 

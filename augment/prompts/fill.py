@@ -18,6 +18,7 @@ from functools import cache
 from augment.llm.messages import Message, Speaker, Tool
 from augment.prompts.blocks import names_changes
 from augment.prompts.calls import calls_in
+from augment.prompts.extent import BESIDE_M, CROSSED_M, behind_m
 from augment.prompts.texts import (
     QUOTE,
     fill_text,
@@ -120,9 +121,16 @@ def pose_tool() -> Tool:
     )
 
 
-def input_format(lanes: LaneFormat = LaneFormat.POLYLINE) -> str:
-    """How a scene is written down."""
-    return fill_text("input_format.md", coordinates=read_text(f"lanes_{lanes}.md"))
+def input_format(radius_m: float, lanes: LaneFormat = LaneFormat.POLYLINE) -> str:
+    """How a scene is written down, and which part of it."""
+    return fill_text(
+        "input_format.md",
+        coordinates=read_text(f"lanes_{lanes}.md"),
+        radius_m=f"{radius_m:g}",
+        behind_m=f"{behind_m(radius_m):g}",
+        beside_m=f"{BESIDE_M:g}",
+        crossed_m=f"{CROSSED_M:g}",
+    )
 
 
 _WORK = {Calling.NONE: "walked", Calling.IN_PROMPT: "called", Calling.NATIVE: "native"}
@@ -141,7 +149,7 @@ def _modifier(form: Form) -> str:
     manner = "walked" if form.calling is Calling.NONE else "called"
     return fill_text(
         "modifier.md",
-        input_format=input_format(form.lanes),
+        input_format=input_format(form.radius_m, form.lanes),
         distances=read_text(f"distances_{manner}.md"),
         rules=read_text("rules.md"),
         tools=tools,

@@ -42,7 +42,7 @@ def reviewer_messages(
         radius_m: How far around the ego the scene is written down.
         earlier: The feedback that the editor was given in earlier rounds.
     """
-    told = fill_text("reviewer.md", **_rules(), problems=read_text("common_problems.md"))
+    told = fill_text("reviewer.md", **_rules(radius_m), problems=read_text("common_problems.md"))
     task = _task(scene, instruction, modification, radius_m, earlier)
     return Message(speaker=Speaker.SYSTEM, text=told), said_by_user(task)
 
@@ -56,7 +56,7 @@ def engineer_messages(
     earlier: Sequence[str] = (),
 ) -> tuple[Message, ...]:
     """What the engineer is asked first: for questions to the viewer; arguments as above."""
-    told = fill_text("engineer.md", **_rules(), drawn=read_text("drawn.md"))
+    told = fill_text("engineer.md", **_rules(radius_m), drawn=read_text("drawn.md"))
     task = _task(scene, instruction, modification, radius_m, earlier)
     return Message(speaker=Speaker.SYSTEM, text=told), said_by_user(task)
 
@@ -95,10 +95,10 @@ def viewer_re_ask_messages(messages: tuple[Message, ...], answer: str) -> tuple[
     return (*messages, model_message(answer), said_by_user(read_text("viewer_re_ask.md")))
 
 
-def _rules() -> dict[str, str]:
+def _rules(radius_m: float) -> dict[str, str]:
     """What the editor was told and what is a deviation from it, the same for every reviewer."""
     return {
-        "input_format": input_format(),
+        "input_format": input_format(radius_m),
         "distances": read_text("distances_walked.md"),
         "rules": read_text("rules.md"),
         "tolerances": tolerances_text(USUAL),

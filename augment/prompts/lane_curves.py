@@ -8,17 +8,17 @@ Frame: ego frame.
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
-from augment.geometry.bezier import travel_pose
+from augment.geometry.bezier import CubicBezier, travel_pose
 from augment.geometry.frames import Pose
 from augment.geometry.polyline import Projection
 from augment.prompts.extent import shown_spans
 from augment.prompts.names import ShortNames
-from augment.scene.bezier_lanes import BezierLane, bezier_lane, piece_ids
+from augment.scene.bezier_lanes import BezierLane, bezier_lane, piece_ids, straight_curve
 from augment.scene.entities import Scene
 from augment.scene.lane_graph import AnyLane, LaneGraph
 
@@ -95,5 +95,20 @@ def lane_curves(scene: Scene, names: ShortNames, radius_m: float) -> dict[str, L
 
 
 def control_points(lane: BezierLane) -> list[list[list[float]]]:
-    """The four control points [x, y] of each piece, to the centimetre, ready for JSON."""
-    return [np.add(np.round(control, 2), 0.0).tolist() for control in lane.control_m]
+    """The control points [x, y] of each piece, to the centimetre, ready for JSON.
+
+    Four, or of a straight piece its two ends.
+    """
+    return [
+        np.add(np.round(piece.curve.control_m[:: 3 if piece.is_straight else 1], 2), 0.0).tolist()
+        for piece in lane.pieces
+    ]
+
+
+def curve_from(points: Sequence[Sequence[float]]) -> CubicBezier:
+    """The curve of control points as the prompt writes them, four, or two of a straight one.
+
+    Raises:
+        ValueError: They are neither, or no curve.
+    """
+    return straight_curve(*points) if len(points) == 2 else CubicBezier(points)

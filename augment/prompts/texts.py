@@ -16,7 +16,7 @@ QUOTE = "> "
 
 LONGEST_ECHO = 20_000
 
-VECTORS_VERSION = 3
+VECTORS_VERSION = 4
 """Raised with every change to what of a scene is written down, or how: no text shows that."""
 
 

@@ -43,7 +43,7 @@ def polyline_coordinates(line: Polyline) -> list[object]:
 
 
 def bezier_coordinates(line: Polyline) -> list[object]:
-    """Pieces in order of travel, each four control points."""
+    """Pieces in order of travel, each four control points, or the two ends of a straight one."""
     return list(control_points(bezier_lane(line)))
 
 

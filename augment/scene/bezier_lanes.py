@@ -19,7 +19,7 @@ from dataclasses import dataclass
 from functools import cached_property, lru_cache
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from augment.geometry.bezier import (
     CHORD_REACH_M,
@@ -63,14 +63,23 @@ class Tolerance:
         return max(error.position_m / self.position_m, error.heading_rad / self.heading_rad)
 
 
+STRAIGHT = Tolerance().loosened(0.75)
+"""What is within three quarters of it of a straight line is written as one."""
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class LanePiece:
-    """One cubic, and from where to where on the lane it leads."""
+    """One cubic, and from where to where on the lane it leads.
+
+    Attributes:
+        is_straight: Whether its two ends say all of it.
+    """
 
     curve: CubicBezier
     start_m: float
     end_m: float
     error: FitError
+    is_straight: bool = False
 
     @property
     def length_m(self) -> float:
@@ -159,6 +168,12 @@ def bezier_lane(line: Polyline, tolerance: Tolerance | None = None) -> BezierLan
     return BezierLane(pieces=min(found, key=lambda pieces: _used(pieces, allowed)))
 
 
+def straight_curve(start_m: ArrayLike, end_m: ArrayLike) -> CubicBezier:
+    """From a point (2,) straight to another, at an even pace."""
+    ends = np.array([start_m, end_m], dtype=np.float64)
+    return CubicBezier(np.linspace(ends[0], ends[1], 4))
+
+
 def piece_ids(lane_id: str, count: int) -> tuple[str, ...]:
     """How the pieces of a lane are called: "Lane3" where it is one, else "Lane3a", "Lane3b"."""
     if count == 1:
@@ -200,6 +215,9 @@ def _within(pieces: Iterable[LanePiece], allowed: Tolerance) -> bool:
 
 def _cut(line: Polyline, span: _Span, allowed: Tolerance, way: _Way) -> list[LanePiece]:
     """The part of the line as the pieces that it takes to stay within the tolerance."""
+    straight = _straight_piece(line, span)
+    if _within([straight], STRAIGHT):
+        return [straight]
     whole = way.kept(line, *span, allowed)
     if _within([whole], allowed) or whole.length_m < 2.0 * SHORTEST_PIECE_M:
         return [whole]
@@ -247,6 +265,13 @@ def _loose_piece(line: Polyline, start_m: float, end_m: float, allowed: Toleranc
         return smooth
     free = [_piece(line, (start_m, end_m), fixed=fixed) for fixed in _FREE_ENDS]
     return min([smooth, *free], key=lambda piece: allowed.used_by(piece.error))
+
+
+def _straight_piece(line: Polyline, span: _Span) -> LanePiece:
+    """The chord of a part of the line."""
+    curve = straight_curve(*line.points_at(np.array(span)))
+    error = fit_error(curve, line, *span)
+    return LanePiece(curve=curve, start_m=span[0], end_m=span[1], error=error, is_straight=True)
 
 
 def _piece(line: Polyline, span: _Span, *, fixed: tuple[bool, bool]) -> LanePiece:

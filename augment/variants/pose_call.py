@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from augment.errors import ToolError
 from augment.geometry.bezier import CubicBezier
 from augment.prompts.calls import PARAMETERS, TOOL
+from augment.prompts.lane_curves import curve_from
 
 LANE_START = "lane"
 """The start that means the beginning of the lane; any other start is an agent's id."""
@@ -125,13 +126,16 @@ def _numbers(name: str, value: object, limit: float) -> tuple[float, ...]:
 def _lane(value: object) -> str | CubicBezier:
     if isinstance(value, str):
         return value
-    form = "lane must be an id or four control points [[x, y], [x, y], [x, y], [x, y]]"
-    if not (isinstance(value, list) and len(value) == 4):
+    form = (
+        "lane must be an id or four control points [[x, y], [x, y], [x, y], [x, y]], "
+        "or the two ends of a straight piece"
+    )
+    if not (isinstance(value, list) and len(value) in (2, 4)):
         raise ToolError(TOOL, form)
     if not all(isinstance(point, list) and len(point) == 2 for point in value):
         raise ToolError(TOOL, form)
     try:
-        return CubicBezier([[_number("lane", x, FURTHEST_M) for x in point] for point in value])
+        return curve_from([[_number("lane", x, FURTHEST_M) for x in point] for point in value])
     except ValueError as fault:
         raise ToolError(TOOL, f"lane: {fault}") from None
 

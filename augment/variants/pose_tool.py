@@ -44,6 +44,9 @@ FURTHEST_EDGE_M = 30.0
 BESIDE_WITHIN_M = 1.0
 """How far an agent may be past an end of a lane and still count as beside it."""
 
+_OF_A_PLACE = frozenset({"distance_m", "lateral_m", "x_m", "y_m", "heading_rad", "error"})
+"""What stands at every place of an answer about several, be it the same everywhere."""
+
 _ROUNDING_M = 0.005
 _MOST_LISTED = 80
 
@@ -106,8 +109,9 @@ class PoseTool:
     def answer(self, arguments: object) -> dict[str, object]:
         """What goes back to the model, ready for JSON.
 
-        A pose; {"poses": one entry a place} where several distances were asked for; or
-        {"error": a sentence}, where nothing can be read, and at each place that can't be.
+        A pose; {"poses": one entry a place} where several distances were asked for, with what is
+        the same at all of them beside it; or {"error": a sentence}, where nothing can be read,
+        and at each place that can't be.
         """
         try:
             call: PoseCall = read_call(arguments)
@@ -115,13 +119,18 @@ class PoseTool:
             return {"error": fault.problem}
         if not call.is_list:
             return self._answer_at(call, *call.places[0])
-        return {
-            "poses": [
-                {"distance_m": distance_m, "lateral_m": lateral_m}
-                | self._answer_at(call, distance_m, lateral_m)
-                for distance_m, lateral_m in call.places
-            ]
+        found = [
+            {"distance_m": distance_m, "lateral_m": lateral_m}
+            | self._answer_at(call, distance_m, lateral_m)
+            for distance_m, lateral_m in call.places
+        ]
+        shared = {
+            name: value
+            for name, value in found[0].items()
+            if name not in _OF_A_PLACE and all(name in one and one[name] == value for one in found)
         }
+        own = [{name: one[name] for name in one if name not in shared} for one in found]
+        return {"poses": own, **shared}
 
     @cached_property
     def curves(self) -> dict[str, LaneCurve]:

@@ -51,7 +51,7 @@ class ToolDesk:
                 "result": result,
             },
         )
-        return json.dumps(result)
+        return json.dumps(result, separators=(",", ":"))
 
     def _result(self, call: WrittenCall) -> dict[str, object]:
         asked = (call.name, call.arguments, call.problem)

@@ -46,7 +46,7 @@ def test_a_lane_is_number_directions_width_limit_and_points_five_metres_apart() 
         "same",
         3.5,
         13.9,
-        [[-12.0, 0.0], [-7.0, 0.0], [-2.0, 0.0], [3.0, 0.0], [8.0, 0.0], [12.0, 0.0]],
+        [[-6.0, 0.0], [-1.0, 0.0], [4.0, 0.0], [9.0, 0.0], [12.0, 0.0]],
     ]
     assert lanes["Lane2"][:3] == [2, "Westwards", "opposite"]
 
@@ -84,8 +84,8 @@ def test_an_area_is_its_kind_and_a_boundary_cut_to_the_square() -> None:
     kind, points = areas["Area2"]
     assert kind == "walkway"
     assert sorted(map(tuple, points)) == [  # type: ignore[call-overload]
-        (-20.0, -4.25),
-        (-20.0, -1.75),
+        (-10.0, -4.25),
+        (-10.0, -1.75),
         (20.0, -4.25),
         (20.0, -1.75),
     ]

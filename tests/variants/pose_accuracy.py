@@ -14,9 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from augment.formats.readers import recognise
-from augment.geometry.bezier import CubicBezier
 from augment.geometry.frames import Pose
-from augment.prompts.lane_curves import control_points
+from augment.prompts.lane_curves import control_points, curve_from
 from augment.prompts.names import short_names
 from augment.scene.codec import scene_from_document
 from augment.scene.entities import Scene
@@ -84,7 +83,7 @@ def text_accuracy(tool: PoseTool, every_m: float = EVERY_M) -> Accuracy:
 
     def reader_of(name: str) -> Callable[[float], Pose]:
         lane = tool.curves[name].lane
-        pieces = [CubicBezier(control) for control in control_points(lane)]
+        pieces = [curve_from(control) for control in control_points(lane)]
 
         def read(s_m: float) -> Pose:
             number = lane.piece_at(s_m)

@@ -52,7 +52,7 @@ def test_the_answer_carries_what_an_agent_of_the_block_needs() -> None:
         "heading_rad": 0.0,
         "heading_deg": 0.0,
         "lane": "Lane1",
-        "along_m": 60.0,
+        "along_m": 50.0,
         "remaining_m": 5.0,
         "lane_width_m": 3.5,
         "edge_left_m": 1.75,
@@ -129,7 +129,7 @@ def test_a_road_without_an_edge_nearby_has_none() -> None:
 
 
 def test_a_distance_runs_on_straight_over_connectors_and_back_again() -> None:
-    ahead = JUNCTION.pose_on_lane("Lane1", "lane", 85.0)
+    ahead = JUNCTION.pose_on_lane("Lane1", "lane", 75.0)
     assert ahead.route == ("Lane1", "Connector1", "Lane2")
     assert ahead.lane == "Lane2"
     assert ahead.along_m == pytest.approx(4.0)
@@ -172,8 +172,8 @@ def test_control_points_of_no_lane_are_a_curve_that_ends() -> None:
 
 def test_only_what_the_prompt_shows_is_known() -> None:
     near = PoseTool(scene(agents=(vehicle("Agent2", 60.0, 0.0),)), radius_m=30.0)
-    assert near.pose_on_lane("Lane1", "lane", 0.0).pose.x_m == pytest.approx(-30.0)
-    assert near.pose_on_lane("Lane1", "lane", 60.0).next_lanes == ()
+    assert near.pose_on_lane("Lane1", "lane", 0.0).pose.x_m == pytest.approx(-15.0)
+    assert near.pose_on_lane("Lane1", "lane", 45.0).next_lanes == ()
     with pytest.raises(ToolError, match="no agent 'Agent2'"):
         near.pose_on_lane("Lane1", "Agent2", 0.0)
     cut = PoseTool(junction(), radius_m=18.0)
@@ -194,7 +194,7 @@ def test_ids_from_other_peoples_files_go_by_their_short_forms() -> None:
         ({"start": "Agent7"}, "no agent 'Agent7'. Is Agent1 meant? Known: Agent1. Or start at"),
         ({"lane": "Lane2", "start": "Agent1"}, "36.0 m before the beginning of it. To start from"),
         ({"distance_m": 300}, "(Lane1 -> Connector1 -> Lane2): from this start distance_m can be"),
-        ({"distance_m": -300}, "begin 255.00 m short of that (Lane1): from this start distance_m"),
+        ({"distance_m": -300}, "begin 265.00 m short of that (Lane1): from this start distance_m"),
         ({"distance_m": "20"}, "distance_m must be a number, without quotes"),
         ({"distance_m": True}, "distance_m must be a number"),
         ({"distance_m": math.nan}, "distance_m must be between -1000 and 1000"),
@@ -209,7 +209,8 @@ def test_ids_from_other_peoples_files_go_by_their_short_forms() -> None:
         ({"distance_m": [1], "lateral_m": [1, 2]}, "distance_m is a list of 1 and lateral_m"),
         ({"lateral_m": 31}, "lateral_m must be between -30 and 30"),
         ({"start": 3}, 'start must be "lane" or the id of an agent'),
-        ({"lane": [[0, 0], [1, 1]]}, "lane must be an id or four control points"),
+        ({"lane": [[0, 0], [1, 1], [2, 2]]}, "lane must be an id or four control points"),
+        ({"lane": [[0, 0], [1, 1]]}, "this curve is 1.41 m long and no lane of the scene"),
         ({"lane": [[0, 0], [1], [2, 2], [3, 3]]}, "lane must be an id or four control points"),
         ({"lane": [[0, 0]] * 4}, "lane: a curve needs control points in more than one place"),
         ({"offset": 1}, "no argument 'offset'; there are lane, start, distance_m, lateral_m"),

@@ -1,0 +1,11 @@
+"""Counts tokens in an environment of its own: a JSON list of texts in, a list of numbers out."""
+
+from __future__ import annotations
+
+import importlib
+import json
+import sys
+
+if __name__ == "__main__":
+    counted = importlib.import_module("toktok").batch_count(json.load(sys.stdin), sys.argv[1])
+    print(json.dumps(counted))
