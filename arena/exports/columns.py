@@ -87,6 +87,7 @@ COLUMNS = (
     _column("preregistration", key="", of_table=True),
     Column(value=attrgetter("ranks_text"), unit=PLACE, printed="95% ranks",
            text=attrgetter("ranks_text")),
+    _column("options"),
 )  # fmt: skip
 
 IN_FILES = tuple(column for column in COLUMNS if column.name)

@@ -31,6 +31,8 @@ class Format(Generic[Table]):
 _KINDS = {
     "csv": ("csv", "text/csv; charset=utf-8", True),
     "json": ("json", "application/json", True),
+    "jsonl": ("jsonl", "application/jsonl", True),
+    "zip": ("zip", "application/zip", False),
     "parquet": ("parquet", "application/vnd.apache.parquet", False),
     "latex": ("tex", "application/x-tex; charset=utf-8", True),
     "svg": ("svg", "image/svg+xml", True),

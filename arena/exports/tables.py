@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -43,6 +44,7 @@ class Row:
         rank, elo, lower, upper: None where the votes do not determine them; each bound can stand
             without the other one and without a rating.
         note: Why one of these is missing.
+        options: How it asked, a JSON object with sorted names; empty for who asks no model.
         part: Ratings and ranks compare only those with the same number here.
     """
 
@@ -63,6 +65,7 @@ class Row:
     rank_best: int | None = None
     rank_worst: int | None = None
     part: int = 0
+    options: str = ""
 
     @property
     def name(self) -> str:
@@ -197,7 +200,8 @@ def intervals_text(table: LeaderboardTable) -> str:
 
 def leaderboard_table(snapshot: Snapshot) -> LeaderboardTable:
     """The table of a snapshot, best first; one query."""
-    standings = list(snapshot.standings.order_by(F("rating").desc(nulls_last=True), "slug"))
+    lines = snapshot.standings.select_related("contestant")
+    standings = list(lines.order_by(F("rating").desc(nulls_last=True), "slug"))
     board = snapshot.results.board
     names = {standing.slug: standing.name for standing in standings}
     reasons = (snapshot.status,) if board.reasons is None else board.reasons
@@ -256,6 +260,13 @@ def _named(value: Any, names: Mapping[str, str]) -> Any:
     )
 
 
+def _options(standing: Standing) -> str:
+    """What a contestant was fixed to when it first ran, which nothing changes any more."""
+    who = standing.contestant
+    fixed = None if who is None else who.frozen_options
+    return json.dumps(fixed, sort_keys=True) if fixed else ""
+
+
 def _row(standing: Standing, part: int) -> Row:
     name, variant = standing.name, standing.variant
     last_word = name.rpartition(" ")[2]
@@ -277,4 +288,5 @@ def _row(standing: Standing, part: int) -> Row:
         rank_best=standing.rank_best,
         rank_worst=standing.rank_worst,
         part=part,
+        options=_options(standing),
     )

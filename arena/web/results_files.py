@@ -2,22 +2,25 @@
 
 from __future__ import annotations
 
+import tempfile
 import uuid
+from pathlib import Path
 
 from django.contrib import messages
-from django.http import Http404, HttpRequest, HttpResponse
+from django.http import FileResponse, Http404, HttpRequest, HttpResponse, HttpResponseBase
 from django.shortcuts import redirect
 from django.utils.text import slugify
 from django.views.decorators.http import require_safe
 
-from arena.errors import NoSnapshot
+from arena.errors import ArenaError, NoSnapshot
 from arena.exports.bundle import bundle
 from arena.exports.formats import format_named
 from arena.exports.rating_charts import CONTENT_TYPES, chart_bytes
+from arena.exports.study_folder.writing import write_study
 from arena.exports.tables import leaderboard_table
 from arena.exports.votes import VOTE_FORMATS, vote_table
 from arena.exports.writers import FORMATS
-from arena.exports.zips import CONTENT_TYPE, ZIP
+from arena.exports.zips import CONTENT_TYPE, ZIP, zip_folder
 from arena.models import Snapshot, Study
 from arena.queries.results import snapshot_to_export
 from arena.web.access import STAFF, allow_only
@@ -76,6 +79,26 @@ def export_votes(request: HttpRequest, code: uuid.UUID, form: str) -> HttpRespon
         return redirect("results", code=code)
     name = f"{_slug(study)}-votes.{chosen.suffix}"
     return _file(chosen.write(rows), chosen.content_type, name)
+
+
+@allow_only(*STAFF)
+@require_safe
+def export_study(request: HttpRequest, code: uuid.UUID) -> HttpResponseBase:
+    """The whole study, closed, as `manage.py export study` writes it, in one zip."""
+    study = get_readable_study(request, code)
+    packed = tempfile.TemporaryFile()  # noqa: SIM115 - the response closes it
+    try:
+        with tempfile.TemporaryDirectory() as beside:
+            folder = Path(beside) / "study"
+            write_study(study, folder, say=lambda said: None)
+            zip_folder(folder, packed)
+    except ArenaError as error:
+        packed.close()
+        messages.error(request, translate(error))
+        return redirect("results", code=code)
+    packed.seek(0)
+    name = f"{_slug(study)}-study.zip"
+    return FileResponse(packed, as_attachment=True, filename=name, content_type=CONTENT_TYPE)
 
 
 def _snapshot(request: HttpRequest, study: Study) -> Snapshot:

@@ -37,6 +37,7 @@ from arena.web import (
     scenarios,
     scenes,
     studies,
+    transcripts,
     uploads,
     vote_uploads,
     voting,
@@ -124,6 +125,7 @@ urlpatterns: list[URLPattern] = [
         analyses.export,
         name="analyses-export",
     ),
+    path("jobs/<uuid:code>/transcripts.jsonl", transcripts.export, name="transcripts-export"),
     path(
         "jobs/<uuid:code>/tool-calls.<slug:form>",
         jobs.export_tool_calls,
@@ -204,6 +206,7 @@ urlpatterns: list[URLPattern] = [
         name="shown-picture",
     ),
     path("studies/<uuid:code>/results/<slug:tab>/", results.results_page, name="results-tab"),
+    path("studies/<uuid:code>/study.zip", results_files.export_study, name="study-export"),
     path("studies/<uuid:code>/results.<slug:form>", results_files.export, name="results-export"),
     path(
         "studies/<uuid:code>/results-votes.<slug:form>",

@@ -15,11 +15,12 @@ from arena.exports.columns import COLUMNS, IN_FILES, ON_PAGE
 from arena.exports.tables import LeaderboardTable, leaderboard_table
 from arena.exports.writers import FORMATS, plain_text
 from arena.services.cells import csv_text
+from augment.models import Contestant
 from tests.results.old import OLD, stored
 
 pytestmark = pytest.mark.django_db
 
-ADDED = ("rank_best", "rank_worst", "preregistration")
+ADDED = ("rank_best", "rank_worst", "preregistration", "options")
 """The columns that files of an old rating did not have, in their order at the end."""
 
 
@@ -42,8 +43,9 @@ def test_files_of_an_old_rating_are_what_they_were_but_for_the_ranks_at_their_en
     assert digest(before) == OLD["files"]["leaderboard.csv"]
     document = json.loads(FORMATS["json"].write(table))
     for line in document["standings"]:
-        assert tuple(line)[-2:] == ADDED[:2]
-        for name in ADDED[:2]:
+        of_a_line = [name for name in ADDED if name != "preregistration"]
+        assert list(line)[-len(of_a_line) :] == of_a_line
+        for name in of_a_line:
             del line[name]
     for name in ("preregistration", "hypotheses"):
         del document[name]
@@ -69,6 +71,23 @@ def test_best_and_worst_rank_stand_in_every_file(table: LeaderboardTable) -> Non
     for best, worst in wanted:
         assert f" & {best}--{worst}\\\\\n" in tex
         assert f" {best}–{worst}\n" in text
+
+
+def test_the_options_of_each_contestant_stand_in_every_file_with_columns() -> None:
+    snapshot = stored(OLD["snapshot"]["results"])
+    first, *rest = snapshot.standings.order_by("pk")
+    fixed = {"temperature": 0.7, "seed": 3, "protocol": "native"}
+    who = Contestant.objects.create(
+        slug="fixed", name="Fixed", kind=Contestant.Kind.RULE, frozen_options=fixed
+    )
+    snapshot.standings.filter(pk=first.pk).update(contestant=who)
+    table = leaderboard_table(snapshot)
+    wanted = {first.slug: json.dumps(fixed, sort_keys=True)} | {one.slug: "" for one in rest}
+    of_csv = csv.DictReader(io.StringIO(FORMATS["csv"].write(table).decode()))
+    of_json = json.loads(FORMATS["json"].write(table))["standings"]
+    of_parquet = parquet.read_table(io.BytesIO(FORMATS["parquet"].write(table))).to_pylist()
+    for lines in (of_csv, of_json, of_parquet):
+        assert {line["slug"]: line["options"] for line in lines} == wanted
 
 
 def test_a_column_stands_once_in_the_list_with_a_unit_where_it_is_a_number() -> None:

@@ -17,6 +17,7 @@ from arena.exports.displacement_table import displacement_table
 from arena.exports.driving_table import DrivingTable
 from arena.exports.formats import format_named
 from arena.exports.samples import SHEET_FORMATS, sheet_bytes, sheet_of
+from arena.exports.transcripts import TRANSCRIPT_FORMATS
 from arena.management.exporting.kinds import (
     Chosen,
     ExportedFile,
@@ -57,6 +58,10 @@ def add_jobs(kinds: Any) -> None:
         *(kinds, "repeats", REPEAT_FORMATS, repeat_rows),
         help="what varies between the samples of a job",
     )
+    add_table(
+        *(kinds, "transcripts", TRANSCRIPT_FORMATS, lambda job: job),
+        help="every transcript of a job: a line of JSON each, or with their images as a zip",
+    ).set_defaults(format="jsonl")
     _add_analyses(kinds)
 
 

@@ -1,0 +1,66 @@
+"""Every transcript of a job in one call: the same records as one by one."""
+
+from __future__ import annotations
+
+import json
+import zipfile
+from pathlib import Path
+
+import pytest
+from django.core.management import call_command
+from django.test import Client
+from django.urls import reverse
+
+from augment.models import Augmentation, GenerationJob
+from augment.services.running import runner
+from augment.services.running.transcript_export import transcript_of
+from tests.jobs.models import Model, after_a_second_look, llama_job
+from tests.web.cast import people, signed_in
+
+pytestmark = pytest.mark.django_db
+
+
+@pytest.fixture
+def job() -> GenerationJob:
+    """One augmentation that asked twice."""
+    made = llama_job(price="2")
+    row = Augmentation.objects.get(job=made)
+    runner.work_on(augmentation_pk=row.pk, worker="w", connect=Model(after_a_second_look))
+    return made
+
+
+def alone(row: Augmentation) -> dict[str, object]:
+    """Its own transcript, with the names of its images."""
+    record: dict[str, object] = json.loads(json.dumps(transcript_of(row)))
+    images = record["images"]
+    assert isinstance(images, dict)
+    return record | {"images": sorted(images)}
+
+
+def test_a_line_for_each_augmentation_is_its_transcript(
+    job: GenerationJob, tmp_path: Path
+) -> None:
+    out = tmp_path / "all.jsonl"
+    call_command("export", "transcripts", job.name, "--out", str(out))
+    lines = [json.loads(line) for line in out.read_text().splitlines()]
+    assert lines == [alone(row) for row in Augmentation.objects.filter(job=job).order_by("pk")]
+    (attempt,) = lines[0]["attempts"]
+    assert len(attempt["steps"]) == 2
+
+
+def test_the_zip_holds_the_same_lines(job: GenerationJob, tmp_path: Path) -> None:
+    lines, packed = tmp_path / "all.jsonl", tmp_path / "all.zip"
+    call_command("export", "transcripts", job.name, "--out", str(lines))
+    call_command("export", "transcripts", job.name, "--format", "zip", "--out", str(packed))
+    with zipfile.ZipFile(packed) as archive:
+        assert archive.read("transcripts.jsonl") == lines.read_bytes()
+
+
+def test_the_page_of_a_job_offers_them(job: GenerationJob) -> None:
+    client: Client = signed_in(people()["admin"])
+    address = reverse("transcripts-export", args=[job.code])
+    assert address in client.get(reverse("job", args=[job.code])).content.decode()
+    answer = client.get(address)
+    lines = b"".join(answer).splitlines()
+    assert [json.loads(line) for line in lines] == [alone(Augmentation.objects.get(job=job))]
+    assert "attachment" in answer["Content-Disposition"]
