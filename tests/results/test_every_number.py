@@ -1,0 +1,471 @@
+"""Every number of the results, computed again from the raw votes of one small study.
+
+What computes it here is another's package (statsmodels, krippendorff, scipy) or plain loops, never
+our own ratings. Numbers that are drawn at random are held against what they estimate, within the
+error of the draws. docs/results.md says which number is checked where.
+"""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections import Counter, defaultdict
+from typing import Any
+
+import krippendorff
+import numpy as np
+import pytest
+import statsmodels.api as sm
+from django.db import transaction
+from scipy.stats import chi2, t
+
+from tests.results.raw import CHECKS, RawVote, Shown, a_rated_study, strengths_of
+
+pytestmark = pytest.mark.django_db  # so that there is a database; the study is made once
+POINTS = 400.0 / math.log(10.0)
+
+
+@pytest.fixture(scope="module")
+def shown(django_db_setup: None, django_db_blocker: Any) -> Shown:
+    with django_db_blocker.unblock(), transaction.atomic():
+        found = a_rated_study()
+        transaction.set_rollback(True)
+    return found
+
+
+def glm(
+    votes: list[RawVote], slugs: list[str], extra: np.ndarray | None = None, **how: Any
+) -> Any:
+    design = strengths_of(votes, slugs)
+    if extra is not None:
+        design = np.hstack([design, extra])
+    score = np.array([vote.score for vote in votes])
+    return sm.GLM(score, design, family=sm.families.Binomial()).fit(tol=1e-12, **how)
+
+
+def elo_of(fitted: Any, slugs: list[str]) -> dict[str, float]:
+    strengths = np.append(0.0, fitted.params[: len(slugs) - 1])
+    return dict(zip(slugs, 1000.0 + POINTS * (strengths - strengths.mean()), strict=True))
+
+
+def codes(values: list[str]) -> np.ndarray:
+    order = sorted(set(values))
+    return np.array([order.index(value) for value in values])
+
+
+def influences(votes: list[RawVote], slugs: list[str]) -> tuple[np.ndarray, np.ndarray]:
+    """(V, C) how far each vote pulls each rating, in points; (V, C) its information there."""
+    fitted = glm(votes, slugs)
+    design = strengths_of(votes, slugs)
+    expected = fitted.fittedvalues
+    bread = np.linalg.inv(design.T @ (design * (expected * (1 - expected))[:, None]))
+    back = np.vstack([np.zeros(len(slugs) - 1), bread])
+    back -= back.mean(axis=0)
+    surprise = np.array([vote.score for vote in votes]) - expected
+    pulls = POINTS * (design * surprise[:, None]) @ back.T
+    takes_part = np.array([[slug in vote.names for slug in slugs] for vote in votes])
+    return pulls, takes_part * (expected * (1 - expected))[:, None]
+
+
+def squares(pulls: np.ndarray, cluster: np.ndarray) -> np.ndarray:
+    """(C, C) of the sums by cluster."""
+    sums = np.array([pulls[cluster == one].sum(axis=0) for one in np.unique(cluster)])
+    return sums.T @ sums
+
+
+def moderated(votes: list[RawVote], slugs: list[str]) -> tuple[np.ndarray, np.ndarray]:
+    """(C,) half-widths and (C,) variances of the default intervals, by docs/rating.md."""
+    pulls, information = influences(votes, slugs)
+    experts, items = codes([v.judge for v in votes]), codes([v.item for v in votes])
+    inner = squares(pulls, experts * 1000 + items)
+    base = inner.diagonal()
+    total, parts = -base, []
+    number = len(slugs)
+    for cluster in (experts, items):
+        groups = np.unique(cluster)
+        raw = squares(pulls, cluster).diagonal()
+        shares = np.array([information[cluster == one].sum(axis=0) for one in groups])
+        shares /= shares.sum(axis=0)
+        uneven = np.clip((shares**2).sum(axis=0), 1.0 / len(groups), 1.0)
+        left = 1.0 - uneven
+        centred = np.eye(number) - 1.0 / number
+        room = centred @ np.diag(uneven) @ centred
+        weight = 1.0 / base**2
+        effect = (weight * (raw - base * left)).sum() / (weight * room.diagonal() * left).sum()
+        values, ways = np.linalg.eigh(inner + effect * room)
+        common = ((ways * np.maximum(values, 0.0)) @ ways.T).diagonal()
+        common = common if effect >= 0 else np.maximum(common, 0.75 * base)
+        degrees, own = left / uneven, raw / left
+        ratio = own / common
+        surplus = (degrees * ((ratio - 1) ** 2 - 2 / degrees)).sum() / degrees.sum()
+        surplus /= 1 + 2 / degrees.mean()
+        prior = 24.0 if surplus <= 0 else min(24.0, 4 + 2 / surplus)
+        variance = (prior * common + degrees * own) / (prior + degrees)
+        total = total + variance
+        parts.append((variance, np.minimum(prior + degrees, degrees.sum() * (1 - 1 / number))))
+    total = np.maximum(total, 0.75 * base)
+    freedom = total**2 / sum(variance**2 / degrees for variance, degrees in parts)
+    return t.ppf(0.975, freedom) * np.sqrt(total), total
+
+
+# --- The table -----------------------------------------------------------------------------------
+
+
+def test_ratings_intervals_and_ranks(shown: Shown) -> None:
+    rating = elo_of(glm(shown.main, shown.slugs), shown.slugs)
+    half, _ = moderated(shown.main, shown.slugs)
+    lower = {slug: rating[slug] - one for slug, one in zip(shown.slugs, half, strict=True)}
+    upper = {slug: rating[slug] + one for slug, one in zip(shown.slugs, half, strict=True)}
+    for slug, line in shown.lines.items():
+        assert line.rating == pytest.approx(rating[slug], abs=1e-4)
+        assert (line.lower, line.upper) == pytest.approx((lower[slug], upper[slug]), rel=1e-5)
+        assert line.rank == 1 + sum(lower[other] > upper[slug] for other in shown.slugs)
+
+
+def test_counts_of_every_line_and_what_the_page_prints(shown: Shown) -> None:
+    printed = [row for row in shown.rows("table") if len(row) >= 6]
+    for slug, line in shown.lines.items():
+        own = [vote.score_of(slug) for vote in shown.main if slug in vote.names]
+        assert (line.wins, line.ties, line.losses) == (
+            own.count(1.0), own.count(0.5), own.count(0.0)
+        )  # fmt: skip
+        cells = next(row for row in printed if row[1].startswith(line.name))
+        down, up = round(line.lower) - round(line.rating), round(line.upper) - round(line.rating)
+        assert cells[0].split()[0] == str(line.rank)
+        for said in (str(round(line.rating)), f"{down:+d}/{up:+d}", str(len(own))):
+            assert said in cells, (line.name, said)
+        assert any(cell.startswith(str(round(100 * np.mean(own)))) for cell in cells[4:])
+
+
+def test_the_cross_check_is_the_plain_two_way_sandwich(shown: Shown) -> None:
+    votes, slugs = shown.main, shown.slugs
+    experts, items = codes([v.judge for v in votes]), codes([v.item for v in votes])
+    covariance = 0
+    for sign, groups in ((1, experts), (1, items), (-1, experts * 1000 + items)):
+        found = glm(
+            votes, slugs, cov_type="cluster",
+            cov_kwds={"groups": groups, "use_correction": False},
+        )  # fmt: skip
+        number = len(np.unique(groups))
+        covariance = covariance + sign * found.cov_params() * number / (number - 1)
+    centred = np.vstack([np.zeros(len(slugs) - 1), np.eye(len(slugs) - 1)])
+    centred -= centred.mean(axis=0)
+    variances = (centred @ covariance @ centred.T).diagonal()
+    errors = POINTS * np.sqrt(variances) * t.ppf(0.975, len(np.unique(experts)) - 1)
+    rating = elo_of(glm(votes, slugs), slugs)
+    kept = shown.results.board.check
+    for slug, error in zip(slugs, errors, strict=True):
+        assert kept[slug] == pytest.approx((rating[slug] - error, rating[slug] + error), rel=1e-5)
+    gap = max(
+        max(abs(kept[slug][0] - line.lower), abs(kept[slug][1] - line.upper))
+        for slug, line in shown.lines.items()
+    )
+    assert f"differ from these by at most {gap:.0f} points" in shown.said("table")
+
+
+def test_ties_and_what_is_left_out(shown: Shown) -> None:
+    ties = np.mean([vote.score == 0.5 for vote in shown.main])
+    assert shown.results.trust.tie_share == pytest.approx(ties)
+    assert f"{100 * ties:.0f} % of the votes are ties" in shown.said("table")
+    assert f"Counted {len(shown.main)} votes" in shown.said("table")
+    kinds = Counter(vote.kind for vote in shown.votes)
+    assert f"{kinds['check']} attention checks" in shown.said("table")
+    assert f"{kinds['repeat']} hidden repeats" in shown.said("table")
+
+
+def test_online_elo_by_playing_the_votes_in_many_orders(shown: Shown) -> None:
+    rng = np.random.default_rng(11)
+    votes, slugs = shown.main, shown.slugs
+    runs = []
+    for _ in range(60):
+        elo = dict.fromkeys(slugs, 1000.0)
+        for place in rng.integers(0, len(votes), len(votes)):
+            vote = votes[place]
+            expected = 1.0 / (1.0 + 10.0 ** ((elo[vote.right] - elo[vote.left]) / 400.0))
+            gain = 4.0 * (vote.score - expected)
+            elo[vote.left] += gain
+            elo[vote.right] -= gain
+        runs.append([elo[slug] for slug in slugs])
+    middle = dict(zip(slugs, np.median(runs, axis=0), strict=True))
+    order = shown.results.trust.elo_order
+    assert order is not None
+    assert [one.slug for one in order] == sorted(slugs, key=lambda s: -shown.lines[s].rating)
+    places = sorted((-one.elo, one.slug) for one in order)
+    for one in order:
+        assert one.elo == pytest.approx(middle[one.slug], abs=10.0)
+        assert one.place == 1 + [slug for _, slug in places].index(one.slug)
+
+
+def test_what_a_vote_or_an_expert_less_changes(shown: Shown) -> None:
+    votes, slugs = shown.main, shown.slugs
+    whole = elo_of(glm(votes, slugs), slugs)
+
+    def places(rating: dict[str, float]) -> dict[str, int]:
+        order = sorted(slugs, key=lambda slug: -rating[slug])
+        return {slug: order.index(slug) for slug in slugs}
+
+    for line in shown.results.trust.raters:
+        rest = elo_of(glm([v for v in votes if v.judge != line.name], slugs), slugs)
+        now, then = places(whole), places(rest)
+        assert line.moves == max(abs(now[slug] - then[slug]) for slug in slugs)
+        decided = [v for v in votes if v.judge == line.name and v.score != 0.5]
+        hits = [(v.score == 1.0) == (rest[v.left] > rest[v.right]) for v in decided]
+        assert line.favourites.value == pytest.approx(np.mean(hits))
+        assert line.decided == len(hits)
+    moves = [line.moves for line in shown.results.trust.raters if line.moves is not None]
+    said = f"moves a contestant by at most {max(moves)} place"
+    assert (said in shown.said("table")) == (max(moves) > 0)
+    removal = shown.results.trust.removal
+    first = max(slugs, key=lambda slug: whole[slug])
+    if removal is not None and removal.votes > 1:
+        # No single vote does it, tried for each kind of vote on the first.
+        kinds = {(v.left, v.right, v.score): n for n, v in enumerate(votes) if first in v.names}
+        for place in kinds.values():
+            rest = elo_of(glm(votes[:place] + votes[place + 1 :], slugs), slugs)
+            assert max(slugs, key=lambda slug: rest[slug]) == first
+
+
+def test_design_effect_typical_interval_and_votes_wanted(shown: Shown) -> None:
+    pulls, _ = influences(shown.main, shown.slugs)
+    alone = (pulls**2).sum(axis=0)
+    half, variance = moderated(shown.main, shown.slugs)
+    claims = shown.results.claims
+    assert claims.design_effect == pytest.approx(np.median(variance / alone), rel=1e-4)
+    assert claims.half_width == pytest.approx(np.median(half), rel=1e-4)
+    rating = elo_of(glm(shown.main, shown.slugs), shown.slugs)
+    for slug, one in zip(shown.slugs, 1.959964 * np.sqrt(alone), strict=True):
+        bounds = (rating[slug] - one, rating[slug] + one)
+        assert claims.independent[slug] == pytest.approx(bounds, abs=0.01)
+    for wanted in claims.planning:
+        enough = len(shown.main) * (np.median(half) / wanted.half_width) ** 2
+        assert wanted.votes == pytest.approx(math.ceil(enough), abs=1)
+        assert str(wanted.votes) in shown.said("coverage").replace(",", "")
+
+
+def test_the_test_of_fit_and_the_cycles(shown: Shown) -> None:
+    votes, slugs = shown.main, shown.slugs
+    fitted = glm(votes, slugs)
+    strength = dict(zip(slugs, np.append(0.0, fitted.params), strict=True))
+    games: Counter[tuple[str, str]] = Counter()
+    scores: dict[tuple[str, str], float] = defaultdict(float)
+    for vote in votes:
+        pair = (min(vote.names), max(vote.names))
+        games[pair] += 1
+        scores[pair] += vote.score_of(pair[0])
+    chance = {(a, b): 1 / (1 + math.exp(strength[b] - strength[a])) for a, b in games}
+    room = sum(n * 2 * min(chance[pair], 1 - chance[pair]) for pair, n in games.items())
+    share = sum(vote.score == 0.5 for vote in votes) / room
+    x2 = 0.0
+    for pair, n in games.items():
+        p = chance[pair]
+        variance = n * (p * (1 - p) - share * min(p, 1 - p) / 2.0)
+        x2 += (scores[pair] - n * p) ** 2 / variance
+    fit = shown.results.trust.fit
+    assert fit is not None
+    assert fit.statistic == pytest.approx(x2, rel=1e-5)
+    assert fit.freedom == len(games) - len(slugs) + 1
+    assert fit.p_value == pytest.approx(chi2.sf(x2, fit.freedom), abs=0.12)
+    beats = {(a, b) for (a, b) in games if scores[a, b] > games[a, b] / 2}
+    beats |= {(b, a) for (a, b) in games if scores[a, b] < games[a, b] / 2}
+    cycles = triples = 0
+    for three in itertools.combinations(slugs, 3):
+        won = [sum((a, b) in beats for b in three) for a in three]
+        if sum(won) == 3:
+            triples += 1
+            cycles += won == [1, 1, 1]
+    assert (fit.cycles, fit.triples) == (cycles, triples)
+    assert f"{fit.statistic:.1f} on {fit.freedom} degrees of freedom" in shown.said("table")
+    assert f"{cycles} of {triples} triples" in shown.said("table")
+
+
+# --- Pairs, types and coverage -------------------------------------------------------------------
+
+
+def test_pairs_their_scores_and_adjusted_p_values(shown: Shown) -> None:
+    slugs = shown.slugs
+    pulls, _ = influences(shown.main, slugs)
+    experts = codes([vote.judge for vote in shown.main])
+    cells = experts * 1000 + codes([vote.item for vote in shown.main])
+    covariance = squares(pulls, cells)
+    rating = elo_of(glm(shown.main, slugs), slugs)
+    adjusted = {frozenset((one.a, one.b)): one.p for one in shown.results.board.p_values or ()}
+    for pair in shown.results.pairs:
+        both = frozenset((pair.a, pair.b))
+        own = [vote.score_of(pair.a) for vote in shown.main if vote.names == both]
+        assert (pair.wins, pair.ties, pair.losses) == (
+            own.count(1.0), own.count(0.5), own.count(0.0)
+        )  # fmt: skip
+        assert pair.planned == shown.planned[both]
+        # Never surer than a single test of independent votes with as many degrees as experts.
+        a, b = slugs.index(pair.a), slugs.index(pair.b)
+        variance = covariance[a, a] + covariance[b, b] - 2 * covariance[a, b]
+        size = abs(rating[pair.a] - rating[pair.b]) / math.sqrt(0.5 * variance)
+        assert adjusted[both] >= 2 * t.sf(size, 1000) - 1e-9
+    assert len(np.unique(experts)) >= 5
+    above = shown.results.board.above
+    assert above is not None
+    assert {frozenset(pair) for pair in above} == {
+        pair for pair, p in adjusted.items() if p <= 0.05
+    }
+    for line in shown.lines.values():
+        over = sum(pair[1] == line.slug for pair in above)
+        under = sum(pair[0] == line.slug for pair in above)
+        assert (line.rank_best, line.rank_worst) == (1 + over, len(slugs) - under)
+    percents = [cell for row in shown.rows("pairs") for cell in row]
+    for pair in shown.results.pairs:
+        score = 100 * (pair.wins + pair.ties / 2) / pair.votes
+        assert any(f"{score:.0f}" in cell for cell in percents), (pair.a, pair.b)
+
+
+def test_each_type_is_rated_by_its_own_votes(shown: Shown) -> None:
+    assert sum(not part.reasons for part in shown.results.types) >= 3
+    for part in shown.results.types:
+        votes = [vote for vote in shown.main if vote.type == part.type]
+        assert (part.votes, part.scenarios) == (len(votes), len({vote.item for vote in votes}))
+        if part.reasons:  # somebody won or lost all: then statsmodels has no answer, either
+            continue
+        rating = elo_of(glm(votes, shown.slugs), shown.slugs)
+        half, _ = moderated(votes, shown.slugs)
+        for line in part.lines:
+            assert line.votes == sum(line.slug in vote.names for vote in votes)
+            assert line.rating == pytest.approx(rating[line.slug], abs=1e-3)
+            width = half[shown.slugs.index(line.slug)]
+            for bound, sign in ((line.lower, -1), (line.upper, 1)):
+                if bound is not None:
+                    assert bound == pytest.approx(rating[line.slug] + sign * width, rel=1e-4)
+
+
+def test_pooled_ratings_lie_between_the_whole_and_the_type(shown: Shown) -> None:
+    # The exact answer is checked in tests/rating/test_pooling.py; here that it is this study's.
+    whole = elo_of(glm(shown.main, shown.slugs), shown.slugs)
+    nearer = total = 0
+    for part in shown.results.types:
+        assert all(line.pooled.lower is not None for line in part.lines)
+        if part.reasons:
+            continue
+        own = elo_of(glm([v for v in shown.main if v.type == part.type], shown.slugs), shown.slugs)
+        for line in part.lines:
+            assert line.pooled.value is not None
+            far = abs(own[line.slug] - whole[line.slug])
+            nearer += abs(line.pooled.value - whole[line.slug]) <= far + 3.0
+            total += 1
+    assert nearer > 0.9 * total
+
+
+# --- Raters --------------------------------------------------------------------------------------
+
+
+def test_agreement_by_krippendorffs_package_and_by_loops(shown: Shown) -> None:
+    units: dict[tuple[str, frozenset[str]], list[tuple[str, float]]] = defaultdict(list)
+    for vote in shown.main:
+        units[vote.item, vote.names].append((vote.judge, vote.score_of(min(vote.names))))
+    shared = [values for values in units.values() if len(values) > 1]
+    judges = sorted({vote.judge for vote in shown.main})
+    table = np.full((len(judges), len(shared)), np.nan)
+    for column, values in enumerate(shared):
+        for judge, score in values:
+            table[judges.index(judge), column] = 2 * score
+    found = shown.results.trust.agreement
+    assert found is not None
+    assert (found.units, found.judgements) == (len(shared), sum(map(len, shared)))
+    for level, estimate in (("nominal", found.alpha), ("interval", found.alpha_interval)):
+        theirs = krippendorff.alpha(reliability_data=table, level_of_measurement=level)
+        assert estimate.value == pytest.approx(theirs, abs=1e-9)
+    equal = [
+        np.mean([a == b for (_, a), (_, b) in itertools.combinations(values, 2)])
+        for values in shared
+    ]
+    weights = [len(values) for values in shared]
+    shares = [np.mean([[s == v for v in (0, 0.5, 1)] for _, s in vs], axis=0) for vs in shared]
+    by_chance = (np.mean(shares, axis=0) * (1 - np.mean(shares, axis=0))).sum() / 2
+    assert found.ac1.value == pytest.approx((np.mean(equal) - by_chance) / (1 - by_chance))
+    if len(set(weights)) == 1:
+        assert found.percent.value == pytest.approx(np.mean(equal))
+    assert f"{found.alpha.value:.2f} (" in shown.said("raters")
+    agreed = Counter[str]()
+    seen = Counter[str]()
+    for values in shared:
+        for judge, score in values:
+            others = [other == score for who, other in values if who != judge]
+            agreed[judge] += float(np.mean(others))  # type: ignore[assignment]
+            seen[judge] += 1
+    for line in shown.results.trust.raters:
+        assert line.shared == seen[line.name]
+        if line.shared:
+            assert line.agreement.value == pytest.approx(agreed[line.name] / seen[line.name])
+
+
+def test_the_panel_counts_what_each_expert_did(shown: Shown) -> None:
+    first = {vote.matchup: vote for vote in shown.votes}
+    for line in shown.results.trust.raters:
+        own = [vote for vote in shown.main if vote.judge == line.name]
+        decided = [vote.score == 1.0 for vote in own if vote.score != 0.5]
+        assert line.votes == len(own)
+        assert line.median_ms == pytest.approx(np.median([vote.ms for vote in own]))
+        assert line.fast == pytest.approx(np.mean([vote.ms < 1000 for vote in own]))
+        assert line.ties == pytest.approx(np.mean([vote.score == 0.5 for vote in own]))
+        assert line.left.value == pytest.approx(np.mean(decided))
+        again = [v for v in shown.votes if v.kind == "repeat" and v.judge == line.name]
+        alike = [v.score_of(v.left) == first[v.repeat_of or 0].score_of(v.left) for v in again]
+        assert line.repeats == (len(again), sum(alike))
+        checks = [v for v in shown.votes if v.kind == "check" and v.judge == line.name]
+        passed = [v.score_of("interplan") == 1.0 for v in checks]
+        assert line.checks == (len(checks), sum(passed))
+        cells = next(row for row in shown.rows("raters") if row[0].startswith(line.name))
+        assert cells[1] == str(len(own))
+        assert f"{100 * line.ties:.0f} %" in cells
+    assert sum(line.checks[0] for line in shown.results.trust.raters) == CHECKS
+
+
+def test_the_side_and_whom_it_serves(shown: Shown) -> None:
+    votes = shown.main
+    experts = codes([vote.judge for vote in votes])
+    found = glm(
+        votes, shown.slugs, np.ones((len(votes), 1)), cov_type="cluster",
+        cov_kwds={"groups": experts, "use_correction": False},
+    )  # fmt: skip
+    side, groups = shown.results.trust.side, len(np.unique(experts))
+    assert side is not None
+    value = found.params[-1] * POINTS
+    half = t.ppf(0.975, groups - 1) * found.bse[-1] * POINTS * math.sqrt(groups / (groups - 1))
+    assert side.advantage.value == pytest.approx(value, abs=1e-4)
+    assert side.advantage.upper == pytest.approx(value + half, rel=1e-5)
+    both = np.array([[float(slug in vote.names) for slug in shown.slugs] for vote in votes])
+    each = glm(votes, shown.slugs, both).params[len(shown.slugs) - 1 :]
+    kept = shown.results.trust.by_side
+    assert kept is not None
+    effects = {cell.contestant: cell.effect.value for cell in kept.cells}
+    for slug, one in zip(shown.slugs, 2 * (each - each.mean()) * POINTS, strict=True):
+        assert effects[slug] == pytest.approx(one, abs=1e-3)
+
+
+def test_types_against_contestants_by_raos_score(shown: Shown) -> None:
+    votes = shown.main
+    design = strengths_of(votes, shown.slugs)
+    types = codes([vote.type for vote in votes])
+    null = glm(votes, shown.slugs)
+    extra = np.hstack([design * (types == one)[:, None] for one in range(1, types.max() + 1)])
+    score = null.model.score_test(
+        null.params, k_constraints=extra.shape[1], exog_extra=extra, observed=False
+    )[0]
+    kept = shown.results.trust.by_type
+    assert kept is not None
+    assert kept.statistic == pytest.approx(float(np.squeeze(score)), rel=1e-5)
+    assert kept.freedom == extra.shape[1]
+
+
+def test_change_within_sessions_by_least_squares(shown: Shown) -> None:
+    # All votes were drawn at one moment: a session an expert, in the order of their plan.
+    kept = {one.measure: one for one in shown.results.trust.drifts}
+    by_judge: dict[str, list[RawVote]] = defaultdict(list)
+    for vote in shown.main:
+        by_judge[vote.judge].append(vote)
+    x, y, level = [], [], []
+    for number, own in enumerate(by_judge.values()):
+        x += [place / 100 for place in range(len(own))]
+        y += [float(vote.score == 0.5) for vote in own]
+        level += [number] * len(own)
+    design = np.column_stack([np.array(level)[:, None] == np.arange(len(by_judge)), x])
+    slope = sm.OLS(np.array(y), design.astype(float)).fit().params[-1]
+    assert kept["ties"].slope.value == pytest.approx(slope, abs=1e-9)
+    assert kept["ties"].votes == len(shown.main)
