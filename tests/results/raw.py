@@ -94,7 +94,7 @@ def a_rated_study() -> Shown:
     )
     _repeat_and_check(study)
     draw_votes(study, size=SIZE, seed=3)
-    close_study(study=study)
+    study = close_study(study=study)
     Contestant.objects.filter(slug="interplan").update(kind=Contestant.Kind.REFERENCE)
     snapshot = rate(study=study, rounds=1000, seed=4)
     client = signed_in(people()["analyst"])
