@@ -35,7 +35,7 @@ class GalleryForm(forms.Form):
 
     contestant = forms.ChoiceField(label=gettext_lazy("Contestant"), required=False)
     order = forms.ChoiceField(
-        label=gettext_lazy("First"),
+        label=gettext_lazy("Begin with"),
         required=False,
         choices=[
             (LOST, gettext_lazy("most often beaten")),
