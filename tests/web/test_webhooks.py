@@ -7,6 +7,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from threading import Thread
+from threading import enumerate as enumerate_threads
 from typing import Any
 
 import pytest
@@ -14,6 +15,7 @@ from django.contrib.auth.models import User
 from django.urls import reverse
 from django.utils import timezone
 
+from arena import tasks
 from arena.models import Webhook, WebhookDelivery
 from arena.services.webhooks import (
     deliver_due,
@@ -22,6 +24,8 @@ from arena.services.webhooks import (
 )
 from augment.errors import AugmentError, InvalidDocument
 from augment.models import Event
+from augment.services.running import stopping
+from tests.processes import wait_until
 from tests.web.cast import people, signed_in
 from tests.webhooks import Receiver, hook, tell
 
@@ -72,6 +76,24 @@ def test_a_message_arrives_by_the_network_and_its_answer_is_kept(admin: User) ->
     row = WebhookDelivery.objects.get()
     assert (row.state, row.last_status, row.last_answer) == (State.DELIVERED, 200, "hello")
     assert bodies == [row.body.encode()]
+
+
+@pytest.mark.django_db(transaction=True)
+def test_a_worker_that_is_ready_tells_without_being_asked(admin: User) -> None:
+    with listening(200) as (url, bodies):
+        send_test(webhook=hook(admin, url=url).webhook)
+        stopping.withdraw_stop()
+        try:
+            tasks.start_telling()
+            wait_until(lambda: bool(bodies), what="the message arrives")
+            delivered = WebhookDelivery.objects.filter(state=State.DELIVERED)
+            wait_until(delivered.exists, what="its answer is kept")
+        finally:
+            stopping.request_stop()
+            for thread in enumerate_threads():
+                if thread.name == "webhooks":
+                    thread.join()
+            stopping.withdraw_stop()
 
 
 def test_a_redirect_is_not_followed(admin: User) -> None:
