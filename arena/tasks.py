@@ -13,6 +13,7 @@ from threading import Thread
 from celery import shared_task
 from celery.signals import worker_ready
 from django.conf import settings
+from django.contrib.auth.models import User
 from django.db import connection
 from django.utils import timezone
 
@@ -20,7 +21,9 @@ from arena.exports.scenario_files import write_file
 from arena.services import looks, ratings
 from arena.services.webhooks import deliver_due, plan_deliveries
 from augment.broker import open_broker
+from augment.models import Scenario
 from augment.services.running import stopping, workers
+from augment.services.scenarios import attention
 
 logger = logging.getLogger(__name__)
 
@@ -57,6 +60,23 @@ def send_scenario_file(file_pk: int) -> None:
     """
     with open_broker() as broker:
         write_scenario_file.apply_async((file_pk,), connection=broker, retry=False)
+
+
+@shared_task(name="arena.draw_checks", acks_late=True, ignore_result=True)
+def draw_checks(actor_pk: int) -> None:
+    """Draw the attention checks that scenarios with a reference lack; again, none is left."""
+    slugs = list(Scenario.objects.exclude(reference=None).values_list("slug", flat=True))
+    attention.draw_checks(scenarios=slugs, actor=User.objects.filter(pk=actor_pk).first())
+
+
+def send_checks(actor_pk: int) -> None:
+    """Ask a worker to draw attention checks; for transaction.on_commit.
+
+    Raises:
+        QueueFault: No broker, or it refuses; nothing is drawn until somebody asks again.
+    """
+    with open_broker() as broker:
+        draw_checks.apply_async((actor_pk,), connection=broker, retry=False)
 
 
 @worker_ready.connect

@@ -13,6 +13,7 @@ from django.utils.text import slugify
 from django.utils.translation import gettext as _
 from django.views.decorators.http import require_http_methods, require_POST, require_safe
 
+from arena import tasks
 from arena.errors import ArenaError
 from arena.models import Study
 from arena.queries import progress, scenarios
@@ -76,6 +77,21 @@ def new_study_page(request: HttpRequest) -> HttpResponse:
             )
             return redirect("study", code=study.code)
     return render(request, "studies/new.html", {"form": form}, status=422 if form.errors else 200)
+
+
+@allow_only(ADMIN)
+@require_POST
+def draw_checks(request: HttpRequest) -> HttpResponse:
+    """Have workers draw the attention checks that are missing; twice does no harm."""
+    try:
+        tasks.send_checks(cast(User, request.user).pk)
+    except AugmentError as error:
+        messages.error(request, translate(error))
+    else:
+        messages.success(
+            request, _("Attention checks are being drawn. Reload this page in a moment.")
+        )
+    return redirect("study-new")
 
 
 @allow_only(*STAFF)

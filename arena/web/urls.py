@@ -154,6 +154,7 @@ urlpatterns: list[URLPattern] = [
     path("audit.<slug:form>", audit.audit_file, name="audit-export"),
     path("studies/", studies.studies_page, name="studies"),
     path("studies/plan/", planning.planning_page, name="study-plan"),
+    path("studies/checks/", studies.draw_checks, name="checks-draw"),
     path("studies/import/", vote_uploads.upload_votes_page, name="import-votes"),
     path("studies/new/", studies.new_study_page, name="study-new"),
     path("studies/<uuid:code>/", studies.study_page, name="study"),

@@ -132,6 +132,7 @@ ACTIONS: dict[str, tuple[int, int, int]] = {
     "study-rate": (403, 403, 403),
     "rating-again": (403, 403, 403),
     "results-open": (302, 302, 403),
+    "checks-draw": (302, 403, 403),
     "study-close": (200, 403, 403),
     "study-hand-over": (302, 403, 403),
     "labelling-close": (404, 403, 403),

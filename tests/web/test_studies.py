@@ -8,10 +8,15 @@ import pytest
 from django.contrib.auth.models import User
 from django.urls import reverse
 
+from arena import tasks
 from arena.models import Study
 from arena.queries.coverage import shared_units
 from arena.services.reports import report
+from augment.models import Augmentation
+from augment.scene.codec import modification_to_document
+from augment.scene.modification import Modification
 from tests import study_rows
+from tests.scenes import vehicle
 from tests.web.cast import people, signed_in
 
 pytestmark = pytest.mark.django_db
@@ -148,3 +153,21 @@ def test_pairs_that_two_experts_judge_are_planned_previewed_and_shown() -> None:
     assert shared_units(study) == (12, 6)
     shown = admin.get(reverse("study", args=[study.code])).content.decode()
     assert "6 of 12 pairs; 30 % were asked for" in shown
+
+
+def test_attention_checks_are_drawn_by_a_worker_with_one_click(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    place = study_rows.scenario("with-reference")
+    place.reference = modification_to_document(Modification(added=(vehicle("Agent2", 20.0, 0.0),)))
+    place.save()
+    study_rows.scenario("without")
+    sent: list[int] = []
+    monkeypatch.setattr(tasks, "send_checks", sent.append)
+    admin = people()["admin"]
+    answer = signed_in(admin).post(reverse("checks-draw"))
+    assert answer.headers["Location"] == reverse("study-new")
+    tasks.draw_checks(*sent)
+    tasks.draw_checks(*sent)
+    drawn = Augmentation.objects.get(contestant__kind="check")
+    assert (drawn.scenario.slug, sent) == ("with-reference", [admin.pk])
