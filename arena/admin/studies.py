@@ -125,7 +125,7 @@ class VoteAdmin(OfReadStudies, admin.ModelAdmin):
 class ReportAdmin(ReadOnlyStudies, admin.ModelAdmin):
     """What experts reported about pairs."""
 
-    list_display = ("matchup", "expert", "reason", "comment", "at")
+    list_display = ("matchup", "expert", "reason", "side", "comment", "at")
     list_select_related = ("matchup", "expert")
     list_filter = ("reason", "matchup__study")
 

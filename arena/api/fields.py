@@ -39,6 +39,19 @@ class WholeNumberField(serializers.IntegerField):
         return super().to_internal_value(data)
 
 
+class ShareField(serializers.FloatField):
+    """A number of JSON from 0 to 1: neither a text nor true."""
+
+    def __init__(self, **kwargs: Any) -> None:
+        super().__init__(min_value=0, max_value=1, **kwargs)
+
+    def to_internal_value(self, data: Any) -> float:
+        """The number itself."""
+        if isinstance(data, bool) or not isinstance(data, int | float):
+            self.fail("invalid")
+        return super().to_internal_value(data)
+
+
 class CodeField(serializers.UUIDField):
     """A UUID as a text of JSON: no number stands for one."""
 

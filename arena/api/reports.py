@@ -11,11 +11,11 @@ from rest_framework.response import Response
 
 from arena.api.access import ExpertsOnly
 from arena.api.errors import ApiView
-from arena.api.fields import CodeField, StrictSerializer, TextField
+from arena.api.fields import CodeField, ShareField, StrictSerializer, TextField
 from arena.api.schema import describe
 from arena.models import Report
 from arena.services.decisions import LONGEST_COMMENT
-from arena.services.reports import report
+from arena.services.reports import SIDES, Said, report
 
 
 class ReportBody(StrictSerializer):
@@ -24,6 +24,15 @@ class ReportBody(StrictSerializer):
     key = CodeField()
     matchup = CodeField()
     reason = serializers.ChoiceField(choices=Report.Reason.choices)
+    side = serializers.ChoiceField(choices=list(SIDES), required=False, default="both")
+    mark = serializers.ListField(
+        child=ShareField(),
+        required=False,
+        allow_null=True,
+        default=None,
+        min_length=2,
+        max_length=2,
+    )
     comment = TextField(required=False, allow_blank=True, default="", max_length=LONGEST_COMMENT)
 
 
@@ -50,5 +59,12 @@ class ReportsView(ApiView):
         body.is_valid(raise_exception=True)
         given = dict(body.validated_data)
         expert: User = request.user  # type: ignore[assignment]
-        report(expert=expert, matchup_code=given.pop("matchup"), **given)
+        mark = given["mark"]
+        said = Said(
+            reason=given["reason"],
+            side=SIDES[given["side"]],
+            mark=None if mark is None else (mark[0], mark[1]),
+            comment=given["comment"],
+        )
+        report(expert=expert, matchup_code=given["matchup"], key=given["key"], said=said)
         return Response({"saved": True})

@@ -8,6 +8,7 @@ from django.conf import settings
 from django.db import models
 from django.db.models import F, Q
 from django.utils.translation import gettext_lazy as _
+from django.utils.translation import pgettext_lazy
 
 from arena.models.studies import Matchup
 from augment.models import AppendOnly, Augmentation
@@ -124,12 +125,29 @@ class Report(AppendOnly):
         INSTRUCTION_WRONG = "instruction_wrong", _("Something is wrong with the instruction")
         OTHER = "other", _("Other")
 
+    class Side(models.TextChoices):
+        LEFT = "left", pgettext_lazy("a picture", "A")
+        RIGHT = "right", pgettext_lazy("a picture", "B")
+        BOTH = "both", _("both")
+
     key = models.UUIDField(unique=True, help_text="made by the browser; one key is one report")
     matchup = models.ForeignKey(Matchup, on_delete=models.PROTECT, related_name="reports")
     expert = models.ForeignKey(
         settings.AUTH_USER_MODEL, on_delete=models.PROTECT, related_name="reports"
     )
     reason = models.CharField(max_length=20, choices=Reason.choices)
+    side = models.CharField(
+        max_length=10,
+        blank=True,
+        choices=Side.choices,
+        help_text="which picture it is about; reports from before this was asked name none",
+    )
+    mark_x = models.FloatField(
+        null=True, blank=True, help_text="from the left, as a share of the picture's width"
+    )
+    mark_y = models.FloatField(
+        null=True, blank=True, help_text="from the top, as a share of the picture's height"
+    )
     comment = models.TextField(blank=True, max_length=1000)
     at = models.DateTimeField(auto_now_add=True)
 
@@ -139,6 +157,14 @@ class Report(AppendOnly):
             models.CheckConstraint(
                 name="report_reason_is_known",
                 condition=Q(reason__in=["picture_wrong", "instruction_wrong", "other"]),
+            ),
+            models.CheckConstraint(
+                name="report_side_is_known", condition=Q(side__in=["", "left", "right", "both"])
+            ),
+            models.CheckConstraint(
+                name="report_mark_lies_in_the_picture",
+                condition=Q(mark_x=None, mark_y=None)
+                | Q(mark_x__gte=0, mark_x__lte=1, mark_y__gte=0, mark_y__lte=1),
             ),
         )
 

@@ -24,6 +24,7 @@ from arena.queries.voting_keys import (
     voting_preferences,
 )
 from arena.services.replanning import next_pairs
+from arena.services.reports import SIDES
 from augment.services.wording import translate_all
 
 AHEAD = 5
@@ -115,6 +116,7 @@ def vote_context(study: Study, expert: User, *, change: str) -> dict[str, Any] |
         "legend": preferences.switches["legend"],
         "skip_reasons": Vote.SkipReason.choices,
         "report_reasons": Report.Reason.choices,
+        "report_sides": [(name, side.label) for name, side in SIDES.items()],
         "looks": _looks(study),
         "key_labels": _key_labels(study),
         "sometimes": SOMETIMES,

@@ -78,8 +78,7 @@ def report_pair(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
             expert=cast(User, request.user),
             matchup_code=given["matchup"],
             key=given["key"],
-            reason=given["report"],
-            comment=given["report_comment"],
+            said=form.said(),
         )
     except NotYours as error:
         raise Http404 from error

@@ -65,6 +65,7 @@ function paint(pair) {
   if (lists?.open) lens.aids.add("text");
   page.drawPair(pair.shown);
   form.elements.matchup.value = pair.shown.matchup;
+  form.elements.report_side.value = "both";
   page.drawReview(review);
   field.value = (review ? review.comment : pair.draft) ?? "";
   page.drawComment(field.value);
@@ -133,10 +134,12 @@ function leave() {
 }
 
 function report(reason) {
-  const { report_comment: told } = form.elements;
+  const { report_comment: told, report_side: side } = form.elements;
   const { matchup } = onScreen.shown;
-  outbox.add("reports", { key: page.freshKey(), matchup, reason, comment: told.value.trim() });
+  const { mark = null } = onScreen;
+  outbox.add("reports", { key: page.freshKey(), matchup, reason, side: side.value, mark, comment: told.value.trim() });
   told.value = "";
+  onScreen.mark = null;
   page.closePop();
 }
 
@@ -268,6 +271,7 @@ form.addEventListener("submit", (event) => {
   else if (name === "report") report(value);
   else actions[page.ACTIONS[value]]?.();
 });
+at("report").addEventListener("toggle", () => late(import("./vote-report.js"), ({ aim }) => aim(lens)));
 form.addEventListener("input", () => page.drawComment(field.value));
 
 document.addEventListener("click", (event) => {

@@ -173,10 +173,12 @@ def _study_now(*, study_pk: int, expert_pk: int, since: Any) -> Any:
     here = votes.filter(matchup__study=study_pk)
     latest = here.filter(ms_visible__isnull=False).order_by("-pk")[:PACE_VOTES]
     pace = latest.aggregate(ms=Avg(Least("ms_visible", LONGEST_LOOK_MS)))["ms"]
+    skipped = here.filter(superseded_by=None, outcome=Vote.Outcome.SKIP).count()
     return StudyNow(
         study=Study.objects.get(pk=study_pk),
         total=Matchup.objects.filter(study=study_pk, expert=expert_pk).count(),
-        voted=here.filter(supersedes=None).count(),
+        voted=here.filter(supersedes=None).count() - skipped,
+        skipped=skipped,
         just_now=votes.filter(at__gt=since).count(),
         pace_ms=None if pace is None else float(pace),
     )

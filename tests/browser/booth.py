@@ -56,21 +56,26 @@ class Booth:
 
     def enter(self, **how: Any) -> Page:
         """A page of a browser that is signed in, a pair on it; `how` goes to the browser."""
+        page = self.visit("eva", self.path, how)
+        if how.get("java_script_enabled", True):
+            ready(page)
+        return page
+
+    def visit(self, who: str, path: str, how: dict[str, Any]) -> Page:
+        """Any page, by whoever has that name."""
         context = self.browser.new_context(
             base_url=self.address, **{"viewport": DESK, **HERE, **how}
         )
         context.set_default_timeout(PATIENCE_MS)
         self.contexts.append(context)
         client = Client()
-        client.force_login(User.objects.get(username="eva"))
+        client.force_login(User.objects.get(username=who))
         cookie = client.cookies[settings.SESSION_COOKIE_NAME].value
         context.add_cookies(
             [{"name": settings.SESSION_COOKIE_NAME, "value": cookie, "url": self.address}]
         )
         page = context.new_page()
-        page.goto(self.path)
-        if how.get("java_script_enabled", True):
-            ready(page)
+        page.goto(path)
         return page
 
     @property

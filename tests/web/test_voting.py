@@ -213,12 +213,14 @@ def test_the_thanks_still_lead_to_the_last_votes() -> None:
 def test_a_report_by_the_form_is_kept_and_leads_back() -> None:
     here = world()
     first = following(here)
-    sent = ballot(first, report="picture_wrong", report_comment="a car floats")
+    said = {"report": "picture_wrong", "report_side": "B", "report_comment": "a car floats"}
+    sent = ballot(first, **said)
     url = reverse("vote-report", args=[here.study.code])
     answer = signed_in(here.expert).post(url, sent, follow=True)
     assert "Reported, thank you." in answer.content.decode()
     kept = Report.objects.get()
     assert (kept.matchup, kept.reason, kept.comment) == (first, "picture_wrong", "a car floats")
+    assert (kept.side, kept.mark_x) == ("right", None)
     assert not Vote.objects.exists()
 
 
