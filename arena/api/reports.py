@@ -15,7 +15,7 @@ from arena.api.fields import CodeField, ShareField, StrictSerializer, TextField
 from arena.api.schema import describe
 from arena.models import Report
 from arena.services.decisions import LONGEST_COMMENT
-from arena.services.reports import SIDES, Said, report
+from arena.services.reports import SIDES, Complaint, report
 
 
 class ReportBody(StrictSerializer):
@@ -60,7 +60,7 @@ class ReportsView(ApiView):
         given = dict(body.validated_data)
         expert: User = request.user  # type: ignore[assignment]
         mark = given["mark"]
-        said = Said(
+        said = Complaint(
             reason=given["reason"],
             side=SIDES[given["side"]],
             mark=None if mark is None else (mark[0], mark[1]),

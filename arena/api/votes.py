@@ -75,7 +75,8 @@ class VoteDocument(serializers.Serializer[Any]):
 class ReceivedDocument(serializers.Serializer[Any]):
     """What a vote is answered with."""
 
-    saved = serializers.IntegerField(help_text="Pairs that are decided.")
+    saved = serializers.IntegerField(help_text="Pairs with a vote.")
+    skipped = serializers.IntegerField(help_text="Pairs that were skipped instead.")
     total = serializers.IntegerField()
     minutes_left = serializers.IntegerField(allow_null=True)
     next = MatchupDocument(many=True)

@@ -10,7 +10,7 @@ from whitenoise.storage import CompressedManifestStaticFilesStorage
 
 _COMMENT = re.compile(r"^[ \t]*(//.*|/\*[^*]*\*/[ \t]*)$\n?", re.MULTILINE)
 _INDENT = re.compile(r"^[ \t]+|^\n", re.MULTILINE)
-_AROUND_RULES = re.compile(r" (?=\{)|(?<=[{;,>]) | (?=>)|;? ?(?=\})|(?<=\})\n")
+_AROUND_RULES = re.compile(r" (?=\{)|(?<=[{;,:>]) | (?=>)|;? ?(?=\})|(?<=\})\n")
 
 
 class ModuleStorage(CompressedManifestStaticFilesStorage):  # type: ignore[misc] # untyped
@@ -29,8 +29,8 @@ def as_served(name: str, text: str) -> str:
     """A script or style sheet of ours without comment lines, empty lines and indentation.
 
     A style sheet goes without blanks and semicolons around its braces as well, and without blanks
-    behind its commas and around its >. Ours have no text that spans lines, and style sheets none
-    with one of these signs; tests keep it so.
+    behind its commas and colons and around its >. Ours have no text that spans lines, and style
+    sheets none with one of these signs; tests keep it so.
     """
     lean = _INDENT.sub("", _COMMENT.sub("", text))
     return _AROUND_RULES.sub("", lean) if name.endswith(".css") else lean

@@ -7,6 +7,7 @@ from arena.models.authorships import Authorship
 from arena.models.invitations import Invitation, token_digest
 from arena.models.labels import FaultLabel, LabellingRound, LabelTask
 from arena.models.people import Person
+from arena.models.practice import PracticePair
 from arena.models.ratings import EarlyLook, ImportedVote, Snapshot, Standing, VoteFile
 from arena.models.scenario_files import ScenarioFile
 from arena.models.studies import Matchup, Study
@@ -27,6 +28,7 @@ __all__ = [
     "LabellingRound",
     "Matchup",
     "Person",
+    "PracticePair",
     "Report",
     "ScenarioFile",
     "Snapshot",

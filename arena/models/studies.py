@@ -39,6 +39,9 @@ class Study(models.Model):
         default=False,
         help_text="experts may play drives under the pictures; `rules` says of which scenarios",
     )
+    practice = models.BooleanField(
+        default=False, help_text="experts practise on up to five pairs before their first one"
+    )
     votes_to_plan = models.JSONField(
         default=dict, help_text="votes that the adaptive part still has to plan, by username"
     )

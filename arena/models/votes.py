@@ -8,7 +8,6 @@ from django.conf import settings
 from django.db import models
 from django.db.models import F, Q
 from django.utils.translation import gettext_lazy as _
-from django.utils.translation import pgettext_lazy
 
 from arena.models.studies import Matchup
 from augment.models import AppendOnly, Augmentation
@@ -126,8 +125,8 @@ class Report(AppendOnly):
         OTHER = "other", _("Other")
 
     class Side(models.TextChoices):
-        LEFT = "left", pgettext_lazy("a picture", "A")
-        RIGHT = "right", pgettext_lazy("a picture", "B")
+        LEFT = "left", "A"
+        RIGHT = "right", "B"
         BOTH = "both", _("both")
 
     key = models.UUIDField(unique=True, help_text="made by the browser; one key is one report")

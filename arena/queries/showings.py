@@ -10,7 +10,7 @@ from django.db.models import Q
 from django.urls import reverse
 
 from arena.errors import NotYours
-from arena.models import LabelTask, Matchup
+from arena.models import LabelTask, Matchup, PracticePair
 from arena.queries.descriptions import Wording, describe_in_words
 from arena.queries.people import role_of
 from augment.models import Augmentation, Scenario
@@ -114,7 +114,9 @@ def _picture_to_label(*, user: User, token: str) -> str:
         "augmentation__modification", "augmentation__scenario__reference"
     )
     task = tasks.first()
-    if task is None or (task.expert_id != user.pk and role_of(user) != "admin"):
+    if task is None:
+        return _picture_practised(user=user, token=token)
+    if task.expert_id != user.pk and role_of(user) != "admin":
         raise NotYours(_NOT_SHOWN)
     if task.token == token:
         return task.augmentation.image
@@ -122,3 +124,11 @@ def _picture_to_label(*, user: User, token: str) -> str:
     if not original:
         raise NotYours(_NOT_SHOWN)
     return original
+
+
+def _picture_practised(*, user: User, token: str) -> str:
+    rows = PracticePair.objects.filter(Q(left_token=token) | Q(right_token=token))
+    pair = rows.select_related("good", "broken").order_by().first()
+    if pair is None or (pair.expert_id != user.pk and role_of(user) != "admin"):
+        raise NotYours(_NOT_SHOWN)
+    return pair.left.image if pair.left_token == token else pair.right.image

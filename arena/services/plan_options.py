@@ -18,6 +18,7 @@ class PlanOptions:
     Attributes:
         check_share: Needs as many scenarios with pictures for an attention check; see
             `enough_checks`.
+        practice: Experts practise before their first pair; see arena.services.practice.
         samples: Which samples of a cell are shown.
         jobs: Names or codes of the jobs whose augmentations are shown; none for every job.
         hypotheses: What is expected, a line each; see `read_hypotheses`.
@@ -34,6 +35,7 @@ class PlanOptions:
     allow_text: bool = False
     settle_alike: bool = False
     allow_replay: bool = False
+    practice: bool = False
     samples: SampleRule = SampleRule.ONE
     jobs: tuple[str, ...] = ()
     hypotheses: tuple[str, ...] = ()

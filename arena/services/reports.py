@@ -20,7 +20,7 @@ SIDES = {"A": Report.Side.LEFT, "B": Report.Side.RIGHT, "both": Report.Side.BOTH
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Said:
+class Complaint:
     """What an expert reports.
 
     Attributes:
@@ -37,7 +37,7 @@ class Said:
     comment: str = ""
 
 
-def report(*, expert: User, matchup_code: UUID | str, key: UUID, said: Said) -> Report:
+def report(*, expert: User, matchup_code: UUID | str, key: UUID, said: Complaint) -> Report:
     """Keep what an expert reports; the same key again is the same report.
 
     Args:
@@ -66,7 +66,7 @@ def report(*, expert: User, matchup_code: UUID | str, key: UUID, said: Said) -> 
     return stored
 
 
-def _check(said: Said) -> None:
+def _check(said: Complaint) -> None:
     wrong = {}
     if said.reason not in Report.Reason.values:
         wrong["reason"] = f"One of these is needed: {', '.join(Report.Reason.values)}."
@@ -80,7 +80,7 @@ def _check(said: Said) -> None:
         raise InvalidVote(wrong)
 
 
-def _insert(matchup: Matchup, expert: User, key: UUID, said: Said) -> Report:
+def _insert(matchup: Matchup, expert: User, key: UUID, said: Complaint) -> Report:
     across, down = said.mark or (None, None)
     try:
         with transaction.atomic():

@@ -19,6 +19,7 @@ from arena.services.frames import Cells
 from arena.services.hypotheses import read_hypotheses
 from arena.services.plan_options import OF_THE_PLAN, PlanOptions
 from arena.services.plans import rules_of, store
+from arena.services.practice import require_practice_pictures
 from arena.services.preregistration import preregister
 from arena.services.replays import Replays, replays_of
 from arena.services.showable import windows_of
@@ -91,6 +92,8 @@ def open_study(
         **{name: getattr(given, name) for name in OF_THE_PLAN},
     )
     planned = plan(rules)
+    if given.practice:
+        require_practice_pictures()
     played = replays_of(broken | shown.cells) if given.allow_replay else None
     frozen = _frozen_rules(rules, planned, played) | _frozen_pictures(given, shown)
     study = _insert(name, frozen, given, rules, allow_simulated)
@@ -233,6 +236,7 @@ def _insert(
                 allow_both_miss=given.allow_both_miss,
                 allow_text=given.allow_text,
                 allow_replay=given.allow_replay,
+                practice=given.practice,
                 votes_to_plan=(
                     dict.fromkeys(rules.experts, rules.votes_later) if rules.votes_later else {}
                 ),

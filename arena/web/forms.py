@@ -13,7 +13,7 @@ from arena.models import Report, Vote
 from arena.queries.profiles import Language, Theme
 from arena.queries.scenarios import TypeGroup
 from arena.services.decisions import LONGEST_COMMENT, Decision, decision_of
-from arena.services.reports import SIDES, Said
+from arena.services.reports import SIDES, Complaint
 from augment.models import Contestant
 from augment.services.judging.fault_guess import FaultClass
 from augment.services.running.caps import Caps
@@ -190,10 +190,10 @@ class ReportForm(forms.Form):
     report_side = forms.ChoiceField(required=False, choices=[(name, name) for name in SIDES])
     report_comment = forms.CharField(required=False, max_length=LONGEST_COMMENT)
 
-    def said(self) -> Said:
+    def said(self) -> Complaint:
         """What is wrong, once the form is valid; without a side it is about both."""
         given = self.cleaned_data
-        return Said(
+        return Complaint(
             reason=given["report"],
             side=SIDES[given["report_side"] or "both"],
             comment=given["report_comment"],

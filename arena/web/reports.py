@@ -9,7 +9,6 @@ from typing import cast
 from django.contrib.auth.models import User
 from django.http import HttpRequest, HttpResponse
 from django.shortcuts import get_object_or_404, render
-from django.utils.translation import pgettext
 from django.views.decorators.http import require_safe
 
 from arena.models import Report, Study
@@ -68,8 +67,8 @@ def _pictures(
     if report.mark_x is not None and report.mark_y is not None:
         mark = (report.mark_x * width, report.mark_y * height)
     sides = (
-        (_LEFT, pgettext("a picture", "A"), matchup.left_token, matchup.left),
-        (_RIGHT, pgettext("a picture", "B"), matchup.right_token, matchup.right),
+        (_LEFT, "A", matchup.left_token, matchup.left),
+        (_RIGHT, "B", matchup.right_token, matchup.right),
     )
     found = []
     for side, letter, token, made in sides:

@@ -26,6 +26,7 @@ from arena.queries.votes import tallies
 from arena.services.handing_over import hand_over
 from arena.services.hypotheses import hypotheses_of
 from arena.services.looks import stopping_progress
+from arena.services.practice import has_practice
 from arena.services.preregistration import preregistration_bytes, preregistration_sha256
 from arena.services.studies import close_study, open_study, rules_of
 from arena.web.access import ADMIN, STAFF, allow_only
@@ -183,7 +184,7 @@ def close(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
 
 def _planned_numbers(request: HttpRequest) -> dict[str, Any]:
     """What the address says of a study that somebody planned, or of one to be like it."""
-    initial: dict[str, Any] = {"checks": usual_checks()}
+    initial: dict[str, Any] = {"checks": usual_checks(), "practice": has_practice()}
     initial |= {name: request.GET[name] for name in _PLANNED if request.GET.get(name)}
     code = request.GET.get("study")
     if not code:

@@ -19,6 +19,7 @@ from arena.queries.replays import drives_of_pair
 from arena.queries.showings import picture_shown
 from arena.queries.studies import voting_study
 from arena.queries.votes import skipped_pairs
+from arena.services.practice import is_due
 from arena.services.reports import report
 from arena.services.votes import receive_vote
 from arena.web.access import ADMIN, EXPERT, allow_only
@@ -40,6 +41,8 @@ def vote_page(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
     study = _study_of(request, code)
     if request.method == "POST":
         return _save(request, study)
+    if is_due(study, cast(User, request.user)):
+        return redirect("vote-practice", code=study.code)
     return _show(request, study)
 
 

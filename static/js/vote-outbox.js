@@ -60,6 +60,7 @@ export class Outbox {
     if (this.isHalted) return;
     this.#isStopped = false;
     this.#failures = 0;
+    this.told.changed();
     this.#send();
   }
 
@@ -99,6 +100,8 @@ export class Outbox {
     const { status, body, after } = await ask(this.urls[entry.to], { ...entry.body, ...more });
     this.#isSending = false;
     if (this.isHalted) return;
+    // No answer at all: who is offline is told so.
+    this.isCut = !status;
     if (status === 200) {
       this.#failures = 0;
       this.#drop(entry);

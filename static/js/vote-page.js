@@ -85,14 +85,16 @@ export function drawLast(votes) {
 
 let late = 0;
 
-export function drawSaved(waiting) {
+export function drawSaved(waiting, isCut) {
   const line = at("saved");
+  const isOffline = isCut || !navigator.onLine;
   const tell = () => {
-    line.textContent = waiting ? counted("waiting", waiting) : text("saved", given.saved);
-    line.classList.toggle("is-late", waiting > 0);
+    line.textContent = isOffline ? text("offline", waiting) : waiting ? counted("waiting", waiting) : text("saved", given.saved);
+    if (isOffline && !line.classList.contains("is-late")) say(line.textContent);
+    line.classList.toggle("is-late", isOffline || waiting > 0);
   };
   clearTimeout(late);
-  if (!waiting || line.classList.contains("is-late")) tell();
+  if (!waiting || isOffline || line.classList.contains("is-late")) tell();
   else late = setTimeout(tell, LATE_MS);
 }
 

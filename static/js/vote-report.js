@@ -1,11 +1,12 @@
 // The place that a report is about: a press in a picture while the panel of reports is open.
 // Loaded when that opens first.
-import { at } from "./vote-page.js";
+import { at, note } from "./vote-page.js";
 
 const SIDES = ["A", "B"];
 // A press this near to the mark takes it away again.
 const NEAR_PX = 12;
 const side = at("vote").elements.report_side;
+const box = at("report").lastElementChild;
 let lens = null;
 
 // Shows the mark of the pair on the screen, as long as the panel is open.
@@ -14,8 +15,16 @@ export function aim(ofPage) {
     lens = ofPage;
     lens.panels.forEach(listen);
     at("report").addEventListener("change", draw);
+    // The panel covers the pictures, so it gives way.
+    at("mark").addEventListener("click", () => give(true));
   }
+  if (box.hidden) give(false);
   draw();
+}
+
+function give(isAiming) {
+  box.hidden = isAiming;
+  note(isAiming ? at("mark").dataset.aim : "");
 }
 
 function listen(panel, place) {
@@ -30,6 +39,7 @@ function listen(panel, place) {
     const isAgain = Math.hypot((x - x0) * width, (y - y0) * height) < NEAR_PX;
     lens.pair.mark = isAgain ? null : [x, y];
     if (!isAgain) side.value = SIDES[place];
+    if (box.hidden) give(false);
     draw();
   });
 }

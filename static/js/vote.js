@@ -31,7 +31,7 @@ const pairs = new Pairs(given.alts, fetchPairs, draw);
 const lens = new Lens([...document.querySelectorAll(".panel")], text, page.drawLens);
 const outbox = new Outbox(given.outbox, urls, {
   wanted: () => Math.min(12, pairs.depth + outbox.entries.length),
-  changed: () => page.drawSaved(outbox.entries.length),
+  changed: () => page.drawSaved(outbox.entries.length, outbox.isCut),
   saved,
   refused,
   stopped,
@@ -291,6 +291,7 @@ document.addEventListener("visibilitychange", () => {
 addEventListener("beforeunload", (event) => {
   if (outbox.entries.length && !isLeaving) event.preventDefault();
 });
+addEventListener("offline", () => page.drawSaved(outbox.entries.length));
 // A page that comes back from the browser's memory may show a pair that is decided already.
 addEventListener("pageshow", ({ persisted }) => persisted && location.reload());
 

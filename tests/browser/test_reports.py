@@ -54,17 +54,24 @@ def test_a_press_in_a_picture_marks_the_place_and_names_the_picture(booth: Booth
     assert (row.side, row.mark_x, row.mark_y) == ("both", None, None)
 
 
-def test_a_second_press_takes_the_mark_away_and_zoom_moves_it_along(booth: Booth) -> None:
+def test_the_panel_gives_way_to_aim_and_a_second_press_takes_the_mark_away(booth: Booth) -> None:
     page = booth.enter()
     page.keyboard.press("z")
     page.keyboard.press("r")
-    first = page.locator(".panel").first
-    first.click(position=place_in(first, 0.5, 0.5))
-    drawn = page.locator(".spot:not([d=''])")
-    expect(drawn).to_have_count(1)
-    first.click(position=place_in(first, 0.5, 0.5))
-    expect(drawn).to_have_count(0)
-    first.click(position=place_in(first, 0.75, 0.5))
+    aim = page.get_by_role("button", name="Mark the place in an image")
+    first, drawn = page.locator(".panel").first, page.locator(".spot:not([d=''])")
+    for place, marks in ((0.5, 1), (0.5, 0), (0.75, 1)):
+        aim.click()
+        expect(aim).to_be_hidden()
+        expect(page.locator("#note")).to_contain_text("Press the place in an image")
+        first.click(position=place_in(first, place, 0.9))
+        expect(aim).to_be_visible()
+        expect(page.locator("#note")).to_be_empty()
+        expect(drawn).to_have_count(marks)
+    aim.click()
+    page.keyboard.press("Escape")
+    page.keyboard.press("r")
+    expect(aim).to_be_visible()
     page.keyboard.press("1")
     row = told(page.locator("#note"))
     # Zoomed 2.5 times around the middle of the picture.
@@ -75,6 +82,7 @@ def test_a_second_press_takes_the_mark_away_and_zoom_moves_it_along(booth: Booth
 def test_a_tap_marks_on_a_phone_and_the_admin_sees_the_mark(booth: Booth) -> None:
     page = booth.enter(viewport=PHONE, has_touch=True, is_mobile=True)
     page.locator("#report > summary").tap()
+    page.get_by_role("button", name="Mark the place in an image").tap()
     first = page.locator(".panel").first
     first.tap(position=place_in(first, 0.5, 0.5))
     page.get_by_role("button", name="Something is wrong with an image").tap()

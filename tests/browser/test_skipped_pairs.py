@@ -23,7 +23,7 @@ def test_a_skip_moves_no_bar_and_its_pair_comes_back_from_the_list(booth: Booth)
     expect(page.get_by_role("heading", name="Skipped pairs")).to_be_visible()
     assert faults(page) == []
     page.get_by_role("link", name="Open pair 2 again").click()
-    expect(page.locator("#question")).to_have_text("You skipped pair 2. Choose now or go back.")
+    expect(page.locator("#question")).to_have_text("Pair 2: skipped. Choose now?")
     page.wait_for_selector("body.is-live #vote:not([inert]) #answers:not([inert])")
     let_bounce(page)
     page.keyboard.press("3")

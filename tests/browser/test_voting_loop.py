@@ -97,7 +97,7 @@ def test_the_next_four_pairs_are_there_before_they_are_needed(booth: Booth) -> N
     page.context.set_offline(True)
     for _ in range(4):
         press(page, "1")
-    expect(page.locator("#saved")).to_have_text("4 answers are waiting to be sent.")
+    expect(page.locator("#saved")).to_have_text("Offline. Kept in this browser and sent later: 4.")
     page.context.set_offline(False)
     all_sent(page, 4)
 
@@ -112,7 +112,7 @@ def test_the_end_is_the_page_of_thanks_and_the_last_vote_can_still_be_changed(
     expect(page.get_by_role("heading", name="You are done.")).to_be_visible()
     page.get_by_role("link", name="Change pair 9: B").click()
     ready(page)
-    expect(page.locator("#question")).to_contain_text("Your vote on pair 9 was: B.")
+    expect(page.locator("#question")).to_contain_text("Pair 9: B.")
     page.keyboard.press("1")
     expect(page.get_by_role("heading", name="You are done.")).to_be_visible()
     assert booth.outcomes()[-1] == "left"

@@ -8,7 +8,7 @@ import pytest
 
 from arena.models import Matchup
 from arena.services.handing_over import hand_over
-from arena.services.reports import Said, report
+from arena.services.reports import Complaint, report
 from arena.services.studies import PlanOptions, open_study
 from tests.study_rows import cast_of, matchups_of, vote
 
@@ -32,7 +32,7 @@ def test_a_pair_whose_repeat_was_judged_is_not_handed_over(is_vote: bool) -> Non
             expert=repeat.expert,
             matchup_code=repeat.code,
             key=uuid.uuid4(),
-            said=Said(reason="other", comment=""),
+            said=Complaint(reason="other", comment=""),
         )
     taken = hand_over(study=study, username="eva", to=["finn"])
     kept = {row.pk for row in matchups_of(study, "eva")}

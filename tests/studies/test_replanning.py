@@ -16,7 +16,7 @@ from arena.queries.progress import of_expert, of_study
 from arena.queries.votes import tallies, voting_progress
 from arena.services.handing_over import hand_over
 from arena.services.replanning import next_pairs, plan_batch
-from arena.services.reports import Said, report
+from arena.services.reports import Complaint, report
 from arena.services.simulation import simulate_votes
 from arena.services.studies import PlanOptions, close_study, open_study
 from augment.errors import Conflict, UnknownName
@@ -84,7 +84,7 @@ def test_a_pair_that_was_reported_but_not_judged_stays_where_it_is() -> None:
         expert=first.expert,
         matchup_code=first.code,
         key=uuid.uuid4(),
-        said=Said(reason="picture_wrong"),
+        said=Complaint(reason="picture_wrong"),
     )
     assert hand_over(study=study, username="eva", to=["finn"]) == {"finn": 8}
     assert matchups_of(study, "eva") == [first]

@@ -17,7 +17,7 @@ from arena.errors import NothingToPlan, NotYours
 from arena.models import Matchup, Report, Study, Vote
 from arena.services.decisions import decision_of
 from arena.services.handing_over import hand_over
-from arena.services.reports import Said, report
+from arena.services.reports import Complaint, report
 from arena.services.votes import receive_vote
 from augment.models import Event
 from tests.study_rows import a_study
@@ -171,7 +171,10 @@ def test_a_report_at_the_same_time_keeps_its_pair(study: Study) -> None:
         try:
             for row in rows:
                 report(
-                    expert=eva, matchup_code=row.code, key=uuid.uuid4(), said=Said(reason="other")
+                    expert=eva,
+                    matchup_code=row.code,
+                    key=uuid.uuid4(),
+                    said=Complaint(reason="other"),
                 )
                 kept.append(row.code)
                 ballots.first_ones.set()

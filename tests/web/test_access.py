@@ -10,7 +10,7 @@ from django.urls import reverse
 
 from arena.services.authorships import mark_author
 from arena.services.invitations import invite
-from arena.services.reports import Said, report
+from arena.services.reports import Complaint, report
 from arena.services.studies import close_study
 from arena.web.urls import urlpatterns
 from augment.models import Endpoint, EndpointModel, SceneUpload, Simulation, UploadMoment
@@ -96,6 +96,7 @@ PAGES: dict[str, tuple[int, int, int]] = {
     "results-chart": (403, 403, 403),
     "vote": (403, 403, 404),
     "report": (200, 403, 403),
+    "vote-practice": (403, 403, 404),
     "vote-help": (403, 403, 404),
     "vote-skipped": (403, 403, 404),
     "matchup-image": (200, 403, 404),
@@ -157,7 +158,7 @@ OPEN_TO_THE_WORLD = {
 def address(name: str, here: World) -> str:
     shown = here.study.matchups.filter(expert=here.expert).get(position=1)
     if name == "report":
-        key, said = uuid.uuid4(), Said(reason="other")
+        key, said = uuid.uuid4(), Complaint(reason="other")
         report(expert=here.expert, matchup_code=shown.code, key=key, said=said)
         return reverse(name, kwargs={"code": here.study.code, "key": key})
     arguments: dict[str, dict[str, object]] = {

@@ -9,7 +9,7 @@ import pytest
 from django.urls import reverse
 
 from arena.models import Report, Study
-from arena.services.reports import Said, report
+from arena.services.reports import Complaint, report
 from tests import study_rows
 from tests.web.cast import World, people, signed_in, world
 
@@ -19,7 +19,7 @@ pytestmark = pytest.mark.django_db
 def told(here: World, **said: object) -> Report:
     """What eva reports about her second pair."""
     matchup = study_rows.matchups_of(here.study, "eva")[1]
-    given = Said(reason="picture_wrong", comment="The truck is cut off.", **said)  # type: ignore[arg-type]
+    given = Complaint(reason="picture_wrong", comment="The truck is cut off.", **said)  # type: ignore[arg-type]
     return report(expert=here.expert, matchup_code=matchup.code, key=uuid.uuid4(), said=given)
 
 
@@ -57,7 +57,7 @@ def test_the_mark_lies_in_the_pictures_that_the_report_names(side: str, marked: 
 def test_without_a_mark_none_is_drawn() -> None:
     here = world()
     shown = signed_in(people()["admin"]).get(address(told(here))).content.decode()
-    assert "<circle" not in shown
+    assert "The reported place" not in shown
 
 
 def test_an_admin_who_votes_in_the_open_study_is_not_told_who_made_it() -> None:

@@ -76,8 +76,8 @@ def test_a_skipped_pair_is_found_again_and_its_vote_stands_in_place_of_the_skip(
     assert str(skip.key) not in finn.get(address).content.decode()
     again = f"{page(here)}?change={skip.key}"
     shown = eva.get(again).content.decode()
-    assert "You skipped pair 1." in shown
-    assert "You skipped pair 1." not in finn.get(again).content.decode()
+    assert "Pair 1: skipped." in shown
+    assert "Pair 1: skipped." not in finn.get(again).content.decode()
     sent = ballot(mine[0], "right", supersedes=skip.key)
     assert eva.post(page(here), sent).status_code == 302
     assert [vote.outcome for vote in mine[0].votes.filter(superseded_by=None)] == ["right"]

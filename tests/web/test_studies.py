@@ -11,7 +11,7 @@ from django.urls import reverse
 from arena import tasks
 from arena.models import Study
 from arena.queries.coverage import shared_units
-from arena.services.reports import Said, report
+from arena.services.reports import Complaint, report
 from augment.models import Augmentation
 from augment.scene.codec import modification_to_document
 from augment.scene.modification import Modification
@@ -112,7 +112,7 @@ def test_the_page_shows_rules_coverage_and_reports() -> None:
         expert=first.expert,
         matchup_code=second.code,
         key=uuid.uuid4(),
-        said=Said(reason="picture_wrong", comment="The truck is cut off."),
+        said=Complaint(reason="picture_wrong", comment="The truck is cut off."),
     )
     shown = (
         signed_in(people()["analyst"]).get(reverse("study", args=[study.code])).content.decode()

@@ -185,7 +185,7 @@ def test_a_former_vote_is_shown_marked_and_replaced_without_a_script() -> None:
     expert.post(page(here), ballot(first, "left", comment="hm"))
     old = Vote.objects.get()
     shown = expert.get(page(here), {"change": str(old.key)}).content.decode()
-    assert f"Your vote on pair {first.position} was: A." in shown
+    assert f"Pair {first.position}: A. Choose again?" in shown
     assert re.search(r'value="left" aria-pressed="true"', shown)
     assert f'name="supersedes" value="{old.key}"' in shown
     assert ">hm</textarea>" in shown

@@ -138,6 +138,12 @@ class Command(TerminalCommand):
             "picture of a scenario was driven",
         )
         parser.add_argument(
+            "--practice",
+            action="store_true",
+            help="let every expert practise on five pairs, a reference beside a broken picture, "
+            "before the first pair of the study; nothing of it counts",
+        )
+        parser.add_argument(
             "--show-alike",
             action="store_true",
             help="also show pairs that differ by at most 0.15 m and 2 degrees in every object; "
@@ -174,6 +180,7 @@ class Command(TerminalCommand):
                     allow_text=options["text"],
                     settle_alike=not options["show_alike"],
                     allow_replay=options["replay"],
+                    practice=options["practice"],
                     samples=SampleRule(options["samples"]),
                     jobs=tuple(options["jobs"]),
                 ),

@@ -1,0 +1,159 @@
+"""The practice round before an expert's first pair of a study.
+
+In: a study with the rule and an expert. Out: up to five `PracticePair`s, made once; answers to
+them, which no rating, progress or export of votes ever sees.
+"""
+
+from __future__ import annotations
+
+import random
+from collections import Counter
+from uuid import UUID
+
+from django.contrib.auth.models import User
+from django.db import transaction
+from django.db.models import F
+
+from arena.errors import InvalidVote, NothingToPlan, StudyNotOpen
+from arena.models import PracticePair, Study, Vote
+from arena.services.showable import find_showable
+from augment.models import Augmentation, Contestant, Scenario
+from augment.sentences import sentence
+from augment.services.scenarios.pictures import window_of
+
+PAIRS = 5
+
+_GOOD, _BROKEN = Contestant.Kind.REFERENCE, Contestant.Kind.CHECK
+Answer = PracticePair.Answer
+
+
+def is_due(study: Study, expert: User) -> bool:
+    """Whether the expert practises now: the study wants it, nothing is voted, a pair is open."""
+    if not study.practice or study.state != Study.State.OPEN:
+        return False
+    if Vote.objects.filter(matchup__study=study, expert=expert).exists():
+        return False
+    return any(not pair.answer for pair in practice_pairs(study, expert))
+
+
+@transaction.atomic
+def practice_pairs(study: Study, expert: User) -> list[PracticePair]:
+    """The expert's round, made when it is first asked for; empty where nothing can be shown.
+
+    Scenarios that are not in the study come first, then the study's own; of each group one of
+    every type before a second one.
+    """
+    mine = PracticePair.objects.filter(study=study, expert=expert).order_by("position")
+    kept = list(mine.select_related("scenario__base_scene", "good", "broken"))
+    if kept or not study.practice or study.state != Study.State.OPEN:
+        return kept
+    # Two windows of one browser may ask at once.
+    Study.objects.select_for_update().get(pk=study.pk)
+    if not mine.exists():
+        PracticePair.objects.bulk_create(_drawn(study, expert))
+    return list(mine.select_related("scenario__base_scene", "good", "broken"))
+
+
+@transaction.atomic
+def answer_practice(*, study: Study, expert: User, position: int, answer: str) -> None:
+    """Keep what an expert answered; the first answer to a pair stays.
+
+    Raises:
+        InvalidVote: It is no answer.
+        StudyNotOpen: The study is over.
+    """
+    if answer not in (Answer.LEFT, Answer.EQUAL, Answer.RIGHT):
+        raise InvalidVote({"outcome": "It is none of the answers."})
+    _check_open(study)
+    PracticePair.objects.filter(study=study, expert=expert, position=position, answer="").update(
+        answer=answer
+    )
+
+
+def skip_practice(*, study: Study, expert: User) -> None:
+    """End the round; it does not come again.
+
+    Raises:
+        StudyNotOpen: The study is over.
+    """
+    _check_open(study)
+    PracticePair.objects.filter(study=study, expert=expert, answer="").update(
+        answer=Answer.SKIPPED
+    )
+
+
+def has_practice() -> bool:
+    """Whether there is something to practise on."""
+    return bool(_ready(list(Scenario.objects.all())))
+
+
+def require_practice_pictures() -> None:
+    """Do nothing where there is something to practise on.
+
+    Raises:
+        NothingToPlan: There is not; the text says what to do.
+    """
+    if not has_practice():
+        raise NothingToPlan(
+            sentence(
+                "There is nothing to practise on yet: no scenario has a picture of its reference "
+                "and a broken one. Generate the contestant reference and run “manage.py "
+                "draw_checks all”, or open the study without a practice round."
+            )
+        )
+
+
+# --- Private -----------------------------------------------------------------------------------
+
+
+def _check_open(study: Study) -> None:
+    if study.state != Study.State.OPEN:
+        raise StudyNotOpen(f"The study {study.name!r} takes no votes: it is {study.state}.")
+
+
+def _drawn(study: Study, expert: User) -> list[PracticePair]:
+    own = set(study.scenarios.values_list("pk", flat=True))
+    others = Study.objects.filter(experts=expert, state=Study.State.OPEN)
+    seen = set(others.values_list("scenarios", flat=True)) - own
+    ready = _ready(list(Scenario.objects.all()))
+    dice = random.Random(f"{study.seed} {UUID(str(expert.person.code)).int}")
+    order = sorted(ready)
+    dice.shuffle(order)
+    types: Counter[tuple[int, str]] = Counter()
+    ranked = []
+    for number, pk in enumerate(order):
+        group = 2 if pk in own else int(pk in seen)
+        kind = ready[pk][0].scenario.type
+        ranked.append((group, types[group, kind], number, pk))
+        types[group, kind] += 1
+    chosen = [pk for *_, pk in sorted(ranked)[:PAIRS]]
+    return [
+        PracticePair(
+            study=study,
+            expert=expert,
+            position=position,
+            scenario_id=pk,
+            good=ready[pk][0],
+            broken=ready[pk][1],
+            good_is_left=dice.random() < 0.5,
+        )
+        for position, pk in enumerate(chosen, start=1)
+    ]
+
+
+def _ready(scenarios: list[Scenario]) -> dict[int, tuple[Augmentation, Augmentation]]:
+    """By scenario: its latest reference and its latest broken picture, in one window."""
+    rows = find_showable(scenarios).filter(
+        contestant__kind__in=[_GOOD, _BROKEN], state=Augmentation.State.DONE
+    )
+    latest: dict[tuple[int, str], Augmentation] = {}
+    for row in rows.order_by(F("finished_at").asc(nulls_first=True), "pk"):
+        latest[row.scenario_id, row.contestant.kind] = row
+    found = {}
+    for scenario in {pk for pk, _ in latest}:
+        good, broken = latest.get((scenario, _GOOD)), latest.get((scenario, _BROKEN))
+        if good is None or broken is None or good.image == broken.image:
+            continue
+        if window_of(good.image) == window_of(broken.image):
+            found[scenario] = (good, broken)
+    return found

@@ -1,0 +1,81 @@
+"""The practice round in a browser: with and without a script, on every size of window."""
+
+from __future__ import annotations
+
+from itertools import product
+
+import pytest
+from django.contrib.auth.models import User
+from playwright.sync_api import Page, expect
+
+from arena.services.practice import practice_pairs
+from augment.models import Augmentation, Scenario
+from augment.scene.codec import modification_to_document
+from augment.scene.modification import Modification
+from augment.services.scenarios.attention import draw_checks
+from augment.services.scenarios.pictures import store
+from tests.browser.booth import DESK, PHONE, Booth
+from tests.browser.test_voting_page import faults
+from tests.scenes import vehicle
+from tests.study_rows import KINDS, contestant, picture
+from tests.web.cast import png
+
+pytestmark = [pytest.mark.browser, pytest.mark.django_db(transaction=True)]
+LOOKS = list(product(("light", "dark"), (DESK, PHONE)))
+
+
+@pytest.fixture
+def wanted(booth: Booth) -> Booth:
+    """The study of the booth with a practice round, on its own scenarios."""
+    right = modification_to_document(Modification(added=(vehicle("car", 12.0, 1.0),)))
+    Scenario.objects.update(reference=right)
+    reference = contestant("reference", KINDS.REFERENCE)
+    made = [picture(place, reference) for place in Scenario.objects.all()]
+    made += draw_checks(scenarios=list(Scenario.objects.values_list("slug", flat=True)))
+    for number, row in enumerate(made):
+        image = store(png(100 + number, width=3, height=2))
+        Augmentation.objects.filter(pk=row.pk).update(image=image)
+    booth.study.practice = True
+    booth.study.save()
+    return booth
+
+
+def practise(page: Page, booth: Booth) -> None:
+    """Answer all five well."""
+    for pair in practice_pairs(booth.study, User.objects.get(username="eva")):
+        expect(page.locator("#question")).to_contain_text(f"Practice {pair.position} of 5.")
+        letter = "A" if pair.good_is_left else "B"
+        page.get_by_role("button", name=f"{letter} is better").click()
+        expect(page.locator("#feedback-title")).to_contain_text("Right.")
+        last = pair.position == 5
+        page.get_by_role("link", name="Start voting" if last else "Next practice pair").click()
+    expect(page.locator("#place")).to_have_text("1")
+
+
+@pytest.mark.parametrize("has_script", [True, False])
+def test_practice_comes_first_and_only_once(wanted: Booth, has_script: bool) -> None:
+    page = wanted.visit("eva", wanted.path, {"java_script_enabled": has_script})
+    practise(page, wanted)
+    assert wanted.votes() == []
+    page.goto(wanted.path)
+    expect(page.locator("#place")).to_have_text("1")
+
+
+@pytest.mark.parametrize(("theme", "size"), LOOKS)
+def test_practice_is_whole_on_every_window_and_axe_finds_nothing(
+    wanted: Booth, theme: str, size: dict[str, int]
+) -> None:
+    looks = {"viewport": size, "color_scheme": theme, "bypass_csp": True}
+    page = wanted.visit("eva", wanted.path, looks)
+    for step in ("question", "feedback"):
+        assert faults(page) == [], step
+        assert page.evaluate("document.documentElement.scrollWidth <= innerWidth")
+        for box in [panel.bounding_box() for panel in page.locator(".panel").all()]:
+            assert box is not None
+            assert box["width"] > 300
+        if step == "question":
+            page.get_by_role("button", name="Equal").click()
+            expect(page.locator("#feedback-title")).to_contain_text("Not quite.")
+    page.get_by_role("link", name="Next practice pair").click()
+    page.get_by_role("button", name="Skip the practice").click()
+    expect(page.locator("#place")).to_have_text("1")

@@ -1,0 +1,177 @@
+"""A practice round: five pairs with what was right and why, once, and nothing of it a vote."""
+
+from __future__ import annotations
+
+import re
+
+import pytest
+from django.contrib.auth.models import User
+from django.test import Client
+from django.urls import reverse
+
+from arena.errors import NothingToPlan
+from arena.models import PracticePair, Study, Vote
+from arena.queries.votes import voting_progress
+from arena.services.practice import practice_pairs
+from arena.services.studies import PlanOptions, close_study, open_study
+from augment.models import Augmentation, Scenario
+from augment.scene.codec import modification_to_document
+from augment.scene.modification import Modification
+from augment.services.scenarios.attention import draw_checks
+from augment.services.scenarios.pictures import store
+from tests.scenes import vehicle
+from tests.study_rows import KINDS, cast_of, contestant, picture, scenario, vote
+from tests.web.cast import names_of_contestants, people, png, signed_in
+
+pytestmark = pytest.mark.django_db
+
+
+def opened(*, outside: int = 6, **options: object) -> Study:
+    """Six scenarios in the study and some outside of it, all with something to practise on."""
+    cast = cast_of()
+    for number in range(outside):
+        scenario(f"elsewhere-{number}")
+    right = modification_to_document(Modification(added=(vehicle("car", 12.0, 1.0),)))
+    Scenario.objects.update(reference=right)
+    reference = contestant("reference", KINDS.REFERENCE)
+    for place in Scenario.objects.all():
+        picture(place, reference)
+    draw_checks(scenarios=list(Scenario.objects.values_list("slug", flat=True)))
+    for number, row in enumerate(Augmentation.objects.all()):
+        Augmentation.objects.filter(pk=row.pk).update(image=store(png(number)))
+    given = PlanOptions(**{"practice": True, **options})  # type: ignore[arg-type]
+    return open_study(name="Round 1", votes_per_expert=9, seed=7, options=given, **cast)
+
+
+def eva() -> User:
+    return User.objects.get(username="eva")
+
+
+def practice(study: Study) -> str:
+    return reverse("vote-practice", args=[study.code])
+
+
+def page(study: Study) -> str:
+    return reverse("vote", args=[study.code])
+
+
+def answer(client: Client, study: Study, pair: PracticePair, *, well: bool) -> str:
+    """The page that follows."""
+    outcome = "left" if pair.good_is_left == well else "right"
+    sent = {"pair": pair.position, "outcome": outcome}
+    return client.post(practice(study), sent, follow=True).content.decode()
+
+
+def test_five_pairs_with_feedback_come_before_the_first_pair_and_none_is_a_vote() -> None:
+    study = opened()
+    client = signed_in(eva())
+    assert client.get(page(study)).headers["Location"] == practice(study)
+    pairs = practice_pairs(study, eva())
+    assert len(pairs) == 5
+    for number, pair in enumerate(pairs, start=1):
+        shown = client.get(practice(study)).content.decode()
+        assert f"Practice {number} of 5." in shown
+        assert "carries out the instruction, " not in shown, "the answer comes afterwards"
+        told = answer(client, study, pair, well=number != 2)
+        assert ("Right." in told) == (number != 2)
+        assert ("Not quite." in told) == (number == 2)
+        good, broken = ("A", "B") if pair.good_is_left else ("B", "A")
+        assert f"{good} carries out the instruction, {broken} does not." in told
+        assert f"The checks say of {broken}:" in told
+        assert re.search(r"<li>[^<]*overlap[^<]*</li>", told), "why, in words of the checks"
+    assert "Start voting" in told
+    assert client.get(page(study)).status_code == 200
+    assert not Vote.objects.exists()
+    assert voting_progress(study=study, expert=eva()).voted == 0
+
+
+def test_scenarios_outside_of_the_study_come_first_and_its_own_where_those_are_too_few() -> None:
+    study = opened(outside=3)
+    slugs = [pair.scenario.slug for pair in practice_pairs(study, eva())]
+    assert [slug.startswith("elsewhere") for slug in slugs] == [True] * 3 + [False] * 2
+    assert len(set(slugs)) == 5
+
+
+def test_who_skips_the_practice_is_not_asked_again() -> None:
+    study = opened()
+    client = signed_in(eva())
+    client.get(page(study))
+    answered = client.post(practice(study), {"skip": "1"})
+    assert answered.headers["Location"] == page(study)
+    assert client.get(page(study)).status_code == 200
+    assert client.get(practice(study)).status_code == 302
+    finn = signed_in(User.objects.get(username="finn"))
+    assert finn.get(page(study)).status_code == 302, "that was only eva's round"
+
+
+def test_who_has_voted_is_past_practice() -> None:
+    study = opened()
+    vote(study.matchups.filter(expert=eva()).earliest("position"))
+    assert signed_in(eva()).get(page(study)).status_code == 200
+
+
+def test_a_second_answer_to_a_pair_changes_nothing() -> None:
+    study = opened()
+    client = signed_in(eva())
+    first = practice_pairs(study, eva())[0]
+    answer(client, study, first, well=True)
+    assert "Right." in answer(client, study, first, well=False)
+    first.refresh_from_db()
+    assert first.is_right
+
+
+@pytest.mark.parametrize("sent", [{}, {"pair": "x"}, {"pair": "1", "outcome": "skipped"}])
+def test_what_is_no_answer_is_refused(sent: dict[str, str]) -> None:
+    study = opened()
+    client = signed_in(eva())
+    client.get(page(study))
+    assert "nothing was saved" in client.post(practice(study), sent, follow=True).content.decode()
+    assert set(PracticePair.objects.values_list("answer", flat=True)) == {""}
+
+
+def test_pictures_go_to_their_expert_alone_and_the_page_names_nobody() -> None:
+    study = opened()
+    client = signed_in(eva())
+    shown = client.get(practice(study)).content.decode()
+    tokens = re.findall(r'src="/i/([^"]+)"', shown)
+    assert len(tokens) == 2
+    for token in tokens:
+        picture_shown = client.get(reverse("matchup-image", args=[token]))
+        assert picture_shown.status_code == 200
+        b"".join(picture_shown)
+        other = signed_in(User.objects.get(username="finn"))
+        assert other.get(reverse("matchup-image", args=[token])).status_code == 404
+    for pair in practice_pairs(study, eva()):
+        shown += answer(client, study, pair, well=True)
+    words = [word for word in names_of_contestants() if len(word) > 3]
+    assert [word for word in words if word in shown] == []
+
+
+def test_without_the_rule_there_is_no_practice() -> None:
+    study = opened(practice=False)
+    client = signed_in(eva())
+    assert client.get(page(study)).status_code == 200
+    assert client.get(practice(study)).status_code == 302
+    assert not PracticePair.objects.exists()
+
+
+def test_a_closed_study_has_none_either() -> None:
+    study = opened()
+    close_study(study=study)
+    assert "This study is closed" in signed_in(eva()).get(page(study)).content.decode()
+
+
+def test_a_study_with_nothing_to_practise_on_is_not_opened() -> None:
+    given = PlanOptions(practice=True)
+    with pytest.raises(NothingToPlan, match="nothing to practise on"):
+        open_study(name="Round 1", votes_per_expert=9, seed=7, options=given, **cast_of())
+    assert not Study.objects.exists()
+
+
+def test_an_admin_switches_it_by_the_form() -> None:
+    study = opened()
+    admin = signed_in(people()["admin"])
+    shown = admin.get(reverse("study-new")).content.decode()
+    assert 'name="practice" checked' in shown, "on where there is something to practise on"
+    rules = admin.get(reverse("study", args=[study.code])).content.decode()
+    assert "five pairs before the first one" in rules
