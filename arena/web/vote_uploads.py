@@ -40,9 +40,9 @@ class VoteFileForm(forms.Form):
     )
     is_simulated = forms.BooleanField(required=False)
 
-    def clean_file(self) -> UploadedFile:
+    def clean_file(self) -> UploadedFile[bytes]:
         """No larger than a page can wait for."""
-        file: UploadedFile = self.cleaned_data["file"]
+        file: UploadedFile[bytes] = self.cleaned_data["file"]
         if (file.size or 0) > MOST_MB * 1_000_000:
             raise forms.ValidationError(_too_large())
         return file
@@ -74,7 +74,7 @@ def upload_votes_page(request: HttpRequest) -> HttpResponse:
 
 
 def _import(form: VoteFileForm, actor: User) -> ImportedVotes:
-    file: UploadedFile = form.cleaned_data["file"]
+    file: UploadedFile[bytes] = form.cleaned_data["file"]
     with TemporaryDirectory(prefix="arena-votes-") as folder:
         # The reader's errors name the file: as its sender called it, in plain letters.
         path = Path(folder) / (_ODD.sub("_", file.name or "")[-100:].lstrip(".") or "votes")
