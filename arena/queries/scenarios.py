@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import uuid
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 from django.db.models import Count
@@ -72,10 +73,12 @@ def set_asked(name: str | None) -> str:
     return name if name in {*Scenario.SETS, OWN} and name is not None else ""
 
 
-def reference_pictures() -> dict[int, uuid.UUID]:
+def reference_pictures(scenarios: Sequence[Scenario]) -> dict[int, uuid.UUID]:
     """By scenario, the youngest augmentation that draws its reference."""
     rows = Augmentation.objects.filter(
-        contestant__kind=Contestant.Kind.REFERENCE, state=Augmentation.State.DONE
+        scenario__in=scenarios,
+        contestant__kind=Contestant.Kind.REFERENCE,
+        state=Augmentation.State.DONE,
     )
     return dict(rows.order_by("created_at", "pk").values_list("scenario_id", "code"))
 

@@ -147,7 +147,7 @@ def segments(by_state: dict[Augmentation.State, int]) -> list[BarSegment]:
 
 
 @register.filter
-def said(sentence: str) -> str:
+def told_sentence(sentence: str) -> str:
     """What a service tells, in the language of whoever reads it."""
     return translate(sentence)
 

@@ -13,26 +13,43 @@ from django.shortcuts import get_object_or_404, redirect, render
 from django.utils.translation import gettext as _
 from django.views.decorators.http import require_POST, require_safe
 
+from arena.queries.listings import Narrowing, find_contestants
 from arena.web.access import ADMIN, STAFF, allow_only
 from arena.web.asking import asking_of
+from arena.web.listing import read_listing, read_page, said_choices
 from augment.errors import AugmentError
-from augment.models import Contestant, GenerationJob
+from augment.models import Augmentation, Contestant, GenerationJob
 from augment.services.endpoints import contestants
 from augment.services.endpoints.respondents import respondents_of
 from augment.services.endpoints.retirement import retire, take_back
 from augment.services.wording import translate
 
+CONTESTANTS_AT_ONCE = 50
+
 
 @allow_only(*STAFF)
 @require_safe
 def contestants_page(request: HttpRequest) -> HttpResponse:
-    """Everybody, those who are retired at the end."""
+    """Contestants page by page, those who are retired at the end."""
     contestants.ensure_builtin()
-    rows = Contestant.objects.exclude(kind=Contestant.Kind.CHECK).select_related("endpoint")
-    found = list(rows.annotate(made=Count("augmentations")).order_by("name"))
+    kinds = [one for one in Contestant.Kind.choices if one[0] != Contestant.Kind.CHECK]
+    choices = {
+        "kind": (_("Kind"), said_choices(kinds)),
+        "offered": (_("In forms"), [("active", _("offered")), ("retired", _("retired"))]),
+    }
+    listing = read_listing(request, choices)
+    wanted = Narrowing(
+        search=listing.search, kind=listing.chosen("kind"), part=listing.chosen("offered")
+    )
+    page = read_page(request, find_contestants(wanted), size=CONTESTANTS_AT_ONCE)
+    made = Augmentation.objects.filter(contestant__in=list(page.object_list)).order_by()
+    numbers = dict(made.values_list("contestant").annotate(number=Count("pk")))
+    rows = [{"row": row, "made": numbers.get(row.pk, 0)} for row in page.object_list]
     context = {
-        "active": [row for row in found if row.retired_at is None],
-        "retired": [row for row in found if row.retired_at is not None],
+        "active": [line for line in rows if line["row"].retired_at is None],
+        "retired": [line for line in rows if line["row"].retired_at is not None],
+        "page": page,
+        "listing": listing,
     }
     return render(request, "contestants/list.html", context)
 

@@ -18,7 +18,8 @@ from arena.services.preferences import choose_language, choose_theme
 from arena.web.checklist import steps
 from arena.web.forms import LanguageForm, ThemeForm
 from arena.web.sign_in import keep_language
-from augment.services.running.summary import list_jobs
+from augment.models import GenerationJob
+from augment.services.running.summary import count_each
 
 LATEST_JOBS = 5
 
@@ -99,7 +100,7 @@ def _admin(request: HttpRequest) -> HttpResponse:
     context = {
         "inventory": found,
         "steps": steps(found),
-        "jobs": list_jobs()[:LATEST_JOBS],
+        "jobs": count_each(list(GenerationJob.objects.all()[:LATEST_JOBS])),
         "running": [line for line in studies if line.study.state == Study.State.OPEN],
     }
     return render(request, "home/admin.html", context)

@@ -3,19 +3,30 @@
 from __future__ import annotations
 
 import uuid
+from typing import cast
 
+from django.contrib.auth.models import User
 from django.http import Http404, HttpRequest, HttpResponse
 from django.shortcuts import get_object_or_404, render
 from django.utils.text import slugify
+from django.utils.translation import gettext as _
 from django.views.decorators.http import require_safe
 
 from arena.exports.formats import format_named
 from arena.exports.tool_calls import FORMATS as TOOL_CALL_FORMATS
 from arena.queries.job_grid import MARKS, VIEWS, Part, grid_part
+from arena.queries.listings import MINE, Narrowing, find_jobs
 from arena.web.access import STAFF, allow_only
 from arena.web.displacement import section
 from arena.web.driving import section as driving_section
-from arena.web.listing import choice_asked, page_asked, search_asked
+from arena.web.listing import (
+    choice_asked,
+    page_asked,
+    read_listing,
+    read_page,
+    said_choices,
+    search_asked,
+)
 from arena.web.scenario_files import rows_of
 from augment.errors import UnknownName
 from augment.models import Augmentation, GenerationJob
@@ -23,7 +34,7 @@ from augment.services.judging.repeatability import repeatability
 from augment.services.running.causes import SHOWN, failure_groups
 from augment.services.running.costs import costs_of
 from augment.services.running.pace import pace_of
-from augment.services.running.summary import count_rows, list_jobs
+from augment.services.running.summary import count_each, count_rows
 from augment.services.running.tool_calls import (
     tool_calls_by_augmentation,
     tool_calls_by_contestant,
@@ -36,13 +47,25 @@ State = Augmentation.State
 @allow_only(*STAFF)
 @require_safe
 def jobs_page(request: HttpRequest) -> HttpResponse:
-    """Every job with its bar."""
-    found = list_jobs()
-    context: dict[str, object] = {"jobs": found}
-    if any(counts.is_moving for counts in found):
+    """Jobs with their bars, page by page."""
+    choices = {
+        "state": (_("State"), said_choices(GenerationJob.State.choices)),
+        "by": (_("Started by"), [(MINE, _("me"))]),
+    }
+    listing = read_listing(request, choices)
+    wanted = Narrowing(
+        search=listing.search, kind=listing.chosen("state"), part=listing.chosen("by")
+    )
+    found = find_jobs(wanted, user=cast(User, request.user))
+    page = read_page(request, found, size=JOBS_AT_ONCE)
+    counted = count_each(list(page.object_list))
+    context: dict[str, object] = {"jobs": counted, "page": page, "listing": listing}
+    if any(counts.is_moving for counts in counted):
         context["workforce"] = workforce()
     return render(request, "jobs/list.html", context)
 
+
+JOBS_AT_ONCE = 25
 
 MEASURED_AT_ONCE = 1000
 """Of a job with more augmentations the page measures nothing until somebody asks for it."""

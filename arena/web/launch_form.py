@@ -13,7 +13,7 @@ from augment.errors import AugmentError
 from augment.models import Contestant, EndpointModel
 from augment.services.endpoints.entering import PROTOCOLS, REASONING_EFFORTS
 from augment.services.endpoints.keys import is_key_here
-from augment.services.running.cells import Cell, ChosenCells, matrix_of, read_cells
+from augment.services.running.cells import ChosenCells, MatrixCell, matrix_of, read_cells
 from augment.services.running.estimates import JobEstimate, estimate_rows
 from augment.services.running.feasible import find_obstacle, keys_missing
 from augment.services.running.jobs import HIGHEST_SAMPLES
@@ -30,7 +30,7 @@ OF_CELLS = (
 class OfferedCell:
     """A box of the matrix, or why it can't be ticked."""
 
-    cell: Cell
+    cell: MatrixCell
     obstacle: str
     is_chosen: bool
 

@@ -10,13 +10,16 @@ from django.contrib import messages
 from django.db import transaction
 from django.http import Http404, HttpRequest, HttpResponse, HttpResponseBase, JsonResponse
 from django.shortcuts import get_object_or_404, render
+from django.utils.translation import gettext as _
 from django.views.decorators.http import require_safe
 
 from arena.queries import scenarios
+from arena.queries.listings import Narrowing, find_scenarios, group_by_type
 from arena.queries.modifications import modification_lines
 from arena.services.references import why_not_editable
 from arena.web.access import STAFF, allow_only
 from arena.web.asking import asking_of
+from arena.web.listing import read_listing, read_page, said_choices
 from arena.web.pictures import picture_response
 from arena.web.sending import looks_again, send_later
 from augment.errors import QueueFault
@@ -42,6 +45,7 @@ from augment.services.scenarios.scene_pictures import (
     reference_picture,
     scene_picture,
 )
+from augment.services.scenarios.types import type_choices
 from augment.services.wording import translate
 from augment.tasks import enqueue_marks
 
@@ -49,15 +53,26 @@ LOOKS = tuple(str(number) for number in range(6))
 """So often the page of an augmentation looks again for a picture that is being drawn."""
 
 
+SCENARIOS_AT_ONCE = 60
+
+
 @allow_only(*STAFF)
 @require_safe
 def scenarios_page(request: HttpRequest) -> HttpResponse:
     """The contact sheet: scenarios of a set by type, the reference where it was drawn."""
     chosen = scenarios.set_asked(request.GET.get("set"))
+    listing = read_listing(
+        request, {"type": (_("Type"), said_choices(type_choices()))}, keep=("set",)
+    )
+    wanted = Narrowing(search=listing.search, kind=listing.chosen("type"), part=chosen)
+    page = read_page(request, find_scenarios(wanted), size=SCENARIOS_AT_ONCE)
+    rows = list(page.object_list)
     context = {
-        "groups": scenarios.by_type(chosen, with_paraphrases=False),
+        "groups": group_by_type(rows),
         "sets": scenarios.set_choices(chosen),
-        "references": scenarios.reference_pictures(),
+        "references": scenarios.reference_pictures(rows),
+        "page": page,
+        "listing": listing,
     }
     return render(request, "scenarios/list.html", context)
 

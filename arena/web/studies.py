@@ -20,6 +20,7 @@ from arena.queries import progress, scenarios
 from arena.queries.coverage import coverage, reports_of
 from arena.queries.inventory import usual_checks
 from arena.queries.judged import is_imported
+from arena.queries.listings import Narrowing, find_studies
 from arena.queries.people import by_pseudonym, experts
 from arena.queries.results import latest_snapshot
 from arena.queries.votes import tallies
@@ -30,6 +31,7 @@ from arena.services.practice import has_practice
 from arena.services.preregistration import preregistration_bytes, preregistration_sha256
 from arena.services.studies import close_study, open_study, rules_of
 from arena.web.access import ADMIN, STAFF, allow_only
+from arena.web.listing import read_listing, read_page, said_choices
 from arena.web.questions import ask, is_sure, wants_to_change
 from arena.web.study_forms import HandOverForm, StudyForm
 from arena.web.study_questions import closing, handing_over, opening
@@ -41,11 +43,22 @@ _PLANNED = ("votes_per_expert", "repeats", "checks", "overlap")
 """What the planning page hands on to a new study."""
 
 
+STUDIES_AT_ONCE = 25
+
+
 @allow_only(*STAFF)
 @require_safe
 def studies_page(request: HttpRequest) -> HttpResponse:
-    """Every study with its bar."""
-    return render(request, "studies/list.html", {"studies": progress.of_studies()})
+    """Studies with their bars, page by page."""
+    listing = read_listing(request, {"state": (_("State"), said_choices(Study.State.choices))})
+    wanted = Narrowing(search=listing.search, kind=listing.chosen("state"))
+    page = read_page(request, find_studies(wanted), size=STUDIES_AT_ONCE)
+    context = {
+        "studies": progress.of_studies(list(page.object_list)),
+        "page": page,
+        "listing": listing,
+    }
+    return render(request, "studies/list.html", context)
 
 
 @allow_only(ADMIN)

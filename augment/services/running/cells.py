@@ -25,7 +25,7 @@ SEPARATOR = "|"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Cell:
+class MatrixCell:
     """One variant with one model at one endpoint."""
 
     variant: str
@@ -42,7 +42,7 @@ class Cell:
 class ChosenCells:
     """Cells that somebody ticked, and how all of them ask."""
 
-    cells: tuple[Cell, ...] = ()
+    cells: tuple[MatrixCell, ...] = ()
     options: ContestantOptions = field(default_factory=ContestantOptions)
 
     def contestants(self) -> list[Contestant]:
@@ -59,7 +59,7 @@ class MatrixRow:
 
     variant: str
     label: str
-    cells: tuple[tuple[Cell, str], ...]
+    cells: tuple[tuple[MatrixCell, str], ...]
 
 
 def matrix_of(models: Sequence[EndpointModel]) -> list[MatrixRow]:
@@ -70,7 +70,9 @@ def matrix_of(models: Sequence[EndpointModel]) -> list[MatrixRow]:
             label=spell_variant(recipe.slug),
             cells=tuple(
                 (
-                    Cell(variant=recipe.slug, endpoint=known.endpoint.label, model=known.model),
+                    MatrixCell(
+                        variant=recipe.slug, endpoint=known.endpoint.label, model=known.model
+                    ),
                     _obstacle(known, recipe),
                 )
                 for known in models
@@ -122,23 +124,23 @@ def add_cells(chosen: ChosenCells, *, actor: User | None = None) -> list[str]:
 # --- Private -----------------------------------------------------------------------------------
 
 
-def _document(cell: Cell) -> ContestantDocument:
+def _document(cell: MatrixCell) -> ContestantDocument:
     return ContestantDocument(
         slug="to-be-made", variant=cell.variant, endpoint=cell.endpoint, model=cell.model
     )
 
 
-def _usable(cell: Cell, options: ContestantOptions) -> ContestantOptions:
+def _usable(cell: MatrixCell, options: ContestantOptions) -> ContestantOptions:
     usable = names_for(find_recipe(cell.variant))
     chosen = options.to_document()
     return options_from_document({name: v for name, v in chosen.items() if name in usable})
 
 
-def _cell(key: str) -> Cell:
+def _cell(key: str) -> MatrixCell:
     parts = key.split(SEPARATOR, 2)
     if len(parts) != 3:
         raise UnknownName("cell", key, ["VARIANT|ENDPOINT|MODEL"])
-    cell = Cell(variant=find_recipe(parts[0]).slug, endpoint=parts[1], model=parts[2])
+    cell = MatrixCell(variant=find_recipe(parts[0]).slug, endpoint=parts[1], model=parts[2])
     known = EndpointModel.objects.filter(endpoint__label=cell.endpoint)
     if not known.filter(model=cell.model).exists():
         raise UnknownName(
@@ -149,7 +151,7 @@ def _cell(key: str) -> Cell:
     return cell
 
 
-def _contestant(cell: Cell, options: ContestantOptions) -> Contestant:
+def _contestant(cell: MatrixCell, options: ContestantOptions) -> Contestant:
     chosen = _usable(cell, options)
     slug = pick_slug(_document(cell), chosen)
     found = Contestant.objects.filter(slug=slug).select_related("endpoint").first()

@@ -83,11 +83,6 @@ class JobCounts:
         return self.by_state[State.FAILED]
 
 
-def list_jobs() -> list[JobCounts]:
-    """All jobs, the youngest first; two queries."""
-    return count_each(list(GenerationJob.objects.select_related("launched_by__person")))
-
-
 def count_each(jobs: Sequence[GenerationJob]) -> list[JobCounts]:
     """Several jobs; one query."""
     counts: defaultdict[int, Counter[str]] = defaultdict(Counter)

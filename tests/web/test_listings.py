@@ -1,0 +1,145 @@
+"""Lists are found in by a word, narrowed by filters and shown page by page, at a fixed price."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import pytest
+from django.contrib.auth.models import User
+from django.test import Client
+from django.urls import reverse
+
+from arena.models import Study
+from augment.models import Augmentation, BaseScene, Contestant, GenerationJob, Scenario
+from tests.jobs import rows
+from tests.web.cast import people, signed_in
+
+pytestmark = pytest.mark.django_db
+
+MANY = 130
+Questions = Callable[[int], object]
+
+
+@pytest.fixture
+def accounts() -> dict[str, User]:
+    return people()
+
+
+@pytest.fixture
+def admin(accounts: dict[str, User]) -> Client:
+    return signed_in(accounts["admin"])
+
+
+def page(client: Client, name: str, query: str = "") -> str:
+    return client.get(reverse(name) + query).content.decode()
+
+
+def add_many(user: User | None = None) -> None:
+    """So many of everything, and a row of each job."""
+    base = rows.add_scenario("street-000").base_scene
+    BaseScene.objects.update(slug="recorded")
+    Scenario.objects.bulk_create(
+        Scenario(
+            slug=f"street-{number:03}",
+            type=Scenario.Type.JAYWALKER if number % 2 else Scenario.Type.CONSTRUCTION_ZONE,
+            instruction=f"Place {number} cones.",
+            base_scene=base,
+        )
+        for number in range(1, MANY)
+    )
+    Contestant.objects.bulk_create(
+        Contestant(slug=f"who-{number:03}", name=f"Who {number:03}", kind="rule")
+        for number in range(MANY)
+    )
+    jobs = GenerationJob.objects.bulk_create(
+        GenerationJob(name=f"Job {number:03}", state="finished", launched_by=user)
+        for number in range(MANY)
+    )
+    Study.objects.bulk_create(
+        Study(name=f"Study {number:03}", votes_per_expert=1, seed=1) for number in range(MANY)
+    )
+    street, who = Scenario.objects.first(), Contestant.objects.first()
+    Augmentation.objects.bulk_create(
+        Augmentation(job=job, scenario=street, contestant=who, state="failed", reason="broke")
+        for job in jobs
+    )
+
+
+LISTS = {
+    # page: what a row is told by, how many a page has
+    "jobs": ("Job ", 25),
+    "studies": ('">Study ', 25),
+    "contestants": ('<td class="mono">', 50),
+    "scenarios": ("<b>street-", 60),
+}
+
+
+@pytest.mark.parametrize("name", LISTS)
+def test_a_page_holds_so_many_and_the_last_one_the_rest(
+    admin: Client, name: str, django_assert_max_num_queries: Questions
+) -> None:
+    add_many()
+    mark, size = LISTS[name]
+    admin.get(reverse(name))
+    with django_assert_max_num_queries(16):  # type: ignore[attr-defined]
+        first = page(admin, name)
+    assert first.count(mark) == size
+    assert 'aria-current="page">1</a>' in first
+    assert 0 < page(admin, name, "?page=99").count(mark) <= size
+    assert page(admin, name, "?page=nonsense").count(mark) == size
+
+
+@pytest.mark.parametrize("name", LISTS)
+def test_every_row_is_found_by_its_word(admin: Client, name: str) -> None:
+    add_many()
+    mark, _ = LISTS[name]
+    assert page(admin, name, "?q=077").count(mark) == 1
+    nothing = page(admin, name, "?q=no-such-thing")
+    assert nothing.count(mark) == 0
+    assert "Nothing is like that." in nothing
+    assert page(admin, name, "?q=%00").count(mark) == LISTS[name][1]
+
+
+def test_a_page_link_keeps_what_is_looked_for(admin: Client) -> None:
+    add_many()
+    assert 'href="?q=0&amp;state=finished&amp;page=2"' in page(
+        admin, "jobs", "?q=0&state=finished"
+    )
+
+
+@pytest.mark.parametrize(
+    ("name", "query", "found"),
+    [
+        ("jobs", "?state=running", 0),
+        ("jobs", "?state=finished&q=00", 11),
+        ("jobs", "?state=no-state&q=00", 11),
+        ("studies", "?state=open", 0),
+        ("contestants", "?kind=rule&q=who-00", 10),
+        ("contestants", "?kind=llm&q=who-00", 0),
+        ("contestants", "?offered=retired", 0),
+        ("scenarios", f"?type={Scenario.Type.JAYWALKER.value}&q=street-00", 5),
+        ("scenarios", "?set=own&q=street-00", 10),
+        ("scenarios", "?set=paper&q=street-00", 0),
+        ("scenarios", "?q=Place 77 cones", 1),
+    ],
+)
+def test_filters_narrow_a_list(admin: Client, name: str, query: str, found: int) -> None:
+    add_many()
+    assert page(admin, name, query).count(LISTS[name][0]) == found
+
+
+def test_mine_are_the_jobs_that_i_launched(accounts: dict[str, User]) -> None:
+    add_many(user=accounts["admin"])
+    admin, analyst = (signed_in(accounts[role]) for role in ("admin", "analyst"))
+    assert page(admin, "jobs", "?by=mine").count("Job ") == 25
+    assert page(analyst, "jobs", "?by=mine").count("Job ") == 0
+
+
+def test_home_counts_the_latest_jobs_alone(
+    admin: Client, django_assert_max_num_queries: Questions
+) -> None:
+    add_many()
+    admin.get(reverse("home"))
+    with django_assert_max_num_queries(25):  # type: ignore[attr-defined]
+        shown = page(admin, "home")
+    assert shown.count("Job 1") == 5
