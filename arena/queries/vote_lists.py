@@ -99,9 +99,7 @@ def vote_page(snapshot: Snapshot, search: VoteSearch, page: int) -> VotePage:
 
 def each_vote(snapshot: Snapshot, search: VoteSearch) -> Iterator[ListedVote]:
     """All that are looked for, in the order of their pages."""
-    found = _Found(snapshot, search)
-    for start in range(0, found.count(), CHUNK):
-        yield from found.part(start, start + CHUNK)
+    return _Found(snapshot, search).each()
 
 
 def neighbours(snapshot: Snapshot, search: VoteSearch, vote: Vote) -> Neighbours:
@@ -181,6 +179,17 @@ class _Found:
         stored = self._count_stored()
         rest = self._automatic[max(start - stored, 0) : max(stop - stored, 0)]
         return listed + of_automatic(rest, self._snapshot)
+
+    def each(self) -> Iterator[ListedVote]:
+        """All of them; what is found is found once, whatever its number."""
+        if self._votes is None:
+            for start in range(0, self.count(), CHUNK):
+                yield from self.part(start, start + CHUNK)
+            return
+        keys = list(self._votes.order_by("pk").values_list("pk", F("mark")))
+        for start in range(0, len(keys), CHUNK):
+            yield from of_votes(keys[start : start + CHUNK], self._snapshot)
+        yield from of_automatic(self._automatic, self._snapshot)
 
     def _count_stored(self) -> int:
         if self._stored is None:
