@@ -33,6 +33,10 @@ class AlreadyDecided(ArenaError):
         super().__init__(f"This matchup is decided already: {outcome}.")
 
 
+class EnrolmentOver(ArenaError):
+    """The enrolment link takes nobody on: closed, or every place is taken."""
+
+
 class TooFast(ArenaError):
     """More votes came from one account than a person can give; send this one again later.
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from arena.models.api_tokens import ApiToken
 from arena.models.authorships import Authorship
+from arena.models.enrolments import EnrolledVoter, Enrolment
 from arena.models.invitations import Invitation, token_digest
 from arena.models.labels import FaultLabel, LabellingRound, LabelTask
 from arena.models.people import Person
@@ -21,6 +22,8 @@ __all__ = [
     "ApiToken",
     "Authorship",
     "EarlyLook",
+    "EnrolledVoter",
+    "Enrolment",
     "FaultLabel",
     "ImportedVote",
     "Invitation",

@@ -36,10 +36,13 @@ def role_of(user: User | AnonymousUser) -> str | None:
 def experts() -> QuerySet[User]:
     """Active accounts that can be asked to vote: experts who are not analysts or admins too.
 
-    Those may know which contestant made what, and their role opens no voting page.
+    Those may know which contestant made what, and their role opens no voting page. Who enrolled
+    by a link for one study is asked for that one alone.
     """
     more = ("admin", "analyst")
-    found = User.objects.filter(is_active=True, is_superuser=False, groups__name="expert")
+    found = User.objects.filter(
+        is_active=True, is_superuser=False, groups__name="expert", enrolled=None
+    )
     return found.exclude(groups__name__in=more).exclude(person=None).select_related("person")
 
 
@@ -86,8 +89,13 @@ class AccountLine:
 
 
 def list_accounts() -> list[AccountLine]:
-    """Every account but those that the machine votes for, by role and pseudonym; two queries."""
-    found = User.objects.filter(person__is_simulated=False).select_related("person")
+    """Every account, by role and pseudonym; two queries.
+
+    Left out are those that the machine votes for and those that enrolled by a link, which the page
+    of their study lists.
+    """
+    found = User.objects.filter(person__is_simulated=False, enrolled=None)
+    found = found.select_related("person")
     lines = []
     for user in found.prefetch_related("groups"):
         names = {group.name for group in user.groups.all()}

@@ -14,7 +14,7 @@ from django.db import transaction
 from django.utils import timezone
 
 from arena.errors import LinkOver
-from arena.models import Invitation, Person, Study
+from arena.models import EnrolledVoter, Invitation, Person, Study
 from arena.queries.people import ROLES, forgotten_name, has_admin, is_forgotten, role_of
 from augment.errors import Conflict, InvalidDocument, UnknownName
 from augment.sentences import sentence
@@ -149,6 +149,7 @@ def forget_identity(*, user: User, actor: User) -> None:
     user.save(update_fields=["password"])
     Person.objects.filter(user=user).update(pseudonym=f"Former person {name[5:]}", preferences={})
     Invitation.objects.filter(expert=user, revoked_at=None).update(revoked_at=timezone.now())
+    EnrolledVoter.objects.filter(expert=user).update(external_id="")
     _rename_in_plans(known_as, name)
     for failures in (AccessAttempt, AccessFailureLog, AccessLog):
         failures.objects.filter(username=known_as).delete()

@@ -63,7 +63,7 @@ def hand_over(
     rules = without_lost_checks(rules_of(study), cells)
     grid = rules.grid
     rng = np.random.default_rng([rules.seed, number])
-    open_rows = _open_rows(study, giver)
+    open_rows = undecided_rows(study, giver)
     names = [taker.username for taker in takers]
     units = units_of(grid, [_as_planned(row) for row in open_rows])
     later = _shares(votes_left(study, giver), names)
@@ -135,8 +135,8 @@ def _takers(study: Study, username: str, to: Sequence[str]) -> list[User]:
 # --- Handing over ------------------------------------------------------------------------------
 
 
-def _open_rows(study: Study, giver: User) -> list[Matchup]:
-    """What the giver has not judged, held until it is re-planned.
+def undecided_rows(study: Study, giver: User) -> list[Matchup]:
+    """What an expert has not judged and nobody has reported, held until it is re-planned.
 
     A vote holds its matchup's row until it is stored, and a report until then as well: having
     waited for them, look again.

@@ -13,6 +13,7 @@ from django.utils.translation import gettext as _
 from django.utils.translation import pgettext
 
 from arena.models import OUTCOME_LETTERS, Report, Study, Vote
+from arena.queries.enrolments import own_enrolment
 from arena.queries.showings import as_shown
 from arena.queries.studies import longest_instructions
 from arena.queries.votes import VotingProgress, recent_votes, skip_of, voting_progress
@@ -143,6 +144,7 @@ def over_context(study: Study, expert: User) -> dict[str, Any]:
         "study": study,
         "progress": voting_progress(study=study, expert=expert),
         "last": _last_votes(study, expert) if is_open else [],
+        "enrolled": own_enrolment(study, expert),
     }
 
 

@@ -80,6 +80,8 @@ PAGES: dict[str, tuple[int, int, int]] = {
     "study": (200, 200, 403),
     "preregistration": (200, 200, 403),
     "experts": (200, 403, 403),
+    "enrolment": (200, 403, 403),
+    "enrolment-voters": (404, 403, 403),  # no link was made
     "results": (200, 200, 403),  # a page that asks whether to look early
     "results-tab": (200, 200, 403),
     "results-votes": (403, 403, 403),
@@ -139,6 +141,7 @@ ACTIONS: dict[str, tuple[int, int, int]] = {
     "study-close": (200, 403, 403),
     "study-hand-over": (302, 403, 403),
     "labelling-close": (404, 403, 403),
+    "enrolment-drop": (404, 403, 403),
     "theme": (302, 302, 302),
     "language": (302, 302, 302),
     "vote-report": (403, 403, 404),
@@ -146,6 +149,7 @@ ACTIONS: dict[str, tuple[int, int, int]] = {
 OPEN_TO_THE_WORLD = {
     "login",
     "logout",
+    "enrol",
     "invitation",
     "healthz",
     "readyz",
@@ -250,7 +254,7 @@ def address(name: str, here: World) -> str:
         arguments["author-back"] = {"code": marked.code}
     own = (
         *("study", "preregistration", "experts", "invite", "author", "study-close"),
-        *("study-hand-over", "study-rate"),
+        *("study-hand-over", "study-rate", "enrolment", "enrolment-voters", "enrolment-drop"),
     )
     results = (
         *("results", "results-votes", "results-votes-file", "results-open"),

@@ -1,0 +1,231 @@
+"""Taking part by a link that is for everybody: places, consent, drop-outs, completion codes."""
+
+from __future__ import annotations
+
+import uuid
+from datetime import datetime
+
+import numpy as np
+from django.contrib.auth.models import User
+from django.db import transaction
+from django.db.models import Count
+from django.utils import timezone
+
+from arena.errors import EnrolmentOver, NothingToPlan
+from arena.models import EnrolledVoter, Enrolment, Matchup, Study
+from arena.pairing.arrays import IntArray
+from arena.pairing.following import follow_on
+from arena.pairing.newcomers import choose_units
+from arena.pairing.rules import Grid, place_of
+from arena.queries.enrolments import enrolment_by_token, silent, state_of
+from arena.services.attention_checks import without_lost_checks
+from arena.services.handing_over import undecided_rows
+from arena.services.people import create_person
+from arena.services.plans import next_batch, pictures_of, rules_of, shows_all_samples, store
+from augment.errors import Conflict
+from augment.sentences import sentence
+from augment.services.events import log_event
+from augment.services.texts import one_line
+
+LONGEST_CONSENT = 5_000
+
+
+@transaction.atomic
+def set_enrolment(
+    *,
+    study: Study,
+    consent: str,
+    asks_for: str,
+    places: int,
+    votes_each: int,
+    drop_out_after_h: int | None,
+    is_open: bool = True,
+    actor: User | None = None,
+) -> Enrolment:
+    """Make the link of an open study, or change what it says; the link itself stays the same.
+
+    Who has enrolled already keeps quota and place.
+
+    Args:
+        study: An open one.
+        consent: What people agree to; their agreement is kept with a digest of this text.
+        asks_for: What the id is called that they enter, "Your Prolific ID" for example.
+        places: So many may take part at once; who drops out makes room.
+        votes_each: The quota of everybody who enrols from now on.
+        drop_out_after_h: Who is silent for so long and not done loses the place; None: nobody.
+        is_open: Whether anybody may still enrol.
+        actor: Who does so, for the log.
+
+    Raises:
+        Conflict: The study is not open, or a text is empty or too long.
+        InvalidDocument: What is asked for is no line.
+    """
+    study = Study.objects.select_for_update().get(pk=study.pk)
+    if study.state != Study.State.OPEN:
+        raise Conflict(
+            sentence("The study '%(name)s' is not open: nobody can enrol.", name=study.name)
+        )
+    consent = consent.replace("\r\n", "\n").strip()
+    if not 0 < len(consent) <= LONGEST_CONSENT:
+        raise Conflict(
+            sentence("What people agree to has 1 to %(most)s characters.", most=LONGEST_CONSENT)
+        )
+    asks_for = one_line("asks_for", asks_for, what="enrolment", longest=120)
+    values = {
+        "consent": consent,
+        "asks_for": asks_for,
+        "places": places,
+        "votes_each": votes_each,
+        "drop_out_after_h": drop_out_after_h,
+        "is_open": is_open,
+    }
+    before = Enrolment.objects.filter(study=study).values(*values).first()
+    enrolment, _ = Enrolment.objects.update_or_create(study=study, defaults=values)
+    log_event(
+        actor=actor,
+        verb="set enrolment",
+        object_kind="study",
+        object_code=study.code,
+        before=before,
+        after=values,
+    )
+    return enrolment
+
+
+@transaction.atomic
+def enrol(*, token: str, external_id: str, agreed_sha256: str) -> EnrolledVoter:
+    """Give a newcomer a place, an account and a quota of pairs.
+
+    The pairs are a pure function of the study's seed and rules, of the number of this planning and
+    of what was planned before; they are stored before the first showing.
+
+    Args:
+        token: Of the link.
+        external_id: What they entered; one id has one place.
+        agreed_sha256: Of the text that they agreed to, as it was shown.
+
+    Raises:
+        NotYours: No link has this token.
+        EnrolmentOver: It takes nobody on: closed, the study too, or every place is taken.
+        Conflict: The id is enrolled already, or another text was agreed to than holds now.
+        InvalidDocument: The id is empty, too long or no line.
+    """
+    external_id = one_line("id", external_id, what="enrolment", longest=120)
+    found = enrolment_by_token(token)
+    study = Study.objects.select_for_update().get(pk=found.study_id)
+    enrolment = Enrolment.objects.get(pk=found.pk)
+    if not enrolment.is_open or study.state != Study.State.OPEN:
+        raise EnrolmentOver(sentence("This study takes on nobody any more."))
+    if agreed_sha256 != enrolment.consent_sha256:
+        raise Conflict(
+            sentence("The text was changed meanwhile. Please read it again before you agree.")
+        )
+    if enrolment.voters.filter(external_id=external_id).exists():
+        raise Conflict(
+            sentence(
+                "“%(id)s” takes part already. Go on where you began, in the same browser.",
+                id=external_id,
+            )
+        )
+    if not state_of(enrolment).free and not drop_silent(enrolment=enrolment):
+        raise EnrolmentOver(sentence("Every place of this study is taken."))
+    return _take_on(study, enrolment, external_id)
+
+
+@transaction.atomic
+def drop_silent(
+    *, enrolment: Enrolment, now: datetime | None = None, actor: User | None = None
+) -> int:
+    """Give on the places of those who were silent for too long and are not done.
+
+    Their votes stay; what they have not judged goes to whoever comes next, because newcomers get
+    what is planned least. A pair that was reported stays, its report is about it.
+
+    Returns:
+        How many places became free.
+    """
+    study = Study.objects.select_for_update().get(pk=enrolment.study_id)
+    at = now or timezone.now()
+    gone = list(silent(enrolment, now=at))
+    for voter in gone:
+        rows = undecided_rows(study, voter.expert)
+        Matchup.objects.filter(pk__in=[row.pk for row in rows]).delete()
+        EnrolledVoter.objects.filter(pk=voter.pk).update(dropped_at=at)
+        log_event(
+            actor=actor,
+            verb="drop out",
+            object_kind="person",
+            object_code=voter.expert.person.code,
+            after={"study": str(study.code), "withdrawn": len(rows)},
+        )
+    return len(gone)
+
+
+# --- Private -----------------------------------------------------------------------------------
+
+
+def _take_on(study: Study, enrolment: Enrolment, external_id: str) -> EnrolledVoter:
+    person = create_person(
+        username=f"voter-{uuid.uuid4().hex[:12]}",
+        password=None,
+        role="expert",
+        pseudonym=_free_pseudonym(study),
+    )
+    number, cells = next_batch(study), pictures_of(study)
+    rules = without_lost_checks(rules_of(study), cells)
+    grid = rules.grid
+    rng = np.random.default_rng([rules.seed, number])
+    units = choose_units(grid, _judges(study, grid), enrolment.votes_each, rng)
+    if not units:
+        raise NothingToPlan(sentence("The study has no pair that could be shown."))
+    planned, _ = follow_on(rules, grid, person.username, [], units, rng)
+    store(study, planned, cells, [person], batch=number)
+    study.experts.add(person)
+    voter = EnrolledVoter.objects.create(
+        enrolment=enrolment,
+        expert=person,
+        external_id=external_id,
+        consent_sha256=enrolment.consent_sha256,
+    )
+    log_event(
+        actor=person,
+        verb="enrol",
+        object_kind="study",
+        object_code=study.code,
+        after={
+            "batch": number,
+            "matchups": len(planned),
+            "consent_sha256": voter.consent_sha256,
+        },
+    )
+    return voter
+
+
+def _free_pseudonym(study: Study) -> str:
+    """Voters of all studies are counted on; the study's code keeps two studies apart."""
+    number = EnrolledVoter.objects.filter(enrolment__study=study).count() + 1
+    return f"Voter {number} of {study.code.hex[:6]}"
+
+
+def _judges(study: Study, grid: Grid) -> IntArray:
+    """(P, S) how many experts have each unit; counted by the database, one query."""
+    rows = {frozenset(pair): row for row, pair in enumerate(grid.pairs)}
+    columns = {place: column for column, place in enumerate(grid.scenarios)}
+    counts = np.zeros(grid.showable.shape, dtype=np.int64)
+    names = (
+        "scenario__slug",
+        "left__contestant__slug",
+        "right__contestant__slug",
+        "right__sample",
+    )
+    shows_all = shows_all_samples(study)
+    counted = (
+        study.matchups.filter(kind=Matchup.Kind.MAIN)
+        .order_by()
+        .values_list(*names)
+        .annotate(n=Count("pk"))
+    )
+    for slug, left, right, sample, n in counted:
+        place = place_of(slug, sample) if shows_all else slug
+        counts[rows[frozenset((left, right))], columns[place]] += n
+    return counts

@@ -1,0 +1,191 @@
+"""Taking part in a study by a link that is for everybody, and what an admin sees of it."""
+
+from __future__ import annotations
+
+import csv
+import uuid
+from typing import Any, cast
+
+from django import forms
+from django.contrib import messages
+from django.contrib.auth import login
+from django.contrib.auth.decorators import login_not_required
+from django.contrib.auth.models import User
+from django.core.paginator import Paginator
+from django.http import Http404, HttpRequest, HttpResponse
+from django.shortcuts import get_object_or_404, redirect, render
+from django.urls import reverse
+from django.utils.translation import gettext as _
+from django.utils.translation import gettext_lazy, ngettext
+from django.views.decorators.cache import never_cache
+from django.views.decorators.http import require_http_methods, require_POST, require_safe
+
+from arena.errors import ArenaError, EnrolmentOver, NotYours
+from arena.models import Enrolment, Study
+from arena.queries.enrolments import enrolled_voters, enrolment_by_token, state_of
+from arena.services.enrolments import LONGEST_CONSENT, drop_silent, enrol, set_enrolment
+from arena.web.access import ADMIN, allow_only
+from arena.web.invitations import BACKEND, GONE, SESSION_S
+from augment.errors import AugmentError
+from augment.services.wording import translate
+
+PAGE = 100
+ID_PARAMETERS = ("id", "worker", "workerId", "PROLIFIC_PID")
+"""In an address, what the platforms call the id of whom they send."""
+
+COLUMNS = (
+    *("voter", "id", "planned", "answered", "skipped"),
+    *("enrolled_at", "last_vote_at", "dropped_at", "is_done", "completion_code"),
+)
+_CONSENT = gettext_lazy(
+    "I take part of my own free will and may stop at any time. My answers, the time that they "
+    "took and the id that I enter are kept to evaluate this study; the id is published nowhere."
+)
+
+
+class EnrolmentForm(forms.Form):
+    """What an admin says about a link."""
+
+    consent = forms.CharField(max_length=LONGEST_CONSENT, initial=_CONSENT)
+    asks_for = forms.CharField(max_length=120, initial=gettext_lazy("Your name or worker ID"))
+    places = forms.IntegerField(min_value=1, max_value=100_000, initial=100)
+    votes_each = forms.IntegerField(min_value=1, max_value=10_000, initial=30)
+    drop_out_after_h = forms.IntegerField(
+        min_value=1, max_value=10_000, required=False, initial=24
+    )
+    is_open = forms.BooleanField(required=False, initial=True)
+
+
+class NewcomerForm(forms.Form):
+    """What somebody enters who takes part."""
+
+    external_id = forms.CharField(
+        max_length=120, error_messages={"required": gettext_lazy("Please enter it.")}
+    )
+    agreed = forms.BooleanField(
+        error_messages={"required": gettext_lazy("You take part only if you agree.")}
+    )
+    agreed_sha256 = forms.CharField(max_length=64)
+
+
+@login_not_required
+@never_cache
+@require_http_methods(["GET", "HEAD", "POST"])
+def enrol_page(request: HttpRequest, token: str) -> HttpResponse:
+    """What the study is, what one agrees to, and a form for the id; then the first pair."""
+    try:
+        enrolment = enrolment_by_token(token)
+    except NotYours as error:
+        raise Http404 from error
+    user = request.user
+    if user.is_authenticated and enrolment.voters.filter(expert=cast(User, user)).exists():
+        return redirect("vote", code=enrolment.study.code)
+    given = next((request.GET[name] for name in ID_PARAMETERS if name in request.GET), "")
+    form = NewcomerForm(request.POST or None, initial={"external_id": given[:120]})
+    if request.method == "POST" and form.is_valid():
+        try:
+            voter = enrol(
+                token=token,
+                external_id=form.cleaned_data["external_id"],
+                agreed_sha256=form.cleaned_data["agreed_sha256"],
+            )
+        except EnrolmentOver:
+            return _over(request, enrolment)
+        except (ArenaError, AugmentError) as error:
+            form.add_error("external_id", translate(error))
+            enrolment.refresh_from_db()
+        else:
+            login(request, voter.expert, backend=BACKEND)
+            request.session.set_expiry(SESSION_S)
+            return redirect("vote", code=enrolment.study.code)
+    if not enrolment.is_open or enrolment.study.state != Study.State.OPEN:
+        return _over(request, enrolment)
+    context = {"enrolment": enrolment, "form": form}
+    return render(request, "enrol.html", context, status=422 if form.errors else 200)
+
+
+@allow_only(ADMIN)
+@never_cache
+@require_http_methods(["GET", "HEAD", "POST"])
+def enrolment_page(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
+    """The link with its rules, and who came by it."""
+    study = get_object_or_404(Study, code=code)
+    enrolment = Enrolment.objects.filter(study=study).first()
+    form = EnrolmentForm(request.POST or None, initial=_rules_of(enrolment))
+    if request.method == "POST" and form.is_valid():
+        actor = cast(User, request.user)
+        try:
+            set_enrolment(study=study, actor=actor, **form.cleaned_data)
+        except (ArenaError, AugmentError) as error:
+            form.add_error(None, translate(error))
+        else:
+            messages.success(request, _("Saved. What the link says holds from now on."))
+            return redirect("enrolment", code=code)
+    context: dict[str, Any] = {"study": study, "enrolment": enrolment, "form": form}
+    if enrolment is not None:
+        pages = Paginator(enrolled_voters(enrolment), PAGE)
+        context |= {
+            "address": request.build_absolute_uri(reverse("enrol", args=[enrolment.token])),
+            "state": state_of(enrolment),
+            "page": pages.get_page(request.GET.get("page")),
+        }
+    status = 422 if form.errors else 200
+    return render(request, "studies/enrolment.html", context, status=status)
+
+
+@allow_only(ADMIN)
+@require_POST
+def drop_out(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
+    """Give on the places of all who were silent for too long, now."""
+    enrolment = get_object_or_404(Enrolment, study__code=code)
+    freed = drop_silent(enrolment=enrolment, actor=cast(User, request.user))
+    told = ngettext("%(n)s place is free again.", "%(n)s places are free again.", freed)
+    messages.info(request, told % {"n": freed})
+    return redirect("enrolment", code=code)
+
+
+@allow_only(ADMIN)
+@never_cache
+@require_safe
+def voters_file(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
+    """Who is to be thanked or paid: ids, progress and completion codes, as CSV."""
+    enrolment = get_object_or_404(Enrolment, study__code=code)
+    answer = HttpResponse(content_type="text/csv; charset=utf-8")
+    answer["Content-Disposition"] = 'attachment; filename="voters.csv"'
+    table = csv.writer(answer)
+    table.writerow(COLUMNS)
+    for voter in enrolled_voters(enrolment):
+        is_done = voter.dropped_at is None and 0 < voter.planned <= voter.answered
+        times = (voter.enrolled_at, voter.last_vote_at, voter.dropped_at)
+        enrolled_at, last_vote_at, dropped_at = (
+            "" if at is None else at.isoformat() for at in times
+        )
+        table.writerow(
+            [
+                voter.expert.person.pseudonym,
+                _without_formula(voter.external_id),
+                *(voter.planned, voter.answered, voter.skipped),
+                *(enrolled_at, last_vote_at, dropped_at),
+                int(is_done),
+                voter.completion_code if is_done else "",
+            ]
+        )
+    return answer
+
+
+# --- Private -----------------------------------------------------------------------------------
+
+
+def _over(request: HttpRequest, enrolment: Enrolment) -> HttpResponse:
+    return render(request, "enrol_over.html", {"study": enrolment.study}, status=GONE)
+
+
+def _rules_of(enrolment: Enrolment | None) -> dict[str, Any] | None:
+    if enrolment is None:
+        return None
+    return {name: getattr(enrolment, name) for name in EnrolmentForm.base_fields}
+
+
+def _without_formula(text: str) -> str:
+    """What strangers entered, so that a spreadsheet reads it as text."""
+    return f"'{text}" if text.startswith(("=", "+", "-", "@", "\t")) else text

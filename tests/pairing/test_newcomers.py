@@ -1,0 +1,66 @@
+"""What a newcomer judges: what is planned least, spread over pairs and scenarios, by lot."""
+
+from __future__ import annotations
+
+from collections import Counter
+
+import numpy as np
+from hypothesis import given
+from hypothesis import strategies as st
+
+from arena.pairing.newcomers import choose_units
+from arena.pairing.rules import Entry, Grid, grid_of
+
+NAMES = ("ann", "bob", "cid", "dot")
+
+
+def grid(scenarios: int = 5, missing: tuple[tuple[int, str], ...] = ()) -> Grid:
+    return grid_of(
+        tuple(
+            Entry(scenario=f"place-{place}", contestant=name, picture=f"{place}-{name}")
+            for place in range(scenarios)
+            for name in NAMES
+            if (place, name) not in missing
+        )
+    )
+
+
+def nobody(of: Grid) -> np.ndarray:
+    return np.zeros(of.showable.shape, dtype=np.int64)
+
+
+def test_with_nothing_planned_every_pair_comes_once_before_any_comes_twice() -> None:
+    units = choose_units(grid(), nobody(grid()), 12, np.random.default_rng(1))
+    assert set(Counter(unit.pair for unit in units).values()) == {2}
+    assert len({(unit.pair, unit.scenario) for unit in units}) == 12
+
+
+def test_what_is_planned_least_comes_first() -> None:
+    judges = nobody(grid()) + 3
+    judges[2] = 0
+    judges[2, 4] = 1
+    (first,) = choose_units(grid(), judges, 1, np.random.default_rng(1))
+    assert first.pair == 2
+    assert first.scenario != 4
+    assert first.chance == 1 / 4
+
+
+def test_all_units_are_given_where_more_are_asked_for() -> None:
+    of = grid(scenarios=2, missing=((0, "ann"),))
+    units = choose_units(of, nobody(of), 100, np.random.default_rng(1))
+    assert len(units) == int(of.showable.sum()) == 9
+
+
+@given(st.integers(1, 40), st.integers(0, 2**32), st.integers(1, 12))
+def test_voters_who_follow_each_other_keep_all_units_equal(
+    quota: int, seed: int, voters: int
+) -> None:
+    of = grid()
+    judges = nobody(of)
+    for voter in range(voters):
+        for unit in choose_units(of, judges, quota, np.random.default_rng([seed, voter])):
+            judges[unit.pair, unit.scenario] += 1
+    pairs = judges.sum(axis=1)
+    assert pairs.sum() == voters * min(quota, judges.size)
+    assert pairs.max() - pairs.min() <= 1 + (quota > judges.size)
+    assert max(row.max() - row.min() for row in judges) <= 1

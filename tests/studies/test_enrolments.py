@@ -1,0 +1,199 @@
+"""A link for everybody: places, consent, quotas, drop-outs, and who may know who somebody is."""
+
+from __future__ import annotations
+
+from datetime import timedelta
+
+import pytest
+from django.utils import timezone
+
+from arena.errors import EnrolmentOver
+from arena.models import EnrolledVoter, Enrolment, Study
+from arena.queries.enrolments import own_enrolment, state_of
+from arena.queries.people import experts, list_accounts
+from arena.services.accounts import forget_identity
+from arena.services.enrolments import drop_silent, enrol, set_enrolment
+from arena.services.people import create_person
+from arena.services.studies import close_study
+from augment.errors import Conflict
+from augment.models import Event
+from tests.study_rows import a_study, matchups_of, vote
+
+pytestmark = pytest.mark.django_db
+
+
+def link(study: Study, **changes: object) -> Enrolment:
+    given: dict[str, object] = {
+        "consent": "I agree.",
+        "asks_for": "Your ID",
+        "places": 2,
+        "votes_each": 6,
+        "drop_out_after_h": 24,
+    }
+    return set_enrolment(study=study, **{**given, **changes})  # type: ignore[arg-type]
+
+
+def join(enrolment: Enrolment, name: str) -> EnrolledVoter:
+    return enrol(token=enrolment.token, external_id=name, agreed_sha256=enrolment.consent_sha256)
+
+
+def answer(study: Study, voter: EnrolledVoter, pairs: int) -> None:
+    for matchup in matchups_of(study, voter.expert.username)[:pairs]:
+        vote(matchup)
+
+
+def age(voter: EnrolledVoter, *, hours: float) -> None:
+    """As if they had come so long ago."""
+    came = timezone.now() - timedelta(hours=hours)
+    EnrolledVoter.objects.filter(pk=voter.pk).update(enrolled_at=came)
+
+
+@pytest.fixture
+def study() -> Study:
+    return a_study(votes_per_expert=3)
+
+
+def test_a_newcomer_gets_an_account_and_the_quota(study: Study) -> None:
+    voter = join(link(study), "w-1")
+    mine = study.matchups.filter(expert=voter.expert)
+    assert mine.count() == 6
+    assert list(mine.order_by("position").values_list("position", flat=True)) == [1, 2, 3, 4, 5, 6]
+    assert voter.expert in study.experts.all()
+    assert not voter.expert.has_usable_password()
+
+
+def test_newcomers_judge_what_is_planned_least(study: Study) -> None:
+    enrolment = link(study, places=6)
+    for number in range(6):
+        join(enrolment, f"w-{number}")
+    pairs: dict[frozenset[int], int] = {}
+    for left, right in study.matchups.values_list("left__contestant", "right__contestant"):
+        both = frozenset((left, right))
+        pairs[both] = pairs.get(both, 0) + 1
+    assert max(pairs.values()) - min(pairs.values()) <= 1
+
+
+def test_with_every_place_taken_nobody_is_taken_on(study: Study) -> None:
+    enrolment = link(study)
+    join(enrolment, "w-1")
+    join(enrolment, "w-2")
+    before = study.matchups.count()
+    with pytest.raises(EnrolmentOver, match="Every place"):
+        join(enrolment, "w-3")
+    assert study.matchups.count() == before
+    assert state_of(enrolment).free == 0
+
+
+def test_one_id_has_one_place(study: Study) -> None:
+    enrolment = link(study)
+    join(enrolment, " w-1 ")
+    with pytest.raises(Conflict, match="takes part already"):
+        join(enrolment, "w-1")
+
+
+@pytest.mark.parametrize("way", ["link", "study"])
+def test_what_is_closed_takes_nobody_on(study: Study, way: str) -> None:
+    enrolment = link(study, is_open=way != "link")
+    if way == "study":
+        close_study(study=study)
+    with pytest.raises(EnrolmentOver):
+        join(enrolment, "w-1")
+
+
+def test_who_read_an_older_text_reads_the_new_one_first(study: Study) -> None:
+    read = link(study).consent_sha256
+    enrolment = link(study, consent="I agree to more.")
+    with pytest.raises(Conflict, match="changed meanwhile"):
+        enrol(token=enrolment.token, external_id="w-1", agreed_sha256=read)
+    assert join(enrolment, "w-1").consent_sha256 == enrolment.consent_sha256
+
+
+def test_a_changed_rule_keeps_the_link(study: Study) -> None:
+    first = link(study)
+    assert link(study, places=9).token == first.token
+
+
+@pytest.mark.parametrize(
+    ("changes", "told"), [({"consent": "  "}, "1 to 5000"), ({"consent": "x" * 5001}, "1 to 5000")]
+)
+def test_a_rule_that_makes_no_sense_is_refused(
+    study: Study, changes: dict[str, object], told: str
+) -> None:
+    with pytest.raises(Conflict, match=told):
+        link(study, **changes)
+    assert not Enrolment.objects.exists()
+
+
+def test_the_code_is_told_when_every_pair_has_an_answer(study: Study) -> None:
+    voter = join(link(study), "w-1")
+    told = own_enrolment(study, voter.expert)
+    assert told is not None
+    assert told.completion_code == ""
+    answer(study, voter, 6)
+    told = own_enrolment(study, voter.expert)
+    assert told is not None
+    assert told.completion_code == voter.completion_code
+    assert state_of(voter.enrolment).done == 1
+
+
+def test_others_are_told_no_code(study: Study) -> None:
+    join(link(study), "w-1")
+    eva = study.experts.get(username="eva")
+    assert own_enrolment(study, eva) is None
+
+
+@pytest.mark.parametrize(("hours", "places"), [(23.9, 0), (24.1, 1)])
+def test_who_is_silent_for_too_long_makes_room(study: Study, hours: float, places: int) -> None:
+    enrolment = link(study, places=1)
+    voter = join(enrolment, "w-1")
+    age(voter, hours=hours)
+    assert drop_silent(enrolment=enrolment) == places
+    assert state_of(enrolment).free == places
+    assert study.matchups.filter(expert=voter.expert).count() == (0 if places else 6)
+
+
+def test_a_drop_out_is_replaced_when_somebody_comes_and_keeps_the_votes(study: Study) -> None:
+    enrolment = link(study, places=1)
+    first = join(enrolment, "w-1")
+    answer(study, first, 2)
+    age(first, hours=30)
+    with pytest.raises(EnrolmentOver):
+        join(enrolment, "w-2")  # the last vote was just now
+    later = timezone.now() + timedelta(hours=25)
+    drop_silent(enrolment=enrolment, now=later)
+    second = join(enrolment, "w-2")
+    assert study.matchups.filter(expert=first.expert).count() == 2
+    assert study.matchups.filter(expert=second.expert).count() == 6
+    told = own_enrolment(study, first.expert)
+    assert told is not None
+    assert (told.was_given_on, told.completion_code) == (True, "")
+
+
+def test_who_is_done_keeps_the_place_for_ever(study: Study) -> None:
+    enrolment = link(study, places=1)
+    voter = join(enrolment, "w-1")
+    answer(study, voter, 6)
+    assert drop_silent(enrolment=enrolment, now=timezone.now() + timedelta(days=365)) == 0
+
+
+def test_without_a_limit_nobody_drops_out(study: Study) -> None:
+    enrolment = link(study, drop_out_after_h=None)
+    join(enrolment, "w-1")
+    assert drop_silent(enrolment=enrolment, now=timezone.now() + timedelta(days=365)) == 0
+
+
+def test_voters_are_asked_for_their_study_alone(study: Study) -> None:
+    voter = join(link(study), "w-1")
+    assert voter.expert not in experts()
+    assert voter.expert not in [line.user for line in list_accounts()]
+
+
+def test_the_id_stands_in_no_log_and_goes_when_the_person_is_forgotten(study: Study) -> None:
+    admin = create_person(username="root", password=None, role="admin")
+    voter = join(link(study), "w-secret")
+    assert not [
+        event.pk for event in Event.objects.all() if "w-secret" in f"{event.before} {event.after}"
+    ]
+    forget_identity(user=voter.expert, actor=admin)
+    voter.refresh_from_db()
+    assert voter.external_id == ""

@@ -1,0 +1,132 @@
+"""Taking part by a link for everybody: from the form to the completion code."""
+
+from __future__ import annotations
+
+import csv
+import io
+
+import pytest
+from django.db import connection
+from django.test import Client
+from django.test.utils import CaptureQueriesContext
+from django.urls import reverse
+
+from arena.models import Enrolment, Study
+from arena.services.enrolments import set_enrolment
+from tests.study_rows import a_study, matchups_of, vote
+from tests.web.cast import people, signed_in
+
+pytestmark = pytest.mark.django_db
+
+
+@pytest.fixture
+def enrolment() -> Enrolment:
+    return set_enrolment(
+        study=a_study(votes_per_expert=3),
+        consent="I agree <fully>.\nReally.",
+        asks_for="Your Prolific ID",
+        places=2,
+        votes_each=6,
+        drop_out_after_h=24,
+    )
+
+
+def join(client: Client, enrolment: Enrolment, **changes: str) -> int:
+    given = {
+        "external_id": "w-1",
+        "agreed": "on",
+        "agreed_sha256": enrolment.consent_sha256,
+    }
+    return client.post(reverse("enrol", args=[enrolment.token]), given | changes).status_code
+
+
+def test_the_page_says_what_one_agrees_to_and_takes_the_id_from_the_address(
+    enrolment: Enrolment,
+) -> None:
+    page = Client().get(reverse("enrol", args=[enrolment.token]) + "?PROLIFIC_PID=abc")
+    text = page.content.decode()
+    assert "I agree &lt;fully&gt;." in text
+    assert "in 6 pairs" in text
+    assert 'value="abc"' in text
+
+
+def test_a_newcomer_votes_at_once_and_is_told_the_code_at_the_end(enrolment: Enrolment) -> None:
+    client = Client()
+    assert join(client, enrolment) == 302
+    study = enrolment.study
+    assert client.get(reverse("vote", args=[study.code])).status_code == 200
+    voter = enrolment.voters.get()
+    for matchup in matchups_of(study, voter.expert.username):
+        vote(matchup)
+    page = client.get(reverse("vote", args=[study.code])).content.decode()
+    assert voter.completion_code in page
+    again = client.get(reverse("enrol", args=[enrolment.token]))
+    assert again["Location"] == reverse("vote", args=[study.code])
+
+
+@pytest.mark.parametrize(
+    "changes", [{"external_id": " "}, {"agreed": ""}, {"agreed_sha256": "0" * 64}]
+)
+def test_what_is_missing_is_said_and_nobody_is_taken_on(
+    enrolment: Enrolment, changes: dict[str, str]
+) -> None:
+    assert join(Client(), enrolment, **changes) == 422
+    assert not enrolment.voters.exists()
+
+
+def test_a_link_that_takes_nobody_on_says_so(enrolment: Enrolment) -> None:
+    assert join(Client(), enrolment) == 302
+    assert join(Client(), enrolment, external_id="w-2") == 302
+    assert join(Client(), enrolment, external_id="w-3") == 410
+    Enrolment.objects.update(is_open=False)
+    assert Client().get(reverse("enrol", args=[enrolment.token])).status_code == 410
+    assert Client().get(reverse("enrol", args=["nobody"])).status_code == 404
+
+
+def test_a_voter_opens_nothing_but_the_own_study(enrolment: Enrolment) -> None:
+    client = Client()
+    join(client, enrolment)
+    for name in ("enrolment", "study", "experts"):
+        assert client.get(reverse(name, args=[enrolment.study.code])).status_code == 403
+    other = Study.objects.create(name="Round 2", votes_per_expert=1, seed=1, state="open")
+    assert client.get(reverse("vote", args=[other.code])).status_code == 404
+
+
+def test_an_admin_makes_the_link_and_changes_it(enrolment: Enrolment) -> None:
+    admin, url = people()["admin"], reverse("enrolment", args=[enrolment.study.code])
+    given = {
+        **{"consent": "Yes.", "asks_for": "ID", "places": 9, "votes_each": 4},
+        **{"drop_out_after_h": "", "is_open": "on"},
+    }
+    assert signed_in(admin).post(url, given).status_code == 302
+    enrolment.refresh_from_db()
+    assert (enrolment.places, enrolment.drop_out_after_h) == (9, None)
+    assert enrolment.token in signed_in(admin).get(url).content.decode()
+    assert signed_in(admin).post(url, {**given, "places": 0}).status_code == 422
+
+
+def test_the_file_says_whom_to_pay_and_holds_no_formula(enrolment: Enrolment) -> None:
+    join(Client(), enrolment, external_id="=1+1")
+    join(Client(), enrolment, external_id="w-2")
+    done = enrolment.voters.get(external_id="w-2")
+    for matchup in matchups_of(enrolment.study, done.expert.username):
+        vote(matchup)
+    url = reverse("enrolment-voters", args=[enrolment.study.code])
+    text = signed_in(people()["admin"]).get(url).content.decode()
+    first, second = csv.DictReader(io.StringIO(text))
+    assert (first["id"], first["is_done"], first["completion_code"]) == ("'=1+1", "0", "")
+    assert (second["id"], second["answered"]) == ("w-2", "6")
+    assert second["completion_code"] == done.completion_code
+
+
+def test_the_admins_page_asks_as_much_for_many_as_for_few(enrolment: Enrolment) -> None:
+    Enrolment.objects.update(places=40)
+    client = signed_in(people()["admin"])
+    url = reverse("enrolment", args=[enrolment.study.code])
+    asked = []
+    for number in range(4):
+        join(Client(), enrolment, external_id=f"w-{number}")
+        with CaptureQueriesContext(connection) as queries:
+            client.get(url)
+        asked.append(len(queries))
+    assert asked[1] == asked[3]
