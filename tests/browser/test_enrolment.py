@@ -11,7 +11,7 @@ from arena.models import Study
 from arena.services.enrolments import set_enrolment
 from arena.services.people import create_person
 from augment.models import Augmentation
-from tests.browser.booth import DESK, HERE, PHONE, Booth
+from tests.browser.booth import DESK, PHONE, Booth
 from tests.browser.test_voting_page import faults
 
 pytestmark = [pytest.mark.browser, pytest.mark.django_db(transaction=True)]

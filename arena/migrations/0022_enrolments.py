@@ -10,7 +10,7 @@ from django.db import migrations, models
 
 class Migration(migrations.Migration):
     dependencies = [
-        ("arena", "0019_webhooks"),
+        ("arena", "0021_practice_rounds"),
         migrations.swappable_dependency(settings.AUTH_USER_MODEL),
     ]
 
