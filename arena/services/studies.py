@@ -92,8 +92,6 @@ def open_study(
         **{name: getattr(given, name) for name in OF_THE_PLAN},
     )
     planned = plan(rules)
-    if given.practice:
-        require_practice_pictures()
     played = replays_of(broken | shown.cells) if given.allow_replay else None
     frozen = _frozen_rules(rules, planned, played) | _frozen_pictures(given, shown)
     study = _insert(name, frozen, given, rules, allow_simulated)
@@ -271,6 +269,8 @@ def _frozen_pictures(given: PlanOptions, shown: StudyPictures) -> dict[str, Any]
 
 
 def _conclude_opening(study: Study, *, matchups: int, actor: User | None) -> None:
+    if study.practice:
+        require_practice_pictures()
     preregister(study)
     log_event(
         actor=actor,
