@@ -4,12 +4,16 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from datetime import datetime, timedelta
+from typing import Any
 
 from django.contrib.auth.models import User
 from django.db.models import Count, F, Max, Q, QuerySet
 
 from arena.errors import NotYours
 from arena.models import EnrolledVoter, Enrolment, Study
+
+Voters = QuerySet[Any]
+"""Of EnrolledVoter, with what is counted about each."""
 
 
 def enrolment_by_token(token: str) -> Enrolment:
@@ -24,7 +28,7 @@ def enrolment_by_token(token: str) -> Enrolment:
     return found
 
 
-def enrolled_voters(enrolment: Enrolment) -> QuerySet[EnrolledVoter]:
+def enrolled_voters(enrolment: Enrolment) -> Voters:
     """Everybody who ever took a place; one query.
 
     Each has `planned`, `answered` and `skipped` (pairs; a skip is an answer as well) and
@@ -48,12 +52,12 @@ def enrolled_voters(enrolment: Enrolment) -> QuerySet[EnrolledVoter]:
     )
 
 
-def taking_a_place(voters: QuerySet[EnrolledVoter]) -> QuerySet[EnrolledVoter]:
+def taking_a_place(voters: Voters) -> Voters:
     """Those who are done or may still become so."""
     return voters.filter(dropped_at=None)
 
 
-def silent(enrolment: Enrolment, *, now: datetime) -> QuerySet[EnrolledVoter]:
+def find_silent(enrolment: Enrolment, *, now: datetime) -> Voters:
     """Who has a place, is not done and was not heard for as long as the enrolment allows."""
     found = taking_a_place(enrolled_voters(enrolment)).filter(answered__lt=F("planned"))
     if enrolment.drop_out_after_h is None:

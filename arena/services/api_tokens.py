@@ -68,7 +68,10 @@ def make_api_token(*, owner: User, name: str, role: str, days: int) -> FreshToke
             sentence("A token works for %(allowed)s days, not %(n)s.", allowed=allowed, n=days)
         )
     now = timezone.now()
-    if owner.api_tokens.filter(revoked_at=None, expires_at__gt=now).count() >= MOST_ALIVE:
+    if (
+        ApiToken.objects.filter(owner=owner, revoked_at=None, expires_at__gt=now).count()
+        >= MOST_ALIVE
+    ):
         raise Conflict(
             sentence("You have %(n)s tokens already; revoke one of them first.", n=MOST_ALIVE)
         )

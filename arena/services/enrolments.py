@@ -17,7 +17,7 @@ from arena.pairing.arrays import IntArray
 from arena.pairing.following import follow_on
 from arena.pairing.newcomers import choose_units
 from arena.pairing.rules import Grid, place_of
-from arena.queries.enrolments import enrolment_by_token, silent, state_of
+from arena.queries.enrolments import enrolment_by_token, find_silent, state_of
 from arena.services.attention_checks import without_lost_checks
 from arena.services.handing_over import undecided_rows
 from arena.services.people import create_person
@@ -146,7 +146,7 @@ def drop_silent(
     """
     study = Study.objects.select_for_update().get(pk=enrolment.study_id)
     at = now or timezone.now()
-    gone = list(silent(enrolment, now=at))
+    gone = list(find_silent(enrolment, now=at))
     for voter in gone:
         rows = undecided_rows(study, voter.expert)
         Matchup.objects.filter(pk__in=[row.pk for row in rows]).delete()

@@ -78,7 +78,7 @@ def enrol_page(request: HttpRequest, token: str) -> HttpResponse:
     except NotYours as error:
         raise Http404 from error
     user = request.user
-    if user.is_authenticated and enrolment.voters.filter(expert=cast(User, user)).exists():
+    if user.is_authenticated and enrolment.voters.filter(expert=user).exists():
         return redirect("vote", code=enrolment.study.code)
     given = next((request.GET[name] for name in ID_PARAMETERS if name in request.GET), "")
     form = NewcomerForm(request.POST or None, initial={"external_id": given[:120]})
