@@ -25,6 +25,7 @@ GROUPS = {
     "tests/journeys/test_demo.py": "demo_home",
     "tests/browser/test_two_experts.py": "demo_home",
     "tests/browser/": "browser",
+    "tests/results/test_every_": "every_number",
 }
 """Tests that share a fixture which takes long to make: they run in one process, in this order of
 what a test's address begins with."""

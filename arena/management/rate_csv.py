@@ -129,12 +129,7 @@ def run(
     Raises:
         CsvNotRated: The file can't be read or the options don't fit it.
     """
-    if rounds is not None and not 1 <= rounds <= MOST_ROUNDS:
-        raise CsvNotRated(f"rounds go from 1 to {MOST_ROUNDS}, not {rounds}")
-    if seed < 0:
-        raise CsvNotRated(f"a seed is 0 or more, not {seed}")
-    if method == "elo" and intervals == "closed":
-        raise CsvNotRated("elo has no intervals in closed form, only resamples")
+    _check_draws(method, intervals, rounds, seed)
     _check_columns(method, intervals, adjust, by, format)
     path = Path(file)
     try:
@@ -172,6 +167,15 @@ def run(
         by=by_label(votes, board, by) if by else None,
     )
     return FORMATS[format](rated)
+
+
+def _check_draws(method: str, intervals: str | None, rounds: int | None, seed: int) -> None:
+    if rounds is not None and not 1 <= rounds <= MOST_ROUNDS:
+        raise CsvNotRated(f"rounds go from 1 to {MOST_ROUNDS}, not {rounds}")
+    if seed < 0:
+        raise CsvNotRated(f"a seed is 0 or more, not {seed}")
+    if method == "elo" and intervals == "closed":
+        raise CsvNotRated("elo has no intervals in closed form, only resamples")
 
 
 def _check_columns(

@@ -161,9 +161,7 @@ def rate(
     if unit is None:
         unit = Unit.VOTE if method is Method.ELO else Unit.TWO_WAY
     if votes.covariates.shape[1]:
-        intervals = intervals or Intervals.CLOSED_FORM
-        if method is not Method.BRADLEY_TERRY or intervals is not Intervals.CLOSED_FORM:
-            raise ValueError("covariates need Bradley-Terry with intervals in closed form")
+        intervals = _intervals_beside_covariates(method, intervals)
     rules = Rules(
         method=method,
         unit=unit,
@@ -177,6 +175,12 @@ def rate(
         report=report,
     )
     return _rate(votes, rules)
+
+
+def _intervals_beside_covariates(method: Method, intervals: Intervals | None) -> Intervals:
+    if method is not Method.BRADLEY_TERRY or intervals not in (None, Intervals.CLOSED_FORM):
+        raise ValueError("covariates need Bradley-Terry with intervals in closed form")
+    return Intervals.CLOSED_FORM
 
 
 def _rate(votes: Comparisons, rules: Rules) -> Leaderboard:

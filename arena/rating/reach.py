@@ -15,7 +15,7 @@ from itertools import islice
 
 import numpy as np
 
-from arena.rating.bootstrap import Unit, resample
+from arena.rating.bootstrap import Rounds, Unit, resample
 from arena.rating.comparisons import (
     BoolArray,
     Comparisons,
@@ -109,16 +109,10 @@ def loose_rounds(
         while some := list(islice(drawn, workers)):
             unclear: list[BoolArray] = []
             for block in some:
-                games, scores = block.games, block.scores
-                done += games.shape[1]
-                known = np.zeros(games.shape[1], dtype=np.bool_)
-                if len(tree) == contestants - 1:
-                    of_tree = scores[tree]
-                    known = np.asarray(((of_tree > 0) & (of_tree < games[tree])).all(axis=0))
-                fine += int(known.sum())
-                rest = np.flatnonzero(~known)
-                up, down = scores[:, rest] > 0, scores[:, rest] < games[:, rest]
-                unclear += list(np.concatenate([up, down]).T)
+                left = _unclear_rounds(block, tree, contestants)
+                done += block.games.shape[1]
+                fine += block.games.shape[1] - len(left)
+                unclear += left
             if report is not None:
                 report(done, rounds)
             found += list(pool.map(follow, unclear) if workers > 1 else map(follow, unclear))
@@ -137,6 +131,18 @@ def loose_rounds(
 
 
 # --- Private -----------------------------------------------------------------------------------
+
+
+def _unclear_rounds(block: Rounds, tree: IntArray, contestants: int) -> list[BoolArray]:
+    """Who scored against whom, either way, in each round that the tree alone does not settle."""
+    games, scores = block.games, block.scores
+    known = np.zeros(games.shape[1], dtype=np.bool_)
+    if len(tree) == contestants - 1:
+        of_tree = scores[tree]
+        known = np.asarray(((of_tree > 0) & (of_tree < games[tree])).all(axis=0))
+    rest = np.flatnonzero(~known)
+    up, down = scores[:, rest] > 0, scores[:, rest] < games[:, rest]
+    return list(np.concatenate([up, down]).T)
 
 
 class _Ways:

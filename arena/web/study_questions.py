@@ -65,14 +65,7 @@ def opening(rules: dict[str, Any]) -> Confirmation:
         _("Minutes for each expert: about %(minutes)s, at %(seconds)s s a pair.")
         % {"minutes": round(each * seconds / 60), "seconds": f"{seconds:g}"}
     )
-    if settled:
-        facts.append(
-            _(
-                "Pairs that are settled as ties and shown to nobody: %(settled)s; within 0.15 m "
-                "and 2° in every object: %(alike)s, identical pictures among them."
-            )
-            % {"settled": settled, "alike": alike}
-        )
+    facts += _settled_facts(settled, alike)
     if later:
         facts.append(_("Votes that are planned later, by those before: %(n)s.") % {"n": later})
     if rules["allow_simulated"]:
@@ -141,3 +134,15 @@ def handing_over(study: Study, giver: str, takers: Sequence[str]) -> Confirmatio
 def _crumbs(study: Study) -> tuple[tuple[str, str], ...]:
     address = reverse("study", args=[study.code])
     return ((_("Studies"), reverse("studies")), (study.name, address))
+
+
+def _settled_facts(settled: int, alike: int) -> list[str]:
+    if not settled:
+        return []
+    return [
+        _(
+            "Pairs that are settled as ties and shown to nobody: %(settled)s; within 0.15 m "
+            "and 2° in every object: %(alike)s, identical pictures among them."
+        )
+        % {"settled": settled, "alike": alike}
+    ]

@@ -84,8 +84,9 @@ def _visit(size: str) -> None:
     from arena.web.results_tabs import TABS
     from augment.models import Augmentation
     from tests import full_study as made
+    from tests.web.addresses import address
     from tests.web.cast import World
-    from tests.web.test_access import ACTIONS, PAGES, address
+    from tests.web.test_access import ACTIONS, PAGES
 
     call_command("migrate", verbosity=0)
     call_command("collectstatic", verbosity=0, interactive=False)

@@ -2,23 +2,17 @@
 
 from __future__ import annotations
 
-import uuid
-
 import pytest
 from django.test import Client
 from django.urls import reverse
 
-from arena.services.authorships import mark_author
-from arena.services.invitations import invite
-from arena.services.reports import Complaint, report
 from arena.services.studies import close_study
 from arena.web.urls import urlpatterns
-from augment.models import Endpoint, EndpointModel, SceneUpload, Simulation, UploadMoment
-from tests.web.cast import World, people, signed_in, status, world
+from tests.web.addresses import STRANGER, address
+from tests.web.cast import people, signed_in, status, world
 
 pytestmark = pytest.mark.django_db
 
-STRANGER = str(uuid.uuid4())
 PAGES: dict[str, tuple[int, int, int]] = {
     # address: admin, analyst, expert
     "home": (200, 200, 200),
@@ -157,112 +151,6 @@ OPEN_TO_THE_WORLD = {
     "first",
     "welcome",
 }
-
-
-def address(name: str, here: World) -> str:
-    shown = here.study.matchups.filter(expert=here.expert).get(position=1)
-    if name == "report":
-        key, said = uuid.uuid4(), Complaint(reason="other")
-        report(expert=here.expert, matchup_code=shown.code, key=key, said=said)
-        return reverse(name, kwargs={"code": here.study.code, "key": key})
-    arguments: dict[str, dict[str, object]] = {
-        "person-link": {"code": here.expert.person.code},
-        "person-change": {"code": here.expert.person.code},
-        "person-forget": {"code": here.expert.person.code},
-        "api-token-revoke": {"code": STRANGER},
-        "webhook": {"code": STRANGER},
-        "webhook-change": {"code": STRANGER},
-        "webhook-forget": {"code": STRANGER},
-        "webhook-repeat": {"code": STRANGER},
-        "job": {"code": here.job.code},
-        "contestant": {"code": here.augmentation.contestant.code},
-        "contestant-retired": {"code": here.augmentation.contestant.code},
-        "job-progress": {"code": here.job.code},
-        "job-retry": {"code": here.job.code},
-        "job-retry-cause": {"code": here.job.code, "key": "0" * 16},
-        "job-pause": {"code": here.job.code},
-        "job-simulate": {"code": here.job.code},
-        "drives": {"code": here.job.code},
-        "driving-export": {"code": here.job.code, "form": "csv"},
-        "job-cancel": {"code": here.job.code},
-        "job-resume": {"code": here.job.code},
-        "displacement-export": {"code": here.job.code, "form": "csv"},
-        "tool-calls-export": {"code": here.job.code, "form": "csv"},
-        "transcripts-export": {"code": here.job.code},
-        "scenarios-export": {"code": STRANGER},
-        "scenarios-write": {"code": here.job.code, "form": "json"},
-        "analyses": {"code": here.job.code},
-        "analyses-export": {"code": here.job.code, "part": "pairs", "form": "csv"},
-        "faults": {"code": here.job.code},
-        "faults-export": {"code": here.job.code, "form": "csv"},
-        "label": {"code": here.job.code},
-        "labelling-close": {"code": here.job.code},
-        "augmentation": {"code": here.augmentation.code},
-        "transcript": {"code": here.augmentation.code},
-        "asked-image": {"digest": "0" * 64},
-        "scene": {"code": here.augmentation.scenario.base_scene.code},
-        "scenario": {"code": here.augmentation.scenario.code},
-        "reference-edit": {"code": here.augmentation.scenario.code},
-        "scenario-new": {"code": here.augmentation.scenario.base_scene.code},
-        "prompts": {"code": here.augmentation.scenario.code},
-        "prompt-file": {"code": here.augmentation.scenario.code},
-        "prompt-image": {"code": here.augmentation.scenario.code, "number": 0},
-        "reference-drop": {"code": here.augmentation.scenario.code},
-        "edit-check": {"code": here.augmentation.scenario.code},
-        "correct": {"code": here.augmentation.code},
-        "intent": {"code": here.augmentation.scenario.code},
-        "set-intent": {"code": here.augmentation.scenario.code},
-        "intent-read": {"code": here.augmentation.scenario.code},
-        "picture": {"kind": "augmentation", "code": shown.left.code},
-        "audit-export": {"form": "csv"},
-        "results-export": {"code": here.study.code, "form": "csv"},
-        "study-export": {"code": here.study.code},
-        "results-chart": {"code": here.study.code, "name": "pairs", "form": "svg"},
-        "results-votes-export": {"code": here.study.code, "form": "csv"},
-        "results-vote": {"code": here.study.code, "vote": STRANGER},
-        "shown-picture": {"code": here.study.code, "matchup": shown.code, "side": "left"},
-        "results-tab": {"code": here.study.code, "tab": "pairs"},
-        "rating-again": {"code": here.study.code, "rating": STRANGER},
-        "matchup-image": {"token": shown.left_token},
-        "replay": {"code": shown.code},
-    }
-    if name.startswith("endpoint") and name not in ("endpoints", "endpoint-new"):
-        site, _ = Endpoint.objects.get_or_create(
-            label="here", defaults={"base_url": "http://127.0.0.1:1/v1"}
-        )
-        model, _ = EndpointModel.objects.get_or_create(endpoint=site, model="m")
-        is_of_site = name in ("endpoint", "endpoint-model-new")
-        arguments[name] = {"code": site.code if is_of_site else model.code}
-    if name in ("drive", "drive-file"):
-        row, _ = Simulation.objects.get_or_create(
-            scenario=here.augmentation.scenario,
-            subject=Simulation.Subject.UNMODIFIED,
-            planner="idm",
-            offsets="paper",
-        )
-        form = {} if name == "drive" else {"form": "json"}
-        arguments[name] = {"code": row.code, **form}
-    if name.startswith(("upload", "moment-")):
-        upload, _ = SceneUpload.objects.get_or_create(name="log.zip", size_bytes=1, state="failed")
-        moment, _ = UploadMoment.objects.get_or_create(upload=upload)
-        arguments[name] = {"code": moment.code if name == "moment-keep" else upload.code}
-    if name == "revoke":
-        made = invite(study=here.study, expert=here.expert)
-        arguments["revoke"] = {"code": made.invitation.code}
-    if name == "author-back":
-        marked = mark_author(study=here.study, expert=here.expert, contestant="ann")
-        arguments["author-back"] = {"code": marked.code}
-    own = (
-        *("study", "preregistration", "experts", "invite", "author", "study-close"),
-        *("study-hand-over", "study-rate", "enrolment", "enrolment-voters", "enrolment-drop"),
-    )
-    results = (
-        *("results", "results-votes", "results-votes-file", "results-open"),
-        *("results-disagreement", "results-worst", "results-sheet", "results-sheet-file"),
-    )
-    is_of_study = name in own + results or name.startswith("vote")
-    found = {"code": here.study.code} if is_of_study else arguments.get(name, {})
-    return reverse(name, kwargs=found)
 
 
 def test_every_role_gets_what_the_table_says() -> None:

@@ -1,0 +1,138 @@
+"""The same for agreement, the panel, sides, types and sessions; see test_every_number."""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections import Counter, defaultdict
+from typing import Any
+
+import krippendorff
+import numpy as np
+import pytest
+import statsmodels.api as sm
+from scipy.stats import t
+
+from arena.rating.estimate import Estimate
+from tests.results.oracles import POINTS, codes, glm
+from tests.results.raw import CHECKS, RawVote, Shown, strengths_of
+
+pytestmark = pytest.mark.django_db  # so that there is a database; the study is made once
+
+
+def test_agreement_by_krippendorffs_package_and_by_loops(shown: Shown) -> None:
+    units: dict[tuple[str, frozenset[str]], list[tuple[str, float]]] = defaultdict(list)
+    for vote in shown.main:
+        units[vote.item, vote.names].append((vote.judge, vote.score_of(min(vote.names))))
+    shared = [values for values in units.values() if len(values) > 1]
+    judges = sorted({vote.judge for vote in shown.main})
+    table = np.full((len(judges), len(shared)), np.nan)
+    for column, values in enumerate(shared):
+        for judge, score in values:
+            table[judges.index(judge), column] = 2 * score
+    found = shown.results.trust.agreement
+    assert found is not None
+    assert (found.units, found.judgements) == (len(shared), sum(map(len, shared)))
+    levels: list[tuple[Any, Estimate]]
+    levels = [("nominal", found.alpha), ("interval", found.alpha_interval)]
+    for level, estimate in levels:
+        theirs = krippendorff.alpha(reliability_data=table, level_of_measurement=level)
+        assert estimate.value == pytest.approx(theirs, abs=1e-9)
+    equal = [
+        np.mean([a == b for (_, a), (_, b) in itertools.combinations(values, 2)])
+        for values in shared
+    ]
+    weights = [len(values) for values in shared]
+    shares = [np.mean([[s == v for v in (0, 0.5, 1)] for _, s in vs], axis=0) for vs in shared]
+    by_chance = (np.mean(shares, axis=0) * (1 - np.mean(shares, axis=0))).sum() / 2
+    assert found.ac1.value == pytest.approx((np.mean(equal) - by_chance) / (1 - by_chance))
+    if len(set(weights)) == 1:
+        assert found.percent.value == pytest.approx(np.mean(equal))
+    assert f"{found.alpha.value:.2f} (" in shown.said("raters")
+    agreed = Counter[str]()
+    seen = Counter[str]()
+    for values in shared:
+        for judge, score in values:
+            others = [other == score for who, other in values if who != judge]
+            agreed[judge] += float(np.mean(others))  # type: ignore[assignment]
+            seen[judge] += 1
+    for line in shown.results.trust.raters:
+        assert line.shared == seen[line.name]
+        if line.shared:
+            assert line.agreement.value == pytest.approx(agreed[line.name] / seen[line.name])
+
+
+def test_the_panel_counts_what_each_expert_did(shown: Shown) -> None:
+    first = {vote.matchup: vote for vote in shown.votes}
+    for line in shown.results.trust.raters:
+        own = [vote for vote in shown.main if vote.judge == line.name]
+        decided = [vote.score == 1.0 for vote in own if vote.score != 0.5]
+        assert line.votes == len(own)
+        assert line.median_ms == pytest.approx(np.median([vote.ms for vote in own]))
+        assert line.fast == pytest.approx(np.mean([vote.ms < 1000 for vote in own]))
+        assert line.ties == pytest.approx(np.mean([vote.score == 0.5 for vote in own]))
+        assert line.left.value == pytest.approx(np.mean(decided))
+        again = [v for v in shown.votes if v.kind == "repeat" and v.judge == line.name]
+        alike = [v.score_of(v.left) == first[v.repeat_of or 0].score_of(v.left) for v in again]
+        assert line.repeats == (len(again), sum(alike))
+        checks = [v for v in shown.votes if v.kind == "check" and v.judge == line.name]
+        passed = [v.score_of("interplan") == 1.0 for v in checks]
+        assert line.checks == (len(checks), sum(passed))
+        cells = next(row for row in shown.rows("raters") if row[0].startswith(line.name))
+        assert cells[1] == str(len(own))
+        assert f"{100 * line.ties:.0f} %" in cells
+    assert sum(line.checks[0] for line in shown.results.trust.raters) == CHECKS
+
+
+def test_the_side_and_whom_it_serves(shown: Shown) -> None:
+    votes = shown.main
+    experts = codes([vote.judge for vote in votes])
+    found = glm(
+        votes, shown.slugs, np.ones((len(votes), 1)), cov_type="cluster",
+        cov_kwds={"groups": experts, "use_correction": False},
+    )  # fmt: skip
+    side, groups = shown.results.trust.side, len(np.unique(experts))
+    assert side is not None
+    value = found.params[-1] * POINTS
+    half = t.ppf(0.975, groups - 1) * found.bse[-1] * POINTS * math.sqrt(groups / (groups - 1))
+    assert side.advantage.value == pytest.approx(value, abs=1e-4)
+    assert side.advantage.upper == pytest.approx(value + half, rel=1e-5)
+    both = np.array([[float(slug in vote.names) for slug in shown.slugs] for vote in votes])
+    each = glm(votes, shown.slugs, both).params[len(shown.slugs) - 1 :]
+    kept = shown.results.trust.by_side
+    assert kept is not None
+    effects = {cell.contestant: cell.effect.value for cell in kept.cells}
+    for slug, one in zip(shown.slugs, 2 * (each - each.mean()) * POINTS, strict=True):
+        assert effects[slug] == pytest.approx(one, abs=1e-3)
+
+
+def test_types_against_contestants_by_raos_score(shown: Shown) -> None:
+    votes = shown.main
+    design = strengths_of(votes, shown.slugs)
+    types = codes([vote.type for vote in votes])
+    null = glm(votes, shown.slugs)
+    extra = np.hstack([design * (types == one)[:, None] for one in range(1, types.max() + 1)])
+    score = null.model.score_test(
+        null.params, k_constraints=extra.shape[1], exog_extra=extra, observed=False
+    )[0]
+    kept = shown.results.trust.by_type
+    assert kept is not None
+    assert kept.statistic == pytest.approx(float(np.squeeze(score)), rel=1e-5)
+    assert kept.freedom == extra.shape[1]
+
+
+def test_change_within_sessions_by_least_squares(shown: Shown) -> None:
+    # All votes were drawn at one moment: a session an expert, in the order of their plan.
+    kept = {one.measure: one for one in shown.results.trust.drifts}
+    by_judge: dict[str, list[RawVote]] = defaultdict(list)
+    for vote in shown.main:
+        by_judge[vote.judge].append(vote)
+    x, y, level = [], [], []
+    for number, own in enumerate(by_judge.values()):
+        x += [place / 100 for place in range(len(own))]
+        y += [float(vote.score == 0.5) for vote in own]
+        level += [number] * len(own)
+    design = np.column_stack([np.array(level)[:, None] == np.arange(len(by_judge)), x])
+    slope = sm.OLS(np.array(y), design.astype(float)).fit().params[-1]
+    assert kept["ties"].slope.value == pytest.approx(slope, abs=1e-9)
+    assert kept["ties"].votes == len(shown.main)
