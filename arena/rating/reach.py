@@ -118,19 +118,24 @@ def loose_rounds(
             found += list(pool.map(follow, unclear) if workers > 1 else map(follow, unclear))
     loose = [one for one in found if one is not None]
     fine += len(found) - len(loose)
-    in_main, sides, outer = [list(column) for column in zip(*loose, strict=True)] or [[]] * 3
+    return fine, _loose_of(loose, rating)
+
+
+# --- Private -----------------------------------------------------------------------------------
+
+
+def _loose_of(rounds: list[tuple[BoolArray, BoolArray, IntArray]], rating: FloatArray) -> Loose:
+    """The rounds that do not determine everybody, one a column."""
+    in_main, sides, outer = [list(column) for column in zip(*rounds, strict=True)] or [[]] * 3
     if not sides:
-        return fine, Loose.none(contestants)
+        return Loose.none(len(rating))
     main = np.array(in_main).T
-    return fine, Loose(
+    return Loose(
         values=np.repeat(rating[:, None], main.shape[1], axis=1),
         in_main=main & (main.sum(axis=0) > 1),
         side=np.array(sides, dtype=np.int8).T,
         side_of_all=np.array(outer, dtype=np.int8).T,
     )
-
-
-# --- Private -----------------------------------------------------------------------------------
 
 
 def _unclear_rounds(block: Rounds, tree: IntArray, contestants: int) -> list[BoolArray]:
