@@ -12,11 +12,6 @@ class Migration(migrations.Migration):
     operations = [
         migrations.AddField(
             model_name='study',
-            name='entered',
-            field=models.JSONField(default=dict, help_text='what was entered of a draft, by field; empty once it is open'),
-        ),
-        migrations.AddField(
-            model_name='study',
             name='looks',
             field=models.JSONField(default=list, help_text="what the stopping rule saw, one entry a look; no contestant's"),
         ),

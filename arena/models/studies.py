@@ -57,9 +57,6 @@ class Study(models.Model):
     looks = models.JSONField(
         default=list, help_text="what the stopping rule saw, one entry a look; no contestant's"
     )
-    entered = models.JSONField(
-        default=dict, help_text="what was entered of a draft, by field; empty once it is open"
-    )
     opened_at = models.DateTimeField(null=True, blank=True)
     closed_at = models.DateTimeField(null=True, blank=True)
 
