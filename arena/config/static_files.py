@@ -12,6 +12,9 @@ _COMMENT = re.compile(r"^[ \t]*(//.*|/\*[^*]*\*/[ \t]*)$\n?", re.MULTILINE)
 _INDENT = re.compile(r"^[ \t]+|^\n", re.MULTILINE)
 _AROUND_RULES = re.compile(r" (?=\{)|(?<=[{;,:>]) | (?=>)|;? ?(?=\})|(?<=\})\n")
 
+_OPEN_LINE = re.compile(r"^((?:(?!//).)*[{;,(])\n", re.MULTILINE)
+"""A line of a script without a comment (or an address) in it, whose end means nothing."""
+
 
 class ModuleStorage(CompressedManifestStaticFilesStorage):  # type: ignore[misc] # untyped
     """Hashed names also inside `import` statements; comments and indentation stay at home."""
@@ -29,8 +32,9 @@ def as_served(name: str, text: str) -> str:
     """A script or style sheet of ours without comment lines, empty lines and indentation.
 
     A style sheet goes without blanks and semicolons around its braces as well, and without blanks
-    behind its commas and colons and around its >. Ours have no text that spans lines, and style
+    behind its commas and colons and around its >; a script goes on in the same line where one
+    ends in a way that nothing can be over. Ours have no text that spans lines, and style
     sheets none with one of these signs; tests keep it so.
     """
     lean = _INDENT.sub("", _COMMENT.sub("", text))
-    return _AROUND_RULES.sub("", lean) if name.endswith(".css") else lean
+    return _AROUND_RULES.sub("", lean) if name.endswith(".css") else _OPEN_LINE.sub(r"\1", lean)

@@ -93,7 +93,8 @@ class StudyForm(ChoiceForm):
         options = PlanOptions(
             repeat_share=(entered["repeats"] or 0) / 100,
             check_share=(entered["checks"] or 0) / 100,
-            overlap_share=(entered["overlap"] or 0) / 100,
+            # A single expert shares nothing with anybody: what the form offers is no wish then.
+            overlap_share=(entered["overlap"] or 0) / 100 if len(entered["experts"]) > 1 else 0.0,
             adaptive_share=(entered["adaptive"] or 0) / 100,
             appearances=appearances,
             pair_votes=pair_votes,

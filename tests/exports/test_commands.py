@@ -100,11 +100,13 @@ def test_before_the_first_rating_there_is_nothing_to_export(tmp_path: Path) -> N
 def test_an_open_study_is_exported_only_on_purpose_and_that_is_logged(tmp_path: Path) -> None:
     a_study()
     run("rate", "Round 1", "--early")
+    looks = Event.objects.filter(verb="look early")
+    assert looks.count() == 1
     target = ("export", "leaderboard", "Round 1", "--out", tmp_path / "x.csv")
     with pytest.raises(CommandError, match="still open"):
         run(*target)
     run(*target, "--early")
-    assert Event.objects.filter(verb="look early").count() == 1
+    assert looks.count() == 2
     with (tmp_path / "x.csv").open(newline="") as file:
         assert {row["early"] for row in csv.DictReader(file)} == {"yes"}
 

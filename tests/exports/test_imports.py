@@ -130,5 +130,7 @@ def test_the_same_pages_show_imported_votes(tmp_path: Path) -> None:
     for tab in ("pairs", "types", "raters", "coverage", "displacement", "cost", "log"):
         answer = analyst.get(reverse("results-tab", args=[study.code, tab]))
         assert answer.status_code == 200, tab
-    cell = analyst.get(reverse("results-votes", args=[study.code]), {"a": "x", "b": "y"})
+    cell = analyst.get(
+        reverse("results-votes", args=[study.code]), {"contestant": "x", "opponent": "y"}
+    )
     assert cell.content.decode().count("<tr>") == 13, "a head and twelve votes"

@@ -95,5 +95,5 @@ def test_a_job_and_its_script_speak_german() -> None:
     shown = answer.content.decode()
     assert 'aria-label="0 von 2 erledigt"' in shown
     assert 'data-all="Alle 2 sind erledigt."' in shown
-    assert 'data-stopped="An der Grenze angehalten: {} von 2 sind erledigt."' in shown
+    assert 'data-stopped="Steht: {} von 2 sind erledigt."' in shown
     assert '<th scope="col">Szenario</th>' in shown

@@ -31,7 +31,7 @@ def test_all_but_one_is_not_yet_a_hundred_percent() -> None:
     ("job_state", "cells", "tone", "label"),
     [
         ("finished", {"done": 3}, "good", "Finished"),
-        ("finished", {"unreadable": 3}, "good", "Finished"),
+        ("finished", {"unreadable": 3}, "warn", "Finished without a modification"),
         ("finished", {"done": 2, "failed": 1}, "warn", "Finished in part"),
         ("finished", {"unreadable": 1, "failed": 2}, "warn", "Finished in part"),
         ("finished", {"failed": 3}, "bad", "Failed"),

@@ -46,7 +46,12 @@ def test_the_page_names_every_module_that_its_script_imports() -> None:
 
 def test_comments_and_indentation_are_not_served() -> None:
     script = '// why\nconst a = {\n  b: "// no comment",\n};\n\n  // more\na.b;\n'
-    assert as_served("a.js", script) == 'const a = {\nb: "// no comment",\n};\na.b;\n'
+    assert as_served("a.js", script) == 'const a = {b: "// no comment",\n};a.b;'
+
+
+def test_a_line_with_a_comment_behind_it_ends_where_it_ended() -> None:
+    script = "a(); // b;\nc(\n  d,\n);\nreturn\ne\n"
+    assert as_served("a.js", script) == "a(); // b;\nc(d,);return\ne\n"
 
 
 def test_style_sheets_go_without_blanks_around_braces_and_behind_commas_and_colons() -> None:
