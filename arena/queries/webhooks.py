@@ -69,13 +69,12 @@ def _jobs_finished(webhook: Webhook, since: datetime) -> Iterator[Occurrence]:
 
 
 def _budgets_hit(webhook: Webhook, since: datetime) -> Iterator[Occurrence]:
-    stops = Event.objects.filter(object_kind="job", verb="stop", at__gte=since).order_by("pk")
-    names = dict(
-        GenerationJob.objects.filter(code__in=stops.values("object_code")).values_list(
-            "code", "name"
-        )
+    stops = list(
+        Event.objects.filter(object_kind="job", verb="stop", at__gte=since).order_by("pk")
     )
-    known = {str(code): name for code, name in names.items()}
+    # The log keeps codes as texts, which PostgreSQL compares with no code.
+    stopped = GenerationJob.objects.filter(code__in={stop.object_code for stop in stops})
+    known = {str(code): name for code, name in stopped.values_list("code", "name")}
     for stop in stops:
         yield Occurrence(
             name=f"{stop.object_code} {stop.at.isoformat()}",
