@@ -97,26 +97,26 @@ def test_many_calls_come_in_the_order_in_which_they_were_written() -> None:
     assert [call.mended for call in calls] == [False, *[True] * 5]
 
 
-@pytest.mark.parametrize(
-    ("answer", "problem"),
-    [
-        ('I call {"call": "pose_on_lane", "arguments": {"lane": "Lane1"', "one line of the form"),
-        ('{"arguments": {}, "call": "pose_on_lane"', "one line of the form"),
-        ('{"call": "pose_on_lane", "arguments": {}, "why": 1}', "no other keys"),
-        ('- {"call": "pose_on_lane"}', "no other keys"),
-        ('{"name": "pose_on_lane", "why": 1, "arguments": {}}', "no other keys"),
-        ('{"call": {"lane": "Lane1"}, "arguments": {}}', "has the form"),
-        ('{"name": "pose_on_lane", "arguments": "{lane: 1}"}', "the arguments are not JSON"),
-        ("{'call': 'pose_on_lane', 'arguments': {'distance_m': NaN}}", "one line of the form"),
-        ("pose_on_lane(lane='Lane1', distance_m=21.4 m)", "expected a comma or ) at 'm)'"),
-        ("pose_on_lane(lane='Lane1', distance_m=20+1.4)", "expected a comma or ) at '+1.4)'"),
-        ("pose_on_lane(lane='Lane1', lane='Lane2')", "lane stands twice"),
-        ("pose_on_lane('Lane1', lane='Lane2')", "has the form"),
-        ("pose_on_lane(1, 2, 3, 4, 5)", "has the form"),
-        ("I need pose_on_lane(lane, start, distance_m) for this.", "is named and not called"),
-        ("I would ask pose_on_lane for the pose.", "is named and not called"),
-    ],
-)
+MALFORMED = [
+    ('I call {"call": "pose_on_lane", "arguments": {"lane": "Lane1"', "one line of the form"),
+    ('{"arguments": {}, "call": "pose_on_lane"', "one line of the form"),
+    ('{"call": "pose_on_lane", "arguments": {}, "why": 1}', "no other keys"),
+    ('- {"call": "pose_on_lane"}', "no other keys"),
+    ('{"name": "pose_on_lane", "why": 1, "arguments": {}}', "no other keys"),
+    ('{"call": {"lane": "Lane1"}, "arguments": {}}', "has the form"),
+    ('{"name": "pose_on_lane", "arguments": "{lane: 1}"}', "the arguments are not JSON"),
+    ("{'call': 'pose_on_lane', 'arguments': {'distance_m': NaN}}", "one line of the form"),
+    ("pose_on_lane(lane='Lane1', distance_m=21.4 m)", "expected a comma or ) at 'm)'"),
+    ("pose_on_lane(lane='Lane1', distance_m=20+1.4)", "expected a comma or ) at '+1.4)'"),
+    ("pose_on_lane(lane='Lane1', lane='Lane2')", "lane stands twice"),
+    ("pose_on_lane('Lane1', lane='Lane2')", "has the form"),
+    ("pose_on_lane(1, 2, 3, 4, 5)", "has the form"),
+    ("I need pose_on_lane(lane, start, distance_m) for this.", "is named and not called"),
+    ("I would ask pose_on_lane for the pose.", "is named and not called"),
+]
+
+
+@pytest.mark.parametrize(("answer", "problem"), MALFORMED)
 def test_a_call_that_can_not_be_understood_says_what_is_wrong(answer: str, problem: str) -> None:
     (call,) = calls_in(answer)
     assert problem in call.problem
