@@ -11,7 +11,7 @@ from arena.models import Study
 from arena.services.enrolments import set_enrolment
 from arena.services.people import create_person
 from augment.models import Augmentation
-from tests.browser.booth import DESK, PHONE, Booth
+from tests.browser.booth import DESK, PHONE, Booth, ready
 from tests.browser.test_voting_page import faults
 
 pytestmark = [pytest.mark.browser, pytest.mark.django_db(transaction=True)]
@@ -55,8 +55,8 @@ def test_somebody_enrols_votes_and_gets_a_code(booth: Booth, theme: str) -> None
     page.get_by_label("I have read this and agree").check()
     page.get_by_role("button", name="Take part").click()
     for pair in (1, 2):
-        expect(page.get_by_text(f"{pair} of 2").first).to_be_visible()
-        page.wait_for_timeout(300)
+        expect(page.locator("#place")).to_have_text(str(pair))
+        ready(page)
         page.keyboard.press("2")
     expect(page.locator("[data-completion]")).to_have_text(enrolment.voters.get().completion_code)
     assert faults(page) == []
