@@ -54,11 +54,9 @@ def find_contestants(wanted: Narrowing) -> QuerySet[Contestant]:
     """Contestants by name, those that are retired at the end; no attention checks."""
     found = Contestant.objects.exclude(kind=Contestant.Kind.CHECK).select_related("endpoint")
     if wanted.search:
-        words = ("name", "slug", "variant", "model", "endpoint__label")
-        matches = Q()
-        for word in words:
-            matches |= Q(**{f"{word}__icontains": wanted.search})
-        found = found.filter(matches)
+        found = found.filter(
+            _any_has(wanted.search, "name", "slug", "variant", "model", "endpoint__label")
+        )
     if wanted.kind:
         found = found.filter(kind=wanted.kind)
     if wanted.part:
@@ -74,11 +72,7 @@ def find_scenarios(wanted: Narrowing) -> QuerySet[Scenario]:
     """
     found = Scenario.objects.filter(paraphrase_of=None).select_related("base_scene")
     if wanted.search:
-        words = ("slug", "instruction", "base_scene__slug")
-        matches = Q()
-        for word in words:
-            matches |= Q(**{f"{word}__icontains": wanted.search})
-        found = found.filter(matches)
+        found = found.filter(_any_has(wanted.search, "slug", "instruction", "base_scene__slug"))
     if wanted.kind:
         found = found.filter(type=wanted.kind)
     if wanted.part:
@@ -99,3 +93,11 @@ def group_by_type(rows: list[Scenario]) -> list[TypeGroup]:
         TypeGroup(type=name, label=labels.get(name, name), scenarios=scenarios)
         for name, scenarios in found.items()
     ]
+
+
+def _any_has(text: str, *columns: str) -> Q:
+    """Rows with that text in one of these columns, whatever the case."""
+    matches = Q()
+    for column in columns:
+        matches |= Q(**{f"{column}__icontains": text})
+    return matches

@@ -12,7 +12,7 @@ from __future__ import annotations
 import argparse
 import re
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
@@ -203,22 +203,29 @@ def write_table(name: str, text: str) -> None:
     PAGE.write_text(page)
 
 
-def main() -> None:
+def print_tables(tables: Mapping[str, Callable[[int], Iterator[str]]], *, studies: int) -> None:
+    """Print tables line by line; with `--write` each goes between its marks in the page.
+
+    Args:
+        tables: What gives the lines of each, for so many studies a row.
+        studies: How many, unless the command says so.
+    """
     parser = argparse.ArgumentParser()
-    parser.add_argument("studies", type=int, nargs="?", default=250)
+    parser.add_argument("studies", type=int, nargs="?", default=studies)
     parser.add_argument("--write", action="store_true", help="into docs/coverage.md")
     asked = parser.parse_args()
-    began = time.process_time()
-    for name, rows in (
-        ("controversial", controversial_lines(asked.studies)),
-        ("worlds", lines(asked.studies)),
-    ):
+    for name, lines_of in tables.items():
         said = [f"{asked.studies} simulated studies a row.", ""]
-        for line in rows:
+        for line in lines_of(asked.studies):
             print(line, flush=True)
             said.append(line)
         if asked.write:
             write_table(name, "\n".join(said))
+
+
+def main() -> None:
+    began = time.process_time()
+    print_tables({"controversial": controversial_lines, "worlds": lines}, studies=250)
     print(f"{time.process_time() - began:.0f} s of processor")
 
 

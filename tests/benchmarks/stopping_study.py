@@ -10,7 +10,6 @@ All of it is simulated; 60 studies a row take some minutes of one processor.
 
 from __future__ import annotations
 
-import argparse
 from collections.abc import Iterator
 from typing import Any
 
@@ -19,7 +18,7 @@ import numpy as np
 from arena.rating.comparisons import BoolArray, Comparisons, FloatArray, select_votes
 from arena.rating.leaderboard import Leaderboard, rate
 from arena.rating.stopping import StoppingRule, look_levels, widest_half_width
-from tests.benchmarks.coverage_study import bounds, write_table
+from tests.benchmarks.coverage_study import bounds, print_tables
 from tests.benchmarks.worlds import World, paper_ratings
 
 ROWS = ((9, 0.0, 0.0, 30.0), (9, 100.0, 40.0, 45.0), (20, 0.0, 0.0, 22.0), (20, 100.0, 40.0, 35.0))
@@ -104,18 +103,5 @@ def lines(studies: int) -> Iterator[str]:
         yield _row(*row, studies)
 
 
-def main() -> None:
-    parser = argparse.ArgumentParser()
-    parser.add_argument("studies", type=int, nargs="?", default=60)
-    parser.add_argument("--write", action="store_true", help="into docs/coverage.md")
-    asked = parser.parse_args()
-    said = [f"{asked.studies} simulated studies a row.", ""]
-    for line in lines(asked.studies):
-        print(line, flush=True)
-        said.append(line)
-    if asked.write:
-        write_table("stopping", "\n".join(said))
-
-
 if __name__ == "__main__":
-    main()
+    print_tables({"stopping": lines}, studies=60)

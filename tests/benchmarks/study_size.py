@@ -9,7 +9,6 @@ All of it is simulated; 100 studies a row take three minutes of one processor.
 
 from __future__ import annotations
 
-import argparse
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
@@ -18,7 +17,7 @@ import numpy as np
 from arena.rating.comparisons import FloatArray
 from arena.rating.leaderboard import rate
 from arena.rating.sample_size import StudyDesign, expect, votes_per_expert_for
-from tests.benchmarks.coverage_study import write_table
+from tests.benchmarks.coverage_study import print_tables
 from tests.benchmarks.worlds import SCENARIOS, World
 
 CONTESTANTS, TIE_SHARE = 9, 0.42
@@ -130,18 +129,5 @@ def _row(world: World, step: float, gap: float, studies: int) -> list[str]:
     return [*cells, f"{gap:.0f} points: {votes:,}", f"{found.power:.0%}"]
 
 
-def main() -> None:
-    parser = argparse.ArgumentParser()
-    parser.add_argument("studies", type=int, nargs="?", default=100)
-    parser.add_argument("--write", action="store_true", help="into docs/coverage.md")
-    asked = parser.parse_args()
-    said = [f"{asked.studies} simulated studies a row.", ""]
-    for line in lines(asked.studies):
-        print(line, flush=True)
-        said.append(line)
-    if asked.write:
-        write_table("sizes", "\n".join(said))
-
-
 if __name__ == "__main__":
-    main()
+    print_tables({"sizes": lines}, studies=100)
