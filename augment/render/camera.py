@@ -29,8 +29,9 @@ WIDTH_PX = 1200
 MARGIN_M = 5.0
 # The widest window, 5 px/m: beyond it a car is a speck, and an arrow at the edge tells more.
 MAX_WIDTH_M = 240.0
-# Without a reference nothing says where a change may come: a wide view, far ahead.
-OPEN_WIDTH_M = 60.0
+# Without a reference nothing says where a change may come: a view far ahead. A wider one shows
+# more of what lies beside a street, which maps mostly leave blank.
+OPEN_WIDTH_M = 48.0
 _OPEN_AHEAD_M = 40.0
 LEAST_WIDTH_M = 42.0
 WIDTH_STEP_M = 6.0
@@ -43,7 +44,7 @@ _AHEAD_M, _BEHIND_M, _BESIDE_M = 15.0, 3.0, 3.0
 # Cells of the raster on which the ground is counted, per metre.
 _CELLS_PER_M = 2
 
-LOOK = 2
+LOOK = 3
 """Raised whenever pictures of old and new look must not stand side by side."""
 
 

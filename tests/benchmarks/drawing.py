@@ -17,17 +17,17 @@ from pathlib import Path
 
 import django
 import numpy as np
-from PIL import Image
 
-from augment.formats.readers import READERS, recognise
 from augment.geometry.boxes import corners
-from augment.render import bev, palette
+from augment.render import bev
 from augment.render.camera import Camera, camera_for
 from augment.render.marks import PERSON_PX
 from augment.render.shapes import ribbon
 from augment.scene.entities import AgentType, Scene, TrafficAgent
 from augment.scene.lane_graph import AnyLane
 from augment.scene.modification import Modification, without_traffic
+from tests.recorded import recorded_moments
+from tests.render.pictures import blank_share
 
 ROUNDS = 5
 PANEL_PX = 618.0
@@ -40,24 +40,19 @@ def main() -> None:
     print(f"load average {os.getloadavg()[0]:.1f}\n")
     print("| pictures | n | blank, median | person on the page (px) | kB, median |")
     print("|---|---|---|---|---|")
-    shown = list(_catalogue())
-    recorded = list(_recorded())
-    for name, those in (("catalogue", shown), ("recorded", [one for _, one in recorded])):
-        drawn = [(camera_for(scene, change), scene, change) for scene, change in those]
-        pngs = [
-            bev.draw(scene, change or Modification(), camera) for camera, scene, change in drawn
-        ]
-        if pngs:
-            blank = statistics.median(map(_blank_share, pngs))
-            size = statistics.median(len(png) / 1000.0 for png in pngs)
-            people = min(_person_px(camera) for camera, _, _ in drawn)
-            print(f"| {name} | {len(pngs)} | {blank:.0%} | {people:.1f} | {size:.0f} |")
+    recorded = _recorded()
+    _print_pictures("catalogue", list(_catalogue()))
+    for name, scenes in recorded.items():
+        _print_pictures(name, [(scene, None) for scene in scenes])
+    if recorded:
+        firsts = [(scenes[0], None) for scenes in recorded.values()]
+        _print_pictures("recorded, the first moment of each", firsts)
     print(
         "\n| recorded scene | boxes | cold (ms) | warm, one moved (ms) | warm, one added (ms) |",
         end="",
     )
     print(" matplotlib (ms) |\n|---|---|---|---|---|---|")
-    for name, (scene, _) in recorded:
+    for name, (scene, *_) in recorded.items():
         camera = camera_for(scene, None)
         near = scene.agents[0]
         added = Modification(added=(_standing(near),))
@@ -82,24 +77,23 @@ def _catalogue() -> Iterator[tuple[Scene, Modification | None]]:
         yield whole if entry.keep_traffic else without_traffic(whole), entry.reference
 
 
-def _recorded() -> Iterator[tuple[str, tuple[Scene, None]]]:
+def _recorded() -> dict[str, list[Scene]]:
+    """Scenes by the format that they were recorded in, one every five seconds."""
+    found: dict[str, list[Scene]] = {}
     folder = os.environ.get("REALDATA_DIR", "")
-    if not folder:
-        return
-    for path in sorted(Path(folder).glob("*/*")):
-        if not any(reader.recognises(path) for reader in READERS.values()):
-            continue
-        reader = recognise(path)
-        moment = next(iter(reader.moments(path, every_s=60.0)))
-        reading = reader.read(path, item=moment.item, frame=moment.frame, name="recorded")
-        yield reader.title, (reading.scene, None)
+    if folder:
+        for title, scene in recorded_moments(Path(folder), every_s=5.0):
+            found.setdefault(title, []).append(scene)
+    return found
 
 
-def _blank_share(png: bytes) -> float:
-    """Pixels of paper alone; a ground of its own is as empty, so it counts as well."""
-    pixels = np.asarray(Image.open(io.BytesIO(png)).convert("RGB"))
-    empty = [(pixels == colour).all(axis=2) for colour in (palette.PAPER, palette.BEYOND)]
-    return float((empty[0] | empty[1]).mean())
+def _print_pictures(name: str, shown: list[tuple[Scene, Modification | None]]) -> None:
+    drawn = [(camera_for(scene, change), scene, change) for scene, change in shown]
+    pngs = [bev.draw(scene, change or Modification(), camera) for camera, scene, change in drawn]
+    blank = statistics.median(map(blank_share, pngs))
+    size = statistics.median(len(png) / 1000.0 for png in pngs)
+    people = min(_person_px(camera) for camera, _, _ in drawn)
+    print(f"| {name} | {len(pngs)} | {blank:.0%} | {people:.1f} | {size:.0f} |")
 
 
 def _person_px(camera: Camera) -> float:
