@@ -1,41 +1,42 @@
-"""The log of administrative acts as CSV and as JSON lines."""
+"""The log of administrative acts as CSV and as JSON lines, written while it is read."""
 
 from __future__ import annotations
 
 import json
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import dataclass
 
-from arena.exports.formats import Format
-from arena.services.cells import csv_text
+from arena.services.cells import csv_parts
 from augment.models import Event
 
 COLUMNS = ("at", "actor", "verb", "object_kind", "object_code", "before", "after")
 
 
-def csv_bytes(events: Iterable[Event]) -> bytes:
+@dataclass(frozen=True, slots=True, kw_only=True)
+class StreamedFormat:
+    """How the log is written, however long it is; `parts` makes the file's bytes one by one."""
+
+    suffix: str
+    content_type: str
+    parts: Callable[[Iterable[Event]], Iterator[bytes]]
+
+
+def csv_of(events: Iterable[Event]) -> Iterator[bytes]:
     """One line an act; what changed is JSON in a cell, empty where there was nothing."""
-    return csv_text(COLUMNS, map(_cells, events)).encode()
+    return csv_parts(COLUMNS, map(_cells, events))
 
 
-def jsonl_bytes(events: Iterable[Event]) -> bytes:
+def jsonl_of(events: Iterable[Event]) -> Iterator[bytes]:
     """One object an act."""
-    return "".join(_lines(events)).encode()
-
-
-AUDIT_FORMATS: dict[str, Format[Iterable[Event]]] = {
-    "csv": Format(
-        suffix="csv", content_type="text/csv; charset=utf-8", is_text=True, write=csv_bytes
-    ),
-    "jsonl": Format(
-        suffix="jsonl", content_type="application/jsonl", is_text=True, write=jsonl_bytes
-    ),
-}
-
-
-def _lines(events: Iterable[Event]) -> Iterator[str]:
     for event in events:
         document = dict(zip(COLUMNS, (*_head(event), event.before, event.after), strict=True))
-        yield json.dumps(document, ensure_ascii=False, sort_keys=True) + "\n"
+        yield (json.dumps(document, ensure_ascii=False, sort_keys=True) + "\n").encode()
+
+
+AUDIT_FORMATS = {
+    "csv": StreamedFormat(suffix="csv", content_type="text/csv; charset=utf-8", parts=csv_of),
+    "jsonl": StreamedFormat(suffix="jsonl", content_type="application/jsonl", parts=jsonl_of),
+}
 
 
 def _head(event: Event) -> tuple[str, ...]:

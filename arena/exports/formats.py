@@ -10,6 +10,7 @@ from typing import Generic, Protocol, TypeVar
 from augment.errors import UnknownName
 
 Table = TypeVar("Table")
+Named = TypeVar("Named")
 Drawn = TypeVar("Drawn", contravariant=True)
 
 
@@ -51,7 +52,7 @@ def formats(**writers: Callable[[Table], bytes]) -> dict[str, Format[Table]]:
     return made
 
 
-def format_named(known: Mapping[str, Format[Table]], name: str) -> Format[Table]:
+def format_named(known: Mapping[str, Named], name: str) -> Named:
     """How to write that format.
 
     Raises:

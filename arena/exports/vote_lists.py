@@ -2,42 +2,23 @@
 
 from __future__ import annotations
 
-import csv
-import io
 from collections.abc import Iterator
 
 from arena.models import Snapshot
 from arena.queries.listed_votes import ListedVote
 from arena.queries.vote_lists import each_vote
 from arena.queries.vote_search import VoteSearch
-from arena.services.cells import cell
+from arena.services.cells import csv_parts
 from arena.services.vote_rows import BOTH_BAD, COLUMNS, WINNERS
 
 LIST_COLUMNS = (*COLUMNS, "mark", "reason", "vote")
 """Those of the rating's own file, then why a vote does not count ("counted" where it does), why it
 was skipped, and the code in its address."""
 
-_AT_ONCE = 1000
-
 
 def vote_list_csv(snapshot: Snapshot, search: VoteSearch) -> Iterator[bytes]:
     """The file, some lines at a time; names are pseudonyms, no cell is a formula."""
-    sheet = io.StringIO()
-    writer = csv.writer(sheet, lineterminator="\n")
-    writer.writerow(LIST_COLUMNS)
-    for number, vote in enumerate(each_vote(snapshot, search), start=1):
-        writer.writerow([cell(value) for value in _row(vote)])
-        if number % _AT_ONCE == 0:
-            yield _taken(sheet)
-    yield _taken(sheet)
-
-
-def _taken(sheet: io.StringIO) -> bytes:
-    """What was written since the last time."""
-    content = sheet.getvalue().encode()
-    sheet.seek(0)
-    sheet.truncate()
-    return content
+    return csv_parts(LIST_COLUMNS, map(_row, each_vote(snapshot, search)))
 
 
 def _row(vote: ListedVote) -> tuple[object, ...]:

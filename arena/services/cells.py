@@ -4,7 +4,10 @@ from __future__ import annotations
 
 import csv
 import io
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
+
+AT_ONCE = 1000
+"""So many lines of a streamed file are written together."""
 
 _FORMULA = ("=", "+", "-", "@", "\t", "\r", "\n")
 
@@ -24,8 +27,24 @@ def cell(value: object) -> str:
 
 def csv_text(head: Sequence[str], rows: Iterable[Sequence[object]]) -> str:
     """A CSV file; no cell below its head is a formula."""
+    return b"".join(csv_parts(head, rows)).decode()
+
+
+def csv_parts(head: Sequence[str], rows: Iterable[Sequence[object]]) -> Iterator[bytes]:
+    """The same file, AT_ONCE lines at a time while the rest is read."""
     sheet = io.StringIO()
     writer = csv.writer(sheet, lineterminator="\n")
     writer.writerow(head)
-    writer.writerows([cell(value) for value in row] for row in rows)
-    return sheet.getvalue()
+    for number, row in enumerate(rows, start=1):
+        writer.writerow([cell(value) for value in row])
+        if number % AT_ONCE == 0:
+            yield _taken(sheet)
+    yield _taken(sheet)
+
+
+def _taken(sheet: io.StringIO) -> bytes:
+    """What was written since the last time."""
+    content = sheet.getvalue().encode()
+    sheet.seek(0)
+    sheet.truncate()
+    return content

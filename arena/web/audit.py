@@ -6,7 +6,7 @@ import json
 from typing import Any
 
 from django import forms
-from django.http import Http404, HttpRequest, HttpResponse
+from django.http import Http404, HttpRequest, HttpResponse, StreamingHttpResponse
 from django.shortcuts import render
 from django.views.decorators.http import require_safe
 
@@ -19,7 +19,6 @@ from augment.errors import UnknownName
 from augment.models import Event
 
 ON_A_PAGE = 50
-MOST_EXPORTED = 200_000
 
 
 class DaysForm(forms.Form):
@@ -51,8 +50,8 @@ def audit_page(request: HttpRequest) -> HttpResponse:
 
 @allow_only(ADMIN)
 @require_safe
-def audit_file(request: HttpRequest, form: str) -> HttpResponse:
-    """All acts that the page's filters name, as a file."""
+def audit_file(request: HttpRequest, form: str) -> StreamingHttpResponse:
+    """All acts that the page's filters name, as a file that is sent while it is read."""
     try:
         chosen = format_named(AUDIT_FORMATS, form)
     except UnknownName as error:
@@ -60,8 +59,8 @@ def audit_file(request: HttpRequest, form: str) -> HttpResponse:
     _, filters, days = _asked(request)
     if days.errors:
         raise Http404
-    return HttpResponse(
-        chosen.write(acts(filters)[:MOST_EXPORTED].iterator()),
+    return StreamingHttpResponse(
+        chosen.parts(acts(filters).iterator()),
         content_type=chosen.content_type,
         headers={"Content-Disposition": f'attachment; filename="audit.{chosen.suffix}"'},
     )

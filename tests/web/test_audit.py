@@ -6,6 +6,7 @@ import csv
 import io
 import json
 import re
+from collections.abc import Iterator
 from io import StringIO
 from pathlib import Path
 
@@ -14,8 +15,11 @@ from django.conf import settings
 from django.core.management import CommandError, call_command
 from django.test import Client
 from django.urls import reverse
+from django.utils import timezone
 
+from arena.exports.audit import AUDIT_FORMATS
 from arena.models import EarlyLook, Snapshot, Study
+from arena.services.cells import AT_ONCE
 from arena.services.ratings import rate
 from arena.services.studies import close_study
 from augment.models import Event
@@ -28,6 +32,12 @@ pytestmark = pytest.mark.django_db
 
 def _page(client: Client, **asked: str) -> str:
     return client.get(reverse("audit"), asked).content.decode()
+
+
+def _file(client: Client, form: str, **asked: str) -> str:
+    answer = client.get(reverse("audit-export", args=[form]), asked)
+    assert answer.streaming
+    return str(answer.getvalue(), "utf-8")
 
 
 def _acts() -> tuple[Client, Study]:
@@ -75,14 +85,33 @@ def test_it_is_paged_and_the_filters_stay() -> None:
 def test_it_is_exported_as_csv_and_as_json_lines() -> None:
     client, study = _acts()
     asked = {"kind": "scene"}
-    text = client.get(reverse("audit-export", args=["csv"]), asked).content.decode()
+    text = _file(client, "csv", **asked)
     (row,) = csv.DictReader(io.StringIO(text))
     assert (row["verb"], row["object_code"], row["actor"]) == ("import", "a-street", "Analyst 1")
     assert json.loads(row["after"]) == {"notes": "=1+1"}
-    lines = client.get(reverse("audit-export", args=["jsonl"])).content.decode().splitlines()
+    lines = _file(client, "jsonl").splitlines()
     assert len(lines) == Event.objects.count()
     assert {json.loads(line)["object_code"] for line in lines} >= {"a-street", str(study.code)}
     assert client.get(reverse("audit-export", args=["xlsx"])).status_code == 404
+
+
+def test_the_file_holds_every_act_and_keeps_none_of_them_in_memory() -> None:
+    """More than were ever read together; read to the end, and given up after the first part."""
+    client, _ = _acts()
+    there_were = Event.objects.count()
+    Event.objects.bulk_create(
+        [Event(verb="probe", object_kind="endpoint", object_code=str(n)) for n in range(2500)]
+    )
+    for form, heads in (("csv", 1), ("jsonl", 0)):
+        assert len(_file(client, form).splitlines()) == there_were + 2500 + heads, form
+    parts = AUDIT_FORMATS["csv"].parts(_endless())
+    assert next(parts).count(b"\n") == AT_ONCE + 1
+
+
+def _endless() -> Iterator[Event]:
+    """A log without an end: whoever wants all of it before the first line never writes one."""
+    while True:
+        yield Event(verb="probe", object_kind="endpoint", object_code="x", at=timezone.now())
 
 
 # --- Early looks -------------------------------------------------------------------------------
