@@ -2,17 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 from django.contrib.auth.models import User
-from django.db.models import Count, Q, QuerySet
+from django.db.models import Count, Exists, OuterRef, QuerySet
 
-from arena.models import Study, Vote
-
-_DECIDED = Q(matchups__votes__isnull=False)
-_SKIPPED = Q(matchups__votes__outcome=Vote.Outcome.SKIP, matchups__votes__superseded_by=None)
-_PLANNED = Count("matchups", distinct=True)
+from arena.models import Matchup, Study, Vote
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -35,11 +31,11 @@ class StudyProgress:
 
 
 def of_studies(studies: Sequence[Study] | None = None) -> list[StudyProgress]:
-    """Every study, or those that are given, the youngest first."""
-    rows = Study.objects.select_related("vote_file").annotate(planned=_PLANNED, **_counted(Q()))
+    """Every study, or those that are given, the youngest first; four queries."""
+    rows = Study.objects.select_related("vote_file").defer(*_LONG)
     if studies is not None:
         rows = rows.filter(pk__in=[study.pk for study in studies])
-    return [_line(row) for row in rows]
+    return of_these(list(rows))
 
 
 def studies_seen_by(user: User, *, is_staff: bool) -> QuerySet[Study]:
@@ -50,51 +46,54 @@ def studies_seen_by(user: User, *, is_staff: bool) -> QuerySet[Study]:
 
 
 def of_these(studies: Sequence[Study], *, expert: User | None = None) -> list[StudyProgress]:
-    """Some studies in their order, counted over all experts or over one's own; one query."""
-    own = Q() if expert is None else Q(matchups__expert=expert)
-    planned = Count("matchups", filter=own, distinct=True) if expert else _PLANNED
-    rows = Study.objects.filter(pk__in=[study.pk for study in studies])
-    found = {row.pk: row for row in rows.annotate(planned=planned, **_counted(own))}
-    later = None if expert is None else expert.username
+    """Some studies in their order, counted over all experts or over one's own; three queries."""
+    matchups = Matchup.objects.filter(study__in=[study.pk for study in studies])
+    if expert is not None:
+        matchups = matchups.filter(expert=expert)
+    votes = Vote.objects.filter(matchup=OuterRef("pk"))
+    planned = _count(matchups)
+    # A matchup's first vote tells whether it has any, and stands in an index of its own.
+    decided = _count(matchups.filter(Exists(votes.filter(supersedes=None))))
+    skips = Vote.objects.filter(outcome=Vote.Outcome.SKIP, superseded_by=None).values("matchup")
+    skipped = _count(matchups.filter(pk__in=skips))
     return [
-        _line(found[study.pk], None if later is None else study.votes_to_plan.get(later, 0))
+        StudyProgress(
+            study=study,
+            planned=planned.get(study.pk, 0) + _planned_later(study, expert),
+            voted=decided.get(study.pk, 0) - skipped.get(study.pk, 0),
+            skipped=skipped.get(study.pk, 0),
+        )
         for study in studies
     ]
 
 
 def of_expert(expert: User) -> list[StudyProgress]:
     """The studies that an expert was invited to, counted over their own matchups; no drafts."""
-    own = Q(matchups__expert=expert)
-    rows = (
-        Study.objects.filter(experts=expert)
-        .exclude(state=Study.State.DRAFT)
-        .annotate(
-            planned=Count("matchups", filter=own, distinct=True),
-            **_counted(own),
-        )
-    )
-    return [_line(row, row.votes_to_plan.get(expert.username, 0)) for row in rows]
+    seen = studies_seen_by(expert, is_staff=False).defer(*_LONG)
+    return of_these(list(seen), expert=expert)
 
 
 def of_study(study: Study) -> StudyProgress:
     """One study over all its experts."""
-    return _line(Study.objects.annotate(planned=_PLANNED, **_counted(Q())).get(pk=study.pk))
+    (line,) = of_these([study])
+    return line
 
 
-def _counted(whose: Q) -> dict[str, Count]:
-    return {
-        "decided": Count("matchups", filter=whose & _DECIDED, distinct=True),
-        "skipped": Count("matchups", filter=whose & _SKIPPED, distinct=True),
-    }
+# --- Private -----------------------------------------------------------------------------------
+
+_LONG = ("rules", "preregistration", "looks")
+"""Columns with a line for every picture of a study, which no progress needs."""
 
 
-def _line(row: Study, later: int | None = None) -> StudyProgress:
-    """The counts of an annotated row, with the votes that the adaptive part still plans."""
-    if later is None:
-        later = sum(row.votes_to_plan.values())
-    planned: int = row.planned  # type: ignore[attr-defined]
-    decided: int = row.decided  # type: ignore[attr-defined]
-    skipped: int = row.skipped  # type: ignore[attr-defined]
-    return StudyProgress(
-        study=row, planned=planned + later, voted=decided - skipped, skipped=skipped
+def _count(matchups: QuerySet[Matchup]) -> dict[int, int]:
+    rows: Iterable[tuple[int, int]] = (
+        matchups.order_by().values("study").annotate(n=Count("pk")).values_list("study", "n")
     )
+    return dict(rows)
+
+
+def _planned_later(study: Study, expert: User | None) -> int:
+    """Showings that the adaptive part still plans."""
+    if expert is None:
+        return sum(study.votes_to_plan.values())
+    return int(study.votes_to_plan.get(expert.username, 0))
