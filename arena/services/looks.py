@@ -5,6 +5,7 @@ What a look keeps is how wide the widest interval was, not whose: no contestant'
 
 from __future__ import annotations
 
+import logging
 from dataclasses import dataclass
 from typing import Any
 
@@ -20,6 +21,9 @@ from arena.rating.stopping import StoppingRule, look_levels, widest_half_width
 from arena.services.studies import close_study
 from arena.services.vote_arrays import vote_arrays
 from augment.services.events import log_event
+from augment.services.running.workers import Survived
+
+logger = logging.getLogger(__name__)
 
 ROUNDS = 1000
 """They only say who is determined at all."""
@@ -88,11 +92,20 @@ def stopping_progress(study: Study) -> StoppingProgress | None:
 def take_due_looks() -> list[Study]:
     """Take the look of every open study whose votes have reached it.
 
+    One that breaks is logged, keeps no other study from its look, and is tried again next time.
+
     Returns:
         The studies at which somebody looked.
     """
     is_open = Study.objects.filter(state=Study.State.OPEN, rules__has_key="stopping")
-    return [study for study in is_open.order_by("pk") if take_look(study)]
+    looked = []
+    for study in is_open.order_by("pk"):
+        with Survived() as look:
+            if take_look(study):
+                looked.append(study)
+        if look.fault is not None:
+            logger.warning("The look at study %s broke: %s", study.code, look.fault)
+    return looked
 
 
 def take_look(study: Study) -> bool:
