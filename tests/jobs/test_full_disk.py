@@ -1,0 +1,85 @@
+"""A disk that is really full: a file system of 64 kB, mounted for the test."""
+
+from __future__ import annotations
+
+import subprocess
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+from django.conf import LazySettings
+
+from augment.models import Augmentation, ModelCall
+from augment.services.running import jobs
+from augment.services.scenarios.pictures import original_picture
+from tests.jobs.models import llama_job
+from tests.jobs.running import Wire, ran
+from tests.variants.answers import GOOD
+
+pytestmark = pytest.mark.django_db
+State = Augmentation.State
+BYTES = 256 * 1024
+LEFT = 4 * 1024
+"""Room for the beginning of a picture."""
+
+
+@pytest.fixture
+def disk(settings: LazySettings, tmp_path: Path) -> Iterator[Path]:
+    """The folder of the pictures, on a disk of its own."""
+    folder = tmp_path / "media"
+    folder.mkdir()
+    mounted = subprocess.run(
+        ["mount", "-t", "tmpfs", "-o", f"size={BYTES}", "arena", str(folder)],
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    if mounted.returncode:
+        pytest.skip(f"no disk can be mounted here: {mounted.stderr.strip()}")
+    settings.MEDIA_ROOT = folder
+    try:
+        yield folder
+    finally:
+        subprocess.run(["umount", str(folder)], check=True)
+
+
+def test_a_full_disk_fails_the_row_and_a_retry_asks_nobody_again(disk: Path) -> None:
+    row = llama_job().augmentations.select_related("scenario__base_scene").get()
+    original_picture(row.scenario)
+    filler = _fill(disk)
+    before = _files(disk)
+
+    ran(row, Wire(GOOD))
+    assert row.state == State.FAILED
+    assert "No space left on device" in row.reason
+    assert row.modification is not None, "what was answered is kept"
+    assert _files(disk) == before, "no half of a picture"
+    assert ModelCall.objects.count() == 1
+
+    filler.unlink()
+    jobs.retry_failed(row.job)
+    ran(row, Wire())
+    assert row.state == State.DONE
+    assert (disk / row.image).read_bytes().endswith(b"IEND\xaeB`\x82")
+    assert ModelCall.objects.count() == 1, "nothing was paid twice"
+
+
+def _fill(disk: Path) -> Path:
+    """Write until there is no more room, then leave a little."""
+    filler = disk / "filler"
+    with filler.open("wb", buffering=0) as file:
+        written = 0
+        try:
+            while True:
+                written += file.write(b"x" * LEFT)
+        except OSError:
+            file.truncate(written - LEFT)
+    return filler
+
+
+def _files(disk: Path) -> dict[str, int]:
+    return {
+        str(path.relative_to(disk)): path.stat().st_size
+        for path in disk.rglob("*")
+        if path.is_file()
+    }
