@@ -63,6 +63,11 @@ class Bucket:
         listed = self.client.list_objects_v2(Bucket=BUCKET).get("Contents", [])
         return sorted(entry["Key"] for entry in listed)
 
+    def clear(self) -> None:
+        """Delete all that lies in it."""
+        for name in self.names():
+            self.client.delete_object(Bucket=BUCKET, Key=name)
+
 
 @contextmanager
 def bucket() -> Iterator[Bucket]:
