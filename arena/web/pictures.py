@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 from django.core.files.storage import default_storage
-from django.http import FileResponse, Http404
+from django.http import FileResponse, Http404, HttpRequest
+
+from augment.services.scenarios.thumbnails import WIDTHS_PX, thumbnail_of
 
 
 def picture_response(name: str) -> FileResponse:
@@ -21,3 +23,19 @@ def picture_response(name: str) -> FileResponse:
     response["Content-Disposition"] = "inline"
     response["Cache-Control"] = "private, max-age=31536000, immutable"
     return response
+
+
+def sized_picture_response(request: HttpRequest, name: str) -> FileResponse:
+    """The stored PNG of that name, or made smaller where the address says `?width=`.
+
+    For pages of staff, who may know which pictures were made together.
+
+    Raises:
+        Http404: There is no such file, or no picture is made that wide.
+    """
+    width = request.GET.get("width", "")
+    if not width:
+        return picture_response(name)
+    if width not in map(str, WIDTHS_PX):
+        raise Http404
+    return picture_response(thumbnail_of(name, int(width)))

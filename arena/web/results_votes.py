@@ -23,7 +23,7 @@ from arena.queries.single_votes import vote_in
 from arena.queries.vote_lists import neighbours, vote_page
 from arena.queries.vote_search import VoteSearch
 from arena.web.access import STAFF, allow_only
-from arena.web.pictures import picture_response
+from arena.web.pictures import sized_picture_response
 from arena.web.results import asked_rating, get_readable_study
 from arena.web.vote_search_form import VoteSearchForm
 from augment.services.wording import translate_all
@@ -104,7 +104,7 @@ def shown_picture(
     shown = get_object_or_404(rows, study=study, code=matchup)
     if side not in ("left", "right", "original"):
         raise Http404
-    return picture_response(picture_of_side(shown, side))
+    return sized_picture_response(request, picture_of_side(shown, side))
 
 
 # --- Private -----------------------------------------------------------------------------------

@@ -20,7 +20,7 @@ from arena.services.references import why_not_editable
 from arena.web.access import STAFF, allow_only
 from arena.web.asking import asking_of
 from arena.web.listing import read_listing, read_page, said_choices
-from arena.web.pictures import picture_response
+from arena.web.pictures import picture_response, sized_picture_response
 from arena.web.sending import looks_again, send_later
 from augment.errors import QueueFault
 from augment.models import (
@@ -177,7 +177,7 @@ def picture(request: HttpRequest, kind: str, code: uuid.UUID) -> HttpResponseBas
         name = scene_picture(get_object_or_404(rows_of_scenes, code=code), SceneView(kind))
     else:
         raise Http404
-    return picture_response(name)
+    return sized_picture_response(request, name)
 
 
 def _drawing(request: HttpRequest, augmentation: Augmentation, found: Checked | None) -> int:

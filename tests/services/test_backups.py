@@ -18,6 +18,8 @@ from arena.services.scenario_files import ask_for_file, keep_file
 from arena.services.stored_rows import applied_migrations, find_tables, frozen_rows, label_of
 from augment.models import Event, GenerationJob
 from augment.services.judging.scenario_export import FORMATS
+from augment.services.scenarios.pictures import store
+from augment.services.scenarios.thumbnails import WIDTHS_PX, thumbnail_of
 from tests.services.backup_rows import (
     NOW,
     PNG,
@@ -27,6 +29,7 @@ from tests.services.backup_rows import (
     note,
     quiet,
 )
+from tests.web.cast import png
 
 pytestmark = [pytest.mark.django_db(transaction=True), pytest.mark.usefixtures("own_folders")]
 
@@ -89,14 +92,17 @@ def test_a_database_of_an_earlier_release_is_left_as_it_is(tmp_path: Path) -> No
         recorder.record_applied(app, name)
 
 
-def test_zips_that_can_be_made_again_stay_out(tmp_path: Path) -> None:
+def test_zips_and_thumbnails_that_can_be_made_again_stay_out(tmp_path: Path) -> None:
     job = GenerationJob.objects.create(name="a job")
     row = ask_for_file(job=job, file_format=next(iter(FORMATS)))
     keep_file(row, name="a.zip", content=b"zip", warnings=(), marked=False)
+    picture = store(png())
+    thumbnail_of(picture, WIDTHS_PX[0])
     take_backup(tmp_path / "b.zip", now=NOW, say=quiet)
     names = contents(tmp_path / "b.zip").keys()
-    assert "rows/augment.generationjob.jsonl" in names
-    assert not [name for name in names if "scenario-files" in name or "scenariofile" in name]
+    assert {"rows/augment.generationjob.jsonl", f"media/{picture}"} <= names
+    for folder in ("scenario-files", "scenariofile", "thumbnails"):
+        assert not [name for name in names if folder in name]
 
 
 def test_every_table_is_in_it_but_those_that_mean_nothing_later() -> None:

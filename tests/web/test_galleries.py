@@ -62,7 +62,7 @@ def page(client: Client, snapshot: Snapshot, name: str, **query: str) -> str:
 
 
 def pictures_in(shown: str) -> list[str]:
-    return re.findall(r'<img[^>]* src="([^"]*/shown/[^"]*)"', shown)
+    return re.findall(r'<img[^>]* src="([^"?]*/shown/[^"?]*)[^"]*"', shown)
 
 
 @pytest.mark.parametrize(

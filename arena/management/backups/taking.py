@@ -24,6 +24,7 @@ from arena.services.stored_rows import (
     read_rows,
 )
 from arena.serving.readiness import find_unapplied_migrations
+from augment.services.scenarios.thumbnails import FOLDER as THUMBNAILS
 
 
 def take_backup(path: Path, *, now: datetime, say: Callable[[str], None]) -> Manifest:
@@ -55,13 +56,13 @@ def take_backup(path: Path, *, now: datetime, say: Callable[[str], None]) -> Man
 
 
 def find_media(folder: str = "") -> Iterator[str]:
-    """The names of all pictures, whatever keeps them; zips that can be made again are none."""
+    """The names of all pictures, whatever keeps them; zips and thumbnails can be made again."""
     folders, files = default_storage.listdir(folder)
     for name in sorted(files):
         if not name.startswith("."):  # half a file of a worker that was killed
             yield f"{folder}{name}"
     for name in sorted(folders):
-        if f"{folder}{name}" != SCENARIO_FILES:
+        if f"{folder}{name}" not in (SCENARIO_FILES, THUMBNAILS):
             yield from find_media(f"{folder}{name}/")
 
 

@@ -1,0 +1,93 @@
+"""Pages of many pictures show small ones, which are made once and kept where pictures are."""
+
+from __future__ import annotations
+
+import io
+from collections.abc import Iterator
+
+import pytest
+from django.core.files.storage import default_storage
+from django.urls import reverse
+from PIL import Image
+from pytest_django import Settings
+
+from arena.config import env
+from augment.render.bev import draw
+from augment.render.camera import camera_for
+from augment.render.shrunken import shrink_png
+from augment.scene.modification import Modification
+from augment.services.scenarios.pictures import store
+from augment.services.scenarios.thumbnails import WIDTHS_PX, thumbnail_of
+from tests import scenes
+from tests.buckets import Bucket, bucket
+from tests.jobs.rows import add_scenario
+from tests.web.cast import people, signed_in
+
+
+@pytest.fixture(scope="module")
+def picture() -> bytes:
+    scene = scenes.junction()
+    return draw(scene, Modification(), camera_for(scene, None))
+
+
+@pytest.fixture
+def there(settings: Settings, monkeypatch: pytest.MonkeyPatch) -> Iterator[Bucket]:
+    with bucket() as there:
+        for name, value in there.environment.items():
+            monkeypatch.setenv(name, value)
+        settings.STORAGES = {**settings.STORAGES, "default": env.media("ARENA_MEDIA_URL")}
+        yield there
+
+
+def read(name: str) -> bytes:
+    with default_storage.open(name) as file:
+        return bytes(file.read())
+
+
+@pytest.mark.parametrize("widest_px", WIDTHS_PX)
+def test_a_thumbnail_is_small_and_the_same_whenever_it_is_made(
+    picture: bytes, widest_px: int
+) -> None:
+    small = shrink_png(picture, widest_px)
+    assert small == shrink_png(picture, widest_px)
+    assert Image.open(io.BytesIO(small)).width == widest_px
+    assert len(small) < len(picture) / 2
+
+
+def test_a_thumbnail_is_made_once(picture: bytes) -> None:
+    name = store(picture)
+    small = thumbnail_of(name, 400)
+    assert read(small) == shrink_png(picture, 400)
+    default_storage.delete(name)
+    assert thumbnail_of(name, 400) == small
+    assert thumbnail_of(name, 800) == ""
+
+
+def test_there_is_none_without_a_picture_or_of_another_width() -> None:
+    assert thumbnail_of("", 400) == ""
+    with pytest.raises(ValueError, match="not 401"):
+        thumbnail_of("", 401)
+
+
+def test_thumbnails_lie_in_the_bucket_with_the_pictures(picture: bytes, there: Bucket) -> None:
+    small = thumbnail_of(store(picture), 400)
+    assert read(small) == shrink_png(picture, 400)
+    assert f"arena/{small}" in there.names()
+
+
+@pytest.mark.django_db
+def test_pages_ask_for_the_width_that_they_show(picture: bytes) -> None:
+    scenario = add_scenario("street")
+    scenario.original_image = store(picture)
+    scenario.save()
+    analyst = signed_in(people()["analyst"])
+    address = reverse("picture", args=["original", scenario.code])
+    sizes = {
+        query: Image.open(io.BytesIO(b"".join(analyst.get(address + query)))).width
+        for query in ("", "?v=1", "?width=400&v=1", "?width=800")
+    }
+    assert sizes == {"": 2400, "?v=1": 2400, "?width=400&v=1": 400, "?width=800": 800}
+    for query in ("?width=2400", "?width=-1", "?width=400.0", "?width=x"):
+        assert analyst.get(address + query).status_code == 404
+    shown = analyst.get(reverse("scenarios")).content.decode()
+    assert f"{address}?width=400&amp;v={scenario.original_image[-16:-4]} 400w" in shown
