@@ -15,7 +15,7 @@ from augment.services.running import jobs, leases, pausing, runner
 from augment.services.running.caps import Caps
 from augment.services.running.summary import count_rows
 from tests.jobs.models import Model, llama_job
-from tests.jobs.rows import launch
+from tests.jobs.rows import failed, launch, leased
 
 pytestmark = pytest.mark.django_db
 
@@ -56,6 +56,27 @@ def test_of_many_rows_the_first_is_held_first() -> None:
     assert " ORDER BY 1 ASC" in looked
     assert ("FOR NO KEY UPDATE" in looked) is (connection.vendor == "postgresql")
     assert changed.startswith(f'UPDATE "{ROWS}"')
+
+
+def test_who_ends_a_row_of_many_locks_nobody_else_out() -> None:
+    """The job's row is what all its workers share: it is held only to finish the job."""
+    job = launch(scenarios=2)
+    first, last = job.augmentations.order_by("pk")
+    for row, statements in ((first, 1), (last, 6)):
+        leases.settle(held=leased(row, timezone.now()), settlement=failed())
+        with CaptureQueriesContext(connection) as captured:
+            finished = jobs.finish_if_over(job_pk=job.pk)
+        assert len(captured) == statements, [query["sql"] for query in captured]
+        assert finished == (row == last)
+
+
+def test_a_call_is_settled_before_the_job_is_held() -> None:
+    job = llama_job()
+    with CaptureQueriesContext(connection) as captured:
+        runner.work_on(augmentation_pk=job.augmentations.get().pk, connect=Model())
+    changes = [query["sql"].split('"')[1] for query in captured if query["sql"][:6] == "UPDATE"]
+    reserved, settled, *_ = (place for place, table in enumerate(changes) if table == JOB)
+    assert changes[reserved + 1 : settled].count("augment_modelcall") == 2, "sent, then answered"
 
 
 def test_a_job_that_is_over_keeps_what_waits() -> None:

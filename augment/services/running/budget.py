@@ -101,6 +101,14 @@ def settle(*, call_pk: int, used: Used, now: Moment, answer: dict[str, Any] | No
     """
     # Not the request and the answer, which are long.
     call = ModelCall.objects.select_for_update().only("attempt_id", *_COUNTED).get(pk=call_pk)
+    # The job's row last: all calls of a job wait for it until the transaction ends.
+    ModelCall.objects.filter(pk=call_pk).update(
+        spent_tokens=used.tokens,
+        cost_nano_usd=used.nano_usd,
+        is_cost_estimated=used.is_estimated,
+        settled_at=now,
+        **(answer or {}),
+    )
     job = GenerationJob.objects.filter(augmentations__attempts=call.attempt_id)
     if call.settled_at is None:
         job.update(
@@ -118,13 +126,6 @@ def settle(*, call_pk: int, used: Used, now: Moment, answer: dict[str, Any] | No
             spent_calls=F("spent_calls") + used.calls - counted,
             spent_tokens=F("spent_tokens") + used.tokens - (call.spent_tokens or 0),
         )
-    ModelCall.objects.filter(pk=call_pk).update(
-        spent_tokens=used.tokens,
-        cost_nano_usd=used.nano_usd,
-        is_cost_estimated=used.is_estimated,
-        settled_at=now,
-        **(answer or {}),
-    )
 
 
 @transaction.atomic

@@ -7,7 +7,7 @@ from typing import Any, TypeVar
 
 from django.contrib.auth.models import User
 from django.db import transaction
-from django.db.models import Case, F, QuerySet, Value, When
+from django.db.models import Case, Exists, F, OuterRef, QuerySet, Value, When
 from django.utils import timezone
 
 from augment.errors import Conflict, UnknownName
@@ -183,7 +183,11 @@ def finish_if_over(*, now: Moment = DATABASE_TIME, job_pk: int | None = None) ->
     running = GenerationJob.objects.filter(state__in=_MAY_END)
     if job_pk is not None:
         running = running.filter(pk=job_pk)
-    return sum(_finish(pk, now) for pk in list(running.values_list("pk", flat=True)))
+    # Looked at without the lock first: after nearly every outcome something is still under way,
+    # and all workers of a job would wait for its row. Who commits the last outcome sees none.
+    rows = Augmentation.objects.filter(job=OuterRef("pk"), state__in=Augmentation.UNDER_WAY)
+    over = running.filter(~Exists(rows)).values_list("pk", flat=True)
+    return sum(_finish(pk, now) for pk in list(over))
 
 
 # --- Private -----------------------------------------------------------------------------------
