@@ -68,6 +68,11 @@ class ModelCall(models.Model):
         default=False, help_text="usage is unknown: the worst case counts"
     )
     settled_at = models.DateTimeField(null=True, blank=True)
+    removed_at = models.DateTimeField(
+        null=True,
+        blank=True,
+        help_text="its messages and its answer were removed for their age; the numbers stay",
+    )
 
     class Meta:
         ordering = ("number",)

@@ -150,6 +150,7 @@ def _call(call: ModelCall) -> dict[str, Any]:
         "started_at": _time(call.started_at),
         "sent_at": _time(call.sent_at),
         "latency_s": call.latency_s,
+        **({} if call.removed_at is None else {"removed_at": _time(call.removed_at)}),
     }
 
 
