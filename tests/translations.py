@@ -19,7 +19,9 @@ from tests.house.source import ROOT
 PO = ROOT / "arena" / "locale" / "de" / "LC_MESSAGES" / "django.po"
 MO = PO.with_suffix(".mo")
 MARKERS: dict[str, tuple[int | None, int, int | None]] = {
-    **dict.fromkeys(("_", "gettext", "gettext_lazy", "gettext_noop", "sentence"), (None, 0, None)),
+    **dict.fromkeys(
+        ("_", "gettext", "gettext_lazy", "gettext_noop", "sentence", "word"), (None, 0, None)
+    ),
     **dict.fromkeys(("ngettext", "ngettext_lazy"), (None, 0, 1)),
     **dict.fromkeys(("pgettext", "pgettext_lazy"), (0, 1, None)),
     **dict.fromkeys(("npgettext", "npgettext_lazy"), (0, 1, 2)),

@@ -71,6 +71,7 @@ class WholeStudyDocument(StudyDocument):
     allow_both_miss = serializers.BooleanField(source="study.allow_both_miss")
     allow_text = serializers.BooleanField(source="study.allow_text")
     allow_replay = serializers.BooleanField(source="study.allow_replay")
+    allow_measures = serializers.BooleanField(source="study.allow_measures")
     allow_simulated = serializers.BooleanField(source="study.allow_simulated")
 
 
@@ -95,6 +96,7 @@ class StudyBody(StrictSerializer):
     allow_both_miss = FlagField(required=False, default=False)
     allow_text = FlagField(required=False, default=False)
     allow_replay = FlagField(required=False, default=False)
+    allow_measures = FlagField(required=False, default=True)
     allow_simulated = FlagField(required=False, default=False)
     settle_alike = FlagField(required=False, default=False)
     samples = serializers.ChoiceField(
@@ -147,7 +149,8 @@ class StudiesView(ApiView):
         given["samples"], given["jobs"] = SampleRule(given["samples"]), tuple(given["jobs"])
         names = (
             *("repeat_share", "check_share", "adaptive_share", "samples", "jobs"),
-            *("allow_both_miss", "allow_text", "allow_replay", "settle_alike"),
+            *("allow_both_miss", "allow_text", "allow_replay", "allow_measures"),
+            "settle_alike",
         )
         options = PlanOptions(**{name: given.pop(name) for name in names})
         study = open_study(**given, options=options, actor=cast(User, request.user))

@@ -210,6 +210,7 @@ def _raters(results: Results) -> bytes:
     head = (
         "judge", "votes", "median_ms", "under_1_s", "ties", "left", "agreement", "shared",
         "favourites", "decided", "repeats", "repeats_same", "checks", "checks_passed", "moves",
+        "checks_skipped", "aids",
     )  # fmt: skip
     return _csv(
         head,
@@ -217,7 +218,8 @@ def _raters(results: Results) -> bytes:
             [
                 line.name, line.votes, line.median_ms, line.fast, line.ties, line.left.value,
                 line.agreement.value, line.shared, line.favourites.value, line.decided,
-                *line.repeats, *line.checks, line.moves,
+                *line.repeats, *line.checks, line.moves, line.checks_skipped,
+                " ".join(f"{name}={number}" for name, number in line.aids),
             ]
             for line in results.trust.raters
         ),

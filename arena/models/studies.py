@@ -39,6 +39,10 @@ class Study(models.Model):
         default=False,
         help_text="experts may play drives under the pictures; `rules` says of which scenarios",
     )
+    allow_measures = models.BooleanField(
+        default=False,
+        help_text="experts may lay lines of the instruction and distances to lane edges over both",
+    )
     practice = models.BooleanField(
         default=False, help_text="experts practise on up to five pairs before their first one"
     )

@@ -12,8 +12,19 @@ from django.utils.translation import gettext_lazy as _
 from arena.models.studies import Matchup
 from augment.models import AppendOnly, Augmentation
 
-AIDS = ("zoom", "original", "ruler", "flip", "text", "replay", "blink", "difference")
-"""What an expert may look with; a vote names those that were used."""
+AID_LABELS = {
+    "zoom": _("zoom"),
+    "original": _("the scene before the edit, kept"),
+    "ruler": _("the ruler"),
+    "flip": _("the scene before the edit, held"),
+    "text": _("the text description"),
+    "replay": _("the drives"),
+    "blink": _("blinking"),
+    "difference": _("the difference"),
+    "measures": _("the measures"),
+}
+"""What an expert may look with; a vote names those that were used, in this order."""
+AIDS = tuple(AID_LABELS)
 
 _AID_SETS = [
     " ".join(chosen) for count in range(len(AIDS) + 1) for chosen in combinations(AIDS, count)

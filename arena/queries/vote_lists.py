@@ -133,6 +133,8 @@ def votes_behind(snapshot: Snapshot, search: VoteSearch) -> QuerySet[Vote]:
         rows = rows.filter(matchup__scenario__type=search.type)
     if search.comment:
         rows = rows.filter(comment__icontains=search.comment)
+    if search.aid:  # no aid's name is part of another's
+        rows = rows.filter(aids__contains=search.aid)
     rows = rows.filter(_shows(search), _came_out(search))
     return _PARTS[SoughtPart(search.part)](rows, snapshot) if search.part else rows
 
@@ -201,7 +203,7 @@ class _Found:
 
 def _automatic(snapshot: Snapshot, search: VoteSearch) -> list[tuple[Judged, str]]:
     """Pairs that nobody can tell apart, with their mark, by the same search."""
-    if search.comment or search.part or search.expert not in ("", AUTOMATIC):
+    if search.comment or search.part or search.aid or search.expert not in ("", AUTOMATIC):
         return []
     if search.outcome not in ("", SoughtOutcome.TIED, SoughtOutcome.EQUAL):
         return []
@@ -296,8 +298,9 @@ _PARTS: dict[SoughtPart, Callable[[_Rows, Snapshot], _Rows]] = {
     SoughtPart.OWN: _own_votes,
     SoughtPart.REPEATS: _repeats,
     SoughtPart.ALIKE: _alike,
-    SoughtPart.CHECKS: lambda rows, _: rows.filter(matchup__kind=CHECK),
+    SoughtPart.CHECKS: lambda rows, _: rows.filter(matchup__kind=CHECK, outcome__in=RATED),
     SoughtPart.PASSED: lambda rows, _: rows.filter(
         matchup__kind=CHECK, winner__contestant__kind=Contestant.Kind.REFERENCE
     ),
+    SoughtPart.CHECKS_SKIPPED: lambda rows, _: rows.filter(matchup__kind=CHECK, outcome="skip"),
 }

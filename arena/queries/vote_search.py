@@ -40,6 +40,7 @@ class SoughtPart(StrEnum):
     ALIKE = "alike"
     CHECKS = "checks"
     PASSED = "passed"
+    CHECKS_SKIPPED = "checks_skipped"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -54,6 +55,7 @@ class VoteSearch:
         part: Of `SoughtPart`.
         mark: Why votes do not count, or one of the words above.
         comment: Words in the expert's comment.
+        aid: What the expert looked with.
     """
 
     contestant: str = ""
@@ -65,6 +67,7 @@ class VoteSearch:
     part: str = ""
     mark: str = COUNTED
     comment: str = ""
+    aid: str = ""
 
     def as_query(self) -> dict[str, str]:
         """What an address says of it: nothing of what is left as it is."""

@@ -24,6 +24,7 @@ USUAL_KEYS: dict[str, tuple[str, ...]] = {
     "ruler": ("m",),
     "blink": ("x",),
     "difference": ("v",),
+    "measures": ("g",),
     "text": ("t",),
     "replay": ("d",),
     "legend": ("l",),
@@ -45,6 +46,7 @@ KEY_LABELS = {
     "ruler": gettext_noop("Ruler"),
     "blink": gettext_noop("Blink"),
     "difference": gettext_noop("Difference"),
+    "measures": gettext_noop("Measures"),
     "text": gettext_noop("Text description"),
     "replay": gettext_noop("Drives"),
     "legend": gettext_noop("Legend"),
@@ -52,7 +54,7 @@ KEY_LABELS = {
 }
 """Action -> what the page calls it, in English."""
 
-SOMETIMES = ("text", "replay", "blink", "difference")
+SOMETIMES = ("text", "replay", "blink", "difference", "measures")
 """Actions that only some studies have, or that came later than the keys of some accounts: their
 usual key gives way to one that was chosen."""
 

@@ -37,11 +37,12 @@ WHERE matchup.code = %(code)s AND matchup.expert_id = %(expert)s
 
 _STUDY = (
     *("id", "code", "name", "state", "allow_both_miss", "allow_text", "allow_replay"),
+    "allow_measures",
     "votes_to_plan",
 )
 _STATE = """
 SELECT study.id, study.code, study.name, study.state, study.allow_both_miss, study.allow_text,
-       study.allow_replay, study.votes_to_plan,
+       study.allow_replay, study.allow_measures, study.votes_to_plan,
        (SELECT COUNT(*) FROM arena_matchup matchup
         WHERE matchup.study_id = study.id AND matchup.expert_id = %(expert)s) AS total,
        (SELECT COUNT(*) FROM arena_vote vote

@@ -30,8 +30,8 @@ notes in the lines of types; a rating of version 0 kept its standings alone."""
 Bounds = tuple[float, float]
 
 
-_SINCE_2, _SINCE_3, _SINCE_4 = {"since": 2}, {"since": 3}, {"since": 4}
-"""Of fields that documents of earlier versions do not have."""
+_SINCE_2, _SINCE_3, _SINCE_4, _SINCE_5 = {"since": 2}, {"since": 3}, {"since": 4}, {"since": 5}
+"""Of fields that documents of earlier versions do not have, unless they say something."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -110,6 +110,9 @@ class PanelRater(Rater):
         moves: By how many places a contestant moves at most without their votes.
         repeats: How many hidden repeats they answered, and how many of them alike.
         checks: How many attention checks they answered, and how many for the reference.
+        checks_skipped: How many they skipped, which is neither; ratings before version 5 counted
+            these among the answered ones.
+        aids: In how many of the counted votes they looked with what.
     """
 
     judge: str
@@ -118,6 +121,8 @@ class PanelRater(Rater):
     repeats: tuple[int, int]
     checks: tuple[int, int]
     bet: RaterBet | None = None
+    checks_skipped: int = field(default=0, metadata=_SINCE_5)
+    aids: tuple[tuple[str, int], ...] = field(default=(), metadata=_SINCE_5)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

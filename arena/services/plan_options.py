@@ -18,6 +18,7 @@ class PlanOptions:
     Attributes:
         check_share: Needs as many scenarios with pictures for an attention check; see
             `enough_checks`.
+        allow_measures: Experts may lay lines and rings of the instruction over both pictures.
         practice: Experts practise before their first pair; see arena.services.practice.
         samples: Which samples of a cell are shown.
         jobs: Names or codes of the jobs whose augmentations are shown; none for every job.
@@ -35,6 +36,7 @@ class PlanOptions:
     allow_text: bool = False
     settle_alike: bool = False
     allow_replay: bool = False
+    allow_measures: bool = True
     practice: bool = False
     samples: SampleRule = SampleRule.ONE
     jobs: tuple[str, ...] = ()

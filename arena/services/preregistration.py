@@ -74,6 +74,7 @@ def _document(study: Study) -> dict[str, Any]:
             "both_miss": study.allow_both_miss,
             "text": study.allow_text,
             "replay": study.allow_replay,
+            "measures": study.allow_measures,
             "practice": study.practice,
             "simulated": study.allow_simulated,
         },

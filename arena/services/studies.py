@@ -234,6 +234,7 @@ def _insert(
                 allow_both_miss=given.allow_both_miss,
                 allow_text=given.allow_text,
                 allow_replay=given.allow_replay,
+                allow_measures=given.allow_measures,
                 practice=given.practice,
                 votes_to_plan=(
                     dict.fromkeys(rules.experts, rules.votes_later) if rules.votes_later else {}

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from dataclasses import fields, replace
 from typing import Any
 
@@ -242,7 +243,8 @@ def _panel(
             name=names[arrays.judges[line.expert]],
             moves=changes[line.expert],
             repeats=repeats.by_expert.get(line.expert, (0, 0)),
-            checks=_checks(votes, arrays.judges[line.expert]),
+            **_checks(votes, arrays.judges[line.expert]),
+            aids=_aids(votes, arrays.judges[line.expert]),
             bet=RaterBet(**_by_field(against[line.expert]), limit=detection_limit(len(against)))
             if line.expert in against
             else None,
@@ -261,10 +263,20 @@ def _by_field(value: Rater | Bet) -> dict[str, Any]:
     return {one.name: getattr(value, one.name) for one in fields(value)}
 
 
-def _checks(votes: VoteSet, judge: str) -> tuple[int, int]:
-    """How many attention checks were answered, and how many of them for the reference."""
+def _checks(votes: VoteSet, judge: str) -> dict[str, Any]:
+    """How many attention checks were answered, how many for the reference, how many skipped."""
     own = [vote for vote in votes.checks if vote.judge == judge]
-    return len(own), sum(vote.winner in votes.references for vote in own)
+    answered = [vote for vote in own if vote.outcome in SCORES]
+    passed = sum(vote.winner in votes.references for vote in answered)
+    return {"checks": (len(answered), passed), "checks_skipped": len(own) - len(answered)}
+
+
+def _aids(votes: VoteSet, judge: str) -> tuple[tuple[str, int], ...]:
+    """In how many counted votes a judge looked with what, by name."""
+    used = Counter(
+        aid for vote in votes.counted if vote.judge == judge for aid in vote.aids.split()
+    )
+    return tuple(sorted(used.items()))
 
 
 def _elo_order(votes: Comparisons, strengths: FloatArray, seed: int) -> tuple[OnlinePlace, ...]:

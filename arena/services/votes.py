@@ -97,6 +97,8 @@ def _check_allowed(decision: Decision, state: VotingState, is_paced: bool) -> No
         raise InvalidVote({"aids": "This study has no text description."})
     if "replay" in decision.aids.split() and not state.study.allow_replay:
         raise InvalidVote({"aids": "This study has no drives to play."})
+    if "measures" in decision.aids.split() and not state.study.allow_measures:
+        raise InvalidVote({"aids": "This study has no measures."})
     if is_paced and state.just_now > settings.VOTES_PER_S * PACE_WINDOW.total_seconds():
         raise TooFast(math.ceil(PACE_WINDOW.total_seconds() / 2))
 

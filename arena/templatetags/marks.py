@@ -12,6 +12,7 @@ from django.utils.translation import gettext_noop as _
 
 from arena.models import Study
 from augment.models import Augmentation, GenerationJob
+from augment.services.judging.findings import Finding
 from augment.services.running.summary import JobCounts
 from augment.services.wording import translate
 
@@ -144,6 +145,12 @@ def segments(by_state: dict[Augmentation.State, int]) -> list[BarSegment]:
             )
         start += width
     return found
+
+
+@register.filter
+def say_finding(finding: Finding) -> str:
+    """What a check found, with its numbers; agents and lanes go by their ids."""
+    return finding.sentence(say=translate)
 
 
 @register.filter

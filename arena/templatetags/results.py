@@ -13,6 +13,7 @@ from django.utils.translation import gettext_lazy, gettext_noop
 from arena.exports.columns import Column
 from arena.exports.tables import Row
 from arena.models import Vote
+from arena.models.votes import AID_LABELS
 from arena.rating.estimate import Estimate
 from arena.rating.printed import interval_text, rating_text, with_minus
 from augment.models import Scenario
@@ -131,22 +132,10 @@ def printed(row: Row, column: Column) -> str:
     return minus(column.text(row))
 
 
-_AIDS: dict[str, str | Promise] = {
-    "zoom": gettext_lazy("zoom"),
-    "original": gettext_lazy("the scene before the edit, kept"),
-    "ruler": gettext_lazy("the ruler"),
-    "flip": gettext_lazy("the scene before the edit, held"),
-    "text": gettext_lazy("the text description"),
-    "replay": gettext_lazy("the drives"),
-    "blink": gettext_lazy("blinking"),
-    "difference": gettext_lazy("the difference"),
-}
-
-
 @register.filter
 def aid_labels(aids: str) -> str:
     """What an expert looked with."""
-    return ", ".join(str(_AIDS.get(name, name)) for name in aids.split())
+    return ", ".join(str(AID_LABELS.get(name, name)) for name in aids.split())
 
 
 @register.filter

@@ -87,7 +87,7 @@ def check(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
         {
             "severity": line.severity,
             "label": _("measured") if line.severity == "fact" else _(line.severity),
-            "sentence": line.sentence,
+            "sentence": line.finding.sentence(say=translate),
         }
         for line in found.lines
     ]

@@ -21,6 +21,7 @@ from arena.services.practice import answer_practice, practice_pairs, skip_practi
 from arena.web.access import EXPERT, allow_only
 from arena.web.screen import over_context
 from augment.services.judging.findings import check_augmentation
+from augment.services.wording import translate
 
 MOST_REASONS = 3
 
@@ -76,4 +77,5 @@ def _answer(request: HttpRequest, study: Study, expert: User) -> HttpResponse:
 def _reasons(pair: PracticePair) -> list[str]:
     """What the checks find wrong in the broken picture, the worst first."""
     checked = check_augmentation(pair.broken)
-    return [line.sentence for line in checked.faults[:MOST_REASONS]] if checked else []
+    worst = checked.faults[:MOST_REASONS] if checked else []
+    return [line.finding.sentence(say=translate) for line in worst]

@@ -6,6 +6,7 @@ from arena.exports.heat import heat_map
 from arena.exports.plots import plots
 from arena.exports.tables import LeaderboardTable
 from arena.models import Snapshot
+from arena.models.votes import AIDS
 from arena.queries.judged import AUTOMATIC
 from arena.queries.people import natural_order
 from arena.results.tree import PanelRater
@@ -21,14 +22,17 @@ def raters(snapshot: Snapshot, table: LeaderboardTable) -> Context:
     kept = snapshot.results.trust.raters
     lines = [line for line in kept if line.judge != AUTOMATIC]
     left = [(line.judge, line.left.lower, line.left.value, line.left.upper) for line in lines]
+    used = {name for line in lines for name, _ in line.aids}
+    aids = [name for name in AIDS if name in used]
     panel = sorted(
-        (line | _counts(line["rater"]) for line in with_authors(snapshot, lines)),
+        (line | _counts(line["rater"], aids) for line in with_authors(snapshot, lines)),
         key=lambda line: natural_order(line["rater"].name),
     )
     return {
         "trust": snapshot.results.trust,
         "all_tied": is_all_tied(snapshot),
         "panel": panel,
+        "aids": aids,
         "limit": next((line.bet.limit for line in lines if line.bet), None),
         "automatic": sum(line.votes for line in kept if line.judge == AUTOMATIC),
         "automatic_judge": AUTOMATIC,
@@ -55,12 +59,13 @@ def coverage(snapshot: Snapshot, table: LeaderboardTable) -> Context:
 # --- Private -----------------------------------------------------------------------------------
 
 
-def _counts(rater: PanelRater) -> Context:
+def _counts(rater: PanelRater, aids: list[str]) -> Context:
     """How many votes the shares of an expert stand for; of the favourites only where all do."""
     ties = round(rater.ties * rater.votes)
     decided = rater.votes - ties
-    left = rater.left.value
+    left, used = rater.left.value, dict(rater.aids)
     return {
+        "aids": [(name, used.get(name, 0)) for name in aids],
         "ties": ties,
         "left": None if left is None else round(left * decided),
         "all_foreseen": rater.decided == decided,

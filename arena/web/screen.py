@@ -189,7 +189,9 @@ def _counts(progress: VotingProgress) -> dict[str, Any]:
 
 
 def _urls(study: Study) -> dict[str, str]:
+    measures = reverse("measures", args=[study.code]).removesuffix(str(study.code))
     return {
+        **({"measures": measures} if study.allow_measures else {}),
         "page": reverse("vote", args=[study.code]),
         "votes": reverse("api-votes"),
         "matchups": f"{reverse('api-matchups')}?study={study.code}",
@@ -213,7 +215,11 @@ def _preferences(study: Study, kept: VotingPreferences) -> dict[str, Any]:
 
 def _actions(study: Study) -> list[str]:
     """What keys do here: nothing tells of what the study does not have."""
-    without = {"text": not study.allow_text, "replay": not study.allow_replay}
+    without = {
+        "text": not study.allow_text,
+        "replay": not study.allow_replay,
+        "measures": not study.allow_measures,
+    }
     return [name for name in USUAL_KEYS if not without.get(name)]
 
 
@@ -224,6 +230,7 @@ def _looks(study: Study) -> list[tuple[str, str]]:
         "ruler": _("Ruler"),
         "blink": _("Blink"),
         "difference": pgettext("a way to look", "Differ"),
+        "measures": _("Measures"),
         "text": pgettext("a way to look", "Text"),
         "replay": _("Drives"),
         "legend": _("Legend"),

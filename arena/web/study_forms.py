@@ -48,6 +48,7 @@ class StudyForm(ChoiceForm):
     allow_text = forms.BooleanField(required=False)
     show_alike = forms.BooleanField(required=False)
     allow_replay = forms.BooleanField(required=False)
+    no_measures = forms.BooleanField(required=False)
     practice = forms.BooleanField(required=False)
     allow_simulated = forms.BooleanField(required=False)
     samples = forms.ChoiceField(
@@ -102,6 +103,7 @@ class StudyForm(ChoiceForm):
             allow_text=entered["allow_text"],
             settle_alike=not entered["show_alike"],
             allow_replay=entered["allow_replay"],
+            allow_measures=not entered["no_measures"],
             practice=entered["practice"],
             hypotheses=tuple(entered["hypotheses"].splitlines()),
             stopping=self._stopping(),

@@ -189,6 +189,7 @@ urlpatterns: list[URLPattern] = [
     path("studies/<uuid:code>/vote/report/", voting.report_pair, name="vote-report"),
     path("i/<str:token>", voting.matchup_image, name="matchup-image"),
     path("d/<uuid:code>", voting.replay, name="replay"),
+    path("m/<uuid:code>", voting.measures, name="measures"),
     path("studies/<uuid:code>/results/", results.results_page, name="results"),
     path("studies/<uuid:code>/results/open/", results.open_results_early, name="results-open"),
     path("studies/<uuid:code>/results/votes/", results_votes.votes_page, name="results-votes"),

@@ -10,6 +10,7 @@ from django.utils.translation import gettext as _
 from django.utils.translation import gettext_lazy
 
 from arena.models import Snapshot
+from arena.models.votes import AID_LABELS
 from arena.queries.judged import AUTOMATIC, is_imported
 from arena.queries.people import natural_order
 from arena.queries.vote_lists import is_scenario_of
@@ -41,8 +42,9 @@ PARTS = {
     SoughtPart.OWN: gettext_lazy("By authors on their own contestants"),
     SoughtPart.REPEATS: gettext_lazy("Hidden repeats of counted votes"),
     SoughtPart.ALIKE: gettext_lazy("Hidden repeats answered alike"),
-    SoughtPart.CHECKS: gettext_lazy("Attention checks"),
+    SoughtPart.CHECKS: gettext_lazy("Attention checks answered"),
     SoughtPart.PASSED: gettext_lazy("Attention checks passed"),
+    SoughtPart.CHECKS_SKIPPED: gettext_lazy("Attention checks skipped"),
 }
 MARKS = {
     COUNTED: gettext_lazy("Counted"),
@@ -70,6 +72,7 @@ class VoteSearchForm(forms.Form):
     expert = forms.ChoiceField(label=gettext_lazy("Expert"), required=False)
     mark = forms.ChoiceField(label=gettext_lazy("Counts"), required=False)
     part = forms.ChoiceField(label=gettext_lazy("Only"), required=False)
+    aid = forms.ChoiceField(label=gettext_lazy("Looked with"), required=False)
     comment = forms.CharField(
         label=gettext_lazy("Words in the comment"), required=False, max_length=200
     )
@@ -91,8 +94,9 @@ class VoteSearchForm(forms.Form):
         self._offer("expert", [everybody, *_experts(snapshot)])
         self._offer("mark", _choices(MARKS))
         self._offer("part", [everybody, *_choices(PARTS)])
+        self._offer("aid", [everybody, *_choices(AID_LABELS)])
         if is_imported(snapshot.study):
-            for name in ("type", "part", "comment"):
+            for name in ("type", "part", "aid", "comment"):
                 del self.fields[name]
 
     def clean_scenario(self) -> str:

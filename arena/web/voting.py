@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import uuid
 from typing import cast
 
@@ -15,6 +16,7 @@ from django.views.decorators.http import require_http_methods, require_POST, req
 
 from arena.errors import AlreadyDecided, InvalidVote, NotYours, StudyNotOpen, TooFast
 from arena.models import Study
+from arena.queries.measures import lane_edges_of_pair, measures_of_pair
 from arena.queries.replays import drives_of_pair
 from arena.queries.showings import picture_shown
 from arena.queries.studies import voting_study
@@ -27,6 +29,8 @@ from arena.web.forms import ReportForm, VoteForm
 from arena.web.pictures import picture_response
 from arena.web.screen import over_context, vote_context
 from augment.errors import Conflict
+from augment.services.judging.measures import LaneEdges
+from augment.services.wording import translate
 
 
 @allow_only(EXPERT)
@@ -116,7 +120,39 @@ def replay(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
     return JsonResponse(drives, headers={"Cache-Control": "private, no-store"})
 
 
+@allow_only(EXPERT, ADMIN)
+@require_safe
+def measures(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
+    """Lines and rings over a pair, or with x and y (pixels) how far the lane's edges are there."""
+    user, place = cast(User, request.user), request.GET
+    try:
+        if place.keys() & {"x", "y"}:
+            x_px, y_px = (float(place.get(name, "")) for name in ("x", "y"))
+            if not (math.isfinite(x_px) and math.isfinite(y_px)):
+                raise ValueError
+            found = lane_edges_of_pair(user=user, code=code, x_px=x_px, y_px=y_px)
+            answer = None if found is None else {"words": _edges(found[0])}
+        else:
+            answer = measures_of_pair(user=user, code=code, say=translate)
+    except NotYours as error:
+        raise Http404 from error
+    except ValueError:
+        return JsonResponse({"problem": _("x and y are pixels of the picture.")}, status=422)
+    if answer is None:
+        raise Http404
+    return JsonResponse(answer, headers={"Cache-Control": "private, no-store"})
+
+
 # Private
+
+
+def _edges(edges: LaneEdges | None) -> str:
+    if edges is None:
+        return _("on no lane")
+    return _("%(left)s m from the left edge of its lane, %(right)s m from the right") % {
+        "left": f"{edges.left_m:.1f}",
+        "right": f"{edges.right_m:.1f}",
+    }
 
 
 def _study_of(request: HttpRequest, code: uuid.UUID) -> Study:

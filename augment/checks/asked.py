@@ -10,8 +10,10 @@ from augment.checks.lanes_across import LanesAcross
 from augment.checks.parties import Party, RequestMatching
 from augment.checks.tolerances import Tolerances
 from augment.scene.ego_route import EgoRoute
-from augment.scene.entities import TrafficAgent, TrafficSide
+from augment.scene.entities import Scene, TrafficAgent, TrafficSide
+from augment.scene.intent_words import Facing
 from augment.scene.modification import Modification
+from augment.sentences import Sentence, word
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -39,7 +41,7 @@ class Asked:
     @property
     def kerb(self) -> float:
         """On which side the kerb is: 1 left, -1 right."""
-        return 1.0 if self.route.scene.traffic_side is TrafficSide.LEFT else -1.0
+        return kerb_of(self.route.scene)
 
     @property
     def parties(self) -> tuple[Party, ...]:
@@ -58,6 +60,11 @@ class Asked:
 AskedCheck = Callable[[Asked], Iterator[Finding]]
 
 
+def kerb_of(scene: Scene) -> float:
+    """On which side of the ego's lane the kerb is: 1 left, -1 right."""
+    return 1.0 if scene.traffic_side is TrafficSide.LEFT else -1.0
+
+
 def distance_outside(value: float, low: float, high: float) -> float:
     """How far a value is outside a range, 0 within it."""
     return max(low - value, value - high, 0.0)
@@ -68,6 +75,18 @@ def severity_of(*, fits: bool) -> Severity:
     return Severity.FACT if fits else Severity.WRONG
 
 
-def side_of(left: float) -> str:
+def facing_words(facing: Facing | None) -> Sentence:
+    """Which way something is to face, as its lane leads where nothing is said."""
+    return _FACING[facing or Facing.WITH_LANE]
+
+
+def side_of(left: float) -> Sentence:
     """The side of a number whose left is positive."""
-    return "left" if left >= 0.0 else "right"
+    return word("left") if left >= 0.0 else word("right")
+
+
+_FACING = {
+    Facing.WITH_LANE: word("facing with the lane"),
+    Facing.AGAINST_LANE: word("facing against the lane"),
+    Facing.ACROSS: word("facing across the lane"),
+}

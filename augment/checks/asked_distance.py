@@ -21,6 +21,7 @@ from augment.scene.intent import (
 from augment.scene.intent_words import (
     Shape,
 )
+from augment.sentences import sentence, word
 
 
 def asked_distance(asked: Asked) -> Iterator[Finding]:
@@ -44,9 +45,8 @@ def _finding(asked: Asked, party: Party, span_m: tuple[float, float]) -> Finding
     allowed_m = asked.tolerances.distance_m
     if math.isfinite(high_m):
         allowed_m = max(allowed_m, asked.tolerances.distance_share * high_m) + _to_next_m(party)
-    side = "ahead of" if measured_m * sign >= 0.0 else "behind"
-    where = "ahead" if sign > 0.0 else "behind"
-    what, range_words = _words(party, low_m, high_m)
+    side = word("ahead of") if measured_m * sign >= 0.0 else word("behind")
+    what, place = _words(party, low_m, high_m)
     belongs_m = sign * min(max(measured_m, low_m), high_m)
     return Finding(
         kind=FindingKind.ASKED_DISTANCE,
@@ -59,9 +59,13 @@ def _finding(asked: Asked, party: Party, span_m: tuple[float, float]) -> Finding
             "asked_high_m": high_m if math.isfinite(high_m) else None,
             "off_m": off_m,
         },
-        template=(
-            f"{what} is {{along_m:.1f}} m {side} the ego along its lane; "
-            f"{range_words} {where} is asked for."
+        template=sentence(
+            "%(what)s is {along_m:.1f} m %(side)s the ego along its lane; %(words)s.",
+            what=what,
+            side=side,
+            words=sentence("%(place)s ahead is asked for", place=place)
+            if sign > 0.0
+            else sentence("%(place)s behind is asked for", place=place),
         ),
     )
 
@@ -116,16 +120,19 @@ def _ends_on_road(asked: Asked, agent: TrafficAgent) -> Iterator[tuple[float, fl
 
 def _words(party: Party, low_m: float, high_m: float) -> tuple[str, str]:
     request = party.request
+    what: str
     if isinstance(request, CrashRequest):
-        what = "The first of the crashed vehicles, {agents[0]},"
+        what = word("The first of the crashed vehicles, {agents[0]},")
     elif isinstance(request, ConesRequest):
         is_ring = request.shape is Shape.RING
-        what = "The middle of the cones" if is_ring else "The first cone, {agents[0]},"
+        first = word("The first cone, {agents[0]},")
+        what = word("The middle of the cones") if is_ring else first
     elif isinstance(request, WalkRequest):
-        what = "The walk of {agents[0]}"
+        what = word("The walk of {agents[0]}")
     else:
         what = "{agents[0]}"
     if not math.isfinite(high_m):
-        return what, "a place"
-    is_range = high_m > low_m
-    return what, f"{{asked_low_m:.4g}}{' to {asked_high_m:.4g}' if is_range else ''} m"
+        return what, word("a place")
+    if high_m > low_m:
+        return what, word("{asked_low_m:.4g} to {asked_high_m:.4g} m")
+    return what, "{asked_low_m:.4g} m"

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 
-from augment.checks.asked import Asked, severity_of, side_of
+from augment.checks.asked import Asked, facing_words, severity_of, side_of
 from augment.checks.finding import Finding, FindingKind
 from augment.geometry.angles import difference
 from augment.scene.entities import TrafficAgent
@@ -15,6 +15,7 @@ from augment.scene.intent import (
 from augment.scene.intent_words import (
     Facing,
 )
+from augment.sentences import sentence, word
 
 
 def asked_heading(asked: Asked) -> Iterator[Finding]:
@@ -46,19 +47,25 @@ def _vehicle(asked: Asked, request: VehicleRequest, agent: TrafficAgent) -> Iter
             "asked_deg": _difference_deg(wanted_deg, 0.0),
             "off_deg": off_deg,
         },
-        template=(
-            f"{{agents[0]}} is turned {{turn_deg:.0f}} degrees to the {side_of(turn_deg)} of its "
-            f"lane; {_words(request)} is asked for."
+        template=sentence(
+            "{agents[0]} is turned {turn_deg:.0f} degrees to the %(side)s of its lane; "
+            "%(words)s%(usual)s%(turn)s is asked for.",
+            side=side_of(turn_deg),
+            words=facing_words(request.facing),
+            usual="" if request.facing else word(", as nothing else is said,"),
+            turn=_turn(request),
         ),
     )
 
 
-def _words(request: VehicleRequest) -> str:
-    turn = ""
-    if request.turn_deg:
-        turn = f", turned {abs(request.turn_deg):g} degrees to the {side_of(request.turn_deg)}"
-    usual = "" if request.facing else ", as nothing else is said,"
-    return f"facing {_facing(request)}{usual}{turn}"
+def _turn(request: VehicleRequest) -> str:
+    if not request.turn_deg:
+        return ""
+    return sentence(
+        ", turned %(degrees)s degrees to the %(side)s",
+        degrees=f"{abs(request.turn_deg):g}",
+        side=side_of(request.turn_deg),
+    )
 
 
 def _facing(request: VehicleRequest) -> Facing:

@@ -13,6 +13,7 @@ from augment.checks.parties import Party
 from augment.checks.tolerances import WORKER_M
 from augment.scene.entities import TrafficAgent
 from augment.scene.intent import ConesRequest, Length, Side
+from augment.sentences import sentence, word
 
 
 def asked_spacing(asked: Asked) -> Iterator[Finding]:
@@ -61,7 +62,7 @@ def _spacing(asked: Asked, cones: Sequence[TrafficAgent], wanted: Length) -> Fin
         severity=severity_of(fits=fits_gap(asked, gap_m, wanted)),
         agents=tuple(cone.id for cone in cones),
         measured={"gap_m": gap_m, "asked_m": (wanted.low_m + wanted.high_m) / 2.0},
-        template="The cones stand {gap_m:.1f} m apart; {asked_m:.1f} m are asked for.",
+        template=sentence("The cones stand {gap_m:.1f} m apart; {asked_m:.1f} m are asked for."),
     )
 
 
@@ -72,7 +73,9 @@ def _worker(worker: TrafficAgent, party: Party) -> Finding:
         severity=severity_of(fits=apart_m(worker, nearest) <= WORKER_M),
         agents=(worker.id, nearest.id),
         measured={"gap_m": apart_m(worker, nearest)},
-        template="The worker {agents[0]} is {gap_m:.1f} m from the nearest cone, {agents[1]}.",
+        template=sentence(
+            "The worker {agents[0]} is {gap_m:.1f} m from the nearest cone, {agents[1]}."
+        ),
     )
 
 
@@ -81,11 +84,13 @@ def _worker_side(asked: Asked, worker: TrafficAgent, party: Party, side: Side) -
     left_m = asked.left_m(worker) - asked.left_m(nearest)
     return Finding(
         kind=FindingKind.ASKED_SIDE,
-        severity=severity_of(fits=side_of(left_m) == side),
+        severity=severity_of(fits=side_of(left_m) == side.value),
         agents=(worker.id, nearest.id),
         measured={"left_m": left_m},
-        template=(
-            f"The worker {{agents[0]}} stands to the {side_of(left_m)} of {{agents[1]}}; the "
-            f"{side} is asked for."
+        template=sentence(
+            "The worker {agents[0]} stands to the %(side)s of {agents[1]}; the %(asked)s is asked "
+            "for.",
+            side=side_of(left_m),
+            asked=word(side.value),
         ),
     )

@@ -8,9 +8,10 @@ from augment.checks.asked import Asked, severity_of
 from augment.checks.finding import Finding, FindingKind, Severity
 from augment.checks.parties import Role, middle_of
 from augment.checks.situation import STOPPED_BELOW_MPS
+from augment.checks.size import name_type
 from augment.checks.tolerances import SPEED_MPS, SPEED_SHARE
-from augment.scene.entities import TrafficAgent
 from augment.scene.intent import CrashRequest, VehicleRequest
+from augment.sentences import sentence, word
 
 
 def asked_count(asked: Asked) -> Iterator[Finding]:
@@ -24,7 +25,10 @@ def asked_count(asked: Asked) -> Iterator[Finding]:
                 agents=here,
                 belongs_m=None if here else middle_of(party.request.spot, asked.lanes),
                 measured={"missing": float(number)},
-                template=f"{{missing:.0f}} {_plural(role, number)} asked for and not there.",
+                template=sentence(
+                    "{missing:.0f} %(things)s asked for and not there.",
+                    things=_COUNTED[role][number != 1],
+                ),
             )
     for agent in asked.matching.surplus:
         yield Finding(
@@ -32,7 +36,10 @@ def asked_count(asked: Asked) -> Iterator[Finding]:
             severity=Severity.WRONG,
             agents=(agent.id,),
             measured={"surplus": 1.0},
-            template=f"{{agents[0]}}, a {_named(agent)}, is more than was asked for.",
+            template=sentence(
+                "{agents[0]}, %(a_thing)s, is more than was asked for.",
+                a_thing=name_type(agent.type),
+            ),
         )
 
 
@@ -44,7 +51,11 @@ def asked_type(asked: Asked) -> Iterator[Finding]:
                 kind=FindingKind.ASKED_TYPE,
                 severity=Severity.WRONG,
                 agents=(agent.id,),
-                template=f"{{agents[0]}} is a {_named(agent)}; a {role} is asked for.",
+                template=sentence(
+                    "{agents[0]} is %(a_thing)s; %(asked)s is asked for.",
+                    a_thing=name_type(agent.type),
+                    asked=_A[role],
+                ),
             )
 
 
@@ -58,7 +69,7 @@ def asked_motion(asked: Asked) -> Iterator[Finding]:
         if wanted_mps is None:
             continue
         allowed_mps = max(SPEED_MPS, SPEED_SHARE * wanted_mps) if wanted_mps else STOPPED_BELOW_MPS
-        words = "{asked_mps:.1f} m/s is asked for" if wanted_mps else "it is to stand"
+        words = _DRIVES if wanted_mps else _STANDS
         for agent in party.agents:
             off_mps = abs(agent.speed_mps - wanted_mps)
             yield Finding(
@@ -66,14 +77,16 @@ def asked_motion(asked: Asked) -> Iterator[Finding]:
                 severity=severity_of(fits=off_mps <= allowed_mps),
                 agents=(agent.id,),
                 measured={"speed_mps": agent.speed_mps, "asked_mps": wanted_mps},
-                template=f"{{agents[0]}} moves at {{speed_mps:.1f}} m/s; {words}.",
+                template=sentence(
+                    "{agents[0]} moves at {speed_mps:.1f} m/s; %(words)s.", words=words
+                ),
             )
 
 
 def find_unasked(asked: Asked) -> Iterator[Finding]:
     """Agents of the scene that were moved or removed, and nobody asked for that."""
-    moved = [(agent.id, "moved", asked.to_move) for agent in asked.modification.moved]
-    removed = [(name, "removed", asked.to_remove) for name in asked.modification.removed]
+    moved = [(agent.id, _MOVED, asked.to_move) for agent in asked.modification.moved]
+    removed = [(name, _REMOVED, asked.to_remove) for name in asked.modification.removed]
     for name, done, wanted in (*moved, *removed):
         if name in wanted:
             continue
@@ -81,7 +94,9 @@ def find_unasked(asked: Asked) -> Iterator[Finding]:
             kind=FindingKind.UNASKED,
             severity=Severity.WRONG,
             agents=(name,),
-            template=f"{{agents[0]}} was in the scene and is {done}; nobody asked for that.",
+            template=sentence(
+                "{agents[0]} was in the scene and is %(done)s; nobody asked for that.", done=done
+            ),
         )
 
 
@@ -89,14 +104,14 @@ def asked_changes(asked: Asked) -> Iterator[Finding]:
     """Agents of the scene that are to be moved or removed, and were not."""
     moved = frozenset(agent.id for agent in asked.modification.moved)
     removed = frozenset(asked.modification.removed)
-    left_alone = [(name, "moved") for name in sorted(asked.to_move - moved)]
-    left_alone += [(name, "removed") for name in sorted(asked.to_remove - removed)]
+    left_alone = [(name, _MOVED) for name in sorted(asked.to_move - moved)]
+    left_alone += [(name, _REMOVED) for name in sorted(asked.to_remove - removed)]
     for name, wanted in left_alone:
         yield Finding(
             kind=FindingKind.ASKED_COUNT,
             severity=Severity.WRONG,
             agents=(name,),
-            template=f"{{agents[0]}} is to be {wanted} and is not.",
+            template=sentence("{agents[0]} is to be %(wanted)s and is not.", wanted=wanted),
         )
 
 
@@ -109,17 +124,33 @@ def find_attempted(asked: Asked) -> Iterator[Finding]:
             kind=FindingKind.UNASKED,
             severity=Severity.WRONG,
             agents=tuple(touched),
-            template=f"The wish can't be met, and {{agents[0]}} is changed: {why}",
+            template=sentence(
+                "The wish can't be met, and {agents[0]} is changed: %(why)s", why=why
+            ),
         )
 
 
 # Private
 
 
-def _named(agent: TrafficAgent) -> str:
-    return agent.type.value.lower().replace("_", " ")
-
-
-def _plural(role: Role, number: int) -> str:
-    plural = {Role.BUS: "buses are"}.get(role, f"{role}s are")
-    return f"{role} is" if number == 1 else plural
+_MOVED, _REMOVED = word("moved"), word("removed")
+_DRIVES, _STANDS = word("{asked_mps:.1f} m/s is asked for"), word("it is to stand")
+_A = {
+    Role.VEHICLE: word("a vehicle"),
+    Role.CAR: word("a car"),
+    Role.BUS: word("a bus"),
+    Role.BICYCLE: word("a bicycle"),
+    Role.WALKER: word("a pedestrian"),
+    Role.CONE: word("a cone"),
+    Role.WORKER: word("a worker"),
+}
+_COUNTED = {
+    Role.VEHICLE: (word("vehicle is"), word("vehicles are")),
+    Role.CAR: (word("car is"), word("cars are")),
+    Role.BUS: (word("bus is"), word("buses are")),
+    Role.BICYCLE: (word("bicycle is"), word("bicycles are")),
+    Role.WALKER: (word("pedestrian is"), word("pedestrians are")),
+    Role.CONE: (word("cone is"), word("cones are")),
+    Role.WORKER: (word("worker is"), word("workers are")),
+}
+"""One, and several or none."""

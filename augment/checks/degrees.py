@@ -9,6 +9,7 @@ from augment.checks.finding import Finding, FindingKind, Severity
 from augment.checks.situation import ChangedScene
 from augment.geometry.angles import difference
 from augment.scene.entities import AgentType, TrafficAgent
+from augment.sentences import sentence
 
 ROUND_DEG = 5
 EXACT_RAD = 6e-4
@@ -66,23 +67,23 @@ def _beyond(agent: TrafficAgent) -> Finding:
         severity=Severity.WRONG,
         agents=(agent.id,),
         measured={"heading_rad": agent.heading_rad},
-        template=(
-            "{agents[0]} has a heading of "
-            + ("" if agent.heading_rad >= 0.0 else "-")
-            + "{heading_rad:.3g}, more than a full turn: it looks like degrees, radians are meant."
+        template=sentence(
+            "{agents[0]} has a heading of %(minus)s{heading_rad:.3g}, more than a full turn: it "
+            "looks like degrees, radians are meant.",
+            minus="" if agent.heading_rad >= 0.0 else "-",
         ),
     )
 
 
 def _suspicious(agent: TrafficAgent, degrees: int) -> Finding:
-    minus = "-" if degrees < 0 else ""
     return Finding(
         kind=FindingKind.DEGREES,
         severity=Severity.DOUBTFUL,
         agents=(agent.id,),
         measured={"heading_rad": agent.heading_rad, "read_as_deg": float(degrees)},
-        template=(
-            f"The heading of {{agents[0]}} looks like {minus}{{read_as_deg:.0f}} degrees that "
-            "were given as radians: read as degrees it would fit."
+        template=sentence(
+            "The heading of {agents[0]} looks like %(minus)s{read_as_deg:.0f} degrees that were "
+            "given as radians: read as degrees it would fit.",
+            minus="-" if degrees < 0 else "",
         ),
     )

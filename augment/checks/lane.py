@@ -7,6 +7,7 @@ from collections.abc import Iterator
 from augment.checks.finding import Finding, FindingKind, Severity
 from augment.checks.lane_index import Beside
 from augment.checks.situation import ChangedScene
+from augment.sentences import sentence, word
 
 
 def lane(situation: ChangedScene) -> Iterator[Finding]:
@@ -21,15 +22,18 @@ def lane(situation: ChangedScene) -> Iterator[Finding]:
 
 
 def _on(agent_id: str, place: Beside) -> Finding:
-    side = "left" if place.d_m >= 0.0 else "right"
-    offset = "on" if abs(place.d_m) < 0.005 else f"{{left_m:.2f}} m to the {side} of"
-    return _fact(
-        agent_id,
-        place,
-        0.0,
-        f"{{agents[0]}} is on {{lanes[0]}}, {{along_m:.1f}} m along it and {offset} its centre "
-        "line; the lane is {lane_width_m:.1f} m wide.",
-    )
+    if abs(place.d_m) < 0.005:
+        words = sentence(
+            "{agents[0]} is on {lanes[0]}, {along_m:.1f} m along it and on its centre line; the "
+            "lane is {lane_width_m:.1f} m wide."
+        )
+    else:
+        words = sentence(
+            "{agents[0]} is on {lanes[0]}, {along_m:.1f} m along it and {left_m:.2f} m to the "
+            "%(side)s of its centre line; the lane is {lane_width_m:.1f} m wide.",
+            side=word("left") if place.d_m >= 0.0 else word("right"),
+        )
+    return _fact(agent_id, place, 0.0, words)
 
 
 def _off(agent_id: str, place: Beside) -> Finding:
@@ -37,8 +41,10 @@ def _off(agent_id: str, place: Beside) -> Finding:
         agent_id,
         place,
         place.off_m,
-        "{agents[0]} is {off_m:.1f} m off every lane; the nearest lane is {lanes[0]} at "
-        "{along_m:.1f} m along it.",
+        sentence(
+            "{agents[0]} is {off_m:.1f} m off every lane; the nearest lane is {lanes[0]} at "
+            "{along_m:.1f} m along it."
+        ),
     )
 
 

@@ -9,6 +9,7 @@ from augment.checks.finding import Finding, FindingKind, Severity
 from augment.checks.situation import VEHICLES, ChangedScene, is_stopped
 from augment.geometry import boxes
 from augment.scene.entities import AgentType, TrafficAgent
+from augment.sentences import sentence
 
 TOUCH_M = 0.01
 """Depths below this are rounding."""
@@ -53,11 +54,7 @@ def _pair(agent: TrafficAgent, other: TrafficAgent, situation: ChangedScene) -> 
         severity=Severity.WRONG if is_ego else _severity(agent, other, share),
         agents=(agent.id, other.id),
         measured={"share_of_smaller": share, "area_m2": shared.area_m2, "depth_m": shared.depth_m},
-        template=(
-            "{agents[0]} and "
-            + ("the ego" if is_ego else "{agents[1]}")
-            + " overlap by {share_of_smaller:.0%} of the smaller box, {depth_m:.2f} m deep."
-        ),
+        template=_WITH_EGO if is_ego else _WITH_OTHER,
     )
 
 
@@ -70,3 +67,13 @@ def _severity(one: TrafficAgent, other: TrafficAgent, share: float) -> Severity:
     if share <= fine:
         return Severity.FACT
     return Severity.DOUBTFUL if share <= doubtful else Severity.WRONG
+
+
+_WITH_EGO = sentence(
+    "{agents[0]} and the ego overlap by {share_of_smaller:.0%%} of the smaller box, {depth_m:.2f} "
+    "m deep."
+)
+_WITH_OTHER = sentence(
+    "{agents[0]} and {agents[1]} overlap by {share_of_smaller:.0%%} of the smaller box, "
+    "{depth_m:.2f} m deep."
+)

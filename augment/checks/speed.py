@@ -6,7 +6,9 @@ from collections.abc import Iterator
 
 from augment.checks.finding import Finding, FindingKind, Severity
 from augment.checks.situation import STOPPED_BELOW_MPS, ChangedScene
+from augment.checks.size import unusual_words
 from augment.scene.entities import AgentType, TrafficAgent
+from augment.sentences import sentence, word
 
 USUAL_MPS: dict[AgentType, float] = {
     AgentType.VEHICLE: 36.0,
@@ -31,13 +33,12 @@ def speed(situation: ChangedScene) -> Iterator[Finding]:
         off = abs(agent.speed_mps) / usual_mps
         if off > 1.0:
             is_wrong = off > FAR_OFF or agent.type not in USUAL_MPS
-            kind = agent.type.value.lower().replace("_", " ")
-            yield _finding(agent, f"which is unusual for a {kind}.", is_wrong=is_wrong)
+            yield _finding(agent, unusual_words(agent.type), is_wrong=is_wrong)
         elif limit_mps is not None and agent.speed_mps > OVER_LIMIT * limit_mps:
-            words = f"where the limit is {limit_mps:.1f} m/s."
+            words = sentence("where the limit is %(limit)s m/s.", limit=f"{limit_mps:.1f}")
             yield _finding(agent, words, is_wrong=False)
         elif agent.speed_mps < -STOPPED_BELOW_MPS:
-            yield _finding(agent, "backwards.", is_wrong=False)
+            yield _finding(agent, word("backwards."), is_wrong=False)
 
 
 def _limit_mps(agent: TrafficAgent, situation: ChangedScene) -> float | None:
@@ -53,5 +54,5 @@ def _finding(agent: TrafficAgent, words: str, *, is_wrong: bool) -> Finding:
         severity=Severity.WRONG if is_wrong else Severity.DOUBTFUL,
         agents=(agent.id,),
         measured={"speed_mps": agent.speed_mps},
-        template=f"{{agents[0]}} moves at {{speed_mps:.1f}} m/s, {words}",
+        template=sentence("{agents[0]} moves at {speed_mps:.1f} m/s, %(words)s", words=words),
     )

@@ -99,6 +99,11 @@ export class Lens {
     return this.#pair;
   }
 
+  // Where the ruler ends, in pixels of the picture.
+  get end() {
+    return this.#at;
+  }
+
   rule(isOn) {
     this.isRuling = isOn;
     this.#from = null;

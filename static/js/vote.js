@@ -214,6 +214,7 @@ const actions = {
   ruler: () => lens.rule(true),
   text: () => lists && page.toggleText() && lens.aids.add("text"),
   replay: () => late(import("./vote-replay.js"), ({ toggleReplay }) => toggleReplay(lens.aids)),
+  measures: () => late(import("./vote-measures.js"), ({ toggle }) => toggle(lens)),
   blink: () => compare("blink", true),
   difference: () => compare("difference"),
   legend: () => ask(urls.preferences, { legend: page.toggleLegend() }),

@@ -99,7 +99,7 @@ def test_the_checks_speak_before_anything_is_kept() -> None:
     found = check_edit(here, document(CAR, vehicle("Added2", 21.0, 0.4)))
     assert found.is_against_intent
     assert found.lines[0].severity == "wrong"
-    assert any("overlap" in line.sentence for line in found.lines)
+    assert any("overlap" in line.finding.sentence() for line in found.lines)
     assert "is not a field" in check_edit(here, {**document(CAR), "more": 1}).problem
     assert "Agent9 is not in the scene" in check_edit(here, document(removed=("Agent9",))).problem
     assert not Event.objects.exists()

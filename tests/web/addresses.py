@@ -81,6 +81,7 @@ def address(name: str, here: World) -> str:
         "rating-again": {"code": here.study.code, "rating": STRANGER},
         "matchup-image": {"token": shown.left_token},
         "replay": {"code": shown.code},
+        "measures": {"code": shown.code},
     }
     if name.startswith("endpoint") and name not in ("endpoints", "endpoint-new"):
         site, _ = Endpoint.objects.get_or_create(

@@ -97,6 +97,7 @@ PAGES: dict[str, tuple[int, int, int]] = {
     "vote-skipped": (403, 403, 404),
     "matchup-image": (200, 403, 404),
     "replay": (404, 403, 404),  # the study plays no drives
+    "measures": (200, 403, 404),
 }
 ACTIONS: dict[str, tuple[int, int, int]] = {
     "job-retry": (302, 403, 403),

@@ -175,3 +175,14 @@ def test_an_admin_switches_it_by_the_form() -> None:
     assert 'name="practice" checked' in shown, "on where there is something to practise on"
     rules = admin.get(reverse("study", args=[study.code])).content.decode()
     assert "five pairs before the first one" in rules
+
+
+def test_the_feedback_is_in_the_language_of_the_page() -> None:
+    study = opened()
+    client = signed_in(eva())
+    client.get(page(study))
+    answer(client, study, practice_pairs(study, eva())[0], well=True)
+    told = client.get(practice(study), {"pair": 1}, HTTP_ACCEPT_LANGUAGE="de").content.decode()
+    reasons = re.findall(r"<li>([^<]*(?:overlap|überlappen)[^<]*)</li>", told)
+    assert reasons
+    assert all("überlappen sich zu" in reason for reason in reasons)

@@ -142,6 +142,24 @@ def test_raters_are_pseudonyms_with_repeats_and_checks(analyst: Client) -> None:
     assert ">1</a>" in shown.partition("0 / ")[2][:250]
 
 
+def test_a_skipped_attention_check_is_neither_passed_nor_failed(analyst: Client) -> None:
+    study = study_rows.a_study(votes_per_expert=9)
+    first, second, *rest = study_rows.matchups_of(study, "eva")
+    Matchup.objects.filter(pk__in=[first.pk, second.pk]).update(kind="check")
+    study_rows.vote(first, "skip", reason="picture_missing")
+    for matchup in (second, *rest, *study_rows.matchups_of(study, "finn")):
+        study_rows.vote(matchup, "left", aids=["zoom"])
+    snapshot = rate(study=close_study(study=study), rounds=50)
+    eva = next(one for one in snapshot.results.trust.raters if one.checks_skipped)
+    assert (eva.checks[0], eva.checks_skipped) == (1, 1)
+    assert eva.aids == (("zoom", 7),), "of the votes that count"
+    shown = page(analyst, study, "raters")
+    assert "Checks skipped" in shown
+    assert 'part=checks_skipped&amp;mark=check" data-votes="1"' in shown
+    assert 'aid=zoom" data-votes="7"' in shown
+    assert b",1,zoom=7" in bundle_files(snapshot)["raters.csv"]
+
+
 @pytest.mark.parametrize(
     ("bet", "said"),
     [

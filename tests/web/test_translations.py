@@ -18,7 +18,7 @@ ON_EXPERT_PAGES = (
     "arena/queries/voting_keys",
 )
 TELLING = re.compile(r"\b(Modell\w*|LLM|generier\w*|KI|GPT)\b")
-HELD = re.compile(r"%\(\w+\)s|\{\}|%%|</?\w+[^>]*>")
+HELD = re.compile(r"%\(\w+\)s|\{[^{} ]*\}|%%|</?\w+[^>]*>")
 
 
 def held(text: str) -> list[str]:

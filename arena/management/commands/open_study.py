@@ -138,6 +138,12 @@ class Command(TerminalCommand):
             "picture of a scenario was driven",
         )
         parser.add_argument(
+            "--no-measures",
+            action="store_true",
+            help="do not let experts lay lines and rings of what the instruction asks for over "
+            "both pictures, nor read distances to lane edges under the ruler",
+        )
+        parser.add_argument(
             "--practice",
             action="store_true",
             help="let every expert practise on five pairs, a reference beside a broken picture, "
@@ -180,6 +186,7 @@ class Command(TerminalCommand):
                     allow_text=options["text"],
                     settle_alike=not options["show_alike"],
                     allow_replay=options["replay"],
+                    allow_measures=not options["no_measures"],
                     practice=options["practice"],
                     samples=SampleRule(options["samples"]),
                     jobs=tuple(options["jobs"]),

@@ -50,7 +50,7 @@ def check_edit(scenario: Scenario, document: object, *, snapped: str = "") -> Ch
         modification = read_edit(scenario, document)
         if snapped:
             modification = snap(scenario, modification, snapped)
-        ground = _ground(editable_scene(scenario))
+        ground = ground_of(scenario)
         intent = intent_of(scenario)
         findings = check_against_intent(ground, modification, intent)
     except (InvalidDocument, InvalidModification) as error:
@@ -60,6 +60,15 @@ def check_edit(scenario: Scenario, document: object, *, snapped: str = "") -> Ch
         lines=list_lines(findings),
         is_against_intent=intent is not None,
     )
+
+
+def ground_of(scenario: Scenario) -> Ground:
+    """The ground of a scenario's scene before any change; the last ones asked for are kept.
+
+    Raises:
+        InvalidDocument: The stored scene can't be read.
+    """
+    return _ground(editable_scene(scenario))
 
 
 @lru_cache(maxsize=4)

@@ -5,7 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from augment.checks import Finding, Severity
+from augment.checks import Finding as Finding
+from augment.checks import Severity
 from augment.errors import InvalidDocument, InvalidModification
 from augment.models import Augmentation
 from augment.services.judging.checks import findings_of
@@ -20,13 +21,13 @@ class FindingLine:
         severity: "wrong", "doubtful" or "fact".
         kind: What was measured, in words: "off road".
         fault: The class of fault that it speaks for, empty for a fact.
-        sentence: With its numbers; agents go by their ids in the modification.
+        finding: In full; its sentence calls agents by their ids in the modification.
     """
 
     severity: str
     kind: str
     fault: str
-    sentence: str
+    finding: Finding
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -85,5 +86,5 @@ def _line(one: Finding) -> FindingLine:
         severity=one.severity.value,
         kind=one.kind.value.replace("_", " "),
         fault=one.fault.value if one.is_fault else "",
-        sentence=one.sentence(),
+        finding=one,
     )

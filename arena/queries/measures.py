@@ -1,0 +1,143 @@
+"""Lines, rings and lane edges over a pair, in pixels of its pictures, for who judges it."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from itertools import pairwise
+from typing import Any
+from uuid import UUID
+
+import numpy as np
+from django.contrib.auth.models import User
+
+from arena.errors import NotYours
+from arena.models import Matchup
+from arena.queries.people import role_of
+from arena.queries.showings import view_shown
+from augment.services.judging.measures import LaneEdges, lane_edges_of, measures_of
+
+_Point = list[float]
+
+_MARGIN_PX = 24.0
+"""Labels stay so far within the picture."""
+
+
+def measures_of_pair(
+    *, user: User, code: UUID, say: Callable[[str], str]
+) -> dict[str, Any] | None:
+    """What may be drawn over both pictures of one of the user's own pairs; admins may look at all.
+
+    It follows from the scenario alone. None where the study has no such aid.
+
+    Args:
+        user: Who looks.
+        code: Of the matchup.
+        say: Puts a label into the reader's language.
+
+    Raises:
+        NotYours: The pair is somebody else's or there is none; the text does not say which.
+        InvalidDocument: The stored scene or intent can't be read.
+    """
+    matchup = _measured(user, code)
+    if matchup is None:
+        return None
+    view = view_shown(matchup)
+    reach_m = math.hypot(view["width"], view["height"]) / view["px_per_m"]
+    found = measures_of(matchup.scenario, reach_m=reach_m)
+    lines = [
+        ([_pixels(point, view) for point in line.points_m], say(line.label))
+        for line in found.lines
+    ]
+    rings = [
+        (_pixels(ring.centre_m, view), ring.radius_m * view["px_per_m"], say(ring.label))
+        for ring in found.rings
+    ]
+    return {
+        "lines": [
+            {"points": points, "at": _label_at(points, view), "label": label}
+            for points, label in lines
+            if _is_seen(points, view)
+        ],
+        "rings": [
+            {"at": centre, "r": round(radius, 1), "text": _label_at(around, view), "label": label}
+            for centre, radius, label in rings
+            if _is_seen(around := _around(centre, radius), view)
+        ],
+    }
+
+
+def lane_edges_of_pair(
+    *, user: User, code: UUID, x_px: float, y_px: float
+) -> tuple[LaneEdges | None] | None:
+    """How far a place in the pictures is from the edges of its lane, (None,) off every lane.
+
+    None where the study has no such aid.
+
+    Raises:
+        NotYours: The pair is somebody else's or there is none; the text does not say which.
+        InvalidDocument: The stored scene can't be read.
+    """
+    matchup = _measured(user, code)
+    if matchup is None:
+        return None
+    view = view_shown(matchup)
+    ego_x, ego_y = view["ego_px"]
+    x_m, y_m = (x_px - ego_x) / view["px_per_m"], (ego_y - y_px) / view["px_per_m"]
+    return (lane_edges_of(matchup.scenario, x_m, y_m),)
+
+
+# --- Private -----------------------------------------------------------------------------------
+
+
+def _measured(user: User, code: UUID) -> Matchup | None:
+    rows = Matchup.objects.select_related("study", "scenario").only(
+        "expert", "view", "study__allow_measures", "scenario__intent", "scenario__base_scene",
+        "scenario__keep_traffic",
+    )  # fmt: skip
+    matchup = rows.filter(code=code).first()
+    if matchup is None or (matchup.expert_id != user.pk and role_of(user) != "admin"):
+        raise NotYours("This pair is not shown to you.")
+    return matchup if matchup.study.allow_measures else None
+
+
+def _pixels(point_m: tuple[float, float], view: dict[str, Any]) -> _Point:
+    (ego_x, ego_y), scale = view["ego_px"], view["px_per_m"]
+    return [round(ego_x + point_m[0] * scale, 1), round(ego_y - point_m[1] * scale, 1)]
+
+
+def _around(centre: _Point, radius: float) -> list[_Point]:
+    """Points of a circle, the one straight up first, where a label is least in the way."""
+    turns = np.radians([0.0, 40.0, 140.0, -40.0, -140.0, 70.0, 110.0, 180.0])
+    return [
+        [
+            round(centre[0] + radius * math.sin(turn), 1),
+            round(centre[1] - radius * math.cos(turn), 1),
+        ]
+        for turn in turns.tolist()
+    ]
+
+
+def _is_within(point: _Point, view: dict[str, Any]) -> bool:
+    sizes = (float(view["width"]), float(view["height"]))
+    return all(
+        _MARGIN_PX <= value <= size - _MARGIN_PX for value, size in zip(point, sizes, strict=True)
+    )
+
+
+def _is_seen(points: list[_Point], view: dict[str, Any]) -> bool:
+    """Whether any of a line is within the picture: its points and the middles between them."""
+    middles = [[(x + u) / 2.0, (y + v) / 2.0] for (x, y), (u, v) in pairwise(points)]
+    return any(_is_within(point, view) for point in (*points, *middles))
+
+
+def _label_at(points: list[_Point], view: dict[str, Any]) -> _Point:
+    """The first point within the picture, else the first one drawn into it."""
+    found = next((point for point in points if _is_within(point, view)), None)
+    if found is not None:
+        return found
+    x, y = points[0]
+    return [
+        min(max(x, _MARGIN_PX), view["width"] - _MARGIN_PX),
+        min(max(y, _MARGIN_PX), view["height"] - _MARGIN_PX),
+    ]

@@ -1,0 +1,176 @@
+"""What helps to measure a picture by eye: lines where something is asked for, rings, lane edges.
+
+In: the ground of a scene and what its instruction asks for. Out: lines and rings in the frame of
+the scene. No change to the scene and nobody's answer is known here, so they are the same whoever
+drew what.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+from augment.checks.asked import kerb_of
+from augment.checks.asked_across import side_sign
+from augment.checks.ground import Ground
+from augment.checks.landmarks import resolve_landmarks
+from augment.checks.lanes_across import LanesAcross
+from augment.geometry.angles import difference
+from augment.scene.entities import Point
+from augment.scene.intent import Intent, LaneChoice, Spot, WalkRequest, resolve_anchors
+from augment.sentences import Sentence, sentence
+
+RING_STEP_M = 10.0
+_BESIDE_M = 1.0
+"""How far a line across the road reaches beyond the outer edges of the lanes it is about."""
+_WALK_M = 5.0
+"""So far beyond where people walk, who begin beside the road."""
+_ALONG_M = 6.0
+"""How far a line along the lane reaches beyond the places that are asked for."""
+_OPEN_M = (0.0, 40.0)
+"""Where a line along the lane runs if no distance is asked for."""
+_STEP_M = 1.0
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class MeasureLine:
+    """A line of two points or more, with its number in words."""
+
+    points_m: tuple[Point, ...]
+    label: Sentence
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class MeasureRing:
+    """A circle around the ego's centre: a distance in a straight line."""
+
+    centre_m: Point
+    radius_m: float
+    label: Sentence
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Measures:
+    """All of one scenario."""
+
+    lines: tuple[MeasureLine, ...] = ()
+    rings: tuple[MeasureRing, ...] = ()
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class LaneEdges:
+    """How far a point within a lane is from its edges; sides are those of the ego's direction."""
+
+    left_m: float
+    right_m: float
+
+
+def find_measures(ground: Ground, intent: Intent | None, *, reach_m: float) -> Measures:
+    """The lines and rings of a scenario.
+
+    A line across the road lies so far along the ego's route as is asked for, one at each end of a
+    range; a line along the lane lies so far from the lane's centre. What is asked for without a
+    number has none.
+
+    Args:
+        ground: Of the scene before any change.
+        intent: What the instruction asks for; without it, or without a lane under the ego, there
+            are rings alone.
+        reach_m: The radius up to which rings are drawn.
+    """
+    ego = (ground.scene.ego.x_m, ground.scene.ego.y_m)
+    rings = tuple(
+        MeasureRing(
+            centre_m=ego, radius_m=number * RING_STEP_M, label=_metres(number * RING_STEP_M)
+        )
+        for number in range(1, int(reach_m / RING_STEP_M) + 1)
+    )
+    lanes = None if intent is None else LanesAcross.of(ground, intent.route)
+    if intent is None or lanes is None:
+        return Measures(rings=rings)
+    counted = resolve_anchors(resolve_landmarks(intent, lanes))
+    return Measures(lines=tuple(dict.fromkeys(_lines(counted, lanes))), rings=rings)
+
+
+def lane_edges_at(ground: Ground, x_m: float, y_m: float) -> LaneEdges | None:
+    """How far a point is from the edges of the lane under it, None off every lane.
+
+    Where several lanes lie over each other, a lane goes before the connectors of a junction, and
+    of several the one whose centre is nearest.
+    """
+    connectors = {one.id for one in ground.scene.connectors}
+    under = min(
+        (one for one in ground.lanes.beside(x_m, y_m) if one.covers),
+        key=lambda one: (one.lane_id in connectors, abs(one.d_m)),
+        default=None,
+    )
+    if under is None:
+        return None
+    turn_rad = abs(difference(under.tangent_rad, ground.scene.ego.heading_rad))
+    left_m = -under.d_m if turn_rad > math.pi / 2.0 else under.d_m
+    half_m = under.width_m / 2.0
+    return LaneEdges(left_m=half_m - left_m, right_m=half_m + left_m)
+
+
+# Private
+
+
+def _lines(intent: Intent, lanes: LanesAcross) -> Iterator[MeasureLine]:
+    for one in (*intent.requests, *intent.moves):
+        span_m = one.spot.span_m if one.spot.distance else None
+        ends_m = sorted({end for end in span_m or () if math.isfinite(end)})
+        for ahead_m in ends_m:
+            yield _across(one.spot, lanes, ahead_m, is_walk=isinstance(one, WalkRequest))
+        yield from _along(one.spot, lanes, ends_m)
+
+
+def _across(spot: Spot, lanes: LanesAcross, ahead_m: float, *, is_walk: bool) -> MeasureLine:
+    """Over the ego's lane and the one that is asked for."""
+    bands = [lanes.band(choice, ahead_m) for choice in (LaneChoice.OWN, spot.lane) if choice]
+    edges_m = [
+        band.left_m + side * band.width_m / 2.0 for band in bands if band for side in (-1.0, 1.0)
+    ] or [-2.0, 2.0]
+    beyond_m = _WALK_M if is_walk else _BESIDE_M
+    low_m, high_m = min(edges_m) - beyond_m, max(edges_m) + beyond_m
+    label = (
+        sentence("%(metres)s m ahead", metres=f"{ahead_m:.4g}")
+        if ahead_m >= 0.0
+        else sentence("%(metres)s m behind", metres=f"{-ahead_m:.4g}")
+    )
+    ends = tuple(lanes.route.position(ahead_m, left_m) for left_m in (high_m, low_m))
+    return MeasureLine(points_m=ends, label=label)
+
+
+def _along(spot: Spot, lanes: LanesAcross, ends_m: list[float]) -> Iterator[MeasureLine]:
+    """Beside the centre of the lane that is asked for, as far as is said."""
+    lateral = spot.lateral
+    if lateral is None or spot.lane is None:
+        return
+    sign = side_sign(lateral, kerb=kerb_of(lanes.route.scene))
+    if sign and lateral.offset is None:
+        return
+    offsets_m = {0.0} if lateral.offset is None else {lateral.offset.low_m, lateral.offset.high_m}
+    low_m, high_m = (ends_m[0], ends_m[-1]) if ends_m else _OPEN_M
+    band = lanes.band(spot.lane, (low_m + high_m) / 2.0)
+    if band is None:
+        return
+    steps = math.ceil((high_m - low_m + 2.0 * _ALONG_M) / _STEP_M)
+    for offset_m in sorted({sign * one for one in offsets_m}):
+        points = tuple(
+            lanes.route.position(low_m - _ALONG_M + step * _STEP_M, band.left_m + offset_m)
+            for step in range(steps + 1)
+        )
+        yield MeasureLine(points_m=points, label=_beside(offset_m))
+
+
+def _beside(offset_m: float) -> Sentence:
+    if offset_m > 0.0:
+        return sentence("%(metres)s m left", metres=f"{offset_m:.4g}")
+    if offset_m < 0.0:
+        return sentence("%(metres)s m right", metres=f"{-offset_m:.4g}")
+    return sentence("centre of the lane")
+
+
+def _metres(metres: float) -> Sentence:
+    return sentence("%(metres)s m", metres=f"{metres:.4g}")

@@ -1,0 +1,127 @@
+"""Measures over a pair: the same whoever drew what, right in pixels, only where they may be."""
+
+from __future__ import annotations
+
+import uuid
+
+import pytest
+from django.contrib.auth.models import User
+from django.urls import reverse
+
+from arena.errors import InvalidVote
+from arena.models import Matchup, Study
+from arena.services.studies import PlanOptions, open_study
+from augment.models import Scenario
+from augment.scene.intent_codec import intent_to_document
+from tests.intents import LEFT_EDGE, parked, towards
+from tests.study_rows import a_study, cast_of, matchups_of, vote
+from tests.web.cast import people, signed_in
+from tests.web.test_replay import loaded
+from tests.web.test_weight import MOST_BYTES, weight
+
+pytestmark = pytest.mark.django_db
+
+
+def measured_study() -> Study:
+    study = a_study()
+    intent = intent_to_document(parked(25.0, lateral=towards(LEFT_EDGE, 1.2)))
+    Scenario.objects.update(intent=intent, intent_origin="authored")
+    return study
+
+
+def without_measures() -> Study:
+    options = PlanOptions(allow_measures=False)
+    return open_study(name="Round 1", votes_per_expert=9, seed=7, options=options, **cast_of())
+
+
+def address(matchup: Matchup) -> str:
+    return reverse("measures", args=[matchup.code])
+
+
+def test_lines_stand_where_the_picture_has_the_metres() -> None:
+    first = matchups_of(measured_study(), "eva")[0]
+    eva = signed_in(User.objects.get(username="eva"))
+    found = eva.get(address(first)).json()
+    view = first.view
+    (ego_x, ego_y), scale = view["ego_px"], view["px_per_m"]
+    ahead, beside = found["lines"]
+    assert ahead["label"] == "25 m ahead"
+    assert {x for x, _ in ahead["points"]} == {round(ego_x + 25.0 * scale, 1)}
+    assert beside["label"] == "1.2 m left"
+    assert {y for _, y in beside["points"]} == {round(ego_y - 1.2 * scale, 1)}
+    assert found["rings"][0] | {"text": None} == {
+        "at": [ego_x, ego_y], "r": round(10.0 * scale, 1), "label": "10 m", "text": None,
+    }  # fmt: skip
+    for one in (*found["lines"], *found["rings"]):
+        x, y = one.get("text", one.get("at"))
+        assert 0 < x < view["width"]
+        assert 0 < y < view["height"]
+
+
+def test_they_are_the_same_bytes_whoever_drew_the_pictures() -> None:
+    study = measured_study()
+    eva = signed_in(User.objects.get(username="eva"))
+    by_scenario: dict[int, set[bytes]] = {}
+    for matchup in matchups_of(study, "eva"):
+        by_scenario.setdefault(matchup.scenario_id, set()).add(eva.get(address(matchup)).content)
+    assert len(by_scenario) < len(matchups_of(study, "eva")), "some come twice, of other pairs"
+    assert all(len(answers) == 1 for answers in by_scenario.values())
+
+
+def test_the_ruler_learns_the_edges_of_the_lane_in_the_language_of_the_page() -> None:
+    first = matchups_of(measured_study(), "eva")[0]
+    eva = signed_in(User.objects.get(username="eva"))
+    (ego_x, ego_y), scale = first.view["ego_px"], first.view["px_per_m"]
+    place = {"x": ego_x + 10.0 * scale, "y": ego_y - 1.35 * scale}
+    said = eva.get(address(first), place).json()
+    assert said == {"words": "0.4 m from the left edge of its lane, 3.1 m from the right"}
+    german = eva.get(address(first), place, HTTP_ACCEPT_LANGUAGE="de").json()["words"]
+    assert german == "0.4 m vom linken Rand seines Fahrstreifens, 3.1 m vom rechten"
+    assert eva.get(address(first), place | {"y": 1e6}).json() == {"words": "on no lane"}
+    for wrong in ({"x": "1"}, {"x": "1", "y": "nan"}, {"x": "a", "y": "1"}):
+        assert eva.get(address(first), wrong).status_code == 422
+
+
+def test_a_pair_is_measured_by_its_expert_alone() -> None:
+    first = matchups_of(measured_study(), "eva")[0]
+    assert signed_in(User.objects.get(username="finn")).get(address(first)).status_code == 404
+    stranger = reverse("measures", args=[uuid.uuid4()])
+    assert signed_in(User.objects.get(username="eva")).get(stranger).status_code == 404
+
+
+def test_the_page_offers_them_and_loads_nothing_until_they_are_asked_for() -> None:
+    study = measured_study()
+    eva = signed_in(User.objects.get(username="eva"))
+    shown = eva.get(reverse("vote", args=[study.code])).content.decode()
+    assert 'data-do="measures"' in shown
+    names = loaded(shown)
+    assert not any("measures" in name for name in names)
+    assert sum(weight(name) for name in names) <= MOST_BYTES
+    matchup = matchups_of(study, "eva")[0]
+    assert vote(matchup, "left", aids=["measures", "zoom"]).aids == "zoom measures"
+
+
+def test_a_study_that_forbids_them_has_no_trace_of_them() -> None:
+    study = without_measures()
+    first = matchups_of(study, "eva")[0]
+    eva = signed_in(User.objects.get(username="eva"))
+    page = reverse("vote", args=[study.code])
+    for place in (page, f"{page}help/"):
+        shown = eva.get(place).content.decode()
+        assert [word for word in ("measures", "Measures", "<kbd>G</kbd>") if word in shown] == []
+    assert eva.get(address(first)).status_code == 404
+    assert eva.get(address(first), {"x": "1", "y": "1"}).status_code == 404
+    with pytest.raises(InvalidVote, match="no measures"):
+        vote(first, "left", aids=["measures"])
+
+
+def test_they_are_allowed_unless_the_form_says_no_and_the_preregistration_tells() -> None:
+    admin = signed_in(people()["admin"])
+    shown = admin.get(reverse("study-new")).content.decode()
+    assert 'name="no_measures"' in shown
+    assert 'name="no_measures" checked' not in shown
+    allowed = measured_study()
+    assert allowed.allow_measures
+    rules = admin.get(reverse("study", args=[allowed.code])).content.decode()
+    assert "may be laid over both images" in rules
+    assert '"measures": true' in allowed.preregistration
