@@ -8,7 +8,7 @@ from datetime import timedelta
 
 from django.contrib.auth.models import User
 from django.db import transaction
-from django.db.models import F
+from django.db.models import Case, F, Q, Value, When
 from django.utils import timezone
 
 from arena.errors import TokenOver, TooManyRequests
@@ -116,18 +116,19 @@ def use_api_token(secret: str) -> tuple[User, ApiToken]:
 
 
 def _count(token: ApiToken, most: int) -> None:
-    """Count one request of the window, which begins with the first request after the last one."""
+    """Count one request of the window, which begins with the first request after the last one.
+
+    In one statement: of two that come at once in a new window, each finds the other counted.
+    """
     now = timezone.now()
-    rows = ApiToken.objects.filter(pk=token.pk)
-    running = rows.filter(window_began_at__gt=now - WINDOW)
-    if running.filter(window_requests__lt=most).update(
-        window_requests=F("window_requests") + 1, last_used_at=now
+    is_new = Q(window_began_at=None) | Q(window_began_at__lte=now - WINDOW)
+    free = ApiToken.objects.filter(is_new | Q(window_requests__lt=most), pk=token.pk)
+    if not free.update(
+        window_requests=Case(When(is_new, then=Value(1)), default=F("window_requests") + 1),
+        window_began_at=Case(When(is_new, then=Value(now)), default=F("window_began_at")),
+        last_used_at=now,
     ):
-        return
-    over = rows.exclude(window_began_at__gt=now - WINDOW)
-    if over.update(window_began_at=now, window_requests=1, last_used_at=now):
-        return
-    raise TooManyRequests(most, WINDOW.seconds)
+        raise TooManyRequests(most, WINDOW.seconds)
 
 
 def _log(token: ApiToken, actor: User, verb: str) -> None:

@@ -9,6 +9,7 @@ from django.contrib.auth.models import User
 from django.test import Client
 from django.urls import reverse
 from django.utils import timezone
+from pytest_django import DjangoAssertNumQueries
 
 from arena.models import ApiToken
 from arena.queries.api_tokens import effective_role
@@ -176,6 +177,17 @@ def test_use_is_remembered_and_limited_by_role(monkeypatch: pytest.MonkeyPatch) 
     ApiToken.objects.update(window_began_at=timezone.now() - timedelta(seconds=61))
     assert asking.get(ACCOUNT).status_code == 200, "a new window"
     assert ApiToken.objects.exclude(last_used_at=None).count() == 2
+
+
+def test_a_request_is_counted_by_one_statement_so_that_none_between_is_refused(
+    django_assert_num_queries: DjangoAssertNumQueries,
+) -> None:
+    secret = secret_of(people()["analyst"])
+    role_at(program(secret))
+    for began in (None, timezone.now() - timedelta(seconds=61), timezone.now()):
+        ApiToken.objects.update(window_began_at=began)
+        with django_assert_num_queries(3):  # the token with its owner, their roles, the count
+            api_tokens.use_api_token(secret)
 
 
 @pytest.mark.parametrize(
