@@ -96,7 +96,7 @@ def start_telling(**_: object) -> None:
 
 def _tell() -> None:
     plan_deliveries(timezone.now())
-    deliver_due(timezone.now())
+    deliver_due()
 
 
 def _start(what: str, act: Callable[[], object], *, every_s: float) -> None:

@@ -44,4 +44,4 @@ class Receiver:
 def tell(receiver: Receiver, now: datetime | None = None) -> int:
     now = now or timezone.now() + timedelta(seconds=1)
     plan_deliveries(now)
-    return deliver_due(now, send=receiver)
+    return deliver_due(lambda: now, send=receiver)

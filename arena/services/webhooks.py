@@ -47,6 +47,7 @@ KEPT_DELIVERIES = 500
 LONGEST_ANSWER = 300
 
 Send = Callable[..., NoticeAnswer]
+Clock = Callable[[], datetime]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -141,22 +142,22 @@ def plan_deliveries(now: datetime) -> int:
     return len(webhooks)
 
 
-def deliver_due(now: datetime, *, send: Send = send_notice) -> int:
+def deliver_due(clock: Clock = timezone.now, *, send: Send = send_notice) -> int:
     """Try every message that is due; of two workers one takes it.
 
     Args:
-        now: The time.
+        clock: Says the time, anew for each message: those before it may have taken minutes.
         send: Sends one message.
 
     Returns:
         How many were tried.
     """
-    due = WebhookDelivery.objects.filter(
-        state=State.WAITING, due_at__lte=now, webhook__is_active=True
-    )
+    waiting = WebhookDelivery.objects.filter(state=State.WAITING, webhook__is_active=True)
+    due = waiting.filter(due_at__lte=clock()).order_by("due_at", "pk")
     tried = 0
-    for pk in list(due.order_by("due_at", "pk").values_list("pk", flat=True)[:MOST_AT_ONCE]):
-        mine = due.filter(pk=pk)
+    for pk in list(due.values_list("pk", flat=True)[:MOST_AT_ONCE]):
+        now = clock()
+        mine = waiting.filter(pk=pk, due_at__lte=now)
         if mine.update(due_at=now + timedelta(seconds=HELD_S), attempts=F("attempts") + 1):
             row = WebhookDelivery.objects.select_related("webhook").get(pk=pk)
             _try(row, send)

@@ -203,12 +203,33 @@ def test_of_two_workers_one_sends_and_a_dead_ones_message_is_taken_over(admin: U
     now = timezone.now() + timedelta(seconds=1)
 
     def meanwhile(url: str, *, body: bytes, headers: Any) -> NoticeAnswer:
-        assert deliver_due(now, send=receiver) == 0, "the other one finds nothing"
+        assert deliver_due(lambda: now, send=receiver) == 0, "the other one finds nothing"
         raise SystemExit
 
     receiver = Receiver()
     with pytest.raises(SystemExit):
-        deliver_due(now, send=meanwhile)
-    assert deliver_due(now + timedelta(seconds=HELD_S - 1), send=receiver) == 0
-    assert deliver_due(now + timedelta(seconds=HELD_S), send=receiver) == 1
+        deliver_due(lambda: now, send=meanwhile)
+    assert tell(receiver, now + timedelta(seconds=HELD_S - 1)) == 0
+    assert tell(receiver, now + timedelta(seconds=HELD_S)) == 1
     assert WebhookDelivery.objects.get().state == State.DELIVERED
+
+
+def test_a_message_is_held_from_when_it_is_taken_however_slow_those_before_were(
+    admin: User,
+) -> None:
+    webhook = hook(admin).webhook
+    for _ in range(3):
+        send_test(webhook=webhook)
+    now = timezone.now() + timedelta(seconds=1)
+
+    def slowly(url: str, *, body: bytes, headers: Any) -> NoticeAnswer:
+        nonlocal now
+        now += timedelta(seconds=HELD_S - 1)
+        sent.append(body)
+        if len(sent) == 3:
+            assert deliver_due(lambda: now, send=Receiver()) == 0, "another worker finds nothing"
+        return NoticeAnswer(status=200, text="ok")
+
+    sent: list[bytes] = []
+    assert deliver_due(lambda: now, send=slowly) == 3
+    assert set(WebhookDelivery.objects.values_list("state", "attempts")) == {("delivered", 1)}

@@ -13,7 +13,6 @@ from typing import Any
 import pytest
 from django.contrib.auth.models import User
 from django.urls import reverse
-from django.utils import timezone
 
 from arena import tasks
 from arena.models import Webhook, WebhookDelivery
@@ -72,7 +71,7 @@ def listening(status: int, **headers: str) -> Iterator[tuple[str, list[bytes]]]:
 def test_a_message_arrives_by_the_network_and_its_answer_is_kept(admin: User) -> None:
     with listening(200) as (url, bodies):
         send_test(webhook=hook(admin, url=url).webhook)
-        assert deliver_due(timezone.now()) == 1
+        assert deliver_due() == 1
     row = WebhookDelivery.objects.get()
     assert (row.state, row.last_status, row.last_answer) == (State.DELIVERED, 200, "hello")
     assert bodies == [row.body.encode()]
@@ -99,7 +98,7 @@ def test_a_worker_that_is_ready_tells_without_being_asked(admin: User) -> None:
 def test_a_redirect_is_not_followed(admin: User) -> None:
     with listening(200) as (target, taken), listening(302, Location=target) as (url, _):
         send_test(webhook=hook(admin, url=url).webhook)
-        deliver_due(timezone.now())
+        deliver_due()
     assert taken == []
     assert WebhookDelivery.objects.get().last_status == 302
 
@@ -108,7 +107,7 @@ def test_nobody_listening_is_said_in_words(admin: User) -> None:
     with listening(200) as (url, _):
         pass
     send_test(webhook=hook(admin, url=url).webhook)
-    deliver_due(timezone.now())
+    deliver_due()
     row = WebhookDelivery.objects.get()
     assert (row.state, row.last_status, row.last_answer) == (
         State.WAITING,
@@ -147,7 +146,7 @@ def test_a_name_that_leads_elsewhere_later_is_refused_when_it_is_called(
     monkeypatch.setattr("augment.services.endpoints.notices.RESOLVE", resolve)
     send_test(webhook=hook(admin, url="http://hooks.example.org/x").webhook)
     leads_to[0] = "169.254.169.254"
-    deliver_due(timezone.now())
+    deliver_due()
     assert "link-local" in WebhookDelivery.objects.get().last_answer
 
 
