@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from datetime import date, datetime, time, timedelta
+from datetime import date, datetime, time
 
 from django.contrib.auth.models import User
 from django.db.models import Q, QuerySet
@@ -48,9 +48,9 @@ def acts(filters: AuditFilters) -> QuerySet[Event]:
     if filters.object_code:
         rows = rows.filter(_about(filters.object_code))
     if filters.since is not None:
-        rows = rows.filter(at__gte=_start_of(filters.since))
+        rows = rows.filter(at__gte=_at(filters.since, time.min))
     if filters.until is not None:
-        rows = rows.filter(at__lt=_start_of(filters.until + timedelta(days=1)))
+        rows = rows.filter(at__lte=_at(filters.until, time.max))
     return rows
 
 
@@ -75,5 +75,5 @@ def _about(wanted: str) -> Q:
     return Q(object_code__in=[wanted, *(str(code) for code in codes)])
 
 
-def _start_of(day: date) -> datetime:
-    return timezone.make_aware(datetime.combine(day, time.min))
+def _at(day: date, moment: time) -> datetime:
+    return timezone.make_aware(datetime.combine(day, moment))

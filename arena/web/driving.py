@@ -24,6 +24,7 @@ from arena.models import Snapshot
 from arena.queries.costs import shown_augmentations
 from arena.queries.driving import before_of, cells_of
 from arena.web.access import ADMIN, STAFF, allow_only
+from arena.web.listing import choice_asked
 from augment.errors import AugmentError, QueueFault, UnknownName
 from augment.models import GenerationJob, Simulation
 from augment.services.judging import simulations
@@ -213,8 +214,8 @@ def _options_asked(request: HttpRequest, job: GenerationJob) -> Options:
 
 
 def _way_asked(request: HttpRequest, known: list[Options]) -> int:
-    wanted = request.GET.get("driven", "")
-    return int(wanted) if wanted.isdecimal() and int(wanted) < len(known) else 0
+    numbers = [str(number) for number in range(len(known))]
+    return int(choice_asked(request, "driven", numbers) or 0)
 
 
 def _offsets() -> dict[str, str]:

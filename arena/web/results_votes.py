@@ -23,6 +23,7 @@ from arena.queries.single_votes import vote_in
 from arena.queries.vote_lists import neighbours, vote_page
 from arena.queries.vote_search import VoteSearch
 from arena.web.access import STAFF, allow_only
+from arena.web.listing import page_asked
 from arena.web.pictures import sized_picture_response
 from arena.web.results import asked_rating, get_readable_study
 from arena.web.vote_search_form import VoteSearchForm
@@ -39,10 +40,9 @@ def votes_page(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
     if not form.is_valid():
         return render(request, "results/votes.html", context, status=422)
     search = form.search()
-    number = request.GET.get("page", "1")
     context |= {
         "search": search,
-        "found": vote_page(snapshot, search, int(number) if number.isdecimal() else 1),
+        "found": vote_page(snapshot, search, page_asked(request)),
         "query": _query(snapshot, search),
     }
     return render(request, "results/votes.html", context)

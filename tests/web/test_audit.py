@@ -70,6 +70,9 @@ def test_acts_are_filtered_by_who_what_which_and_when() -> None:
     assert "Nothing like that was done" in _page(client, since="2999-01-01")
     assert "Nothing like that was done" in _page(client, until="1999-01-01")
     assert client.get(reverse("audit"), {"since": "yesterday"}).status_code == 422
+    assert "a-street" in _page(client, since="0001-01-01", until="9999-12-31")
+    today = timezone.localdate().isoformat()
+    assert "a-street" in _page(client, since=today, until=today)
 
 
 def test_it_is_paged_and_the_filters_stay() -> None:

@@ -92,6 +92,7 @@ def test_the_button_offers_what_the_command_does() -> None:
     assert "Up to 1 m (original)" in text
     other = admin.get(page + "?driven=1&score=nuplan").content.decode()
     assert '<option value="original" selected>' in other
+    assert admin.get(page + f"?driven={'9' * 5000}").status_code == 200
 
 
 def test_a_score_that_nobody_knows_drives_nothing() -> None:

@@ -100,6 +100,8 @@ def test_the_filters_stand_in_the_address_and_in_the_form(study: Study, analyst:
     assert 'value="kerb"' in page
     assert number_of(page) == kept.filter(winner__contestant__slug=slug).count() > 0
     assert number_of(listed(analyst, study, scenario="place-3")) > 0
+    for page in ("0", "x", "99", "9" * 5000):
+        assert number_of(listed(analyst, study, page=page)) > 0
 
 
 @pytest.mark.parametrize(
