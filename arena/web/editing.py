@@ -15,11 +15,12 @@ from django.views.decorators.http import require_http_methods, require_POST
 
 from arena.services.references import drop_reference, set_reference, why_not_editable
 from arena.web.access import STAFF, allow_only
+from arena.web.json_text import read_json
 from arena.web.sending import looks_again, send_later
 from augment.errors import AugmentError, Conflict
 from augment.models import Augmentation, Scenario
 from augment.scene_tasks import enqueue_scenario, enqueue_scene
-from augment.sentences import sentence
+from augment.sentences import Sentence, sentence
 from augment.services.judging.edits import check_edit
 from augment.services.running import by_hand
 from augment.services.scenarios.editing import PLACED, editor_document
@@ -29,6 +30,8 @@ from augment.tasks import enqueue_job
 
 LONGEST = 1_000_000
 """Of a modification, in bytes."""
+
+NO_JSON = sentence("The change is no JSON.")
 
 
 @allow_only(*STAFF)
@@ -71,12 +74,13 @@ def drop(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
 def check(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
     """What the checks find in a change that is being made; nothing is kept."""
     scenario = _scenario(code)
+    no_json = sentence("This is no JSON of a change.")
     try:
-        asked = json.loads(request.body[:LONGEST]) if len(request.body) <= LONGEST else None
-    except ValueError:
-        asked = None
-    if not isinstance(asked, dict):
-        return JsonResponse({"problem": _("This is no JSON of a change.")}, status=422)
+        asked = _document(request.body, otherwise=no_json)
+        if not isinstance(asked, dict):
+            raise Conflict(no_json)
+    except Conflict as error:
+        return JsonResponse({"problem": translate(error)}, status=422)
     snapped = asked.get("snap")
     found = check_edit(
         scenario,
@@ -151,7 +155,7 @@ def _context(
         "scenario": scenario,
         "editor": editor_document(scenario),
         "given": given,
-        "text": json.dumps(given, indent=2) if given is not None else "",
+        "text": request.POST.get("modification", _as_text(given)),
         "problem": problem,
         "types": [(one.value, one.value.replace("_", " ").lower()) for one in PLACED],
         "is_drawn": drawn,
@@ -159,15 +163,16 @@ def _context(
     }
 
 
-def _document(text: str) -> object:
-    """What the field holds.
+def _as_text(document: object) -> str:
+    return "" if document is None else json.dumps(document, indent=2)
+
+
+def _document(text: str | bytes, *, otherwise: Sentence = NO_JSON) -> object:
+    """What was typed.
 
     Raises:
         Conflict: It is too long, or no JSON.
     """
     if len(text) > LONGEST:
         raise Conflict(sentence("The change is too long."))
-    try:
-        return json.loads(text)
-    except ValueError:
-        raise Conflict(sentence("The change is no JSON.")) from None
+    return read_json(text, otherwise=otherwise)

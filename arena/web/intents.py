@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import uuid
 from typing import cast
 
@@ -15,6 +14,7 @@ from django.utils.translation import gettext as _
 from django.views.decorators.http import require_POST, require_safe
 
 from arena.web.access import ADMIN, STAFF, allow_only
+from arena.web.json_text import read_json
 from augment.errors import AugmentError, Conflict, QueueFault
 from augment.models import EndpointModel, Scenario
 from augment.sentences import sentence
@@ -101,7 +101,4 @@ def _document(request: HttpRequest) -> object:
         raise Conflict(sentence("Choose a JSON file."))
     if file.size is None or file.size > LONGEST_FILE:
         raise Conflict(sentence("The file is too long for an intent."))
-    try:
-        return json.loads(file.read())
-    except ValueError:
-        raise Conflict(sentence("The file is no JSON.")) from None
+    return read_json(file.read(), otherwise=sentence("The file is no JSON."))

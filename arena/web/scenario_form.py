@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import tempfile
 import uuid
 from pathlib import Path
@@ -19,6 +18,7 @@ from django.utils.translation import gettext_lazy
 from django.views.decorators.http import require_http_methods
 
 from arena.web.access import STAFF, allow_only
+from arena.web.json_text import read_json
 from arena.web.sending import looks_again, send_later, was_too_large
 from augment.errors import AugmentError, Conflict
 from augment.models import BaseScene
@@ -63,12 +63,10 @@ class ScenarioForm(forms.Form):
         text = self.cleaned_data["intent"].strip()
         if not text:
             return simple_intent({name: self.data.get(f"i_{name}", "") for name in CHOICES})
-        try:
-            found = json.loads(text)
-        except ValueError:
-            raise Conflict(sentence("The intent is no JSON.")) from None
+        no_json = sentence("The intent is no JSON.")
+        found = read_json(text, otherwise=no_json)
         if not isinstance(found, dict):
-            raise Conflict(sentence("The intent is no JSON."))
+            raise Conflict(no_json)
         return found
 
 

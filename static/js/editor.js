@@ -307,5 +307,11 @@ new ResizeObserver(() => {
 }).observe(svg);
 
 form.classList.add("is-live");
+const typed = field.value;
 show();
+try {
+  JSON.parse(typed || "null");
+} catch {
+  field.value = typed; // what was refused for being no JSON is there to be mended
+}
 check().catch(fail);

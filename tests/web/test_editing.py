@@ -83,6 +83,9 @@ def test_a_drawn_reference_is_kept_and_shown(analyst: Client) -> None:
     [
         ("", "no JSON"),
         ("{", "no JSON"),
+        ("[" * 100_000, "no JSON"),
+        (CAR.replace("20.0", "NaN"), "add[0]"),
+        (CAR.replace("20.0", "1e999"), "add[0]"),
         (CAR.replace("Added1", "Agent2"), "Agent2 is in the scene already"),
         (CAR.replace("VEHICLE", "TRAM"), "add[0].type"),
     ],
@@ -91,7 +94,9 @@ def test_a_refused_reference_stays_on_the_page(analyst: Client, text: str, probl
     here = busy()
     answer = analyst.post(reverse("reference-edit", args=[here.code]), {"modification": text})
     assert answer.status_code == 422
-    assert problem in answer.content.decode()
+    shown = answer.content.decode()
+    assert problem in shown
+    assert html.escape(text) in shown, "as it was typed"
     here.refresh_from_db()
     assert here.reference is None
 
@@ -111,6 +116,9 @@ def test_the_checks_answer_while_one_draws(analyst: Client) -> None:
     assert "lines" in found
     assert "Agent8" in str(ask(modification={**json.loads(CAR), "remove": ["Agent8"]})["problem"])
     assert "expected an object" in str(ask()["problem"])
+    for body in ("", "[]", "[" * 100_000):
+        answer = analyst.post(url, body, content_type="application/json")
+        assert (answer.status_code, "no JSON" in answer.json()["problem"]) == (422, True)
     here.refresh_from_db()
     assert here.reference is None
 

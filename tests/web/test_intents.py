@@ -74,6 +74,7 @@ def test_a_file_replaces_the_intent_and_can_be_fetched_again(staff: Client) -> N
     ("text", "why"),
     [
         ("{", "The file is no JSON"),
+        ("[" * 100_000, "The file is no JSON"),
         (json.dumps(LINE).replace("line", "zigzag"), "requests[0].cones.shape"),
         ("[" * 200_001, "too long"),
     ],

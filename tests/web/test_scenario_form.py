@@ -106,6 +106,7 @@ def test_an_intent_as_json_goes_before_the_fields(analyst: Client, scene: BaseSc
         ({"type": "", "own_type": "Cut In"}, "must be one of"),
         ({"type": "jaywalking_pedestrian", "slug": "street"}, "called &#x27;street&#x27; already"),
         ({"type": "jaywalking_pedestrian", "intent": "["}, "The intent is no JSON"),
+        ({"type": "avoid_crashed_cars", "intent": "[" * 100_000}, "The intent is no JSON"),
         ({"type": "jaywalking_pedestrian", "intent": "{}"}, "format"),
         ({"type": "jaywalking_pedestrian", "i_kind": "walk", "i_count": "x"}, "is no number"),
         ({"type": "jaywalking_pedestrian", "i_kind": "tram"}, "tram"),
