@@ -13,6 +13,9 @@ from augment.sentences import Sentence, sentence
 MOST_OVERLAP = 0.8
 """More can't be brought together where all pairs and scenarios stay balanced for everybody."""
 
+MOST_CHECKS = 0.5
+ATTENTION_CHECKS = sentence("attention checks")
+
 
 def check_rules(rules: PlanRules, grid: Grid) -> None:
     """Whether the rules make sense.
@@ -96,23 +99,28 @@ def _too_few(rules: PlanRules, grid: Grid, units: int) -> Sentence:
     )
 
 
-def _check_shares(rules: PlanRules) -> None:
-    shares = (
-        (sentence("repeats"), rules.repeat_share, 0.5),
-        (sentence("what two experts judge"), rules.overlap_share, MOST_OVERLAP),
-        (sentence("attention checks"), rules.check_share, 0.5),
-        (sentence("the adaptive part"), rules.adaptive_share, 0.9),
-    )
-    for part, share, most in shares:
-        if not 0 <= share <= most:
-            raise NothingToPlan(
-                sentence(
-                    "The share of %(part)s goes from 0 to %(most)s, not %(share)s.",
-                    part=part,
-                    most=f"{most:.0%}",
-                    share=f"{share:.1%}",
-                )
+def check_share(part: Sentence, share: float, most: float) -> None:
+    """Do nothing for a share from 0 to the most that there can be.
+
+    Raises:
+        NothingToPlan: It is none.
+    """
+    if not 0 <= share <= most:
+        raise NothingToPlan(
+            sentence(
+                "The share of %(part)s goes from 0 to %(most)s, not %(share)s.",
+                part=part,
+                most=f"{most:.0%}",
+                share=f"{share:.1%}",
             )
+        )
+
+
+def _check_shares(rules: PlanRules) -> None:
+    check_share(sentence("repeats"), rules.repeat_share, 0.5)
+    check_share(sentence("what two experts judge"), rules.overlap_share, MOST_OVERLAP)
+    check_share(ATTENTION_CHECKS, rules.check_share, MOST_CHECKS)
+    check_share(sentence("the adaptive part"), rules.adaptive_share, 0.9)
     if not 0.2 <= rules.uniform_share <= 1:
         raise NothingToPlan(
             sentence(

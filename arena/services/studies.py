@@ -12,6 +12,7 @@ from django.utils import timezone
 
 from arena.errors import StudyNotOpen
 from arena.models import Study
+from arena.pairing.demands import ATTENTION_CHECKS, MOST_CHECKS, check_share
 from arena.pairing.plan import Check, Entry, MatchupPlan, PlanRules, plan
 from arena.queries.people import experts as expert_accounts
 from arena.services.attention_checks import enough_checks, placed_checks
@@ -200,6 +201,7 @@ def _checks_for(
     given: PlanOptions, scenarios: list[Scenario], entries: tuple[Entry, ...], votes: int
 ) -> tuple[tuple[Check, ...], Cells]:
     """The attention checks that are asked for, where the plan shows them."""
+    check_share(ATTENTION_CHECKS, given.check_share, MOST_CHECKS)
     wanted = round(given.check_share * votes)
     found = enough_checks(scenarios, windows=windows_of(entries), wanted=wanted)
     return placed_checks(*found, shows_all=given.samples is SampleRule.ALL)

@@ -112,6 +112,9 @@ def test_the_command_says_that_there_are_no_checks_where_nobody_asked_for_any() 
     words += ["--votes-per-expert", "12", "--seed", "7"]
     with pytest.raises(CommandError, match="Ask for fewer"):
         call_command(*words, "--checks", "25")
+    for share in ("nan", "inf", "51"):
+        with pytest.raises(CommandError, match="attention checks goes from 0 to 50%"):
+            call_command(*words, "--checks", share)
     call_command(*words, stdout=told)
     assert "No attention checks: nobody has drawn pictures" in told.getvalue()
 
