@@ -25,7 +25,7 @@ from arena.models import Snapshot, Study
 from arena.queries.results import snapshot_to_export
 from arena.web.access import STAFF, allow_only
 from arena.web.results import asked_rating, get_readable_study
-from augment.errors import Conflict, UnknownName
+from augment.errors import AugmentError, Conflict, UnknownName
 from augment.services.wording import translate
 
 
@@ -92,7 +92,7 @@ def export_study(request: HttpRequest, code: uuid.UUID) -> HttpResponseBase:
             folder = Path(beside) / "study"
             write_study(study, folder, say=lambda said: None)
             zip_folder(folder, packed)
-    except ArenaError as error:
+    except (ArenaError, AugmentError) as error:
         packed.close()
         messages.error(request, translate(error))
         return redirect("results", code=code)

@@ -12,10 +12,11 @@ from django.core.files.storage import default_storage
 from django.urls import reverse
 from pytest_django import Settings
 
-from arena.models import EarlyLook, Study
+from arena.models import EarlyLook, Study, Vote
 from arena.services.ratings import rate
 from arena.services.studies import close_study
 from augment.models import Augmentation, GenerationJob
+from tests.append_only import rewriting
 from tests.exports.test_study_folder import PNG, export
 from tests.study_rows import a_study, matchups_of, vote
 from tests.web.cast import people, signed_in
@@ -56,3 +57,11 @@ def test_the_button_opens_no_study_that_takes_votes(closed: Study) -> None:
     EarlyLook.objects.create(study=closed, user=admin)
     answer = signed_in(admin).get(address, follow=True)
     assert "is open; close it before it is exported" in answer.content.decode()
+
+
+def test_a_rating_whose_votes_were_changed_by_hand_is_told(closed: Study) -> None:
+    with rewriting(Vote):
+        Vote.objects.update(ms_visible=1)
+    address = reverse("study-export", args=[closed.code])
+    answer = signed_in(people()["admin"]).get(address, follow=True)
+    assert "are not those of this rating any more" in answer.content.decode()

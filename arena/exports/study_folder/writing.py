@@ -54,6 +54,7 @@ def write_study(study: Study, out: Path, *, say: Callable[[str], None]) -> None:
     Raises:
         ArenaError: The study is open, a job of it still runs, a picture of it is missing, or the
             folder is there.
+        Conflict: The votes of a rating are not what they were.
         OSError: It can't be written; nothing is left of it.
     """
     if out.exists():
