@@ -84,7 +84,7 @@ def skip_practice(*, study: Study, expert: User) -> None:
 
 def has_practice() -> bool:
     """Whether there is something to practise on."""
-    return bool(_ready(list(Scenario.objects.all())))
+    return bool(_ready())
 
 
 def require_practice_pictures() -> None:
@@ -115,7 +115,8 @@ def _drawn(study: Study, expert: User) -> list[PracticePair]:
     own = set(study.scenarios.values_list("pk", flat=True))
     others = Study.objects.filter(experts=expert, state=Study.State.OPEN)
     seen = set(others.values_list("scenarios", flat=True)) - own
-    ready = _ready(list(Scenario.objects.all()))
+    ready = _ready()
+    kinds = dict(Scenario.objects.filter(pk__in=ready).values_list("pk", "type"))
     dice = random.Random(f"{study.seed} {UUID(str(expert.person.code)).int}")
     order = sorted(ready)
     dice.shuffle(order)
@@ -123,9 +124,8 @@ def _drawn(study: Study, expert: User) -> list[PracticePair]:
     ranked = []
     for number, pk in enumerate(order):
         group = 2 if pk in own else int(pk in seen)
-        kind = ready[pk][0].scenario.type
-        ranked.append((group, types[group, kind], number, pk))
-        types[group, kind] += 1
+        ranked.append((group, types[group, kinds[pk]], number, pk))
+        types[group, kinds[pk]] += 1
     chosen = [pk for *_, pk in sorted(ranked)[:PAIRS]]
     return [
         PracticePair(
@@ -141,9 +141,9 @@ def _drawn(study: Study, expert: User) -> list[PracticePair]:
     ]
 
 
-def _ready(scenarios: list[Scenario]) -> dict[int, tuple[Augmentation, Augmentation]]:
+def _ready() -> dict[int, tuple[Augmentation, Augmentation]]:
     """By scenario: its latest reference and its latest broken picture, in one window."""
-    rows = find_showable(scenarios).filter(
+    rows = find_showable(list(Scenario.objects.only("pk"))).filter(
         contestant__kind__in=[_GOOD, _BROKEN], state=Augmentation.State.DONE
     )
     latest: dict[tuple[int, str], Augmentation] = {}

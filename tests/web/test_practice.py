@@ -3,11 +3,15 @@
 from __future__ import annotations
 
 import re
+import uuid
 
 import pytest
 from django.contrib.auth.models import User
+from django.db import connection
 from django.test import Client
+from django.test.utils import CaptureQueriesContext
 from django.urls import reverse
+from pytest_django import DjangoAssertNumQueries
 
 from arena.errors import NothingToPlan
 from arena.models import PracticePair, Study, Vote
@@ -90,6 +94,24 @@ def test_scenarios_outside_of_the_study_come_first_and_its_own_where_those_are_t
     slugs = [pair.scenario.slug for pair in practice_pairs(study, eva())]
     assert [slug.startswith("elsewhere") for slug in slugs] == [True] * 3 + [False] * 2
     assert len(set(slugs)) == 5
+
+
+def test_a_round_takes_as_many_queries_for_any_number_of_scenarios(
+    django_assert_num_queries: DjangoAssertNumQueries,
+) -> None:
+    study = opened(outside=1)
+    with CaptureQueriesContext(connection) as few:
+        practice_pairs(study, eva())
+    for number in range(5):
+        twin = Scenario.objects.get(slug="elsewhere-0")
+        rows = list(twin.augmentations.all())
+        twin.pk, twin.slug, twin.code = None, f"twin-{number}", uuid.uuid4()
+        twin.save()
+        for row in rows:
+            row.pk, row.code, row.scenario = None, uuid.uuid4(), twin
+            row.save()
+    with django_assert_num_queries(len(few)):
+        practice_pairs(study, User.objects.get(username="finn"))
 
 
 def test_who_skips_the_practice_is_not_asked_again() -> None:
