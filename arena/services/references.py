@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from django.contrib.auth.models import User
+from django.db import transaction
 
 from arena.services.redrawing import find_judged_now
 from augment.errors import Conflict
@@ -11,6 +12,7 @@ from augment.sentences import sentence
 from augment.services.scenarios import references
 
 
+@transaction.atomic
 def set_reference(scenario: Scenario, document: object, *, actor: User | None = None) -> Scenario:
     """Give a scenario this reference; the window of its pictures may become another one.
 
@@ -20,17 +22,18 @@ def set_reference(scenario: Scenario, document: object, *, actor: User | None = 
         Conflict: The scenario is the catalogue's, an open study or labelling shows it, or nothing
             changes.
     """
-    _refuse_judged(scenario)
+    _hold_unjudged(scenario)
     return references.set_reference(scenario, document, actor=actor)
 
 
+@transaction.atomic
 def drop_reference(scenario: Scenario, *, actor: User | None = None) -> Scenario:
     """Leave a scenario without a reference.
 
     Raises:
         Conflict: As above, or it has none.
     """
-    _refuse_judged(scenario)
+    _hold_unjudged(scenario)
     return references.drop_reference(scenario, actor=actor)
 
 
@@ -42,6 +45,12 @@ def why_not_editable(scenario: Scenario) -> str:
     except Conflict as conflict:
         return conflict.args[0]  # type: ignore[no-any-return]
     return ""
+
+
+def _hold_unjudged(scenario: Scenario) -> None:
+    """Hold it, as an opening study does: none opens between the look and the change."""
+    Scenario.objects.select_for_update(of=("self",)).get(pk=scenario.pk)
+    _refuse_judged(scenario)
 
 
 def _refuse_judged(scenario: Scenario) -> None:

@@ -7,7 +7,7 @@ from django.db import transaction
 from django.db.models import Q, QuerySet
 
 from augment.errors import Conflict
-from augment.models import Augmentation, GenerationJob
+from augment.models import Augmentation, GenerationJob, Scenario
 from augment.sentences import sentence
 from augment.services.running import retrying
 from augment.services.running.causes import rows_of_cause
@@ -33,6 +33,9 @@ def retry_cause(job: GenerationJob, *, key: str, actor: User | None = None) -> G
             contestants have refused.
     """
     _, _, pks = rows_of_cause(job, key)
+    # Held, as an opening study does, so that none shows them between the look and the change.
+    places = Scenario.objects.filter(pk__in=job.scenarios.values("pk"))
+    list(places.select_for_update(no_key=True).order_by("pk").values_list("pk"))
     shown = sum(
         _shown(pks[start : start + _BATCH]).count() for start in range(0, len(pks), _BATCH)
     )

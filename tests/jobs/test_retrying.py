@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 import pytest
+from django.db import connection
+from django.test.utils import CaptureQueriesContext
 
+from arena.services.retrying import retry_cause as retry_unless_shown
 from augment.errors import Conflict, UnknownName
 from augment.models import Augmentation, Event, GenerationJob, ModelCall
 from augment.services.running import jobs, leases, retrying, runner
@@ -93,3 +96,16 @@ def test_who_refused_is_not_asked_again_and_a_cancelled_job_stays_over() -> None
     with pytest.raises(Conflict, match="was cancelled"):
         retrying.retry_cause(job, key=group.key)
     assert job.augmentations.filter(state=State.FAILED).count() == 2, "nothing is half done"
+
+
+def test_the_scenarios_are_held_before_somebody_looks_who_is_shown_a_row() -> None:
+    """Else a study could open with it between the look and the second try."""
+    job = launch(scenarios=2)
+    broken(job, "HTTP 429: slow down", "HTTP 429: slow down")
+    (group,) = failure_groups(job)
+    with CaptureQueriesContext(connection) as seen:
+        retry_unless_shown(job, key=group.key)
+    asked = [one["sql"] for one in seen]
+    look = next(n for n, sql in enumerate(asked) if "arena_matchup" in sql)
+    held = next(n for n, sql in enumerate(asked) if 'FROM "augment_scenario"' in sql)
+    assert held < look

@@ -9,6 +9,8 @@ import numpy as np
 import pytest
 from django.contrib.auth.models import User
 from django.core.files.storage import default_storage
+from django.db import connection
+from django.test.utils import CaptureQueriesContext
 
 from arena.models import Study
 from arena.services import references as guarded
@@ -217,3 +219,17 @@ def test_a_correction_that_is_none_writes_nothing() -> None:
             by_hand.keep_correction(first, given, slug=slug)
     assert Augmentation.objects.count() == rows
     assert not Contestant.objects.filter(kind=Contestant.Kind.HUMAN).exists()
+
+
+def test_a_scenario_is_held_before_somebody_looks_who_shows_it() -> None:
+    """Else a study could open between the look and the change."""
+    here = add_scenario("street", reference=None)
+    for change in (
+        lambda: guarded.set_reference(here, document(CAR)),
+        lambda: guarded.drop_reference(here),
+    ):
+        with CaptureQueriesContext(connection) as seen:
+            change()
+        asked = [one["sql"] for one in seen if one["sql"].startswith("SELECT")]
+        assert "augment_scenario" in asked[0]
+        assert "arena_study" in asked[1]
