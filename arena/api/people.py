@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Any, cast
 
 from django.contrib.auth.models import User
+from django.db import transaction
 from django.urls import reverse
 from rest_framework import serializers
 from rest_framework.request import Request
@@ -16,7 +17,7 @@ from arena.api.fields import StrictSerializer, TextField
 from arena.api.paging import PageQuery, answer_page, page_of, read_query
 from arena.api.schema import describe
 from arena.models import ApiToken, Person
-from arena.queries.people import ROLES, role_of
+from arena.queries.people import ROLES, role_given, role_of
 from arena.services.accounts import (
     accept_welcome,
     check_password_strength,
@@ -204,8 +205,9 @@ class WelcomeView(ApiView):
         body = WelcomeBody(data=request.data)
         body.is_valid(raise_exception=True)
         given = body.validated_data
-        user = accept_welcome(token=_end_of(given["link"]), password=given["password"])
-        return _token(user, "welcome")
+        with transaction.atomic():  # who gets no token has a link that still works
+            user = accept_welcome(token=_end_of(given["link"]), password=given["password"])
+            return _token(user, "welcome")
 
 
 # --- Private -----------------------------------------------------------------------------------
@@ -223,13 +225,11 @@ def _token(user: User, name: str) -> Response:
 
 
 def _person(user: User) -> dict[str, Any]:
-    names = {group.name for group in user.groups.all()}
-    role = "admin" if user.is_superuser else next((one for one in ROLES if one in names), None)
     return {
         "code": user.person.code,
         "username": user.get_username(),
         "pseudonym": user.person.pseudonym,
-        "role": role,
+        "role": role_given(user),
         "is_active": user.is_active,
         "has_password": user.has_usable_password(),
     }

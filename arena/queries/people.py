@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Collection
 from dataclasses import dataclass
 
 from django.contrib.auth.models import AnonymousUser, User
@@ -25,12 +26,15 @@ def role_of(user: User | AnonymousUser) -> str | None:
     if hasattr(user, "token_role"):
         role: str = user.token_role
         return role
-    if user.is_superuser:
-        return "admin"
     groups = getattr(user, "role_names", None)
-    if groups is None:
+    if groups is None and not user.is_superuser:
         groups = set(user.groups.values_list("name", flat=True))
-    return next((role for role in ROLES if role in groups), None)
+    return _highest(user, groups or ())
+
+
+def role_given(user: User) -> str | None:
+    """The same whether or not the account is paused; its groups are fetched before."""
+    return _highest(user, {group.name for group in user.groups.all()})
 
 
 def experts() -> QuerySet[User]:
@@ -98,12 +102,10 @@ def list_accounts() -> list[AccountLine]:
     found = found.select_related("person")
     lines = []
     for user in found.prefetch_related("groups"):
-        names = {group.name for group in user.groups.all()}
-        role = "admin" if user.is_superuser else next((one for one in ROLES if one in names), None)
         lines.append(
             AccountLine(
                 user=user,
-                role=role,
+                role=role_given(user),
                 has_password=user.has_usable_password(),
                 is_forgotten=is_forgotten(user),
             )
@@ -116,3 +118,12 @@ def list_accounts() -> list[AccountLine]:
             natural_order(line.user.person.pseudonym),
         ),
     )
+
+
+# --- Private -----------------------------------------------------------------------------------
+
+
+def _highest(user: User, groups: Collection[str]) -> str | None:
+    if user.is_superuser:
+        return "admin"
+    return next((role for role in ROLES if role in groups), None)

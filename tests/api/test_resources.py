@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 import pytest
-from django.contrib.auth.models import User
+from django.contrib.auth.models import Group, User
 from django.db import connection
 from django.test import Client
 from django.test.utils import CaptureQueriesContext
@@ -193,6 +193,19 @@ def test_links_let_in_once_and_only_with_a_password_that_holds() -> None:
     assert expert.get(API + "account").json()["role"] == "expert"
     error_of(send(Client(), "welcome", **invited), 410, "link_over")
     assert User.objects.get(username="grace").check_password("a bird in the hand")
+
+
+def test_who_can_have_no_token_keeps_the_link() -> None:
+    asking = program_of(people()["admin"])
+    link = send(asking, "people", username="grace", role="expert").json()["link"]
+    grace = User.objects.get(username="grace")
+    grace.groups.clear()
+    invited = {"link": link, "password": "a bird in the hand"}
+    error_of(send(Client(), "welcome", **invited), 400, "refused")
+    grace.refresh_from_db()
+    assert not grace.has_usable_password()
+    grace.groups.add(Group.objects.get(name="expert"))
+    assert send(Client(), "welcome", **invited).status_code == 201
 
 
 # --- Blindness ---------------------------------------------------------------------------------
