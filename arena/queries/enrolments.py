@@ -108,6 +108,12 @@ class OwnEnrolment:
     was_given_on: bool
 
 
+def code_told(voter: Any) -> str:
+    """The completion code of one of `enrolled_voters`, empty unless every pair has an answer."""
+    is_done = voter.dropped_at is None and 0 < voter.planned <= voter.answered
+    return voter.completion_code if is_done else ""
+
+
 def own_enrolment(study: Study, expert: User) -> OwnEnrolment | None:
     """None for who did not come by an enrolment link of this study."""
     enrolment = Enrolment.objects.filter(study=study).first()
@@ -116,8 +122,6 @@ def own_enrolment(study: Study, expert: User) -> OwnEnrolment | None:
     voter = enrolled_voters(enrolment).filter(expert=expert).first()
     if voter is None:
         return None
-    is_done = voter.dropped_at is None and 0 < voter.planned <= voter.answered
     return OwnEnrolment(
-        completion_code=voter.completion_code if is_done else "",
-        was_given_on=voter.dropped_at is not None,
+        completion_code=code_told(voter), was_given_on=voter.dropped_at is not None
     )

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import csv
 import uuid
 from typing import Any, cast
 
@@ -22,7 +21,8 @@ from django.views.decorators.http import require_http_methods, require_POST, req
 
 from arena.errors import ArenaError, EnrolmentOver, NotYours
 from arena.models import Enrolment, Study
-from arena.queries.enrolments import enrolled_voters, enrolment_by_token, state_of
+from arena.queries.enrolments import code_told, enrolled_voters, enrolment_by_token, state_of
+from arena.services.cells import csv_text
 from arena.services.enrolments import LONGEST_CONSENT, drop_silent, enrol, set_enrolment
 from arena.web.access import ADMIN, allow_only
 from arena.web.invitations import BACKEND, GONE, SESSION_S
@@ -150,27 +150,11 @@ def drop_out(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
 def voters_file(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
     """Who is to be thanked or paid: ids, progress and completion codes, as CSV."""
     enrolment = get_object_or_404(Enrolment, study__code=code)
-    answer = HttpResponse(content_type="text/csv; charset=utf-8")
-    answer["Content-Disposition"] = 'attachment; filename="voters.csv"'
-    table = csv.writer(answer)
-    table.writerow(COLUMNS)
-    for voter in enrolled_voters(enrolment):
-        is_done = voter.dropped_at is None and 0 < voter.planned <= voter.answered
-        times = (voter.enrolled_at, voter.last_vote_at, voter.dropped_at)
-        enrolled_at, last_vote_at, dropped_at = (
-            "" if at is None else at.isoformat() for at in times
-        )
-        table.writerow(
-            [
-                voter.expert.person.pseudonym,
-                _without_formula(voter.external_id),
-                *(voter.planned, voter.answered, voter.skipped),
-                *(enrolled_at, last_vote_at, dropped_at),
-                int(is_done),
-                voter.completion_code if is_done else "",
-            ]
-        )
-    return answer
+    return HttpResponse(
+        csv_text(COLUMNS, map(_line_of, enrolled_voters(enrolment))),
+        content_type="text/csv; charset=utf-8",
+        headers={"Content-Disposition": 'attachment; filename="voters.csv"'},
+    )
 
 
 # --- Private -----------------------------------------------------------------------------------
@@ -186,6 +170,14 @@ def _rules_of(enrolment: Enrolment | None) -> dict[str, Any] | None:
     return {name: getattr(enrolment, name) for name in EnrolmentForm.base_fields}
 
 
-def _without_formula(text: str) -> str:
-    """What strangers entered, so that a spreadsheet reads it as text."""
-    return f"'{text}" if text.startswith(("=", "+", "-", "@", "\t")) else text
+def _line_of(voter: Any) -> tuple[object, ...]:
+    times = (voter.enrolled_at, voter.last_vote_at, voter.dropped_at)
+    code = code_told(voter)
+    return (
+        voter.expert.person.pseudonym,
+        voter.external_id,
+        *(voter.planned, voter.answered, voter.skipped),
+        *(None if at is None else at.isoformat() for at in times),
+        int(bool(code)),
+        code,
+    )
