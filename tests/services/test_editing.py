@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
@@ -224,10 +225,11 @@ def test_a_correction_that_is_none_writes_nothing() -> None:
 def test_a_scenario_is_held_before_somebody_looks_who_shows_it() -> None:
     """Else a study could open between the look and the change."""
     here = add_scenario("street", reference=None)
-    for change in (
+    changes: list[Callable[[], Scenario]] = [
         lambda: guarded.set_reference(here, document(CAR)),
         lambda: guarded.drop_reference(here),
-    ):
+    ]
+    for change in changes:
         with CaptureQueriesContext(connection) as seen:
             change()
         asked = [one["sql"] for one in seen if one["sql"].startswith("SELECT")]
