@@ -8,6 +8,7 @@ take seconds and little memory: no text is kept but the names.
 from __future__ import annotations
 
 import csv
+import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from itertools import islice
@@ -120,9 +121,11 @@ def _numbers(path: Path, column: str, codes: _Codes) -> NDArray[np.float64]:
         try:
             values[place] = float(name)
         except ValueError:
+            values[place] = math.nan
+        if not math.isfinite(values[place]):
             raise VotesFileUnreadable(
                 f"line {line_of(path, column, name)}: {column} is {name!r}, which is no number"
-            ) from None
+            )
     return values
 
 

@@ -6,6 +6,7 @@ anything is written, and while it is written the bytes are counted, whatever the
 
 from __future__ import annotations
 
+import lzma
 import os
 import stat
 import struct
@@ -13,6 +14,7 @@ import zipfile
 import zlib
 from dataclasses import dataclass
 from pathlib import Path, PurePosixPath
+from typing import IO
 
 from augment.errors import InvalidDocument
 from augment.formats.reading import Reader
@@ -56,7 +58,7 @@ def unpack_zip(path: Path, into: Path, *, bounds: ZipBounds = USUAL_BOUNDS) -> N
 
     Raises:
         InvalidDocument: It is no zip, is encrypted, leads out of the folder, holds links or other
-            special files, a name twice, or more than the bounds allow.
+            special files, a name twice, a file in a file, or more than the bounds allow.
     """
     try:
         with zipfile.ZipFile(path) as packed:
@@ -122,6 +124,9 @@ def _checked(
             raise InvalidDocument(WHAT, [(_shown(entry.filename), "is there twice")])
         taken.add(key)
         files.append((entry, name))
+    for entry, name in files:
+        if any(str(above).lower() in taken for above in name.parents):
+            raise InvalidDocument(WHAT, [(_shown(entry.filename), "lies in a file")])
     if not files:
         raise InvalidDocument(WHAT, [("", "holds no file")])
     return files
@@ -132,7 +137,7 @@ def _place(entry: zipfile.ZipInfo) -> PurePosixPath:
     name = entry.filename
     place = PurePosixPath(name)
     bad = (
-        not name.strip("/")
+        not place.parts
         or "\\" in name
         or ":" in name
         or not name.isprintable()
@@ -169,13 +174,21 @@ def _write(packed: zipfile.ZipFile, entry: zipfile.ZipInfo, path: Path, *, most:
     path.parent.mkdir(parents=True, exist_ok=True)
     written = 0
     with packed.open(entry) as source, path.open("xb") as file:
-        while piece := source.read(_PIECE):
+        while piece := _next_piece(source):
             written += len(piece)
             if written > min(most, entry.file_size):
                 text = "unpacks to more than it says"
                 raise InvalidDocument(WHAT, [(_shown(entry.filename), text)])
             file.write(piece)
     return written
+
+
+def _next_piece(source: IO[bytes]) -> bytes:
+    """Bytes of an entry; what its way of packing says of broken ones is said of the zip."""
+    try:
+        return source.read(_PIECE)
+    except (OSError, lzma.LZMAError) as fault:
+        raise zipfile.BadZipFile(str(fault)) from None
 
 
 def _shown(name: str) -> str:

@@ -46,7 +46,7 @@ def test_a_log_folder_comes_out_as_it_went_in(tmp_path: Path) -> None:
         assert (into / "log" / file.relative_to(log)).read_bytes() == file.read_bytes()
 
 
-NAMES = ["../out", "/etc/passwd", "a/../../out", "c:\\out", "a\\b", "a:b", "x" * 300, "a\nb"]
+NAMES = ["../out", "/etc/passwd", "a/../../out", "c:\\out", "a\\b", "a:b", "x" * 300, "a\nb", "."]
 
 
 @pytest.mark.parametrize("name", NAMES)
@@ -63,9 +63,13 @@ def test_no_name_leads_out_of_the_folder(tmp_path: Path, name: str) -> None:
         (lambda p: packed(p, {"link": b"/etc/passwd"}, kind=stat.S_IFLNK), "link or a special"),
         (lambda p: packed(p, {"pipe": b""}, kind=stat.S_IFIFO), "link or a special"),
         (lambda p: packed(p, {"a": b"1", "A": b"2"}), "is there twice"),
+        (lambda p: packed(p, {"a": b"1", "A/b": b"2"}), "'A/b': lies in a file"),
+        (lambda p: packed(p, {"a/b/c": b"1", "a": b"2"}), "'a/b/c': lies in a file"),
         (lambda p: packed(p, {}), "holds no file"),
         (lambda p: garbage(p), "is broken"),
         (lambda p: cut(packed(p, {"a": bytes(range(256)) * 50})), "is broken"),
+        (lambda p: scrambled(p, zipfile.ZIP_LZMA), "is broken"),
+        (lambda p: scrambled(p, zipfile.ZIP_BZIP2), "is broken"),
         (lambda p: wrong_checksum(packed(p, {"a": b"hello"})), "is broken"),
         (lambda p: encrypted(packed(p, {"a": b"hello"})), "is encrypted"),
         (lambda p: understated(packed(p, {"a": bytes(2_000)})), "broken|more than it says"),
@@ -95,6 +99,16 @@ def garbage(path: Path) -> Path:
 
 def cut(path: Path) -> Path:
     path.write_bytes(path.read_bytes()[:-30])
+    return path
+
+
+def scrambled(path: Path, kind: int) -> Path:
+    """Packed in another way, and broken where its bytes lie."""
+    with zipfile.ZipFile(path, "w", kind) as made:
+        made.writestr("a", bytes(range(256)) * 400)
+    data = bytearray(path.read_bytes())
+    data[45:80] = bytes(byte ^ 0xFF for byte in data[45:80])
+    path.write_bytes(data)
     return path
 
 

@@ -248,9 +248,10 @@ def test_what_the_file_does_not_have_is_refused(
         run(file=str(file), **options)
 
 
-def test_a_covariate_that_is_no_number_is_named_with_its_line(votes: Any) -> None:
-    file = votes("a,b,model_a,2,x", "a,b,tie,2,1", head="model_a,model_b,winner,o_a,o_b")
-    with pytest.raises(CsvNotRated, match="line 2: o_b is 'x', which is no number"):
+@pytest.mark.parametrize("cell", ["x", "inf", "-1e999"])
+def test_a_covariate_that_is_no_number_is_named_with_its_line(votes: Any, cell: str) -> None:
+    file = votes(f"a,b,model_a,2,{cell}", "a,b,tie,2,1", head="model_a,model_b,winner,o_a,o_b")
+    with pytest.raises(CsvNotRated, match=f"line 2: o_b is '{cell}', which is no number"):
         run(file=str(file), adjust=("o",))
 
 

@@ -119,14 +119,18 @@ def test_a_file_that_ends_worker_after_worker_is_given_up(log: bytes) -> None:
         uploads.read_again(row)
 
 
-def test_what_waits_too_long_is_sent_again(log: bytes) -> None:
+@pytest.mark.parametrize("was_sent", [True, False])
+def test_what_waits_too_long_is_sent_again(log: bytes, was_sent: bool) -> None:
     row = sent(log)
-    uploads.mark_sent(row.pk)
+    if was_sent:
+        uploads.mark_sent(row.pk)
     assert uploads.find_lost() == []
     later = timezone.now() + timedelta(minutes=11)
     assert uploads.find_lost(now=later) == [row.pk]
     moment, _ = upload_moments.ask_for_moment(read(row), item="", frame=0)
-    upload_moments.mark_sent(moment.pk)
+    if was_sent:
+        upload_moments.mark_sent(moment.pk)
+    assert upload_moments.find_lost() == []
     assert upload_moments.find_lost(now=later) == [moment.pk]
     assert uploads.find_lost(now=later) == []
 

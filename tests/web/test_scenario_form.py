@@ -109,6 +109,8 @@ def test_an_intent_as_json_goes_before_the_fields(analyst: Client, scene: BaseSc
         ({"type": "avoid_crashed_cars", "intent": "[" * 100_000}, "The intent is no JSON"),
         ({"type": "jaywalking_pedestrian", "intent": "{}"}, "format"),
         ({"type": "jaywalking_pedestrian", "i_kind": "walk", "i_count": "x"}, "is no number"),
+        ({"type": "jaywalking_pedestrian", "i_kind": "walk", "i_count": "inf"}, "is no number"),
+        ({"type": "jaywalking_pedestrian", "i_kind": "walk", "i_count": "nan"}, "is no number"),
         ({"type": "jaywalking_pedestrian", "i_kind": "tram"}, "tram"),
         ({"type": "jaywalking_pedestrian", "instruction": " "}, "required"),
     ],

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from typing import Any
 
@@ -57,6 +58,9 @@ def _number(fields: Mapping[str, str], name: str) -> float | None:
     if not text:
         return None
     try:
-        return float(text)
+        number = float(text)
     except ValueError:
-        raise InvalidDocument("intent", [(name, f"{text[:40]!r} is no number")]) from None
+        number = math.nan
+    if not math.isfinite(number):
+        raise InvalidDocument("intent", [(name, f"{text[:40]!r} is no number")])
+    return number

@@ -24,9 +24,9 @@ from augment.services.scenarios.scene_notes import said_of
 from augment.services.scenarios.scenes import check_slug
 from augment.services.scenarios.uploads import (
     LONGEST_REASON,
-    LOST_AFTER,
     MOST_ATTEMPTS,
     OUR_FAULT,
+    lost_since,
     open_upload,
 )
 from augment.services.texts import make_storable
@@ -112,9 +112,7 @@ def sentences_of(row: UploadMoment) -> list[Sentence]:
 
 def find_lost(*, now: Moment = DATABASE_TIME) -> list[int]:
     """Moments whose message never came, or whose worker ended over them."""
-    lost = UploadMoment.objects.filter(
-        state__in=UploadMoment.WAITING, sent_at__lt=now - LOST_AFTER
-    )
+    lost = UploadMoment.objects.filter(lost_since(now), state__in=UploadMoment.WAITING)
     return list(lost.values_list("pk", flat=True))
 
 

@@ -21,7 +21,7 @@ from django.contrib.auth.models import User
 from django.core.files.base import File
 from django.core.files.storage import default_storage
 from django.db import transaction
-from django.db.models import F
+from django.db.models import F, Q
 from django.utils import timezone
 
 from augment.errors import AugmentError, Conflict, InvalidDocument
@@ -172,8 +172,14 @@ def plain_name(name: str) -> str:
 
 def find_lost(*, now: Moment = DATABASE_TIME) -> list[int]:
     """Uploads whose message never came, or whose worker ended over them."""
-    lost = SceneUpload.objects.filter(state__in=SceneUpload.WAITING, sent_at__lt=now - LOST_AFTER)
+    lost = SceneUpload.objects.filter(lost_since(now), state__in=SceneUpload.WAITING)
     return list(lost.values_list("pk", flat=True))
+
+
+def lost_since(now: Moment) -> Q:
+    """Which waiting rows nobody works on: their message was sent long ago, or never."""
+    long_ago = now - LOST_AFTER
+    return Q(sent_at__lt=long_ago) | Q(sent_at=None, created_at__lt=long_ago)
 
 
 def mark_sent(upload_pk: int, *, now: Moment = DATABASE_TIME) -> None:
