@@ -279,17 +279,15 @@ def _least_squares(
     """The cubic with the first and the last of the points (N, 2), closest to all at t (N,)."""
     first, last = points[0], points[-1]
     rest = 1.0 - t
-    inner = 3.0 * rest * rest * t, 3.0 * rest * t * t
-    ends = np.outer(rest**3 + inner[0], first) + np.outer(t**3 + inner[1], last)
-    rows = np.column_stack(
-        [
-            np.outer(weight, arm).ravel()
-            for weight, side in zip(inner, arms, strict=True)
-            for arm in side
-        ]
-    )
+    inner = np.stack([3.0 * rest * rest * t, 3.0 * rest * t * t])
+    outer = np.stack([rest * rest * rest, t * t * t])
+    missing = points - (inner + outer).T @ np.stack([first, last])
+    arm = np.concatenate(arms)
+    side = np.repeat([0, 1], [len(arms[0]), len(arms[1])])
+    square = (inner @ inner.T)[side[:, None], side] * (arm @ arm.T)
+    wanted = ((inner @ missing)[side] * arm).sum(axis=1)
     # The normal equations have four unknowns at most; lstsq bears it if they depend on each other.
-    found = np.linalg.lstsq(rows.T @ rows, rows.T @ (points - ends).ravel(), rcond=None)[0]
+    found = np.linalg.lstsq(square, wanted, rcond=None)[0]
     starts, finishes = found[: len(arms[0])], found[len(arms[0]) :]
     # A curve that leaves against its heading would turn back on itself.
     if len(starts) == 1:

@@ -267,6 +267,7 @@ def _loose_piece(line: Polyline, start_m: float, end_m: float, allowed: Toleranc
     return min([smooth, *free], key=lambda piece: allowed.used_by(piece.error))
 
 
+@lru_cache(maxsize=1024)  # where a cut leads nowhere, the next way to cut asks for the same
 def _straight_piece(line: Polyline, span: _Span) -> LanePiece:
     """The chord of a part of the line."""
     curve = straight_curve(*line.points_at(np.array(span)))
@@ -274,6 +275,7 @@ def _straight_piece(line: Polyline, span: _Span) -> LanePiece:
     return LanePiece(curve=curve, start_m=span[0], end_m=span[1], error=error, is_straight=True)
 
 
+@lru_cache(maxsize=1024)
 def _piece(line: Polyline, span: _Span, *, fixed: tuple[bool, bool]) -> LanePiece:
     start_m, end_m = span
     curve = fit(

@@ -24,6 +24,12 @@ def modules() -> tuple[tuple[str, ast.Module], ...]:
     return tuple(found)
 
 
+@cache
+def walked() -> tuple[tuple[str, tuple[ast.AST, ...]], ...]:
+    """(dotted name, all nodes) of every module: to walk them takes longer than to look at them."""
+    return tuple((name, tuple(ast.walk(tree))) for name, tree in modules())
+
+
 def functions(tree: ast.Module) -> Iterator[ast.FunctionDef | ast.AsyncFunctionDef]:
     for node in ast.walk(tree):
         if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef):

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import ast
 
-from tests.house.source import modules
+from tests.house.source import walked
 
 DOORS = ("arena.web", "arena.templatetags", "arena.api")
 WORDING = "augment.services.wording"
@@ -24,9 +24,9 @@ def allowed(name: str) -> set[str]:
 def test_only_doors_translate() -> None:
     found = [
         f"{name}:{node.lineno} {alias.name}"
-        for name, tree in modules()
+        for name, nodes in walked()
         if not within(name, (*DOORS, WORDING))
-        for node in ast.walk(tree)
+        for node in nodes
         if isinstance(node, ast.ImportFrom) and (node.module or "").startswith("django.utils.tra")
         for alias in node.names
         if alias.name not in allowed(name)
@@ -37,9 +37,9 @@ def test_only_doors_translate() -> None:
 def test_only_doors_have_sentences_said() -> None:
     found = [
         f"{name}:{node.lineno}"
-        for name, tree in modules()
+        for name, nodes in walked()
         if not within(name, DOORS)
-        for node in ast.walk(tree)
+        for node in nodes
         if isinstance(node, ast.ImportFrom) and node.module == WORDING
     ]
     assert found == []
@@ -48,9 +48,9 @@ def test_only_doors_have_sentences_said() -> None:
 def test_pages_show_no_error_as_it_stands() -> None:
     found = [
         f"{name}:{node.lineno}"
-        for name, tree in modules()
+        for name, nodes in walked()
         if within(name, ("arena.web",))
-        for handler in ast.walk(tree)
+        for handler in nodes
         if isinstance(handler, ast.ExceptHandler) and handler.name
         for node in ast.walk(handler)
         if isinstance(node, ast.Call)

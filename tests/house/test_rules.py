@@ -9,7 +9,7 @@ import sys
 
 import pytest
 
-from tests.house.source import ROOT, dotted, functions, imported, modules
+from tests.house.source import ROOT, dotted, functions, imported, modules, walked
 
 HEAVY = {
     "openai": ("augment.llm.openai_wire",),
@@ -71,16 +71,16 @@ def test_randomness_is_an_argument() -> None:
     shared = re.compile(r"(np\.|numpy\.)?random\.(\w+)")
     found = [
         f"{name}:{node.lineno} {called}"
-        for name, tree in modules()
-        for node in ast.walk(tree)
+        for name, nodes in walked()
+        for node in nodes
         if isinstance(node, ast.Attribute)
         for called in [dotted(node)]
         for match in [shared.fullmatch(called)]
         if match and match.group(2) not in SEEDED
     ] + [
         f"{name}:{node.lineno} imports {alias.name} from random"
-        for name, tree in modules()
-        for node in ast.walk(tree)
+        for name, nodes in walked()
+        for node in nodes
         if isinstance(node, ast.ImportFrom) and node.module == "random"
         for alias in node.names
         if alias.name not in SEEDED
@@ -91,8 +91,8 @@ def test_randomness_is_an_argument() -> None:
 def test_settings_are_read_only_where_processes_are_put_together() -> None:
     found = [
         f"{name}:{node.lineno}"
-        for name, tree in modules()
-        for node in ast.walk(tree)
+        for name, nodes in walked()
+        for node in nodes
         if isinstance(node, ast.ImportFrom)
         and node.module == "django.conf"
         and not within(name, READS_SETTINGS)
@@ -104,9 +104,9 @@ def test_settings_are_read_only_where_processes_are_put_together() -> None:
 def test_models_read_only_the_name_of_the_user_model() -> None:
     found = [
         f"{name}:{node.lineno} {dotted(node)}"
-        for name, tree in modules()
+        for name, nodes in walked()
         if "models" in name.split(".")
-        for node in ast.walk(tree)
+        for node in nodes
         if isinstance(node, ast.Attribute)
         and dotted(node).startswith("settings.")
         and node.attr != "AUTH_USER_MODEL"
@@ -116,14 +116,17 @@ def test_models_read_only_the_name_of_the_user_model() -> None:
 
 def test_only_heavy_packages_are_imported_inside_functions_and_only_by_their_owners() -> None:
     found = []
-    for name, tree in modules():
+    trees = dict(modules())
+    for name, nodes in walked():
+        tree = trees[name]
         inner = {
             id(node)
-            for function in functions(tree)
+            for function in nodes
+            if isinstance(function, ast.FunctionDef | ast.AsyncFunctionDef)
             for node in ast.walk(function)
             if isinstance(node, ast.Import | ast.ImportFrom)
         }
-        for node in ast.walk(tree):
+        for node in nodes:
             if not isinstance(node, ast.Import | ast.ImportFrom):
                 continue
             for target in imported(node):
@@ -153,8 +156,8 @@ def test_no_error_is_swallowed_whole() -> None:
     """Whoever catches everything passes it on, or logs it with its traceback."""
     found = [
         f"{name}:{node.lineno}"
-        for name, tree in modules()
-        for node in ast.walk(tree)
+        for name, nodes in walked()
+        for node in nodes
         if isinstance(node, ast.ExceptHandler)
         and (node.type is None or dotted(node.type) in {"Exception", "BaseException"})
         and not any(_passes_on(inner) for inner in ast.walk(node))
