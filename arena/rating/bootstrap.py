@@ -129,16 +129,14 @@ def _clusters(
     votes: Comparisons, counts: PairCounts, unit: Unit, rounds: int, seed: int
 ) -> Iterator[Rounds]:
     """Rounds are weights of clusters times their counts."""
-    experts, expert_of = renumber_codes(votes.expert)
-    scenarios, scenario_of = renumber_codes(votes.scenario)
-    cells, cell_of = renumber_codes(expert_of * len(scenarios) + scenario_of)
-    weights = _Weights(
-        expert_of=cells // len(scenarios),
-        scenario_of=cells % len(scenarios),
-        experts=len(experts) if unit in (Unit.EXPERT, Unit.TWO_WAY) else 0,
-        scenarios=len(scenarios) if unit in (Unit.SCENARIO, Unit.TWO_WAY) else 0,
-        seed=seed,
+    expert_of, (scenarios, scenario_of) = (
+        renumber_codes(votes.expert)[1],
+        renumber_codes(votes.scenario),
     )
+    cells, cell_of = renumber_codes(expert_of * len(scenarios) + scenario_of)
+    row_of_cell = np.empty(len(cells), dtype=np.int64)
+    row_of_cell[cell_of] = np.arange(len(votes))
+    weights = _Weights(votes, unit, row_of_cell, seed)
     if len(cells) * len(counts.low) > _EMPTIEST * len(votes):
         return _row_by_row(votes, counts, cell_of, weights, rounds)
     return _by_tables(_Tables(votes, counts, cell_of, len(cells)), weights, rounds)
@@ -223,45 +221,52 @@ class _Tables:
         return table.reshape(2, pairs, self.cells)
 
 
+@dataclass(slots=True, kw_only=True)
+class ClusterDraws:
+    """Draws of clusters, as many as there are; every call goes on with further rounds."""
+
+    clusters: int
+    rng: np.random.Generator
+
+    def draw(self, rounds: int) -> NDArray[np.float32]:
+        """(K, B) how often each was drawn."""
+        place = self.rng.integers(0, self.clusters, size=(rounds, self.clusters)).T * rounds
+        place += np.arange(rounds)
+        drawn = np.bincount(place.ravel(), minlength=self.clusters * rounds)
+        return drawn.reshape(self.clusters, rounds).astype(np.float32)
+
+
+def cluster_draws(
+    votes: Comparisons, unit: Unit, seed: int
+) -> list[tuple[ClusterDraws, IntArray]]:
+    """The draws of each kind of cluster that the unit names, and (R,) which one a row is in."""
+    wanted = {Unit.EXPERT: (True, False), Unit.SCENARIO: (False, True), Unit.VOTE: (False, False)}
+    seeds = np.random.SeedSequence(seed).spawn(2)
+    found = []
+    for is_drawn, codes, child in zip(
+        wanted.get(unit, (True, True)), (votes.expert, votes.scenario), seeds, strict=True
+    ):
+        if is_drawn:
+            occurring, of_row = renumber_codes(codes)
+            draws = ClusterDraws(clusters=len(occurring), rng=np.random.default_rng(child))
+            found.append((draws, of_row))
+    return found
+
+
 class _Weights:
     """How often each cell is drawn: its expert's draws times its scenario's.
 
-    0 experts or scenarios means that they are not drawn and count once.
+    What the unit does not name is not drawn and counts once.
     """
 
-    def __init__(
-        self,
-        *,
-        expert_of: IntArray,
-        scenario_of: IntArray,
-        experts: int,
-        scenarios: int,
-        seed: int,
-    ) -> None:
-        self._drawn = [
-            (np.random.default_rng(child), size, of_cell)
-            for child, size, of_cell in zip(
-                np.random.SeedSequence(seed).spawn(2),
-                (experts, scenarios),
-                (expert_of, scenario_of),
-                strict=True,
-            )
-            if size
-        ]
+    def __init__(self, votes: Comparisons, unit: Unit, rows: IntArray, seed: int) -> None:
+        """`rows` (K,) has a row of each cell."""
+        self._drawn = [(draws, of_row[rows]) for draws, of_row in cluster_draws(votes, unit, seed)]
 
     def draw(self, rounds: int) -> NDArray[np.float32]:
         """(K, B)."""
-        factors = [
-            _draws(rng, size, rounds).take(of_cell, axis=0) for rng, size, of_cell in self._drawn
-        ]
+        factors = [draws.draw(rounds).take(of_cell, axis=0) for draws, of_cell in self._drawn]
         weight = factors[0]
         for factor in factors[1:]:
             weight *= factor
         return weight
-
-
-def _draws(rng: np.random.Generator, clusters: int, rounds: int) -> NDArray[np.float32]:
-    """(clusters, B) how often each is drawn when as many are drawn as there are."""
-    place = rng.integers(0, clusters, size=(rounds, clusters)).T * rounds + np.arange(rounds)
-    drawn = np.bincount(place.ravel(), minlength=clusters * rounds)
-    return drawn.reshape(clusters, rounds).astype(np.float32)

@@ -8,7 +8,7 @@ from 0; `names` gives the contestants' names.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field, fields, replace
 
 import numpy as np
@@ -174,6 +174,33 @@ def restrict_to(votes: Comparisons, members: Sequence[int]) -> Comparisons:
         first=number[inside.first],
         second=number[inside.second],
     )
+
+
+def split_votes(votes: Comparisons, groups: Sequence[Sequence[int]]) -> Iterator[Comparisons]:
+    """What `restrict_to` gives for each of the groups, which have nobody in common.
+
+    The rows are gone through once, however many groups there are.
+    """
+    if len(groups) == 1:
+        yield restrict_to(votes, groups[0])
+        return
+    group_of = np.full(len(votes.names), -1, dtype=np.int64)
+    number = np.zeros(len(votes.names), dtype=np.int64)
+    for index, members in enumerate(groups):
+        group_of[list(members)] = index
+        number[list(members)] = np.arange(len(members))
+    of_first = group_of[votes.first]
+    rows = np.flatnonzero((of_first >= 0) & (of_first == group_of[votes.second]))
+    rows = rows[np.argsort(of_first[rows], kind="stable")]
+    ends = np.cumsum(np.bincount(of_first[rows], minlength=len(groups)))[:-1]
+    for members, inside in zip(groups, np.split(rows, ends), strict=False):
+        some = select_votes(votes, inside)
+        yield replace(
+            some,
+            names=tuple(votes.names[member] for member in members),
+            first=number[some.first],
+            second=number[some.second],
+        )
 
 
 def count_pairs(votes: Comparisons) -> PairCounts:

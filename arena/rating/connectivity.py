@@ -8,15 +8,15 @@ Notation: C contestants, P pairs, B rounds, which are the last axis.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from enum import StrEnum
 from typing import TypeVar
 
 import numpy as np
 
+from arena.rating.chains import Chains, chains_among
 from arena.rating.comparisons import BoolArray, FloatArray, IntArray, PairCounts
-from arena.rating.reach import are_all_together
 from augment.sentences import Sentence, sentence
 
 _NUMBERS_AT_ONCE = 4_000_000
@@ -52,19 +52,14 @@ class Diagnosis:
 
     Attributes:
         explanation: The sentences on the status, none where nothing is amiss.
-        parts: Those who can be rated among each other, numbers as in the counts, in order of their
-            first member; a part of one has no rating.
-        groups: Those who met, directly or through others, in the same order.
-        reached: (C, C) whether the row's contestant scored against the column's, or through a
-            chain.
+        chains: Who reaches whom by scores, among parts: those who can be rated among each other,
+            a part of one without a rating.
         notes: Why each contestant has no rating; empty for who has one.
     """
 
     status: Status
     explanation: tuple[Sentence, ...] = ()
-    parts: tuple[tuple[int, ...], ...] = ()
-    groups: tuple[tuple[int, ...], ...] = ()
-    reached: BoolArray = field(default_factory=lambda: np.zeros((0, 0), dtype=bool), compare=False)
+    chains: Chains = field(default_factory=Chains.of_nobody, compare=False)
     notes: tuple[Sentence | str, ...] = ()
 
 
@@ -81,27 +76,20 @@ def diagnose(
     if not len(names) or not counts.outcomes.sum():
         said = sentence("There are no votes to rate.")
         return Diagnosis(status=Status.NO_VOTES, explanation=(said,))
-    games, scores = counts.games[:, None], counts.scores[:, None]
-    if are_all_together(len(names), counts):  # else matrices of all contestants are multiplied
-        reached: BoolArray = np.broadcast_to(np.bool_(True), (len(names), len(names)))
-        scored, apart = reached[None], _groups(reached)
-    else:
-        scored = _scored(len(names), counts.low, counts.high, games, scores)
-        apart = _groups(_closure(scored | scored.transpose(0, 2, 1))[0])
-        reached = _closure(scored)[0]
-    parts = tuple(map(tuple, apart if bounded_anyway else _groups(reached)))
-    groups = tuple(map(tuple, apart))
+    chains = chains_among(len(names), counts)
+    groups = chains.groups()
+    if bounded_anyway:
+        chains = chains.by_group()
+    parts = chains.parts()
     if len(parts) > 1:
-        explanation = [_who_is_apart(names, apart)] if len(apart) > 1 else []
+        explanation = [_who_is_apart(names, groups)] if len(groups) > 1 else []
         if not bounded_anyway:
-            explanation += _who_is_unbounded(names, reached)
+            explanation += _who_is_unbounded(names, chains)
         return Diagnosis(
-            status=Status.DISCONNECTED if len(apart) > 1 else Status.UNBOUNDED,
+            status=Status.DISCONNECTED if len(groups) > 1 else Status.UNBOUNDED,
             explanation=tuple(explanation),
-            parts=parts,
-            groups=groups,
-            reached=reached,
-            notes=_notes(parts, scored[0]),
+            chains=chains,
+            notes=_notes(parts, chains),
         )
     if not (counts.outcomes[:, 0].any() or counts.outcomes[:, 2].any()):
         return Diagnosis(
@@ -112,11 +100,9 @@ def diagnose(
                     "that is."
                 ),
             ),
-            parts=parts,
-            groups=groups,
-            reached=reached,
+            chains=chains,
         )
-    return Diagnosis(status=Status.RATED, parts=parts, groups=groups, reached=reached)
+    return Diagnosis(status=Status.RATED, chains=chains)
 
 
 class Determined:
@@ -232,17 +218,7 @@ def _closure(edges: BoolArray) -> BoolArray:
     return edges
 
 
-def _groups(reached: BoolArray) -> list[list[int]]:
-    """Contestants who reach each other, in order of their first member; `reached` is (C, C)."""
-    mutual = reached & reached.T
-    return [
-        np.flatnonzero(row).tolist()
-        for index, row in enumerate(mutual)
-        if int(np.argmax(row)) == index
-    ]
-
-
-def _who_is_apart(names: tuple[str, ...], groups: list[list[int]]) -> Sentence:
+def _who_is_apart(names: tuple[str, ...], groups: tuple[tuple[int, ...], ...]) -> Sentence:
     return sentence(
         "These groups were never compared with each other: %(groups)s. Each is rated by itself; "
         "ratings across them have no meaning.",
@@ -250,16 +226,13 @@ def _who_is_apart(names: tuple[str, ...], groups: list[list[int]]) -> Sentence:
     )
 
 
-def _notes(parts: tuple[tuple[int, ...], ...], scored: BoolArray) -> tuple[Sentence | str, ...]:
+def _notes(parts: tuple[tuple[int, ...], ...], chains: Chains) -> tuple[Sentence | str, ...]:
     """(C,) why those who are alone in their part have no rating."""
-    notes: list[Sentence | str] = [""] * len(scored)
+    notes: list[Sentence | str] = [""] * len(chains.part_of)
     for part in parts:
-        if len(part) > 1:
-            continue
-        others = np.delete(np.arange(len(scored)), part[0])
-        lower = bool(scored[part[0], others].any())
-        upper = bool(scored[others, part[0]].any())
-        notes[part[0]] = _LIMITS[lower, upper]
+        if len(part) == 1:
+            lower, upper = bool(chains.scored[part[0]]), bool(chains.conceded[part[0]])
+            notes[part[0]] = _LIMITS[lower, upper]
     return tuple(notes)
 
 
@@ -272,18 +245,16 @@ _LIMITS = {
 """By whether there is a lower and an upper one."""
 
 
-def _who_is_unbounded(names: tuple[str, ...], reached: BoolArray) -> list[Sentence]:
+def _who_is_unbounded(names: tuple[str, ...], chains: Chains) -> list[Sentence]:
     """Sentences about those who won or lost everything against the rest that they met."""
-    unbeaten, scoreless = [], []
-    met = _closure((reached | reached.T)[None])[0]
-    for group in _groups(reached):
-        inside = np.zeros(len(names), dtype=bool)
-        inside[group] = True
-        rest = met[group[0]] & ~inside
-        if rest.any() and not reached[np.ix_(rest, inside)].any():
-            unbeaten.append(_listed(names, group))
-        if rest.any() and not reached[np.ix_(inside, rest)].any():
-            scoreless.append(_listed(names, group))
+    members, group_of_part = chains.parts(), chains.group_of[chains.first_of_parts]
+    has_rest = np.bincount(group_of_part)[group_of_part] > 1
+    is_unbeaten = has_rest & (chains.between.sum(axis=0) == 1)
+    is_scoreless = has_rest & (chains.between.sum(axis=1) == 1)
+    unbeaten, scoreless = (
+        [_listed(names, members[part]) for part in np.flatnonzero(which).tolist()]
+        for which in (is_unbeaten, is_scoreless)
+    )
     sentences = []
     if unbeaten:
         sentences.append(
@@ -308,5 +279,5 @@ def _groups_or_one(
     return groups[0] if len(groups) == 1 else few_of(tuple(groups), mark=("…",))
 
 
-def _listed(names: tuple[str, ...], group: list[int]) -> tuple[str, ...]:
+def _listed(names: tuple[str, ...], group: Sequence[int]) -> tuple[str, ...]:
     return few_of(tuple(names[index] for index in group), mark="…")

@@ -73,7 +73,7 @@ def _bradley_terry(votes: Comparisons, counts: PairCounts, rules: Rules) -> Fitt
         if adjusted is not None:
             return adjusted
     if len(votes.names) > LARGEST_DENSE and rules.intervals is Intervals.CLOSED_FORM:
-        found = fit_many(len(votes.names), counts)
+        found = fit_many(len(votes.names), counts.low, counts.high, counts.games, counts.scores)
         rating = to_elo(found.strengths)
         samples, rest = _same_everywhere(votes, counts, rules, rating)
         return Fitted(rating=rating, samples=samples, loose=rest, many=found)

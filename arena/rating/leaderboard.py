@@ -27,6 +27,7 @@ from arena.rating.comparisons import (
     count_pairs,
     renumber_codes,
     restrict_to,
+    split_votes,
     tally,
 )
 from arena.rating.connectivity import Diagnosis, Status, diagnose
@@ -34,7 +35,15 @@ from arena.rating.lines import Line, blank_lines, fill, rank_across
 from arena.rating.logistic import Coefficient
 from arena.rating.parts import Rated, rate_part
 from arena.rating.ranking import Separation
-from arena.rating.rules import Intervals, Method, Order, Report, Rules, default_intervals
+from arena.rating.rules import (
+    LARGEST_DENSE,
+    Intervals,
+    Method,
+    Order,
+    Report,
+    Rules,
+    default_intervals,
+)
 from arena.rating.tiers import standing_order, tiers
 from augment.sentences import Sentence, sentence
 
@@ -188,20 +197,18 @@ def _rate(votes: Comparisons, rules: Rules) -> Leaderboard:
     present = np.flatnonzero(counted.sum(axis=1)).tolist()
     counting = restrict_to(votes, present)
     diagnosis = _diagnose(votes, counting, rules.method)
-    across = tiers(counting, diagnosis, rules.unit)
+    chains = diagnosis.chains
+    across = tiers(counting, chains, rules.unit)
+    above = chains.above()
     parts = sorted(
-        (part for part in diagnosis.parts if len(part) > 1),
-        key=lambda part: (
-            across.group_of[part[0]],
-            np.delete(across.reached[:, part[0]], part).sum(),
-            part,
-        ),
+        (part for part in chains.parts() if len(part) > 1),
+        key=lambda part: (chains.group_of[part[0]], above[part[0]], part),
     )
-    rated = [rate_part(restrict_to(counting, part), rules, diagnosis.status) for part in parts]
+    rated = [rate_part(inside, rules, diagnosis.status) for inside in split_votes(counting, parts)]
     lines = blank_lines(votes.names, counted.tolist(), present, diagnosis)
     for number, (part, found) in enumerate(zip(parts, rated, strict=True)):
         fill(lines, [present[member] for member in part], number, found)
-    if len(diagnosis.parts) > len(diagnosis.groups):
+    if len(chains.sizes) > len(chains.groups()):
         rank_across(lines, present, across, rules)
     order = standing_order(across, [lines[index] for index in present])
     whole = rated[0] if len(rated) == 1 and len(parts[0]) == len(present) else None
@@ -224,7 +231,7 @@ def _rate(votes: Comparisons, rules: Rules) -> Leaderboard:
         degenerate_rounds=max((found.degenerate for found in rated), default=0),
         covariance=_joined(len(lines), present, parts, rated),
         separation=whole.separation.among(np.array(present), len(lines))
-        if whole and whole.separation
+        if whole and whole.separation and len(lines) <= LARGEST_DENSE
         else None,
         coefficients=whole.coefficients if whole else (),
     )
@@ -292,7 +299,7 @@ def _joined(
     contestants: int, present: list[int], parts: list[tuple[int, ...]], rated: list[Rated]
 ) -> FloatArray | None:
     """(C, C) of the parts' covariances, NaN between parts."""
-    if not any(found.covariance is not None for found in rated):
+    if contestants > LARGEST_DENSE or all(found.covariance is None for found in rated):
         return None
     joined = np.full((contestants, contestants), np.nan)
     for part, found in zip(parts, rated, strict=True):

@@ -11,22 +11,23 @@ import numpy as np
 
 from arena.rating import remarks, sandwich
 from arena.rating.bootstrap import Unit, interval
-from arena.rating.comparisons import BoolArray, Comparisons, FloatArray, count_pairs
+from arena.rating.comparisons import Comparisons, FloatArray, IntArray, count_pairs
 from arena.rating.components import Placed, open_interval, place_on_one_scale
 from arena.rating.connectivity import Status
 from arena.rating.fits import Fitted, fit_votes
 from arena.rating.logistic import Coefficient
-from arena.rating.many import Variances, variances_of
 from arena.rating.moderated import Spread, spread_of
 from arena.rating.ranking import (
     Separation,
     above_by_bounds,
     rank_sets,
+    rank_sets_of_many,
     separation,
     shown_ranks,
 )
 from arena.rating.rules import Intervals, Method, Rules
 from arena.rating.simultaneous import judge_pairs
+from arena.rating.sketched import Variances, variances_of
 from augment.sentences import Sentence
 
 _SAME = 1e-6
@@ -92,7 +93,9 @@ def rate_part(votes: Comparisons, rules: Rules, status: Status) -> Rated:
     spread: Spread | Variances | None = None
     if found.many is not None:
         reference = everywhere.reference
-        spread = variances_of(votes, found.many, rules.unit, reference, seed=rules.seed)
+        spread = variances_of(
+            votes, found.many, rules.unit, reference, seed=rules.seed, workers=rules.workers
+        )
     elif rules.intervals is Intervals.CLOSED_FORM and found.pulls is not None:
         spread = spread_of(votes, found.pulls, rules.unit, everywhere.reference)
     if _are_all_the_same(everywhere.values if spread is None else _ends(spread)):
@@ -208,11 +211,11 @@ def _of_many(
     """The same without covariances: places go by intervals that hold for all at once."""
     half = spread.half_widths()
     below, above = (np.where(np.isnan(bound), np.nan, half) for bound in open_bounds)
-    wide = spread.half_widths(alike=len(half))
-    shown = (fit.rating - wide)[:, None] > (fit.rating + wide)[None, :]
     bounds = (fit.rating - below, fit.rating + above)
+    of_all = spread.half_widths(alike=len(half))
+    places = rank_sets_of_many(bounds, (fit.rating - of_all, fit.rating + of_all))
     return _with_intervals(
-        votes, rules, fit, everywhere, bounds, None, None, np.sqrt(spread.plain), shown
+        votes, rules, fit, everywhere, bounds, None, None, np.sqrt(spread.plain), places
     )
 
 
@@ -225,15 +228,15 @@ def _with_intervals(
     judged: Separation | None,
     covariance: FloatArray | None,
     plain_error: FloatArray | None,
-    apart: BoolArray | None = None,
+    places: tuple[IntArray, IntArray] | None = None,
 ) -> Rated:
     lower, upper = bounds
     rank = shown_ranks(lower, upper, average=float(fit.rating[everywhere.reference].mean()))
-    if apart is None:
+    if places is None:
         nobody = np.zeros((len(lower), len(lower)), dtype=bool)
         apart = nobody if judged is None else judged.above
-    shown = above_by_bounds(apart, lower, upper)
-    best, worst = rank_sets(shown)
+        places = rank_sets(above_by_bounds(apart, lower, upper))
+    best, worst = places
     unbounded = np.isnan(lower) & np.isnan(upper)
     best[unbounded] = worst[unbounded] = 0
     check = None

@@ -13,12 +13,15 @@ Notation: C contestants, P pairs, N draws.
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import NDArray
 
 from arena.rating.comparisons import FloatArray, IntArray
 from arena.rating.estimate import LEVEL
 from arena.rating.moderated import LEAST, Component, Spread
 from arena.rating.ranking import Separation, gather_pairs, holm
 from arena.rating.student import t_above
+
+SingleArray = NDArray[np.float32]
 
 CAUTION = 1.8
 """What p-values are multiplied by: effects of scenarios are no sums of many, and simulated studies
@@ -70,68 +73,77 @@ def judge_pairs(rating: FloatArray, spread: Spread, *, rounds: int, seed: int) -
 
 
 def _of_pairs(covariance: FloatArray, low: IntArray, high: IntArray) -> FloatArray:
-    """(..., P) variances of differences, from covariances (..., C, C)."""
-    variance = np.diagonal(covariance, axis1=-2, axis2=-1)
-    both = covariance[..., low, high]
-    return np.asarray(variance[..., low] + variance[..., high] - 2.0 * both)
+    """(P,) variances of differences, from a covariance (C, C)."""
+    variance = covariance.diagonal()
+    return np.asarray(variance[low] + variance[high] - 2.0 * covariance[low, high])
 
 
-def _drawn(spread: Spread, low: IntArray, high: IntArray, rounds: int, seed: int) -> FloatArray:
-    """(P, N) standardised differences of equals."""
+def _drawn(spread: Spread, low: IntArray, high: IntArray, rounds: int, seed: int) -> SingleArray:
+    """(P, N) standardised differences of equals, in single precision: they are compared, once."""
     rng = np.random.default_rng(seed)
     contestants = len(spread.covariance)
     root = _root(spread.common)
-    least = LEAST * _of_pairs(spread.base, low, high)
+    least = (LEAST * _of_pairs(spread.base, low, high)).astype(np.float32)
     taken_off = max(len(spread.components) - 1, 0) * _of_pairs(spread.base, low, high)
     clusters = sum(component.own_degrees.max(initial=1.0) for component in spread.components)
     at_once = int(max(1, _NUMBERS_AT_ONCE // (contestants * (contestants + clusters))))
     roots = [_root(component.common) for component in spread.components]
-    blocks = []
+    drawn: SingleArray = np.empty((rounds, len(low)), dtype=np.float32)
     for first in range(0, rounds, at_once):
         number = min(at_once, rounds - first)
-        ratings = rng.standard_normal((number, contestants)) @ root
-        variance = np.zeros((number, len(low)))
+        ratings = rng.standard_normal((number, contestants), dtype=np.float32) @ root
+        variance: SingleArray = np.tile(-taken_off.astype(np.float32), (number, 1))
         if not spread.components:
-            variance += _of_pairs(spread.covariance, low, high)
+            variance += _of_pairs(spread.covariance, low, high).astype(np.float32)
         for component, of_component in zip(spread.components, roots, strict=True):
             variance += _variances(component, of_component, low, high, number, rng)
-        variance = np.maximum(variance - taken_off, least)
-        gaps = np.abs(ratings[:, low] - ratings[:, high])
-        blocks.append((gaps / np.sqrt(np.maximum(variance, 1e-300))).T)
-    return np.hstack(blocks)
+        np.maximum(variance, np.maximum(least, np.float32(1e-30)), out=variance)
+        gaps = ratings.take(low, axis=1) - ratings.take(high, axis=1)
+        np.divide(gaps, np.sqrt(variance), out=drawn[first : first + number])
+    return np.abs(drawn, out=drawn).T
 
 
 def _variances(
     one: Component,
-    root: FloatArray,
+    root: SingleArray,
     low: IntArray,
     high: IntArray,
     number: int,
     rng: np.random.Generator,
-) -> FloatArray:
+) -> SingleArray:
     """(N, P) what a component would say of the pairs' variances if all were alike."""
     degrees = float(np.median(one.own_degrees))
-    common = _of_pairs(one.common, low, high)
     if degrees >= _MANY_CLUSTERS:
+        common = _of_pairs(one.common, low, high).astype(np.float32)
         return np.asarray(np.broadcast_to(common, (number, len(low))))
     clusters = max(1, round(degrees))
     contestants = len(one.common)
-    pulls = rng.standard_normal((number, clusters, contestants)) @ root
-    squares = np.matmul(pulls.transpose(0, 2, 1), pulls) / clusters
-    seen = np.diagonal(squares, axis1=1, axis2=2) / np.maximum(one.common.diagonal(), 1e-300)
-    mine, others = np.sqrt(one.own_share), np.sqrt(1.0 - one.own_share)
-    own = _of_pairs(mine[:, None] * squares * mine, low, high)
-    shared = _of_pairs(others[:, None] * one.common * others, low, high)
-    return np.asarray(own + seen.mean(axis=1)[:, None] * shared)
+    pulls = rng.standard_normal((number, clusters, contestants), dtype=np.float32) @ root
+    seen = np.einsum("ngc,ngc,c->n", pulls, pulls, _over(one.common.diagonal()))
+    seen /= np.float32(clusters * contestants)
+    others = np.sqrt(1.0 - one.own_share)
+    shared = _of_pairs(others[:, None] * one.common * others, low, high).astype(np.float32)
+    pulls *= np.sqrt(one.own_share / clusters).astype(np.float32)
+    squares = np.matmul(pulls.transpose(0, 2, 1), pulls)
+    variance = np.diagonal(squares, axis1=1, axis2=2)
+    own = variance.take(low, axis=1) + variance.take(high, axis=1)
+    own -= np.float32(2.0) * squares.reshape(number, -1).take(low * contestants + high, axis=1)
+    return np.asarray(own + seen[:, None] * shared)
 
 
-def _root(covariance: FloatArray) -> FloatArray:
+def _over(values: FloatArray) -> SingleArray:
+    """One over each."""
+    return np.asarray(1.0 / np.maximum(values, 1e-30), dtype=np.float32)
+
+
+def _root(covariance: FloatArray) -> SingleArray:
     """(C, C): standard normal rows times it have the covariance."""
     values, directions = np.linalg.eigh(0.5 * (covariance + covariance.T))
-    return np.asarray(np.sqrt(np.maximum(values, 0.0))[:, None] * directions.T)
+    root = np.sqrt(np.maximum(values, 0.0))[:, None] * directions.T
+    return np.asarray(root, dtype=np.float32)
 
 
-def _step_down(size: FloatArray, drawn: FloatArray) -> tuple[FloatArray, float]:
+def _step_down(size: FloatArray, drawn: SingleArray) -> tuple[FloatArray, float]:
     """(P,) adjusted p-values of sizes (P,), and what the largest must exceed."""
     order = np.argsort(size, kind="stable")
     largest = np.maximum.accumulate(drawn[order], axis=0)

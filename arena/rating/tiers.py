@@ -24,6 +24,7 @@ import numpy as np
 from arena.rating import bradley_terry
 from arena.rating.bootstrap import Unit
 from arena.rating.bradley_terry import ELO_PER_LOGIT, Meetings
+from arena.rating.chains import Chains
 from arena.rating.comparisons import (
     BoolArray,
     Comparisons,
@@ -31,11 +32,12 @@ from arena.rating.comparisons import (
     IntArray,
     count_pairs,
     renumber_codes,
-    restrict_to,
     select_votes,
+    split_votes,
 )
-from arena.rating.connectivity import Diagnosis
 from arena.rating.estimate import LEVEL
+from arena.rating.many import fit_many
+from arena.rating.rules import LARGEST_DENSE
 
 _TAIL = (1.0 - LEVEL) / 2.0
 
@@ -45,37 +47,42 @@ class Tiers:
     """Where the components of a diagnosis stand.
 
     Attributes:
-        reached: (C, C) whether the row's contestant scored against the column's, or through a
-            chain.
-        part_of: (C,) the number of each one's component in `Diagnosis.parts`.
-        group_of: (C,) of each one's group of components that met.
+        chains: Who scored against whom through others, by component.
         level: (C,) points; where each one's component lies at least above the next lower one, or
             at most below the next higher one. Its zero is the mean of the group.
     """
 
-    reached: BoolArray
-    part_of: IntArray
-    group_of: IntArray
+    chains: Chains
     level: FloatArray
 
+    @property
+    def part_of(self) -> IntArray:
+        """(C,) the number of each one's component."""
+        return self.chains.part_of
 
-def tiers(votes: Comparisons, diagnosis: Diagnosis, unit: Unit) -> Tiers:
+    @property
+    def group_of(self) -> IntArray:
+        """(C,) the number of each one's group of components that met."""
+        return self.chains.group_of
+
+
+def tiers(votes: Comparisons, chains: Chains, unit: Unit) -> Tiers:
     """The components' places on common scales.
 
     Args:
         votes: Of contestants who all have votes.
-        diagnosis: Of these votes.
+        chains: Of these votes.
         unit: What hangs together.
     """
-    contestants = len(votes.names)
-    part_of = _numbered(diagnosis.parts, contestants)
-    group_of = _numbered(diagnosis.groups, contestants)
-    level = np.zeros(contestants)
-    for group in diagnosis.groups:
-        members = list(group)
-        if len(np.unique(part_of[members])) > 1:
-            level[members] = _levels(restrict_to(votes, members), part_of[members], unit)
-    return Tiers(reached=diagnosis.reached, part_of=part_of, group_of=group_of, level=level)
+    level = np.zeros(len(votes.names))
+    groups = chains.groups()
+    if len(groups) < len(chains.sizes):
+        for group, inside in zip(groups, split_votes(votes, groups), strict=True):
+            members = list(group)
+            part_of = chains.part_of[members]
+            if (part_of != part_of[0]).any():
+                level[members] = _levels(inside, part_of, unit)
+    return Tiers(chains=chains, level=level)
 
 
 class Ranked(Protocol):
@@ -104,7 +111,7 @@ def standing_order(found: Tiers, lines: Sequence[Ranked]) -> list[int]:
         found: Where the components stand.
         lines: (C,) theirs.
     """
-    above_me = (found.reached & (found.part_of[:, None] != found.part_of[None, :])).sum(axis=0)
+    above_me = found.chains.above()
     keys = [
         (
             int(found.group_of[number]),
@@ -140,15 +147,16 @@ def outer_bounds(found: Tiers) -> tuple[FloatArray, FloatArray]:
     """
     lower, upper = np.full((2, len(found.level)), np.nan)
     is_main, level = main_parts(found), found.level - _middle(found)
-    across = found.part_of[:, None] != found.part_of[None, :]
-    above, below = found.reached & across, found.reached.T & across
+    others = _across(found.chains)
     for one in np.flatnonzero(_is_single(found)).tolist():
         base = (found.group_of == found.group_of[one]) & is_main
         if not base.any():
             base = found.group_of == found.group_of[one]
-        if above[one][base].any() and not below[one].any():
+        part = found.part_of[one]
+        above, below = others[part], others[:, part]
+        if above[found.part_of[base]].any() and not below.any():
             lower[one] = level[one]
-        elif below[one][base].any() and not above[one].any():
+        elif below[found.part_of[base]].any() and not above.any():
             upper[one] = level[one]
     return lower, upper
 
@@ -169,11 +177,13 @@ def ranks_across(found: Tiers, rank: IntArray, lower: FloatArray, upper: FloatAr
     single, is_main = _is_single(found), main_parts(found)
     low = found.level + np.where(np.isnan(lower), -np.inf, lower)
     high = found.level + np.where(np.isnan(upper), np.inf, upper)
-    across = found.reached & (found.part_of[:, None] != found.part_of[None, :])
-    higher = (across & (low[:, None] > high[None, :])).sum(axis=0)
+    others = _across(found.chains)
+    higher = _higher(others, found.part_of, low, high)
+    has_lower = np.asarray(others.any(axis=1))[found.part_of]
+    has_higher = np.asarray(others.any(axis=0))[found.part_of]
     inner = np.where(single, 1, rank)
-    on_top = across.any(axis=1) & ~across.any(axis=0)
-    keeps = is_main | ~(across.any(axis=1) | across.any(axis=0) | single)
+    on_top = has_lower & ~has_higher
+    keeps = is_main | ~(has_lower | has_higher | single)
     is_first = on_top & (low > _middle(found)) & (inner == 1)
     decided = np.where(keeps, rank > 0, (inner > 1) | is_first) | (higher > 0)
     return np.where(decided, np.maximum(inner, 1) + higher, 0)
@@ -182,10 +192,20 @@ def ranks_across(found: Tiers, rank: IntArray, lower: FloatArray, upper: FloatAr
 # --- Private -----------------------------------------------------------------------------------
 
 
-def _numbered(groups: Sequence[Sequence[int]], contestants: int) -> IntArray:
-    number = np.zeros(contestants, dtype=np.int64)
-    for index, members in enumerate(groups):
-        number[list(members)] = index
+def _across(chains: Chains) -> BoolArray:
+    """(K, K) which parts reach which others."""
+    across = chains.between.copy()
+    np.fill_diagonal(across, False)
+    return across
+
+
+def _higher(others: BoolArray, part_of: IntArray, low: FloatArray, high: FloatArray) -> IntArray:
+    """(C,) how many of parts that reach the own one have their lower bound above the own upper."""
+    number = np.zeros(len(low), dtype=np.int64)
+    for part in np.flatnonzero(others.any(axis=0)).tolist():
+        members = np.flatnonzero(part_of == part)
+        bounds = np.sort(low[others[part_of, part]])
+        number[members] = len(bounds) - np.searchsorted(bounds, high[members], side="right")
     return number
 
 
@@ -207,23 +227,41 @@ def _levels(votes: Comparisons, part_of: IntArray, unit: Unit) -> FloatArray:
     counts = count_pairs(votes)
     games, scores = counts.games, counts.scores.copy()
     ends = np.sort([part_of[counts.low], part_of[counts.high]], axis=0)
-    for first, second in np.unique(ends[:, ends[0] != ends[1]], axis=1).T.tolist():
-        pairs = (ends[0] == first) & (ends[1] == second)
-        share = _TAIL ** (1.0 / _independent(select_votes(votes, pairs[counts.pair_of]), unit))
-        won = scores[pairs] > 0.0
-        scores[pairs] = games[pairs] * np.where(won, share, 1.0 - share)
-    met = Meetings(contestants=len(votes.names), low=counts.low, high=counts.high)
-    strengths = bradley_terry.newton(met, games[:, None], scores[:, None])[:, 0] * ELO_PER_LOGIT
+    across = np.flatnonzero(ends[0] != ends[1])
+    parts, meeting_of = np.unique(ends[:, across], axis=1, return_inverse=True)
+    rows = np.flatnonzero(np.isin(counts.pair_of, across))
+    of_row = meeting_of[np.searchsorted(across, counts.pair_of[rows])]
+    number = _independent(select_votes(votes, rows), of_row, parts.shape[1], unit)
+    share = (_TAIL ** (1.0 / number))[meeting_of]
+    scores[across] = games[across] * np.where(scores[across] > 0.0, share, 1.0 - share)
+    if len(votes.names) > LARGEST_DENSE:
+        strengths = fit_many(len(votes.names), counts.low, counts.high, games, scores).strengths
+    else:
+        met = Meetings(contestants=len(votes.names), low=counts.low, high=counts.high)
+        strengths = bradley_terry.newton(met, games[:, None], scores[:, None])[:, 0]
+    strengths = strengths * ELO_PER_LOGIT
     _, place = np.unique(part_of, return_inverse=True)
     mean = np.bincount(place, weights=strengths) / np.bincount(place)
     return np.asarray(mean[place])
 
 
-def _independent(votes: Comparisons, unit: Unit) -> int:
-    """How many votes count as independent; what there is only one of is left out."""
-    numbers = []
-    if unit in (Unit.EXPERT, Unit.TWO_WAY):
-        numbers.append(len(renumber_codes(votes.expert)[0]))
-    if unit in (Unit.SCENARIO, Unit.TWO_WAY):
-        numbers.append(len(renumber_codes(votes.scenario)[0]))
-    return min((number for number in numbers if number > 1), default=votes.votes)
+def _independent(votes: Comparisons, of_row: IntArray, meetings: int, unit: Unit) -> IntArray:
+    """(M,) how many votes of each meeting of two parts count as independent.
+
+    What there is only one of is left out.
+
+    Args:
+        votes: R rows.
+        of_row: (R,) the meeting of each.
+        meetings: M.
+        unit: What hangs together.
+    """
+    kinds = {Unit.EXPERT: (votes.expert,), Unit.SCENARIO: (votes.scenario,), Unit.VOTE: ()}
+    fewest: FloatArray = np.full(meetings, np.inf)
+    for codes in kinds.get(unit, (votes.expert, votes.scenario)):
+        occurring, place = renumber_codes(codes)
+        met = np.unique(of_row * len(occurring) + place)
+        different = np.bincount(met // len(occurring), minlength=meetings)
+        fewest = np.where(different > 1, np.minimum(fewest, different), fewest)
+    of_all = np.bincount(of_row, weights=votes.count, minlength=meetings)
+    return np.where(np.isinf(fewest), of_all, fewest).astype(np.int64)

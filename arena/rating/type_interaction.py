@@ -14,6 +14,7 @@ import numpy as np
 
 from arena.rating import bradley_terry
 from arena.rating.bradley_terry import ELO_PER_LOGIT, Meetings
+from arena.rating.chains import are_all_together
 from arena.rating.comparisons import (
     Comparisons,
     FloatArray,
@@ -25,7 +26,6 @@ from arena.rating.comparisons import (
 from arena.rating.interactions import Effect, Interaction, cells_of
 from arena.rating.moderated import LEAST
 from arena.rating.pulls import Pulls, bradley_terry_pulls
-from arena.rating.reach import are_all_together
 
 FEWEST_LAYOUTS = 20
 """With fewer ways to give out the types no p-value falls below 5 %."""

@@ -6,11 +6,12 @@ import numpy as np
 import pytest
 
 from arena.rating.bootstrap import Unit
+from arena.rating.chains import are_all_together
 from arena.rating.comparisons import FloatArray, count_pairs
 from arena.rating.connectivity import are_determined, heaviest_tree
 from arena.rating.leaderboard import Intervals, rate
 from arena.rating.pulls import _squares
-from arena.rating.reach import are_all_together, loose_rounds, rounds_to_draw
+from arena.rating.reach import loose_rounds, rounds_to_draw
 from tests.rating.votes import simulated
 
 SPREAD = [1400.0, 1200.0, 1100.0, 1000.0, 900.0, 600.0]
