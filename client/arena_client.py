@@ -5,18 +5,21 @@
         print(job["name"], job["by_state"])
 
 What there is to ask for stands in the OpenAPI document, which staff read at
-/api/v1/reference/. `post` sends JSON, `get` and `list` read it, `download` gives a file's bytes.
+/api/v1/reference/. `post` sends JSON, `get` and `list` read it, `upload` sends files, `download`
+gives a file's bytes.
 """
 
 from __future__ import annotations
 
 import http.client
 import json
+import re
 import time
 import urllib.error
 import urllib.request
 import uuid
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from pathlib import Path
 from typing import Any
 from urllib.parse import urlencode
 
@@ -108,6 +111,23 @@ class Arena:
         data = json.dumps(body).encode()
         return json.loads(self._send("POST", self._address(path, {}), data, headers).body)
 
+    def upload(
+        self, path: str, files: Mapping[str, str | Path | Sequence[str | Path]], **fields: object
+    ) -> Any:
+        """What is answered to files, by the name of their field, and other fields beside them.
+
+        Raises:
+            ApiError: It was refused; nothing was changed.
+        """
+        mark = uuid.uuid4().hex
+        parts = [_part(mark, name, str(value).encode()) for name, value in fields.items()]
+        for name, given in files.items():
+            for file in [given] if isinstance(given, str | Path) else given:
+                parts.append(_part(mark, name, Path(file).read_bytes(), file))
+        data = b"".join([*parts, f"--{mark}--\r\n".encode()])
+        headers = {"Content-Type": f"multipart/form-data; boundary={mark}"}
+        return json.loads(self._send("POST", self._address(path, {}), data, headers).body)
+
     def download(self, path: str, **query: object) -> bytes:
         """The bytes of a file.
 
@@ -142,9 +162,15 @@ class Arena:
             TimeoutError: It is neither.
         """
         ended = ("ready", "failed")
-        return self._wait(
-            f"snapshots/{code}", lambda one: one["state"] in ended, every_s, within_s
-        )
+        return self.wait_for(f"snapshots/{code}", *ended, every_s=every_s, within_s=within_s)
+
+    def wait_for(self, path: str, *states: str, every_s: float = 1, within_s: float = 3600) -> Any:
+        """A row once its state is one of these: `wait_for(f"uploads/{code}", "read", "failed")`.
+
+        Raises:
+            TimeoutError: It is none of them.
+        """
+        return self._wait(path, lambda one: one["state"] in states, every_s, within_s)
 
     def pairs(self, study: str) -> Iterator[dict[str, Any]]:
         """The pairs that an expert still has to judge; decide each before the next one comes."""
@@ -213,6 +239,15 @@ class Arena:
 class _Answer:
     def __init__(self, status: int, tag: str, body: bytes) -> None:
         self.status, self.tag, self.body = status, tag, body
+
+
+def _part(mark: str, name: str, content: bytes, file: str | Path | None = None) -> bytes:
+    """One field of a form; names of files go in plain letters."""
+    head = f'--{mark}\r\nContent-Disposition: form-data; name="{name}"'
+    if file is not None:
+        plain = re.sub(r"[^A-Za-z0-9._-]", "-", Path(file).name)
+        head += f'; filename="{plain}"\r\nContent-Type: application/octet-stream'
+    return f"{head}\r\n\r\n".encode() + content + b"\r\n"
 
 
 def _wait_s(error: urllib.error.HTTPError) -> float | None:

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import uuid
-from typing import Any
+from functools import partial
+from typing import Any, cast
 
+from django.contrib.auth.models import User
 from django.shortcuts import get_object_or_404
 from drf_spectacular.types import OpenApiTypes
 from rest_framework import serializers
@@ -13,10 +15,15 @@ from rest_framework.response import Response
 
 from arena.api.access import StaffOnly
 from arena.api.errors import ApiView
+from arena.api.fields import StrictSerializer, TextField
 from arena.api.paging import PageQuery, answer_page, page_of, read_query
 from arena.api.schema import describe
+from arena.api.sending import WarnedDocument, keep_and_send
 from augment.models import Augmentation
+from augment.services.running import by_hand
 from augment.services.running.transcript_export import transcript_of
+from augment.services.texts import LONGEST_NOTES
+from augment.tasks import enqueue_job
 
 
 class AugmentationQuery(PageQuery):
@@ -58,6 +65,28 @@ class WholeAugmentationDocument(AugmentationDocument):
     notes = serializers.CharField(help_text="What the contestant said of its own work.")
 
 
+class CorrectedDocument(WholeAugmentationDocument, WarnedDocument):
+    """A correction just kept."""
+
+
+class CorrectionBody(StrictSerializer):
+    """An augmentation as it should have been."""
+
+    modification = serializers.DictField()
+    contestant = TextField(
+        max_length=80,
+        required=False,
+        default=by_hand.BY_HAND,
+        help_text="The slug of a person; made where there is none.",
+    )
+    name = TextField(
+        max_length=120, required=False, default="", allow_blank=True, help_text="Of a new one."
+    )
+    notes = TextField(
+        max_length=LONGEST_NOTES, required=False, default="", allow_blank=True, help_text="Why."
+    )
+
+
 class AugmentationsView(ApiView):
     """The augmentations, the youngest first."""
 
@@ -93,6 +122,45 @@ class AugmentationView(ApiView):
         """With what was changed."""
         row = get_object_or_404(_augmentations(), code=code)
         return Response(WholeAugmentationDocument(row).data)
+
+
+class CorrectionsView(ApiView):
+    """What a person makes of an augmentation."""
+
+    permission_classes = (StaffOnly,)
+
+    @describe(
+        "Keep a correction by hand",
+        takes=CorrectionBody,
+        answers=CorrectedDocument,
+        status=201,
+        name="correctAugmentation",
+    )
+    def post(self, request: Request, code: uuid.UUID) -> Response:
+        """An augmentation of its own, of a contestant of kind human; a worker draws it."""
+        rows = Augmentation.objects.select_related("contestant", "job", "scenario__base_scene")
+        original = get_object_or_404(rows.defer("scenario__base_scene__recording"), code=code)
+        body = CorrectionBody(data=request.data)
+        body.is_valid(raise_exception=True)
+        given = dict(body.validated_data)
+        keep = partial(
+            by_hand.keep_correction,
+            original,
+            given.pop("modification"),
+            slug=given.pop("contestant"),
+            **given,
+            actor=cast(User, request.user),
+        )
+        job_of: dict[int, int] = {}
+
+        def keep_it() -> Augmentation:
+            made = keep()
+            job_of[made.pk] = made.job_id
+            return made
+
+        made, warnings = keep_and_send(keep_it, lambda pk: enqueue_job(job_of[pk]))
+        found = dict(WholeAugmentationDocument(_augmentations().get(pk=made.pk)).data)
+        return Response(found | {"warnings": warnings}, status=201)
 
 
 class TranscriptView(ApiView):

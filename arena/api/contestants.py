@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import uuid
+from collections.abc import Sequence
 from typing import Any, cast
 
 from django.contrib.auth.models import User
@@ -20,7 +21,7 @@ from arena.api.schema import describe
 from augment.models import Contestant
 from augment.services.endpoints.entering import VARIANTS, EnteredEndpoint, enter_contestant
 from augment.services.endpoints.retirement import retire, take_back
-from augment.services.running.transcript_export import contestant_document
+from augment.services.running.transcript_export import contestant_documents
 
 KINDS = [kind for kind in Contestant.Kind if kind is not Contestant.Kind.CHECK]
 
@@ -106,7 +107,7 @@ class ContestantsView(ApiView):
             query,
             WholeContestantDocument,
             order="slug",
-            lines=lambda page: [_document(row) for row in page],
+            lines=_documents,
         )
 
     @describe(
@@ -165,5 +166,12 @@ def _contestants() -> QuerySet[Contestant]:
     return rows.select_related("endpoint")
 
 
+def _documents(rows: Sequence[Contestant]) -> list[dict[str, Any]]:
+    return [
+        document | {"code": row.code, "retired_at": row.retired_at}
+        for row, document in zip(rows, contestant_documents(rows), strict=True)
+    ]
+
+
 def _document(row: Contestant) -> dict[str, Any]:
-    return contestant_document(row) | {"code": row.code, "retired_at": row.retired_at}
+    return _documents([row])[0]

@@ -17,6 +17,7 @@ from django.utils.translation import gettext as _
 from django.views.decorators.cache import never_cache
 from django.views.decorators.http import conditional_page
 from rest_framework import exceptions
+from rest_framework.parsers import BaseParser
 from rest_framework.request import Request
 from rest_framework.response import Response
 from rest_framework.views import APIView
@@ -25,10 +26,12 @@ from arena.api.parsing import SoundJSONParser
 from arena.api.schema import ArenaSchema
 from arena.errors import (
     AlreadyDecided,
+    AlreadyLabelled,
     ArenaError,
     DatabaseBusy,
     InvalidPreference,
     InvalidVote,
+    LabellingClosed,
     LinkOver,
     NoSnapshot,
     NotYours,
@@ -53,6 +56,8 @@ STATUS: tuple[tuple[type[Exception], int, str], ...] = (
     (StudyNotOpen, 410, "study_not_open"),
     (StudyStillOpen, 403, "study_still_open"),
     (AlreadyDecided, 409, "already_decided"),
+    (AlreadyLabelled, 409, "already_labelled"),
+    (LabellingClosed, 410, "labelling_closed"),
     (InvalidVote, 422, "invalid"),
     (InvalidPreference, 422, "invalid"),
     (TooFast, 429, "too_fast"),
@@ -87,7 +92,7 @@ class ApiView(APIView):
         read_errors: Further statuses that a GET can have, for the document.
     """
 
-    parser_classes = (SoundJSONParser,)
+    parser_classes: tuple[type[BaseParser], ...] = (SoundJSONParser,)
     schema = ArenaSchema()
     is_never_cached = False
     is_public = False

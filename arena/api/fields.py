@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import uuid
 from collections.abc import Mapping
+from math import isfinite
 from typing import Any
 
 from rest_framework import serializers
@@ -18,6 +19,8 @@ class StrictSerializer(serializers.Serializer[Any]):
         Raises:
             serializers.ValidationError: A field is unknown, missing or of the wrong type.
         """
+        if data is serializers.empty:  # one inside another that is not there
+            return super().run_validation(data)
         if not isinstance(data, Mapping):
             raise serializers.ValidationError({"body": ["Must be a JSON object."]})
         unknown = sorted(set(data) - set(self.fields))
@@ -39,17 +42,27 @@ class WholeNumberField(serializers.IntegerField):
         return super().to_internal_value(data)
 
 
-class ShareField(serializers.FloatField):
-    """A number of JSON from 0 to 1: neither a text nor true."""
-
-    def __init__(self, **kwargs: Any) -> None:
-        super().__init__(min_value=0, max_value=1, **kwargs)
+class NumberField(serializers.FloatField):
+    """A finite number of JSON: neither a text nor true."""
 
     def to_internal_value(self, data: Any) -> float:
         """The number itself."""
         if isinstance(data, bool) or not isinstance(data, int | float):
             self.fail("invalid")
-        return super().to_internal_value(data)
+        try:
+            number = float(data)
+        except OverflowError:  # a whole number with hundreds of digits
+            self.fail("invalid")
+        if not isfinite(number):
+            self.fail("invalid")
+        return number
+
+
+class ShareField(NumberField):
+    """A number of JSON from 0 to 1."""
+
+    def __init__(self, **kwargs: Any) -> None:
+        super().__init__(min_value=0, max_value=1, **kwargs)
 
 
 class CodeField(serializers.UUIDField):

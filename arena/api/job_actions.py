@@ -17,9 +17,7 @@ from arena.api.fields import StrictSerializer, TextField
 from arena.api.jobs import CapsBody, ChangedJobDocument, change_job, find_job, take_caps
 from arena.api.schema import describe
 from arena.services.retrying import retry_cause
-from augment.models import GenerationJob
-from augment.services.running import caps, jobs, pausing
-from augment.services.running.caps import Caps
+from augment.services.running import jobs, pausing
 from augment.services.running.causes import failure_groups
 
 
@@ -116,11 +114,6 @@ class ResumeJobView(ApiView):
         """What is left is queued again."""
         body = CapsBody(data=request.data)
         body.is_valid(raise_exception=True)
-        job, higher, actor = find_job(code), take_caps(dict(body.validated_data)), request.user
-
-        def resume() -> GenerationJob:
-            if higher != Caps():
-                caps.raise_cap(job, caps=higher, actor=cast(User, actor))
-            return pausing.resume(job, actor=cast(User, actor))
-
-        return Response(change_job(resume))
+        job, higher = find_job(code), take_caps(dict(body.validated_data))
+        actor = cast(User, request.user)
+        return Response(change_job(partial(pausing.resume, job, higher=higher, actor=actor)))

@@ -113,15 +113,20 @@ class CapsBody(StrictSerializer):
     cap_tokens = WholeNumberField(required=False, min_value=1, max_value=caps.HIGHEST_TOKENS)
 
 
-class JobBody(ChoiceBody, CapsBody):
-    """A new job."""
+class EstimateBody(ChoiceBody):
+    """A job that is not launched."""
 
-    name = TextField(max_length=120)
     is_fresh = FlagField(
         required=False,
         default=False,
         help_text="Ask anew what was answered in other jobs before.",
     )
+
+
+class JobBody(EstimateBody, CapsBody):
+    """A new job."""
+
+    name = TextField(max_length=120)
 
 
 class EstimateLineDocument(serializers.Serializer[Any]):
@@ -140,6 +145,7 @@ class EstimateLineDocument(serializers.Serializer[Any]):
     seen = serializers.IntegerField(
         help_text="Earlier augmentations that it rests on; 0 for a guess."
     )
+    answered = serializers.IntegerField(help_text="Rows whose answers are in the store already.")
 
 
 class EstimateDocument(serializers.Serializer[Any]):
@@ -153,6 +159,9 @@ class EstimateDocument(serializers.Serializer[Any]):
     tokens_out = serializers.IntegerField()
     usd = serializers.DecimalField(None, 9)
     usd_most = serializers.DecimalField(None, 9)
+    answered = serializers.IntegerField(help_text="Rows whose answers are in the store already.")
+    seconds = serializers.FloatField()
+    is_time_guessed = serializers.BooleanField(help_text="A model among them was never asked.")
     lines = EstimateLineDocument(many=True)
 
 
@@ -224,11 +233,11 @@ class EstimateView(ApiView):
     permission_classes = (AdminsOnly,)
 
     @describe(
-        "What a job would use", takes=ChoiceBody, answers=EstimateDocument, name="estimateJob"
+        "What a job would use", takes=EstimateBody, answers=EstimateDocument, name="estimateJob"
     )
     def post(self, request: Request) -> Response:
         """From recorded figures where there are some, else a guess; nothing is launched."""
-        body = ChoiceBody(data=request.data)
+        body = EstimateBody(data=request.data)
         body.is_valid(raise_exception=True)
         return Response(EstimateDocument(estimate(**body.validated_data)).data)
 

@@ -5,7 +5,7 @@ No row is lost or shown twice where rows are added meanwhile, and no key of the 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from functools import cache
 from typing import Any, TypeVar
 from urllib.parse import urlencode
@@ -69,6 +69,7 @@ def answer_page(
     *,
     order: str = "-pk",
     lines: Callable[[Sequence[Row]], Sequence[Any]] | None = None,
+    context: Mapping[str, Any] | None = None,
 ) -> Response:
     """A page of the rows.
 
@@ -79,6 +80,7 @@ def answer_page(
         line: What is told of each.
         order: A unique column, a minus before it where the greatest comes first.
         lines: What `line` is told of, made of all rows of the page at once.
+        context: What `line` is told besides.
 
     Raises:
         ValidationError: No row has the code that the page is to begin after.
@@ -94,7 +96,9 @@ def answer_page(
     found = list(rows[: limit + 1])
     shown = found[:limit]
     body: dict[str, Any] = {
-        "results": line(shown if lines is None else lines(shown), many=True).data,
+        "results": line(
+            shown if lines is None else lines(shown), many=True, context=dict(context or {})
+        ).data,
         "next": None,
     }
     if len(found) > limit:

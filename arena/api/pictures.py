@@ -38,7 +38,7 @@ class ShownPictureView(FileView):
     @describe_file("A picture of a pair", types=[PNG], name="getShownPicture")
     def get(self, request: Request, token: str) -> HttpResponseBase:
         """Neither its name nor an ETag goes with it: they would tell what was made together."""
-        return _picture(picture_shown(user=cast(User, request.user), token=token))
+        return picture_named(picture_shown(user=cast(User, request.user), token=token))
 
 
 class ScenarioPictureView(FileView):
@@ -51,7 +51,7 @@ class ScenarioPictureView(FileView):
     def get(self, request: Request, code: uuid.UUID) -> HttpResponseBase:
         """Nothing before it was drawn."""
         rows = Scenario.objects.only("original_image")
-        return _picture(get_object_or_404(rows, code=code).original_image)
+        return picture_named(get_object_or_404(rows, code=code).original_image)
 
 
 class AugmentationPictureView(FileView):
@@ -64,10 +64,11 @@ class AugmentationPictureView(FileView):
     def get(self, request: Request, code: uuid.UUID) -> HttpResponseBase:
         """Nothing before it was drawn."""
         rows = Augmentation.objects.only("image")
-        return _picture(get_object_or_404(rows, code=code).image)
+        return picture_named(get_object_or_404(rows, code=code).image)
 
 
-def _picture(name: str) -> HttpResponse:
+def picture_named(name: str) -> HttpResponse:
+    """The stored picture of that name, 404 before it is drawn."""
     if not name or not default_storage.exists(name):
         raise Http404
     with default_storage.open(name) as file:

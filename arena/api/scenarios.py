@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import uuid
+from functools import partial
 from typing import Any, cast
 
 from django.contrib.auth.models import User
@@ -14,13 +15,17 @@ from rest_framework.response import Response
 
 from arena.api.access import AdminsOnly, StaffOnly
 from arena.api.errors import ApiView
-from arena.api.fields import StrictSerializer
+from arena.api.fields import FlagField, StrictSerializer, TextField
 from arena.api.paging import PageQuery, answer_page, page_of, read_query
 from arena.api.schema import describe
+from arena.api.sending import WarnedDocument, keep_and_send
 from arena.queries.scenarios import OWN
 from augment.models import Scenario
+from augment.scene_tasks import enqueue_scenario
 from augment.services.endpoints.contestants import ensure_builtin
 from augment.services.scenarios.catalogue import load_own_catalogue
+from augment.services.scenarios.scenes import INSTRUCTION_LENGTH, SLUG_LENGTH, add_scenario
+from augment.services.scenarios.types import LONGEST_LABEL, LONGEST_TYPE
 
 SETS = (*Scenario.SETS, OWN)
 
@@ -52,6 +57,27 @@ class WholeScenarioDocument(ScenarioDocument):
 
     reference = serializers.DictField(allow_null=True, help_text="The reference modification.")
     intent = serializers.DictField(allow_null=True, help_text="What the instruction asks for.")
+
+
+class ScenarioBody(StrictSerializer):
+    """A new scenario of a scene that is there."""
+
+    scene = TextField(max_length=80, help_text="Its slug.")
+    type = TextField(
+        max_length=LONGEST_TYPE, help_text="One of the paper's five, or a slug of your own."
+    )
+    type_label = TextField(
+        max_length=LONGEST_LABEL, required=False, help_text="What people read for one of your own."
+    )
+    instruction = TextField(max_length=INSTRUCTION_LENGTH)
+    slug = TextField(max_length=SLUG_LENGTH, required=False, help_text="Made where none is given.")
+    reference = serializers.DictField(required=False, help_text="A modification that fits.")
+    intent = serializers.DictField(required=False, help_text="What the instruction asks for.")
+    keep_traffic = FlagField(required=False, default=False)
+
+
+class NewScenarioDocument(WholeScenarioDocument, WarnedDocument):
+    """A scenario after a change."""
 
 
 class CatalogueBody(StrictSerializer):
@@ -93,6 +119,20 @@ class ScenariosView(ApiView):
             rows = rows.filter(catalogue_set="" if query["set"] == OWN else query["set"])
         return answer_page(request, rows, query, ScenarioDocument, order="slug")
 
+    @describe(
+        "Add a scenario",
+        takes=ScenarioBody,
+        answers=NewScenarioDocument,
+        status=201,
+        name="addScenario",
+    )
+    def post(self, request: Request) -> Response:
+        """A worker draws it."""
+        body = ScenarioBody(data=request.data)
+        body.is_valid(raise_exception=True)
+        add = partial(add_scenario, **body.validated_data, actor=cast(User, request.user))
+        return Response(changed_scenario(*keep_and_send(add, enqueue_scenario)), status=201)
+
 
 class ScenarioView(ApiView):
     """One scenario."""
@@ -102,7 +142,7 @@ class ScenarioView(ApiView):
     @describe("A scenario", answers=WholeScenarioDocument, name="getScenario")
     def get(self, request: Request, code: uuid.UUID) -> Response:
         """With its reference and its intent."""
-        return Response(WholeScenarioDocument(get_object_or_404(_scenarios(), code=code)).data)
+        return Response(WholeScenarioDocument(find_scenario(code)).data)
 
 
 class CatalogueView(ApiView):
@@ -124,6 +164,20 @@ class CatalogueView(ApiView):
         report = load_own_catalogue(sets=[body.validated_data["set"]], actor=actor)
         ensure_builtin()
         return Response(CatalogueDocument(report).data)
+
+
+def find_scenario(code: uuid.UUID) -> Scenario:
+    """The scenario of that code, 404 without one."""
+    found: Scenario = get_object_or_404(_scenarios(), code=code)
+    return found
+
+
+def changed_scenario(row: Scenario, warnings: list[str]) -> dict[str, Any]:
+    """A scenario as it is now, with what did not work."""
+    return dict(WholeScenarioDocument(find_scenario(row.code)).data) | {"warnings": warnings}
+
+
+# --- Private -----------------------------------------------------------------------------------
 
 
 def _scenarios() -> Any:

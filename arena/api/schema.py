@@ -26,9 +26,9 @@ OF_CHANGES = {
     400: "Refused; the message says why and what is allowed.",
     404: "Nothing at this address, or nothing that this account may know of.",
     409: "It does not fit what is there.",
-    410: "Over: the study takes no votes, or the link no visitors.",
-    413: "The body is larger than 2.5 MB.",
-    415: "Bodies are JSON.",
+    410: "Over: the study takes no votes, the labelling no labels, or the link no visitors.",
+    413: "The body is larger than 2.5 MB, or a file in it than the installation takes.",
+    415: "The body has another form than is said here: JSON, or with files that of browsers.",
 }
 
 

@@ -8,24 +8,27 @@ from typing import Any, cast
 
 from django.contrib.auth.models import User
 from django.db import transaction
+from django.http import Http404
 from django.shortcuts import get_object_or_404
 from drf_spectacular.utils import extend_schema_field
 from rest_framework import serializers
+from rest_framework.permissions import BasePermission
 from rest_framework.request import Request
 from rest_framework.response import Response
+from rest_framework.views import APIView
 
 from arena import tasks
-from arena.api.access import StaffOnly
 from arena.api.errors import ApiView
 from arena.api.fields import FlagField, StrictSerializer, TextField, WholeNumberField
 from arena.api.paging import PageQuery, answer_page, page_of, read_query
 from arena.api.schema import describe
 from arena.api.studies import get_study
-from arena.exports.tables import LeaderboardTable, leaderboard_table
+from arena.exports.tables import LeaderboardTable, for_experts, leaderboard_table
 from arena.models import Snapshot, Study
 from arena.pairing.order import MAIN, REPEAT
-from arena.queries.results import must_read_results, snapshots_of
-from arena.queries.vote_sets import Filters
+from arena.queries.people import role_of
+from arena.queries.results import STAFF, must_read_results, snapshots_of
+from arena.queries.vote_sets import Filters, of_experts
 from arena.rating.bootstrap import Unit
 from arena.rating.leaderboard import Intervals, Method
 from arena.services.ratings import DEFAULT_ROUNDS, MOST_ROUNDS, is_big, plan_snapshot, rate
@@ -34,6 +37,15 @@ from augment.services.scenarios.types import type_choices
 from augment.services.wording import translate
 
 HIGHEST_SEED = 2**63 - 1
+
+
+class ResultReaders(BasePermission):
+    """Experts read the results of their closed studies, as on the page; staff also rate."""
+
+    def has_permission(self, request: Request, view: APIView) -> bool:
+        """Whether the account may do what it asks for."""
+        allowed = STAFF if request.method == "POST" else (*STAFF, "expert")
+        return role_of(request.user) in allowed
 
 
 class SnapshotDocument(serializers.Serializer[Any]):
@@ -57,8 +69,9 @@ class SnapshotDocument(serializers.Serializer[Any]):
     made_at = serializers.DateTimeField()
 
     def get_filters(self, row: Snapshot) -> dict[str, Any]:
-        """Which votes were asked for."""
-        return dict(row.filters)
+        """Which votes were asked for; an expert reads nothing of authors."""
+        kept = dict(row.filters)
+        return of_experts(kept) if self.context.get("is_expert") else kept
 
 
 class StandingDocument(serializers.Serializer[Any]):
@@ -107,7 +120,8 @@ class WholeSnapshotDocument(SnapshotDocument):
         """The table."""
         if row.state != Snapshot.State.READY:
             return None
-        return TableDocument(leaderboard_table(row)).data
+        table = leaderboard_table(row)
+        return TableDocument(for_experts(table) if self.context.get("is_expert") else table).data
 
 
 class SnapshotBody(StrictSerializer):
@@ -140,7 +154,7 @@ class SnapshotBody(StrictSerializer):
 class SnapshotsView(ApiView):
     """The ratings of a study, the newest first."""
 
-    permission_classes = (StaffOnly,)
+    permission_classes = (ResultReaders,)
 
     @describe(
         "Ratings of a study, the newest first",
@@ -149,10 +163,13 @@ class SnapshotsView(ApiView):
         name="listSnapshots",
     )
     def get(self, request: Request, code: uuid.UUID) -> Response:
-        """Of an open study only after `POST .../early-look`."""
-        study = _readable(request, code)
+        """Of an open study only after `POST .../early-look`; an expert's closed ones."""
+        study, context = _readable(request, code), _context(request)
         rows = snapshots_of(study).select_related("study").defer("results")
-        return answer_page(request, rows, read_query(request, PageQuery), SnapshotDocument)
+        if context["is_expert"]:
+            rows = rows.filter(state=Snapshot.State.READY)
+        query = read_query(request, PageQuery)
+        return answer_page(request, rows, query, SnapshotDocument, context=context)
 
     @describe(
         "Rate the votes as they are now",
@@ -181,12 +198,15 @@ class SnapshotsView(ApiView):
 class SnapshotView(ApiView):
     """One rating."""
 
-    permission_classes = (StaffOnly,)
+    permission_classes = (ResultReaders,)
 
     @describe("A rating with its table", answers=WholeSnapshotDocument, name="getSnapshot")
     def get(self, request: Request, code: uuid.UUID) -> Response:
-        """Of an open study only after `POST .../early-look`."""
-        return Response(WholeSnapshotDocument(get_snapshot(request, code)).data)
+        """Of an open study only after `POST .../early-look`; an expert's closed ones."""
+        row, context = get_snapshot(request, code), _context(request)
+        if context["is_expert"] and row.state != Snapshot.State.READY:
+            raise Http404
+        return Response(WholeSnapshotDocument(row, context=context).data)
 
 
 def get_snapshot(request: Request, code: uuid.UUID) -> Snapshot:
@@ -208,6 +228,11 @@ def _readable(request: Request, code: uuid.UUID) -> Study:
     study = get_study(code)
     must_read_results(user=cast(User, request.user), study=study)
     return study
+
+
+def _context(request: Request) -> dict[str, bool]:
+    """For whom the documents are."""
+    return {"is_expert": role_of(request.user) == "expert"}
 
 
 def _wanted(given: dict[str, Any]) -> dict[str, Any]:

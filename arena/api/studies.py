@@ -15,20 +15,16 @@ from rest_framework.views import APIView
 
 from arena.api.access import AdminsOnly, StaffOnly
 from arena.api.errors import ApiView
-from arena.api.fields import FlagField, StrictSerializer, TextField, WholeNumberField
 from arena.api.paging import PageQuery, answer_page, page_of, read_query
 from arena.api.schema import describe
+from arena.api.study_body import StudyBody
 from arena.models import Study
 from arena.queries.people import role_of
 from arena.queries.progress import StudyProgress, of_these, studies_seen_by
 from arena.services.early_looks import open_early
-from arena.services.shown_pictures import SampleRule
-from arena.services.studies import PlanOptions, close_study, open_study
+from arena.services.studies import close_study, open_study
 
 STAFF = ("admin", "analyst")
-MOST_CHOSEN = 5_000
-MOST_VOTES = 10_000
-HIGHEST_SEED = 2**63 - 1
 
 
 class StudyReaders(BasePermission):
@@ -75,42 +71,6 @@ class WholeStudyDocument(StudyDocument):
     allow_simulated = serializers.BooleanField(source="study.allow_simulated")
 
 
-class StudyBody(StrictSerializer):
-    """A new study; its rules are fixed from the moment it opens."""
-
-    name = TextField(max_length=120)
-    contestants = serializers.ListField(
-        child=TextField(max_length=80), max_length=MOST_CHOSEN, help_text="Slugs."
-    )
-    scenarios = serializers.ListField(
-        child=TextField(max_length=80), max_length=MOST_CHOSEN, help_text="Slugs."
-    )
-    experts = serializers.ListField(
-        child=TextField(max_length=150), max_length=MOST_CHOSEN, help_text="Usernames."
-    )
-    votes_per_expert = WholeNumberField(min_value=1, max_value=MOST_VOTES)
-    seed = WholeNumberField(required=False, default=1, min_value=0, max_value=HIGHEST_SEED)
-    repeat_share = serializers.FloatField(required=False, default=0, min_value=0, max_value=0.5)
-    check_share = serializers.FloatField(required=False, default=0, min_value=0, max_value=0.5)
-    adaptive_share = serializers.FloatField(required=False, default=0, min_value=0, max_value=0.9)
-    allow_both_miss = FlagField(required=False, default=False)
-    allow_text = FlagField(required=False, default=False)
-    allow_replay = FlagField(required=False, default=False)
-    allow_measures = FlagField(required=False, default=True)
-    allow_simulated = FlagField(required=False, default=False)
-    settle_alike = FlagField(required=False, default=False)
-    samples = serializers.ChoiceField(
-        choices=[rule.value for rule in SampleRule], required=False, default=SampleRule.ONE.value
-    )
-    jobs = serializers.ListField(
-        child=TextField(max_length=120),
-        required=False,
-        default=list,
-        max_length=MOST_CHOSEN,
-        help_text="Names or codes of the jobs whose augmentations are shown; none for all.",
-    )
-
-
 class StudiesView(ApiView):
     """The studies, the youngest first."""
 
@@ -145,15 +105,7 @@ class StudiesView(ApiView):
         """Its experts can vote at once."""
         body = StudyBody(data=request.data)
         body.is_valid(raise_exception=True)
-        given = dict(body.validated_data)
-        given["samples"], given["jobs"] = SampleRule(given["samples"]), tuple(given["jobs"])
-        names = (
-            *("repeat_share", "check_share", "adaptive_share", "samples", "jobs"),
-            *("allow_both_miss", "allow_text", "allow_replay", "allow_measures"),
-            "settle_alike",
-        )
-        options = PlanOptions(**{name: given.pop(name) for name in names})
-        study = open_study(**given, options=options, actor=cast(User, request.user))
+        study = open_study(**body.rules(), actor=cast(User, request.user))
         return Response(_whole(study), status=201)
 
 

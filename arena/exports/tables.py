@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 from django.db.models import F
 
 from arena.models import Snapshot, Standing
+from arena.queries.vote_sets import LeftOut
 from arena.rating.printed import (
     interval_text,
     notes_by_reason,
@@ -232,6 +233,15 @@ def leaderboard_table(snapshot: Snapshot) -> LeaderboardTable:
         preregistration=preregistration_sha256(snapshot.study),
         hypotheses=answer_hypotheses(snapshot),
     )
+
+
+def for_experts(table: LeaderboardTable) -> LeaderboardTable:
+    """The same table without a word of authors: what is left out for that was not asked for."""
+    left_out = dict(table.left_out)
+    own = left_out.pop(LeftOut.OWN.value, 0)
+    if own:
+        left_out[LeftOut.FILTERED.value] = left_out.get(LeftOut.FILTERED.value, 0) + own
+    return replace(table, left_out=left_out)
 
 
 def sentences_of(kept: Sequence[str], names: Mapping[str, str]) -> tuple[str, ...]:

@@ -176,7 +176,9 @@ def _save(
     known = FaultLabel.objects.filter(task=task).first()
     if known is not None:
         if any(getattr(known, name) != value for name, value in said.items()):
-            raise AlreadyLabelled
+            raise AlreadyLabelled(
+                sentence("You had labelled that picture before; your first label counts.")
+            )
         return known
     if task.labelling.closed_at is not None:
         raise LabellingClosed(

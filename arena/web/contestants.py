@@ -19,7 +19,6 @@ from arena.web.asking import asking_of
 from arena.web.listing import read_listing, read_page, said_choices
 from augment.errors import AugmentError
 from augment.models import Augmentation, Contestant, GenerationJob
-from augment.services.endpoints import contestants
 from augment.services.endpoints.respondents import respondents_of
 from augment.services.endpoints.retirement import retire, take_back
 from augment.services.wording import translate
@@ -31,7 +30,6 @@ CONTESTANTS_AT_ONCE = 50
 @require_safe
 def contestants_page(request: HttpRequest) -> HttpResponse:
     """Contestants page by page, those who are retired at the end."""
-    contestants.ensure_builtin()
     kinds = [one for one in Contestant.Kind.choices if one[0] != Contestant.Kind.CHECK]
     choices = {
         "kind": (_("Kind"), said_choices(kinds)),

@@ -21,9 +21,8 @@ from arena.web.forms import CapsForm
 from arena.web.questions import Confirmation, ask, is_sure
 from augment.errors import AugmentError, QueueFault
 from augment.models import Augmentation, GenerationJob
-from augment.services.running import caps, pausing
 from augment.services.running import jobs as service
-from augment.services.running.caps import Caps
+from augment.services.running import pausing
 from augment.services.running.causes import rows_of_cause
 from augment.services.running.summary import count_rows
 from augment.services.wording import translate
@@ -112,10 +111,7 @@ def resume_job(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
         return redirect("job", code=code)
     try:
         with transaction.atomic():
-            actor = cast(User, request.user)
-            if form.caps() != Caps():
-                job = caps.raise_cap(job, caps=form.caps(), actor=actor)
-            pausing.resume(job, actor=actor)
+            pausing.resume(job, higher=form.caps(), actor=cast(User, request.user))
             transaction.on_commit(partial(send_rows, request, job.pk))
     except AugmentError as error:
         messages.error(request, translate(error))

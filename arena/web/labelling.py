@@ -126,8 +126,8 @@ def _save(request: HttpRequest, expert: User, code: uuid.UUID) -> HttpResponse:
             faults=form.faults(),
             note=form.cleaned_data["note"],
         )
-    except AlreadyLabelled:
-        messages.info(request, _("You had labelled that picture before; your first label counts."))
+    except AlreadyLabelled as error:
+        messages.info(request, translate(error))
     except LabellingClosed as error:
         messages.error(request, translate(error))
     else:

@@ -21,7 +21,6 @@ from arena.web.job_actions import send_rows
 from arena.web.launch_form import LaunchForm
 from augment.errors import AugmentError
 from augment.models import Contestant, EndpointModel, GenerationJob
-from augment.services.endpoints import contestants
 from augment.services.running import jobs as service
 from augment.services.running.cells import add_cells
 from augment.services.running.matrix import matrix_text, read_matrix
@@ -35,7 +34,6 @@ LONGEST_NAME = 120
 @require_http_methods(["GET", "HEAD", "POST"])
 def new_job_page(request: HttpRequest) -> HttpResponse:
     """Choose contestants and scenarios, then launch."""
-    contestants.ensure_builtin()
     if "read" in request.POST:
         return _read(request)
     form = _form(request, request.POST or None, initial=_like(request))

@@ -18,7 +18,7 @@ from django.views.decorators.http import require_POST, require_safe
 
 from arena import tasks
 from arena.errors import ArenaError
-from arena.exports.tables import EARLY_LOOK, leaderboard_table
+from arena.exports.tables import EARLY_LOOK, for_experts, leaderboard_table
 from arena.models import Snapshot, Study
 from arena.queries.judged import is_imported
 from arena.queries.people import role_of
@@ -36,7 +36,7 @@ from arena.services.ratings import is_big, plan_snapshot, rate
 from arena.web.access import ADMIN, ANALYST, EXPERT, STAFF, allow_only
 from arena.web.rating_form import RatingForm
 from arena.web.results_adjustment import show_adjustment
-from arena.web.results_authors import both_versions, for_experts
+from arena.web.results_authors import both_versions
 from arena.web.results_tabs import TABS, Tab
 from augment.errors import AugmentError
 from augment.services.wording import translate

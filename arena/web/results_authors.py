@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
 
 from arena.exports.tables import LeaderboardTable, Row, sentences_of
 from arena.models import Snapshot
-from arena.queries.vote_sets import Filters, LeftOut
+from arena.queries.vote_sets import Filters
 from arena.rating.printed import rating_text
 from arena.results.both_versions import BothRanks
 from arena.results.tree import PanelRater
@@ -46,15 +45,6 @@ def with_authors(snapshot: Snapshot, panel: Sequence[PanelRater]) -> list[Contex
         }
         for rater in panel
     ]
-
-
-def for_experts(table: LeaderboardTable) -> LeaderboardTable:
-    """The same table without a word of authors: what is left out for that was not asked for."""
-    left_out = dict(table.left_out)
-    own = left_out.pop(LeftOut.OWN.value, 0)
-    if own:
-        left_out[LeftOut.FILTERED.value] = left_out.get(LeftOut.FILTERED.value, 0) + own
-    return replace(table, left_out=left_out)
 
 
 def in_both_versions(line: BothRanks, row: Row) -> Context:

@@ -2,39 +2,36 @@
 
 from __future__ import annotations
 
-import tempfile
 import uuid
-from pathlib import Path
 from typing import Any, cast
 
 from django import forms
 from django.contrib import messages
 from django.contrib.auth.models import User
-from django.core.files.uploadedfile import UploadedFile
 from django.http import HttpRequest, HttpResponse
 from django.shortcuts import get_object_or_404, redirect, render
 from django.utils.translation import gettext as _
 from django.utils.translation import gettext_lazy
 from django.views.decorators.http import require_http_methods
 
+from arena.services.sent_files import was_too_large
 from arena.web.access import STAFF, allow_only
 from arena.web.json_text import read_json
-from arena.web.sending import looks_again, send_later, was_too_large
+from arena.web.sending import looks_again, send_later
 from augment.errors import AugmentError, Conflict
 from augment.models import BaseScene
 from augment.scene_tasks import enqueue_scenario, enqueue_scene
 from augment.sentences import sentence
-from augment.services.scenarios.bulk import MOST_ROWS_AT_ONCE, BulkReport, read_rows, report_rows
+from augment.services.scenarios.bulk import MOST_ROWS_AT_ONCE, BulkReport
+from augment.services.scenarios.bulk_files import MOST_FILES, add_from_files
 from augment.services.scenarios.scene_pictures import SceneView, is_drawn, scene_picture
 from augment.services.scenarios.scenes import INSTRUCTION_LENGTH, SLUG_LENGTH, add_scenario
 from augment.services.scenarios.simple_intent import CHOICES, simple_intent
 from augment.services.scenarios.types import LONGEST_LABEL, LONGEST_TYPE, type_choices
-from augment.services.scenarios.uploads import plain_name
 from augment.services.wording import translate
 
 OWN = ""
 LONGEST_INTENT = 200_000
-MOST_FILES = 500
 
 
 class ScenarioForm(forms.Form):
@@ -139,32 +136,10 @@ def _bulk(request: HttpRequest) -> BulkReport:
         InvalidDocument: It can't be read.
     """
     table, others = request.FILES.get("file"), request.FILES.getlist("documents")
-    if was_too_large(request) or len(others) > MOST_FILES:
+    if was_too_large(request.META) or len(others) > MOST_FILES:
         raise Conflict(sentence("The files are too large, or too many."))
     if table is None:
         raise Conflict(sentence("Choose a CSV or YAML file."))
-    with tempfile.TemporaryDirectory(prefix="arena-bulk-") as name:
-        folder = Path(name)
-        for one in others:
-            _write(one, folder)
-        rows = read_rows(_write(table, folder))
-        if len(rows) > MOST_ROWS_AT_ONCE:
-            raise Conflict(
-                sentence(
-                    "%(number)s rows are too many for a page, at most %(most)s: use manage.py "
-                    "add_scenario --file.",
-                    number=len(rows),
-                    most=MOST_ROWS_AT_ONCE,
-                )
-            )
-        keeps = "try" not in request.POST
-        return report_rows(rows, folder=folder, keeps=keeps, actor=cast(User, request.user))
-
-
-def _write(file: UploadedFile[bytes], folder: Path) -> Path:
-    """The file in the folder, under a name without folders."""
-    path = folder / plain_name(file.name or "")
-    with path.open("wb") as written:
-        for piece in file.chunks():
-            written.write(piece)
-    return path
+    return add_from_files(
+        table, others, keeps="try" not in request.POST, actor=cast(User, request.user)
+    )

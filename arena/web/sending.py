@@ -12,16 +12,8 @@ from django.http import HttpRequest
 from augment.errors import QueueFault
 from augment.services.wording import translate
 
-FILE_TOO_LARGE = "arena.file_too_large"
-"""In the META of a request one of whose files was let pass by unread."""
-
 LOOKS = 40
 """So often a page looks again for something that a worker makes."""
-
-
-def was_too_large(request: HttpRequest) -> bool:
-    """Whether a file of the form was larger than any may be; it is not among the files then."""
-    return bool(request.META.get(FILE_TOO_LARGE))
 
 
 def send_later(request: HttpRequest, send: Callable[[int], object], pk: int) -> None:

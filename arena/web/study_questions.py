@@ -2,50 +2,29 @@
 
 from __future__ import annotations
 
-from collections import Counter
 from collections.abc import Sequence
+from dataclasses import asdict
 from typing import Any
 
 from django.db import transaction
 from django.urls import reverse
 from django.utils.translation import gettext as _
 
-from arena.models import Matchup, Study
-from arena.queries.coverage import shared_units
+from arena.models import Study
 from arena.queries.votes import tallies
 from arena.services.handing_over import hand_over
-from arena.services.prospects import GUESSES, usual_seconds
-from arena.services.studies import open_study
+from arena.services.previews import preview_study
 from arena.web.questions import Confirmation
-
-Kind = Matchup.Kind
 
 
 def opening(rules: dict[str, Any]) -> Confirmation:
-    """Counted by opening the study and taking that back at once.
+    """What the study would be.
 
     Raises:
         ArenaError, AugmentError: It can't be opened.
     """
-    with transaction.atomic():
-        study = open_study(**rules)
-        kinds = Counter(study.matchups.values_list("kind", flat=True))
-        later = sum(study.votes_to_plan.values())
-        people = study.experts.count()
-        settled = len(study.rules["identical"])
-        alike = len(study.rules["alike"])
-        together = shared_units(study)
-        sides = study.contestants.count(), study.scenarios.count()
-        transaction.set_rollback(True)
-    votes = kinds[Kind.MAIN] + later
-    numbers = {
-        "experts": people,
-        "votes": votes,
-        "contestants": sides[0],
-        "scenarios": sides[1],
-        "repeats": kinds[Kind.REPEAT],
-        "checks": kinds[Kind.CHECK],
-    }
+    found = preview_study(rules)
+    numbers = asdict(found)
     facts = [
         _(
             "Experts: %(experts)s. Votes: %(votes)s. Contestants: %(contestants)s. Scenarios: "
@@ -54,20 +33,16 @@ def opening(rules: dict[str, Any]) -> Confirmation:
         % numbers,
         _("On top of the votes: hidden repeats %(repeats)s, attention checks %(checks)s.")
         % numbers,
-    ]
-    facts.append(
         _("Pairs of a scenario that are judged: %(judged)s; by two experts or more: %(shared)s.")
-        % {"judged": together[0], "shared": together[1]}
-    )
-    seconds = usual_seconds() or GUESSES["seconds"]
-    each = (votes + kinds[Kind.REPEAT] + kinds[Kind.CHECK]) / people
-    facts.append(
+        % numbers,
         _("Minutes for each expert: about %(minutes)s, at %(seconds)s s a pair.")
-        % {"minutes": round(each * seconds / 60), "seconds": f"{seconds:g}"}
-    )
-    facts += _settled_facts(settled, alike)
-    if later:
-        facts.append(_("Votes that are planned later, by those before: %(n)s.") % {"n": later})
+        % (numbers | {"seconds": f"{found.seconds:g}"}),
+    ]
+    facts += _settled_facts(found.settled, found.alike)
+    if found.later:
+        facts.append(
+            _("Votes that are planned later, by those before: %(n)s.") % {"n": found.later}
+        )
     if rules["allow_simulated"]:
         facts.append(_("What is simulated may take part; every page and file then says so."))
     facts.append(_("Experts can vote at once. The rules can’t be changed afterwards."))

@@ -14,8 +14,9 @@ from django.utils.translation import gettext as _
 from django.views.decorators.http import require_POST, require_safe
 
 from arena.queries.uploads import place_of, track_maps
+from arena.services.sent_files import was_too_large
 from arena.web.access import STAFF, allow_only
-from arena.web.sending import looks_again, send_later, was_too_large
+from arena.web.sending import looks_again, send_later
 from augment.errors import AugmentError
 from augment.models import SceneUpload, UploadMoment
 from augment.scene_tasks import enqueue_moment, enqueue_upload
@@ -28,7 +29,7 @@ from augment.services.wording import translate
 def send_file(request: HttpRequest) -> HttpResponse:
     """Keep a recording and leave it to a worker."""
     file = request.FILES.get("file")
-    if was_too_large(request):
+    if was_too_large(request.META):
         text = _("The file is too large: at most %(most)s MB are taken. A zip may be smaller.")
         messages.error(request, text % {"most": uploads.most_megabytes()})
         return redirect("scenes")

@@ -18,9 +18,9 @@ from django.utils.translation import gettext_lazy
 from django.views.decorators.http import require_http_methods
 
 from arena.errors import ArenaError
+from arena.services.sent_files import was_too_large
 from arena.services.vote_imports import ImportedVotes, import_votes
 from arena.web.access import ADMIN, allow_only
-from arena.web.sending import FILE_TOO_LARGE
 from augment.errors import AugmentError
 from augment.services.wording import translate
 
@@ -53,7 +53,7 @@ class VoteFileForm(forms.Form):
 def upload_votes_page(request: HttpRequest) -> HttpResponse:
     """The form; what can't be read is said with its line, and nothing is kept."""
     form = VoteFileForm(request.POST or None, request.FILES or None)
-    if request.META.get(FILE_TOO_LARGE):
+    if was_too_large(request.META):
         form.is_valid()
         form.errors.pop("file", None)
         form.add_error("file", _too_large())

@@ -36,6 +36,7 @@ pytestmark = pytest.mark.django_db
 OF_EXPERTS = {
     *("api-account", "api-first", "api-welcome", "api-studies", "api-matchups"),
     *("api-picture", "api-preferences", "api-reports", "api-votes"),
+    *("api-labellings", "api-label-next", "api-labels", "api-snapshots", "api-snapshot"),
 }
 API = "/api/v1/"
 

@@ -25,10 +25,22 @@ from schemathesis.specs.openapi import checks
 
 from arena.api import studies
 from arena.api.reference import make_document
-from arena.models import ScenarioFile, Snapshot
+from arena.models import LabellingRound, ScenarioFile, Snapshot
 from arena.services.early_looks import open_early
+from arena.services.faults import open_labelling
 from arena.services.ratings import rate
-from augment.models import Contestant, Simulation
+from augment.models import (
+    Contestant,
+    Endpoint,
+    EndpointModel,
+    GenerationJob,
+    Probe,
+    SceneUpload,
+    Simulation,
+    UploadMoment,
+)
+from augment.services.endpoints.known_endpoints import ensure_endpoint
+from augment.services.endpoints.known_models import model_at
 from tests.api.tokens import secret_of
 from tests.study_rows import matchups_of, vote
 from tests.web.cast import World, people, world
@@ -45,11 +57,14 @@ CHECKS: list[Any] = [
 ROLES = ("anonymous", "expert", "analyst", "admin")
 OF_EXPERTS = {"getAccount", "listStudies", "listMatchups", "listVotes", "getShownPicture"}
 OF_EXPERTS |= {"keepPreferences", "report", "vote"}
+OF_EXPERTS |= {"listLabellings", "getNextTask", "labelFaults", "listSnapshots", "getSnapshot"}
 EXPORTS = {"jobs": ("tool-calls", "csv"), "snapshots": ("leaderboard", "latex")}
 READ_BY_STAFF = {
     *("listJobs", "getJob", "exportJob", "listFailures", "listAugmentations", "getAugmentation"),
     *("getTranscript", "listStudies", "getStudy", "getSnapshot", "exportSnapshot"),
     *("listScenarios", "listContestants", "listEndpoints", "listSimulations", "rateStudy"),
+    *("listScenes", "getScene", "listUploads", "getUpload", "getMoment", "getEndpoint"),
+    *("getModel", "listLabellings", "getStudyProgress", "getPreregistration", "checkEdit"),
 }
 
 Seen = dict[str, set[int]]
@@ -79,7 +94,17 @@ def here() -> World:
         offsets="paper",
     )
     ScenarioFile.objects.create(job=found.job, format="json")
+    site = ensure_endpoint(label="here", base_url="http://127.0.0.1:9/v1")
+    Probe.objects.create(model=model_at(endpoint=site, model="m"))
+    upload = SceneUpload.objects.create(name="log.zip", size_bytes=1, state="failed")
+    UploadMoment.objects.create(upload=upload)
+    open_labelling(name="Faults", job=picture_job(found), experts=["eva"], seed=1)
     return found
+
+
+def picture_job(here: World) -> GenerationJob:
+    """A job that is done."""
+    return here.study.matchups.all()[0].left.job
 
 
 def codes(here: World) -> dict[str, object]:
@@ -93,6 +118,12 @@ def codes(here: World) -> dict[str, object]:
         "scenario-files": ScenarioFile.objects.get().code,
         "studies": here.study.code,
         "snapshots": Snapshot.objects.get().code,
+        "scenes": here.augmentation.scenario.base_scene.code,
+        "uploads": SceneUpload.objects.get().code,
+        "moments": UploadMoment.objects.get().code,
+        "endpoints": Endpoint.objects.get(label="here").code,
+        "models": EndpointModel.objects.get().code,
+        "labellings": LabellingRound.objects.get().code,
     }
 
 

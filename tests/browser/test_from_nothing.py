@@ -1,23 +1,35 @@
 """From an empty database to a rated table in LaTeX, without a shell.
 
-The model is the stand-in, which runs in this process; its endpoint is entered on a page.
+The model is the stand-in, which runs in this process; its endpoint is entered on a page. The
+scene is sent, its scenarios are written on a page and by a list, and the job goes all the ways
+that a job can go.
 """
 
 from __future__ import annotations
 
+import json
 import re
+import threading
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any
 
 import pytest
 from playwright.sync_api import Browser, Page, expect
 
 from augment.fake_llm.server import FakeServer, running
+from augment.scene.codec import modification_to_document, scene_to_document
+from augment.scene.intent import Intent
+from augment.scene.intent_codec import intent_from_document
+from augment.scene.modification import Modification
+from augment.services.scenarios.simple_intent import simple_intent
 from tests.browser.booth import DESK, ready
 from tests.browser.chromium import PATIENCE_MS, chromium
-from tests.intents import intents
+from tests.browser.job_round import CONTESTANTS, SCENARIOS, run_round
 from tests.processes import wait_until
+from tests.scenes import scene, vehicle
 from tests.stack import Home
 
 pytestmark = [
@@ -29,52 +41,110 @@ pytestmark = [
 
 PASSWORD = "nine lives of a cat"
 VOTES = 6
+TYPE = "nudge_around_parked_vehicle"
+WISH = re.compile(r"A parked car stands (\d+) m ahead of the ego\.")
+
+
+def wish(ahead_m: int) -> str:
+    return f"A parked car stands {ahead_m} m ahead of the ego."
+
+
+def asked(ahead_m: int) -> dict[str, Any]:
+    """What the wish asks for, as the fields of the form say it."""
+    fields = {"kind": "vehicles", "distance_m": str(ahead_m), "lane": "own", "body": "car"}
+    found = simple_intent(fields)
+    assert found is not None
+    return found
+
+
+def reference(ahead_m: int) -> dict[str, Any]:
+    return modification_to_document(Modification(added=(vehicle("Agent2", float(ahead_m), -0.7),)))
+
+
+@dataclass(frozen=True)
+class StandIn:
+    """The server of the models, which can be kept from answering."""
+
+    gate: threading.Event = field(default_factory=threading.Event)
+
+    def intents(self, instruction: str) -> Intent | None:
+        self.gate.wait(timeout=120)
+        found = WISH.search(instruction)
+        return None if found is None else intent_from_document(asked(int(found[1])))
 
 
 @pytest.fixture
-def model() -> Iterator[FakeServer]:
-    with running(intents=intents) as serving:
+def stand_in() -> StandIn:
+    made = StandIn()
+    made.gate.set()
+    return made
+
+
+@pytest.fixture
+def model(stand_in: StandIn) -> Iterator[FakeServer]:
+    with running(intents=stand_in.intents) as serving:
         yield serving
+        stand_in.gate.set()
 
 
-def test_an_empty_house_ends_at_a_table(model: FakeServer, tmp_path: Path) -> None:
+@pytest.fixture
+def files(tmp_path: Path) -> Path:
+    """A scene; a list of all scenarios but the first, with the documents that it names."""
+    folder = tmp_path / "files"
+    folder.mkdir()
+    (folder / "street.json").write_text(json.dumps(scene_to_document(scene())))
+    lines = ["scene,type,instruction,slug,reference,intent"]
+    for number in range(1, SCENARIOS):
+        ahead_m = 15 + 5 * number
+        for name, document in (("to", reference(ahead_m)), ("asks", asked(ahead_m))):
+            (folder / f"{name}-{ahead_m}.json").write_text(json.dumps(document))
+        parts = (f"parked-{ahead_m}", f"to-{ahead_m}.json", f"asks-{ahead_m}.json")
+        lines.append(",".join(("street", TYPE, wish(ahead_m), *parts)))
+    (folder / "many.csv").write_text("\n".join(lines) + "\n")
+    return folder
+
+
+def test_an_empty_house_ends_at_a_table(
+    model: FakeServer, stand_in: StandIn, files: Path, tmp_path: Path
+) -> None:
     home = Home.at(tmp_path / "h")
     home.folder.mkdir()
     with home.serving() as address, ThreadPoolExecutor(1) as pool:
         # Playwright wants a thread without an event loop.
-        table = pool.submit(_work, home, address, model.url).result()
+        work = pool.submit(_work, home, address, model.url, stand_in.gate, files)
+        table = work.result()
     assert r"\toprule" in table
     for name in ("Reference", "Rule placer", "fake-careless"):
         assert name in table
 
 
-def _work(home: Home, address: str, model: str) -> str:
+def _work(home: Home, address: str, model: str, gate: threading.Event, files: Path) -> str:
     with chromium() as browser:
-        admin = _page(browser)
-        _become_admin(admin, home, address)
-        admin.goto(f"{address}/scenarios/")
-        admin.click("button[value=paper]")
-        expect(admin.get_by_text("50 added")).to_be_visible()
-        _enter_contestant(admin, address, model)
-        _run_job(admin, address)
-        link = _invite(admin, address)
-        study = _open_study(admin, address)
-        _vote(browser, link)
+        admin = _page(browser, address)
+        _become_admin(admin, home)
+        _send_scene(admin, files)
+        _write_scenarios(admin, files)
+        _enter_models(admin, model)
+        _enter_contestant(admin)
+        run_round(admin, gate)
+        link = _invite(admin)
+        study = _open_study(admin)
+        _vote(_page(browser, address), link)
         return _rate(admin, study)
 
 
-def _page(browser: Browser) -> Page:
-    page = browser.new_context(viewport=DESK).new_page()
+def _page(browser: Browser, address: str) -> Page:
+    page = browser.new_context(viewport=DESK, base_url=address).new_page()
     page.set_default_timeout(PATIENCE_MS)
     return page
 
 
-def _become_admin(page: Page, home: Home, address: str) -> None:
+def _become_admin(page: Page, home: Home) -> None:
     def printed() -> list[str]:
         return re.findall(r"/first/\S+", (home.folder / "serve.log").read_text())
 
     wait_until(lambda: bool(printed()), what="the link of the first admin is printed")
-    page.goto(address + printed()[0])
+    page.goto(printed()[0])
     page.fill("[name=username]", "ada")
     _set_password(page)
     expect(page.get_by_role("heading", name="Overview")).to_be_visible()
@@ -86,45 +156,87 @@ def _set_password(page: Page) -> None:
     page.click("button.main")
 
 
-def _enter_contestant(page: Page, address: str, model: str) -> None:
-    page.goto(f"{address}/contestants/new/")
-    given = {
-        "slug": "careless-otm",
-        "model": "fake-careless",
-        "label": "stand-in",
-        "base_url": model,
-    }
-    for name, value in given.items():
-        page.fill(f"[name={name}]", value)
-    page.select_option("[name=variant]", "otm")
+def _send_scene(page: Page, files: Path) -> None:
+    page.goto("/scenes/")
+    page.set_input_files("[name=file]", files / "street.json")
+    page.click("form[action*=send] button.main")
+    page.get_by_role("button", name="Show").click()
+    page.fill("[name=slug]", "street")
+    page.get_by_role("button", name="Keep as a scene").click()
+    page.locator("#moment a", has_text="street").click()
+    expect(page.get_by_role("heading", name="street")).to_be_visible()
+
+
+def _write_scenarios(page: Page, files: Path) -> None:
+    """One by the form, its reference typed; the others by a list."""
+    page.get_by_role("link", name="New scenario").click()
+    page.fill("[name=instruction]", wish(15))
+    page.select_option("[name=type]", TYPE)
+    page.fill("[name=slug]", "parked-15")
+    chosen = {"kind": "vehicles", "lane": "own", "body": "car"}
+    for name, value in chosen.items():
+        page.select_option(f"[name=i_{name}]", value)
+    page.fill("[name=i_distance_m]", "15")
+    page.get_by_role("button", name="Add the scenario").click()
+    page.get_by_role("link", name="Draw one").click()
+    page.get_by_text("As JSON").click()
+    page.fill("[name=modification]", json.dumps(reference(15)))
+    page.get_by_role("button", name="Keep the reference").click()
+    expect(page.get_by_text("The reference is kept")).to_be_visible()
+    page.goto("/scenarios/bulk/")
+    page.set_input_files("[name=file]", files / "many.csv")
+    page.set_input_files("[name=documents]", sorted(files.glob("*-*.json")))
+    page.get_by_role("button", name="Add them").click()
+    expect(page.get_by_text(f"{SCENARIOS - 1} scenarios are added.")).to_be_visible()
+
+
+def _enter_models(page: Page, model: str) -> None:
+    """An endpoint with a model that fails and one that works, priced and probed."""
+    page.goto("/endpoints/new/")
+    page.fill("[name=label]", "stand-in")
+    page.fill("[name=base_url]", model)
+    page.fill("[name=max_concurrency]", "2")
     page.check("[name=is_simulated]")
+    page.click("button.main.big")
+    page.fill("#new-model", "fake-quota")
+    page.click("form.add-model button")
+    page.click("ol.crumbs a:has-text('stand-in')")
+    page.fill("#new-model", "fake-careless")
+    page.click("form.add-model button")
+    price = {"price_in_usd": "1", "price_out_usd": "4", "price_as_of": "2026-01-31"}
+    for name, value in (price | {"price_source": "made up"}).items():
+        page.fill(f"[name={name}]", value)
+    page.get_by_role("button", name="Keep").click()
+    page.click("#probe")
+    expect(page.locator("tr[data-ability] .badge.is-good")).to_have_count(6)
+    expect(page.get_by_text("Last report:")).to_be_visible()
+
+
+def _enter_contestant(page: Page) -> None:
+    page.click("a:has-text('New contestant')")
+    expect(page.locator("[name=model]")).to_have_value("fake-careless")
+    page.fill("[name=slug]", "careless-otm")
+    page.select_option("[name=variant]", "otm")
+    page.fill("[name=temperature]", "0.7")
     page.click("button.main.big")
     expect(page.locator("p.mono", has_text="careless-otm")).to_be_visible()
 
 
-def _run_job(page: Page, address: str) -> None:
-    page.goto(f"{address}/jobs/new/")
-    page.fill("[name=name]", "Round 1")
-    _choose(page)
-    page.click("[data-launch]")
-    expect(page.get_by_text("Finished").first).to_be_visible(timeout=240_000)
-
-
 def _choose(page: Page) -> None:
-    for slug in ("reference", "rule-placer", "careless-otm"):
+    for slug in CONTESTANTS:
         page.check(f"[name=contestants][value={slug}]")
-    page.locator("[name=types][value=nudge_around_parked_vehicle]").check()
+    page.locator(f"[name=types][value={TYPE}]").check()
 
 
-def _invite(page: Page, address: str) -> str:
-    page.goto(f"{address}/people/")
+def _invite(page: Page) -> str:
+    page.goto("/people/")
     page.fill("[name=username]", "grace")
     page.click("section button.main")
     return page.locator("#link").input_value()
 
 
-def _open_study(page: Page, address: str) -> str:
-    page.goto(f"{address}/studies/new/")
+def _open_study(page: Page) -> str:
+    page.goto("/studies/new/")
     page.fill("[name=name]", "First study")
     page.check("[name=experts][value=grace]")
     _choose(page)
@@ -138,8 +250,7 @@ def _open_study(page: Page, address: str) -> str:
     return re.sub(r"(/studies/[^/]+/).*", r"\1", page.url)
 
 
-def _vote(browser: Browser, link: str) -> None:
-    page = _page(browser)
+def _vote(page: Page, link: str) -> None:
     page.goto(link)
     _set_password(page)
     page.click("a[href*='/vote/']")

@@ -3,19 +3,22 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
 
 import pytest
-from django.db import connection
+from django.db import connection, transaction
 from django.test.utils import CaptureQueriesContext
 from django.utils import timezone
 
 from augment.errors import Conflict
 from augment.models import GenerationJob
-from augment.services.running import jobs, leases, pausing, runner
+from augment.services.running import jobs, leases, pausing, retrying, runner
 from augment.services.running.caps import Caps
+from augment.services.running.causes import failure_groups
 from augment.services.running.summary import count_rows
 from tests.jobs.models import Model, llama_job
 from tests.jobs.rows import failed, launch, leased
+from tests.processes import wait_until
 
 pytestmark = pytest.mark.django_db
 
@@ -45,6 +48,63 @@ def test_who_resumes_a_job_holds_what_waits_before_the_job() -> None:
     job = llama_job(caps=Caps(tokens=5))
     runner.work_on(augmentation_pk=job.augmentations.get().pk, connect=Model())
     assert held(lambda: pausing.resume(job)) == [ROWS, JOB]
+
+
+def test_who_raises_a_cap_and_resumes_holds_what_waits_before_the_job() -> None:
+    job = llama_job(caps=Caps(tokens=5))
+    runner.work_on(augmentation_pk=job.augmentations.get().pk, connect=Model())
+    assert held(lambda: pausing.resume(job, higher=Caps(tokens=50_000))) == [ROWS, JOB]
+    job.refresh_from_db()
+    assert (job.state, job.cap_tokens) == ("running", 50_000)
+
+
+def all_failed() -> GenerationJob:
+    job = launch(scenarios=2)
+    job.augmentations.update(state="failed", reason="the wire broke")
+    return job
+
+
+def test_who_retries_holds_the_rows_before_the_job() -> None:
+    job = all_failed()
+    assert held(lambda: jobs.retry_failed(job)) == [ROWS, JOB]
+    job.augmentations.update(state="failed", reason="the wire broke")
+    (cause,) = failure_groups(job)
+    assert held(lambda: retrying.retry_cause(job, key=cause.key)) == [ROWS, JOB]
+
+
+@pytest.mark.django_db(transaction=True)
+def test_two_who_retry_at_once_wait_for_each_other_and_never_in_a_circle() -> None:
+    """On PostgreSQL the one who comes second waits for the rows, holding nothing of the job."""
+    job = all_failed()
+
+    def retry() -> str:
+        try:
+            jobs.retry_failed(job)
+        except Conflict as refused:
+            return str(refused)
+        finally:
+            connection.close()
+        return ""
+
+    with ThreadPoolExecutor(1) as pool:
+        with transaction.atomic():
+            leases.change_all(job.augmentations.all(), state="queued", reason="")
+            second = pool.submit(retry)
+            if connection.vendor == "postgresql":
+                wait_until(somebody_waits, what="the second one waits")
+            jobs.open_again(job)
+        assert "Nothing in job" in second.result(timeout=30)
+    assert count_rows(job).queued == 2
+
+
+def somebody_waits() -> bool:
+    with connection.cursor() as cursor:
+        cursor.execute("SELECT pg_stat_clear_snapshot()")  # else one transaction sees one moment
+        cursor.execute(
+            "SELECT count(*) FROM pg_stat_activity"
+            " WHERE datname = current_database() AND wait_event_type = 'Lock'"
+        )
+        return bool(cursor.fetchone()[0])
 
 
 def test_of_many_rows_the_first_is_held_first() -> None:

@@ -40,9 +40,9 @@ REPLY = {
 OWN = {
     *("username", "pseudonym", "role", "token_expires_at"),
     *("results", "name", "state", "planned", "voted", "skipped", "left"),
-    *("opened_at", "closed_at"),
+    *("opened_at", "closed_at", "labelled", "task", "picture", "original"),
 }
-"""What an expert is told of their account and of the list of their studies."""
+"""What an expert is told of their account, their studies and what they label."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -13,6 +13,7 @@ from django.test import Client
 from django.urls import reverse
 
 from augment.models import Contestant, Endpoint, EndpointModel, Event, GenerationJob, ModelCall
+from augment.services.endpoints.editing import EndpointFacts, change_endpoint
 from augment.services.running import jobs, runner
 from augment.services.running.caps import Caps
 from augment.services.running.estimates import estimate
@@ -125,6 +126,20 @@ def test_what_is_answered_already_is_reused_and_counts_for_nothing() -> None:
     assert (twice.answered, twice.calls[1]) == (2, 4), "a second sample was never asked"
     ModelCall.objects.update(prompt_version="000000000000")
     assert estimate(["llama"], where).answered == 0, "other prompts, other requests"
+
+
+def test_what_was_answered_at_another_address_is_asked_anew() -> None:
+    ran()
+    where, site = ["street-1", "street-2"], Endpoint.objects.get()
+    here, there = site.base_url, "http://127.0.0.1:3/v1"
+
+    def move(base_url: str) -> int:
+        change_endpoint(site, facts=EndpointFacts(base_url=base_url))
+        return estimate(["llama"], where).answered
+
+    assert estimate(["llama"], where).answered == 2
+    assert move(there) == 0, "the store knows other requests than those to be sent"
+    assert move(here + "/") == 2, "moved back, the same requests are sent"
 
 
 def test_asked_anew_nothing_is_reused(admin: Client) -> None:

@@ -8,17 +8,22 @@ from django.conf import settings
 from django.core.management import call_command
 
 from arena.services.redrawing import redraw_pictures
+from augment.services.endpoints.contestants import ensure_builtin
 from augment.services.terminal import TerminalCommand
 
 
 class Command(TerminalCommand):
     """What has to be done once after every update, before anything is served."""
 
-    help = "Apply migrations, collect the static files, redraw pictures of earlier versions."
+    help = (
+        "Apply migrations, add contestants that ask no model, collect the static files, redraw "
+        "pictures of earlier versions."
+    )
 
     def handle(self, *args: Any, **options: Any) -> None:
         """Apply and collect."""
         call_command("migrate", interactive=False, verbosity=0)
+        ensure_builtin()
         settings.STATIC_ROOT.mkdir(parents=True, exist_ok=True)
         call_command("collectstatic", interactive=False, verbosity=0)
         for found in redraw_pictures():

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Iterable
 from datetime import datetime
-from typing import Any
+from typing import Any, Protocol
 
 from django.contrib.auth.models import User
 from django.core.serializers.json import DjangoJSONEncoder
@@ -27,6 +28,18 @@ _KNOWN = (
 )
 
 
+class AskedModel(Protocol):
+    """A model at an endpoint."""
+
+    @property
+    def endpoint(self) -> Endpoint:
+        """Where it is."""
+
+    @property
+    def model(self) -> str:
+        """Its id there."""
+
+
 @transaction.atomic
 def model_at(*, endpoint: Endpoint, model: str) -> EndpointModel:
     """What is known of the model at the endpoint.
@@ -43,6 +56,18 @@ def profile_of(*, endpoint: Endpoint, model: str) -> ModelProfile:
     """What the model takes, as far as its row knows; nothing is known of one without a row."""
     row = EndpointModel.objects.filter(endpoint=endpoint, model=model).first()
     return ModelProfile() if row is None else _profile(row)
+
+
+def profiles_of(asked: Iterable[AskedModel]) -> dict[tuple[int, str], ModelProfile]:
+    """The same of several, by the primary key of the endpoint and the model; one query at most."""
+    wanted = {(one.endpoint.pk, one.model) for one in asked}
+    if not wanted:
+        return {}
+    rows = EndpointModel.objects.filter(
+        endpoint__in={pk for pk, _ in wanted}, model__in={model for _, model in wanted}
+    )
+    known = {(row.endpoint_id, row.model): _profile(row) for row in rows}
+    return {key: known.get(key, ModelProfile()) for key in wanted}
 
 
 @transaction.atomic

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
 from augment.errors import Conflict, InvalidDocument
@@ -49,24 +49,22 @@ def respondents_of(contestant: Contestant) -> dict[ModelRole, Respondent]:
         UnknownName: Its variant is none of ours any more.
         Conflict: An endpoint that it names is gone.
     """
-    if contestant.endpoint is None:
-        return {}
-    own = Respondent(endpoint=contestant.endpoint, model=contestant.model)
-    respondents = dict.fromkeys(roles_of(find_recipe(contestant.variant)), own)
-    for name, chosen in contestant.roles.items():
-        endpoint = Endpoint.objects.filter(label=chosen["endpoint"]).first()
-        if endpoint is None:
-            raise Conflict(
-                sentence(
-                    "The %(role)s of %(contestant)s sits at endpoint '%(endpoint)s', which does "
-                    "not exist any more.",
-                    role=word(name),
-                    contestant=contestant.slug,
-                    endpoint=chosen["endpoint"],
-                )
-            )
-        respondents[ModelRole(name)] = Respondent(endpoint=endpoint, model=chosen["model"])
-    return respondents
+    return respondents_of_each([contestant])[contestant.pk]
+
+
+def respondents_of_each(
+    contestants: Sequence[Contestant],
+) -> dict[int, dict[ModelRole, Respondent]]:
+    """The same of several, by primary key; one query at most where their endpoints are read.
+
+    Raises:
+        UnknownName: The variant of one is none of ours any more.
+        Conflict: An endpoint that one names is gone.
+    """
+    labels = {role["endpoint"] for row in contestants for role in row.roles.values()}
+    rows = Endpoint.objects.filter(label__in=labels) if labels else ()
+    endpoints = {row.label: row for row in rows}
+    return {row.pk: _respondents(row, endpoints) for row in contestants}
 
 
 def documents_of(respondents: Mapping[ModelRole, Respondent]) -> dict[str, dict[str, str]]:
@@ -86,3 +84,29 @@ def sight_of(respondent: Respondent) -> bool | None:
     """Whether a model sees pictures, None where nobody probed it or said so."""
     known = respondent.known
     return None if known is None else known.vision
+
+
+# --- Private -----------------------------------------------------------------------------------
+
+
+def _respondents(
+    contestant: Contestant, endpoints: Mapping[str, Endpoint]
+) -> dict[ModelRole, Respondent]:
+    if contestant.endpoint is None:
+        return {}
+    own = Respondent(endpoint=contestant.endpoint, model=contestant.model)
+    respondents = dict.fromkeys(roles_of(find_recipe(contestant.variant)), own)
+    for name, chosen in contestant.roles.items():
+        endpoint = endpoints.get(chosen["endpoint"])
+        if endpoint is None:
+            raise Conflict(
+                sentence(
+                    "The %(role)s of %(contestant)s sits at endpoint '%(endpoint)s', which does "
+                    "not exist any more.",
+                    role=word(name),
+                    contestant=contestant.slug,
+                    endpoint=chosen["endpoint"],
+                )
+            )
+        respondents[ModelRole(name)] = Respondent(endpoint=endpoint, model=chosen["model"])
+    return respondents

@@ -8,7 +8,7 @@ when it was added, and what counted then of what was left open.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -21,8 +21,8 @@ from augment.llm.profile import ModelProfile
 from augment.models import Augmentation, Contestant, Endpoint, ModelCall
 from augment.prompts.texts import prompt_version
 from augment.sentences import Sentence, sentence
-from augment.services.endpoints.known_models import profile_of
-from augment.services.endpoints.respondents import Respondent, respondents_of
+from augment.services.endpoints.known_models import profile_of, profiles_of
+from augment.services.endpoints.respondents import Respondent, respondents_of_each
 from augment.services.events import log_event
 from augment.variants.options import (
     NAMES,
@@ -36,7 +36,8 @@ from augment.variants.transcript import ModelRole
 OPTIONS = NAMES
 """Of a contestant, in the order in which they are shown."""
 
-_SENT = frozenset({"temperature", "seed", "reasoning_effort", *LengthName})
+_REFUSABLE = frozenset({"temperature", "seed", "reasoning_effort"})
+_SENT = _REFUSABLE | frozenset(LengthName)
 """Parameters that some endpoints refuse and that contestants send."""
 
 
@@ -154,22 +155,41 @@ def other_prompts(slug: str, options: ContestantOptions) -> Sentence | None:
 def left_out(contestant: Contestant) -> dict[str, list[str]]:
     """By role, the chosen options that its model does not take and that are not sent therefore.
 
-    Of a contestant that has not run yet: as far as it is known now. Costs a query for each of its
-    roles then, and none where nothing of the kind was chosen.
+    Of a contestant that has not run yet: as far as it is known now.
+
+    Raises:
+        Conflict: An endpoint that it names is gone.
+    """
+    return left_out_of_each([contestant])[contestant.pk]
+
+
+def left_out_of_each(contestants: Sequence[Contestant]) -> dict[int, dict[str, list[str]]]:
+    """The same of several, by primary key, in two queries at most.
+
+    Raises:
+        Conflict: An endpoint that one of them names is gone.
     """
     # Never of what is completed at the first run: no default of ours is one of these.
-    options = contestant.frozen_options or contestant.options
-    chosen = {"temperature", "seed", "reasoning_effort"} & options.keys()
-    if not chosen:
-        return {}
-    sends = contestant.sends or {
-        role.value: document_of(profile_of(endpoint=one.endpoint, model=one.model))
-        for role, one in respondents_of(contestant).items()
+    chosen = {
+        row.pk: _REFUSABLE & (row.frozen_options or row.options).keys() for row in contestants
     }
-    refused_by_role = {
-        role: sorted(chosen & set(sent["refused"])) for role, sent in sorted(sends.items())
-    }
-    return {role: names for role, names in refused_by_role.items() if names}
+    open_rows = [row for row in contestants if chosen[row.pk] and not row.sends]
+    playing = respondents_of_each(open_rows)
+    known = profiles_of(
+        [respondent for roles in playing.values() for respondent in roles.values()]
+    )
+    found: dict[int, dict[str, list[str]]] = {}
+    for row in contestants:
+        sends = row.sends or {
+            role.value: document_of(known[one.endpoint.pk, one.model])
+            for role, one in playing.get(row.pk, {}).items()
+        }
+        refused = {
+            role: sorted(chosen[row.pk] & set(sent["refused"]))
+            for role, sent in sorted(sends.items())
+        }
+        found[row.pk] = {role: names for role, names in refused.items() if names}
+    return found
 
 
 def loosen_unanswered(contestants: Iterable[Contestant]) -> int:

@@ -66,6 +66,9 @@ class Caps:
         return given
 
 
+NO_CAPS = Caps()
+
+
 def check_caps(caps: Caps, contestants: Sequence[Contestant]) -> dict[str, int]:
     """The caps as columns of a new job.
 

@@ -134,7 +134,11 @@ class JobEstimate:
 
 
 def estimate(
-    contestants: Sequence[str], scenarios: Sequence[str], *, samples: int = 1
+    contestants: Sequence[str],
+    scenarios: Sequence[str],
+    *,
+    samples: int = 1,
+    is_fresh: bool = False,
 ) -> JobEstimate:
     """What a job of these would use; slugs that nobody knows are left out.
 
@@ -143,7 +147,7 @@ def estimate(
         Conflict: An endpoint that a contestant names is gone.
     """
     who = Contestant.objects.filter(slug__in=contestants).select_related("endpoint")
-    return estimate_rows(list(who.order_by("slug")), scenarios, samples=samples)
+    return estimate_rows(list(who.order_by("slug")), scenarios, samples=samples, is_fresh=is_fresh)
 
 
 def estimate_rows(
@@ -153,14 +157,7 @@ def estimate_rows(
     samples: int = 1,
     is_fresh: bool = False,
 ) -> JobEstimate:
-    """The same of contestants, be they stored or not.
-
-    Args:
-        who: Contestants, each once.
-        scenarios: Slugs.
-        samples: So often each is asked about each.
-        is_fresh: Whether what was answered before is asked anew.
-    """
+    """The same of contestants, each once, be they stored or not."""
     where = Scenario.objects.filter(slug__in=scenarios).order_by("slug")
     count = where.count()
     asking = [row for row in who if row.endpoint is not None]

@@ -17,7 +17,7 @@ from augment.services.clock import DATABASE_TIME, Moment
 from augment.services.endpoints.treatments import loosen_unanswered
 from augment.services.events import log_event
 from augment.services.running.budget import limit_of
-from augment.services.running.caps import Caps, check_caps, over_already
+from augment.services.running.caps import NO_CAPS, Caps, check_caps, over_already
 from augment.services.running.feasible import refuse_impossible
 from augment.services.running.leases import change_all
 from augment.services.texts import one_line
@@ -27,7 +27,6 @@ State = Augmentation.State
 
 _Row = TypeVar("_Row", Contestant, Scenario)
 
-NO_CAPS = Caps()
 
 HIGHEST_SAMPLES = MOST_SAMPLES
 """Of one cell of a job."""
@@ -133,9 +132,9 @@ def retry_failed(job: GenerationJob, actor: User | None = None) -> GenerationJob
     Raises:
         Conflict: The job was cancelled, or nothing in it failed.
     """
-    open_again(job)
     failed = Augmentation.objects.filter(job=job, state=State.FAILED)
-    again = failed.update(state=State.QUEUED, reason="", finished_at=None, sent_at=None)
+    again = change_all(failed, state=State.QUEUED, reason="", finished_at=None, sent_at=None)
+    open_again(job)
     if not again:
         raise Conflict(
             sentence(
@@ -156,7 +155,7 @@ def retry_failed(job: GenerationJob, actor: User | None = None) -> GenerationJob
 def open_again(job: GenerationJob) -> None:
     """Let a job run on with what is about to wait again; one that is held stays so.
 
-    To be called in the transaction that lets its rows wait.
+    To be called in the transaction that lets its rows wait, after they were changed.
 
     Raises:
         Conflict: The job was cancelled.

@@ -9,7 +9,7 @@ from augment.errors import Conflict
 from augment.models import Augmentation, GenerationJob
 from augment.sentences import sentence, word
 from augment.services.events import log_event
-from augment.services.running.caps import over_already
+from augment.services.running.caps import NO_CAPS, Caps, over_already, raise_cap
 from augment.services.running.leases import change_all
 
 State = GenerationJob.State
@@ -51,17 +51,26 @@ def pause(job: GenerationJob, *, actor: User | None = None) -> GenerationJob:
 
 
 @transaction.atomic
-def resume(job: GenerationJob, *, actor: User | None = None) -> GenerationJob:
+def resume(
+    job: GenerationJob, *, higher: Caps = NO_CAPS, actor: User | None = None
+) -> GenerationJob:
     """Let a job that is paused or stopped at its cap go on; the door sends the messages.
 
     Attempts that were stopped are replayed from the answers that they had, and pay for none twice.
 
+    Args:
+        job: Which.
+        higher: The caps that are raised first; the others stay.
+        actor: Who wants it.
+
     Raises:
-        Conflict: The job is not held.
+        Conflict: The job is not held, or a cap would not be higher than it is.
     """
     held = GenerationJob.objects.filter(pk=job.pk, state__in=GenerationJob.HELD)
     waiting = Augmentation.objects.filter(job=job.pk, state=Augmentation.State.QUEUED)
     again = change_all(waiting, sent_at=None)
+    if higher != NO_CAPS:
+        raise_cap(job, caps=higher, actor=actor)
     before = held.select_for_update().values_list("state", flat=True).first()
     if not held.update(state=State.RUNNING):
         job.refresh_from_db()

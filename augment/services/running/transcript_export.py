@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import base64
+from collections.abc import Sequence
 from datetime import datetime
 from decimal import Decimal
 from typing import Any
@@ -10,7 +11,7 @@ from typing import Any
 from django.core.files.storage import default_storage
 
 from augment.models import Augmentation, Contestant, ModelCall
-from augment.services.endpoints.treatments import left_out
+from augment.services.endpoints.treatments import left_out_of_each
 from augment.services.running.transcript_steps import (
     TranscriptStep,
     Try,
@@ -67,6 +68,19 @@ def record_of(augmentation: Augmentation, tries: list[Try]) -> dict[str, Any]:
 
 def contestant_document(contestant: Contestant) -> dict[str, Any]:
     """A contestant in full, ready for JSON: who it is, and how it asks."""
+    return contestant_documents([contestant])[0]
+
+
+def contestant_documents(contestants: Sequence[Contestant]) -> list[dict[str, Any]]:
+    """The same of several, with as many queries as for one."""
+    omitted = left_out_of_each(contestants)
+    return [_contestant(row, omitted[row.pk]) for row in contestants]
+
+
+# --- Private -----------------------------------------------------------------------------------
+
+
+def _contestant(contestant: Contestant, omitted: dict[str, list[str]]) -> dict[str, Any]:
     endpoint = contestant.endpoint
     return {
         "slug": contestant.slug,
@@ -77,7 +91,7 @@ def contestant_document(contestant: Contestant) -> dict[str, Any]:
         "roles": _same_order(contestant.roles),
         "options": _same_order(contestant.options),
         "frozen_options": _same_order(contestant.frozen_options),
-        "left_out": left_out(contestant),
+        "left_out": omitted,
         "sends": _same_order(contestant.sends),
         "endpoint": None
         if endpoint is None
@@ -87,9 +101,6 @@ def contestant_document(contestant: Contestant) -> dict[str, Any]:
             "is_simulated": endpoint.is_simulated,
         },
     }
-
-
-# --- Private -----------------------------------------------------------------------------------
 
 
 def _totals(tries: list[Try]) -> dict[str, Any]:

@@ -1,0 +1,121 @@
+"""A study is opened by the wire with all that the form of the page has."""
+
+from __future__ import annotations
+
+from dataclasses import fields
+from typing import Any
+
+import pytest
+
+from arena.api.study_body import WHO_AND_WHAT, StudyBody
+from arena.models import Study
+from arena.rating.stopping import StoppingRule
+from arena.services.studies import PlanOptions
+from arena.web.study_forms import StudyForm
+from tests.api.asking import error_of
+from tests.api.tokens import program_of
+from tests.study_rows import cast_of
+from tests.web.cast import people
+
+OTHER_NAMES = {
+    "repeats": "repeat_share",
+    "checks": "check_share",
+    "overlap": "overlap_share",
+    "adaptive": "adaptive_share",
+    "show_alike": "settle_alike",
+    "no_measures": "allow_measures",
+    "stop_half_width": "stopping.half_width",
+    "stop_votes": "stopping.votes",
+    "stop_looks": "stopping.looks",
+    "stop_closes": "stopping.closes",
+}
+"""What the wire calls a field of the form; shares are percent there."""
+OF_THE_PAGE_ALONE = {"types"}
+"""Ticks all scenarios of a type where no script does."""
+
+
+def names_in(body: Any, before: str = "") -> set[str]:
+    found: set[str] = set()
+    for name, field in body.fields.items():
+        inner = names_in(field, f"{name}.") if hasattr(field, "fields") else {before + name}
+        found |= inner
+    return found
+
+
+def test_the_wire_takes_every_field_of_the_form_and_no_other() -> None:
+    of_form = set(StudyForm.base_fields) - OF_THE_PAGE_ALONE
+    assert {OTHER_NAMES.get(name, name) for name in of_form} == names_in(StudyBody())
+
+
+def test_every_option_of_a_plan_can_be_given() -> None:
+    least = {"name": "x", "contestants": [], "scenarios": [], "experts": [], "votes_per_expert": 1}
+    rest: dict[str, Any] = {
+        **dict.fromkeys(("repeat_share", "check_share", "overlap_share"), 0.25),
+        "adaptive_share": 0.25,
+        **dict.fromkeys(("allow_both_miss", "allow_text", "allow_replay", "practice"), True),
+        "settle_alike": True,
+        "allow_measures": False,
+        "allow_simulated": True,
+        "targets": ["ann 7", "ann vs bob 3"],
+        "hypotheses": ["ann above bob"],
+        "stopping": {"half_width": 40, "votes": 900, "looks": 3, "closes": True},
+        "samples": "all",
+        "jobs": ["Round 1"],
+    }
+    body = StudyBody(data=least | rest)
+    assert body.is_valid(), body.errors
+    rules = body.rules()
+    assert set(rules) == {*WHO_AND_WHAT, "options"}
+    usual = PlanOptions()
+    left = [
+        one.name
+        for one in fields(PlanOptions)
+        if getattr(rules["options"], one.name) == getattr(usual, one.name)
+    ]
+    assert left == []
+    assert rules["options"].stopping == StoppingRule(
+        half_width=40, votes=900, looks=3, closes=True
+    )
+
+
+@pytest.mark.parametrize(
+    ("given", "field"),
+    [
+        ({"overlap_share": 0.81}, "overlap_share"),
+        ({"adaptive_share": "0.5"}, "adaptive_share"),
+        ({"repeat_share": 10**400}, "repeat_share"),
+        ({"stopping": {}}, "stopping"),
+        ({"stopping": {"votes": 5, "looks": 21}}, "stopping"),
+        ({"stopping": {"votes": 5, "colour": "red"}}, "stopping"),
+        ({"hypotheses": "ann above bob"}, "hypotheses"),
+    ],
+)
+def test_what_can_not_be_is_named(given: dict[str, Any], field: str) -> None:
+    least = {"name": "x", "contestants": [], "scenarios": [], "experts": [], "votes_per_expert": 1}
+    body = StudyBody(data=least | given)
+    assert not body.is_valid()
+    assert list(body.errors) == [field]
+
+
+@pytest.mark.django_db
+def test_a_preregistered_study_with_a_stopping_rule_is_opened_by_the_wire() -> None:
+    chosen = cast_of()
+    admin = program_of(people()["admin"])
+    given = {
+        **chosen,
+        "name": "Preregistered",
+        "votes_per_expert": 6,
+        "overlap_share": 0.5,
+        "hypotheses": ["ann above bob", "Nobody is perfect."],
+        "stopping": {"votes": 10, "looks": 2},
+    }
+    wrong = given | {"hypotheses": ["ann above zoe"]}
+    answer = admin.post("/api/v1/studies", wrong, content_type="application/json")
+    assert "zoe" in error_of(answer, 400, "refused")["message"]
+    assert not Study.objects.exists()
+    answer = admin.post("/api/v1/studies", given, content_type="application/json")
+    assert answer.status_code == 201, answer.content
+    study = Study.objects.get()
+    assert [one["above"] for one in study.rules["hypotheses"]] == [["ann", "bob"], None]
+    assert study.rules["stopping"]["votes"] == 10
+    assert study.rules["overlap_share"] == 0.5

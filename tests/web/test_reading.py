@@ -1,0 +1,38 @@
+"""Whoever only looks changes nothing: a GET writes no row."""
+
+from __future__ import annotations
+
+import re
+
+import pytest
+from django.db import connection
+from django.test.utils import CaptureQueriesContext
+
+from tests.web.addresses import address
+from tests.web.cast import people, signed_in, world
+from tests.web.test_access import PAGES
+
+pytestmark = pytest.mark.django_db
+
+WRITES = re.compile(r'^(?:INSERT(?: OR \w+)? INTO|UPDATE|DELETE FROM) "(\w+)"')
+ALLOWED = {"django_session"}
+"""What a look may write: that its session goes on."""
+
+
+@pytest.mark.parametrize("role", ["admin", "analyst"])
+def test_no_page_of_staff_writes_a_row_when_it_is_read(role: str) -> None:
+    here, client = world(), signed_in(people()[role])
+    column = ("admin", "analyst").index(role)
+    wrote = {}
+    for name in PAGES:
+        if PAGES[name][column] != 200:
+            continue
+        url = address(name, here)
+        with CaptureQueriesContext(connection) as seen:
+            answer = client.get(url)
+            if answer.streaming:
+                b"".join(answer)
+        written = {found[1] for one in seen if (found := WRITES.match(one["sql"]))}
+        if written - ALLOWED:
+            wrote[name] = written - ALLOWED
+    assert wrote == {}
