@@ -18,8 +18,9 @@ def choose_units(
     """Units for a newcomer, so that pairs and scenarios stay as equal as they can.
 
     One after the other: of the pairs that come least in this choice those that are planned least
-    so far, and of those one by lot; of its scenarios those with the fewest judges, then those that
-    come least in this choice, and of those one by lot.
+    so far, and of those one by lot; of its scenarios those with the fewest judges, of those the
+    ones that come least in this choice, then those that are planned least so far over all pairs,
+    and of those one by lot.
 
     Args:
         grid: What can be shown.
@@ -39,7 +40,11 @@ def choose_units(
         pair = int(rng.choice(pairs))
         open_scenarios = np.flatnonzero(free[pair])
         scenarios = open_scenarios[
-            _least(counts[pair, open_scenarios], of_scenario[open_scenarios])
+            _least(
+                counts[pair, open_scenarios],
+                of_scenario[open_scenarios],
+                counts[:, open_scenarios].sum(axis=0),
+            )
         ]
         scenario = int(rng.choice(scenarios))
         chance = 1.0 / (len(pairs) * len(scenarios))
@@ -51,7 +56,9 @@ def choose_units(
     return chosen
 
 
-def _least(first: IntArray, then: IntArray) -> np.ndarray:
-    """Where the first is least and, among those, the second."""
-    candidates = first == first.min()
-    return np.flatnonzero(candidates & (then == then[candidates].min()))
+def _least(*keys: IntArray) -> np.ndarray:
+    """Where the first is least, among those the second, and so on."""
+    left = np.arange(len(keys[0]))
+    for key in keys:
+        left = left[key[left] == key[left].min()]
+    return left

@@ -67,6 +67,11 @@ def find_silent(enrolment: Enrolment, *, now: datetime) -> Voters:
     return found.filter(is_quiet, enrolled_at__lte=since)
 
 
+def has_free_place(enrolment: Enrolment) -> bool:
+    """Whether somebody may still take a place; what the others have judged is not looked at."""
+    return enrolment.voters.filter(dropped_at=None).count() < enrolment.places
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class EnrolmentState:
     """How many places there are, and what became of them."""

@@ -17,7 +17,7 @@ from arena.pairing.arrays import IntArray
 from arena.pairing.following import follow_on
 from arena.pairing.newcomers import choose_units
 from arena.pairing.rules import Grid, place_of
-from arena.queries.enrolments import enrolment_by_token, find_silent, state_of
+from arena.queries.enrolments import enrolment_by_token, find_silent, has_free_place
 from arena.services.attention_checks import without_lost_checks
 from arena.services.handing_over import undecided_rows
 from arena.services.people import create_person
@@ -127,7 +127,7 @@ def enrol(*, token: str, external_id: str, agreed_sha256: str) -> EnrolledVoter:
                 id=external_id,
             )
         )
-    if not state_of(enrolment).free and not drop_silent(enrolment=enrolment):
+    if not has_free_place(enrolment) and not drop_silent(enrolment=enrolment):
         raise EnrolmentOver(sentence("Every place of this study is taken."))
     return _take_on(study, enrolment, external_id)
 

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from django.db.models import Q
+from django.db.models import Min, Q
 
 from arena.errors import NothingToPlan
-from arena.models import Matchup
+from arena.models import Matchup, Study
 from arena.pairing.plan import PlannedMatchup
 from arena.pairing.rules import scenario_of
 from arena.queries.showings import VIEW_OF_OLD, view_of
@@ -32,10 +32,23 @@ class ScenarioFrame:
     original_image: str
 
 
+FramesShown = dict[tuple[str, str], ScenarioFrame]
+"""By scenario and window, what a study's showings have already."""
+
+
 def find_frames(
-    planned: Sequence[PlannedMatchup], cells: Cells, places: dict[str, Scenario]
+    planned: Sequence[PlannedMatchup],
+    cells: Cells,
+    places: dict[str, Scenario],
+    shown_before: FramesShown,
 ) -> dict[str, ScenarioFrame]:
     """By scenario; both sides of every pair are drawn in one window, or nothing is planned.
+
+    Args:
+        planned: What is to be shown.
+        cells: The pictures.
+        places: The scenarios by slug.
+        shown_before: Of the study; what is known so is not worked out from the scene again.
 
     Raises:
         NothingToPlan: Some are of an earlier version, or of before the reference was changed; or
@@ -49,8 +62,29 @@ def find_frames(
     if mixed:
         raise _other_windows(mixed)
     return {
-        name: _frame(places[scenario_of(name)], *windows.popitem())
+        name: shown_before.get((scenario_of(name), next(iter(windows))))
+        or _frame(places[scenario_of(name)], *windows.popitem())
         for name, windows in shown.items()
+    }
+
+
+def frames_shown(study: Study, scenarios: Iterable[str]) -> FramesShown:
+    """Those of the first showing of each scenario; without the scene before, it is none.
+
+    To read a scene takes longer than all else that planning for one more expert does.
+    """
+    first = (
+        study.matchups.filter(scenario__slug__in=set(scenarios), view__isnull=False)
+        .order_by()
+        .values("scenario")
+        .annotate(first=Min("pk"))
+    )
+    rows = Matchup.objects.filter(pk__in=[row["first"] for row in first])
+    names = ("scenario__slug", "left_image", "view", "original_image")
+    return {
+        (slug, window_of(image)): ScenarioFrame(view, original)
+        for slug, image, view, original in rows.values_list(*names)
+        if original and view
     }
 
 

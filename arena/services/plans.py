@@ -12,7 +12,7 @@ from arena.models import Matchup, Study
 from arena.pairing.plan import Check, Entry, PlannedMatchup, PlanRules
 from arena.pairing.rules import place_of, scenario_of
 from arena.services.attention_checks import check_pictures, placed_checks
-from arena.services.frames import Cells, find_frames, sides_of
+from arena.services.frames import Cells, find_frames, frames_shown, sides_of
 from arena.services.showable import find_showable, windows_of
 from augment.models import Augmentation, Scenario
 from augment.services.scenarios.descriptions import Description, descriptions
@@ -77,8 +77,9 @@ def store(
         NothingToPlan: The pictures of a scenario are drawn in several windows.
     """
     by_name = {expert.username: expert for expert in experts}
-    places = _places(planned, cells)
-    frames = find_frames(planned, cells, places)
+    known = frames_shown(study, {scenario_of(one.scenario) for one in planned}) if batch else {}
+    places = _places(planned, cells, reads_scenes=study.allow_text or not known)
+    frames = find_frames(planned, cells, places, known)
     texts = _descriptions(study, planned, cells, places)
     rows = [
         Matchup(
@@ -163,12 +164,16 @@ def _place(study: Study, row: Augmentation) -> str:
     return place_of(slug, row.sample) if shows_all_samples(study) else slug
 
 
-def _places(planned: Sequence[PlannedMatchup], cells: Cells) -> dict[str, Scenario]:
-    """The scenarios with what their views are worked out from."""
+def _places(
+    planned: Sequence[PlannedMatchup], cells: Cells, *, reads_scenes: bool
+) -> dict[str, Scenario]:
+    """The scenarios, with what their views are worked out from where all of these are needed."""
     named = {one.scenario for one in planned}
     keys = {cell.scenario_id for (place, _), cell in cells.items() if place in named}
-    rows = Scenario.objects.filter(pk__in=keys).select_related("base_scene")
-    return {row.slug: row for row in rows.defer("base_scene__recording")}
+    rows = Scenario.objects.filter(pk__in=keys)
+    if reads_scenes:
+        rows = rows.select_related("base_scene").defer("base_scene__recording")
+    return {row.slug: row for row in rows}
 
 
 def _descriptions(

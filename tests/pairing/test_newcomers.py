@@ -64,3 +64,16 @@ def test_voters_who_follow_each_other_keep_all_units_equal(
     assert pairs.sum() == voters * min(quota, judges.size)
     assert pairs.max() - pairs.min() <= 1 + (quota > judges.size)
     assert max(row.max() - row.min() for row in judges) <= 1
+
+
+@given(st.integers(0, 2**32))
+def test_scenarios_stay_equal_too_and_hardly_come_twice_to_one_voter(seed: int) -> None:
+    of = grid(scenarios=20)
+    judges = nobody(of)
+    for voter in range(30):
+        units = choose_units(of, judges, 10, np.random.default_rng([seed, voter]))
+        assert max(Counter(unit.scenario for unit in units).values()) <= 2
+        for unit in units:
+            judges[unit.pair, unit.scenario] += 1
+    scenarios = judges.sum(axis=0)
+    assert scenarios.max() - scenarios.min() <= 2

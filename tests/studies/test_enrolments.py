@@ -16,7 +16,7 @@ from arena.services.enrolments import drop_silent, enrol, set_enrolment
 from arena.services.people import create_person
 from arena.services.studies import close_study
 from augment.errors import Conflict
-from augment.models import Event
+from augment.models import BaseScene, Event
 from tests.study_rows import a_study, matchups_of, vote
 
 pytestmark = pytest.mark.django_db
@@ -197,3 +197,14 @@ def test_the_id_stands_in_no_log_and_goes_when_the_person_is_forgotten(study: St
     forget_identity(user=voter.expert, actor=admin)
     voter.refresh_from_db()
     assert voter.external_id == ""
+
+
+def test_planning_for_a_newcomer_takes_the_window_from_what_is_shown(study: Study) -> None:
+    """To read and measure the scenes again would take longer than all the rest."""
+    study.matchups.update(original_image="bev/before.png")
+    before = {row.scenario_id: row.view for row in study.matchups.all()}
+    BaseScene.objects.update(document={})
+    voter = join(link(study), "w-1")
+    mine = matchups_of(study, voter.expert.username)
+    assert {row.original_image for row in mine} == {"bev/before.png"}
+    assert [row.view for row in mine] == [before[row.scenario_id] for row in mine]

@@ -27,10 +27,15 @@ PAUSE_S = 6.0
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Arena:
-    """A running server with a study; one link a voter."""
+    """A running server with a study; one link a voter.
+
+    Attributes:
+        environment: What a process needs that works on the same rows.
+    """
 
     port: int
     pid: int
+    environment: dict[str, str]
     study: str
     tokens: list[str]
 
@@ -47,11 +52,11 @@ def arena(folder: Path, *, port: int, clients: int, votes: int, database: str) -
         "ARENA_VAR_DIR": str(folder / "var"),
         "ARENA_MEDIA_DIR": str(folder / "media"),
     }
-    _must([sys.executable, "manage.py", "prepare"], environment)
+    must([sys.executable, "manage.py", "prepare"], environment)
     voters = clients * ACCOUNTS_PER_CLIENT
     seed = [sys.executable, "-m", "tests.benchmarks.rivals.ours_seed"]
     each = min(200, -(-votes // voters) + 2)
-    made = json.loads(_must([*seed, str(voters), str(each)], environment).splitlines()[-1])
+    made = json.loads(must([*seed, str(voters), str(each)], environment).splitlines()[-1])
     gunicorn = [
         *(sys.executable, "-m", "gunicorn", "arena.config.wsgi"),
         *("--worker-class", "arena.serving.web_worker.BufferingWorker"),
@@ -61,7 +66,7 @@ def arena(folder: Path, *, port: int, clients: int, votes: int, database: str) -
     with serving(
         gunicorn, environment=environment, port=port, path="/login/", log=folder / "web.log"
     ) as pid:
-        yield Arena(port=port, pid=pid, **made)
+        yield Arena(port=port, pid=pid, environment=environment, **made)
 
 
 def voters(here: Arena, clients: int) -> list[Turn]:
@@ -104,7 +109,8 @@ def _voter(here: Arena, accounts: list[dict[str, str]]) -> Turn:
     return turn
 
 
-def _must(arguments: list[str], environment: dict[str, str]) -> str:
+def must(arguments: list[str], environment: dict[str, str]) -> str:
+    """What a command says; it must end well."""
     ended = subprocess.run(
         arguments, cwd=ROOT, env=environment, capture_output=True, text=True, check=False
     )
