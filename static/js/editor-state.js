@@ -4,15 +4,23 @@ export const EMPTY = { format: "scenario-arena/modification", version: 1 };
 export class Edit {
   constructor(scene, document) {
     this.scene = scene;
-    this.change = Edit.read(document);
+    this.change = Edit.read(document) ?? Edit.read({});
     this.past = [];
     this.future = [];
     this.selected = null;
   }
 
+  // Null where it can't be drawn; the server says why.
   static read(document) {
     const { add = [], move = [], remove = [] } = structuredClone(document ?? {});
+    if (![add, move, remove].every(Array.isArray) || ![...add, ...move].every(Edit.isDrawable)) return null;
     return { add, move, remove };
+  }
+
+  static isDrawable(agent) {
+    const { id, x_m, y_m, heading_rad, length_m, width_m, walk_to_m = [0, 0] } = agent ?? {};
+    const isWalk = Array.isArray(walk_to_m) && walk_to_m.length === 2;
+    return typeof id === "string" && isWalk && [x_m, y_m, heading_rad, length_m, width_m, ...walk_to_m].every(Number.isFinite);
   }
 
   // As the server reads it.

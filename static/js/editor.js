@@ -24,7 +24,6 @@ let timer = 0;
 
 function show() {
   stage.draw(edit);
-  field.value = JSON.stringify(edit.document, null, 2);
   const rows = edit.everyone().filter(([agent, was]) => was !== "kept" || agent.id === edit.selected);
   showList(rows);
   form.querySelector("[data-empty]").hidden = rows.length > 0;
@@ -44,7 +43,7 @@ function showList(rows) {
   }
   rows.forEach(([agent, was], index) => {
     const button = list.children[index].firstChild;
-    const kind = form.elements.type.querySelector(`[value="${agent.type}"]`).textContent;
+    const kind = [...form.elements.type.options].find(({ value }) => value === agent.type)?.textContent ?? agent.type;
     button.dataset.pick = agent.id;
     button.setAttribute("aria-pressed", String(agent.id === edit.selected));
     button.textContent = `${agent.id} · ${kind} · ${words[was]}`;
@@ -75,29 +74,41 @@ function shown(agent, name) {
 
 // --- Changing -----------------------------------------------------------------------------------
 
-function changed() {
+function written() {
+  return JSON.stringify(edit.document, null, 2);
+}
+
+// What is on the picture now is what is sent.
+function take() {
   isDirty = true;
+  field.value = written();
   show();
+}
+
+function changed() {
+  take();
+  asked += 1; // what is under way is about what was before
   clearTimeout(timer);
   timer = setTimeout(() => check().catch(fail), 250);
 }
 
 // What the server makes of it; with an id, that agent on the nearest centreline.
-async function check(snapped = "") {
+async function check(snapped = "", modification = edit.document) {
+  clearTimeout(timer);
   const mine = ++asked;
   const answer = await fetch(words.check, {
     method: "POST",
     headers: { "Content-Type": "application/json", "X-CSRFToken": form.elements.csrfmiddlewaretoken.value },
-    body: JSON.stringify({ modification: edit.document, snap: snapped }),
+    body: JSON.stringify({ modification, snap: snapped }),
   });
+  if (mine !== asked) return;
   if (!answer.ok) throw new Error(String(answer.status));
   const found = await answer.json();
   if (mine !== asked) return;
   if (snapped && found.modification) {
     edit.begin();
     edit.change = Edit.read(found.modification);
-    isDirty = true;
-    show();
+    take();
   }
   tell(found);
 }
@@ -283,15 +294,22 @@ form.addEventListener("click", (event) => {
 });
 
 field.addEventListener("change", () => {
+  let typed;
   try {
-    const change = Edit.read(JSON.parse(field.value));
-    edit.begin();
-    edit.change = change;
-    edit.selected = null;
-    changed();
+    typed = JSON.parse(field.value);
   } catch {
     tell({ problem: words.nojson, lines: [] });
+    return;
   }
+  const change = Edit.read(typed);
+  if (!change) {
+    check("", typed).catch(fail);
+    return;
+  }
+  edit.begin();
+  edit.change = change;
+  edit.selected = null;
+  changed();
 });
 
 form.addEventListener("submit", () => {
@@ -307,11 +325,6 @@ new ResizeObserver(() => {
 }).observe(svg);
 
 form.classList.add("is-live");
-const typed = field.value;
+field.value ||= written(); // what was refused stands there to be mended
 show();
-try {
-  JSON.parse(typed || "null");
-} catch {
-  field.value = typed; // what was refused for being no JSON is there to be mended
-}
 check().catch(fail);
