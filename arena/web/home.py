@@ -62,9 +62,8 @@ def language(request: HttpRequest) -> HttpResponse:
 def _back(request: HttpRequest) -> HttpResponse:
     """To where the switch was pressed, if that is a page of ours."""
     back = request.POST.get("next", "")
-    if not url_has_allowed_host_and_scheme(back, {request.get_host()}, request.is_secure()):
-        back = "home"
-    return redirect(back)
+    is_ours = url_has_allowed_host_and_scheme(back, {request.get_host()}, request.is_secure())
+    return redirect(back if is_ours and "/" in back else "home")  # else it names a view
 
 
 def _expert(request: HttpRequest) -> HttpResponse:

@@ -12,7 +12,6 @@ from django.core.exceptions import PermissionDenied
 from django.db import transaction
 from django.http import Http404, HttpRequest, HttpResponse
 from django.shortcuts import get_object_or_404, redirect, render
-from django.urls import reverse
 from django.utils.translation import gettext as _
 from django.views.decorators.http import require_POST, require_safe
 
@@ -163,11 +162,6 @@ def asked_rating(request: HttpRequest) -> uuid.UUID | None:
         return uuid.UUID(wanted) if wanted else None
     except ValueError:
         raise Http404 from None
-
-
-def address_of(study: Study, snapshot: Snapshot, tab: str) -> str:
-    """The permanent address of a tab of a rating."""
-    return f"{reverse('results-tab', args=[study.code, tab])}?rating={snapshot.code}"
 
 
 # --- Private -----------------------------------------------------------------------------------

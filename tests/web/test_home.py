@@ -67,10 +67,10 @@ def test_the_theme_is_kept_with_the_person_and_leads_back() -> None:
     assert 'data-theme="dark"' in home(expert)
 
 
-def test_a_made_up_theme_or_a_foreign_address_changes_nothing() -> None:
+@pytest.mark.parametrize("address", ["https://elsewhere.example/", "//elsewhere", "-1", "jobs"])
+def test_a_made_up_theme_or_a_foreign_address_changes_nothing(address: str) -> None:
     expert = people()["expert"]
-    sent = {"theme": "pink", "next": "https://elsewhere.example/"}
-    answer = signed_in(expert).post(reverse("theme"), sent)
+    answer = signed_in(expert).post(reverse("theme"), {"theme": "pink", "next": address})
     assert answer.headers["Location"] == "/"
     assert Person.objects.get(user=expert).preferences == {}
 

@@ -65,6 +65,9 @@ def test_a_viewer_s_picture_is_drawn_by_a_worker_and_nobody_is_asked(analyst: Cl
     here = add_scenario("street")
     asked = {"variant": "vqa", "role": "viewer"}
     url = reverse("prompts", args=[here.code])
+    waits = analyst.get(url, asked | {"look": "1"}).content.decode()
+    assert "A worker is drawing it." in waits
+    assert 'url=?variant=vqa&amp;role=viewer&amp;look=2"' in waits, "the last look is not said"
     assert "A worker is drawing it." in analyst.get(url, asked).content.decode()
     shown = analyst.get(url, asked).content.decode()
     assert "In which lane does each blue object stand?" in html.unescape(shown)
