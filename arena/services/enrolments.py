@@ -16,9 +16,10 @@ from arena.models import EnrolledVoter, Enrolment, Matchup, Study
 from arena.pairing.arrays import IntArray
 from arena.pairing.following import follow_on
 from arena.pairing.newcomers import choose_units
-from arena.pairing.rules import Grid, place_of
+from arena.pairing.rules import Grid, PlanRules, place_of
 from arena.queries.enrolments import enrolment_by_token, find_silent, has_free_place
 from arena.services.attention_checks import without_lost_checks
+from arena.services.frames import Cells
 from arena.services.handing_over import undecided_rows
 from arena.services.people import create_person
 from arena.services.plans import next_batch, pictures_of, rules_of, shows_all_samples, store
@@ -112,9 +113,11 @@ def enrol(*, token: str, external_id: str, agreed_sha256: str) -> EnrolledVoter:
     """
     external_id = one_line("id", external_id, what="enrolment", longest=120)
     found = enrolment_by_token(token)
+    # What holds since the opening is read before the study is held: others wait only for the rest.
+    fixed = _read_plan(found.study) if found.is_open else None
     study = Study.objects.select_for_update().get(pk=found.study_id)
     enrolment = Enrolment.objects.get(pk=found.pk)
-    if not enrolment.is_open or study.state != Study.State.OPEN:
+    if fixed is None or not enrolment.is_open or study.state != Study.State.OPEN:
         raise EnrolmentOver(sentence("This study takes on nobody any more."))
     if agreed_sha256 != enrolment.consent_sha256:
         raise Conflict(
@@ -129,7 +132,7 @@ def enrol(*, token: str, external_id: str, agreed_sha256: str) -> EnrolledVoter:
         )
     if not has_free_place(enrolment) and not drop_silent(enrolment=enrolment):
         raise EnrolmentOver(sentence("Every place of this study is taken."))
-    return _take_on(study, enrolment, external_id)
+    return _take_on(study, enrolment, external_id, *fixed)
 
 
 @transaction.atomic
@@ -164,16 +167,22 @@ def drop_silent(
 # --- Private -----------------------------------------------------------------------------------
 
 
-def _take_on(study: Study, enrolment: Enrolment, external_id: str) -> EnrolledVoter:
+def _read_plan(study: Study) -> tuple[PlanRules, Cells]:
+    """The rules with the pictures that they speak of."""
+    cells = pictures_of(study)
+    return without_lost_checks(rules_of(study), cells), cells
+
+
+def _take_on(
+    study: Study, enrolment: Enrolment, external_id: str, rules: PlanRules, cells: Cells
+) -> EnrolledVoter:
     person = create_person(
         username=f"voter-{uuid.uuid4().hex[:12]}",
         password=None,
         role="expert",
         pseudonym=_free_pseudonym(study),
     )
-    number, cells = next_batch(study), pictures_of(study)
-    rules = without_lost_checks(rules_of(study), cells)
-    grid = rules.grid
+    number, grid = next_batch(study), rules.grid
     rng = np.random.default_rng([rules.seed, number])
     units = choose_units(grid, _judges(study, grid), enrolment.votes_each, rng)
     if not units:
