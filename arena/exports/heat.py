@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from arena.exports.tables import Row
+from arena.rating.printed import whole_percent
 from arena.results.tree import PairRecord
 
 STRONG = 0.3
@@ -34,7 +35,7 @@ class HeatCell:
     @property
     def percent(self) -> int | None:
         """The share in percent."""
-        return None if self.share is None else round(100 * self.share)
+        return None if self.share is None else whole_percent(self.share)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -17,6 +17,7 @@ from arena.rating.printed import (
     places_text,
     rank_text,
     rating_text,
+    whole_percent,
 )
 from arena.rating.rules import METHOD_TEXTS, UNIT_TEXTS, Intervals
 from arena.services.hypotheses import Answered, answer_hypotheses
@@ -81,7 +82,7 @@ class Row:
     @property
     def score_percent(self) -> int:
         """The mean score of a vote in percent, a tie half; 0 without votes."""
-        return round(100 * (self.wins + self.ties / 2) / self.votes) if self.votes else 0
+        return whole_percent((self.wins + self.ties / 2) / self.votes) if self.votes else 0
 
     @property
     def rank_text(self) -> str:

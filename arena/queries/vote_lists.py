@@ -292,6 +292,18 @@ def _own_votes(rows: _Rows, snapshot: Snapshot) -> _Rows:
     return rows.filter(own_votes(Filters.of_document(snapshot.filters)))
 
 
+def _shared(rows: _Rows, snapshot: Snapshot) -> _Rows:
+    """Votes on what another expert's vote that counts is on as well."""
+    others = marked_votes(snapshot).filter(
+        Q(mark=COUNTED), matchup__scenario=OuterRef("matchup__scenario")
+    )
+    others = others.exclude(expert=OuterRef("expert"))
+    left, right = "shown_left__contestant", "shown_right__contestant"
+    alike = others.filter(**{left: OuterRef(left), right: OuterRef(right)})
+    turned = others.filter(**{left: OuterRef(right), right: OuterRef(left)})
+    return rows.filter(Exists(alike) | Exists(turned))
+
+
 _PARTS: dict[SoughtPart, Callable[[_Rows, Snapshot], _Rows]] = {
     SoughtPart.COMMENTED: lambda rows, _: rows.exclude(comment=""),
     SoughtPart.FAST: lambda rows, _: rows.filter(ms_visible__lt=FAST_MS),
@@ -299,6 +311,7 @@ _PARTS: dict[SoughtPart, Callable[[_Rows, Snapshot], _Rows]] = {
     SoughtPart.REPEATS: _repeats,
     SoughtPart.ALIKE: _alike,
     SoughtPart.CHECKS: lambda rows, _: rows.filter(matchup__kind=CHECK, outcome__in=RATED),
+    SoughtPart.SHARED: _shared,
     SoughtPart.PASSED: lambda rows, _: rows.filter(
         matchup__kind=CHECK, winner__contestant__kind=Contestant.Kind.REFERENCE
     ),

@@ -41,6 +41,7 @@ class SoughtPart(StrEnum):
     CHECKS = "checks"
     PASSED = "passed"
     CHECKS_SKIPPED = "checks_skipped"
+    SHARED = "shared"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -39,6 +39,15 @@ def rating_text(rating: float | None) -> str:
     return UNKNOWN if rating is None else str(round(rating))
 
 
+def whole_percent(share: float) -> int:
+    """A share in whole percent, the same wherever it stands; two shares of one make a hundred.
+
+    A half goes to the even number, also where 100 times the share falls short of it: 0.575 of the
+    votes are 58 %, and the 0.425 beside them 42 %.
+    """
+    return round(round(100.0 * share, 9))
+
+
 def rank_text(rank: int | None) -> str:
     """The rank, or two hyphens without one."""
     return UNKNOWN if rank is None else str(rank)

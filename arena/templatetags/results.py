@@ -15,7 +15,7 @@ from arena.exports.tables import Row
 from arena.models import Vote
 from arena.models.votes import AID_LABELS
 from arena.rating.estimate import Estimate
-from arena.rating.printed import interval_text, rating_text, with_minus
+from arena.rating.printed import interval_text, rating_text, whole_percent, with_minus
 from augment.models import Scenario
 from augment.services.scenarios.types import type_label as own_label
 from augment.services.wording import translate
@@ -147,7 +147,7 @@ def skip_reason(reason: str) -> str:
 @register.filter
 def percent(share: float | None) -> str:
     """A share from 0 to 1 in whole percent."""
-    return "–" if share is None else f"{100 * share:.0f} %"
+    return "–" if share is None else f"{whole_percent(share)} %"
 
 
 @register.filter
@@ -194,7 +194,7 @@ def estimate(found: Estimate | None) -> str:
 @register.filter
 def estimate_percent(found: Estimate | None) -> str:
     """The same in percent."""
-    return _with_interval(found, lambda value: f"{100 * value:.0f} %")
+    return _with_interval(found, lambda value: f"{whole_percent(value)} %")
 
 
 @register.filter

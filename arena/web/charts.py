@@ -11,12 +11,12 @@ from arena.exports.plot_axes import interval_ticks, known_ends, shorten_name
 from arena.exports.tables import Row
 from arena.rating.printed import with_minus
 
-WIDTH = 760.0
-LEFT, RIGHT = 210.0, 676.0
+WIDTH = 560.0
+LEFT, RIGHT = 196.0, 500.0
 """Where the plot begins and ends; names stand to its left, values to its right."""
 
 TOP, ROW = 16.0, 34.0
-LONGEST_NAME = 30
+LONGEST_NAME = 26
 
 BAR_LEFT, BAR_RIGHT = 6.0, 254.0
 """The same for an interval inside a table's cell, 260 units wide."""

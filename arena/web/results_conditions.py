@@ -44,14 +44,23 @@ def interaction(found: Interaction | None, rows: Sequence[Row]) -> Context | Non
     }
 
 
-def drifts(found: Sequence[Drift]) -> list[Context]:
-    """A line a measure: at the start and at the end of sessions, and the change."""
+def drifts(found: Sequence[Drift], behind: Mapping[str, int]) -> list[Context]:
+    """A line a measure: at the start and at the end of sessions, and the change.
+
+    Args:
+        found: The measures of a rating.
+        behind: How many votes there are by measure; where these are all that it is made of, and
+            no session had only one of them, its number leads there.
+    """
     return [
         {
             "label": MEASURES[one.measure][0],
             "unit": MEASURES[one.measure][1],
             "kept": one,
             "is_sure": one.p_value is not None and one.p_value < SURE,
+            "are_behind": behind.get(one.measure) == one.votes,
+            "outcome": "decided" if one.measure == "left" else "",
+            "part": "shared" if one.measure == "agreement" else "",
         }
         for one in found
         if one.measure in MEASURES

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 from arena.exports.heat import heat_map
 from arena.exports.plots import plots
 from arena.exports.tables import LeaderboardTable
 from arena.models import Snapshot
 from arena.models.votes import AIDS
-from arena.queries.judged import AUTOMATIC
+from arena.queries.judged import AUTOMATIC, is_imported
 from arena.queries.people import natural_order
 from arena.results.tree import PanelRater
 from arena.web.charts import bars
@@ -38,7 +40,7 @@ def raters(snapshot: Snapshot, table: LeaderboardTable) -> Context:
         "automatic_judge": AUTOMATIC,
         "left_bars": bars(left, span=(0.0, 1.0)),
         "by_side": interaction(snapshot.results.trust.by_side, table.rows),
-        "drifts": drifts(snapshot.results.trust.drifts),
+        "drifts": drifts(snapshot.results.trust.drifts, _behind_drifts(snapshot, lines)),
     }
 
 
@@ -57,6 +59,22 @@ def coverage(snapshot: Snapshot, table: LeaderboardTable) -> Context:
 
 
 # --- Private -----------------------------------------------------------------------------------
+
+
+def _behind_drifts(snapshot: Snapshot, lines: Sequence[PanelRater]) -> dict[str, int]:
+    """How many votes of people are behind a measure of sessions.
+
+    None where others stand in the same lists: ties that nobody was shown, votes of a file.
+    """
+    if is_imported(snapshot.study) or len(lines) < len(snapshot.results.trust.raters):
+        return {}
+    votes = sum(line.votes for line in lines)
+    return {
+        "ties": votes,
+        "seconds": votes,
+        "agreement": sum(line.shared for line in lines),
+        "left": votes - sum(round(line.ties * line.votes) for line in lines),
+    }
 
 
 def _counts(rater: PanelRater, aids: list[str]) -> Context:

@@ -45,6 +45,7 @@ PARTS = {
     SoughtPart.CHECKS: gettext_lazy("Attention checks answered"),
     SoughtPart.PASSED: gettext_lazy("Attention checks passed"),
     SoughtPart.CHECKS_SKIPPED: gettext_lazy("Attention checks skipped"),
+    SoughtPart.SHARED: gettext_lazy("On what others judged as well"),
 }
 MARKS = {
     COUNTED: gettext_lazy("Counted"),

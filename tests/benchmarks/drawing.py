@@ -10,7 +10,7 @@ import io
 import os
 import statistics
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
@@ -87,7 +87,7 @@ def _recorded() -> dict[str, list[Scene]]:
     return found
 
 
-def _print_pictures(name: str, shown: list[tuple[Scene, Modification | None]]) -> None:
+def _print_pictures(name: str, shown: Sequence[tuple[Scene, Modification | None]]) -> None:
     drawn = [(camera_for(scene, change), scene, change) for scene, change in shown]
     pngs = [bev.draw(scene, change or Modification(), camera) for camera, scene, change in drawn]
     blank = statistics.median(map(blank_share, pngs))

@@ -47,7 +47,7 @@ def test_rows_do_not_overlap_and_long_names_are_cut() -> None:
     chart = interval_chart([line("A" * 50, 1000.0), line("Bob", 990.0), line("Cid", 980.0)])
     assert chart is not None
     assert all(later.y - row.y > 20 for row, later in itertools.pairwise(chart.rows))
-    assert len(chart.rows[0].name) == 30
+    assert len(chart.rows[0].name) == 26
     assert ("A" * 50) in chart.rows[0].title
 
 

@@ -81,6 +81,9 @@ def test_every_number_leads_to_as_many_votes(
         shown = analyst.get(reverse("results-tab", args=[study.code, tab.name]))
         promised |= links_of(shown.content.decode())
     assert len(promised) > 50
+    parts = set(re.findall(r"part=(\w+)", " ".join(promised)))
+    # Ties that nobody was shown are no votes of others, so then n leads nowhere.
+    assert {"alike", "" if filters.automatic_ties else "shared"} <= {*parts, ""}
     wrong = {}
     for address, number in promised.items():
         answer = analyst.get(address)

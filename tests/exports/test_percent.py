@@ -1,0 +1,50 @@
+"""A share is rounded the same wherever it stands: in the table, the heat map and the panels."""
+
+from __future__ import annotations
+
+from fractions import Fraction
+
+import pytest
+
+from arena.exports.heat import heat_map
+from arena.exports.tables import Row
+from arena.rating.estimate import Estimate
+from arena.rating.printed import whole_percent
+from arena.results.tree import PairRecord
+from arena.templatetags.results import estimate_percent, percent
+
+
+@pytest.mark.parametrize(
+    ("share", "shown"),
+    [(0.0, 0), (0.005, 0), (0.015, 2), (0.425, 42), (0.575, 58), (0.995, 100), (1.0, 100)],
+)
+def test_a_half_goes_to_the_even_number(share: float, shown: int) -> None:
+    assert whole_percent(share) == shown
+
+
+def test_every_share_of_up_to_200_votes_is_rounded_as_if_it_were_exact() -> None:
+    for votes in range(1, 201):
+        for halves in range(2 * votes + 1):
+            share = halves / 2 / votes
+            assert whole_percent(share) == round(Fraction(100 * halves, 2 * votes)), (
+                halves,
+                votes,
+            )
+            assert whole_percent(share) + whole_percent(1.0 - share) == 100
+
+
+def test_table_heat_map_and_panels_agree() -> None:
+    rows = [_row("ann", wins=23), _row("bob", wins=17)]
+    judged = PairRecord(a="ann", b="bob", wins=23, ties=0, losses=17, both_miss=0, planned=None)
+    lines = heat_map([judged], rows)
+    shown = [cell.percent for line in lines for cell in line.cells if cell is not None]
+    assert shown == [row.score_percent for row in rows] == [58, 42]
+    assert percent(0.575) == "58 %"
+    assert "58 %" in estimate_percent(Estimate(value=0.575, lower=0.425, upper=0.995))
+
+
+def _row(slug: str, *, wins: int) -> Row:
+    return Row(
+        model=slug, variant="", slug=slug, kind="rule", simulated=False, rank=None, elo=None,
+        lower=None, upper=None, votes=40, wins=wins, ties=0, losses=40 - wins, note="",
+    )  # fmt: skip

@@ -1,0 +1,66 @@
+"""The pages that people can open, with rows behind them: for what has to hold on all of them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from django.contrib.auth.models import User
+from django.urls import reverse
+
+from arena.models import Vote
+from arena.queries.vote_sets import Filters
+from arena.services.ratings import rate
+from arena.web.results_tabs import TABS
+from tests.mixed_study import mixed_study
+from tests.web.addresses import address
+from tests.web.cast import people, signed_in, world
+from tests.web.test_access import ASKS_FIRST, PAGES
+
+GALLERIES = ("results-votes", "results-disagreement", "results-worst", "results-sheet")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ShownPage:
+    """A page as somebody is shown it."""
+
+    name: str
+    url: str
+    user: User
+    html: str
+
+
+def pages_of_an_open_study() -> list[ShownPage]:
+    """Every page of the site that an admin can open, and those of an expert who votes."""
+    here, admin = world(), people()["admin"]
+    named = {name: address(name, here) for name in (*PAGES, *ASKS_FIRST)}
+    staff = _shown(admin, named)
+    own = {name: url for name, url in named.items() if name.startswith(("home", "vote"))}
+    return staff + _shown(here.expert, own)
+
+
+def pages_of_a_rated_study() -> list[ShownPage]:
+    """The results of a study with everything that a vote can be, closed and rated."""
+    study = mixed_study()
+    study.allow_simulated = True
+    study.save()
+    rate(study=study, rounds=100, filters=Filters(automatic_ties=True))
+    code = [study.code]
+    named = {f"tab {tab.name}": reverse("results-tab", args=[*code, tab.name]) for tab in TABS}
+    named |= {name: reverse(name, args=code) for name in ("study", "preregistration", *GALLERIES)}
+    vote = Vote.objects.exclude(comment="").first()
+    assert vote is not None
+    named["results-vote"] = reverse("results-vote", args=[*code, vote.key])
+    return _shown(people()["admin"], named)
+
+
+def _shown(user: User, named: dict[str, str]) -> list[ShownPage]:
+    client, found = signed_in(user), []
+    for name, url in named.items():
+        answer = client.get(url)
+        is_page = "html" in answer.headers.get("Content-Type", "")
+        if answer.streaming:
+            b"".join(answer)
+        elif answer.status_code == 200 and is_page:
+            html = answer.content.decode()
+            found.append(ShownPage(name=name, url=url, user=user, html=html))
+    return found
