@@ -14,7 +14,7 @@ class NotYours(ArenaError):
 
 
 class StudyNotOpen(ArenaError):
-    """The study does not take votes: it is a draft or closed."""
+    """The study does not take votes: it is closed or was cancelled."""
 
 
 class LabellingClosed(ArenaError):

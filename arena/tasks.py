@@ -17,6 +17,7 @@ from django.contrib.auth.models import User
 from django.db import connection
 from django.utils import timezone
 
+from arena.exports import study_files
 from arena.exports.scenario_files import write_file
 from arena.services import looks, ratings
 from arena.services.webhooks import deliver_due, plan_deliveries
@@ -60,6 +61,22 @@ def send_scenario_file(file_pk: int) -> None:
     """
     with open_broker() as broker:
         write_scenario_file.apply_async((file_pk,), connection=broker, retry=False)
+
+
+@shared_task(name="arena.write_study_file", acks_late=True, ignore_result=True)
+def write_study_file(file_pk: int) -> None:
+    """Write a file of a study, unless it is ready already."""
+    study_files.write_study_file(file_pk=file_pk)
+
+
+def send_study_file(file_pk: int) -> None:
+    """Ask a worker to write a file of a study; for transaction.on_commit.
+
+    Raises:
+        QueueFault: No broker, or it refuses; the row waits until it is sent again.
+    """
+    with open_broker() as broker:
+        write_study_file.apply_async((file_pk,), connection=broker, retry=False)
 
 
 @shared_task(name="arena.draw_checks", acks_late=True, ignore_result=True)

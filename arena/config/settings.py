@@ -245,6 +245,7 @@ CELERY_TASK_ROUTES = {
     "augment.draw_prompts": {"queue": "drawing"},
     "arena.compute_snapshot": {"queue": "drawing"},
     "arena.write_scenario_file": {"queue": "drawing"},
+    "arena.write_study_file": {"queue": "drawing"},
     "arena.draw_checks": {"queue": "drawing"},
 }
 CELERY_BROKER_TRANSPORT_OPTIONS = {"visibility_timeout": 3600, "socket_connect_timeout": 5}

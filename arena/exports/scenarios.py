@@ -1,4 +1,4 @@
-"""A job's scenarios as one zip: the files, and a manifest of what they are and what they lost."""
+"""Scenarios of a job or a study as one zip: files, and a manifest of what they are and lost."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ def _manifest(exported: Exported, files: dict[str, bytes]) -> bytes:
     document = {
         "format": "scenario-arena/scenarios",
         "version": 1,
-        "job": {"name": exported.job.name, "code": str(exported.job.code)},
+        exported.origin.kind: {"name": exported.origin.name, "code": exported.origin.code},
         "scenarios_in": exported.format,
         "warnings": list(exported.warnings),
         "sources": [asdict(source) for source in exported.sources],

@@ -6,9 +6,18 @@ from typing import NamedTuple
 
 from arena.exports.formats import Format, formats
 from arena.exports.parquet import TEXT, WHOLE, YES_NO, parquet_bytes
-from arena.models import Snapshot
+from arena.models import Snapshot, Study
+from arena.queries.judged import last_vote_of, votes_up_to
 from arena.services.snapshots import votes_of, votes_version_of
-from arena.services.vote_rows import COLUMNS, Row, columns_of, vote_rows, votes_csv
+from arena.services.vote_rows import (
+    COLUMNS,
+    VERSION,
+    WINNERS,
+    Row,
+    columns_of,
+    vote_rows,
+    votes_csv,
+)
 
 _KINDS = dict.fromkeys(COLUMNS, TEXT) | {
     "ms_visible": WHOLE,
@@ -32,6 +41,14 @@ def vote_table(snapshot: Snapshot) -> VoteTable:
     """
     rows = vote_rows(votes_of(snapshot).counted, snapshot.results.judges)
     return VoteTable(version=votes_version_of(snapshot), rows=list(rows))
+
+
+def unrated_votes(study: Study) -> VoteTable:
+    """The votes of a study that nobody rates, repeats and checks by their kind; no skips."""
+    current, _ = votes_up_to(study, last_vote_of(study))
+    decided = [vote for vote in current if vote.outcome in WINNERS]
+    names = {vote.judge: vote.judge_name for vote in decided}
+    return VoteTable(version=VERSION, rows=list(vote_rows(decided, names)))
 
 
 def csv_of(table: VoteTable) -> bytes:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from arena.models.api_tokens import ApiToken
 from arena.models.authorships import Authorship
+from arena.models.drafts import StudyDraft
 from arena.models.enrolments import EnrolledVoter, Enrolment
 from arena.models.invitations import Invitation, token_digest
 from arena.models.labels import FaultLabel, LabellingRound, LabelTask
@@ -12,6 +13,7 @@ from arena.models.practice import PracticePair
 from arena.models.ratings import EarlyLook, ImportedVote, Snapshot, Standing, VoteFile
 from arena.models.scenario_files import ScenarioFile
 from arena.models.studies import Matchup, Study
+from arena.models.study_files import StudyFile
 from arena.models.tokens import fresh_token
 from arena.models.votes import AIDS, OUTCOME_LETTERS, Report, Vote
 from arena.models.webhooks import Webhook, WebhookDelivery
@@ -37,6 +39,8 @@ __all__ = [
     "Snapshot",
     "Standing",
     "Study",
+    "StudyDraft",
+    "StudyFile",
     "Vote",
     "VoteFile",
     "Webhook",

@@ -14,16 +14,16 @@ from augment.models import Augmentation, Contestant, Scenario
 
 
 class Study(models.Model):
-    """What experts vote on; its rules are fixed when it opens."""
+    """What experts vote on; its rules are fixed when it opens. A StudyDraft comes before it."""
 
     class State(models.TextChoices):
-        DRAFT = "draft", "Draft"
         OPEN = "open", "Open"
         CLOSED = "closed", "Closed"
+        CANCELLED = "cancelled", "Cancelled"
 
     code = models.UUIDField(default=uuid.uuid4, unique=True, editable=False)
     name = models.CharField(max_length=120, unique=True)
-    state = models.CharField(max_length=10, choices=State.choices, default=State.DRAFT)
+    state = models.CharField(max_length=10, choices=State.choices, default=State.OPEN)
     contestants = models.ManyToManyField(Contestant, related_name="studies")
     scenarios = models.ManyToManyField(Scenario, related_name="studies")
     experts = models.ManyToManyField(settings.AUTH_USER_MODEL, related_name="studies")
@@ -62,14 +62,16 @@ class Study(models.Model):
         default=list, help_text="what the stopping rule saw, one entry a look; no contestant's"
     )
     opened_at = models.DateTimeField(null=True, blank=True)
-    closed_at = models.DateTimeField(null=True, blank=True)
+    closed_at = models.DateTimeField(
+        null=True, blank=True, help_text="when it took its last votes: closed or cancelled"
+    )
 
     class Meta:
         ordering = ("-opened_at", "-pk")
         verbose_name_plural = "studies"
         constraints = (
             models.CheckConstraint(
-                name="study_state_is_known", condition=Q(state__in=["draft", "open", "closed"])
+                name="study_state_is_known", condition=Q(state__in=["open", "closed", "cancelled"])
             ),
         )
 

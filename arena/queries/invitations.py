@@ -96,7 +96,7 @@ def expert_lines(study: Study, now: datetime) -> list[ExpertLine]:
                 last_seen=max(seen, default=None),
                 invitation=invitation,
                 link=invitation.state(now) if invitation else None,
-                may_be_invited=study.state != Study.State.DRAFT and may_be_let_in(user),
+                may_be_invited=study.state != Study.State.CANCELLED and may_be_let_in(user),
             )
         )
     return lines

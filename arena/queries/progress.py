@@ -39,10 +39,10 @@ def of_studies(studies: Sequence[Study] | None = None) -> list[StudyProgress]:
 
 
 def studies_seen_by(user: User, *, is_staff: bool) -> QuerySet[Study]:
-    """Staff see every study, an expert those that they were invited to; no drafts."""
+    """Staff see every study, an expert those that they were invited to."""
     if is_staff:
         return Study.objects.all()
-    return Study.objects.filter(experts=user).exclude(state=Study.State.DRAFT)
+    return Study.objects.filter(experts=user)
 
 
 def of_these(studies: Sequence[Study], *, expert: User | None = None) -> list[StudyProgress]:
@@ -68,7 +68,7 @@ def of_these(studies: Sequence[Study], *, expert: User | None = None) -> list[St
 
 
 def of_expert(expert: User) -> list[StudyProgress]:
-    """The studies that an expert was invited to, counted over their own matchups; no drafts."""
+    """The studies that an expert was invited to, counted over their own matchups."""
     seen = studies_seen_by(expert, is_staff=False).defer(*_LONG)
     return of_these(list(seen), expert=expert)
 

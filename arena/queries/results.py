@@ -35,7 +35,7 @@ def results_access(*, user: User, study: Study, role: str | None = None) -> Resu
 
     Staff may open the results of an open study on purpose; if they vote in it, that ends their
     voting. An expert who still judges the same contestants in another study waits until that one
-    closes.
+    closes. A cancelled study has no results for anybody.
 
     Args:
         user: Who asks.
@@ -103,8 +103,10 @@ def snapshot_to_export(study: Study, code: UUID | None = None) -> Snapshot:
     """The rating with that code, the newest without one.
 
     Raises:
-        NoSnapshot: The study has not been rated yet, or not by that rating.
+        NoSnapshot: The study has not been rated yet, or not by that rating, or was cancelled.
     """
+    if study.state == Study.State.CANCELLED:
+        raise NoSnapshot(f"The study {study.name!r} was cancelled: it has votes, but no results.")
     snapshot = snapshot_coded(study, code)
     if snapshot is None:
         what = "no rating yet" if code is None else f"no rating {code}"

@@ -16,6 +16,7 @@ from django.utils import timezone
 from arena.errors import LinkOver
 from arena.models import EnrolledVoter, Invitation, Person, Study
 from arena.queries.people import ROLES, forgotten_name, has_admin, is_forgotten, role_of
+from arena.services.study_drafts import rename_in_drafts
 from augment.errors import Conflict, InvalidDocument, UnknownName
 from augment.sentences import sentence
 from augment.services.events import log_event
@@ -151,6 +152,7 @@ def forget_identity(*, user: User, actor: User) -> None:
     Invitation.objects.filter(expert=user, revoked_at=None).update(revoked_at=timezone.now())
     EnrolledVoter.objects.filter(expert=user).update(external_id="")
     _rename_in_plans(known_as, name)
+    rename_in_drafts(known_as, name)
     for failures in (AccessAttempt, AccessFailureLog, AccessLog):
         failures.objects.filter(username=known_as).delete()
     _sign_out(user)

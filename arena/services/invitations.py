@@ -41,13 +41,13 @@ def invite(*, study: Study, expert: User, actor: User | None = None) -> FreshLin
 
     Raises:
         NotYours: The account does not take part in the study.
-        Conflict: The study is a draft, or the account can't be let in by a link: it is simulated,
-            inactive, or more than an expert.
+        Conflict: The study was cancelled, or the account can't be let in by a link: it is
+            simulated, inactive, or more than an expert.
     """
     must_take_part(study=study, expert=expert)
-    if study.state == Study.State.DRAFT:
+    if study.state == Study.State.CANCELLED:
         raise Conflict(
-            sentence("The study '%(name)s' is a draft; open it first.", name=study.name)
+            sentence("The study '%(name)s' was cancelled; nobody is invited.", name=study.name)
         )
     if not may_be_let_in(expert):
         raise Conflict(

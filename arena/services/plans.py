@@ -51,6 +51,18 @@ def pictures_of(study: Study) -> Cells:
     return cells
 
 
+def shown_augmentations(study: Study) -> list[Augmentation]:
+    """What the study shows of its contestants, by scenario; no attention checks."""
+    planned = study.matchups.exclude(kind=Matchup.Kind.CHECK).values_list("left", "right")
+    keys = {key for pair in planned for key in pair}
+    # Whoever is in pairs that nobody is shown; a picture drawn anew since is no longer told.
+    rated = set(study.contestants.values_list("slug", flat=True))
+    keys |= {row.pk for (_, slug), row in pictures_of(study).items() if slug in rated}
+    rows = Augmentation.objects.filter(pk__in=keys)
+    rows = rows.select_related("scenario__base_scene", "contestant")
+    return list(rows.order_by("scenario__slug", "contestant__slug", "sample"))
+
+
 def shows_all_samples(study: Study) -> bool:
     """Whether each sample of a scenario is judged on its own."""
     return bool(study.rules.get("samples") == "all")

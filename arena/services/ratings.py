@@ -160,6 +160,10 @@ def _planned(
     early: bool = False,
     actor: User | None = None,
 ) -> Snapshot:
+    if study.state == Study.State.CANCELLED:
+        raise Conflict(
+            sentence("The study '%(name)s' was cancelled: it is not rated.", name=study.name)
+        )
     is_early = study.state == Study.State.OPEN
     if is_early and not early:
         raise StudyStillOpen(study.name)

@@ -23,6 +23,7 @@ LEFT_OUT = frozenset(
         *("sessions.session", "arena.session"),
         *("axes.accessattempt", "axes.accesslog", "axes.accessfailurelog"),
         *("axes.accessattemptexpiration", "augment.worker", "arena.scenariofile"),
+        "arena.studyfile",
     }
 )
 """What means nothing after a restore: who was signed in, who was locked out, who worked, and zips

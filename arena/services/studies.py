@@ -1,4 +1,4 @@
-"""Opening and closing a study. Its plan is stored before anybody can vote."""
+"""Opening a study. Its plan is stored before anybody can vote."""
 
 from __future__ import annotations
 
@@ -10,12 +10,12 @@ from django.contrib.auth.models import User
 from django.db import IntegrityError, transaction
 from django.utils import timezone
 
-from arena.errors import StudyNotOpen
 from arena.models import Study
 from arena.pairing.demands import ATTENTION_CHECKS, MOST_CHECKS, check_share
 from arena.pairing.plan import Check, Entry, MatchupPlan, PlanRules, plan
 from arena.queries.people import experts as expert_accounts
 from arena.services.attention_checks import enough_checks, placed_checks
+from arena.services.ending import cancel_study, close_study
 from arena.services.frames import Cells
 from arena.services.hypotheses import read_hypotheses
 from arena.services.plan_options import OF_THE_PLAN, PlanOptions
@@ -33,7 +33,7 @@ from augment.services.judging.alike import alike_pairs
 from augment.services.running.choosing import find_job
 from augment.services.texts import one_line
 
-__all__ = ["PlanOptions", "close_study", "open_study", "rules_of"]
+__all__ = ["PlanOptions", "cancel_study", "close_study", "open_study", "rules_of"]
 
 PLANNER = "balanced-2"
 """Name and version of the planner, kept with the rules so that a plan can be made again."""
@@ -99,40 +99,6 @@ def open_study(
     _enrol(study, contestant_rows, scenario_rows, expert_rows)
     store(study, planned.matchups, broken | shown.cells, expert_rows)
     _conclude_opening(study, matchups=len(planned.matchups), actor=actor)
-    return study
-
-
-@transaction.atomic
-def close_study(*, study: Study, actor: User | None = None) -> Study:
-    """Take no more votes; closing a closed study changes nothing.
-
-    Votes under way are waited for, so none arrives after the study is closed.
-
-    Raises:
-        StudyNotOpen: The study is a draft.
-    """
-    study = Study.objects.select_for_update().get(pk=study.pk)
-    if study.state == Study.State.CLOSED:
-        return study
-    if study.state != Study.State.OPEN:
-        raise StudyNotOpen(
-            sentence(
-                "The study '%(name)s' is a draft: there is nothing to close.", name=study.name
-            )
-        )
-    # A vote holds its matchup's row until it is stored; see arena.services.votes.
-    list(study.matchups.select_for_update().order_by("pk").values_list("pk", flat=True))
-    study.state = Study.State.CLOSED
-    study.closed_at = timezone.now()
-    study.save(update_fields=["state", "closed_at"])
-    log_event(
-        actor=actor,
-        verb="close",
-        object_kind="study",
-        object_code=study.code,
-        before={"state": "open"},
-        after={"state": "closed"},
-    )
     return study
 
 
@@ -264,11 +230,17 @@ def _frozen_pictures(given: PlanOptions, shown: StudyPictures) -> dict[str, Any]
         NothingToPlan: A hypothesis can't be read.
     """
     contestants = sorted({contestant for _, contestant in shown.cells})
-    return given.frozen_aims(read_hypotheses(given.hypotheses, contestants)) | {
-        "samples": given.samples.value,
-        "jobs": [{"code": str(job.code), "name": job.name} for job in shown.jobs],
-        "options": dict(sorted(shown.options.items())),
-    }
+    # Kept where it departs from what the pages do, so that the settings can be used again.
+    alike = {} if given.settle_alike else {"show_alike": True}
+    return (
+        given.frozen_aims(read_hypotheses(given.hypotheses, contestants))
+        | alike
+        | {
+            "samples": given.samples.value,
+            "jobs": [{"code": str(job.code), "name": job.name} for job in shown.jobs],
+            "options": dict(sorted(shown.options.items())),
+        }
+    )
 
 
 def _conclude_opening(study: Study, *, matchups: int, actor: User | None) -> None:

@@ -58,9 +58,9 @@ _LABELS: dict[str, str | Promise] = {
     "why": gettext_lazy("why"),
 }
 _STATES: dict[str, str | Promise] = {
-    "draft": gettext_lazy("draft"),
     "open": gettext_lazy("open"),
     "closed": gettext_lazy("closed"),
+    "cancelled": gettext_lazy("cancelled"),
 }
 
 Names = Mapping[str, str]

@@ -46,6 +46,7 @@ _WORDS = (
     ),
     *(_("Reference"), _("Human"), _("Language model"), _("Rules"), _("Baseline")),
     *(_("Simulated"), _("Attention check")),
+    *(_("The whole study"), _("Contact sheet"), _("Scenarios for interPlan")),
     *(_("added"), _("moved"), _("removed")),
     *(_("vehicle"), _("bus"), _("bicycle"), _("pedestrian"), _("traffic cone"), _("barrier")),
     *(_("construction sign"), _("generic object")),

@@ -57,7 +57,7 @@ _SECTIONS: dict[str, tuple[Promise, frozenset[str]]] = {
         _("Studies"),
         frozenset(
             {
-                *("studies", "study-new", "study", "experts", "invite"),
+                *("studies", "study-new", "study-draft", "study", "experts", "invite", "remind"),
                 *("results", "results-tab", "results-votes", "results-open"),
             }
         ),

@@ -14,6 +14,7 @@ from django.utils.translation import gettext as _
 from django.views.decorators.http import require_POST, require_safe
 
 from arena.queries.listings import Narrowing, find_contestants
+from arena.queries.scenarios import by_type
 from arena.web.access import ADMIN, STAFF, allow_only
 from arena.web.asking import asking_of
 from arena.web.listing import read_listing, read_page, said_choices
@@ -61,6 +62,7 @@ def contestant_page(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
         "contestant": row,
         "jobs": GenerationJob.objects.filter(contestants=row),
         "studies": row.studies.all(),
+        "groups": by_type() if row.endpoint else [],
     }
     try:
         context |= {"asking": asking_of(row), "respondents": respondents_of(row)}

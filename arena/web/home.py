@@ -75,6 +75,7 @@ def _expert(request: HttpRequest) -> HttpResponse:
         "to_do": [line for line in is_open if line.left],
         "finished": [line for line in is_open if not line.left],
         "closed": closed,
+        "cancelled": [line for line in found if line.study.state == Study.State.CANCELLED],
         "labellings": faults.of_expert(expert),
         "readable": {
             line.study.pk: results_access(user=expert, study=line.study) is ResultsAccess.FULL

@@ -21,6 +21,7 @@ from arena.errors import ArenaError, LinkOver, NotYours
 from arena.models import Invitation, Study
 from arena.queries.authorships import authorships_of
 from arena.queries.invitations import expert_lines, invitation_by_token, may_be_let_in
+from arena.queries.reminders import slow_experts
 from arena.services.invitations import SESSION_KEY, FreshLink, accept, invite, revoke
 from arena.web.access import ADMIN, allow_only
 from arena.web.authorships import AuthorForm
@@ -56,9 +57,11 @@ def invitation_page(request: HttpRequest, token: str) -> HttpResponse:
 def experts_page(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
     """Every expert of a study: progress, pace, quota, last seen, link, and who is an author."""
     study = get_object_or_404(Study, code=code)
-    lines = expert_lines(study, timezone.now())
+    now = timezone.now()
+    lines = expert_lines(study, now)
     context = {
         "study": study,
+        "slow": slow_experts(study, lines, now),
         "lines": lines,
         "without_link": sum(line.may_be_invited and not line.has_live_link for line in lines),
         "authorships": authorships_of(study),

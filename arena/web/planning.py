@@ -41,7 +41,7 @@ class GoalLine:
 @require_safe
 def planning_page(request: HttpRequest) -> HttpResponse:
     """The form, its answer beside it; with a study at hand, filled in with what that one says."""
-    studies = Study.objects.exclude(state=Study.State.DRAFT)
+    studies = Study.objects.all()
     study = _study_at_hand(request)
     known, fault = Known(values={}), ""
     if study is not None:

@@ -4,17 +4,23 @@ from __future__ import annotations
 
 import json
 import uuid
+from typing import Any
+from urllib.parse import urlencode
 
 from django.http import Http404, HttpRequest, HttpResponse, HttpResponseBase
-from django.shortcuts import get_object_or_404, render
+from django.shortcuts import get_object_or_404, redirect, render
+from django.urls import reverse
 from django.views.decorators.http import require_safe
 
 from arena.web.access import STAFF, allow_only
+from arena.web.asking import asking_of
 from arena.web.pictures import picture_response
 from arena.web.sending import looks_again, send_later
 from augment.errors import AugmentError, UnknownName
-from augment.models import Scenario
+from augment.models import Contestant, Scenario
 from augment.scene_tasks import enqueue_prompts
+from augment.services.endpoints.contestant_prompts import asking_contestants, preview_contestant
+from augment.services.endpoints.respondents import respondents_of
 from augment.services.scenarios.prompts import Preview, list_choices, preview_prompt
 from augment.services.wording import translate
 
@@ -34,7 +40,11 @@ def prompts_page(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
         send_later(request, enqueue_prompts, scenario.pk)
     variant = request.GET.get("variant", "otm")
     choices = list_choices()
+    contestant = _contestant(request)
     context = {
+        "contestants": asking_contestants(),
+        "contestant": contestant,
+        **_how(contestant, request.GET.get("role", "modifier")),
         "scenario": scenario,
         "choices": choices,
         "chosen": next((one for one in choices if one.slug == variant), None),
@@ -47,6 +57,21 @@ def prompts_page(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
         "look": look,
     }
     return render(request, "scenarios/prompts.html", context)
+
+
+@allow_only(*STAFF)
+@require_safe
+def contestant_prompts(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
+    """To what a contestant would send for the scenario that was chosen, else the first one."""
+    contestant = get_object_or_404(Contestant, code=code)
+    rows = Scenario.objects.order_by("type", "slug")
+    if slug := request.GET.get("scenario"):
+        rows = rows.filter(slug=slug)
+    scenario = rows.only("code").first()
+    if scenario is None:
+        raise Http404
+    address = reverse("prompts", args=[scenario.code])
+    return redirect(f"{address}?{urlencode({'contestant': contestant.slug})}")
 
 
 @allow_only(*STAFF)
@@ -85,7 +110,34 @@ def _scenario(code: uuid.UUID) -> Scenario:
     return get_object_or_404(rows, code=code)
 
 
+def _contestant(request: HttpRequest) -> Contestant | None:
+    """The one that the address names by its slug, None where it names none.
+
+    Raises:
+        Http404: There is none of that name.
+    """
+    slug = request.GET.get("contestant")
+    if not slug:
+        return None
+    return get_object_or_404(Contestant.objects.select_related("endpoint"), slug=slug)
+
+
+def _how(contestant: Contestant | None, role: str) -> dict[str, Any]:
+    """What goes with the messages of a contestant: its options, and who is asked."""
+    if contestant is None:
+        return {}
+    try:
+        respondents = {one.value: who for one, who in respondents_of(contestant).items()}
+        return {"asking": asking_of(contestant), "respondent": respondents.get(role)}
+    except AugmentError:  # said above the messages, of which there are none
+        return {}
+
+
 def _preview(request: HttpRequest, scenario: Scenario) -> Preview:
+    contestant = _contestant(request)
+    if contestant is not None:
+        role = request.GET.get("role", "modifier")
+        return preview_contestant(scenario, contestant, role=role)
     return preview_prompt(
         scenario,
         variant=request.GET.get("variant", "otm"),

@@ -6,12 +6,16 @@ from dataclasses import dataclass, field
 
 from django.http import HttpRequest, HttpResponse
 from django.shortcuts import render
+from django.utils.text import slugify
 
 SURE = "sure"
 """What the page's own button sends; without it nothing is done."""
 
 CHANGE = "change"
 """What the other button sends, where there is a form to go back to."""
+
+TYPED, WHY = "typed", "why"
+"""What the question's own fields send: a name as it was typed, and a reason."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -24,6 +28,8 @@ class Confirmation:
         button: What the act is called.
         back: Where "no" leads.
         is_final: Whether something ends by it, rather than begins.
+        phrase: What has to be typed before it is done; empty where a second click will do.
+        asks_why: Whether a reason may be given.
         crumbs: The way here: names and addresses.
     """
 
@@ -32,12 +38,20 @@ class Confirmation:
     button: str
     back: str
     is_final: bool = True
+    phrase: str = ""
+    asks_why: bool = False
     crumbs: tuple[tuple[str, str], ...] = field(default=())
 
 
 def is_sure(request: HttpRequest) -> bool:
     """Whether this is the answer "yes" of the page below."""
     return request.method == "POST" and SURE in request.POST
+
+
+def is_typed(request: HttpRequest, name: str) -> bool:
+    """Whether the answer is "yes" and the name was typed, as it stands or as a slug."""
+    given = " ".join(request.POST.get(TYPED, "").split()).casefold()
+    return is_sure(request) and given in {" ".join(name.split()).casefold(), slugify(name)} - {""}
 
 
 def wants_to_change(request: HttpRequest) -> bool:
@@ -47,12 +61,21 @@ def wants_to_change(request: HttpRequest) -> bool:
 
 def ask(request: HttpRequest, question: Confirmation) -> HttpResponse:
     """The page that asks; it sends along what came in by a form, and works without a script."""
-    ours = {"csrfmiddlewaretoken", SURE, CHANGE}
+    ours = {"csrfmiddlewaretoken", SURE, CHANGE, TYPED, WHY}
     given = [
         (name, value)
         for name, values in request.POST.lists()
         if name not in ours
         for value in values
     ]
-    context = {"question": question, "given": given, "sure": SURE, "change": CHANGE}
-    return render(request, "ask.html", context)
+    is_mistyped = bool(question.phrase) and is_sure(request)
+    context = {
+        "question": question,
+        "given": given,
+        "sure": SURE,
+        "change": CHANGE,
+        "typed": request.POST.get(TYPED, ""),
+        "why": request.POST.get(WHY, ""),
+        "is_mistyped": is_mistyped,
+    }
+    return render(request, "ask.html", context, status=422 if is_mistyped else 200)

@@ -37,6 +37,7 @@ from arena.web.rating_form import RatingForm
 from arena.web.results_adjustment import show_adjustment
 from arena.web.results_authors import both_versions
 from arena.web.results_tabs import TABS, Tab
+from arena.web.study_files import export_place
 from augment.errors import AugmentError
 from augment.services.wording import translate
 
@@ -74,6 +75,8 @@ def results_page(request: HttpRequest, code: uuid.UUID, tab: str = "table") -> H
     }
     if is_staff:
         context["form"] = RatingForm(snapshot=snapshot)
+        # Votes from a file have no page of a study, where the files are otherwise.
+        context["export"] = export_place(study, user) if is_imported(study) else None
     if snapshot is not None:
         table = leaderboard_table(snapshot)
         if is_staff:

@@ -2,30 +2,27 @@
 
 from __future__ import annotations
 
-import tempfile
 import uuid
-from pathlib import Path
 
 from django.contrib import messages
-from django.http import FileResponse, Http404, HttpRequest, HttpResponse, HttpResponseBase
-from django.shortcuts import redirect
+from django.http import Http404, HttpRequest, HttpResponse
+from django.shortcuts import get_object_or_404, redirect
 from django.utils.text import slugify
 from django.views.decorators.http import require_safe
 
-from arena.errors import ArenaError, NoSnapshot
+from arena.errors import NoSnapshot
 from arena.exports.bundle import bundle
 from arena.exports.formats import format_named
 from arena.exports.rating_charts import CONTENT_TYPES, chart_bytes
-from arena.exports.study_folder.writing import write_study
 from arena.exports.tables import leaderboard_table
-from arena.exports.votes import VOTE_FORMATS, vote_table
+from arena.exports.votes import VOTE_FORMATS, unrated_votes, vote_table
 from arena.exports.writers import FORMATS
-from arena.exports.zips import CONTENT_TYPE, ZIP, zip_folder
+from arena.exports.zips import CONTENT_TYPE, ZIP
 from arena.models import Snapshot, Study
 from arena.queries.results import snapshot_to_export
 from arena.web.access import STAFF, allow_only
 from arena.web.results import asked_rating, get_readable_study
-from augment.errors import AugmentError, Conflict, UnknownName
+from augment.errors import Conflict, UnknownName
 from augment.services.wording import translate
 
 
@@ -66,12 +63,14 @@ def export_chart(request: HttpRequest, code: uuid.UUID, name: str, form: str) ->
 @allow_only(*STAFF)
 @require_safe
 def export_votes(request: HttpRequest, code: uuid.UUID, form: str) -> HttpResponse:
-    """The votes of a rating, with pseudonyms."""
-    study = get_readable_study(request, code)
-    snapshot = _snapshot(request, study)
+    """The votes of a rating, with pseudonyms; of a cancelled study, which has none, all votes."""
+    study = get_object_or_404(Study.objects.select_related("vote_file"), code=code)
+    is_cancelled = study.state == Study.State.CANCELLED
+    if not is_cancelled:
+        study = get_readable_study(request, code)
     try:
         chosen = format_named(VOTE_FORMATS, form)
-        rows = vote_table(snapshot)
+        rows = unrated_votes(study) if is_cancelled else vote_table(_snapshot(request, study))
     except UnknownName as error:
         raise Http404 from error
     except Conflict as error:
@@ -79,26 +78,6 @@ def export_votes(request: HttpRequest, code: uuid.UUID, form: str) -> HttpRespon
         return redirect("results", code=code)
     name = f"{_slug(study)}-votes.{chosen.suffix}"
     return _file(chosen.write(rows), chosen.content_type, name)
-
-
-@allow_only(*STAFF)
-@require_safe
-def export_study(request: HttpRequest, code: uuid.UUID) -> HttpResponseBase:
-    """The whole study, closed, as `manage.py export study` writes it, in one zip."""
-    study = get_readable_study(request, code)
-    packed = tempfile.TemporaryFile()  # noqa: SIM115 - the response closes it
-    try:
-        with tempfile.TemporaryDirectory() as beside:
-            folder = Path(beside) / "study"
-            write_study(study, folder, say=lambda said: None)
-            zip_folder(folder, packed)
-    except (ArenaError, AugmentError) as error:
-        packed.close()
-        messages.error(request, translate(error))
-        return redirect("results", code=code)
-    packed.seek(0)
-    name = f"{_slug(study)}-study.zip"
-    return FileResponse(packed, as_attachment=True, filename=name, content_type=CONTENT_TYPE)
 
 
 def _snapshot(request: HttpRequest, study: Study) -> Snapshot:

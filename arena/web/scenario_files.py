@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import uuid
-from functools import partial
 from typing import cast
 
 from django.contrib import messages
@@ -21,7 +20,8 @@ from arena.exports.zips import CONTENT_TYPE
 from arena.models import ScenarioFile
 from arena.services.scenario_files import ask_for_file, files_of
 from arena.web.access import STAFF, allow_only
-from augment.errors import AugmentError, QueueFault
+from arena.web.sending import send_later
+from augment.errors import AugmentError
 from augment.models import GenerationJob
 from augment.services.judging.scenario_export import FORMATS
 from augment.services.wording import translate
@@ -43,9 +43,11 @@ def ask(request: HttpRequest, code: uuid.UUID, form: str) -> HttpResponse:
     try:
         with transaction.atomic():
             row = ask_for_file(job=job, file_format=form, actor=cast(User, request.user))
-            transaction.on_commit(partial(_send, request, row.pk))
+            send_later(request, tasks.send_scenario_file, row.pk)
     except AugmentError as error:
         messages.error(request, translate(error))
+    else:
+        messages.success(request, _("A worker writes the file; it is offered here when ready."))
     return redirect(reverse("job", args=[code]) + "#scenario-files")
 
 
@@ -59,15 +61,3 @@ def download(request: HttpRequest, code: uuid.UUID) -> FileResponse:
     except FileNotFoundError:
         raise Http404 from None
     return FileResponse(content, as_attachment=True, filename=row.name, content_type=CONTENT_TYPE)
-
-
-# --- Private -----------------------------------------------------------------------------------
-
-
-def _send(request: HttpRequest, file_pk: int) -> None:
-    try:
-        tasks.send_scenario_file(file_pk)
-    except QueueFault as error:
-        messages.error(request, translate(error))
-    else:
-        messages.success(request, _("A worker writes the file; it is offered here when ready."))

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+import json
 import uuid
+from dataclasses import replace
 from typing import Any, cast
 
 from django import forms
 from django.contrib import messages
 from django.contrib.auth.models import User
-from django.http import HttpRequest, HttpResponse
+from django.http import HttpRequest, HttpResponse, QueryDict
 from django.shortcuts import get_object_or_404, redirect, render
 from django.utils.translation import gettext as _
 from django.utils.translation import gettext_lazy
@@ -24,18 +26,29 @@ from augment.scene_tasks import enqueue_scenario, enqueue_scene
 from augment.sentences import sentence
 from augment.services.scenarios.bulk import MOST_ROWS_AT_ONCE, BulkReport
 from augment.services.scenarios.bulk_files import MOST_FILES, add_from_files
+from augment.services.scenarios.intent_fields import (
+    CHOICES,
+    FIELDS,
+    NEW_ROW,
+    REST,
+    IntentFields,
+    fields_of_intent,
+    intent_of_fields,
+)
 from augment.services.scenarios.scene_pictures import SceneView, is_drawn, scene_picture
 from augment.services.scenarios.scenes import INSTRUCTION_LENGTH, SLUG_LENGTH, add_scenario
-from augment.services.scenarios.simple_intent import CHOICES, simple_intent
 from augment.services.scenarios.types import LONGEST_LABEL, LONGEST_TYPE, type_choices
 from augment.services.wording import translate
 
 OWN = ""
 LONGEST_INTENT = 200_000
 
+REARRANGE = "fields"
+"""What the buttons send that add and remove objects, and turn fields into JSON and back."""
+
 
 class ScenarioForm(forms.Form):
-    """An instruction for a scene; what it asks for as JSON, or by fields for one kind."""
+    """An instruction for a scene; what it asks for as JSON, or object by object by fields."""
 
     slug = forms.CharField(required=False, max_length=SLUG_LENGTH)
     type = forms.ChoiceField(required=False)
@@ -45,8 +58,8 @@ class ScenarioForm(forms.Form):
     keep_traffic = forms.BooleanField(required=False)
     intent = forms.CharField(required=False, max_length=LONGEST_INTENT)
 
-    def __init__(self, data: Any = None) -> None:
-        super().__init__(data)
+    def __init__(self, data: Any = None, *, initial: dict[str, Any] | None = None) -> None:
+        super().__init__(data, initial=initial)
         field = cast(forms.ChoiceField, self.fields["type"])
         field.choices = [*type_choices(), (OWN, gettext_lazy("A type of your own"))]
 
@@ -59,12 +72,8 @@ class ScenarioForm(forms.Form):
         """
         text = self.cleaned_data["intent"].strip()
         if not text:
-            return simple_intent({name: self.data.get(f"i_{name}", "") for name in CHOICES})
-        no_json = sentence("The intent is no JSON.")
-        found = read_json(text, otherwise=no_json)
-        if not isinstance(found, dict):
-            raise Conflict(no_json)
-        return found
+            return intent_of_fields(entered_fields(cast(QueryDict, self.data)))
+        return _read_json(text)
 
 
 @allow_only(*STAFF)
@@ -72,6 +81,8 @@ class ScenarioForm(forms.Form):
 def new_scenario_page(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
     """The form beside the picture of the scene; filled in as it was where something is wrong."""
     scene = get_object_or_404(BaseScene.objects.defer("recording"), code=code)
+    if request.method == "POST" and REARRANGE in request.POST:
+        return _rearranged(request, scene)
     form = ScenarioForm(request.POST if request.method == "POST" else None)
     if request.method == "POST" and form.is_valid():
         given = form.cleaned_data
@@ -92,19 +103,8 @@ def new_scenario_page(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
             send_later(request, enqueue_scenario, made.pk)
             messages.success(request, _("“%(name)s” is added.") % {"name": made.slug})
             return redirect("scenario", code=made.code)
-    drawn = is_drawn(scene_picture(scene, SceneView.KEPT))
-    look = looks_again(request, waits=not drawn and request.method != "POST")
-    if look == 1:
-        send_later(request, enqueue_scene, scene.pk)
-    entered = {name: form.data.get(f"i_{name}", "") for name in CHOICES}
-    context = {
-        "scene": scene,
-        "form": form,
-        "is_drawn": drawn,
-        "look": look,
-        "asks": [(name, CHOICES[name], entered[name]) for name in CHOICES],
-    }
-    return render(request, "scenarios/new.html", context)
+    fields = entered_fields(request.POST) if request.method == "POST" else IntentFields()
+    return _shown(request, scene, form, fields)
 
 
 @allow_only(*STAFF)
@@ -125,7 +125,86 @@ def bulk_page(request: HttpRequest) -> HttpResponse:
     return render(request, "scenarios/bulk.html", context)
 
 
+def entered_fields(posted: QueryDict) -> IntentFields:
+    """The fields of the intent as they came in: the same name again for every further object."""
+    columns = {name: posted.getlist(f"i_{name}") for name in FIELDS}
+    number = max(map(len, columns.values()))
+    rows = tuple(
+        {name: values[n] if n < len(values) else "" for name, values in columns.items()}
+        for n in range(number)
+    )
+    return IntentFields(rows=rows or (NEW_ROW,), rest=posted.get("i_whole", ""))
+
+
 # --- Private -----------------------------------------------------------------------------------
+
+
+def _rearranged(request: HttpRequest, scene: BaseScene) -> HttpResponse:
+    """The form as it was filled in, with an object more or less, or the fields as JSON and back.
+
+    Nothing is added yet, so nothing is asked of the rest of the form.
+    """
+    fields, act = entered_fields(request.POST), request.POST[REARRANGE]
+    initial, problem = request.POST.dict(), ""
+    try:
+        if act == "add":
+            fields = replace(fields, rows=(*fields.rows, NEW_ROW))
+        elif act == "write":
+            document = intent_of_fields(fields)
+            initial["intent"] = "" if document is None else _written(document)
+            fields = IntentFields()
+        elif act == "read":
+            fields = fields_of_intent(_read_json(initial.get("intent", "")))
+            initial["intent"] = ""
+        else:
+            kept = [row for n, row in enumerate(fields.rows) if act != f"drop-{n}"]
+            fields = replace(fields, rows=tuple(kept) or (NEW_ROW,))
+    except AugmentError as error:
+        problem = translate(error)
+    return _shown(request, scene, ScenarioForm(initial=initial), fields, problem)
+
+
+def _shown(
+    request: HttpRequest,
+    scene: BaseScene,
+    form: ScenarioForm,
+    fields: IntentFields,
+    problem: str = "",
+) -> HttpResponse:
+    drawn = is_drawn(scene_picture(scene, SceneView.KEPT))
+    look = looks_again(request, waits=not drawn and request.method != "POST")
+    if look == 1:
+        send_later(request, enqueue_scene, scene.pk)
+    context = {
+        "scene": scene,
+        "form": form,
+        "is_drawn": drawn,
+        "look": look,
+        "rows": [
+            {"fields": [(name, CHOICES[name], row[name]) for name in CHOICES], "rest": row[REST]}
+            for row in fields.rows
+        ],
+        "whole_rest": fields.rest,
+        "intent_problem": problem,
+    }
+    return render(request, "scenarios/new.html", context, status=422 if problem else 200)
+
+
+def _read_json(text: str) -> dict[str, Any]:
+    """An intent as somebody wrote it.
+
+    Raises:
+        Conflict: The text is no JSON object.
+    """
+    no_json = sentence("The intent is no JSON.")
+    found = read_json(text, otherwise=no_json)
+    if not isinstance(found, dict):
+        raise Conflict(no_json)
+    return found
+
+
+def _written(document: dict[str, Any]) -> str:
+    return json.dumps(document, indent=2, ensure_ascii=False)
 
 
 def _bulk(request: HttpRequest) -> BulkReport:

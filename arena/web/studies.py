@@ -13,99 +13,51 @@ from django.utils.text import slugify
 from django.utils.translation import gettext as _
 from django.views.decorators.http import require_http_methods, require_POST, require_safe
 
-from arena import tasks
 from arena.errors import ArenaError
 from arena.models import Study
-from arena.queries import progress, scenarios
+from arena.queries import progress
 from arena.queries.coverage import coverage, reports_of
-from arena.queries.inventory import usual_checks
 from arena.queries.judged import is_imported
 from arena.queries.listings import Narrowing, find_studies
 from arena.queries.people import by_pseudonym, experts
-from arena.queries.results import latest_snapshot
+from arena.queries.study_drafts import find_drafts
 from arena.queries.votes import tallies
 from arena.services.handing_over import hand_over
 from arena.services.hypotheses import hypotheses_of
 from arena.services.looks import stopping_progress
-from arena.services.practice import has_practice
 from arena.services.preregistration import preregistration_bytes, preregistration_sha256
-from arena.services.studies import close_study, open_study, rules_of
+from arena.services.studies import cancel_study, close_study, rules_of
 from arena.web.access import ADMIN, STAFF, allow_only
 from arena.web.listing import read_listing, read_page, said_choices
-from arena.web.questions import ask, is_sure, wants_to_change
-from arena.web.study_forms import HandOverForm, StudyForm
-from arena.web.study_questions import closing, handing_over, opening
+from arena.web.questions import WHY, ask, is_sure, is_typed, wants_to_change
+from arena.web.study_files import export_place
+from arena.web.study_forms import HandOverForm
+from arena.web.study_questions import cancelling, closing, handing_over
 from augment.errors import AugmentError
-from augment.models import Contestant, GenerationJob
 from augment.services.wording import translate
 
-_PLANNED = ("votes_per_expert", "repeats", "checks", "overlap")
-"""What the planning page hands on to a new study."""
-
-
 STUDIES_AT_ONCE = 25
+
+DRAFT = "draft"
+"""What the list calls the state of a study that is still set up."""
 
 
 @allow_only(*STAFF)
 @require_safe
 def studies_page(request: HttpRequest) -> HttpResponse:
-    """Studies with their bars, page by page."""
-    listing = read_listing(request, {"state": (_("State"), said_choices(Study.State.choices))})
+    """Studies with their bars, page by page; before the first ones the drafts."""
+    states = [(DRAFT, _("Draft")), *said_choices(Study.State.choices)]
+    listing = read_listing(request, {"state": (_("State"), states)})
     wanted = Narrowing(search=listing.search, kind=listing.chosen("state"))
     page = read_page(request, find_studies(wanted), size=STUDIES_AT_ONCE)
+    shows_drafts = page.number == 1 and wanted.kind in ("", DRAFT)
     context = {
         "studies": progress.of_studies(list(page.object_list)),
+        "drafts": list(find_drafts(wanted.search)) if shows_drafts else [],
         "page": page,
         "listing": listing,
     }
     return render(request, "studies/list.html", context)
-
-
-@allow_only(ADMIN)
-@require_http_methods(["GET", "HEAD", "POST"])
-def new_study_page(request: HttpRequest) -> HttpResponse:
-    """Who competes on what, and who judges; opening plans every matchup."""
-    form = StudyForm(
-        request.POST or None,
-        contestants=list(
-            Contestant.objects.exclude(kind=Contestant.Kind.CHECK)
-            .filter(retired_at=None)
-            .select_related("endpoint")
-            .order_by("name")
-        ),
-        groups=scenarios.by_type(),
-        experts=by_pseudonym(experts()),
-        jobs=list(GenerationJob.objects.all()),
-        initial=_planned_numbers(request),
-    )
-    if request.method == "POST" and form.is_valid() and not wants_to_change(request):
-        try:
-            if not is_sure(request):
-                return ask(request, opening(form.rules()))
-            study = open_study(**form.rules(), actor=cast(User, request.user))
-        except (ArenaError, AugmentError) as error:
-            form.add_error(None, translate(error))
-        else:
-            messages.success(
-                request, _("“%(name)s” is open; its experts can vote now.") % {"name": study.name}
-            )
-            return redirect("study", code=study.code)
-    return render(request, "studies/new.html", {"form": form}, status=422 if form.errors else 200)
-
-
-@allow_only(ADMIN)
-@require_POST
-def draw_checks(request: HttpRequest) -> HttpResponse:
-    """Have workers draw the attention checks that are missing; twice does no harm."""
-    try:
-        tasks.send_checks(cast(User, request.user).pk)
-    except AugmentError as error:
-        messages.error(request, translate(error))
-    else:
-        messages.success(
-            request, _("Attention checks are being drawn. Reload this page in a moment.")
-        )
-    return redirect("study-new")
 
 
 @allow_only(*STAFF)
@@ -117,10 +69,10 @@ def study_page(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
         return redirect("results", code=code)
     context = {
         "line": progress.of_study(study),
+        "export": export_place(study, cast(User, request.user)),
         "tallies": tallies(study),
         "contestants": list(study.contestants.all()),
         "scenario_count": study.scenarios.count(),
-        "snapshot": latest_snapshot(study),
         "rules": _shown_rules(study),
         "coverage": coverage(study),
         "reports": list(reports_of(study)),
@@ -195,22 +147,26 @@ def close(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
     return redirect("study", code=code)
 
 
-def _planned_numbers(request: HttpRequest) -> dict[str, Any]:
-    """What the address says of a study that somebody planned, or of one to be like it."""
-    initial: dict[str, Any] = {"checks": usual_checks(), "practice": has_practice()}
-    initial |= {name: request.GET[name] for name in _PLANNED if request.GET.get(name)}
-    code = request.GET.get("study")
-    if not code:
-        return initial
+@allow_only(ADMIN)
+@require_http_methods(["GET", "HEAD", "POST"])
+def cancel(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
+    """Give the study up, without results; its name has to be typed."""
+    study = get_object_or_404(Study, code=code)
+    if not is_typed(request, study.name):
+        if study.state != Study.State.OPEN:
+            return redirect("study", code=code)
+        return ask(request, cancelling(study))
     try:
-        study = get_object_or_404(Study, code=uuid.UUID(code))
-    except ValueError:
-        raise Http404 from None
-    return initial | {
-        "contestants": list(study.contestants.values_list("slug", flat=True)),
-        "scenarios": list(study.scenarios.values_list("slug", flat=True)),
-        "experts": list(study.experts.values_list("username", flat=True)),
-    }
+        why = request.POST.get(WHY, "")
+        cancel_study(study=study, why=why, actor=cast(User, request.user))
+    except (ArenaError, AugmentError) as error:
+        messages.error(request, translate(error))
+    else:
+        messages.success(request, _("Cancelled. Its votes stay."))
+    return redirect("study", code=code)
+
+
+# --- Private -----------------------------------------------------------------------------------
 
 
 def _shown_rules(study: Study) -> dict[str, Any] | None:

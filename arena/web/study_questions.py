@@ -10,15 +10,19 @@ from django.db import transaction
 from django.urls import reverse
 from django.utils.translation import gettext as _
 
-from arena.models import Study
+from arena.models import Study, StudyDraft
 from arena.queries.votes import tallies
 from arena.services.handing_over import hand_over
 from arena.services.previews import preview_study
 from arena.web.questions import Confirmation
 
 
-def opening(rules: dict[str, Any]) -> Confirmation:
+def opening(rules: dict[str, Any], draft: StudyDraft | None = None) -> Confirmation:
     """What the study would be.
+
+    Args:
+        rules: As `open_study` takes them.
+        draft: What they were set up in, if anything.
 
     Raises:
         ArenaError, AugmentError: It can't be opened.
@@ -46,13 +50,56 @@ def opening(rules: dict[str, Any]) -> Confirmation:
     if rules["allow_simulated"]:
         facts.append(_("What is simulated may take part; every page and file then says so."))
     facts.append(_("Experts can vote at once. The rules can’t be changed afterwards."))
+    page = (_("New study"), reverse("study-new"))
+    if draft is not None:
+        page = (_("Draft"), reverse("study-draft", args=[draft.code]))
     return Confirmation(
         title=_("Open the study “%(name)s”?") % {"name": rules["name"]},
         facts=tuple(facts),
         button=_("Open the study"),
-        back=reverse("study-new"),
+        back=page[1],
         is_final=False,
-        crumbs=((_("Studies"), reverse("studies")), (_("New study"), reverse("study-new"))),
+        crumbs=((_("Studies"), reverse("studies")), page),
+    )
+
+
+def cancelling(study: Study) -> Confirmation:
+    """What ends, what stays, and how it differs from closing; its name has to be typed."""
+    lines = tallies(study)
+    facts = [
+        _("No more votes are taken, and the study is never rated: it has no results.")
+        + " "
+        + _("This can’t be taken back."),
+        _("Votes that stay and can be exported as votes: %(given)s.")
+        % {"given": sum(line.voted for line in lines)},
+        _("Experts read that it was cancelled and that nothing is left to do."),
+        _("To end it with results, close it instead. Its settings can be used again for another."),
+    ]
+    if study.snapshots.exists():
+        facts.insert(1, _("Ratings that were made early are shown to nobody any more."))
+    return Confirmation(
+        title=_("Cancel the study “%(name)s”?") % {"name": study.name},
+        facts=tuple(facts),
+        button=_("Cancel the study"),
+        back=reverse("study", args=[study.code]),
+        phrase=study.name,
+        asks_why=True,
+        crumbs=_crumbs(study),
+    )
+
+
+def discarding(draft: StudyDraft) -> Confirmation:
+    """Nothing but the draft goes."""
+    name = draft.name or _("Study without a name")
+    return Confirmation(
+        title=_("Discard the draft “%(name)s”?") % {"name": name},
+        facts=(_("What was entered is gone then. No expert has seen anything of it."),),
+        button=_("Discard the draft"),
+        back=reverse("study-draft", args=[draft.code]),
+        crumbs=(
+            (_("Studies"), reverse("studies")),
+            (name, reverse("study-draft", args=[draft.code])),
+        ),
     )
 
 
@@ -69,7 +116,7 @@ def closing(study: Study) -> Confirmation:
         _("Planned votes that will be missing: %(n)s. Experts who are not done: %(experts)s.")
         % {"n": missing, "experts": unfinished},
         _("No more votes are taken. This can’t be taken back."),
-        _("Its results can be read then, also by its experts."),
+        _("Its results can be read then, also by its experts. To end it without any, cancel it."),
     )
     return Confirmation(
         title=_("Close the study “%(name)s”?") % {"name": study.name},

@@ -160,15 +160,13 @@ def _study_of(request: HttpRequest, code: uuid.UUID) -> Study:
         study = voting_study(expert=cast(User, request.user), code=code)
     except NotYours as error:
         raise Http404 from error
-    if study.state == Study.State.DRAFT:
-        raise Http404
     return study
 
 
 def _show(request: HttpRequest, study: Study, status: int = 200) -> HttpResponse:
     """A pair, or why there is none."""
     expert = cast(User, request.user)
-    if study.state == Study.State.CLOSED:
+    if study.state != Study.State.OPEN:
         return render(request, "vote/closed.html", over_context(study, expert))
     context = vote_context(study, expert, change=request.GET.get("change", ""))
     if context is None:

@@ -19,7 +19,7 @@ MARKED = (
     *(gettext_noop("expert of this study"), gettext_noop("scenario type"), gettext_noop("method")),
     *(gettext_noop("resampling unit"), gettext_noop("variant"), gettext_noop("study")),
     *(gettext_noop("job"), gettext_noop("labelling"), gettext_noop("name")),
-    *(gettext_noop("draft"), gettext_noop("open"), gettext_noop("closed")),
+    *(gettext_noop("open"), gettext_noop("closed")),
     *(gettext_noop("running"), gettext_noop("finished"), gettext_noop("cancelled")),
     *(gettext_noop("stopped at cap"), gettext_noop("paused"), gettext_noop("endpoint")),
 )

@@ -24,7 +24,7 @@ from augment.scene.codec import modification_to_document, scene_to_document
 from augment.scene.intent import Intent
 from augment.scene.intent_codec import intent_from_document
 from augment.scene.modification import Modification
-from augment.services.scenarios.simple_intent import simple_intent
+from augment.services.scenarios.intent_fields import NEW_ROW, IntentFields, intent_of_fields
 from tests.browser.booth import DESK, ready
 from tests.browser.chromium import PATIENCE_MS, chromium
 from tests.browser.job_round import CONTESTANTS, SCENARIOS, run_round
@@ -52,7 +52,7 @@ def wish(ahead_m: int) -> str:
 def asked(ahead_m: int) -> dict[str, Any]:
     """What the wish asks for, as the fields of the form say it."""
     fields = {"kind": "vehicles", "distance_m": str(ahead_m), "lane": "own", "body": "car"}
-    found = simple_intent(fields)
+    found = intent_of_fields(IntentFields(rows=(NEW_ROW | fields,)))
     assert found is not None
     return found
 

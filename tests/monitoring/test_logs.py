@@ -118,6 +118,6 @@ def test_drawing_and_driving_wait_in_a_queue_of_their_own() -> None:
     assert queue_of("augment.run_augmentation") == "models"
     for task in (
         *("augment.draw_marks", "augment.run_simulation"),
-        *("arena.compute_snapshot", "arena.write_scenario_file"),
+        *("arena.compute_snapshot", "arena.write_scenario_file", "arena.write_study_file"),
     ):
         assert queue_of(task) == "drawing"

@@ -7,6 +7,7 @@ import uuid
 from pathlib import Path
 
 import pytest
+from django.core.files.base import ContentFile
 from django.core.files.storage import default_storage
 from django.core.management import CommandError, call_command
 from django.db import connection
@@ -14,8 +15,9 @@ from django.db.migrations.recorder import MigrationRecorder
 
 from arena.management.backups.taking import take_backup
 from arena.models import Vote
-from arena.services.scenario_files import ask_for_file, keep_file
+from arena.services.scenario_files import ask_for_file
 from arena.services.stored_rows import applied_migrations, find_tables, frozen_rows, label_of
+from arena.services.written_files import keep_file
 from augment.models import Event, GenerationJob
 from augment.services.judging.scenario_export import FORMATS
 from augment.services.scenarios.pictures import store
@@ -95,7 +97,7 @@ def test_a_database_of_an_earlier_release_is_left_as_it_is(tmp_path: Path) -> No
 def test_zips_and_thumbnails_that_can_be_made_again_stay_out(tmp_path: Path) -> None:
     job = GenerationJob.objects.create(name="a job")
     row = ask_for_file(job=job, file_format=next(iter(FORMATS)))
-    keep_file(row, name="a.zip", content=b"zip", warnings=(), marked=False)
+    keep_file(row, name="a.zip", content=ContentFile(b"zip"))
     picture = store(png())
     thumbnail_of(picture, WIDTHS_PX[0])
     take_backup(tmp_path / "b.zip", now=NOW, say=quiet)

@@ -95,8 +95,8 @@ def test_only_who_takes_part_can_be_invited(study: Study) -> None:
         invite(study=study, expert=machine)
 
 
-def test_nobody_is_invited_to_a_draft(study: Study, eva: User) -> None:
-    Study.objects.update(state=Study.State.DRAFT)
+def test_nobody_is_invited_to_a_cancelled_study(study: Study, eva: User) -> None:
+    Study.objects.update(state=Study.State.CANCELLED)
     study.refresh_from_db()
     with pytest.raises(Conflict):
         invite(study=study, expert=eva)

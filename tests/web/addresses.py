@@ -9,6 +9,7 @@ from django.urls import reverse
 from arena.services.authorships import mark_author
 from arena.services.invitations import invite
 from arena.services.reports import Complaint, report
+from arena.services.study_drafts import keep_draft
 from augment.models import Endpoint, EndpointModel, SceneUpload, Simulation, UploadMoment
 from tests.web.cast import World
 
@@ -32,6 +33,7 @@ def address(name: str, here: World) -> str:
         "webhook-repeat": {"code": STRANGER},
         "job": {"code": here.job.code},
         "contestant": {"code": here.augmentation.contestant.code},
+        "contestant-prompts": {"code": here.augmentation.contestant.code},
         "contestant-retired": {"code": here.augmentation.contestant.code},
         "job-progress": {"code": here.job.code},
         "job-retry": {"code": here.job.code},
@@ -72,7 +74,8 @@ def address(name: str, here: World) -> str:
         "picture": {"kind": "augmentation", "code": shown.left.code},
         "audit-export": {"form": "csv"},
         "results-export": {"code": here.study.code, "form": "csv"},
-        "study-export": {"code": here.study.code},
+        "study-file": {"code": here.study.code, "kind": "interplan"},
+        "study-write": {"code": here.study.code, "kind": "interplan"},
         "results-chart": {"code": here.study.code, "name": "pairs", "form": "svg"},
         "results-votes-export": {"code": here.study.code, "form": "csv"},
         "results-vote": {"code": here.study.code, "vote": STRANGER},
@@ -103,6 +106,8 @@ def address(name: str, here: World) -> str:
         upload, _ = SceneUpload.objects.get_or_create(name="log.zip", size_bytes=1, state="failed")
         moment, _ = UploadMoment.objects.get_or_create(upload=upload)
         arguments[name] = {"code": moment.code if name == "moment-keep" else upload.code}
+    if name.startswith("study-draft"):
+        arguments[name] = {"code": keep_draft(entered={"name": "Round 2"}).code}
     if name == "revoke":
         made = invite(study=here.study, expert=here.expert)
         arguments["revoke"] = {"code": made.invitation.code}
@@ -110,7 +115,8 @@ def address(name: str, here: World) -> str:
         marked = mark_author(study=here.study, expert=here.expert, contestant="ann")
         arguments["author-back"] = {"code": marked.code}
     own = (
-        *("study", "preregistration", "experts", "invite", "author", "study-close"),
+        *("study", "preregistration", "experts", "invite", "remind", "author", "study-close"),
+        *("study-cancel", "study-again"),
         *("study-hand-over", "study-rate", "enrolment", "enrolment-voters", "enrolment-drop"),
     )
     results = (

@@ -40,6 +40,7 @@ PAGES: dict[str, tuple[int, int, int]] = {
     "contestants": (200, 200, 403),
     "contestant-new": (200, 403, 403),
     "contestant": (200, 200, 403),
+    "contestant-prompts": (302, 302, 403),
     "endpoints": (200, 200, 403),
     "endpoint-new": (200, 403, 403),
     "endpoint": (200, 200, 403),
@@ -71,6 +72,7 @@ PAGES: dict[str, tuple[int, int, int]] = {
     "study-plan": (200, 200, 403),
     "import-votes": (200, 403, 403),
     "study-new": (200, 403, 403),
+    "study-draft": (200, 403, 403),
     "study": (200, 200, 403),
     "preregistration": (200, 200, 403),
     "experts": (200, 403, 403),
@@ -88,7 +90,7 @@ PAGES: dict[str, tuple[int, int, int]] = {
     "shown-picture": (403, 403, 403),
     "results-votes-export": (403, 403, 403),
     "results-export": (403, 403, 403),
-    "study-export": (403, 403, 403),
+    "study-file": (404, 404, 403),  # nothing was written yet
     "results-chart": (403, 403, 403),
     "vote": (403, 403, 404),
     "report": (200, 403, 403),
@@ -116,7 +118,9 @@ ACTIONS: dict[str, tuple[int, int, int]] = {
     "moment-keep": (302, 302, 403),
     "job-simulate": (302, 403, 403),
     "scenarios-write": (302, 302, 403),
+    "study-write": (302, 302, 403),
     "invite": (200, 403, 403),
+    "remind": (302, 403, 403),  # nobody is slow yet
     "person-link": (200, 403, 403),
     "person-change": (302, 403, 403),
     "api-token-revoke": (404, 404, 404),  # somebody else's
@@ -134,6 +138,9 @@ ACTIONS: dict[str, tuple[int, int, int]] = {
     "results-open": (302, 302, 403),
     "checks-draw": (302, 403, 403),
     "study-close": (200, 403, 403),
+    "study-cancel": (200, 403, 403),
+    "study-again": (302, 403, 403),
+    "study-draft-discard": (200, 403, 403),
     "study-hand-over": (302, 403, 403),
     "labelling-close": (404, 403, 403),
     "enrolment-drop": (404, 403, 403),
@@ -170,7 +177,10 @@ def test_every_action_is_for_the_roles_of_the_table() -> None:
         assert found == expected, name
 
 
-ASKS_FIRST = {"study-close": 200, "job-cancel": 200, "labelling-close": 404}
+ASKS_FIRST = {
+    **{"study-close": 200, "study-cancel": 200, "study-draft-discard": 200, "job-cancel": 200},
+    "labelling-close": 404,
+}
 """What a GET of them answers: a question, which changes nothing; here nobody labels."""
 
 

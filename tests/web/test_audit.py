@@ -121,7 +121,7 @@ def _endless() -> Iterator[Event]:
 
 GIVES_RESULTS = re.compile(
     r"\b(leaderboard_table|bundle|chart_bytes|vote_table|vote_list_csv|snapshot_to_export"
-    r"|write_study|plan_snapshot|answer_hypotheses|known_of)\("
+    r"|write_study|ask_for_study_file|unrated_votes|plan_snapshot|answer_hypotheses|known_of)\("
     r"|services\.ratings import .*\brate\b"
 )
 DOORS = {
@@ -137,6 +137,7 @@ DOORS = {
     "arena/web/results_files.py": "behind the gate",
     "arena/web/results_galleries.py": "behind the gate",
     "arena/web/results_votes.py": "behind the gate",
+    "arena/web/study_files.py": "asks results_access; what shows results needs it in full",
 }
 """Every module of pages, API, admin and commands that makes something of results, and why nobody
 sees those of an open study through it without an early look."""

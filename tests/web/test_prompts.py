@@ -94,3 +94,73 @@ def test_what_no_variant_sends_is_said(
     here = add_scenario("street")
     page = analyst.get(reverse("prompts", args=[here.code]), asked).content.decode()
     assert problem in html.unescape(page)
+
+
+@pytest.mark.parametrize(
+    ("variant", "options"),
+    [
+        ("otm", {"radius_m": 20.0}),
+        ("fc", {"radius_m": 20.0, "protocol": "native"}),
+        ("fc", {"protocol": "prompt"}),
+        ("tqa", {"radius_m": 30.0, "rounds": 2}),
+    ],
+)
+def test_a_contestant_s_prompts_are_what_its_options_then_send(
+    analyst: Client, server: Scripted, variant: str, options: dict[str, object]
+) -> None:
+    add(server, "other", "otm", temperature=0.5)
+    here = run("other")[0].scenario
+    asker, asked_before = add(server, "asked", variant, **options), len(server.bodies)
+    before = previewed(analyst, here, contestant="asked")
+    run("asked")
+    sent = server.bodies[asked_before]
+    for found in (before, previewed(analyst, here, contestant="asked")):
+        assert found["messages"] == sent["messages"]
+        assert found.get("tools") == sent.get("tools")
+    page = analyst.get(reverse("prompts", args=[here.code]), {"contestant": "asked"})
+    shown = html.unescape(page.content.decode())
+    assert f"variant {asker.variant}, with its own options." in shown
+    assert "It would go to" in shown
+    if "radius_m" in options:
+        assert f"{options['radius_m']:g} m" in shown
+        assert found["messages"] != previewed(analyst, here, variant=variant)["messages"]
+
+
+def test_a_viewer_is_shown_the_picture_of_the_contestant_s_width(
+    analyst: Client, server: Scripted
+) -> None:
+    add(server, "asked", "vqa", picture_px=600)
+    here = add_scenario("street")
+    asked = {"contestant": "asked", "role": "viewer"}
+    url = reverse("prompts", args=[here.code])
+    assert "A worker is drawing it." in analyst.get(url, asked).content.decode()
+    analyst.get(url, asked)
+    answer = analyst.get(reverse("prompt-image", args=[here.code, 0]), asked)
+    png = b"".join(answer)
+    assert int.from_bytes(png[16:20]) == 600
+
+
+def test_a_contestant_s_page_leads_to_its_prompts(analyst: Client, server: Scripted) -> None:
+    asker = add(server, "asked", "otm")
+    here = add_scenario("street")
+    page = analyst.get(reverse("contestant", args=[asker.code])).content.decode()
+    way = reverse("contestant-prompts", args=[asker.code])
+    assert way in page
+    answer = analyst.get(way, {"scenario": here.slug})
+    assert answer.headers["Location"] == (
+        f"{reverse('prompts', args=[here.code])}?contestant=asked"
+    )
+    assert analyst.get(way, {"scenario": "nowhere"}).status_code == 404
+
+
+def test_a_contestant_that_asks_with_other_prompts_says_so(
+    analyst: Client, server: Scripted
+) -> None:
+    asker = add(server, "asked", "otm")
+    asker.frozen_options = {"radius_m": 50.0, "prompt_version": "0123456789ab"}
+    asker.save()
+    here = add_scenario("street")
+    page = analyst.get(reverse("prompts", args=[here.code]), {"contestant": "asked"})
+    assert "asks with prompts of version 0123456789ab" in html.unescape(page.content.decode())
+    missing = analyst.get(reverse("prompts", args=[here.code]), {"contestant": "nobody"})
+    assert missing.status_code == 404

@@ -47,13 +47,13 @@ def write_study(study: Study, out: Path, *, say: Callable[[str], None]) -> None:
     """Write the folder.
 
     Args:
-        study: Any that is not open.
+        study: A closed one.
         out: A folder that is not there yet.
         say: Told what was written.
 
     Raises:
-        ArenaError: The study is open, a job of it still runs, a picture of it is missing, or the
-            folder is there.
+        ArenaError: The study is not closed, a job of it still runs, a picture of it is missing, or
+            the folder is there.
         Conflict: The votes of a rating are not what they were.
         OSError: It can't be written; nothing is left of it.
     """
@@ -61,6 +61,8 @@ def write_study(study: Study, out: Path, *, say: Callable[[str], None]) -> None:
         raise ArenaError(f"{out} is there already; an export overwrites nothing.")
     if study.state == Study.State.OPEN:
         raise ArenaError(f"The study {study.name!r} is open; close it before it is exported.")
+    if study.state == Study.State.CANCELLED:
+        raise ArenaError(f"The study {study.name!r} was cancelled; export its votes instead.")
     out.parent.mkdir(parents=True, exist_ok=True)
     beside = Path(tempfile.mkdtemp(dir=out.parent, prefix=f".{out.name}."))
     try:

@@ -15,7 +15,6 @@ from django.db import connection
 
 from arena.errors import ArenaError
 from arena.management.backups.archive import MEDIA, ROWS, SECRET_KEY, Manifest, add_member
-from arena.services.scenario_files import FOLDER as SCENARIO_FILES
 from arena.services.stored_rows import (
     applied_migrations,
     find_tables,
@@ -23,6 +22,7 @@ from arena.services.stored_rows import (
     label_of,
     read_rows,
 )
+from arena.services.written_files import FOLDERS
 from arena.serving.readiness import find_unapplied_migrations
 from augment.services.scenarios.thumbnails import FOLDER as THUMBNAILS
 
@@ -62,7 +62,7 @@ def find_media(folder: str = "") -> Iterator[str]:
         if not name.startswith("."):  # half a file of a worker that was killed
             yield f"{folder}{name}"
     for name in sorted(folders):
-        if f"{folder}{name}" not in (SCENARIO_FILES, THUMBNAILS):
+        if f"{folder}{name}" not in (*FOLDERS, THUMBNAILS):
             yield from find_media(f"{folder}{name}/")
 
 

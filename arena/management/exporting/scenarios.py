@@ -77,7 +77,7 @@ def write_scenarios(options: Chosen, say: Say) -> ExportedFile:
         strict=options["strict"],
     )
     _tell(exported, say)
-    slug = slugify(exported.job.name) or str(exported.job.code)
+    slug = slugify(exported.origin.name) or exported.origin.code
     return ExportedFile(scenario_zip(exported), ZIP, False, name=zip_name(exported, slug))
 
 

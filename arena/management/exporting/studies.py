@@ -11,7 +11,7 @@ from arena.exports.contact_sheet import contact_sheet, sheet_pdf
 from arena.exports.formats import format_named
 from arena.exports.rating_charts import CONTENT_TYPES, chart_bytes
 from arena.exports.tables import leaderboard_table
-from arena.exports.votes import VOTE_FORMATS, vote_table
+from arena.exports.votes import VOTE_FORMATS, unrated_votes, vote_table
 from arena.exports.writers import FORMATS
 from arena.exports.zips import ZIP
 from arena.management.exporting.kinds import (
@@ -75,8 +75,11 @@ def write_leaderboard(options: Chosen, say: Say) -> ExportedFile:
 
 
 def write_votes(options: Chosen, say: Say) -> ExportedFile:
-    """The votes that the rating counted."""
+    """The votes that the rating counted; of a cancelled study all that were given."""
     chosen = format_named(VOTE_FORMATS, options["format"])
+    study = study_named(options["study"])
+    if study.state == Study.State.CANCELLED:
+        return fill(chosen, unrated_votes(study))
     return fill(chosen, vote_table(_snapshot(options)))
 
 

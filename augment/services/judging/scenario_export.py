@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -46,14 +46,23 @@ class Source:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class ExportOrigin:
+    """What scenarios were taken from: its kind ("job", "study"), name and code."""
+
+    kind: str
+    name: str
+    code: str
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Exported:
-    """The files of a job's scenarios and what is to be said with them.
+    """The files of scenarios and what is to be said with them.
 
     Attributes:
         missing: Scenarios without a modification, which have no file.
     """
 
-    job: GenerationJob
+    origin: ExportOrigin
     format: str
     written: Written
     missing: tuple[Loss, ...]
@@ -96,34 +105,69 @@ def export_job(
         UnknownName: No such format or contestant, or nothing was driven by that planner.
         Conflict: Nothing is there to write, or `strict` and something would change.
     """
-    writer = writer_named(file_format)
+    writer_named(file_format)  # what nobody can write is refused before anything is read
     rows = _rows(job, contestant)
     drives = {} if motion == RECORDED else _drives(job, motion)
+    origin = ExportOrigin(kind="job", name=job.name, code=str(job.code))
+    driven_by = None if motion == RECORDED else motion
+    return export_rows(
+        *(rows, origin, file_format),
+        many=job.samples > 1, drives=drives, driven_by=driven_by, strict=strict,
+    )  # fmt: skip
+
+
+def export_rows(
+    rows: Sequence[Augmentation],
+    origin: ExportOrigin,
+    file_format: str,
+    *,
+    many: bool = False,
+    drives: Mapping[int, Simulation] | None = None,
+    driven_by: str | None = None,
+    strict: bool = False,
+) -> Exported:
+    """Augmentations as scenarios of that format.
+
+    Args:
+        rows: In their order, with scenario, its scene, and contestant.
+        origin: What they were taken from.
+        file_format: One of `FORMATS`.
+        many: Whether cells have several samples, which the names then say.
+        drives: By the key of an augmentation the drive that says what everybody does.
+        driven_by: The planner of the drives; None where what was recorded is written.
+        strict: Whether nothing is written once a scenario would not be the same there.
+
+    Raises:
+        UnknownName: No such format.
+        Conflict: Nothing is there to write, or `strict` and something would change.
+    """
+    writer, found = writer_named(file_format), drives or {}
     cells, missing, extra = [], [], []
     scenes: dict[str, BaseScene] = {}
     for row in rows:
         cell_name = f"{row.scenario.slug} by {row.contestant.slug}"
-        if job.samples > 1:
+        if many:
             cell_name += f", sample {row.sample}"
         if row.modification is None:
             text = f"there is no modification: {row.state}"
             missing.append(Loss(cell=cell_name, text=text, changes_scene=True))
             continue
-        cell = _cell(cell_name, row, many=job.samples > 1)
-        if motion != RECORDED and row.pk in drives:
-            cell = replace(cell, drive=_motion(cell, trace_document(drives[row.pk])))
-        elif motion != RECORDED:
-            extra.append(Loss(cell=cell_name, text=f"{motion} has not driven it; not as driven"))
+        cell = _cell(cell_name, row, many=many)
+        if row.pk in found:
+            cell = replace(cell, drive=_motion(cell, trace_document(found[row.pk])))
+        elif driven_by is not None:
+            text = f"{driven_by} has not driven it; not as driven"
+            extra.append(Loss(cell=cell_name, text=text))
         cells.append(cell)
         scenes[row.scenario.base_scene.slug] = row.scenario.base_scene
     if not cells:
-        raise Conflict(f"{job.name} has no modification that could be written.")
+        raise Conflict(f"{origin.name} has no modification that could be written.")
     written = writer(cells)
     written = replace(written, losses=(*extra, *written.losses))
     if strict:
         refuse_changes([*missing, *written.refused, *written.losses], where=file_format)
     return Exported(
-        job=job,
+        origin=origin,
         format=file_format,
         written=written,
         missing=tuple(missing),

@@ -11,12 +11,13 @@ from django.core.files.base import ContentFile
 from django.core.files.storage import default_storage
 
 from augment.errors import Conflict, UnknownName
-from augment.models import Scenario
+from augment.models import Contestant, Scenario
 from augment.prompts.texts import prompt_version
 from augment.render.camera import LOOK
 from augment.scene.modification import Modification
 from augment.services.scenarios.pictures import store
 from augment.services.scenarios.scenes import content_hash, reference_of, scene_of
+from augment.variants.options import ContestantOptions, recipe_with
 from augment.variants.recipes import RECIPES, Tools, find_recipe
 from augment.variants.showing import Shown, roles_of, shown_prompt
 from augment.variants.transcript import ModelRole
@@ -33,6 +34,7 @@ def prompt_of(
     role: ModelRole,
     native_tools: bool = False,
     images: tuple[bytes, ...] | None = None,
+    options: ContestantOptions | None = None,
 ) -> Shown:
     """The first messages to that role; reviewers judge the scenario's reference.
 
@@ -42,12 +44,13 @@ def prompt_of(
         role: Whose messages.
         native_tools: Whether the modifier calls natively.
         images: What the viewer is shown, where it is drawn already.
+        options: Of whoever asks; without them the variant's own.
 
     Raises:
         UnknownName: No such scenario or variant.
         Conflict: Nobody plays that role in the variant, or it is to call natively and has no tool.
     """
-    recipe = find_recipe(variant)
+    recipe = recipe_with(find_recipe(variant), options or ContestantOptions())
     if role not in roles_of(recipe):
         played = ", ".join(roles_of(recipe))
         raise Conflict(f"Nobody plays the {role} in {recipe.slug}; its roles: {played}.")
@@ -118,9 +121,21 @@ class Preview:
 
 
 def preview_prompt(
-    scenario: Scenario, *, variant: str, role: str, native_tools: bool = False
+    scenario: Scenario,
+    *,
+    variant: str,
+    role: str,
+    native_tools: bool = False,
+    options: ContestantOptions | None = None,
 ) -> Preview:
     """What would be sent, without asking or drawing anything.
+
+    Args:
+        scenario: Which.
+        variant: The name of a recipe.
+        role: Whose first messages.
+        native_tools: Whether the modifier calls natively.
+        options: Of whoever asks; without them the variant's own.
 
     Raises:
         UnknownName: No such variant or role.
@@ -130,8 +145,9 @@ def preview_prompt(
         raise UnknownName("role", role, [one.value for one in ModelRole])
     names: tuple[str, ...] = ()
     images: tuple[bytes, ...] | None = None
-    if role == ModelRole.VIEWER and ModelRole.VIEWER in roles_of(find_recipe(variant)):
-        names = _drawn(scenario, variant)
+    recipe = recipe_with(find_recipe(variant), options or ContestantOptions())
+    if role == ModelRole.VIEWER and ModelRole.VIEWER in roles_of(recipe):
+        names = _drawn(scenario, recipe.limits.picture_px)
         if not names:
             return Preview(shown=None)
         images = tuple(_bytes(name) for name in names)
@@ -141,6 +157,7 @@ def preview_prompt(
         role=ModelRole(role),
         native_tools=native_tools,
         images=images,
+        options=options,
     )
     return Preview(shown=shown, images=names, version=prompt_version())
 
@@ -148,25 +165,35 @@ def preview_prompt(
 def draw_prompts(scenario_pk: int) -> None:
     """What a worker does: the pictures that viewers are shown of a scenario's reference.
 
+    One of each width that a variant or a contestant asks for.
+
     Raises:
         InvalidDocument: The stored scene or reference can't be read.
     """
     row = Scenario.objects.select_related("base_scene").get(pk=scenario_pk)
-    for recipe in RECIPES.values():
-        if ModelRole.VIEWER not in roles_of(recipe) or _drawn(row, recipe.slug):
+    for width_px in _widths():
+        if _drawn(row, width_px):
             continue
-        found = pictures(
-            scene_of(row), reference_of(row) or Modification(), width_px=recipe.limits.picture_px
-        )
+        found = pictures(scene_of(row), reference_of(row) or Modification(), width_px=width_px)
         names = [store(png, folder=FOLDER) for png in found]
         listed = ContentFile(json.dumps(names).encode())
-        default_storage.save(_list_name(row, recipe.slug), listed)
+        default_storage.save(_list_name(row, width_px), listed)
 
 
 # --- Private -----------------------------------------------------------------------------------
 
 
-def _list_name(scenario: Scenario, variant: str) -> str:
+def _widths() -> list[int]:
+    """The widths of pictures that somebody is shown, the narrowest first."""
+    seeing = [one for one in RECIPES.values() if ModelRole.VIEWER in roles_of(one)]
+    found = {recipe.limits.picture_px for recipe in seeing}
+    rows = Contestant.objects.exclude(endpoint=None).values_list("options", "frozen_options")
+    for documents in rows:
+        found |= {one["picture_px"] for one in documents if one and one.get("picture_px")}
+    return sorted(found)
+
+
+def _list_name(scenario: Scenario, width_px: int) -> str:
     """The file that names the pictures; its own name says what is on them."""
     scene = scenario.base_scene
     shown = [
@@ -175,15 +202,15 @@ def _list_name(scenario: Scenario, variant: str) -> str:
         scene.content_hash or content_hash(scene.document),
         scenario.keep_traffic,
         scenario.reference,
-        find_recipe(variant).limits.picture_px,
+        width_px,
     ]
     digest = hashlib.sha256(json.dumps(shown, sort_keys=True).encode()).hexdigest()
     return f"{FOLDER}/{digest}.json"
 
 
-def _drawn(scenario: Scenario, variant: str) -> tuple[str, ...]:
+def _drawn(scenario: Scenario, width_px: int) -> tuple[str, ...]:
     """The names of a viewer's pictures, none where they are not drawn yet."""
-    name = _list_name(scenario, variant)
+    name = _list_name(scenario, width_px)
     if not default_storage.exists(name):
         return ()
     return tuple(json.loads(_bytes(name)))

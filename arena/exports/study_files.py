@@ -1,0 +1,72 @@
+"""Files of a study, as a worker writes them."""
+
+from __future__ import annotations
+
+import tempfile
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+from django.core.files import File
+from django.core.files.base import ContentFile
+from django.utils.text import slugify
+
+from arena.exports.contact_sheet import contact_sheet, sheet_pdf
+from arena.exports.scenario_files import made_of
+from arena.exports.study_folder.writing import write_study
+from arena.exports.tables import leaderboard_table
+from arena.exports.written_files import MadeFile, write_row
+from arena.exports.zips import zip_folder
+from arena.models import Study, StudyFile
+from arena.queries.results import snapshot_to_export
+from arena.services.plans import shown_augmentations, shows_all_samples
+from arena.services.study_files import why_not
+from augment.errors import Conflict
+from augment.services.judging.scenario_export import ExportOrigin, export_rows
+
+Kind = StudyFile.Kind
+
+
+def write_study_file(*, file_pk: int) -> None:
+    """Write the file of a row, unless it is ready; what is wrong is kept on the row."""
+    write_row(StudyFile, file_pk, _made)
+
+
+@contextmanager
+def _made(row: StudyFile) -> Iterator[MadeFile]:
+    if reason := why_not(row.study, row.kind):  # it changed since somebody asked
+        raise Conflict(reason)
+    slug = slugify(row.study.name) or "study"
+    with tempfile.TemporaryDirectory() as beside:
+        made = _MAKERS[Kind(row.kind)](row.study, slug, Path(beside))
+        with made.content:
+            yield made
+
+
+def _whole(study: Study, slug: str, beside: Path) -> MadeFile:
+    folder = beside / "study"
+    write_study(study, folder, say=lambda said: None)
+    packed = tempfile.TemporaryFile()  # noqa: SIM115 - it is closed when it is stored
+    zip_folder(folder, packed)
+    return MadeFile(name=f"{slug}-study.zip", content=File(packed))
+
+
+def _sheet(study: Study, slug: str, beside: Path) -> MadeFile:
+    snapshot = snapshot_to_export(study)
+    places = list(study.scenarios.defer("reference").order_by("type", "slug"))
+    sheet = contact_sheet(snapshot, leaderboard_table(snapshot), places)
+    return MadeFile(name=f"{slug}-contact-sheet.pdf", content=ContentFile(sheet_pdf(sheet)))
+
+
+def _interplan(study: Study, slug: str, beside: Path) -> MadeFile:
+    origin = ExportOrigin(kind="study", name=study.name, code=str(study.code))
+    rows = shown_augmentations(study)
+    many = shows_all_samples(study)
+    return made_of(export_rows(rows, origin, "interplan", many=many), slug)
+
+
+_MAKERS: dict[Kind, Callable[[Study, str, Path], MadeFile]] = {
+    Kind.STUDY: _whole,
+    Kind.CONTACT_SHEET: _sheet,
+    Kind.INTERPLAN: _interplan,
+}

@@ -1,0 +1,36 @@
+"""manage.py cancel_study: give an open study up."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from django.core.management.base import CommandError, CommandParser
+
+from arena.errors import ArenaError
+from arena.queries.studies import study_named
+from arena.services.ending import cancel_study
+from augment.errors import AugmentError
+from augment.services.terminal import TerminalCommand
+
+
+class Command(TerminalCommand):
+    """The door to arena.services.ending.cancel_study."""
+
+    help = "Cancel an open study for good: no more votes, never any results; its votes stay."
+
+    def add_arguments(self, parser: CommandParser) -> None:
+        """Which study, and that this is meant."""
+        parser.add_argument("study", help="its name or its code")
+        parser.add_argument("--sure", metavar="NAME", required=True, help="its name once more")
+        parser.add_argument("--why", default="", help="a reason, for the log")
+
+    def handle(self, *args: Any, **options: Any) -> None:
+        """Cancel the study and say so."""
+        try:
+            study = study_named(options["study"])
+            if options["sure"] != study.name:
+                raise CommandError(f"Nothing was cancelled: --sure must say {study.name!r}.")
+            cancel_study(study=study, why=options["why"])
+        except (ArenaError, AugmentError) as error:
+            raise CommandError(str(error)) from error
+        self.stdout.write(f"Cancelled {study.name!r}. Its votes stay: export votes.")

@@ -1,0 +1,142 @@
+"""A study that was cancelled: no votes, no results, its votes stay."""
+
+from __future__ import annotations
+
+import csv
+import io
+from pathlib import Path
+
+import pytest
+from django.contrib.auth.models import User
+from django.core.management import CommandError, call_command
+from django.test import Client
+from django.urls import reverse
+
+from arena.errors import NoSnapshot, StudyNotOpen
+from arena.models import Study, Vote
+from arena.queries.results import ResultsAccess, results_access, snapshot_to_export
+from arena.services.ending import cancel_study, close_study
+from arena.services.ratings import rate
+from augment.errors import Conflict
+from augment.models import Event
+from tests import study_rows
+from tests.web.cast import people, signed_in
+from tests.web.test_questions import text_of
+
+pytestmark = pytest.mark.django_db
+
+
+@pytest.fixture
+def study() -> Study:
+    """Open, with three votes and a skip of eva's."""
+    study = study_rows.a_study()
+    first, *rest = study_rows.matchups_of(study, "eva")
+    study_rows.vote(first, "skip", reason="unclear")
+    for matchup in rest[:3]:
+        study_rows.vote(matchup)
+    return study
+
+
+@pytest.fixture
+def admin() -> Client:
+    return signed_in(people()["admin"])
+
+
+def test_cancelling_needs_the_name_and_says_how_it_differs_from_closing(
+    study: Study, admin: Client
+) -> None:
+    page = reverse("study-cancel", args=[study.code])
+    assert page in admin.get(reverse("study", args=[study.code])).content.decode()
+    asked = text_of(admin.get(page))
+    assert "Cancel the study “Round 1”?" in asked
+    assert "never rated" in asked
+    assert "exported as votes: 3." in asked
+    assert "To end it with results, close it instead." in asked
+    for typed in ("", "Round", "round 12"):
+        answer = admin.post(page, {"sure": "1", "typed": typed, "why": "Wrong pictures."})
+        assert answer.status_code == 422, typed
+        assert "That is another name; nothing was done." in text_of(answer)
+        assert "Wrong pictures." in answer.content.decode(), "nothing is lost"
+        assert Study.objects.get().state == "open"
+    answer = admin.post(page, {"sure": "1", "typed": "round-1", "why": "Wrong pictures."})
+    assert answer.headers["Location"] == reverse("study", args=[study.code])
+    event = Event.objects.get(verb="cancel")
+    assert event.after == {"state": "cancelled", "why": "Wrong pictures."}
+    assert event.actor == User.objects.get(username="the-admin")
+    assert admin.get(page).status_code == 302, "there is nothing more to ask"
+
+
+def test_closing_still_takes_one_more_click_alone(study: Study, admin: Client) -> None:
+    admin.post(reverse("study-close", args=[study.code]), {"sure": "1"})
+    assert Study.objects.get().state == "closed"
+
+
+def test_an_expert_reads_a_calm_sentence_and_can_vote_no_more(study: Study) -> None:
+    eva = signed_in(User.objects.get(username="eva"))
+    waiting = study_rows.matchups_of(study, "eva")[5]
+    cancel_study(study=study)
+    shown = text_of(eva.get(reverse("vote", args=[study.code])))
+    assert "This study was cancelled" in shown
+    assert "There is nothing left for you to do. Your 3 answers are saved, thank you." in shown
+    assert "This study was cancelled" in text_of(eva.get("/"))
+    with pytest.raises(StudyNotOpen):
+        study_rows.vote(waiting)
+    assert Vote.objects.count() == 4
+
+
+def test_it_has_no_results_for_anybody_also_where_somebody_rated_early(
+    study: Study, admin: Client
+) -> None:
+    early = rate(study=study, early=True, rounds=20)
+    cancel_study(study=study)
+    study.refresh_from_db()
+    for user in User.objects.all():
+        assert results_access(user=user, study=study) is ResultsAccess.NONE, user
+    for name in ("results", "study-rate"):
+        address = reverse(name, args=[study.code])
+        answer = admin.post(address) if name == "study-rate" else admin.get(address)
+        assert answer.status_code == 403, name
+    with pytest.raises(NoSnapshot):
+        snapshot_to_export(study, early.code)
+    with pytest.raises(Conflict):
+        rate(study=study, early=True, rounds=20)
+    shown = admin.get(reverse("studies")).content.decode()
+    assert "Cancelled" in shown
+    assert reverse("results", args=[study.code]) not in shown
+
+
+def test_its_votes_are_exported_as_votes(study: Study, admin: Client, tmp_path: Path) -> None:
+    cancel_study(study=study)
+    address = reverse("results-votes-export", args=[study.code, "csv"])
+    answer = admin.get(address)
+    lines = list(csv.DictReader(io.StringIO(answer.content.decode())))
+    assert len(lines) == 3, "a skip says nothing"
+    assert {line["winner"] for line in lines} == {"model_a"}
+    eva = User.objects.get(username="eva")
+    assert {line["judge"] for line in lines} == {eva.person.pseudonym}
+    assert signed_in(eva).get(address).status_code == 403
+    out = tmp_path / "votes.csv"
+    call_command("export", "votes", "Round 1", "--out", str(out))
+    assert out.read_bytes() == answer.content
+    with pytest.raises(CommandError, match="cancelled"):
+        call_command("export", "leaderboard", "Round 1", "--out", str(tmp_path / "table.csv"))
+    with pytest.raises(CommandError, match="was cancelled"):
+        call_command("export", "study", "Round 1", "--out", str(tmp_path / "study"))
+
+
+def test_closed_and_cancelled_exclude_each_other(study: Study) -> None:
+    cancel_study(study=study)
+    assert cancel_study(study=study).state == "cancelled"
+    assert Event.objects.filter(verb="cancel").count() == 1
+    with pytest.raises(StudyNotOpen, match="was cancelled"):
+        close_study(study=study)
+    Study.objects.update(state="closed")
+    with pytest.raises(StudyNotOpen, match="is closed"):
+        cancel_study(study=study)
+
+
+def test_the_command_wants_the_name_once_more(study: Study) -> None:
+    with pytest.raises(CommandError, match="Nothing was cancelled"):
+        call_command("cancel_study", "Round 1", "--sure", "Round")
+    call_command("cancel_study", "Round 1", "--sure", "Round 1", "--why", "A test.")
+    assert Study.objects.get().state == "cancelled"

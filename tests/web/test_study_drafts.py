@@ -1,0 +1,272 @@
+"""A study is set up over several sittings: saved as it stands, taken up, opened, discarded."""
+
+from __future__ import annotations
+
+import html
+import re
+from typing import Any
+
+import pytest
+from django.contrib.auth.models import User
+from django.test import Client
+from django.urls import reverse
+
+from arena.models import Study, StudyDraft
+from arena.pairing.plan import plan
+from arena.rating.stopping import StoppingRule
+from arena.services.accounts import forget_identity
+from arena.services.plans import rules_of
+from arena.services.studies import PlanOptions, open_study
+from arena.services.study_drafts import FIELDS, NAMES, keep_draft, read_entered, settings_of
+from arena.web.forms import ChoiceForm
+from arena.web.study_forms import StudyForm
+from augment.errors import InvalidDocument, UnknownName
+from augment.models import Contestant, Event, Scenario
+from augment.services.endpoints.retirement import retire
+from tests import study_rows
+from tests.web.cast import people, signed_in
+from tests.web.test_questions import hidden_of, text_of
+
+pytestmark = pytest.mark.django_db
+
+NEW = "/studies/new/"
+
+
+@pytest.fixture
+def admin() -> Client:
+    return signed_in(people()["admin"])
+
+
+def page_of(draft: StudyDraft) -> str:
+    return reverse("study-draft", args=[draft.code])
+
+
+def ticked(answer: Any, name: str) -> list[str]:
+    """What is ticked on a page, as a browser would send it."""
+    boxes = re.findall(r'<input type="checkbox" name="([^"]+)"([^>]*)>', answer.content.decode())
+    return [
+        match[1]
+        for field, rest in boxes
+        if field == name and " checked" in rest and (match := re.search(r'value="([^"]*)"', rest))
+    ]
+
+
+def value(answer: Any, name: str) -> str:
+    """What stands in a field of a page."""
+    shown = answer.content.decode()
+    found = re.search(rf'<input[^>]* name="{name}"[^>]*?value="([^"]*)"', shown)
+    if found is None:
+        found = re.search(rf'<textarea[^>]* name="{name}"[^>]*>([^<]*)</textarea>', shown)
+    assert found is not None, name
+    return html.unescape(found[1])
+
+
+def test_a_draft_keeps_every_field_as_it_stands(admin: Client) -> None:
+    study_rows.cast_of()
+    sent = {
+        "name": "Round 1", "contestants": ["bob"], "experts": ["finn"], "targets": "ann lots",
+        "scenarios": ["place-0", "place-3"], "votes_per_expert": "", "seed": "77",
+        "repeats": "12.5", "checks": "99", "hypotheses": "ann above", "stop_votes": "40",
+        "stop_closes": "on", "allow_text": "on", "samples": "all", "keep": "1",
+    }  # fmt: skip
+    answer = admin.post(NEW, sent)
+    draft = StudyDraft.objects.get()
+    assert answer.headers["Location"] == page_of(draft)
+    shown = admin.get(page_of(draft))
+    assert shown.status_code == 200, "what is not finished is no error yet"
+    for name in ("name", "seed", "repeats", "checks", "targets", "hypotheses", "stop_votes"):
+        assert value(shown, name) == sent[name], name
+    assert value(shown, "votes_per_expert") == "", "no number comes back that was deleted"
+    for name in ("contestants", "experts", "scenarios"):
+        assert ticked(shown, name) == sent[name], name
+    page = shown.content.decode()
+    assert '<option value="all" selected>' in page
+    assert 'name="allow_text" checked' in page
+    assert 'name="practice" checked' not in page, "a switch that was off stays off"
+    assert not Study.objects.exists()
+
+
+def test_the_drafts_fields_are_those_of_the_form() -> None:
+    """A field that one of them lacks would be lost on the way."""
+    fields = {**ChoiceForm.base_fields, **StudyForm.base_fields}
+    assert set(FIELDS) == set(fields) - {"types"}, "whole types are kept as their scenarios"
+
+
+def test_a_whole_type_is_kept_as_the_scenarios_it_had(admin: Client) -> None:
+    study_rows.cast_of(scenarios=2)
+    admin.post(NEW, {"name": "Round 1", "types": [Scenario.Type.NUDGE], "keep": "1"})
+    study_rows.scenario("later")
+    assert StudyDraft.objects.get().names_in("scenarios") == ["place-0", "place-1"]
+
+
+def test_a_draft_is_listed_and_no_expert_sees_it(admin: Client) -> None:
+    cast = study_rows.cast_of()
+    keep_draft(entered={"name": "Secret plan", **cast})
+    shown = text_of(admin.get(reverse("studies")))
+    assert "Secret plan" in shown
+    assert "Draft" in shown
+    listed = {
+        (state, word): "Secret plan" in text_of(admin.get(f"/studies/?state={state}&q={word}"))
+        for state in ("draft", "open")
+        for word in ("secret", "other")
+    }
+    assert [pair for pair, is_there in listed.items() if is_there] == [("draft", "secret")]
+    eva = signed_in(User.objects.get(username="eva"))
+    assert "Secret plan" not in eva.get("/").content.decode()
+    assert not Study.objects.exists(), "so nothing else can show it either"
+
+
+def test_a_draft_is_previewed_and_opened_and_is_gone_then(admin: Client) -> None:
+    cast = study_rows.cast_of()
+    draft = keep_draft(entered={"name": "Round 1", **cast, "votes_per_expert": 9, "seed": 4})
+    sent = {"name": "Round 1", **cast, "votes_per_expert": "9", "seed": "4", "revision": "1"}
+    asked = admin.post(page_of(draft), sent)
+    assert "Open the study “Round 1”?" in text_of(asked)
+    assert "Experts: 2. Votes: 18." in text_of(asked)
+    assert not Study.objects.exists(), "a preview plans nothing"
+    answer = admin.post(page_of(draft), {**hidden_of(asked), "sure": "1"})
+    study = Study.objects.get()
+    assert answer.headers["Location"] == reverse("study", args=[study.code])
+    assert (study.state, study.matchups.count()) == ("open", 18)
+    assert not StudyDraft.objects.exists()
+    assert admin.get(page_of(draft)).status_code == 404
+
+
+def test_what_cannot_be_opened_is_said_and_the_draft_stays(admin: Client) -> None:
+    draft = keep_draft(entered={"name": "Round 1", **study_rows.cast_of()})
+    answer = admin.post(page_of(draft), {"name": "Round 1", "revision": "1", "sure": "1"})
+    assert answer.status_code == 422
+    assert "Choose at least one contestant." in text_of(answer)
+    assert StudyDraft.objects.get().names_in("contestants") == ["ann", "bob", "cid"]
+
+
+def test_what_is_gone_is_said_and_stays_ticked_until_somebody_unticks_it(admin: Client) -> None:
+    cast = study_rows.cast_of()
+    draft = keep_draft(entered={"name": "Round 1", **cast, "experts": ["eva", "nobody"]})
+    retire(Contestant.objects.get(slug="bob"), actor=None)
+    shown = admin.get(page_of(draft))
+    assert "the contestant was retired" in text_of(shown)
+    assert "no active expert has this name any more" in text_of(shown)
+    assert sorted(ticked(shown, "contestants")) == ["ann", "bob", "cid"]
+    sent = {"name": "Round 1", **cast, "votes_per_expert": "9", "seed": "4", "revision": "1"}
+    refused = admin.post(page_of(draft), {**sent, "sure": "1"})
+    assert refused.status_code == 422
+    assert "bob" in text_of(refused)
+    assert not Study.objects.exists()
+
+
+def test_two_admins_do_not_overwrite_each_other_unseen(admin: Client) -> None:
+    draft = keep_draft(entered={"name": "Round 1"})
+    admin.post(page_of(draft), {"name": "Mine", "revision": "1", "keep": "1"})
+    late = admin.post(page_of(draft), {"name": "Theirs", "revision": "1", "keep": "1"})
+    assert late.status_code == 409
+    assert value(late, "name") == "Theirs", "what was entered is not lost"
+    assert StudyDraft.objects.get().name == "Mine"
+    admin.post(page_of(draft), {**hidden_of(late), "name": "Theirs", "keep": "1"})
+    assert StudyDraft.objects.get().name == "Theirs", "the second time they mean it"
+
+
+def test_a_draft_that_was_changed_meanwhile_is_not_opened(admin: Client) -> None:
+    cast = study_rows.cast_of()
+    draft = keep_draft(entered={"name": "Round 1", **cast})
+    admin.post(page_of(draft), {"name": "Other", "revision": "1", "keep": "1"})
+    sent = {"name": "Round 1", **cast, "votes_per_expert": "9", "seed": "4", "revision": "1"}
+    answer = admin.post(page_of(draft), {**sent, "sure": "1"})
+    assert (answer.status_code, Study.objects.count()) == (422, 0)
+
+
+def test_discarding_takes_a_second_click(admin: Client) -> None:
+    draft = keep_draft(entered={"name": "Round 1"})
+    page = reverse("study-draft-discard", args=[draft.code])
+    assert "Discard the draft “Round 1”?" in text_of(admin.post(page))
+    assert StudyDraft.objects.exists()
+    admin.post(page, {"sure": "1"})
+    assert not StudyDraft.objects.exists()
+
+
+def test_the_log_has_every_act_on_a_draft(admin: Client) -> None:
+    cast = study_rows.cast_of()
+    admin.post(NEW, {"name": "One", "keep": "1"})
+    draft = StudyDraft.objects.get()
+    for name in ("One", "Two"):
+        revision = str(StudyDraft.objects.get().revision)
+        admin.post(page_of(draft), {"name": name, "revision": revision, "keep": "1"})
+    sent = {"name": "Two", **cast, "votes_per_expert": "9", "seed": "4", "revision": "2"}
+    admin.post(page_of(draft), {**sent, "sure": "1"})
+    acts = Event.objects.filter(object_kind="study draft").order_by("pk")
+    assert [act.verb for act in acts] == ["draft", "change draft", "open draft"]
+    assert acts[1].after == {"name": "Two", "fields": ["name"]}
+    assert {act.actor.username for act in acts if act.actor} == {"the-admin"}
+
+
+def test_who_is_forgotten_is_forgotten_in_drafts_too(admin: Client) -> None:
+    draft = keep_draft(entered={"experts": study_rows.cast_of()["experts"]})
+    eva = User.objects.get(username="eva")
+    forget_identity(user=eva, actor=User.objects.get(username="the-admin"))
+    draft.refresh_from_db()
+    assert "eva" not in str(draft.entered)
+
+
+@pytest.mark.parametrize(
+    ("given", "fault"),
+    [
+        ({"colour": "red"}, UnknownName),
+        ({"experts": "eva"}, InvalidDocument),
+        ({"practice": "on"}, InvalidDocument),
+        ({"seed": ["4"]}, InvalidDocument),
+        ({"name": "x" * 121}, InvalidDocument),
+        ({"name": "two\nlines"}, InvalidDocument),
+        ({"targets": "x" * 60_001}, InvalidDocument),
+    ],
+)
+def test_a_program_is_told_what_a_field_takes(
+    given: dict[str, object], fault: type[Exception]
+) -> None:
+    with pytest.raises(fault):
+        read_entered(given)
+    assert read_entered({"name": "x" * 120, "seed": 4})["seed"] == "4"
+
+
+def a_rich_study() -> Study:
+    """One that departs from the defaults wherever it can."""
+    options = PlanOptions(
+        repeat_share=0.25, overlap_share=0.1, appearances=(("ann", 20), ("bob", 15), ("cid", 13)),
+        allow_both_miss=True, allow_measures=False, hypotheses=("ann above bob", "It is so."),
+        stopping=StoppingRule(half_width=25.0, votes=30, looks=3, closes=True),
+    )  # fmt: skip
+    return open_study(
+        name="Round 1", **study_rows.cast_of(), votes_per_expert=12, seed=4, options=options
+    )
+
+
+def test_the_settings_of_a_study_open_another_that_is_planned_the_same(admin: Client) -> None:
+    first = a_rich_study()
+    answer = admin.post(reverse("study-again", args=[first.code]))
+    draft = StudyDraft.objects.get()
+    assert answer.headers["Location"] == page_of(draft)
+    assert draft.name == "Round 1 (2)"
+    sent: dict[str, Any] = {k: v for k, v in draft.entered.items() if v is not False}
+    sent |= {k: "on" for k, v in draft.entered.items() if v is True}
+    admin.post(page_of(draft), {**sent, "revision": "1", "sure": "1"})
+    second = Study.objects.get(name="Round 1 (2)")
+    first.refresh_from_db()
+    apart = {"jobs", "replays"}
+    kept = [{k: v for k, v in one.rules.items() if k not in apart} for one in (first, second)]
+    assert kept[0] == kept[1]
+    assert plan(rules_of(first)) == plan(rules_of(second))
+    for name in (
+        "allow_both_miss",
+        "allow_measures",
+        "allow_text",
+        "allow_replay",
+        "practice",
+        "allow_simulated",
+    ):
+        assert getattr(first, name) == getattr(second, name), name
+
+
+def test_names_of_drafts_count_when_a_free_one_is_looked_for() -> None:
+    study = study_rows.a_study()
+    keep_draft(entered={"name": "Round 1 (2)"})
+    assert settings_of(study)["name"] == "Round 1 (3)"
+    assert set(NAMES) < set(settings_of(study))
