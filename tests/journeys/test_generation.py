@@ -80,12 +80,9 @@ def check_each_row_is_done_once(place: Machine, killed: set[int]) -> None:
     assert all((place.media / name).is_file() for name in images)
 
 
-@pytest.mark.parametrize("pool", ["threads", "prefork"])
-def test_a_job_survives_kill_9_of_its_worker(
-    place: Machine, model: WaitingModel, pool: str
-) -> None:
+def test_a_job_survives_kill_9_of_its_worker(place: Machine, model: WaitingModel) -> None:
     redis = place.redis()
-    worker = place.worker(pool=pool)
+    worker = place.worker(pool="prefork")
     try:
         place.must("generate", *CHOSEN)
         killed = in_flight(place, model)
@@ -93,7 +90,7 @@ def test_a_job_survives_kill_9_of_its_worker(
         assert len(killed) == 2
         place.age("heartbeat_at", state="running")
         model.gate.set()
-        worker = place.worker(pool=pool)
+        worker = place.worker(pool="prefork")
         wait_until(lambda: is_finished(place), what="the job is over", within_s=240)
         check_each_row_is_done_once(place, killed)
     finally:
@@ -104,6 +101,7 @@ def test_a_job_survives_kill_9_of_its_worker(
 def test_a_job_survives_the_loss_of_redis_with_all_its_messages(
     place: Machine, model: WaitingModel
 ) -> None:
+    """And that of a worker of threads."""
     redis = place.redis()
     worker = place.worker()
     try:
@@ -172,11 +170,18 @@ def test_a_worker_that_is_told_to_stop_waits_for_its_calls_and_takes_nothing_on(
 
 
 def test_the_command_waits_for_the_job_and_reports(place: Machine, model: WaitingModel) -> None:
+    """What was done by its table; a failure by its reason, and ends with 1."""
     model.gate.set()
     redis = place.redis()
     worker = place.worker()
+    facts = ("--variant", "otm", "--endpoint", "cloud", "--model", "m")
+    address = ("--base-url", model.base_url, "--key-variable", "NO_SUCH_API_KEY")
+    chosen = ("--contestants", "cloudy", "--scenarios", "street-1", "street-2", "--wait")
     try:
         said = place.must("generate", *CHOSEN, "--wait", "--timeout", "240")
+        asked = model.asked
+        place.must("add_contestant", "cloudy", *facts, *address)
+        ended = place.manage("generate", *chosen)
     finally:
         worker.stop()
         redis.stop()
@@ -186,26 +191,10 @@ def test_the_command_waits_for_the_job_and_reports(place: Machine, model: Waitin
         "reference      3           0        0       0",
         "waiting        3           0        0       0",
     ]
-
-
-def test_a_failure_ends_the_command_with_1_and_its_reason(
-    place: Machine, model: WaitingModel
-) -> None:
-    redis = place.redis()
-    worker = place.worker()
-    facts = ("--variant", "otm", "--endpoint", "cloud", "--model", "m")
-    address = ("--base-url", model.base_url, "--key-variable", "NO_SUCH_API_KEY")
-    try:
-        place.must("add_contestant", "cloudy", *facts, *address)
-        chosen = ("--contestants", "cloudy", "--scenarios", "street-1", "street-2", "--wait")
-        ended = place.manage("generate", *chosen)
-    finally:
-        worker.stop()
-        redis.stop()
     assert ended.returncode == 1
     assert "failed 2 times: The environment variable NO_SUCH_API_KEY" in ended.stdout
     assert "2 failed" in ended.stderr
-    assert model.asked == 0
+    assert model.asked == asked
 
 
 def test_without_redis_the_command_says_what_to_do(place: Machine) -> None:
