@@ -48,8 +48,7 @@ async function load(address, options) {
 }
 
 // Look for the moment until no worker is busy with it any more; a newer wish ends an older look.
-async function follow(page, answer) {
-  const mine = ++looking;
+async function follow(mine, page, answer) {
   for (let n = 0; n < LOOKS; n += 1) {
     if (mine !== looking) return;
     take(page, answer);
@@ -57,15 +56,22 @@ async function follow(page, answer) {
     if (!section || section.dataset.waits === undefined) return;
     await new Promise((done) => setTimeout(done, LOOK_MS));
     if (mine !== looking) return;
-    [page, answer] = await load(`?moment=${section.dataset.code}`);
+    try {
+      [page, answer] = await load(`?moment=${section.dataset.code}`);
+    } catch {
+      // The network may be back at the next turn.
+    }
   }
 }
 
 async function show(form) {
+  const mine = ++looking;
   form.setAttribute("aria-busy", "true");
   try {
     const [page, answer] = await load(form.action, { method: "POST", body: new FormData(form) });
-    await follow(page, answer);
+    await follow(mine, page, answer);
+  } catch (fault) {
+    if (mine === looking) throw fault;
   } finally {
     form.removeAttribute("aria-busy");
   }
@@ -102,5 +108,5 @@ document.addEventListener("submit", (event) => {
 // The file itself is still being read: look again for the whole page.
 if (document.querySelector("[data-state][data-waits]")) setTimeout(() => location.reload(), 1500);
 else if (document.querySelector("#moment[data-waits]")) {
-  load(location.href).then(([page, answer]) => follow(page, answer));
+  follow(++looking, document, { url: location.href });
 }

@@ -1,46 +1,40 @@
-"""The page on which changes are drawn, its server played by the test: who answers when."""
+"""The page on which changes are drawn, and what it makes of answers that come late."""
 
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Iterator
-from dataclasses import dataclass, field
+from collections.abc import Iterator
+from dataclasses import dataclass
 from typing import Any
-from urllib.parse import urlsplit
 
 import pytest
-from django.contrib.staticfiles import finders
 from django.urls import reverse
-from playwright.sync_api import Browser, Page, Request, Route, expect
+from playwright.sync_api import Browser, Page, expect
 
 from augment.services.scenarios.scene_pictures import draw_scene
-from tests.browser.booth import DESK
-from tests.browser.chromium import PATIENCE_MS
+from tests.browser.held import Held, hold
 from tests.jobs.rows import add_scenario
 from tests.scenes import scene
 from tests.web.cast import people, signed_in
 
 pytestmark = [pytest.mark.browser, pytest.mark.django_db]
-SITE = "http://editor.test"
 LATER_MS = 1_000
 """Longer than the page waits before it asks what a change is worth."""
 
 
-@dataclass(slots=True, kw_only=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Desk:
     """The page, and the checks that wait for their answers."""
 
-    page: Page
-    waiting: list[Route] = field(default_factory=list)
-    errors: list[str] = field(default_factory=list)
+    held: Held
+
+    @property
+    def page(self) -> Page:
+        return self.held.page
 
     def asked(self, number: int) -> dict[str, Any]:
-        """What the check of that number was asked about; the page may have yet to ask it."""
-        for _ in range(PATIENCE_MS // 20):
-            if len(self.waiting) > number:
-                break
-            self.page.wait_for_timeout(20)
-        found = self.waiting[number].request.post_data_json
+        """What the check of that number was asked about."""
+        found = self.held.post(number).request.post_data_json
         assert isinstance(found, dict)
         return found
 
@@ -50,7 +44,7 @@ class Desk:
         if y_m is not None:
             change = change | {"add": [agent | {"y_m": y_m} for agent in change["add"]]}
         given = {"modification": change, "lines": [], "problem": problem}
-        self.waiting[number].fulfill(json=given)
+        self.held.posted[number].fulfill(json=given)
 
     def place_ahead(self) -> None:
         """A car, whose first check is answered."""
@@ -76,35 +70,10 @@ class Desk:
 def desk(browser: Browser) -> Iterator[Desk]:
     scenario = add_scenario("street", scene=scene(), reference=None)
     draw_scene(scenario.base_scene_id)
-    where = reverse("reference-edit", args=[scenario.code])
-    html = signed_in(people()["analyst"]).get(where).content
-    context = browser.new_context(viewport=DESK, base_url=SITE)
-    context.set_default_timeout(PATIENCE_MS)
-    made = Desk(page=context.new_page())
-    made.page.on("pageerror", lambda error: made.errors.append(str(error)))
-    made.page.clock.install()
-    context.route("**/*", _server(html, made))
-    made.page.goto(where)
-    yield made
-    context.close()
-    assert made.errors == []
-
-
-def _server(html: bytes, desk: Desk) -> Callable[[Route, Request], None]:
-    def serve(route: Route, request: Request) -> None:
-        path = urlsplit(request.url).path
-        if path.startswith("/static/"):
-            found = finders.find(path.removeprefix("/static/"))
-            assert isinstance(found, str)
-            route.fulfill(path=found)
-        elif request.method == "POST":
-            desk.waiting.append(route)
-        elif request.resource_type == "document":
-            route.fulfill(body=html, content_type="text/html")
-        else:
-            route.fulfill(status=404)
-
-    return serve
+    path = reverse("reference-edit", args=[scenario.code])
+    html = signed_in(people()["analyst"]).get(path).content
+    with hold(browser, path, html) as held:
+        yield Desk(held=held)
 
 
 def test_an_answer_never_undoes_what_was_done_after_its_question(desk: Desk) -> None:
@@ -126,7 +95,7 @@ def test_a_snap_right_after_a_change_is_not_lost(desk: Desk) -> None:
     assert desk.asked(2)["snap"] == "Added1"
     desk.answer(2, y_m=0.0)
     expect(desk.page.locator("#n-y")).to_have_value("0")
-    assert len(desk.waiting) == 3
+    assert len(desk.held.posted) == 3
 
 
 @pytest.mark.parametrize(
@@ -144,7 +113,7 @@ def test_what_is_no_modification_is_told_and_leaves_the_picture(
     desk.place_ahead()
     desk.type_in(json.dumps(change))
     assert desk.asked(2)["modification"] == change
-    desk.waiting[2].fulfill(json={"modification": None, "lines": [], "problem": "not so"})
+    desk.held.posted[2].fulfill(json={"modification": None, "lines": [], "problem": "not so"})
     expect(desk.page.locator("[data-findings]")).to_contain_text("not so")
     assert desk.page.input_value("[name=modification]") == json.dumps(change)
     desk.page.locator("svg.stage").press("Shift+ArrowUp")
