@@ -17,7 +17,7 @@ from urllib.request import urlopen
 
 from tests.processes import ROOT, Machine, wait_until
 
-SMALL_DEMO = ("demo", "--no-serve", "--per-type", "2")
+SMALL_DEMO = ("demo", "--no-serve", "--per-type", "2", "--driven", "1")
 
 
 class Home(Machine):

@@ -146,12 +146,12 @@ def generate(
     return job
 
 
-def start_drives(scenarios: list[str]) -> None:
+def start_drives(scenarios: list[str], *, per_type: int) -> None:
     """Have a few scenarios driven by the workers, before the change and with the reference."""
     kinds: dict[str, list[Scenario]] = {}
     for row in Scenario.objects.filter(slug__in=scenarios).order_by("slug"):
         kinds.setdefault(row.type, []).append(row)
-    chosen = [row for rows in kinds.values() for row in rows[:DRIVEN_PER_TYPE]]
+    chosen = [row for rows in kinds.values() for row in rows[:per_type]]
     waiting = [pk for row in chosen for pk in plan_scenario(scenario=row, options=Options())]
     enqueue_simulations(waiting)
 

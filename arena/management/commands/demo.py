@@ -40,19 +40,28 @@ class Command(TerminalCommand):
         parser.add_argument(
             "--per-type", type=int, metavar="N", help="only N scenarios of each type; default: all"
         )
+        parser.add_argument(
+            "--driven",
+            type=int,
+            metavar="N",
+            default=demo.DRIVEN_PER_TYPE,
+            help="drive N scenarios of each type; default: %(default)s",
+        )
 
     def handle(self, *args: Any, **options: Any) -> None:
         """Run the demo; a fault of any step ends it with a sentence."""
         web = Web(host=options["host"], port=options["port"])
         try:
             with hold_alone(self.stdout.write):
-                self._run(web, options["per_type"], serve=not options["no_serve"])
+                self._run(
+                    web, options["per_type"], options["driven"], serve=not options["no_serve"]
+                )
         except (ArenaError, AugmentError) as error:
             raise CommandError(str(error)) from error
         except KeyboardInterrupt:
             raise CommandError(STOPPED, returncode=INTERRUPTED) from None
 
-    def _run(self, web: Web, per_type: int | None, *, serve: bool) -> None:
+    def _run(self, web: Web, per_type: int | None, driven: int, *, serve: bool) -> None:
         started = time.monotonic()
         server = [web_server(web)] if serve else []
         call_command("prepare", verbosity=0)
@@ -66,7 +75,7 @@ class Command(TerminalCommand):
                 supervisor.start()
                 look = partial(_look_at, supervisor)
                 job = demo.generate(scenarios, self.stdout.write, look)
-                demo.start_drives(scenarios)
+                demo.start_drives(scenarios, per_type=driven)
                 folder = settings.VAR_DIR / "demo"
                 board = demo.vote_and_rate(scenarios, self.stdout.write, folder)
                 drives = demo.driving_lines(job, look)
