@@ -10,14 +10,22 @@ from collections.abc import Collection
 from django.db.models import Q
 
 from arena.models import Study
+from arena.queries.remembering import Remembered, plan_of
 from augment.models import Contestant, EndpointModel
 from augment.services.endpoints.spending import CONTESTANT, Spending, sum_spending
 
 
 def shown_augmentations(study: Study) -> frozenset[int]:
-    """The primary keys of all augmentations in the study's matchups; one query."""
+    """The primary keys of all augmentations in the study's matchups; two queries at most."""
+    return _SHOWN.get(plan_of(study), lambda: _shown(study))
+
+
+def _shown(study: Study) -> frozenset[int]:
     rows = study.matchups.order_by().values_list("left", "right").distinct()
     return frozenset(pk for pair in rows for pk in pair)
+
+
+_SHOWN: Remembered[frozenset[int]] = Remembered(8)
 
 
 def spent_on(augmentations: Collection[int]) -> dict[int, Spending]:

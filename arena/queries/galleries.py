@@ -5,8 +5,9 @@ Everything is counted over the votes of the rating; a picture is that of a showi
 
 from __future__ import annotations
 
+import json
 from collections import defaultdict
-from collections.abc import Iterable, Sequence
+from collections.abc import Hashable, Iterable, Sequence
 from dataclasses import dataclass, replace
 from typing import NamedTuple
 from uuid import UUID
@@ -14,6 +15,7 @@ from uuid import UUID
 from django.db.models import Count, Max, Q
 
 from arena.models import FaultLabel, Matchup, Snapshot
+from arena.queries.remembering import Remembered, plan_types
 from arena.queries.vote_lists import counted_votes
 from augment.models import Contestant, Scenario
 
@@ -124,8 +126,12 @@ class DisputedUnit(NamedTuple):
 def disputed_pairs(snapshot: Snapshot, *, type_name: str = "") -> list[DisputedUnit]:
     """All pairs of pictures that were judged at least twice, the most disputed first.
 
-    One query; `with_pictures` makes a page of them what people see.
+    One query, and none the next time; `with_pictures` makes a page of them what people see.
     """
+    return _DISPUTED.get(_key(snapshot, type_name), lambda: _disputed(snapshot, type_name))
+
+
+def _disputed(snapshot: Snapshot, type_name: str) -> list[DisputedUnit]:
     units: dict[_Unit, VoteScore] = {}
     shown: dict[_Unit, int] = {}
     for one in _counts(snapshot, type_name=type_name):
@@ -171,7 +177,22 @@ def with_pictures(found: Sequence[DisputedUnit]) -> list[DisputedPair]:
 
 
 def pictures_of(snapshot: Snapshot, slug: str, *, type_name: str = "") -> list[PictureShown]:
-    """Every picture of a contestant that was judged, the most beaten first; three queries."""
+    """Every picture of a contestant that was judged, the most beaten first; five queries."""
+    key = (_key(snapshot, type_name), slug)
+    shown, scores = _JUDGED.get(key, lambda: _judged(snapshot, slug, type_name))
+    (own,) = Contestant.objects.filter(slug=slug).values_list("pk", flat=True)
+    rows = _matchups(shown.values())
+    found = [
+        _picture(rows[pk], _side_of(rows[pk], own), scores[place]) for place, pk in shown.items()
+    ]
+    found = _with_labels(found)
+    return sorted(found, key=lambda one: (-one.score.lost_share, -one.score.votes, one.place))
+
+
+def _judged(
+    snapshot: Snapshot, slug: str, type_name: str
+) -> tuple[dict[int, int], dict[int, VoteScore]]:
+    """By scenario: the newest showing of a contestant's picture, and its score."""
     scores: defaultdict[int, VoteScore] = defaultdict(VoteScore)
     shown: dict[int, int] = {}
     (own,) = Contestant.objects.filter(slug=slug).values_list("pk", flat=True)
@@ -179,12 +200,7 @@ def pictures_of(snapshot: Snapshot, slug: str, *, type_name: str = "") -> list[P
         if own in (one.left, one.right):
             scores[one.scenario] = scores[one.scenario].plus(_score_of(one, own))
             shown[one.scenario] = max(shown.get(one.scenario, 0), one.matchup)
-    rows = _matchups(shown.values())
-    found = [
-        _picture(rows[pk], _side_of(rows[pk], own), scores[place]) for place, pk in shown.items()
-    ]
-    found = _with_labels(found)
-    return sorted(found, key=lambda one: (-one.score.lost_share, -one.score.votes, one.place))
+    return shown, dict(scores)
 
 
 def by_faults(pictures: Iterable[PictureShown]) -> list[PictureShown]:
@@ -211,6 +227,15 @@ def sheet_rows(snapshot: Snapshot, scenarios: Sequence[int]) -> dict[int, dict[s
 
 
 # --- Private -----------------------------------------------------------------------------------
+
+_DISPUTED: Remembered[list[DisputedUnit]] = Remembered(3)
+_JUDGED: Remembered[tuple[dict[int, int], dict[int, VoteScore]]] = Remembered(40)
+
+
+def _key(snapshot: Snapshot, type_name: str) -> Hashable:
+    """What a gallery is counted from: a rating's votes never change, types of scenarios do."""
+    types = plan_types(snapshot.study) if type_name else ()
+    return (snapshot.code, snapshot.last_vote, json.dumps(snapshot.filters), type_name, types)
 
 
 def _counts(

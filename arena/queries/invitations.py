@@ -12,6 +12,7 @@ from django.contrib.auth.models import User
 from arena.errors import NotYours
 from arena.models import Invitation, Study, Vote, token_digest
 from arena.queries.people import role_of
+from arena.queries.remembering import Remembered, plan_and_votes
 from arena.queries.votes import ExpertTally, tallies
 
 
@@ -66,20 +67,13 @@ def invitation_by_token(token: str, *, locked: bool = False) -> Invitation:
 
 
 def expert_lines(study: Study, now: datetime) -> list[ExpertLine]:
-    """One line per expert of the study, by pseudonym; the number of queries is fixed per expert.
+    """One line per expert of the study, by pseudonym; so many queries whatever their number.
 
     Args:
         study: Any, also a closed one.
         now: For the states of the links.
     """
-    pace: dict[int, list[int]] = defaultdict(list)
-    last_vote: dict[int, datetime] = {}
-    votes = Vote.objects.filter(matchup__study=study).order_by("at", "pk")
-    shown = ("expert", "outcome", "ms_visible", "at")
-    for expert, outcome, ms_visible, at in votes.values_list(*shown):
-        last_vote[expert] = at
-        if ms_visible is not None and outcome != Vote.Outcome.SKIP:
-            pace[expert].append(ms_visible)
+    pace, last_vote = _PACED.get(plan_and_votes(study), lambda: _pace(study))
     newest = {
         row.expert_id: row
         for row in study.invitations.select_related("invited_by").order_by("made_at", "pk")
@@ -92,7 +86,7 @@ def expert_lines(study: Study, now: datetime) -> list[ExpertLine]:
         lines.append(
             ExpertLine(
                 tally=tally,
-                seconds_per_vote=median(pace[user.pk]) / 1000 if pace[user.pk] else None,
+                seconds_per_vote=pace.get(user.pk),
                 last_seen=max(seen, default=None),
                 invitation=invitation,
                 link=invitation.state(now) if invitation else None,
@@ -100,3 +94,23 @@ def expert_lines(study: Study, now: datetime) -> list[ExpertLine]:
             )
         )
     return lines
+
+
+# --- Private -----------------------------------------------------------------------------------
+
+
+def _pace(study: Study) -> tuple[dict[int, float], dict[int, datetime]]:
+    """By expert: the median of the seconds per vote, skips apart, and the moment of the last."""
+    shown: dict[int, list[int]] = defaultdict(list)
+    last: dict[int, datetime] = {}
+    votes = Vote.objects.filter(matchup__study=study)
+    for expert, outcome, ms_visible, at in votes.values_list(
+        "expert", "outcome", "ms_visible", "at"
+    ).iterator(chunk_size=5000):
+        last[expert] = max(at, last.get(expert, at))
+        if ms_visible is not None and outcome != Vote.Outcome.SKIP:
+            shown[expert].append(ms_visible)
+    return {expert: median(times) / 1000 for expert, times in shown.items()}, last
+
+
+_PACED: Remembered[tuple[dict[int, float], dict[int, datetime]]] = Remembered(8)

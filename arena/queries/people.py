@@ -28,7 +28,7 @@ def role_of(user: User | AnonymousUser) -> str | None:
         return role
     groups = getattr(user, "role_names", None)
     if groups is None and not user.is_superuser:
-        groups = set(user.groups.values_list("name", flat=True))
+        groups = {group.name for group in user.groups.all()}
     return _highest(user, groups or ())
 
 

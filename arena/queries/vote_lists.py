@@ -6,6 +6,7 @@ as `vote_sets` says it; the database finds them, so that a page costs the same f
 
 from __future__ import annotations
 
+import json
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from uuid import UUID
@@ -22,6 +23,7 @@ from arena.queries.listed_votes import (
     of_imported,
     of_votes,
 )
+from arena.queries.remembering import Remembered, plan_types
 from arena.queries.vote_marks import RATED, made_up_contestants, marked_votes, own_votes, users_of
 from arena.queries.vote_search import (
     AUTOMATIC_TIE,
@@ -161,10 +163,9 @@ class _Found:
     """Rows of the database, and after them the pairs that nobody can tell apart."""
 
     def __init__(self, snapshot: Snapshot, search: VoteSearch) -> None:
-        self._snapshot = snapshot
+        self._snapshot, self._search = snapshot, search
         self._imported = is_imported(snapshot.study)
         self._automatic = [] if self._imported else _automatic(snapshot, search)
-        self._votes = None if self._imported else votes_behind(snapshot, search)
         self._lines = imported_votes(snapshot, search) if self._imported else None
         self._stored: int | None = None
 
@@ -175,30 +176,40 @@ class _Found:
         """The votes from one place up to another, from 0."""
         if self._lines is not None:
             return of_imported(self._lines[start:stop], self._snapshot)
-        assert self._votes is not None
-        keys = list(self._votes.order_by("pk").values_list("pk", F("mark"))[start:stop])
-        listed = of_votes(keys, self._snapshot)
+        listed = of_votes(self._keys()[start:stop], self._snapshot)
         stored = self._count_stored()
         rest = self._automatic[max(start - stored, 0) : max(stop - stored, 0)]
         return listed + of_automatic(rest, self._snapshot)
 
     def each(self) -> Iterator[ListedVote]:
         """All of them; what is found is found once, whatever its number."""
-        if self._votes is None:
+        if self._lines is not None:
             for start in range(0, self.count(), CHUNK):
                 yield from self.part(start, start + CHUNK)
             return
-        keys = list(self._votes.order_by("pk").values_list("pk", F("mark")))
+        keys = self._keys()
         for start in range(0, len(keys), CHUNK):
             yield from of_votes(keys[start : start + CHUNK], self._snapshot)
         yield from of_automatic(self._automatic, self._snapshot)
 
     def _count_stored(self) -> int:
         if self._stored is None:
-            rows = self._votes if self._lines is None else self._lines
-            assert rows is not None
-            self._stored = rows.count()
+            self._stored = len(self._keys()) if self._lines is None else self._lines.count()
         return self._stored
+
+    def _keys(self) -> list[tuple[int, str]]:
+        """Every vote that is looked for, with its mark; a rating's votes never change."""
+        rating = self._snapshot
+        types = plan_types(rating.study) if self._search.type else ()
+        found = (rating.code, rating.last_vote, json.dumps(rating.filters), self._search, types)
+        return _FOUND.get(found, self._find)
+
+    def _find(self) -> list[tuple[int, str]]:
+        rows = votes_behind(self._snapshot, self._search)
+        return list(rows.order_by("pk").values_list("pk", F("mark")))
+
+
+_FOUND: Remembered[list[tuple[int, str]]] = Remembered(3)
 
 
 def _automatic(snapshot: Snapshot, search: VoteSearch) -> list[tuple[Judged, str]]:

@@ -13,6 +13,7 @@ from django.utils import timezone
 from arena.errors import NotYours
 from arena.models import Matchup, Study, Vote
 from arena.queries.people import by_pseudonym
+from arena.queries.remembering import Remembered, plan_and_votes
 from arena.queries.voting_path import study_now
 
 
@@ -143,7 +144,30 @@ def voting_state(*, study_pk: int, expert: User, since: datetime) -> VotingState
 
 
 def tallies(study: Study) -> list[ExpertTally]:
-    """One line per expert of the study, for analysts and admins; three queries."""
+    """One line per expert of the study, for analysts and admins; six queries at most."""
+    totals, outcomes = _TALLIED.get(plan_and_votes(study), lambda: _tally(study))
+    lines = []
+    experts = study.experts.select_related("person").prefetch_related("groups")
+    for expert in by_pseudonym(experts):
+        counts = outcomes.get(expert.pk, (0, 0, 0, 0))
+        lines.append(
+            ExpertTally(
+                expert=expert,
+                pseudonym=expert.person.pseudonym,
+                is_simulated=expert.person.is_simulated,
+                total=totals.get(expert.pk, 0) + study.votes_to_plan.get(expert.username, 0),
+                voted=sum(counts[:3]),
+                left_wins=counts[0],
+                ties=counts[1],
+                right_wins=counts[2],
+                skips=counts[3],
+            )
+        )
+    return lines
+
+
+def _tally(study: Study) -> tuple[dict[int, int], dict[int, tuple[int, ...]]]:
+    """By expert: the matchups, and the current votes to the left, equal, to the right, skipped."""
     totals = dict(
         Matchup.objects.filter(study=study)
         .values_list("expert")
@@ -163,20 +187,7 @@ def tallies(study: Study) -> list[ExpertTally]:
         .order_by()
         .values_list("expert", "left_wins", "ties", "right_wins", "skips")
     }
-    lines = []
-    for expert in by_pseudonym(study.experts.select_related("person")):
-        counts = outcomes.get(expert.pk, (0, 0, 0, 0))
-        lines.append(
-            ExpertTally(
-                expert=expert,
-                pseudonym=expert.person.pseudonym,
-                is_simulated=expert.person.is_simulated,
-                total=totals.get(expert.pk, 0) + study.votes_to_plan.get(expert.username, 0),
-                voted=sum(counts[:3]),
-                left_wins=counts[0],
-                ties=counts[1],
-                right_wins=counts[2],
-                skips=counts[3],
-            )
-        )
-    return lines
+    return totals, outcomes
+
+
+_TALLIED: Remembered[tuple[dict[int, int], dict[int, tuple[int, ...]]]] = Remembered(8)
