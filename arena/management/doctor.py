@@ -12,7 +12,7 @@ import tempfile
 import uuid
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
-from datetime import UTC, datetime
+from datetime import UTC, datetime, timedelta
 from enum import StrEnum
 from pathlib import Path
 
@@ -21,7 +21,9 @@ from django.core.files.base import ContentFile
 from django.core.files.storage import FileSystemStorage, default_storage
 from django.db import DatabaseError, connection
 
+from arena.models import ApiToken, Study, Webhook, WebhookDelivery
 from arena.queries.people import find_admins
+from arena.services.looks import stopping_progress
 from arena.serving.readiness import look_at_broker, look_at_database, look_at_workers
 from augment.errors import KeyMissing, KeyNotAllowed, MediaFault
 from augment.models import Contestant, Endpoint, EndpointModel, GenerationJob
@@ -30,6 +32,9 @@ from augment.services.endpoints.keys import key_of
 
 ENOUGH_BYTES = 1 << 30
 FAR_APART_S = 60.0
+LATE = timedelta(minutes=10)
+SOON = timedelta(days=7)
+RECENTLY = timedelta(days=30)
 
 
 class Level(StrEnum):
@@ -196,10 +201,60 @@ def _endpoints() -> Ailments:
         yield Ailment(Level.DOUBTFUL, f"endpoint {model.endpoint.label}", text, remedy)
 
 
+def _webhooks() -> Ailments:
+    """Addresses whose last message was given up, and messages that nobody sends."""
+    now = database_now()
+    for webhook in Webhook.objects.filter(is_active=True):
+        last = webhook.deliveries.exclude(state=WebhookDelivery.State.WAITING)
+        row = last.order_by("-pk").first()
+        part = f"webhook {webhook.name}"
+        if row is not None and row.state == WebhookDelivery.State.FAILED:
+            text = f"its last message was given up: {row.last_answer or row.last_status}"
+            yield Ailment(Level.DOUBTFUL, part, text, "Look at its address, then send it again.")
+        late = webhook.deliveries.filter(
+            state=WebhookDelivery.State.WAITING, due_at__lt=now - LATE
+        ).count()
+        if late:
+            text = f"{late} messages are due since {LATE.seconds // 60} minutes and not sent"
+            yield Ailment(Level.DOUBTFUL, part, text, "Workers send them; see whether one runs.")
+
+
+def _tokens() -> Ailments:
+    """Tokens that stopped working, or soon will, and were in use."""
+    now = database_now()
+    used = ApiToken.objects.filter(
+        revoked_at=None,
+        last_used_at__gt=now - RECENTLY,
+        expires_at__gt=now - RECENTLY,
+        expires_at__lt=now + SOON,
+    )
+    for token in used.order_by("expires_at", "pk"):
+        verb = "has expired" if token.expires_at <= now else "expires"
+        text = f"{verb} on {token.expires_at:%Y-%m-%d}; it was used on {token.last_used_at:%m-%d}"
+        remedy = "Its owner makes a new one on the page of API tokens."
+        yield Ailment(Level.DOUBTFUL, f"token {token.name}", text, remedy)
+
+
+def _looks() -> Ailments:
+    """Studies whose stopping rule should have looked by now: workers do that."""
+    for study in Study.objects.filter(state=Study.State.OPEN, rules__has_key="stopping"):
+        found = stopping_progress(study)
+        if found is None or found.is_met:
+            continue
+        coming = [line.votes for line in found.lines if not line.is_done]
+        if coming and coming[0] <= found.votes:
+            text = f"a look is due at {coming[0]} votes; there are {found.votes}"
+            remedy = "A worker takes it within a minute; or run `manage.py check_stopping`."
+            yield Ailment(Level.DOUBTFUL, f"study {study.name}", text, remedy)
+
+
 NEED_THE_DATABASE: tuple[Callable[[], Ailments], ...] = (
     _clock,
     _broker,
     _workers,
     _accounts,
     _endpoints,
+    _webhooks,
+    _tokens,
+    _looks,
 )

@@ -166,7 +166,7 @@ def tallies(study: Study) -> list[ExpertTally]:
     return lines
 
 
-def _tally(study: Study) -> tuple[dict[int, int], dict[int, tuple[int, ...]]]:
+def _tally(study: Study) -> tuple[dict[int, int], dict[int, tuple[int, int, int, int]]]:
     """By expert: the matchups, and the current votes to the left, equal, to the right, skipped."""
     totals = dict(
         Matchup.objects.filter(study=study)
@@ -190,4 +190,4 @@ def _tally(study: Study) -> tuple[dict[int, int], dict[int, tuple[int, ...]]]:
     return totals, outcomes
 
 
-_TALLIED: Remembered[tuple[dict[int, int], dict[int, tuple[int, ...]]]] = Remembered(8)
+_TALLIED: Remembered[tuple[dict[int, int], dict[int, tuple[int, int, int, int]]]] = Remembered(8)

@@ -171,6 +171,8 @@ def section(request: HttpRequest, job: GenerationJob) -> dict[str, object]:
 
 def driving(snapshot: Snapshot, table: LeaderboardTable) -> dict[str, Any]:
     """What the tab of a study's results shows: of the augmentations that it shows."""
+    if not Simulation.objects.exists():
+        return {"drivings": []}
     ids = shown_augmentations(snapshot.study)
     found = [
         DrivingTable(

@@ -4,21 +4,31 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterator
+from datetime import timedelta
 from pathlib import Path
 
 import pytest
 from celery import current_app
 from django.contrib.auth.models import User
 from django.core.management import CommandError, call_command
+from django.utils import timezone
 from pytest_django import Settings
 
 from arena.management import doctor
 from arena.management.doctor import Level, examine
+from arena.models import ApiToken, Webhook, WebhookDelivery
+from arena.rating.stopping import StoppingRule
+from arena.services.looks import take_due_looks
 from arena.services.people import create_person
+from arena.services.plan_options import PlanOptions
+from arena.services.studies import open_study
+from arena.services.webhooks import send_test
 from arena.serving import readiness
 from augment.models import Endpoint, GenerationJob, Worker
 from augment.services.clock import DATABASE_TIME
+from tests import study_rows
 from tests.brokers import MEMORY, broker_at
+from tests.webhooks import hook
 
 pytestmark = pytest.mark.django_db
 
@@ -37,6 +47,11 @@ def _sound(tmp_path: Path, settings: Settings) -> Iterator[None]:
     Worker.objects.create(name="w 1", **now)
     with broker_at(MEMORY):
         yield
+
+
+@pytest.fixture
+def admin() -> User:
+    return User.objects.get(username="root")
 
 
 def wrong() -> dict[str, Level]:
@@ -132,3 +147,63 @@ def test_settings_that_will_surprise(
 def test_nobody_is_admin() -> None:
     User.objects.filter(username="root").update(is_active=False)
     assert wrong() == {"accounts": Level.DOUBTFUL}
+
+
+def test_a_webhook_whose_message_was_given_up_or_stays_behind(admin: User) -> None:
+    found = hook(admin)
+    send_test(webhook=found.webhook)
+    row = WebhookDelivery.objects.get()
+    part = f"webhook {found.webhook.name}"
+    assert wrong() == {}
+    WebhookDelivery.objects.update(due_at=timezone.now() - timedelta(minutes=11))
+    assert wrong() == {part: Level.DOUBTFUL}
+    given_up = WebhookDelivery.State.FAILED
+    WebhookDelivery.objects.update(state=given_up, last_answer="Connection refused")
+    assert wrong() == {part: Level.DOUBTFUL}
+    assert any("Connection refused" in one.text for one in examine())
+    send_test(webhook=found.webhook)
+    later = WebhookDelivery.objects.exclude(pk=row.pk)
+    later.update(state=WebhookDelivery.State.DELIVERED)
+    assert wrong() == {}
+    WebhookDelivery.objects.update(state=given_up)
+    Webhook.objects.update(is_active=False)
+    assert wrong() == {}
+
+
+@pytest.mark.parametrize(
+    ("expires", "used", "is_told"),
+    [
+        (3, 1, True),
+        (-3, 5, True),
+        (8, 1, False),
+        (3, None, False),
+        (3, 31, False),
+        (-31, 31, False),
+    ],
+)
+def test_a_token_in_use_that_expires(
+    admin: User, expires: int, used: int | None, is_told: bool
+) -> None:
+    now = timezone.now()
+    token = ApiToken.objects.create(
+        owner=admin, name="nightly", role="analyst", token_sha256="0" * 64,
+        expires_at=now + timedelta(days=expires),
+        last_used_at=None if used is None else now - timedelta(days=used),
+    )  # fmt: skip
+    assert wrong() == ({"token nightly": Level.DOUBTFUL} if is_told else {})
+    ApiToken.objects.filter(pk=token.pk).update(revoked_at=now)
+    assert wrong() == {}
+
+
+def test_a_look_that_nobody_takes() -> None:
+    rule = StoppingRule(half_width=5.0, looks=2)
+    study = open_study(
+        name="Round 1", votes_per_expert=9, seed=7, options=PlanOptions(stopping=rule),
+        **study_rows.cast_of(),
+    )  # fmt: skip
+    assert wrong() == {}
+    for one in study.matchups.all():
+        study_rows.vote(one)
+    assert wrong() == {"study Round 1": Level.DOUBTFUL}
+    take_due_looks()
+    assert wrong() == {}
