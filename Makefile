@@ -40,6 +40,7 @@ lint: $(VENV)/.test ## Format, style, floors and types
 bench: chromium ## Ours beside other products, each in its own environment; writes docs/benchmarks.md
 	$(BIN)/python -m tests.benchmarks.rivals.voting
 	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m tests.benchmarks.rating_speed
+	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m tests.benchmarks.rating_scale --write
 
 mutants: $(VENV)/.test ## Whether the tests notice small mutations of what matters; writes docs/mutants.md
 	$(BIN)/python -m tests.mutants

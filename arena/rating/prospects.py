@@ -100,7 +100,7 @@ def foretell(question: Question) -> Outlook:
         return found.widest <= question.half_width
 
     def tells_apart(found: Expected) -> bool:
-        return found.gap_found(power=question.power) <= question.gap
+        return found.tells_apart(question.gap, power=question.power)
 
     votes = question.votes_per_expert
     return Outlook(

@@ -1,13 +1,15 @@
 """What a study will be able to tell, before its first vote: half-widths, power, votes needed.
 
-In: a `StudyDesign`. Out: half-widths, the gap that is found, and the votes that either needs. All
-of it is closed form, from the terms that the intervals of `moderated.py` are made of:
+In: a `StudyDesign`. Out: half-widths, the gap that is found, and the votes that either needs, from
+the terms that the intervals of `moderated.py` are made of:
 
 - single votes: the sandwich of a balanced plan, H^-1 B H^-1, with contestants evenly spaced over
   the spread and ties likelier between those close to each other;
 - what experts, and what scenarios, make of each contestant: its variance over the number of
   clusters, plus what an uneven share of the pairs adds where a cluster has few votes;
 - Student's t with Satterthwaite's degrees of freedom of that sum.
+
+All of it is closed form, but for the gap that is found (`planned_pairs.py`).
 
 `docs/coverage.md` holds it against simulated studies. Everything is on the scale of the rated
 table, ties as half a win.
@@ -27,7 +29,8 @@ from scipy.special import ndtr, ndtri
 from arena.rating.bradley_terry import ELO_PER_LOGIT
 from arena.rating.comparisons import FloatArray, IntArray
 from arena.rating.estimate import LEVEL
-from arena.rating.moderated import MOST_PRIOR
+from arena.rating.moderated import MOST_PRIOR, Spread
+from arena.rating.planned_pairs import MOST_DRAWN, PlannedPairs, component_of
 from arena.rating.simultaneous import CAUTION
 from arena.rating.student import t_quantile
 
@@ -114,13 +117,18 @@ class Expected:
 
     Attributes:
         design: Whose.
-        covariance: (C, C) squared points.
+        spread: As a rating would find it if it found what is true.
         degrees: Of Student's t.
     """
 
     design: StudyDesign
-    covariance: FloatArray
+    spread: Spread
     degrees: float
+
+    @property
+    def covariance(self) -> FloatArray:
+        """(C, C) squared points."""
+        return self.spread.covariance
 
     @property
     def half_width(self) -> float:
@@ -131,19 +139,35 @@ class Expected:
     @property
     def widest(self) -> float:
         """Points of the widest 95 % interval of a table: by chance some are wider."""
-        largest = math.sqrt(float(self.covariance.diagonal().max()))
-        by_chance = 1.0 + _largest_of(self.design.contestants) / math.sqrt(2.0 * self.degrees)
-        return float(t_quantile(self.degrees)) * largest * by_chance
+        place = int(self.covariance.diagonal().argmax())
+        variance = float(self.covariance[place, place])
+        # Only a contestant's own squares are guesses; what all have in common moves all alike.
+        chance = sum(
+            2.0
+            * (part.own_share[place] * part.common[place, place] / variance) ** 2
+            / part.own_degrees[place]
+            for part in self.spread.components
+        )
+        by_chance = 1.0 + 0.5 * _largest_of(self.design.contestants) * math.sqrt(chance)
+        return float(t_quantile(self.degrees)) * math.sqrt(variance) * by_chance
+
+    def tells_apart(self, gap: float, *, power: float) -> bool:
+        """Whether two so many points apart are told apart with such a chance."""
+        if self.design.contestants <= MOST_DRAWN:
+            return self._planned_pairs().power(gap) >= power
+        return self.gap_found(power=power) <= gap
 
     def gap_found(self, *, power: float) -> float:
         """How far apart, in points, two must be to be told apart with such a chance.
 
-        All pairs of the table are judged at once, at 5 % for all of them; those further apart are
-        found first, so the closer ones share the 5 %. An approximation: see docs/coverage.md.
+        All pairs of the table are judged at once, at 5 % for all of them. Among more than 12
+        contestants, where nothing is drawn, the closer ones share the 5 % by Tukey's range.
 
         Args:
             power: From 0.5 to below 1.
         """
+        if self.design.contestants <= MOST_DRAWN:
+            return self._planned_pairs().gap_found(power)
         variance = self.covariance.diagonal()
         error = math.sqrt(float((variance[1:] + variance[:-1]
                                  - 2.0 * self.covariance.diagonal(1)).mean()))  # fmt: skip
@@ -159,6 +183,9 @@ class Expected:
                 break
         return gap
 
+    def _planned_pairs(self) -> PlannedPairs:
+        return PlannedPairs(self.spread, self.design.gaps() * ELO_PER_LOGIT)
+
 
 def expect(design: StudyDesign, votes: float) -> Expected:
     """How sure ratings will be after so many votes of all experts, more than 0."""
@@ -170,15 +197,24 @@ def expect(design: StudyDesign, votes: float) -> Expected:
         (design.experts, design.expert_sd, votes / design.experts),
         (design.scenarios, design.scenario_sd, distinct / design.scenarios),
     )
-    covariance, weights = single.copy(), 0.0
     at_widest = float(single.diagonal().max())
+    common, weights, components = single.copy(), 0.0, []
     for clusters, effect, per_cluster in parts:
         added = effect**2 * (1.0 / clusters + _uneven(design, per_cluster) / clusters) * centre
-        covariance = covariance + added
-        degrees = min(MOST_PRIOR + clusters - 1.0, (clusters - 1.0) * (contestants - 1.0))
-        weights += (at_widest + float(added[0, 0])) ** 2 / max(degrees, 1.0)
-    found = float(covariance.diagonal().max()) ** 2 / weights
-    return Expected(design=design, covariance=covariance, degrees=max(found, 1.0))
+        common = common + added
+        own = clusters - 1.0
+        degrees = max(min(MOST_PRIOR + own, own * (contestants - 1.0)), 1.0)
+        weights += (at_widest + float(added[0, 0])) ** 2 / degrees
+        components.append(component_of(single + added, own, degrees))
+    spread = Spread(
+        covariance=common,
+        degrees=np.full(contestants, max(float(common.diagonal().max()) ** 2 / weights, 1.0)),
+        common=common,
+        base=single,
+        plain=common,
+        components=tuple(components),
+    )
+    return Expected(design=design, spread=spread, degrees=float(spread.degrees[0]))
 
 
 def votes_per_expert_for(

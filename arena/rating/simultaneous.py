@@ -50,7 +50,8 @@ def judge_pairs(rating: FloatArray, spread: Spread, *, rounds: int, seed: int) -
     gap = rating[low] - rating[high]
     # Of 36 pairs some have a small square by chance, and those would be told apart first.
     variance = np.maximum(
-        _of_pairs(spread.covariance, low, high), _of_pairs(spread.common, low, high)
+        variances_of_pairs(spread.covariance, low, high),
+        variances_of_pairs(spread.common, low, high),
     )
     error = np.sqrt(np.maximum(variance, 1e-300))
     size = np.abs(gap) / error
@@ -69,38 +70,63 @@ def judge_pairs(rating: FloatArray, spread: Spread, *, rounds: int, seed: int) -
     )
 
 
-# --- Private -----------------------------------------------------------------------------------
+def draw_equals(
+    spread: Spread, low: IntArray, high: IntArray, *, rounds: int, seed: int
+) -> tuple[SingleArray, SingleArray, SingleArray]:
+    """(N, P) each: differences of equals, and two variances that would be found for them.
+
+    The first is moderated, the second what it would be if all contestants were taken for alike.
+    In single precision: they are compared, once.
+
+    Args:
+        spread: Of the ratings.
+        low: (P,) one of each pair.
+        high: (P,) the other one.
+        rounds: N.
+        seed: Of the draws.
+    """
+    rng = np.random.default_rng(seed)
+    contestants = len(spread.covariance)
+    root = _root(spread.common)
+    least = (LEAST * variances_of_pairs(spread.base, low, high)).astype(np.float32)
+    taken_off = max(len(spread.components) - 1, 0) * variances_of_pairs(spread.base, low, high)
+    clusters = sum(component.own_degrees.max(initial=1.0) for component in spread.components)
+    at_once = int(max(1, _NUMBERS_AT_ONCE // (contestants * (contestants + clusters))))
+    roots = [_root(component.common) for component in spread.components]
+    gaps: SingleArray = np.empty((rounds, len(low)), dtype=np.float32)
+    variances, commons = np.empty_like(gaps), np.empty_like(gaps)
+    for first in range(0, rounds, at_once):
+        block = slice(first, min(first + at_once, rounds))
+        number = block.stop - first
+        ratings = rng.standard_normal((number, contestants), dtype=np.float32) @ root
+        gaps[block] = ratings.take(low, axis=1) - ratings.take(high, axis=1)
+        variances[block] = commons[block] = -taken_off
+        if not spread.components:
+            variances[block] += variances_of_pairs(spread.covariance, low, high)
+        for component, of_component in zip(spread.components, roots, strict=True):
+            found = _variances(component, of_component, low, high, number, rng)
+            variances[block] += found[0]
+            commons[block] += found[1]
+    least = np.maximum(least, np.float32(1e-30))
+    np.maximum(variances, least, out=variances)
+    np.maximum(commons, least, out=commons)
+    return gaps, variances, commons
 
 
-def _of_pairs(covariance: FloatArray, low: IntArray, high: IntArray) -> FloatArray:
+def variances_of_pairs(covariance: FloatArray, low: IntArray, high: IntArray) -> FloatArray:
     """(P,) variances of differences, from a covariance (C, C)."""
     variance = covariance.diagonal()
     return np.asarray(variance[low] + variance[high] - 2.0 * covariance[low, high])
 
 
+# --- Private -----------------------------------------------------------------------------------
+
+
 def _drawn(spread: Spread, low: IntArray, high: IntArray, rounds: int, seed: int) -> SingleArray:
-    """(P, N) standardised differences of equals, in single precision: they are compared, once."""
-    rng = np.random.default_rng(seed)
-    contestants = len(spread.covariance)
-    root = _root(spread.common)
-    least = (LEAST * _of_pairs(spread.base, low, high)).astype(np.float32)
-    taken_off = max(len(spread.components) - 1, 0) * _of_pairs(spread.base, low, high)
-    clusters = sum(component.own_degrees.max(initial=1.0) for component in spread.components)
-    at_once = int(max(1, _NUMBERS_AT_ONCE // (contestants * (contestants + clusters))))
-    roots = [_root(component.common) for component in spread.components]
-    drawn: SingleArray = np.empty((rounds, len(low)), dtype=np.float32)
-    for first in range(0, rounds, at_once):
-        number = min(at_once, rounds - first)
-        ratings = rng.standard_normal((number, contestants), dtype=np.float32) @ root
-        variance: SingleArray = np.tile(-taken_off.astype(np.float32), (number, 1))
-        if not spread.components:
-            variance += _of_pairs(spread.covariance, low, high).astype(np.float32)
-        for component, of_component in zip(spread.components, roots, strict=True):
-            variance += _variances(component, of_component, low, high, number, rng)
-        np.maximum(variance, np.maximum(least, np.float32(1e-30)), out=variance)
-        gaps = ratings.take(low, axis=1) - ratings.take(high, axis=1)
-        np.divide(gaps, np.sqrt(variance), out=drawn[first : first + number])
-    return np.abs(drawn, out=drawn).T
+    """(P, N) standardised differences of equals."""
+    gaps, variances, _ = draw_equals(spread, low, high, rounds=rounds, seed=seed)
+    np.sqrt(variances, out=variances)
+    return np.abs(np.divide(gaps, variances, out=gaps), out=gaps).T
 
 
 def _variances(
@@ -110,25 +136,29 @@ def _variances(
     high: IntArray,
     number: int,
     rng: np.random.Generator,
-) -> SingleArray:
-    """(N, P) what a component would say of the pairs' variances if all were alike."""
+) -> tuple[SingleArray, SingleArray]:
+    """(N, P), (N, P): what a component would add to the two variances of `draw_equals`."""
     degrees = float(np.median(one.own_degrees))
+    common = variances_of_pairs(one.common, low, high).astype(np.float32)
     if degrees >= _MANY_CLUSTERS:
-        common = _of_pairs(one.common, low, high).astype(np.float32)
-        return np.asarray(np.broadcast_to(common, (number, len(low))))
+        known = np.broadcast_to(common, (number, len(low)))
+        return known, known
     clusters = max(1, round(degrees))
     contestants = len(one.common)
     pulls = rng.standard_normal((number, clusters, contestants), dtype=np.float32) @ root
     seen = np.einsum("ngc,ngc,c->n", pulls, pulls, _over(one.common.diagonal()))
     seen /= np.float32(clusters * contestants)
     others = np.sqrt(1.0 - one.own_share)
-    shared = _of_pairs(others[:, None] * one.common * others, low, high).astype(np.float32)
+    shared = variances_of_pairs(others[:, None] * one.common * others, low, high).astype(
+        np.float32
+    )
     pulls *= np.sqrt(one.own_share / clusters).astype(np.float32)
     squares = np.matmul(pulls.transpose(0, 2, 1), pulls)
     variance = np.diagonal(squares, axis1=1, axis2=2)
     own = variance.take(low, axis=1) + variance.take(high, axis=1)
     own -= np.float32(2.0) * squares.reshape(number, -1).take(low * contestants + high, axis=1)
-    return np.asarray(own + seen[:, None] * shared)
+    own += seen[:, None] * shared
+    return np.asarray(own), np.asarray(seen[:, None] * common)
 
 
 def _over(values: FloatArray) -> SingleArray:

@@ -71,7 +71,8 @@ class Found:
     Attributes:
         intervals: By method.
         hardest: The default's of the controversial contestants alone.
-        ranks: The share of contestants whose true place is in their rank set.
+        ranks_held: Contestants whose true place is in their rank set, of so many `ranked`.
+        all_ranks_held: Studies in which all of them are.
         false: Studies in which a pair was wrongly told apart.
         studies: How many there were, without those whose votes determine no ratings.
     """
@@ -82,6 +83,7 @@ class Found:
     hardest: Tally = field(default_factory=Tally)
     ranked: int = 0
     ranks_held: int = 0
+    all_ranks_held: int = 0
     places: int = 0
     false: int = 0
     studies: int = 0
@@ -134,11 +136,13 @@ def _add_ranks(found: Found, board: Leaderboard, truth: FloatArray) -> None:
     close = 1e-6
     best = 1 + (truth[:, None] > truth[None, :] + close).sum(axis=0)
     worst = len(truth) - (truth[:, None] < truth[None, :] - close).sum(axis=0)
+    before = found.ranked - found.ranks_held
     for line, first, last in zip(board.lines, best, worst, strict=True):
         if line.rank_best is not None and line.rank_worst is not None:
             found.ranked += 1
             found.ranks_held += line.rank_best <= first and last <= line.rank_worst
             found.places += line.rank_worst - line.rank_best + 1
+    found.all_ranks_held += found.ranked - found.ranks_held == before
     if board.separation is not None:
         wrong = board.separation.above & (truth[:, None] < truth[None, :] + close)
         found.false += bool(wrong.any())
@@ -191,6 +195,32 @@ def controversial_lines(studies: int) -> Iterator[str]:
         yield f"| {experts} x 200 | " + " | ".join(cells) + " |"
 
 
+def tied_lines(studies: int) -> Iterator[str]:
+    """Rank sets where several are truly equal: nine, or three times three 60 points apart."""
+    heads = (
+        "experts x votes", "scenario / expert", "equals", "all nine rank sets hold",
+        "each set holds, places",
+    )  # fmt: skip
+    yield "| " + " | ".join(heads) + " |"
+    yield "|---" * len(heads) + "|"
+    for experts in (5, 9, 20):
+        for scenario_sd, expert_sd in EFFECTS[:2]:
+            for said, groups in (("nine", 1), ("three, three, three", 3)):
+                world = World(
+                    ratings=np.repeat(1000.0 + 60.0 * np.arange(groups), 9 // groups),
+                    scenario_sd=scenario_sd,
+                    expert_sd=expert_sd,
+                    experts=experts,
+                    votes_per_expert=480,
+                )
+                found = study(world, studies=studies, methods=())
+                cells = (
+                    f"{experts} x 480", f"{scenario_sd:.0f} / {expert_sd:.0f}", said,
+                    f"{found.all_ranks_held / found.studies:.1%}", found.ranks,
+                )  # fmt: skip
+                yield "| " + " | ".join(cells) + " |"
+
+
 def write_table(name: str, text: str) -> None:
     """Replace what stands between the marks of a table."""
     begin, end = f"<!-- {name} -->\n", f"<!-- end of {name} -->"
@@ -225,7 +255,8 @@ def print_tables(tables: Mapping[str, Callable[[int], Iterator[str]]], *, studie
 
 def main() -> None:
     began = time.process_time()
-    print_tables({"controversial": controversial_lines, "worlds": lines}, studies=250)
+    tables = {"controversial": controversial_lines, "ties": tied_lines, "worlds": lines}
+    print_tables(tables, studies=250)
     print(f"{time.process_time() - began:.0f} s of processor")
 
 

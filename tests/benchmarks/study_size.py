@@ -20,7 +20,7 @@ from arena.rating.sample_size import StudyDesign, expect, votes_per_expert_for
 from tests.benchmarks.coverage_study import print_tables
 from tests.benchmarks.worlds import SCENARIOS, World
 
-CONTESTANTS, TIE_SHARE = 9, 0.42
+CONTESTANTS = 9
 HALF_WIDTH, GAP, POWER = 25.0, 40.0, 0.8
 ROUNDS = 1000
 EXPERTS = (5, 9, 12, 20)
@@ -70,8 +70,8 @@ def design_of(world: World) -> StudyDesign:
         experts=world.experts,
         scenarios=SCENARIOS,
         spread=float(np.ptp(truth)),
-        tie_share=TIE_SHARE,
-        expert_sd=pulled * world.expert_sd,
+        tie_share=world.tie_share(),
+        expert_sd=world.shown_expert_sd(),
         scenario_sd=pulled * world.scenario_sd,
     )
 
@@ -121,7 +121,7 @@ def _row(world: World, step: float, gap: float, studies: int) -> list[str]:
     else:
         found = simulate(replace(world, votes_per_expert=votes), studies=studies, apart=1)
         cells += [f"{votes:,}", f"±{found.widest:.1f}"]
-    votes = votes_per_expert_for(design, lambda found: found.gap_found(power=POWER) <= gap)
+    votes = votes_per_expert_for(design, lambda found: found.tells_apart(gap, power=POWER))
     if votes is None:
         return [*cells, f"{gap:.0f} points: none, {most.gap_found(power=POWER):.0f} at least", ""]
     larger = replace(world, votes_per_expert=votes)

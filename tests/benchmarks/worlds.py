@@ -53,24 +53,53 @@ class World:
         found[list(self.controversial)] *= 4.0
         return found
 
-    def truth(self) -> FloatArray:
-        """(C,) what infinitely many votes of this world would be rated."""
-        strengths = self.ratings / ELO_PER_LOGIT
-        low, high = np.triu_indices(len(strengths), 1)
-        variance = self.scenario_sd**2 + self.expert_sds**2
-        spread = np.sqrt(variance[low] + variance[high])[:, None] / ELO_PER_LOGIT
-        nodes, weights = np.polynomial.hermite_e.hermegauss(60)
-        gaps = (strengths[low] - strengths[high])[:, None] + spread * nodes
-        win, loss = _chances(gaps[None], THRESHOLDS[:, None, None])
-        scores = (0.5 * (1.0 + win - loss)).mean(axis=0) @ (weights / weights.sum())
+    def truth(self, thresholds: FloatArray = THRESHOLDS) -> FloatArray:
+        """(C,) what infinitely many votes of this world would be rated, if these thresholds
+        were alike frequent among experts."""
+        win, loss, weights = self._chances_of_pairs(thresholds)
+        scores = (0.5 * (1.0 + win - loss)).mean(axis=0) @ weights
+        low, high = np.triu_indices(len(self.ratings), 1)
         fitted = bradley_terry.fit(
-            contestants=len(strengths),
+            contestants=len(self.ratings),
             low=low,
             high=high,
             games=np.ones((1, len(low))),
             scores=scores[None],
         )
         return bradley_terry.to_elo(fitted[0])
+
+    def tie_share(self) -> float:
+        """Of all votes, pairs alike frequent."""
+        win, loss, weights = self._chances_of_pairs(THRESHOLDS)
+        return float(((1.0 - win - loss).mean(axis=0) @ weights).mean())
+
+    def shown_expert_sd(self) -> float:
+        """Points by which experts differ about a contestant, as it shows in ratings.
+
+        An expert who seldom calls two equal pulls them further apart than another one: where
+        contestants differ, thresholds show as tastes do.
+        """
+        truth = self.truth()
+        by_thresholds = [self.truth(one) - truth for one in np.split(THRESHOLDS, len(THRESHOLDS))]
+        contestants = len(truth)
+        of_thresholds = np.mean(np.square(by_thresholds)) * contestants / (contestants - 1)
+        spread = float(np.ptp(self.ratings))
+        pulled = float(np.ptp(truth)) / spread if spread else 1.0
+        return float(np.hypot(pulled * self.expert_sd, np.sqrt(of_thresholds)))
+
+    def _chances_of_pairs(
+        self, thresholds: FloatArray
+    ) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """(T, P, N) of T thresholds and N sizes of effects that the first wins, and loses; and
+        (N,) how likely these sizes are."""
+        strengths = self.ratings / ELO_PER_LOGIT
+        low, high = np.triu_indices(len(strengths), 1)
+        variance = self.scenario_sd**2 + self.expert_sds**2
+        spread = np.sqrt(variance[low] + variance[high])[:, None] / ELO_PER_LOGIT
+        nodes, weights = np.polynomial.hermite_e.hermegauss(60)
+        gaps = (strengths[low] - strengths[high])[:, None] + spread * nodes
+        win, loss = _chances(gaps[None], thresholds[:, None, None])
+        return win, loss, weights / weights.sum()
 
     def votes(self, rng: np.random.Generator) -> Comparisons:
         """A study: experts and scenarios are new ones each time."""

@@ -8,11 +8,14 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from scipy.special import ndtr
+from scipy.special import ndtr, ndtri
 from scipy.stats import studentized_range
 
+from arena.rating.bradley_terry import ELO_PER_LOGIT
 from arena.rating.effects import estimate_effects
 from arena.rating.leaderboard import rate
+from arena.rating.moderated import Spread
+from arena.rating.planned_pairs import PlannedPairs
 from arena.rating.planning import votes_for
 from arena.rating.prospects import Question, foretell, prospect
 from arena.rating.sample_size import (
@@ -23,6 +26,7 @@ from arena.rating.sample_size import (
     expect,
     votes_per_expert_for,
 )
+from arena.rating.simultaneous import CAUTION
 from tests.benchmarks.study_size import design_of, world_of
 from tests.benchmarks.worlds import World, paper_ratings
 
@@ -95,6 +99,57 @@ def test_more_votes_never_tell_less(
 def test_all_pairs_share_the_error_as_the_studentized_range_has_it(contestants: int) -> None:
     limit = studentized_range.ppf(0.95, contestants, 1e7) / np.sqrt(2.0)
     assert _level_of_all_pairs(contestants) == pytest.approx(2 * ndtr(-limit), rel=1e-4)
+
+
+def known_spread(contestants: int, variance: float) -> Spread:
+    """Ratings whose variances are as good as known, with those of pairs twice as large."""
+    covariance = variance * np.eye(contestants)
+    return Spread(
+        covariance=covariance,
+        degrees=np.full(contestants, 1e9),
+        common=covariance,
+        base=covariance,
+        plain=covariance,
+        components=(),
+    )
+
+
+@pytest.mark.parametrize("gap", [20.0, 40.0, 55.0])
+def test_one_pair_of_known_variance_is_found_as_often_as_a_normal_value_has_it(
+    gap: float,
+) -> None:
+    error = np.sqrt(2.0 * 10.0**2)
+    limit = ndtri(1.0 - 0.05 / CAUTION / 2.0)
+    planned = PlannedPairs(known_spread(2, 100.0), np.array([30.0]))
+    wanted = ndtr(gap / error - limit) + ndtr(-gap / error - limit)
+    assert planned.power(gap) == pytest.approx(wanted, abs=0.12)
+    assert planned.power(planned.gap_found(0.8)) >= 0.8
+
+
+def test_one_pair_of_many_is_harder_to_find_than_a_single_one() -> None:
+    design = replace(NINE, spread=320.0)
+    planned = PlannedPairs(known_spread(9, 100.0), design.gaps() * ELO_PER_LOGIT)
+    alone = PlannedPairs(known_spread(2, 100.0), np.array([40.0]))
+    assert planned.gap_found(0.8) > alone.gap_found(0.8) + 3.0
+    assert planned.power(80.0) > planned.power(40.0) > planned.power(20.0)
+
+
+def test_votes_that_find_a_gap_are_those_at_which_it_is_found() -> None:
+    design = replace(NINE, spread=120.0)
+    votes = votes_per_expert_for(design, lambda found: found.tells_apart(60.0, power=0.8))
+    assert votes is not None
+    assert expect(design, 9 * votes).gap_found(power=0.8) == pytest.approx(60.0, abs=1.0)
+
+
+def test_thresholds_of_experts_show_as_tastes_where_contestants_differ() -> None:
+    """Nobody differs about equals; who calls few equal pulls others further apart."""
+    found = [
+        World(ratings=1000.0 + np.linspace(-span, span, 9)).shown_expert_sd()
+        for span in (0.0, 60.0, 160.0)
+    ]
+    assert found[0] == pytest.approx(0.0, abs=1e-6)
+    assert found[0] < found[1] < found[2]
+    assert World(ratings=paper_ratings(), expert_sd=30.0).shown_expert_sd() < 30.0
 
 
 def test_the_largest_of_normal_values_is_the_tabled_one() -> None:
