@@ -15,6 +15,7 @@ from rest_framework.views import APIView
 
 from arena.api.access import AdminsOnly, StaffOnly
 from arena.api.errors import ApiView
+from arena.api.fields import StrictSerializer, TextField
 from arena.api.paging import PageQuery, answer_page, page_of, read_query
 from arena.api.schema import describe
 from arena.api.study_body import StudyBody
@@ -22,7 +23,8 @@ from arena.models import Study
 from arena.queries.people import role_of
 from arena.queries.progress import StudyProgress, of_these, studies_seen_by
 from arena.services.early_looks import open_early
-from arena.services.studies import close_study, open_study
+from arena.services.ending import LONGEST_WHY
+from arena.services.studies import cancel_study, close_study, open_study
 
 STAFF = ("admin", "analyst")
 
@@ -106,7 +108,7 @@ class StudiesView(ApiView):
         body = StudyBody(data=request.data)
         body.is_valid(raise_exception=True)
         study = open_study(**body.rules(), actor=cast(User, request.user))
-        return Response(_whole(study), status=201)
+        return Response(whole_study(study), status=201)
 
 
 class StudyView(ApiView):
@@ -117,7 +119,7 @@ class StudyView(ApiView):
     @describe("A study", answers=WholeStudyDocument, name="getStudy")
     def get(self, request: Request, code: uuid.UUID) -> Response:
         """With who takes part."""
-        return Response(_whole(get_study(code)))
+        return Response(whole_study(get_study(code)))
 
 
 class CloseStudyView(ApiView):
@@ -128,7 +130,32 @@ class CloseStudyView(ApiView):
     @describe("Close a study", answers=WholeStudyDocument, name="closeStudy")
     def post(self, request: Request, code: uuid.UUID) -> Response:
         """No more votes are taken; there is no way back. Twice changes nothing."""
-        return Response(_whole(close_study(study=get_study(code), actor=cast(User, request.user))))
+        return Response(
+            whole_study(close_study(study=get_study(code), actor=cast(User, request.user)))
+        )
+
+
+class CancelBody(StrictSerializer):
+    """Why a study is given up."""
+
+    why = TextField(max_length=LONGEST_WHY, required=False, default="", allow_blank=True)
+
+
+class CancelStudyView(ApiView):
+    """A study that is given up."""
+
+    permission_classes = (AdminsOnly,)
+
+    @describe("Cancel a study", takes=CancelBody, answers=WholeStudyDocument, name="cancelStudy")
+    def post(self, request: Request, code: uuid.UUID) -> Response:
+        """No more votes, no rating, no results; there is no way back. Twice changes nothing."""
+        study = get_study(code)
+        body = CancelBody(data=request.data)
+        body.is_valid(raise_exception=True)
+        actor = cast(User, request.user)
+        return Response(
+            whole_study(cancel_study(study=study, why=body.validated_data["why"], actor=actor))
+        )
 
 
 class EarlyLookView(ApiView):
@@ -149,15 +176,8 @@ def get_study(code: uuid.UUID) -> Study:
     return get_object_or_404(Study.objects.select_related("vote_file"), code=code)
 
 
-# --- Private -----------------------------------------------------------------------------------
-
-
-def _progress(study: Study) -> StudyProgress:
-    (found,) = of_these([study])
-    return found
-
-
-def _whole(study: Study) -> dict[str, Any]:
+def whole_study(study: Study) -> dict[str, Any]:
+    """As `WholeStudyDocument` has it."""
     lists = {
         "contestants": study.contestants.values_list("slug", flat=True),
         "scenarios": study.scenarios.values_list("slug", flat=True),
@@ -167,3 +187,11 @@ def _whole(study: Study) -> dict[str, Any]:
     for name in WholeStudyDocument().fields.keys() - found.keys() - lists.keys():
         found[name] = getattr(study, name)
     return found | {name: list(values) for name, values in lists.items()}
+
+
+# --- Private -----------------------------------------------------------------------------------
+
+
+def _progress(study: Study) -> StudyProgress:
+    (found,) = of_these([study])
+    return found

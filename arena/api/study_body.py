@@ -74,6 +74,9 @@ class StoppingBody(StrictSerializer):
 class StudyBody(StrictSerializer):
     """A new study; its rules are fixed from the moment it opens."""
 
+    beside: tuple[str, ...] = ()
+    """Fields of a longer body that go with the rules as they are."""
+
     name = TextField(max_length=120)
     contestants = _slugs()
     scenarios = _slugs()
@@ -114,7 +117,7 @@ class StudyBody(StrictSerializer):
             NothingToPlan: A target can't be read.
         """
         given = dict(self.validated_data)
-        who = {name: given.pop(name) for name in WHO_AND_WHAT}
+        who = {name: given.pop(name) for name in (*WHO_AND_WHAT, *self.beside)}
         stopping = given.pop("stopping", None)
         appearances, pair_votes = read_targets(given.pop("targets"))
         options = PlanOptions(

@@ -47,10 +47,13 @@ async function askEstimate() {
 if (estimate) {
   let timer = 0;
   form.querySelector("[data-ask]").hidden = true;
-  form.addEventListener("change", () => {
+  const askSoon = () => {
     clearTimeout(timer);
     timer = setTimeout(() => askEstimate().catch(() => estimate.replaceChildren()), 300);
-  });
+  };
+  form.addEventListener("change", askSoon);
+  // Filled in from another job: what of it is there already is what one wants to know.
+  if (form.querySelector("[name=scenarios]:checked")) askSoon();
 }
 
 form.addEventListener("change", (event) => {

@@ -66,6 +66,42 @@ def test_the_frozen_file_is_that_of_the_page() -> None:
     assert json.loads(answer.content)["format"] == "scenario-arena/preregistration"
 
 
+def test_a_draft_is_kept_changed_and_opened() -> None:
+    chosen = cast_of()
+    accounts = people()
+    admin, analyst = program_of(accounts["admin"]), program_of(accounts["analyst"])
+    draft = send(admin, "study-drafts", entered={"name": "Round 1", "repeats": "5"}).json()
+    assert (draft["revision"], draft["entered"]["repeats"], draft["missing"]) == (1, "5", [])
+    here = f"study-drafts/{draft['code']}"
+    entered = {"name": "Round 1", "contestants": ["ann", "zoe"]}
+    changed = send(admin, here, entered=entered, revision=1).json()
+    assert [line["name"] for line in changed["missing"]] == ["zoe"]
+    error_of(send(admin, here, entered={}, revision=1), 409, "conflict")
+    error_of(send(admin, here, entered={"colour": "red"}, revision=2), 400, "refused")
+    assert [line["name"] for line in analyst.get(API + "study-drafts").json()["results"]] == [
+        "Round 1"
+    ]
+    error_of(analyst.get(API + here), 403, "forbidden")
+    rules = {**chosen, "name": "Round 1", "votes_per_expert": 6}
+    error_of(send(admin, here + "/open", **rules, revision=1), 409, "conflict")
+    study = send(admin, here + "/open", **rules, revision=2)
+    assert (study.status_code, study.json()["state"]) == (201, "open")
+    error_of(admin.get(API + here), 404, "not_found")
+    like = send(admin, f"studies/{study.json()['code']}/draft").json()
+    assert (like["name"], like["entered"]["votes_per_expert"]) == ("Round 1 (2)", "6")
+    assert send(admin, f"study-drafts/{like['code']}/discard").json()["name"] == "Round 1 (2)"
+    assert admin.get(API + "study-drafts").json()["results"] == []
+
+
+def test_a_cancelled_study_has_no_results() -> None:
+    study, admin = a_study(), program_of(people()["admin"])
+    answer = send(admin, f"studies/{study.code}/cancel", why="A wrong scene.")
+    assert answer.json()["state"] == "cancelled"
+    assert Event.objects.get(verb="cancel").after["why"] == "A wrong scene."
+    error_of(send(admin, f"studies/{study.code}/close"), 410, "study_not_open")
+    error_of(admin.get(f"{API}studies/{study.code}/snapshots"), 404, "not_found")
+
+
 # --- What an expert reads ----------------------------------------------------------------------
 
 

@@ -11,7 +11,7 @@ import pytest
 
 from augment.fake_llm.server import FakeServer, running
 from client.arena_client import ApiError, Arena
-from tests.intents import intents
+from tests.parked import intents, write_street
 from tests.processes import wait_until
 from tests.stack import Home
 
@@ -40,9 +40,12 @@ def test_the_example_of_the_docs_goes_from_nothing_to_a_table(
         monkeypatch.setenv("ARENA_URL", address)
         monkeypatch.setenv("FIRST_LINK", first_link(home))
         monkeypatch.setenv("MODEL_URL", model.url)
+        monkeypatch.setenv("SCENE_FILE", str(write_street(tmp_path)))
         left: dict[str, Any] = {}
         exec(compile(example(), str(DOCS), "exec"), left)
         assert left["job"]["state"] == "finished"
+        assert left["estimate"]["rows"] == 3 * len(left["scenarios"])
+        assert {line["progress"] for line in left["probe"]["lines"]} == {"asked"}
         assert r"\toprule" in left["table"]
         for name in ("Reference", "Rule placer", "fake-careless"):
             assert name in left["table"]

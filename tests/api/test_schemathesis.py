@@ -25,10 +25,11 @@ from schemathesis.specs.openapi import checks
 
 from arena.api import studies
 from arena.api.reference import make_document
-from arena.models import LabellingRound, ScenarioFile, Snapshot
+from arena.models import LabellingRound, ScenarioFile, Snapshot, StudyDraft
 from arena.services.early_looks import open_early
 from arena.services.faults import open_labelling
 from arena.services.ratings import rate
+from arena.services.study_drafts import keep_draft
 from augment.models import (
     Contestant,
     Endpoint,
@@ -98,6 +99,7 @@ def here() -> World:
     Probe.objects.create(model=model_at(endpoint=site, model="m"))
     upload = SceneUpload.objects.create(name="log.zip", size_bytes=1, state="failed")
     UploadMoment.objects.create(upload=upload)
+    keep_draft(entered={"name": "Round 2"})
     open_labelling(name="Faults", job=picture_job(found), experts=["eva"], seed=1)
     return found
 
@@ -124,6 +126,7 @@ def codes(here: World) -> dict[str, object]:
         "endpoints": Endpoint.objects.get(label="here").code,
         "models": EndpointModel.objects.get().code,
         "labellings": LabellingRound.objects.get().code,
+        "study-drafts": StudyDraft.objects.get().code,
     }
 
 

@@ -14,22 +14,17 @@ from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
 
 import pytest
 from playwright.sync_api import Browser, Page, expect
 
 from augment.fake_llm.server import FakeServer, running
-from augment.scene.codec import modification_to_document, scene_to_document
 from augment.scene.intent import Intent
-from augment.scene.intent_codec import intent_from_document
-from augment.scene.modification import Modification
-from augment.services.scenarios.intent_fields import NEW_ROW, IntentFields, intent_of_fields
 from tests.browser.booth import DESK, ready
 from tests.browser.chromium import PATIENCE_MS, chromium
 from tests.browser.job_round import CONTESTANTS, SCENARIOS, run_round
+from tests.parked import TYPE, asked, intents, reference, wish, write_street
 from tests.processes import wait_until
-from tests.scenes import scene, vehicle
 from tests.stack import Home
 
 pytestmark = [
@@ -41,24 +36,6 @@ pytestmark = [
 
 PASSWORD = "nine lives of a cat"
 VOTES = 6
-TYPE = "nudge_around_parked_vehicle"
-WISH = re.compile(r"A parked car stands (\d+) m ahead of the ego\.")
-
-
-def wish(ahead_m: int) -> str:
-    return f"A parked car stands {ahead_m} m ahead of the ego."
-
-
-def asked(ahead_m: int) -> dict[str, Any]:
-    """What the wish asks for, as the fields of the form say it."""
-    fields = {"kind": "vehicles", "distance_m": str(ahead_m), "lane": "own", "body": "car"}
-    found = intent_of_fields(IntentFields(rows=(NEW_ROW | fields,)))
-    assert found is not None
-    return found
-
-
-def reference(ahead_m: int) -> dict[str, Any]:
-    return modification_to_document(Modification(added=(vehicle("Agent2", float(ahead_m), -0.7),)))
 
 
 @dataclass(frozen=True)
@@ -69,8 +46,7 @@ class StandIn:
 
     def intents(self, instruction: str) -> Intent | None:
         self.gate.wait(timeout=120)
-        found = WISH.search(instruction)
-        return None if found is None else intent_from_document(asked(int(found[1])))
+        return intents(instruction)
 
 
 @pytest.fixture
@@ -92,7 +68,7 @@ def files(tmp_path: Path) -> Path:
     """A scene; a list of all scenarios but the first, with the documents that it names."""
     folder = tmp_path / "files"
     folder.mkdir()
-    (folder / "street.json").write_text(json.dumps(scene_to_document(scene())))
+    write_street(folder)
     lines = ["scene,type,instruction,slug,reference,intent"]
     for number in range(1, SCENARIOS):
         ahead_m = 15 + 5 * number
@@ -173,13 +149,13 @@ def _write_scenarios(page: Page, files: Path) -> None:
     page.fill("[name=instruction]", wish(15))
     page.select_option("[name=type]", TYPE)
     page.fill("[name=slug]", "parked-15")
-    chosen = {"kind": "vehicles", "lane": "own", "body": "car"}
-    for name, value in chosen.items():
+    for name, value in {"kind": "vehicles", "lane": "own"}.items():
         page.select_option(f"[name=i_{name}]", value)
-    page.fill("[name=i_distance_m]", "15")
+    for name, value in {"distance_m": "15", "speed_mps": "0"}.items():
+        page.fill(f"[name=i_{name}]", value)
     page.get_by_role("button", name="Add the scenario").click()
     page.get_by_role("link", name="Draw one").click()
-    page.get_by_text("As JSON").click()
+    page.get_by_text("As JSON", exact=True).click()
     page.fill("[name=modification]", json.dumps(reference(15)))
     page.get_by_role("button", name="Keep the reference").click()
     expect(page.get_by_text("The reference is kept")).to_be_visible()

@@ -1,0 +1,47 @@
+"""Scenarios of one kind for whole rounds: a car parked so far ahead on a street of our own."""
+
+from __future__ import annotations
+
+import json
+import re
+from pathlib import Path
+from typing import Any
+
+from augment.scene.codec import modification_to_document, scene_to_document
+from augment.scene.intent import Intent
+from augment.scene.intent_codec import intent_from_document
+from augment.scene.modification import Modification
+from augment.services.scenarios.intent_fields import NEW_ROW, IntentFields, intent_of_fields
+from tests.scenes import scene, vehicle
+
+TYPE = "nudge_around_parked_vehicle"
+WISH = re.compile(r"A parked car stands (\d+) m ahead of the ego\.")
+
+
+def wish(ahead_m: int) -> str:
+    return f"A parked car stands {ahead_m} m ahead of the ego."
+
+
+def asked(ahead_m: int) -> dict[str, Any]:
+    """What the wish asks for, as the fields of the form say it."""
+    fields = {"kind": "vehicles", "distance_m": str(ahead_m), "lane": "own", "speed_mps": "0"}
+    found = intent_of_fields(IntentFields(rows=(NEW_ROW | fields,)))
+    assert found is not None
+    return found
+
+
+def reference(ahead_m: int) -> dict[str, Any]:
+    return modification_to_document(Modification(added=(vehicle("Agent2", float(ahead_m), -0.7),)))
+
+
+def intents(instruction: str) -> Intent | None:
+    """What the stand-in's models know of an instruction."""
+    found = WISH.search(instruction)
+    return None if found is None else intent_from_document(asked(int(found[1])))
+
+
+def write_street(folder: Path) -> Path:
+    """The scene as a file."""
+    path = folder / "street.json"
+    path.write_text(json.dumps(scene_to_document(scene())))
+    return path
