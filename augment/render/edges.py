@@ -13,10 +13,10 @@ from augment.render import palette
 from augment.render.canvas import Box, MetricCanvas, text_width_px
 from augment.scene.entities import TrafficAgent
 
-TEXT_PX = 15
-_HEIGHT_PX = 26.0
-_ARROW_PX = 26.0
-_PADDING_PX = 9.0
+TEXT_PX = 21
+_HEIGHT_PX = 34.0
+_ARROW_PX = 30.0
+_PADDING_PX = 11.0
 _INSET_PX = 6.0
 _GAP_PX = 4.0
 

@@ -15,10 +15,10 @@ from augment.scene.entities import Scene
 GRID_M = 5.0
 Corner = tuple[bool, bool]
 """Of a picture: whether it is right, whether it is at the top."""
-_TEXT_PX = 15
+TEXT_PX = 21
 _INSET_PX = 12.0
 _PADDING_PX = 28.0
-_HEIGHT_PX = 46.0
+_HEIGHT_PX = 52.0
 # About half a car at the usual scale.
 _NEAR_PX = 50.0
 
@@ -76,8 +76,8 @@ def draw_scale(ground: MetricCanvas, box_px: Box) -> None:
     )
     for index in range(3):
         text = f"{index * unit_m:.0f}" + (" m" if index == 2 else "")
-        at = (start + index * unit_px, bar_bottom + 12.0)
-        ground.canvas.text(at, text, palette.INK, _TEXT_PX)
+        at = (start + index * unit_px, bar_bottom + 15.0)
+        ground.canvas.text(at, text, palette.INK, TEXT_PX)
 
 
 def _close(box: Box, x_px: float, y_px: float) -> bool:

@@ -12,8 +12,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from augment.geometry.boxes import corners
+from augment.render import edges, scale
 from augment.render.bev import draw
-from augment.render.camera import MARGIN_M, Camera, camera_for
+from augment.render.camera import MARGIN_M, WIDTH_PX, Camera, camera_for
 from augment.scene.modification import Modification, without_traffic
 from augment.services.scenarios.catalogue_files import read_catalogue
 from tests import scenes
@@ -104,6 +105,11 @@ def test_over_the_catalogue_at_most_35_percent_are_blank_and_people_14_pixels_hi
         blank.append(blank_share(draw(scene, entry.reference, camera)))
     assert statistics.median(blank) <= 0.35
     assert 28.0 * PANEL_PX / widest >= 14.0
+
+
+def test_what_is_written_in_a_picture_is_ten_pixels_high_on_the_page() -> None:
+    for text_px in (edges.TEXT_PX, scale.TEXT_PX):
+        assert text_px * PANEL_PX / WIDTH_PX >= 10.0
 
 
 @pytest.mark.realdata
