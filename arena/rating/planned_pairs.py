@@ -56,7 +56,7 @@ class PlannedPairs:
         rounds = _EQUALS + _STUDIES
         gaps, found, common = draw_equals(spread, low, high, rounds=rounds, seed=_SEED)
         self._distances = distances
-        self._equals: SingleArray = np.abs(gaps[_STUDIES:]) / np.sqrt(found[_STUDIES:])
+        self._equals = _sizes(gaps[_STUDIES:], np.sqrt(found[_STUDIES:]))
         self._gaps = gaps[:_STUDIES]
         self._errors: SingleArray = np.sqrt(np.maximum(found, common)[:_STUDIES])
 
@@ -68,7 +68,7 @@ class PlannedPairs:
         nearest = self._distances[np.abs(self._distances - gap).argmin()]
         asked = np.abs(self._distances - nearest) <= (_ALIKE - 1.0) * nearest
         distances = np.where(asked, gap, self._distances).astype(np.float32)
-        sizes = np.abs(distances + self._gaps) / self._errors
+        sizes = _sizes(distances + self._gaps, self._errors)
         return float(np.mean([self._told_apart(of_study)[asked].mean() for of_study in sizes]))
 
     def gap_found(self, power: float) -> float:
@@ -90,3 +90,8 @@ class PlannedPairs:
         told_apart = np.empty(len(sizes), dtype=np.bool_)
         told_apart[order] = np.logical_and.accumulate(exceeded <= 1.0 - LEVEL)
         return told_apart
+
+
+def _sizes(gaps: SingleArray, errors: SingleArray) -> SingleArray:
+    """How many errors a gap is wide, either way."""
+    return np.asarray(np.abs(gaps) / errors, dtype=np.float32)

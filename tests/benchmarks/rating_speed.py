@@ -67,7 +67,8 @@ TASKS = {
         Task(rival="choix", size="M", rounds=ROUNDS),
         Task(rival="choix", size="L", rounds=100, calls=2),
         Task(rival="evalica-bt", size="S", rounds=ROUNDS),
-        Task(rival="evalica-bt", size="M", rounds=20, calls=2),
+        Task(rival="evalica-bt", size="M", rounds=100, calls=2),
+        Task(rival="evalica-bt", size="L", rounds=20, calls=2),
     ),
     CLOSED_FORM: tuple(Task(rival="arena-rank", size=size, rounds=0) for size in "SML"),
     ONLINE: (
@@ -77,8 +78,9 @@ TASKS = {
         Task(rival="evalica-elo", size="M", rounds=20, calls=2),
     ),
 }
-"""What is not here can't be done: evalica holds all rounds at once (about 190 GB for L), FastChat
-a matrix of votes by contestants (5 GB for L), and arena-rank's own bootstrap hangs on Linux."""
+"""What is not here can't be done: evalica's Elo holds all rounds at once (about 190 GB for L),
+FastChat a matrix of votes by contestants (5 GB for L), and arena-rank's own bootstrap hangs on
+Linux."""
 
 ELSEWHERE = """FastChat's later Bradley-Terry (in its repository, not in the published package),
 measured elsewhere on 2 cores, not in this run: 0.39 s on S, 3.4 s on M, 34 s on L."""
@@ -278,9 +280,11 @@ def section(found: Found, names: str, before: str) -> str:
         f"lists). (e): fewer rounds run, and multiplied. {before}.\n\n"
         + table(["what", "who", *names], rows)
         + f"\n\n{' '.join(TARGETS.split())}\n\n{' '.join(ELSEWHERE.split())}\n\n"
-        "A dash can't be done: evalica holds all rounds at once, FastChat a dense matrix of votes "
-        "by contestants; arena-rank's bootstrap hangs on Linux as published, so its closed form "
-        "stands beside ours."
+        "Rivals at their best: choix starts every round at the ratings of the data, evalica rates "
+        "counts with weights instead of single votes. "
+        "A dash can't be done: evalica's Elo holds all rounds at once, FastChat a dense matrix of "
+        "votes by contestants; arena-rank's bootstrap hangs on Linux as published, so its closed "
+        "form stands beside ours."
     )
 
 

@@ -13,7 +13,17 @@ from arena.management.rate_csv import run
 from arena.rating.bootstrap import Unit
 from arena.rating.leaderboard import PAPER_ROUNDS, rate
 from arena.rating.ranking import ranks
-from tests.rating.paper import ELO, MINUS, NAMES, PLUS, RANKS, VOTES, pair_counts, simulated_votes
+from tests.rating.paper import (
+    ELO,
+    MINUS,
+    NAMES,
+    PLUS,
+    RANKS,
+    VOTES,
+    fitting_votes,
+    pair_counts,
+    simulated_votes,
+)  # fmt: skip
 
 WINNERS = {1.0: "model_a", 0.5: "tie", 0.0: "model_b"}
 
@@ -37,6 +47,13 @@ def test_paper_mode_on_simulated_votes_gives_half_widths_of_the_printed_size() -
         halves.append((bounds[:, 1] - bounds[:, 0]) / 2.0)
     off = np.abs(np.mean(halves, axis=0) - (MINUS + PLUS) / 2.0)
     assert off.mean() < 2.0
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_votes_that_fit_the_printed_ratings_have_the_printed_ranks(seed: int) -> None:
+    board = rate(fitting_votes(0.65), unit=Unit.VOTE, rounds=PAPER_ROUNDS, seed=seed)
+    assert [line.rating for line in board.lines] == pytest.approx(ELO.tolist(), abs=2.5)
+    assert [line.rank for line in board.lines] == RANKS.tolist()
 
 
 def test_the_simulation_as_latex_has_the_tables_exact_form(tmp_path: Path) -> None:
