@@ -27,7 +27,7 @@ GROUPS = {
     "tests/browser/": "browser",
     "tests/results/test_every_": "every_number",
 }
-"""Tests that share a fixture which takes long to make: they run in one process, in this order of
+"""Files that share a fixture which takes long to make: they run in one process, in this order of
 what a test's address begins with."""
 
 # Whether a property holds does not depend on how busy the machine is.
@@ -38,29 +38,34 @@ hypothesis_settings.load_profile("unhurried")
 
 
 class Grouped(LoadScopeScheduling):  # type: ignore[misc] # it has no types
-    """Sends a group to one process and any other test by itself, the largest group first.
+    """Sends a group, and any other file, to one process: what it has made once serves all of it.
 
     xdist_group marks do nothing with pytest 9: the address of a test can't be written any more.
     """
 
     def _split_scope(self, nodeid: str) -> str:
         fitting = (group for start, group in GROUPS.items() if nodeid.startswith(start))
-        return next(fitting, nodeid)
+        return next(fitting, nodeid.partition("::")[0])
 
 
 @pytest.hookimpl(optionalhook=True)
 def pytest_xdist_make_scheduler(config: pytest.Config, log: Any) -> LoadScopeScheduling | None:
+    config.option.loadscopereorder = False  # in the order of the tests, not by their number
     return Grouped(config, log) if config.getoption("dist") == "loadgroup" else None
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     # What takes long starts first, so that no worker is left alone with it in the end.
-    items.sort(key=lambda item: item.get_closest_marker("slow") is None)
+    items.sort(key=lambda item: not _takes_long(item))
     for item in items:
         folder = item.path.relative_to(Path(__file__).parent).parts[0]
         is_about_sqlite = item.get_closest_marker("sqlite") is not None
         if folder in FOLDERS and item.get_closest_marker("django_db") and not is_about_sqlite:
             item.add_marker(pytest.mark.postgres)
+
+
+def _takes_long(item: pytest.Item) -> bool:
+    return item.get_closest_marker("slow") is not None or item.nodeid.startswith(tuple(GROUPS))
 
 
 @pytest.fixture(scope="session")
