@@ -175,8 +175,8 @@ def _tally(study: Study) -> tuple[dict[int, int], dict[int, tuple[int, int, int,
         .values_list("expert", "n")
     )
     outcomes = {
-        row[0]: row[1:]
-        for row in current_votes(study)
+        expert: (left_wins, ties, right_wins, skips)
+        for expert, left_wins, ties, right_wins, skips in current_votes(study)
         .values("expert")
         .annotate(
             left_wins=Count("pk", filter=Q(outcome="left")),

@@ -8,6 +8,7 @@ from __future__ import annotations
 import json
 import sys
 from collections import Counter
+from collections.abc import Callable
 from datetime import timedelta
 from typing import Any
 
@@ -78,4 +79,5 @@ def count() -> dict[str, Any]:
 
 if __name__ == "__main__":
     name, *numbers = sys.argv[1:]
-    print(json.dumps({"link": link, "drop": drop, "count": count}[name](*map(int, numbers))))
+    steps: dict[str, Callable[..., object]] = {"link": link, "drop": drop, "count": count}
+    print(json.dumps(steps[name](*map(int, numbers))))

@@ -43,6 +43,7 @@ def test_lines_stand_where_the_picture_has_the_metres() -> None:
     eva = signed_in(User.objects.get(username="eva"))
     found = eva.get(address(first)).json()
     view = first.view
+    assert view is not None
     (ego_x, ego_y), scale = view["ego_px"], view["px_per_m"]
     ahead, beside = found["lines"]
     assert ahead["label"] == "25 m ahead"
@@ -71,7 +72,9 @@ def test_they_are_the_same_bytes_whoever_drew_the_pictures() -> None:
 def test_the_ruler_learns_the_edges_of_the_lane_in_the_language_of_the_page() -> None:
     first = matchups_of(measured_study(), "eva")[0]
     eva = signed_in(User.objects.get(username="eva"))
-    (ego_x, ego_y), scale = first.view["ego_px"], first.view["px_per_m"]
+    view = first.view
+    assert view is not None
+    (ego_x, ego_y), scale = view["ego_px"], view["px_per_m"]
     place = {"x": ego_x + 10.0 * scale, "y": ego_y - 1.35 * scale}
     said = eva.get(address(first), place).json()
     assert said == {"words": "0.4 m from the left edge of its lane, 3.1 m from the right"}
