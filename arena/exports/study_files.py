@@ -19,7 +19,7 @@ from arena.exports.written_files import MadeFile, write_row
 from arena.exports.zips import zip_folder
 from arena.models import Study, StudyFile
 from arena.queries.results import snapshot_to_export
-from arena.services.plans import shown_augmentations, shows_all_samples
+from arena.services.plans import shown_augmentations
 from arena.services.study_files import why_not
 from augment.errors import Conflict
 from augment.services.judging.scenario_export import ExportOrigin, export_rows
@@ -61,7 +61,7 @@ def _sheet(study: Study, slug: str, beside: Path) -> MadeFile:
 def _interplan(study: Study, slug: str, beside: Path) -> MadeFile:
     origin = ExportOrigin(kind="study", name=study.name, code=str(study.code))
     rows = shown_augmentations(study)
-    many = shows_all_samples(study)
+    many = study.shows_all_samples
     return made_of(export_rows(rows, origin, "interplan", many=many), slug)
 
 

@@ -78,6 +78,11 @@ class Study(models.Model):
     def __str__(self) -> str:
         return self.name
 
+    @property
+    def shows_all_samples(self) -> bool:
+        """Whether each sample of a scenario is judged on its own."""
+        return bool(self.rules.get("samples") == "all")
+
 
 class Matchup(models.Model):
     """One planned showing of two augmentations of one scenario to one expert.

@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 from typing import NamedTuple
 from uuid import UUID
 
-from django.db.models import Count, Max, Q
+from django.db.models import Count, F, Max, Q, Value
 
 from arena.models import FaultLabel, Matchup, Snapshot
 from arena.queries.remembering import Remembered, plan_types
@@ -52,6 +52,7 @@ class PictureShown:
     """A contestant's picture on a scenario, as a showing had it, with what experts made of it.
 
     Attributes:
+        sample: Its number where every sample is judged on its own, else 0.
         matchup, side: Where it was shown, for its address.
         image: Its name in the storage.
         labels, faulty: How many experts looked for faults in it, and how many found some.
@@ -59,6 +60,7 @@ class PictureShown:
 
     scenario: Scenario
     contestant: Contestant
+    sample: int
     augmentation: UUID
     matchup: UUID
     side: str
@@ -101,9 +103,14 @@ class _Beside(NamedTuple):
 
 
 class _Count(NamedTuple):
-    """So many votes of one outcome on two contestants of a scenario, and one of the showings."""
+    """So many votes of one outcome on two contestants of a scenario, and one of the showings.
+
+    Attributes:
+        sample: Which one both showed where every sample is judged on its own, else 0.
+    """
 
     scenario: int
+    sample: int
     left: int
     right: int
     outcome: str
@@ -111,7 +118,9 @@ class _Count(NamedTuple):
     matchup: int
 
 
-_Unit = tuple[int, int, int]
+_Place = tuple[int, int]
+_Unit = tuple[int, int, int, int]
+"""Scenario, sample, and the two contestants, the lower key first."""
 
 
 class DisputedUnit(NamedTuple):
@@ -136,7 +145,7 @@ def _disputed(snapshot: Snapshot, type_name: str) -> list[DisputedUnit]:
     shown: dict[_Unit, int] = {}
     for one in _counts(snapshot, type_name=type_name):
         low, high = sorted((one.left, one.right))
-        unit = (one.scenario, low, high)
+        unit = (one.scenario, one.sample, low, high)
         score = _score_of(one, low)
         units[unit] = units.get(unit, VoteScore()).plus(score)
         shown[unit] = max(shown.get(unit, 0), one.matchup)
@@ -164,12 +173,12 @@ def with_pictures(found: Sequence[DisputedUnit]) -> list[DisputedPair]:
     for one in found:
         row = rows[one.matchup]
         mine, theirs = one.score, _turned(one.score)
-        if row.left.contestant_id != one.unit[1]:
+        if row.left.contestant_id != one.unit[2]:
             mine, theirs = theirs, mine
         pairs.append(
             DisputedPair(
-                left=_picture(row, "left", mine),
-                right=_picture(row, "right", theirs),
+                left=_picture(row, "left", mine, one.unit[1]),
+                right=_picture(row, "right", theirs, one.unit[1]),
                 disagreement=one.disagreement,
             )
         )
@@ -183,23 +192,27 @@ def pictures_of(snapshot: Snapshot, slug: str, *, type_name: str = "") -> list[P
     (own,) = Contestant.objects.filter(slug=slug).values_list("pk", flat=True)
     rows = _matchups(shown.values())
     found = [
-        _picture(rows[pk], _side_of(rows[pk], own), scores[place]) for place, pk in shown.items()
+        _picture(rows[pk], _side_of(rows[pk], own), scores[place], place[1])
+        for place, pk in shown.items()
     ]
     found = _with_labels(found)
-    return sorted(found, key=lambda one: (-one.score.lost_share, -one.score.votes, one.place))
+    return sorted(
+        found, key=lambda one: (-one.score.lost_share, -one.score.votes, one.place, one.sample)
+    )
 
 
 def _judged(
     snapshot: Snapshot, slug: str, type_name: str
-) -> tuple[dict[int, int], dict[int, VoteScore]]:
-    """By scenario: the newest showing of a contestant's picture, and its score."""
-    scores: defaultdict[int, VoteScore] = defaultdict(VoteScore)
-    shown: dict[int, int] = {}
+) -> tuple[dict[_Place, int], dict[_Place, VoteScore]]:
+    """By scenario and sample: the newest showing of a contestant's picture, and its score."""
+    scores: defaultdict[_Place, VoteScore] = defaultdict(VoteScore)
+    shown: dict[_Place, int] = {}
     (own,) = Contestant.objects.filter(slug=slug).values_list("pk", flat=True)
     for one in _counts(snapshot, type_name=type_name):
         if own in (one.left, one.right):
-            scores[one.scenario] = scores[one.scenario].plus(_score_of(one, own))
-            shown[one.scenario] = max(shown.get(one.scenario, 0), one.matchup)
+            place = one.scenario, one.sample
+            scores[place] = scores[place].plus(_score_of(one, own))
+            shown[place] = max(shown.get(place, 0), one.matchup)
     return shown, dict(scores)
 
 
@@ -229,7 +242,7 @@ def sheet_rows(snapshot: Snapshot, scenarios: Sequence[int]) -> dict[int, dict[s
 # --- Private -----------------------------------------------------------------------------------
 
 _DISPUTED: Remembered[list[DisputedUnit]] = Remembered(3)
-_JUDGED: Remembered[tuple[dict[int, int], dict[int, VoteScore]]] = Remembered(40)
+_JUDGED: Remembered[tuple[dict[_Place, int], dict[_Place, VoteScore]]] = Remembered(40)
 
 
 def _key(snapshot: Snapshot, type_name: str) -> Hashable:
@@ -246,8 +259,10 @@ def _counts(
         rows = rows.filter(matchup__scenario__type=type_name)
     if scenarios is not None:
         rows = rows.filter(matchup__scenario__in=scenarios)
+    apart = snapshot.study.shows_all_samples
     grouped = rows.values_list(
-        "matchup__scenario", "shown_left__contestant", "shown_right__contestant", "outcome"
+        *("matchup__scenario", F("matchup__right__sample") if apart else Value(0)),
+        *("shown_left__contestant", "shown_right__contestant", "outcome"),
     ).annotate(number=Count("pk"), shown=Max("matchup"))
     return (_Count(*row) for row in grouped)
 
@@ -273,12 +288,13 @@ def _side_of(row: Matchup, contestant: int) -> str:
     return "left" if row.left.contestant_id == contestant else "right"
 
 
-def _picture(row: Matchup, side: str, score: VoteScore) -> PictureShown:
+def _picture(row: Matchup, side: str, score: VoteScore, sample: int = 0) -> PictureShown:
     augmentation = row.left if side == "left" else row.right
     kept = row.left_image if side == "left" else row.right_image
     return PictureShown(
         scenario=row.scenario,
         contestant=augmentation.contestant,
+        sample=sample,
         augmentation=augmentation.code,
         matchup=row.code,
         side=side,

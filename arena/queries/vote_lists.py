@@ -129,14 +129,14 @@ def votes_behind(snapshot: Snapshot, search: VoteSearch) -> QuerySet[Vote]:
         return rows.none()
     if search.expert:
         rows = rows.filter(expert__in=users_of([search.expert]).values())
-    if search.scenario:
-        rows = rows.filter(matchup__scenario__slug=search.scenario)
-    if search.type:
-        rows = rows.filter(matchup__scenario__type=search.type)
-    if search.comment:
-        rows = rows.filter(comment__icontains=search.comment)
-    if search.aid:  # no aid's name is part of another's
-        rows = rows.filter(aids__contains=search.aid)
+    words = {
+        "matchup__scenario__slug": search.scenario,
+        "matchup__right__sample": search.sample,  # both sides show the same one
+        "matchup__scenario__type": search.type,
+        "comment__icontains": search.comment,
+        "aids__contains": search.aid,  # no aid's name is part of another's
+    }
+    rows = rows.filter(**{path: word for path, word in words.items() if word})
     rows = rows.filter(_shows(search), _came_out(search))
     return _PARTS[SoughtPart(search.part)](rows, snapshot) if search.part else rows
 
@@ -214,7 +214,8 @@ _FOUND: Remembered[list[tuple[int, str]]] = Remembered(3)
 
 def _automatic(snapshot: Snapshot, search: VoteSearch) -> list[tuple[Judged, str]]:
     """Pairs that nobody can tell apart, with their mark, by the same search."""
-    if search.comment or search.part or search.aid or search.expert not in ("", AUTOMATIC):
+    judged = search.comment or search.part or search.aid or search.sample
+    if judged or search.expert not in ("", AUTOMATIC):
         return []
     if search.outcome not in ("", SoughtOutcome.TIED, SoughtOutcome.EQUAL):
         return []

@@ -51,6 +51,7 @@ class VoteSearch:
     Attributes:
         contestant, opponent: Slugs of who was shown.
         scenario: A slug, and `type` the type of scenarios.
+        sample: Its number, in a study that shows every sample on its own.
         expert: The code of a judge.
         outcome: Of `SoughtOutcome`.
         part: Of `SoughtPart`.
@@ -62,6 +63,7 @@ class VoteSearch:
     contestant: str = ""
     opponent: str = ""
     scenario: str = ""
+    sample: str = ""
     type: str = ""
     expert: str = ""
     outcome: str = ""

@@ -22,7 +22,7 @@ from arena.services.attention_checks import without_lost_checks
 from arena.services.frames import Cells
 from arena.services.handing_over import undecided_rows
 from arena.services.people import create_person
-from arena.services.plans import next_batch, pictures_of, rules_of, shows_all_samples, store
+from arena.services.plans import next_batch, pictures_of, rules_of, store
 from augment.errors import Conflict
 from augment.sentences import sentence
 from augment.services.events import log_event
@@ -227,7 +227,7 @@ def _judges(study: Study, grid: Grid) -> IntArray:
         "right__contestant__slug",
         "right__sample",
     )
-    shows_all = shows_all_samples(study)
+    shows_all = study.shows_all_samples
     counted = (
         study.matchups.filter(kind=Matchup.Kind.MAIN)
         .order_by()

@@ -20,7 +20,6 @@ from arena.services.plans import (
     pictures_of,
     planned_so_far,
     rules_of,
-    shows_all_samples,
     store,
     votes_left,
 )
@@ -157,7 +156,7 @@ def undecided_rows(study: Study, giver: User) -> list[Matchup]:
 
 def _as_planned(row: Matchup) -> PlannedMatchup:
     scenario = row.scenario.slug
-    if shows_all_samples(row.study):
+    if row.study.shows_all_samples:
         scenario = place_of(scenario, 1 if row.kind == Matchup.Kind.CHECK else row.right.sample)
     return PlannedMatchup(
         expert="",

@@ -41,7 +41,7 @@ def pictures_of(study: Study) -> Cells:
     wanted = {(entry.scenario, entry.contestant): entry for entry in rules.entries}
     scenarios = list(study.scenarios.only("slug"))
     found = check_pictures(scenarios, windows_of(rules.entries))
-    _, cells = placed_checks(*found, shows_all=shows_all_samples(study))
+    _, cells = placed_checks(*found, shows_all=study.shows_all_samples)
     rows = find_showable(scenarios).filter(contestant__in=study.contestants.all()).order_by("pk")
     for row in rows:
         cell = (_place(study, row), row.contestant.slug)
@@ -61,11 +61,6 @@ def shown_augmentations(study: Study) -> list[Augmentation]:
     rows = Augmentation.objects.filter(pk__in=keys)
     rows = rows.select_related("scenario__base_scene", "contestant")
     return list(rows.order_by("scenario__slug", "contestant__slug", "sample"))
-
-
-def shows_all_samples(study: Study) -> bool:
-    """Whether each sample of a scenario is judged on its own."""
-    return bool(study.rules.get("samples") == "all")
 
 
 def store(
@@ -144,7 +139,7 @@ def planned_so_far(study: Study) -> SoFar:
     found: SoFar = defaultdict(list)
     for expert, position, slug, left, right, chance, kind, repeats, sample in rows:
         scenario = slug
-        if shows_all_samples(study):
+        if study.shows_all_samples:
             scenario = place_of(slug, 1 if kind == Matchup.Kind.CHECK else sample)
         found[expert].append(
             PlannedMatchup(
@@ -173,7 +168,7 @@ _PLAIN = (
 
 def _place(study: Study, row: Augmentation) -> str:
     slug = row.scenario.slug
-    return place_of(slug, row.sample) if shows_all_samples(study) else slug
+    return place_of(slug, row.sample) if study.shows_all_samples else slug
 
 
 def _places(

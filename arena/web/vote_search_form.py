@@ -23,6 +23,7 @@ from arena.queries.vote_search import (
     SoughtPart,
     VoteSearch,
 )
+from augment.services.running.jobs import HIGHEST_SAMPLES
 from augment.services.scenarios.types import type_choices
 
 OUTCOMES = {
@@ -70,6 +71,9 @@ class VoteSearchForm(forms.Form):
     outcome = forms.ChoiceField(label=gettext_lazy("Outcome"), required=False)
     type = forms.ChoiceField(label=gettext_lazy("Scenario type"), required=False)
     scenario = forms.CharField(label=gettext_lazy("Scenario"), required=False, max_length=200)
+    sample = forms.IntegerField(
+        label=gettext_lazy("Sample"), required=False, min_value=1, max_value=HIGHEST_SAMPLES
+    )
     expert = forms.ChoiceField(label=gettext_lazy("Expert"), required=False)
     mark = forms.ChoiceField(label=gettext_lazy("Counts"), required=False)
     part = forms.ChoiceField(label=gettext_lazy("Only"), required=False)
@@ -96,6 +100,8 @@ class VoteSearchForm(forms.Form):
         self._offer("mark", _choices(MARKS))
         self._offer("part", [everybody, *_choices(PARTS)])
         self._offer("aid", [everybody, *_choices(AID_LABELS)])
+        if not snapshot.study.shows_all_samples:
+            del self.fields["sample"]
         if is_imported(snapshot.study):
             for name in ("type", "part", "aid", "comment"):
                 del self.fields[name]
@@ -108,6 +114,10 @@ class VoteSearchForm(forms.Form):
                 _("There is no scenario “%(name)s” in this study."), params={"name": slug}
             )
         return slug
+
+    def clean_sample(self) -> str:
+        """As an address has it."""
+        return str(self.cleaned_data["sample"] or "")
 
     def clean(self) -> dict[str, Any]:
         """Refuse what says nothing."""

@@ -18,9 +18,11 @@ from pytest_django import DjangoAssertNumQueries
 from arena.models import FaultLabel, LabellingRound, LabelTask, Snapshot, Study
 from arena.queries.galleries import VoteScore, by_faults, disagreement, disputed_pairs, pictures_of
 from arena.services.ratings import rate
+from arena.services.shown_pictures import SampleRule
 from arena.services.studies import close_study
 from augment.models import Augmentation
 from augment.services.scenarios.pictures import store
+from tests.studies.test_samples import opened, sampled
 from tests.study_rows import a_study, hang, vote
 from tests.web.cast import people, png, signed_in
 
@@ -162,6 +164,31 @@ def test_the_numbers_of_the_galleries_lead_to_as_many_votes(
         found = analyst.get(unescape(address)).content.decode()
         if f'<b id="found">{number} vote' not in found:
             wrong[address] = number
+    assert wrong == {}
+
+
+def test_a_picture_of_one_sample_has_the_votes_on_that_sample_alone(analyst: Client) -> None:
+    """Both experts say the same of each sample, and the opposite of the other one."""
+    sampled(samples=2, places=3)
+    study = opened(votes=18, places=3, samples=SampleRule.ALL)
+    for matchup in study.matchups.select_related("left__contestant", "right__contestant"):
+        first = matchup.left.contestant.slug < matchup.right.contestant.slug
+        vote(matchup, "left" if first == (matchup.left.sample == 1) else "right")
+    snapshot = rate(study=close_study(study=study), rounds=10)
+    units = disputed_pairs(snapshot)
+    assert [one.disagreement for one in units] == [0.0] * 18
+    found = pictures_of(snapshot, "ann")
+    assert [(one.sample, one.score.lost_share) for one in found] == [(2, 1.0)] * 3 + [(1, 0.0)] * 3
+    wrong = {}
+    for name in ("results-disagreement", "results-worst"):
+        shown = page(analyst, snapshot, name, contestant="ann")
+        assert "sample 2" in shown
+        links = re.findall(r'href="([^"]*sample=[^"]*)" data-votes="(\d+)"', shown)
+        assert links
+        for address, number in links[:6]:
+            votes = analyst.get(unescape(address)).content.decode()
+            if f'<b id="found">{number} vote' not in votes:
+                wrong[address] = number
     assert wrong == {}
 
 
