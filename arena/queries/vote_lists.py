@@ -7,14 +7,13 @@ as `vote_sets` says it; the database finds them, so that a page costs the same f
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from uuid import UUID
 
-from django.db.models import Exists, F, OuterRef, Q, QuerySet
+from django.db.models import F, Q, QuerySet
 
 from arena.models import ImportedVote, Snapshot, Vote
-from arena.pairing.order import CHECK, REPEAT
 from arena.queries.judged import AUTOMATIC, Judged, automatic_ties, is_imported
 from arena.queries.listed_votes import (
     ListedVote,
@@ -24,7 +23,8 @@ from arena.queries.listed_votes import (
     of_votes,
 )
 from arena.queries.remembering import Remembered, plan_types
-from arena.queries.vote_marks import RATED, made_up_contestants, marked_votes, own_votes, users_of
+from arena.queries.vote_marks import made_up_contestants, marked_votes, users_of
+from arena.queries.vote_parts import find_part
 from arena.queries.vote_search import (
     AUTOMATIC_TIE,
     COUNTED,
@@ -34,9 +34,8 @@ from arena.queries.vote_search import (
     SoughtPart,
     VoteSearch,
 )
-from arena.queries.vote_sets import Filters, LeftOut, why_left_out
-from arena.rating.raters import FAST_MS
-from augment.models import Augmentation, Contestant
+from arena.queries.vote_sets import Filters, why_left_out
+from augment.models import Augmentation
 
 PER_PAGE = 25
 CHUNK = 2000
@@ -138,7 +137,7 @@ def votes_behind(snapshot: Snapshot, search: VoteSearch) -> QuerySet[Vote]:
     }
     rows = rows.filter(**{path: word for path, word in words.items() if word})
     rows = rows.filter(_shows(search), _came_out(search))
-    return _PARTS[SoughtPart(search.part)](rows, snapshot) if search.part else rows
+    return find_part(rows, snapshot, SoughtPart(search.part)) if search.part else rows
 
 
 def is_scenario_of(snapshot: Snapshot, slug: str) -> bool:
@@ -274,58 +273,3 @@ def _came_out(search: VoteSearch) -> Q:
     if wanted == SoughtOutcome.BOTH_MISS:
         return Q(both_miss=True)
     return Q(outcome=wanted) if wanted else Q()
-
-
-# --- Parts that a number of the results stands for ---------------------------------------------
-
-_Rows = QuerySet[Vote]
-
-
-def _first_votes(snapshot: Snapshot) -> _Rows:
-    """The vote that counts on what a hidden repeat shows again."""
-    return marked_votes(snapshot).filter(Q(mark=COUNTED), matchup=OuterRef("matchup__repeat_of"))
-
-
-def _repeats(rows: _Rows, snapshot: Snapshot) -> _Rows:
-    decided = rows.filter(matchup__kind=REPEAT, outcome__in=RATED)
-    current = decided.exclude(Q(mark=LeftOut.SUPERSEDED.value))
-    return current.filter(Exists(_first_votes(snapshot)))
-
-
-def _alike(rows: _Rows, snapshot: Snapshot) -> _Rows:
-    first = _first_votes(snapshot)
-    tied, won = first.filter(winner=None), first.filter(winner=OuterRef("winner"))
-    return _repeats(rows, snapshot).filter(
-        (Q(winner=None) & Exists(tied)) | (Q(winner__isnull=False) & Exists(won))
-    )
-
-
-def _own_votes(rows: _Rows, snapshot: Snapshot) -> _Rows:
-    return rows.filter(own_votes(Filters.of_document(snapshot.filters)))
-
-
-def _shared(rows: _Rows, snapshot: Snapshot) -> _Rows:
-    """Votes on what another expert's vote that counts is on as well."""
-    others = marked_votes(snapshot).filter(
-        Q(mark=COUNTED), matchup__scenario=OuterRef("matchup__scenario")
-    )
-    others = others.exclude(expert=OuterRef("expert"))
-    left, right = "shown_left__contestant", "shown_right__contestant"
-    alike = others.filter(**{left: OuterRef(left), right: OuterRef(right)})
-    turned = others.filter(**{left: OuterRef(right), right: OuterRef(left)})
-    return rows.filter(Exists(alike) | Exists(turned))
-
-
-_PARTS: dict[SoughtPart, Callable[[_Rows, Snapshot], _Rows]] = {
-    SoughtPart.COMMENTED: lambda rows, _: rows.exclude(comment=""),
-    SoughtPart.FAST: lambda rows, _: rows.filter(ms_visible__lt=FAST_MS),
-    SoughtPart.OWN: _own_votes,
-    SoughtPart.REPEATS: _repeats,
-    SoughtPart.ALIKE: _alike,
-    SoughtPart.CHECKS: lambda rows, _: rows.filter(matchup__kind=CHECK, outcome__in=RATED),
-    SoughtPart.SHARED: _shared,
-    SoughtPart.PASSED: lambda rows, _: rows.filter(
-        matchup__kind=CHECK, winner__contestant__kind=Contestant.Kind.REFERENCE
-    ),
-    SoughtPart.CHECKS_SKIPPED: lambda rows, _: rows.filter(matchup__kind=CHECK, outcome="skip"),
-}
