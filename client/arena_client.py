@@ -220,7 +220,7 @@ class Arena:
         while True:
             request = urllib.request.Request(address, data, sent, method=method)
             try:
-                with urllib.request.urlopen(request, timeout=self.timeout_s) as answer:
+                with _STAYING.open(request, timeout=self.timeout_s) as answer:
                     tag = answer.headers.get("ETag", "")
                     return _Answer(answer.status, tag, answer.read())
             except urllib.error.HTTPError as error:
@@ -234,6 +234,16 @@ class Arena:
                 if not is_repeatable or time.monotonic() + wait_s > ends_at:
                     raise
             time.sleep(wait_s)
+
+
+class _StaysHere(urllib.request.HTTPRedirectHandler):
+    """Follows no redirect: it would lose what is posted, and show the token to another host."""
+
+    def redirect_request(self, *args: Any, **more: Any) -> None:
+        """Nowhere."""
+
+
+_STAYING = urllib.request.build_opener(_StaysHere)
 
 
 class _Answer:
@@ -258,6 +268,9 @@ def _wait_s(error: urllib.error.HTTPError) -> float | None:
 
 def _error_in(error: urllib.error.HTTPError) -> dict[str, Any]:
     body = error.read()
+    if 300 <= error.code < 400:
+        there = error.headers.get("Location", "elsewhere")
+        return {"code": "moved", "message": f"this leads to {there}: use the address of that"}
     try:
         found = json.loads(body)["error"]
     except (ValueError, KeyError, TypeError):
