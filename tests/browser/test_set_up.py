@@ -1,0 +1,100 @@
+"""What scripts add where a study is set up: objects of an intent without a reload, and copying."""
+
+from __future__ import annotations
+
+import json
+
+import pytest
+from django.urls import reverse
+from playwright.sync_api import Page, expect
+
+from arena.services.people import create_person
+from augment.models import BaseScene
+from augment.services.scenarios.scene_pictures import draw_scene
+from tests.browser.booth import Booth
+
+pytestmark = [pytest.mark.browser, pytest.mark.django_db(transaction=True)]
+
+
+def visit(booth: Booth, path: str, **how: object) -> Page:
+    """A page by an admin, which remembers that it was not loaded anew."""
+    create_person(username="ada", password="a password", role="admin")
+    page = booth.visit("ada", path, dict(how))
+    page.evaluate("window.stayed = true")
+    return page
+
+
+def add_a_walk(page: Page) -> None:
+    """A bus, and a walk whose distance runs from it."""
+    page.fill("[name=instruction]", "Somebody crosses before the bus.")
+    page.select_option("[name=i_kind]", "vehicles")
+    page.fill("[name=i_name]", "bus")
+    page.get_by_role("button", name="One more object").click()
+    asks = page.locator("[data-ask]")
+    expect(asks).to_have_count(2)
+    asks.nth(1).locator("[name=i_kind]").select_option("walk")
+    asks.nth(1).locator("[name=i_anchor]").fill("bus")
+    asks.nth(1).locator("[name=i_distance_m]").fill("4.5")
+
+
+def test_objects_come_and_go_and_become_json_without_leaving_the_page(booth: Booth) -> None:
+    scene = BaseScene.objects.earliest("pk")
+    page = visit(booth, reverse("scenario-new", args=[scene.code]))
+    add_a_walk(page)
+    page.get_by_text("All of it as JSON", exact=True).click()
+    page.get_by_role("button", name="Fields to JSON").click()
+    text = page.locator("[name=intent]")
+    expect(text).to_be_focused()
+    requests = json.loads(text.input_value())["requests"]
+    assert [one["kind"] for one in requests] == ["vehicles", "walk"]
+    assert requests[1]["spot"]["anchor"] == "bus"
+    page.get_by_role("button", name="JSON to fields").click()
+    asks = page.locator("[data-ask]")
+    expect(asks).to_have_count(2)
+    expect(text).to_have_value("")
+    expect(asks.nth(1).locator("[name=i_distance_m]")).to_have_value("4.5")
+    asks.nth(1).get_by_role("button", name="Remove").click()
+    expect(asks).to_have_count(1)
+    expect(asks.locator("[name=i_name]")).to_have_value("bus")
+    assert page.evaluate("window.stayed")
+    assert page.input_value("[name=instruction]") == "Somebody crosses before the bus."
+
+
+def test_a_picture_comes_without_taking_what_was_typed(booth: Booth) -> None:
+    scene = BaseScene.objects.earliest("pk")
+    page = visit(booth, reverse("scenario-new", args=[scene.code]))
+    page.fill("[name=instruction]", "Somebody crosses before the bus.")
+    page.check("[name=keep_traffic]")
+    expect(page.get_by_text("A worker is drawing it.").first).to_be_visible()
+    draw_scene(scene.pk)
+    expect(page.locator(".beside img").first).to_be_visible()
+    assert page.evaluate("window.stayed")
+    assert page.input_value("[name=instruction]") == "Somebody crosses before the bus."
+
+
+def test_where_the_script_can_ask_nobody_the_form_brings_the_page(booth: Booth) -> None:
+    scene = BaseScene.objects.earliest("pk")
+    page = visit(booth, reverse("scenario-new", args=[scene.code]))
+    page.route(
+        "**/new/",
+        lambda route: (
+            route.abort() if route.request.resource_type == "fetch" else route.continue_()
+        ),
+    )
+    add_a_walk(page)
+    assert not page.evaluate("window.stayed === true")
+    assert page.input_value("[name=instruction]") == "Somebody crosses before the bus."
+
+
+def test_a_link_is_copied_by_its_button(booth: Booth) -> None:
+    page = visit(
+        booth,
+        reverse("experts", args=[booth.study.code]),
+        permissions=["clipboard-read", "clipboard-write"],
+    )
+    page.get_by_role("button", name="Invite", exact=False).first.click()
+    page.get_by_role("button", name="Copy").first.click()
+    expect(page.get_by_text("Copied").first).to_be_visible()
+    copied = page.evaluate("navigator.clipboard.readText()")
+    assert copied == page.locator("input[readonly]").first.input_value()
+    assert "/invitation/" in copied
