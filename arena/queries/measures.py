@@ -8,7 +8,6 @@ from itertools import pairwise
 from typing import Any
 from uuid import UUID
 
-import numpy as np
 from django.contrib.auth.models import User
 
 from arena.errors import NotYours
@@ -55,14 +54,20 @@ def measures_of_pair(
     ]
     return {
         "lines": [
-            {"points": points, "at": _label_at(points, view), "label": label}
+            {"points": points, "label": label, **_label_place(points, view)}
             for points, label in lines
             if _is_seen(points, view)
         ],
         "rings": [
-            {"at": centre, "r": round(radius, 1), "text": _label_at(around, view), "label": label}
+            {
+                "at": centre,
+                "r": round(radius, 1),
+                "label": label,
+                "text": place,
+                "anchor": "middle",
+            }
             for centre, radius, label in rings
-            if _is_seen(around := _around(centre, radius), view)
+            if (place := _first_within(_around(centre, radius), view))
         ],
     }
 
@@ -107,14 +112,14 @@ def _pixels(point_m: tuple[float, float], view: dict[str, Any]) -> _Point:
 
 
 def _around(centre: _Point, radius: float) -> list[_Point]:
-    """Points of a circle, the one straight up first, where a label is least in the way."""
-    turns = np.radians([0.0, 40.0, 140.0, -40.0, -140.0, 70.0, 110.0, 180.0])
+    """Points of a circle, the ones furthest up first: there a label is least in the way."""
+    turns = [side * math.radians(degrees) for degrees in range(0, 181, 10) for side in (1, -1)]
     return [
         [
             round(centre[0] + radius * math.sin(turn), 1),
             round(centre[1] - radius * math.cos(turn), 1),
         ]
-        for turn in turns.tolist()
+        for turn in turns
     ]
 
 
@@ -131,13 +136,19 @@ def _is_seen(points: list[_Point], view: dict[str, Any]) -> bool:
     return any(_is_within(point, view) for point in (*points, *middles))
 
 
-def _label_at(points: list[_Point], view: dict[str, Any]) -> _Point:
-    """The first point within the picture, else the first one drawn into it."""
-    found = next((point for point in points if _is_within(point, view)), None)
-    if found is not None:
-        return found
-    x, y = points[0]
-    return [
-        min(max(x, _MARGIN_PX), view["width"] - _MARGIN_PX),
-        min(max(y, _MARGIN_PX), view["height"] - _MARGIN_PX),
+def _first_within(points: list[_Point], view: dict[str, Any]) -> _Point | None:
+    return next((point for point in points if _is_within(point, view)), None)
+
+
+def _label_place(points: list[_Point], view: dict[str, Any]) -> dict[str, Any]:
+    """Where a line's label stands, beside its first point within the picture.
+
+    Lines along the lane have it before them, so that it meets no label of a line across.
+    """
+    x, y = _first_within(points, view) or [
+        min(max(value, _MARGIN_PX), view[side] - _MARGIN_PX)
+        for value, side in zip(points[0], ("width", "height"), strict=True)
     ]
+    is_along = len(points) > 2
+    has_room = x > view["width"] * (0.2 if is_along else 0.8)
+    return {"at": [x, y], "anchor": "end" if has_room else "start"}

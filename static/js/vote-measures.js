@@ -6,6 +6,7 @@ const SVG = "http://www.w3.org/2000/svg";
 const COLOUR = "#4b1d7a";
 const REST_MS = 150;
 const LABEL_PX = 13;
+const LEAST_PX = 300;
 const LOOK = "position:absolute;right:.5rem;bottom:.5rem;padding:.125rem .375rem;background:#ffffffe6;color:#212529;font-size:.75rem;pointer-events:none";
 
 let shown = null;
@@ -45,9 +46,8 @@ class Measures {
     svg.style.stroke = COLOUR;
     for (const { at: [cx, cy], r } of this.found.rings) svg.append(make("circle", { cx, cy, r }));
     for (const { points } of this.found.lines) svg.append(make("path", { d: `M${points.join("L")}`, "data-asked": "" }));
-    const labels = [...this.found.rings.map((ring) => [ring.label, ring.text]), ...this.found.lines.map((line) => [line.label, line.at])];
-    for (const [label, [x, y]] of labels) {
-      const word = make("text", { x, y });
+    for (const { label, at: [x, y], anchor } of [...this.found.lines, ...this.found.rings.map((ring) => ({ ...ring, at: ring.text }))]) {
+      const word = make("text", { x, y, "text-anchor": anchor });
       word.textContent = label;
       svg.append(word);
     }
@@ -63,8 +63,7 @@ class Measures {
       for (const part of svg.children) {
         const { style, dataset } = part;
         if (part.localName === "text") {
-          style.cssText = `fill:${COLOUR};stroke:#fff;stroke-width:${3 * pixel}px;paint-order:stroke;font-size:${LABEL_PX * pixel}px;font-weight:600`;
-          style.textAnchor = Number(part.getAttribute("x")) > pair.shown.width * 0.8 ? "end" : "start";
+          style.cssText = `fill:${COLOUR};stroke:#fff;stroke-width:${3 * pixel}px;paint-order:stroke;font-size:${LABEL_PX * pixel}px;font-weight:600;text-rendering:geometricPrecision`;
         } else if ("asked" in dataset) style.strokeWidth = `${2 * pixel}px`;
         else style.cssText = `stroke-width:${pixel}px;stroke-dasharray:${2 * pixel} ${5 * pixel}`;
       }
@@ -84,8 +83,11 @@ class Measures {
 
   #tell(words) {
     if (words && words !== this.tags[0].textContent) say(`${this.lens.reading}, ${words}`);
+    // Small pictures have no room for it.
+    const isSmall = this.lens.panels[0].clientWidth < LEAST_PX;
+    if (isSmall || this.noted) note((this.noted = isSmall ? words : ""));
     for (const tag of this.tags) {
-      tag.hidden = !words;
+      tag.hidden = !words || isSmall;
       tag.textContent = words;
     }
   }

@@ -11,6 +11,7 @@ from pytest_django.live_server_helper import LiveServer
 from augment.models import Scenario
 from augment.scene.intent_codec import intent_to_document
 from tests.browser.booth import BOUNCE_MS, Booth, furnish, ready
+from tests.browser.test_voting_page import faults
 from tests.intents import LEFT_EDGE, parked, towards
 
 pytestmark = [pytest.mark.browser, pytest.mark.django_db(transaction=True)]
@@ -34,7 +35,7 @@ def line_widths(page: Page) -> list[float]:
 
 
 def test_g_lays_lines_over_both_and_the_ruler_says_how_far_the_edges_are(measured: Booth) -> None:
-    page = measured.enter()
+    page = measured.enter(bypass_csp=True)
     switch = page.get_by_role("button", name="Measures G")
     page.keyboard.press("g")
     layers = page.locator(".measures")
@@ -44,6 +45,7 @@ def test_g_lays_lines_over_both_and_the_ruler_says_how_far_the_edges_are(measure
     first, second = (layers.nth(number).inner_html() for number in (0, 1))
     assert first == second, "drawn over both the same"
     assert line_widths(page) == [2.0] * 4
+    assert faults(page) == [], "axe"
     page.mouse.move(200, 300)
     page.keyboard.press("z")
     assert line_widths(page) == [2.0] * 4, "as thin when zoomed"

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 from django.urls import reverse
-from playwright.sync_api import Locator, Position, expect
+from playwright.sync_api import Locator, Position, ViewportSize, expect
 
 from arena.models import Report
 from arena.services.people import create_person
@@ -96,3 +96,20 @@ def test_a_tap_marks_on_a_phone_and_the_admin_sees_the_mark(booth: Booth) -> Non
         office = booth.visit("ada", path, looks)
         expect(office.locator("figure.reported svg")).to_have_count(1)
         assert faults(office) == []
+
+
+def test_the_panel_is_whole_above_the_answers_on_every_phone(booth: Booth) -> None:
+    page = booth.enter(locale="de-DE")
+    for width, height in ((360, 640), (390, 844), (667, 375), (740, 360), (844, 390)):
+        page.set_viewport_size(ViewportSize(width=width, height=height))
+        page.locator("#report > summary").click()
+        panel = page.locator("#report > div").bounding_box()
+        answers = page.locator("#answers").bounding_box()
+        assert panel is not None
+        assert answers is not None
+        assert panel["y"] >= 0, f"{width}x{height}: its top is out of the window"
+        assert panel["y"] + panel["height"] <= answers["y"] + 1, f"{width}x{height}"
+        last = page.locator("#report [data-choice]").last
+        last.scroll_into_view_if_needed()
+        expect(last).to_be_in_viewport(ratio=1)
+        page.keyboard.press("Escape")

@@ -10,6 +10,7 @@ from django.urls import reverse
 
 from arena.errors import InvalidVote
 from arena.models import Matchup, Study
+from arena.queries.showings import view_shown
 from arena.services.studies import PlanOptions, open_study
 from augment.models import Scenario
 from augment.scene.intent_codec import intent_to_document
@@ -42,16 +43,17 @@ def test_lines_stand_where_the_picture_has_the_metres() -> None:
     first = matchups_of(measured_study(), "eva")[0]
     eva = signed_in(User.objects.get(username="eva"))
     found = eva.get(address(first)).json()
-    view = first.view
-    assert view is not None
+    view = view_shown(first)
     (ego_x, ego_y), scale = view["ego_px"], view["px_per_m"]
     ahead, beside = found["lines"]
     assert ahead["label"] == "25 m ahead"
     assert {x for x, _ in ahead["points"]} == {round(ego_x + 25.0 * scale, 1)}
     assert beside["label"] == "1.2 m left"
     assert {y for _, y in beside["points"]} == {round(ego_y - 1.2 * scale, 1)}
+    assert ahead["anchor"] != beside["anchor"], "labels go apart"
     assert found["rings"][0] | {"text": None} == {
         "at": [ego_x, ego_y], "r": round(10.0 * scale, 1), "label": "10 m", "text": None,
+        "anchor": "middle",
     }  # fmt: skip
     for one in (*found["lines"], *found["rings"]):
         x, y = one.get("text", one.get("at"))
@@ -72,8 +74,7 @@ def test_they_are_the_same_bytes_whoever_drew_the_pictures() -> None:
 def test_the_ruler_learns_the_edges_of_the_lane_in_the_language_of_the_page() -> None:
     first = matchups_of(measured_study(), "eva")[0]
     eva = signed_in(User.objects.get(username="eva"))
-    view = first.view
-    assert view is not None
+    view = view_shown(first)
     (ego_x, ego_y), scale = view["ego_px"], view["px_per_m"]
     place = {"x": ego_x + 10.0 * scale, "y": ego_y - 1.35 * scale}
     said = eva.get(address(first), place).json()
