@@ -33,37 +33,15 @@ class Shell:
     links: list[Link]
 
 
-_NEW = ("scenario-new", "scenarios-bulk", "prompts")
 _SECTIONS: dict[str, tuple[Promise, frozenset[str]]] = {
-    "home": (_("Home"), frozenset({"home"})),
-    "scenarios": (
-        _("Scenarios"),
-        frozenset({"scenarios", "scenario", "scenes", "scene", "upload", "reference-edit", *_NEW}),
-    ),
-    "contestants": (
-        _("Contestants"),
-        frozenset(
-            {
-                *("contestants", "contestant", "contestant-new"),
-                *("endpoints", "endpoint", "endpoint-new", "endpoint-model"),
-            }
-        ),
-    ),
-    "jobs": (
-        _("Jobs"),
-        frozenset({"jobs", "job-new", "job", "faults", "augmentation", "correct"}),
-    ),
-    "studies": (
-        _("Studies"),
-        frozenset(
-            {
-                *("studies", "study-new", "study-draft", "study", "experts", "invite", "remind"),
-                *("results", "results-tab", "results-votes", "results-open"),
-            }
-        ),
-    ),
-    "people": (_("People"), frozenset({"people", "person-link", "person-forget"})),
+    "home": (_("Home"), frozenset({""})),
+    "scenarios": (_("Scenarios"), frozenset({"scenarios", "scenes", "uploads"})),
+    "contestants": (_("Contestants"), frozenset({"contestants", "endpoints", "models"})),
+    "jobs": (_("Jobs"), frozenset({"jobs", "augmentations", "drives"})),
+    "studies": (_("Studies"), frozenset({"studies"})),
+    "people": (_("People"), frozenset({"people", "audit"})),
 }
+"""Labels, and with which words the addresses of their pages begin."""
 _MENU = {
     "expert": ("home",),
     "analyst": ("home", "scenarios", "contestants", "jobs", "studies"),
@@ -80,7 +58,7 @@ def shell(context: Context) -> Shell:
     if request is None or profile is None or profile.role is None:
         return Shell(profile=profile, links=[])
     match = request.resolver_match
-    here = match.url_name if match else None
+    here = match.route.partition("/")[0] if match else None
     return Shell(
         profile=profile,
         links=[

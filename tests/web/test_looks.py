@@ -17,7 +17,8 @@ from arena.services.ratings import rate
 from augment.models import Contestant
 from tests.full_study import Size, full_study
 from tests.jobs.rows import add_kind, add_scenario
-from tests.web.cast import people, signed_in
+from tests.web.addresses import address
+from tests.web.cast import people, signed_in, world
 
 pytestmark = pytest.mark.django_db
 TEMPLATES = Path(settings.BASE_DIR) / "templates"
@@ -77,3 +78,30 @@ def test_single_scenarios_are_folded_until_some_are_ticked() -> None:
     assert '<details class="singles" open>' in admin.post(url, sent).content.decode()
     sent["scenarios"] = ["street", "square"]
     assert '<details class="singles">' in admin.post(url, sent).content.decode()
+
+
+def test_every_page_of_a_section_marks_it_in_the_navigation() -> None:
+    here = world()
+    admin = signed_in(people()["admin"])
+    rows = {
+        "Home": ("home",),
+        "Scenarios": (
+            "scenarios",
+            "scenario",
+            "reference-edit",
+            "scene",
+            "scenario-new",
+            "upload",
+        ),
+        "Contestants": ("contestants", "contestant", "endpoint-new", "endpoint-model"),
+        "Jobs": ("jobs", "job-cancel", "analyses", "drives", "drive", "augmentation", "correct"),
+        "Studies": ("study-plan", "import-votes", "study", "enrolment", "report", "study-close"),
+        "People": ("people", "person-forget", "audit"),
+        None: ("password", "api-tokens", "webhooks"),
+    }
+    for label, names in rows.items():
+        for name in names:
+            shown = admin.get(address(name, here)).content.decode()
+            nav = shown.partition("<main")[0]
+            found = re.findall(r'<a href="[^"]*" aria-current="page">([^<]*)</a>', nav)
+            assert found == ([label] if label else []), name
