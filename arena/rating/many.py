@@ -18,6 +18,8 @@ from arena.rating.comparisons import FloatArray, IntArray
 _MOST_STEPS = 100
 _MOST_ROUNDS_OF_CG = 2000
 _TOLERANCE = 1e-9
+_NEGLIGIBLE = 1e-12
+"""Logits: what is smaller is the rounding of sums."""
 
 
 class SparseCurvature:
@@ -52,11 +54,11 @@ class SparseCurvature:
             DidNotConverge: After 2000 rounds some column was not there.
         """
         answer = np.zeros_like(wanted)
-        left = wanted.copy()
+        left = wanted - wanted.mean(axis=0)
         scaled = self._scaled(left)
         way = scaled.copy()
         size = (left * scaled).sum(axis=0)
-        goal = tolerance**2 * np.maximum(size, 1e-300)
+        goal = np.maximum(tolerance**2 * size, _NEGLIGIBLE**2 * self.diagonal.mean())
         for _ in range(_MOST_ROUNDS_OF_CG):
             if (size <= goal).all():
                 return np.asarray(answer - answer.mean(axis=0))

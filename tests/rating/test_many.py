@@ -109,3 +109,10 @@ def test_threads_change_nothing() -> None:
     assert once[1].in_main.shape[1] > 0
     assert (once[1].in_main == twice[1].in_main).all()
     assert (once[1].side == twice[1].side).all()
+
+
+def test_what_rounding_leaves_of_a_slope_is_no_fault() -> None:
+    """At the answer of these votes the slope was never small against itself."""
+    elo = np.random.default_rng(11).normal(1000, 100, 60).tolist()
+    votes = simulated(elo, 900, 11)
+    assert fitted(votes).strengths == pytest.approx(fit(votes), abs=1e-8)
