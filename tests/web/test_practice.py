@@ -89,6 +89,18 @@ def test_five_pairs_with_feedback_come_before_the_first_pair_and_none_is_a_vote(
     assert voting_progress(study=study, expert=eva()).voted == 0
 
 
+def test_by_ear_and_by_keys_the_feedback_comes_first_and_enter_leads_on() -> None:
+    study = opened()
+    client = signed_in(eva())
+    client.get(page(study))
+    for pair, verdict in zip(practice_pairs(study, eva()), ("Right.", "Not quite."), strict=False):
+        told = answer(client, study, pair, well=verdict == "Right.")
+        assert f"<title>{verdict} Practice pair {pair.position}," in told
+        focused = re.findall(r"<a [^>]*autofocus[^>]*>", told)
+        assert len(focused) == 1
+        assert 'aria-describedby="feedback-title"' in focused[0]
+
+
 def test_scenarios_outside_of_the_study_come_first_and_its_own_where_those_are_too_few() -> None:
     study = opened(outside=3)
     slugs = [pair.scenario.slug for pair in practice_pairs(study, eva())]
