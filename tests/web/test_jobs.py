@@ -64,6 +64,7 @@ def test_a_whole_type_stands_for_its_scenarios_without_a_script() -> None:
     ],
 )
 def test_a_job_that_misses_something_is_not_launched(missing: str, sentence: str) -> None:
+    rows.add_kind("reference")
     rows.add_scenario("one")
     sent = {"name": "Night run", "contestants": ["reference"], "scenarios": ["one"]}
     del sent[missing]
@@ -74,6 +75,7 @@ def test_a_job_that_misses_something_is_not_launched(missing: str, sentence: str
 
 
 def test_a_job_that_could_not_end_is_refused_in_words() -> None:
+    rows.add_kind("reference")
     rows.add_scenario("bare", reference=None)
     sent = {"name": "Night run", "contestants": ["reference"], "scenarios": ["bare"]}
     answer = signed_in(people()["admin"]).post(reverse("job-new"), sent)
