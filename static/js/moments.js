@@ -31,8 +31,8 @@ function take(page, answer) {
     return;
   }
   if (found.outerHTML !== here.outerHTML) here.replaceWith(document.adoptNode(found));
-  const messages = page.querySelector(".messages");
-  document.querySelector(".messages")?.remove();
+  const messages = page.querySelector(".messages")?.parentElement;
+  document.querySelector(".messages")?.parentElement.remove();
   if (messages) document.getElementById("main").prepend(document.adoptNode(messages));
   const kept = page.getElementById("kept");
   if (kept) {

@@ -55,7 +55,7 @@ def test_the_page_shows_what_the_wire_then_carries(
     assert found.get("tools") == sent.get("tools")
     page = analyst.get(reverse("prompts", args=[row.scenario.code]), asked).content.decode()
     shown = [
-        html.unescape(one) for one in re.findall(r"<pre data-message>(.*?)</pre>", page, re.S)
+        html.unescape(one) for one in re.findall(r"<pre data-message[^>]*>(.*?)</pre>", page, re.S)
     ]
     assert shown == [message["content"] for message in sent["messages"]]
     assert re.search(r"About [\d,]+ tokens of text", page)
