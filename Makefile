@@ -12,7 +12,7 @@ SERVE ?= 1
 # Compiled once, not by each of the many processes that the tests start.
 export PYTHONDONTWRITEBYTECODE :=
 
-.PHONY: demo serve test lint check fast postgres chromium bench mutants receivers lock clean
+.PHONY: demo serve test lint check fast postgres chromium screenshots bench mutants receivers lock clean
 
 demo: $(VENV)/.runtime ## Run the main job on the catalogue, then serve it (SERVE=0: don't)
 	$(BIN)/python manage.py demo --port $(PORT) $(if $(filter 0,$(SERVE)),--no-serve)
@@ -36,6 +36,9 @@ lint: $(VENV)/.test ## Format, style, floors and types
 	$(BIN)/lint-imports
 	$(BIN)/mypy
 	$(BIN)/python manage.py makemigrations --check --dry-run
+
+screenshots: chromium ## Every page, light and dark, into docs/images/pages and docs/pages.md
+	$(BIN)/python -m tests.screenshots
 
 bench: chromium ## Ours beside other products, each in its own environment; writes docs/benchmarks.md
 	$(BIN)/python -m tests.benchmarks.rivals.voting

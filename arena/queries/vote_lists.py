@@ -13,7 +13,7 @@ from uuid import UUID
 
 from django.db.models import F, Q, QuerySet
 
-from arena.models import ImportedVote, Snapshot, Vote
+from arena.models import Snapshot, Vote
 from arena.queries.judged import AUTOMATIC, Judged, automatic_ties, is_imported
 from arena.queries.listed_votes import (
     ListedVote,
@@ -138,16 +138,6 @@ def votes_behind(snapshot: Snapshot, search: VoteSearch) -> QuerySet[Vote]:
     rows = rows.filter(**{path: word for path, word in words.items() if word})
     rows = rows.filter(_shows(search), _came_out(search))
     return find_part(rows, snapshot, SoughtPart(search.part)) if search.part else rows
-
-
-def is_scenario_of(snapshot: Snapshot, slug: str) -> bool:
-    """Whether the study has a scenario of that name, be it in attention checks alone."""
-    study = snapshot.study
-    if is_imported(study):
-        return ImportedVote.objects.filter(file__study=study, item=slug).exists()
-    return study.matchups.filter(scenario__slug=slug).exists() or (
-        study.scenarios.filter(slug=slug).exists()
-    )
 
 
 def counted_votes(snapshot: Snapshot) -> QuerySet[Vote]:

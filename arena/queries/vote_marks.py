@@ -8,8 +8,9 @@ from uuid import UUID
 from django.db.models import Case, Q, QuerySet, Value, When
 from django.db.models.fields import CharField
 
-from arena.models import Person, Snapshot, Study, Vote
+from arena.models import ImportedVote, Person, Snapshot, Study, Vote
 from arena.pairing.order import CHECK, MAIN, REPEAT
+from arena.queries.judged import is_imported
 from arena.queries.vote_search import COUNTED
 from arena.queries.vote_sets import Filters, LeftOut
 from augment.models import Contestant
@@ -52,6 +53,16 @@ def users_of(codes: Sequence[str]) -> dict[str, int]:
     """Accounts by the codes of their people; one query."""
     found = Person.objects.filter(code__in=[code for code in codes if _is_code(code)])
     return {str(code): user for code, user in found.values_list("code", "user_id")}
+
+
+def is_scenario_of(snapshot: Snapshot, slug: str) -> bool:
+    """Whether the study has a scenario of that name, be it in attention checks alone."""
+    study = snapshot.study
+    if is_imported(study):
+        return ImportedVote.objects.filter(file__study=study, item=slug).exists()
+    return study.matchups.filter(scenario__slug=slug).exists() or (
+        study.scenarios.filter(slug=slug).exists()
+    )
 
 
 # --- Private -----------------------------------------------------------------------------------

@@ -13,7 +13,7 @@ from arena.models import Snapshot
 from arena.models.votes import AID_LABELS
 from arena.queries.judged import AUTOMATIC, is_imported
 from arena.queries.people import natural_order
-from arena.queries.vote_lists import is_scenario_of
+from arena.queries.vote_marks import is_scenario_of
 from arena.queries.vote_search import (
     AUTOMATIC_TIE,
     COUNTED,

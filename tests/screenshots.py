@@ -1,0 +1,200 @@
+"""Every page, light and dark, into docs/images/pages: `python -m tests.screenshots [FOLDER]`.
+
+Fills a new installation with the demo (authored scenes, simulated people and models), serves it,
+opens every page of the table of access with Chromium at 1280 px, and writes docs/pages.md. What
+answers no page there (a file, a question that is not asked there) is left out and said. With a
+folder, the demo that is there is used again.
+"""
+
+from __future__ import annotations
+
+import io
+import os
+import sys
+import tempfile
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Literal
+
+import django
+from PIL import Image
+from playwright.sync_api import Browser, Error, Page
+
+from tests.browser.chromium import PATIENCE_MS, chromium
+from tests.processes import ROOT
+from tests.stack import SMALL_DEMO, Home
+
+FOLDER = ROOT / "docs" / "images" / "pages"
+INDEX = ROOT / "docs" / "pages.md"
+SCHEMES: tuple[Literal["light", "dark"], ...] = ("light", "dark")
+WIDTH, LEAST, MOST = 1280, 720, 1600
+"""A page is shown from its top, so many pixels high at least and at most."""
+
+QUALITIES = (50, 35, 20)
+LIGHT = 40_000
+"""Bytes: the first quality that stays below, else the last one."""
+VOTES_HERE = ("vote", "vote-practice", "vote-help", "vote-skipped")
+OPEN_HERE = ("study", "experts", "enrolment", "preregistration", "invite")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Shot:
+    """A page and who opens it, nobody where `who` is empty."""
+
+    name: str
+    who: str
+    path: str
+
+
+def main() -> None:
+    """Fill, open, write."""
+    with tempfile.TemporaryDirectory(prefix="arena-shots-") as folder:
+        home = Home.at(Path(sys.argv[1] if len(sys.argv) > 1 else folder).resolve())
+        home.folder.mkdir(exist_ok=True)
+        if not home.database.exists():
+            home.must(*SMALL_DEMO)
+        os.environ.update(home.environment)
+        os.environ |= {
+            "DJANGO_SETTINGS_MODULE": "arena.config.settings",
+            "DJANGO_ALLOW_ASYNC_UNSAFE": "true",  # Playwright keeps an event loop in this thread
+        }
+        django.setup()
+        shots, sessions = _shots(), _sessions()
+        with home.serving() as url, chromium() as browser:
+            pages = {who: _page(browser, url, sessions.get(who)) for who in ("", *sessions)}
+            taken = [one for one in shots if _take(pages[one.who], url, one)]
+    INDEX.write_text("\n".join(_index(taken)) + "\n")
+    size = sum(path.stat().st_size for path in FOLDER.glob("*.webp"))
+    print(f"{len(taken)} pages, {size / 1e6:.1f} MB")
+
+
+# --- Private -----------------------------------------------------------------------------------
+
+
+def _shots() -> list[Shot]:
+    """Every page that somebody may open, with the address of something that there is."""
+    from django.contrib.auth.models import User
+
+    from arena.management.demo import JOB, OPEN_STUDY, SIMULATED_STUDY
+    from arena.models import Study, Vote
+    from arena.web.results_tabs import TABS
+    from augment.models import Augmentation, GenerationJob, Simulation
+    from tests.web.addresses import address
+    from tests.web.cast import World
+    from tests.web.test_access import ACTIONS, PAGES
+
+    job = GenerationJob.objects.get(name=JOB)
+    made = job.augmentations.filter(state=Augmentation.State.DONE, attempts__calls__isnull=False)
+    row = made.select_related("scenario__base_scene", "contestant").first()
+    assert row is not None
+    closed, is_open = (Study.objects.get(name=name) for name in (SIMULATED_STUDY, OPEN_STUDY))
+    judge = closed.matchups.first()
+    assert judge is not None
+    voter = User.objects.get(username="expert")
+    rated = World(study=closed, job=job, augmentation=row, expert=judge.expert)
+    voted = World(study=is_open, job=job, augmentation=row, expert=voter)
+    drive = Simulation.objects.filter(state=Simulation.State.DONE).first()
+    vote = Vote.objects.filter(matchup__study=closed).first()
+    shots = [
+        Shot(name="login", who="", path="/login/"),
+        Shot(name="home-of-an-expert", who="expert", path="/"),
+        Shot(name="home-of-an-analyst", who="analyst", path="/"),
+        Shot(name="home-of-an-admin", who="admin", path="/"),
+    ]
+    for name in sorted(
+        PAGES.keys() - ACTIONS.keys() - {"home", "report", "drive", "results-vote"}
+    ):
+        who = "expert" if name in VOTES_HERE else "admin"
+        here = voted if name in (*VOTES_HERE, *OPEN_HERE) else rated
+        shots.append(Shot(name=name, who=who, path=address(name, here)))
+    results = address("results", rated)
+    shots += [
+        Shot(name=f"results-{tab.name}", who="admin", path=f"{results}{tab.name}/") for tab in TABS
+    ]
+    if drive is not None:
+        shots.append(Shot(name="drive", who="admin", path=f"/drives/{drive.code}/"))
+    if vote is not None:
+        shots.append(Shot(name="results-vote", who="admin", path=f"{results}votes/{vote.key}/"))
+    shots.append(Shot(name="api-reference", who="admin", path="/api/v1/reference/"))
+    return shots
+
+
+def _sessions() -> dict[str, str]:
+    """A signed-in session of each account of the demo."""
+    from django.conf import settings
+    from django.contrib.auth.models import User
+    from django.test import Client
+
+    found = {}
+    for username in ("admin", "analyst", "expert"):
+        client = Client()
+        client.force_login(User.objects.get(username=username))
+        found[username] = client.cookies[settings.SESSION_COOKIE_NAME].value
+    return found
+
+
+def _take(page: Page, url: str, shot: Shot) -> bool:
+    """Both pictures of a page; False where it answers none."""
+    try:
+        answer = page.goto(url + shot.path, wait_until="load")
+    except Error as error:  # a file is downloaded, which ends the visit
+        print(f"{shot.name}: {error.message.splitlines()[0]}", flush=True)
+        return False
+    assert answer is not None
+    if not answer.ok or "text/html" not in answer.headers.get("content-type", ""):
+        print(f"{shot.name}: {answer.status}", flush=True)
+        return False
+    page.set_viewport_size({"width": WIDTH, "height": LEAST})
+    high = page.evaluate("document.documentElement.scrollHeight")
+    page.set_viewport_size({"width": WIDTH, "height": min(max(high, LEAST), MOST)})
+    page.wait_for_load_state("networkidle")
+    for taken_over in page.get_by_role("button", name="Use this one").all():
+        if taken_over.is_visible():  # the voting page knows that it was open a moment ago
+            taken_over.click()
+            page.wait_for_load_state("networkidle")
+    for scheme in SCHEMES:
+        page.emulate_media(color_scheme=scheme, reduced_motion="reduce")
+        _keep(page.screenshot(), FOLDER / f"{shot.name}-{scheme}.webp")
+    return True
+
+
+def _page(browser: Browser, url: str, session: str | None) -> Page:
+    context = browser.new_context(viewport={"width": WIDTH, "height": LEAST}, locale="en-GB")
+    context.set_default_timeout(PATIENCE_MS)
+    if session is not None:
+        context.add_cookies([{"name": "sessionid", "value": session, "url": url}])
+    return context.new_page()
+
+
+def _keep(png: bytes, path: Path) -> None:
+    path.parent.mkdir(parents=True, exist_ok=True)
+    picture = Image.open(io.BytesIO(png)).convert("RGB")
+    for quality in QUALITIES:
+        picture.save(path, "WEBP", quality=quality, method=6)
+        if path.stat().st_size < LIGHT:
+            return
+
+
+def _index(taken: list[Shot]) -> Iterator[str]:
+    yield "# Every page, light and dark"
+    yield ""
+    yield "Made by `python -m tests.screenshots` from the demo: authored scenes, simulated models"
+    yield "and simulated votes. Pages longer than the picture are shown from their top."
+    for shot in taken:
+        who = f" (as {shot.who})" if shot.who else ""
+        yield f"\n## {shot.name}{who}\n"
+        yield "| light | dark |"
+        yield "|---|---|"
+        yield (
+            "| "
+            + " | ".join(
+                f"![{shot.name}, {scheme}](images/pages/{shot.name}-{scheme}.webp)"
+                for scheme in SCHEMES
+            )
+            + " |"
+        )
+
+
+if __name__ == "__main__":
+    main()
