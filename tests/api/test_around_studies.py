@@ -97,7 +97,9 @@ def test_a_cancelled_study_has_no_results() -> None:
     study, admin = a_study(), program_of(people()["admin"])
     answer = send(admin, f"studies/{study.code}/cancel", why="A wrong scene.")
     assert answer.json()["state"] == "cancelled"
-    assert Event.objects.get(verb="cancel").after["why"] == "A wrong scene."
+    after = Event.objects.get(verb="cancel").after
+    assert after is not None
+    assert after["why"] == "A wrong scene."
     error_of(send(admin, f"studies/{study.code}/close"), 410, "study_not_open")
     error_of(admin.get(f"{API}studies/{study.code}/snapshots"), 404, "not_found")
 
