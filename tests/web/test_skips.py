@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from functools import partial
 
 import pytest
 from django.contrib.auth.models import User
@@ -101,7 +102,8 @@ def test_progress_carries_no_rules_along_with_every_vote() -> None:
     """Rules name every picture: grouped by them, 100,000 votes fill 100 GB of temporary rows."""
     study = study_rows.a_study(votes_per_expert=3)
     expert = study.experts.get(username="eva")
-    for look in (progress.of_studies, lambda: progress.of_expert(expert)):
+    looks = (progress.of_studies, partial(progress.of_expert, expert))
+    for look in looks:
         with CaptureQueriesContext(connection) as captured:
             (line,) = look()
         assert line.left
