@@ -46,6 +46,9 @@ class SceneUpload(models.Model):
         related_name="+",
     )
     sent_at = models.DateTimeField(null=True, blank=True, help_text="last put on the queue")
+    heartbeat_at = models.DateTimeField(
+        null=True, blank=True, help_text="when the worker that reads it was last heard"
+    )
     created_at = models.DateTimeField(auto_now_add=True)
     finished_at = models.DateTimeField(null=True, blank=True)
 
@@ -95,6 +98,9 @@ class UploadMoment(models.Model):
         related_name="+",
     )
     sent_at = models.DateTimeField(null=True, blank=True, help_text="last put on the queue")
+    heartbeat_at = models.DateTimeField(
+        null=True, blank=True, help_text="when the worker that reads it was last heard"
+    )
     created_at = models.DateTimeField(auto_now_add=True)
 
     class Meta:

@@ -119,6 +119,46 @@ def test_a_file_that_ends_worker_after_worker_is_given_up(log: bytes) -> None:
         uploads.read_again(row)
 
 
+def read_by_another(
+    upload: SceneUpload, *, heard_before: timedelta, sent_before: timedelta
+) -> None:
+    now = timezone.now()
+    marks = {"heartbeat_at": now - heard_before, "sent_at": now - sent_before}
+    SceneUpload.objects.filter(pk=upload.pk).update(state="running", attempts=1, **marks)
+
+
+SECONDS, HOUR = timedelta(seconds=3), timedelta(hours=1)
+
+
+def test_a_file_that_takes_an_hour_is_begun_once(log: bytes) -> None:
+    row = sent(log)
+    read_by_another(row, heard_before=SECONDS, sent_before=HOUR)
+    assert uploads.find_lost() == []
+    row = read(row)  # the message came twice
+    assert (row.state, row.attempts) == ("running", 1)
+
+
+def test_a_file_whose_worker_ended_is_sent_again_once_and_read(log: bytes) -> None:
+    row = sent(log)
+    read_by_another(row, heard_before=2 * timedelta(minutes=1), sent_before=timedelta(minutes=3))
+    assert uploads.find_lost() == [row.pk]
+    uploads.mark_sent(row.pk)
+    assert uploads.find_lost() == []
+    row = read(row)
+    assert (row.state, row.attempts, row.heartbeat_at) == ("read", 2, None)
+
+
+def test_a_moment_that_takes_an_hour_is_begun_once(log: bytes) -> None:
+    moment, _ = upload_moments.ask_for_moment(read(sent(log)), item="", frame=0)
+    now = timezone.now()
+    marks = {"heartbeat_at": now - SECONDS, "sent_at": now - HOUR}
+    UploadMoment.objects.filter(pk=moment.pk).update(attempts=1, **marks)
+    assert upload_moments.find_lost() == []
+    upload_moments.work_on_moment(moment.pk)
+    moment.refresh_from_db()
+    assert (moment.state, moment.attempts) == ("queued", 1)
+
+
 @pytest.mark.parametrize("was_sent", [True, False])
 def test_what_waits_too_long_is_sent_again(log: bytes, was_sent: bool) -> None:
     row = sent(log)

@@ -22,11 +22,11 @@ from augment.services.scenarios.pictures import store_as
 from augment.services.scenarios.scene_imports import keep_reading
 from augment.services.scenarios.scene_notes import said_of
 from augment.services.scenarios.scenes import check_slug
+from augment.services.scenarios.upload_heartbeat import heartbeat, is_silent, lost_since
 from augment.services.scenarios.uploads import (
     LONGEST_REASON,
     MOST_ATTEMPTS,
     OUR_FAULT,
-    lost_since,
     open_upload,
 )
 from augment.services.texts import make_storable
@@ -84,25 +84,8 @@ def work_on_moment(moment_pk: int) -> None:
     row = _begin(moment_pk)
     if row is None:
         return
-    wants_scene = row.state == State.KEEPING
-    try:
-        with open_upload(row.upload) as (reader, path):
-            name = row.slug if wants_scene else "preview"
-            reading = reader.read(path, item=row.item or None, frame=row.frame, name=name)
-            if wants_scene:
-                scene, _ = keep_reading(reading, reader=reader, path=path, actor=row.asked_by)
-                _end(row, state=State.KEPT, scene=scene)
-                return
-        picture = f"{PREVIEWS}/{row.code}.png"
-        camera = camera_for(reading.scene, None)
-        store_as(picture, draw(reading.scene, Modification(), camera))
-        _end(row, state=State.DRAWN, picture=picture, report=_report(reading))
-    except AugmentError as error:
-        reason = make_storable(str(error))[:LONGEST_REASON]
-        _end(row, state=State.DRAWN if wants_scene else State.FAILED, reason=reason)
-    except Exception:
-        logger.exception("A moment of upload %s could not be read", row.upload.code)
-        _end(row, state=State.FAILED, reason=OUR_FAULT)
+    with heartbeat(row):
+        _draw_or_keep(row)
 
 
 def sentences_of(row: UploadMoment) -> list[Sentence]:
@@ -126,7 +109,8 @@ def mark_sent(moment_pk: int, *, now: Moment = DATABASE_TIME) -> None:
 
 def _begin(moment_pk: int) -> UploadMoment | None:
     waiting = UploadMoment.objects.filter(pk=moment_pk, state__in=UploadMoment.WAITING)
-    if not waiting.update(attempts=F("attempts") + 1):
+    begun = {"attempts": F("attempts") + 1, "heartbeat_at": DATABASE_TIME}
+    if not waiting.filter(is_silent()).update(**begun):
         return None
     row = UploadMoment.objects.select_related("upload", "asked_by").get(pk=moment_pk)
     if row.attempts > MOST_ATTEMPTS:
@@ -135,8 +119,30 @@ def _begin(moment_pk: int) -> UploadMoment | None:
     return row
 
 
+def _draw_or_keep(row: UploadMoment) -> None:
+    wants_scene = row.state == State.KEEPING
+    try:
+        with open_upload(row.upload) as (reader, path):
+            name = row.slug if wants_scene else "preview"
+            reading = reader.read(path, item=row.item or None, frame=row.frame, name=name)
+            if wants_scene:
+                scene, _ = keep_reading(reading, reader=reader, path=path, actor=row.asked_by)
+                _end(row, state=State.KEPT, scene=scene)
+                return
+        picture = f"{PREVIEWS}/{row.code}.png"
+        camera = camera_for(reading.scene, None)
+        store_as(picture, draw(reading.scene, Modification(), camera))
+        _end(row, state=State.DRAWN, picture=picture, report=_report(reading))
+    except AugmentError as error:
+        reason = make_storable(str(error))[:LONGEST_REASON]
+        _end(row, state=State.DRAWN if wants_scene else State.FAILED, reason=reason)
+    except Exception:
+        logger.exception("A moment of upload %s could not be read", row.upload.code)
+        _end(row, state=State.FAILED, reason=OUR_FAULT)
+
+
 def _end(row: UploadMoment, **columns: Any) -> None:
-    UploadMoment.objects.filter(pk=row.pk, state=row.state).update(**columns)
+    UploadMoment.objects.filter(pk=row.pk, state=row.state).update(heartbeat_at=None, **columns)
 
 
 def _report(reading: Reading) -> dict[str, Any]:

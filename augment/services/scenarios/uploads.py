@@ -1,7 +1,8 @@
 """Recordings that came by a page: kept as files, read by workers, kept as scenes.
 
-A worker that ends over a file leaves its row under way; the row is begun again, and given up once
-`MOST_ATTEMPTS` workers ended over it, so that no file can kill one worker after the other.
+A worker that ends over a file leaves its row under way, and is not heard from any more; the row is
+begun again, and given up once `MOST_ATTEMPTS` workers ended over it, so that no file can kill one
+worker after the other.
 """
 
 from __future__ import annotations
@@ -12,7 +13,6 @@ import re
 import tempfile
 from collections.abc import Iterator
 from contextlib import contextmanager
-from datetime import timedelta
 from pathlib import Path
 from typing import Any
 
@@ -21,7 +21,7 @@ from django.contrib.auth.models import User
 from django.core.files.base import File
 from django.core.files.storage import default_storage
 from django.db import transaction
-from django.db.models import F, Q
+from django.db.models import F
 from django.utils import timezone
 
 from augment.errors import AugmentError, Conflict, InvalidDocument
@@ -33,6 +33,7 @@ from augment.models import SceneUpload
 from augment.sentences import sentence
 from augment.services.clock import DATABASE_TIME, Moment
 from augment.services.events import log_event
+from augment.services.scenarios.upload_heartbeat import heartbeat, is_silent, lost_since
 from augment.services.texts import make_storable
 
 logger = logging.getLogger(__name__)
@@ -41,8 +42,6 @@ State = SceneUpload.State
 
 FOLDER = "uploads"
 MOST_ATTEMPTS = 2
-LOST_AFTER = timedelta(minutes=10)
-"""A row that waits longer may have lost its message."""
 LONGEST_REASON = 2_000
 OUR_FAULT = "The program itself failed on this file; the worker's log says more."
 
@@ -125,14 +124,8 @@ def read_upload(upload_pk: int) -> None:
     row = _begin(upload_pk)
     if row is None:
         return
-    try:
-        with open_upload(row) as (reader, path):
-            _keep(row, reader, timeline_of(reader, path))
-    except AugmentError as error:
-        _end(row, state=State.FAILED, reason=make_storable(str(error))[:LONGEST_REASON])
-    except Exception:
-        logger.exception("Upload %s could not be read", row.code)
-        _end(row, state=State.FAILED, reason=OUR_FAULT)
+    with heartbeat(row):
+        _find_out(row)
 
 
 @contextmanager
@@ -176,12 +169,6 @@ def find_lost(*, now: Moment = DATABASE_TIME) -> list[int]:
     return list(lost.values_list("pk", flat=True))
 
 
-def lost_since(now: Moment) -> Q:
-    """Which waiting rows nobody works on: their message was sent long ago, or never."""
-    long_ago = now - LOST_AFTER
-    return Q(sent_at__lt=long_ago) | Q(sent_at=None, created_at__lt=long_ago)
-
-
 def mark_sent(upload_pk: int, *, now: Moment = DATABASE_TIME) -> None:
     """Remember when the message of an upload was sent."""
     SceneUpload.objects.filter(pk=upload_pk).update(sent_at=now)
@@ -192,7 +179,8 @@ def mark_sent(upload_pk: int, *, now: Moment = DATABASE_TIME) -> None:
 
 def _begin(upload_pk: int) -> SceneUpload | None:
     waiting = SceneUpload.objects.filter(pk=upload_pk, state__in=SceneUpload.WAITING)
-    if not waiting.update(state=State.RUNNING, attempts=F("attempts") + 1):
+    begun = {"state": State.RUNNING, "attempts": F("attempts") + 1, "heartbeat_at": DATABASE_TIME}
+    if not waiting.filter(is_silent()).update(**begun):
         return None
     row = SceneUpload.objects.get(pk=upload_pk)
     if row.attempts > MOST_ATTEMPTS:
@@ -201,9 +189,20 @@ def _begin(upload_pk: int) -> SceneUpload | None:
     return row
 
 
+def _find_out(row: SceneUpload) -> None:
+    try:
+        with open_upload(row) as (reader, path):
+            _keep(row, reader, timeline_of(reader, path))
+    except AugmentError as error:
+        _end(row, state=State.FAILED, reason=make_storable(str(error))[:LONGEST_REASON])
+    except Exception:
+        logger.exception("Upload %s could not be read", row.code)
+        _end(row, state=State.FAILED, reason=OUR_FAULT)
+
+
 def _end(row: SceneUpload, **columns: Any) -> None:
     running = SceneUpload.objects.filter(pk=row.pk, state=State.RUNNING)
-    running.update(finished_at=timezone.now(), **columns)
+    running.update(finished_at=timezone.now(), heartbeat_at=None, **columns)
 
 
 def _keep(row: SceneUpload, reader: Reader, found: Timeline) -> None:
