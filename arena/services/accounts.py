@@ -16,6 +16,7 @@ from django.utils import timezone
 from arena.errors import LinkOver
 from arena.models import EnrolledVoter, Invitation, Person, Study
 from arena.queries.people import ROLES, forgotten_name, has_admin, is_forgotten, role_of
+from arena.services.enrolments import give_up_places
 from arena.services.study_drafts import rename_in_drafts
 from augment.errors import Conflict, InvalidDocument, UnknownName
 from augment.sentences import sentence
@@ -134,6 +135,7 @@ def set_role(*, user: User, role: str, actor: User) -> None:
 def forget_identity(*, user: User, actor: User) -> None:
     """Take name, address and pseudonym from an account; its votes stay. There is no way back.
 
+    Who came by an enrolment link and is not done loses the place, as nobody can sign in any more.
     Ratings that are frozen keep the pseudonym that stood there when they were made.
 
     Raises:
@@ -150,8 +152,9 @@ def forget_identity(*, user: User, actor: User) -> None:
     user.save(update_fields=["password"])
     Person.objects.filter(user=user).update(pseudonym=f"Former person {name[5:]}", preferences={})
     Invitation.objects.filter(expert=user, revoked_at=None).update(revoked_at=timezone.now())
+    _rename_in_plans(known_as, name)  # holds the studies, which comes before what is in them
+    give_up_places(expert=user, actor=actor)
     EnrolledVoter.objects.filter(expert=user).update(external_id="")
-    _rename_in_plans(known_as, name)
     rename_in_drafts(known_as, name)
     for failures in (AccessAttempt, AccessFailureLog, AccessLog):
         failures.objects.filter(username=known_as).delete()

@@ -17,7 +17,7 @@ from arena.pairing.arrays import IntArray
 from arena.pairing.following import follow_on
 from arena.pairing.newcomers import choose_units
 from arena.pairing.rules import Grid, PlanRules, place_of
-from arena.queries.enrolments import enrolment_by_token, find_silent, has_free_place
+from arena.queries.enrolments import enrolment_by_token, find_silent, has_free_place, unfinished
 from arena.services.attention_checks import without_lost_checks
 from arena.services.frames import Cells
 from arena.services.handing_over import undecided_rows
@@ -151,17 +151,30 @@ def drop_silent(
     at = now or timezone.now()
     gone = list(find_silent(enrolment, now=at))
     for voter in gone:
-        rows = undecided_rows(study, voter.expert)
-        Matchup.objects.filter(pk__in=[row.pk for row in rows]).delete()
-        EnrolledVoter.objects.filter(pk=voter.pk).update(dropped_at=at)
-        log_event(
-            actor=actor,
-            verb="drop out",
-            object_kind="person",
-            object_code=voter.expert.person.code,
-            after={"study": str(study.code), "withdrawn": len(rows)},
-        )
+        _give_on(study, voter, at=at, actor=actor)
     return len(gone)
+
+
+@transaction.atomic
+def give_up_places(*, expert: User, actor: User | None = None) -> int:
+    """Give on at once the places of somebody who comes no more and is not done; as `drop_silent`.
+
+    Returns:
+        How many places became free.
+    """
+    # Studies are held in the order of their numbers, as everybody does who holds several.
+    places = EnrolledVoter.objects.filter(expert=expert, dropped_at=None)
+    studies = list(
+        Study.objects.select_for_update()
+        .filter(state=Study.State.OPEN, pk__in=places.values("enrolment__study"))
+        .order_by("pk")
+    )
+    given = 0
+    for study in studies:
+        for voter in unfinished(Enrolment.objects.get(study=study)).filter(expert=expert):
+            _give_on(study, voter, at=timezone.now(), actor=actor)
+            given += 1
+    return given
 
 
 # --- Private -----------------------------------------------------------------------------------
@@ -171,6 +184,19 @@ def _read_plan(study: Study) -> tuple[PlanRules, Cells]:
     """The rules with the pictures that they speak of."""
     cells = pictures_of(study)
     return without_lost_checks(rules_of(study), cells), cells
+
+
+def _give_on(study: Study, voter: EnrolledVoter, *, at: datetime, actor: User | None) -> None:
+    rows = undecided_rows(study, voter.expert)
+    Matchup.objects.filter(pk__in=[row.pk for row in rows]).delete()
+    EnrolledVoter.objects.filter(pk=voter.pk).update(dropped_at=at)
+    log_event(
+        actor=actor,
+        verb="drop out",
+        object_kind="person",
+        object_code=voter.expert.person.code,
+        after={"study": str(study.code), "withdrawn": len(rows)},
+    )
 
 
 def _take_on(

@@ -199,6 +199,23 @@ def test_the_id_stands_in_no_log_and_goes_when_the_person_is_forgotten(study: St
     assert voter.external_id == ""
 
 
+@pytest.mark.parametrize(("answered", "free"), [(0, 1), (2, 1), (6, 0)])
+def test_who_is_forgotten_before_the_end_makes_room_at_once(
+    study: Study, answered: int, free: int
+) -> None:
+    admin = create_person(username="root", password=None, role="admin")
+    enrolment = link(study, places=1, drop_out_after_h=None)
+    voter = join(enrolment, "w-1")
+    answer(study, voter, answered)
+    forget_identity(user=voter.expert, actor=admin)
+    assert state_of(enrolment).free == free
+    assert study.matchups.filter(expert=voter.expert).count() == answered
+    assert Event.objects.filter(verb="drop out", actor=admin).count() == free
+    if free:
+        newcomer = join(enrolment, "w-2")
+        assert study.matchups.filter(expert=newcomer.expert).count() == 6
+
+
 def test_planning_for_a_newcomer_takes_the_window_from_what_is_shown(study: Study) -> None:
     """To read and measure the scenes again would take longer than all the rest."""
     study.matchups.update(original_image="bev/before.png")
