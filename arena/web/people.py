@@ -22,6 +22,7 @@ from django.views.decorators.http import require_http_methods, require_POST
 from arena.errors import ArenaError, LinkOver
 from arena.queries.people import ROLES, list_accounts
 from arena.services.accounts import (
+    accept_welcome,
     find_welcomed,
     forget_identity,
     make_welcome_token,
@@ -174,11 +175,12 @@ def welcome_page(request: HttpRequest, token: str) -> HttpResponse:
     """Where somebody sets the password of an account that was made for them."""
     try:
         user = find_welcomed(token)
+        form = SetPasswordForm(user, request.POST if request.method == "POST" else None)
+        if request.method == "POST" and form.is_valid():
+            password = form.cleaned_data["new_password1"]
+            return _let_in(request, accept_welcome(token=token, password=password))
     except LinkOver:
         return _keep_secret(render(request, "people/link_over.html", status=GONE))
-    form = SetPasswordForm(user, request.POST if request.method == "POST" else None)
-    if request.method == "POST" and form.is_valid():
-        return _let_in(request, form.save())
     context = {"form": form, "welcomed": user}
     return _keep_secret(render(request, "people/welcome.html", context))
 

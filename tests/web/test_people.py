@@ -12,11 +12,18 @@ from django.contrib.auth.models import User
 from django.contrib.sessions.models import Session
 from django.test import Client
 from django.urls import reverse
+from pytest_django import Settings
 
 from arena.config.hiding import HideKeys
 from arena.models import Study, Vote
 from arena.queries.people import find_admins
-from arena.services.accounts import forget_identity, make_welcome_token, set_active, set_role
+from arena.services.accounts import (
+    accept_welcome,
+    forget_identity,
+    make_welcome_token,
+    set_active,
+    set_role,
+)
 from arena.services.first_start import LINK_LIVES_S, make_first_link_token
 from arena.services.people import create_person
 from augment.errors import Conflict
@@ -87,6 +94,31 @@ def test_an_admin_makes_an_account_whose_owner_sets_the_password() -> None:
     assert guest.post(link, TWICE).status_code == 302
     assert guest.get(reverse("jobs")).status_code == 200, "signed in, and an analyst"
     assert Client().get(link).status_code == 410, "it works once"
+    assert can_sign_in("grace", PASSWORD)
+
+
+class FasterVisitor:
+    """A rule for passwords that is asked while a link is used: meanwhile somebody else uses it."""
+
+    def __init__(self, token: str) -> None:
+        self._left = [token]
+
+    def validate(self, password: str, user: User | None = None) -> None:
+        if self._left:
+            accept_welcome(token=self._left.pop(), password=PASSWORD)
+
+    def get_help_text(self) -> str:
+        return "anything"
+
+
+def test_of_two_who_use_a_link_at_once_the_second_finds_it_used(settings: Settings) -> None:
+    grace = create_person(username="grace", password=None, role="expert")
+    token = make_welcome_token(grace, actor=people()["admin"])
+    settings.AUTH_PASSWORD_VALIDATORS = [
+        {"NAME": f"{__name__}.FasterVisitor", "OPTIONS": {"token": token}}
+    ]
+    second = dict.fromkeys(TWICE, "the password of who was slower")
+    assert Client().post(reverse("welcome", args=[token]), second).status_code == 410
     assert can_sign_in("grace", PASSWORD)
 
 
