@@ -49,6 +49,8 @@ def keep_file(
 ) -> None:
     """Store the content; the files of the same owner and kind before it go.
 
+    So does the content itself where a newer one was faster and has removed the row.
+
     Args:
         row: As `begin_file` gave it.
         name: What it is called for people.
@@ -68,21 +70,30 @@ def keep_file(
     content.seek(0)
     kept = default_storage.save(stored, content)
     with transaction.atomic():
-        row.alike().filter(pk=row.pk).update(
-            state=State.READY,
-            name=name,
-            stored=kept,
-            size_bytes=size_bytes,
-            digest=digest.hexdigest(),
-            warnings=list(warnings),
-            is_non_commercial=marked,
-            finished_at=timezone.now(),
+        is_kept = (
+            row.alike()
+            .filter(pk=row.pk)
+            .update(
+                state=State.READY,
+                name=name,
+                stored=kept,
+                size_bytes=size_bytes,
+                digest=digest.hexdigest(),
+                warnings=list(warnings),
+                is_non_commercial=marked,
+                finished_at=timezone.now(),
+            )
         )
-        older = row.alike().filter(pk__lt=row.pk)
-        gone = [one for one in older.values_list("stored", flat=True) if one]
-        older.delete()
-        for one in gone:
-            transaction.on_commit(partial(default_storage.delete, one))
+        if not is_kept:
+            transaction.on_commit(partial(default_storage.delete, kept))
+            return
+        # Held, so that none of them is kept between the reading of its name and its removal.
+        older = row.alike().filter(pk__lt=row.pk).order_by("pk").select_for_update()
+        gone = list(older.values_list("pk", "stored"))
+        row.alike().filter(pk__in=[pk for pk, _ in gone]).delete()
+        for _, stored_as in gone:
+            if stored_as:
+                transaction.on_commit(partial(default_storage.delete, stored_as))
 
 
 def note_failure(row: WrittenFile, why: str) -> None:

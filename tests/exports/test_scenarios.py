@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from django.core.files.base import ContentFile
 from django.core.files.storage import default_storage
 from django.core.management import call_command
 from django.core.management.base import CommandError
@@ -17,6 +18,7 @@ from django.test import Client
 from django.urls import reverse
 
 from arena.models import ScenarioFile
+from arena.services.written_files import keep_file
 from arena.tasks import write_scenario_file
 from augment.formats.writers import WRITERS
 from augment.models import Augmentation, BaseScene, Contestant, GenerationJob
@@ -205,3 +207,16 @@ def test_what_can_not_be_asked_for_is_named(
     with pytest.raises(CommandError, match=said):
         export(*options, "--out", str(tmp_path / "x.zip"))
     assert not list(tmp_path.glob("*.zip"))
+
+
+def test_a_zip_that_a_newer_one_overtook_leaves_no_file(
+    job: GenerationJob, django_capture_on_commit_callbacks: Any
+) -> None:
+    slow, fast = (ScenarioFile.objects.create(job=job, format="json") for _ in range(2))
+    with django_capture_on_commit_callbacks(execute=True):
+        for row in (fast, slow):
+            keep_file(row, name="a.zip", content=ContentFile(b"zip"))
+    (left,) = ScenarioFile.objects.all()
+    assert (left, left.is_waiting) == (fast, False)
+    assert default_storage.exists(left.stored)
+    assert not default_storage.exists(f"{ScenarioFile.FOLDER}/{slow.code}.zip")
