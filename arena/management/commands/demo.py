@@ -13,6 +13,7 @@ from django.core.management.base import CommandError, CommandParser
 
 from arena.errors import ArenaError
 from arena.management import demo
+from arena.management.arguments import at_least
 from arena.management.commands.serve import INTERRUPTED
 from arena.serving.hold import hold_alone
 from arena.serving.ledger import Ledger
@@ -38,11 +39,14 @@ class Command(TerminalCommand):
         parser.add_argument("--port", type=int, default=8000, help="port to listen on")
         parser.add_argument("--no-serve", action="store_true", help="stop before serving")
         parser.add_argument(
-            "--per-type", type=int, metavar="N", help="only N scenarios of each type; default: all"
+            "--per-type",
+            type=at_least(1),
+            metavar="N",
+            help="only N scenarios of each type; default: all",
         )
         parser.add_argument(
             "--driven",
-            type=int,
+            type=at_least(0),
             metavar="N",
             default=demo.DRIVEN_PER_TYPE,
             help="drive N scenarios of each type; default: %(default)s",

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from argparse import ArgumentTypeError
 from typing import Any
 
 from django.conf import settings
@@ -10,6 +9,7 @@ from django.core.management import call_command
 from django.core.management.base import CommandError, CommandParser
 
 from arena.errors import ArenaError
+from arena.management.arguments import at_least
 from arena.services.first_start import make_first_link_token
 from arena.serving.hold import hold_alone
 from arena.serving.ledger import Ledger
@@ -34,10 +34,10 @@ class Command(TerminalCommand):
         parser.add_argument("--host", default="127.0.0.1", help="address to listen on")
         parser.add_argument("--port", type=int, default=8000, help="port to listen on")
         parser.add_argument(
-            "--web-workers", type=_one_or_more, default=2, help="web server processes"
+            "--web-workers", type=at_least(1), default=2, help="web server processes"
         )
         parser.add_argument(
-            "--concurrency", type=_one_or_more, default=4, help="augmentations at once"
+            "--concurrency", type=at_least(1), default=4, help="augmentations at once"
         )
 
     def handle(self, *args: Any, **options: Any) -> None:
@@ -80,10 +80,3 @@ class Command(TerminalCommand):
 
     def _say(self, name: str, line: str) -> None:
         self.stdout.write(f"{name:8} | {line}")
-
-
-def _one_or_more(text: str) -> int:
-    number = int(text)
-    if number < 1:
-        raise ArgumentTypeError(f"1 or more is needed, not {number}")
-    return number
