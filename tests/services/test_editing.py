@@ -12,6 +12,7 @@ from django.contrib.auth.models import User
 from django.core.files.storage import default_storage
 from django.db import connection
 from django.test.utils import CaptureQueriesContext
+from django.utils import timezone
 
 from arena.models import Study
 from arena.services import references as guarded
@@ -220,6 +221,16 @@ def test_a_correction_that_is_none_writes_nothing() -> None:
             by_hand.keep_correction(first, given, slug=slug)
     assert Augmentation.objects.count() == rows
     assert not Contestant.objects.filter(kind=Contestant.Kind.HUMAN).exists()
+
+
+def test_nothing_counts_any_more_for_a_retired_person() -> None:
+    first = original()
+    by_hand.keep_correction(first, document(vehicle("Added1", 21.0, 0.0)), slug="ada")
+    Contestant.objects.filter(slug="ada").update(retired_at=timezone.now())
+    rows = Augmentation.objects.count()
+    with pytest.raises(Conflict, match="“ada” is retired; choose another slug"):
+        by_hand.keep_correction(first, document(vehicle("Added1", 22.0, 0.0)), slug="ada")
+    assert Augmentation.objects.count() == rows
 
 
 def test_a_scenario_is_held_before_somebody_looks_who_shows_it() -> None:

@@ -48,7 +48,8 @@ def keep_correction(
     Raises:
         InvalidDocument: The document, the slug, the name or the notes break their format.
         InvalidModification: The modification does not fit the scene.
-        Conflict: Nothing was changed, nothing is left, or somebody who is no person has the slug.
+        Conflict: Nothing was changed, nothing is left, or the slug is that of somebody who is no
+            person or retired.
     """
     modification = _corrected(original, document)
     if notes:
@@ -118,4 +119,8 @@ def _person(slug: str, name: str) -> Contestant:
         return Contestant.objects.create(slug=slug, name=shown, kind=Kind.HUMAN)
     if found.kind != Kind.HUMAN:
         raise Conflict(sentence("“%(name)s” is no person; choose another slug.", name=found.name))
+    if found.retired_at is not None:
+        raise Conflict(
+            sentence("“%(name)s” is retired; choose another slug.", name=found.name),
+        )
     return found
