@@ -45,10 +45,10 @@ from arena.exports.votes import VOTE_FORMATS, vote_table
 from arena.exports.writers import FORMATS as LEADERBOARD
 from arena.exports.zips import CONTENT_TYPE as ZIP_TYPE
 from arena.models import ScenarioFile, Snapshot
+from arena.queries.analyses import analysis_of
 from arena.services.scenario_files import ask_for_file
 from augment.errors import QueueFault, UnknownName
 from augment.models import GenerationJob
-from augment.services.judging.analyses import analyse_job
 from augment.services.judging.displacement import By
 from augment.services.judging.driving_scores import options_driven, scores_of_job
 from augment.services.judging.scenario_export import FORMATS as SCENARIO_FORMATS
@@ -71,7 +71,7 @@ def _displacement(by: By, job: GenerationJob) -> Any:
 
 
 def _analysis(part: str, job: GenerationJob) -> Any:
-    return analyses.analysis_table(analyse_job(job), part)
+    return analyses.analysis_table(analysis_of(job), part)
 
 
 OF_JOBS: dict[str, Export] = {

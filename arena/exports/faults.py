@@ -13,11 +13,11 @@ from arena.exports.formats import Format, formats
 from arena.exports.latex import escape
 from arena.exports.tables import shown_name
 from arena.models import FaultLabel
-from arena.queries.faults import labels_of
+from arena.queries.faults import contestants_of, labels_of
 from arena.rating.agreement import cohens_kappa
 from arena.rating.reliability import DifferenceMetric, krippendorff_alpha
 from arena.services.cells import csv_text
-from augment.models import Augmentation, Contestant, GenerationJob
+from augment.models import Contestant, GenerationJob
 from augment.services.judging.fault_guess import FaultClass
 
 COLUMNS = (
@@ -115,7 +115,7 @@ class FaultTable:
 
 
 def fault_table(job: GenerationJob) -> FaultTable:
-    """The table of a job; two queries.
+    """The table of a job; three queries, which read a row a label and a row a contestant.
 
     Of several experts on one augmentation a fault counts where more than half of them see it.
     """
@@ -123,15 +123,14 @@ def fault_table(job: GenerationJob) -> FaultTable:
     lines_by_row: defaultdict[int, list[FaultLabel]] = defaultdict(list)
     for label in labels:
         lines_by_row[label.augmentation_id].append(label)
-    rows = job.augmentations.select_related("contestant").only(
-        "state", "job", "contestant__name", "contestant__slug", "contestant__kind"
-    )
-    by_contestant: defaultdict[Contestant, list[Augmentation]] = defaultdict(list)
-    for row in rows.order_by("contestant__name", "contestant__slug"):
-        by_contestant[row.contestant].append(row)
+    by_contestant: defaultdict[int, list[list[FaultLabel]]] = defaultdict(list)
+    for own in lines_by_row.values():
+        by_contestant[own[0].augmentation.contestant_id].append(own)
     return FaultTable(
         job=job.name,
-        lines=tuple(_line(who, own, lines_by_row) for who, own in by_contestant.items()),
+        lines=tuple(
+            _line(who, missed, by_contestant[who.pk]) for who, missed in contestants_of(job)
+        ),
         agreement=tuple(_agreement(fault, labels, lines_by_row) for fault in FaultClass),
     )
 
@@ -194,11 +193,7 @@ FORMATS: dict[str, Format[FaultTable]] = formats(
 # Private
 
 
-def _line(
-    who: Contestant, rows: Sequence[Augmentation], found: dict[int, list[FaultLabel]]
-) -> FaultLine:
-    labelled = [found[row.pk] for row in rows if row.pk in found]
-    missed = (Augmentation.State.UNREADABLE, Augmentation.State.REFUSED)
+def _line(who: Contestant, missed: int, labelled: Sequence[Sequence[FaultLabel]]) -> FaultLine:
     return FaultLine(
         name=who.name,
         slug=who.slug,
@@ -208,7 +203,7 @@ def _line(
         },
         labelled=len(labelled),
         labels=sum(len(labels) for labels in labelled),
-        without_modification=sum(row.state in missed for row in rows),
+        without_modification=missed,
     )
 
 

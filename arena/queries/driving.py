@@ -1,19 +1,22 @@
-"""Drives as pages show them: one with its partner before the change, and a job's all at once."""
+"""Drives as pages show them: one with its partner before the change, and a part of a grid."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 
-from arena.queries.jobs import JobGrid, grid
+from arena.queries.job_grid import GridPart, Part, View, grid_part
 from augment.models import GenerationJob, Simulation
 from augment.services.judging.simulations import Options
+
+DRIVES = View(name="drives", cells=300, columns=10, samples=1, rows=50)
+"""How many drives are shown at once: one sample of each contestant."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class DriveCells:
-    """The grid of a job with its drives by augmentation, and those of the scenes."""
+    """A part of a job's grid with its drives by augmentation, and those of its scenes."""
 
-    grid: JobGrid
+    grid: GridPart
     by_augmentation: dict[int, Simulation]
     before: dict[int, Simulation]
     reference: dict[int, Simulation]
@@ -31,16 +34,19 @@ def before_of(row: Simulation) -> Simulation | None:
     return drives.exclude(pk=row.pk).first()
 
 
-def cells_of(job: GenerationJob, options: Options) -> DriveCells:
-    """Every drive of a job; no documents."""
+def cells_of(job: GenerationJob, options: Options, part: Part) -> DriveCells:
+    """The drives of a part of a job's grid; seven queries, no documents."""
+    shown = grid_part(job, part)
+    scenarios = [row.scenario.pk for row in shown.rows]
+    augmentations = [cell.pk for row in shown.rows for cells in row.cells for cell in cells]
     rows = options.of(Simulation.objects.defer("document", "trace"))
-    of_scenes = list(rows.filter(augmentation=None, scenario__in=job.scenarios.all()))
+    of_scenes = list(rows.filter(augmentation=None, scenario__in=scenarios))
     subject = Simulation.Subject
     return DriveCells(
-        grid=grid(job),
+        grid=shown,
         by_augmentation={
             row.augmentation_id: row
-            for row in rows.filter(augmentation__job=job)
+            for row in rows.filter(augmentation__in=augmentations)
             if row.augmentation_id is not None
         },
         before={row.scenario_id: row for row in of_scenes if row.subject == subject.UNMODIFIED},

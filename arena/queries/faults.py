@@ -7,11 +7,11 @@ from dataclasses import dataclass
 from uuid import UUID
 
 from django.contrib.auth.models import User
-from django.db.models import Count, QuerySet
+from django.db.models import Count, Q, QuerySet
 
 from arena.errors import NotYours
 from arena.models import FaultLabel, LabellingRound, LabelTask
-from augment.models import GenerationJob
+from augment.models import Augmentation, Contestant, GenerationJob
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -98,8 +98,27 @@ def next_task(*, labelling: LabellingRound, expert: User) -> LabelTask | None:
 
 
 def labels_of(job: GenerationJob) -> QuerySet[FaultLabel]:
-    """Every label on the augmentations of a job."""
-    return FaultLabel.objects.filter(augmentation__job=job).order_by("augmentation", "pk")
+    """Every label on the augmentations of a job, each with its augmentation's contestant."""
+    found = FaultLabel.objects.filter(augmentation__job=job).select_related("augmentation")
+    return found.only(*_LABEL, "augmentation__contestant").order_by("augmentation", "pk")
+
+
+def contestants_of(job: GenerationJob) -> list[tuple[Contestant, int]]:
+    """The contestants of a job by name, each with its answers that are none; two queries."""
+    missed = Q(state__in=(Augmentation.State.UNREADABLE, Augmentation.State.REFUSED))
+    counted = dict(
+        job.augmentations.order_by()
+        .values_list("contestant")
+        .annotate(missed=Count("pk", filter=missed))
+    )
+    found = Contestant.objects.filter(pk__in=counted).order_by("name", "slug")
+    return [(who, counted[who.pk]) for who in found.only("name", "slug", "kind")]
+
+
+_LABEL = (
+    *("augmentation", "position", "heading", "logic"),
+    *("guessed_position", "guessed_heading", "guessed_logic"),
+)
 
 
 def _counted(rows: QuerySet[LabellingRound]) -> list[LabellingProgress]:

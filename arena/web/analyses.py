@@ -11,18 +11,18 @@ from django.views.decorators.http import require_safe
 
 from arena.exports.analyses import ANALYSIS_FORMATS, PARTS, analysis_table
 from arena.exports.formats import format_named
+from arena.queries.analyses import analysis_of
 from arena.web.access import STAFF, allow_only
 from augment.errors import UnknownName
 from augment.models import GenerationJob
-from augment.services.judging.analyses import analyse_job
 
 
 @allow_only(*STAFF)
 @require_safe
 def page(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
-    """All three parts; a page of its own, because the bootstrap takes a moment."""
+    """All three parts; a page of its own, because the bootstrap takes a moment the first time."""
     job = get_object_or_404(GenerationJob, code=code)
-    context = {"job": job, "analysis": analyse_job(job), "forms": list(ANALYSIS_FORMATS)}
+    context = {"job": job, "analysis": analysis_of(job), "forms": list(ANALYSIS_FORMATS)}
     return render(request, "jobs/analyses.html", context)
 
 
@@ -39,7 +39,7 @@ def export(request: HttpRequest, code: uuid.UUID, part: str, form: str) -> HttpR
         raise Http404 from error
     name = f"{slugify(job.name) or 'job'}-{part}.{chosen.suffix}"
     return HttpResponse(
-        chosen.write(analysis_table(analyse_job(job), part)),
+        chosen.write(analysis_table(analysis_of(job), part)),
         content_type=chosen.content_type,
         headers={"Content-Disposition": f'attachment; filename="{name}"'},
     )

@@ -22,9 +22,10 @@ from arena.exports.formats import format_named
 from arena.exports.tables import LeaderboardTable
 from arena.models import Snapshot
 from arena.queries.costs import shown_augmentations
-from arena.queries.driving import before_of, cells_of
+from arena.queries.driving import DRIVES, before_of, cells_of
+from arena.queries.job_grid import Part
 from arena.web.access import ADMIN, STAFF, allow_only
-from arena.web.listing import choice_asked
+from arena.web.listing import choice_asked, page_asked
 from augment.errors import AugmentError, QueueFault, UnknownName
 from augment.models import GenerationJob, Simulation
 from augment.services.judging import simulations
@@ -78,11 +79,18 @@ def simulate_job(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
 @allow_only(*STAFF)
 @require_safe
 def drives_page(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
-    """Every drive of a job in a grid."""
+    """The drives of a job in a grid, page by page."""
     job = get_object_or_404(GenerationJob, code=code)
     score = _score_asked(request)
-    options = _options_asked(request, job)
-    cells = cells_of(job, options)
+    known = options_driven(job)
+    way = _way_asked(request, known)
+    part = Part(
+        view=DRIVES,
+        row=page_asked(request, "row"),
+        column=page_asked(request, "column"),
+        sample=page_asked(request, "sample"),
+    )
+    cells = cells_of(job, known[way] if known else Options(), part)
     lines = [
         {
             "scenario": row.scenario,
@@ -91,14 +99,14 @@ def drives_page(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
                 for found in (cells.before, cells.reference)
             ],
             "cells": [
-                _cell(None if cell is None else cells.by_augmentation.get(cell.pk), score)
-                for cell in row.cells
+                _cell(cells.by_augmentation.get(sample[0].pk) if sample else None, score)
+                for sample in row.cells
             ],
         }
         for row in cells.grid.rows
     ]
-    context = {"job": job, "lines": lines, "contestants": cells.grid.contestants, "score": score}
-    driven = {"labels": LABELS, "driven": _way_asked(request, options_driven(job))}
+    context = {"job": job, "lines": lines, "grid": cells.grid, "score": score}
+    driven = {"labels": LABELS, "driven": way}
     return render(request, "drives/list.html", context | driven)
 
 

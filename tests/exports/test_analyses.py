@@ -3,18 +3,23 @@ from __future__ import annotations
 import csv
 import io
 import json
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
 import pytest
 from django.core.management import CommandError, call_command
+from django.db import connection
+from django.test.utils import CaptureQueriesContext
 from django.urls import reverse
 
+from arena.queries.analyses import analysis_of
 from augment.models import Augmentation, Contestant, GenerationJob, Scenario
 from augment.scene.codec import modification_to_document
 from augment.scene.intent import Intent
 from augment.scene.intent_codec import intent_to_document
 from augment.scene.modification import Modification
+from augment.services.judging.analyses import analyse_job
 from augment.services.scenarios.pictures import store
 from augment.services.scenarios.scenes import reference_of
 from tests.jobs import rows
@@ -23,6 +28,7 @@ from tests.web.cast import people, png, signed_in
 pytestmark = pytest.mark.django_db
 
 State = Augmentation.State
+NOTHING = modification_to_document(Modification())
 UNMET = intent_to_document(Intent(unmet="There is no tram."))
 
 
@@ -105,10 +111,40 @@ def test_pairs_wordings_and_refusals_come_as_files(tmp_path: Path) -> None:
         exported(job, "elephants", tmp_path)
 
 
+def test_a_second_look_reads_what_it_follows_from_and_computes_nothing() -> None:
+    job = a_job()
+    kept = analysis_of(job)
+    assert kept == analyse_job(job)
+    with CaptureQueriesContext(connection) as asked:
+        assert analysis_of(job) is kept
+    assert len(asked) == 3
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        lambda: Augmentation.objects.filter(contestant__slug="ann").update(state=State.UNREADABLE),
+        lambda: Augmentation.objects.filter(scenario__slug="wish-1").update(modification=NOTHING),
+        lambda: Augmentation.objects.filter(scenario__slug="wish-1").delete(),
+        lambda: Scenario.objects.filter(slug="wish-2").update(reference=NOTHING),
+        lambda: Scenario.objects.filter(slug="never").update(intent=None, intent_origin=""),
+        lambda: Scenario.objects.filter(slug="wish-0-p1").update(paraphrase_of=None),
+        lambda: Contestant.objects.filter(slug="ann").update(name="Anna"),
+    ],
+)
+def test_whatever_changes_is_analysed_anew(change: Callable[[], object]) -> None:
+    job = a_job()
+    before = analysis_of(job)
+    change()
+    after = analysis_of(job)
+    assert after == analyse_job(job)
+    assert after != before
+
+
 def test_the_page_shows_all_three_and_an_empty_job_says_so() -> None:
     staff = signed_in(people()["admin"])
     shown = staff.get(reverse("analyses", args=[a_job().code])).content.decode()
-    assert "-1.30" in shown
+    assert "−1.30" in shown
     assert "0.0156" in shown
     assert all(f'id="{part}"' in shown for part in ("pairs", "wordings", "refusals"))
     empty = GenerationJob.objects.create(name="Nothing")

@@ -7,7 +7,7 @@ import pytest
 from scipy.stats import bootstrap
 from statsmodels.stats.multitest import multipletests
 
-from augment.metrics.paired import adjust_holm, compare_all, find_p_by_signed_ranks
+from augment.metrics.paired import LEVEL, adjust_holm, compare_all, find_p_by_signed_ranks
 from augment.metrics.refusals import score_refusals
 from augment.metrics.robustness import measure_robustness
 
@@ -66,6 +66,19 @@ def test_pairs_are_made_over_shared_scenarios_and_say_which_is_nearer() -> None:
     assert found.p == found.p_holm == pytest.approx(p_by_enumeration(DIFFERENCES))
     assert compare_all({"near": base, "far": far}, seed=3) == (found,)
     assert compare_all({"near": {"a": 1.0}, "far": {"b": 1.0}}, seed=3) == ()
+
+
+@pytest.mark.parametrize(("n", "rounds"), [(1, 70), (7, 200), (8, 200), (300, 130), (32_768, 3)])
+def test_the_interval_is_that_of_all_resamples_at_once(n: int, rounds: int) -> None:
+    differences = np.round(np.random.default_rng(n).normal(size=n), 2)
+    far = {f"s{place:06}": float(one) for place, one in enumerate(differences)}
+    near = dict.fromkeys(far, 0.0)
+    (found,) = compare_all({"far": far, "near": near}, seed=4, rounds=rounds)
+    (stream,) = np.random.SeedSequence(4).spawn(1)
+    drawn = differences[np.random.default_rng(stream).integers(0, n, size=(rounds, n))]
+    tail = 100.0 * (1.0 - LEVEL) / 2.0
+    low, high = np.percentile(np.median(drawn, axis=1), (tail, 100.0 - tail))
+    assert (found.low_m, found.high_m) == (low, high), "to the last bit"
 
 
 def test_the_spread_over_wordings_is_within_scenarios_alone() -> None:

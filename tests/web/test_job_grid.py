@@ -5,12 +5,14 @@ from __future__ import annotations
 import re
 from collections.abc import Callable
 from html import unescape
+from itertools import product
 
 import pytest
+from django.db.models.signals import post_init
 from django.test import Client
 from django.urls import reverse
 
-from augment.models import Augmentation, Contestant, GenerationJob, Scenario
+from augment.models import Augmentation, Contestant, GenerationJob, Scenario, Simulation
 from tests.jobs import rows
 from tests.web.cast import people, signed_in
 
@@ -153,3 +155,43 @@ def test_the_grid_is_narrowed_by_word_and_state(
     grid = page(analyst, job, query).split('id="grid"')[1]
     found = re.findall(r'<th scope="row"><a[^>]*>(street-\d+)</a>', grid)
     assert found == shown if isinstance(shown, list) else len(found) == shown
+
+
+DRIVE = re.compile(r'href="/drives/([0-9a-f-]+)/"')
+
+
+def test_the_drives_of_a_large_job_are_a_page_of_them(
+    analyst: Client, django_assert_max_num_queries: Questions
+) -> None:
+    job = large_job(scenarios=60, contestants=12, samples=2)
+    Simulation.objects.bulk_create(
+        Simulation(scenario_id=row.scenario_id, augmentation=row, subject="augmentation")
+        for row in job.augmentations.all()
+    )
+    shown = reverse("drives", args=[job.code])
+    seen: list[str] = []
+    for column, sample, row in product((1, 2), (1, 2), (1, 2)):
+        with django_assert_max_num_queries(13):  # type: ignore[attr-defined]
+            found = analyst.get(shown, {"column": column, "sample": sample, "row": row})
+        drives = DRIVE.findall(found.content.decode())
+        assert 0 < len(drives) <= 300
+        seen += drives
+    assert len(set(seen)) == len(seen), "no drive is on two pages"
+    assert len(seen) == 2 * 60 * 12
+
+
+def test_fault_labels_of_a_large_job_read_no_augmentation(analyst: Client) -> None:
+    job = large_job(scenarios=60, contestants=12)
+    made: list[object] = []
+
+    def note(instance: object, **_: object) -> None:
+        made.append(instance)
+
+    post_init.connect(note, sender=Augmentation)
+    try:
+        found = analyst.get(reverse("faults", args=[job.code])).content.decode()
+    finally:
+        post_init.disconnect(note, sender=Augmentation)
+    assert not made
+    assert found.count("Who ") == 12
+    assert "60" in found
