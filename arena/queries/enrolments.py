@@ -57,14 +57,14 @@ def taking_a_place(voters: Voters) -> Voters:
     return voters.filter(dropped_at=None)
 
 
-def unfinished(enrolment: Enrolment) -> Voters:
+def find_unfinished(enrolment: Enrolment) -> Voters:
     """Who has a place and pairs without an answer."""
     return taking_a_place(enrolled_voters(enrolment)).filter(answered__lt=F("planned"))
 
 
 def find_silent(enrolment: Enrolment, *, now: datetime) -> Voters:
     """Who has a place, is not done and was not heard for as long as the enrolment allows."""
-    found = unfinished(enrolment)
+    found = find_unfinished(enrolment)
     if enrolment.drop_out_after_h is None:
         return found.none()
     since = now - timedelta(hours=enrolment.drop_out_after_h)

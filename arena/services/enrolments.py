@@ -17,7 +17,12 @@ from arena.pairing.arrays import IntArray
 from arena.pairing.following import follow_on
 from arena.pairing.newcomers import choose_units
 from arena.pairing.rules import Grid, PlanRules, place_of
-from arena.queries.enrolments import enrolment_by_token, find_silent, has_free_place, unfinished
+from arena.queries.enrolments import (
+    enrolment_by_token,
+    find_silent,
+    find_unfinished,
+    has_free_place,
+)
 from arena.services.attention_checks import without_lost_checks
 from arena.services.frames import Cells
 from arena.services.handing_over import undecided_rows
@@ -171,7 +176,7 @@ def give_up_places(*, expert: User, actor: User | None = None) -> int:
     )
     given = 0
     for study in studies:
-        for voter in unfinished(Enrolment.objects.get(study=study)).filter(expert=expert):
+        for voter in find_unfinished(Enrolment.objects.get(study=study)).filter(expert=expert):
             _give_on(study, voter, at=timezone.now(), actor=actor)
             given += 1
     return given
