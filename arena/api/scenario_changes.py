@@ -27,6 +27,7 @@ from arena.services.references import drop_reference, set_reference
 from augment.models import IntentReading
 from augment.scene_tasks import enqueue_scenario
 from augment.services.judging.edits import check_edit
+from augment.services.judging.findings import FindingLine
 from augment.services.running.intent_readings import plan_reading
 from augment.services.scenarios.bulk_files import MOST_FILES, add_from_files
 from augment.services.scenarios.intents import accept_reading, enter_intent, last_reading
@@ -117,7 +118,11 @@ class FindingDocument(serializers.Serializer[Any]):
 
     severity = serializers.CharField(help_text="wrong, doubtful or fact.")
     kind = serializers.CharField()
-    sentence = serializers.CharField()
+    sentence = serializers.SerializerMethodField()
+
+    def get_sentence(self, line: FindingLine) -> str:
+        """In the language of the request."""
+        return line.finding.sentence(say=translate)
 
 
 class CheckedDocument(serializers.Serializer[Any]):

@@ -156,6 +156,7 @@ def test_a_scenario_gets_a_reference_that_is_checked_first(
     here = f"scenarios/{made['code']}"
     checked = send(analyst, here + "/check", modification=AWAY).json()
     assert checked["lines"][0]["severity"] == "wrong"
+    assert checked["lines"][0]["sentence"].endswith(".")
     assert Scenario.objects.get(slug="mine").reference is None
     changed = send(analyst, here + "/reference", reference=CAR).json()
     assert changed["reference"]["add"][0]["id"] == "Added1"

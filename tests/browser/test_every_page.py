@@ -11,7 +11,7 @@ from playwright.sync_api import Browser, BrowserContext, Page, Route
 from pytest_django.live_server_helper import LiveServer
 
 from arena.models import Study
-from tests.browser.booth import PHONE, Booth
+from tests.browser.booth import PHONE, Booth, ready
 from tests.browser.test_voting_page import RULES, faults
 from tests.web.every_page import ShownPage, pages_of_a_rated_study, pages_of_an_open_study
 
@@ -63,6 +63,9 @@ def _tab(booth: Booth, by_user: dict[str, BrowserContext], one: ShownPage) -> Pa
         by_user[who] = booth.visit(who, reverse("healthz"), how).context
     page = by_user[who].new_page()
     page.goto(one.url)
+    if page.locator("#answers").count():
+        # The pair fades until it takes an answer.
+        ready(page)
     page.route("**/*", _stay)
     return page
 

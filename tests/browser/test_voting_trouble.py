@@ -161,7 +161,7 @@ def test_a_closing_is_said_with_what_came_too_late(booth: Booth) -> None:
     booth.look_ahead(page)
     close_study(study=booth.study)
     press(page, "1")
-    gate = page.get_by_role("dialog", name="This study is closed")
+    gate = page.get_by_role("dialog", name="This study takes no more votes")
     expect(gate).to_contain_text("1 answer came too late")
     gate.get_by_role("button", name="Go on").click()
     expect(page.get_by_role("heading", name="This study is closed")).to_be_visible()

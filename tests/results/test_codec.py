@@ -76,7 +76,7 @@ def test_an_old_rating_opens_on_every_tab_and_exports_the_same_bytes() -> None:
     files = {
         "pairs.csv": bundle._pairs(results),
         "types.csv": bundle._types(results),
-        "raters.csv": bundle._raters(results),
+        "raters.csv": _without_last(bundle._raters(results), b"checks_skipped,aids"),
         "statistics.json": bundle._json(bundle._public(results)),
     }
     found = {name: hashlib.sha256(content).hexdigest() for name, content in files.items()}
@@ -100,3 +100,12 @@ def test_a_dump_has_the_document_and_loads_again() -> None:
     assert json.loads(text)[0]["fields"]["results"] == kept
     next(iter(serializers.deserialize("json", text))).save()
     assert Snapshot.objects.get().results == read_results(kept)
+
+
+def _without_last(table: bytes, columns: bytes) -> bytes:
+    """A table as it was before columns were added at its end."""
+    head, *rows = table.splitlines(keepends=True)
+    assert head.rstrip().endswith(b"," + columns)
+    more = columns.count(b",") + 1
+    end = head[len(head.rstrip()) :]
+    return b"".join(line.rstrip().rsplit(b",", more)[0] + end for line in (head, *rows))
