@@ -84,6 +84,9 @@ def test_a_placed_agent_is_on_the_lane_that_lies_under_it() -> None:
         (vehicle("Added1", 20.0, 3.0, 3.0), 20.0, 3.5, math.pi),  # along the other one
         (vehicle("Added1", 20.0, 12.0, 0.2), 20.0, 3.5, 0.0),  # beside the road
         (vehicle("Added1", 20.0, 30.0, 0.2), 20.0, 30.0, 0.2),  # too far from every lane
+        (pedestrian("Added1", 20.0, -1.0, (20.0, 6.0)), 20.0, 0.0, math.pi / 2),  # walks across
+        (pedestrian("Added1", 20.0, -1.0, (26.0, 6.0)), 20.0, 0.0, math.pi / 4),
+        (pedestrian("Added1", 20.0, -1.0, (20.0, 0.0)), 20.0, 0.0, math.pi / 2),  # is there
     ],
 )
 def test_an_agent_is_put_on_the_centreline(

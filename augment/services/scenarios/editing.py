@@ -12,6 +12,7 @@ from functools import lru_cache
 from typing import Any
 
 from augment.geometry.angles import difference, wrap
+from augment.geometry.frames import Pose
 from augment.models import BaseScene, Scenario
 from augment.render.camera import AROUND_THE_EGO
 from augment.scene.codec import (
@@ -19,7 +20,7 @@ from augment.scene.codec import (
     modification_to_document,
     scene_from_document,
 )
-from augment.scene.entities import AgentType, Scene, TrafficAgent
+from augment.scene.entities import AgentType, Point, Scene, TrafficAgent
 from augment.scene.lane_graph import LaneGraph
 from augment.scene.modification import Modification, without_traffic
 from augment.scene.sizes import LENGTH_WIDTH_M
@@ -75,6 +76,7 @@ def read_edit(scenario: Scenario, document: object) -> Modification:
 def snap(scenario: Scenario, modification: Modification, agent_id: str) -> Modification:
     """The modification with one agent on the nearest centreline, facing along it or against it.
 
+    A pedestrian who walks somewhere faces that way from there, along or across the lane.
     Nothing happens to an agent that is not changed, or further than 15 m from every lane.
     """
     _, graph = _scene_of(scenario)
@@ -133,5 +135,13 @@ def _snapped(agent: TrafficAgent, graph: LaneGraph, agent_id: str) -> TrafficAge
     pose = line.pose_at(line.project(agent.x_m, agent.y_m).s_m)
     is_against = abs(difference(pose.heading_rad, agent.heading_rad)) > _HALF_TURN_RAD / 2.0
     heading = wrap(pose.heading_rad + _HALF_TURN_RAD) if is_against else pose.heading_rad
+    if agent.walk_to_m is not None:
+        heading = _towards(agent.walk_to_m, pose, instead=agent.heading_rad)
     snapped = replace(agent, x_m=pose.x_m, y_m=pose.y_m, heading_rad=heading)
     return _on_its_lane(snapped, graph)
+
+
+def _towards(point: Point, pose: Pose, *, instead: float) -> float:
+    """The heading from the pose to the point; `instead` where they are the same."""
+    away = (point[0] - pose.x_m, point[1] - pose.y_m)
+    return math.atan2(away[1], away[0]) if any(away) else instead
