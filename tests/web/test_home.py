@@ -76,10 +76,10 @@ def test_a_made_up_theme_or_a_foreign_address_changes_nothing(address: str) -> N
 
 
 def test_an_account_that_no_service_made_is_a_person_and_has_a_home() -> None:
-    Person.objects.filter(user=people()["expert"]).update(pseudonym="Person 4")
-    bare = User.objects.create_user("bare", password="a password", id=4)
+    Person.objects.filter(user=people()["expert"]).update(pseudonym="Person 4000000")
+    bare = User.objects.create_user("bare", password="a password", id=4_000_000)
     bare.groups.add(Group.objects.get(name="analyst"))
-    assert f"Person 4 {bare.person.code.hex[:8]}" in home(bare)
+    assert f"Person 4000000 {bare.person.code.hex[:8]}" in home(bare)
     signed_in(bare).post(reverse("theme"), {"theme": "light"})
     assert 'data-theme="light"' in home(bare)
 
