@@ -15,20 +15,16 @@ from celery.signals import worker_ready
 from django.conf import settings
 from django.contrib.auth.models import User
 from django.db import connection
-from django.utils import timezone
 
 from arena.exports import study_files
 from arena.exports.scenario_files import write_file
 from arena.services import looks, ratings
-from arena.services.webhooks import deliver_due, plan_deliveries
 from augment.broker import open_broker
 from augment.models import Scenario
 from augment.services.running import stopping, workers
 from augment.services.scenarios import attention
 
 logger = logging.getLogger(__name__)
-
-TELL_EVERY_S = 5
 
 
 @shared_task(name="arena.compute_snapshot", acks_late=True, ignore_result=True)
@@ -102,18 +98,7 @@ def start_watching(**_: object) -> None:
     _start("looks", looks.take_due_looks, every_s=settings.RECOVER_EVERY_S)
 
 
-@worker_ready.connect
-def start_telling(**_: object) -> None:
-    """Tell webhooks what happens, in a thread of the worker; of several, one sends a message."""
-    _start("webhooks", _tell, every_s=TELL_EVERY_S)
-
-
 # --- Private -----------------------------------------------------------------------------------
-
-
-def _tell() -> None:
-    plan_deliveries(timezone.now())
-    deliver_due()
 
 
 def _start(what: str, act: Callable[[], object], *, every_s: float) -> None:

@@ -21,7 +21,7 @@ from django.core.files.base import ContentFile
 from django.core.files.storage import FileSystemStorage, default_storage
 from django.db import DatabaseError, connection
 
-from arena.models import ApiToken, Study, Webhook, WebhookDelivery
+from arena.models import ApiToken, Study
 from arena.queries.people import find_admins
 from arena.services.looks import stopping_progress
 from arena.serving.readiness import look_at_broker, look_at_database, look_at_workers
@@ -32,7 +32,6 @@ from augment.services.endpoints.keys import key_of
 
 ENOUGH_BYTES = 1 << 30
 FAR_APART_S = 60.0
-LATE = timedelta(minutes=10)
 SOON = timedelta(days=7)
 RECENTLY = timedelta(days=30)
 
@@ -201,24 +200,6 @@ def _endpoints() -> Ailments:
         yield Ailment(Level.DOUBTFUL, f"endpoint {model.endpoint.label}", text, remedy)
 
 
-def _webhooks() -> Ailments:
-    """Addresses whose last message was given up, and messages that nobody sends."""
-    now = database_now()
-    for webhook in Webhook.objects.filter(is_active=True):
-        last = webhook.deliveries.exclude(state=WebhookDelivery.State.WAITING)
-        row = last.order_by("-pk").first()
-        part = f"webhook {webhook.name}"
-        if row is not None and row.state == WebhookDelivery.State.FAILED:
-            text = f"its last message was given up: {row.last_answer or row.last_status}"
-            yield Ailment(Level.DOUBTFUL, part, text, "Look at its address, then send it again.")
-        late = webhook.deliveries.filter(
-            state=WebhookDelivery.State.WAITING, due_at__lt=now - LATE
-        ).count()
-        if late:
-            text = f"{late} messages are due since {LATE.seconds // 60} minutes and not sent"
-            yield Ailment(Level.DOUBTFUL, part, text, "Workers send them; see whether one runs.")
-
-
 def _tokens() -> Ailments:
     """Tokens that stopped working, or soon will, and were in use."""
     now = database_now()
@@ -254,7 +235,6 @@ NEED_THE_DATABASE: tuple[Callable[[], Ailments], ...] = (
     _workers,
     _accounts,
     _endpoints,
-    _webhooks,
     _tokens,
     _looks,
 )

@@ -16,7 +16,6 @@ from arena.models.studies import Matchup, Study
 from arena.models.study_files import StudyFile
 from arena.models.tokens import fresh_token
 from arena.models.votes import AIDS, OUTCOME_LETTERS, Report, Vote
-from arena.models.webhooks import Webhook, WebhookDelivery
 
 __all__ = [
     "AIDS",
@@ -43,8 +42,6 @@ __all__ = [
     "StudyFile",
     "Vote",
     "VoteFile",
-    "Webhook",
-    "WebhookDelivery",
     "fresh_token",
     "token_digest",
 ]

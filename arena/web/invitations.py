@@ -21,7 +21,6 @@ from arena.errors import ArenaError, LinkOver, NotYours
 from arena.models import Invitation, Study
 from arena.queries.authorships import authorships_of
 from arena.queries.invitations import expert_lines, invitation_by_token, may_be_let_in
-from arena.queries.reminders import slow_experts
 from arena.services.invitations import SESSION_KEY, FreshLink, accept, invite, revoke
 from arena.web.access import ADMIN, allow_only
 from arena.web.authorships import AuthorForm
@@ -61,7 +60,6 @@ def experts_page(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
     lines = expert_lines(study, now)
     context = {
         "study": study,
-        "slow": slow_experts(study, lines, now),
         "lines": lines,
         "without_link": sum(line.may_be_invited and not line.has_live_link for line in lines),
         "authorships": authorships_of(study),

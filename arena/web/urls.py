@@ -30,7 +30,6 @@ from arena.web import (
     planning,
     practice,
     prompts,
-    reminders,
     reports,
     results,
     results_files,
@@ -47,7 +46,6 @@ from arena.web import (
     uploads,
     vote_uploads,
     voting,
-    webhooks,
 )
 from arena.web.sign_in import SignIn
 
@@ -65,11 +63,6 @@ urlpatterns: list[URLPattern] = [
     path("first/<str:token>/", people.first_page, name="first"),
     path("welcome/<str:token>/", people.welcome_page, name="welcome"),
     path("password/", people.password_page, name="password"),
-    path("webhooks/", webhooks.webhooks_page, name="webhooks"),
-    path("webhooks/<uuid:code>/", webhooks.webhook_page, name="webhook"),
-    path("webhooks/<uuid:code>/change/", webhooks.change_webhook, name="webhook-change"),
-    path("webhooks/<uuid:code>/remove/", webhooks.forget_webhook, name="webhook-forget"),
-    path("deliveries/<uuid:code>/again/", webhooks.repeat_delivery, name="webhook-repeat"),
     path("tokens/", api_tokens.tokens_page, name="api-tokens"),
     path("tokens/<uuid:code>/revoke/", api_tokens.revoke, name="api-token-revoke"),
     path("people/", people.people_page, name="people"),
@@ -185,7 +178,6 @@ urlpatterns: list[URLPattern] = [
         enrolments.voters_file,
         name="enrolment-voters",
     ),
-    path("studies/<uuid:code>/experts/remind/", reminders.write_reminders, name="remind"),
     path("studies/<uuid:code>/experts/invite/", invitations.invite_experts, name="invite"),
     path("invitations/<uuid:code>/revoke/", invitations.revoke_invitation, name="revoke"),
     path("studies/<uuid:code>/experts/authors/", authorships.mark, name="author"),

@@ -81,10 +81,6 @@ class NotSent(ModelFault):
         super().__init__(message, retryable=retryable)
 
 
-class NoticeLost(AugmentError):
-    """A message to an address that somebody entered got no answer; the text says why."""
-
-
 class EndpointBusy(NotSent):
     """No place was free at the endpoint; nothing was sent. Raise its limits or wait.
 

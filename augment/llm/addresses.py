@@ -42,7 +42,6 @@ _STAND_FOR_IPV4 = tuple(
     )
 )
 _LOOPBACK = IPv6Address("::1")
-LONGEST_NOTICE_URL = 500
 
 
 def check_base_url(base_url: str) -> str:
@@ -56,37 +55,6 @@ def check_base_url(base_url: str) -> str:
     if problem:
         raise InvalidDocument("endpoint", [("base_url", problem)])
     return base_url.rstrip("/")
-
-
-def check_notice_url(url: str) -> str:
-    """An address that messages may go to; it may have a query, as those of chats do.
-
-    Raises:
-        InvalidDocument: It is no http(s) address, too long, carries a password, or is a
-            link-local, metadata or translated address.
-    """
-    parts = _split(url)
-    if parts is None or parts.scheme not in {"http", "https"} or not parts.hostname:
-        problem = sentence("an address such as https://chat.example.org/hooks/1 is needed")
-    elif len(url) > LONGEST_NOTICE_URL or not url.isascii() or not url.isprintable():
-        problem = sentence("at most %(n)s characters of ASCII are needed", n=LONGEST_NOTICE_URL)
-    elif parts.username or parts.password:
-        problem = sentence("passwords don't belong into the address")
-    elif leads_astray(parts.hostname):
-        problem = sentence(
-            "%(host)s is a link-local or metadata address, or one that stands for another",
-            host=parts.hostname,
-        )
-    else:
-        return url
-    raise InvalidDocument("webhook", [("url", problem)])
-
-
-def leads_astray(host: str) -> bool:
-    """Whether a host is forbidden by its name or by the number that it is written as."""
-    name = host.rstrip(".").lower()
-    address = _address(name)
-    return name in _METADATA_NAMES or (address is not None and _is_forbidden(address))
 
 
 def check_resolved(base_url: str, *, resolve: Resolve = socket.getaddrinfo) -> None:
@@ -143,13 +111,20 @@ def _problem(base_url: str) -> str | None:
             "keys and passwords don't belong into the address; name a variable for the key"
         )
     host = parts.hostname.rstrip(".").lower()
-    if leads_astray(host):
+    if _is_forbidden_host(host):
         return sentence(
             "%(host)s is a link-local or metadata address, or one that stands for another; no "
             "model is served from there",
             host=host,
         )
     return None
+
+
+def _is_forbidden_host(host: str) -> bool:
+    """Return whether a host is forbidden by its name or as an address literal."""
+    name = host.rstrip(".").lower()
+    address = _address(name)
+    return name in _METADATA_NAMES or (address is not None and _is_forbidden(address))
 
 
 def _split(base_url: str) -> SplitResult | None:

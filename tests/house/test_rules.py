@@ -13,9 +13,7 @@ from tests.house.source import ROOT, dotted, functions, imported, modules, walke
 
 HEAVY = {
     "openai": ("augment.llm.openai_wire",),
-    "httpx2": (
-        *("augment.llm.openai_wire", "augment.llm.wire_transport", "augment.llm.wire_notice"),
-    ),
+    "httpx2": (*("augment.llm.openai_wire", "augment.llm.wire_transport"),),
     "httpcore2": ("augment.llm.wire_transport", "augment.llm.wire_network"),
     "genai_prices": ("augment.services.endpoints.price_list",),
     "shapely": (

@@ -16,19 +16,17 @@ from pytest_django import Settings
 
 from arena.management import doctor
 from arena.management.doctor import Level, examine
-from arena.models import ApiToken, Webhook, WebhookDelivery
+from arena.models import ApiToken
 from arena.rating.stopping import StoppingRule
 from arena.services.looks import take_due_looks
 from arena.services.people import create_person
 from arena.services.plan_options import PlanOptions
 from arena.services.studies import open_study
-from arena.services.webhooks import send_test
 from arena.serving import readiness
 from augment.models import Endpoint, GenerationJob, Worker
 from augment.services.clock import DATABASE_TIME
 from tests import study_rows
 from tests.brokers import MEMORY, broker_at
-from tests.webhooks import hook
 
 pytestmark = pytest.mark.django_db
 
@@ -147,27 +145,6 @@ def test_settings_that_will_surprise(
 def test_nobody_is_admin() -> None:
     User.objects.filter(username="root").update(is_active=False)
     assert wrong() == {"accounts": Level.DOUBTFUL}
-
-
-def test_a_webhook_whose_message_was_given_up_or_stays_behind(admin: User) -> None:
-    found = hook(admin)
-    send_test(webhook=found.webhook)
-    row = WebhookDelivery.objects.get()
-    part = f"webhook {found.webhook.name}"
-    assert wrong() == {}
-    WebhookDelivery.objects.update(due_at=timezone.now() - timedelta(minutes=11))
-    assert wrong() == {part: Level.DOUBTFUL}
-    given_up = WebhookDelivery.State.FAILED
-    WebhookDelivery.objects.update(state=given_up, last_answer="Connection refused")
-    assert wrong() == {part: Level.DOUBTFUL}
-    assert any("Connection refused" in one.text for one in examine())
-    send_test(webhook=found.webhook)
-    later = WebhookDelivery.objects.exclude(pk=row.pk)
-    later.update(state=WebhookDelivery.State.DELIVERED)
-    assert wrong() == {}
-    WebhookDelivery.objects.update(state=given_up)
-    Webhook.objects.update(is_active=False)
-    assert wrong() == {}
 
 
 @pytest.mark.parametrize(

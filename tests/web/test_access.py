@@ -54,9 +54,6 @@ PAGES: dict[str, tuple[int, int, int]] = {
     "scene": (200, 200, 403),
     "upload": (200, 200, 403),
     "api-tokens": (200, 200, 200),
-    "webhooks": (200, 403, 403),
-    "webhook": (404, 403, 403),  # there is none
-    "webhook-forget": (404, 403, 403),
     "scenarios": (200, 200, 403),
     "scenario": (200, 200, 403),
     "intent": (200, 200, 403),
@@ -120,12 +117,9 @@ ACTIONS: dict[str, tuple[int, int, int]] = {
     "scenarios-write": (302, 302, 403),
     "study-write": (302, 302, 403),
     "invite": (200, 403, 403),
-    "remind": (302, 403, 403),  # nobody is slow yet
     "person-link": (200, 403, 403),
     "person-change": (302, 403, 403),
     "api-token-revoke": (404, 404, 404),  # somebody else's
-    "webhook-change": (404, 403, 403),
-    "webhook-repeat": (404, 403, 403),
     "revoke": (302, 403, 403),
     "author": (302, 403, 403),
     "author-back": (302, 403, 403),
