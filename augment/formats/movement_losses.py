@@ -17,6 +17,15 @@ def report_motion(cell: Cell, report: LossReport, *, can_trigger: bool = False) 
     motion = cell.motion
     if motion.ego.source is MotionSource.HELD_SPEED:
         report.lose("the ego was not recorded; it is let hold its speed along its lane")
+    elif motion.ego.source is MotionSource.STANDING:
+        report.lose("the ego was not recorded; it stands, as it does at t0")
+    elif cell.drive is None and cell.recording is not None:
+        unseen = ~cell.recording.ego_is_seen
+        if unseen.any():
+            report.lose(
+                f"the ego was not recorded at {unseen.sum()} of {len(unseen)} steps; it goes "
+                "straight across gaps, and holds its last speed after the last step"
+            )
     names = [other.agent.id for other in motion.others if other.source is MotionSource.HELD_SPEED]
     report.lose_of(names, "not recorded; let hold the speed of t0 along the lane, or straight on")
     walkers = [other for other in motion.others if other.agent.walk_to_m is not None]

@@ -39,9 +39,12 @@ def _write_one(cell: Cell, report: LossReport) -> dict[str, bytes]:
 def _recording(cell: Cell) -> Recording:
     """What was seen, in a log or in a drive; nothing that had to be assumed."""
     motion = cell.motion
+    ego = motion.ego.states.copy()
+    if motion.ego.source not in _SEEN:
+        ego[1:] = np.nan  # written as null: nobody recorded it
     return Recording(
         times_s=motion.times_s,
-        ego=motion.ego.states,
+        ego=ego,
         tracks=tuple(_track(other) for other in motion.others if other.source in _SEEN),
     )
 

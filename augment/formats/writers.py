@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
+from functools import partial
 from typing import Final
 
 from augment.errors import UnknownName
@@ -13,7 +15,7 @@ from augment.formats import (
     own_writer,
     scenarionet_writer,
 )
-from augment.formats.writing import Cell, Writer, Written
+from augment.formats.writing import CannotExpress, Cell, Loss, Writer, Written, check_finite
 
 
 def write_interplan(cells: Sequence[Cell]) -> Written:
@@ -32,11 +34,27 @@ WRITERS: Final[dict[str, Writer]] = {
 
 
 def writer_named(name: str) -> Writer:
-    """How to write that format.
+    """How to write that format; what holds a number that is not finite is refused in all of them.
 
     Raises:
         UnknownName: There is no writer of that name.
     """
     if name not in WRITERS:
         raise UnknownName("format", name, list(WRITERS))
-    return WRITERS[name]
+    return partial(_write_finite, WRITERS[name])
+
+
+# Private
+
+
+def _write_finite(writer: Writer, cells: Sequence[Cell]) -> Written:
+    finite, refused = [], []
+    for cell in cells:
+        try:
+            check_finite(cell)
+        except CannotExpress as reason:
+            refused.append(Loss(cell=cell.name, text=str(reason), changes_scene=True))
+        else:
+            finite.append(cell)
+    written = writer(finite)
+    return replace(written, refused=(*refused, *written.refused))

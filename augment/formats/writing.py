@@ -10,7 +10,11 @@ from dataclasses import dataclass
 from datetime import date
 from functools import cached_property
 
+import numpy as np
+
+from augment.errors import InvalidDocument
 from augment.scene.catalogue import ScenarioType
+from augment.scene.codec import scene_to_document
 from augment.scene.entities import Scene
 from augment.scene.modification import Modification, apply
 from augment.scene.motion import Motion, motion_of
@@ -120,6 +124,25 @@ class LossReport:
 
 class CannotExpress(Exception):
     """A cell can't be said in a format; raised and caught inside a writer, never passed on."""
+
+
+def check_finite(cell: Cell) -> None:
+    """Do nothing where every number of a cell can be written.
+
+    Raises:
+        CannotExpress: The scene after the change, or where somebody is at a step, is no finite
+            number; or the ego is missing at a step.
+    """
+    try:
+        scene_to_document(cell.after)
+    except InvalidDocument as error:
+        raise CannotExpress(str(error)) from error
+    for movement in (cell.motion.ego, *cell.motion.others):
+        is_ego = movement is cell.motion.ego
+        rows = movement.states if is_ego else movement.states[movement.is_present]
+        broken = np.flatnonzero(~np.isfinite(rows).all(axis=1))
+        if len(broken):
+            raise CannotExpress(f"{movement.agent.id} is at no finite place in step {broken[0]}")
 
 
 def write_each(

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import StrEnum
 from typing import Final
 
@@ -93,7 +93,9 @@ def motion_of(
     """What is known of the scene's agents after t0, and what has to be assumed.
 
     Who was recorded does what was recorded; who has a walk goes it; who moves otherwise holds the
-    speed of t0 along its lane, or straight on where there is none; all others stand.
+    speed of t0 along its lane, or straight on where there is none; all others stand. The ego is
+    there at every step: where its recording has a gap it goes straight across, and after the last
+    step that was recorded it goes on like someone who was not.
 
     Args:
         scene: After its change.
@@ -101,12 +103,11 @@ def motion_of(
         replaced: Ids whose tracks count no longer: moved, removed.
         with_later: Whether who appears after t0 is part of it.
     """
+    if recording is not None and len(recording.times_s) < 2:
+        recording = None  # of one moment nothing follows
     times_s = _times(recording)
     graph = LaneGraph(scene)
-    if recording is None:
-        ego = _assumed(scene.ego, times_s, graph, stays=True)
-    else:
-        ego = _recorded(scene.ego, recording.ego, recording, times_s)
+    ego = _ego_movement(scene.ego, recording, times_s, graph)
     tracks = {} if recording is None else {track.agent_id: track for track in recording.tracks}
     others = []
     for agent in scene.agents:
@@ -127,11 +128,33 @@ def motion_of(
 
 
 def _times(recording: Recording | None) -> FloatArray:
-    if recording is None or len(recording.times_s) < 2:
-        last_s = LENGTH_S
-    else:
-        last_s = float(recording.times_s[-1])
+    last_s = LENGTH_S if recording is None else float(recording.times_s[-1])
     return np.asarray(np.arange(round(last_s / STEP_S) + 1) * STEP_S, dtype=np.float64)
+
+
+def _ego_movement(
+    ego: TrafficAgent, recording: Recording | None, times_s: FloatArray, graph: LaneGraph
+) -> Movement:
+    """The ego's recorded motion, completed so that it is there at every step."""
+    if recording is None or not recording.shows_ego:
+        return _assumed(ego, times_s, graph, stays=True)
+    read = _recorded(ego, recording.ego, recording, times_s)
+    states, seen = read.states, np.flatnonzero(read.is_present)
+    last = int(seen[-1])
+    gaps = np.flatnonzero(~read.is_present[:last])
+    known = states[seen]
+    known[:, 2] = np.unwrap(known[:, 2])
+    for column in range(4):
+        states[gaps, column] = np.interp(times_s[gaps], times_s[seen], known[:, column])
+    states[gaps, 2] = _wrapped(states[gaps, 2])
+    if last + 1 < len(times_s):
+        x_m, y_m, heading_rad, speed_mps = (float(value) for value in states[last])
+        lane_id = graph.under(x_m, y_m, heading_rad)
+        there = replace(
+            ego, x_m=x_m, y_m=y_m, heading_rad=heading_rad, speed_mps=speed_mps, lane_id=lane_id
+        )
+        states[last:] = _assumed(there, times_s[last:] - times_s[last], graph, stays=True).states
+    return read
 
 
 def _recorded(
@@ -145,8 +168,6 @@ def _recorded(
 
 def _read_at(states: FloatArray, recorded_s: FloatArray, times_s: FloatArray) -> FloatArray:
     """States between two recorded ones; NaN beside a step where nothing was seen."""
-    if len(recorded_s) < 2:
-        return np.vstack([states, np.full((len(times_s) - len(states), 4), np.nan)])
     after = np.clip(np.searchsorted(recorded_s, times_s - 1e-9), 1, len(recorded_s) - 1)
     before = after - 1
     share = (times_s - recorded_s[before]) / (recorded_s[after] - recorded_s[before])

@@ -41,3 +41,13 @@ class Recording:
     times_s: NDArray[np.float64]
     ego: NDArray[np.float64]
     tracks: tuple[Track, ...]
+
+    @property
+    def ego_is_seen(self) -> NDArray[np.bool_]:
+        """At which moments the ego was recorded, (T,)."""
+        return np.asarray(~np.isnan(self.ego).any(axis=1))
+
+    @property
+    def shows_ego(self) -> bool:
+        """Whether more of the ego was recorded than where it began."""
+        return int(self.ego_is_seen.sum()) > 1

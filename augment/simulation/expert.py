@@ -5,10 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from enum import StrEnum
 
-import numpy as np
-
 from augment.scene.modification import Modification
-from augment.scene.recording import Recording
 from augment.simulation.drive import DURATION_STEPS, run
 from augment.simulation.idm_planner import IdmPlanner
 from augment.simulation.road import Road
@@ -42,9 +39,9 @@ def expert_of(setting: DriveSetting, road: Road, *, steps: int = DURATION_STEPS)
 
     The recorded one goes as far as the drive lasts and the map goes.
     """
-    if setting.recording is not None and _drove(setting.recording):
+    if setting.recording is not None and setting.recording.shows_ego:
         times = setting.recording.times_s
-        seen = ~np.isnan(setting.recording.ego).any(axis=1)
+        seen = setting.recording.ego_is_seen
         ego = setting.recording.ego[seen & (times <= steps * STEP_S + STEP_S / 2.0)]
         ends, _ = road.centreline.beside(ego[[0, -1], :2])
         return Expert(
@@ -56,11 +53,6 @@ def expert_of(setting: DriveSetting, road: Road, *, steps: int = DURATION_STEPS)
     drive = run(plain, IdmPlanner(target_mps=None), road=road, steps=steps)
     ends, _ = road.centreline.beside(drive.boxes[[0, -1], :2])
     return Expert(kind=ExpertKind.IDM, start_m=float(ends[0]), end_m=float(ends[1]))
-
-
-def _drove(recording: Recording) -> bool:
-    """Whether more of the ego was recorded than where it began."""
-    return int((~np.isnan(recording.ego).any(axis=1)).sum()) > 1
 
 
 def furthest_m(road: Road, body: EgoBody) -> float:

@@ -1,0 +1,159 @@
+"""No file says NaN, and an ego that nobody recorded is there at every step of every format."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+from xml.etree import ElementTree as ET
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from augment.formats.readers import READERS
+from augment.formats.writers import WRITERS, writer_named
+from augment.formats.writing import Cell, Written
+from augment.scene.motion import MotionSource
+from augment.scene.recording import Recording
+from tests.fixtures.shelf import entry, whole_scene
+from tests.formats.cells import OF_EACH_TYPE, cell, crossing, recorded_street
+from tests.formats.receivers import told_by
+from tests.formats.sanity import check_sanity, loaded
+from tests.scenes import curve, junction, scene, vehicle
+
+SCENES = (scene(), curve(), junction(), crossing())
+
+
+def not_finite(value: Any) -> bool:
+    """Whether NaN or an infinity is anywhere in a structure of a pickle."""
+    if isinstance(value, dict):
+        return any(not_finite(one) for one in value.values())
+    if isinstance(value, list | tuple | set):
+        return any(not_finite(one) for one in value)
+    if isinstance(value, float | np.ndarray) and np.asarray(value).dtype.kind == "f":
+        return not np.isfinite(value).all()
+    return False
+
+
+def check_finite_files(written: Written) -> None:
+    for name, content in written.files.items():
+        if name.endswith(".pkl"):
+            assert not not_finite(loaded(content)), name
+        else:
+            assert not re.search(rb"\b(nan|infinity|inf)\b", content, re.IGNORECASE), name
+
+
+@pytest.mark.parametrize("form", sorted(WRITERS))
+@given(data=st.data())
+def test_no_file_says_nan_whatever_of_the_ego_and_the_others_was_recorded(
+    form: str, data: st.DataObject
+) -> None:
+    before, whole = recorded_street()
+    before = replace(data.draw(st.sampled_from(SCENES)), agents=before.agents)
+    speed_mps = data.draw(st.sampled_from([0.0, 0.3, 8.0]))
+    before = replace(before, ego=replace(before.ego, speed_mps=speed_mps))
+    steps = data.draw(st.integers(min_value=1, max_value=31))
+    ego = whole.ego[:steps].copy()
+    hidden = data.draw(st.sets(st.integers(min_value=1, max_value=30)))
+    ego[[row for row in hidden if row < steps]] = np.nan
+    tracks = []
+    for track in whole.tracks:
+        states = track.states[:steps].copy()
+        states[data.draw(st.integers(min_value=1, max_value=31)) :] = np.nan
+        tracks.append(replace(track, states=states))
+    thin = Recording(times_s=whole.times_s[:steps], ego=ego, tracks=tuple(tracks))
+    made = cell(before, recording=thin, keeps_traffic=True, added=())
+    written = writer_named(form)([made])
+    assert not written.refused
+    check_finite_files(written)
+    assert np.isfinite(made.motion.ego.states).all()
+
+
+@pytest.mark.parametrize("form", sorted(WRITERS))
+def test_scenes_of_the_catalogue_and_of_each_type_say_no_nan(form: str) -> None:
+    authored = entry("roadworks-market-crossing")
+    cells = [
+        cell(stem="street"),
+        cell(crossing(), added=OF_EACH_TYPE, stem="crossing"),
+        cell(whole_scene(authored.scene), stem="whole", added=()),
+    ]
+    check_finite_files(writer_named(form)(cells))
+
+
+@pytest.mark.parametrize("form", sorted(WRITERS))
+def test_what_is_not_finite_is_refused_and_the_rest_is_written(form: str) -> None:
+    nowhere = cell(stem="nowhere", added=(vehicle("Agent2", np.nan, 0.0),), name="nowhere")
+    drive = cell().motion
+    drive.ego.states[5, 0] = np.nan
+    lost = cell(drive=drive, name="lost")
+    written = writer_named(form)([nowhere, lost, cell()])
+    assert [one.cell for one in written.refused] == ["nowhere", "lost"]
+    assert "agents[0].x_m" in written.refused[0].text
+    assert written.refused[1].text == "Agent1 is at no finite place in step 5"
+    assert written.files
+    check_finite_files(written)
+
+
+def test_a_gap_is_crossed_and_after_the_last_step_the_ego_goes_on() -> None:
+    before, recording = recorded_street()
+    recording.ego[5:8] = np.nan
+    recording.ego[20:] = np.nan
+    made = cell(before, recording=recording, added=())
+    assert made.motion.ego.states[:, 0] == pytest.approx(8.0 * made.motion.times_s)
+    lines = [loss.text for loss in writer_named("commonroad")([made]).losses]
+    assert any("not recorded at 14 of 31 steps" in line for line in lines)
+
+
+@pytest.fixture
+def without_ego(realdata: Path) -> Cell:
+    """A recorded CommonRoad scene, whose ego is a planning problem that nobody drove."""
+    (path,) = (realdata / "commonroad").glob("*.xml")
+    reading = READERS["commonroad"].read(path, item=None, frame=None, name="log")
+    assert reading.recording is not None
+    assert not reading.recording.shows_ego
+    made = cell(reading.scene, recording=reading.recording, keeps_traffic=True, added=())
+    assert made.motion.ego.source is MotionSource.HELD_SPEED
+    return made
+
+
+def test_every_receiver_finds_an_unrecorded_ego_at_every_step(
+    without_ego: Cell, tmp_path: Path
+) -> None:
+    written = {form: writer_named(form)([without_ego]) for form in WRITERS}
+    for form in ("commonroad", "openscenario", "scenarionet"):
+        said = [loss.text for loss in written[form].losses]
+        assert any("the ego was not recorded" in line for line in said)
+    for one in written.values():
+        check_finite_files(one)
+        for name, content in one.files.items():
+            (tmp_path / name).write_bytes(content)
+    stem, steps = without_ego.stem, len(without_ego.motion.times_s)
+    (told,) = told_by("read_commonroad.py", tmp_path / f"{stem}.xml")
+    assert told["faults"] == []
+    goal = [*without_ego.motion.ego.states[-1, :2], steps - 1]
+    assert told["goals"][0] == pytest.approx(goal, abs=1e-6)
+    for checked in told_by("check_asam.py", tmp_path / f"{stem}.xosc"):
+        assert checked["issues"] == []
+    check_openscenario(tmp_path / f"{stem}.xosc", steps)
+    (pickled,) = tmp_path.glob("sd_*.pkl")
+    scenario = loaded(pickled.read_bytes())
+    check_sanity(scenario)
+    ego = scenario["tracks"][scenario["metadata"]["sdc_id"]]
+    assert ego["state"]["valid"].tolist() == [True] * steps
+    back = READERS["scenarionet"].read(pickled, item=None, frame=None, name="back")
+    assert back.recording is not None
+    assert back.recording.ego_is_seen.all()
+
+
+def check_openscenario(file: Path, steps: int) -> None:
+    root = ET.parse(file)
+    (group,) = (
+        group
+        for group in root.iter("ManeuverGroup")
+        if group.find("*/EntityRef[@entityRef='Agent1']") is not None
+    )
+    assert not list(group.iter("DeleteEntityAction"))
+    assert len(list(group.iter("Vertex"))) == steps
