@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from typing import Any
 
-import numpy as np
 from django.contrib.auth.models import User
 from django.db.models import Q
 from django.urls import reverse
@@ -13,8 +12,8 @@ from arena.errors import NotYours
 from arena.models import LabelTask, Matchup, PracticePair
 from arena.queries.descriptions import Wording, describe_in_words
 from arena.queries.people import role_of
-from augment.models import Augmentation, Scenario
-from augment.services.scenarios.pictures import camera_of, window_of
+from augment.models import Augmentation
+from augment.services.scenarios.pictures import window_of
 
 VIEW_OF_OLD: dict[str, Any] = {
     **{"px_per_m": 20.0, "ego_px": [300.0, 400.0]},
@@ -53,22 +52,6 @@ def picture_of_side(matchup: Matchup, side: str) -> str:
     if side == "left":
         return matchup.left_image or matchup.left.image
     return matchup.right_image or matchup.right.image
-
-
-def view_of(scenario: Scenario) -> dict[str, Any]:
-    """Where metres lie in the pictures of a scenario: px_per_m, ego_px [x, y], width, height.
-
-    Raises:
-        InvalidDocument: The stored scene can't be read.
-    """
-    camera = camera_of(scenario)
-    ego = camera.to_pixels(np.zeros((1, 2)))[0]
-    return {
-        "px_per_m": camera.px_per_m,
-        "ego_px": [float(ego[0]), float(ego[1])],
-        "width": camera.width_px,
-        "height": camera.height_px,
-    }
 
 
 def view_shown(matchup: Matchup) -> dict[str, Any]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import replace
+from functools import partial
 
 from django.db.models import F
 
@@ -11,7 +12,7 @@ from arena.errors import NothingToPlan
 from arena.pairing.plan import Check, PlanRules
 from arena.pairing.rules import place_of
 from arena.services.frames import Cells
-from arena.services.showable import find_showable
+from arena.services.showable import find_showable, with_picture
 from augment.models import Augmentation, Contestant, Scenario
 from augment.sentences import sentence
 from augment.services.scenarios.pictures import window_of
@@ -33,8 +34,9 @@ def check_pictures(
     )
     latest: dict[tuple[str, str], Augmentation] = {}
     for row in found.order_by(F("finished_at").asc(nulls_first=True), "pk"):
-        if windows.get(row.scenario.slug) == window_of(row.image):
-            latest[row.scenario.slug, row.contestant.kind] = row
+        window = windows.get(row.scenario.slug)
+        if shown := with_picture(row, partial(_is_in, window)):
+            latest[row.scenario.slug, row.contestant.kind] = shown
     checks: list[Check] = []
     cells: Cells = {}
     for scenario in sorted({slug for slug, _ in latest}):
@@ -109,3 +111,7 @@ def without_lost_checks(rules: PlanRules, cells: Cells) -> PlanRules:
         if {(check.scenario, check.good), (check.scenario, check.broken)} <= cells.keys()
     )
     return replace(rules, checks=kept)
+
+
+def _is_in(window: str | None, image: str) -> bool:
+    return window_of(image) == window

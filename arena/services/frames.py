@@ -12,10 +12,10 @@ from arena.errors import NothingToPlan
 from arena.models import Matchup, Study
 from arena.pairing.plan import PlannedMatchup
 from arena.pairing.rules import scenario_of
-from arena.queries.showings import VIEW_OF_OLD, view_of
+from arena.queries.showings import VIEW_OF_OLD
 from augment.models import Augmentation, Scenario
 from augment.sentences import sentence
-from augment.services.scenarios.pictures import camera_of, window_of
+from augment.services.scenarios.pictures import camera_of, view_of, window_of
 
 Cells = dict[tuple[str, str], Augmentation]
 """By place (a scenario, or one sample of it) and contestant, the augmentation that is shown."""
@@ -94,11 +94,13 @@ def _frame(place: Scenario, window: str, cell: Augmentation) -> ScenarioFrame:
     Raises:
         NothingToPlan: Nobody knows any more where metres lie in such a picture.
     """
-    original = place.original_image
-    if window_of(original) != window:
-        original = ""
-    if window == camera_of(place).key:
-        return ScenarioFrame(view_of(place), original)
+    if window in place.windows:
+        noted = place.windows[window]
+        return ScenarioFrame(noted["view"], noted["image"])
+    original = place.original_image if window_of(place.original_image) == window else ""
+    camera = camera_of(place)
+    if window == camera.key:
+        return ScenarioFrame(view_of(camera), original)
     shows = Q(left_image=cell.image) | Q(right_image=cell.image)
     earlier = Matchup.objects.filter(shows, scenario=place, view__isnull=False)
     before = earlier.order_by("pk").first()
@@ -113,8 +115,8 @@ def _other_windows(scenarios: list[str]) -> NothingToPlan:
     return NothingToPlan(
         sentence(
             "The pictures of %(scenarios)s show different windows, so they can’t stand side "
-            "by side. Close the open studies that show them and run “manage.py "
-            "redraw_pictures”.",
+            "by side. They are drawn anew when the program starts; restart it, or choose other "
+            "scenarios.",
             scenarios=tuple(scenarios[:MOST_NAMED]),
         )
     )

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from collections import defaultdict
 from collections.abc import Iterable, Sequence
+from functools import partial
+from operator import eq
 
 from django.contrib.auth.models import User
 from django.db.models import Max
@@ -13,7 +15,7 @@ from arena.pairing.plan import Check, Entry, PlannedMatchup, PlanRules
 from arena.pairing.rules import place_of, scenario_of
 from arena.services.attention_checks import check_pictures, placed_checks
 from arena.services.frames import Cells, find_frames, frames_shown, sides_of
-from arena.services.showable import find_showable, windows_of
+from arena.services.showable import find_showable, windows_of, with_picture
 from augment.models import Augmentation, Scenario
 from augment.services.scenarios.descriptions import Description, descriptions
 
@@ -46,8 +48,10 @@ def pictures_of(study: Study) -> Cells:
     for row in rows:
         cell = (_place(study, row), row.contestant.slug)
         entry = wanted.get(cell)
-        if entry is not None and (entry.picture, entry.sample) == (row.image, row.sample):
-            cells[cell] = row
+        if entry is None or entry.sample != row.sample:
+            continue
+        if shown := with_picture(row, partial(eq, entry.picture)):
+            cells[cell] = shown
     return cells
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable
+from collections.abc import Callable, Collection, Iterable
 
 from django.db.models import QuerySet
 
@@ -22,10 +22,23 @@ def find_showable(scenarios: list[Scenario]) -> QuerySet[Augmentation]:
         .exclude(image="")
         .select_related("scenario", "contestant")
         .only(
-            *("image", "sample", "options", "job", "scenario__slug"),
+            *("image", "earlier_images", "sample", "options", "job", "scenario__slug"),
             *("contestant__slug", "contestant__kind"),
         )
     )
+
+
+def with_picture(row: Augmentation, is_wanted: Callable[[str], bool]) -> Augmentation | None:
+    """Return the row with that of its pictures, of today or of before, that is wanted.
+
+    The row's `image` is changed in memory alone; None where no picture of it is wanted.
+    """
+    names = (row.image, *reversed(row.earlier_images))
+    image = next((name for name in names if is_wanted(name)), None)
+    if image is None:
+        return None
+    row.image = image
+    return row
 
 
 def refuse_missing(

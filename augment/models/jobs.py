@@ -156,6 +156,9 @@ class Augmentation(models.Model):
         help_text="whose hand made the modification; null where no person did",
     )
     image = models.CharField(max_length=120, blank=True, help_text="name in the media storage")
+    earlier_images = models.JSONField(
+        default=list, blank=True, help_text="names of its pictures in windows of before"
+    )
     claim = models.UUIDField(null=True, blank=True, help_text="who works on it right now")
     heartbeat_at = models.DateTimeField(null=True, blank=True)
     sent_at = models.DateTimeField(null=True, blank=True, help_text="last put on the queue")

@@ -103,6 +103,11 @@ class Scenario(models.Model):
     original_image = models.CharField(
         max_length=120, blank=True, help_text="name of the picture before any change"
     )
+    windows = models.JSONField(
+        default=dict,
+        blank=True,
+        help_text="by key of a window that was drawn: original image and view",
+    )
     created_at = models.DateTimeField(auto_now_add=True)
 
     class Meta:

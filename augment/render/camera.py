@@ -1,7 +1,7 @@
 """Which part of a scene a picture shows: one window for every contestant of a scenario.
 
-The window holds the ego and all that the scenario's reference touches, and lies where it shows
-the most of the road.
+The window holds the ego, all that the scenario's reference touches and what any contestant
+changed nearby, and lies where it shows the most of the road.
 
 Frames: metres in the ego frame (x forward, y left); pixels from the picture's top left corner
 (x right, y down). The ego faces right, so what lies to its left is further up.
@@ -29,6 +29,8 @@ WIDTH_PX = 1200
 MARGIN_M = 5.0
 # The widest window, 5 px/m: beyond it a car is a speck, and an arrow at the edge tells more.
 MAX_WIDTH_M = 240.0
+# How far from the ego the window follows what contestants changed.
+FOLLOWED_M = 60.0
 # Without a reference nothing says where a change may come: a view far ahead. A wider one shows
 # more of what lies beside a street, which maps mostly leave blank.
 OPEN_WIDTH_M = 48.0
@@ -145,24 +147,31 @@ class _Window:
 
 
 @lru_cache(maxsize=16)
-def camera_for(scene: Scene, reference: Modification | None) -> Camera:
-    """The window of a scenario: it depends on the scene and its reference, on nothing else.
+def camera_for(
+    scene: Scene, reference: Modification | None, changes: tuple[Modification, ...] = ()
+) -> Camera:
+    """Return the window of a scenario, the same for all its contestants.
 
     The least of the windows in steps of 6 m that holds the ego, 15 m ahead of it and with 5 m
-    around it all that the reference touches; of those on a raster of 1 m the one that shows most
-    of the ground. 3:2, or 2:1 where that leaves less blank. Of places too far apart for the
-    widest window the nearest to the ego are kept.
+    around it all that the reference touches, and all that contestants touch within 60 m of the
+    ego; of those on a raster of 1 m the one that shows most of the ground. 3:2, or 2:1 where
+    that leaves less blank. Of places too far apart for the widest window the nearest to the ego
+    are kept.
 
     Args:
-        scene: The scene before the change; the old places of what the reference moves or
-            removes belong into the picture as well.
+        scene: The scene before the change; the old places of what is moved or removed belong
+            into the picture as well.
         reference: The scenario's reference, None without one.
+        changes: What the scenario's contestants made of it.
     """
     half_m = scene.ego.length_m / 2.0
     ahead_m = _OPEN_AHEAD_M if reference is None else _AHEAD_M
     need = _Need(-math.ceil(half_m + _BEHIND_M), ahead_m, -_BESIDE_M, _BESIDE_M)
     least_m = OPEN_WIDTH_M if reference is None else LEAST_WIDTH_M
-    for place in sorted(_places(scene, reference or Modification()), key=_distance_m):
+    places = [*_places(scene, reference or Modification())]
+    for change in changes:
+        places += [one for one in _places(scene, change) if _distance_m(one) <= FOLLOWED_M]
+    for place in sorted(places, key=_distance_m):
         more = need.and_points(place)
         if more.width_m(TALL, least_m) <= MAX_WIDTH_M:
             need = more
@@ -224,13 +233,13 @@ def _best(need: _Need, ground: _Ground, ratio: float, least_m: float) -> _Window
     )
 
 
-def _places(scene: Scene, reference: Modification) -> Iterator[FloatArray]:
-    """The points (N, 2) of each place that the reference touches."""
-    touched = {agent.id for agent in reference.moved} | set(reference.removed)
+def _places(scene: Scene, change: Modification) -> Iterator[FloatArray]:
+    """The points (N, 2) of each place that a change touches."""
+    touched = {agent.id for agent in change.moved} | set(change.removed)
     for agent in scene.agents:
         if agent.id in touched:
             yield _footprint(agent)
-    for agent in reference.changed:
+    for agent in change.changed:
         yield _footprint(agent)
 
 

@@ -10,7 +10,7 @@ from pytest_django.live_server_helper import LiveServer
 
 from augment.models import Augmentation
 from augment.scene.modification import Modification
-from augment.services.scenarios.pictures import picture_of
+from augment.services.scenarios.pictures import camera_of, picture_of
 from augment.services.scenarios.scenes import scene_of
 from tests.browser.booth import PHONE, Booth, all_sent, press
 from tests.scenes import vehicle
@@ -40,8 +40,9 @@ def drawn(live_server: LiveServer, browser: Browser) -> Iterator[Booth]:
     for row in Augmentation.objects.select_related("scenario", "contestant"):
         car = vehicle("New1", places[row.contestant.slug], 0.0)
         scene = scene_of(row.scenario)
-        hang(row, picture_of(row.scenario, scene, Modification(added=(car,))))
-        unchanged = picture_of(row.scenario, scene, Modification())
+        camera = camera_of(row.scenario)
+        hang(row, picture_of(scene, Modification(added=(car,)), camera))
+        unchanged = picture_of(scene, Modification(), camera)
         row.scenario.matchups.update(original_image=unchanged)
     made = Booth(address=live_server.url, browser=browser, study=study)
     yield made

@@ -9,7 +9,7 @@ from django.core.files.base import ContentFile
 from django.core.files.storage import default_storage
 
 from augment.scene.modification import Modification
-from augment.services.scenarios.pictures import original_picture, picture_of, store
+from augment.services.scenarios.pictures import camera_of, original_picture, picture_of, store
 from augment.services.scenarios.scenes import scene_of
 from tests.jobs.rows import TWO_CONES, add_scenario
 
@@ -61,7 +61,7 @@ def test_the_original_picture_is_drawn_once_and_remembered() -> None:
     assert read(name).startswith(b"\x89PNG")
     scenario.refresh_from_db()
     assert scenario.original_image == name
-    assert name == picture_of(scenario, scene_of(scenario), Modification())
+    assert name == picture_of(scene_of(scenario), Modification(), camera_of(scenario))
     assert original_picture(scenario) == name
 
 
@@ -77,5 +77,5 @@ def test_an_original_picture_that_got_lost_is_drawn_again() -> None:
 @pytest.mark.django_db
 def test_a_changed_scene_has_another_picture() -> None:
     scenario = add_scenario("street")
-    changed = picture_of(scenario, scene_of(scenario), TWO_CONES)
+    changed = picture_of(scene_of(scenario), TWO_CONES, camera_of(scenario))
     assert changed != original_picture(scenario)

@@ -122,3 +122,14 @@ def test_over_recorded_scenes_at_most_35_percent_are_blank(
         assert camera.x_max_m >= 40.0
         blank.append(blank_share(draw(scene, Modification(), camera)))
     assert statistics.median(blank) <= 0.35
+
+
+def test_the_window_holds_what_contestants_changed_within_60_m_and_no_more() -> None:
+    street, reference = scenes.scene(), Modification(added=(scenes.vehicle("New1", 20.0, 0.0),))
+    behind = Modification(added=(scenes.vehicle("New1", -50.0, 20.0),))
+    lost = Modification(added=(scenes.vehicle("New1", 0.0, 80.0),))
+    camera = camera_for(street, reference, (behind, lost))
+    assert camera == camera_for(street, reference, (behind,))
+    assert camera.x_min_m <= -57.0
+    assert camera.y_max_m >= 26.0
+    assert camera.x_max_m >= 27.0

@@ -11,18 +11,22 @@ from django.core.management import call_command
 
 from arena.errors import NothingToPlan
 from arena.models import Matchup, Study
-from arena.queries.showings import VIEW_OF_OLD, view_of
-from arena.services.faults import close_labelling, open_labelling
+from arena.queries.showings import VIEW_OF_OLD
+from arena.services.frames import find_frames
+from arena.services.plans import pictures_of, planned_so_far
 from arena.services.redrawing import redraw_pictures
-from arena.services.studies import close_study, open_study
+from arena.services.studies import open_study
 from augment.models import Augmentation, Scenario
 from augment.scene.codec import modification_to_document
 from augment.scene.modification import Modification
-from augment.services.scenarios.pictures import camera_of, original_picture, window_of
-from augment.services.scenarios.redrawing import redraw
+from augment.services.running import runner
+from augment.services.running.by_hand import keep_correction
+from augment.services.scenarios.pictures import camera_of, original_picture, view_of, window_of
+from tests.scenes import cone, pedestrian
 from tests.study_rows import cast_of
 
 pytestmark = pytest.mark.django_db
+CONE_AHEAD = Modification(added=(cone("New1", 15.0, 0.0),))
 
 
 def drawn_before(folder: str = "bev") -> None:
@@ -42,7 +46,7 @@ def look_otherwise(contestant: str) -> None:
 
 
 def opened(name: str, **cast: object) -> Study:
-    return open_study(name=name, votes_per_expert=2, seed=7, **cast)  # type: ignore[arg-type]
+    return open_study(**({"votes_per_expert": 2, "seed": 7} | cast), name=name)  # type: ignore[arg-type]
 
 
 def test_pictures_of_two_windows_are_never_paired() -> None:
@@ -50,7 +54,7 @@ def test_pictures_of_two_windows_are_never_paired() -> None:
     drawn_before()
     one = Augmentation.objects.filter(contestant__slug="ann")[:1].get()
     Augmentation.objects.filter(pk=one.pk).update(image=original_picture(one.scenario))
-    with pytest.raises(NothingToPlan, match="redraw_pictures"):
+    with pytest.raises(NothingToPlan, match="different windows"):
         opened("mixed", **cast)
     call_command("redraw_pictures")
     look_otherwise("bob")
@@ -60,7 +64,7 @@ def test_pictures_of_two_windows_are_never_paired() -> None:
             for name in (matchup.left_image, matchup.right_image, matchup.original_image)
         }
         assert windows == {camera_of(matchup.scenario).key}
-        assert matchup.view == view_of(matchup.scenario)
+        assert matchup.view == view_of(camera_of(matchup.scenario))
     assert not any(found.pictures for found in redraw_pictures())
 
 
@@ -70,13 +74,13 @@ def test_a_study_keeps_the_pictures_that_were_shown() -> None:
     study = opened("before", **cast)
     assert {row.original_image for row in study.matchups.all()} == {"bev/original.png"}
     assert [row.view for row in study.matchups.all()] == [VIEW_OF_OLD] * 2
-    assert view_of(Scenario.objects.first()) != VIEW_OF_OLD  # type: ignore[arg-type]
     shown = set(study.matchups.values_list("left_image", "right_image", "original_image"))
-    assert {found.needed_by for found in redraw_pictures()} == {"before"}
-    close_study(study=study)
     assert sum(found.pictures for found in redraw_pictures()) == 4
     assert not Augmentation.objects.filter(image__regex=r"^bev/[^/]+$").exists()
     assert set(study.matchups.values_list("left_image", "right_image", "original_image")) == shown
+    assert {row.image for row in pictures_of(study).values()} == {
+        name for pair in shown for name in pair[:2]
+    }
 
 
 def test_pictures_that_are_as_they_should_be_are_not_said_to_be_kept() -> None:
@@ -91,7 +95,7 @@ def test_pictures_that_are_as_they_should_be_are_not_said_to_be_kept() -> None:
 def test_pictures_of_a_former_window_keep_the_view_that_they_were_shown_with() -> None:
     cast = cast_of(contestants=("ann", "bob"), scenarios=2, experts=("eva",))
     drawn_before("bev/1-0ld")
-    with pytest.raises(NothingToPlan, match="redraw_pictures"):
+    with pytest.raises(NothingToPlan, match="different windows"):
         opened("unknown", **cast)
     drawn_before()
     opened("first", **cast)
@@ -112,47 +116,6 @@ def test_pictures_of_a_former_window_keep_the_view_that_they_were_shown_with() -
         again.matchups.all().delete()
 
 
-def test_who_opens_a_study_while_others_are_drawn_keeps_its_pictures() -> None:
-    cast = cast_of(contestants=("ann", "bob"), scenarios=2, experts=("eva",))
-    drawn_before()
-    drawing = redraw_pictures()
-    assert next(drawing).scenario == "place-0"
-    cast["scenarios"] = ["place-1"]
-    open_study(name="meanwhile", votes_per_expert=1, seed=7, **cast)
-    assert [found.needed_by for found in drawing] == ["meanwhile"]
-    shown = Augmentation.objects.filter(scenario__slug="place-1").values_list("image", flat=True)
-    assert {window_of(name) for name in shown} == {""}
-
-
-def test_who_opens_a_study_while_its_own_are_drawn_keeps_them_too() -> None:
-    cast = cast_of(contestants=("ann", "bob"), scenarios=1, experts=("eva",))
-    drawn_before()
-    place = Scenario.objects.get()
-
-    def meanwhile() -> bool:
-        open_study(name="now", votes_per_expert=1, seed=7, **cast)
-        return not Study.objects.exists()
-
-    before = set(Augmentation.objects.values_list("image", flat=True))
-    assert redraw(place, is_free=meanwhile) is None
-    assert set(Augmentation.objects.values_list("image", flat=True)) == before
-    assert Scenario.objects.get().original_image == "bev/original.png"
-
-
-def test_pictures_that_somebody_has_to_label_are_kept_until_the_labelling_is_over() -> None:
-    cast_of(contestants=("ann",), scenarios=2, experts=("eva",))
-    drawn_before()
-    row = Augmentation.objects.get(scenario__slug="place-1")
-    labelling = open_labelling(name="faults", job=row.job, experts=["eva"], seed=1)
-    found = list(redraw_pictures())
-    assert [(one.scenario, one.pictures, one.needed_by) for one in found] == [
-        ("place-0", 1, ""),
-        ("place-1", 0, "faults"),
-    ]
-    close_labelling(labelling=labelling)
-    assert [(one.scenario, one.pictures) for one in redraw_pictures()] == [("place-1", 1)]
-
-
 @pytest.mark.parametrize("command", ["redraw_pictures", "prepare"])
 def test_one_that_can_not_be_drawn_does_not_stop_the_others(
     command: str, settings: Any, tmp_path: Path
@@ -168,3 +131,31 @@ def test_one_that_can_not_be_drawn_does_not_stop_the_others(
     assert "place-2: 1 drawn anew" in said.getvalue()
     assert "place-0: kept as they are. This modification can't be read" in wrong.getvalue()
     assert window_of(bad.get().image) == ""
+
+
+def test_a_change_outside_widens_the_window_of_all_and_an_open_study_keeps_its_own() -> None:
+    cast = cast_of(contestants=("reference", "ann"), scenarios=1, experts=("eva",))
+    place = Scenario.objects.get()
+    Scenario.objects.update(reference=modification_to_document(CONE_AHEAD))
+    Augmentation.objects.update(modification=modification_to_document(CONE_AHEAD))
+    call_command("redraw_pictures")
+    look_otherwise("ann")
+    study = opened("before", **cast, votes_per_expert=1)
+    shown = study.matchups.values_list("left_image", "right_image", "original_image").get()
+
+    far = Augmentation.objects.get(contestant__slug="ann")
+    person = Modification(added=(pedestrian("New1", 12.0, -40.0),))
+    row = keep_correction(far, modification_to_document(person))
+    runner.work_on(augmentation_pk=row.pk)
+
+    place.refresh_from_db()
+    assert camera_of(place).y_min_m <= -45.0
+    names = [place.original_image, *Augmentation.objects.values_list("image", flat=True)]
+    assert {window_of(name) for name in names} == {camera_of(place).key}
+    assert {picture.image for picture in pictures_of(study).values()} == set(shown[:2])
+    enlarged = study.matchups.get()
+    frame = find_frames(planned_so_far(study)["eva"], pictures_of(study), {place.slug: place}, {})
+    assert frame[place.slug].view == enlarged.view
+    assert frame[place.slug].original_image == enlarged.original_image
+    cast["contestants"] = ["reference", "by-hand"]
+    opened("after", **cast, votes_per_expert=1)

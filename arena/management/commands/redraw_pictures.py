@@ -11,7 +11,7 @@ from augment.services.terminal import TerminalCommand
 class Command(TerminalCommand):
     """Draw pictures of an earlier look anew; a second run changes nothing."""
 
-    help = "Draw pictures that an earlier version drew anew, but for those of open studies."
+    help = "Draw pictures anew that do not show today's window of their scenario."
 
     def handle(self, *args: Any, **options: Any) -> None:
         """Draw, and say what."""

@@ -15,11 +15,10 @@ from django.core.files.storage import default_storage
 from augment.checks import Finding, Severity
 from augment.models import Augmentation
 from augment.render.annotated import FaultMark, draw_annotated
-from augment.render.camera import camera_for
 from augment.scene.codec import modification_from_document
 from augment.services.judging.checks import findings_of
-from augment.services.scenarios.pictures import store_as
-from augment.services.scenarios.scenes import reference_of, scene_of
+from augment.services.scenarios.pictures import camera_of, store_as
+from augment.services.scenarios.scenes import scene_of
 
 _LOOK = 2
 """Raised whenever the pictures look different."""
@@ -82,7 +81,7 @@ def draw_marked(*, augmentation_pk: int) -> str:
     png = draw_annotated(
         scene,
         modification_from_document(row.modification),
-        camera_for(scene, reference_of(row.scenario)),
+        camera_of(row.scenario),
         [
             FaultMark(
                 number=number,

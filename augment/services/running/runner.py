@@ -40,7 +40,8 @@ from augment.services.endpoints.wires import wire_to
 from augment.services.running import jobs, leases, stopping
 from augment.services.running.holding import OutcomeOnCrash, heartbeat
 from augment.services.running.transcripts import RowTranscript, sentence_of
-from augment.services.scenarios.pictures import original_picture, picture_of
+from augment.services.scenarios.pictures import camera_of, original_picture, picture_of
+from augment.services.scenarios.redrawing import redraw
 from augment.services.scenarios.scenes import intent_of, reference_of, scene_of, seed_of
 from augment.variants import pipeline
 from augment.variants.options import ToolProtocol, recipe_with
@@ -101,10 +102,14 @@ def work_on(*, augmentation_pk: int, worker: str = "", connect: Connect | None =
     if held is None:
         return False
     row = _row(held)
+    is_new_change = False
     try:
         with heartbeat(held, every_s=settings.HEARTBEAT_S), OutcomeOnCrash(held):
             settlement = run(row, held=held, connect=connect)
-            leases.settle(held=held, settlement=settlement)
+            is_settled = leases.settle(held=held, settlement=settlement)
+            is_new_change = is_settled and settlement.modification is not None
+        if is_new_change:
+            redraw(row.scenario)
     finally:
         jobs.finish_if_over(job_pk=row.job_id)
     return True
@@ -126,7 +131,7 @@ def run(
         if answer.modification is None:
             return _settlement(answer, image=unchanged)
         _keep(held, answer)
-        image = picture_of(row.scenario, scene, answer.modification)
+        image = picture_of(scene, answer.modification, camera_of(row.scenario))
         return _settlement(answer, image=image)
     except (Unwanted, BudgetSpent):
         raise

@@ -13,7 +13,8 @@ from augment.baselines.broken import break_reference
 from augment.models import Augmentation, Contestant, GenerationJob, Scenario
 from augment.scene.codec import modification_to_document
 from augment.services.events import log_event
-from augment.services.scenarios.pictures import picture_of
+from augment.services.scenarios.pictures import camera_of, picture_of
+from augment.services.scenarios.redrawing import redraw
 from augment.services.scenarios.scenes import reference_of, scene_of
 
 ATTENTION_CHECK = "attention-check"
@@ -47,8 +48,11 @@ def draw_checks(*, scenarios: Sequence[str], actor: User | None = None) -> list[
             continue
         document = modification_to_document(change)
         if not _pictures(row).filter(modification=document).exists():
-            drawn.append((row, document, picture_of(row, scene_of(row), change)))
-    return _keep(drawn, actor) if drawn else []
+            drawn.append((row, document, picture_of(scene_of(row), change, camera_of(row))))
+    kept = _keep(drawn, actor) if drawn else []
+    for row, _, _ in drawn:
+        redraw(row)
+    return kept
 
 
 def _pictures(scenario: Scenario) -> QuerySet[Augmentation]:

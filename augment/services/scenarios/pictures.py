@@ -3,16 +3,19 @@
 from __future__ import annotations
 
 import hashlib
+from typing import Any
 
 import numpy as np
 from django.core.files.base import ContentFile
 from django.core.files.storage import default_storage
+from django.db import transaction
 from numpy.typing import NDArray
 
 from augment.models import Scenario
 from augment.render.bev import draw
 from augment.render.camera import Camera, camera_for
 from augment.render.shrunken import shrink
+from augment.scene.codec import modification_from_document
 from augment.scene.entities import Scene
 from augment.scene.modification import Modification
 from augment.services.scenarios.scenes import reference_of, scene_of
@@ -37,37 +40,52 @@ def original_picture(scenario: Scenario) -> str:
     Raises:
         InvalidDocument: The stored scene can't be read.
     """
-    kept, scene = scenario.original_image, scene_of(scenario)
-    key = camera_for(scene, reference_of(scenario)).key
-    if kept and window_of(kept) == key and default_storage.exists(kept):
+    kept, camera = scenario.original_image, camera_of(scenario)
+    if kept and window_of(kept) == camera.key and default_storage.exists(kept):
         return kept
-    name = picture_of(scenario, scene, Modification())
-    Scenario.objects.filter(pk=scenario.pk).update(original_image=name)
-    scenario.original_image = name
+    scene = scene_of(scenario)
+    name = picture_of(scene, Modification(), camera)
+    noted = {camera.key: {"image": name, "view": view_of(camera)}}
+    before = camera_for(scene, reference_of(scenario))
+    if window_of(kept) == before.key:  # of before windows were noted
+        noted |= {before.key: {"image": kept, "view": view_of(before)}}
+    with transaction.atomic():
+        held = Scenario.objects.select_for_update(no_key=True).only("windows").get(pk=scenario.pk)
+        scenario.windows = held.windows | noted
+        scenario.original_image = name
+        scenario.save(update_fields=["original_image", "windows"])
     return name
 
 
 def camera_of(scenario: Scenario) -> Camera:
-    """The window that all pictures of a scenario show.
+    """Return the window that all pictures of a scenario show, as its contestants are today.
 
     Raises:
-        InvalidDocument: The stored scene can't be read.
+        InvalidDocument: The stored scene or a modification can't be read.
     """
-    return camera_for(scene_of(scenario), reference_of(scenario))
+    answered = scenario.augmentations.exclude(modification=None).order_by("pk")
+    documents = answered.values_list("modification", flat=True)
+    changes = tuple(modification_from_document(document) for document in documents if document)
+    return camera_for(scene_of(scenario), reference_of(scenario), changes)
 
 
-def picture_of(scenario: Scenario, scene: Scene, modification: Modification) -> str:
-    """The name of the picture after a change.
+def view_of(camera: Camera) -> dict[str, Any]:
+    """Return where metres lie in a picture: px_per_m, ego_px [x, y], width, height (pixels)."""
+    ego = camera.to_pixels(np.zeros((1, 2)))[0]
+    return {
+        "px_per_m": camera.px_per_m,
+        "ego_px": [float(ego[0]), float(ego[1])],
+        "width": camera.width_px,
+        "height": camera.height_px,
+    }
 
-    Args:
-        scenario: Whose reference decides on the camera, the same for every contestant.
-        scene: The scene before the change.
-        modification: The change.
+
+def picture_of(scene: Scene, modification: Modification, camera: Camera) -> str:
+    """Draw a scene after a change and return the picture's name.
 
     Raises:
         InvalidModification: The change does not fit the scene.
     """
-    camera = camera_for(scene, reference_of(scenario))
     return store(draw(scene, modification, camera), folder=f"{FOLDER}/{camera.key}")
 
 

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-
 from django.db import transaction
 
 from augment.models import Augmentation, Scenario
@@ -18,53 +16,53 @@ from augment.services.scenarios.pictures import (
 from augment.services.scenarios.scenes import scene_of
 
 
-def redraw(scenario: Scenario, *, is_free: Callable[[], bool] = lambda: True) -> int | None:
-    """Draw what was drawn in another window than today's; the old files stay where they are.
+def redraw(scenario: Scenario) -> int:
+    """Draw what shows another window than today's, until nothing does.
 
+    Old files stay where they are and rows keep their names, for the studies that show them.
     Call it from a worker or a command, not in a request.
 
-    Args:
-        scenario: Whose pictures are drawn.
-        is_free: Asked once all are drawn, with the scenario held: whether nobody needs the old
-            ones, which drawing may have taken too long for.
-
     Returns:
-        How many augmentations have a new picture; None where the old ones are needed.
+        How many augmentations have a new picture.
 
     Raises:
         InvalidDocument: What is stored can't be read.
         InvalidModification: A modification does not fit the scene.
     """
-    if not is_outdated(scenario):
-        return 0
-    scene, key = scene_of(scenario), camera_of(scenario).key
-    rows = scenario.augmentations.exclude(image="").only("image", "state", "modification")
-    outdated = [row for row in rows if window_of(row.image) != key]
-    drawn = [(row, picture_of(scenario, scene, _shown(row))) for row in outdated]
+    redrawn = 0
+    # Another worker may store a change that widens the window while this one draws.
+    while outdated := _find_outdated(scenario):
+        redrawn += _redraw_rows(scenario, outdated)
+    original_picture(scenario)
+    return redrawn
+
+
+# --- Private -----------------------------------------------------------------------------------
+
+
+def _find_outdated(scenario: Scenario) -> list[Augmentation]:
+    key = camera_of(scenario).key
+    rows = scenario.augmentations.exclude(image="")
+    rows = rows.only("image", "earlier_images", "state", "modification")
+    return [row for row in rows if window_of(row.image) != key]
+
+
+def _redraw_rows(scenario: Scenario, outdated: list[Augmentation]) -> int:
+    scene, camera = scene_of(scenario), camera_of(scenario)
+    drawn = [(row, picture_of(scene, _shown(row), camera)) for row in outdated]
     with transaction.atomic():
         Scenario.objects.select_for_update(no_key=True).get(pk=scenario.pk)
-        if not is_free():
-            return None
         original_picture(scenario)
-        for row, name in drawn:
-            Augmentation.objects.filter(pk=row.pk, image=row.image).update(image=name)
-    return len(drawn)
-
-
-def is_outdated(scenario: Scenario) -> bool:
-    """Whether any of its pictures shows another window than today's.
-
-    Raises:
-        InvalidDocument: The stored scene or reference can't be read.
-    """
-    key = camera_of(scenario).key
-    images = scenario.augmentations.exclude(image="").values_list("image", flat=True)
-    own = [scenario.original_image] if scenario.original_image else []
-    return any(window_of(image) != key for image in (*own, *images))
+        return sum(
+            Augmentation.objects.filter(pk=row.pk, image=row.image).update(
+                image=name, earlier_images=[*row.earlier_images, row.image]
+            )
+            for row, name in drawn
+        )
 
 
 def _shown(row: Augmentation) -> Modification:
     """What its picture shows: an answer that could not be read changes nothing."""
-    if row.state != Augmentation.State.DONE or row.modification is None:
+    if row.state != Augmentation.State.DONE or not row.modification:
         return Modification()
     return modification_from_document(row.modification)

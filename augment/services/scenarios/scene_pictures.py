@@ -17,7 +17,8 @@ from augment.render.bev import draw
 from augment.render.camera import AROUND_THE_EGO, LOOK, camera_for
 from augment.scene.codec import scene_from_document
 from augment.scene.modification import Modification, without_traffic
-from augment.services.scenarios.pictures import original_picture, store_as
+from augment.services.scenarios.pictures import store_as
+from augment.services.scenarios.redrawing import redraw
 from augment.services.scenarios.scenes import content_hash, reference_of, scene_of
 
 FOLDER = "scenes"
@@ -84,7 +85,7 @@ def draw_scenario(scenario_pk: int) -> None:
     """
     row = Scenario.objects.select_related("base_scene").get(pk=scenario_pk)
     draw_scene(row.base_scene_id)
-    original_picture(row)
+    redraw(row)
     name, reference = reference_picture(row), reference_of(row)
     if reference is None or is_drawn(name):
         return
