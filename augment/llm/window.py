@@ -54,13 +54,19 @@ def least_tokens(text: str) -> int:
     return words + numbers + signs
 
 
-def cut_of(request: Request, reply: Reply) -> ContextTruncated | None:
-    """Compare the tokens that the endpoint counted with what it was sent.
+def cut_of(
+    request: Request, reply: Reply, *, context_tokens: int | None = None
+) -> ContextTruncated | None:
+    """Return the fault of a prompt that the endpoint cut silently, None where nothing shows one.
 
-    Returns:
-        A fault where it counted far fewer than there are, where its prompt ended exactly at a
-        usual window, or where prompt and answer together did and the answer was not finished;
-        None where nothing shows a cut, also because nobody counted.
+    A cut shows in the endpoint's own count of prompt tokens: far below what the prompt must have
+    at least; below it at all and exactly at the window; or prompt and unfinished answer together
+    exactly at the window. A count that equals a window proves nothing by itself.
+
+    Args:
+        request: What was sent.
+        reply: What came back; without a count of tokens nothing can be shown.
+        context_tokens: The model's context window; None for any that servers usually have.
     """
     counted = reply.prompt_tokens
     if counted is None:
@@ -71,11 +77,12 @@ def cut_of(request: Request, reply: Reply) -> ContextTruncated | None:
             f"the endpoint silently cut the prompt: it counted {counted} tokens, the prompt has "
             f"at least {least}; give it a larger context window"
         )
-    if counted in _WINDOWS or _ends_at_window(request, reply, counted):
-        window = counted if counted in _WINDOWS else counted + (reply.completion_tokens or 0)
+    windows = _WINDOWS if context_tokens is None else {context_tokens}
+    total = counted + _unfinished_tokens(request, reply)
+    if total in windows and (total > counted or counted < least):
         return ContextTruncated(
-            f"the endpoint silently cut the prompt: its count of tokens ends exactly at {window}, "
-            "a usual context window; give it a larger one"
+            f"the endpoint silently cut the prompt: its count of tokens ends exactly at {total}, "
+            "a context window; give it a larger one"
         )
     return None
 
@@ -83,9 +90,8 @@ def cut_of(request: Request, reply: Reply) -> ContextTruncated | None:
 # --- Private -----------------------------------------------------------------------------------
 
 
-def _ends_at_window(request: Request, reply: Reply, counted: int) -> bool:
-    """Whether the answer ran into the window's end, rather than to its own."""
-    written = reply.completion_tokens
-    if written is None or reply.finish_reason == "stop" or written >= request.max_tokens:
-        return False
-    return counted + written in _WINDOWS
+def _unfinished_tokens(request: Request, reply: Reply) -> int:
+    """Return the length of an answer that ended before its own end and its limit, else 0."""
+    written = reply.completion_tokens or 0
+    is_finished = reply.finish_reason == "stop" or written >= request.max_tokens
+    return 0 if is_finished else written

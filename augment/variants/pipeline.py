@@ -64,6 +64,7 @@ def run(
     transcript: Transcript,
     patience: Patience | None = None,
     native_tools: bool = False,
+    context_tokens: int | None = None,
     others: Mapping[ModelRole, RespondentClient] | None = None,
     intent: Intent | None = None,
     sampling: Sampling | None = None,
@@ -79,6 +80,7 @@ def run(
         transcript: Is handed every raw answer before it is read.
         patience: How faults that may pass are waited out; by default three attempts.
         native_tools: Whether the modifier calls its tools natively instead of in its answer.
+        context_tokens: The model's context window, where it is known.
         others: Who plays the reviewers' roles; by default the modifier's model does.
         intent: What a geometric review holds modifications against, where that is stored.
         sampling: What every request is sent with.
@@ -90,7 +92,9 @@ def run(
     known = RECIPES.get(recipe.slug)
     if known is None or replace(recipe, limits=known.limits) != known:
         raise UnknownName("recipe", recipe.slug, sorted(RECIPES))
-    modifying = RespondentClient(client=client, model=model, native_tools=native_tools)
+    modifying = RespondentClient(
+        client=client, model=model, native_tools=native_tools, context_tokens=context_tokens
+    )
     respondents = Respondents(
         clients={**(others or {}), ModelRole.MODIFIER: modifying},
         transcript=transcript,

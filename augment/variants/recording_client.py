@@ -21,6 +21,7 @@ class RecordingClient:
     model: str
     transcript: Transcript
     patience: Patience
+    context_tokens: int | None = None
 
     def ask(self, role: ModelRole, request: Request, prompt_version: str) -> Reply:
         """The reply to the request; every attempt is in the transcript before it is judged.
@@ -67,7 +68,7 @@ class RecordingClient:
                 self.patience.sleep(wait_s)
                 attempt += 1
             else:
-                cut = cut_of(request, reply)
+                cut = cut_of(request, reply, context_tokens=self.context_tokens)
                 self.transcript.answered(number, reply, cut)
                 if cut is not None:
                     raise cut

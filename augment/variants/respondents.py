@@ -26,11 +26,13 @@ class RespondentClient:
     Attributes:
         model: The model id that the client is asked for.
         native_tools: Whether the model is to call tools natively instead of in its answer.
+        context_tokens: Its context window, None where nobody entered it.
     """
 
     client: ChatClient
     model: str
     native_tools: bool = False
+    context_tokens: int | None = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -83,6 +85,7 @@ class Respondents:
             model=respondent.model,
             transcript=self.transcript,
             patience=self.patience,
+            context_tokens=respondent.context_tokens,
         )
         reply = recording.ask(role, request, prompt_version())
         if reply.refusal is not None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from contextlib import AbstractContextManager
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import pytest
@@ -129,10 +129,13 @@ def test_a_refusal_that_can_not_be_helped_is_raised_once() -> None:
 
 
 def test_a_cut_prompt_is_a_fault_whose_answer_is_kept() -> None:
+    long = Message(speaker=Speaker.USER, text="word " * 4097)
     with picky(prompt_tokens=4096) as server:
+        assert Asking(server).ask() == "Hi"  # a prompt may be just as long as a window
+        server.bodies.clear()
         asking = Asking(server)
         with pytest.raises(ContextTruncated, match="exactly at 4096"):
-            asking.ask()
+            asking.ask(replace(ASKED, messages=(long,)))
         assert len(server.bodies) == 1
     reply = asking.transcript.calls[0].reply
     assert reply is not None

@@ -55,8 +55,25 @@ def test_what_nobody_counted_passes() -> None:
 
 
 @pytest.mark.parametrize("window", [2048, 4096, 8192])
-def test_a_prompt_that_ends_at_a_usual_window_was_cut(window: int) -> None:
-    assert f"exactly at {window}" in str(cut_of(request("Hello"), reply(window)))
+def test_a_finished_answer_to_a_prompt_of_exactly_a_window_is_sound(window: int) -> None:
+    assert cut_of(request("Hello"), reply(window)) is None
+    assert cut_of(request("Hello"), reply(window), context_tokens=window) is None
+
+
+@pytest.mark.parametrize(
+    ("words", "known", "is_cut"),
+    [(4096, None, False), (4097, None, True), (4097, 4096, True), (4097, 8192, False)],
+)
+def test_a_count_at_the_window_below_the_least_is_a_cut(
+    words: int, known: int | None, is_cut: bool
+) -> None:
+    cut = cut_of(request("word " * words), reply(4096), context_tokens=known)
+    assert (cut is not None) == is_cut
+
+
+def test_an_unfinished_answer_at_a_known_window_shows_a_cut() -> None:
+    assert cut_of(request("Hello"), reply(500, 12, "length"), context_tokens=512) is not None
+    assert cut_of(request("Hello"), reply(4000, 96, "length"), context_tokens=512) is None
 
 
 @pytest.mark.parametrize(

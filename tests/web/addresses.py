@@ -111,7 +111,7 @@ def address(name: str, here: World) -> str:
         marked = mark_author(study=here.study, expert=here.expert, contestant="ann")
         arguments["author-back"] = {"code": marked.code}
     own = (
-        *("study", "preregistration", "experts", "invite", "remind", "author", "study-close"),
+        *("study", "preregistration", "experts", "invite", "author", "study-close"),
         *("study-cancel", "study-again"),
         *("study-hand-over", "study-rate", "enrolment", "enrolment-voters", "enrolment-drop"),
     )

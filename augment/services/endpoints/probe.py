@@ -124,6 +124,7 @@ def probe(
             profile=ModelProfile(
                 reasoning_effort=row.reasoning_effort, max_output_tokens=row.max_output_tokens
             ),
+            context_tokens=row.context_tokens,
         )
         report = prober.report(questions_for(model), now=timezone.now(), on_finding=on_finding)
     _store(row, report, actor)
@@ -142,6 +143,7 @@ class _Prober:
     price: Price | None
     patience: Patience
     profile: ModelProfile
+    context_tokens: int | None
     calls: int = 0
 
     def report(
@@ -175,7 +177,7 @@ class _Prober:
             refuses = fault.status in _REFUSALS and ability != Ability.ANSWERS
             has_it = False if refuses or ability == Ability.ANSWERS else None
             return ProbeFinding(ability=ability, has_it=has_it, note=_short(str(fault)))
-        cut = cut_of(request, reply)
+        cut = cut_of(request, reply, context_tokens=self.context_tokens)
         is_good = question.is_good(reply) and cut is None
         # Any answer shows that the parameter is taken.
         has_it = True if ability in (Ability.ANSWERS, Ability.TEMPERATURE) else is_good

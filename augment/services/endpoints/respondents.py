@@ -28,6 +28,11 @@ class Respondent:
         """What is known of the model there, None where nobody entered anything."""
         return EndpointModel.objects.filter(endpoint=self.endpoint, model=self.model).first()
 
+    @property
+    def context_tokens(self) -> int | None:
+        """The model's context window there, None where nobody entered it."""
+        return self.known.context_tokens if self.known else None
+
 
 def check_roles(recipe: Recipe, roles: Iterable[ModelRole]) -> None:
     """Refuse roles that nobody plays in a recipe, and the modifier's, which is the contestant's.

@@ -275,7 +275,11 @@ def _from_model(
             for pk, site in sites.items()
         }
         others: dict[ModelRole, RespondentClient] = {
-            role: RespondentClient(client=clients[respondent.endpoint.pk], model=respondent.model)
+            role: RespondentClient(
+                client=clients[respondent.endpoint.pk],
+                model=respondent.model,
+                context_tokens=respondent.context_tokens,
+            )
             for role, respondent in respondents.items()
             if role is not ModelRole.MODIFIER
         }
@@ -293,6 +297,7 @@ def _from_model(
                 key=options.key(row.sample),
             ),
             native_tools=options.protocol is ToolProtocol.NATIVE,
+            context_tokens=respondents[ModelRole.MODIFIER].context_tokens,
             others=others,
             intent=intent_of(row.scenario),
             sampling=options.sampling(row.sample),
