@@ -12,7 +12,7 @@ SERVE ?= 1
 # Compiled once, not by each of the many processes that the tests start.
 export PYTHONDONTWRITEBYTECODE :=
 
-.PHONY: demo serve test lint check fast postgres chromium screenshots bench mutants receivers lock clean
+.PHONY: demo serve test lint fuzz fast postgres chromium screenshots bench mutants receivers lock clean
 
 demo: $(VENV)/.runtime ## Run the main job on the catalogue, then serve it (SERVE=0: don't)
 	$(BIN)/python manage.py demo --port $(PORT) $(if $(filter 0,$(SERVE)),--no-serve)
@@ -29,6 +29,9 @@ fast: $(VENV)/.test ## The tests that need neither a browser nor a server
 
 postgres: $(VENV)/.test ## The tests of rows and concurrency on a real PostgreSQL
 	$(BIN)/python -m tests.on_postgres -m "postgres and not redis" -n 2
+
+fuzz: $(VENV)/.test ## New random examples for every property, ten times as many as in `make test`
+	$(BIN)/python -m pytest -n 2 -m "hypothesis and not browser" --hypothesis-profile fuzz
 
 lint: $(VENV)/.test ## Format, style, floors and types
 	$(BIN)/ruff format --check .

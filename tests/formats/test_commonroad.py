@@ -5,7 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from augment.errors import InvalidDocument
@@ -15,6 +15,7 @@ from augment.formats.xml_file import read_xml
 from augment.scene.codec import scene_to_document
 from augment.scene.entities import AgentType, AreaKind, TrafficLight, TurnType
 from augment.scene.notes import SceneNoteKind
+from tests.properties import examples
 
 
 def bound(name: str, *pairs: tuple[float, float]) -> str:
@@ -195,7 +196,7 @@ def test_a_flood_of_elements_is_refused(tmp_path: Path) -> None:
 
 
 @given(st.data())
-@settings(max_examples=40, deadline=2000)
+@examples(40)
 def test_any_change_is_read_or_refused(
     tmp_path_factory: pytest.TempPathFactory, data: st.DataObject
 ) -> None:

@@ -10,7 +10,7 @@ from contextlib import suppress
 from pathlib import Path
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from augment.errors import InvalidDocument
@@ -20,6 +20,7 @@ from augment.scene.schema import SCENE_FORMAT
 from tests.formats import av2_logs, av2_motion, nuplan_files, waymo_files
 from tests.formats.test_commonroad import newer
 from tests.formats.test_scenarionet import description, store
+from tests.properties import examples
 
 
 def _nuplan(root: Path) -> Path:
@@ -58,7 +59,7 @@ def good() -> Iterator[dict[str, Path]]:
 
 
 @pytest.mark.parametrize("name", GOOD)
-@settings(max_examples=25, deadline=None, derandomize=True)
+@examples(25)
 @given(data=st.data())
 def test_damaged_bytes_end_in_a_scene_or_in_our_own_error(
     good: dict[str, Path], name: str, data: st.DataObject
@@ -96,7 +97,7 @@ def _damaged(block: bytes, data: st.DataObject) -> bytes:
 VALUES = ("NULL", "''", "'x'", "-1", "1e400", "1e15", "9223372036854775807", "x'ff'", "0.5")
 
 
-@settings(max_examples=30, deadline=None, derandomize=True)
+@examples(30)
 @given(data=st.data())
 def test_any_value_in_any_column_of_a_database_is_read_or_refused(
     good: dict[str, Path], data: st.DataObject

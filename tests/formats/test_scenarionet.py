@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from augment.errors import InvalidDocument
@@ -19,6 +19,7 @@ from augment.formats.scenarionet.unpickling import read_pickle
 from augment.scene.codec import scene_to_document
 from augment.scene.entities import AreaKind, TrafficLight, TrafficSide, TurnType
 from augment.scene.notes import SceneNoteKind
+from tests.properties import examples
 
 
 def moving(x: float, speed: float, steps: int = 3, **fields: object) -> dict[str, Any]:
@@ -196,7 +197,7 @@ def test_odd_descriptions_are_refused(tmp_path: Path, change: dict[str, Any], sa
 
 
 @given(st.data())
-@settings(max_examples=60, deadline=2000)
+@examples(60)
 def test_any_change_of_a_pickle_is_read_or_refused(
     tmp_path_factory: pytest.TempPathFactory, data: st.DataObject
 ) -> None:

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from augment.errors import InvalidDocument
@@ -16,6 +16,7 @@ from augment.formats.waymo.scenario import WaymoMotion
 from augment.scene.codec import scene_to_document
 from augment.scene.entities import TrafficLight, TurnType
 from tests.formats.waymo_files import record, scenario, state, track, write
+from tests.properties import examples
 
 
 def read(path: Path, item: str | None = None, frame: int | None = None) -> Reading:
@@ -48,7 +49,7 @@ def test_checksums_are_those_of_rfc_3720(block: bytes, checksum: int) -> None:
 
 
 @given(st.integers(0, 5000), st.integers(0, 2**32 - 1))
-@settings(max_examples=20, deadline=None)
+@examples(20)
 def test_a_long_block_has_the_checksum_of_its_bytes_one_by_one(size: int, seed: int) -> None:
     block = np.random.default_rng(seed).bytes(size)
     state = 0xFFFFFFFF
@@ -132,7 +133,7 @@ def test_a_broken_message_says_what_is_wrong(tmp_path: Path, payload: bytes, sai
 
 
 @given(st.data())
-@settings(max_examples=60, deadline=2000)
+@examples(60)
 def test_any_change_of_a_message_is_read_or_refused(data: st.DataObject) -> None:
     payload = bytearray(scenario())
     for _ in range(data.draw(st.integers(1, 4))):

@@ -5,7 +5,7 @@ import math
 from dataclasses import replace
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from augment.metrics.displacement import CLASS_OF, Displacement, displacement
@@ -101,9 +101,6 @@ def test_a_moved_object_counts_where_it_went_and_a_removed_one_not_at_all() -> N
 
 # Properties
 
-# The first example loads scipy.optimize, which is slower than Hypothesis allows an example.
-unhurried = settings(deadline=None)
-
 MAKERS = (vehicle, cone, pedestrian)
 metres = st.floats(-60.0, 60.0)
 
@@ -129,7 +126,6 @@ def turned(change: Modification, angle: float, dx_m: float, dy_m: float) -> Modi
     )
 
 
-@unhurried
 @given(change=changes())
 def test_the_reference_is_exactly_where_the_reference_is(change: Modification) -> None:
     found = displacement(change, change)
@@ -137,7 +133,6 @@ def test_the_reference_is_exactly_where_the_reference_is(change: Modification) -
     assert (found.missing, found.surplus) == ((), ())
 
 
-@unhurried
 @given(
     generated=changes(), reference=changes(), angle=st.floats(-4.0, 4.0), dx_m=metres, dy_m=metres
 )
@@ -152,7 +147,6 @@ def test_turning_and_shifting_the_world_changes_nothing(
     assert (len(after.missing), len(after.surplus)) == (len(before.missing), len(before.surplus))
 
 
-@unhurried
 @given(generated=changes(), reference=changes(), data=st.data())
 def test_the_order_of_the_objects_changes_nothing(
     generated: Modification, reference: Modification, data: st.DataObject
@@ -163,7 +157,6 @@ def test_the_order_of_the_objects_changes_nothing(
     assert len(after.surplus) == len(before.surplus)
 
 
-@unhurried
 @given(generated=changes(), reference=changes())
 def test_no_other_matching_has_a_smaller_sum(
     generated: Modification, reference: Modification
@@ -192,7 +185,6 @@ def test_of_equal_sums_the_even_one_counts_in_whatever_order() -> None:
         assert displacement(placed(*order), reference).distances_m == (1.0, 1.0)
 
 
-@unhurried
 @given(generated=changes(), reference=changes())
 def test_every_object_is_matched_or_counted_once(
     generated: Modification, reference: Modification
@@ -216,7 +208,6 @@ def least_sum_m(generated: Modification, reference: Modification) -> float:
     return total
 
 
-@unhurried
 @given(generated=changes(), reference=changes())
 def test_no_other_pairing_has_a_smaller_sum_of_distances(
     generated: Modification, reference: Modification

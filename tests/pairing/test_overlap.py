@@ -7,13 +7,14 @@ from collections import Counter, defaultdict
 from dataclasses import replace
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from arena.errors import NothingToPlan
 from arena.pairing.order import MAIN
 from arena.pairing.plan import Entry, MatchupPlan, PlanRules, plan
 from tests.pairing.studies import appearances, check_extras, pair, paper_rules
+from tests.properties import examples
 
 
 def twelve_by_forty(share: float, seed: int = 1) -> PlanRules:
@@ -85,7 +86,7 @@ def test_a_plan_that_has_more_keeps_it() -> None:
 @given(
     st.integers(2, 5), st.integers(3, 8), st.integers(2, 4), st.integers(4, 20), st.floats(0, 0.8)
 )
-@settings(max_examples=60, deadline=None)
+@examples(60)
 def test_it_is_honoured_or_refused(
     contestants: int, scenarios: int, experts: int, votes: int, share: float
 ) -> None:

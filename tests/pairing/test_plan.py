@@ -5,12 +5,13 @@ from itertools import combinations
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from arena.errors import NothingToPlan
 from arena.pairing.order import _two_places
 from arena.pairing.plan import Entry, MatchupPlan, PlannedMatchup, PlanRules, plan
+from tests.properties import examples
 
 
 def rules(
@@ -75,7 +76,7 @@ sizes = st.tuples(
 
 
 @given(sizes)
-@settings(max_examples=150, deadline=None)
+@examples(150)
 def test_a_full_plan_is_balanced_to_one(size: tuple[int, int, int, int, int]) -> None:
     contestants, scenarios, experts, votes, seed = size
     pairs = contestants * (contestants - 1) // 2
@@ -98,7 +99,7 @@ cells = st.frozensets(st.tuples(st.integers(0, 4), st.integers(0, 7)), max_size=
 
 
 @given(cells, cells, st.integers(1, 40), st.integers(1, 4), st.integers(0, 5))
-@settings(max_examples=150, deadline=None)
+@examples(150)
 def test_a_plan_with_holes_keeps_every_rule(
     without: frozenset[tuple[int, int]],
     same: frozenset[tuple[int, int]],
@@ -123,7 +124,7 @@ def units(asked: PlanRules) -> int:
 
 
 @given(st.lists(st.integers(1, 6), min_size=2, max_size=7), st.integers(0, 3))
-@settings(max_examples=60, deadline=None)
+@examples(60)
 def test_the_scenario_gap_is_the_largest_possible(counts: list[int], seed: int) -> None:
     """Contestants per scenario differ, all units are shown: the fullest scenario sets the gap."""
     entries = tuple(

@@ -6,7 +6,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from hypothesis import given
-from hypothesis import settings as hypothesis_settings
 from hypothesis import strategies as st
 
 from arena.errors import NothingToPlan
@@ -24,6 +23,7 @@ from tests.pairing.studies import (
     smallest_distance,
     smallest_gap,
 )
+from tests.properties import examples
 
 NINE_DEGREES_ONE_IN_A_THOUSAND = 27.9
 
@@ -66,7 +66,7 @@ def test_pairs_meet_as_often_as_independence_has_it() -> None:
 
 
 @given(st.integers(3, 9), st.integers(1, 12), st.integers(0, 10_000))
-@hypothesis_settings(max_examples=60, deadline=None)
+@examples(60)
 def test_sums_that_some_votes_have_are_reached(size: int, most: int, seed: int) -> None:
     rng = np.random.default_rng(seed)
     capacity = np.triu(rng.integers(0, most + 1, (size, size)), 1)

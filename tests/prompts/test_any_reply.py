@@ -8,7 +8,7 @@ import random
 import time
 
 import pytest
-from hypothesis import HealthCheck, example, given, settings
+from hypothesis import example, given
 from hypothesis import strategies as st
 
 from augment.errors import ReplyUnreadable
@@ -46,7 +46,6 @@ JSON = st.recursive(
 
 
 # How long a draw takes says how busy the computer is, not how good the reader.
-UNHURRIED = settings(deadline=None, suppress_health_check=[HealthCheck.too_slow])
 
 
 def read(text: str) -> ReadReply | None:
@@ -55,7 +54,6 @@ def read(text: str) -> ReadReply | None:
     return None
 
 
-@UNHURRIED
 @given(st.text())
 @example("{" * 5000)
 @example('{"add": [' + "{" * 5000)
@@ -66,13 +64,11 @@ def test_any_text(text: str) -> None:
     read(text)
 
 
-@UNHURRIED
 @given(st.lists(PIECES, max_size=40).map("".join))
 def test_any_string_of_what_answers_are_made_of(text: str) -> None:
     read(text)
 
 
-@UNHURRIED
 @given(st.dictionaries(st.sampled_from([*sorted(agent()), "walk_to"]), JSON))
 def test_any_fields_of_an_agent(fields: dict[str, object]) -> None:
     read(answer(block(agent(**fields))))
@@ -124,7 +120,6 @@ def test_ten_thousand_mutated_answers() -> None:
                 assert math.isfinite(placed.x_m + placed.y_m + placed.heading_rad)
 
 
-@UNHURRIED
 @given(st.text(alphabet=st.characters(exclude_characters="`")), st.text())
 def test_prose_around_a_good_answer_does_not_change_it(before: str, after: str) -> None:
     if "</think>" in before + after:

@@ -8,7 +8,7 @@ from collections.abc import Callable
 from functools import partial
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from augment.errors import ReplyUnreadable
@@ -79,7 +79,6 @@ def test_a_good_answer_of_another_kind_is_none(reader: Callable[[str], object]) 
         reader(json.dumps({"add": [], "move": [], "remove": []}))
 
 
-@settings(deadline=None)
 @given(st.one_of(st.text(), st.lists(PIECES, max_size=30).map("".join)))
 def test_nothing_but_its_own_error_comes_out_of_a_reader(text: str) -> None:
     for reader in READERS:

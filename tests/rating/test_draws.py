@@ -6,11 +6,12 @@ import math
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from arena.rating.comparisons import FloatArray
 from arena.rating.draws import AliasTables, Multinomial, alias_tables, poisson_tables
+from tests.properties import examples
 
 
 def chances_of(tables: AliasTables, row: int) -> dict[float, float]:
@@ -32,7 +33,7 @@ def chances_of(tables: AliasTables, row: int) -> dict[float, float]:
         max_size=4,
     )
 )
-@settings(max_examples=100, deadline=None)
+@examples(100)
 def test_an_alias_table_gives_each_value_its_chance(rows: list[list[float]]) -> None:
     chances: FloatArray = np.array(rows, dtype=np.float64)
     chances /= chances.sum(axis=1, keepdims=True)
@@ -56,7 +57,7 @@ def test_poisson_tables_have_the_poisson_chances(mean: float) -> None:
 
 
 @given(st.lists(st.integers(1, 400), min_size=1, max_size=6), st.integers(0, 2**32))
-@settings(max_examples=60, deadline=None)
+@examples(60)
 def test_every_round_has_as_many_votes_as_there_are(counts: list[int], seed: int) -> None:
     drawn = Multinomial(np.array(counts)).draw(np.random.default_rng(seed), 50)
     assert (drawn.sum(axis=0) == sum(counts)).all()

@@ -6,12 +6,13 @@ from dataclasses import astuple, replace
 
 import numpy as np
 import pytest
-from hypothesis import assume, given, settings
+from hypothesis import assume, given
 from hypothesis import strategies as st
 
 from arena.rating.bootstrap import Unit
 from arena.rating.comparisons import LOSS, TIE, WIN, Comparison, Comparisons, as_arrays, tally
 from arena.rating.leaderboard import Leaderboard, Method
+from tests.properties import examples
 from tests.rating.votes import by_votes
 
 NAMES = ("a", "b", "c", "d")
@@ -51,7 +52,7 @@ def alike(one: Leaderboard, other: Leaderboard) -> bool:
 
 
 @given(votes_of_four)
-@settings(max_examples=60, deadline=None)
+@examples(60)
 def test_swapping_the_sides_changes_nothing(drawn: list[tuple[list[str], float, str]]) -> None:
     votes = as_votes(drawn)
     swapped = [replace(v, first=v.second, second=v.first, score=1 - v.score) for v in votes]
@@ -60,7 +61,7 @@ def test_swapping_the_sides_changes_nothing(drawn: list[tuple[list[str], float, 
 
 
 @given(votes_of_four, st.randoms(use_true_random=False))
-@settings(max_examples=60, deadline=None)
+@examples(60)
 def test_the_order_of_the_votes_changes_nothing(
     drawn: list[tuple[list[str], float, str]], shuffle: object
 ) -> None:
@@ -72,7 +73,7 @@ def test_the_order_of_the_votes_changes_nothing(
 
 
 @given(votes_of_four, st.permutations(NAMES))
-@settings(max_examples=60, deadline=None)
+@examples(60)
 def test_renaming_the_contestants_renames_the_table(
     drawn: list[tuple[list[str], float, str]], names: list[str]
 ) -> None:
@@ -85,7 +86,7 @@ def test_renaming_the_contestants_renames_the_table(
 
 
 @given(votes_of_four)
-@settings(max_examples=60, deadline=None)
+@examples(60)
 def test_every_vote_twice_leaves_the_ratings(drawn: list[tuple[list[str], float, str]]) -> None:
     votes = as_votes(drawn)
     assert same(
@@ -95,7 +96,7 @@ def test_every_vote_twice_leaves_the_ratings(drawn: list[tuple[list[str], float,
 
 
 @given(votes_of_four, st.sampled_from(Unit))
-@settings(max_examples=60, deadline=None)
+@examples(60)
 def test_the_mean_is_1000_whatever_the_unit(
     drawn: list[tuple[list[str], float, str]], unit: Unit
 ) -> None:
@@ -104,7 +105,7 @@ def test_the_mean_is_1000_whatever_the_unit(
 
 
 @given(votes_of_four)
-@settings(max_examples=60, deadline=None)
+@examples(60)
 def test_counts_add_up(drawn: list[tuple[list[str], float, str]]) -> None:
     wins, ties, losses = tally(as_arrays(NAMES, as_votes(drawn))).sum(axis=0)
     assert wins == losses

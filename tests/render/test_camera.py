@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from augment.geometry.boxes import corners
@@ -18,6 +18,7 @@ from augment.render.camera import MARGIN_M, WIDTH_PX, Camera, camera_for
 from augment.scene.modification import Modification, without_traffic
 from augment.services.scenarios.catalogue_files import read_catalogue
 from tests import scenes
+from tests.properties import examples
 from tests.recorded import recorded_moments
 from tests.render.pictures import blank_share
 
@@ -49,7 +50,7 @@ def test_without_a_reference_the_window_looks_far_ahead() -> None:
     y_m=st.floats(-60.0, 60.0),
     heading_rad=st.floats(-3.2, 3.2),
 )
-@settings(max_examples=30, deadline=None)
+@examples(30)
 def test_ego_and_reference_are_inside_with_room_around_them(
     x_m: float, y_m: float, heading_rad: float
 ) -> None:

@@ -6,7 +6,7 @@ import math
 from dataclasses import replace
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from augment.render.bev import draw
@@ -14,6 +14,7 @@ from augment.render.camera import camera_for
 from augment.render.description import CHANGED, GONE, DescribedAgent, describe
 from augment.scene.entities import AgentType, TrafficAgent
 from augment.scene.modification import Modification
+from tests.properties import examples
 from tests.scenes import cone, pedestrian, scene, vehicle
 
 STREET = scene(agents=(vehicle("Agent2", 20.04, -3.46), vehicle("Agent3", -12.0, 3.5, math.pi)))
@@ -129,7 +130,7 @@ def changed(agents: list[TrafficAgent], names: str = "abcdef") -> Modification:
     return Modification(added=tuple(replace(agent, id=name) for agent, name in named))
 
 
-@settings(max_examples=60, deadline=None)
+@examples(60)
 @given(AGENTS, st.randoms(use_true_random=False))
 def test_neither_ids_nor_their_order_leave_a_trace(
     agents: list[TrafficAgent], rng: object
@@ -140,7 +141,7 @@ def test_neither_ids_nor_their_order_leave_a_trace(
     assert describe(STREET, changed(shuffled, "zyxwvu")) == told
 
 
-@settings(max_examples=60, deadline=None)
+@examples(60)
 @given(AGENTS)
 def test_in_a_mirror_left_and_right_change_places_and_nothing_else(
     agents: list[TrafficAgent],

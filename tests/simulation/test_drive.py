@@ -10,7 +10,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from augment.errors import CannotDrive
@@ -27,6 +27,7 @@ from augment.simulation.road import Road
 from augment.simulation.score import score_drive
 from augment.simulation.setting import DriveSetting
 from augment.simulation.states import EgoBody, FloatArray, X, Y
+from tests.properties import examples
 from tests.scenes import pedestrian, vehicle
 from tests.simulation.worlds import street
 
@@ -64,7 +65,7 @@ def bend() -> Scene:
     return replace(street(), lanes=lanes)
 
 
-@settings(max_examples=3)
+@examples(3)
 @given(
     st.floats(-50.0, 50.0),
     st.floats(-50.0, 50.0),

@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 import shapely
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from scipy.signal import savgol_filter
 
@@ -15,6 +15,7 @@ from augment.simulation.overlap import corners, meet
 from augment.simulation.path import Path, dense
 from augment.simulation.region import Region
 from augment.simulation.smoothing import filter_matrix
+from tests.properties import examples
 
 metres = st.floats(-8.0, 8.0)
 angles = st.floats(-math.pi, math.pi)
@@ -22,7 +23,7 @@ sizes = st.floats(0.2, 6.0)
 boxes = st.tuples(metres, metres, angles, sizes, sizes)
 
 
-@settings(max_examples=25)
+@examples(25)
 @given(st.lists(st.tuples(boxes, boxes), min_size=1, max_size=20))
 def test_boxes_meet_where_their_polygons_do(pairs: list[tuple[tuple[float, ...], ...]]) -> None:
     first, second = (np.array([pair[side] for pair in pairs]) for side in (0, 1))
@@ -32,7 +33,7 @@ def test_boxes_meet_where_their_polygons_do(pairs: list[tuple[tuple[float, ...],
     assert (meet(first, second) == shapely.intersects(a, b))[clear].all()
 
 
-@settings(max_examples=25)
+@examples(25)
 @given(st.integers(0, 2**32 - 1))
 def test_a_region_answers_as_its_polygon_does(seed: int) -> None:
     rng = np.random.default_rng(seed)
@@ -50,7 +51,7 @@ def test_a_region_of_nothing_holds_nothing() -> None:
     assert empty.distance_m(points)[0] == np.inf
 
 
-@settings(max_examples=25)
+@examples(25)
 @given(st.integers(0, 2**32 - 1))
 def test_places_beside_a_path_are_those_of_the_whole_line(seed: int) -> None:
     rng = np.random.default_rng(seed)
