@@ -34,7 +34,7 @@ from augment.scene.entities import Scene
 from augment.scene.modification import Modification
 from augment.services.endpoints.call_limits import Queue
 from augment.services.endpoints.client import EndpointClient
-from augment.services.endpoints.respondents import respondents_of
+from augment.services.endpoints.respondents import Respondent, respondents_of
 from augment.services.endpoints.treatments import Treatment, treatment_of
 from augment.services.endpoints.wires import wire_to
 from augment.services.running import jobs, leases, stopping
@@ -275,11 +275,7 @@ def _from_model(
             for pk, site in sites.items()
         }
         others: dict[ModelRole, RespondentClient] = {
-            role: RespondentClient(
-                client=clients[respondent.endpoint.pk],
-                model=respondent.model,
-                context_tokens=respondent.context_tokens,
-            )
+            role: _client_for(respondent, clients)
             for role, respondent in respondents.items()
             if role is not ModelRole.MODIFIER
         }
@@ -307,6 +303,14 @@ def _from_model(
         modification=outcome.modification,
         notes=outcome.notes,
         reason=outcome.reason,
+    )
+
+
+def _client_for(respondent: Respondent, clients: dict[int, ChatClient]) -> RespondentClient:
+    return RespondentClient(
+        client=clients[respondent.endpoint.pk],
+        model=respondent.model,
+        context_tokens=respondent.context_tokens,
     )
 
 
