@@ -184,10 +184,10 @@ def recover(*, now: Moment = DATABASE_TIME, at_start: bool = False) -> None:
 
 
 @worker_ready.connect
-def start_recovering(sender: Any = None, **_: object) -> None:
+def start_recovering(**_: object) -> None:
     """Show that this worker lives and recover again and again, in threads of its main process."""
     stopping.withdraw_stop()
-    presence = workers.Presence(f"{getattr(sender, 'hostname', None) or 'here'} {os.getpid()}")
+    presence = workers.Presence(workers.worker_name(os.getpid()))
     Thread(target=_be_present, args=(presence,), name="presence", daemon=True).start()
     Thread(target=_recover_until_stopped, args=(presence,), name="recover", daemon=True).start()
 

@@ -29,6 +29,8 @@ class Program:
         arguments: The command line.
         environment: What it needs beside the environment of the supervisor.
         is_ready: Asked until it says yes; it must not raise.
+        is_alive: Asked with its process id every ALIVE_EVERY_S while it runs; on no it is killed
+            and started again. It must not raise.
         ready_within_s: How long it may take to come up.
         grace_s: How long it may take to end after SIGTERM.
     """
@@ -37,6 +39,7 @@ class Program:
     arguments: tuple[str, ...]
     environment: Mapping[str, str] = field(default_factory=dict)
     is_ready: Callable[[], bool]
+    is_alive: Callable[[int], bool] = lambda pid: True
     ready_within_s: float = 60.0
     grace_s: float = 10.0
 

@@ -8,14 +8,19 @@ from urllib.parse import urlsplit
 
 import redis
 from django.conf import settings
+from django.db import DatabaseError, connection
 
 from arena.serving.child import Program
 from arena.serving.probes import port_answers, require_free_port
 from arena.serving.redis_server import private_redis
 from augment.models import Endpoint
+from augment.services.running.workers import is_silent
 
 SHORTEST_GRACE_S, DRAWING_S = 60.0, 30.0
 """A worker that is to stop has the time of a call, and for what is drawn after it."""
+
+HUNG_AFTER = 3
+"""Times `ARENA_STALE_AFTER_S`: a database that is locked for a while silences a sound worker."""
 
 WEB_GRACE_S = 35.0
 """Gunicorn itself gives its workers 30 s."""
@@ -93,6 +98,7 @@ def _worker(concurrency: int) -> Program:
         arguments=arguments,
         environment=environment,
         is_ready=_worker_listens,
+        is_alive=_worker_is_heard,
         # A call in flight may take this long; cut off, it would be paid and asked again.
         grace_s=max(SHORTEST_GRACE_S, settings.LLM_TIMEOUT_S) + DRAWING_S,
     )
@@ -107,6 +113,16 @@ def _worker_listens() -> bool:
         return False
     finally:
         client.close()
+
+
+def _worker_is_heard(pid: int) -> bool:
+    """Return whether the worker of this process gave a sign of life lately; True if unknown."""
+    try:
+        return not is_silent(pid=pid, for_s=HUNG_AFTER * settings.STALE_AFTER_S)
+    except DatabaseError:
+        return True
+    finally:
+        connection.close()
 
 
 def _broker() -> redis.Redis:

@@ -1,4 +1,4 @@
-"""Several programs as one: all up or none, all down together; each crashed one starts again.
+"""Several programs as one: all up or none, all down together; crashed or hung ones start again.
 
 One that keeps crashing is started again after longer and longer waits, and the others live on: a
 worker that can't work takes no page away from anybody.
@@ -25,6 +25,7 @@ STEADY_S = 60.0
 """Who has run for so long starts again at once, as after a first crash."""
 
 LONGEST_WAIT_S = 60.0
+ALIVE_EVERY_S = 5.0
 CRASHES_ALLOWED = 3
 """Who has crashed more often in a row is not steady."""
 
@@ -42,12 +43,14 @@ class Place:
         started_at: When that one was started, seconds of the supervisor's clock.
         crashes: How often in a row it ended soon after its start.
         due_at: When it is started again; None while it runs.
+        asked_at: When it was last asked whether it is alive.
     """
 
     child: Child
     started_at: float
     crashes: int = 0
     due_at: float | None = None
+    asked_at: float = 0.0
 
 
 def wait_s(crashes: int) -> float:
@@ -114,6 +117,11 @@ class Supervisor:
                     self._start_again(place)
             elif place.child.exit_code is not None:
                 self._bury(place)
+            elif self._clock() - place.asked_at >= ALIVE_EVERY_S:
+                place.asked_at = self._clock()
+                if not place.child.program.is_alive(place.child.pid):
+                    self._say(place.child.program.name, "hangs; killing it")
+                    place.child.kill()
 
     def insist_on_steadiness(self) -> None:
         """Return unless a program keeps crashing; for who waits for what the programs do.

@@ -12,7 +12,6 @@ from dataclasses import dataclass, replace
 from enum import StrEnum
 
 from augment.errors import ModelRefused, ReplyUnreadable, UnknownName
-from augment.llm.client import ChatClient
 from augment.llm.patience import Patience
 from augment.scene.entities import Scene
 from augment.scene.intent import Intent
@@ -59,12 +58,9 @@ def run(
     *,
     scene: Scene,
     instruction: str,
-    client: ChatClient,
-    model: str,
+    modifier: RespondentClient,
     transcript: Transcript,
     patience: Patience | None = None,
-    native_tools: bool = False,
-    context_tokens: int | None = None,
     others: Mapping[ModelRole, RespondentClient] | None = None,
     intent: Intent | None = None,
     sampling: Sampling | None = None,
@@ -75,12 +71,9 @@ def run(
         recipe: The variant, within whatever limits.
         scene: The scene before the change.
         instruction: The user's wish in natural language.
-        client: Who answers.
-        model: The model id that it is asked for.
+        modifier: Who modifies.
         transcript: Is handed every raw answer before it is read.
         patience: How faults that may pass are waited out; by default three attempts.
-        native_tools: Whether the modifier calls its tools natively instead of in its answer.
-        context_tokens: The model's context window, where it is known.
         others: Who plays the reviewers' roles; by default the modifier's model does.
         intent: What a geometric review holds modifications against, where that is stored.
         sampling: What every request is sent with.
@@ -92,18 +85,15 @@ def run(
     known = RECIPES.get(recipe.slug)
     if known is None or replace(recipe, limits=known.limits) != known:
         raise UnknownName("recipe", recipe.slug, sorted(RECIPES))
-    modifying = RespondentClient(
-        client=client, model=model, native_tools=native_tools, context_tokens=context_tokens
-    )
     respondents = Respondents(
-        clients={**(others or {}), ModelRole.MODIFIER: modifying},
+        clients={**(others or {}), ModelRole.MODIFIER: modifier},
         transcript=transcript,
         patience=patience or Patience(),
         sampling=sampling or Sampling(),
     )
-    modifier = Modifier(recipe=recipe, scene=scene, respondents=respondents, intent=intent)
+    modification = Modifier(recipe=recipe, scene=scene, respondents=respondents, intent=intent)
     try:
-        result = modify_and_review(modifier, instruction)
+        result = modify_and_review(modification, instruction)
     except ReplyUnreadable as unreadable:
         return _without(OutcomeStatus.UNREADABLE, "; ".join(unreadable.problems))
     except ModelRefused as refused:

@@ -26,6 +26,7 @@ from augment.llm.messages import Reply, Request
 from augment.llm.patience import Patience
 from augment.variants.pipeline import Outcome, run
 from augment.variants.recipes import RECIPES
+from augment.variants.respondents import RespondentClient
 from augment.variants.transcript import MemoryTranscript
 from tests.fixtures.shelf import SLUGS, entry, shown_scene
 from tests.intents import intents
@@ -95,8 +96,7 @@ def play(number: int, seed: int = SEED) -> Outcome:
         RECIPES[variant],
         scene=shown_scene(slug),
         instruction=entry(slug).instruction,
-        client=answering,
-        model="m",
+        modifier=RespondentClient(client=answering, model="m"),
         transcript=MemoryTranscript(),
         patience=Patience(sleep=lambda _: None, rng=rng),
     )

@@ -10,6 +10,7 @@ from augment.llm.patience import Patience
 from augment.scene.entities import Scene
 from augment.variants.pipeline import Outcome, run
 from augment.variants.recipes import find_recipe
+from augment.variants.respondents import RespondentClient
 from augment.variants.transcript import MemoryTranscript
 
 
@@ -28,8 +29,7 @@ def outcome(
             find_recipe("otm"),
             scene=scene,
             instruction=instruction,
-            client=client,
-            model=model,
+            modifier=RespondentClient(client=client, model=model),
             transcript=transcript or MemoryTranscript(),
             patience=Patience(sleep=lambda _: None, rng=random.Random(0)),
         )

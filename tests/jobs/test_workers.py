@@ -26,6 +26,8 @@ from augment.services.running.workers import (
     Presence,
     RecoveryRounds,
     Workforce,
+    is_silent,
+    worker_name,
     workforce,
 )
 from tests.jobs.rows import launch, only_row
@@ -63,6 +65,20 @@ def test_a_worker_that_is_silent_too_long_is_dead_since_its_last_word(
     found = workforce()
     assert found.living == count
     assert found.silent_since == (None if count else worker.seen_at)
+
+
+@pytest.mark.parametrize(
+    ("heard_s_ago", "silent"), [(None, False), (59.0, False), (61.0, True), ("ended", False)]
+)
+def test_a_process_is_silent_when_its_newest_worker_is(
+    heard_s_ago: float | str | None, silent: bool
+) -> None:
+    if heard_s_ago is not None:
+        worker = living(worker_name(7))
+        long_ago(worker, "seen_at", 61.0 if heard_s_ago == "ended" else float(heard_s_ago))
+        if heard_s_ago == "ended":
+            Worker.objects.update(ended_at=DATABASE_TIME)
+    assert is_silent(pid=7, for_s=60.0) == silent
 
 
 def test_a_worker_that_ended_in_order_is_gone_at_once() -> None:

@@ -63,8 +63,8 @@ def test_every_queue_has_a_worker_that_is_probed(services: dict[str, Any]) -> No
 
 
 def test_the_web_server_is_probed_at_an_address_of_ours(services: dict[str, Any]) -> None:
-    assert "http://localhost:8000/readyz" in services["web"]["healthcheck"]["test"][-1]
-    assert reverse("readyz") == "/readyz"
+    assert "http://localhost:8000/healthz" in services["web"]["healthcheck"]["test"][-1]
+    assert reverse("healthz") == "/healthz"
 
 
 PASSED_ON = (

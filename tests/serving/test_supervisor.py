@@ -6,6 +6,7 @@ import subprocess
 import sys
 import threading
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
 import psutil
@@ -14,7 +15,7 @@ from django.conf import settings
 
 from arena.serving.child import Program
 from arena.serving.stack import background
-from arena.serving.supervisor import ChildFailed, Supervisor, wait_s
+from arena.serving.supervisor import ALIVE_EVERY_S, ChildFailed, Supervisor, wait_s
 from tests.processes import wait_until
 
 SLEEP = "import time; print('up', flush=True); time.sleep(600)"
@@ -119,6 +120,24 @@ def crash(supervisor: Supervisor, place: int) -> None:
     os.kill(child.pid, signal.SIGKILL)
     wait_until(lambda: child.exit_code is not None, what="it has crashed")
     supervisor.check()
+
+
+def test_a_program_that_hangs_is_killed_and_started_again(clock: Clock) -> None:
+    hung: list[int] = []
+    sleeper = replace(program("worker", SLEEP), is_alive=lambda pid: pid not in hung)
+    supervisor = Supervisor([sleeper], said := Said(), clock=clock)
+    supervisor.start()
+    hung.append(first := supervisor._places[0].child.pid)
+    clock.now += ALIVE_EVERY_S
+    supervisor.check()  # asked, killed
+    assert not is_living(first)
+    supervisor.check()  # buried
+    supervisor.check()  # started again at once
+    second = supervisor._places[0].child.pid
+    assert second != first
+    assert is_living(second)
+    assert ("worker", "hangs; killing it") in said.lines
+    supervisor.stop()
 
 
 def test_who_keeps_crashing_waits_longer_each_time_and_the_others_live_on(clock: Clock) -> None:

@@ -40,11 +40,9 @@ class Play:
             find_recipe(variant),
             scene=shown or scene(),
             instruction=WISH,
-            client=self.client,
-            model="m",
+            modifier=RespondentClient(client=self.client, model="m", native_tools=native),
             transcript=self.transcript,
             patience=Patience(sleep=lambda _: None, rng=random.Random(0)),
-            native_tools=native,
             others=others,
             intent=intent,
         )

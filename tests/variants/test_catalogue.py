@@ -18,6 +18,7 @@ from augment.llm.patience import Patience
 from augment.metrics.displacement import displacement
 from augment.variants.pipeline import Outcome, OutcomeStatus, run
 from augment.variants.recipes import RECIPES, Review, Tools, find_recipe
+from augment.variants.respondents import RespondentClient
 from augment.variants.transcript import MemoryTranscript
 from tests.baselines.test_rule_placer_catalogue import placed
 from tests.fixtures.shelf import SLUGS, entry, shown_scene
@@ -61,11 +62,9 @@ def played(
             find_recipe(variant),
             scene=shown_scene(slug),
             instruction=entry(slug).instruction,
-            client=client,
-            model=model,
+            modifier=RespondentClient(client=client, model=model, native_tools=native),
             transcript=transcript,
             patience=Patience(sleep=lambda _: None, rng=random.Random(0)),
-            native_tools=native,
         )
     return outcome, transcript
 

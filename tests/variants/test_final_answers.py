@@ -14,6 +14,7 @@ from augment.prompts.calls import calls_in
 from augment.prompts.texts import read_text
 from augment.variants.pipeline import run
 from augment.variants.recipes import find_recipe
+from augment.variants.respondents import RespondentClient
 from augment.variants.transcript import MemoryTranscript
 from tests.benchmarks.mutated_answers import Answering
 from tests.fixtures.shelf import SLUGS, entry, shown_scene
@@ -27,8 +28,7 @@ def answers(slug: str, variant: str, character: object) -> list[str]:
         find_recipe(variant),
         scene=shown_scene(slug),
         instruction=entry(slug).instruction,
-        client=Answering(character, 10**9, random.Random(0)),  # type: ignore[arg-type]
-        model="m",
+        modifier=RespondentClient(client=Answering(character, 10**9, random.Random(0)), model="m"),  # type: ignore[arg-type]
         transcript=transcript,
         patience=Patience(sleep=lambda _: None, rng=random.Random(0)),
     )

@@ -15,6 +15,7 @@ from augment.llm.patience import Patience
 from augment.variants.forecast import CallRange, calls_of, most_tokens
 from augment.variants.pipeline import run
 from augment.variants.recipes import FC, OTM, RECIPES, TQA, VQA
+from augment.variants.respondents import RespondentClient
 from augment.variants.transcript import MemoryTranscript, ModelRole
 from tests.fixtures.shelf import entry, shown_scene
 from tests.intents import intents
@@ -46,8 +47,7 @@ def calls_made(variant: str, character: Character) -> dict[ModelRole, int]:
         RECIPES[variant],
         scene=shown_scene(SLUG),
         instruction=entry(SLUG).instruction,
-        client=Playing(character),
-        model="m",
+        modifier=RespondentClient(client=Playing(character), model="m"),
         transcript=transcript,
         patience=Patience(sleep=lambda _: None, rng=random.Random(1)),
     )

@@ -13,6 +13,7 @@ from augment.llm.scripted import ScriptedClient
 from augment.prompts.fill import prompt_version
 from augment.variants.pipeline import Outcome, OutcomeStatus, run
 from augment.variants.recipes import OTM, Review
+from augment.variants.respondents import RespondentClient
 from augment.variants.transcript import MemoryTranscript
 from tests.scenes import scene
 from tests.variants.answers import GOOD, agent, answer, block
@@ -31,8 +32,7 @@ class Run:
             OTM,
             scene=scene(),
             instruction="Add a parked car 21.4 m ahead.",
-            client=self.client,
-            model="some-model",
+            modifier=RespondentClient(client=self.client, model="some-model"),
             transcript=self.transcript,
             patience=Patience(sleep=self.waits.append, rng=random.Random(0)),
         )
@@ -150,8 +150,7 @@ def test_a_recipe_that_nobody_can_run_is_refused() -> None:
             replace(OTM, slug="tqa", review=Review.TEXT),
             scene=scene(),
             instruction="Add a car.",
-            client=ScriptedClient([]),
-            model="m",
+            modifier=RespondentClient(client=ScriptedClient([]), model="m"),
             transcript=MemoryTranscript(),
         )
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 import logging
 from collections.abc import Callable
 from contextlib import AbstractContextManager, ExitStack
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from django.conf import settings
 from django.db import Error, OperationalError
@@ -283,8 +283,10 @@ def _from_model(
             recipe_with(find_recipe(row.contestant.variant), options),
             scene=scene,
             instruction=row.scenario.instruction,
-            client=clients[endpoint.pk],
-            model=row.contestant.model,
+            modifier=replace(
+                _client_for(respondents[ModelRole.MODIFIER], clients),
+                native_tools=options.protocol is ToolProtocol.NATIVE,
+            ),
             transcript=RowTranscript(
                 held,
                 row,
@@ -292,8 +294,6 @@ def _from_model(
                 others={role: respondents[role].endpoint for role in others},
                 key=options.key(row.sample),
             ),
-            native_tools=options.protocol is ToolProtocol.NATIVE,
-            context_tokens=respondents[ModelRole.MODIFIER].context_tokens,
             others=others,
             intent=intent_of(row.scenario),
             sampling=options.sampling(row.sample),

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import logging
+import socket
 from collections.abc import Callable
 from dataclasses import dataclass
 from datetime import datetime, timedelta
@@ -50,6 +51,11 @@ class Workforce:
     def works(self) -> bool:
         """Whether somebody lives, and what is lost is brought back."""
         return self.living > 0 and self.not_recovered_since is None
+
+
+def worker_name(pid: int) -> str:
+    """Return the name of a worker process on this host."""
+    return f"{socket.gethostname()} {pid}"[:120]
 
 
 class Survived:
@@ -180,6 +186,17 @@ def workforce() -> Workforce:
         return Workforce(living=len(living))
     last = max(living, key=_worked_at)
     return Workforce(living=len(living), not_recovered_since=_worked_at(last), fault=last.fault)
+
+
+def is_silent(*, pid: int, for_s: float) -> bool:
+    """Return whether the newest worker of that process id has given no sign of life for so long.
+
+    A worker that has not been heard yet, or has ended, is not silent.
+    """
+    newest = Worker.objects.filter(name=worker_name(pid)).order_by("-pk").first()
+    if newest is None or newest.ended_at:
+        return False
+    return database_now() - newest.seen_at > timedelta(seconds=for_s)
 
 
 # --- Private -----------------------------------------------------------------------------------
