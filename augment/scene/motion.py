@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from augment.geometry.angles import wrap
 from augment.scene.entities import AgentType, Scene, TrafficAgent
 from augment.scene.lane_graph import LaneGraph
-from augment.scene.recording import Recording, Track
+from augment.scene.recording import Recording, agent_of
 
 FloatArray = NDArray[np.float64]
 
@@ -190,22 +190,8 @@ def _later(
         states = _read_at(track.states, recording.times_s, times_s)
         seen = np.flatnonzero(~np.isnan(states).any(axis=1))
         if len(seen):
-            agent = _as_agent(track, states[seen[0]])
+            agent = agent_of(track, states[seen[0]])
             yield Movement(agent=agent, source=MotionSource.RECORDED, states=states)
-
-
-def _as_agent(track: Track, state: FloatArray) -> TrafficAgent:
-    x_m, y_m, heading_rad, speed_mps = (float(value) for value in state)
-    return TrafficAgent(
-        id=track.agent_id,
-        type=AgentType(track.type),
-        x_m=x_m,
-        y_m=y_m,
-        heading_rad=heading_rad,
-        width_m=track.width_m,
-        length_m=track.length_m,
-        speed_mps=speed_mps,
-    )
 
 
 def _walk(agent: TrafficAgent, times_s: FloatArray, ego: Movement) -> Movement:

@@ -10,6 +10,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from augment.scene.entities import AgentType, TrafficAgent
+
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Track:
@@ -51,3 +53,18 @@ class Recording:
     def shows_ego(self) -> bool:
         """Whether more of the ego was recorded than where it began."""
         return int(self.ego_is_seen.sum()) > 1
+
+
+def agent_of(track: Track, state: NDArray[np.float64]) -> TrafficAgent:
+    """Return the agent of a track as it is in one of its states (4,)."""
+    x_m, y_m, heading_rad, speed_mps = (float(value) for value in state)
+    return TrafficAgent(
+        id=track.agent_id,
+        type=AgentType(track.type),
+        x_m=x_m,
+        y_m=y_m,
+        heading_rad=heading_rad,
+        width_m=track.width_m,
+        length_m=track.length_m,
+        speed_mps=speed_mps,
+    )

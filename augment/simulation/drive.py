@@ -29,6 +29,7 @@ class Drive:
         objects: T rows of who was there.
         plans: T - 1 plans, one a step.
         at_map_end: Whether the drive ended early because the road did.
+        recorded_s: How long a recording of its scene lasts, None without one.
     """
 
     road: Road
@@ -37,11 +38,17 @@ class Drive:
     objects: list[Objects]
     plans: list[Plan] = field(default_factory=list)
     at_map_end: bool = False
+    recorded_s: float | None = None
 
     @property
     def duration_s(self) -> float:
         """How long was driven."""
         return (len(self.states) - 1) * STEP_S
+
+    @property
+    def outlasts_recording(self) -> bool:
+        """Whether part of it was driven after the end of the recording."""
+        return self.recorded_s is not None and self.duration_s > self.recorded_s + STEP_S / 2.0
 
     @property
     def boxes(self) -> FloatArray:
@@ -75,7 +82,11 @@ def run(
     traffic = Traffic(setting, road, body, state)
     planner.start(road, body)
     made = Drive(
-        road=road, body=body, states=np.empty(0), objects=[traffic.objects()], at_map_end=False
+        road=road,
+        body=body,
+        states=np.empty(0),
+        objects=[traffic.objects()],
+        recorded_s=None if setting.recording is None else float(setting.recording.times_s[-1]),
     )
     states = [state]
     for step in range(steps):

@@ -5,12 +5,17 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from enum import StrEnum
 
+import numpy as np
+
 from augment.scene.modification import Modification
+from augment.scene.recording import Recording
 from augment.simulation.drive import DURATION_STEPS, run
 from augment.simulation.idm_planner import IdmPlanner
 from augment.simulation.road import Road
 from augment.simulation.setting import DriveSetting
 from augment.simulation.states import STEP_S, EgoBody
+
+_PACE_S = 1.0
 
 
 class ExpertKind(StrEnum):
@@ -37,22 +42,31 @@ class Expert:
 def expert_of(setting: DriveSetting, road: Road, *, steps: int = DURATION_STEPS) -> Expert:
     """The recorded ego, or an IDM drive at the speed limit without the change.
 
-    The recorded one goes as far as the drive lasts and the map goes.
+    Either goes as long as the drive lasts and as far as the map goes. Where the recording ends
+    before, the recorded one holds the pace of its last second.
     """
     if setting.recording is not None and setting.recording.shows_ego:
-        times = setting.recording.times_s
-        seen = setting.recording.ego_is_seen
-        ego = setting.recording.ego[seen & (times <= steps * STEP_S + STEP_S / 2.0)]
-        ends, _ = road.centreline.beside(ego[[0, -1], :2])
-        return Expert(
-            kind=ExpertKind.RECORDED,
-            start_m=float(ends[0]),
-            end_m=min(float(ends[1]), furthest_m(road, EgoBody.of(setting.scene.ego))),
-        )
+        return _recorded(setting.recording, road, EgoBody.of(setting.scene.ego), steps * STEP_S)
     plain = replace(setting, modification=Modification())
     drive = run(plain, IdmPlanner(target_mps=None), road=road, steps=steps)
     ends, _ = road.centreline.beside(drive.boxes[[0, -1], :2])
     return Expert(kind=ExpertKind.IDM, start_m=float(ends[0]), end_m=float(ends[1]))
+
+
+def _recorded(recording: Recording, road: Road, body: EgoBody, duration_s: float) -> Expert:
+    seen = recording.ego_is_seen & (recording.times_s <= duration_s + STEP_S / 2.0)
+    times_s = recording.times_s[seen]
+    stations_m, _ = road.centreline.beside(recording.ego[seen, :2])
+    end_m, missing_s = float(stations_m[-1]), duration_s - float(times_s[-1])
+    before_s = max(float(times_s[-1]) - _PACE_S, float(times_s[0]))
+    if missing_s > STEP_S / 2.0 and before_s < times_s[-1]:
+        before_m = float(np.interp(before_s, times_s, stations_m))
+        end_m += max(0.0, end_m - before_m) / (float(times_s[-1]) - before_s) * missing_s
+    return Expert(
+        kind=ExpertKind.RECORDED,
+        start_m=float(stations_m[0]),
+        end_m=min(end_m, furthest_m(road, body)),
+    )
 
 
 def furthest_m(road: Road, body: EgoBody) -> float:

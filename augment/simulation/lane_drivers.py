@@ -34,10 +34,8 @@ class LaneDrivers:
     """D drivers on their lanes.
 
     Args:
-        agents: Moving, each on a lane; who starts in a collision is dropped.
+        agents: Moving, each on a lane.
         road: The map.
-        ego_box: (5,) at the start.
-        standing: Boxes (A, 5) of what never moves.
         idm: Their wishes.
         sweep_s: How much road ahead of itself a driver takes up, in seconds of its speed, from
             the second step on (nuPlan's traffic does); 0 for the plain law.
@@ -47,14 +45,12 @@ class LaneDrivers:
         self,
         agents: Sequence[TrafficAgent],
         road: Road,
-        ego_box: FloatArray,
-        standing: FloatArray,
         *,
         idm: Idm = TRAFFIC_IDM,
         sweep_s: float = SWEEP_S,
     ) -> None:
         self._idm, self._sweep_s, self._first = idm, sweep_s, True
-        self._agents = _free(agents, np.vstack([ego_box[None], standing]))
+        self._agents = tuple(agents)
         made = [_Lane(road, agent) for agent in self._agents]
         self._lanes = made
         self._base = objects_of(self._agents, speeds=True)
@@ -150,6 +146,18 @@ class LaneDrivers:
         return driver[hit], other[hit], first[hit]
 
 
+def free_agents(agents: Sequence[TrafficAgent], taken: FloatArray) -> list[TrafficAgent]:
+    """Return those who touch no box in `taken` (A, 5) and nobody before them, in their order."""
+    kept: list[TrafficAgent] = []
+    boxes = list(taken)
+    for agent in agents:
+        box = objects_of([agent], speeds=True).boxes
+        if not meet(np.array(boxes), box).any():
+            kept.append(agent)
+            boxes.append(box[0])
+    return kept
+
+
 # Private
 
 
@@ -194,18 +202,6 @@ def lane_under(road: Road, agent: TrafficAgent) -> str | None:
     line = road.graph.lanes[name].centerline
     heading = line.heading_at(line.project(agent.x_m, agent.y_m).s_m)
     return name if np.cos(heading - agent.heading_rad) > 0.0 else None
-
-
-def _free(agents: Sequence[TrafficAgent], taken: FloatArray) -> tuple[TrafficAgent, ...]:
-    """Those who touch nobody that is there already, in the order given."""
-    kept: list[TrafficAgent] = []
-    boxes = list(taken)
-    for agent in agents:
-        box = objects_of([agent], speeds=True).boxes
-        if not meet(np.array(boxes), box).any():
-            kept.append(agent)
-            boxes.append(box[0])
-    return tuple(kept)
 
 
 def _stacked(paths: Sequence[Path]) -> FloatArray:

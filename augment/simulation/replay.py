@@ -1,4 +1,4 @@
-"""Recorded others, where they were."""
+"""Recorded others, where they were as long as the recording lasts."""
 
 from __future__ import annotations
 
@@ -6,10 +6,13 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from augment.scene.entities import AgentType
-from augment.scene.recording import Recording, Track
-from augment.simulation.objects import KIND_OF, Objects
-from augment.simulation.states import STEP_S, FloatArray
+from augment.scene.entities import AgentType, TrafficAgent
+from augment.scene.recording import Recording, Track, agent_of
+from augment.simulation.objects import KIND_OF, NOBODY, Objects
+from augment.simulation.states import STEP_S, FloatArray, IntArray
+
+STANDS_BELOW_MPS = 0.5
+"""Recorded speeds of what is parked are not quite 0."""
 
 
 class Replay:
@@ -27,29 +30,42 @@ class Replay:
         self._states = np.array(states).reshape(len(states), len(self._times), 4)
         self._kinds = np.array([KIND_OF[AgentType(t.type)] for t in tracks], dtype=np.int64)
         self._sizes = np.array([(t.length_m, t.width_m) for t in tracks]).reshape(-1, 2)
-        self._step = 0
+        self._step, self._last_step = 0, round(float(self._times[-1]) / STEP_S)
 
     def objects(self) -> Objects:
         """Those who are seen now."""
-        now_s = self._step * STEP_S
-        if now_s > self._times[-1] + STEP_S or not self._tracks:
-            return self._made(np.zeros((0, 4)), np.zeros(0, dtype=np.int64))
-        at = int(np.abs(self._times - now_s).argmin())
-        states = self._states[:, at]
-        seen = np.flatnonzero(~np.isnan(states).any(axis=1))
-        return self._made(states[seen], seen)
-
-    def step(self) -> None:
-        """One step on."""
-        self._step += 1
-
-    def _made(self, states: FloatArray, rows: np.typing.NDArray[np.int64]) -> Objects:
+        if self._step > self._last_step or not self._tracks:
+            return NOBODY
+        states, rows = self._seen()
         return Objects(
             ids=tuple(self._tracks[row].agent_id for row in rows),
             kinds=self._kinds[rows],
             boxes=np.hstack([states[:, :3], self._sizes[rows]]),
             speeds_mps=states[:, 3],
         )
+
+    @property
+    def ends_now(self) -> bool:
+        """Whether this is the last step that was recorded."""
+        return self._step == self._last_step
+
+    def agents(self) -> list[TrafficAgent]:
+        """Those who are seen now, as agents who go on from here; who hardly moves stands."""
+        states, rows = self._seen()
+        tracks = [self._tracks[row] for row in rows]
+        states[states[:, 3] < STANDS_BELOW_MPS, 3] = 0.0
+        return [agent_of(track, state) for track, state in zip(tracks, states, strict=True)]
+
+    def step(self) -> None:
+        """One step on."""
+        self._step += 1
+
+    def _seen(self) -> tuple[FloatArray, IntArray]:
+        """States (A, 4) and rows (A,) of those who are seen now."""
+        at = int(np.abs(self._times - self._step * STEP_S).argmin())
+        states = self._states[:, at]
+        rows = np.flatnonzero(~np.isnan(states).any(axis=1))
+        return states[rows], rows
 
 
 def moves(track: Track) -> bool:

@@ -54,9 +54,7 @@ def test_traffic_settles_at_the_steady_gap_and_its_sweep(sweep_s: float) -> None
     # A leader that holds 5 m/s; the follower's limit is 10 m/s.
     road = Road(street(3000.0))
     follower = replace(vehicle("Agent2", 0.0, 0.0), speed_mps=5.0)
-    drivers = LaneDrivers(
-        [follower], road, np.array([-45.0, 0.0, 0.0, 5.0, 2.0]), np.zeros((0, 5)), sweep_s=sweep_s
-    )
+    drivers = LaneDrivers([follower], road, sweep_s=sweep_s)
     leader_m = 30.0
     for _ in range(700):
         leader = Objects(
