@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from augment.sentences import sentence
-from augment.services.judging.driving_scores import DrivingLine, DrivingScores
+from augment.services.judging.driving_scores import CLOSE_M, DrivingLine, DrivingScores
 from augment.services.scenarios.types import type_choices
 
 SOURCE = "reported in the paper"
@@ -69,6 +69,17 @@ class DrivingTable:
                 sentence(
                     "Drives that failed: %(number)s (%(reason)s).", number=number, reason=reason
                 )
+            )
+        if self.scores.outlasting:
+            said.append(
+                f"The recording ends before the drive in {self.scores.outlasting} of "
+                f"{self.scores.total} drives: there, who stands stays, who moves goes on along "
+                "its lane or straight, and the expert holds the pace of its last second."
+            )
+        if any(line.close for line in self.lines):
+            said.append(
+                f"Drives that pass somebody at less than {CLOSE_M:g} m are counted beside the "
+                "score, which takes nothing off for them."
             )
         if self.scores.under_way:
             said.append(

@@ -16,7 +16,8 @@ from augment.services.judging.driving_scores import DrivingLine
 MEASURED = "measured"
 _BEFORE = (
     "scenarios", "slug", "model", "variant", "simulated", "score_percent", "before_percent",
-    "lowered_percent", "drives", "failed", "collided", "emergency_braked",
+    "lowered_percent", "drives", "failed", "least_clearance_m", "closer_than_0_3_m", "collided",
+    "emergency_braked",
 )  # fmt: skip
 
 
@@ -33,14 +34,13 @@ def csv_bytes(table: DrivingTable) -> bytes:
             line.is_simulated,
         ]
         means = [_percent(value) for value in (line.mean, line.before, line.lowered)]
-        counts = [line.drives, line.failed, line.collided, line.braked]
+        clearance = "" if line.least_clearance_m is None else f"{line.least_clearance_m:.2f}"
+        counts = [line.drives, line.failed, clearance, line.close, line.collided, line.braked]
         types = [_percent(line.by_type[kind]) for kind in kinds]
         rows.append([*who, *means, *counts, *types, MEASURED])
     blank = [""] * len(kinds)
     for name, score in REPORTED:
-        rows.append(
-            [name, "", "", "", "no", _percent(score), "", "", "", "", "", "", *blank, SOURCE]
-        )
+        rows.append([name, "", "", "", "no", _percent(score), *[""] * 8, *blank, SOURCE])
     head = (*_BEFORE, *(f"{kind}_percent" for kind in kinds), "source")
     return csv_text(head, rows).encode()
 
@@ -79,18 +79,20 @@ def latex_bytes(table: DrivingTable) -> bytes:
         *(f"% {note}" for note in table.notes),
         r"\begin{table}",
         r"    \centering",
-        r"    \begin{tabular}{lrr}",
+        r"    \begin{tabular}{lrrr}",
         r"    \toprule",
-        r"    \textbf{Scenarios} & \textbf{Mean Driving Score} [\%] & \textbf{Before} [\%] \\",
+        r"    \textbf{Scenarios} & \textbf{Mean Driving Score} [\%] & \textbf{Before} [\%]"
+        r" & \textbf{Clearance below 0.3 m} \\",
         r"    \midrule",
         *(
-            rf"    {escape(name)} & {_printed(line.mean)} & {_printed(line.before)} \\"
+            rf"    {escape(name)} & {_printed(line.mean)} & {_printed(line.before)} & {line.close}"
+            r" \\"
             for line in table.lines
             for name in [shown_name(line.name, line.is_simulated)]
         ),
         r"    \midrule",
         *(
-            rf"    {escape(name)} ({escape(SOURCE)}) & {_printed(score)} & -- \\"
+            rf"    {escape(name)} ({escape(SOURCE)}) & {_printed(score)} & -- & -- \\"
             for name, score in REPORTED
         ),
         r"    \bottomrule",
@@ -131,6 +133,8 @@ def _line(line: DrivingLine) -> dict[str, Any]:
         "lowered": round_value(line.lowered),
         "drives": line.drives,
         "failed": line.failed,
+        "least_clearance_m": round_value(line.least_clearance_m),
+        "closer_than_0_3_m": line.close,
         "collided": line.collided,
         "emergency_braked": line.braked,
         "by_type": {kind: round_value(mean) for kind, mean in line.by_type.items()},

@@ -35,11 +35,11 @@ def before_of(row: Simulation) -> Simulation | None:
 
 
 def cells_of(job: GenerationJob, options: Options, part: Part) -> DriveCells:
-    """The drives of a part of a job's grid; seven queries, no documents."""
+    """The drives of a part of a job's grid; seven queries, no traces."""
     shown = grid_part(job, part)
     scenarios = [row.scenario.pk for row in shown.rows]
     augmentations = [cell.pk for row in shown.rows for cells in row.cells for cell in cells]
-    rows = options.of(Simulation.objects.defer("document", "trace"))
+    rows = options.of(Simulation.objects.defer("trace"))
     of_scenes = list(rows.filter(augmentation=None, scenario__in=scenarios))
     subject = Simulation.Subject
     return DriveCells(

@@ -17,6 +17,7 @@ from arena.models.votes import AID_LABELS
 from arena.rating.estimate import Estimate
 from arena.rating.printed import interval_text, rating_text, whole_percent, with_minus
 from augment.models import Scenario
+from augment.services.judging.driving_scores import clearance_text
 from augment.services.scenarios.types import type_label as own_label
 from augment.services.wording import translate
 
@@ -78,6 +79,9 @@ _UNITS: dict[str, str | Promise] = {
     "expert": gettext_lazy("experts"),
     "two-way": gettext_lazy("experts and scenarios"),
 }
+
+
+register.filter("clearance", clearance_text)
 
 
 @register.filter

@@ -31,6 +31,7 @@ from augment.models import GenerationJob, Simulation
 from augment.services.judging import simulations
 from augment.services.judging.drive_files import FILES, drive_file
 from augment.services.judging.driving_scores import (
+    least_clearance_m,
     options_driven,
     scores_of_augmentations,
     scores_of_job,
@@ -241,7 +242,11 @@ def _driven(code: uuid.UUID) -> Simulation:
 def _cell(row: Simulation | None, score: str) -> dict[str, Any] | None:
     if row is None:
         return None
-    return {"row": row, "value": getattr(row, SCORES[score])}
+    return {
+        "row": row,
+        "value": getattr(row, SCORES[score]),
+        "clearance_m": least_clearance_m(row),
+    }
 
 
 def _metrics(row: Simulation, before: Simulation | None) -> list[dict[str, Any]]:

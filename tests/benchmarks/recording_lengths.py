@@ -63,7 +63,7 @@ def recorded_street() -> tuple[Scene, Recording]:
     scene = street(speed_mps=EGO_MPS)
     ahead = replace(vehicle("Agent2", 40.0, 0.0), speed_mps=EGO_MPS, lane_id="Lane1")
     parked = replace(vehicle("Agent3", 60.0, -3.2), speed_mps=0.0)
-    times_s = np.arange(151) * STEP_S
+    times_s = np.asarray(np.arange(151) * STEP_S, dtype=np.float64)
     tracks = tuple(
         Track(
             agent_id=agent.id,

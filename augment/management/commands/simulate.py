@@ -2,21 +2,33 @@
 
 from __future__ import annotations
 
+import time
 from argparse import ArgumentParser
-from typing import Any
+from datetime import timedelta
+from typing import Any, Final
 
+from django.conf import settings
 from django.core.management.base import CommandError
 from django.db import transaction
+from django.db.models import Q
 
 from augment.broker import check_broker
 from augment.errors import AugmentError, UnknownName
 from augment.models import Scenario, Simulation
 from augment.services.judging import simulations
-from augment.services.judging.driving_scores import DrivingScores, scores_of_job
+from augment.services.judging.driving_scores import (
+    DrivingScores,
+    clearance_text,
+    drives_of_job,
+    least_clearance_m,
+    scores_of_job,
+)
 from augment.services.judging.simulations import SCORES, Options
 from augment.services.running.choosing import find_job
 from augment.services.terminal import TerminalCommand
 from augment.tasks import enqueue_simulations
+
+POLL_S: Final = 0.2
 
 
 class Command(TerminalCommand):
@@ -78,20 +90,16 @@ class Command(TerminalCommand):
         if options["queue"]:
             self.stdout.write(f"{len(waiting)} drives wait for the workers.")
             return
-        for number, pk in enumerate(waiting, start=1):
-            simulations.drive(simulation_pk=pk)
-            self._say(
-                Simulation.objects.select_related("scenario", "augmentation__contestant").get(
-                    pk=pk
-                ),
-                number,
-                len(waiting),
-                options["score"],
-            )
+        rows = drives_of_job(job) if job is not None else Q(scenario=scenario, augmentation=None)
+        asked = how.of(Simulation.objects.filter(rows))
+        # A worker that runs beside this command may have taken some: they are waited for.
+        open_rows = list(asked.filter(state__in=Simulation.UNDER_WAY).order_by("pk"))
+        for number, row in enumerate(open_rows, start=1):
+            self._say(_finished(row.pk), number, len(open_rows), options["score"])
         if job is not None:
             self._table(scores_of_job(job, options=how, score=options["score"]))
-        elif scenario is not None and not waiting:
-            for row in how.of(scenario.simulations.filter(augmentation=None)):
+        elif not open_rows:
+            for row in asked.select_related("scenario"):
                 self._say(row, 1, 1, options["score"])
 
     def _say(self, row: Simulation, number: int, total: int, score: str) -> None:
@@ -101,13 +109,16 @@ class Command(TerminalCommand):
             else row.augmentation.contestant.name
         )
         value = getattr(row, SCORES[score])
-        said = row.reason if value is None else f"{100.0 * value:.1f}"
+        clearance = clearance_text(least_clearance_m(row))
+        said = row.reason if value is None else f"{100.0 * value:.1f}, clearance {clearance}"
         self.stdout.write(f"[{number}/{total}] {row.scenario.slug}, {who}: {said}")
         self.stdout.flush()
 
     def _table(self, table: DrivingScores) -> None:
         width = max([len(line.name) for line in table.lines], default=10)
-        self.stdout.write(f"{'mean driving score, %':{width}}  score  before  drives  failed")
+        self.stdout.write(
+            f"{'mean driving score, %':{width}}  score  before  drives  failed  clearance"
+        )
         for line in table.lines:
             mean, before = (
                 "-" if value is None else f"{100.0 * value:.1f}"
@@ -115,4 +126,25 @@ class Command(TerminalCommand):
             )
             self.stdout.write(
                 f"{line.name:{width}}  {mean:>5}  {before:>6}  {line.drives:>6}  {line.failed:>6}"
+                f"  {clearance_text(line.least_clearance_m)}"
             )
+        if table.outlasting:
+            self.stdout.write(
+                f"In {table.outlasting} of {table.total} drives the recording ends before the "
+                "drive: traffic and expert are carried on."
+            )
+
+
+# Private
+
+
+def _finished(pk: int) -> Simulation:
+    """Drive a row, or wait until the worker that has it is done or has fallen silent."""
+    rows = Simulation.objects.select_related("scenario", "augmentation__contestant")
+    while True:
+        simulations.drive(simulation_pk=pk)
+        row = rows.get(pk=pk)
+        if row.state not in Simulation.UNDER_WAY:
+            return row
+        time.sleep(POLL_S)
+        simulations.requeue_stale(older_than=timedelta(seconds=settings.STALE_AFTER_S))

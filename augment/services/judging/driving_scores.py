@@ -12,6 +12,8 @@ from augment.models import GenerationJob, Scenario, Simulation
 from augment.services.judging.simulations import SCORES, Options
 
 State, Subject = Simulation.State, Simulation.Subject
+CLOSE_M = 0.3
+"""A least clearance below this is marked wherever a score is shown; the score does not ask."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -25,6 +27,8 @@ class DrivingLine:
         mean: 0 to 1, None without drives.
         before: The mean of the same scenes before the change; None without.
         by_type: The mean by scenario type, in the catalogue's order, None without drives.
+        least_clearance_m: The smallest of its drives; None where nobody else was there.
+        close: How many drives came closer to somebody than `CLOSE_M`.
         collided: How many drives had a collision at fault.
         braked: How many had an emergency brake.
     """
@@ -40,6 +44,8 @@ class DrivingLine:
     mean: float | None
     before: float | None
     by_type: dict[str, float | None]
+    least_clearance_m: float | None
+    close: int
     collided: int
     braked: int
 
@@ -60,6 +66,7 @@ class DrivingScores:
             score, the most first.
         under_way: How many drives wait or run.
         failures: Why drives failed, with how often.
+        outlasting: How many drives went on after the end of their recording.
     """
 
     score: str
@@ -68,6 +75,7 @@ class DrivingScores:
     total: int
     under_way: int
     failures: tuple[tuple[str, int], ...]
+    outlasting: int
     codes: dict[int, str]
 
     @property
@@ -78,7 +86,7 @@ class DrivingScores:
 
 def scores_of_job(job: GenerationJob, *, options: Options, score: str) -> DrivingScores:
     """The table of a job; one query for its drives."""
-    return _scores(_of_job(job), options, score)
+    return _scores(drives_of_job(job), options, score)
 
 
 def scores_of_augmentations(
@@ -91,10 +99,34 @@ def scores_of_augmentations(
     )
 
 
+def drives_of_job(job: GenerationJob) -> Q:
+    """Return a filter for its results, and its scenes before the change and as referred to."""
+    return Q(augmentation__job=job) | Q(augmentation=None, scenario__in=job.scenarios.all())
+
+
+def least_clearance_m(row: Simulation) -> float | None:
+    """Return how near the ego of a drive came to anybody; None without a drive or others."""
+    measures = (row.document or {}).get("criticality", {})
+    distance: float | None = measures.get("least_distance_m")
+    return distance
+
+
+def clearance_text(least_distance_m: float | None) -> str:
+    """Return the least clearance of a drive in words, marked where it is below `CLOSE_M`.
+
+    Args:
+        least_distance_m: Between the ego's body and the nearest other; None where nobody was.
+    """
+    if least_distance_m is None:
+        return "–"
+    mark = f" (below {CLOSE_M:g} m)" if least_distance_m < CLOSE_M else ""
+    return f"{least_distance_m:.2f} m{mark}"
+
+
 def options_driven(job: GenerationJob) -> list[Options]:
     """Every way in which drives of a job were asked for, the latest first."""
     found = (
-        Simulation.objects.filter(_of_job(job))
+        Simulation.objects.filter(drives_of_job(job))
         .order_by("-pk")
         .values_list("planner", "offsets", "is_reactive")
     )
@@ -105,11 +137,6 @@ def options_driven(job: GenerationJob) -> list[Options]:
 
 
 # Private
-
-
-def _of_job(job: GenerationJob) -> Q:
-    """Its results, and its scenes before the change and with the reference."""
-    return Q(augmentation__job=job) | Q(augmentation=None, scenario__in=job.scenarios.all())
 
 
 def _scores(which: Q, options: Options, score: str) -> DrivingScores:
@@ -134,6 +161,7 @@ def _scores(which: Q, options: Options, score: str) -> DrivingScores:
         total=len(rows),
         under_way=len(under_way),
         failures=_failures(rows),
+        outlasting=sum(bool((row.document or {}).get("outlasts_recording")) for row in rows),
         codes={row.augmentation_id: str(row.code) for row in rows if row.augmentation_id},
     )
 
@@ -158,6 +186,7 @@ def _line(
     paired = [row for row in done if row.scenario_id in before]
     first = cell[0]
     contestant = None if first.augmentation is None else first.augmentation.contestant
+    clearances = [distance for row in paired if (distance := least_clearance_m(row)) is not None]
     values = {row.pk: float(getattr(row, SCORES[score])) for row in paired}
     return DrivingLine(
         subject=first.subject,
@@ -174,6 +203,8 @@ def _line(
             kind: _mean(values[row.pk] for row in paired if row.scenario.type == kind)
             for kind in kinds
         },
+        least_clearance_m=min(clearances, default=None),
+        close=sum(distance < CLOSE_M for distance in clearances),
         collided=sum(_collided(row) for row in paired),
         braked=sum(bool((row.document or {}).get("emergency_brake_steps")) for row in paired),
     )

@@ -153,6 +153,8 @@ def document_of(drove: Drive, scores: dict[ScoreKind, Score]) -> dict[str, Any]:
     return {
         "duration_s": round(drove.duration_s, 1),
         "at_map_end": drove.at_map_end,
+        "recorded_s": None if drove.recorded_s is None else round(drove.recorded_s, 1),
+        "outlasts_recording": drove.outlasts_recording,
         "emergency_brake_steps": sum(plan.braking for plan in drove.plans),
         "red_light_compliance": red_lights(drove).value,
         "expert": {"kind": score.expert.kind.value, "progress_m": score.expert.progress_m},
