@@ -7,21 +7,15 @@ page of a rating that waits offers to send it once more).
 from __future__ import annotations
 
 import logging
-from collections.abc import Callable
-from threading import Thread
 
 from celery import shared_task
-from celery.signals import worker_ready
-from django.conf import settings
 from django.contrib.auth.models import User
-from django.db import connection
 
 from arena.exports import study_files
 from arena.exports.scenario_files import write_file
-from arena.services import looks, ratings
+from arena.services import ratings
 from augment.broker import open_broker
 from augment.models import Scenario
-from augment.services.running import stopping, workers
 from augment.services.scenarios import attention
 
 logger = logging.getLogger(__name__)
@@ -90,27 +84,3 @@ def send_checks(actor_pk: int) -> None:
     """
     with open_broker() as broker:
         draw_checks.apply_async((actor_pk,), connection=broker, retry=False)
-
-
-@worker_ready.connect
-def start_watching(**_: object) -> None:
-    """Take the looks of stopping rules as they fall due, in a thread of the worker."""
-    _start("looks", looks.take_due_looks, every_s=settings.RECOVER_EVERY_S)
-
-
-# --- Private -----------------------------------------------------------------------------------
-
-
-def _start(what: str, act: Callable[[], object], *, every_s: float) -> None:
-    """Do something again and again in a thread that ends with the worker."""
-
-    def go_on() -> None:
-        while not stopping.is_stop_requested():
-            with workers.Survived() as watch:
-                act()
-            if watch.fault is not None:
-                logger.warning("The %s of this worker broke: %s", what, watch.fault)
-            connection.close()
-            stopping.wait(every_s)
-
-    Thread(target=go_on, name=what, daemon=True).start()

@@ -8,7 +8,6 @@ from rest_framework import serializers
 
 from arena.api.fields import FlagField, NumberField, StrictSerializer, TextField, WholeNumberField
 from arena.pairing.target_lines import read_targets
-from arena.rating.stopping import LOOKS, MOST_LOOKS, StoppingRule
 from arena.services.shown_pictures import SampleRule
 from arena.services.studies import PlanOptions
 
@@ -43,34 +42,6 @@ def _share(most: float) -> NumberField:
     return NumberField(required=False, default=0.0, min_value=0, max_value=most)
 
 
-class StoppingBody(StrictSerializer):
-    """When a study is to close; a width, a number of votes, or both."""
-
-    half_width = NumberField(
-        required=False,
-        min_value=1,
-        max_value=1000,
-        help_text="When every interval is at most ± so many points.",
-    )
-    votes = WholeNumberField(
-        required=False, min_value=1, max_value=10_000_000, help_text="At the latest."
-    )
-    looks = WholeNumberField(required=False, default=LOOKS, min_value=1, max_value=MOST_LOOKS)
-    closes = FlagField(
-        required=False,
-        default=False,
-        help_text="Whether it closes by itself; else admins are told.",
-    )
-
-    def validate(self, attrs: dict[str, Any]) -> dict[str, Any]:
-        """Refuse a rule that never stops."""
-        if "half_width" not in attrs and "votes" not in attrs:
-            raise serializers.ValidationError(
-                {"half_width": ["Give a half-width, a number of votes, or both."]}
-            )
-        return attrs
-
-
 class StudyBody(StrictSerializer):
     """A new study; its rules are fixed from the moment it opens."""
 
@@ -91,7 +62,6 @@ class StudyBody(StrictSerializer):
     adaptive_share = _share(0.9)
     targets = _lines("“CONTESTANT NUMBER” or “CONTESTANT vs CONTESTANT NUMBER” each.")
     hypotheses = _lines("What is expected, a line each; frozen at the opening.")
-    stopping = StoppingBody(required=False)
     allow_both_miss = FlagField(required=False, default=False)
     allow_text = FlagField(required=False, default=False)
     allow_replay = FlagField(required=False, default=False)
@@ -118,7 +88,6 @@ class StudyBody(StrictSerializer):
         """
         given = dict(self.validated_data)
         who = {name: given.pop(name) for name in (*WHO_AND_WHAT, *self.beside)}
-        stopping = given.pop("stopping", None)
         appearances, pair_votes = read_targets(given.pop("targets"))
         options = PlanOptions(
             appearances=appearances,
@@ -126,7 +95,6 @@ class StudyBody(StrictSerializer):
             hypotheses=tuple(given.pop("hypotheses")),
             jobs=tuple(given.pop("jobs")),
             samples=SampleRule(given.pop("samples")),
-            stopping=None if stopping is None else StoppingRule(**stopping),
             **given,
         )
         return who | {"options": options}

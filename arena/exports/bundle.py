@@ -15,7 +15,6 @@ from arena.exports.votes import VOTE_FORMATS, vote_table
 from arena.exports.writers import FORMATS
 from arena.exports.zips import zip_bytes
 from arena.models import Snapshot
-from arena.rating.interactions import Interaction
 from arena.results.codec import results_document
 from arena.results.tree import Results
 from arena.services.cells import csv_text
@@ -62,10 +61,6 @@ def _files(snapshot: Snapshot) -> dict[str, bytes]:
     files["pairs.csv"] = _pairs(results)
     files["types.csv"] = _types(results)
     files["raters.csv"] = _raters(results)
-    if results.version >= 4:
-        files["type_effects.csv"] = _cells(results.trust.by_type)
-        files["side_effects.csv"] = _cells(results.trust.by_side)
-        files["sessions.csv"] = _sessions(results)
     frozen = preregistration_bytes(snapshot.study)
     if frozen:
         files[FILE_NAME] = frozen
@@ -170,40 +165,7 @@ def _types(results: Results) -> bytes:
     head = ("type", "contestant", "rank", "elo", "lower", "upper", "votes", "too_few", "note")
     keys = ("slug", "rank", "rating", "lower", "upper", "votes", "few", "note")
     lines = [(part.type, line) for part in results.types for line in part.lines]
-    rows = ([name, *(getattr(line, key) for key in keys)] for name, line in lines)
-    if results.version < 4:
-        return _csv(head, rows)
-    more = ("pooled_elo", "pooled_lower", "pooled_upper")
-    pooled = ([line.pooled.value, line.pooled.lower, line.pooled.upper] for _, line in lines)
-    return _csv((*head, *more), ([*row, *own] for row, own in zip(rows, pooled, strict=True)))
-
-
-def _cells(found: Interaction | None) -> bytes:
-    """A line a contestant and condition."""
-    head = ("contestant", "condition", "votes", "effect", "lower", "upper", "p_adjusted")
-    return _csv(
-        head,
-        (
-            [one.contestant, one.condition, one.votes, one.effect.value, one.effect.lower,
-             one.effect.upper, one.p_value]
-            for one in (found.cells if found else ())
-        ),
-    )  # fmt: skip
-
-
-def _sessions(results: Results) -> bytes:
-    head = (
-        "measure", "votes", "sessions", "experts", "first_quarter", "last_quarter",
-        "change_per_100", "lower", "upper", "p",
-    )  # fmt: skip
-    return _csv(
-        head,
-        (
-            [one.measure, one.votes, one.sessions, one.experts, one.early, one.late,
-             one.slope.value, one.slope.lower, one.slope.upper, one.p_value]
-            for one in results.trust.drifts
-        ),
-    )  # fmt: skip
+    return _csv(head, ([name, *(getattr(line, key) for key in keys)] for name, line in lines))
 
 
 def _raters(results: Results) -> bytes:

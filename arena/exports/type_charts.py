@@ -7,7 +7,6 @@ from collections.abc import Sequence
 
 from arena.exports.charts import draw_interval, rating_axis
 from arena.exports.drawing import INK, SIMULATED, house_style, width_in, write_figure
-from arena.exports.pooled import with_pooled
 from arena.exports.tables import LeaderboardTable
 from arena.results.tree import TypeRating
 
@@ -50,7 +49,6 @@ def type_charts(
             for place, row in enumerate(rows):
                 line = by_slug.get(row.slug)
                 if line is not None:
-                    line = with_pooled(line)
                     interval = (line.lower, line.rating, line.upper)
                     draw_interval(panel, place, interval, simulated=row.simulated)
             panel.set_title(f"{part.label} (n {part.votes})", fontsize=7, color=INK)

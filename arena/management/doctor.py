@@ -21,9 +21,8 @@ from django.core.files.base import ContentFile
 from django.core.files.storage import FileSystemStorage, default_storage
 from django.db import DatabaseError, connection
 
-from arena.models import ApiToken, Study
+from arena.models import ApiToken
 from arena.queries.people import find_admins
-from arena.services.looks import stopping_progress
 from arena.serving.readiness import look_at_broker, look_at_database, look_at_workers
 from augment.errors import KeyMissing, KeyNotAllowed, MediaFault
 from augment.models import Contestant, Endpoint, EndpointModel, GenerationJob
@@ -216,19 +215,6 @@ def _tokens() -> Ailments:
         yield Ailment(Level.DOUBTFUL, f"token {token.name}", text, remedy)
 
 
-def _looks() -> Ailments:
-    """Studies whose stopping rule should have looked by now: workers do that."""
-    for study in Study.objects.filter(state=Study.State.OPEN, rules__has_key="stopping"):
-        found = stopping_progress(study)
-        if found is None or found.is_met:
-            continue
-        coming = [line.votes for line in found.lines if not line.is_done]
-        if coming and coming[0] <= found.votes:
-            text = f"a look is due at {coming[0]} votes; there are {found.votes}"
-            remedy = "A worker takes it within a minute; or run `manage.py check_stopping`."
-            yield Ailment(Level.DOUBTFUL, f"study {study.name}", text, remedy)
-
-
 NEED_THE_DATABASE: tuple[Callable[[], Ailments], ...] = (
     _clock,
     _broker,
@@ -236,5 +222,4 @@ NEED_THE_DATABASE: tuple[Callable[[], Ailments], ...] = (
     _accounts,
     _endpoints,
     _tokens,
-    _looks,
 )

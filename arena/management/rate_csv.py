@@ -13,11 +13,10 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from arena.management.progress_line import ProgressLine
-from arena.management.rated_by import by_label
 from arena.management.rated_csv import FORMATS, RatedCsv
 from arena.rating.bootstrap import Unit
 from arena.rating.leaderboard import Intervals, Leaderboard, Method, Order, rate
-from arena.rating.rules import unit_for
+from arena.rating.rules import TooManyContestants, unit_for
 from arena.rating.votes_file import VotesFile, read_votes
 from arena.rating.votes_table import SIDE, VotesFileUnreadable, columns_of
 from augment.sentences import escape_controls
@@ -102,11 +101,6 @@ def add_arguments(parser: ArgumentParser) -> None:
         metavar="WHAT",
         help="rate models as if alike in: side, or NAME of columns NAME_a and NAME_b of numbers",
     )
-    parser.add_argument(
-        "--by",
-        metavar="COLUMN",
-        help="also by what this column says, each value drawn towards all (table and json)",
-    )
     parser.add_argument("--format", choices=FORMATS, default="table")
 
 
@@ -120,7 +114,6 @@ def run(
     rounds: int | None = None,
     seed: int = 0,
     adjust: Sequence[str] = (),
-    by: str | None = None,
     format: str = "table",
     progress: ProgressLine | None = None,
 ) -> str:
@@ -130,17 +123,16 @@ def run(
         CsvNotRated: The file can't be read or the options don't fit it.
     """
     _check_draws(method, intervals, rounds, seed)
-    _check_columns(method, intervals, adjust, by, format)
+    _check_columns(method, intervals, adjust)
     path = Path(file)
     try:
         columns = columns_of(path)
         chosen, notes = _resample(columns, method, resample)
-        _check_there(columns, adjust, by)
+        _check_there(columns, adjust)
         votes = read_votes(
             path,
             clusters=_CLUSTERS[chosen],
             covariates=adjust,
-            label=by,
             report=progress.read if progress else None,
         )
     except VotesFileUnreadable as error:
@@ -148,23 +140,25 @@ def run(
     except OSError as error:
         raise CsvNotRated(f"{path}: {error.strerror}") from error
     many = votes.comparisons.votes > MANY_VOTES
-    board = rate(
-        votes.comparisons,
-        method=METHODS[method],
-        unit=RESAMPLES[chosen],
-        intervals=INTERVALS[intervals] if intervals else None,
-        order=Order(order),
-        rounds=rounds or (ROUNDS_OF_MANY if many else ROUNDS),
-        seed=seed,
-        workers=os.cpu_count() or 1,
-        report=progress.drawn if progress else None,
-    )
+    try:
+        board = rate(
+            votes.comparisons,
+            method=METHODS[method],
+            unit=RESAMPLES[chosen],
+            intervals=INTERVALS[intervals] if intervals else None,
+            order=Order(order),
+            rounds=rounds or (ROUNDS_OF_MANY if many else ROUNDS),
+            seed=seed,
+            workers=os.cpu_count() or 1,
+            report=progress.drawn if progress else None,
+        )
+    except TooManyContestants as error:
+        raise CsvNotRated(f"{path}: {error}") from error
     rated = RatedCsv(
         board=board,
         resample=chosen,
         notes=_notes(board, votes, notes),
         covariates=tuple(adjust),
-        by=by_label(votes, board, by) if by else None,
     )
     return FORMATS[format](rated)
 
@@ -178,23 +172,18 @@ def _check_draws(method: str, intervals: str | None, rounds: int | None, seed: i
         raise CsvNotRated("elo has no intervals in closed form, only resamples")
 
 
-def _check_columns(
-    method: str, intervals: str | None, adjust: Sequence[str], by: str | None, format: str
-) -> None:
+def _check_columns(method: str, intervals: str | None, adjust: Sequence[str]) -> None:
     if adjust and (method != "bt" or intervals == "resamples"):
         raise CsvNotRated("--adjust needs --method bt with intervals in closed form")
     if len(set(adjust)) < len(adjust):
         raise CsvNotRated("--adjust names something twice")
-    if by and (method == "elo" or format not in ("table", "json")):
-        raise CsvNotRated("--by needs --method bt or davidson and --format table or json")
 
 
-def _check_there(columns: Sequence[str], adjust: Sequence[str], by: str | None) -> None:
+def _check_there(columns: Sequence[str], adjust: Sequence[str]) -> None:
     needed = [f"{name}_{end}" for name in adjust if name != SIDE for end in "ab"]
-    for name in [*needed, *([by] if by else [])]:
+    for name in needed:
         if name not in columns:
-            asked = "--by" if name == by else "--adjust"
-            raise VotesFileUnreadable(f"line 1: there is no column {name!r}, which {asked} needs")
+            raise VotesFileUnreadable(f"line 1: there is no column {name!r}, which --adjust needs")
 
 
 def _resample(columns: Sequence[str], method: str, wanted: str | None) -> tuple[str, list[str]]:

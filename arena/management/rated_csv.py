@@ -10,7 +10,6 @@ from typing import Any
 
 import numpy as np
 
-from arena.management.rated_by import ByLabel, by_document, by_lines
 from arena.rating.leaderboard import Intervals, Leaderboard, Line
 from arena.rating.logistic import Coefficient
 from arena.rating.printed import HEADS as PAPERS_HEADS
@@ -43,7 +42,6 @@ class RatedCsv:
     resample: str
     notes: tuple[str, ...]
     covariates: tuple[str, ...] = ()
-    by: ByLabel | None = None
 
     @property
     def standings(self) -> list[Line]:
@@ -116,8 +114,6 @@ def _table(rated: RatedCsv) -> str:
     missing = [" ".join(f"{line}.".split()) for line in rated.missing]
     said += _judged(rated)
     said += [_adjusted(name, one) for name, one in rated.coefficients]
-    if rated.by is not None:
-        said = [*by_lines(rated.by), *said]
     return "\n".join([*lines, "", *missing, *said, *rated.notes]) + "\n"
 
 
@@ -199,8 +195,6 @@ def _json(rated: RatedCsv) -> str:
             }
             for name, one in rated.coefficients
         ]
-    if rated.by is not None:
-        document["by"] = by_document(rated.by)
     return json.dumps(document, indent=2, ensure_ascii=False) + "\n"
 
 

@@ -58,9 +58,6 @@ class Study(models.Model):
     preregistration = models.TextField(
         blank=True, help_text="the file that was frozen at the opening, as it is downloaded"
     )
-    looks = models.JSONField(
-        default=list, help_text="what the stopping rule saw, one entry a look; no contestant's"
-    )
     opened_at = models.DateTimeField(null=True, blank=True)
     closed_at = models.DateTimeField(
         null=True, blank=True, help_text="when it took its last votes: closed or cancelled"

@@ -81,7 +81,7 @@ def of_study(study: Study) -> StudyProgress:
 
 # --- Private -----------------------------------------------------------------------------------
 
-_LONG = ("rules", "preregistration", "looks")
+_LONG = ("rules", "preregistration")
 """Columns with a line for every picture of a study, which no progress needs."""
 
 

@@ -17,10 +17,9 @@ from arena.rating.comparisons import BoolArray, Comparisons, FloatArray, PairCou
 from arena.rating.components import Loose, loose
 from arena.rating.connectivity import Determined, heaviest_tree
 from arena.rating.logistic import Coefficient, coefficients_of, fit_with_columns
-from arena.rating.many import ManyFitted, fit_many
 from arena.rating.pulls import Pulls, bradley_terry_pulls, davidson_pulls
 from arena.rating.reach import loose_rounds, rounds_to_draw
-from arena.rating.rules import LARGEST_DENSE, Intervals, Method, Order, Rules
+from arena.rating.rules import Intervals, Method, Order, Rules
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -39,7 +38,6 @@ class Fitted:
     strengths: FloatArray | None = None
     tie_strength: float | None = None
     coefficients: tuple[Coefficient, ...] | None = None
-    many: ManyFitted | None = None
 
 
 def fit_votes(votes: Comparisons, counts: PairCounts, rules: Rules) -> Fitted | None:
@@ -72,11 +70,6 @@ def _bradley_terry(votes: Comparisons, counts: PairCounts, rules: Rules) -> Fitt
         adjusted = _adjusted(votes, counts, rules)
         if adjusted is not None:
             return adjusted
-    if len(votes.names) > LARGEST_DENSE and rules.intervals is Intervals.CLOSED_FORM:
-        found = fit_many(len(votes.names), counts.low, counts.high, counts.games, counts.scores)
-        rating = to_elo(found.strengths)
-        samples, rest = _same_everywhere(votes, counts, rules, rating)
-        return Fitted(rating=rating, samples=samples, loose=rest, many=found)
     met = Meetings(contestants=len(votes.names), low=counts.low, high=counts.high)
     point = bradley_terry.newton(met, counts.games[:, None], counts.scores[:, None])[:, 0]
     curvature = bradley_terry.inverse_curvature(met, counts.games, point)

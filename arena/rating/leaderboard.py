@@ -36,12 +36,13 @@ from arena.rating.logistic import Coefficient
 from arena.rating.parts import Rated, rate_part
 from arena.rating.ranking import Separation
 from arena.rating.rules import (
-    LARGEST_DENSE,
+    MOST_CONTESTANTS,
     Intervals,
     Method,
     Order,
     Report,
     Rules,
+    TooManyContestants,
     default_intervals,
 )
 from arena.rating.tiers import standing_order, tiers
@@ -158,12 +159,12 @@ def rate(
         seed: Of its draws; the same votes and seed give the same table.
         k: Points at stake in a vote, online Elo only.
         order: Online Elo's point: the median over shuffled rounds, or the recorded order.
-        details: Also what costs extra: covariance, cross-check and separation. Above 2000
-            contestants neither covariance nor separation.
+        details: Also what costs extra: covariance, cross-check and separation.
         workers: Threads, where they help; the answer does not depend on how many.
         report: Is told how many rounds are done.
 
     Raises:
+        TooManyContestants: More than 2000.
         ValueError: Fewer than one round, online Elo with a unit other than votes, or covariates
             with another method than Bradley-Terry or with resampled intervals.
     """
@@ -174,7 +175,7 @@ def rate(
     rules = Rules(
         method=method,
         unit=unit,
-        intervals=intervals or default_intervals(method, unit, contestants=len(votes.names)),
+        intervals=intervals or default_intervals(method, unit),
         rounds=rounds,
         seed=seed,
         k=k,
@@ -193,6 +194,10 @@ def _intervals_beside_covariates(method: Method, intervals: Intervals | None) ->
 
 
 def _rate(votes: Comparisons, rules: Rules) -> Leaderboard:
+    if len(votes.names) > MOST_CONTESTANTS:
+        raise TooManyContestants(
+            f"at most {MOST_CONTESTANTS} contestants can be rated together, not {len(votes.names)}"
+        )
     counted = tally(votes)
     present = np.flatnonzero(counted.sum(axis=1)).tolist()
     counting = restrict_to(votes, present)
@@ -231,7 +236,7 @@ def _rate(votes: Comparisons, rules: Rules) -> Leaderboard:
         degenerate_rounds=max((found.degenerate for found in rated), default=0),
         covariance=_joined(len(lines), present, parts, rated),
         separation=whole.separation.among(np.array(present), len(lines))
-        if whole and whole.separation and len(lines) <= LARGEST_DENSE
+        if whole and whole.separation
         else None,
         coefficients=whole.coefficients if whole else (),
     )
@@ -299,7 +304,7 @@ def _joined(
     contestants: int, present: list[int], parts: list[tuple[int, ...]], rated: list[Rated]
 ) -> FloatArray | None:
     """(C, C) of the parts' covariances, NaN between parts."""
-    if contestants > LARGEST_DENSE or all(found.covariance is None for found in rated):
+    if all(found.covariance is None for found in rated):
         return None
     joined = np.full((contestants, contestants), np.nan)
     for part, found in zip(parts, rated, strict=True):

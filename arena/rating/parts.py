@@ -11,7 +11,7 @@ import numpy as np
 
 from arena.rating import remarks, sandwich
 from arena.rating.bootstrap import Unit, interval
-from arena.rating.comparisons import Comparisons, FloatArray, IntArray, count_pairs
+from arena.rating.comparisons import Comparisons, FloatArray, count_pairs
 from arena.rating.components import Placed, open_interval, place_on_one_scale
 from arena.rating.connectivity import Status
 from arena.rating.fits import Fitted, fit_votes
@@ -21,13 +21,11 @@ from arena.rating.ranking import (
     Separation,
     above_by_bounds,
     rank_sets,
-    rank_sets_of_many,
     separation,
     shown_ranks,
 )
 from arena.rating.rules import Intervals, Method, Rules
 from arena.rating.simultaneous import judge_pairs
-from arena.rating.sketched import Variances, variances_of
 from augment.sentences import Sentence
 
 _SAME = 1e-6
@@ -90,13 +88,8 @@ def rate_part(votes: Comparisons, rules: Rules, status: Status) -> Rated:
     if status is Status.ALL_TIES:
         return _without_intervals(found, rules, remarks.ONLY_TIES, ())
     everywhere = place_on_one_scale(found.rating, found.samples, found.loose)
-    spread: Spread | Variances | None = None
-    if found.many is not None:
-        reference = everywhere.reference
-        spread = variances_of(
-            votes, found.many, rules.unit, reference, seed=rules.seed, workers=rules.workers
-        )
-    elif rules.intervals is Intervals.CLOSED_FORM and found.pulls is not None:
+    spread: Spread | None = None
+    if rules.intervals is Intervals.CLOSED_FORM and found.pulls is not None:
         spread = spread_of(votes, found.pulls, rules.unit, everywhere.reference)
     if _are_all_the_same(everywhere.values if spread is None else _ends(spread)):
         return _without_intervals(
@@ -110,14 +103,12 @@ def rate_part(votes: Comparisons, rules: Rules, status: Status) -> Rated:
         lost = found.loose.values.shape[1]
         said = remarks.why_no_interval(votes.names, lost=lost, rounds=rules.rounds)
         return _without_intervals(found, rules, remarks.TOO_FEW, said)
-    if isinstance(spread, Variances):
-        return _of_many(votes, rules, found, everywhere, bounds, spread)
     if spread is not None:
         return _in_closed_form(votes, rules, found, everywhere, bounds, spread)
     return _by_rounds(votes, rules, found, everywhere, bounds)
 
 
-def _ends(spread: Spread | Variances) -> FloatArray:
+def _ends(spread: Spread) -> FloatArray:
     """(C, 2) both ends of the intervals, around zero."""
     half = spread.half_widths()
     return np.stack([-half, half], axis=1)
@@ -200,25 +191,6 @@ def _in_closed_form(
     return _with_intervals(votes, rules, fit, everywhere, bounds, judged, spread.covariance, plain)
 
 
-def _of_many(
-    votes: Comparisons,
-    rules: Rules,
-    fit: Fitted,
-    everywhere: Placed,
-    open_bounds: tuple[FloatArray, FloatArray],
-    spread: Variances,
-) -> Rated:
-    """The same without covariances: places go by intervals that hold for all at once."""
-    half = spread.half_widths()
-    below, above = (np.where(np.isnan(bound), np.nan, half) for bound in open_bounds)
-    bounds = (fit.rating - below, fit.rating + above)
-    of_all = spread.half_widths(alike=len(half))
-    places = rank_sets_of_many(bounds, (fit.rating - of_all, fit.rating + of_all))
-    return _with_intervals(
-        votes, rules, fit, everywhere, bounds, None, None, np.sqrt(spread.plain), places
-    )
-
-
 def _with_intervals(
     votes: Comparisons,
     rules: Rules,
@@ -228,15 +200,12 @@ def _with_intervals(
     judged: Separation | None,
     covariance: FloatArray | None,
     plain_error: FloatArray | None,
-    places: tuple[IntArray, IntArray] | None = None,
 ) -> Rated:
     lower, upper = bounds
     rank = shown_ranks(lower, upper, average=float(fit.rating[everywhere.reference].mean()))
-    if places is None:
-        nobody = np.zeros((len(lower), len(lower)), dtype=bool)
-        apart = nobody if judged is None else judged.above
-        places = rank_sets(above_by_bounds(apart, lower, upper))
-    best, worst = places
+    nobody = np.zeros((len(lower), len(lower)), dtype=bool)
+    apart = nobody if judged is None else judged.above
+    best, worst = rank_sets(above_by_bounds(apart, lower, upper))
     unbounded = np.isnan(lower) & np.isnan(upper)
     best[unbounded] = worst[unbounded] = 0
     check = None

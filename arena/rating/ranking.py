@@ -80,30 +80,6 @@ def above_by_bounds(above: BoolArray, lower: FloatArray, upper: FloatArray) -> B
     return np.asarray(above | (apart & (missing[:, None] | missing[None, :])))
 
 
-def rank_sets_of_many(
-    bounds: tuple[FloatArray, FloatArray], wide: tuple[FloatArray, FloatArray]
-) -> tuple[IntArray, IntArray]:
-    """The rank sets (C,), (C,) of thousands, some at a time.
-
-    Args:
-        bounds: (C,), (C,) of each by itself, NaN where there is none.
-        wide: (C,), (C,) that hold for all at once.
-    """
-    lower, upper = bounds
-    contestants = len(lower)
-    missing = np.isnan(lower) | np.isnan(upper)
-    best, worst = np.ones(contestants, dtype=np.int64), np.full(contestants, contestants)
-    at_once = max(1, _NUMBERS_AT_ONCE // contestants)
-    for first in range(0, contestants, at_once):
-        some = slice(first, first + at_once)
-        above = wide[0][some, None] > wide[1][None, :]
-        apart = lower[some, None] > upper[None, :]
-        above |= apart & (missing[some, None] | missing[None, :])
-        best += above.sum(axis=0)
-        worst[some] -= above.sum(axis=1)
-    return best, worst
-
-
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Separation:
     """Which pairs differ, all pairs judged at once: the error is 5 % for the whole table.

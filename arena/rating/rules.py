@@ -31,16 +31,17 @@ class Intervals(StrEnum):
     RESAMPLES = "resamples"
 
 
-LARGEST_DENSE = 2000
-"""Among more contestants no matrix of all of them is made: see `arena.rating.many`."""
+MOST_CONTESTANTS = 2000
+"""Covariances of all pairs are kept as matrices; more contestants are refused."""
 
 
-def default_intervals(method: Method, unit: Unit, *, contestants: int = 0) -> Intervals:
-    """In closed form wherever votes hang together; single votes are resampled as in the paper.
+class TooManyContestants(ValueError):
+    """More contestants than `MOST_CONTESTANTS`; the text says so."""
 
-    Among very many contestants those are in closed form as well: resamples would take hours.
-    """
-    if method is Method.ELO or (unit is Unit.VOTE and contestants <= LARGEST_DENSE):
+
+def default_intervals(method: Method, unit: Unit) -> Intervals:
+    """In closed form wherever votes hang together; single votes are resampled as in the paper."""
+    if method is Method.ELO or unit is Unit.VOTE:
         return Intervals.RESAMPLES
     return Intervals.CLOSED_FORM
 

@@ -36,8 +36,6 @@ from arena.rating.comparisons import (
     split_votes,
 )
 from arena.rating.estimate import LEVEL
-from arena.rating.many import fit_many
-from arena.rating.rules import LARGEST_DENSE
 
 _TAIL = (1.0 - LEVEL) / 2.0
 
@@ -234,12 +232,8 @@ def _levels(votes: Comparisons, part_of: IntArray, unit: Unit) -> FloatArray:
     number = _independent(select_votes(votes, rows), of_row, parts.shape[1], unit)
     share = (_TAIL ** (1.0 / number))[meeting_of]
     scores[across] = games[across] * np.where(scores[across] > 0.0, share, 1.0 - share)
-    if len(votes.names) > LARGEST_DENSE:
-        strengths = fit_many(len(votes.names), counts.low, counts.high, games, scores).strengths
-    else:
-        met = Meetings(contestants=len(votes.names), low=counts.low, high=counts.high)
-        strengths = bradley_terry.newton(met, games[:, None], scores[:, None])[:, 0]
-    strengths = strengths * ELO_PER_LOGIT
+    met = Meetings(contestants=len(votes.names), low=counts.low, high=counts.high)
+    strengths = bradley_terry.newton(met, games[:, None], scores[:, None])[:, 0] * ELO_PER_LOGIT
     _, place = np.unique(part_of, return_inverse=True)
     mean = np.bincount(place, weights=strengths) / np.bincount(place)
     return np.asarray(mean[place])

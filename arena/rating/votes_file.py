@@ -48,14 +48,10 @@ class VotesFile:
             for is one judge or item for all; without either, equal votes are in one row.
         repeats: How many votes repeat an earlier one of the same judge, item and pair; None where
             these were not asked for.
-        labels: What the label column says, in alphabetical order.
-        label_of: (R,) the place of each row's label there; None where none was asked for.
     """
 
     comparisons: Comparisons
     repeats: int | None
-    labels: tuple[str, ...] = ()
-    label_of: IntArray | None = None
 
 
 def read_votes(
@@ -63,7 +59,6 @@ def read_votes(
     *,
     clusters: Sequence[str],
     covariates: Sequence[str] = (),
-    label: str | None = None,
     report: Callable[[int], None] | None = None,
 ) -> VotesFile:
     """Read all votes.
@@ -73,7 +68,6 @@ def read_votes(
         clusters: Which of the optional columns to read; every line must fill them.
         covariates: What else may say who wins: `side`, or a name NAME with columns NAME_a and
             NAME_b of numbers, of which the difference counts.
-        label: A column to tell votes apart by.
         report: Is told how many votes are read.
 
     Raises:
@@ -82,9 +76,8 @@ def read_votes(
             first.
     """
     numbers = [f"{name}_{end}" for name in covariates if name != SIDE for end in "ab"]
-    more = (*clusters, *numbers, *([label] if label else []))
-    wanted = (*NEEDED, *more)
-    names = [_Codes() for _ in range(1 + len(more))]
+    wanted = (*NEEDED, *clusters, *numbers)
+    names = [_Codes() for _ in wanted[2:]]
     try:
         rows, counts = _read(path, wanted, names, report)
     except VotesFileUnreadable:
@@ -108,10 +101,7 @@ def read_votes(
         ]
         votes = replace(found.comparisons, covariates=np.column_stack(columns))
         found = replace(found, comparisons=votes)
-    if label is None:
-        return found
-    places = _alphabetical(names[-1])
-    return replace(found, labels=tuple(sorted(names[-1].names)), label_of=places[rows[:, -1]])
+    return found
 
 
 def _numbers(path: Path, column: str, codes: _Codes) -> NDArray[np.float64]:

@@ -3,27 +3,24 @@
 In: what `arena.services` computes of the votes. Out: what pages and files read. The names of the
 fields are the keys of the stored document (`arena.results.codec`); `since` marks those that came
 with a later version of it. None and empty mean that the votes do not determine it, that nobody
-asked, or that the version which rated did not know of it yet.
+asked, or that the version which rated did not know of it yet. Keys of statistics that are no
+longer computed (bets against experts, types pooled, change within sessions) are passed over.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass, field
 
-from arena.rating.e_values import Bet
-from arena.rating.estimate import Estimate
 from arena.rating.fit_test import FitTest
-from arena.rating.interactions import Interaction
 from arena.rating.position import SideBias
 from arena.rating.raters import Rater
 from arena.rating.reliability import Agreement
 from arena.rating.repeats import Repeats
-from arena.rating.session import Drift
 from arena.results.both_versions import Adjustment, OwnVotes
 from arena.results.kept import Kept
 
 VERSION = 4
-"""3 is without what depends on types, sides and the place in a session; 2 also without adjusted
+"""3 is without what a rating was adjusted for; 2 also without adjusted
 p-values and the measures that came with them; 1 also without the order of the board and without
 notes in the lines of types; a rating of version 0 kept its standings alone."""
 
@@ -95,13 +92,6 @@ class OnlinePlace:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class RaterBet(Bet):
-    """A bet against an expert, and the e-value above which the expert deserves a look."""
-
-    limit: float
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
 class PanelRater(Rater):
     """An expert with what the votes of all say of them.
 
@@ -120,7 +110,6 @@ class PanelRater(Rater):
     moves: int | None
     repeats: tuple[int, int]
     checks: tuple[int, int]
-    bet: RaterBet | None = None
     checks_skipped: int = field(default=0, metadata=_SINCE_5)
     aids: tuple[tuple[str, int], ...] = field(default=(), metadata=_SINCE_5)
 
@@ -132,9 +121,6 @@ class Trust:
     Attributes:
         tie_share: From 0 to 1.
         elo_order: Contestants by Bradley-Terry, with what online Elo makes of them.
-        by_side: Whether some contestants gain more than others by being on the left.
-        by_type: Whether some are stronger on some scenario types.
-        drifts: How experts change within a session.
     """
 
     tie_share: float | None = None
@@ -145,9 +131,6 @@ class Trust:
     removal: Overtaking | None = None
     elo_order: tuple[OnlinePlace, ...] | None = None
     fit: FitTest | None = None
-    by_side: Interaction | None = field(default=None, metadata=_SINCE_4)
-    by_type: Interaction | None = field(default=None, metadata=_SINCE_4)
-    drifts: tuple[Drift, ...] = field(default=(), metadata=_SINCE_4)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -194,11 +177,7 @@ class PairRecord:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class TypeStanding:
-    """A contestant among the votes on one scenario type; `few` are too few to read much from.
-
-    Attributes:
-        pooled: Its rating there, drawn towards that on all types.
-    """
+    """A contestant among the votes on one scenario type; `few` are too few to read much from."""
 
     slug: str
     rating: float | None
@@ -208,7 +187,6 @@ class TypeStanding:
     note: Kept | None = field(default=None, metadata=_SINCE_2)
     votes: int
     few: bool
-    pooled: Estimate = field(default=Estimate(value=None), metadata=_SINCE_4)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -260,8 +238,6 @@ class Results:
     """All of it; without arguments what a rating of version 0 kept.
 
     Attributes:
-        type_spread: By how many points contestants differ from type to type: the standard
-            deviation that pooled ratings of types rest on.
         models: What models contestants ask, by slug.
         judges: Pseudonyms by code.
     """
@@ -274,7 +250,6 @@ class Results:
     adjustment: Adjustment | None = field(default=None, metadata=_SINCE_4)
     pairs: tuple[PairRecord, ...] = ()
     types: tuple[TypeRating, ...] = ()
-    type_spread: Estimate | None = field(default=None, metadata=_SINCE_4)
     displacement: tuple[DisplacementSummary, ...] = ()
     cost: tuple[ScenarioCost, ...] = ()
     models: dict[str, str] = field(default_factory=dict)

@@ -6,7 +6,7 @@ Pairs, scenario types, coverage of the plan, displacement, cost.
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from typing import Any
 
 from django.db.models import Count
@@ -16,7 +16,6 @@ from arena.queries.costs import model_classes, shown_augmentations, spent_on
 from arena.queries.judged import Entrant, Judged, is_imported
 from arena.queries.vote_sets import Filters
 from arena.rating.comparisons import Comparisons, select_votes
-from arena.rating.estimate import Estimate
 from arena.rating.leaderboard import Leaderboard, rate
 from arena.rating.win_rates import win_rates
 from arena.results.tree import (
@@ -77,22 +76,19 @@ def planned_pairs(study: Study, filters: Filters) -> Counter[frozenset[str]]:
     return planned
 
 
-def by_type(
-    arrays: VoteArrays, board: Leaderboard, pooled: Mapping[tuple[str, str], Estimate]
-) -> tuple[TypeRating, ...]:
+def by_type(arrays: VoteArrays, board: Leaderboard) -> tuple[TypeRating, ...]:
     """The rating of every scenario type on its own, as the board's, in the catalogue's order.
 
     Args:
         arrays: The votes that count.
         board: Their rating.
-        pooled: Ratings by type and slug that borrow from each other.
     """
     order = [*Scenario.Type.values]
     known = sorted(
         (name for name in arrays.types if name),
         key=lambda name: order.index(name) if name in order else len(order),
     )
-    return tuple(_one_type(arrays, name, board, pooled) for name in known)
+    return tuple(_one_type(arrays, name, board) for name in known)
 
 
 def displacement(study: Study) -> tuple[DisplacementSummary, ...]:
@@ -139,12 +135,7 @@ def cost(study: Study, entrants: Sequence[Entrant]) -> tuple[ScenarioCost, ...]:
 # --- Private -----------------------------------------------------------------------------------
 
 
-def _one_type(
-    arrays: VoteArrays,
-    name: str,
-    whole: Leaderboard,
-    pooled: Mapping[tuple[str, str], Estimate],
-) -> TypeRating:
+def _one_type(arrays: VoteArrays, name: str, whole: Leaderboard) -> TypeRating:
     votes = select_votes(arrays.comparisons, arrays.type_of == arrays.types.index(name))
     board = rate(
         votes,
@@ -172,7 +163,6 @@ def _one_type(
                 note=line.note or None,
                 votes=line.votes,
                 few=line.votes < FEW_VOTES,
-                pooled=pooled.get((name, line.name), Estimate(value=None)),
             )
             for line in board.standings
         ),

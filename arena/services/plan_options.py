@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from typing import Any
 
-from arena.rating.stopping import StoppingRule
 from arena.services.hypotheses import Hypothesis
 from arena.services.shown_pictures import SampleRule
 
@@ -23,7 +22,6 @@ class PlanOptions:
         samples: Which samples of a cell are shown.
         jobs: Names or codes of the jobs whose augmentations are shown; none for every job.
         hypotheses: What is expected, a line each; see `read_hypotheses`.
-        stopping: When the study is to close; None for never by itself.
     """
 
     repeat_share: float = 0.0
@@ -41,14 +39,10 @@ class PlanOptions:
     samples: SampleRule = SampleRule.ONE
     jobs: tuple[str, ...] = ()
     hypotheses: tuple[str, ...] = ()
-    stopping: StoppingRule | None = None
 
     def frozen_aims(self, hypotheses: Sequence[Hypothesis]) -> dict[str, Any]:
-        """What is expected and when to stop, as the study's rules keep it."""
-        kept: dict[str, Any] = {"hypotheses": [one.as_document() for one in hypotheses]}
-        if self.stopping is not None:
-            kept["stopping"] = asdict(self.stopping)
-        return kept
+        """What is expected, as the study's rules keep it."""
+        return {"hypotheses": [one.as_document() for one in hypotheses]}
 
 
 OF_THE_PLAN = (

@@ -84,7 +84,6 @@ def _document(study: Study) -> dict[str, Any]:
         "pictures": rules["entries"],
         "plan": _plan(study),
         "hypotheses": rules["hypotheses"],
-        "stopping": rules.get("stopping"),
         "analysis": {
             "method": "Bradley-Terry on the Elo scale, ties half a win, mean 1000",
             "intervals": "95 %, two-way over experts and scenarios, closed form",

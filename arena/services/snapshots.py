@@ -16,10 +16,10 @@ from arena.queries.vote_sets import Filters, VoteSet, vote_set
 from arena.rating.bootstrap import Unit
 from arena.rating.comparisons import Comparisons
 from arena.rating.leaderboard import Intervals, Leaderboard, Method, rate
+from arena.rating.rules import TooManyContestants
 from arena.results.tree import VERSION as RESULTS_VERSION
 from arena.results.tree import Results
 from arena.services import breakdowns
-from arena.services.conditions import pooled_by_type
 from arena.services.covariates import adjustment, with_covariates
 from arena.services.own_votes import with_and_without
 from arena.services.trust import board_remarks, precision, trust
@@ -129,14 +129,17 @@ def votes_version_of(snapshot: Snapshot) -> int:
 
 
 def _rate(snapshot: Snapshot, comparisons: Comparisons) -> Leaderboard:
-    return rate(
-        comparisons,
-        method=Method(snapshot.method),
-        rounds=snapshot.rounds,
-        unit=Unit(snapshot.resampling_unit),
-        intervals=Intervals(snapshot.intervals),
-        seed=snapshot.seed,
-    )
+    try:
+        return rate(
+            comparisons,
+            method=Method(snapshot.method),
+            rounds=snapshot.rounds,
+            unit=Unit(snapshot.resampling_unit),
+            intervals=Intervals(snapshot.intervals),
+            seed=snapshot.seed,
+        )
+    except TooManyContestants as error:
+        raise Conflict(f"{snapshot.study.name!r}: {error}") from error
 
 
 def _vote_set(snapshot: Snapshot) -> VoteSet:
@@ -156,7 +159,6 @@ def _results(
     from_file = is_imported(study)
     filters = Filters.of_document(snapshot.filters)
     planned = breakdowns.planned_pairs(study, filters)
-    pooled, type_spread = pooled_by_type(arrays, board)
     return Results(
         version=RESULTS_VERSION,
         board=board_remarks(board),
@@ -165,8 +167,7 @@ def _results(
         own_votes=with_and_without(votes, filters, board, snapshot.covariates),
         adjustment=adjustment(snapshot.covariates, board, plain),
         pairs=breakdowns.pairs(arrays.comparisons, votes.counted, planned),
-        types=breakdowns.by_type(arrays, board, pooled),
-        type_spread=type_spread,
+        types=breakdowns.by_type(arrays, board),
         displacement=() if from_file else breakdowns.displacement(study),
         cost=() if from_file else breakdowns.cost(study, votes.entrants),
         models={

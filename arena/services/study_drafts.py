@@ -22,10 +22,10 @@ Entered = dict[str, str | bool | list[str]]
 
 TEXTS = (
     *("name", "votes_per_expert", "seed", "repeats", "checks", "overlap", "adaptive", "targets"),
-    *("hypotheses", "stop_half_width", "stop_votes", "stop_looks", "samples"),
+    *("hypotheses", "samples"),
 )
 SWITCHES = (
-    *("stop_closes", "allow_both_miss", "show_alike", "allow_text", "allow_replay", "practice"),
+    *("allow_both_miss", "show_alike", "allow_text", "allow_replay", "practice"),
     *("no_measures", "allow_simulated"),
 )
 NAMES = ("contestants", "scenarios", "experts", "jobs")
@@ -159,7 +159,6 @@ def settings_of(study: Study) -> Entered:
         raise Conflict(
             sentence("The votes of '%(name)s' came from a file: it has no rules.", name=study.name)
         )
-    stopping = rules.get("stopping") or {}
     shares = ("repeat_share", "check_share", "overlap_share", "adaptive_share")
     names = ("repeats", "checks", "overlap", "adaptive")
     given: dict[str, object] = {
@@ -172,17 +171,13 @@ def settings_of(study: Study) -> Entered:
         "seed": study.seed,
         "targets": "\n".join(_target_lines(rules)),
         "hypotheses": "\n".join(one.text for one in hypotheses_of(study)),
-        "stop_half_width": _number(stopping.get("half_width")),
-        "stop_votes": _number(stopping.get("votes")),
-        "stop_looks": _number(stopping.get("looks")),
         "samples": rules.get("samples", "one"),
-        "stop_closes": bool(stopping.get("closes")),
         "show_alike": bool(rules.get("show_alike")),
         "no_measures": not study.allow_measures,
         **{
             name: getattr(study, name)
             for name in SWITCHES
-            if name not in ("stop_closes", "show_alike", "no_measures")
+            if name not in ("show_alike", "no_measures")
         },
         "contestants": list(study.contestants.order_by("slug").values_list("slug", flat=True)),
         "scenarios": list(study.scenarios.order_by("slug").values_list("slug", flat=True)),
@@ -267,7 +262,3 @@ def _free_name(name: str) -> str:
 def _target_lines(rules: Mapping[str, Any]) -> list[str]:
     by_pair = [f"{one} vs {other} {votes}" for one, other, votes in rules.get("pair_votes", ())]
     return [f"{slug} {votes}" for slug, votes in rules.get("appearances", ())] + by_pair
-
-
-def _number(value: float | None) -> str:
-    return "" if value is None else f"{value:g}" if isinstance(value, float) else str(value)

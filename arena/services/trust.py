@@ -8,21 +8,16 @@ from typing import Any
 
 import numpy as np
 
-from arena.pairing.order import REPEAT
-from arena.queries.judged import AUTOMATIC
 from arena.queries.vote_sets import VoteSet
 from arena.rating import elo
 from arena.rating.bootstrap import Unit
 from arena.rating.bradley_terry import ELO_PER_LOGIT, MEAN_ELO
 from arena.rating.comparisons import (
-    BoolArray,
     Comparisons,
     FloatArray,
     restrict_to,
-    select_votes,
     tally,
 )
-from arena.rating.e_values import Bet, compute_e_values, detection_limit
 from arena.rating.fit_test import fit_test
 from arena.rating.influence import (
     fewest_votes_to_change_first,
@@ -36,7 +31,6 @@ from arena.rating.ranking import Separation
 from arena.rating.raters import Rater, raters
 from arena.rating.reliability import agreement
 from arena.rating.repeats import Repeats, repeat_consistency
-from arena.rating.side_interaction import side_interaction
 from arena.results.tree import (
     BoardRemarks,
     OnlinePlace,
@@ -44,11 +38,9 @@ from arena.results.tree import (
     PairP,
     PanelRater,
     Precision,
-    RaterBet,
     Trust,
     VotesWanted,
 )
-from arena.services.conditions import by_type, within_sessions
 from arena.services.vote_arrays import SCORES, VoteArrays
 
 AGREEMENT_ROUNDS = 1000
@@ -80,9 +72,6 @@ def trust(arrays: VoteArrays, votes: VoteSet, board: Leaderboard, *, seed: int) 
         side=side_bias(inner) if len(inner) else None,
         repeats=first if first.number else None,
         raters=_panel(arrays, inner, strengths, votes, first),
-        by_side=side_interaction(inner) if strengths is not None else None,
-        by_type=by_type(arrays, strengths, seed=seed),
-        drifts=within_sessions(arrays, strengths, np.flatnonzero(_are_first_looks(votes))),
     )
     if strengths is None:
         return found
@@ -233,9 +222,6 @@ def _panel(
         without = without_each_expert(inner, strengths)
         changes = rank_changes(strengths, without)
     names = {vote.judge: vote.judge_name for vote in votes.counted}
-    # To say the same of the same pictures again is no new evidence.
-    fresh = np.array([vote.kind != REPEAT for vote in votes.counted], dtype=bool)
-    against = compute_e_values(select_votes(inner, fresh))
     return tuple(
         PanelRater(
             **_by_field(line),
@@ -245,21 +231,12 @@ def _panel(
             repeats=repeats.by_expert.get(line.expert, (0, 0)),
             **_checks(votes, arrays.judges[line.expert]),
             aids=_aids(votes, arrays.judges[line.expert]),
-            bet=RaterBet(**_by_field(against[line.expert]), limit=detection_limit(len(against)))
-            if line.expert in against
-            else None,
         )
         for line in raters(inner, ms=arrays.ms, without=without)
     )
 
 
-def _are_first_looks(votes: VoteSet) -> BoolArray:
-    """(V,) whether a person saw the pair for the first time."""
-    seen = (vote.kind not in (REPEAT, AUTOMATIC) for vote in votes.counted)
-    return np.fromiter(seen, dtype=np.bool_, count=len(votes.counted))
-
-
-def _by_field(value: Rater | Bet) -> dict[str, Any]:
+def _by_field(value: Rater) -> dict[str, Any]:
     return {one.name: getattr(value, one.name) for one in fields(value)}
 
 

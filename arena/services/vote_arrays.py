@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from datetime import datetime
 from functools import partial
 
 import numpy as np
@@ -29,8 +28,6 @@ class VoteArrays:
         judges, items, types: Names by their numbers.
         type_of: (V,) the type of each vote's scenario.
         ms: (V,) how long each pair was on screen, not a number where unknown.
-        at_s: (V,) when each vote was given, in seconds; not a number where unknown.
-        position: (V,) the place of each in its expert's own order, not a number where unknown.
     """
 
     comparisons: Comparisons
@@ -39,8 +36,6 @@ class VoteArrays:
     types: tuple[str, ...]
     type_of: IntArray
     ms: FloatArray
-    at_s: FloatArray
-    position: FloatArray
 
 
 def vote_arrays(names: Sequence[str], votes: Sequence[Judged]) -> VoteArrays:
@@ -72,14 +67,6 @@ def vote_arrays(names: Sequence[str], votes: Sequence[Judged]) -> VoteArrays:
         type_of=type_of,
         ms=np.array(
             [np.nan if vote.ms_visible is None else vote.ms_visible for vote in votes],
-            dtype=np.float64,
-        ),
-        at_s=np.array(
-            [datetime.fromisoformat(vote.at).timestamp() if vote.at else np.nan for vote in votes],
-            dtype=np.float64,
-        ),
-        position=np.array(
-            [np.nan if vote.position is None else vote.position for vote in votes],
             dtype=np.float64,
         ),
     )

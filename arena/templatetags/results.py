@@ -58,7 +58,6 @@ _VERBS: dict[str, str | Promise] = {
     "rate early": gettext_lazy("rated early"),
     "rating failed": gettext_lazy("a rating failed"),
     "look early": gettext_lazy("looked at results early"),
-    "look": gettext_lazy("took a look of the stopping rule"),
     "hand over": gettext_lazy("handed over"),
     "plan batch": gettext_lazy("planned a batch"),
     "simulate votes": gettext_lazy("simulated votes"),
@@ -155,14 +154,6 @@ def percent(share: float | None) -> str:
 
 
 @register.filter
-def e_value(value: float) -> str:
-    """One digit behind the point below ten; far up only how far."""
-    if value >= 1000.0:
-        return _("over 1,000")
-    return _decimal(value, 1 if value < 10.0 else 0)
-
-
-@register.filter
 def p_value(value: float) -> str:
     """Two digits; below a hundredth only that."""
     sign, shown = ("<", 0.01) if value < 0.01 else ("=", value)
@@ -220,24 +211,6 @@ def estimate_elo(found: Estimate | None) -> str:
 def estimate_tenths(found: Estimate | None) -> str:
     """Points with one digit after the point and their sign."""
     return _with_interval(found, _change)
-
-
-@register.filter
-def estimate_share_change(found: Estimate | None) -> str:
-    """A change of a share in percentage points, with its sign."""
-    return _with_interval(found, lambda value: _change(100 * value))
-
-
-@register.filter
-def estimate_seconds(found: Estimate | None) -> str:
-    """A change of seconds, with its sign."""
-    return _with_interval(found, lambda value: f"{_change(value)} s")
-
-
-@register.filter
-def seconds_text(value: float | None) -> str:
-    """Seconds with one digit after the point."""
-    return "–" if value is None else f"{_decimal(value, 1)} s"
 
 
 @register.filter

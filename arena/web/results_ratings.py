@@ -9,12 +9,10 @@ from typing import Any
 
 from arena.exports.columns import ON_PAGE
 from arena.exports.heat import heat_map
-from arena.exports.pooled import with_pooled
 from arena.exports.tables import LeaderboardTable, Row, sentences_of
 from arena.models import Snapshot
 from arena.results.tree import Bounds, OnlinePlace, PairRecord, TypeStanding
 from arena.web.charts import bars, interval_chart
-from arena.web.results_conditions import interaction
 
 Context = dict[str, Any]
 """What a tab's template needs."""
@@ -70,7 +68,7 @@ def pairs(snapshot: Snapshot, table: LeaderboardTable) -> Context:
 def types(snapshot: Snapshot, table: LeaderboardTable) -> Context:
     """One small chart and table a scenario type, all on one axis."""
     names = by_slug(table)
-    lines = [with_pooled(line) for part in snapshot.results.types for line in part.lines]
+    lines = [line for part in snapshot.results.types for line in part.lines]
     ends = [end for line in lines for end in (line.lower, line.upper) if end is not None]
     span = (min(ends), max(ends)) if ends else None
     by_name = {row.slug: row.name for row in table.rows}
@@ -85,9 +83,6 @@ def types(snapshot: Snapshot, table: LeaderboardTable) -> Context:
                 "kept": part,
                 "rows": rows,
                 "chart": interval_chart(rows, span),
-                "pooled": {
-                    line.slug: line.pooled for line in part.lines if line.pooled.value is not None
-                },
                 "reasons": sentences_of(reasons, by_name),
             }
         )
@@ -95,8 +90,6 @@ def types(snapshot: Snapshot, table: LeaderboardTable) -> Context:
         "parts": parts,
         "few_votes": FEW,
         "any_few": any(row.votes < FEW for part in parts for row in part["rows"]),
-        "by_type": interaction(snapshot.results.trust.by_type, table.rows),
-        "type_spread": snapshot.results.type_spread,
     }
 
 
@@ -138,8 +131,7 @@ def _pair(
 
 
 def _row(line: TypeStanding, row: Row) -> Row:
-    """A line among the votes of one type; with what it borrows where these are few."""
-    line = with_pooled(line)
+    """A line among the votes of one type."""
     return replace(
         row,
         rank=line.rank,

@@ -2,19 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
 from arena.exports.heat import heat_map
 from arena.exports.plots import plots
 from arena.exports.tables import LeaderboardTable
 from arena.models import Snapshot
 from arena.models.votes import AIDS
-from arena.queries.judged import AUTOMATIC, is_imported
+from arena.queries.judged import AUTOMATIC
 from arena.queries.people import natural_order
 from arena.results.tree import PanelRater
 from arena.web.charts import bars
 from arena.web.results_authors import with_authors
-from arena.web.results_conditions import drifts, interaction
 from arena.web.results_ratings import Context, is_all_tied
 from arena.web.scatter import scatter
 
@@ -35,12 +32,9 @@ def raters(snapshot: Snapshot, table: LeaderboardTable) -> Context:
         "all_tied": is_all_tied(snapshot),
         "panel": panel,
         "aids": aids,
-        "limit": next((line.bet.limit for line in lines if line.bet), None),
         "automatic": sum(line.votes for line in kept if line.judge == AUTOMATIC),
         "automatic_judge": AUTOMATIC,
         "left_bars": bars(left, span=(0.0, 1.0)),
-        "by_side": interaction(snapshot.results.trust.by_side, table.rows),
-        "drifts": drifts(snapshot.results.trust.drifts, _behind_drifts(snapshot, lines)),
     }
 
 
@@ -59,22 +53,6 @@ def coverage(snapshot: Snapshot, table: LeaderboardTable) -> Context:
 
 
 # --- Private -----------------------------------------------------------------------------------
-
-
-def _behind_drifts(snapshot: Snapshot, lines: Sequence[PanelRater]) -> dict[str, int]:
-    """How many votes of people are behind a measure of sessions.
-
-    None where others stand in the same lists: ties that nobody was shown, votes of a file.
-    """
-    if is_imported(snapshot.study) or len(lines) < len(snapshot.results.trust.raters):
-        return {}
-    votes = sum(line.votes for line in lines)
-    return {
-        "ties": votes,
-        "seconds": votes,
-        "agreement": sum(line.shared for line in lines),
-        "left": votes - sum(round(line.ties * line.votes) for line in lines),
-    }
 
 
 def _counts(rater: PanelRater, aids: list[str]) -> Context:

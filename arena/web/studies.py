@@ -24,7 +24,6 @@ from arena.queries.study_drafts import find_drafts
 from arena.queries.votes import tallies
 from arena.services.handing_over import hand_over
 from arena.services.hypotheses import hypotheses_of
-from arena.services.looks import stopping_progress
 from arena.services.preregistration import preregistration_bytes, preregistration_sha256
 from arena.services.studies import cancel_study, close_study, rules_of
 from arena.web.access import ADMIN, STAFF, allow_only
@@ -79,7 +78,6 @@ def study_page(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
         "accounts": by_pseudonym(experts()),
         "hypotheses": hypotheses_of(study),
         "frozen": preregistration_sha256(study),
-        "stopping": stopping_progress(study),
     }
     return render(request, "studies/study.html", context)
 

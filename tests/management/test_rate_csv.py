@@ -16,10 +16,8 @@ from django.core.management import CommandError, call_command
 
 from arena.management.rate_csv import CsvNotRated, run
 from arena.management.rated_csv import COLUMNS
-from arena.rating.bootstrap import Unit
 from arena.rating.comparisons import Comparisons
 from arena.rating.leaderboard import rate
-from arena.rating.pooling import pool_types
 from tests.house.source import ROOT
 from tests.management.votes import HEAD, PLAIN, WITH_CLUSTERS, clustered, document
 from tests.rating.votes import simulated
@@ -174,15 +172,14 @@ def test_what_votes_do_not_determine_is_null_and_explained(votes: Any) -> None:
 # --- The process ---------------------------------------------------------------------------------
 
 
-def a_file(votes: Any) -> tuple[Any, Comparisons, list[int]]:
-    """Votes of three models with how many objects each showed and the kind of scene."""
+def a_file(votes: Any) -> tuple[Any, Comparisons]:
+    """Votes of three models with how many objects each showed."""
     drawn = simulated([1060.0, 1000, 940], 240, 3, experts=6, scenarios=24)
     rng = np.random.default_rng(2)
     objects = rng.integers(0, 5, (240, 2))
     winner = {1.0: "model_a", 0.5: "tie", 0.0: "model_b"}
     lines = [
-        f"{drawn.names[a]},{drawn.names[b]},{winner[score]},j{judge},i{item:02d},{mine},{theirs},"
-        f"{'day' if item % 2 else 'night'}"
+        f"{drawn.names[a]},{drawn.names[b]},{winner[score]},j{judge},i{item:02d},{mine},{theirs}"
         for a, b, score, judge, item, (mine, theirs) in zip(
             drawn.first.tolist(),
             drawn.second.tolist(),
@@ -194,12 +191,12 @@ def a_file(votes: Any) -> tuple[Any, Comparisons, list[int]]:
         )
     ]
     more = np.column_stack([np.ones(240), objects[:, 0] - objects[:, 1]]).astype(np.float64)
-    file = votes(*lines, head=f"{WITH_CLUSTERS},objects_a,objects_b,light")
-    return file, replace(drawn, covariates=more), (drawn.scenario % 2).tolist()
+    file = votes(*lines, head=f"{WITH_CLUSTERS},objects_a,objects_b")
+    return file, replace(drawn, covariates=more)
 
 
 def test_ratings_are_adjusted_for_the_side_and_for_columns_of_numbers(votes: Any) -> None:
-    file, drawn, _ = a_file(votes)
+    file, drawn = a_file(votes)
     board = rate(drawn)
     found = document(file, adjust=("side", "objects"))
     ratings = {row["model"]: row["rating"] for row in found["standings"]}
@@ -212,38 +209,19 @@ def test_ratings_are_adjusted_for_the_side_and_for_columns_of_numbers(votes: Any
     assert re.search(r"^objects: [+-]\d+\.\d points for one, 95 % ", table, re.M)
 
 
-def test_ratings_by_a_column_are_drawn_towards_all(votes: Any) -> None:
-    file, drawn, dark = a_file(votes)
-    pooled = pool_types(drawn, np.array(dark), 2, Unit.TWO_WAY)
-    assert pooled is not None
-    found = document(file, by="light")["by"]
-    assert [(one["value"], one["votes"]) for one in found["values"]] == [
-        ("day", dark.count(1)),
-        ("night", dark.count(0)),
-    ]
-    night = [one["rating"] for one in found["values"][1]["pooled"]]
-    assert night == pytest.approx(pooled.rating[0].tolist(), abs=1e-3)
-    assert found["test"]["df"] == 2
-    table = run(file=str(file), by="light")
-    assert "light day, " in table
-    assert "Models against light: score test" in table
-
-
 @pytest.mark.parametrize(
     ("options", "said"),
     [
         ({"adjust": ("length",)}, "no column 'length_a', which --adjust needs"),
-        ({"adjust": ("light",)}, "no column 'light_a'"),
+        ({"adjust": ("weight",)}, "no column 'weight_a'"),
         ({"adjust": ("side", "side")}, "names something twice"),
         ({"adjust": ("side",), "method": "elo"}, "needs --method bt with intervals in closed"),
-        ({"by": "weather"}, "no column 'weather', which --by needs"),
-        ({"by": "light", "format": "csv"}, "--format table or json"),
     ],
 )
 def test_what_the_file_does_not_have_is_refused(
     votes: Any, options: dict[str, Any], said: str
 ) -> None:
-    file, _, _ = a_file(votes)
+    file, _ = a_file(votes)
     with pytest.raises(CsvNotRated, match=said):
         run(file=str(file), **options)
 

@@ -17,15 +17,10 @@ from pytest_django import Settings
 from arena.management import doctor
 from arena.management.doctor import Level, examine
 from arena.models import ApiToken
-from arena.rating.stopping import StoppingRule
-from arena.services.looks import take_due_looks
 from arena.services.people import create_person
-from arena.services.plan_options import PlanOptions
-from arena.services.studies import open_study
 from arena.serving import readiness
 from augment.models import Endpoint, GenerationJob, Worker
 from augment.services.clock import DATABASE_TIME
-from tests import study_rows
 from tests.brokers import MEMORY, broker_at
 
 pytestmark = pytest.mark.django_db
@@ -169,18 +164,4 @@ def test_a_token_in_use_that_expires(
     )  # fmt: skip
     assert wrong() == ({"token nightly": Level.DOUBTFUL} if is_told else {})
     ApiToken.objects.filter(pk=token.pk).update(revoked_at=now)
-    assert wrong() == {}
-
-
-def test_a_look_that_nobody_takes() -> None:
-    rule = StoppingRule(half_width=5.0, looks=2)
-    study = open_study(
-        name="Round 1", votes_per_expert=9, seed=7, options=PlanOptions(stopping=rule),
-        **study_rows.cast_of(),
-    )  # fmt: skip
-    assert wrong() == {}
-    for one in study.matchups.all():
-        study_rows.vote(one)
-    assert wrong() == {"study Round 1": Level.DOUBTFUL}
-    take_due_looks()
     assert wrong() == {}

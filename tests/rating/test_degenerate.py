@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 import pytest
 
 from arena.rating.bootstrap import Unit
 from arena.rating.comparisons import Comparison, as_arrays
 from arena.rating.connectivity import Status
-from arena.rating.leaderboard import Leaderboard, Method
+from arena.rating.leaderboard import Leaderboard, Method, rate
+from arena.rating.rules import TooManyContestants
 from tests.rating.votes import by_votes, named, versus
 
 
@@ -155,3 +158,21 @@ def test_rules_that_make_no_sense_are_refused() -> None:
         by_votes(votes, method=Method.ELO, unit=Unit.SCENARIO)
     with pytest.raises(ValueError, match="named twice"):
         as_arrays(("a", "a"), [])
+
+
+def test_experts_who_cancel_themselves_out_leave_no_degrees_of_freedom() -> None:
+    votes = [
+        Comparison(first=first, second=second, score=score, expert=expert, scenario="s")
+        for first, second, expert in (("c", "b", "x"), ("b", "a", "y"))
+        for score in (0.0, 1.0)
+    ]
+    board = rate(as_arrays(("a", "b", "c"), votes), unit=Unit.EXPERT, rounds=30)
+    assert [line.rating for line in board.lines] == pytest.approx([1000.0] * 3)
+    bounds = [bound for line in board.lines for bound in (line.lower, line.upper)]
+    assert all(bound is None or math.isfinite(bound) for bound in bounds)
+
+
+def test_more_than_two_thousand_contestants_are_refused() -> None:
+    names = [f"c{number}" for number in range(2001)]
+    with pytest.raises(TooManyContestants, match="not 2001"):
+        rate(as_arrays(names, versus("c0", "c1", 1, 0, 0)))

@@ -10,12 +10,11 @@ from typing import Any
 import krippendorff
 import numpy as np
 import pytest
-import statsmodels.api as sm
 from scipy.stats import t
 
 from arena.rating.estimate import Estimate
 from tests.results.oracles import POINTS, codes, glm
-from tests.results.raw import CHECKS, RawVote, Shown, strengths_of
+from tests.results.raw import CHECKS, Shown
 
 pytestmark = pytest.mark.django_db  # so that there is a database; the study is made once
 
@@ -84,7 +83,7 @@ def test_the_panel_counts_what_each_expert_did(shown: Shown) -> None:
     assert sum(line.checks[0] for line in shown.results.trust.raters) == CHECKS
 
 
-def test_the_side_and_whom_it_serves(shown: Shown) -> None:
+def test_what_the_side_is_worth(shown: Shown) -> None:
     votes = shown.main
     experts = codes([vote.judge for vote in votes])
     found = glm(
@@ -97,42 +96,3 @@ def test_the_side_and_whom_it_serves(shown: Shown) -> None:
     half = t.ppf(0.975, groups - 1) * found.bse[-1] * POINTS * math.sqrt(groups / (groups - 1))
     assert side.advantage.value == pytest.approx(value, abs=1e-4)
     assert side.advantage.upper == pytest.approx(value + half, rel=1e-5)
-    both = np.array([[float(slug in vote.names) for slug in shown.slugs] for vote in votes])
-    each = glm(votes, shown.slugs, both).params[len(shown.slugs) - 1 :]
-    kept = shown.results.trust.by_side
-    assert kept is not None
-    effects = {cell.contestant: cell.effect.value for cell in kept.cells}
-    for slug, one in zip(shown.slugs, 2 * (each - each.mean()) * POINTS, strict=True):
-        assert effects[slug] == pytest.approx(one, abs=1e-3)
-
-
-def test_types_against_contestants_by_raos_score(shown: Shown) -> None:
-    votes = shown.main
-    design = strengths_of(votes, shown.slugs)
-    types = codes([vote.type for vote in votes])
-    null = glm(votes, shown.slugs)
-    extra = np.hstack([design * (types == one)[:, None] for one in range(1, types.max() + 1)])
-    score = null.model.score_test(
-        null.params, k_constraints=extra.shape[1], exog_extra=extra, observed=False
-    )[0]
-    kept = shown.results.trust.by_type
-    assert kept is not None
-    assert kept.statistic == pytest.approx(float(np.squeeze(score)), rel=1e-5)
-    assert kept.freedom == extra.shape[1]
-
-
-def test_change_within_sessions_by_least_squares(shown: Shown) -> None:
-    # All votes were drawn at one moment: a session an expert, in the order of their plan.
-    kept = {one.measure: one for one in shown.results.trust.drifts}
-    by_judge: dict[str, list[RawVote]] = defaultdict(list)
-    for vote in shown.main:
-        by_judge[vote.judge].append(vote)
-    x, y, level = [], [], []
-    for number, own in enumerate(by_judge.values()):
-        x += [place / 100 for place in range(len(own))]
-        y += [float(vote.score == 0.5) for vote in own]
-        level += [number] * len(own)
-    design = np.column_stack([np.array(level)[:, None] == np.arange(len(by_judge)), x])
-    slope = sm.OLS(np.array(y), design.astype(float)).fit().params[-1]
-    assert kept["ties"].slope.value == pytest.approx(slope, abs=1e-9)
-    assert kept["ties"].votes == len(shown.main)

@@ -255,21 +255,4 @@ def test_each_type_is_rated_by_its_own_votes(shown: Shown) -> None:
                     assert bound == pytest.approx(rating[line.slug] + sign * width, rel=1e-4)
 
 
-def test_pooled_ratings_lie_between_the_whole_and_the_type(shown: Shown) -> None:
-    # The exact answer is checked in tests/rating/test_pooling.py; here that it is this study's.
-    whole = elo_of(glm(shown.main, shown.slugs), shown.slugs)
-    nearer = total = 0
-    for part in shown.results.types:
-        assert all(line.pooled.lower is not None for line in part.lines)
-        if part.reasons:
-            continue
-        own = elo_of(glm([v for v in shown.main if v.type == part.type], shown.slugs), shown.slugs)
-        for line in part.lines:
-            assert line.pooled.value is not None
-            far = abs(own[line.slug] - whole[line.slug])
-            nearer += abs(line.pooled.value - whole[line.slug]) <= far + 3.0
-            total += 1
-    assert nearer > 0.9 * total
-
-
 # --- Raters --------------------------------------------------------------------------------------

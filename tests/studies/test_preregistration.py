@@ -1,15 +1,13 @@
-"""What is frozen at the opening, what the results answer, and the stopping rule at work."""
+"""What is frozen at the opening, and what the results answer."""
 
 from __future__ import annotations
 
 import hashlib
 import json
 from dataclasses import replace
-from io import StringIO
 from typing import Any
 
 import pytest
-from django.core.management import call_command
 from django.urls import reverse
 
 from arena.errors import NothingToPlan
@@ -17,17 +15,15 @@ from arena.exports.bundle import bundle_files
 from arena.exports.tables import leaderboard_table
 from arena.exports.writers import FORMATS, plain_text
 from arena.models import Study
-from arena.rating.stopping import StoppingRule
 from arena.results.tree import PairP
 from arena.services.hypotheses import HypothesisVerdict
-from arena.services.looks import stopping_progress, take_due_looks, take_look
 from arena.services.plan_options import PlanOptions
 from arena.services.preregistration import preregistration_bytes, preregistration_sha256
 from arena.services.ratings import rate
 from arena.services.studies import close_study, open_study
-from augment.models import Contestant, Event
+from augment.models import Contestant
 from tests import study_rows
-from tests.web.cast import names_of_contestants, people, signed_in
+from tests.web.cast import people, signed_in
 
 pytestmark = pytest.mark.django_db
 
@@ -56,7 +52,7 @@ def voted(study: Study, most: int = 1000, *, slips: int = 7) -> None:
 
 
 def test_the_file_is_frozen_at_the_opening_and_names_everything_but_people() -> None:
-    study = opened(hypotheses=LINES, overlap_share=0.2, stopping=StoppingRule(half_width=25.0))
+    study = opened(hypotheses=LINES, overlap_share=0.2)
     frozen = preregistration_bytes(study)
     document = json.loads(frozen)
     assert document["hypotheses"] == [
@@ -66,7 +62,6 @@ def test_the_file_is_frozen_at_the_opening_and_names_everything_but_people() -> 
     ]
     assert document["seed"] == 7
     assert document["rules"]["overlap_share"] == 0.2
-    assert document["stopping"]["half_width"] == 25.0
     assert [one["slug"] for one in document["contestants"]] == ["ann", "bob", "cid"]
     assert document["product"]["version"] == "0.1.0"
     assert len(document["pictures"]) == 18
@@ -141,64 +136,3 @@ def test_staff_download_it_and_an_expert_does_not() -> None:
     assert answer.content == preregistration_bytes(study)
     assert "round-1-preregistration.json" in answer.headers["Content-Disposition"]
     assert signed_in(accounts["expert"]).get(url).status_code == 403
-
-
-def test_a_look_is_taken_when_its_votes_are_there_and_once() -> None:
-    study = opened(votes=18, stopping=StoppingRule(half_width=5.0, looks=3))
-    voted(study, 29)
-    assert take_due_looks() == []
-    voted(study, 0)
-    for one in study.matchups.order_by("position", "pk")[29:31]:
-        study_rows.vote(one)
-    assert take_due_looks() == [study]
-    assert take_due_looks() == []
-    study.refresh_from_db()
-    assert [look["votes"] for look in study.looks] == [31]
-    assert not study.looks[0]["met"]
-    found = stopping_progress(study)
-    assert found is not None
-    assert [(line.votes, line.is_done) for line in found.lines] == [
-        (31, True), (60, False), (90, False)
-    ]  # fmt: skip
-
-
-def test_a_stale_worker_takes_no_second_look() -> None:
-    study = opened(votes=18, stopping=StoppingRule(half_width=5.0, looks=3))
-    voted(study, 31)
-    stale = Study.objects.get()
-    assert take_look(study)
-    assert not take_look(stale)
-
-
-@pytest.mark.parametrize(("closes", "state"), [(True, "closed"), (False, "open")])
-def test_the_rule_closes_or_proposes_as_it_says(closes: bool, state: str) -> None:
-    study = opened(votes=18, stopping=StoppingRule(half_width=900.0, looks=2, closes=closes))
-    voted(study, 45, slips=2)
-    out = StringIO()
-    call_command("check_stopping", stdout=out)
-    study.refresh_from_db()
-    assert study.state == state
-    assert "look 1 at 45 votes" in out.getvalue()
-    assert f"the rule is met, the study is {state}." in out.getvalue()
-    person = people()["admin"]
-    page = signed_in(person).get(reverse("study", args=[study.code])).content.decode()
-    assert ("The rule is met: the study can be closed." in page) == (not closes)
-
-
-def test_at_its_votes_it_is_met_however_wide_intervals_are() -> None:
-    study = opened(votes=18, stopping=StoppingRule(half_width=1.0, votes=40, closes=True))
-    voted(study, 40)
-    take_due_looks()
-    study.refresh_from_db()
-    assert (study.state, study.looks[-1]["met"]) == ("closed", True)
-
-
-def test_nothing_of_a_contestant_leaves_a_look() -> None:
-    study = opened(votes=18, stopping=StoppingRule(half_width=5.0, looks=3))
-    voted(study, 31)
-    take_due_looks()
-    study.refresh_from_db()
-    event = Event.objects.get(verb="look")
-    assert set(study.looks[0]) == {"votes", "at", "level", "widest", "met"}
-    said = json.dumps([study.looks, event.after])
-    assert not [word for word in names_of_contestants() if word in said]

@@ -2,10 +2,6 @@
 
 from __future__ import annotations
 
-import re
-from dataclasses import replace
-from typing import Any
-
 import pytest
 from django.contrib.auth.models import User
 from django.test import Client
@@ -15,11 +11,8 @@ from pytest_django import DjangoAssertNumQueries
 from arena.exports.bundle import bundle_files
 from arena.models import EarlyLook, Matchup, Snapshot, Study
 from arena.queries.vote_sets import Filters
-from arena.rating.e_values import Manner
-from arena.results.tree import RaterBet
 from arena.services.ratings import plan_snapshot, rate
 from arena.services.studies import close_study
-from arena.templatetags.results import estimate_elo
 from arena.web.results_tabs import TABS
 from augment.models import Scenario
 from tests import study_rows
@@ -94,33 +87,6 @@ def test_types_stand_on_one_axis_with_a_warning_where_votes_are_few(
     assert "Lines marked with * have fewer than 30 votes: too few to read much from." in shown
 
 
-def test_pages_and_files_show_what_depends_on_types_sides_and_sessions(
-    study: Study, analyst: Client
-) -> None:
-    kept = study.snapshots.get().results
-    assert kept.trust.by_type is not None
-    assert kept.trust.by_side is not None
-    shown = page(analyst, study, "types")
-    assert f"{kept.trust.by_type.statistic:.1f} on {kept.trust.by_type.freedom} degrees" in shown
-    # Ten votes of a contestant on a type: many have no interval of their own, all a pooled one.
-    lines = [line for part in kept.types for line in part.lines]
-    assert any(line.lower is None or line.upper is None for line in lines)
-    assert all(line.pooled.lower is not None for line in lines)
-    assert "pooled with the other types" in shown
-    assert all(estimate_elo(line.pooled) in shown for line in lines)
-    shown = page(analyst, study, "raters")
-    assert f"{kept.trust.by_side.statistic:.1f} on {kept.trust.by_side.freedom} degrees" in shown
-    assert [one.measure for one in kept.trust.drifts][:2] == ["ties", "seconds"]
-    for one in kept.trust.drifts:
-        number = rf'<td class="num">(<a [^>]*>)?{one.votes}(</a>)?</td></tr>'
-        assert re.search(number, shown), one.measure
-    files = bundle_files(study.snapshots.get())
-    assert files["type_effects.csv"].count(b"\n") == 1 + 5 * 9
-    assert files["side_effects.csv"].count(b"\n") == 1 + 9
-    assert files["sessions.csv"].startswith(b"measure,votes,sessions,experts,first_quarter")
-    assert b",too_few,note,pooled_elo,pooled_lower,pooled_upper" in files["types.csv"]
-
-
 def test_raters_are_pseudonyms_with_repeats_and_checks(analyst: Client) -> None:
     study = study_rows.a_study(votes_per_expert=9)
     first, second, third, *rest = study_rows.matchups_of(study, "eva")
@@ -160,38 +126,6 @@ def test_a_skipped_attention_check_is_neither_passed_nor_failed(analyst: Client)
     assert 'part=checks_skipped&amp;mark=check" data-votes="1"' in shown
     assert 'aid=zoom" data-votes="7"' in shown
     assert b",1,zoom=7" in bundle_files(snapshot)["raters.csv"]
-
-
-@pytest.mark.parametrize(
-    ("bet", "said"),
-    [
-        ({"e_value": 3.14159, "manner": Manner.BLIND, "votes": 20, "limit": 40.0}, ">3.1</td>"),
-        ({"e_value": 39.9, "manner": Manner.BLIND, "votes": 20, "limit": 40.0}, ">40</td>"),
-        (
-            {"e_value": 45.0, "manner": Manner.BLIND, "votes": 20, "limit": 40.0},
-            "as if not looking",
-        ),
-        (
-            {"e_value": 1e12, "manner": Manner.SWAPPED, "votes": 20, "limit": 40.0},
-            ">over 1,000</td>",
-        ),
-        (
-            {"e_value": 1e12, "manner": Manner.SWAPPED, "votes": 20, "limit": 40.0},
-            "keys were swapped",
-        ),
-        (None, "–</td></tr>"),
-    ],
-)
-def test_who_votes_as_if_without_looking_is_pointed_out(
-    study: Study, analyst: Client, bet: dict[str, Any] | None, said: str
-) -> None:
-    snapshot = Snapshot.objects.get(study=study)
-    trust = snapshot.results.trust
-    first = replace(trust.raters[0], bet=None if bet is None else RaterBet(**bet))
-    trust = replace(trust, raters=(first, *trust.raters[1:]))
-    results = replace(snapshot.results, trust=trust)
-    Snapshot.objects.filter(pk=snapshot.pk).update(results=results)
-    assert said in page(analyst, study, "raters")
 
 
 def test_experts_read_the_table_but_nothing_about_each_other(study: Study) -> None:

@@ -13,7 +13,6 @@ from django.urls import reverse
 
 from arena.models import Study, StudyDraft
 from arena.pairing.plan import plan
-from arena.rating.stopping import StoppingRule
 from arena.services.accounts import forget_identity
 from arena.services.plans import rules_of
 from arena.services.studies import PlanOptions, open_study
@@ -66,15 +65,15 @@ def test_a_draft_keeps_every_field_as_it_stands(admin: Client) -> None:
     sent = {
         "name": "Round 1", "contestants": ["bob"], "experts": ["finn"], "targets": "ann lots",
         "scenarios": ["place-0", "place-3"], "votes_per_expert": "", "seed": "77",
-        "repeats": "12.5", "checks": "99", "hypotheses": "ann above", "stop_votes": "40",
-        "stop_closes": "on", "allow_text": "on", "samples": "all", "keep": "1",
+        "repeats": "12.5", "checks": "99", "hypotheses": "ann above",
+        "allow_text": "on", "samples": "all", "keep": "1",
     }  # fmt: skip
     answer = admin.post(NEW, sent)
     draft = StudyDraft.objects.get()
     assert answer.headers["Location"] == page_of(draft)
     shown = admin.get(page_of(draft))
     assert shown.status_code == 200, "what is not finished is no error yet"
-    for name in ("name", "seed", "repeats", "checks", "targets", "hypotheses", "stop_votes"):
+    for name in ("name", "seed", "repeats", "checks", "targets", "hypotheses"):
         assert value(shown, name) == sent[name], name
     assert value(shown, "votes_per_expert") == "", "no number comes back that was deleted"
     for name in ("contestants", "experts", "scenarios"):
@@ -232,7 +231,6 @@ def a_rich_study() -> Study:
     options = PlanOptions(
         repeat_share=0.25, overlap_share=0.1, appearances=(("ann", 20), ("bob", 15), ("cid", 13)),
         allow_both_miss=True, allow_measures=False, hypotheses=("ann above bob", "It is so."),
-        stopping=StoppingRule(half_width=25.0, votes=30, looks=3, closes=True),
     )  # fmt: skip
     return open_study(
         name="Round 1", **study_rows.cast_of(), votes_per_expert=12, seed=4, options=options

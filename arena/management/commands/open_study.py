@@ -12,7 +12,6 @@ from arena.models import Study
 from arena.pairing.target_lines import read_targets
 from arena.queries.coverage import shared_units
 from arena.queries.inventory import CHECK_PERCENT, usual_checks
-from arena.rating.stopping import StoppingRule
 from arena.services.preregistration import preregistration_sha256
 from arena.services.shown_pictures import SampleRule
 from arena.services.studies import PlanOptions, open_study
@@ -87,7 +86,7 @@ class Command(TerminalCommand):
         self._add_picture_arguments(parser)
 
     def _add_aims(self, parser: CommandParser) -> None:
-        """What is expected, and when to stop."""
+        """What is expected."""
         parser.add_argument(
             "--hypothesis",
             action="append",
@@ -95,23 +94,6 @@ class Command(TerminalCommand):
             metavar="LINE",
             help='what is expected, frozen with the study; "SLUG above SLUG" is answered by the '
             "results; may be given several times",
-        )
-        parser.add_argument(
-            "--stop-half-width",
-            type=float,
-            metavar="ELO",
-            help="close when every 95 %% interval is at most ± so many points at a look",
-        )
-        parser.add_argument(
-            "--stop-votes", type=int, metavar="N", help="close at so many votes at the latest"
-        )
-        parser.add_argument(
-            "--looks", type=int, default=5, metavar="N", help="looks fixed in advance (default 5)"
-        )
-        parser.add_argument(
-            "--stop-closes",
-            action="store_true",
-            help="let the rule close the study; without it an admin is told",
         )
 
     def _add_picture_arguments(self, parser: CommandParser) -> None:
@@ -181,7 +163,6 @@ class Command(TerminalCommand):
                     appearances=appearances,
                     pair_votes=pair_votes,
                     hypotheses=tuple(options["hypothesis"]),
-                    stopping=self._stopping(options),
                     allow_both_miss=options["both_miss"],
                     allow_text=options["text"],
                     settle_alike=not options["show_alike"],
@@ -195,19 +176,6 @@ class Command(TerminalCommand):
         except (ArenaError, AugmentError) as error:
             raise CommandError(str(error)) from error
         self._say(study)
-
-    def _stopping(self, options: dict[str, Any]) -> StoppingRule | None:
-        if options["stop_half_width"] is None and options["stop_votes"] is None:
-            return None
-        try:
-            return StoppingRule(
-                half_width=options["stop_half_width"],
-                votes=options["stop_votes"],
-                looks=options["looks"],
-                closes=options["stop_closes"],
-            )
-        except ValueError as error:
-            raise CommandError(str(error)) from error
 
     def _checks(self, asked: float | None) -> float:
         """The percentage; without one it depends on what was drawn, and that is said."""
