@@ -50,15 +50,15 @@ class TooFast(ArenaError):
 
 
 class DatabaseBusy(ArenaError):
-    """Something long keeps the database to itself. Nothing was written; send it again later."""
+    """The database is locked or its disk is full. Nothing was written; send it again later."""
 
     retry_after_s = 2
 
     def __init__(self) -> None:
         super().__init__(
             sentence(
-                "Something long is being written just now, so nothing was saved. Try again in "
-                "%(seconds)s s.",
+                "The database can't be written just now (it is busy, or its disk is full), so "
+                "nothing was saved. Try again in %(seconds)s s.",
                 seconds=self.retry_after_s,
             )
         )

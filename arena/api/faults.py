@@ -38,7 +38,7 @@ def answer_broken(request: HttpRequest) -> JsonResponse:
 
 
 def answer_busy(request: HttpRequest) -> JsonResponse:
-    """503: something long keeps the database to itself; nothing was written."""
+    """503: the database can't be written just now."""
     return _fault(503, "busy", translate(DatabaseBusy()))
 
 

@@ -20,7 +20,7 @@ OF_ALL = {
     406: "Answers are JSON.",
     422: "The address or the body is wrong; `fields` says where.",
     429: "Too many requests; `Retry-After` says when the next one is taken.",
-    503: "Something long is being written; `Retry-After` says when to try again.",
+    503: "The database is busy or its disk is full; `Retry-After` says when to try again.",
 }
 OF_CHANGES = {
     400: "Refused; the message says why and what is allowed.",

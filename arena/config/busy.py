@@ -14,14 +14,14 @@ from django.http.response import HttpResponseBase
 
 from arena.config import faults
 from arena.errors import DatabaseBusy
-from arena.services.turns import is_lock_fault, limit_waiting
+from arena.services.turns import is_transient, limit_waiting
 from augment.errors import MediaFault
 
 logger = logging.getLogger(__name__)
 
 
 class BusyMiddleware:
-    """Answers 503 where a lock or the storage of pictures was not to be had; ask again later."""
+    """Answers 503 where the database can't be written or pictures can't be reached for now."""
 
     def __init__(self, get_response: Callable[[HttpRequest], HttpResponseBase]) -> None:
         self.get_response = get_response
@@ -32,7 +32,8 @@ class BusyMiddleware:
 
     def process_exception(self, request: HttpRequest, exception: Exception) -> HttpResponse | None:
         """Tell it from faults of ours, which stay what they are."""
-        if isinstance(exception, DatabaseBusy) or is_lock_fault(exception):
+        if isinstance(exception, DatabaseBusy) or is_transient(exception):
+            logger.warning("%s", exception.__cause__ or exception)
             return faults.answer_busy(request)
         if isinstance(exception, MediaFault):
             logger.error("%s", exception)

@@ -26,8 +26,10 @@ STUCK_S = 1.0
 LOOK_EVERY_S = 0.001
 """How often a thread looks whether another process has left; one thread a process does."""
 
-_SQLITE_LOCKED = {5, 6}
-_POSTGRESQL_LOCKED = {"55P03", "40P01"}
+_SQLITE_TRANSIENT = {5, 6, 13}
+"""Busy, locked, full: the primary result codes."""
+_POSTGRESQL_TRANSIENT = {"55P03", "40P01", "53100"}
+"""Lock not available, deadlock detected, disk full."""
 
 
 @contextmanager
@@ -46,7 +48,7 @@ def in_turn(*, within_s: float | None = None) -> Iterator[None]:
             for as long as it takes.
 
     Raises:
-        DatabaseBusy: It took longer; nothing was written.
+        DatabaseBusy: It took longer, or the disk is full; nothing was written.
     """
     if connection.in_atomic_block:
         yield  # who holds SQLite's lock already must not wait for somebody who waits for it
@@ -59,18 +61,18 @@ def in_turn(*, within_s: float | None = None) -> Iterator[None]:
         else:
             yield  # web servers limit the waiting of their connections: arena.config.wsgi
     except OperationalError as error:
-        if limit is not None and is_lock_fault(error):
+        if limit is not None and is_transient(error):
             raise DatabaseBusy from error
         raise
 
 
-def is_lock_fault(error: BaseException) -> bool:
-    """Whether somebody else kept a lock for longer than one may wait for it."""
+def is_transient(error: BaseException) -> bool:
+    """Return whether a database error may pass: a lock was not to be had, or the disk is full."""
     cause = error.__cause__
     code = getattr(cause, "sqlite_errorcode", None)
     if code is not None:
-        return (code & 0xFF) in _SQLITE_LOCKED
-    return getattr(cause, "sqlstate", None) in _POSTGRESQL_LOCKED
+        return (code & 0xFF) in _SQLITE_TRANSIENT
+    return getattr(cause, "sqlstate", None) in _POSTGRESQL_TRANSIENT
 
 
 def limit_waiting(connection: BaseDatabaseWrapper, within_s: float) -> None:

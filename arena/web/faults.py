@@ -26,7 +26,7 @@ def answer_broken(request: HttpRequest) -> HttpResponse:
 
 
 def answer_busy(request: HttpRequest) -> HttpResponse:
-    """503: something long keeps the database to itself, so nothing is asked of it here."""
+    """503: the database can't be written just now, so nothing is asked of it here."""
     return HttpResponse(render_to_string("503.html"), status=503)
 
 

@@ -6,7 +6,9 @@ import os
 import subprocess
 import sys
 import threading
+from collections.abc import Iterator
 from concurrent.futures import Future, ThreadPoolExecutor, as_completed
+from contextlib import contextmanager
 from pathlib import Path
 
 import pytest
@@ -75,6 +77,34 @@ def test_a_report_behind_a_long_writer_is_given_back_in_the_same_shape() -> None
     error_of(refused, 503, "busy")
     assert refused["Retry-After"] == "2"
     connection.close()
+
+
+@contextmanager
+def full_disk() -> Iterator[None]:
+    """Let a vote need pages that SQLite may not add, as on a full disk (SQLITE_FULL)."""
+    with connection.cursor() as cursor:
+        cursor.execute("CREATE TABLE filler (bytes)")
+        cursor.execute(
+            "CREATE TRIGGER fill AFTER INSERT ON arena_vote "
+            "BEGIN INSERT INTO filler VALUES (zeroblob(100000)); END"
+        )
+        cursor.execute("PRAGMA page_count")
+        cursor.execute(f"PRAGMA max_page_count = {cursor.fetchone()[0]}")
+        yield
+        cursor.execute("PRAGMA max_page_count = 4294967294")
+        cursor.execute("DROP TRIGGER fill")
+        cursor.execute("DROP TABLE filler")
+
+
+@only_sqlite
+def test_a_vote_on_a_full_disk_is_given_back() -> None:
+    matchup = matchups_of(a_study(), "eva")[0]
+    client = signed_in("eva")
+    with full_disk():
+        refused = post(client, body_for(matchup))
+    error_of(refused, 503, "busy")
+    assert refused["Retry-After"] == "2"
+    assert not Vote.objects.exists()
 
 
 @only_sqlite
