@@ -20,6 +20,8 @@ from augment.scene.lane_graph import AnyLane
 NARROWEST_M: Final = 0.1
 _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(12)
 """Lengths of cubics to far below a millimetre."""
+_SAMPLES: Final = 9
+"""So many points of a piece are held against a lane's edges."""
 _SHARPEST: Final = 0.3
 """Pieces may turn by this cosine at most between one end and the other: about 70 degrees."""
 
@@ -52,10 +54,6 @@ class End:
             right_m=(self.right_m + other.right_m) / 2.0,
         )
 
-    def step_m(self, other: End) -> float:
-        """How far the edges of two ends are apart."""
-        return max(abs(self.left_m - other.left_m), abs(self.right_m - other.right_m))
-
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class ReferenceLine:
@@ -65,7 +63,6 @@ class ReferenceLine:
         stations_m: (N + 1,) arc length along the pieces at each point.
         start, end: How it begins and ends.
         left_m, right_m: (N + 1,) from the line to the lane's edges, left positive.
-        off_m: How far the curve leaves the straight line between two points at most.
     """
 
     pieces: tuple[Piece, ...]
@@ -74,7 +71,6 @@ class ReferenceLine:
     stations_m: FloatArray
     left_m: FloatArray
     right_m: FloatArray
-    off_m: float
 
     @property
     def length_m(self) -> float:
@@ -121,7 +117,6 @@ def reference_line(
         stations_m=np.concatenate([[0.0], np.cumsum(lengths)]),
         left_m=edges[:, 0],
         right_m=edges[:, 1],
-        off_m=max(_bulge(piece) for piece in pieces),
     )
 
 
@@ -134,6 +129,32 @@ def directions(points_m: FloatArray) -> FloatArray:
         [ways[:1], ways[:-1] * lengths[1:, None] + ways[1:] * lengths[:-1, None], ways[-1:]]
     )
     return np.asarray(mean / np.maximum(np.hypot(mean[:, 0], mean[:, 1]), 1e-12)[:, None])
+
+
+def deviation_m(line: ReferenceLine, way: AnyLane) -> float:
+    """Return how far the edges of a road lie beside those of its way at most."""
+    import shapely
+
+    at = np.linspace(0.0, 1.0, _SAMPLES)[:, None] ** np.arange(4)
+    slope = np.column_stack([np.zeros(_SAMPLES), at[:, :3] * (1.0, 2.0, 3.0)])
+    written: tuple[list[FloatArray], list[FloatArray]] = ([], [])
+    for row, piece in enumerate(line.pieces):
+        local, tangent = (
+            np.column_stack([powers @ piece.u, powers @ piece.v]) for powers in (at, slope)
+        )
+        gone_m = np.hypot(*np.diff(local, axis=0).T).cumsum()
+        share = np.concatenate([[0.0], gone_m / gone_m[-1]])
+        normal = np.column_stack([-tangent[:, 1], tangent[:, 0]])
+        normal /= np.hypot(*normal.T)[:, None]
+        cos, sin = np.cos(piece.heading_rad), np.sin(piece.heading_rad)
+        for edge, offsets_m in zip(written, (line.left_m, line.right_m), strict=True):
+            beside_m = offsets_m[row] + share * (offsets_m[row + 1] - offsets_m[row])
+            points = local + beside_m[:, None] * normal
+            edge.append(points @ np.array([[cos, sin], [-sin, cos]]) + (piece.x_m, piece.y_m))
+    return max(
+        shapely.LineString(np.vstack(made)).hausdorff_distance(shapely.LineString(own.points_m))
+        for made, own in zip(written, bounds_of(way), strict=True)
+    )
 
 
 # Private
@@ -163,13 +184,6 @@ def _length(u: FloatArray, v: FloatArray) -> float:
     at = (_NODES + 1.0) / 2.0
     slopes = [poly[1] + 2.0 * poly[2] * at + 3.0 * poly[3] * at**2 for poly in (u, v)]
     return float((np.hypot(*slopes) * _WEIGHTS).sum() / 2.0)
-
-
-def _bulge(piece: Piece) -> float:
-    at = np.linspace(0.0, 1.0, 9)[:, None] ** np.arange(4)
-    line = np.column_stack([at @ piece.u, at @ piece.v])
-    chord = line[-1]
-    return float(np.abs(line[:, 1] * chord[0] - line[:, 0] * chord[1]).max() / np.hypot(*chord))
 
 
 def _edges(way: AnyLane, points: FloatArray, tangents: FloatArray) -> FloatArray:

@@ -16,6 +16,7 @@ import numpy as np
 from augment.formats.opendrive_geometry import (
     End,
     ReferenceLine,
+    deviation_m,
     directions,
     reference_line,
 )
@@ -53,22 +54,21 @@ def map_of(cell: Cell, report: LossReport) -> bytes:
         raise CannotExpress("OpenDRIVE needs at least one road, and this scene has no lane")
     network = _Network(scene)
     drive = xodr.OpenDrive(scene.name, revMajor=REVISION[0], revMinor=REVISION[1])
-    lines = _fitted(ways, network, report)
+    lines = _fitted(ways, network)
     for way in ways:
         drive.add_road(_road(xodr, scene, way, lines[way.id], network))
     for junction, members in network.junctions.items():
         drive.add_junction(_junction(xodr, junction, members, network, scene.traffic_side))
     network.report(report)
-    _report(scene, lines, report)
-    return _text(drive.get_element(), cell)
+    deviations = {way.id: deviation_m(lines[way.id], way) for way in ways}
+    _report(scene, deviations, report)
+    return _text(drive.get_element(), cell, max(deviations.values()))
 
 
 # Private
 
 
-def _fitted(
-    ways: Sequence[AnyLane], network: _Network, report: LossReport
-) -> dict[str, ReferenceLine]:
+def _fitted(ways: Sequence[AnyLane], network: _Network) -> dict[str, ReferenceLine]:
     """The lines of all roads, without a step or a kink where one is joined to another."""
     by_id = {way.id: way for way in ways}
     alone = {way.id: reference_line(way) for way in ways}
@@ -80,13 +80,6 @@ def _fitted(
         before, after = alone[str(one.from_lane)], alone[str(one.to_lane)]
         starts[one.id] = ends.get(str(one.from_lane), before.end)
         ends[one.id] = starts.get(str(one.to_lane), after.start)
-    steps = [alone[name].start.step_m(end) for name, end in starts.items()]
-    steps += [alone[name].end.step_m(end) for name, end in ends.items()]
-    if max(steps, default=0.0) > _OFF_M:
-        report.lose(
-            f"{sum(step > _OFF_M for step in steps)} ends of roads take the edges of what they "
-            f"are joined to, up to {max(steps):.2f} m from their own"
-        )
     return {
         name: reference_line(way, start=starts.get(name), end=ends.get(name))
         for name, way in by_id.items()
@@ -273,14 +266,13 @@ def _junction(
     return junction
 
 
-def _report(scene: Scene, lines: dict[str, ReferenceLine], report: LossReport) -> None:
-    off = {name: line.off_m for name, line in lines.items() if line.off_m > _OFF_M}
-    if off:
-        worst = max(off, key=lambda name: off[name])
-        report.lose(
-            f"{len(off)} roads are smooth where our lines have corners, up to "
-            f"{off[worst]:.2f} m beside them ({worst})"
-        )
+def _report(scene: Scene, deviations: dict[str, float], report: LossReport) -> None:
+    worst = max(deviations, key=lambda name: deviations[name])
+    off = sum(deviation > _OFF_M for deviation in deviations.values())
+    report.lose(
+        f"the edges of roads are up to {deviations[worst]:.2f} m beside ours ({worst}), of "
+        f"{off} roads more than {_OFF_M:g} m: roads are smooth and meet at common ends"
+    )
     names = [lane.id for lane in scene.lanes if lane.left_neighbor or lane.right_neighbor]
     report.lose_of(names, "that lanes lie side by side is not said: each is a road of its own")
     names = [
@@ -295,8 +287,8 @@ def _report(scene: Scene, lines: dict[str, ReferenceLine], report: LossReport) -
     report.lose_of(names, "turn types are not said, only the lines")
 
 
-def _text(root: ET.Element, cell: Cell) -> bytes:
-    """The file, its header without the time of day, and with what it covers and where it lies."""
+def _text(root: ET.Element, cell: Cell, most_off_m: float) -> bytes:
+    """The file; its header has no time of day, but extent, origin and greatest deviation."""
     header = root.find("header")
     assert header is not None
     ways: list[AnyLane] = [*cell.after.lanes, *cell.after.connectors]
@@ -313,5 +305,6 @@ def _text(root: ET.Element, cell: Cell) -> bytes:
         code="scenario-arena/origin",
         value=f"{cell.after.origin.frame}: {pose.x_m!r} {pose.y_m!r} {pose.heading_rad!r}",
     )
+    ET.SubElement(header, "userData", code="scenario-arena/deviation-m", value=f"{most_off_m:.3f}")
     ET.indent(root)
     return f"<?xml version='1.0' encoding='UTF-8'?>\n{ET.tostring(root, 'unicode')}\n".encode()
