@@ -121,7 +121,6 @@ class SimulationsView(ApiView):
         if given["planner"] != PLANNERS[0]:
             given["offsets"] = OFFSETS[0]  # they are those of PDM-Closed
         options = Options(**given)
-        options.check_built_in()
         warnings: list[str] = []
         with transaction.atomic():
             waiting = simulations.plan_job(job=job, options=options)

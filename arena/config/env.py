@@ -73,6 +73,19 @@ def names(name: str, *, default: tuple[str, ...]) -> list[str]:
     return list(read(name, default, parse, "names separated by commas are needed"))
 
 
+def dotted_paths(name: str) -> tuple[str, ...]:
+    """Dotted paths of Python classes, separated by commas; none by default."""
+
+    def parse(raw: str) -> tuple[str, ...]:
+        paths = tuple(path.strip() for path in raw.split(",") if path.strip())
+        for path in paths:
+            if "." not in path or not all(part.isidentifier() for part in path.split(".")):
+                raise ValueError(path)
+        return paths
+
+    return read(name, (), parse, "use PACKAGE.MODULE.CLASS, more than one separated by commas")
+
+
 def origins(name: str) -> list[str]:
     """Addresses of other servers with their scheme, separated by commas; none by default."""
 

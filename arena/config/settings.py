@@ -256,6 +256,8 @@ STALE_AFTER_S = env.integer("ARENA_STALE_AFTER_S", default=20, low=2, high=3600)
 # Else every row would be taken away from the worker that is busy with it.
 env.at_least_twice("ARENA_STALE_AFTER_S", STALE_AFTER_S, "ARENA_HEARTBEAT_S", HEARTBEAT_S)
 RECOVER_EVERY_S = env.integer("ARENA_RECOVER_EVERY_S", default=30, low=1, high=3600)
+# A planner is code that workers import: beside the built-in ones these alone.
+PLANNERS = env.dotted_paths("ARENA_PLANNERS")
 
 LLM_QUEUE_S = env.integer("ARENA_LLM_QUEUE_S", default=1800, low=1, high=86400)
 LLM_TIMEOUT_S = env.integer("ARENA_LLM_TIMEOUT_S", default=120, low=1, high=3600)

@@ -107,7 +107,7 @@ def enrol(*, token: str, external_id: str, agreed_sha256: str) -> EnrolledVoter:
 
     Args:
         token: Of the link.
-        external_id: What they entered; one id has one place.
+        external_id: What they entered; one id has one place, however its letters are cased.
         agreed_sha256: Of the text that they agreed to, as it was shown.
 
     Raises:
@@ -128,7 +128,7 @@ def enrol(*, token: str, external_id: str, agreed_sha256: str) -> EnrolledVoter:
         raise Conflict(
             sentence("The text was changed meanwhile. Please read it again before you agree.")
         )
-    if enrolment.voters.filter(external_id=external_id).exists():
+    if enrolment.voters.filter(external_id__iexact=external_id).exists():
         raise Conflict(
             sentence(
                 "“%(id)s” takes part already. Go on where you began, in the same browser.",

@@ -120,10 +120,13 @@ def write_rows(model: type[models.Model], lines: Iterable[bytes]) -> int:
 
 def find_filled_tables() -> list[str]:
     """The tables that keep an installation from being an empty one."""
+    there = connection.introspection.table_names()
     return [
         label_of(model)
         for model in find_tables()
-        if label_of(model) not in MADE_BY_MIGRATING and model._base_manager.exists()
+        if model._meta.db_table in there
+        and label_of(model) not in MADE_BY_MIGRATING
+        and model._base_manager.exists()
     ]
 
 

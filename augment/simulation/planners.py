@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import importlib
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 from functools import partial
 
 from augment.errors import CannotDrive, UnknownName
@@ -23,15 +23,16 @@ PDM_CLOSED, IDM = "pdm-closed", "idm"
 NAMED = (PDM_CLOSED, IDM)
 
 
-def planner_named(name: str, *, offsets: str = "paper") -> Planner:
-    """A fresh planner.
+def planner_named(name: str, *, offsets: str = "paper", allowed: Collection[str] = ()) -> Planner:
+    """Return a fresh planner; the only place where a planner's module is imported.
 
     Args:
-        name: One of `NAMED`, or the dotted path of a class without arguments.
+        name: One of `NAMED`, or one of `allowed`.
         offsets: One of `OFFSETS_M`; PDM-Closed's alone.
+        allowed: Dotted paths of classes without arguments that may be imported.
 
     Raises:
-        UnknownName: No such name or offsets.
+        UnknownName: The name is not allowed, or there are no such offsets.
         CannotDrive: The path leads to nothing, or to something that is no planner.
     """
     if offsets not in OFFSETS_M:
@@ -42,8 +43,9 @@ def planner_named(name: str, *, offsets: str = "paper") -> Planner:
     }
     if name in known:
         return known[name]()
-    if "." not in name:
-        raise UnknownName("planner", name, [*NAMED, "a dotted path"])
+    paths = [path for path in allowed if "." in path]
+    if name not in paths:
+        raise UnknownName("planner", name, [*NAMED, *paths])
     return _of_path(name)
 
 

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import sys
 from datetime import timedelta
 from io import StringIO
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -11,6 +13,7 @@ import pytest
 from django.core.management import call_command
 from django.core.management.base import CommandError
 from django.utils import timezone
+from pytest_django import Settings
 
 from arena.exports.driving_table import DrivingTable
 from augment.errors import Conflict, UnknownName
@@ -29,6 +32,12 @@ pytestmark = pytest.mark.django_db
 
 State, Subject = Simulation.State, Simulation.Subject
 STRAIGHT = Options(planner="tests.jobs.test_simulations.Straight")
+BROKEN = Options(planner="tests.jobs.test_simulations.Broken")
+
+
+@pytest.fixture(autouse=True)
+def allowed(settings: Settings) -> None:
+    settings.PLANNERS = (STRAIGHT.planner, BROKEN.planner)
 
 
 class Straight:
@@ -99,13 +108,12 @@ def test_a_row_is_driven_once() -> None:
 
 def test_a_planner_that_breaks_is_a_failed_row_that_can_be_driven_again() -> None:
     job = finished_job()
-    broken = Options(planner="tests.jobs.test_simulations.Broken")
-    driven(job, broken)
+    driven(job, BROKEN)
     assert {row.state for row in Simulation.objects.all()} == {State.FAILED}
     assert {row.reason for row in Simulation.objects.all()} == {"RuntimeError: no idea"}
-    table = driving_scores.scores_of_job(job, options=broken, score="nuplan")
+    table = driving_scores.scores_of_job(job, options=BROKEN, score="nuplan")
     assert table.failures == (("RuntimeError: no idea", 3),)
-    assert len(simulations.plan_job(job=job, options=broken)) == 3
+    assert len(simulations.plan_job(job=job, options=BROKEN)) == 3
 
 
 def test_a_planner_that_nobody_knows_is_named() -> None:
@@ -185,6 +193,32 @@ def test_the_command_drives_a_job_and_prints_the_table() -> None:
     assert "[3/3]" in text
     assert "Unmodified scene" in text
     assert "99.8" in text
+
+
+def test_a_planner_that_is_not_allowed_is_never_imported(
+    settings: Settings, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "evil_planner.py").write_text("raise SystemExit('imported')")
+    monkeypatch.syspath_prepend(tmp_path)
+    evil = "evil_planner.Planner"
+    (first, *_) = simulations.plan_job(job=finished_job(), options=STRAIGHT)
+    Simulation.objects.update(planner=evil)
+    assert simulations.find_unsent(older_than=timedelta(0)) == [], "left to who named it"
+    assert simulations.drive(simulation_pk=first), "a message came all the same"
+    row = Simulation.objects.get(pk=first)
+    assert (row.state, evil in row.reason) == (State.FAILED, True)
+    with pytest.raises(UnknownName, match="evil_planner"):
+        simulations.plan_job(job=GenerationJob.objects.get(), options=Options(planner=evil))
+    assert "evil_planner" not in sys.modules
+
+
+def test_the_command_line_names_a_planner_for_its_own_process_alone(settings: Settings) -> None:
+    settings.PLANNERS = ()
+    finished_job()
+    with pytest.raises(CommandError, match="pdm-closed"):
+        said("Round 1", planner=STRAIGHT.planner, queue=True)
+    assert not Simulation.objects.exists()
+    assert "[3/3]" in said("Round 1", planner=STRAIGHT.planner)
 
 
 def test_the_command_drives_a_scenario_and_says_it_again() -> None:

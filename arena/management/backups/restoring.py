@@ -13,7 +13,6 @@ from django.core.files.base import ContentFile
 from django.core.files.storage import default_storage
 from django.core.management import call_command
 from django.db import DatabaseError, IntegrityError, connection, models, transaction
-from django.db.migrations.recorder import MigrationRecorder
 
 from arena.errors import ArenaError
 from arena.exports.files import write_whole
@@ -31,7 +30,6 @@ from arena.management.backups.archive import (
     read_manifest,
 )
 from arena.services import stored_rows
-from arena.serving.readiness import find_unapplied_migrations
 from augment.models import Endpoint
 
 REFUSED = (DatabaseError, ValidationError)
@@ -107,18 +105,14 @@ def _restore(
 ) -> None:
     """Pictures and rows, or neither."""
     _check_release(manifest)
-    missing = find_unapplied_migrations()
-    if missing and MigrationRecorder(connection).applied_migrations():
-        raise ArenaError(
-            "An empty installation is needed, and this one has tables of another release. "
-            "Point DATABASE_URL to a new database."
-        )
-    call_command("migrate", interactive=False, verbosity=0)
+    # Before tables are made as well: a database of another release is left as it is, and one
+    # without rows is what a restore leaves that was killed while it made them.
     if filled := stored_rows.find_filled_tables():
         raise ArenaError(
             f"An empty installation is needed, and this one has rows in {', '.join(filled)}. "
             "Point DATABASE_URL to a new database."
         )
+    call_command("migrate", interactive=False, verbosity=0)
     written: list[str] = []
     try:
         _write_media(source, manifest, written)

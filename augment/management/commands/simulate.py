@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 from argparse import ArgumentParser
+from collections.abc import Collection
 from datetime import timedelta
 from typing import Any, Final
 
@@ -43,7 +44,10 @@ class Command(TerminalCommand):
         """What to drive, and how."""
         parser.add_argument("what", help="name or code of a job, or slug of a scenario")
         parser.add_argument(
-            "--planner", default="pdm-closed", help="pdm-closed, idm, or a class's dotted path"
+            "--planner",
+            default="pdm-closed",
+            help="pdm-closed, idm, or a class's dotted path; the workers (--queue) load "
+            "only the ones of ARENA_PLANNERS",
         )
         parser.add_argument(
             "--offsets",
@@ -77,14 +81,16 @@ class Command(TerminalCommand):
         )
         scenario = Scenario.objects.filter(slug=options["what"]).first()
         job = None if scenario is not None else find_job(options["what"])
+        also = () if options["queue"] else (how.planner,)
+        simulations.load_planner(how, also=also)
         if options["queue"]:
             check_broker()
         with transaction.atomic():
             if scenario is not None:
-                waiting = simulations.plan_scenario(scenario=scenario, options=how)
+                waiting = simulations.plan_scenario(scenario=scenario, options=how, also=also)
             else:
                 assert job is not None
-                waiting = simulations.plan_job(job=job, options=how)
+                waiting = simulations.plan_job(job=job, options=how, also=also)
             if options["queue"]:
                 transaction.on_commit(lambda: enqueue_simulations(waiting))
         if options["queue"]:
@@ -95,7 +101,7 @@ class Command(TerminalCommand):
         # A worker that runs beside this command may have taken some: they are waited for.
         open_rows = list(asked.filter(state__in=Simulation.UNDER_WAY).order_by("pk"))
         for number, row in enumerate(open_rows, start=1):
-            self._say(_finished(row.pk), number, len(open_rows), options["score"])
+            self._say(_finished(row.pk, also), number, len(open_rows), options["score"])
         if job is not None:
             self._table(scores_of_job(job, options=how, score=options["score"]))
         elif not open_rows:
@@ -138,11 +144,11 @@ class Command(TerminalCommand):
 # Private
 
 
-def _finished(pk: int) -> Simulation:
+def _finished(pk: int, also: Collection[str]) -> Simulation:
     """Drive a row, or wait until the worker that has it is done or has fallen silent."""
     rows = Simulation.objects.select_related("scenario", "augmentation__contestant")
     while True:
-        simulations.drive(simulation_pk=pk)
+        simulations.drive(simulation_pk=pk, also=also)
         row = rows.get(pk=pk)
         if row.state not in Simulation.UNDER_WAY:
             return row

@@ -6,18 +6,19 @@ import json
 import logging
 import time
 import zlib
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Collection, Iterable
 from dataclasses import asdict, dataclass
 from datetime import timedelta
 from types import TracebackType
 from typing import Any
 from uuid import UUID, uuid4
 
+from django.conf import settings
 from django.db import transaction
 from django.db.models import Q, QuerySet
 from django.utils import timezone
 
-from augment.errors import AugmentError, Conflict, LeaseLost, UnknownName
+from augment.errors import AugmentError, Conflict, LeaseLost
 from augment.models import Augmentation, GenerationJob, Scenario, Simulation
 from augment.scene.codec import modification_from_document
 from augment.scene.modification import Modification
@@ -30,6 +31,7 @@ from augment.simulation.criticality import criticality
 from augment.simulation.drive import Drive, run
 from augment.simulation.expert import expert_of
 from augment.simulation.planners import NAMED, PDM_CLOSED, planner_named
+from augment.simulation.planning import Planner
 from augment.simulation.progress import red_lights
 from augment.simulation.road import Road
 from augment.simulation.score import Score, ScoreKind, score_drive
@@ -53,19 +55,6 @@ class Options:
     offsets: str = "paper"
     is_reactive: bool = False
 
-    def check(self) -> None:
-        """Raise UnknownName or CannotDrive unless there is such a planner."""
-        planner_named(self.planner, offsets=self.offsets)
-
-    def check_built_in(self) -> None:
-        """Raise UnknownName unless the planner is one of the project's own.
-
-        A dotted path runs code of whoever names it: that is for the command line, not for pages.
-        """
-        if self.planner not in NAMED:
-            raise UnknownName("planner", self.planner, list(NAMED))
-        self.check()
-
     def of(self, rows: QuerySet[Simulation]) -> QuerySet[Simulation]:
         """Those driven so."""
         return rows.filter(**self.columns)
@@ -76,8 +65,22 @@ class Options:
         return asdict(self)
 
 
+def load_planner(how: Options | Simulation, *, also: Collection[str] = ()) -> Planner:
+    """Return the planner that options or a row name, if this process may load it.
+
+    Args:
+        how: What names it.
+        also: Allowed in this process, beside the built-in planners and the setting PLANNERS.
+
+    Raises:
+        UnknownName, CannotDrive: There is no such planner, or it is not allowed.
+    """
+    allowed = (*settings.PLANNERS, *also)
+    return planner_named(how.planner, offsets=how.offsets, allowed=allowed)
+
+
 @transaction.atomic
-def plan_job(*, job: GenerationJob, options: Options) -> list[int]:
+def plan_job(*, job: GenerationJob, options: Options, also: Collection[str] = ()) -> list[int]:
     """Have every outcome of a job driven, with its scenes before the change and as referred to.
 
     What was driven so already stays; what failed waits again.
@@ -86,10 +89,10 @@ def plan_job(*, job: GenerationJob, options: Options) -> list[int]:
         The keys of all rows that wait.
 
     Raises:
-        UnknownName, CannotDrive: There is no such planner.
+        UnknownName, CannotDrive: As `load_planner`.
         Conflict: The job has nothing to drive yet.
     """
-    options.check()
+    load_planner(options, also=also)
     rows = job.augmentations.filter(state__in=Augmentation.SHOWABLE).select_related("scenario")
     if not rows:
         raise Conflict(
@@ -106,14 +109,20 @@ def plan_job(*, job: GenerationJob, options: Options) -> list[int]:
 
 
 @transaction.atomic
-def plan_scenario(*, scenario: Scenario, options: Options) -> list[int]:
+def plan_scenario(
+    *, scenario: Scenario, options: Options, also: Collection[str] = ()
+) -> list[int]:
     """Have one scenario driven before the change and with its reference; as `plan_job`."""
-    options.check()
+    load_planner(options, also=also)
     return [row.pk for row in _of_scenario(scenario, options) if row.state == State.QUEUED]
 
 
-def drive(*, simulation_pk: int) -> bool:
+def drive(*, simulation_pk: int, also: Collection[str] = ()) -> bool:
     """Claim a row, drive it and write its outcome. A row that nobody may claim is left alone.
+
+    Args:
+        simulation_pk: Which.
+        also: Planners that may be loaded, as `load_planner` takes them.
 
     Returns:
         Whether the row was claimed.
@@ -125,7 +134,7 @@ def drive(*, simulation_pk: int) -> bool:
     rows = Simulation.objects.select_related("scenario__base_scene", "augmentation")
     row = rows.get(pk=simulation_pk)
     with _Settling(row, claim) as settling:
-        settling.outcome = _driven(row, _Beating(simulation_pk, claim))
+        settling.outcome = _driven(row, _Beating(simulation_pk, claim), also)
     return True
 
 
@@ -136,8 +145,12 @@ def requeue_stale(*, older_than: timedelta, now: Moment = DATABASE_TIME) -> int:
 
 
 def find_unsent(*, older_than: timedelta, now: Moment = DATABASE_TIME) -> list[int]:
-    """Keys of waiting rows without a message, or with one sent so long ago."""
-    waiting = Simulation.objects.filter(state=State.QUEUED)
+    """Return the keys of waiting rows without a message, or with one sent so long ago.
+
+    Rows of a planner that no worker may load wait for the command that named it.
+    """
+    loadable = (*NAMED, *settings.PLANNERS)
+    waiting = Simulation.objects.filter(state=State.QUEUED, planner__in=loadable)
     old = Q(sent_at=None) | Q(sent_at__lt=now - older_than)
     return list(waiting.filter(old).order_by("pk").values_list("pk", flat=True))
 
@@ -265,11 +278,13 @@ def _row(
     return row
 
 
-def _driven(row: Simulation, beating: Callable[[int], None]) -> dict[str, Any]:
+def _driven(
+    row: Simulation, beating: Callable[[int], None], also: Collection[str]
+) -> dict[str, Any]:
     """The columns of a row's outcome."""
     setting = setting_of(row)
     road = Road(setting.scene, setting.recording)
-    planner = planner_named(row.planner, offsets=row.offsets)
+    planner = load_planner(row, also=also)
     drove = run(setting, planner, road=road, after_step=beating)
     expert = expert_of(setting, road)
     kind = type_of(row.scenario.type)
