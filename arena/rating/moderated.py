@@ -36,8 +36,12 @@ MOST_PRIOR = 24.0
 """The others count at most like so many further clusters, however alike all contestants seem: one
 whom experts disagree about more is then still seen."""
 
-LEAST = 0.75
+LEAST = 0.6
 """No variance is smaller than this share of what single cells would give."""
+
+LEAST_LEFT = 0.5
+"""The fit leaves at least this share of the effects of clusters, compared with single votes: one
+expert with nearly all votes would make the estimate as large as chance likes."""
 
 _FAR = 1e9
 """Degrees of freedom of what is as good as known."""
@@ -71,7 +75,7 @@ class Spread:
     Attributes:
         covariance: (C, C) in squared points, around the mean of the reference.
         degrees: (C,) of Student's t for a rating.
-        common: (C, C) the covariance if contestants were disagreed about alike.
+        common: (C, C) the covariance if contestants were disagreed about alike, at least `base`.
         base: (C, C) that of independent cells, or votes.
         plain: (C, C) by the plain sandwich, in which each contestant stands for itself.
         components: By kind of cluster; none for votes that count as independent.
@@ -137,12 +141,13 @@ def spread_of(
     pulls = pulls.relative_to(reference)
     kinds = clusters_of(votes, unit)
     base = pulls.by_row()
+    single = base.diagonal()
     cells = np.empty(0, dtype=np.int64)
     if len(kinds) > 1:
         cells, cell_of = renumber_codes(kinds[0][1] * kinds[1][0] + kinds[1][1])
         base = pulls.by_cluster(cell_of, len(cells))
     components = tuple(
-        _component(pulls, base, clusters, of_row, reference) for clusters, of_row in kinds
+        _component(pulls, base, single, clusters, of_row, reference) for clusters, of_row in kinds
     )
     if not components and unit is not Unit.VOTE:
         base = np.zeros_like(base)  # there is but one of what differs: nothing can be said
@@ -152,11 +157,13 @@ def spread_of(
             covariance=base, degrees=known, common=base, base=base, plain=base, components=()
         )
     found = sum((component.covariance for component in components[1:]), components[0].covariance)
-    common = sum((component.common for component in components[1:]), components[0].common)
+    # What clusters add is never negative: equals drawn with less would be told apart too often.
+    added = (part.common - base for part in components if part.common.trace() > base.trace())
+    common = sum(added, base)
     plain = sum((component.plain for component in components[1:]), components[0].plain)
     if len(components) > 1:
         plain = plain - base * len(cells) / max(len(cells) - 1, 1)
-        found, common = found - base, common - base
+        found = found - base
     least = np.maximum(found.diagonal(), LEAST * base.diagonal())
     found = _with_variances(without_negative_parts(found), least)
     return Spread(
@@ -189,6 +196,16 @@ def clusters_of(votes: Comparisons, unit: Unit) -> list[tuple[int, IntArray]]:
     return [(len(codes), of_row) for codes, of_row in codes_by_unit if len(codes) > 1]
 
 
+def left_of_effect(uneven: FloatArray, cubes: FloatArray) -> FloatArray:
+    """Return the share of the variance of cluster effects that the fit leaves in the pulls.
+
+    Args:
+        uneven: (C,) sums of squared shares of a contestant's information by cluster, at most 1.
+        cubes: (C,) sums of cubed shares.
+    """
+    return np.maximum(1.0 - 2.0 * cubes / uneven + uneven, LEAST_LEFT * (1.0 - uneven))
+
+
 def prior_degrees(own: FloatArray, common: FloatArray, degrees: FloatArray) -> float:
     """How many clusters what all have in common counts for: few where contestants differ.
 
@@ -208,20 +225,39 @@ def prior_degrees(own: FloatArray, common: FloatArray, degrees: FloatArray) -> f
 
 
 def _component(
-    pulls: Pulls, base: FloatArray, clusters: int, of_row: IntArray, reference: BoolArray
+    pulls: Pulls,
+    base: FloatArray,
+    single: FloatArray,
+    clusters: int,
+    of_row: IntArray,
+    reference: BoolArray,
 ) -> Component:
+    """What clusters of one kind add; docs/rating.md derives it.
+
+    Args:
+        pulls: What each row pulls at its contestants.
+        base: (C, C) the sandwich of independent cells, or votes.
+        single: (C,) variances by independent votes.
+        clusters: G.
+        of_row: (R,) the cluster of each row.
+        reference: (C,) whose mean is fixed.
+    """
     raw = pulls.by_cluster(of_row, clusters)
-    uneven = np.clip(pulls.concentration(of_row, clusters), 1.0 / clusters, 1.0)
-    left = 1.0 - uneven  # what the fit leaves of a cluster's pulls
+    uneven, cubes = pulls.concentration(of_row, clusters)
+    left_of_votes = 1.0 - uneven
+    left_of_effects = left_of_effect(uneven, cubes)
     effects = _centred(uneven, reference)
-    surplus = raw.diagonal() - base.diagonal() * left
-    room = effects.diagonal() * left
-    weight = np.where(reference, 1.0 / np.maximum(base.diagonal(), 1e-9) ** 2, 0.0)
+    surplus = raw.diagonal() - base.diagonal() * left_of_votes
+    room = effects.diagonal() * left_of_effects
+    # Single votes, as cells contain the effect: weights by these would prefer where it is small.
+    weight = np.where(reference, 1.0 / np.maximum(single, 1e-9) ** 2, 0.0)
     # Chance makes this as often too small as too large: cut off at zero it would be too large.
     effect = float((weight * surplus).sum()) / max(float((weight * room).sum()), 1e-300)
     common = base + effect * effects
     if effect < 0.0:
         common = _at_least(without_negative_parts(common), LEAST * base)
+    of_votes = np.minimum(base.diagonal() / np.maximum(common.diagonal(), 1e-300), 1.0)
+    left = of_votes * left_of_votes + (1.0 - of_votes) * left_of_effects
     degrees = left / uneven
     with np.errstate(invalid="ignore", divide="ignore"):
         own = np.where(left > 0.0, raw.diagonal() / left, 0.0)

@@ -91,10 +91,11 @@ class Pulls:
         place = np.tile(cluster_of, len(ends)) * size + np.concatenate(ends)
         return self._of_ratings(_squares(place, np.concatenate(pulls), clusters, size))
 
-    def concentration(self, cluster_of: IntArray, clusters: int) -> FloatArray:
-        """(C,) how unevenly a contestant's information comes from the clusters.
+    def concentration(self, cluster_of: IntArray, clusters: int) -> tuple[FloatArray, FloatArray]:
+        """(C,), (C,) how unevenly a contestant's information comes from the clusters.
 
-        The sum of squared shares: 1 / G where all give alike, 1 where one gives all.
+        The sums of squared and of cubed shares: 1 / G and 1 / G^2 where all give alike, 1 where
+        one gives all.
         """
         weight = self.information * self.count
         place = np.concatenate([self.first, self.second]) * clusters + np.tile(cluster_of, 2)
@@ -102,8 +103,11 @@ class Pulls:
         given = np.bincount(of_row, weights=np.tile(weight, 2))
         total = np.bincount(met // clusters, weights=given, minlength=self.contestants)
         shares = given / total[met // clusters]
-        squares = np.bincount(met // clusters, weights=shares**2, minlength=self.contestants)
-        return squares.astype(np.float64)
+        squares, cubes = (
+            np.bincount(met // clusters, weights=shares**power, minlength=self.contestants)
+            for power in (2, 3)
+        )
+        return np.minimum(squares, 1.0), cubes.astype(np.float64)
 
     def _of_ratings(self, squares: FloatArray) -> FloatArray:
         """(C, C) from squared sums of slopes (K, K)."""

@@ -59,7 +59,7 @@ def moderated(votes: list[RawVote], slugs: list[str]) -> tuple[np.ndarray, np.nd
     pulls, information = influences(votes, slugs)
     experts, items = codes([v.judge for v in votes]), codes([v.item for v in votes])
     inner = squares(pulls, experts * 1000 + items)
-    base = inner.diagonal()
+    base, single = inner.diagonal(), (pulls**2).sum(axis=0)
     total, parts = -base, []
     number = len(slugs)
     for cluster in (experts, items):
@@ -67,15 +67,19 @@ def moderated(votes: list[RawVote], slugs: list[str]) -> tuple[np.ndarray, np.nd
         raw = squares(pulls, cluster).diagonal()
         shares = np.array([information[cluster == one].sum(axis=0) for one in groups])
         shares /= shares.sum(axis=0)
-        uneven = np.clip((shares**2).sum(axis=0), 1.0 / len(groups), 1.0)
-        left = 1.0 - uneven
+        uneven = (shares**2).sum(axis=0)
+        even_left = 1.0 - uneven
+        left = np.maximum(1.0 - 2.0 * (shares**3).sum(axis=0) / uneven + uneven, 0.5 * even_left)
         centred = np.eye(number) - 1.0 / number
         room = centred @ np.diag(uneven) @ centred
-        weight = 1.0 / base**2
-        effect = (weight * (raw - base * left)).sum() / (weight * room.diagonal() * left).sum()
+        weight = 1.0 / single**2
+        effect = (weight * (raw - base * even_left)).sum()
+        effect /= (weight * room.diagonal() * left).sum()
         values, ways = np.linalg.eigh(inner + effect * room)
         common = ((ways * np.maximum(values, 0.0)) @ ways.T).diagonal()
-        common = common if effect >= 0 else np.maximum(common, 0.75 * base)
+        common = common if effect >= 0 else np.maximum(common, 0.6 * base)
+        noise = np.minimum(base / common, 1.0)
+        left = noise * even_left + (1.0 - noise) * left
         degrees, own = left / uneven, raw / left
         ratio = own / common
         surplus = (degrees * ((ratio - 1) ** 2 - 2 / degrees)).sum() / degrees.sum()
@@ -84,7 +88,7 @@ def moderated(votes: list[RawVote], slugs: list[str]) -> tuple[np.ndarray, np.nd
         variance = (prior * common + degrees * own) / (prior + degrees)
         total = total + variance
         parts.append((variance, np.minimum(prior + degrees, degrees.sum() * (1 - 1 / number))))
-    total = np.maximum(total, 0.75 * base)
+    total = np.maximum(total, 0.6 * base)
     freedom = total**2 / sum(variance**2 / degrees for variance, degrees in parts)
     return t.ppf(0.975, freedom) * np.sqrt(total), total
 
