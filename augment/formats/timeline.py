@@ -7,24 +7,23 @@ Frame of a track: the ego frame of its first moment, metres.
 from __future__ import annotations
 
 import itertools
+import time
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
 from augment.formats.reading import Moment, Reader, Reading
 from augment.geometry.frames import Pose
 from augment.scene.lane_graph import AnyLane
 
-FloatArray = NDArray[np.float64]
-
 EVERY_S = 0.5
 MOST_STOPS = 2_000
 """Moments that are offered; later ones of a longer recording are not."""
-MOST_LOOKS = 24
-"""So many moments are read for the maps, each of them the whole file once more."""
+LOOKS_S = 3.0
+"""So long moments are read for the maps, each of them the whole file once more: seconds of
+computing, of those that its process has (`sandbox.ProcessLimits`)."""
 _LOOKS_OF_A_TRACK = 6
 _ROAD_POINT_EVERY_M = 4.0
 _MOST_ROADS = 600
@@ -48,13 +47,13 @@ class RecordingPart:
 
     Attributes:
         name: Its item, empty where there is one part alone.
-        roads_m: Centrelines (P, 2) around the places that were looked at.
+        roads_m: Points of centrelines around the places that were looked at, to 0.1 m.
         is_seen: Whether anybody looked: a part beyond the bounds has neither places nor roads.
     """
 
     name: str
     stops: list[Stop]
-    roads_m: list[FloatArray] = field(default_factory=list)
+    roads_m: list[list[tuple[float, float]]] = field(default_factory=list)
     is_seen: bool = False
 
 
@@ -78,11 +77,9 @@ def timeline_of(reader: Reader, path: Path, *, every_s: float = EVERY_S) -> Time
     """
     moments = list(itertools.islice(reader.moments(path, every_s=every_s), MOST_STOPS + 1))
     tracks = [_track(name, stops) for name, stops in _parts(moments[:MOST_STOPS])]
-    looks = MOST_LOOKS
+    until_s = time.process_time() + LOOKS_S
     for track in tracks:
-        if looks <= 0:
-            break
-        looks -= _look(track, reader, path, most=min(looks, _LOOKS_OF_A_TRACK))
+        _look(track, reader, path, until_s)
     return Timeline(tracks=tuple(tracks), is_cut=len(moments) > MOST_STOPS)
 
 
@@ -108,27 +105,24 @@ def _track(name: str, moments: list[Moment]) -> RecordingPart:
     return RecordingPart(name=name, stops=[Stop(moment=moment) for moment in moments])
 
 
-def _look(track: RecordingPart, reader: Reader, path: Path, *, most: int) -> int:
-    """Find the ego's places by reading the first moment that has none, again and again.
-
-    Returns:
-        How many moments were read.
-    """
+def _look(track: RecordingPart, reader: Reader, path: Path, until_s: float) -> None:
+    """Find the ego's places by reading the first moment that has none, again and again."""
     frame: Pose | None = None
     looks = 0
     for index in range(len(track.stops)):
-        if track.stops[index].place_m is not None or looks >= most:
+        if looks >= _LOOKS_OF_A_TRACK or time.process_time() > until_s:
+            return
+        if track.stops[index].place_m is not None:
             continue
         moment = track.stops[index].moment
         reading = reader.read(path, item=moment.item, frame=moment.frame, name="look")
         looks += 1
         here = reading.scene.origin.pose
+        track.is_seen = True
         frame = frame or here
         seen = frame.pose_to_local(here)
         _fill_in(track, index, reading, seen)
         _add_roads(track, reading, seen)
-    track.is_seen = looks > 0
-    return looks
 
 
 def _fill_in(track: RecordingPart, first: int, reading: Reading, seen: Pose) -> None:
@@ -158,4 +152,5 @@ def _add_roads(track: RecordingPart, reading: Reading, seen: Pose) -> None:
     for way in ways[: _MOST_ROADS - len(track.roads_m)]:
         line = way.centerline
         every_m = max(_ROAD_POINT_EVERY_M, line.length_m / 60.0)
-        track.roads_m.append(seen.to_parent(line.resampled(every_m).points_m))
+        points_m = seen.to_parent(line.resampled(every_m).points_m)
+        track.roads_m.append([(round(x, 1), round(y, 1)) for x, y in points_m.tolist()])

@@ -8,6 +8,7 @@ from __future__ import annotations
 import pickle
 import sqlite3
 import struct
+import sys
 from collections.abc import Callable
 from pathlib import Path
 
@@ -237,6 +238,75 @@ def scenarionet_of_very_many_steps(root: Path) -> Made:
     return "scenarionet", file
 
 
+def scenarionet_of_nested_tuples_as_a_key(root: Path) -> Made:
+    """A key whose hash takes 2 ** 120 steps in C."""
+    return _pickled(root, b"}K\x01" + b"\x942\x86" * 120 + b"Ns.")
+
+
+def scenarionet_of_a_key_that_is_too_deep_for_the_stack(root: Path) -> Made:
+    return _pickled(root, b"})" + b"\x85" * 390_000 + b"Ns.")
+
+
+def scenarionet_of_a_number_for_bytes(root: Path) -> Made:
+    kind = b"cnumpy\ndtype\n(X\x02\0\0\0f8tR"
+    scalar = b"cnumpy.core.multiarray\nscalar\n(" + kind + b"J" + struct.pack("<i", 2_000_000_000)
+    return _pickled(root, scalar + b"tR.")
+
+
+def scenarionet_of_integers_of_equal_hash(root: Path) -> Made:
+    block = b"".join(
+        pickle.dumps(number * sys.hash_info.modulus, protocol=2)[2:-1] + b"N"
+        for number in range(1, 100_000)
+    )
+    return _pickled(root, b"}(" + block + b"u.")
+
+
+def scenarionet_of_sets_of_a_long_text(root: Path) -> Made:
+    text = "".join(map(chr, range(1_000))).encode()
+    head = b"c__builtin__\nset\n\x94X" + struct.pack("<I", len(text)) + text + b"\x940]\x94("
+    return _pickled(root, head + b"h\x00h\x01\x85R" * 150 + b"e.")
+
+
+def zip_of_very_many_entries(root: Path) -> Made:
+    return _zipped(root, 0xFFFF)
+
+
+def zip_of_more_entries_than_it_says(root: Path) -> Made:
+    return _zipped(root, 1)
+
+
+def _zipped(root: Path, said: int) -> Made:
+    """A zip whose list of contents alone has 4.2 million lines."""
+    file, many = root / "many.zip", 4_200_000
+    local = b"PK\3\4" + bytes(26)
+    entry = b"PK\1\2" + bytes(24) + struct.pack("<H", 1) + bytes(16) + b"a"
+    with file.open("wb") as out:
+        out.write(local)
+        for _ in range(many // 100_000):
+            out.write(entry * 100_000)
+        size = many * len(entry)
+        out.write(b"PK\5\6" + struct.pack("<HHHHIIH", 0, 0, said, said, size, len(local), 0))
+    return "json", file
+
+
+def commonroad_of_one_long_text(root: Path) -> Made:
+    file = root / "long.xml"
+    text = "a" * 60_000_000
+    file.write_text(HEAD.format(version="2020a") + f"<location>{text}</location></commonRoad>")
+    return "commonroad", file
+
+
+def nuplan_of_very_many_tables(root: Path) -> Made:
+    made = _changed_log(root, "SELECT 1")
+    base = sqlite3.connect(made[1])
+    base.execute("PRAGMA writable_schema = ON")
+    rows = ((f"t{number}", f"CREATE TABLE t{number}(a)") for number in range(200_000))
+    base.executemany("INSERT INTO sqlite_master SELECT 'table', ?1, ?1, 2, ?2", rows)
+    base.commit()
+    base.close()
+    return made
+
+
 def nuplan_a_view_without_an_end(root: Path) -> Made:
     return _changed_log(
         root,
@@ -281,6 +351,12 @@ def nuplan_a_map_of_lines_without_an_end(root: Path) -> Made:
     return made
 
 
+def _pickled(root: Path, instructions: bytes) -> Made:
+    file = root / "made.pkl"
+    file.write_bytes(b"\x80\x04" + instructions)
+    return "scenarionet", file
+
+
 def _one_text(text: str, rows: int) -> pa.Array:
     """A column of one text all the way, which takes next to nothing."""
     places = pa.array(np.zeros(rows, np.int8))
@@ -301,6 +377,6 @@ HOSTILE: dict[str, Callable[[Path], Made]] = {
     name: made
     for name, made in list(globals().items())
     if name.split("_")[0]
-    in {"av2", "motion", "json", "commonroad", "waymo", "scenarionet", "nuplan"}
+    in {"av2", "motion", "json", "commonroad", "waymo", "scenarionet", "nuplan", "zip"}
     and callable(made)
 }

@@ -68,14 +68,14 @@ def test_a_broken_scene_is_refused_with_the_place(tmp_path: Path) -> None:
     assert "lanes[1].centerline_m[0][1]" in refused("json", file, "--slug", "crossing")
     file.write_text(json.dumps(document)[:-20])
     assert "scene.json: is not JSON" in refused("json", file, "--slug", "crossing")
-    assert "No such file" in refused("json", tmp_path / "gone.json", "--slug", "crossing")
+    assert "is not there" in refused("json", tmp_path / "gone.json", "--slug", "crossing")
 
 
 def test_a_log_without_its_map_is_refused(tmp_path: Path) -> None:
     folder = write_log(tmp_path / "log")
     shutil.rmtree(folder / "map")
     assert "map/log_map_archive_*.json: no such file" in refused("av2", folder, "--slug", "made")
-    assert "gone: is not a folder" in refused("av2", tmp_path / "gone", "--slug", "made")
+    assert "gone: is not there" in refused("av2", tmp_path / "gone", "--slug", "made")
 
 
 def test_a_frame_source_or_slug_that_can_not_be_is_refused(tmp_path: Path) -> None:

@@ -14,6 +14,7 @@ from pathlib import Path
 from django.contrib.auth.models import User
 
 from augment.errors import AugmentError, InvalidDocument
+from augment.formats.apart import UntrustedInput
 from augment.formats.interplan_instruction import instruction_of
 from augment.formats.interplan_reader import read_entry
 from augment.formats.interplan_schema import (
@@ -25,7 +26,6 @@ from augment.formats.interplan_schema import (
     left_out_of_details,
     left_out_of_file,
 )
-from augment.formats.nuplan.scenario import NuPlan, tokens_in
 from augment.formats.reading import Reading
 from augment.formats.yaml_file import MAX_CHARACTERS, read_yaml_file
 from augment.models import BaseScene, Scenario
@@ -38,6 +38,7 @@ from augment.services.scenarios.scenes import add_scenario
 
 KEY = b"modification_details_dictionary"
 SLUG = "interplan"
+LOGS = "nuplan"
 COLUMNS = ("id", "instruction")
 _MOST_SENTENCES = 10_000
 
@@ -182,7 +183,7 @@ def _look_through(data: Path, wanted: Mapping[str, Details]) -> Iterator[LogLook
         tokens: tuple[str, ...] = ()
         fault = ""
         try:
-            tokens = tokens_in(path, tuple(wanted))
+            tokens = UntrustedInput(path=path, format=LOGS).tokens(list(wanted))
         except InvalidDocument as raised:
             fault = str(raised)
         yield LogLooked(path=path, number=number, of=len(paths), tokens=tokens, fault=fault)
@@ -191,11 +192,11 @@ def _look_through(data: Path, wanted: Mapping[str, Details]) -> Iterator[LogLook
 def _keep_token(
     token: str, details: Details, log: Path, sentences: Mapping[str, str], actor: User | None
 ) -> Iterator[Step]:
-    reader = NuPlan()
+    file = UntrustedInput(path=log, format=LOGS)
     try:
-        reading = reader.read(log, item=token, frame=None, name=f"{SLUG}-{token}")
+        source, reading = file.read(item=token, frame=None, name=f"{SLUG}-{token}")
         row, _ = keep_reading(
-            _with_notes(reading, token, details), reader=reader, path=log, actor=actor
+            _with_notes(reading, token, details), source=source, path=log, actor=actor
         )
     except AugmentError as fault:
         yield from _skip_all(token, details, str(fault))

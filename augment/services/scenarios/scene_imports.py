@@ -11,8 +11,8 @@ from django.contrib.auth.models import User
 from django.db import IntegrityError, transaction
 
 from augment.errors import Conflict
-from augment.formats.readers import reader_of, recognise
-from augment.formats.reading import Moment, Reader, Reading
+from augment.formats.apart import UntrustedInput
+from augment.formats.reading import Moment, Reading
 from augment.models import BaseScene
 from augment.scene.codec import scene_to_document
 from augment.scene.notes import notes_to_document
@@ -61,13 +61,14 @@ def import_scene(
     """
     check_slug(slug, what="scene")
     _refuse_taken(slug)
-    reader = recognise(path) if source is None else reader_of(source)
-    reading = reader.read(path, item=item, frame=frame, name=slug)
+    name, reading = UntrustedInput(path=path, format=source).read(
+        item=item, frame=frame, name=slug
+    )
     document = scene_to_document(reading.scene)
     same = _same(document)
     if same is not None:
         raise Conflict(f"The same scene is stored already, as {same.slug!r}.")
-    return _keep(reading, document, reader=reader, path=path, slug=slug, actor=actor)
+    return _keep(reading, document, source=name, path=path, slug=slug, actor=actor)
 
 
 def import_log(
@@ -96,25 +97,23 @@ def import_log(
         UnknownName, InvalidDocument, Conflict: As above; what was yielded before stays.
     """
     check_slug(f"{slug}-1", what="scene")
-    reader = recognise(path) if source is None else reader_of(source)
+    log = UntrustedInput(path=path, format=source)
     number = 0
-    for count, moment in enumerate(reader.moments(path, every_s=every_s)):
-        if limit is not None and count >= limit:
-            return
+    for moment in log.moments(every_s=every_s)[:limit]:
         number, name = _free(slug, number)
-        reading = reader.read(path, item=moment.item, frame=moment.frame, name=name)
+        format_name, reading = log.read(item=moment.item, frame=moment.frame, name=name)
         document = scene_to_document(reading.scene)
         same = _same(document)
         if same is not None:
             number -= 1
             yield ImportedMoment(moment=moment, row=same, is_new=False)
             continue
-        row = _keep(reading, document, reader=reader, path=path, slug=name, actor=actor)
+        row = _keep(reading, document, source=format_name, path=path, slug=name, actor=actor)
         yield ImportedMoment(moment=moment, row=row, is_new=True)
 
 
 def keep_reading(
-    reading: Reading, *, reader: Reader, path: Path, actor: User | None = None
+    reading: Reading, *, source: str, path: Path, actor: User | None = None
 ) -> tuple[BaseScene, bool]:
     """The row of a scene that was read under its name, and whether it is new.
 
@@ -128,7 +127,7 @@ def keep_reading(
     if same is not None:
         return same, False
     slug = reading.scene.name
-    return _keep(reading, document, reader=reader, path=path, slug=slug, actor=actor), True
+    return _keep(reading, document, source=source, path=path, slug=slug, actor=actor), True
 
 
 # Private
@@ -158,7 +157,7 @@ def _keep(
     reading: Reading,
     document: dict[str, Any],
     *,
-    reader: Reader,
+    source: str,
     path: Path,
     slug: str,
     actor: User | None,
@@ -170,7 +169,7 @@ def _keep(
                 slug=slug,
                 document=document,
                 recording=None if recording is None else recording_to_document(recording),
-                source=reader.name,
+                source=source,
                 provenance=reading.scene.provenance,
                 notes=notes_to_document(reading.notes),
                 content_hash=content_hash(document),
@@ -179,7 +178,7 @@ def _keep(
         raise Conflict(f"There is a scene called {slug!r} already; choose another slug.") from None
     after = {
         "slug": slug,
-        "source": reader.name,
+        "source": source,
         "path": path.name,
         "frame": reading.moment.frame,
     }

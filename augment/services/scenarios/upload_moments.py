@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import logging
+from pathlib import Path
 from typing import Any
 
 from django.contrib.auth.models import User
@@ -122,13 +123,14 @@ def _begin(moment_pk: int) -> UploadMoment | None:
 def _draw_or_keep(row: UploadMoment) -> None:
     wants_scene = row.state == State.KEEPING
     try:
-        with open_upload(row.upload) as (reader, path):
-            name = row.slug if wants_scene else "preview"
-            reading = reader.read(path, item=row.item or None, frame=row.frame, name=name)
-            if wants_scene:
-                scene, _ = keep_reading(reading, reader=reader, path=path, actor=row.asked_by)
-                _end(row, state=State.KEPT, scene=scene)
-                return
+        name = row.slug if wants_scene else "preview"
+        with open_upload(row.upload) as file:
+            source, reading = file.read(item=row.item or None, frame=row.frame, name=name)
+        if wants_scene:
+            path = Path(row.upload.name)
+            scene, _ = keep_reading(reading, source=source, path=path, actor=row.asked_by)
+            _end(row, state=State.KEPT, scene=scene)
+            return
         picture = f"{PREVIEWS}/{row.code}.png"
         camera = camera_for(reading.scene, None)
         store_as(picture, draw(reading.scene, Modification(), camera))

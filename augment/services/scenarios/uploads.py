@@ -10,6 +10,7 @@ from __future__ import annotations
 import hashlib
 import logging
 import re
+import shutil
 import tempfile
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -25,10 +26,9 @@ from django.db.models import F
 from django.utils import timezone
 
 from augment.errors import AugmentError, Conflict, InvalidDocument
-from augment.formats.archive import find_input, is_zip, unpack_zip
-from augment.formats.readers import READERS, reader_of, recognise
-from augment.formats.reading import Reader
-from augment.formats.timeline import RecordingPart, Timeline, timeline_of
+from augment.formats.apart import UntrustedInput
+from augment.formats.readers import READERS, reader_of
+from augment.formats.timeline import RecordingPart, Timeline
 from augment.models import SceneUpload
 from augment.sentences import sentence
 from augment.services.clock import DATABASE_TIME, Moment
@@ -129,31 +129,20 @@ def read_upload(upload_pk: int) -> None:
 
 
 @contextmanager
-def open_upload(row: SceneUpload) -> Iterator[tuple[Reader, Path]]:
-    """The file on this machine, unpacked if it is a zip, and who reads it; gone afterwards.
+def open_upload(row: SceneUpload) -> Iterator[UntrustedInput]:
+    """The file on this machine; gone afterwards.
 
     Raises:
-        InvalidDocument: It is in none of the formats, or is a zip that breaks the rules.
         Conflict: The file was removed.
     """
     with tempfile.TemporaryDirectory(prefix="arena-upload-") as folder:
         path = Path(folder) / row.name
         try:
             with default_storage.open(row.stored) as source, path.open("wb") as file:
-                for piece in source.chunks():
-                    file.write(piece)
+                shutil.copyfileobj(source, file)
         except FileNotFoundError:
             raise Conflict(sentence("The file of “%(name)s” is gone.", name=row.name)) from None
-        asked = [reader_of(row.asked_format)] if row.asked_format else list(READERS.values())
-        if is_zip(path):
-            # The name of a log's folder is told with its scenes.
-            unpacked = Path(folder) / "zip" / path.stem
-            unpacked.mkdir(parents=True)
-            unpack_zip(path, unpacked)
-            path.unlink()
-            yield find_input(unpacked, asked)
-        else:
-            yield (asked[0] if row.asked_format else recognise(path)), path
+        yield UntrustedInput(path=path, format=row.asked_format or None)
 
 
 def plain_name(name: str) -> str:
@@ -191,8 +180,9 @@ def _begin(upload_pk: int) -> SceneUpload | None:
 
 def _find_out(row: SceneUpload) -> None:
     try:
-        with open_upload(row) as (reader, path):
-            _keep(row, reader, timeline_of(reader, path))
+        with open_upload(row) as source:
+            name, timeline = source.look()
+        _end(row, state=State.READ, reason="", format=name, **_columns(timeline))
     except AugmentError as error:
         _end(row, state=State.FAILED, reason=make_storable(str(error))[:LONGEST_REASON])
     except Exception:
@@ -203,10 +193,6 @@ def _find_out(row: SceneUpload) -> None:
 def _end(row: SceneUpload, **columns: Any) -> None:
     running = SceneUpload.objects.filter(pk=row.pk, state=State.RUNNING)
     running.update(finished_at=timezone.now(), heartbeat_at=None, **columns)
-
-
-def _keep(row: SceneUpload, reader: Reader, found: Timeline) -> None:
-    _end(row, state=State.READ, reason="", format=reader.name, **_columns(found))
 
 
 def _columns(found: Timeline) -> dict[str, Any]:
@@ -230,9 +216,7 @@ def _document(track: RecordingPart) -> dict[str, Any]:
             }
             for stop in track.stops
         ],
-        "roads_m": [
-            [[round(x, 1), round(y, 1)] for x, y in line.tolist()] for line in track.roads_m
-        ],
+        "roads_m": track.roads_m,
     }
 
 
