@@ -133,6 +133,7 @@ def run(
             path,
             clusters=_CLUSTERS[chosen],
             covariates=adjust,
+            in_order=method == "elo" and order == Order.RECORDED,
             report=progress.read if progress else None,
         )
     except VotesFileUnreadable as error:
@@ -158,6 +159,7 @@ def run(
         board=board,
         resample=chosen,
         notes=_notes(board, votes, notes),
+        knows_clusters=set(_CLUSTERS[chosen]) == {"judge", "item"} & set(columns),
         covariates=tuple(adjust),
     )
     return FORMATS[format](rated)

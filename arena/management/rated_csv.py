@@ -22,6 +22,7 @@ from arena.rating.printed import (
     rank_text,
     rating_text,
 )
+from arena.rating.ranking import Separation
 from arena.rating.rules import METHOD_TEXTS
 from arena.services.cells import csv_text
 from augment.sentences import escape_controls
@@ -36,17 +37,27 @@ MOST_PAIRS = 100_000
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class RatedCsv:
-    """What came out for a file, and how it was asked."""
+    """What came out for a file, and how it was asked.
+
+    Attributes:
+        knows_clusters: Whether the intervals know of every column by which votes hang together.
+    """
 
     board: Leaderboard
     resample: str
     notes: tuple[str, ...]
+    knows_clusters: bool
     covariates: tuple[str, ...] = ()
 
     @property
     def standings(self) -> list[Line]:
         """Best first within each part; who has neither rating nor rank comes last."""
         return list(self.board.standings)
+
+    @property
+    def told_apart(self) -> Separation | None:
+        """The pairs that differ with all judged at once; None where that can't be said."""
+        return self.board.told_apart if self.knows_clusters else None
 
     @property
     def missing(self) -> list[str]:
@@ -130,7 +141,7 @@ def _under_their_groups(rated: RatedCsv, lines: list[str]) -> Iterator[str]:
 def _judged(rated: RatedCsv) -> list[str]:
     """How many pairs are told apart, and how far the cross-check differs."""
     said = []
-    found = rated.board.told_apart
+    found = rated.told_apart
     if found is not None:
         models = len(rated.board.lines)
         said.append(
@@ -182,7 +193,7 @@ def _json(rated: RatedCsv) -> str:
             | ({"part": line.part} if len(parts) > 1 else {})
             for line in rated.standings
         ],
-        "pairs": _pairs(board),
+        "pairs": _pairs(board, rated.told_apart),
     }
     if rated.covariates:
         document["covariates"] = [
@@ -206,9 +217,8 @@ def _latex(rated: RatedCsv) -> str:
     return latex_table(rows, comments=comments, heads=heads, notes=rated.missing)
 
 
-def _pairs(board: Leaderboard) -> list[dict[str, Any]] | None:
+def _pairs(board: Leaderboard, found: Separation | None) -> list[dict[str, Any]] | None:
     """Pairs with p-values adjusted for all of them; None where these were not judged."""
-    found = board.told_apart
     if found is None:
         return None
     low, high = np.triu_indices(len(board.lines), 1)

@@ -108,17 +108,15 @@ class Leaderboard:
     def told_apart(self) -> Separation | None:
         """The pairs where "at 5 % for the whole table" holds: docs/coverage.md.
 
-        Not with fewer than five experts or scenarios, nor where votes of one expert or scenario
-        hang together and the unit takes them for independent, nor by resamples that take too much
-        for certain.
+        Only intervals in closed form that know of experts or scenarios, at least five of each,
+        hold it: votes that hang together unseen tell equals apart in every second study.
         """
         clusters = {Unit.EXPERT: self.experts, Unit.SCENARIO: self.scenarios}
         there = {unit: number for unit, number in clusters.items() if number > 1}
-        if self.intervals is not Intervals.CLOSED_FORM:
-            return None if there else self.separation
         seen = there if self.unit is Unit.TWO_WAY else {self.unit}
         holds = there.keys() <= set(seen) and min(there.values(), default=0) >= FEWEST_TO_JUDGE
-        return self.separation if holds else None
+        is_closed = self.intervals is Intervals.CLOSED_FORM
+        return self.separation if holds and is_closed else None
 
     @property
     def explanation(self) -> str:

@@ -59,6 +59,7 @@ def read_votes(
     *,
     clusters: Sequence[str],
     covariates: Sequence[str] = (),
+    in_order: bool = False,
     report: Callable[[int], None] | None = None,
 ) -> VotesFile:
     """Read all votes.
@@ -68,6 +69,7 @@ def read_votes(
         clusters: Which of the optional columns to read; every line must fill them.
         covariates: What else may say who wins: `side`, or a name NAME with columns NAME_a and
             NAME_b of numbers, of which the difference counts.
+        in_order: Keep a row for each line, in the order of the lines.
         report: Is told how many votes are read.
 
     Raises:
@@ -79,7 +81,7 @@ def read_votes(
     wanted = (*NEEDED, *clusters, *numbers)
     names = [_Codes() for _ in wanted[2:]]
     try:
-        rows, counts = _read(path, wanted, names, report)
+        rows, counts = _read(path, wanted, names, report, in_order=in_order)
     except VotesFileUnreadable:
         raise
     except (ValueError, KeyError, csv.Error) as error:
@@ -154,6 +156,8 @@ def _read(
     wanted: Sequence[str],
     names: list[_Codes],
     report: Callable[[int], None] | None,
+    *,
+    in_order: bool,
 ) -> tuple[Rows, IntArray]:
     """(R, 3 + clusters) first, second, outcome in half points, clusters; (R,) how often."""
     coders = [names[0], names[0], _Winners(), *names[1:]]
@@ -161,6 +165,8 @@ def _read(
         (np.empty((0, len(wanted)), np.int32), np.empty(0, np.int64))
     ]
     pending = total = 0
+    # With judges and items hardly two votes are equal.
+    is_grouped = len(wanted) == len(NEEDED) and not in_order
     with open_votes(path) as table:
         places = [table.header.index(name) for name in wanted]
         while block := list(islice(table.rows, _LINES_AT_ONCE)):
@@ -170,12 +176,11 @@ def _read(
             total += len(rows)
             if report is not None:
                 report(total)
-            if pending > _ROWS_BEFORE_GROUPING and len(wanted) == len(NEEDED):
+            if pending > _ROWS_BEFORE_GROUPING and is_grouped:
                 parts = [_grouped(parts)]
                 pending = 0
-    if len(wanted) == len(NEEDED):
+    if is_grouped:
         return _grouped(parts)
-    # With judges and items hardly two votes are equal.
     rows = np.concatenate([rows for rows, _ in parts])
     return rows, np.ones(len(rows), dtype=np.int64)
 

@@ -123,6 +123,10 @@ def test_davidson_rank_sets_pairs_and_cross_check_are_offered(votes: Any) -> Non
         assert line["check_lower"] <= line["rating"] <= line["check_upper"]
     said = run(file=file, rounds=100)
     assert "of 3 pairs are told apart with all of them judged at once" in said
+    blinds: list[dict[str, Any]] = [{"resample": "vote"}, {"resample": "judge"}, {"method": "elo"}]
+    for blind in blinds:
+        assert "told apart" not in run(file=file, rounds=100, **blind), blind
+        assert document(file, rounds=100, **blind)["pairs"] is None, blind
     assert "Bounds by the plain sandwich differ" in said
 
 
@@ -167,6 +171,14 @@ def test_what_votes_do_not_determine_is_null_and_explained(votes: Any) -> None:
     parts = document(votes(*two), rounds=50)
     assert parts["status"] == "disconnected"
     assert [row["part"] for row in parts["standings"]] == [0, 0, 0, 1, 1]
+
+
+def test_online_elo_plays_the_lines_in_their_order(votes: Any) -> None:
+    # By hand: K is 4, everybody starts at 1000.
+    lines = ["A,B,model_a", "B,C,model_a", "C,A,tie", "A,B,model_b", "A,C,model_b"]
+    found = document(votes(*lines), method="elo", order="recorded", rounds=20)
+    ratings = {row["model"]: row["rating"] for row in found["standings"]}
+    assert ratings == pytest.approx({"A": 997.9543, "B": 1002.0228, "C": 1000.0228}, abs=1e-4)
 
 
 # --- The process ---------------------------------------------------------------------------------
