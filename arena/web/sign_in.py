@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 from django.contrib.auth.forms import AuthenticationForm
 from django.contrib.auth.models import User
 from django.contrib.auth.views import LoginView
 from django.http import HttpResponse
 
+from arena.queries.people import has_admin
 from arena.queries.profiles import Language, language_of
 
 LANGUAGE_COOKIE = "django_language"
@@ -20,6 +23,10 @@ class SignIn(LoginView):
 
     template_name = "login.html"
     redirect_authenticated_user = True
+
+    def get_context_data(self, **more: Any) -> dict[str, Any]:
+        """Whether the first admin is still to be made."""
+        return super().get_context_data(**more, is_empty=not has_admin())
 
     def form_valid(self, form: AuthenticationForm) -> HttpResponse:
         """Sign in."""
