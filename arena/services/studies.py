@@ -62,8 +62,7 @@ def open_study(
         votes_per_expert: How many matchups each expert judges.
         seed: Of the plan; the same seed and rules give the same plan.
         options: Further rules; without them a balanced plan and nothing on top of it.
-        allow_simulated: Let simulated contestants and experts take part; where any does,
-            everything says so.
+        allow_simulated: Let simulated ones take part; where any does, everything says so.
         actor: Who opens it, for the log.
 
     Raises:
