@@ -30,6 +30,7 @@ def test_a_form_that_was_sent_too_late_is_sent_after_signing_in() -> None:
     typed = {SURE: "1", TYPED: study.name, "why": "too <few> experts", "new_password1": "secret"}
     asked = client.post(page, typed)
     assert "What you typed is kept" in asked.content.decode()
+    assert f'action="{reverse("login")}"' in asked.content.decode()
     assert "secret" not in asked.content.decode()
     sent = fields(asked.content) | {"username": admin.username}
     wrong = client.post(reverse("login"), sent | {"password": "wrong"})
