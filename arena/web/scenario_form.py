@@ -21,7 +21,7 @@ from arena.web.access import STAFF, allow_only
 from arena.web.json_text import read_json
 from arena.web.sending import looks_again, send_later
 from augment.errors import AugmentError, Conflict
-from augment.models import BaseScene
+from augment.models import BaseScene, Scenario
 from augment.scene_tasks import enqueue_scenario, enqueue_scene
 from augment.sentences import sentence
 from augment.services.scenarios.bulk import MOST_ROWS_AT_ONCE, BulkReport
@@ -35,6 +35,7 @@ from augment.services.scenarios.intent_fields import (
     fields_of_intent,
     intent_of_fields,
 )
+from augment.services.scenarios.intents import enter_intent, refuse_open
 from augment.services.scenarios.scene_pictures import SceneView, is_drawn, scene_picture
 from augment.services.scenarios.scenes import INSTRUCTION_LENGTH, SLUG_LENGTH, add_scenario
 from augment.services.scenarios.types import LONGEST_LABEL, LONGEST_TYPE, type_choices
@@ -47,8 +48,30 @@ REARRANGE = "fields"
 """What the buttons send that add and remove objects, and turn fields into JSON and back."""
 
 
-class ScenarioForm(forms.Form):
-    """An instruction for a scene; what it asks for as JSON, or object by object by fields."""
+class IntentForm(forms.Form):
+    """What a scenario asks for as JSON, or object by object by fields."""
+
+    intent = forms.CharField(required=False, max_length=LONGEST_INTENT)
+
+    def intent_document(self) -> dict[str, Any] | None:
+        """What was entered, None where nothing was.
+
+        Raises:
+            Conflict: The text is no JSON object.
+            InvalidDocument: The fields do not make an intent, or leave open what jobs need.
+        """
+        text = self.cleaned_data["intent"].strip()
+        if not text:
+            document = intent_of_fields(entered_fields(cast(QueryDict, self.data)))
+        else:
+            document = _read_json(text)
+        if document is not None:
+            refuse_open(document)
+        return document
+
+
+class ScenarioForm(IntentForm):
+    """An instruction for a scene, and what it asks for."""
 
     slug = forms.CharField(required=False, max_length=SLUG_LENGTH)
     type = forms.ChoiceField(required=False)
@@ -56,24 +79,11 @@ class ScenarioForm(forms.Form):
     own_label = forms.CharField(required=False, max_length=LONGEST_LABEL)
     instruction = forms.CharField(max_length=INSTRUCTION_LENGTH, strip=True)
     keep_traffic = forms.BooleanField(required=False)
-    intent = forms.CharField(required=False, max_length=LONGEST_INTENT)
 
     def __init__(self, data: Any = None, *, initial: dict[str, Any] | None = None) -> None:
         super().__init__(data, initial=initial)
         field = cast(forms.ChoiceField, self.fields["type"])
         field.choices = [*type_choices(), (OWN, gettext_lazy("A type of your own"))]
-
-    def intent_document(self) -> dict[str, Any] | None:
-        """What was entered, None where nothing was.
-
-        Raises:
-            Conflict: The text is no JSON object.
-            InvalidDocument: The fields do not make an intent.
-        """
-        text = self.cleaned_data["intent"].strip()
-        if not text:
-            return intent_of_fields(entered_fields(cast(QueryDict, self.data)))
-        return _read_json(text)
 
 
 @allow_only(*STAFF)
@@ -109,6 +119,36 @@ def new_scenario_page(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
 
 @allow_only(*STAFF)
 @require_http_methods(["GET", "HEAD", "POST"])
+def intent_page(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
+    """What a scenario asks for, in the fields, to be changed."""
+    scenario = get_object_or_404(Scenario, code=code)
+    problem = ""
+    initial: dict[str, Any] = {}
+    form = IntentForm(request.POST if request.method == "POST" else None)
+    if request.method == "POST" and REARRANGE in request.POST:
+        fields, initial, problem = _rearrange(request)
+        form = IntentForm(initial=initial)
+    elif request.method == "POST":
+        fields = entered_fields(request.POST)
+        try:
+            if form.is_valid():
+                enter_intent(
+                    scenario=scenario.slug,
+                    document=form.intent_document(),
+                    actor=cast(User, request.user),
+                )
+                messages.success(request, "The intent is set. It counts from now on.")
+                return redirect("scenario", code=code)
+        except AugmentError as error:
+            form.add_error(None, translate(error))
+    else:
+        fields = fields_of_intent(scenario.intent) if scenario.intent else IntentFields()
+    context = {"scenario": scenario, "form": form} | _intent_context(fields, problem)
+    return render(request, "scenarios/intent.html", context, status=422 if problem else 200)
+
+
+@allow_only(*STAFF)
+@require_http_methods(["GET", "HEAD", "POST"])
 def bulk_page(request: HttpRequest) -> HttpResponse:
     """Many scenarios from a CSV or YAML file and the JSON files that it names, all or none."""
     report: BulkReport | None = None
@@ -140,10 +180,13 @@ def entered_fields(posted: QueryDict) -> IntentFields:
 
 
 def _rearranged(request: HttpRequest, scene: BaseScene) -> HttpResponse:
-    """The form as it was filled in, with an object more or less, or the fields as JSON and back.
+    """The form as it was filled in; nothing is added yet, so nothing is asked of the rest."""
+    fields, initial, problem = _rearrange(request)
+    return _shown(request, scene, ScenarioForm(initial=initial), fields, problem)
 
-    Nothing is added yet, so nothing is asked of the rest of the form.
-    """
+
+def _rearrange(request: HttpRequest) -> tuple[IntentFields, dict[str, Any], str]:
+    """The fields with an object more or less, or as JSON and back; all else; what is wrong."""
     fields, act = entered_fields(request.POST), request.POST[REARRANGE]
     initial, problem = request.POST.dict(), ""
     try:
@@ -161,7 +204,18 @@ def _rearranged(request: HttpRequest, scene: BaseScene) -> HttpResponse:
             fields = replace(fields, rows=tuple(kept) or (NEW_ROW,))
     except AugmentError as error:
         problem = translate(error)
-    return _shown(request, scene, ScenarioForm(initial=initial), fields, problem)
+    return fields, initial, problem
+
+
+def _intent_context(fields: IntentFields, problem: str) -> dict[str, Any]:
+    return {
+        "rows": [
+            {"fields": [(name, CHOICES[name], row[name]) for name in CHOICES], "rest": row[REST]}
+            for row in fields.rows
+        ],
+        "whole_rest": fields.rest,
+        "intent_problem": problem,
+    }
 
 
 def _shown(
@@ -180,13 +234,7 @@ def _shown(
         "form": form,
         "is_drawn": drawn,
         "look": look,
-        "rows": [
-            {"fields": [(name, CHOICES[name], row[name]) for name in CHOICES], "rest": row[REST]}
-            for row in fields.rows
-        ],
-        "whole_rest": fields.rest,
-        "intent_problem": problem,
-    }
+    } | _intent_context(fields, problem)
     return render(request, "scenarios/new.html", context, status=422 if problem else 200)
 
 

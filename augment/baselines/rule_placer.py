@@ -156,7 +156,12 @@ _BODIES = {AgentType.BUS: Body.BUS, AgentType.BICYCLE: Body.BICYCLE}
 
 
 def _insist_on_needs(request: Request) -> None:
-    """Refuse what leaves open without which nothing can be placed."""
+    for problem in list_open(request):
+        raise CannotPlace(problem)
+
+
+def list_open(request: Request) -> list[str]:
+    """Return what a request leaves open without which nothing can be placed, a sentence each."""
     needs: dict[str, object] = {"the distance": request.spot.distance}
     match request:
         case VehicleRequest():
@@ -166,9 +171,11 @@ def _insist_on_needs(request: Request) -> None:
         case ConesRequest():
             needs |= {"the shape": request.shape}
     needs |= {"the count": request.count}
-    for what, given in needs.items():
-        if given is None:
-            raise CannotPlace(f"What is asked of the {name_of(request)} leaves open {what}.")
+    return [
+        f"What is asked of the {name_of(request)} leaves open {what}."
+        for what, given in needs.items()
+        if given is None
+    ]
 
 
 def _fitted(

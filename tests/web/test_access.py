@@ -58,6 +58,7 @@ PAGES: dict[str, tuple[int, int, int]] = {
     "scenario": (200, 200, 403),
     "intent": (200, 200, 403),
     "scenario-new": (200, 200, 403),
+    "intent-edit": (200, 200, 403),
     "scenarios-bulk": (200, 200, 403),
     "prompts": (200, 200, 403),
     "prompt-file": (200, 200, 403),
@@ -124,6 +125,8 @@ ACTIONS: dict[str, tuple[int, int, int]] = {
     "author": (302, 403, 403),
     "author-back": (302, 403, 403),
     "set-intent": (302, 302, 403),
+    "scenario-delete": (200, 403, 403),
+    "scene-delete": (200, 403, 403),
     "intent-read": (302, 403, 403),
     "job-cancel": (200, 403, 403),
     "job-resume": (302, 403, 403),
@@ -172,6 +175,7 @@ def test_every_action_is_for_the_roles_of_the_table() -> None:
 
 
 ASKS_FIRST = {
+    **{"scenario-delete": 200, "scene-delete": 200},
     **{"study-close": 200, "study-cancel": 200, "study-draft-discard": 200, "job-cancel": 200},
     "labelling-close": 404,
 }

@@ -18,6 +18,7 @@ from augment.services.scenarios.scene_pictures import draw_scenario, draw_scene
 from tests.intents import cones
 from tests.jobs.rows import add_scenario
 from tests.scenes import cone
+from tests.study_rows import a_study
 from tests.web.cast import people, signed_in
 
 pytestmark = pytest.mark.django_db
@@ -105,6 +106,11 @@ def test_an_intent_as_json_goes_before_the_fields(analyst: Client, scene: BaseSc
     [
         ({"type": "", "own_type": "Cut In"}, "must be one of"),
         ({"type": "jaywalking_pedestrian", "slug": "street"}, "called &#x27;street&#x27; already"),
+        (
+            {"type": "jaywalking_pedestrian", "i_kind": "vehicles", "i_count": "1"}
+            | {"i_distance_m": "20", "i_relation": "ahead"},
+            "leaves open whether they stand or how fast they drive",
+        ),
         ({"type": "jaywalking_pedestrian", "intent": "["}, "The intent is no JSON"),
         ({"type": "avoid_crashed_cars", "intent": "[" * 100_000}, "The intent is no JSON"),
         ({"type": "jaywalking_pedestrian", "intent": "{}"}, "format"),
@@ -159,3 +165,35 @@ def test_a_file_that_is_no_list_is_told(analyst: Client) -> None:
     assert "301 rows are too many for a page" in upload(analyst, many)
     answer = analyst.post(reverse("scenarios-bulk"))
     assert "Choose a CSV or YAML file." in answer.content.decode()
+
+
+def test_an_intent_is_changed_by_fields(analyst: Client, scene: BaseScene) -> None:
+    _, made = send(analyst, scene, type="jaywalking_pedestrian", intent=RING)
+    assert made is not None
+    page = reverse("intent-edit", args=[made.code])
+    assert 'name="i_shape"' in analyst.get(page).content.decode()
+    row = {"i_kind": "vehicles", "i_count": "1", "i_distance_m": "30", "i_relation": "ahead"}
+    refused = analyst.post(page, row).content.decode()
+    assert "leaves open whether they stand" in refused
+    assert 'value="30"' in refused
+    analyst.post(page, row | {"i_speed_mps": "0"})
+    made.refresh_from_db()
+    assert made.intent is not None
+    assert [one["kind"] for one in made.intent["requests"]] == ["vehicles"]
+
+
+def test_what_nothing_needs_is_deleted_and_else_is_said_what_needs_it(scene: BaseScene) -> None:
+    study = a_study(scenarios=1, votes_per_expert=1)
+    place = study.scenarios.get()
+    admin = signed_in(people()["admin"])
+    needed = admin.post(reverse("scenario-delete", args=[place.code]), {"sure": "1"}, follow=True)
+    assert "needed by the study “Round 1”" in needed.content.decode()
+    base = reverse("scene-delete", args=[place.base_scene.code])
+    assert (
+        "the scenario “place-0”" in admin.post(base, {"sure": "1"}, follow=True).content.decode()
+    )
+    for made in scene.scenarios.all():
+        admin.post(reverse("scenario-delete", args=[made.code]), {"sure": "1"})
+    admin.post(reverse("scene-delete", args=[scene.code]), {"sure": "1"})
+    assert not BaseScene.objects.filter(pk=scene.pk).exists()
+    assert list(Scenario.objects.all()) == [place]

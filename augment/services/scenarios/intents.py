@@ -7,7 +7,8 @@ from typing import Any
 from django.contrib.auth.models import User
 from django.db import transaction
 
-from augment.errors import Conflict, UnknownName
+from augment.baselines.rule_placer import list_open
+from augment.errors import Conflict, InvalidDocument, UnknownName
 from augment.models import IntentReading, Scenario
 from augment.scene.intent_codec import intent_from_document, intent_to_document
 from augment.scene.intent_statements import list_statements
@@ -85,6 +86,20 @@ def statements_of(document: object) -> tuple[Sentence, ...]:
         InvalidDocument: The document breaks the format.
     """
     return () if document is None else list_statements(intent_from_document(document))
+
+
+def refuse_open(document: object) -> None:
+    """Do nothing where an intent says all that jobs need to place it; for who enters one.
+
+    Raises:
+        InvalidDocument: It is no intent, or leaves open what the rule placer would refuse.
+    """
+    requests = intent_from_document(document).requests
+    problems = [
+        (f"requests[{n}]", problem) for n, one in enumerate(requests) for problem in list_open(one)
+    ]
+    if problems:
+        raise InvalidDocument("intent", problems)
 
 
 # --- Private -----------------------------------------------------------------------------------

@@ -1,0 +1,60 @@
+"""Deleting scenarios and scenes; asks first, and names what needs them."""
+
+from __future__ import annotations
+
+import uuid
+from typing import cast
+
+from django.contrib import messages
+from django.contrib.auth.models import User
+from django.http import HttpRequest, HttpResponse
+from django.shortcuts import get_object_or_404, redirect
+from django.urls import reverse
+from django.views.decorators.http import require_http_methods
+
+from arena.services.removal import delete_scenario, delete_scene
+from arena.web.access import ADMIN, allow_only
+from arena.web.questions import Confirmation, ask, is_sure
+from augment.errors import AugmentError
+from augment.models import BaseScene, Scenario
+
+
+@allow_only(ADMIN)
+@require_http_methods(["GET", "HEAD", "POST"])
+def delete_scenario_page(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
+    """Delete a scenario that nothing depends on."""
+    scenario = get_object_or_404(Scenario, code=code)
+    if not is_sure(request):
+        return ask(request, _question(scenario.slug, reverse("scenario", args=[code])))
+    try:
+        delete_scenario(scenario, actor=cast(User, request.user))
+    except AugmentError as error:
+        messages.error(request, str(error))
+        return redirect("scenario", code=code)
+    messages.success(request, f"“{scenario.slug}” is deleted.")
+    return redirect("scenarios")
+
+
+@allow_only(ADMIN)
+@require_http_methods(["GET", "HEAD", "POST"])
+def delete_scene_page(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
+    """Delete a scene that no scenario stands on."""
+    scene = get_object_or_404(BaseScene.objects.defer("recording", "document"), code=code)
+    if not is_sure(request):
+        return ask(request, _question(scene.slug, reverse("scene", args=[code])))
+    try:
+        delete_scene(scene, actor=cast(User, request.user))
+    except AugmentError as error:
+        messages.error(request, str(error))
+        return redirect("scene", code=code)
+    messages.success(request, f"“{scene.slug}” is deleted.")
+    return redirect("scenes")
+
+
+def _question(slug: str, back: str) -> Confirmation:
+    return Confirmation(
+        title=f"Delete “{slug}”?",
+        facts=("Only what no job, study or scenario needs is deleted. There is no way back.",),
+        button="Delete",
+        back=back,
+    )
