@@ -14,6 +14,7 @@ from django.utils.translation import gettext_lazy
 from django.views.decorators.http import require_http_methods
 
 from arena.web.access import ADMIN, allow_only
+from arena.web.endpoint_forms import SLUG_RULE
 from augment.errors import AugmentError
 from augment.models import Endpoint
 from augment.services.endpoints.entering import (
@@ -33,7 +34,7 @@ NEW = ""
 class ContestantForm(forms.Form):
     """A model, a variant, and how it asks; options that are left empty stay open."""
 
-    slug = forms.SlugField(max_length=80, label=gettext_lazy("Slug"))
+    slug = forms.SlugField(max_length=80, label=gettext_lazy("Slug"), help_text=SLUG_RULE)
     name = forms.CharField(
         max_length=120, required=False, label=gettext_lazy("Name (made of model and variant)")
     )

@@ -17,10 +17,13 @@ from augment.services.wording import translate
 _UNKNOWN = [("", _("unknown")), ("yes", _("yes")), ("no", _("no"))]
 
 
+SLUG_RULE = "Lower-case letters, digits, hyphens."
+
+
 class EndpointPageForm(forms.Form):
     """An address, the variable with its key, and its limits; the label and what it is stay."""
 
-    label = forms.SlugField(max_length=80, label=_("Label"))
+    label = forms.SlugField(max_length=80, label=_("Label"), help_text=SLUG_RULE)
     base_url = forms.CharField(max_length=200, label=_("Address, up to /v1"))
     key_variable = forms.CharField(
         max_length=80,

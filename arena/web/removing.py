@@ -17,6 +17,7 @@ from arena.web.access import ADMIN, allow_only
 from arena.web.questions import Confirmation, ask, is_sure
 from augment.errors import AugmentError
 from augment.models import BaseScene, Scenario
+from augment.services.wording import translate
 
 
 @allow_only(ADMIN)
@@ -29,7 +30,7 @@ def delete_scenario_page(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
     try:
         delete_scenario(scenario, actor=cast(User, request.user))
     except AugmentError as error:
-        messages.error(request, str(error))
+        messages.error(request, translate(error))
         return redirect("scenario", code=code)
     messages.success(request, f"“{scenario.slug}” is deleted.")
     return redirect("scenarios")
@@ -45,7 +46,7 @@ def delete_scene_page(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
     try:
         delete_scene(scene, actor=cast(User, request.user))
     except AugmentError as error:
-        messages.error(request, str(error))
+        messages.error(request, translate(error))
         return redirect("scene", code=code)
     messages.success(request, f"“{scene.slug}” is deleted.")
     return redirect("scenes")
