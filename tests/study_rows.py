@@ -14,7 +14,8 @@ from arena.services.people import create_person
 from arena.services.studies import open_study
 from arena.services.votes import cast_vote
 from augment.models import Augmentation, BaseScene, Contestant, GenerationJob, Scenario
-from augment.scene.codec import scene_to_document
+from augment.scene.codec import modification_to_document, scene_to_document
+from augment.scene.modification import Modification
 from tests.scenes import scene as street
 
 KINDS = Contestant.Kind
@@ -65,6 +66,12 @@ def picture(
         image=f"bev/{uuid.uuid4().hex}.png" if image is None else image,
         finished_at=timezone.now(),
     )
+
+
+def write_changes() -> None:
+    """Give every augmentation the document of a change that changes nothing."""
+    document = modification_to_document(Modification())
+    Augmentation.objects.filter(modification={}).update(modification=document)
 
 
 def hang(augmentation: Augmentation, image: str) -> None:

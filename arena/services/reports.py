@@ -53,7 +53,7 @@ def report(*, expert: User, matchup_code: UUID | str, key: UUID, said: Complaint
         StudyNotOpen: The study is over.
         Conflict: The key belongs to another report.
     """
-    _check(said)
+    check_complaint(said)
     matchup = matchup_of(expert=expert, code=matchup_code)
     stored = Report.objects.filter(key=key).first()
     if stored is None:
@@ -66,7 +66,8 @@ def report(*, expert: User, matchup_code: UUID | str, key: UUID, said: Complaint
     return stored
 
 
-def _check(said: Complaint) -> None:
+def check_complaint(said: Complaint) -> None:
+    """Refuse parts that are unknown or too long, with an InvalidVote."""
     wrong = {}
     if said.reason not in Report.Reason.values:
         wrong["reason"] = f"One of these is needed: {', '.join(Report.Reason.values)}."

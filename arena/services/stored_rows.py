@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import base64
 import json
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from datetime import date, datetime
 from decimal import Decimal
@@ -13,10 +13,14 @@ from typing import Any
 from uuid import UUID
 
 from django.apps import apps
+from django.core.exceptions import ObjectDoesNotExist, ValidationError
 from django.core.management.color import no_style
 from django.db import connection, models, transaction
 from django.db.migrations.loader import MigrationLoader
 from django.db.models import QuerySet
+
+from arena.services.row_rules import REFUSALS
+from augment.services.texts import make_storable
 
 LEFT_OUT = frozenset(
     {
@@ -98,18 +102,28 @@ def columns_of(model: type[models.Model]) -> list[models.Field[Any, Any]]:
     return [field for field in model._meta.local_concrete_fields if not field.generated]
 
 
-def write_rows(model: type[models.Model], lines: Iterable[bytes]) -> int:
+def write_rows(
+    model: type[models.Model],
+    lines: Iterable[bytes],
+    *,
+    check: Callable[[models.Model], None],
+) -> int:
     """Store what `read_rows` gave, keys and times included; returns how many.
 
+    Args:
+        model: Of which table.
+        lines: One row each.
+        check: Raises one of REFUSALS for a row that must not be stored.
+
     Raises:
-        ValueError: A line does not fit the table.
+        ValueError: A line does not fit the table, or was refused; it is named by its number.
     """
     columns = columns_of(model)
     largest = max(1, connection.ops.bulk_batch_size(columns, [None] * AT_ONCE))
     number = 0
-    waiting = iter(lines)
+    waiting = enumerate(lines, start=1)
     while batch := list(islice(waiting, min(AT_ONCE, largest))):
-        rows = [_row(model, columns, json.loads(line)) for line in batch]
+        rows = [_checked_row(model, columns, line, check, place) for place, line in batch]
         # Raw: times that are set when a row is made stay those of the backup.
         model._base_manager.all()._insert(  # type: ignore[attr-defined]
             rows, fields=columns, using=connection.alias, raw=True
@@ -143,13 +157,62 @@ def reset_sequences() -> None:
             cursor.execute(statement)
 
 
+def _checked_row(
+    model: type[models.Model],
+    columns: list[models.Field[Any, Any]],
+    line: bytes,
+    check: Callable[[models.Model], None],
+    place: int,
+) -> models.Model:
+    try:
+        row = _row(model, columns, json.loads(line, parse_constant=_refuse_constant))
+        check(row)
+    except (*REFUSALS, ObjectDoesNotExist, RecursionError) as error:
+        raise ValueError(f"line {place}: {_sentence(error)}") from error
+    return row
+
+
+def _sentence(error: Exception) -> str:
+    if isinstance(error, ValidationError):
+        return " ".join(error.messages)
+    return f"{error} is missing" if isinstance(error, KeyError) else str(error)
+
+
+def _refuse_constant(name: str) -> None:
+    raise ValueError(f"{name} is no number of JSON")
+
+
 def _row(
     model: type[models.Model], columns: list[models.Field[Any, Any]], values: list[Any]
 ) -> models.Model:
     if not isinstance(values, list) or len(values) != len(columns):
         raise ValueError(f"{label_of(model)}: {len(columns)} values are needed in each line")
-    given = zip(columns, values, strict=True)
-    return model(**{field.attname: _typed(field, value) for field, value in given})
+    given = list(zip(columns, values, strict=True))
+    row = model(**{field.attname: _typed(field, value) for field, value in given})
+    for field, value in given:
+        _check_column(row, field, value)
+    return row
+
+
+def _check_column(row: models.Model, field: models.Field[Any, Any], given: Any) -> None:
+    """Refuse a value that `read_rows` would not have written, or that the column's rules refuse.
+
+    Raises:
+        ValueError: With the column.
+    """
+    value = getattr(row, field.attname)
+    written = _plain(field, value)
+    try:
+        if written != given or type(written) is not type(given):
+            raise ValueError(f"{given!r} is no value of this column")
+        if isinstance(value, str) and make_storable(value) != value:
+            raise ValueError("holds signs that no database takes")
+        if isinstance(field, models.JSONField):
+            field.to_python(value)
+        elif not field.is_relation and not (value is None and field.null):
+            field.clean(value, row)
+    except REFUSALS as error:
+        raise ValueError(f"{field.name}: {_sentence(error)}") from error
 
 
 def _plain(field: models.Field[Any, Any], value: Any) -> Any:
@@ -167,10 +230,17 @@ def _plain(field: models.Field[Any, Any], value: Any) -> Any:
 
 
 def _typed(field: models.Field[Any, Any], value: Any) -> Any:
+    try:
+        return _parsed(field, value)
+    except REFUSALS as error:
+        raise ValueError(f"{field.name}: {_sentence(error)}") from error
+
+
+def _parsed(field: models.Field[Any, Any], value: Any) -> Any:
     if value is None or isinstance(field, models.JSONField):
         return value
     if isinstance(field, models.BinaryField):
         return base64.b64decode(value)
     if isinstance(field, models.ForeignKey):
-        return _typed(field.target_field, value)
+        return _parsed(field.target_field, value)
     return field.to_python(value)

@@ -73,7 +73,7 @@ def open_study(
         NothingToPlan: A hypothesis can't be read; pictures, drives or checks are missing.
     """
     name, given = _free_name(name), options or PlanOptions()
-    _check_seed(seed)
+    check_seed(seed)
     contestant_rows, scenario_rows = _contestants(contestants), _scenarios(scenarios)
     expert_rows = _experts(experts)
     has_simulated = _has_simulated(contestant_rows, expert_rows, are_allowed=allow_simulated)
@@ -112,7 +112,8 @@ def _free_name(name: str) -> str:
     return name
 
 
-def _check_seed(seed: int) -> None:
+def check_seed(seed: int) -> None:
+    """Refuse what is no seed of a plan."""
     if not 0 <= seed < 2**63:
         raise Conflict(sentence("A seed goes from 0 to 2^63 - 1, not %(seed)s.", seed=seed))
 

@@ -6,8 +6,10 @@ import csv
 import hashlib
 import json
 import shutil
+import sys
 import uuid
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -27,7 +29,7 @@ from arena.exports.study_folder.closure import TRAVELLING, close_over
 from arena.exports.study_folder.tables import files_for_people
 from arena.models import Study, Vote
 from arena.services.ratings import rate
-from arena.services.stored_rows import as_line, columns_of, label_of
+from arena.services.stored_rows import as_line, columns_of, find_filled_tables, label_of
 from arena.services.studies import close_study
 from augment.models import (
     Attempt,
@@ -39,7 +41,7 @@ from augment.models import (
     Scenario,
     Simulation,
 )
-from tests.study_rows import a_study, hang, matchups_of, scenario, vote
+from tests.study_rows import a_study, hang, matchups_of, scenario, vote, write_changes
 
 pytestmark = pytest.mark.django_db(transaction=True)
 
@@ -66,6 +68,7 @@ def study(tmp_path: Path, settings: Settings) -> Study:
     for row in Augmentation.objects.all():
         default_storage.save(row.image, ContentFile(PNG))
     GenerationJob.objects.update(state=GenerationJob.State.FINISHED)
+    write_changes()
     close_study(study=made)
     made.refresh_from_db()
     rate(study=made, rounds=20)
@@ -310,3 +313,90 @@ def test_a_folder_with_tables_that_no_study_has_is_refused(study: Study, tmp_pat
     with pytest.raises(CommandError, match=r"no study has: auth\.user_groups"):
         call_command("import", "study", str(folder))
     assert not Study.objects.exists()
+
+
+HOSTILE: list[tuple[str, dict[str, Any], str]] = [
+    ("augment.simulation", {"state": "queued"}, "state: 'queued' is not over"),
+    ("augment.simulation", {"planner": "evil_planner.Planner"}, "not allowed here, only pdm-cl"),
+    ("augment.simulation", {"offsets": "wide"}, "offsets: one of paper, original"),
+    ("augment.simulation", {"trace": "AAAA"}, "trace: "),
+    ("augment.generationjob", {"state": "running"}, "state: 'running' is not over"),
+    ("augment.generationjob", {"samples": 9999}, "Samples go from 1 to"),
+    ("augment.augmentation", {"state": "queued"}, "state: 'queued' is not over"),
+    ("augment.augmentation", {"image": "../../secret.png"}, "image: '../../secret.png' must be"),
+    ("augment.augmentation", {"image": f"/{'0' * 64}.png"}, "must be bev/"),
+    ("augment.augmentation", {"modification": {"format": "?"}}, "format: expected"),
+    ("augment.basescene", {"document": {}}, "format: expected"),
+    ("augment.scenario", {"slug": "a/b"}, "slug: "),
+    ("augment.scenario", {"original_image": "uploads/x"}, "original_image: "),
+    ("augment.contestant", {"options": {"warmth": 1}}, "warmth: is no option"),
+    ("augment.endpoint", {"base_url": "http://169.254.169.254/v1"}, "base_url: 169.254.169.254"),
+    ("augment.endpoint", {"max_concurrency": 10**6}, "max_concurrency: "),
+    ("arena.study", {"state": "open"}, "state: 'open' is not over"),
+    ("arena.study", {"seed": -1}, "A seed goes from 0"),
+    ("arena.matchup", {"left_image": "marked/x.png"}, "left_image: 'marked/x.png' must be bev/"),
+    ("arena.vote", {"key": 999999}, "key: 999999 is no value of this column"),
+    ("arena.vote", {"comment": "x" * 1001}, "at most 1000 characters"),
+    ("arena.vote", {"is_simulated": "no"}, "is_simulated: "),
+    ("arena.snapshot", {"state": "queued"}, "state: 'queued' is not over"),
+    ("arena.snapshot", {"method": "best"}, "'best' is not a valid Method"),
+]
+"""What the author of a folder writes into a table, and what the refusal says of its first row."""
+
+
+def test_a_hostile_folder_is_refused_with_its_row_and_imports_nothing(
+    study: Study, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "evil_planner.py").write_text("raise SystemExit('imported')")
+    monkeypatch.syspath_prepend(tmp_path)
+    endpoint = Endpoint.objects.create(label="away", base_url="https://away.example/v1")
+    Contestant.objects.filter(pk=study.contestants.all()[0].pk).update(
+        kind=Contestant.Kind.LLM, variant="otm", endpoint=endpoint, model="m"
+    )
+    Simulation.objects.create(
+        scenario=study.scenarios.all()[0],
+        subject=Simulation.Subject.UNMODIFIED,
+        planner="idm",
+        offsets="paper",
+        state=Simulation.State.FAILED,
+    )
+    honest = tmp_path / "out"
+    export(study, honest)
+    empty()
+    for label, columns, says in HOSTILE:
+        hostile = tmp_path / "hostile"
+        shutil.copytree(honest, hostile)
+        craft(hostile, label, partial(dict, **columns))
+        with pytest.raises(CommandError) as refused:
+            call_command("import", "study", str(hostile))
+        assert f"rows/{label}.jsonl can't be stored: line 1: " in str(refused.value)
+        assert says in str(refused.value), label
+        shutil.rmtree(hostile)
+    assert "evil_planner" not in sys.modules
+    assert find_filled_tables() == []
+    assert not list(Path(default_storage.path("")).rglob("*.png")), "no picture either"
+    call_command("import", "study", str(honest))
+
+
+def test_a_folder_with_a_file_of_a_strange_name_is_refused(study: Study, tmp_path: Path) -> None:
+    folder = tmp_path / "out"
+    export(study, folder)
+    empty()
+    (folder / "media/evil").mkdir()
+    (folder / "media/evil/x.png").write_bytes(PNG)
+    manifest = json.loads((folder / "manifest.json").read_text())
+    manifest["members"]["media/evil/x.png"] = hashlib.sha256(PNG).hexdigest()
+    (folder / "manifest.json").write_text(json.dumps(manifest))
+    with pytest.raises(CommandError, match=r"files that no study has: media/evil/x\.png"):
+        call_command("import", "study", str(folder))
+
+
+def test_a_vote_on_what_its_expert_was_not_shown_is_refused(study: Study, tmp_path: Path) -> None:
+    folder = tmp_path / "out"
+    export(study, folder)
+    other = User.objects.get(username="finn").pk
+    empty()
+    craft(folder, "arena.vote", lambda row: row | {"expert_id": other})
+    with pytest.raises(CommandError, match=r"arena\.vote, row \d+"):
+        call_command("import", "study", str(folder))
+    assert find_filled_tables() == []

@@ -14,11 +14,12 @@ from django.core.management import call_command
 from arena.services.ratings import rate
 from arena.services.studies import close_study
 from augment.services.events import log_event
-from tests.study_rows import a_study, matchups_of, vote
+from tests.study_rows import a_study, matchups_of, vote, write_changes
 
 NOW = datetime(2026, 11, 22, 12, 0, tzinfo=UTC)
 OUTCOMES = ("left", "equal", "right")
 PNG = b"\x89PNG picture"
+PICTURE = f"bev/{'1' * 64}.png"
 
 
 def quiet(_: str) -> None:
@@ -40,12 +41,13 @@ def a_full_house() -> None:
     study.refresh_from_db()
     rate(study=study, rounds=20)
     note(study.code)
-    default_storage.save("bev/one.png", ContentFile(PNG))
+    write_changes()
+    default_storage.save(PICTURE, ContentFile(PNG))
 
 
 def empty() -> None:
     call_command("flush", interactive=False, verbosity=0)
-    default_storage.delete("bev/one.png")
+    default_storage.delete(PICTURE)
 
 
 def contents(path: Path) -> dict[str, bytes]:

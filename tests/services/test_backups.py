@@ -28,6 +28,7 @@ from augment.services.scenarios.thumbnails import WIDTHS_PX, thumbnail_of
 from tests.house.source import ROOT
 from tests.services.backup_rows import (
     NOW,
+    PICTURE,
     PNG,
     a_full_house,
     contents,
@@ -48,7 +49,7 @@ def test_what_was_restored_backs_up_to_the_same_bytes(tmp_path: Path) -> None:
     empty()
     call_command("restore", str(first))
     assert list(Vote.objects.order_by("pk").values()) == votes
-    with default_storage.open("bev/one.png") as picture:
+    with default_storage.open(PICTURE) as picture:
         assert picture.read() == PNG
     take_backup(second, now=NOW, say=quiet)
     assert contents(second) == contents(first)

@@ -5,11 +5,16 @@ from __future__ import annotations
 import hashlib
 import json
 import re
+import sys
+import uuid
 import zipfile
 from collections.abc import Callable
+from datetime import timedelta
 from pathlib import Path
 
 import pytest
+from django.apps import apps
+from django.core.files.base import ContentFile
 from django.core.files.storage import default_storage
 from django.core.management import CommandError, call_command
 from pytest_django import Settings
@@ -17,8 +22,13 @@ from pytest_django import Settings
 from arena.management.backups.archive import MANIFEST, ZipSource, read_manifest
 from arena.management.backups.taking import take_backup
 from arena.models import Vote
+from arena.services.stored_rows import as_line, columns_of
+from augment.models import GenerationJob, Scenario, Simulation
+from augment.services.judging import simulations
+from augment.services.running import leases
 from tests.services.backup_rows import (
     NOW,
+    PICTURE,
     a_full_house,
     contents,
     empty,
@@ -91,7 +101,7 @@ def test_a_row_that_does_not_fit_takes_everything_back(tmp_path: Path) -> None:
     with pytest.raises(CommandError, match=r"arena\.vote has"):
         call_command("restore", str(path))
     assert not Vote.objects.exists()
-    assert not default_storage.exists("bev/one.png")
+    assert not default_storage.exists(PICTURE)
 
 
 def with_rows(found: dict[str, bytes], label: str, content: bytes) -> None:
@@ -101,6 +111,16 @@ def with_rows(found: dict[str, bytes], label: str, content: bytes) -> None:
     members = manifest["members"] | {name: hashlib.sha256(content).hexdigest()}
     rows = manifest["rows"] | {label: len(content.splitlines())}
     with_manifest(found, members=members, rows=rows)
+
+
+def changed(found: dict[str, bytes], label: str, **columns: object) -> None:
+    """Other values in every row of a table."""
+    names = [column.attname for column in columns_of(apps.get_model(label))]
+    rows = [json.loads(line) for line in found[f"rows/{label}.jsonl"].splitlines()]
+    lines = [
+        as_line(list((dict(zip(names, row, strict=True)) | columns).values())) for row in rows
+    ]
+    with_rows(found, label, b"".join(lines))
 
 
 def no_matchups(found: dict[str, bytes]) -> None:
@@ -113,7 +133,16 @@ def no_times(found: dict[str, bytes]) -> None:
 
 
 @pytest.mark.parametrize(
-    ("mend", "says"), [(no_matchups, "don't fit each other"), (no_times, "can't be stored")]
+    ("mend", "says"),
+    [
+        (no_matchups, "don't fit each other"),
+        (no_times, "can't be stored: line 1: at: "),
+        (lambda found: changed(found, "arena.vote", key=999999), "line 1: key: 999999"),
+        (
+            lambda found: changed(found, "augment.augmentation", image="../secret.png"),
+            "line 1: .*must be bev/",
+        ),
+    ],
 )
 def test_rows_that_fit_no_table_take_everything_back(
     tmp_path: Path, mend: Callable[[dict[str, bytes]], None], says: str
@@ -126,7 +155,7 @@ def test_rows_that_fit_no_table_take_everything_back(
     with pytest.raises(CommandError, match=says):
         call_command("restore", str(path))
     assert not Vote.objects.exists()
-    assert not default_storage.exists("bev/one.png")
+    assert not default_storage.exists(PICTURE)
 
 
 def test_a_key_that_can_not_be_written_takes_everything_back(
@@ -142,7 +171,7 @@ def test_a_key_that_can_not_be_written_takes_everything_back(
     with pytest.raises(CommandError, match="Nothing was restored"):
         call_command("restore", str(tmp_path / "b.zip"))
     assert not Vote.objects.exists()
-    assert not default_storage.exists("bev/one.png")
+    assert not default_storage.exists(PICTURE)
 
 
 FLAGS, METHOD = 8, 10
@@ -196,3 +225,34 @@ def test_a_member_has_one_way_to_be_named(tmp_path: Path, name: str) -> None:
     change(path, add)
     with pytest.raises(CommandError, match="at a place of none"):
         call_command("restore", str(path))
+
+
+def test_no_work_of_a_backup_goes_on_by_itself(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "evil_planner.py").write_text("raise SystemExit('imported')")
+    monkeypatch.syspath_prepend(tmp_path)
+    a_full_house()
+    first, second = GenerationJob.objects.order_by("pk")[:2]
+    first.augmentations.update(state="running", claim=uuid.uuid4(), heartbeat_at=NOW)
+    GenerationJob.objects.exclude(pk=first.pk).update(state="finished")
+    second.augmentations.update(state="queued")
+    drive = Simulation.objects.create(
+        scenario=Scenario.objects.all()[0],
+        subject=Simulation.Subject.UNMODIFIED,
+        planner="evil_planner.Planner",
+        offsets="paper",
+    )
+    default_storage.save("evil/x.png", ContentFile(b"no picture"))
+    take_backup(tmp_path / "b.zip", now=NOW, say=quiet)
+    empty()
+    default_storage.delete("evil/x.png")
+    call_command("restore", str(tmp_path / "b.zip"))
+    assert leases.find_unsent(older_than=timedelta(0)) == []
+    assert simulations.find_unsent(older_than=timedelta(0)) == []
+    assert not simulations.drive(simulation_pk=drive.pk)
+    assert "Start it again" in Simulation.objects.get().reason
+    held = GenerationJob.objects.filter(augmentations__state="queued")
+    assert set(held.values_list("pk", "state")) == {(first.pk, "paused"), (second.pk, "paused")}
+    assert "evil_planner" not in sys.modules
+    assert not default_storage.exists("evil/x.png")

@@ -27,7 +27,7 @@ from arena.services.stored_rows import (
     frozen_rows,
     label_of,
 )
-from augment.models import GenerationJob
+from arena.services.unfinished_work import UNFINISHED
 
 FORMAT, VERSION = "scenario-arena-study", 1
 MANIFEST, README = "manifest.json", "README.md"
@@ -76,9 +76,7 @@ def write_study(study: Study, out: Path, *, say: Callable[[str], None]) -> None:
 
 def _fill(study: Study, folder: Path, say: Callable[[str], None]) -> None:
     closure = close_over(study)
-    running = GenerationJob.objects.filter(pk__in=closure.jobs, state=GenerationJob.State.RUNNING)
-    if job := running.first():
-        raise ArenaError(f"The job {job.name!r} of this study still runs.")
+    _refuse_unfinished(closure)
     writer = _Folder(folder)
     counts: dict[str, int] = {}
     for rows in closure.tables():
@@ -93,6 +91,16 @@ def _fill(study: Study, folder: Path, say: Callable[[str], None]) -> None:
     writer.write(README, render_to_string("exports/study_readme.md", context).encode())
     say(f"files: {len(writer.digests)}")
     (folder / MANIFEST).write_bytes(_manifest(closure, counts, writer.digests))
+
+
+def _refuse_unfinished(closure: Closure) -> None:
+    for rows in closure.tables():
+        states = UNFINISHED.get(rows.model)
+        if states and (row := rows.filter(state__in=states).first()):
+            raise ArenaError(
+                f"The {row._meta.verbose_name} {str(row)!r} of this study still runs "
+                f"({row.state}); cancel it, or let it end."
+            )
 
 
 def _lines(closure: Closure, rows: Any, named: set[str]) -> Iterator[bytes]:

@@ -8,7 +8,6 @@ from pathlib import Path
 from django.conf import settings
 from django.contrib.auth.hashers import make_password
 from django.contrib.auth.models import Group, User
-from django.core.exceptions import ValidationError
 from django.core.files.base import ContentFile
 from django.core.files.storage import default_storage
 from django.core.management import call_command
@@ -30,10 +29,11 @@ from arena.management.backups.archive import (
     read_manifest,
 )
 from arena.services import stored_rows
-from augment.models import Endpoint
-
-REFUSED = (DatabaseError, ValidationError)
-"""What a table says to values that are none of its."""
+from arena.services.row_rules import check_row, check_votes
+from arena.services.unfinished_work import end_restored_work, is_unfinished
+from augment.models import Endpoint, Simulation
+from augment.services.judging.simulations import allowed_planners
+from augment.services.stored_names import is_stored_name
 
 EXPERTS = "expert"
 """The role of every account of a study's folder."""
@@ -57,13 +57,14 @@ def restore_backup(path: Path, *, say: Callable[[str], None]) -> Manifest:
 
         def write() -> None:
             stored_rows.empty_what_migrating_made()
-            _write_rows(source, manifest, tables)
+            _write_rows(source, manifest, tables, check_row)
             _settle()
+            end_restored_work()
             if SECRET_KEY in manifest.members:
                 with source.open(SECRET_KEY) as key:
                     write_whole(settings.VAR_DIR / SECRET_KEY, key.read(), mode=0o600)
 
-        _restore(source, manifest, write, say)
+        _restore(source, manifest, _ours_of(manifest, say), write, say)
     return manifest
 
 
@@ -79,15 +80,52 @@ def import_study(folder: Path, *, say: Callable[[str], None]) -> Manifest:
     manifest = read_manifest(source, wanted=STUDY)
     if strange := sorted(manifest.rows.keys() - TRAVELLING):
         raise BackupUnreadable(f"This has tables that no study has: {', '.join(strange)}.")
-    by_label = {stored_rows.label_of(model): model for model in stored_rows.find_tables()}
+    media = _media_of(manifest)
+    if strange := sorted(name for name in media if not is_stored_name(name)):
+        raise BackupUnreadable(f"This has files that no study has: {MEDIA}{strange[0]}.")
+    tables = [
+        model
+        for model in stored_rows.find_tables()
+        if stored_rows.label_of(model) in manifest.rows
+    ]
 
     def write() -> None:
-        _write_rows(source, manifest, [by_label[label] for label in manifest.rows])
+        _write_rows(source, manifest, tables, _check_of_study)
         _take_powers()
         _settle()
 
-    _restore(source, manifest, write, say)
+    _restore(source, manifest, media, write, say)
     return manifest
+
+
+def _check_of_study(row: models.Model) -> None:
+    """Refuse what a study's folder must not hold: work to be done, and code to be loaded."""
+    check_row(row)
+    if is_unfinished(row):
+        raise ValueError(
+            f"state: {getattr(row, 'state', '')!r} is not over; a study's folder holds what has "
+            "ended"
+        )
+    if isinstance(row, Simulation) and row.planner not in allowed_planners():
+        raise ValueError(
+            f"planner: {row.planner!r} is not allowed here, only "
+            f"{', '.join(allowed_planners())}; ARENA_PLANNERS names more"
+        )
+
+
+def _media_of(manifest: Manifest) -> list[str]:
+    """Return the names of the files that are put into the media storage."""
+    members = (name for name in manifest.members if name.startswith(MEDIA))
+    return [name.removeprefix(MEDIA) for name in members]
+
+
+def _ours_of(manifest: Manifest, say: Callable[[str], None]) -> list[str]:
+    """Return the files with names of ours; a backup may hold what somebody else laid there."""
+    media = _media_of(manifest)
+    for name in media:
+        if not is_stored_name(name):
+            say(f"left out, no file of ours: {MEDIA}{name}")
+    return [name for name in media if is_stored_name(name)]
 
 
 def _take_powers() -> None:
@@ -101,7 +139,11 @@ def _take_powers() -> None:
 
 
 def _restore(
-    source: MemberSource, manifest: Manifest, write: Callable[[], None], say: Callable[[str], None]
+    source: MemberSource,
+    manifest: Manifest,
+    media: list[str],
+    write: Callable[[], None],
+    say: Callable[[str], None],
 ) -> None:
     """Pictures and rows, or neither."""
     _check_release(manifest)
@@ -115,7 +157,7 @@ def _restore(
     call_command("migrate", interactive=False, verbosity=0)
     written: list[str] = []
     try:
-        _write_media(source, manifest, written)
+        _write_media(source, media, written)
         say(f"pictures: {len(written)}")
         with transaction.atomic():
             write()
@@ -139,12 +181,9 @@ def _check_release(manifest: Manifest) -> None:
     )
 
 
-def _write_media(source: MemberSource, manifest: Manifest, written: list[str]) -> None:
-    for member in manifest.members:
-        if not member.startswith(MEDIA):
-            continue
-        name = member.removeprefix(MEDIA)
-        with source.open(member) as file:
+def _write_media(source: MemberSource, media: list[str], written: list[str]) -> None:
+    for name in media:
+        with source.open(f"{MEDIA}{name}") as file:
             content = file.read()
         if default_storage.exists(name):
             with default_storage.open(name) as there:
@@ -161,18 +200,22 @@ def _settle() -> None:
         connection.check_constraints()
     except IntegrityError as error:
         raise BackupUnreadable(f"Its rows don't fit each other: {error}") from error
+    check_votes()
     stored_rows.reset_sequences()
 
 
 def _write_rows(
-    source: MemberSource, manifest: Manifest, tables: Iterable[type[models.Model]]
+    source: MemberSource,
+    manifest: Manifest,
+    tables: Iterable[type[models.Model]],
+    check: Callable[[models.Model], None],
 ) -> None:
     for model in tables:
         label = stored_rows.label_of(model)
         try:
             with source.open(f"{ROWS}{label}.jsonl") as lines:
-                number = stored_rows.write_rows(model, lines)
-        except (ValueError, TypeError, KeyError, OSError, *REFUSED) as error:
-            raise BackupUnreadable(f"The rows of {label} can't be stored: {error}") from error
+                number = stored_rows.write_rows(model, lines, check=check)
+        except (ValueError, OSError, DatabaseError) as error:
+            raise BackupUnreadable(f"{ROWS}{label}.jsonl can't be stored: {error}") from error
         if number != manifest.rows[label]:
             raise BackupUnreadable(f"{label} has {number} rows, not {manifest.rows[label]}.")

@@ -86,7 +86,7 @@ def add_endpoint(
                 "There is an endpoint “%(label)s” already; choose another label.", label=label
             )
         )
-    row = Endpoint(label=label, is_simulated=is_simulated, **_checked(facts))
+    row = Endpoint(label=label, is_simulated=is_simulated, **check_facts(facts))
     row.save()
     log_event(
         actor=actor,
@@ -113,7 +113,7 @@ def change_endpoint(
         Conflict: Its key would go to another server, and nobody said that it may.
     """
     row = Endpoint.objects.select_for_update(no_key=True).get(pk=row.pk)
-    wanted = _checked(facts)
+    wanted = check_facts(facts)
     move = move_of(endpoint=row, base_url=wanted["base_url"], key_variable=facts.key_variable)
     if move is not None and not may_move_key:
         raise Conflict(
@@ -181,8 +181,8 @@ def change_model(
 # --- Private -----------------------------------------------------------------------------------
 
 
-def _checked(facts: EndpointFacts) -> dict[str, Any]:
-    """The facts as columns.
+def check_facts(facts: EndpointFacts) -> dict[str, Any]:
+    """Return the facts as columns.
 
     Raises:
         InvalidDocument: With every fault at its place.

@@ -65,6 +65,11 @@ class Options:
         return asdict(self)
 
 
+def allowed_planners() -> tuple[str, ...]:
+    """Return the planners that workers of this installation may load."""
+    return (*NAMED, *settings.PLANNERS)
+
+
 def load_planner(how: Options | Simulation, *, also: Collection[str] = ()) -> Planner:
     """Return the planner that options or a row name, if this process may load it.
 
@@ -149,8 +154,7 @@ def find_unsent(*, older_than: timedelta, now: Moment = DATABASE_TIME) -> list[i
 
     Rows of a planner that no worker may load wait for the command that named it.
     """
-    loadable = (*NAMED, *settings.PLANNERS)
-    waiting = Simulation.objects.filter(state=State.QUEUED, planner__in=loadable)
+    waiting = Simulation.objects.filter(state=State.QUEUED, planner__in=allowed_planners())
     old = Q(sent_at=None) | Q(sent_at__lt=now - older_than)
     return list(waiting.filter(old).order_by("pk").values_list("pk", flat=True))
 

@@ -73,7 +73,7 @@ def launch(
     who = _contestants(contestants)
     where = _scenarios(scenarios)
     refuse_impossible(who, where)
-    _check_samples(samples)
+    check_samples(samples)
     job = GenerationJob.objects.create(
         name=name,
         launched_by_id=actor.pk if actor else None,
@@ -229,7 +229,8 @@ def _log_launch(
     )
 
 
-def _check_samples(samples: int) -> None:
+def check_samples(samples: int) -> None:
+    """Refuse what a job can't ask for, with a Conflict."""
     if not 1 <= samples <= MOST_SAMPLES:
         raise Conflict(
             sentence(

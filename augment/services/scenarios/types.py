@@ -36,6 +36,23 @@ def type_rank(name: str) -> int:
     return known.index(name) if name in known else len(known)
 
 
+def check_type(name: str) -> None:
+    """Refuse what can't be a scenario type.
+
+    Raises:
+        InvalidDocument: It is neither one of the five nor a slug.
+    """
+    if type_of(name) is not None:
+        return
+    if len(name) > LONGEST_TYPE or not re.fullmatch(r"[a-z0-9]+([_-][a-z0-9]+)*", name):
+        known = ", ".join(one.value for one in ScenarioType)
+        rule = (
+            f"one of {known}, or a slug of your own: lower-case letters, digits and single _ or "
+            f"-, at most {LONGEST_TYPE}"
+        )
+        raise InvalidDocument("scenario", [("type", f"{name!r} must be {rule}")])
+
+
 def label_for(name: str, label: str | None) -> str:
     """The label that a scenario of this type is stored with: empty for one of the five.
 
@@ -52,13 +69,7 @@ def label_for(name: str, label: str | None) -> str:
         if label:
             raise InvalidDocument("scenario", [("type_label", f"{name} has a label of its own")])
         return ""
-    if len(name) > LONGEST_TYPE or not re.fullmatch(r"[a-z0-9]+([_-][a-z0-9]+)*", name):
-        known = ", ".join(one.value for one in ScenarioType)
-        rule = (
-            f"one of {known}, or a slug of your own: lower-case letters, digits and single _ or "
-            f"-, at most {LONGEST_TYPE}"
-        )
-        raise InvalidDocument("scenario", [("type", f"{name!r} must be {rule}")])
+    check_type(name)
     before = Scenario.objects.filter(type=name).values_list("type_label", flat=True).first()
     if not label:
         return before or re.sub(r"[_-]", " ", name).capitalize()

@@ -1,0 +1,136 @@
+"""What a row from outside must keep to, beyond its columns: the rules of the forms and the API.
+
+Each rule is the function by which the form or the API reads the same thing.
+"""
+
+from __future__ import annotations
+
+import zlib
+from collections.abc import Callable, Mapping
+from typing import Any
+
+from django.db import models
+
+from augment.baselines.simulated import Rates
+from augment.errors import InvalidDocument
+from augment.models import (
+    Augmentation,
+    BaseScene,
+    Contestant,
+    Endpoint,
+    EndpointModel,
+    GenerationJob,
+    IntentReading,
+    Scenario,
+    SceneUpload,
+    Simulation,
+    UploadMoment,
+)
+from augment.scene.codec import modification_from_document, scene_from_document
+from augment.scene.intent_codec import intent_from_document
+from augment.scene.notes import notes_from_document
+from augment.scene.recording_codec import recording_from_document
+from augment.services.endpoints.editing import EndpointFacts, check_facts
+from augment.services.running.jobs import check_samples
+from augment.services.scenarios.scenes import (
+    INSTRUCTION_LENGTH,
+    check_reference,
+    check_slug,
+    scene_of,
+)
+from augment.services.scenarios.types import check_type
+from augment.services.stored_names import check_picture_name, check_stored_name
+from augment.services.texts import check_prose, one_line
+from augment.simulation.planners import OFFSETS_M
+from augment.variants.options import options_from_document
+from augment.variants.transcript import ModelRole
+
+LONGEST_TRACE = 1 << 26
+"""Of a drive to look at, unpacked: some hundred times what 15 s take."""
+
+
+def _check_scene(row: BaseScene) -> None:
+    check_slug(row.slug, what="scene")
+    scene_from_document(row.document)
+    notes_from_document(row.notes)
+    if row.recording is not None:
+        recording_from_document(row.recording)
+
+
+def _check_scenario(row: Scenario) -> None:
+    check_slug(row.slug, what="scenario")
+    check_type(row.type)
+    check_prose("instruction", row.instruction, what="scenario", longest=INSTRUCTION_LENGTH)
+    check_picture_name("original_image", row.original_image)
+    if row.intent is not None:
+        intent_from_document(row.intent)
+    if row.reference is not None:
+        check_reference(scene_of(row), modification_from_document(row.reference))
+
+
+def _check_endpoint(row: Endpoint) -> None:
+    check_slug(row.label, what="endpoint")
+    check_facts(
+        EndpointFacts(
+            base_url=row.base_url,
+            key_variable=row.key_variable,
+            max_concurrency=row.max_concurrency,
+            requests_per_minute=row.requests_per_minute,
+        )
+    )
+
+
+def _check_contestant(row: Contestant) -> None:
+    check_slug(row.slug, what="contestant")
+    one_line("name", row.name, what="contestant")
+    options_from_document(row.options)
+    for role, chosen in row.roles.items():
+        ModelRole(role)
+        one_line(f"roles.{role}", chosen["model"], what="contestant")
+    if row.error_rates is not None:
+        Rates(**row.error_rates)
+
+
+def _check_job(row: GenerationJob) -> None:
+    one_line("name", row.name, what="job")
+    check_samples(row.samples)
+
+
+def _check_augmentation(row: Augmentation) -> None:
+    check_picture_name("image", row.image)
+    if row.modification is not None:
+        modification_from_document(row.modification)
+
+
+def _check_reading(row: IntentReading) -> None:
+    if row.document is not None:
+        intent_from_document(row.document)
+
+
+def _check_drive(row: Simulation) -> None:
+    if row.offsets not in OFFSETS_M:
+        raise InvalidDocument("drive", [("offsets", f"one of {', '.join(OFFSETS_M)}")])
+    if row.trace is not None:
+        unpacking = zlib.decompressobj()
+        try:
+            unpacking.decompress(row.trace, LONGEST_TRACE)
+        except zlib.error as error:
+            raise InvalidDocument("drive", [("trace", str(error))]) from None
+        if not unpacking.eof:
+            raise InvalidDocument("drive", [("trace", f"more than {LONGEST_TRACE} bytes")])
+
+
+RULES: Mapping[type[models.Model], Callable[[Any], None]] = {
+    Augmentation: _check_augmentation,
+    BaseScene: _check_scene,
+    Contestant: _check_contestant,
+    Endpoint: _check_endpoint,
+    EndpointModel: EndpointModel.clean,
+    GenerationJob: _check_job,
+    IntentReading: _check_reading,
+    Scenario: _check_scenario,
+    SceneUpload: lambda row: check_stored_name("stored", row.stored),
+    Simulation: _check_drive,
+    UploadMoment: lambda row: check_stored_name("picture", row.picture),
+}
+"""What is raised is an AugmentError, or a ValueError, KeyError or TypeError of a document."""
