@@ -7,14 +7,16 @@ scene's origin is given in; agents are in their scene's ego frame. Positions are
 from __future__ import annotations
 
 import hashlib
+import re
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any, Final
 
 import yaml
 
 from augment.checks.ground import Ground
 from augment.scene.catalogue import ScenarioType
+from augment.scene.entities import SceneOptions, TrafficDensity, TurnType
 from augment.scene.modification import Modification
 from augment.sentences import escape_controls
 
@@ -28,6 +30,25 @@ MOST_ENTRIES: Final = 100
 GOALS: Final = ("left", "right", "straight")
 ACCEL_MAX_MPS2: Final = 1.0
 DECEL_MAX_MPS2: Final = 2.0
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class InterplanSource:
+    """Where a scenario comes from in nuPlan and in interPlan's file, whose parts stay verbatim.
+
+    Attributes:
+        token: The base token: nuPlan's lidar_pc of t0.
+        index: Of the special scenario; None for one that is in no file of interPlan's.
+        entry: The special scenario.
+        details: What stands beside the special scenarios under the token.
+        file: What stands beside the tokens.
+    """
+
+    token: str
+    index: str | None = None
+    entry: Mapping[str, Any] = field(default_factory=dict)
+    details: Mapping[str, Any] = field(default_factory=dict)
+    file: Mapping[str, Any] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -73,23 +94,57 @@ def token_of(scene_name: str) -> str:
     return hashlib.sha256(scene_name.encode()).hexdigest()[:16]
 
 
-def details(entries: Mapping[str, dict[str, Any]]) -> dict[str, Any]:
+def options_of(config: str | None) -> tuple[TrafficDensity, TurnType | None]:
+    """Density and goal of a suffix such as "dlgl"."""
+    parts = {part[0]: part[1:] for part in _CONFIG_PARTS.findall(config or "")}
+    return _DENSITIES[parts.get("d")], _TURNS[parts.get("g")]
+
+
+def config_of(options: SceneOptions, given: str = "") -> str:
+    """The suffix that says a scenario's options; as given where that says the same already."""
+    if options_of(given) == (options.density, options.goal):
+        return given
+    density = "" if options.density is TrafficDensity.NONE else f"d{options.density[0]}"
+    goal = "" if options.goal is None else f"g{options.goal[0]}"
+    others = [part for part in _CONFIG_PARTS.findall(given) if part[0] not in "dg"]
+    return "".join([density, goal, *others])
+
+
+def details(
+    entries: Mapping[str, Mapping[str, Any]], given: Mapping[str, Any] | None = None
+) -> dict[str, Any]:
     """What interPlan keeps for one base token, with these special scenarios by index."""
+    special = {_Quoted(index): entry for index, entry in entries.items()}
+    if given:
+        return {**given, "special_scenario": special}
     return {
         "extra_agents_to_spawn": [],
         "roadblock_locations_to_spawn_agents": [],
         "goal": dict.fromkeys(GOALS),
         "spawn_in_intersection": False,
-        "special_scenario": {_Quoted(index): entry for index, entry in entries.items()},
+        "special_scenario": special,
     }
 
 
-def yaml_text(by_token: Mapping[str, dict[str, Any]], comments: list[str]) -> str:
-    """The whole file; tokens are quoted, since some would be read as numbers."""
-    document = {
+def yaml_text(
+    by_token: Mapping[str, dict[str, Any]],
+    comments: list[str],
+    given: Mapping[str, Any] | None = None,
+) -> str:
+    """The whole file; tokens are quoted, since some would be read as numbers.
+
+    Args:
+        by_token: What stands under each base token.
+        comments: Lines at the top.
+        given: What stands beside the tokens; None for interPlan's fallbacks.
+    """
+    usual = {
         "accel_max": ACCEL_MAX_MPS2,
         "decel_max": DECEL_MAX_MPS2,
         "scenario_specifics": None,
+    }
+    document = {
+        **(given or usual),
         "modification_details_dictionary": {
             _Quoted(token): one for token, one in by_token.items()
         },
@@ -97,6 +152,16 @@ def yaml_text(by_token: Mapping[str, dict[str, Any]], comments: list[str]) -> st
     body = yaml.dump(document, Dumper=_Dumper, sort_keys=False, allow_unicode=True, width=99)
     head = "".join(f"# {escape_controls(' '.join(line.split()))}\n" for line in comments)
     return head + body
+
+
+_CONFIG_PARTS: Final = re.compile(r"[dgo][a-z]|a\d|s\d{1,2}")
+_DENSITIES = {
+    None: TrafficDensity.NONE,
+    "l": TrafficDensity.LOW,
+    "m": TrafficDensity.MEDIUM,
+    "h": TrafficDensity.HIGH,
+}
+_TURNS = {None: None, "l": TurnType.LEFT, "r": TurnType.RIGHT, "s": TurnType.STRAIGHT}
 
 
 class _Quoted(str):

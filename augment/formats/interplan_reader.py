@@ -6,16 +6,25 @@ Frames: from the file's global frame, the one of each scene's origin, to the sce
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
 from augment.checks.ground import Ground
 from augment.errors import InvalidDocument
-from augment.formats.interplan import STANDING_WALK_M, WALK_S, ReadEntry, ReadFile, cone_heading
+from augment.formats.interplan import (
+    STANDING_WALK_M,
+    WALK_S,
+    ReadEntry,
+    ReadFile,
+    cone_heading,
+    options_of,
+)
 from augment.formats.interplan_schema import (
     WHAT,
+    Details,
     SpecialScenario,
     file_of,
     left_out_of_details,
@@ -25,7 +34,8 @@ from augment.formats.interplan_schema import (
 from augment.formats.yaml_file import read_yaml
 from augment.geometry.angles import wrap
 from augment.geometry.frames import Pose
-from augment.scene.entities import AgentType, Scene, TrafficAgent
+from augment.scene.density import ExtraAgent, spawn_traffic
+from augment.scene.entities import AgentType, Point, Scene, TrafficAgent
 from augment.scene.modification import Modification
 from augment.scene.sizes import LENGTH_WIDTH_M
 
@@ -76,7 +86,7 @@ def read_document(document: object, scenes: Mapping[str, Scene]) -> ReadFile:
     ]
     return ReadFile(
         entries=tuple(
-            read_entry(token, index, entry, scenes[token])
+            _with_config(read_entry(token, index, entry, scenes[token]), entry)
             for token, entries in special.items()
             if token in scenes
             for index, entry in entries.items()
@@ -86,6 +96,13 @@ def read_document(document: object, scenes: Mapping[str, Scene]) -> ReadFile:
         },
         left_out=tuple(left_out),
     )
+
+
+def _with_config(read: ReadEntry, entry: SpecialScenario) -> ReadEntry:
+    """With the options that a scenario can have, and a modification alone can't say."""
+    if not entry.config:
+        return read
+    return replace(read, left_out=(f"config {entry.config}", *read.left_out))
 
 
 def read_entry(token: str, index: str | int, entry: SpecialScenario, scene: Scene) -> ReadEntry:
@@ -103,7 +120,7 @@ def read_entry(token: str, index: str | int, entry: SpecialScenario, scene: Scen
             placer.add(kind, *row, place=(key, number))
     for number, cone in enumerate(entry.cones):
         placer.add_cone(*cone, place=("cones", number))
-    left_out = [f"config {entry.config}"] if entry.config else []
+    left_out = []
     for number, (x_m, y_m, end_x_m, end_y_m, iteration) in enumerate(entry.pedestrian):
         place = ("pedestrian", number)
         walk_m = placer.add_walker((x_m, y_m), (end_x_m, end_y_m), place=place)
@@ -119,6 +136,69 @@ def read_entry(token: str, index: str | int, entry: SpecialScenario, scene: Scen
         modification=Modification(added=tuple(placer.added)),
         left_out=tuple(left_out),
     )
+
+
+def traffic_of(
+    entry: SpecialScenario,
+    details: Details,
+    scene: Scene,
+    *,
+    seed: str,
+    clear_of: Sequence[TrafficAgent] = (),
+) -> tuple[TrafficAgent, ...]:
+    """The traffic of a special scenario's density; none without one.
+
+    Args:
+        entry: Its roadblocks come before those of the token, an empty list too.
+        details: Of its base token.
+        scene: Cleared of the recorded traffic.
+        seed: interPlan takes the base token.
+        clear_of: Who is spawned keeps away from these.
+
+    Raises:
+        InvalidDocument: An extra agent has no place or speed.
+    """
+    density, _ = options_of(entry.config)
+    roadblocks = entry.roadblock_locations_to_spawn_agents
+    if roadblocks is None:
+        roadblocks = details.roadblock_locations_to_spawn_agents or []
+    return spawn_traffic(
+        scene,
+        density,
+        seed=seed,
+        roadblocks_m=[_to_local(scene, *place) for place in roadblocks],
+        extras=[_extra(row, scene) for row in details.extra_agents_to_spawn or []],
+        clear_of=clear_of,
+    )
+
+
+def goal_place(source: Mapping[str, Any] | None, goal: str, scene: Scene) -> Point | None:
+    """Where a goal of interPlan's file lies in the scene's ego frame, None where it has no place.
+
+    Args:
+        source: A scenario's parts of the file, as they are stored; None for one of another kind.
+        goal: left, right or straight.
+        scene: Whose origin tells the frame.
+    """
+    places = ((source or {}).get("details") or {}).get("goal") or {}
+    if not places.get(goal):
+        return None
+    x_m, y_m = (float(part) for part in places[goal].split(","))
+    return _to_local(scene, x_m, y_m)
+
+
+def _extra(row: Sequence[Any], scene: Scene) -> ExtraAgent:
+    values = row[:3]
+    if not all(isinstance(one, (int, float)) and math.isfinite(one) for one in values):
+        problem = f"{list(values)!r} must be x, y and a speed in metres and metres per second"
+        raise InvalidDocument(WHAT, [("extra_agents_to_spawn", problem)])
+    x_m, y_m = _to_local(scene, values[0], values[1])
+    return ExtraAgent(x_m=x_m, y_m=y_m, speed_mps=abs(float(values[2])))
+
+
+def _to_local(scene: Scene, x_m: float, y_m: float) -> Point:
+    x_m, y_m = scene.origin.pose.to_local(np.array([[x_m, y_m]]))[0]
+    return float(x_m), float(y_m)
 
 
 class _Placer:
@@ -165,7 +245,7 @@ class _Placer:
         return walk_m
 
     def _local(self, x_m: float, y_m: float, place: Place) -> tuple[float, float]:
-        x_m, y_m = self._scene.origin.pose.to_local(np.array([[x_m, y_m]]))[0]
+        x_m, y_m = _to_local(self._scene, x_m, y_m)
         away_m = math.hypot(x_m, y_m)
         if away_m > FURTHEST_FROM_EGO_M:
             problem = (
@@ -173,7 +253,7 @@ class _Placer:
                 f"{FURTHEST_FROM_EGO_M:.0f} m means another scene or another frame"
             )
             raise InvalidDocument(WHAT, [(place_of(*self._entry, *place), problem)])
-        return float(x_m), float(y_m)
+        return x_m, y_m
 
     def _put(self, kind: AgentType, pose: Pose, **more: Any) -> None:
         length_m, width_m = LENGTH_WIDTH_M[kind]

@@ -20,11 +20,18 @@ MOST_OBJECTS = 1_000
 FURTHEST_M = 1e8
 WIDEST_RAD = 100.0
 
+OBJECTS = ("stopped_vehicle", "stopped_bus", "cones", "pedestrian")
+"""The keys of a special scenario whose rows a change writes anew."""
+
 _Item = TypeVar("_Item")
 _Objects = Annotated[list[_Item], Field(max_length=MOST_OBJECTS, fail_fast=True)]
 Metres = Annotated[float, Field(ge=-FURTHEST_M, le=FURTHEST_M)]
 Radians = Annotated[float, Field(ge=-WIDEST_RAD, le=WIDEST_RAD)]
 Standing = tuple[Metres, Metres, Radians]
+Place = Annotated[tuple[Metres, Metres], Strict(False)]
+CONFIG = r"^(d[lmh]|g[lrs]|o[amc]|a\d|s\d{1,2})*$"
+"""Density, goal, observation, amount of agents and special scenario, as one suffix."""
+GoalPlace = Annotated[str, Field(pattern=r"^\s*-?\d{1,9}(\.\d+)?\s*,\s*-?\d{1,9}(\.\d+)?\s*$")]
 Iteration = Annotated[int, Field(ge=0, le=1_000_000)]
 Token = Annotated[str, Field(pattern=r"^[0-9a-f]{16}$")]
 Index = Annotated[str, Field(pattern=r"^[0-9]{1,2}$")] | Annotated[int, Field(ge=0, le=99)]
@@ -38,21 +45,27 @@ class SpecialScenario(_Part):
     """One special scenario."""
 
     type: Annotated[ScenarioType, Strict(False)]
-    config: str | None = None
+    config: Annotated[str, Field(pattern=CONFIG)] | None = None
     stopped_vehicle: _Objects[Annotated[Standing, Strict(False)]] = []
     stopped_bus: _Objects[Annotated[Standing, Strict(False)]] = []
     cones: _Objects[Annotated[tuple[Metres, Metres], Strict(False)]] = []
     pedestrian: _Objects[
         Annotated[tuple[Metres, Metres, Metres, Metres, Iteration | None], Strict(False)]
     ] = []
+    roadblock_locations_to_spawn_agents: _Objects[Place] | None = None
 
 
 class Details(_Part):
-    """What stands under one base token; only its special scenarios hold objects to read."""
+    """What stands under one base token; only its special scenarios hold objects to read.
 
-    extra_agents_to_spawn: list[Any] | None = None
-    roadblock_locations_to_spawn_agents: list[Any] | None = None
-    goal: dict[str, Any] | None = None
+    Attributes:
+        extra_agents_to_spawn: Rows of x, y and speed, and perhaps how the vehicle behaves.
+        goal: "x, y" by turn; None where the turn alone is said.
+    """
+
+    extra_agents_to_spawn: _Objects[Annotated[list[Any], Field(min_length=3)]] | None = None
+    roadblock_locations_to_spawn_agents: _Objects[Place] | None = None
+    goal: dict[str, GoalPlace | None] | None = None
     spawn_in_intersection: bool | None = None
     special_scenario: dict[Index, SpecialScenario] | None = None
 
@@ -95,15 +108,7 @@ def left_out_of_file(file: File) -> Iterator[str]:
 
 
 def left_out_of_details(details: Details) -> Iterator[str]:
-    """What a base token has besides special scenarios: other traffic, a route."""
-    if details.extra_agents_to_spawn:
-        yield f"extra_agents_to_spawn ({len(details.extra_agents_to_spawn)})"
-    if details.roadblock_locations_to_spawn_agents:
-        number = len(details.roadblock_locations_to_spawn_agents)
-        yield f"roadblock_locations_to_spawn_agents ({number})"
-    goals = [f"{turn} {goal}" for turn, goal in (details.goal or {}).items() if goal is not None]
-    if goals:
-        yield f"goal ({'; '.join(goals)})"
+    """What a base token says that changes nothing here; an export says it again."""
     if details.spawn_in_intersection:
         yield "spawn_in_intersection"
     yield from (f"key {key}" for key in details.model_extra or {})

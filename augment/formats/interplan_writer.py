@@ -7,8 +7,9 @@ from __future__ import annotations
 
 import math
 from collections import defaultdict
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -19,15 +20,20 @@ from augment.formats.interplan import (
     MOST_ENTRIES,
     STANDING_WALK_M,
     WALK_S,
+    InterplanSource,
     cone_heading,
+    config_of,
     details,
     token_of,
     yaml_text,
 )
+from augment.formats.interplan_reader import read_entry
+from augment.formats.interplan_schema import OBJECTS, SpecialScenario
 from augment.formats.writing import Cell, Loss
 from augment.geometry.angles import difference, wrap
 from augment.scene.catalogue import ScenarioType
 from augment.scene.entities import AgentType, Point, Scene, TrafficAgent
+from augment.scene.modification import without_traffic
 from augment.scene.sizes import LENGTH_WIDTH_M
 
 BUS_LENGTH_M = 7.0
@@ -43,16 +49,18 @@ _SAME_PACE_MPS = 0.02
 _SAME_WAY_RAD = 0.001
 _NO_WALK_M = 0.01
 _MADE_UP = (
-    "The base tokens are made from the scenes' names and are none of nuPlan's. Places are in "
-    "the frame of each scene's origin."
+    "These base tokens are made from the scenes' names and are none of nuPlan's; places are in "
+    "the frame of each scene's origin:"
 )
 
 
 def write(cells: Iterable[Cell]) -> tuple[str, tuple[Loss, ...]]:
     """The file's text and what it could not say.
 
-    Scenes that nuPlan does not have get a token made from their name; special scenarios are
-    numbered in the given order. The comments at the top say what is what.
+    What came from interPlan's file keeps its base token and index, and is written as it stood
+    there unless it was changed. Scenes that nuPlan does not have get a token made from their
+    name; special scenarios without an index are numbered in the given order. The comments at the
+    top say what is what.
 
     Args:
         cells: What to write, several for one scene under one token.
@@ -60,27 +68,60 @@ def write(cells: Iterable[Cell]) -> tuple[str, tuple[Loss, ...]]:
     Raises:
         Conflict: More than a hundred for one scene, which two digits can't number.
     """
-    by_token: dict[str, dict[str, dict[str, Any]]] = defaultdict(dict)
-    comments, losses = [_MADE_UP], []
+    entries, losses = [], []
     for cell in cells:
         if cell.type is None:
             text = "interPlan has five types of scenarios, and this one is of another: left out"
             losses.append(Loss(cell=cell.name, text=text, changes_scene=True))
+        else:
+            entries.append(_Entry(cell))
+    by_token: dict[str, dict[str, dict[str, Any]]] = defaultdict(dict)
+    comments = []
+    numbers = _numbered(entries)
+    made_up = {one.token for one in entries if one.cell.source is None}
+    if made_up:
+        comments.append(f"{_MADE_UP} {', '.join(sorted(made_up))}")
+    for entry in entries:
+        index = numbers[id(entry)]
+        by_token[entry.token][index] = entry.written()
+        losses += entry.losses
+        comments.append(f"{entry.token}-s{index} {entry.cell.scene.name}: {entry.cell.name}")
+        comments += [f"  lost: {loss.text}" for loss in entry.losses]
+    given = {one.token: one.source for one in reversed(entries) if one.source.index is not None}
+    documents = {
+        token: details(special, given[token].details if token in given else None)
+        for token, special in by_token.items()
+    }
+    file = next((source.file for source in given.values() if source.file), None)
+    return yaml_text(documents, comments, file), tuple(losses)
+
+
+def _numbered(entries: Sequence[_Entry]) -> dict[int, str]:
+    """The index of each special scenario by its id().
+
+    Its own for who is as in the file, then for who comes first, else the next that nobody has.
+    """
+    numbers: dict[int, str] = {}
+    taken = defaultdict[str, set[str]](set)
+    for entry in sorted(entries, key=lambda one: not one.is_unchanged):
+        own = entry.source.index
+        if own is not None and own not in taken[entry.token]:
+            numbers[id(entry)] = own
+            taken[entry.token].add(own)
+    for entry in entries:
+        if id(entry) in numbers:
             continue
-        token = token_of(cell.scene.name)
-        index = str(len(by_token[token]))
-        if len(by_token[token]) >= MOST_ENTRIES:
+        used = taken[entry.token]
+        free = (str(number) for number in range(MOST_ENTRIES) if str(number) not in used)
+        index = next(free, None)
+        if index is None:
             raise Conflict(
                 f"interPlan numbers at most {MOST_ENTRIES} special scenarios for a scene, and "
-                f"{cell.scene.name} has more; write fewer contestants at a time."
+                f"{entry.cell.scene.name} has more; write fewer contestants at a time."
             )
-        entry = _Entry(cell)
-        by_token[token][index] = entry.written()
-        losses += entry.losses
-        comments.append(f"{token}-s{index} {cell.scene.name}: {cell.name}")
-        comments += [f"  lost: {loss.text}" for loss in entry.losses]
-    documents = {token: details(entries) for token, entries in by_token.items()}
-    return yaml_text(documents, comments), tuple(losses)
+        numbers[id(entry)] = index
+        used.add(index)
+    return numbers
 
 
 @dataclass(kw_only=False)
@@ -90,15 +131,44 @@ class _Entry:
     cell: Cell
     losses: list[Loss] = field(default_factory=list)
 
+    @property
+    def source(self) -> InterplanSource:
+        """Where it comes from; a token made from the scene's name where nobody says."""
+        return self.cell.source or InterplanSource(token=token_of(self.cell.scene.name))
+
+    @property
+    def token(self) -> str:
+        """The base token."""
+        return self.source.token
+
+    @cached_property
+    def is_unchanged(self) -> bool:
+        """Whether the change is the one that stands in interPlan's file."""
+        if self.source.index is None:
+            return False
+        read = read_entry(
+            self.token,
+            self.source.index,
+            SpecialScenario.model_validate(self.source.entry),
+            without_traffic(self.cell.scene),
+        )
+        return read.modification == self.cell.modification
+
     def written(self) -> dict[str, Any]:
         """InterPlan's keys, those without objects left out."""
+        assert self.cell.type is not None
+        given = dict(self.source.entry)
+        config = config_of(self.cell.scene.options, given.pop("config", None) or "")
+        head = {"type": self.cell.type.value} | ({"config": config} if config else {})
+        if self.is_unchanged:
+            return head | {key: value for key, value in given.items() if key != "type"}
         lists: dict[str, list[list[float | None]]] = defaultdict(list)
         for agent in self.cell.modification.added:
             for key, row in self._row(agent):
                 lists[key].append(row)
         self._report_scene()
-        assert self.cell.type is not None
-        return {"type": self.cell.type.value, **lists}
+        rest = {key: value for key, value in given.items() if key not in ("type", *OBJECTS)}
+        return {**head, **lists, **rest}
 
     def _lose(self, text: str, *, changes_scene: bool = True) -> None:
         self.losses.append(Loss(cell=self.cell.name, text=text, changes_scene=changes_scene))

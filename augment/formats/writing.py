@@ -13,6 +13,7 @@ from functools import cached_property
 import numpy as np
 
 from augment.errors import InvalidDocument
+from augment.formats.interplan import InterplanSource
 from augment.scene.catalogue import ScenarioType
 from augment.scene.codec import scene_to_document
 from augment.scene.entities import Scene
@@ -34,6 +35,7 @@ class Cell:
         made_on: When the change was made, for formats that ask for a date.
         recording: What was recorded after t0, None where nothing was.
         drive: A simulated drive, which then says what everybody does instead of the recording.
+        source: Where the scenario comes from in nuPlan and interPlan, None where it does not.
     """
 
     name: str
@@ -45,6 +47,7 @@ class Cell:
     made_on: date = date(1970, 1, 1)
     recording: Recording | None = None
     drive: Motion | None = None
+    source: InterplanSource | None = None
 
     @cached_property
     def after(self) -> Scene:

@@ -8,10 +8,12 @@ from django.db import models
 from django.db.models import Q
 
 from augment.scene.catalogue import CatalogueSet, ScenarioType
+from augment.scene.entities import TrafficDensity, TurnType
 from augment.scene.intent_words import (
     IntentOrigin,
 )
 
+GOALS = (TurnType.LEFT, TurnType.RIGHT, TurnType.STRAIGHT)
 SLUG_HELP = "lower-case letters, digits and hyphens"
 
 
@@ -23,6 +25,9 @@ class BaseScene(models.Model):
     document = models.JSONField(help_text="the scene in augment.scene.codec's format")
     recording = models.JSONField(null=True, blank=True, help_text="tracks and ego motion after t0")
     source = models.CharField(max_length=40, help_text="authored, av2, ...")
+    source_item = models.CharField(
+        max_length=200, blank=True, help_text="which part of its source; nuPlan's base token"
+    )
     provenance = models.TextField()
     notes = models.JSONField(
         default=list,
@@ -83,6 +88,29 @@ class Scenario(models.Model):
     )
     keep_traffic = models.BooleanField(
         default=False, help_text="keep the recorded traffic; interPlan clears it"
+    )
+    traffic_density = models.CharField(
+        max_length=10,
+        default=TrafficDensity.NONE.value,
+        choices=[(one.value, one.value) for one in TrafficDensity],
+        help_text="of the traffic spawned in place of the recorded one",
+    )
+    goal = models.CharField(
+        max_length=10,
+        blank=True,
+        choices=[(one.value, one.value) for one in GOALS],
+        help_text="where the ego's way turns; empty for the recorded or straightest way",
+    )
+    spawned = models.JSONField(
+        null=True, blank=True, help_text="the spawned traffic, as a modification that adds it"
+    )
+    interplan = models.JSONField(
+        null=True,
+        blank=True,
+        help_text="the special scenario in interPlan's file: index, entry, details, file",
+    )
+    instruction_is_generated = models.BooleanField(
+        default=False, help_text="made from the reference, not written by a person"
     )
     catalogue_set = models.CharField(
         max_length=10,

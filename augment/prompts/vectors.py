@@ -21,7 +21,15 @@ from augment.prompts.extent import BESIDE_M, Extent, extent_of, shown_spans
 from augment.prompts.lane_curves import control_points
 from augment.prompts.names import ShortNames, number_of, short_names
 from augment.scene.bezier_lanes import bezier_lane
-from augment.scene.entities import Area, Lane, LaneConnector, Scene, TrafficAgent
+from augment.scene.entities import (
+    Area,
+    Lane,
+    LaneConnector,
+    Scene,
+    TrafficAgent,
+    TrafficDensity,
+    TurnType,
+)
 from augment.scene.modification import Modification
 
 SPACING_M = 5.0
@@ -76,8 +84,21 @@ def scene_text(
     }
     parts = [f"{title}:\n{_listed(vectors)}" for title, vectors in lists.items()]
     parts.append(f"Traffic drives on the {scene.traffic_side.value}-hand side of the road.")
+    parts += _options_lines(scene)
     parts.append(f"The first new agent is {names.next_agent}.")
     return "\n\n".join(parts)
+
+
+def _options_lines(scene: Scene) -> list[str]:
+    """What the scenario sets besides its change: the density of its traffic and its goal."""
+    density, goal = scene.options.density, scene.options.goal
+    lines = []
+    if density is not TrafficDensity.NONE:
+        lines.append(f"The traffic around the ego has a {density} density.")
+    if goal is not None:
+        way = "goes straight on" if goal is TurnType.STRAIGHT else f"turns {goal}"
+        lines.append(f"The ego's goal: its way {way} where the lanes first part.")
+    return lines
 
 
 def changes_text(scene: Scene, modification: Modification) -> str:

@@ -21,7 +21,7 @@ from augment.render.marks import draw_mark, draw_motion, draw_walks, is_small
 from augment.render.palette import MarkStyle
 from augment.render.road import beyond_road, draw_ground
 from augment.render.scale import Corner, draw_grid, draw_scale, scale_box, scale_corner
-from augment.render.signals import draw_signals
+from augment.render.signals import draw_goal, draw_signals
 from augment.scene.entities import AgentType, Scene, TrafficAgent
 from augment.scene.modification import Modification, apply
 
@@ -76,6 +76,7 @@ def paint_scene(
 def _unchanged(rest: Scene, camera: Camera, corner: Corner) -> MetricCanvas:
     """Everything that a change leaves as it is; nobody draws on it, only on copies."""
     ground = _flat(replace(rest, agents=()), camera).copy()
+    draw_goal(ground, rest)
     draw_signals(ground, rest)
     draw_scale(ground, scale_box(camera, corner))
     traffic = [(agent, palette.OTHER_MARK) for agent in rest.agents]

@@ -13,6 +13,7 @@ import numpy as np
 from augment.geometry.frames import Pose
 from augment.render import palette
 from augment.render.canvas import MetricCanvas
+from augment.scene.ego_route import EgoRoute
 from augment.scene.entities import LaneConnector, Scene, TrafficLight, TurnType
 
 _COLOURS = {
@@ -22,6 +23,7 @@ _COLOURS = {
 }
 _LEFT_TO_RIGHT = (TurnType.U_TURN, TurnType.LEFT, TurnType.STRAIGHT, TurnType.RIGHT)
 _LAMP_PX = 5.5
+_GOAL_FROM_M, _GOAL_TO_M = 4.0, 80.0
 
 
 def draw_signals(ground: MetricCanvas, scene: Scene) -> None:
@@ -33,6 +35,16 @@ def draw_signals(ground: MetricCanvas, scene: Scene) -> None:
     for connectors in starts.values():
         if ground.camera.shows(connectors[0].centerline.points_m[:1]):
             _bar(ground, connectors)
+
+
+def draw_goal(ground: MetricCanvas, scene: Scene) -> None:
+    """The ego's way to the scenario's goal, dashed; nothing for a scenario without one."""
+    route = EgoRoute.of(scene) if scene.options.goal is not None else None
+    if route is None or route.line.length_m - route.ego_s_m < _GOAL_FROM_M:
+        return
+    end_m = min(route.line.length_m, route.ego_s_m + _GOAL_TO_M)
+    way = route.line.between(route.ego_s_m + _GOAL_FROM_M, end_m)
+    ground.dashed(way.points_m, palette.EGO_MARK.fill, 2.0, 1.5, 1.5)
 
 
 def _bar(ground: MetricCanvas, connectors: list[LaneConnector]) -> None:

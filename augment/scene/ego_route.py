@@ -60,9 +60,16 @@ class EgoRoute:
         scene: Scene,
         graph: LaneGraph | None = None,
         *,
-        turn: TurnType = TurnType.STRAIGHT,
+        turn: TurnType | None = None,
     ) -> EgoRoute | None:
-        """The route of a scene's ego, None where the map has no lane for it."""
+        """The route of a scene's ego, None where the map has no lane for it.
+
+        Args:
+            scene: Whose ego.
+            graph: Of the scene, where there is one already.
+            turn: Where the lanes part; None for the scenario's goal, else straight on.
+        """
+        turn = turn or scene.options.goal or TurnType.STRAIGHT
         graph = LaneGraph(scene) if graph is None else graph
         own = find_ego_lane(scene, graph)
         if own is None:

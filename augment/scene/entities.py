@@ -47,6 +47,15 @@ class TurnType(StrEnum):
     U_TURN = "u_turn"
 
 
+class TrafficDensity(StrEnum):
+    """How much traffic is spawned in place of the recorded one; interPlan's three, and none."""
+
+    NONE = "none"
+    LOW = "low"
+    MEDIUM = "medium"
+    HIGH = "high"
+
+
 class AreaKind(StrEnum):
     """What an area is; the union of lanes, connectors and `drivable` areas can be driven on."""
 
@@ -156,6 +165,21 @@ class Origin:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class SceneOptions:
+    """What a scenario sets besides its change.
+
+    Attributes:
+        density: Of the spawned traffic, which is among the scene's agents.
+        goal: Where the ego's way turns: left, right or straight; None where nobody says.
+        goal_m: A place in the ego frame that the way leads to, None where the turn alone is said.
+    """
+
+    density: TrafficDensity = TrafficDensity.NONE
+    goal: TurnType | None = None
+    goal_m: Point | None = None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Scene:
     """Ego, traffic, lanes, connectors and areas at one moment, t0.
 
@@ -164,6 +188,7 @@ class Scene:
         ego: Always at (0, 0), heading 0, type EGO_VEHICLE, id "Agent1".
         agents: All others, nearest to the ego first.
         provenance: Where it comes from and under which licence, in a sentence.
+        options: Set by a scenario; no part of the scene's document.
     """
 
     name: str
@@ -175,6 +200,7 @@ class Scene:
     lanes: tuple[Lane, ...] = ()
     connectors: tuple[LaneConnector, ...] = ()
     areas: tuple[Area, ...] = field(default=())
+    options: SceneOptions = SceneOptions()
 
     @property
     def everyone(self) -> tuple[TrafficAgent, ...]:

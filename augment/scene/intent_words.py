@@ -11,6 +11,7 @@ class IntentOrigin(StrEnum):
     AUTHORED = "authored"
     ENTERED = "entered"
     READ = "read"
+    DERIVED = "derived"
 
 
 class LateralTarget(StrEnum):

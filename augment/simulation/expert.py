@@ -45,7 +45,9 @@ def expert_of(setting: DriveSetting, road: Road, *, steps: int = DURATION_STEPS)
     Either goes as long as the drive lasts and as far as the map goes. Where the recording ends
     before, the recorded one holds the pace of its last second.
     """
-    if setting.recording is not None and setting.recording.shows_ego:
+    # A recorded ego is no expert on the way to a goal, which may be another.
+    has_goal = setting.scene.options.goal is not None
+    if setting.recording is not None and setting.recording.shows_ego and not has_goal:
         return _recorded(setting.recording, road, EgoBody.of(setting.scene.ego), steps * STEP_S)
     plain = replace(setting, modification=Modification())
     drive = run(plain, IdmPlanner(target_mps=None), road=road, steps=steps)

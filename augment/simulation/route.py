@@ -10,7 +10,7 @@ import numpy as np
 from augment.errors import CannotDrive
 from augment.geometry.angles import difference
 from augment.scene.ego_route import find_ego_lane
-from augment.scene.entities import Lane, Scene
+from augment.scene.entities import Lane, Scene, TurnType
 from augment.scene.lane_graph import LaneGraph
 from augment.scene.recording import Recording
 from augment.sentences import sentence
@@ -24,10 +24,15 @@ _ALIGNED_RAD = math.radians(60.0)
 def find_route(scene: Scene, graph: LaneGraph, recording: Recording | None) -> tuple[str, ...]:
     """Ids of the ways from the one under the ego on; one way before it where the map has one.
 
+    A scenario's goal comes before what was recorded: the way to the lane nearest to its place,
+    or its turn where the lanes first part that way. Where neither can be reached without a lane
+    change, the way is as without a goal.
+
     Raises:
         CannotDrive: There is no way under the ego or within 3 m of it.
     """
     start = _start(scene, graph)
+    goal = _ways_to_goal(scene, graph)
     seen = Counter[str]() if recording is None else _driven(graph, recording)
     route = [start]
     length_m = graph.lane(start).centerline.length_m
@@ -36,7 +41,7 @@ def find_route(scene: Scene, graph: LaneGraph, recording: Recording | None) -> t
         if not options:
             break
         # Of equally driven ones the first: successors come straightest first.
-        route.append(max(options, key=lambda name: _support(graph, seen, name)))
+        route.append(max(options, key=lambda name: (name in goal, _support(graph, seen, name))))
         length_m += graph.lane(route[-1]).centerline.length_m
     before = [name for name in graph.predecessors(start) if name not in route]
     return (*before[:1], *route)
@@ -61,6 +66,38 @@ def beside_route(scene: Scene, graph: LaneGraph, route: tuple[str, ...]) -> froz
 
 
 # Private
+
+
+def _ways_to_goal(scene: Scene, graph: LaneGraph) -> frozenset[str]:
+    """Ids of all ways from which the goal's lane or turn can be reached."""
+    options = scene.options
+    if options.goal_m is not None:
+        nearest = graph.nearest(*options.goal_m)
+        ends = [] if nearest is None else [nearest[0]]
+    elif options.goal is not None:
+        ends = _first_turns(scene, graph, options.goal)
+    else:
+        return frozenset()
+    reaching = set(ends)
+    while ends:
+        ends = [name for end in ends for name in graph.predecessors(end) if name not in reaching]
+        reaching.update(ends)
+    return frozenset(reaching)
+
+
+def _first_turns(scene: Scene, graph: LaneGraph, turn: TurnType) -> list[str]:
+    """The first connector of that turn on the ways from the ego on, the fewest ways ahead."""
+    connectors = {one.id: one for one in scene.connectors}
+    ahead, seen = [_start(scene, graph)], set[str]()
+    while ahead:
+        fitting = [
+            name for name in ahead if name in connectors and connectors[name].turn_type is turn
+        ]
+        if fitting:
+            return fitting[:1]
+        seen.update(ahead)
+        ahead = [name for way in ahead for name in graph.successors(way) if name not in seen]
+    return []
 
 
 def _start(scene: Scene, graph: LaneGraph) -> str:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 from tests.formats.nuplan_files import CITIES, token, write_log, write_map
 
@@ -62,6 +63,87 @@ modification_details_dictionary:
           - 143000
           - 0
 """
+
+
+CONSTRUCTION, ACCIDENT, JAYWALK, NUDGE, OVERTAKE = (
+    "approaching_construction_zone",
+    "avoid_crashed_cars",
+    "jaywalking_pedestrian",
+    "nudge_around_parked_vehicle",
+    "overtake_parked_vehicle",
+)
+FIFTY: dict[int, list[tuple[str, str]]] = {
+    0: [  # the base scene with 15 entries
+        *[(OVERTAKE, config) for config in ("dh", "")],
+        (ACCIDENT, ""),
+        *[(NUDGE, "")] * 3,
+        *[(CONSTRUCTION, config) for config in ("dl", "gl")],
+        *[(JAYWALK, "")] * 4,
+        *[(OVERTAKE, config) for config in ("dh", "dm", "a0")],
+    ],
+    1: [
+        (JAYWALK, ""),
+        *[(NUDGE, "")] * 3,
+        *[(CONSTRUCTION, config) for config in ("dl", "gl", "a0")],
+        *[(JAYWALK, "")] * 3,
+    ],
+    2: [*[(ACCIDENT, config) for config in ("gr", "", "")], *[(JAYWALK, "")] * 2],
+    3: [(CONSTRUCTION, config) for config in ("dl", "dl", "dl", "")],
+    4: [(CONSTRUCTION, ""), (ACCIDENT, "gr"), (ACCIDENT, "")],
+    5: [(ACCIDENT, "")] * 3,
+    6: [(NUDGE, ""), (ACCIDENT, ""), (NUDGE, "")],
+    7: [(OVERTAKE, config) for config in ("dh", "dm", "a0")],
+    8: [(NUDGE, "")] * 2,
+    9: [(OVERTAKE, config) for config in ("dh", "a0")],
+}
+"""The structure of interPlan's 50 special scenarios: types and configs by base scene and index."""
+
+
+def fifty_entries(city: str = CITY) -> dict[str, Any]:
+    """A modification file with the structure of interPlan's 50 special scenarios."""
+    _, east, north, _ = CITIES[city]
+
+    def entry(scene: int, index: int, kind: str, config: str) -> dict[str, Any]:
+        ahead = round(15.1 + scene + 0.37 * index, 6)
+
+        def at(more: float, left: float) -> list[float]:
+            """Beside the ego of that frame, which drives east."""
+            return [round(east + 1.461 + ahead + more, 7), round(north + left, 7)]
+
+        made: dict[str, Any] = {"type": kind} | ({"config": config} if config else {})
+        if kind == CONSTRUCTION:
+            made["cones"] = [at(2.5 * one, 1.5 - 0.6 * one) for one in range(3 + scene)]
+            made["pedestrian"] = [[*at(3.0, -2.5), *at(4.0, -2.5), None]]
+            if config == "dl":
+                made["roadblock_locations_to_spawn_agents"] = []
+        elif kind == ACCIDENT:
+            made["stopped_vehicle"] = [[*at(0.0, 0.3), 0.1], [*at(4.6, -0.5), -2.27]]
+        elif kind == JAYWALK:
+            made["pedestrian"] = [[*at(0.0, -6.0), *at(1.0, 6.0), None]]
+            if (scene, index) == (1, 0):
+                made["stopped_bus"] = [[*at(-6.0, -1.0), 0.0]]
+        else:
+            made["stopped_vehicle"] = [[*at(0.0, -0.8), 0.05]]
+        return made
+
+    return {
+        "accel_max": "${oc.select:observation.accel_max, 1}",
+        "decel_max": "${oc.select:observation.decel_max, 2}",
+        "scenario_specifics": None,
+        "modification_details_dictionary": {
+            token(100 + scene).hex(): {
+                "extra_agents_to_spawn": [[east + 40.25, north + 4.0, 3.0]] if scene < 2 else [],
+                "roadblock_locations_to_spawn_agents": [[east + 30.0, north + 4.0]],
+                "goal": {"left": f"{east + 60}, {north + 4}", "right": None, "straight": None},
+                "spawn_in_intersection": False,
+                "special_scenario": {
+                    str(index): entry(scene, index, kind, config)
+                    for index, (kind, config) in enumerate(entries)
+                },
+            }
+            for scene, entries in FIFTY.items()
+        },
+    }
 
 
 def write_folder(root: Path, city: str = CITY) -> Path:

@@ -265,15 +265,11 @@ modification_details_dictionary:
         "config dh",
         "pedestrian 0 starts at iteration 12",
         "pedestrian 1 walks 0 m, which gives it no direction",
-        "key roadblock_locations_to_spawn_agents",
     )
     assert found.modification.added[0].speed_mps == pytest.approx(8.0 / 15.0, abs=0.01)
     assert given.left_out == (
         "key colour",
         "scenario_specifics",
-        f"{AB}: extra_agents_to_spawn (2)",
-        f"{AB}: roadblock_locations_to_spawn_agents (1)",
-        f"{AB}: goal (right 1, 2)",
         f"{AB}: spawn_in_intersection",
         f"{AB}: key weather",
     )

@@ -1,17 +1,24 @@
 from __future__ import annotations
 
+from copy import deepcopy
 from io import StringIO
 from pathlib import Path
 
 import pytest
+import yaml
 from django.core.management import call_command
 from django.core.management.base import CommandError
 
-from augment.models import BaseScene, Scenario
+from augment.baselines.rule_placer import place
+from augment.checks.against_intent import check_against_intent
+from augment.checks.ground import Ground
+from augment.errors import CannotPlace
+from augment.models import Augmentation, BaseScene, GenerationJob, Scenario
 from augment.scene.entities import AgentType
 from augment.services.scenarios.scene_notes import notes_of
-from augment.services.scenarios.scenes import reference_of, scene_of
-from tests.formats.interplan_files import ELSEWHERE, HERE, write_folder
+from augment.services.scenarios.scenes import intent_of, reference_of, scene_of
+from tests.formats.interplan_files import ELSEWHERE, HERE, fifty_entries, write_folder
+from tests.jobs import rows
 
 pytestmark = pytest.mark.django_db
 
@@ -55,8 +62,10 @@ def test_one_command_makes_scenarios_with_their_human_references(folder: Path) -
     assert car.lane_id == scene_of(nudge).ego.lane_id
     assert nudge.instruction == (
         "Have the ego nudge around what stands at the side of its lane: a parked vehicle "
-        "17.5 m ahead of the ego and 0.8 m to its right, in the ego's direction."
+        "17.5 m ahead of the ego along its lane, in the ego's lane, 0.8 m right of its centre, "
+        "in the lane's direction."
     )
+    assert nudge.instruction_is_generated
     zone = reference_of(Scenario.objects.get(slug=f"interplan-{HERE}-s1"))
     assert zone is not None
     assert [one.type for one in zone.added] == [
@@ -65,21 +74,87 @@ def test_one_command_makes_scenarios_with_their_human_references(folder: Path) -
     ]
 
 
-def test_what_cannot_be_kept_stands_on_the_scene(folder: Path) -> None:
-    run(folder)
+def test_what_is_not_used_stands_in_the_lines_and_the_token_with_the_scene(folder: Path) -> None:
+    lines = run(folder)
     row = BaseScene.objects.get(slug=f"interplan-{HERE}")
-    assert HERE in row.provenance
+    assert row.source_item == HERE
     assert row.recording is not None
+    assert any(f"{HERE}-s2" in line and "starts at iteration 12" in line for line in lines)
     notes = [str(note) for note in notes_of(row)]
-    (left_out,) = [note for note in notes if note.startswith("What interPlan says besides")]
-    for part in (
-        "extra_agents_to_spawn (2)",
-        "roadblock_locations_to_spawn_agents (1)",
-        "goal (left ",
-        f"{HERE}-s1: config dlgl",
-    ):
-        assert part in left_out
     assert any(note.startswith("The source's route leads over 2 roadblocks") for note in notes)
+
+
+def test_density_and_goal_become_options_of_the_scenario(folder: Path) -> None:
+    run(folder)
+    plain, zone = (Scenario.objects.get(slug=f"interplan-{HERE}-s{one}") for one in (0, 1))
+    assert (plain.traffic_density, plain.goal, plain.spawned) == ("none", "", None)
+    assert (zone.traffic_density, zone.goal) == ("low", "left")
+    scene = scene_of(zone)
+    assert scene.options.goal_m == pytest.approx((60.0, 0.0), abs=1e-3)
+    assert scene.agents
+    assert {one.id for one in scene.agents} >= {"Agent101"}
+
+
+def test_an_unchanged_reference_goes_out_as_it_came_in(tmp_path: Path) -> None:
+    root = write_folder(tmp_path / "given")
+    (given,) = root.rglob("interPlan_modifications.yaml")
+    wanted = fifty_entries()
+    given.write_text(yaml.safe_dump(wanted))
+    assert run(root)[-1] == "50 scenarios imported, 0 were there already, 0 skipped."
+    job = GenerationJob.objects.create(name="Round 1")
+    reference = rows.add_kind("reference")
+    Augmentation.objects.bulk_create(
+        Augmentation(
+            job=job,
+            scenario=scenario,
+            contestant=reference,
+            state="done",
+            modification=scenario.reference,
+            image="x.png",
+        )
+        for scenario in Scenario.objects.all()
+    )
+    file, said = tmp_path / "out.yaml", StringIO()
+    arguments = ("modifications", "Round 1", "--format", "interplan", "--strict", "--out", file)
+    call_command("export", *map(str, arguments), stdout=StringIO(), stderr=said)
+    assert yaml.safe_load(file.read_text()) == wanted
+    assert "Lost" not in said.getvalue()
+
+
+def test_scenarios_that_differ_in_nothing_are_reported(folder: Path) -> None:
+    (given,) = folder.rglob("interPlan_modifications.yaml")
+    document = yaml.safe_load(given.read_text())
+    entries = document["modification_details_dictionary"][HERE]["special_scenario"]
+    entries["4"] = deepcopy(entries["0"]) | {"config": "a0"}
+    entries["5"] = deepcopy(entries["0"]) | {"config": "dh"}
+    given.write_text(yaml.safe_dump(document))
+    lines = run(folder)
+    assert f"{HERE}-s4: interplan-{HERE}-s4; the same as {HERE}-s0" in lines
+    assert f"{HERE}-s5: interplan-{HERE}-s5" in lines, "only its traffic tells it from the first"
+    assert "1 scenarios are the same as an earlier one." in lines
+
+
+def test_the_derived_intents_are_met_by_their_references(tmp_path: Path) -> None:
+    root = write_folder(tmp_path / "given")
+    (given,) = root.rglob("interPlan_modifications.yaml")
+    given.write_text(yaml.safe_dump(fifty_entries()))
+    run(root)
+    faults: dict[str, list[str]] = {}
+    refused: dict[str, str] = {}
+    for row in Scenario.objects.all():
+        intent, reference = intent_of(row), reference_of(row)
+        assert intent is not None
+        assert reference is not None
+        assert row.intent_origin == "derived"
+        found = check_against_intent(Ground.of(scene_of(row)), reference, intent)
+        asked = [str(one.kind) for one in found if one.is_fault and one.kind.startswith("asked")]
+        faults |= {row.slug: asked} if asked else {}
+        try:
+            place(scene_of(row), intent)
+        except CannotPlace as fault:
+            refused[row.slug] = str(fault)
+    assert faults == {}
+    assert refused == {}
 
 
 def test_importing_again_changes_nothing(folder: Path) -> None:

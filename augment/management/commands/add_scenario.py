@@ -10,11 +10,13 @@ from django.core.management.base import CommandError
 
 from augment.errors import AugmentError
 from augment.formats.json_file import read_json
+from augment.models.scenes import GOALS
 from augment.scene.catalogue import ScenarioType
 from augment.scene.codec import modification_from_document, modification_to_document
+from augment.scene.entities import TrafficDensity, TurnType
 from augment.scene.intent_codec import intent_from_document, intent_to_document
 from augment.services.scenarios.bulk import NEEDED, OPTIONAL, add_scenarios, read_rows
-from augment.services.scenarios.scenes import add_scenario
+from augment.services.scenarios.scenes import Circumstances, add_scenario
 from augment.services.terminal import TerminalCommand
 
 
@@ -53,6 +55,14 @@ class Command(TerminalCommand):
         parser.add_argument(
             "--keep-traffic", action="store_true", help="keep the recorded traffic in the scene"
         )
+        parser.add_argument(
+            "--density",
+            choices=[one.value for one in TrafficDensity],
+            help="spawn traffic in place of the recorded one",
+        )
+        parser.add_argument(
+            "--goal", choices=[one.value for one in GOALS], help="where the ego's way turns"
+        )
 
     def handle(self, *args: Any, **options: Any) -> None:
         """Add, and say under which name."""
@@ -72,6 +82,10 @@ class Command(TerminalCommand):
                 reference=_reference(options["reference"]),
                 intent=_intent(options["intent"]),
                 keep_traffic=options["keep_traffic"],
+                circumstances=Circumstances(
+                    density=TrafficDensity(options["density"] or "none"),
+                    goal=TurnType(options["goal"]) if options["goal"] else None,
+                ),
             )
         except AugmentError as fault:
             raise CommandError(str(fault)) from fault
@@ -82,7 +96,11 @@ class Command(TerminalCommand):
         )
 
     def _add_many(self, options: dict[str, Any]) -> None:
-        given = [f"--{name.replace('_', '-')}" for name in (*NEEDED, *OPTIONAL) if options[name]]
+        given = [
+            f"--{name.replace('_', '-')}"
+            for name in (*NEEDED, *OPTIONAL, "density", "goal")
+            if options[name]
+        ]
         if given:
             raise CommandError(f"--file says all of it; it goes without {', '.join(given)}.")
         try:

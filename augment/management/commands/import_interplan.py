@@ -59,11 +59,14 @@ class Command(TerminalCommand):
                 instructions=options["instructions"],
             ):
                 counts[_kind(step)] += 1
+                counts["same"] += isinstance(step, ScenarioDone) and bool(step.same_as)
                 self.stdout.write(_line(step))
                 self.stdout.flush()
         except AugmentError as fault:
             raise CommandError(str(fault)) from fault
         new, old, skipped = counts["new"], counts["old"], counts["skipped"]
+        if counts["same"]:
+            self.stdout.write(f"{counts['same']} scenarios are the same as an earlier one.")
         told = f"{new} scenarios imported, {old} were there already, {skipped} skipped."
         if not new + old:
             raise CommandError(
@@ -93,7 +96,8 @@ def _line(step: Step) -> str:
         case ScenarioDone():
             left_out = f"; left out: {', '.join(step.left_out)}" if step.left_out else ""
             done = "" if step.is_new else " was there already"
-            return f"{step.id}: {step.row.slug}{done}{left_out}"
+            same = f"; the same as {step.same_as}" if step.same_as else ""
+            return f"{step.id}: {step.row.slug}{done}{same}{left_out}"
         case ScenarioSkipped():
             return f"{step.id}: skipped. {step.reason}"
         case FileLeftOut():

@@ -13,18 +13,17 @@ from typing import Any
 
 from augment.geometry.angles import difference, wrap
 from augment.geometry.frames import Pose
-from augment.models import BaseScene, Scenario
+from augment.models import Scenario
 from augment.render.camera import AROUND_THE_EGO
 from augment.scene.codec import (
     modification_from_document,
     modification_to_document,
-    scene_from_document,
 )
 from augment.scene.entities import AgentType, Point, Scene, TrafficAgent
 from augment.scene.lane_graph import LaneGraph
-from augment.scene.modification import Modification, without_traffic
+from augment.scene.modification import Modification
 from augment.scene.sizes import LENGTH_WIDTH_M
-from augment.services.scenarios.scenes import check_reference, content_hash
+from augment.services.scenarios.scenes import check_reference, scene_key, scene_of
 
 PLACED = tuple(one for one in AgentType if one is not AgentType.EGO_VEHICLE)
 _HALF_TURN_RAD = math.pi
@@ -105,16 +104,13 @@ def edit_to_document(modification: Modification) -> dict[str, Any]:
 
 
 def _scene_of(scenario: Scenario) -> tuple[Scene, LaneGraph]:
-    hashes = BaseScene.objects.values_list("content_hash", flat=True)
-    content = hashes.get(pk=scenario.base_scene_id) or content_hash(scenario.base_scene.document)
-    return _read_scene(scenario.base_scene_id, content, scenario.keep_traffic)
+    return _read_scene(scenario.pk, scene_key(scenario))
 
 
 @lru_cache(maxsize=8)
-def _read_scene(scene_pk: int, content: str, keeps_traffic: bool) -> tuple[Scene, LaneGraph]:
-    row = BaseScene.objects.only("document").get(pk=scene_pk)
-    scene = scene_from_document(row.document)
-    scene = scene if keeps_traffic else without_traffic(scene)
+def _read_scene(scenario_pk: int, key: str) -> tuple[Scene, LaneGraph]:
+    """The key alone tells when a scene that was read before still holds."""
+    scene = scene_of(Scenario.objects.select_related("base_scene").get(pk=scenario_pk))
     return scene, LaneGraph(scene)
 
 

@@ -7,17 +7,19 @@ from pathlib import Path
 
 from augment.errors import Conflict, InvalidDocument, UnknownName
 from augment.formats import interplan_writer
-from augment.formats.interplan import ReadFile, token_of
+from augment.formats.interplan import InterplanSource, ReadFile, token_of
 from augment.formats.interplan_reader import read_document
 from augment.formats.interplan_schema import WHAT
+from augment.formats.nuplan.scenario import NuPlan
 from augment.formats.writing import Cell, Loss
 from augment.formats.yaml_file import read_yaml_file
-from augment.models import Augmentation, BaseScene, GenerationJob
+from augment.models import Augmentation, BaseScene, GenerationJob, Scenario
 from augment.scene.codec import modification_from_document, scene_from_document
 from augment.scene.modification import without_traffic
 from augment.services.scenarios.scenes import scene_of
 from augment.services.scenarios.types import type_of
 
+NUPLAN = NuPlan.name
 _MOST_LISTED = 12
 
 
@@ -75,6 +77,7 @@ def references_from_interplan(path: Path, *, scenes: Mapping[str, str] | None = 
     given = tuple(scenes or ())
     if scenes is None:
         scenes = {token_of(slug): slug for slug in stored}
+        scenes |= {row.source_item: row.slug for row in stored.values() if row.source == NUPLAN}
     for slug in scenes.values():
         if slug not in stored:
             raise UnknownName("scene", slug, sorted(stored))
@@ -123,4 +126,13 @@ def _cell(name: str, row: Augmentation) -> Cell:
         type=type_of(row.scenario.type),
         modification=modification_from_document(row.modification),
         keeps_traffic=row.scenario.keep_traffic,
+        source=_source(row.scenario),
     )
+
+
+def _source(scenario: Scenario) -> InterplanSource | None:
+    """Where a scenario comes from in nuPlan, None for a scene of another source."""
+    row = scenario.base_scene
+    if row.source != NUPLAN or not row.source_item:
+        return None
+    return InterplanSource(token=row.source_item, **(scenario.interplan or {}))

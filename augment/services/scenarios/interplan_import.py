@@ -7,16 +7,20 @@ token becomes a scene, each of its special scenarios a scenario; what is stored 
 from __future__ import annotations
 
 import csv
+import json
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any
 
 from django.contrib.auth.models import User
+from pydantic import BaseModel
 
 from augment.errors import AugmentError, InvalidDocument
 from augment.formats.apart import UntrustedInput
-from augment.formats.interplan_instruction import instruction_of
-from augment.formats.interplan_reader import read_entry
+from augment.formats.interplan import options_of
+from augment.formats.interplan_intent import describe_reference
+from augment.formats.interplan_reader import goal_place, read_entry, traffic_of
 from augment.formats.interplan_schema import (
     WHAT,
     Details,
@@ -25,16 +29,19 @@ from augment.formats.interplan_schema import (
     file_of,
     left_out_of_details,
     left_out_of_file,
+    place_of,
 )
 from augment.formats.reading import Reading
 from augment.formats.yaml_file import MAX_CHARACTERS, read_yaml_file
 from augment.models import BaseScene, Scenario
 from augment.scene.codec import modification_to_document
-from augment.scene.entities import Scene
+from augment.scene.entities import Scene, SceneOptions
+from augment.scene.intent_codec import intent_to_document
+from augment.scene.intent_words import IntentOrigin
 from augment.scene.modification import without_traffic
 from augment.scene.notes import Note, SceneNoteKind
 from augment.services.scenarios.scene_imports import keep_reading
-from augment.services.scenarios.scenes import add_scenario
+from augment.services.scenarios.scenes import Circumstances, add_scenario
 
 KEY = b"modification_details_dictionary"
 SLUG = "interplan"
@@ -67,13 +74,15 @@ class ScenarioDone:
     Attributes:
         id: interPlan's own name.
         is_new: False where it was there before.
-        left_out: What of it is not kept.
+        left_out: What of it changes nothing here; an export says it again.
+        same_as: The name of an earlier one that differs from it in nothing; empty for none.
     """
 
     id: str
     row: Scenario
     is_new: bool
     left_out: tuple[str, ...]
+    same_as: str = ""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -120,13 +129,16 @@ def import_interplan(
     wanted = _wanted(file)
     sentences = {} if instructions is None else _sentences(instructions, wanted)
     yield from (FileLeftOut(text=text) for text in left_out_of_file(file))
+    for token in file.modification_details_dictionary:
+        if token not in wanted:
+            yield FileLeftOut(text=f"base token {token}, which has no special scenario")
     logs: dict[str, Path] = {}
     for looked in _look_through(data or folder, wanted):
         logs |= {token: looked.path for token in looked.tokens if token not in logs}
         yield looked
     for token, details in wanted.items():
         if token in logs:
-            yield from _keep_token(token, details, logs[token], sentences, actor)
+            yield from _keep_token(token, file, logs[token], sentences, actor)
         else:
             reason = "none of the logs has a frame of its base token"
             yield from _skip_all(token, details, reason)
@@ -190,11 +202,12 @@ def _look_through(data: Path, wanted: Mapping[str, Details]) -> Iterator[LogLook
 
 
 def _keep_token(
-    token: str, details: Details, log: Path, sentences: Mapping[str, str], actor: User | None
+    token: str, file: File, log: Path, sentences: Mapping[str, str], actor: User | None
 ) -> Iterator[Step]:
-    file = UntrustedInput(path=log, format=LOGS)
+    details = file.modification_details_dictionary[token]
+    recorded = UntrustedInput(path=log, format=LOGS)
     try:
-        source, reading = file.read(item=token, frame=None, name=f"{SLUG}-{token}")
+        source, reading = recorded.read(item=token, frame=None, name=f"{SLUG}-{token}")
         row, _ = keep_reading(
             _with_notes(reading, token, details), source=source, path=log, actor=actor
         )
@@ -202,43 +215,103 @@ def _keep_token(
         yield from _skip_all(token, details, str(fault))
         return
     scene = without_traffic(reading.scene)
+    kept: dict[str, str] = {}
     for name, index, entry in _entries(token, details):
         try:
-            yield _keep_entry(row, scene, (token, index, entry), sentences.get(name), actor)
+            place = _Place(file=file, token=token, index=index, entry=entry)
+            done = _keep_entry(row, scene, place, sentences.get(name), actor)
         except AugmentError as fault:
             yield ScenarioSkipped(id=name, reason=str(fault))
+            continue
+        same = kept.setdefault(_asks(done.row), name)
+        yield replace(done, same_as="" if same == name else same)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Place:
+    """A special scenario in its file."""
+
+    file: File
+    token: str
+    index: str
+    entry: SpecialScenario
+
+    @property
+    def details(self) -> Details:
+        return self.file.modification_details_dictionary[self.token]
+
+    def to_document(self) -> dict[str, Any]:
+        """What is kept verbatim: all that an export has to say again.
+
+        Raises:
+            InvalidDocument: An unknown key holds what JSON can't.
+        """
+        document = {
+            "index": self.index,
+            "entry": _plain(self.entry),
+            "details": _plain(self.details, "special_scenario"),
+            "file": _plain(self.file, "modification_details_dictionary"),
+        }
+        try:
+            json.dumps(document, allow_nan=False)
+        except ValueError:
+            where = place_of(self.token, self.index)
+            raise InvalidDocument(WHAT, [(where, "holds a number that is not finite")]) from None
+        return document
+
+
+def _plain(part: BaseModel, *left_out: str) -> dict[str, Any]:
+    return part.model_dump(mode="json", exclude_unset=True, exclude=set(left_out))
+
+
+def _asks(row: Scenario) -> str:
+    """What makes two scenarios of one scene the same: all but name and words."""
+    asked = [row.type, row.reference, row.traffic_density, row.goal, row.spawned]
+    return json.dumps(asked, sort_keys=True)
 
 
 def _keep_entry(
-    row: BaseScene,
-    scene: Scene,
-    place: tuple[str, str, SpecialScenario],
-    sentence: str | None,
-    actor: User | None,
+    row: BaseScene, scene: Scene, place: _Place, sentence: str | None, actor: User | None
 ) -> ScenarioDone:
-    token, index, entry = place
-    found = read_entry(token, index, entry, scene)
-    slug = f"{row.slug}-s{index}"
+    entry, details = place.entry, place.details
+    found = read_entry(place.token, place.index, entry, scene)
+    slug = f"{row.slug}-s{place.index}"
     before = Scenario.objects.filter(slug=slug, base_scene=row, type=found.type.value).first()
-    made = before or add_scenario(
+    if before is not None:
+        return ScenarioDone(id=found.id, row=before, is_new=False, left_out=found.left_out)
+    density, goal = options_of(entry.config)
+    source = place.to_document()
+    traffic = traffic_of(
+        entry, details, scene, seed=place.token, clear_of=found.modification.added
+    )
+    options = SceneOptions(
+        density=density, goal=goal, goal_m=goal_place(source, goal or "", scene)
+    )
+    driven = replace(scene, agents=traffic, options=options)
+    generated, intent = describe_reference(found.type, found.modification, driven)
+    made = add_scenario(
         scene=row.slug,
         type=found.type.value,
-        instruction=sentence or instruction_of(found.type, found.modification),
+        instruction=sentence or generated,
         slug=slug,
         reference=modification_to_document(found.modification),
+        intent=None if intent is None else intent_to_document(intent),
+        intent_origin=IntentOrigin.DERIVED,
+        circumstances=Circumstances(
+            density=density,
+            goal=goal,
+            traffic=traffic,
+            interplan=source,
+            instruction_is_generated=not sentence,
+        ),
         actor=actor,
     )
-    return ScenarioDone(id=found.id, row=made, is_new=before is None, left_out=found.left_out)
+    return ScenarioDone(id=found.id, row=made, is_new=True, left_out=found.left_out)
 
 
 def _with_notes(reading: Reading, token: str, details: Details) -> Reading:
     """With what interPlan says of the base token and a scenario here can't."""
     left_out = [*left_out_of_details(details)]
-    left_out += [
-        f"{name}: config {entry.config}"
-        for name, _, entry in _entries(token, details)
-        if entry.config
-    ]
     if not left_out:
         return reading
     note = Note(kind=SceneNoteKind.INTERPLAN_LEFT_OUT, names=tuple(left_out))

@@ -16,7 +16,7 @@ from augment.prompts.texts import prompt_version
 from augment.render.camera import LOOK
 from augment.scene.modification import Modification
 from augment.services.scenarios.pictures import store
-from augment.services.scenarios.scenes import content_hash, reference_of, scene_of
+from augment.services.scenarios.scenes import reference_of, scene_key, scene_of
 from augment.variants.options import ContestantOptions, recipe_with
 from augment.variants.recipes import RECIPES, Tools, find_recipe
 from augment.variants.showing import Shown, roles_of, shown_prompt
@@ -195,15 +195,7 @@ def _widths() -> list[int]:
 
 def _list_name(scenario: Scenario, width_px: int) -> str:
     """The file that names the pictures; its own name says what is on them."""
-    scene = scenario.base_scene
-    shown = [
-        LOOK,
-        prompt_version(),
-        scene.content_hash or content_hash(scene.document),
-        scenario.keep_traffic,
-        scenario.reference,
-        width_px,
-    ]
+    shown = [LOOK, prompt_version(), scene_key(scenario), scenario.reference, width_px]
     digest = hashlib.sha256(json.dumps(shown, sort_keys=True).encode()).hexdigest()
     return f"{FOLDER}/{digest}.json"
 

@@ -170,6 +170,7 @@ def _keep(
                 document=document,
                 recording=None if recording is None else recording_to_document(recording),
                 source=source,
+                source_item=reading.moment.item or "",
                 provenance=reading.scene.provenance,
                 notes=notes_to_document(reading.notes),
                 content_hash=content_hash(document),

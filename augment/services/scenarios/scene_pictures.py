@@ -19,7 +19,7 @@ from augment.scene.codec import scene_from_document
 from augment.scene.modification import Modification, without_traffic
 from augment.services.scenarios.pictures import store_as
 from augment.services.scenarios.redrawing import redraw
-from augment.services.scenarios.scenes import content_hash, reference_of, scene_of
+from augment.services.scenarios.scenes import content_hash, reference_of, scene_key, scene_of
 
 FOLDER = "scenes"
 
@@ -43,13 +43,7 @@ def reference_picture(scenario: Scenario) -> str:
     """The name of the picture of a scenario's reference; empty where it has none."""
     if scenario.reference is None:
         return ""
-    scene = scenario.base_scene
-    shown = [
-        LOOK,
-        scene.content_hash or content_hash(scene.document),
-        scenario.keep_traffic,
-        scenario.reference,
-    ]
+    shown = [LOOK, scene_key(scenario), scenario.reference]
     digest = hashlib.sha256(json.dumps(shown, sort_keys=True).encode()).hexdigest()
     return f"references/{digest}.png"
 

@@ -5,19 +5,23 @@ from __future__ import annotations
 import hashlib
 import json
 import re
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from typing import Any
 
 from django.contrib.auth.models import User
 from django.db import IntegrityError, transaction
 
 from augment.errors import Conflict, InvalidDocument, UnknownName
+from augment.formats.interplan_reader import goal_place
 from augment.models import BaseScene, Scenario
 from augment.scene.codec import (
     modification_from_document,
     modification_to_document,
     scene_from_document,
 )
-from augment.scene.entities import Scene
+from augment.scene.density import spawn_traffic
+from augment.scene.entities import Scene, SceneOptions, TrafficAgent, TrafficDensity, TurnType
 from augment.scene.intent import (
     Intent,
 )
@@ -26,7 +30,7 @@ from augment.scene.intent_words import (
     IntentOrigin,
 )
 from augment.scene.lane_graph import LaneGraph
-from augment.scene.modification import Modification, check_fits, without_traffic
+from augment.scene.modification import Modification, apply, check_fits, without_traffic
 from augment.services.events import log_event
 from augment.services.scenarios.types import label_for, type_of
 from augment.services.texts import check_prose
@@ -34,6 +38,25 @@ from augment.services.texts import check_prose
 SLUG_LENGTH = 80
 INSTRUCTION_LENGTH = 2_000
 """An instruction is read above the pictures, and by models: a few sentences."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Circumstances:
+    """What a scenario sets besides its change, and where it comes from.
+
+    Attributes:
+        density: Of the traffic that is spawned where the recorded one is cleared.
+        goal: Where the ego's way turns.
+        traffic: Who is spawned, where that is known already; None to spawn it.
+        interplan: The parts of interPlan's file that it comes from.
+        instruction_is_generated: Whether no person wrote the instruction.
+    """
+
+    density: TrafficDensity = TrafficDensity.NONE
+    goal: TurnType | None = None
+    traffic: Sequence[TrafficAgent] | None = None
+    interplan: dict[str, Any] | None = None
+    instruction_is_generated: bool = False
 
 
 @transaction.atomic
@@ -48,6 +71,7 @@ def add_scenario(
     intent: dict[str, Any] | None = None,
     intent_origin: IntentOrigin = IntentOrigin.ENTERED,
     keep_traffic: bool = False,
+    circumstances: Circumstances | None = None,
     actor: User | None = None,
 ) -> Scenario:
     """Keep an instruction for a scene, with its intent and reference if there are any.
@@ -62,6 +86,7 @@ def add_scenario(
         intent: An intent document: what the instruction asks for.
         intent_origin: Where that comes from.
         keep_traffic: Whether the recorded traffic stays in the scene.
+        circumstances: Spawned traffic, goal and source; None for none of them.
         actor: Who did it.
 
     Raises:
@@ -69,24 +94,21 @@ def add_scenario(
         InvalidDocument: The slug, the type, the instruction, the intent or the reference breaks
             its format.
         InvalidModification: The reference does not fit the scene.
-        Conflict: The slug is taken, or the type has another label.
+        Conflict: The slug is taken, the type has another label, or traffic is to be kept and
+            spawned.
     """
     base_scene = _base_scene(scene)
     label = label_for(type, type_label)
     check_prose("instruction", instruction, what="scenario", longest=INSTRUCTION_LENGTH)
-    if slug is None:
-        slug = _free_slug(base_scene, type)
-    check_slug(slug, what="scenario")
-    if Scenario.objects.filter(slug=slug).exists():
-        raise Conflict(f"There is a scenario called {slug!r} already; choose another slug.")
     scenario = Scenario(
-        slug=slug,
+        slug=_untaken_slug(base_scene, type, slug),
         base_scene=base_scene,
         type=type,
         type_label=label,
         instruction=instruction.strip(),
         keep_traffic=keep_traffic,
     )
+    _set_circumstances(scenario, circumstances or Circumstances(), reference)
     if reference is not None:
         _set_reference(scenario, reference)
     if intent is not None:
@@ -114,6 +136,28 @@ def _log_addition(scenario: Scenario, actor: User | None) -> None:
     )
 
 
+def _set_circumstances(
+    scenario: Scenario, given: Circumstances, reference: dict[str, Any] | None
+) -> None:
+    """Keep them; spawned traffic then stays as it is whatever becomes of the reference."""
+    scenario.traffic_density, scenario.goal = given.density.value, given.goal or ""
+    scenario.interplan = given.interplan
+    scenario.instruction_is_generated = given.instruction_is_generated
+    density, traffic = given.density, given.traffic
+    if scenario.keep_traffic and density is not TrafficDensity.NONE:
+        raise Conflict("Spawned traffic replaces the recorded one: choose one of the two.")
+    if traffic is None:
+        base = scenario.base_scene
+        traffic = spawn_traffic(
+            without_traffic(scene_from_document(base.document)),
+            density,
+            seed=base.slug,
+            clear_of=() if reference is None else modification_from_document(reference).added,
+        )
+    if traffic:
+        scenario.spawned = modification_to_document(Modification(added=tuple(traffic)))
+
+
 def _set_reference(scenario: Scenario, reference: dict[str, Any]) -> None:
     modification = modification_from_document(reference)
     check_reference(scene_of(scenario), modification)
@@ -131,9 +175,32 @@ def _insert(scenario: Scenario) -> None:
 
 
 def scene_of(scenario: Scenario) -> Scene:
-    """The scene that contestants are asked to change; cleared of traffic unless it is kept."""
+    """The scene that contestants are asked to change, with the scenario's own traffic and goal."""
     scene = scene_from_document(scenario.base_scene.document)
-    return scene if scenario.keep_traffic else without_traffic(scene)
+    if not scenario.keep_traffic:
+        scene = without_traffic(scene)
+    if scenario.spawned is not None:
+        scene = apply(scene, modification_from_document(scenario.spawned))
+    options = SceneOptions(
+        density=TrafficDensity(scenario.traffic_density),
+        goal=TurnType(scenario.goal) if scenario.goal else None,
+        goal_m=goal_place(scenario.interplan, scenario.goal, scene),
+    )
+    return replace(scene, options=options)
+
+
+def scene_key(scenario: Scenario) -> str:
+    """A digest of all that `scene_of` reads; two scenarios of one key have the same scene."""
+    scene = scenario.base_scene
+    parts = [
+        scene.content_hash or content_hash(scene.document),
+        scenario.keep_traffic,
+        scenario.traffic_density,
+        scenario.goal,
+        scenario.spawned,
+        scenario.interplan if scenario.goal else None,
+    ]
+    return hashlib.sha256(json.dumps(parts, sort_keys=True).encode()).hexdigest()
 
 
 def reference_of(scenario: Scenario) -> Modification | None:
@@ -198,6 +265,15 @@ def _base_scene(slug: str) -> BaseScene:
     except BaseScene.DoesNotExist:
         known = list(BaseScene.objects.values_list("slug", flat=True))
         raise UnknownName("scene", slug, known) from None
+
+
+def _untaken_slug(base_scene: BaseScene, name: str, slug: str | None) -> str:
+    if slug is None:
+        return _free_slug(base_scene, name)
+    check_slug(slug, what="scenario")
+    if Scenario.objects.filter(slug=slug).exists():
+        raise Conflict(f"There is a scenario called {slug!r} already; choose another slug.")
+    return slug
 
 
 def _free_slug(base_scene: BaseScene, name: str) -> str:
