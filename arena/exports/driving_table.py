@@ -37,10 +37,20 @@ DIFFERENCES = (
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class DrivingTable:
-    """The lines and all that must be said with them."""
+    """The lines and all that must be said with them.
+
+    Attributes:
+        with_paper: Whether the paper's rows were asked for, which nobody measured here.
+    """
 
     title: str
     scores: DrivingScores
+    with_paper: bool = False
+
+    @property
+    def reported(self) -> tuple[tuple[str, float], ...]:
+        """The paper's rows, where they were asked for."""
+        return REPORTED if self.with_paper else ()
 
     @property
     def lines(self) -> tuple[DrivingLine, ...]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 from typing import Any
 
-from arena.exports.driving_table import REPORTED, SOURCE, DrivingTable
+from arena.exports.driving_table import SOURCE, DrivingTable
 from arena.exports.formats import Format, formats, round_value
 from arena.exports.tables import shown_name
 from arena.rating.printed import escape
@@ -13,7 +13,7 @@ from arena.services.cells import csv_text
 from augment.models import Scenario
 from augment.services.judging.driving_scores import DrivingLine
 
-MEASURED = "measured"
+MEASURED = "own simulator"
 _BEFORE = (
     "scenarios", "slug", "model", "variant", "simulated", "score_percent", "before_percent",
     "lowered_percent", "drives", "failed", "least_clearance_m", "closer_than_0_3_m", "collided",
@@ -22,7 +22,7 @@ _BEFORE = (
 
 
 def csv_bytes(table: DrivingTable) -> bytes:
-    """One line a contestant, then the paper's; what is unknown is empty."""
+    """One line a contestant, then the paper's if asked for; what is unknown is empty."""
     rows: list[list[object]] = []
     kinds = _kinds(table)
     for line in table.lines:
@@ -39,7 +39,7 @@ def csv_bytes(table: DrivingTable) -> bytes:
         types = [_percent(line.by_type[kind]) for kind in kinds]
         rows.append([*who, *means, *counts, *types, MEASURED])
     blank = [""] * len(kinds)
-    for name, score in REPORTED:
+    for name, score in table.reported:
         rows.append([name, "", "", "", "no", _percent(score), *[""] * 8, *blank, SOURCE])
     head = (*_BEFORE, *(f"{kind}_percent" for kind in kinds), "source")
     return csv_text(head, rows).encode()
@@ -66,7 +66,7 @@ def json_bytes(table: DrivingTable) -> bytes:
         "notes": list(table.notes),
         "lines": [_line(line) for line in table.lines],
         "reported": [
-            {"scenarios": name, "mean": score, "source": SOURCE} for name, score in REPORTED
+            {"scenarios": name, "mean": score, "source": SOURCE} for name, score in table.reported
         ],
     }
     return (json.dumps(document, indent=2, ensure_ascii=False) + "\n").encode()
@@ -79,25 +79,26 @@ def latex_bytes(table: DrivingTable) -> bytes:
         *(f"% {note}" for note in table.notes),
         r"\begin{table}",
         r"    \centering",
-        r"    \begin{tabular}{lrrr}",
+        r"    \begin{tabular}{lrrrr}",
         r"    \toprule",
-        r"    \textbf{Scenarios} & \textbf{Mean Driving Score} [\%] & \textbf{Before} [\%]"
-        r" & \textbf{Clearance below 0.3 m} \\",
+        r"    \textbf{Scenarios} & \textbf{n} & \textbf{Mean Driving Score} [\%]"
+        r" & \textbf{Before} [\%] & \textbf{Clearance below 0.3 m} \\",
         r"    \midrule",
         *(
-            rf"    {escape(name)} & {_printed(line.mean)} & {_printed(line.before)} & {line.close}"
-            r" \\"
+            rf"    {escape(name)} & {line.drives} & {_printed(line.mean)}"
+            rf" & {_printed(line.before)} & {line.close} \\"
             for line in table.lines
             for name in [shown_name(line.name, line.is_simulated)]
         ),
-        r"    \midrule",
+        *([r"    \midrule"] if table.reported else []),
         *(
-            rf"    {escape(name)} ({escape(SOURCE)}) & {_printed(score)} & -- & -- \\"
-            for name, score in REPORTED
+            rf"    {escape(name)} ({escape(SOURCE)}) & -- & {_printed(score)} & -- & -- \\"
+            for name, score in table.reported
         ),
         r"    \bottomrule",
         r"    \end{tabular}",
-        rf"    \caption{{Mean driving score of {escape(table.scores.options.planner)}.}}",
+        rf"    \caption{{Mean driving score of {escape(table.scores.options.planner)} in Scenario"
+        r" Arena's own simulator; n: drives.}",
         r"    \label{tab:driving_score}",
         r"\end{table}",
     ]

@@ -26,6 +26,9 @@ COLUMNS = (
 )  # fmt: skip
 
 
+NOT_LABELLED = "--"
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class FaultLine:
     """One contestant's faults.
@@ -56,19 +59,15 @@ class FaultLine:
         return self.labelled + self.without_modification
 
     @property
-    def position(self) -> int:
-        """For the template."""
-        return self.counts[FaultClass.POSITION]
+    def shown_counts(self) -> tuple[int | str, ...]:
+        """All, position, heading and logic; a dash where nothing was labelled.
 
-    @property
-    def heading(self) -> int:
-        """For the template."""
-        return self.counts[FaultClass.HEADING]
-
-    @property
-    def logic(self) -> int:
-        """For the template."""
-        return self.counts[FaultClass.LOGIC]
+        Answers without a modification count in the sum of all, labelled or not.
+        """
+        total = self.all if self.counted else NOT_LABELLED
+        if not self.labelled:
+            return total, *[NOT_LABELLED] * len(FaultClass)
+        return total, *(self.counts[fault] for fault in FaultClass)
 
     @property
     def shown_name(self) -> str:
@@ -136,11 +135,12 @@ def fault_table(job: GenerationJob) -> FaultTable:
 
 
 def csv_bytes(table: FaultTable) -> bytes:
-    """One line a contestant."""
+    """One line a contestant; counts are empty where nothing was labelled."""
     rows = (
         (
-            line.shown_name, line.slug, line.is_simulated, line.all, line.position, line.heading,
-            line.logic, line.labelled, line.labels, line.without_modification,
+            line.shown_name, line.slug, line.is_simulated,
+            *("" if one == NOT_LABELLED else one for one in line.shown_counts),
+            line.labelled, line.labels, line.without_modification,
         )
         for line in table.lines
     )  # fmt: skip
@@ -171,8 +171,8 @@ def latex(table: FaultTable) -> str:
         r" & \textbf{No answer}~$\downarrow$ & \textbf{n} \\",
         r"    \midrule",
         *(
-            f"    {escape(line.shown_name)} & {line.all} & {line.position} & {line.heading} "
-            rf"& {line.logic} & {line.without_modification} & {line.counted}\\"
+            f"    {escape(line.shown_name)} & {' & '.join(map(str, line.shown_counts))} "
+            rf"& {line.without_modification} & {line.counted}\\"
             for line in table.lines
             if line.counted
         ),

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import sys
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from urllib.parse import urlsplit
 
@@ -25,6 +27,9 @@ HUNG_AFTER = 3
 WEB_GRACE_S = 35.0
 """Gunicorn itself gives its workers 30 s."""
 
+SERVED_AT = "served-at"
+"""The file under var/ that holds the address of the running server."""
+
 MANAGE = (sys.executable, str(settings.BASE_DIR / "manage.py"))
 
 
@@ -42,6 +47,28 @@ class Web:
         """The address for a browser."""
         shown = "localhost" if self.host in {"127.0.0.1", "0.0.0.0", "::1"} else self.host
         return f"http://{shown}:{self.port}/"
+
+
+@contextmanager
+def remembered_address(web: Web) -> Iterator[None]:
+    """Keep in a file where the pages are served, for as long as they are."""
+    file = settings.VAR_DIR / SERVED_AT
+    file.parent.mkdir(parents=True, exist_ok=True)
+    file.write_text(web.address, encoding="utf-8")
+    try:
+        yield
+    finally:
+        file.unlink(missing_ok=True)
+
+
+def served_address() -> str | None:
+    """Return where this installation's pages are served now, None where nobody does."""
+    with suppress(OSError):
+        address = (settings.VAR_DIR / SERVED_AT).read_text(encoding="utf-8")
+        parts = urlsplit(address)
+        if port_answers(parts.hostname or "localhost", parts.port or 80):
+            return address
+    return None
 
 
 def background(*, concurrency: int) -> list[Program]:

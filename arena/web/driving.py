@@ -16,7 +16,7 @@ from django.utils.translation import gettext as _
 from django.utils.translation import ngettext
 from django.views.decorators.http import require_POST, require_safe
 
-from arena.exports.driving_table import REPORTED, DrivingTable
+from arena.exports.driving_table import DrivingTable
 from arena.exports.driving_writers import FORMATS
 from arena.exports.formats import format_named
 from arena.exports.tables import LeaderboardTable
@@ -197,7 +197,7 @@ def driving(snapshot: Snapshot, table: LeaderboardTable) -> dict[str, Any]:
 
 def _table(request: HttpRequest, job: GenerationJob) -> DrivingTable:
     scores = scores_of_job(job, options=_options_asked(request, job), score=_score_asked(request))
-    return DrivingTable(title=job.name, scores=scores)
+    return DrivingTable(title=job.name, scores=scores, with_paper="paper" in request.GET)
 
 
 def _shown(table: DrivingTable) -> dict[str, Any]:
@@ -206,7 +206,6 @@ def _shown(table: DrivingTable) -> dict[str, Any]:
             {"line": line, "types": [line.by_type[kind] for kind, _ in table.types]}
             for line in table.lines
         ],
-        "reported": REPORTED,
         "labels": LABELS,
         "score": table.scores.score,
     }

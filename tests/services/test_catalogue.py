@@ -11,7 +11,7 @@ import pytest
 from django.contrib.auth.models import User
 from django.core.management import CommandError, call_command
 
-from augment.errors import Conflict, InvalidDocument
+from augment.errors import Conflict, InvalidDocument, UnknownName
 from augment.models import Augmentation, BaseScene, Contestant, Event, GenerationJob, Scenario
 from augment.scene.catalogue import ScenarioType
 from augment.scene.catalogue_codec import CatalogueEntry, entry_to_document
@@ -124,6 +124,16 @@ def test_the_hard_set_comes_when_it_is_asked_for_with_its_paraphrases_beside(
     assert resolve_scenarios(["paper"]) == ["parked-car"]
     assert resolve_scenarios(["hard", "hairpin-hill-van"]) == ["hairpin-hill-van"]
     assert len(resolve_scenarios(["hard", "paraphrases"])) == 4
+    assert resolve_scenarios(["set:hard"]) == resolve_scenarios(["hard"])
+    assert resolve_scenarios(["hairpin-hill-van-p?", "parked-*"]) == [
+        "hairpin-hill-van-p1",
+        "hairpin-hill-van-p2",
+        "hairpin-hill-van-p3",
+        "parked-car",
+    ]
+    for word in ("set:soft", "interplan-*", "parked"):
+        with pytest.raises(UnknownName, match=r"set 'soft'|scenario"):
+            resolve_scenarios([word])
     german = Scenario.objects.get(slug="hairpin-hill-van-p2")
     original = Scenario.objects.get(slug="hairpin-hill-van")
     assert (german.language, german.paraphrase_of) == ("de", original)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from contextlib import nullcontext
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -17,7 +18,7 @@ from arena.management.arguments import at_least
 from arena.management.commands.serve import INTERRUPTED
 from arena.serving.hold import hold_alone
 from arena.serving.ledger import Ledger
-from arena.serving.stack import Web, background, web_server
+from arena.serving.stack import Web, background, remembered_address, web_server
 from arena.serving.supervisor import Supervisor
 from augment.errors import AugmentError
 from augment.services.terminal import TerminalCommand
@@ -74,7 +75,7 @@ class Command(TerminalCommand):
         supervisor = Supervisor(
             [*background(concurrency=2), *server], self._keep, ledger=Ledger(settings.VAR_DIR)
         )
-        with supervisor.signals():
+        with supervisor.signals(), remembered_address(web) if serve else nullcontext():
             try:
                 supervisor.start()
                 look = partial(_look_at, supervisor)

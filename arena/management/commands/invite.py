@@ -13,6 +13,7 @@ from arena.models import Study
 from arena.queries.invitations import ExpertLine, expert_lines
 from arena.queries.studies import study_named
 from arena.services.invitations import LINK_LIVES, invite
+from arena.serving.stack import Web, served_address
 from augment.errors import AugmentError, UnknownName
 from augment.services.terminal import TerminalCommand
 
@@ -31,8 +32,8 @@ class Command(TerminalCommand):
         parser.add_argument("--experts", nargs="+", metavar="USERNAME", help="all by default")
         parser.add_argument(
             "--address",
-            default="http://127.0.0.1:8000",
-            help="of the pages, as experts reach it (default: %(default)s)",
+            help="of the pages, as experts reach it; by default that of the running server, else "
+            f"{Web().address}",
         )
 
     def handle(self, *args: Any, **options: Any) -> None:
@@ -45,10 +46,11 @@ class Command(TerminalCommand):
             ]
         except (ArenaError, AugmentError) as error:
             raise CommandError(str(error)) from error
+        address = options["address"] or served_address() or Web().address
         for line, fresh in made:
             path = reverse("invitation", args=[fresh.token])
             name = f"{line.tally.expert.get_username()} ({line.tally.pseudonym})"
-            self.stdout.write(f"{name}: {options['address'].rstrip('/')}{path}")
+            self.stdout.write(f"{name}: {address.rstrip('/')}{path}")
         if made:
             self.stdout.write(f"Each works for {LINK_LIVES.days} days and is not shown again.")
         else:

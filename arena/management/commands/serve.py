@@ -13,7 +13,7 @@ from arena.management.arguments import at_least
 from arena.services.first_start import make_first_link_token
 from arena.serving.hold import hold_alone
 from arena.serving.ledger import Ledger
-from arena.serving.stack import Web, background, web_server
+from arena.serving.stack import Web, background, remembered_address, web_server
 from arena.serving.supervisor import Supervisor
 from augment.services.terminal import TerminalCommand
 
@@ -60,7 +60,7 @@ class Command(TerminalCommand):
             self._say,
             ledger=Ledger(settings.VAR_DIR),
         )
-        with supervisor.signals():
+        with supervisor.signals(), remembered_address(web):
             try:
                 supervisor.start()
                 self.stdout.write(f"\nScenario Arena is at {web.address}  (Ctrl-C stops it)\n")

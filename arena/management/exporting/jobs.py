@@ -133,6 +133,9 @@ def _add_driving(kinds: Any) -> None:
     kind.add_argument("--planner", default="pdm-closed", help="as it was simulated with")
     kind.add_argument("--offsets", default="paper", help="as it was simulated with")
     kind.add_argument("--reactive", action="store_true", help="as it was simulated")
+    kind.add_argument(
+        "--with-paper", action="store_true", help="add the paper's rows below a rule"
+    )
     add_format(kind, driving_writers.FORMATS)
 
 
@@ -150,7 +153,8 @@ def write_driving(options: Chosen, say: Say) -> ExportedFile:
     if how not in options_driven(job):
         raise Conflict(f"Job {job.name!r} was not driven so; manage.py simulate does it.")
     scores = scores_of_job(job, options=how, score=options["score"])
-    return fill(chosen, DrivingTable(title=job.name, scores=scores))
+    table = DrivingTable(title=job.name, scores=scores, with_paper=options["with_paper"])
+    return fill(chosen, table)
 
 
 def _add_analyses(kinds: Any) -> None:

@@ -56,7 +56,8 @@ class Command(TerminalCommand):
         parser.add_argument(
             "--scenarios",
             nargs="+",
-            help="slugs, or all, catalogue, paper, hard, paraphrases",
+            help="slugs, patterns such as 'interplan-*', or all, catalogue, set:paper, set:hard, "
+            "paraphrases",
         )
         parser.add_argument("--name", help="what people call the job")
         parser.add_argument(

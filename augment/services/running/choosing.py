@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import fnmatch
 from collections.abc import Sequence
 from contextlib import suppress
 from uuid import UUID
@@ -13,33 +14,59 @@ from augment.models import Contestant, GenerationJob, Scenario
 from augment.scene.catalogue import CatalogueSet
 from augment.services.running.feasible import RUNNABLE
 
-ALL = "all"
+ALL, SET = "all", "set:"
 
 
 def resolve_contestants(given: Sequence[str]) -> list[str]:
-    """The slugs; `all` stands for every contestant that a job can run and nobody retired."""
-    if list(given) != [ALL]:
-        return list(given)
-    return list(
-        Contestant.objects.filter(RUNNABLE, retired_at=None).values_list("slug", flat=True)
-    )
+    """The slugs; `all` stands for every contestant that a job can run and nobody retired.
+
+    Raises:
+        UnknownName: There is no contestant of that slug.
+    """
+    if list(given) == [ALL]:
+        rows = Contestant.objects.filter(RUNNABLE, retired_at=None)
+        return list(rows.values_list("slug", flat=True))
+    known = set(Contestant.objects.values_list("slug", flat=True))
+    for slug in given:
+        if slug not in known:
+            raise UnknownName("contestant", slug, sorted(known))
+    return list(given)
 
 
 def resolve_scenarios(given: Sequence[str]) -> list[str]:
     """The slugs, each once; words that are no slugs stand for several.
 
-    `all`: every scenario; `catalogue`: the authored ones, `paper` or `hard`: those of one set,
-    all three without paraphrases; `paraphrases`: those of the catalogue.
+    `all`: every scenario; `catalogue`: the authored ones, `set:paper` or `set:hard` (or the name
+    alone): those of one set, all three without paraphrases; `paraphrases`: those of the
+    catalogue; with *, ? or [...]: every slug of that pattern.
+
+    Raises:
+        UnknownName: There is no such scenario or set, or none of that pattern.
     """
+    known = list(Scenario.objects.values_list("slug", flat=True))
     slugs: list[str] = []
     for word in given:
-        several = _several(word)
-        slugs += [word] if several is None else several.values_list("slug", flat=True)
+        slugs += _matching(word, known)
     return list(dict.fromkeys(slugs))
+
+
+def _matching(word: str, known: Sequence[str]) -> list[str]:
+    several = _several(word)
+    if several is not None:
+        return list(several.values_list("slug", flat=True))
+    found = fnmatch.filter(known, word)
+    if not found:
+        raise UnknownName("scenario", word, sorted(known))
+    return found
 
 
 def _several(word: str) -> QuerySet[Scenario] | None:
     authored = Scenario.objects.exclude(catalogue_set="")
+    name = word.removeprefix(SET)
+    if name in list(CatalogueSet):
+        return authored.filter(paraphrase_of=None, catalogue_set=name)
+    if word.startswith(SET):
+        raise UnknownName("set", name, [one.value for one in CatalogueSet])
     match word:
         case "all":
             return Scenario.objects.all()
@@ -47,8 +74,6 @@ def _several(word: str) -> QuerySet[Scenario] | None:
             return authored.exclude(paraphrase_of=None)
         case "catalogue":
             return authored.filter(paraphrase_of=None)
-        case CatalogueSet.PAPER | CatalogueSet.HARD:
-            return authored.filter(paraphrase_of=None, catalogue_set=word)
     return None
 
 

@@ -17,9 +17,9 @@ from django.contrib.auth.models import User
 from django.db import transaction
 from pydantic import Field, ValidationError
 
-from augment.errors import AugmentError, InvalidDocument
+from augment.errors import AugmentError, InvalidDocument, UnknownName
 from augment.formats.yaml_file import read_yaml
-from augment.models import Contestant, Scenario
+from augment.models import Contestant
 from augment.scene.schema import Document, problems_of
 from augment.services.endpoints.contestants import add_contestant, ensure_builtin
 from augment.services.running.choosing import resolve_scenarios
@@ -273,14 +273,12 @@ def _found(
 
 
 def _scenarios(names: Sequence[str], problems: _Problems) -> tuple[str, ...]:
-    known = set(Scenario.objects.values_list("slug", flat=True))
     found: list[str] = []
     for place, name in enumerate(names):
-        several = resolve_scenarios([name])
-        if several == [name] and name not in known:
-            problems.append((f"scenarios[{place}]", f"{name!r} is no scenario"))
-        else:
-            found += several
+        try:
+            found += resolve_scenarios([name])
+        except UnknownName as error:
+            problems.append((f"scenarios[{place}]", f"{name!r} is no {error.kind}"))
     if not found and not problems:
         problems.append(("scenarios", "there is none of these"))
     return tuple(dict.fromkeys(found))
