@@ -16,13 +16,13 @@ class NotInstalled(Exception):
     """A rival can't be installed here (no package index, no room); the text is pip's last line."""
 
 
-def python_of(name: str) -> Path:
+def python_of(name: str, lock: Path | None = None) -> Path:
     """The interpreter of a rival's environment, which is made or renewed where the lock changed.
 
     Raises:
         NotInstalled: pip could not install what the lock names.
     """
-    lock = RIVALS / name / "requirements.txt"
+    lock = lock or RIVALS / name / "requirements.txt"
     folder = ROOT / ".bench" / name
     stamp = folder / "installed"
     digest = hashlib.sha256(lock.read_bytes()).hexdigest()

@@ -1,0 +1,1 @@
+"""Measurements against other software, each in an environment of its own."""

@@ -1,0 +1,1 @@
+"""The whole way with a real language model: `make real-model`."""
