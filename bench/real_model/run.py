@@ -32,7 +32,7 @@ HEADING = "A real language model, from the endpoint to the table"
 VARIANTS = ("otm", "fc", "tqa", "fc+geo")
 PER_TYPE = 2
 CONTEXT_TOKENS = 8192
-MOST_TOKENS = 1024
+MOST_TOKENS = 512
 """Of an answer; a model of this size often repeats itself until it is cut off."""
 LONGEST_CALL_S = 600
 JOB = "real-model"
@@ -69,6 +69,7 @@ def served() -> Iterator[str]:
     port = free_port()
     command = [str(python), "-m", "llama_cpp.server", "--model", weights.stdout.strip()]
     command += ["--model_alias", "smollm2-135m", "--n_ctx", str(CONTEXT_TOKENS)]
+    command += ["--n_threads", "1", "--n_threads_batch", "1"]  # more wait for each other when busy
     command += ["--host", "127.0.0.1", "--port", str(port)]
     server = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
     base_url = f"http://127.0.0.1:{port}/v1"
