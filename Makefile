@@ -12,7 +12,7 @@ SERVE ?= 1
 # Compiled once, not by each of the many processes that the tests start.
 export PYTHONDONTWRITEBYTECODE :=
 
-.PHONY: demo serve test lint fuzz fast postgres chromium screenshots bench real-model mutants receivers lock clean
+.PHONY: demo serve test lint fuzz fast postgres chromium screenshots bench figures real-model mutants receivers lock clean
 
 demo: $(VENV)/.runtime ## Run the main job on the catalogue, then serve it (SERVE=0: don't)
 	$(BIN)/python manage.py demo --port $(PORT) $(if $(filter 0,$(SERVE)),--no-serve)
@@ -47,6 +47,9 @@ bench: chromium ## Ours beside other products, each in its own environment; writ
 	$(BIN)/python -m tests.benchmarks.rivals.voting
 	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m tests.benchmarks.rating_speed
 	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m tests.benchmarks.rating_scale --write
+
+figures: $(VENV)/.test ## Write the figures of README and docs/checks.md anew
+	$(BIN)/python -m tests.benchmarks.figures
 
 real-model: $(VENV)/.test ## The whole way with a real, tiny language model; writes docs/benchmarks.md
 	$(BIN)/python -m bench.real_model.run --write

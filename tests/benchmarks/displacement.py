@@ -15,6 +15,7 @@ from augment.metrics.displacement import Displacement, displacement
 from augment.metrics.summary import summarise
 from augment.scene.catalogue import ScenarioType
 from augment.scene.modification import Modification
+from tests.benchmarks.report import table
 from tests.fixtures.shelf import SLUGS, entry, shown_scene
 
 
@@ -39,40 +40,44 @@ def measured(slug: str, modification: Modification | None) -> Displacement:
     return displacement(modification, reference)
 
 
-def line(name: str, found: Sequence[Displacement]) -> str:
-    """A row of a table."""
-    summary = summarise(found)
-    counts = f"{summary.n} | {summary.missing}"
-    if summary.box is None:
-        return f"| {name} | {counts} | | | | |"
-    box = summary.box
-    numbers = (box.q1_m, box.median_m, box.q3_m, box.mean_m)
-    return f"| {name} | {counts} | " + " | ".join(f"{one:.2f}" for one in numbers) + " |"
-
-
-def table(
-    title: str, slugs: Sequence[str], made_by: dict[str, dict[str, Modification | None]]
-) -> None:
-    """Print a table over some scenarios."""
-    print(f"\n{title}, {len(slugs)} scenarios\n")
-    print("| contestant | n | missing | quartile (m) | median (m) | quartile (m) | mean (m) |")
-    print("|---|---|---|---|---|---|---|")
-    for name, found in made_by.items():
-        print(line(name, [measured(slug, found[slug]) for slug in slugs]))
-
-
-def main() -> None:
-    """Print the tables."""
-    made_by = {
+def placed_by_each() -> dict[str, dict[str, Modification | None]]:
+    """What each built-in contestant makes of each scenario of the catalogue."""
+    return {
         name: {slug: made(placer.place, slug) for slug in SLUGS}
         for name, placer in PLACERS.items()
     }
-    table("All", SLUGS, made_by)
-    for kind in ScenarioType:
-        table(kind.value, [slug for slug in SLUGS if entry(slug).type is kind], made_by)
-    placed = [slug for slug in SLUGS if all(found[slug] for found in made_by.values())]
-    table("What all of them place", placed, made_by)
+
+
+def displacement_table(
+    slugs: Sequence[str], made_by: dict[str, dict[str, Modification | None]]
+) -> str:
+    """A row a contestant over some scenarios, in Markdown; distances in metres."""
+    rows = []
+    for name, found in made_by.items():
+        summary = summarise([measured(slug, found[slug]) for slug in slugs])
+        box = summary.box
+        numbers = () if box is None else (box.q1_m, box.median_m, box.q3_m, box.mean_m)
+        cells = [f"{number:.2f}" for number in numbers] or ["–"] * 4
+        rows.append([name, str(summary.n), str(summary.missing), *cells])
+    head = ["contestant", "objects", "missing", "quartile (m)", "median (m)", "quartile (m)"]
+    return table([*head, "mean (m)"], rows)
+
+
+def report() -> str:
+    """The tables over all scenarios, each type, and what all contestants place."""
+    made_by = placed_by_each()
+    parts = {"All": list(SLUGS)}
+    parts |= {
+        kind.value: [slug for slug in SLUGS if entry(slug).type is kind] for kind in ScenarioType
+    }
+    parts["What all of them place"] = [
+        slug for slug in SLUGS if all(found[slug] for found in made_by.values())
+    ]
+    return "\n\n".join(
+        f"{title}, {len(slugs)} scenarios\n\n{displacement_table(slugs, made_by)}"
+        for title, slugs in parts.items()
+    )
 
 
 if __name__ == "__main__":
-    main()
+    print(report())

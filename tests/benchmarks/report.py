@@ -1,4 +1,4 @@
-"""Writing a benchmark's table into docs/benchmarks.md, each in its own section."""
+"""Writing a benchmark's table into the docs: a section of docs/benchmarks.md, or a block."""
 
 from __future__ import annotations
 
@@ -6,7 +6,8 @@ import os
 import re
 from pathlib import Path
 
-PAGE = Path(__file__).resolve().parents[2] / "docs" / "benchmarks.md"
+ROOT = Path(__file__).resolve().parents[2]
+PAGE = ROOT / "docs" / "benchmarks.md"
 
 
 def write_section(heading: str, text: str, *, page: Path = PAGE) -> None:
@@ -19,6 +20,20 @@ def write_section(heading: str, text: str, *, page: Path = PAGE) -> None:
     else:
         rest = kept[found.end() :]
         page.write_text(kept[: found.start()] + section + ("\n" + rest if rest else ""))
+
+
+def write_block(name: str, text: str, *, page: Path) -> None:
+    """Replace what stands between the comments `figures: NAME` and `end of figures`.
+
+    Raises:
+        LookupError: The page has no such block.
+    """
+    begin, end = f"<!-- figures: {name} -->\n", "<!-- end of figures -->"
+    before, found, rest = page.read_text().partition(begin)
+    _, closed, after = rest.partition(end)
+    if not (found and closed):
+        raise LookupError(f"{page.name} has no block of figures {name!r}")
+    page.write_text(f"{before}{begin}\n{text.strip()}\n\n{end}{after}")
 
 
 def table(head: list[str], rows: list[list[str]]) -> str:
