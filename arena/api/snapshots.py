@@ -147,7 +147,7 @@ class SnapshotBody(StrictSerializer):
         help_text="Codes as a rating names them; none for all.",
     )
     with_repeats = FlagField(required=False, default=False)
-    automatic_ties = FlagField(required=False, default=False)
+    leave_out_settled = FlagField(required=False, default=False)
     leave_out_own = FlagField(required=False, default=False)
 
 
@@ -248,7 +248,7 @@ def _wanted(given: dict[str, Any]) -> dict[str, Any]:
         types=tuple(given.pop("types")),
         experts=tuple(given.pop("experts")),
         kinds=kinds,
-        automatic_ties=given.pop("automatic_ties"),
+        leave_out_settled=given.pop("leave_out_settled"),
         leave_out_own=given.pop("leave_out_own"),
     )
     return given | {"filters": filters}

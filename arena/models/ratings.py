@@ -69,7 +69,8 @@ class Snapshot(models.Model):
     )
     seed = models.BigIntegerField()
     filters = models.JSONField(
-        default=dict, help_text="which votes were asked for: types, experts, kinds, automatic_ties"
+        default=dict,
+        help_text="which votes were asked for: types, experts, kinds and so on",
     )
     last_vote = models.BigIntegerField(
         null=True, blank=True, help_text="no vote after this row counts; null without votes"

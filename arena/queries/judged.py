@@ -14,11 +14,15 @@ from django.db.models import Max, Q
 
 from arena.models import ImportedVote, Person, Study, Vote
 from arena.pairing.order import MAIN
-from arena.pairing.rules import scenario_of
+from arena.pairing.rules import Entry, grid_of, scenario_of
+from arena.pairing.settled import draw_ties
 from augment.models import Contestant
 
 AUTOMATIC = "automatic"
-"""A kind beside those of matchups: a pair of identical pictures, which nobody sees."""
+"""A kind beside those of matchups: a tie on a pair that nobody can tell apart nor was shown."""
+
+RATED = (Vote.Outcome.LEFT.value, Vote.Outcome.EQUAL.value, Vote.Outcome.RIGHT.value)
+"""Outcomes that say something; a skip does not."""
 
 IMPORTED = "imported"
 """The kind of a contestant that is known by its name alone."""
@@ -113,18 +117,44 @@ def entrants_of(study: Study, votes: Iterable[Judged]) -> tuple[Entrant, ...]:
     return _names(votes) if is_imported(study) else _contestants(study)
 
 
-def automatic_ties(study: Study) -> list[Judged]:
-    """One tie for every pair of identical pictures; the planner never shows them."""
+def settled_ties(study: Study, lines: Iterable[Judged]) -> list[Judged]:
+    """Ties on the pairs that the study settled without showing; see arena.pairing.settled.
+
+    Args:
+        study: A study; one of votes from elsewhere has no such pairs.
+        lines: Its votes, which say how often a pair is judged, and by whom.
+    """
+    settled = [(place, one, other) for place, one, other in study.rules.get("identical", ())]
+    if not settled:
+        return []
+    by_judge: dict[str, list[Judged]] = {}
+    for line in lines:
+        if line.kind == MAIN and line.outcome in RATED:
+            by_judge.setdefault(line.judge, []).append(line)
     types = dict(study.scenarios.values_list("slug", "type"))
+    drawn = draw_ties(
+        settled,
+        {judge: len(own) for judge, own in by_judge.items()},
+        showable=_count_showable(study),
+        seed=study.seed,
+    )
     return [
         Judged(
-            judge=AUTOMATIC, judge_name="Pictures alike", item=scenario_of(place),
-            type=types[scenario_of(place)],
-            kind=AUTOMATIC, left=left, right=right, outcome=Vote.Outcome.EQUAL.value,
-            both_miss=False, is_simulated=False, ms_visible=None, matchup=None, repeat_of=None,
+            judge=judge, judge_name=by_judge[judge][0].judge_name, item=scenario_of(place),
+            type=types[scenario_of(place)], kind=AUTOMATIC, left=left, right=right,
+            outcome=Vote.Outcome.EQUAL.value, both_miss=False,
+            is_simulated=by_judge[judge][0].is_simulated, ms_visible=None, matchup=None,
+            repeat_of=None,
         )
-        for place, left, right in study.rules.get("identical", [])
+        for (place, left, right), judge in drawn
     ]  # fmt: skip
+
+
+def _count_showable(study: Study) -> int:
+    """How many pairs of pictures the planner may show."""
+    entries = tuple(Entry(**entry) for entry in study.rules["entries"])
+    alike = tuple((place, one, other) for place, one, other in study.rules.get("alike", ()))
+    return int(grid_of(entries, alike).showable.sum())
 
 
 def references() -> frozenset[str]:

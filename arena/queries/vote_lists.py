@@ -14,7 +14,7 @@ from uuid import UUID
 from django.db.models import F, Q, QuerySet
 
 from arena.models import Snapshot, Vote
-from arena.queries.judged import AUTOMATIC, Judged, automatic_ties, is_imported
+from arena.queries.judged import AUTOMATIC, Judged, is_imported, settled_ties, votes_up_to
 from arena.queries.listed_votes import (
     ListedVote,
     imported_votes,
@@ -199,6 +199,16 @@ class _Found:
 
 
 _FOUND: Remembered[list[tuple[int, str]]] = Remembered(3)
+_TIES: Remembered[list[Judged]] = Remembered(3)
+
+
+def _settled_ties(snapshot: Snapshot) -> list[Judged]:
+    """The ties on pairs that nobody was shown, as the rating's votes give them."""
+    study, last = snapshot.study, snapshot.last_vote
+    if not study.rules.get("identical"):
+        return []
+    key = (snapshot.code, last, plan_types(study))
+    return _TIES.get(key, lambda: settled_ties(study, votes_up_to(study, last)[0]))
 
 
 def _automatic(snapshot: Snapshot, search: VoteSearch) -> list[tuple[Judged, str]]:
@@ -211,9 +221,10 @@ def _automatic(snapshot: Snapshot, search: VoteSearch) -> list[tuple[Judged, str
     filters = Filters.of_document(snapshot.filters)
     simulated = set(made_up_contestants(snapshot.study).values_list("slug", flat=True))
     found = []
-    for line in automatic_ties(snapshot.study):
+    for line in _settled_ties(snapshot):
         reason = why_left_out(line, filters, simulated, snapshot.study.allow_simulated)
-        mark = (reason.value if reason else COUNTED) if filters.automatic_ties else AUTOMATIC_TIE
+        counted = reason.value if reason else COUNTED
+        mark = AUTOMATIC_TIE if filters.leave_out_settled else counted
         if _fits(line, mark, search):
             found.append((line, mark))
     return found

@@ -8,15 +8,16 @@ from dataclasses import dataclass
 from enum import StrEnum
 from typing import Any
 
-from arena.models import Study, Vote
+from arena.models import Study
 from arena.pairing.order import CHECK, MAIN, REPEAT
 from arena.queries.judged import (
     AUTOMATIC,
+    RATED,
     Entrant,
     Judged,
-    automatic_ties,
     entrants_of,
     references,
+    settled_ties,
     votes_up_to,
 )
 from augment.errors import UnknownName
@@ -26,7 +27,7 @@ KINDS = (MAIN, REPEAT)
 """What may be rated: planned showings, and on demand the hidden repeats of them."""
 
 
-OPEN_TO_EXPERTS = ("types", "kinds", "automatic_ties")
+OPEN_TO_EXPERTS = ("types", "kinds", "leave_out_settled")
 
 
 class LeftOut(StrEnum):
@@ -49,7 +50,8 @@ class Filters:
         types: Of scenarios; empty is all.
         experts: Codes of judges; empty is all.
         kinds: Of matchups.
-        automatic_ties: Whether pairs of identical pictures, which nobody sees, count as a tie.
+        leave_out_settled: Whether pairs that nobody was shown, because nobody can tell them
+            apart, do not count as ties.
         leave_out_own: Whether votes of authors on their own contestants do not count.
         authors: Who was marked author of what when the votes were frozen, codes of judges with
             slugs of contestants. They are known also where their votes count.
@@ -58,7 +60,7 @@ class Filters:
     types: tuple[str, ...] = ()
     experts: tuple[str, ...] = ()
     kinds: tuple[str, ...] = (MAIN,)
-    automatic_ties: bool = False
+    leave_out_settled: bool = False
     leave_out_own: bool = False
     authors: frozenset[tuple[str, str]] = frozenset()
 
@@ -72,19 +74,19 @@ class Filters:
             "types": list(self.types),
             "experts": list(self.experts),
             "kinds": list(self.kinds),
-            "automatic_ties": self.automatic_ties,
+            "leave_out_settled": self.leave_out_settled,
             "leave_out_own": self.leave_out_own,
             "authors": [list(pair) for pair in sorted(self.authors)],
         }
 
     @classmethod
     def of_document(cls, document: dict[str, Any]) -> Filters:
-        """What `as_document` wrote; older snapshots have none."""
+        """What `as_document` wrote; older snapshots left settled pairs out."""
         return cls(
             types=tuple(document.get("types", ())),
             experts=tuple(document.get("experts", ())),
             kinds=tuple(document.get("kinds", (MAIN,))),
-            automatic_ties=bool(document.get("automatic_ties", False)),
+            leave_out_settled=bool(document.get("leave_out_settled", True)),
             leave_out_own=bool(document.get("leave_out_own", False)),
             authors=frozenset((judge, slug) for judge, slug in document.get("authors", ())),
         )
@@ -134,7 +136,7 @@ def vote_set(study: Study, *, filters: Filters, last: int | None) -> VoteSet:
             raise UnknownName("kind of vote", kind, list(KINDS))
     lines, superseded = votes_up_to(study, last)
     entrants = entrants_of(study, lines)
-    automatic = automatic_ties(study) if filters.automatic_ties else []
+    automatic = [] if filters.leave_out_settled else settled_ties(study, lines)
     _check(filters, [*lines, *automatic])
     simulated = {entrant.slug for entrant in entrants if entrant.is_simulated}
     judged = [
@@ -148,13 +150,16 @@ def vote_set(study: Study, *, filters: Filters, last: int | None) -> VoteSet:
         entrants=entrants,
         counted=tuple(line for line, reason in judged if reason is None),
         with_own=tuple(line for line, reason in judged if reason in (None, LeftOut.OWN)),
-        repeats=tuple(
-            line for line, _ in judged if line.kind == REPEAT and line.outcome in _RATED
-        ),
+        repeats=tuple(line for line, _ in judged if line.kind == REPEAT and line.outcome in RATED),
         checks=checks,
         references=references() if checks else frozenset(),
         left_out={reason: number for reason, number in sorted(left_out.items()) if number},
     )
+
+
+def is_own_vote(line: Judged, filters: Filters) -> bool:
+    """Whether an author voted on a contestant of their own; settled ties are nobody's votes."""
+    return line.kind != AUTOMATIC and filters.is_own(line.judge, line.left, line.right)
 
 
 def why_left_out(
@@ -167,18 +172,16 @@ def why_left_out(
     reasons = (
         (LeftOut.CHECK, line.kind == CHECK),
         (LeftOut.REPEAT, line.kind == REPEAT and REPEAT not in filters.kinds),
-        (LeftOut.SKIP, line.outcome not in _RATED),
+        (LeftOut.SKIP, line.outcome not in RATED),
         (LeftOut.SIMULATED, made_up and not allow_simulated),
-        (LeftOut.FILTERED, other_type or (other_expert and line.kind != AUTOMATIC)),
-        (LeftOut.FILTERED, line.kind == MAIN and MAIN not in filters.kinds),
-        (LeftOut.OWN, filters.leave_out_own and filters.is_own(line.judge, line.left, line.right)),
+        (LeftOut.FILTERED, other_type or other_expert),
+        (LeftOut.FILTERED, line.kind in (MAIN, AUTOMATIC) and MAIN not in filters.kinds),
+        (LeftOut.OWN, filters.leave_out_own and is_own_vote(line, filters)),
     )
     return next((reason for reason, holds in reasons if holds), None)
 
 
-# --- Which count -------------------------------------------------------------------------------
-
-_RATED = (Vote.Outcome.LEFT.value, Vote.Outcome.EQUAL.value, Vote.Outcome.RIGHT.value)
+# --- Private -----------------------------------------------------------------------------------
 
 
 def _check(filters: Filters, lines: Sequence[Judged]) -> None:

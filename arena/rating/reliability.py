@@ -38,7 +38,8 @@ class Agreement:
         alpha_interval: The same with a win twice as far from a loss as from a tie.
         ac1: Gwet's, values as names: chance is what raters would share who guess on hard units
             alone, so many votes of one kind do not push it towards zero as they do alpha.
-        percent: The share of pairs of judgements of one unit that are equal, 0 to 1.
+        percent: Of the others' judgements of the same unit, the share that is equal, 0 to 1, on
+            average over all judgements: the mean of what the panel shows of each expert.
         units: With two judgements or more.
         judgements: On those units.
     """
@@ -60,28 +61,27 @@ def agreement(votes: Comparisons, *, rounds: int, seed: int) -> Agreement:
         seed: Of its draws.
     """
     table, scenario = unit_table(votes)
-    shared = table.sum(axis=1) >= 2
-    table, scenario = table[shared], scenario[shared]
-    if not len(table):
+    is_shared = table.sum(axis=1) >= 2
+    if not is_shared.any():
         nothing = Estimate(value=None)
         return Agreement(
             alpha=nothing, alpha_interval=nothing, percent=nothing, units=0, judgements=0
         )
     found, cluster = np.unique(scenario, return_inverse=True)
-    by_unit = np.hstack([_coincidences(table), _shares(table), _equal_pairs(table)])
+    by_unit = np.hstack([_coincidences(table), _shares(table)])
     sums = np.zeros((len(found), by_unit.shape[1]))
     np.add.at(sums, cluster, by_unit)
     rng = np.random.default_rng(seed)
     chance = np.full(len(found), 1.0 / len(found))
     drawn = rng.multinomial(len(found), chance, size=rounds) @ sums
     whole = sums.sum(axis=0)[None]
-    several = len(found) > 1
+    several = len(np.unique(scenario[is_shared])) > 1
     return Agreement(
         alpha=_estimate(_alpha, DifferenceMetric.NOMINAL, whole, drawn, several),
         alpha_interval=_estimate(_alpha, DifferenceMetric.INTERVAL, whole, drawn, several),
         percent=_estimate(_percent, DifferenceMetric.NOMINAL, whole, drawn, several),
-        units=len(table),
-        judgements=int(table.sum()),
+        units=int(is_shared.sum()),
+        judgements=int(table[is_shared].sum()),
         ac1=_estimate(_ac1, DifferenceMetric.NOMINAL, whole, drawn, several),
     )
 
@@ -89,10 +89,12 @@ def agreement(votes: Comparisons, *, rounds: int, seed: int) -> Agreement:
 def gwet_ac1(table: IntArray) -> float | None:
     """AC1 of a table (U, K) of values by unit; None if no unit was judged twice.
 
+    What is expected by chance comes from all units, also those that were judged once.
+
     Source: K. L. Gwet, Computing inter-rater reliability in the presence of high agreement (2008).
     """
-    paired = table[table.sum(axis=1) >= 2]
-    return float(_ac1_of(_shares(paired).sum(axis=0)[None])[0]) if len(paired) else None
+    is_shared = table.sum(axis=1) >= 2
+    return float(_ac1_of(_shares(table).sum(axis=0)[None])[0]) if is_shared.any() else None
 
 
 def unit_table(votes: Comparisons) -> tuple[IntArray, IntArray]:
@@ -121,34 +123,29 @@ def krippendorff_alpha(table: IntArray, metric: DifferenceMetric) -> float | Non
 
 
 def _coincidences(table: IntArray) -> FloatArray:
-    """(U, 9): each unit's pairs of values, every value weighing one in all."""
+    """(U, 9): each unit's pairs of values, every value weighing one in all; none of a single."""
     pairs = table[:, :, None] * (table[:, None, :] - np.eye(VALUES, dtype=np.int64))
-    return np.asarray((pairs / (table.sum(axis=1) - 1)[:, None, None]).reshape(len(table), -1))
-
-
-def _equal_pairs(table: IntArray) -> FloatArray:
-    """(U, 2): ordered pairs of equal judgements, and all ordered pairs."""
-    total = table.sum(axis=1)
-    equal = (table * (table - 1)).sum(axis=1)
-    return np.stack([equal, total * (total - 1)], axis=1).astype(np.float64)
+    others = np.maximum(table.sum(axis=1) - 1, 1)
+    return np.asarray((pairs / others[:, None, None]).reshape(len(table), -1))
 
 
 def _shares(table: IntArray) -> FloatArray:
-    """(U, K + 2): the share of each value, the share of equal pairs, and one, for every unit."""
+    """(U, K + 3): the values' shares, one, the share of equal pairs, and one if there are any."""
     total = table.sum(axis=1, keepdims=True)
-    equal = (table * (table - 1)).sum(axis=1, keepdims=True) / (total * (total - 1))
-    return np.hstack([table / total, equal, np.ones((len(table), 1))])
+    equal = (table * (table - 1)).sum(axis=1, keepdims=True) / np.maximum(total * (total - 1), 1)
+    return np.hstack([table / total, np.ones((len(table), 1)), equal, total > 1])
 
 
 def _ac1(sums: FloatArray, _: DifferenceMetric) -> FloatArray:
     """(B,) of sums as `agreement` makes them."""
-    return _ac1_of(sums[:, VALUES * VALUES : -2])
+    return _ac1_of(sums[:, VALUES * VALUES :])
 
 
 def _ac1_of(sums: FloatArray) -> FloatArray:
-    """(B,) of sums (B, K + 2) of what units share."""
-    means = sums[:, :-1] / sums[:, -1:]
-    values, seen = means[:, :-1], means[:, -1]
+    """(B,) of sums (B, K + 3) of what units share; not a number where none was judged twice."""
+    values = sums[:, :-3] / sums[:, -3:-2]
+    with np.errstate(invalid="ignore"):
+        seen = sums[:, -2] / sums[:, -1]
     by_chance = (values * (1.0 - values)).sum(axis=1) / (values.shape[1] - 1)
     return np.asarray((seen - by_chance) / (1.0 - by_chance))
 
@@ -172,7 +169,9 @@ def _alpha(sums: FloatArray, metric: DifferenceMetric) -> FloatArray:
 
 
 def _percent(sums: FloatArray, _: DifferenceMetric) -> FloatArray:
-    return np.asarray(sums[:, -2] / sums[:, -1])
+    pairs = sums[:, : VALUES * VALUES]
+    with np.errstate(invalid="ignore"):
+        return np.asarray(pairs[:, :: VALUES + 1].sum(axis=1) / pairs.sum(axis=1))
 
 
 def _estimate(

@@ -9,8 +9,8 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Sequence
 
-from arena.queries.judged import AUTOMATIC, Judged
-from arena.queries.vote_sets import Filters, VoteSet
+from arena.queries.judged import AUTOMATIC
+from arena.queries.vote_sets import Filters, VoteSet, is_own_vote
 from arena.rating.leaderboard import Leaderboard, Line, rate
 from arena.results.both_versions import BothRanks, OwnVotes
 from arena.services.covariates import largest_move, with_covariates
@@ -33,10 +33,10 @@ def with_and_without(
         board: The table's rating.
         covariates: What it is adjusted for.
     """
-    own = [vote for vote in votes.with_own if _is_own(vote, filters)]
+    own = [vote for vote in votes.with_own if is_own_vote(vote, filters)]
     if not own:
         return None
-    others = [vote for vote in votes.with_own if not _is_own(vote, filters)]
+    others = [vote for vote in votes.with_own if not is_own_vote(vote, filters)]
     rest = votes.with_own if filters.leave_out_own else others
     arrays = vote_arrays([entrant.slug for entrant in votes.entrants], rest)
     other = rate(
@@ -65,10 +65,6 @@ def with_and_without(
 
 
 # --- Private -----------------------------------------------------------------------------------
-
-
-def _is_own(vote: Judged, filters: Filters) -> bool:
-    return filters.is_own(vote.judge, vote.left, vote.right)
 
 
 def _both_ranks(full: Line, fewer: Line) -> BothRanks:

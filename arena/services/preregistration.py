@@ -88,6 +88,7 @@ def _document(study: Study) -> dict[str, Any]:
             "method": "Bradley-Terry on the Elo scale, ties half a win, mean 1000",
             "intervals": "95 %, two-way over experts and scenarios, closed form",
             "pairs": "all judged at once, 5 % for the whole table",
+            "settled_pairs": "ties, as many a pair as others have votes on average",
             "left_out": "hidden repeats, attention checks, skips, superseded votes",
         },
     }

@@ -22,6 +22,7 @@ from arena.results.tree import Results
 from arena.services import breakdowns
 from arena.services.covariates import adjustment, with_covariates
 from arena.services.own_votes import with_and_without
+from arena.services.settled_pairs import settled_remark
 from arena.services.trust import board_remarks, precision, trust
 from arena.services.vote_arrays import VoteArrays, vote_arrays
 from arena.services.vote_rows import VERSION as VOTES_VERSION
@@ -61,9 +62,6 @@ def compute(snapshot: Snapshot, report: Report) -> Computed:
     if snapshot.covariates:
         names = snapshot.covariates
         board = _rate(snapshot, with_covariates(arrays.comparisons, votes.counted, names))
-    if any(vote.kind == AUTOMATIC for vote in votes.counted):
-        # Nobody judged those ties: who judged them is no expert that could outvote others.
-        board = replace(board, experts=board.experts - 1)
     report(60)
     judges = {vote.judge: vote.judge_name for vote in votes.counted}
     snapshot.results = _results(snapshot, votes, arrays, board, plain, judges)
@@ -159,9 +157,16 @@ def _results(
     from_file = is_imported(study)
     filters = Filters.of_document(snapshot.filters)
     planned = breakdowns.planned_pairs(study, filters)
+    planned.update(
+        frozenset((vote.left, vote.right)) for vote in votes.counted if vote.kind == AUTOMATIC
+    )
+    remark = settled_remark(study, votes, left_out=filters.leave_out_settled)
+    remarks = board_remarks(board)
+    if remark:
+        remarks = replace(remarks, warnings=(*remarks.warnings, remark))
     return Results(
         version=RESULTS_VERSION,
-        board=board_remarks(board),
+        board=remarks,
         trust=trust(arrays, votes, plain, seed=seed),
         claims=precision(arrays, board, unit=board.unit, seed=seed),
         own_votes=with_and_without(votes, filters, board, snapshot.covariates),

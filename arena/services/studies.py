@@ -13,6 +13,7 @@ from django.utils import timezone
 from arena.models import Study
 from arena.pairing.demands import ATTENTION_CHECKS, MOST_CHECKS, check_share
 from arena.pairing.plan import Check, Entry, MatchupPlan, PlanRules, plan
+from arena.pairing.settled import Triple, draw_shown
 from arena.queries.people import experts as expert_accounts
 from arena.services.attention_checks import enough_checks, placed_checks
 from arena.services.ending import cancel_study, close_study
@@ -68,8 +69,7 @@ def open_study(
     Raises:
         InvalidDocument: The name is empty, too long or not one line.
         UnknownName: A contestant, scenario or expert does not exist.
-        Conflict: The name is taken, the seed is out of range, or something simulated takes part
-            unasked.
+        Conflict: The name is taken, the seed out of range, or something simulated unasked.
         NothingToPlan: A hypothesis can't be read; pictures, drives or checks are missing.
     """
     name, given = _free_name(name), options or PlanOptions()
@@ -83,19 +83,20 @@ def open_study(
     )
     entries = _entries(shown.cells)
     checks, broken = _checks_for(given, scenario_rows, entries, votes_per_expert)
+    settled, kept = _alike(given, shown.cells, entries, seed)
     rules = PlanRules(
         entries=entries,
         experts=tuple(expert.username for expert in expert_rows),
         votes_per_expert=votes_per_expert,
         seed=seed,
         checks=checks,
-        alike=alike_pairs(shown.cells) if given.settle_alike else (),
+        alike=settled,
         **{name: getattr(given, name) for name in OF_THE_PLAN},
     )
     planned = plan(rules)
     played = replays_of(broken | shown.cells) if given.allow_replay else None
-    frozen = _frozen_rules(rules, planned, played) | _frozen_pictures(given, shown)
-    study = _insert(name, frozen, given, rules, allow_simulated)
+    kept |= _frozen_rules(rules, planned, played) | _frozen_pictures(given, shown)
+    study = _insert(name, kept, given, rules, allow_simulated)
     _enrol(study, contestant_rows, scenario_rows, expert_rows)
     store(study, planned.matchups, broken | shown.cells, expert_rows)
     _conclude_opening(study, matchups=len(planned.matchups), actor=actor)
@@ -212,6 +213,16 @@ def _insert(
             )
     except IntegrityError:  # somebody else was faster
         raise _taken(name) from None
+
+
+def _alike(
+    given: PlanOptions, cells: Cells, entries: Sequence[Entry], seed: int
+) -> tuple[tuple[Triple, ...], dict[str, Any]]:
+    """Which alike pairs are settled, and as a rule of the study which are shown all the same."""
+    alike = alike_pairs(cells) if given.settle_alike else ()
+    alike_shown = draw_shown(alike, entries, seed=seed)
+    kept = {"alike_shown": [list(pair) for pair in alike_shown]}
+    return tuple(sorted(set(alike) - set(alike_shown))), kept
 
 
 def _enrol(

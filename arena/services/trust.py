@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from arena.queries.judged import AUTOMATIC
 from arena.queries.vote_sets import VoteSet
 from arena.rating import elo
 from arena.rating.bootstrap import Unit
@@ -15,7 +16,9 @@ from arena.rating.bradley_terry import ELO_PER_LOGIT, MEAN_ELO
 from arena.rating.comparisons import (
     Comparisons,
     FloatArray,
+    IntArray,
     restrict_to,
+    select_votes,
     tally,
 )
 from arena.rating.fit_test import fit_test
@@ -66,12 +69,14 @@ def trust(arrays: VoteArrays, votes: VoteSet, board: Leaderboard, *, seed: int) 
     if set(arrays.items) == {""}:  # nobody knows what was shown twice
         inner = replace(inner, scenario=np.arange(len(inner), dtype=np.int64))
     first = _repeats(arrays, votes)
+    given = np.flatnonzero([vote.kind != AUTOMATIC for vote in votes.counted])
+    by_people = select_votes(inner, given)
     found = Trust(
         tie_share=_tie_share(inner),
-        agreement=agreement(inner, rounds=AGREEMENT_ROUNDS, seed=seed),
-        side=side_bias(inner) if len(inner) else None,
+        agreement=agreement(by_people, rounds=AGREEMENT_ROUNDS, seed=seed),
+        side=side_bias(by_people) if len(by_people) else None,
         repeats=first if first.number else None,
-        raters=_panel(arrays, inner, strengths, votes, first),
+        raters=_panel(arrays, inner, strengths, votes, first, given),
     )
     if strengths is None:
         return found
@@ -214,7 +219,9 @@ def _panel(
     strengths: FloatArray | None,
     votes: VoteSet,
     repeats: Repeats,
+    given: IntArray,
 ) -> tuple[PanelRater, ...]:
+    """A line an expert, by the votes that people gave (V,)."""
     experts = len(arrays.judges)
     without = np.full((experts, len(inner.names)), np.nan)
     changes: list[int | None] = [None] * experts
@@ -232,7 +239,7 @@ def _panel(
             **_checks(votes, arrays.judges[line.expert]),
             aids=_aids(votes, arrays.judges[line.expert]),
         )
-        for line in raters(inner, ms=arrays.ms, without=without)
+        for line in raters(select_votes(inner, given), ms=arrays.ms[given], without=without)
     )
 
 

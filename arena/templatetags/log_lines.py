@@ -126,8 +126,8 @@ def _filters(value: Any, names: Names) -> str:
         said.append(ngettext("%(n)s expert", "%(n)s experts", n) % {"n": n})
     if "repeat" in value.get("kinds", ()):
         said.append(_("hidden repeats count"))
-    if value.get("automatic_ties"):
-        said.append(_("pairs that nobody can tell apart count as ties"))
+    if value.get("leave_out_settled"):
+        said.append("pairs that nobody can tell apart are left out")
     if value.get("leave_out_own"):
         said.append(_("left out: %(what)s") % {"what": left_out("own")})
     return "; ".join(said) or _("all")

@@ -82,7 +82,7 @@ class RatingForm(forms.Form):
         choices=[(name, COVARIATE_LABELS[name]) for name in COVARIATES], required=False
     )
     with_repeats = forms.BooleanField(required=False)
-    automatic_ties = forms.BooleanField(required=False)
+    leave_out_settled = forms.BooleanField(required=False)
     leave_out_own = forms.BooleanField(required=False)
 
     def __init__(
@@ -112,7 +112,7 @@ class RatingForm(forms.Form):
                 types=tuple(asked["types"]),
                 experts=tuple(asked["experts"]),
                 kinds=kinds,
-                automatic_ties=asked["automatic_ties"],
+                leave_out_settled=asked["leave_out_settled"],
                 leave_out_own=asked["leave_out_own"],
             ),
         }

@@ -167,4 +167,5 @@ def _settled_facts(settled: int, alike: int) -> list[str]:
             "and 2° in every object: %(alike)s, identical pictures among them."
         )
         % {"settled": settled, "alike": alike}
+        + " A tenth of those that are alike and not identical is shown all the same."
     ]

@@ -122,7 +122,7 @@ def test_an_expert_reads_the_results_of_a_closed_study_and_nothing_of_authors() 
     waiting = plan_snapshot(study=study, rounds=20)
     listed = finn.get(API + path).json()["results"]
     assert [line["code"] for line in listed] == [str(rated.code), str(early.code)]
-    assert all(set(line["filters"]) == {"types", "kinds", "automatic_ties"} for line in listed)
+    assert all(set(line["filters"]) == {"types", "kinds", "leave_out_settled"} for line in listed)
     shown = finn.get(f"{API}snapshots/{rated.code}")
     assert {row["slug"] for row in shown.json()["table"]["rows"]} == {"ann", "bob", "cid"}
     assert b"author" not in shown.content

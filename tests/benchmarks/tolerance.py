@@ -92,10 +92,9 @@ def judge(units: list[Unit], *, voters: int, seed: int) -> list[list[Comparison]
 
 
 def rate_each_way(units: list[Unit], said: list[list[Comparison]]) -> dict[str, Leaderboard]:
-    """Ratings of all votes, of those on pairs that differ, and of these with automatic ties.
+    """Ratings of all votes, of those on pairs that differ, and of these with settled ties.
 
-    The product counts one tie a pair of pictures; the last way counts as many as voters would
-    have given.
+    The product counts as many ties as voters would have given.
     """
     names = sorted({name for one in units for name in (one.first, one.second)})
     every = [vote for votes in said for vote in votes]
@@ -103,12 +102,10 @@ def rate_each_way(units: list[Unit], said: list[list[Comparison]]) -> dict[str, 
         vote for one, votes in zip(units, said, strict=True) for vote in votes if not one.is_alike
     ]
     alike = [(one, votes) for one, votes in zip(units, said, strict=True) if one.is_alike]
-    ties = [_vote(one, TIE, "nobody") for one, _ in alike]
     each = [replace(vote, score=TIE) for _, votes in alike for vote in votes]
     return {
         "all pairs voted on": rate(as_arrays(names, every)),
         "settled and left out": rate(as_arrays(names, apart)),
-        "settled, one tie each": rate(as_arrays(names, [*apart, *ties])),
         "settled, a tie for each voter": rate(as_arrays(names, [*apart, *each])),
     }
 

@@ -103,28 +103,30 @@ def test_votes_after_the_frozen_one_do_not_count_nor_supersede() -> None:
     assert found.left_out == {}
 
 
-@pytest.mark.parametrize(("experts", "marks"), [(4, False), (5, True)])
-def test_who_judged_automatic_ties_is_no_expert(experts: int, marks: bool) -> None:
-    study = a_study(experts=tuple(f"expert-{n}" for n in range(experts)), votes_per_expert=6)
-    study.rules["identical"] = [["place-0", "ann", "bob"]]
+def test_settled_pairs_are_ties_of_experts_but_no_judgements_of_theirs() -> None:
+    study = a_study(votes_per_expert=6)
+    study.rules["identical"] = [[f"place-{n}", "ann", "bob"] for n in range(6)]
     study.save()
-    for number, matchup in enumerate(study.matchups.order_by("pk")):
-        vote(matchup, ("left", "right", "equal")[number % 3])
+    for matchup in study.matchups.all():
+        vote(matchup, "equal")
+    voted = study.matchups.count()
     close_study(study=study)
     study.refresh_from_db()
-    for ties in (False, True):
-        snapshot = rate(study=study, filters=Filters(automatic_ties=ties), rounds=50)
-        board = snapshot.results.board
-        assert board.experts == experts
-        assert (board.above is not None) == marks
-
-
-def test_identical_pictures_are_a_tie_only_on_demand() -> None:
-    study = a_study(votes_per_expert=2)
-    study.rules["identical"] = [["place-0", "ann", "bob"]]
-    study.save()
-    assert counted(study) == []
-    assert counted(study, automatic_ties=True) == ["place-0 ann bob equal"]
+    whole, alone = (
+        rate(study=study, filters=Filters(leave_out_settled=left_out), rounds=50)
+        for left_out in (False, True)
+    )
+    settled = whole.votes_counted - voted
+    assert alone.votes_counted == voted
+    assert settled == pytest.approx(6 * voted / study.scenarios.count() / 3, abs=6)
+    assert whole.results.board.experts == alone.results.board.experts
+    for name in ("agreement", "side"):
+        assert getattr(whole.results.trust, name) == getattr(alone.results.trust, name)
+    said = f"6 pairs that nobody can tell apart were not shown and count as {settled} ties"
+    assert any(said in warning for warning in whole.results.board.warnings)
+    assert any("are left out" in warning for warning in alone.results.board.warnings)
+    planned = {frozenset((pair.a, pair.b)): pair for pair in whole.results.pairs}
+    assert planned[frozenset(("ann", "bob"))].planned == planned[frozenset(("ann", "bob"))].votes
 
 
 def test_a_snapshot_keeps_its_filters_and_judges_and_finds_its_votes_again() -> None:

@@ -6,29 +6,31 @@ import pytest
 
 from arena.models import Study
 from arena.pairing.plan import plan
-from arena.queries.judged import automatic_ties
+from arena.queries.judged import last_vote_of
+from arena.queries.vote_sets import Filters, vote_set
 from arena.services.plans import rules_of
-from arena.services.studies import PlanOptions, open_study
+from arena.services.ratings import rate
+from arena.services.studies import PlanOptions, close_study, open_study
 from augment.models import Augmentation
 from augment.scene.codec import modification_to_document
 from augment.scene.modification import Modification
 from tests.scenes import vehicle
-from tests.study_rows import cast_of
+from tests.study_rows import cast_of, vote
 
 pytestmark = pytest.mark.django_db
 
 PLACES_M = {"ann": 20.0, "bob": 20.1, "cid": 20.3}
 
 
-def opened(*, settle_alike: bool = False) -> Study:
-    cast = cast_of(scenarios=4, experts=("eva",))
+def opened(*, settle_alike: bool = False, scenarios: int = 4) -> Study:
+    cast = cast_of(scenarios=scenarios, experts=("eva",))
     for row in Augmentation.objects.select_related("contestant"):
         car = vehicle("New1", PLACES_M[row.contestant.slug], 0.0)
         row.modification = modification_to_document(Modification(added=(car,)))
         row.save(update_fields=["modification"])
     return open_study(
         name="Round 1",
-        votes_per_expert=8,
+        votes_per_expert=2 * scenarios,
         seed=7,
         options=PlanOptions(settle_alike=settle_alike),
         **cast,
@@ -43,14 +45,42 @@ def pairs_shown(study: Study) -> set[frozenset[str]]:
 def test_pairs_within_the_tolerance_are_ties_that_nobody_sees() -> None:
     study = opened(settle_alike=True)
     assert pairs_shown(study) == {frozenset({"ann", "cid"}), frozenset({"bob", "cid"})}
-    ties = automatic_ties(study)
-    assert {(tie.left, tie.right, tie.outcome) for tie in ties} == {("ann", "bob", "equal")}
-    assert len(ties) == 4
     again = plan(rules_of(study))
     assert len(again.matchups) == study.matchups.count()
+    for matchup in study.matchups.all():
+        vote(matchup, "left")
+    found = vote_set(study, filters=Filters(), last=last_vote_of(study))
+    ties = [line for line in found.counted if line.kind == "automatic"]
+    # Eva judged each of the eight pairs that can be shown once, so she ties each of the four.
+    assert {(tie.left, tie.right, tie.outcome) for tie in ties} == {("ann", "bob", "equal")}
+    assert [tie.item for tie in ties] == [f"place-{number}" for number in range(4)]
+    assert {tie.judge_name for tie in ties} == {found.counted[0].judge_name}
+
+
+def test_a_tenth_of_them_is_shown_and_their_share_of_ties_is_told() -> None:
+    study = opened(settle_alike=True, scenarios=20)
+    shown = study.rules["alike_shown"]
+    assert [pair[1:] for pair in shown] == [["ann", "bob"]] * 2
+    assert len(study.rules["identical"]) == 18
+    study = hand_in(study)
+    (remark,) = [one for one in rate(study=study, rounds=20).results.board.warnings if "18" in one]
+    seen = study.matchups.filter(left__contestant__slug__in=["ann", "bob"])
+    seen = seen.filter(right__contestant__slug__in=["ann", "bob"])
+    number = seen.count()
+    assert number > 0
+    assert f"Of {number} votes on 2 such pairs that were shown all the same, {number} " in remark
+    assert remark.endswith("are ties (100 %).")
+
+
+def hand_in(study: Study) -> Study:
+    """Whoever is far off loses; alike ones tie."""
+    for number, matchup in enumerate(study.matchups.all()):
+        slugs = {matchup.left.contestant.slug, matchup.right.contestant.slug}
+        vote(matchup, "equal" if slugs == {"ann", "bob"} else ("left", "right")[number % 2])
+    return close_study(study=study)
 
 
 def test_a_study_may_show_them() -> None:
     study = opened()
     assert frozenset({"ann", "bob"}) in pairs_shown(study)
-    assert automatic_ties(study) == []
+    assert study.rules["identical"] == []

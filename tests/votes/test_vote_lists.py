@@ -41,8 +41,8 @@ CHOICES: dict[str, dict[str, object]] = {
     "one type": {"types": (Scenario.Type.OVERTAKE.value,)},
     "with repeats": {"kinds": ("main", "repeat")},
     "repeats alone": {"kinds": ("repeat",)},
-    "with automatic ties": {"automatic_ties": True},
-    "automatic ties of a type": {"automatic_ties": True, "types": (Scenario.Type.NUDGE.value,)},
+    "without settled pairs": {"leave_out_settled": True},
+    "one nudge": {"types": (Scenario.Type.NUDGE.value,)},
     "without own": {"leave_out_own": True},
 }
 
@@ -73,7 +73,7 @@ def test_the_database_gives_the_reasons_of_the_rating(
 def test_one_expert_alone_counts_and_the_other_is_not_asked_for(study: Study) -> None:
     study.allow_simulated = True
     study.save()
-    snapshot = rated(study, experts=(code_of("eva"),))
+    snapshot = rated(study, experts=(code_of("eva"),), leave_out_settled=True)
     assert total(snapshot) == snapshot.votes_counted == 11
     assert total(snapshot, expert=code_of("finn"), mark="filtered") == 11
     assert total(snapshot, expert=code_of("finn")) == 0
@@ -95,7 +95,7 @@ def test_what_comes_after_a_rating_is_none_of_its_votes(study: Study) -> None:
 def test_every_number_of_standings_pairs_and_raters_is_a_search(study: Study) -> None:
     study.allow_simulated = True
     study.save()
-    snapshot = rated(study, automatic_ties=True)
+    snapshot = rated(study)
     for line in snapshot.standings.all():
         for outcome, number in (("won", line.wins), ("tied", line.ties), ("lost", line.losses)):
             assert total(snapshot, contestant=line.slug, outcome=outcome) == number
@@ -142,7 +142,7 @@ def test_pages_hold_every_vote_once_and_automatic_ties_at_the_end(
     monkeypatch.setattr("arena.queries.vote_lists.PER_PAGE", 7)
     study.allow_simulated = True
     study.save()
-    snapshot = rated(study, automatic_ties=True)
+    snapshot = rated(study)
     search = VoteSearch()
     pages = [vote_page(snapshot, search, number) for number in range(1, 5)]
     assert [page.number for page in pages] == [1, 2, 3, 4]

@@ -43,7 +43,7 @@ def pages_of_a_rated_study() -> list[ShownPage]:
     study = mixed_study()
     study.allow_simulated = True
     study.save()
-    rate(study=study, rounds=100, filters=Filters(automatic_ties=True))
+    rate(study=study, rounds=100, filters=Filters())
     code = [study.code]
     named = {f"tab {tab.name}": reverse("results-tab", args=[*code, tab.name]) for tab in TABS}
     named |= {name: reverse(name, args=code) for name in ("study", "preregistration", *GALLERIES)}

@@ -70,7 +70,7 @@ def links_of(page: str) -> dict[str, int | None]:
 
 @pytest.mark.parametrize(
     "filters",
-    [Filters(automatic_ties=True), Filters(leave_out_own=True, kinds=("main", "repeat"))],
+    [Filters(), Filters(leave_out_own=True, kinds=("main", "repeat"))],
 )
 def test_every_number_leads_to_as_many_votes(
     study: Study, analyst: Client, filters: Filters
@@ -82,8 +82,7 @@ def test_every_number_leads_to_as_many_votes(
         promised |= links_of(shown.content.decode())
     assert len(promised) > 50
     parts = set(re.findall(r"part=(\w+)", " ".join(promised)))
-    # Ties that nobody was shown are no votes of others, so then n leads nowhere.
-    assert {"alike", "" if filters.automatic_ties else "shared"} <= {*parts, ""}
+    assert {"alike", "shared"} <= parts
     wrong = {}
     for address, number in promised.items():
         answer = analyst.get(address)
@@ -129,7 +128,7 @@ def test_a_filter_that_means_nothing_is_explained(
 
 
 def test_the_file_has_the_votes_of_the_list(study: Study, analyst: Client) -> None:
-    rate(study=study, rounds=10, filters=Filters(automatic_ties=True))
+    rate(study=study, rounds=10, filters=Filters())
     address = reverse("results-votes-file", args=[study.code])
     pseudonyms = study.experts.values_list("person__pseudonym", flat=True)
     for search in ({}, {"mark": "left_out"}, {"contestant": "ann", "outcome": "lost"}):
@@ -182,7 +181,7 @@ def test_a_changed_vote_says_from_what_to_what(study: Study, analyst: Client) ->
 
 
 def test_one_walks_from_vote_to_vote_within_the_filters(study: Study, analyst: Client) -> None:
-    rate(study=study, rounds=10)
+    rate(study=study, rounds=10, filters=Filters(leave_out_settled=True))
     address = reverse("results-votes", args=[study.code])
     page = listed(analyst, study, contestant="ann", opponent="bob")
     total = number_of(page)
@@ -231,7 +230,7 @@ def test_an_open_study_keeps_its_votes_until_an_early_look(analyst: Client) -> N
 def test_a_list_takes_as_many_queries_for_any_number_of_votes(
     study: Study, analyst: Client, django_assert_max_num_queries: DjangoAssertNumQueries
 ) -> None:
-    rate(study=study, rounds=10, filters=Filters(automatic_ties=True))
+    rate(study=study, rounds=10, filters=Filters())
     for search in ({"scenario": "place-3"}, {"mark": "all"}):
         listed(analyst, study, **search)
         with django_assert_max_num_queries(18):

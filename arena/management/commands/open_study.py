@@ -135,7 +135,7 @@ class Command(TerminalCommand):
             "--show-alike",
             action="store_true",
             help="also show pairs that differ by at most 0.15 m and 2 degrees in every object; "
-            "without it they are settled as ties, which ratings count or leave out",
+            "without it they are settled as ties, but for a tenth that is shown as a check",
         )
         parser.add_argument(
             "--allow-simulated",
