@@ -27,6 +27,7 @@ from augment.sentences import Sentence, sentence
 SIMULATED = " (simulated)"
 SIMULATED_TABLE = "Simulated: votes or contestants of this table are made by the machine."
 EARLY_LOOK = sentence("Early look: the study was still open.")
+NOT_RANKED = "Not enough votes to rank: no contestant can be told from any other."
 APART = -1
 """The part of those who are rated with nobody."""
 
@@ -211,12 +212,17 @@ def leaderboard_table(snapshot: Snapshot) -> LeaderboardTable:
     standings.sort(key=lambda standing: board.parts.get(standing.slug, last))
     if board.order:
         standings.sort(key=lambda standing: board.order.index(standing.slug))
+    rows = [
+        _row(standing, board.parts.get(standing.slug, APART) if board.parts else 0)
+        for standing in standings
+    ]
+    ranks = [row.rank for row in rows if row.rank is not None]
+    if len(rows) > 1 and len(ranks) != 1 and set(ranks) <= {1}:
+        rows = [replace(row, rank=None, rank_best=None, rank_worst=None) for row in rows]
+        reasons = (*reasons, NOT_RANKED)
     return LeaderboardTable(
         study=snapshot.study.name,
-        rows=tuple(
-            _row(standing, board.parts.get(standing.slug, APART) if board.parts else 0)
-            for standing in standings
-        ),
+        rows=tuple(rows),
         method=snapshot.method,
         rounds=snapshot.rounds,
         unit=snapshot.resampling_unit,

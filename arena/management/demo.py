@@ -20,6 +20,7 @@ from arena.exports.tables import leaderboard_table
 from arena.exports.writers import FORMATS, plain_text
 from arena.models import Study
 from arena.services.people import create_person
+from arena.services.plan_options import PlanOptions
 from arena.services.ratings import rate
 from arena.services.simulation import simulate_votes
 from arena.services.studies import close_study, open_study
@@ -206,6 +207,7 @@ def vote_and_rate(scenarios: list[str], say: Callable[[str], None], folder: Path
             votes_per_expert=min(YOUR_VOTES, 2 * len(scenarios)),
             seed=SEED,
             allow_simulated=True,
+            options=PlanOptions(settle_alike=True),
         )
     table = leaderboard_table(study.snapshots.latest("made_at"))
     folder.mkdir(parents=True, exist_ok=True)
@@ -214,6 +216,16 @@ def vote_and_rate(scenarios: list[str], say: Callable[[str], None], folder: Path
         files.append(folder / f"leaderboard.{chosen.suffix}")
         write_whole(files[-1], chosen.write(table))
     return DemoTable(text=plain_text(table), files=tuple(files))
+
+
+def login_lines() -> list[str]:
+    """Return a line for each account of the demo that still has the demo's password."""
+    names = [username for username, _ in PEOPLE]
+    return [
+        f"  sign in as {user.username:8} password {PASSWORD}"
+        for user in User.objects.filter(username__in=names, is_active=True).order_by("pk")
+        if user.check_password(PASSWORD)
+    ]
 
 
 def _person(username: str, role: str, *, is_simulated: bool = False) -> None:

@@ -63,7 +63,7 @@ def open_study(
         votes_per_expert: How many matchups each expert judges.
         seed: Of the plan; the same seed and rules give the same plan.
         options: Further rules; without them a balanced plan and nothing on top of it.
-        allow_simulated: Let simulated contestants and experts take part; everything then says so.
+        allow_simulated: Let simulated ones take part; where any does, everything says so.
         actor: Who opens it, for the log.
 
     Raises:
@@ -76,7 +76,7 @@ def open_study(
     check_seed(seed)
     contestant_rows, scenario_rows = _contestants(contestants), _scenarios(scenarios)
     expert_rows = _experts(experts)
-    _refuse_simulated(contestant_rows, expert_rows, unless=allow_simulated)
+    has_simulated = _has_simulated(contestant_rows, expert_rows, are_allowed=allow_simulated)
     jobs = [find_job(job) for job in given.jobs]
     shown = choose_pictures(
         contestant_rows, scenario_rows, seed=seed, rule=given.samples, jobs=jobs
@@ -96,7 +96,7 @@ def open_study(
     planned = plan(rules)
     played = replays_of(broken | shown.cells) if given.allow_replay else None
     kept |= _frozen_rules(rules, planned, played) | _frozen_pictures(given, shown)
-    study = _insert(name, kept, given, rules, allow_simulated)
+    study = _insert(name, kept, given, rules, has_simulated)
     _enrol(study, contestant_rows, scenario_rows, expert_rows)
     store(study, planned.matchups, broken | shown.cells, expert_rows)
     _conclude_opening(study, matchups=len(planned.matchups), actor=actor)
@@ -145,9 +145,10 @@ def _named(kind: str, name: str, known: dict[str, Any]) -> Any:
     return known[name]
 
 
-def _refuse_simulated(contestants: list[Contestant], experts: list[User], *, unless: bool) -> None:
-    if unless:
-        return
+def _has_simulated(
+    contestants: list[Contestant], experts: list[User], *, are_allowed: bool
+) -> bool:
+    """Return whether a simulated contestant or expert takes part; refused where none may."""
     simulated = [
         sentence("contestant %(name)s", name=row.slug) for row in contestants if row.is_simulated
     ] + [
@@ -155,7 +156,7 @@ def _refuse_simulated(contestants: list[Contestant], experts: list[User], *, unl
         for user in experts
         if user.person.is_simulated
     ]
-    if simulated:
+    if simulated and not are_allowed:
         raise Conflict(
             sentence(
                 "Simulated: %(names)s. They never mix into a rating unless the study allows "
@@ -163,6 +164,7 @@ def _refuse_simulated(contestants: list[Contestant], experts: list[User], *, unl
                 names=tuple(simulated),
             )
         )
+    return bool(simulated)
 
 
 def _checks_for(

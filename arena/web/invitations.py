@@ -31,6 +31,7 @@ from augment.services.wording import translate
 SESSION_S = 30 * 24 * 3600
 BACKEND = "arena.queries.accounts.AccountBackend"
 GONE = 410
+LINK_COOKIE = "arena_link"
 
 
 @login_not_required
@@ -131,6 +132,15 @@ def _let_in(request: HttpRequest, token: str) -> HttpResponse:
     request.session.set_expiry(SESSION_S)
     is_open = invitation.study.state == Study.State.OPEN
     answer = redirect("vote", code=invitation.study.code) if is_open else redirect("home")
+    # Shown on the sign-in page alone, when this session is over.
+    answer.set_cookie(
+        LINK_COOKIE,
+        token,
+        max_age=SESSION_S,
+        httponly=True,
+        secure=request.is_secure(),
+        samesite="Lax",
+    )
     return with_own_language(answer, invitation.expert)
 
 

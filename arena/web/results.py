@@ -3,16 +3,13 @@
 from __future__ import annotations
 
 import uuid
-from functools import partial
 from typing import cast
 
 from django.contrib import messages
 from django.contrib.auth.models import User
 from django.core.exceptions import PermissionDenied
-from django.db import transaction
 from django.http import Http404, HttpRequest, HttpResponse
 from django.shortcuts import get_object_or_404, redirect, render
-from django.utils.translation import gettext as _
 from django.views.decorators.http import require_POST, require_safe
 
 from arena import tasks
@@ -31,8 +28,8 @@ from arena.queries.results import (
     votes_in,
 )
 from arena.services.early_looks import open_early
-from arena.services.ratings import is_big, plan_snapshot, rate
 from arena.web.access import ADMIN, ANALYST, EXPERT, STAFF, allow_only
+from arena.web.rating import rate_or_send
 from arena.web.rating_form import RatingForm
 from arena.web.results_adjustment import show_adjustment
 from arena.web.results_authors import both_versions
@@ -99,19 +96,14 @@ def rate_study(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
         for faults in form.errors.values():
             messages.error(request, " ".join(str(fault) for fault in faults))
         return redirect("results", code=code)
-    wanted = {
-        **form.wanted(),
-        "early": study.state == Study.State.OPEN,
-        "actor": cast(User, request.user),
-    }
     try:
-        if is_big(study):
-            with transaction.atomic():
-                planned = plan_snapshot(study=study, **wanted)
-                transaction.on_commit(partial(tasks.send_snapshot, planned.pk))
-            messages.success(request, _("The rating is being computed."))
-        else:
-            rate(study=study, **wanted)
+        rate_or_send(
+            request,
+            study,
+            **form.wanted(),
+            early=study.state == Study.State.OPEN,
+            actor=cast(User, request.user),
+        )
     except (ArenaError, AugmentError) as error:
         messages.error(request, translate(error))
     return redirect("results", code=code)

@@ -2,12 +2,17 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 from django.contrib.auth.forms import AuthenticationForm
 from django.contrib.auth.models import User
 from django.contrib.auth.views import LoginView
 from django.http import HttpResponse
+from django.shortcuts import render
 
+from arena.queries.people import has_admin
 from arena.queries.profiles import Language, language_of
+from arena.web.kept_forms import KEPT, read_form
 
 LANGUAGE_COOKIE = "django_language"
 """Django's own name for it, which its locale middleware reads."""
@@ -21,9 +26,18 @@ class SignIn(LoginView):
     template_name = "login.html"
     redirect_authenticated_user = True
 
+    def get_context_data(self, **more: Any) -> dict[str, Any]:
+        """Whether the first admin is still to be made, and what was typed elsewhere."""
+        kept = self.request.POST.get(KEPT, "")
+        more |= {KEPT: kept, "is_empty": not has_admin()}
+        return super().get_context_data(**more)
+
     def form_valid(self, form: AuthenticationForm) -> HttpResponse:
-        """Sign in."""
+        """Sign in; what was typed before the session expired is shown to be sent again."""
         answer = super().form_valid(form)
+        if fields := read_form(self.request.POST.get(KEPT, "")):
+            context = {"fields": fields, "address": self.get_success_url()}
+            answer = render(self.request, "kept_form.html", context)
         return with_own_language(answer, form.get_user())
 
 

@@ -29,6 +29,7 @@ from arena.services.studies import cancel_study, close_study, rules_of
 from arena.web.access import ADMIN, STAFF, allow_only
 from arena.web.listing import read_listing, read_page, said_choices
 from arena.web.questions import WHY, ask, is_sure, is_typed, wants_to_change
+from arena.web.rating import rate_or_send
 from arena.web.study_files import export_place
 from arena.web.study_forms import HandOverForm
 from arena.web.study_questions import cancelling, closing, handing_over
@@ -130,19 +131,21 @@ def hand_over_pairs(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
 @allow_only(ADMIN)
 @require_http_methods(["GET", "HEAD", "POST"])
 def close(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
-    """Take no more votes; this can't be taken back, so it asks first."""
+    """Take no more votes, rate them with the defaults and show the table; asks first."""
     study = get_object_or_404(Study, code=code)
     if not is_sure(request):
         if study.state != Study.State.OPEN:
             return redirect("study", code=code)
         return ask(request, closing(study))
+    actor = cast(User, request.user)
     try:
-        close_study(study=study, actor=cast(User, request.user))
-    except ArenaError as error:
+        closed = close_study(study=study, actor=actor)
+        if study.state == Study.State.OPEN:  # not pressed twice
+            rate_or_send(request, closed, actor=actor)
+    except (ArenaError, AugmentError) as error:
         messages.error(request, translate(error))
-    else:
-        messages.success(request, _("Closed. Its results can be read now."))
-    return redirect("study", code=code)
+        return redirect("study", code=code)
+    return redirect("results", code=code)
 
 
 @allow_only(ADMIN)

@@ -23,7 +23,7 @@ from augment.models import Augmentation, Contestant, Event, Scenario
 from augment.scene.codec import modification_to_document
 from augment.scene.modification import Modification
 from tests.scenes import vehicle
-from tests.study_rows import KINDS, a_study, cast_of, matchups_of, shown_again, vote
+from tests.study_rows import KINDS, a_study, cast_of, expert, matchups_of, shown_again, vote
 
 pytestmark = pytest.mark.django_db
 
@@ -247,12 +247,12 @@ def test_simulated_votes_need_a_study_that_allows_them() -> None:
         name="Demo",
         contestants=["ann", "bob"],
         scenarios=["place-0"],
-        experts=["eva"],
+        experts=["eva", expert("sim", is_simulated=True).username],
         votes_per_expert=1,
         seed=1,
         allow_simulated=True,
     )
-    assert simulate_votes(study=demo, seed=1) == 0, "eva is a person"
+    assert simulate_votes(study=demo, seed=1) == 1, "eva is a person"
 
 
 def test_a_closed_study_takes_no_simulated_votes() -> None:

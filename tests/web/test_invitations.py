@@ -179,3 +179,13 @@ def test_no_log_line_holds_a_key() -> None:
     )
     assert HideKeys().filter(line)
     assert line.getMessage() == '"GET /invitation/.../ HTTP/1.1" 200'
+
+
+def test_whose_session_ended_finds_the_link_again_on_the_sign_in_page(study: Study) -> None:
+    client, address = Client(), link(study)
+    client.post(address)
+    assert who(client) is not None
+    del client.cookies["sessionid"]
+    page = client.get(reverse("home"), follow=True).content.decode()
+    assert f'href="{address}"' in page
+    assert "Open your link again" not in Client().get(reverse("login")).content.decode()

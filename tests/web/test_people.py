@@ -49,6 +49,8 @@ def first(token: str, **given: str) -> tuple[int, str]:
 
 def test_the_first_admin_is_made_by_the_printed_link_once() -> None:
     token = make_first_link_token()
+    where = "was printed in the terminal"
+    assert where in Client().get(reverse("login")).content.decode()
     assert token is not None
     client = Client()
     assert client.get(reverse("first", args=[token])).status_code == 200
@@ -56,6 +58,7 @@ def test_the_first_admin_is_made_by_the_printed_link_once() -> None:
     assert answer.status_code == 302
     assert client.get(reverse("people")).status_code == 200, "signed in, and an admin"
     assert make_first_link_token() is None
+    assert where not in Client().get(reverse("login")).content.decode()
     assert first(token, username="eve")[0] == 410
     assert not User.objects.filter(username="eve").exists()
 

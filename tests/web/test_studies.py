@@ -12,6 +12,7 @@ from arena import tasks
 from arena.models import Study
 from arena.queries.coverage import shared_units
 from arena.services.reports import Complaint, report
+from arena.services.studies import open_study
 from augment.models import Augmentation
 from augment.scene.codec import modification_to_document
 from augment.scene.modification import Modification
@@ -59,13 +60,35 @@ def test_progress_is_shown_by_expert_and_says_nothing_of_who_leads() -> None:
     assert "Close the study" not in shown
 
 
-def test_closing_is_for_admins_and_leads_to_the_results() -> None:
+def test_closing_rates_the_votes_once_and_shows_the_table() -> None:
+    study = study_rows.a_study()
+    for matchup in study_rows.matchups_of(study, "eva")[:2]:
+        study_rows.vote(matchup)
+    admin = signed_in(people()["admin"])
+    for _ in range(2):
+        answer = admin.post(reverse("study-close", args=[study.code]), {"sure": "1"}, follow=True)
+        assert answer.redirect_chain[-1][0] == reverse("results", args=[study.code])
+        assert "2 votes counted" in answer.content.decode()
+        assert "Not enough votes to rank" in answer.content.decode()
+    study.refresh_from_db()
+    assert (study.state, study.snapshots.count()) == ("closed", 1)
+
+
+def test_a_study_nobody_voted_in_can_be_closed() -> None:
     study = study_rows.a_study()
     admin = signed_in(people()["admin"])
     answer = admin.post(reverse("study-close", args=[study.code]), {"sure": "1"}, follow=True)
-    assert reverse("results", args=[study.code]) in answer.content.decode()
+    assert answer.status_code == 200
     study.refresh_from_db()
     assert study.state == "closed"
+
+
+def test_only_a_study_with_something_simulated_says_so() -> None:
+    real = open_study(
+        name="Real", votes_per_expert=2, seed=7, allow_simulated=True, **study_rows.cast_of()
+    )
+    page = signed_in(people()["admin"]).get(reverse("study", args=[real.code]))
+    assert "Simulated votes and contestants count" not in page.content.decode()
 
 
 def opened(**rules: object) -> tuple[int, str]:

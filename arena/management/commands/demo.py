@@ -104,10 +104,12 @@ class Command(TerminalCommand):
             f"The demo took {took_s:.0f} s.",
         ]
         if serve:
+            lines += ["", f"Scenario Arena is at {web.address}  (Ctrl-C stops it)"]
+        else:
+            lines += ["", f"“make serve” serves it at {web.address}"]
+        lines += demo.login_lines()
+        if serve:
             lines += [
-                "",
-                f"Scenario Arena is at {web.address}  (Ctrl-C stops it)",
-                *(f"  sign in as {name:8} password {demo.PASSWORD}" for name, _ in demo.PEOPLE),
                 f"  Vote as 'expert' in the study {demo.OPEN_STUDY!r}.",
                 f"  See the drives as 'admin': Jobs, {demo.JOB!r}, See the drives.",
             ]

@@ -10,6 +10,7 @@ from django.core.management.base import CommandError, CommandParser
 
 from arena.errors import ArenaError
 from arena.management.arguments import at_least
+from arena.management.demo import login_lines
 from arena.services.first_start import make_first_link_token
 from arena.serving.hold import hold_alone
 from arena.serving.ledger import Ledger
@@ -64,6 +65,8 @@ class Command(TerminalCommand):
             try:
                 supervisor.start()
                 self.stdout.write(f"\nScenario Arena is at {web.address}  (Ctrl-C stops it)\n")
+                for line in login_lines():
+                    self.stdout.write(line)
                 self._offer_first_link(web)
                 supervisor.watch()
             finally:

@@ -1,13 +1,14 @@
 """Lanelets, signs, lights and intersections as segments and areas.
 
 What an intersection names as the successors of its incoming lanelets lies in it, and what follows
-these in a bend. Turn types are those that it names; a light holds for the ways in its direction.
+these in a bend. In a file without intersections, lanelets of forks and merges that cross others
+do. Turn types are those that it names; a light holds for the ways in its direction.
 """
 
 from __future__ import annotations
 
 from collections import Counter
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -20,6 +21,7 @@ from augment.formats.commonroad.fields import (
     whole,
 )
 from augment.formats.commonroad.lights import Light, lights_of
+from augment.formats.intersection_ways import crossing_segments
 from augment.formats.road_map import FloatArray, RoadMap, Segment
 from augment.formats.strips import midline
 from augment.formats.xml_file import Element
@@ -92,7 +94,11 @@ def network_of(root: Element, step: int) -> RoadNetwork:
         for lanelet in lanelets.values()
         for kind in sorted(lanelet.kinds & AREA_OF.keys())[:1]
     )
-    notes = _notes(segments, areas, bool(inside), lights, other_signs, lanelets)
+    if not inside:  # the dialect of 2018b has no intersections
+        crossing = crossing_segments({one.name: one for one in segments})
+        segments = tuple(replace(one, crosses=one.name in crossing) for one in segments)
+    has_intersections = any(one.crosses for one in segments)
+    notes = _notes(segments, areas, has_intersections, lights, other_signs, lanelets)
     city = RoadMap(what=WHAT, place="lanelet", segments=segments, areas=areas)
     return RoadNetwork(map=city, notes=notes)
 

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections import Counter
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
 from augment.errors import InvalidDocument
+from augment.formats.intersection_ways import crossing_segments, take_end_widths
 from augment.formats.lane_edges import NARROWEST_M, USUAL_M, WIDEST_M, edge_of, width_of
 from augment.formats.road_map import FURTHEST_M, FloatArray, RoadMap, Segment
 from augment.formats.scenarionet.unpickling import WHAT
@@ -95,15 +96,23 @@ def city_of(description: dict[str, Any], frame: int, *, place_name: str) -> Scen
             left_out[kind] += 1
     meaningless = {key for key, lane in lanes.items() if _is_meaningless(lane, lanes)}
     built = [_segment(key, lane, key in meaningless, lights) for key, lane in lanes.items()]
+    if not any(lane.get("type") == CONNECTOR for lane in lanes.values()):
+        crossing = crossing_segments({one.name: one for one, _ in built})
+        built = [
+            (replace(one, crosses=one.crosses or one.name in crossing), was_assumed)
+            for one, was_assumed in built
+        ]
+    segments, assumed = take_end_widths(
+        [one for one, _ in built], {one.name for one, was_assumed in built if was_assumed}
+    )
     is_left = place_name.lower().startswith(LEFT_HAND)
     city = RoadMap(
         what=WHAT,
         place="map_features",
-        segments=tuple(segment for segment, _ in built),
+        segments=segments,
         areas=tuple(areas),
         side=TrafficSide.LEFT if is_left else TrafficSide.RIGHT,
     )
-    assumed = sum(was_assumed for _, was_assumed in built)
     notes = _notes(city, assumed, len(meaningless), bool(lights), left_out)
     return ScenarioNetCity(map=city, notes=notes)
 

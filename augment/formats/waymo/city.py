@@ -1,19 +1,23 @@
 """The map of a Waymo scenario as segments and areas.
 
-A lane lies in an intersection if it interpolates between others, if a light controls it, or if no
-line bounds it on either side while others begin where it begins or end where it ends. World frame.
+A lane lies in an intersection if it interpolates between others, if a light controls it, if no
+line bounds it on either side while others begin where it begins or end where it ends, or if it is
+of a fork or merge and crosses another lane. World frame.
 """
 
 from __future__ import annotations
 
 from collections import Counter
-from dataclasses import dataclass
+from collections.abc import Sequence
+from collections.abc import Set as AbstractSet
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from augment.errors import InvalidDocument
+from augment.formats.intersection_ways import crossing_segments, take_end_widths
 from augment.formats.lane_edges import USUAL_M, edge_of, whole_edge, width_of
-from augment.formats.road_map import FloatArray, RoadMap, Segment
+from augment.formats.road_map import FloatArray, Name, RoadMap, Segment
 from augment.formats.waymo.messages import BoundaryMessage, LaneMessage, ScenarioMessage
 from augment.formats.waymo.tfrecord import WHAT
 from augment.scene.entities import AreaKind, TrafficLight
@@ -54,19 +58,22 @@ def city_of(scenario: ScenarioMessage, frame: int) -> WaymoCity:
     _check_work(scenario, lanes)
     lights = scenario.lights[frame] if frame < len(scenario.lights) else {}
     controlled = {lane for step in scenario.lights for lane in step}
-    crossing = {key for key, lane in lanes.items() if lane.interpolating or key in controlled}
+    crossing: set[Name] = {
+        key for key, lane in lanes.items() if lane.interpolating or key in controlled
+    }
     crossing |= _unbounded_joints(lanes)
-    segments, assumed = [], 0
-    for key, lane in lanes.items():
-        made, was_assumed = _segment(scenario, lane, key in crossing, lights.get(key))
-        segments.append(made)
-        assumed += was_assumed
+    built = [_segment(scenario, lane, lights.get(key)) for key, lane in lanes.items()]
+    crossing |= crossing_segments({one.name: one for one, _ in built})
+    segments, assumed = take_end_widths(
+        [replace(one, crosses=one.name in crossing) for one, _ in built],
+        {one.name for one, was_assumed in built if was_assumed},
+    )
     areas = [
         (AreaKind.CROSSWALK if kind == CROSSWALK else AreaKind.DRIVABLE, polygon)
         for kind, polygon in scenario.polygons
         if kind != SPEED_BUMP and len(np.unique(polygon, axis=0)) >= 3
     ]
-    city = RoadMap(what=WHAT, place="map_features", segments=tuple(segments), areas=tuple(areas))
+    city = RoadMap(what=WHAT, place="map_features", segments=segments, areas=tuple(areas))
     return WaymoCity(map=city, notes=_notes(scenario, segments, assumed, crossing, controlled))
 
 
@@ -104,7 +111,7 @@ def _unbounded_joints(lanes: dict[int, LaneMessage]) -> set[int]:
 
 
 def _segment(
-    scenario: ScenarioMessage, lane: LaneMessage, crosses: bool, light: int | None
+    scenario: ScenarioMessage, lane: LaneMessage, light: int | None
 ) -> tuple[Segment, bool]:
     """The segment, and whether its width was assumed."""
     line = lane.line
@@ -118,7 +125,6 @@ def _segment(
     return (
         Segment(
             name=lane.id,
-            crosses=crosses,
             centerline=line,
             left=both[0],
             right=both[1],
@@ -160,9 +166,9 @@ def _beside_m(scenario: ScenarioMessage, lane: LaneMessage) -> float | None:
 
 def _notes(
     scenario: ScenarioMessage,
-    segments: list[Segment],
+    segments: Sequence[Segment],
     assumed: int,
-    crossing: set[int],
+    crossing: AbstractSet[Name],
     controlled: set[int],
 ) -> tuple[Note, ...]:
     notes, count = [], len(segments)

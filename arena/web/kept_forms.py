@@ -1,0 +1,64 @@
+"""A form that is sent after its session expired: kept in the page over the sign-in."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from typing import Any
+
+from django.contrib.auth.forms import AuthenticationForm
+from django.contrib.auth.middleware import LoginRequiredMiddleware
+from django.http import HttpRequest, HttpResponseBase, QueryDict
+from django.shortcuts import render
+
+from arena.queries.people import has_admin
+
+KEPT = "kept_form"
+"""The field of the sign-in page that holds what was typed elsewhere."""
+
+_LEFT_OUT = ("csrfmiddlewaretoken", "password")
+
+
+class SignInMiddleware(LoginRequiredMiddleware):
+    """Ask who is not signed in to do so; what they sent comes along in the sign-in page."""
+
+    def handle_no_permission(  # type: ignore[override]
+        self, request: HttpRequest, view_func: Callable[..., Any]
+    ) -> HttpResponseBase:
+        """Show the sign-in page in place of the answer to a typed form, else go there."""
+        if not request.POST:
+            return super().handle_no_permission(request, view_func)
+        context = {
+            "form": AuthenticationForm(request),
+            "next": request.get_full_path(),
+            KEPT: keep_form(request.POST),
+            "is_empty": not has_admin(),
+        }
+        return render(request, "login.html", context)
+
+
+def keep_form(sent: QueryDict) -> str:
+    """Return the fields of a form as text, without passwords."""
+    fields = {
+        name: values
+        for name, values in sent.lists()
+        if not any(word in name for word in _LEFT_OUT)
+    }
+    return json.dumps(fields)
+
+
+def read_form(kept: str) -> list[tuple[str, str]]:
+    """Return the names and values of what `keep_form` gave; nothing where it is not of ours."""
+    try:
+        fields = json.loads(kept)
+    except ValueError:
+        return []
+    if not isinstance(fields, dict):
+        return []
+    return [
+        (name, value)
+        for name, values in fields.items()
+        if isinstance(values, list)
+        for value in values
+        if isinstance(value, str)
+    ]
