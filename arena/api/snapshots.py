@@ -57,7 +57,7 @@ class SnapshotDocument(serializers.Serializer[Any]):
     progress = serializers.IntegerField(help_text="Percent.")
     method = serializers.CharField()
     rounds = serializers.IntegerField()
-    unit = serializers.CharField(source="resampling_unit")
+    resample = serializers.CharField(source="resampling_unit")
     intervals = serializers.CharField()
     seed = serializers.IntegerField()
     filters = serializers.SerializerMethodField()
@@ -130,7 +130,9 @@ class SnapshotBody(StrictSerializer):
     method = serializers.ChoiceField(
         choices=[one.value for one in Method], required=False, default=Method.BRADLEY_TERRY.value
     )
-    unit = serializers.ChoiceField(choices=[one.value for one in Unit], required=False)
+    resample = serializers.ChoiceField(
+        source="unit", choices=[one.value for one in Unit], required=False
+    )
     intervals = serializers.ChoiceField(choices=[one.value for one in Intervals], required=False)
     rounds = WholeNumberField(
         required=False, default=DEFAULT_ROUNDS, min_value=1, max_value=MOST_ROUNDS

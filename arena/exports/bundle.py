@@ -156,9 +156,14 @@ def _pairs(results: Results) -> bytes:
     rows = ([getattr(pair, name) for name in head] for pair in results.pairs)
     if results.board.p_values is None:
         return _csv(head, rows)
-    adjusted = {frozenset((one.a, one.b)): one.p for one in results.board.p_values}
-    of_pairs = (adjusted.get(frozenset((pair.a, pair.b))) for pair in results.pairs)
-    return _csv((*head, "p_adjusted"), ([*row, p] for row, p in zip(rows, of_pairs, strict=True)))
+    adjusted = {(one.a, one.b): one for one in results.board.p_values}
+    more = ("difference", "lower", "upper", "p")
+    judged = (
+        [getattr(adjusted.get((pair.a, pair.b)), name, None) for name in more]
+        for pair in results.pairs
+    )
+    heads = (*head, *more[:-1], "p_adjusted")
+    return _csv(heads, ([*row, *own] for row, own in zip(rows, judged, strict=True)))
 
 
 def _types(results: Results) -> bytes:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from arena.exports.columns import PRINTED
 from arena.exports.tables import LeaderboardTable, Row
-from arena.rating.printed import CAPTION, escape, latex_table
+from arena.rating.printed import caption_text, escape, latex_table
 
 __all__ = ["escape", "latex"]
 
@@ -12,6 +12,9 @@ __all__ = ["escape", "latex"]
 def latex(table: LeaderboardTable) -> str:
     """The table with its comments: needs booktabs and xcolor with the option `table`."""
     marks = [word for word, so in (("simulated", table.simulated), ("early", table.early)) if so]
+    caption = caption_text(
+        table.method_text, votes=table.votes, experts=table.experts, scenarios=table.scenarios
+    )
     return latex_table(
         (
             [_model(row), *(column.text(row) for column in PRINTED if not column.identifies)]
@@ -25,7 +28,7 @@ def latex(table: LeaderboardTable) -> str:
             *table.warnings,
         ),
         notes=table.missing,
-        caption=f"{CAPTION} ({', '.join(marks)})" if marks else CAPTION,
+        caption=f"{caption} ({', '.join(marks)})" if marks else caption,
     )
 
 

@@ -102,7 +102,7 @@ class Row:
 
     @property
     def interval_text(self) -> str:
-        """The interval as the paper prints it: -9/+11 around the printed rating."""
+        """The interval: ±55, or -9/+11 around the printed rating."""
         return interval_text(self.elo, self.lower, self.upper)
 
     @property
@@ -136,6 +136,8 @@ class LeaderboardTable:
     votes: int
     left_out: dict[str, int]
     votes_sha256: str
+    experts: int = 0
+    scenarios: int = 0
     reasons: tuple[str, ...] = ()
     simulated: bool
     early: bool
@@ -197,7 +199,7 @@ def intervals_text(table: LeaderboardTable) -> str:
     """How intervals were found."""
     unit = UNIT_TEXTS[table.unit]
     if table.is_closed_form:
-        return f"95 % intervals in closed form, by {unit} (moderated sandwich, Student's t)"
+        return f"95 % intervals in closed form, clustered by {unit}"
     return f"95 % intervals by {table.rounds} resamples of {unit}"
 
 
@@ -232,6 +234,8 @@ def leaderboard_table(snapshot: Snapshot) -> LeaderboardTable:
         votes=snapshot.votes_counted,
         left_out=dict(sorted(snapshot.votes_left_out.items())),
         votes_sha256=snapshot.votes_sha256,
+        experts=board.experts,
+        scenarios=board.scenarios,
         reasons=sentences_of(reasons, names),
         simulated=snapshot.includes_simulated,
         early=snapshot.is_early,

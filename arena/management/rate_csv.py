@@ -16,7 +16,7 @@ from arena.management.progress_line import ProgressLine
 from arena.management.rated_csv import FORMATS, RatedCsv
 from arena.rating.bootstrap import Unit
 from arena.rating.leaderboard import Intervals, Leaderboard, Method, Order, rate
-from arena.rating.rules import TooManyContestants, unit_for
+from arena.rating.rules import TooManyContestants, default_intervals, unit_for
 from arena.rating.votes_file import VotesFile, read_votes
 from arena.rating.votes_table import SIDE, VotesFileUnreadable, columns_of
 from augment.sentences import escape_controls
@@ -25,16 +25,14 @@ HELP = (
     "Rate votes from a file (CSV, JSON lines, Parquet): columns model_a, model_b, winner, and "
     "maybe judge and item."
 )
-RESAMPLES = {
-    "vote": Unit.VOTE,
-    "judge": Unit.EXPERT,
-    "item": Unit.SCENARIO,
-    "two-way": Unit.TWO_WAY,
-}
 METHODS = {one.value: one for one in Method}
-INTERVALS = {"closed": Intervals.CLOSED_FORM, "resamples": Intervals.RESAMPLES}
-_CLUSTERS = {"vote": (), "judge": ("judge",), "item": ("item",), "two-way": ("judge", "item")}
-ROUNDS, ROUNDS_OF_MANY, MANY_VOTES = 10_000, 1000, 500_000
+_CLUSTERS = {
+    Unit.VOTE: (),
+    Unit.EXPERT: ("judge",),
+    Unit.SCENARIO: ("item",),
+    Unit.TWO_WAY: ("judge", "item"),
+}
+ROUNDS, ROUNDS_OF_MANY, MANY_VOTES, MANY_MODELS = 10_000, 1000, 500_000, 100
 MOST_ROUNDS = 100_000
 
 
@@ -74,12 +72,13 @@ def add_arguments(parser: ArgumentParser) -> None:
     )
     parser.add_argument(
         "--resample",
-        choices=RESAMPLES,
-        help="what hangs together: two-way where judge and item are there, else what there is",
+        choices=[one.value for one in Unit],
+        help="what hangs together: votes of an expert (judge), on a scenario (item), or two-way; "
+        "two-way where judge and item are there, else what there is",
     )
     parser.add_argument(
         "--intervals",
-        choices=INTERVALS,
+        choices=[one.value for one in Intervals],
         help="closed form, or resamples; right for the method unless given",
     )
     parser.add_argument(
@@ -91,7 +90,8 @@ def add_arguments(parser: ArgumentParser) -> None:
     parser.add_argument(
         "--rounds",
         type=int,
-        help=f"of the bootstrap; {ROUNDS}, above {MANY_VOTES} votes {ROUNDS_OF_MANY}",
+        help=f"of the bootstrap; {ROUNDS}, above {MANY_VOTES} votes or {MANY_MODELS} models "
+        f"{ROUNDS_OF_MANY}",
     )
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument(
@@ -140,15 +140,15 @@ def run(
         raise CsvNotRated(f"{path}: {error}") from error
     except OSError as error:
         raise CsvNotRated(f"{path}: {error.strerror}") from error
-    many = votes.comparisons.votes > MANY_VOTES
+    default = _default_rounds(votes, METHODS[method], chosen, intervals)
     try:
         board = rate(
             votes.comparisons,
             method=METHODS[method],
-            unit=RESAMPLES[chosen],
-            intervals=INTERVALS[intervals] if intervals else None,
+            unit=chosen,
+            intervals=Intervals(intervals) if intervals else None,
             order=Order(order),
-            rounds=rounds or (ROUNDS_OF_MANY if many else ROUNDS),
+            rounds=rounds or default,
             seed=seed,
             workers=os.cpu_count() or 1,
             report=progress.drawn if progress else None,
@@ -157,12 +157,18 @@ def run(
         raise CsvNotRated(f"{path}: {error}") from error
     rated = RatedCsv(
         board=board,
-        resample=chosen,
-        notes=_notes(board, votes, notes),
+        notes=_notes(board, votes, notes, is_default=rounds is None),
         knows_clusters=set(_CLUSTERS[chosen]) == {"judge", "item"} & set(columns),
         covariates=tuple(adjust),
     )
     return FORMATS[format](rated)
+
+
+def _default_rounds(votes: VotesFile, method: Method, unit: Unit, intervals: str | None) -> int:
+    counted = votes.comparisons
+    kind = Intervals(intervals) if intervals else default_intervals(method, unit)
+    takes_long = kind is Intervals.RESAMPLES and len(counted.names) > MANY_MODELS
+    return ROUNDS_OF_MANY if takes_long or counted.votes > MANY_VOTES else ROUNDS
 
 
 def _check_draws(method: str, intervals: str | None, rounds: int | None, seed: int) -> None:
@@ -170,7 +176,7 @@ def _check_draws(method: str, intervals: str | None, rounds: int | None, seed: i
         raise CsvNotRated(f"rounds go from 1 to {MOST_ROUNDS}, not {rounds}")
     if seed < 0:
         raise CsvNotRated(f"a seed is 0 or more, not {seed}")
-    if method == "elo" and intervals == "closed":
+    if method == "elo" and intervals == Intervals.CLOSED_FORM:
         raise CsvNotRated("elo has no intervals in closed form, only resamples")
 
 
@@ -188,36 +194,42 @@ def _check_there(columns: Sequence[str], adjust: Sequence[str]) -> None:
             raise VotesFileUnreadable(f"line 1: there is no column {name!r}, which --adjust needs")
 
 
-def _resample(columns: Sequence[str], method: str, wanted: str | None) -> tuple[str, list[str]]:
+def _resample(columns: Sequence[str], method: str, wanted: str | None) -> tuple[Unit, list[str]]:
     """What to draw, and a note where that was not asked for and is less than there could be."""
     if method == "elo":
         if wanted not in (None, "vote"):
             raise CsvNotRated(f"elo resamples single votes only; {wanted!r} needs --method bt")
-        return "vote", []
+        return Unit.VOTE, []
     if wanted is not None:
-        missing = [name for name in _CLUSTERS[wanted] if name not in columns]
+        missing = [name for name in _CLUSTERS[Unit(wanted)] if name not in columns]
         if missing:
             raise VotesFileUnreadable(
                 f"line 1: there is no column {missing[0]!r}, which --resample {wanted} needs"
             )
-        return wanted, []
+        return Unit(wanted), []
     unit = unit_for(judges="judge" in columns, items="item" in columns)
-    chosen = next(name for name, one in RESAMPLES.items() if one is unit)
-    return chosen, [_MISSING[chosen]] if chosen in _MISSING else []
+    return unit, [_MISSING[unit]] if unit in _MISSING else []
 
 
 _MISSING = {
-    "vote": "The file does not name both judge and item: single votes are resampled as if they "
-    "were independent, and if they are not, the intervals are too narrow.",
-    "judge": "The file names no item: votes of one judge hang together, and if those on one item "
-    "do as well, the intervals are too narrow.",
-    "item": "The file names no judge: votes on one item hang together, and if those of one judge "
-    "do as well, the intervals are too narrow.",
+    Unit.VOTE: "The file does not name both judge and item: single votes count as if they were "
+    "independent, and if they are not, the intervals are too narrow.",
+    Unit.EXPERT: "The file names no item: votes of one judge hang together, and if those on one "
+    "item do as well, the intervals are too narrow.",
+    Unit.SCENARIO: "The file names no judge: votes on one item hang together, and if those of one "
+    "judge do as well, the intervals are too narrow.",
 }
 
 
-def _notes(board: Leaderboard, votes: VotesFile, notes: list[str]) -> tuple[str, ...]:
+def _notes(
+    board: Leaderboard, votes: VotesFile, notes: list[str], *, is_default: bool
+) -> tuple[str, ...]:
     said = [board.explanation, *notes, *map(_in_their_words, board.warnings)]
+    if is_default and board.intervals is Intervals.RESAMPLES and board.rounds < ROUNDS:
+        said.append(
+            f"Intervals rest on {board.rounds} resamples, because there are so many votes or "
+            "models; --rounds sets another number."
+        )
     if votes.repeats:
         said.append(
             f"{votes.repeats} votes repeat an earlier one of the same judge, item and pair; all "

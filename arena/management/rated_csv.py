@@ -10,10 +10,12 @@ from typing import Any
 
 import numpy as np
 
+from arena.rating.bootstrap import Unit
 from arena.rating.leaderboard import Intervals, Leaderboard, Line
 from arena.rating.logistic import Coefficient
 from arena.rating.printed import HEADS as PAPERS_HEADS
 from arena.rating.printed import (
+    caption_text,
     escape,
     interval_text,
     latex_table,
@@ -27,10 +29,16 @@ from arena.rating.rules import METHOD_TEXTS
 from arena.services.cells import csv_text
 from augment.sentences import escape_controls
 
-COLUMNS = ("model", "rank", "rating", "lower", "upper", "votes", "note", "rank_best", "rank_worst")
+COLUMNS = ("model", "rank", "elo", "lower", "upper", "votes", "note", "rank_best", "rank_worst")
 """Those of CSV and JSON; a new one comes at the end."""
 _CHECKS = ("check_lower", "check_upper")
 HEADS = (*PAPERS_HEADS, "95% ranks")
+_CLUSTERED = {
+    Unit.VOTE: "single votes",
+    Unit.EXPERT: "clustered by judge",
+    Unit.SCENARIO: "clustered by item",
+    Unit.TWO_WAY: "clustered by judge and item",
+}
 MOST_PAIRS = 100_000
 """Above so many pairs JSON holds only those that are told apart."""
 
@@ -44,7 +52,6 @@ class RatedCsv:
     """
 
     board: Leaderboard
-    resample: str
     notes: tuple[str, ...]
     knows_clusters: bool
     covariates: tuple[str, ...] = ()
@@ -66,17 +73,20 @@ class RatedCsv:
 
     @property
     def method_text(self) -> str:
+        """How the numbers came about, and of how many votes."""
+        return f"{self.how}; {self.board.votes} votes"
+
+    @property
+    def how(self) -> str:
         """How the numbers came about."""
         found = (
-            f"in closed form (moderated sandwich by {self.resample}, Student's t)"
+            f"in closed form ({_CLUSTERED[self.board.unit]})"
             if self.board.intervals is Intervals.CLOSED_FORM
-            else f"by {self.board.rounds} resamples ({self.resample})"
+            else f"by {self.board.rounds} resamples ({self.board.unit.value})"
         )
         adjusted = f", adjusted for {', '.join(self.covariates)}" if self.coefficients else ""
-        return (
-            f"{METHOD_TEXTS[self.board.method]}{adjusted}; 95 % intervals {found}, "
-            f"seed {self.board.seed}; {self.board.votes} votes"
-        )
+        text = f"{METHOD_TEXTS[self.board.method]}{adjusted}; 95 % intervals {found}"
+        return f"{text}, seed {self.board.seed}"
 
     @property
     def coefficients(self) -> list[tuple[str, Coefficient]]:
@@ -179,7 +189,7 @@ def _json(rated: RatedCsv) -> str:
     parts = {line.part for line in board.lines if line.rating is not None}
     document: dict[str, Any] = {
         "method": board.method.value,
-        "resample": rated.resample,
+        "resample": board.unit.value,
         "intervals": board.intervals.value,
         "rounds": board.rounds,
         "degenerate_rounds": board.degenerate_rounds,
@@ -214,7 +224,11 @@ def _latex(rated: RatedCsv) -> str:
     heads = PAPERS_HEADS if in_paper else HEADS
     rows = ((escape(name), *rest)[: len(heads)] for name, *rest in _cells(rated))
     comments = (rated.method_text, *rated.notes)
-    return latex_table(rows, comments=comments, heads=heads, notes=rated.missing)
+    board = rated.board
+    caption = caption_text(
+        rated.how, votes=board.votes, experts=board.experts, scenarios=board.scenarios
+    )
+    return latex_table(rows, comments=comments, heads=heads, notes=rated.missing, caption=caption)
 
 
 def _pairs(board: Leaderboard, found: Separation | None) -> list[dict[str, Any]] | None:
@@ -230,7 +244,9 @@ def _pairs(board: Leaderboard, found: Separation | None) -> list[dict[str, Any]]
             "a": board.lines[i].name,
             "b": board.lines[j].name,
             "difference": _rounded(float(found.difference[i, j])),
-            "p_adjusted": _rounded(float(found.p_value[i, j])),
+            "lower": _rounded(float(found.difference[i, j] - found.half[i, j])),
+            "upper": _rounded(float(found.difference[i, j] + found.half[i, j])),
+            "p_adjusted": float(found.p_value[i, j]),
             "told_apart": bool(found.above[i, j] or found.above[j, i]),
         }
         for i, j in zip(low.tolist(), high.tolist(), strict=True)
@@ -240,7 +256,7 @@ def _pairs(board: Leaderboard, found: Separation | None) -> list[dict[str, Any]]
 
 def _value(line: Line, column: str, *, digits: int | None = None) -> object:
     """What a line has in a column of CSV and JSON."""
-    value = getattr(line, "name" if column == "model" else column)
+    value = getattr(line, {"model": "name", "elo": "rating"}.get(column, column))
     return round(value, digits) if digits is not None and isinstance(value, float) else value
 
 

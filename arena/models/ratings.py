@@ -62,7 +62,7 @@ class Snapshot(models.Model):
     rounds = models.PositiveIntegerField()
     resampling_unit = models.CharField(max_length=20)
     intervals = models.CharField(
-        max_length=20, default="resamples", help_text="closed form or resamples"
+        max_length=20, default="resamples", help_text="closed or resamples"
     )
     covariates = models.JSONField(
         default=list, help_text="what is adjusted for: side, objects, vehicles"

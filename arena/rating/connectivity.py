@@ -140,9 +140,8 @@ class Determined:
             fine = np.asarray(((of_tree > 0) & (of_tree < games[self._tree])).all(axis=0))
         else:
             fine = np.zeros(games.shape[1], dtype=np.bool_)
-        unclear = np.flatnonzero(~fine)
-        for some, reached in self.chains(games, scores, unclear):
-            fine[some] = reached.all(axis=(1, 2))
+        for some, scored in self._scored(games, scores, np.flatnonzero(~fine)):
+            fine[some] = _all_from_first(scored) & _all_from_first(scored.transpose(0, 2, 1))
         return fine
 
     def chains(
@@ -152,13 +151,19 @@ class Determined:
 
         The row's contestant reached the column's by a score against them, or through a chain.
         """
+        for some, scored in self._scored(games, scores, chosen):
+            yield some, _closure(scored)
+
+    def _scored(
+        self, games: FloatArray, scores: FloatArray, chosen: IntArray
+    ) -> Iterator[tuple[IntArray, BoolArray]]:
         at_once = max(1, _NUMBERS_AT_ONCE // max(1, self._contestants**2))
         for first in range(0, len(chosen), at_once):
             some = chosen[first : first + at_once]
-            scored = _scored(
-                self._contestants, self._low, self._high, games[:, some], scores[:, some]
+            yield (
+                some,
+                _scored(self._contestants, self._low, self._high, games[:, some], scores[:, some]),
             )
-            yield some, _closure(scored)
 
 
 def are_determined(
@@ -210,12 +215,23 @@ def _scored(
 
 def _closure(edges: BoolArray) -> BoolArray:
     """(B, C, C) who is reached through chains; each squaring doubles their length."""
-    length = 1
-    while length < edges.shape[-1]:
+    while True:
         steps = edges.astype(np.float32)
-        edges = steps @ steps > 0
-        length *= 2
-    return edges
+        further = steps @ steps > 0
+        if (further == edges).all():
+            return edges
+        edges = further
+
+
+def _all_from_first(scored: BoolArray) -> BoolArray:
+    """(B,) whether the first contestant reaches everybody by scores (B, C, C)."""
+    steps = scored.astype(np.float32)
+    reached = scored[:, :1]
+    while True:
+        further = reached.astype(np.float32) @ steps > 0
+        if (further == reached).all():
+            return np.asarray(reached.all(axis=(1, 2)))
+        reached = further
 
 
 def _who_is_apart(names: tuple[str, ...], groups: tuple[tuple[int, ...], ...]) -> Sentence:

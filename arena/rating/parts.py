@@ -215,6 +215,7 @@ def _with_intervals(
         check[np.isnan(lower) | np.isnan(upper)] = np.nan
     degenerate, drawn = fit.loose.values.shape[1], everywhere.values.shape[1]
     notes = remarks.notes_on_bounds(lower, upper, rank)
+    notes = remarks.why_too_few(votes, rules.unit, notes)
     return Rated(
         rating=fit.rating,
         lower=lower,

@@ -1,4 +1,4 @@
-"""How ratings are printed: -9/+11 around a whole number, and the paper's table in LaTeX."""
+"""How ratings are printed: ±55 or -9/+11 around a whole number, and the paper's table in LaTeX."""
 
 from __future__ import annotations
 
@@ -31,7 +31,8 @@ _BEGIN = r"""\providecolor{llm_blue}{RGB}{105, 156, 219}
 _UPWARDS = {"Elo": r"~$\uparrow$"}
 """Where more is better."""
 
-CAPTION = r"Elo with 95\% Confidence Intervals."
+_SYMMETRIC = 1e-6
+"""Points by which sides may differ for the sake of rounding."""
 
 
 def rating_text(rating: float | None) -> str:
@@ -59,7 +60,7 @@ def places_text(best: int | None, worst: int | None) -> str:
 
 
 def interval_text(rating: float | None, lower: float | None, upper: float | None) -> str:
-    """The interval as the paper prints it: -9/+11 around the printed rating.
+    """The interval: ±55, or as the paper prints it where its sides differ, -9/+11.
 
     Where a side would round to nothing, both have a decimal: no interval has the width zero. A
     side without a bound is infinite, and a bound without a rating stands as it is: ≥ 1118.
@@ -72,6 +73,9 @@ def interval_text(rating: float | None, lower: float | None, upper: float | None
         below = "-∞" if lower is None else f"{min(round(lower) - round(rating), -1):+d}"
         above = "+∞" if upper is None else f"{max(round(upper) - round(rating), 1):+d}"
         return f"{below}/{above}"
+    if abs((upper - rating) - (rating - lower)) < _SYMMETRIC:
+        half = (upper - lower) / 2.0
+        return f"±{half:.0f}" if round(half) else f"±{max(half, 0.1):.1f}"
     down, up = round(lower) - round(rating), round(upper) - round(rating)
     if down and up:
         return f"{down:+d}/{up:+d}"
@@ -96,13 +100,27 @@ def notes_by_reason(notes: Iterable[tuple[str, str]]) -> list[str]:
     return [f"{', '.join(names)}: {note}" for note, names in names_by_note.items()]
 
 
+def caption_text(method: str, *, votes: int, experts: int, scenarios: int) -> str:
+    """The caption as TeX: what is shown, by which method, on how many votes.
+
+    Args:
+        method: As plain text.
+        votes: How many were counted.
+        experts: How many gave them; up to 1 is not known, or not worth a word.
+        scenarios: On how many, likewise.
+    """
+    numbers = ((votes, "votes"), (experts, "experts"), (scenarios, "scenarios"))
+    said = ", ".join(f"{number} {what}" for number, what in numbers if number > 1)
+    return rf"Elo with 95\% confidence intervals: {escape(method)}; {said}."
+
+
 def latex_table(
     rows: Iterable[Sequence[str]],
     *,
     comments: Iterable[str],
     heads: Sequence[str] = HEADS,
     notes: Iterable[str] = (),
-    caption: str = CAPTION,
+    caption: str,
 ) -> str:
     """The paper's table; it needs booktabs and xcolor with the option `table`.
 
@@ -138,9 +156,18 @@ def _head(head: str) -> str:
     return rf"\textbf{{{escape(head)}}}{_UPWARDS.get(head, '')}"
 
 
+_IN_TEX = {"∞": r"$\infty$", "≤": r"$\leq$", "≥": r"$\geq$", "–": "--", "±": r"$\pm$"}
+
+
 def _in_tex(number: str) -> str:
     """A printed number; the signs of open intervals are mathematics."""
-    for sign, command in (("∞", r"$\infty$"), ("≤", r"$\leq$"), ("≥", r"$\geq$"), ("–", "--")):
+    for sign, command in (
+        ("∞", r"$\infty$"),
+        ("≤", r"$\leq$"),
+        ("≥", r"$\geq$"),
+        ("–", "--"),
+        ("±", r"$\pm$"),
+    ):
         number = number.replace(sign, command)
     return number
 

@@ -11,6 +11,7 @@ from typing import Self
 
 import numpy as np
 from numpy.typing import ArrayLike
+from scipy.special import ndtri
 
 from arena.rating.comparisons import BoolArray, FloatArray, IntArray
 from arena.rating.estimate import LEVEL
@@ -92,6 +93,7 @@ class Separation:
         critical: How many standard errors a difference must have under max-t.
         difference: (C, C) the row's rating minus the column's.
         error: (C, C) standard error of the difference over the rounds.
+        half: (C, C) half the width of the difference's own 95 % interval.
     """
 
     above: BoolArray
@@ -100,6 +102,7 @@ class Separation:
     critical: float
     difference: FloatArray
     error: FloatArray
+    half: FloatArray
 
     def among(self, members: IntArray, contestants: int) -> Self:
         """The same with rows for all: these members' stay, the others differ from nobody."""
@@ -121,6 +124,7 @@ class Separation:
             holm=wide(self.holm),
             difference=wide(self.difference),
             error=wide(self.error),
+            half=wide(self.half),
         )
 
 
@@ -146,6 +150,7 @@ def separation(rating: FloatArray, samples: FloatArray) -> Separation:
         holm=holm(normal),
         critical=critical,
         error=error,
+        half=float(ndtri(0.5 + LEVEL / 2)) * error,
     )
 
 
@@ -157,6 +162,7 @@ def gather_pairs(
     holm: FloatArray,
     critical: float,
     error: FloatArray,
+    half: FloatArray,
 ) -> Separation:
     """What was found for pairs (P,), in the order of `np.triu_indices`, as squares (C, C)."""
     contestants = len(rating)
@@ -171,6 +177,7 @@ def gather_pairs(
         critical=critical,
         difference=difference,
         error=_square_of(contestants, low, high, error, 0.0),
+        half=_square_of(contestants, low, high, half, 0.0),
     )
 
 

@@ -61,6 +61,37 @@ def notes_on_bounds(
     )
 
 
+def why_too_few(
+    votes: Comparisons, unit: Unit, notes: tuple[Sentence | str, ...]
+) -> tuple[Sentence | str, ...]:
+    """Say what is too few where neither bound is known: votes, experts or scenarios.
+
+    Args:
+        votes: Of the contestants (C,).
+        unit: What hangs together.
+        notes: (C,) as `notes_on_bounds` gives them.
+    """
+    codes = {"expert": votes.expert, "scenario": votes.scenario}
+    wanted = {Unit.EXPERT: ("expert",), Unit.SCENARIO: ("scenario",), Unit.VOTE: ()}
+    kinds = wanted.get(unit, ("expert", "scenario"))
+    found = list(notes)
+    for place, note in enumerate(notes):
+        if note != TOO_FEW:
+            continue
+        own = (votes.first == place) | (votes.second == place)
+        numbers = {kind: len(np.unique(codes[kind][own])) for kind in kinds}
+        kind = min(numbers, key=numbers.__getitem__, default="")
+        if kind and numbers[kind] < _FEWEST_CLUSTERS:
+            many = f"only {numbers[kind]} {kind}s" if numbers[kind] > 1 else f"one {kind}"
+            prefix = "of" if kind == "expert" else "on"
+            found[place] = f"no interval and no rank: all votes are {prefix} {many}"
+    return tuple(found)
+
+
+_FEWEST_CLUSTERS = 6
+"""Six independent comparisons are the fewest that tell two apart."""
+
+
 def who_is_open(names: tuple[str, ...], notes: tuple[Sentence | str, ...]) -> tuple[Sentence, ...]:
     """That some lack bounds, and who; nothing if nobody does."""
     lacking = tuple(name for name, note in zip(names, notes, strict=True) if note)
@@ -99,7 +130,7 @@ def warnings(
             few += 1
     if few:
         said.append(_WIDENED[unit])
-    if degenerate:
+    if degenerate and rules.intervals is Intervals.RESAMPLES:
         said.append(
             sentence(
                 "In %(lost)s of %(rounds)s resamples the votes did not determine everybody's "

@@ -27,7 +27,7 @@ class Order(StrEnum):
 class Intervals(StrEnum):
     """How intervals are found: in closed form, or as percentiles of resampled rounds."""
 
-    CLOSED_FORM = "closed form"
+    CLOSED_FORM = "closed"
     RESAMPLES = "resamples"
 
 

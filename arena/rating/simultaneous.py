@@ -19,7 +19,7 @@ from arena.rating.comparisons import FloatArray, IntArray
 from arena.rating.estimate import LEVEL
 from arena.rating.moderated import LEAST, Component, Spread
 from arena.rating.ranking import Separation, gather_pairs, holm
-from arena.rating.student import t_above
+from arena.rating.student import t_above, t_quantile
 
 SingleArray = NDArray[np.float32]
 
@@ -55,7 +55,8 @@ def judge_pairs(rating: FloatArray, spread: Spread, *, rounds: int, seed: int) -
     )
     error = np.sqrt(np.maximum(variance, 1e-300))
     size = np.abs(gap) / error
-    single = 2.0 * t_above(size, np.minimum(spread.degrees[low], spread.degrees[high]))
+    degrees = np.minimum(spread.degrees[low], spread.degrees[high])
+    single = 2.0 * t_above(size, degrees)
     by_holm = holm(single)
     if contestants <= MOST_DRAWN:
         number = min(rounds, MOST_ROUNDS, max(500, _MOST_KEPT // (10 * max(len(low), 1))))
@@ -66,7 +67,13 @@ def judge_pairs(rating: FloatArray, spread: Spread, *, rounds: int, seed: int) -
     adjusted = np.minimum(CAUTION * adjusted, 1.0)
     differs = adjusted <= 1.0 - LEVEL
     return gather_pairs(
-        rating, differs=differs, p_value=adjusted, holm=by_holm, critical=critical, error=error
+        rating,
+        differs=differs,
+        p_value=adjusted,
+        holm=by_holm,
+        critical=critical,
+        error=error,
+        half=t_quantile(degrees) * error,
     )
 
 

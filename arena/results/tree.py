@@ -33,11 +33,18 @@ _SINCE_2, _SINCE_3, _SINCE_4, _SINCE_5 = {"since": 2}, {"since": 3}, {"since": 4
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PairP:
-    """How likely a difference as large as that of `a` and `b` is among equals, in any pair."""
+    """How likely a difference as large as that of `a` and `b` is among equals, in any pair.
+
+    Attributes:
+        difference: Points by which `a` is above `b`; `lower` and `upper` are of its own interval.
+    """
 
     a: str
     b: str
     p: float
+    difference: float | None = field(default=None, metadata=_SINCE_5)
+    lower: float | None = field(default=None, metadata=_SINCE_5)
+    upper: float | None = field(default=None, metadata=_SINCE_5)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

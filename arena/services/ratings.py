@@ -74,7 +74,7 @@ def plan_snapshot(*, study: Study, **choices: Unpack[Choices]) -> Snapshot:
         seed: Of its draws, 0 or more.
         unit: What the bootstrap draws: "vote", "scenario", "expert" or "two-way"; None for
             two-way where the votes name experts and scenarios, else votes.
-        intervals: "closed form" or "resamples"; None for the closed form, but resamples of single
+        intervals: "closed" or "resamples"; None for the closed form, but resamples of single
             votes and for online Elo.
         covariates: What to adjust for: "side", "objects", "vehicles".
         filters: Which votes count; None for all main ones. Who is author of what is added to them

@@ -114,8 +114,14 @@ def board_remarks(board: Leaderboard) -> BoardRemarks:
 
 def _p_values(names: list[str], found: Separation) -> tuple[PairP, ...]:
     low, high = np.triu_indices(len(names), 1)
-    known = zip(low.tolist(), high.tolist(), found.p_value[low, high].tolist(), strict=True)
-    return tuple(PairP(a=names[i], b=names[j], p=p) for i, j, p in known if not np.isnan(p))
+    known = ~np.isnan(found.p_value[low, high])
+    difference, half = found.difference[low, high], found.half[low, high]
+    columns = (low, high, found.p_value[low, high], difference, difference - half)
+    rows = zip(*(column[known].tolist() for column in (*columns, difference + half)), strict=True)
+    return tuple(
+        PairP(a=names[i], b=names[j], p=p, difference=gap, lower=lower, upper=upper)
+        for i, j, p, gap, lower, upper in rows
+    )
 
 
 def precision(arrays: VoteArrays, board: Leaderboard, *, unit: Unit, seed: int) -> Precision:

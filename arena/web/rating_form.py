@@ -33,7 +33,7 @@ UNIT_LABELS = {
 
 INTERVAL_LABELS = {
     "": _("right for the method"),
-    "closed form": _("in closed form"),
+    "closed": _("in closed form"),
     "resamples": _("by resamples"),
 }
 
@@ -61,7 +61,7 @@ class RatingForm(forms.Form):
         initial=Method.BRADLEY_TERRY.value,
         required=False,
     )
-    unit = forms.ChoiceField(
+    resample = forms.ChoiceField(
         choices=[("", UNIT_LABELS[""]), *((one.value, UNIT_LABELS[one.value]) for one in Unit)],
         required=False,
     )
@@ -89,7 +89,7 @@ class RatingForm(forms.Form):
         self, data: dict[str, Any] | None = None, *, snapshot: Snapshot | None = None
     ) -> None:
         super().__init__(data)
-        for name in ("method", "unit", "intervals", "rounds", "seed"):
+        for name in ("method", "resample", "intervals", "rounds", "seed"):
             self.fields[name].widget.attrs["class"] = "input"
         named = snapshot.results.judges if snapshot is not None else {}
         imported = snapshot is not None and is_imported(snapshot.study)
@@ -103,7 +103,7 @@ class RatingForm(forms.Form):
         kinds = (MAIN, REPEAT) if asked["with_repeats"] else (MAIN,)
         return {
             "method": asked["method"] or Method.BRADLEY_TERRY.value,
-            "unit": asked["unit"] or None,
+            "unit": asked["resample"] or None,
             "intervals": asked["intervals"] or None,
             "covariates": asked["adjust"],
             "rounds": asked["rounds"] or DEFAULT_ROUNDS,

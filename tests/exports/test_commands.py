@@ -63,14 +63,11 @@ def test_rules_that_cannot_be_met_are_a_sentence() -> None:
 
 def test_rate_prints_the_table_and_takes_a_code() -> None:
     study = voted_study()
-    said = run("rate", study.code, "--rounds", 200, "--seed", 3, "--unit", "two-way")
+    said = run("rate", study.code, "--rounds", 200, "--seed", 3, "--resample", "two-way")
     head, first, *_ = said.splitlines()
     assert head.split() == ["Model", "Rank", "Elo", "95%", "CI", "Votes", "95%", "ranks"]
     assert first.startswith("Ann ")
-    assert (
-        "in closed form, by experts and scenarios (moderated sandwich, Student's t), seed 3"
-        in said
-    )
+    assert "in closed form, clustered by experts and scenarios, seed 3" in said
 
 
 def test_the_same_snapshot_is_written_byte_for_byte(tmp_path: Path) -> None:

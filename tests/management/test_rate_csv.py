@@ -28,7 +28,7 @@ def test_json_has_standings_best_first(votes: Any) -> None:
     assert [list(row) for row in found["standings"]] == [
         [*COLUMNS, "check_lower", "check_upper"]
     ] * 3
-    ratings = [row["rating"] for row in found["standings"]]
+    ratings = [row["elo"] for row in found["standings"]]
     assert ratings == sorted(ratings, reverse=True)
     assert sum(ratings) == pytest.approx(3000, abs=0.01)
     assert {row["model"]: row["votes"] for row in found["standings"]} == {
@@ -36,7 +36,7 @@ def test_json_has_standings_best_first(votes: Any) -> None:
     }  # fmt: skip
     assert found["tie_share"] == pytest.approx(14 / 90, abs=1e-4)
     for row in found["standings"]:
-        assert row["lower"] < row["rating"] < row["upper"]
+        assert row["lower"] < row["elo"] < row["upper"]
 
 
 def test_without_judge_and_item_votes_are_resampled_and_a_note_says_so(votes: Any) -> None:
@@ -51,7 +51,7 @@ def test_with_judge_and_item_both_are_resampled(votes: Any) -> None:
     assert not any("does not name" in note for note in found["notes"])
 
 
-@pytest.mark.parametrize("resample", ["vote", "judge", "item", "two-way"])
+@pytest.mark.parametrize("resample", ["vote", "expert", "scenario", "two-way"])
 def test_every_unit_can_be_asked_for(votes: Any, resample: str) -> None:
     file = votes(*clustered(), head=WITH_CLUSTERS)
     assert document(file, resample=resample, rounds=200)["resample"] == resample
@@ -61,13 +61,27 @@ def test_above_half_a_million_votes_a_thousand_rounds_are_enough(votes: Any) -> 
     assert document(votes(*PLAIN * 5_600))["rounds"] == 1000
 
 
+def test_above_a_hundred_models_a_thousand_resamples_are_enough(votes: Any) -> None:
+    lines = [f"m{n},m{(n + 1) % 101},tie" for n in range(101)] + ["m0,m1,model_a", "m1,m0,model_a"]
+    found = document(votes(*lines))
+    assert found["rounds"] == 1000
+    assert document(votes(*lines), intervals="closed")["rounds"] == 10_000
+
+
+def test_symmetric_intervals_are_printed_as_such(votes: Any) -> None:
+    file = votes(*clustered(900), head=WITH_CLUSTERS)
+    assert len(re.findall(r" ±\d+ ", run(file=file))) == 3
+    assert r" & $\pm$" in run(file=file, format="latex")
+    assert "clustered by judge and item" in run(file=file)
+
+
 def test_online_elo_resamples_votes_and_says_what_its_interval_is_not(votes: Any) -> None:
     file = votes(*clustered(), head=WITH_CLUSTERS)
     found = document(file, method="elo", rounds=50)
     assert (found["method"], found["resample"]) == ("elo", "vote")
     assert any("does not shrink with more votes" in note for note in found["notes"])
-    with pytest.raises(CsvNotRated, match="elo resamples single votes only; 'judge' needs"):
-        run(file=file, method="elo", resample="judge")
+    with pytest.raises(CsvNotRated, match="elo resamples single votes only; 'expert' needs"):
+        run(file=file, method="elo", resample="expert")
 
 
 def test_the_same_seed_gives_the_same_text_and_the_order_of_lines_does_not_count(
@@ -107,7 +121,7 @@ def test_latex_has_the_form_of_the_papers_table(votes: Any) -> None:
 def test_a_file_with_a_judge_and_no_item_is_clustered_by_judge(votes: Any) -> None:
     lines = [line.rpartition(",")[0] for line in clustered()]
     found = document(votes(*lines, head=f"{HEAD},judge"), rounds=100)
-    assert (found["resample"], found["intervals"]) == ("judge", "closed form")
+    assert (found["resample"], found["intervals"]) == ("expert", "closed")
     assert "names no item" in found["notes"][0]
 
 
@@ -120,10 +134,14 @@ def test_davidson_rank_sets_pairs_and_cross_check_are_offered(votes: Any) -> Non
     assert all(0.0 < pair["p_adjusted"] <= 1.0 for pair in found["pairs"])
     for line in found["standings"]:
         assert 1 <= line["rank_best"] <= line["rank_worst"] <= 3
-        assert line["check_lower"] <= line["rating"] <= line["check_upper"]
+        assert line["check_lower"] <= line["elo"] <= line["check_upper"]
     said = run(file=file, rounds=100)
     assert "of 3 pairs are told apart with all of them judged at once" in said
-    blinds: list[dict[str, Any]] = [{"resample": "vote"}, {"resample": "judge"}, {"method": "elo"}]
+    blinds: list[dict[str, Any]] = [
+        {"resample": "vote"},
+        {"resample": "expert"},
+        {"method": "elo"},
+    ]
     for blind in blinds:
         assert "told apart" not in run(file=file, rounds=100, **blind), blind
         assert document(file, rounds=100, **blind)["pairs"] is None, blind
@@ -161,7 +179,7 @@ def test_what_votes_do_not_determine_is_null_and_explained(votes: Any) -> None:
     assert (found["status"], found["standings"]) == ("no votes", [])
     found = document(votes("a,b,model_a"))
     assert found["status"] == "unbounded"
-    assert all(row["rating"] is None for row in found["standings"])
+    assert all(row["elo"] is None for row in found["standings"])
     assert found["notes"][0] == (
         "Nobody else scored against a: there is no upper limit. "
         "b scored against nobody else: there is no lower limit."
@@ -177,7 +195,7 @@ def test_online_elo_plays_the_lines_in_their_order(votes: Any) -> None:
     # By hand: K is 4, everybody starts at 1000.
     lines = ["A,B,model_a", "B,C,model_a", "C,A,tie", "A,B,model_b", "A,C,model_b"]
     found = document(votes(*lines), method="elo", order="recorded", rounds=20)
-    ratings = {row["model"]: row["rating"] for row in found["standings"]}
+    ratings = {row["model"]: row["elo"] for row in found["standings"]}
     assert ratings == pytest.approx({"A": 997.9543, "B": 1002.0228, "C": 1000.0228}, abs=1e-4)
 
 
@@ -211,7 +229,7 @@ def test_ratings_are_adjusted_for_the_side_and_for_columns_of_numbers(votes: Any
     file, drawn = a_file(votes)
     board = rate(drawn)
     found = document(file, adjust=("side", "objects"))
-    ratings = {row["model"]: row["rating"] for row in found["standings"]}
+    ratings = {row["model"]: row["elo"] for row in found["standings"]}
     assert ratings == pytest.approx({line.name: line.rating for line in board.lines}, abs=1e-3)
     assert [one["name"] for one in found["covariates"]] == ["side", "objects"]
     points = [one["points"] for one in found["covariates"]]

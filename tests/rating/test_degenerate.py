@@ -176,3 +176,21 @@ def test_more_than_two_thousand_contestants_are_refused() -> None:
     names = [f"c{number}" for number in range(2001)]
     with pytest.raises(TooManyContestants, match="not 2001"):
         rate(as_arrays(names, versus("c0", "c1", 1, 0, 0)))
+
+
+def test_a_contestant_with_all_votes_on_one_scenario_is_told_so() -> None:
+    votes = [
+        Comparison(first=a, second=b, score=score, expert=f"e{n % 7}", scenario=f"s{n % 9}")
+        for n, (a, b, score) in enumerate(
+            3
+            * [("a", "b", 1.0), ("a", "c", 0.0), ("b", "c", 0.5), ("c", "a", 0.0), ("b", "a", 1.0)]
+        )
+        for _ in range(5)
+    ]
+    votes += [
+        Comparison(first="d", second="a", score=n % 2 / 1, expert=f"e{n % 7}", scenario="s0")
+        for n in range(400)
+    ]
+    board = rate(as_arrays(("a", "b", "c", "d"), votes), rounds=500)
+    assert board.lines[3].votes == 400
+    assert board.lines[3].note == "no interval and no rank: all votes are on one scenario"

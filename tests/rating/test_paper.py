@@ -77,7 +77,8 @@ def test_the_simulation_as_latex_has_the_tables_exact_form(tmp_path: Path) -> No
         r"\\textbf\{95\\% CI\} & \\textbf\{Votes\}\\\\\n    \\midrule\n"
         + f"(?:{line}){{9}}"
         + r"    \\bottomrule\n    \\end\{tabular\}\n"
-        r"    \\caption\{Elo with 95\\% Confidence Intervals.\}\n    \\label\{tab:elo\}\n"
+        r"    \\caption\{Elo with 95\\% confidence intervals: [^\n]*\d votes\.\}\n"
+        r"    \\label\{tab:elo\}\n"
         r"\\end\{table\}\n"
     )
     assert re.fullmatch(form, body)

@@ -40,11 +40,12 @@ def test_counts_of_every_line_and_what_the_page_prints(shown: Shown) -> None:
             own.count(1.0), own.count(0.5), own.count(0.0)
         )  # fmt: skip
         cells = next(row for row in printed if row[1].startswith(line.name))
-        assert None not in (line.lower, line.rating, line.upper)
-        lower, rating, upper = (round(v or 0.0) for v in (line.lower, line.rating, line.upper))
-        down, up = lower - rating, upper - rating
+        assert line.lower is not None
+        assert line.upper is not None
+        assert line.rating is not None
+        half = (line.upper - line.lower) / 2
         assert cells[0].split()[0] == str(line.rank)
-        for said in (str(rating), f"{down:+d}/{up:+d}", str(len(own))):
+        for said in (f"{line.rating:.0f}", f"±{half:.0f}", str(len(own))):
             assert said in cells, (line.name, said)
         assert any(cell.startswith(str(round(100 * np.mean(own)))) for cell in cells[4:])
 

@@ -79,7 +79,7 @@ def test_one_is_singular_and_minus_is_a_minus(
 
 def test_the_interval_has_a_minus_sign(analyst: Client) -> None:
     study = mixed_votes()
-    rate(study=study, rounds=10)
+    rate(study=study, rounds=10, intervals="resamples")
     assert re.search(r"\N{MINUS SIGN}\d+/\+\d+", texts(analyst, study)["table"])
 
 

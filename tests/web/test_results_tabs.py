@@ -160,7 +160,7 @@ def test_a_permanent_address_shows_that_rating_and_its_filters(
 def test_a_new_rating_is_asked_for_with_method_and_filters(study: Study, analyst: Client) -> None:
     person = study.experts.order_by("pk")[0].person
     sent = {
-        "method": "bt", "unit": "vote", "rounds": "60", "seed": "9",
+        "method": "bt", "resample": "vote", "rounds": "60", "seed": "9",
         "types": [Scenario.Type.NUDGE.value], "experts": [str(person.code)],
     }  # fmt: skip
     analyst.post(reverse("study-rate", args=[study.code]), sent)

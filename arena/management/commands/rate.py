@@ -11,6 +11,7 @@ from arena.exports.tables import leaderboard_table
 from arena.exports.writers import plain_text
 from arena.queries.studies import study_named
 from arena.queries.vote_sets import Filters
+from arena.rating.bootstrap import Unit
 from arena.rating.rules import Intervals
 from arena.services.covariates import COVARIATES
 from arena.services.early_looks import log_early_look
@@ -31,14 +32,15 @@ class Command(TerminalCommand):
         parser.add_argument("--rounds", type=int, default=DEFAULT_ROUNDS, help="of the bootstrap")
         parser.add_argument("--seed", type=int, default=0)
         parser.add_argument(
-            "--unit",
+            "--resample",
+            choices=[unit.value for unit in Unit],
             help="what is resampled: vote (the paper's), scenario, expert or two-way; two-way "
             "where votes name experts and scenarios, unless given",
         )
         parser.add_argument(
             "--intervals",
             choices=[interval.value for interval in Intervals],
-            help="closed form (the default where votes hang together) or resamples",
+            help="closed (form, the default where votes hang together) or resamples",
         )
         parser.add_argument(
             "--adjust",
@@ -66,7 +68,7 @@ class Command(TerminalCommand):
                 method=options["method"],
                 rounds=options["rounds"],
                 seed=options["seed"],
-                unit=options["unit"],
+                unit=options["resample"],
                 intervals=options["intervals"],
                 covariates=options["adjust"],
                 filters=Filters(leave_out_own=options["leave_out_own"]),
