@@ -2,66 +2,62 @@
 
     python -m tests.benchmarks.coverage_study [STUDIES] [--write]
 
-Numbers of experts, votes and sizes of effects as in `EXPERTS`, `VOTES` and `EFFECTS`, with the
-paper's nine ratings and with nine equals. All of it is simulated; 250 studies a row take a
-quarter of an hour of one processor.
+Each world is simulated with the paper's nine ratings, for coverage, and with nine equals, of whom
+no pair should be told apart. 400 studies a row take about half an hour of one processor.
 """
 
 from __future__ import annotations
 
 import argparse
 import re
-import time
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
+from itertools import product
 from pathlib import Path
 
 import numpy as np
 
+from arena.rating import bradley_terry, remarks, sandwich
 from arena.rating.bootstrap import Unit
-from arena.rating.bradley_terry import DidNotConverge
-from arena.rating.comparisons import Comparisons, FloatArray
-from arena.rating.leaderboard import Intervals, Leaderboard, rate
+from arena.rating.bradley_terry import DidNotConverge, Meetings, to_elo
+from arena.rating.comparisons import BoolArray, Comparisons, FloatArray, count_pairs
+from arena.rating.leaderboard import FEWEST_TO_JUDGE
+from arena.rating.moderated import spread_of
+from arena.rating.pulls import bradley_terry_pulls
+from arena.rating.simultaneous import judge_pairs
 from tests.benchmarks.worlds import World, paper_ratings
 
-EXPERTS = (3, 5, 9, 12, 20)
-VOTES = (40, 200, 480)
-EFFECTS = ((0.0, 0.0), (100.0, 40.0), (0.0, 80.0), (100.0, 80.0))
-ROUNDS = 1000
-RESAMPLED_ROUNDS = 400
+EFFECTS = ((0.0, 0.0), (100.0, 40.0), (0.0, 80.0))
+"""Points by which scenarios, and experts, differ about a contestant."""
+ROUNDS = 500
 PAGE = Path(__file__).resolve().parents[2] / "docs" / "coverage.md"
-
-DEFAULT, PLAIN = "closed form, default", "plain sandwich, t"
-RESAMPLED, PAPERS = "two-way resamples", "paper's mode"
-METHODS = (DEFAULT, PLAIN, RESAMPLED, PAPERS)
+DEFAULT, CHECK, SINGLE = "closed form, default", "cross-check", "single votes"
+METHODS = (DEFAULT, CHECK, SINGLE)
 
 
-@dataclass(slots=True)
-class Tally:
-    """How often intervals held the truth, and how wide they were."""
+def worlds() -> Iterator[tuple[str, World]]:
+    """What is simulated, by what the rows have in common."""
+    blank = World(ratings=paper_ratings(), scenario_sd=100.0, expert_sd=40.0, votes_per_expert=200)
+    for experts, votes, effects in product((3, 5, 9, 20), (40, 480), EFFECTS):
+        even = replace(blank, experts=experts, votes_per_expert=votes)
+        yield "even", _differing(even, effects)
+    strong = replace(blank, experts=3, votes_per_expert=480)
+    yield "even", _differing(strong, (0.0, 300.0))
+    for scenarios, experts, effects in product((3, 5, 8), (5, 9, 20), EFFECTS[:2]):
+        few = replace(blank, scenarios=scenarios, experts=experts, votes_per_expert=100)
+        yield f"{scenarios} scenarios", _differing(few, effects)
+    for uneven, experts, effects in product((1.0, 1.5), (5, 9, 20), EFFECTS):
+        some = replace(blank, uneven=uneven, experts=experts)
+        yield f"uneven experts, {uneven}", _differing(some, effects)
+    for experts in (5, 9, 20):
+        yield "a fifth spammers", replace(blank, experts=experts, spammers=0.2)
+    for experts in (5, 9):
+        yield "handed over", replace(blank, experts=experts, handed_over=True)
+        yield "adaptive", replace(blank, experts=experts, adaptive=True)
 
-    held: int = 0
-    seen: int = 0
-    half_widths: float = 0.0
 
-    def add(self, truth: FloatArray, lower: FloatArray, upper: FloatArray) -> None:
-        """Intervals without one of their ends say nothing of widths and are left out."""
-        known = ~(np.isnan(lower) | np.isnan(upper))
-        inside = (lower <= truth) & (truth <= upper)
-        self.held += int(inside[known].sum())
-        self.seen += int(known.sum())
-        self.half_widths += float((upper - lower)[known].sum() / 2.0)
-
-    @property
-    def coverage(self) -> float:
-        return self.held / self.seen
-
-    @property
-    def half_width(self) -> float:
-        return self.half_widths / self.seen
-
-    def __str__(self) -> str:
-        return f"{self.coverage:.1%} ±{self.half_width:.0f}" if self.seen else "none"
+def _differing(world: World, effects: tuple[float, float]) -> World:
+    return replace(world, scenario_sd=effects[0], expert_sd=effects[1])
 
 
 @dataclass(slots=True)
@@ -69,119 +65,102 @@ class Found:
     """What studies of one world said.
 
     Attributes:
-        intervals: By method.
-        hardest: The default's of the controversial contestants alone.
-        ranks_held: Contestants whose true place is in their rank set, of so many `ranked`.
-        all_ranks_held: Studies in which all of them are.
-        false: Studies in which a pair was wrongly told apart.
-        studies: How many there were, without those whose votes determine no ratings.
+        held: By method, (N, C) whether the interval holds the truth.
+        half_widths: By method, (N, C) points.
+        told_apart: (N,) whether any true order of a pair is contradicted, or equals told apart.
     """
 
-    intervals: dict[str, Tally] = field(
-        default_factory=lambda: {name: Tally() for name in METHODS}
+    held: dict[str, list[BoolArray]] = field(default_factory=lambda: {m: [] for m in METHODS})
+    half_widths: dict[str, list[FloatArray]] = field(
+        default_factory=lambda: {method: [] for method in METHODS}
     )
-    hardest: Tally = field(default_factory=Tally)
-    ranked: int = 0
-    ranks_held: int = 0
-    all_ranks_held: int = 0
-    places: int = 0
-    false: int = 0
-    studies: int = 0
+    told_apart: list[bool] = field(default_factory=list)
+
+    def coverage(self, method: str = DEFAULT, contestants: slice = slice(None)) -> float:
+        return float(np.array(self.held[method])[:, contestants].mean())
+
+    def half_width(self, method: str = DEFAULT, contestants: slice = slice(None)) -> float:
+        return float(np.array(self.half_widths[method])[:, contestants].mean())
+
+    def cell(self, method: str = DEFAULT, contestants: slice = slice(None)) -> str:
+        coverage = self.coverage(method, contestants)
+        return f"{coverage:.1%} ±{self.half_width(method, contestants):.0f}"
 
     @property
-    def ranks(self) -> str:
-        return f"{self.ranks_held / self.ranked:.1%} {self.places / self.ranked:.1f}"
+    def false(self) -> float:
+        return float(np.mean(self.told_apart))
 
 
-def bounds(board: Leaderboard, *, check: bool = False) -> tuple[FloatArray, FloatArray]:
-    """(C,), (C,); NaN where there is none."""
-    kinds = ("check_lower", "check_upper") if check else ("lower", "upper")
-    lower, upper = (
-        np.array([getattr(line, kind) for line in board.lines], dtype=np.float64) for kind in kinds
-    )
-    return lower, upper
+def study(world: World, *, studies: int, judge: bool = False) -> Found:
+    """What studies with seeds 0, 1, 2 and so on say of a world; `judge` also judges all pairs.
 
-
-def study(world: World, *, studies: int, methods: tuple[str, ...] = METHODS) -> Found:
-    """What studies with seeds 0, 1, 2 and so on say of a world."""
+    Studies whose votes determine no ratings are left out.
+    """
     found, truth = Found(), world.truth()
     for seed in range(studies):
         votes = world.votes(np.random.default_rng(seed))
         try:
-            board = rate(votes, rounds=ROUNDS, seed=seed)
+            _add(found, votes, truth, seed if judge else None)
         except DidNotConverge:
             continue
-        if any(line.rating is None for line in board.lines):
-            continue
-        found.studies += 1
-        found.intervals[DEFAULT].add(truth, *bounds(board))
-        found.intervals[PLAIN].add(truth, *bounds(board, check=True))
-        hard = list(world.controversial)
-        found.hardest.add(truth[hard], *(one[hard] for one in bounds(board)))
-        _add_ranks(found, board, truth)
-        for name, unit in ((RESAMPLED, Unit.TWO_WAY), (PAPERS, Unit.VOTE)):
-            if name in methods:
-                found.intervals[name].add(truth, *bounds(_resampled(votes, unit, seed)))
     return found
 
 
-def _resampled(votes: Comparisons, unit: Unit, seed: int) -> Leaderboard:
-    rounds = RESAMPLED_ROUNDS
-    way = Intervals.RESAMPLES
-    return rate(votes, unit=unit, intervals=way, rounds=rounds, seed=seed, details=False)
+def _add(found: Found, votes: Comparisons, truth: FloatArray, seed: int | None) -> None:
+    counts = count_pairs(votes)
+    met = Meetings(contestants=len(truth), low=counts.low, high=counts.high)
+    strengths = bradley_terry.newton(met, counts.games[:, None], counts.scores[:, None])[:, 0]
+    inverse = bradley_terry.inverse_curvature(met, counts.games, strengths)
+    pulls = bradley_terry_pulls(votes, strengths, inverse)
+    rating, spread = to_elo(strengths), spread_of(votes, pulls, Unit.TWO_WAY)
+    few = sandwich.factor(remarks.few_clusters(votes, Unit.TWO_WAY))
+    half_widths = {
+        DEFAULT: spread.half_widths(),
+        CHECK: few * np.sqrt(np.maximum(spread.plain.diagonal(), 0.0)),
+        SINGLE: sandwich.NORMAL * np.sqrt(pulls.by_row().diagonal()),
+    }
+    for method, half_width in half_widths.items():
+        found.held[method].append(np.abs(rating - truth) <= half_width)
+        found.half_widths[method].append(half_width)
+    if seed is not None:
+        above = judge_pairs(rating, spread, rounds=ROUNDS, seed=seed).above
+        found.told_apart.append(bool((above & (truth[:, None] < truth + 1e-6)).any()))
 
 
-def _add_ranks(found: Found, board: Leaderboard, truth: FloatArray) -> None:
-    """True places; equals share theirs, and whoever is told apart from an equal is wrong."""
-    close = 1e-6
-    best = 1 + (truth[:, None] > truth[None, :] + close).sum(axis=0)
-    worst = len(truth) - (truth[:, None] < truth[None, :] - close).sum(axis=0)
-    before = found.ranked - found.ranks_held
-    for line, first, last in zip(board.lines, best, worst, strict=True):
-        if line.rank_best is not None and line.rank_worst is not None:
-            found.ranked += 1
-            found.ranks_held += line.rank_best <= first and last <= line.rank_worst
-            found.places += line.rank_worst - line.rank_best + 1
-    found.all_ranks_held += found.ranked - found.ranks_held == before
-    if board.separation is not None:
-        wrong = board.separation.above & (truth[:, None] < truth[None, :] + close)
-        found.false += bool(wrong.any())
-
-
-def lines(studies: int, numbers: tuple[int, ...] = EXPERTS) -> Iterator[str]:
-    """The big table, row by row, for numbers of experts."""
-    heads = ("experts x votes", "scenario / expert", *METHODS, "rank sets", "false separations")
-    yield "| " + " | ".join(heads) + " |"
-    yield "|---" * len(heads) + "|"
-    equal = np.full(len(paper_ratings()), 1000.0)
-    for experts in numbers:
-        for votes in VOTES:
-            for scenario_sd, expert_sd in EFFECTS:
-                world = World(
-                    ratings=paper_ratings(),
-                    scenario_sd=scenario_sd,
-                    expert_sd=expert_sd,
-                    experts=experts,
-                    votes_per_expert=votes,
-                )
-                found = study(world, studies=studies)
-                alike = study(replace(world, ratings=equal), studies=studies, methods=())
-                cells = [
-                    f"{experts} x {votes}",
-                    f"{scenario_sd:.0f} / {expert_sd:.0f}",
-                    *(str(found.intervals[name]) for name in METHODS),
-                    found.ranks,
-                    f"{alike.false / alike.studies:.1%}",
-                ]
-                yield "| " + " | ".join(cells) + " |"
+def lines(studies: int) -> Iterator[str]:
+    """The table of worlds, row by row, and what is lowest and highest in it."""
+    yield from _head("plan", "experts x votes", "scenario / expert", *METHODS, "told apart")
+    coverage, single, false = [], [], []
+    for plan, world in worlds():
+        number = studies // 3 if world.adaptive else studies
+        found = study(world, studies=number)
+        equal = replace(world, ratings=np.full(len(world.ratings), 1000.0))
+        alike = study(equal, studies=number, judge=True)
+        coverage.append(found.coverage())
+        single.append(found.coverage(SINGLE))
+        judged = min(world.experts, world.scenarios) >= FEWEST_TO_JUDGE
+        if judged:
+            false.append(alike.false)
+        cells = (
+            plan,
+            f"{world.experts} x {world.votes_per_expert}",
+            f"{world.scenario_sd:.0f} / {world.expert_sd:.0f}",
+            *(found.cell(method) for method in METHODS),
+            f"{alike.false:.1%}" if judged else f"({alike.false:.1%})",
+        )
+        yield "| " + " | ".join(cells) + " |"
+    yield ""
+    yield (
+        f"The closed form holds in {min(coverage):.1%} to {max(coverage):.1%}, intervals by "
+        f"single votes in {min(single):.1%} to {max(single):.1%}. Of nine equals any are told "
+        f"apart in at most {max(false):.1%} of studies."
+    )
 
 
 def controversial_lines(studies: int) -> Iterator[str]:
     """One contestant about whom experts differ four times as much (160 points against 40)."""
-    heads = ("experts x votes", DEFAULT, "of the one contestant", PLAIN)
-    yield "| " + " | ".join(heads) + " |"
-    yield "|---" * len(heads) + "|"
-    for experts in EXPERTS:
+    yield from _head("experts x votes", DEFAULT, "of the one contestant", CHECK, "of the one")
+    for experts in (3, 5, 9, 20):
         world = World(
             ratings=paper_ratings(),
             scenario_sd=100.0,
@@ -190,35 +169,16 @@ def controversial_lines(studies: int) -> Iterator[str]:
             votes_per_expert=200,
             controversial=(4,),
         )
-        found = study(world, studies=studies, methods=())
-        cells = (str(found.intervals[DEFAULT]), str(found.hardest), str(found.intervals[PLAIN]))
+        found, one = study(world, studies=studies), slice(4, 5)
+        cells = [
+            found.cell(method, of) for method in (DEFAULT, CHECK) for of in (slice(None), one)
+        ]
         yield f"| {experts} x 200 | " + " | ".join(cells) + " |"
 
 
-def tied_lines(studies: int) -> Iterator[str]:
-    """Rank sets where several are truly equal: nine, or three times three 60 points apart."""
-    heads = (
-        "experts x votes", "scenario / expert", "equals", "all nine rank sets hold",
-        "each set holds, places",
-    )  # fmt: skip
+def _head(*heads: str) -> Iterator[str]:
     yield "| " + " | ".join(heads) + " |"
     yield "|---" * len(heads) + "|"
-    for experts in (5, 9, 20):
-        for scenario_sd, expert_sd in EFFECTS[:2]:
-            for said, groups in (("nine", 1), ("three, three, three", 3)):
-                world = World(
-                    ratings=np.repeat(1000.0 + 60.0 * np.arange(groups), 9 // groups),
-                    scenario_sd=scenario_sd,
-                    expert_sd=expert_sd,
-                    experts=experts,
-                    votes_per_expert=480,
-                )
-                found = study(world, studies=studies, methods=())
-                cells = (
-                    f"{experts} x 480", f"{scenario_sd:.0f} / {expert_sd:.0f}", said,
-                    f"{found.all_ranks_held / found.studies:.1%}", found.ranks,
-                )  # fmt: skip
-                yield "| " + " | ".join(cells) + " |"
 
 
 def write_table(name: str, text: str) -> None:
@@ -253,12 +213,5 @@ def print_tables(tables: Mapping[str, Callable[[int], Iterator[str]]], *, studie
             write_table(name, "\n".join(said))
 
 
-def main() -> None:
-    began = time.process_time()
-    tables = {"controversial": controversial_lines, "ties": tied_lines, "worlds": lines}
-    print_tables(tables, studies=250)
-    print(f"{time.process_time() - began:.0f} s of processor")
-
-
 if __name__ == "__main__":
-    main()
+    print_tables({"controversial": controversial_lines, "worlds": lines}, studies=400)
