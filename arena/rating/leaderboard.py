@@ -15,7 +15,7 @@ Votes that were grouped elsewhere go into `Comparisons` directly, with their `co
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 
@@ -50,6 +50,8 @@ from augment.sentences import Sentence, sentence
 
 __all__ = ["Intervals", "Leaderboard", "Line", "Method", "Order", "Unit", "anchor_board", "rate"]
 
+T = TypeVar("T", bound=str)
+
 ROUNDS = 10_000
 PAPER_ROUNDS = 1000
 FEWEST_TO_JUDGE = 5
@@ -83,7 +85,7 @@ class Leaderboard:
     order: tuple[int, ...]
     status: Status
     reasons: tuple[Sentence, ...]
-    warnings: tuple[Sentence, ...] = ()
+    warnings: tuple[Sentence | str, ...] = ()
     method: Method
     unit: Unit
     intervals: Intervals
@@ -284,7 +286,7 @@ def _diagnose(votes: Comparisons, counting: Comparisons, method: Method) -> Diag
     return diagnose(counting.names, count_pairs(counting), bounded_anyway=method is Method.ELO)
 
 
-def _once(*said: tuple[Sentence, ...]) -> tuple[Sentence, ...]:
+def _once(*said: tuple[T, ...]) -> tuple[T, ...]:
     return tuple(dict.fromkeys(one for sentences in said for one in sentences))
 
 

@@ -58,7 +58,7 @@ class Rated:
     degenerate: int = 0
     notes: tuple[Sentence | str, ...] = ()
     explanation: tuple[Sentence, ...] = ()
-    warnings: tuple[Sentence, ...] = ()
+    warnings: tuple[Sentence | str, ...] = ()
 
     @property
     def is_open(self) -> bool:

@@ -26,7 +26,8 @@ class Question:
     """A design, and what it is to tell.
 
     Attributes:
-        half_width: Points that every 95 % interval is to have at most.
+        half_width: Points that the widest 95 % interval is expected to have: some studies miss
+            it (docs/coverage.md).
         gap: Points between two contestants that are to be told apart.
         power: With this chance.
         votes_per_expert: What somebody has in mind, None without.
@@ -50,7 +51,7 @@ class Prospect:
     Attributes:
         votes_per_expert, votes: Without repeats and checks.
         minutes: Of each expert, with them.
-        half_width, widest: Points of a typical interval, and of the widest.
+        half_width, widest: Points expected of a typical interval, and of the widest.
         gap: Points at which two are told apart with the wanted power.
         judged_twice: Units that two experts judge.
         agreement: The half-width of their share of agreement, from 0 to 1; None without any.

@@ -11,6 +11,9 @@ from arena.rating.connectivity import few_of
 from arena.rating.rules import Intervals, Rules
 from augment.sentences import Sentence, sentence
 
+FEWEST = {"expert": 5, "scenario": 10}
+"""A table that rests on fewer says so: docs/coverage.md."""
+
 
 def _clusters(votes: Comparisons, unit: Unit) -> dict[str, int]:
     """How many of what is drawn there are."""
@@ -117,17 +120,23 @@ def who_is_open(names: tuple[str, ...], notes: tuple[Sentence | str, ...]) -> tu
 
 def warnings(
     votes: Comparisons, *, rules: Rules, rounds: int, degenerate: int
-) -> tuple[Sentence, ...]:
+) -> tuple[Sentence | str, ...]:
     """What to keep in mind with intervals by these rules."""
-    said = []
+    said: list[Sentence | str] = []
     unit = rules.unit
-    few = 0
-    for kind, number in _clusters(votes, unit).items():
-        if number == 1:
+    clusters = _clusters(votes, unit)
+    few = False
+    for kind, number in _clusters(votes, Unit.TWO_WAY).items():
+        is_drawn = kind in clusters and rules.intervals is Intervals.RESAMPLES
+        limit = sandwich.FEW_CLUSTERS if is_drawn else FEWEST[kind]
+        if number == 1 and kind in clusters:
             said.append(_ONLY_ONE[kind])
-        elif number < sandwich.FEW_CLUSTERS and rules.intervals is Intervals.RESAMPLES:
-            said.append(_few(kind, number))
-            few += 1
+        elif 1 < number < limit:
+            said.append(
+                f"Only {number} {kind}s: intervals that rest on fewer than {limit} of them are "
+                "rough."
+            )
+            few = few or is_drawn
     if few:
         said.append(_WIDENED[unit])
     if degenerate and rules.intervals is Intervals.RESAMPLES:
@@ -140,23 +149,6 @@ def warnings(
             )
         )
     return tuple(said)
-
-
-def _few(kind: str, number: int) -> Sentence:
-    limit = sandwich.FEW_CLUSTERS
-    if kind == "expert":
-        return sentence(
-            "Only %(number)s experts: intervals that rest on fewer than %(limit)s of them are "
-            "rough.",
-            number=number,
-            limit=limit,
-        )
-    return sentence(
-        "Only %(number)s scenarios: intervals that rest on fewer than %(limit)s of them are "
-        "rough.",
-        number=number,
-        limit=limit,
-    )
 
 
 ELO_NOTE = sentence(elo.INTERVAL_NOTE)

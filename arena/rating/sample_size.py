@@ -138,7 +138,7 @@ class Expected:
 
     @property
     def widest(self) -> float:
-        """Points of the widest 95 % interval of a table: by chance some are wider."""
+        """Points expected of the widest 95 % interval of a table: by chance some are wider."""
         place = int(self.covariance.diagonal().argmax())
         variance = float(self.covariance[place, place])
         # Only a contestant's own squares are guesses; what all have in common moves all alike.

@@ -95,8 +95,8 @@ def draw_equals(
     rng = np.random.default_rng(seed)
     contestants = len(spread.covariance)
     root = _root(spread.common)
-    least = (LEAST * variances_of_pairs(spread.base, low, high)).astype(np.float32)
-    taken_off = max(len(spread.components) - 1, 0) * variances_of_pairs(spread.base, low, high)
+    base = variances_of_pairs(spread.base, low, high)
+    taken_off = max(len(spread.components) - 1, 0) * base
     clusters = sum(component.own_degrees.max(initial=1.0) for component in spread.components)
     at_once = int(max(1, _NUMBERS_AT_ONCE // (contestants * (contestants + clusters))))
     roots = [_root(component.common) for component in spread.components]
@@ -111,12 +111,11 @@ def draw_equals(
         if not spread.components:
             variances[block] += variances_of_pairs(spread.covariance, low, high)
         for component, of_component in zip(spread.components, roots, strict=True):
-            found = _variances(component, of_component, low, high, number, rng)
-            variances[block] += found[0]
-            commons[block] += found[1]
-    least = np.maximum(least, np.float32(1e-30))
-    np.maximum(variances, least, out=variances)
-    np.maximum(commons, least, out=commons)
+            own, common = _variances(component, of_component, low, high, number, rng)
+            variances[block] += own
+            commons[block] += common
+    for found, least in ((variances, LEAST * base), (commons, base)):
+        np.maximum(found, np.maximum(least, 1e-30).astype(np.float32), out=found)
     return gaps, variances, commons
 
 

@@ -94,7 +94,7 @@ def _lines(
     question: Question, found: Outlook, entered: dict[str, Any], study: Study | None
 ) -> list[GoalLine]:
     wishes = (
-        (_("Every interval at most ±%(points)s") % {"points": f"{question.half_width:g}"},
+        (f"Expected widest interval ±{question.half_width:g}",
          found.narrow, "widest"),
         (_("Two that differ by %(points)s told apart") % {"points": f"{question.gap:g}"},
          found.apart, "gap"),

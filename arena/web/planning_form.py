@@ -6,28 +6,27 @@ from typing import Any
 
 from django import forms
 from django.utils.translation import gettext as _
-from django.utils.translation import gettext_lazy
 
 from arena.rating.prospects import Question
 from arena.rating.sample_size import StudyDesign
 from arena.services.prospects import GUESSES
 
 LABELS = {
-    "contestants": gettext_lazy("Contestants"),
-    "experts": gettext_lazy("Experts"),
-    "scenarios": gettext_lazy("Scenarios"),
-    "spread": gettext_lazy("From the worst to the best, Elo points"),
-    "ties": gettext_lazy("Votes that say Equal, %"),
-    "expert_sd": gettext_lazy("Experts differ about a contestant by, Elo points"),
-    "scenario_sd": gettext_lazy("Scenarios differ in a contestant by, Elo points"),
-    "half_width": gettext_lazy("Every interval at most ±, Elo points"),
-    "gap": gettext_lazy("Tell two apart that differ by, Elo points"),
-    "power": gettext_lazy("with a chance of, %"),
-    "seconds": gettext_lazy("Seconds for one vote"),
-    "repeats": gettext_lazy("Hidden repeats, %"),
-    "checks": gettext_lazy("Attention checks, %"),
-    "overlap": gettext_lazy("Pairs that two experts judge, %"),
-    "votes_per_expert": gettext_lazy("Votes per expert in mind"),
+    "contestants": "Contestants",
+    "experts": "Experts",
+    "scenarios": "Scenarios",
+    "spread": "From the worst to the best, Elo points",
+    "ties": "Votes that say Equal, %",
+    "expert_sd": "Experts differ about a contestant by, Elo points",
+    "scenario_sd": "Scenarios differ in a contestant by, Elo points",
+    "half_width": "Expected widest interval ±, Elo points",
+    "gap": "Tell two apart that differ by, Elo points",
+    "power": "with a chance of, %",
+    "seconds": "Seconds for one vote",
+    "repeats": "Hidden repeats, %",
+    "checks": "Attention checks, %",
+    "overlap": "Pairs that two experts judge, %",
+    "votes_per_expert": "Votes per expert in mind",
 }
 WHO = ("contestants", "experts", "scenarios")
 EXPECTED = ("spread", "ties", "expert_sd", "scenario_sd", "seconds")

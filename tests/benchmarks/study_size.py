@@ -39,10 +39,12 @@ class Outcome:
 
     Attributes:
         widest: Of the intervals, in points.
+        reached: The share of the studies whose widest interval is at most the wanted one.
         power: The share of the pairs a gap apart that were told apart.
     """
 
     widest: float
+    reached: float
     power: float
 
 
@@ -85,7 +87,11 @@ def simulate(world: World, *, studies: int, apart: int) -> Outcome:
         widths.append(float((bounds[:, 1] - bounds[:, 0]).max() / 2.0))
         assert board.separation is not None
         told_apart.append(board.separation.above.diagonal(-apart).mean())
-    return Outcome(widest=float(np.mean(widths)), power=float(np.mean(told_apart)))
+    return Outcome(
+        widest=float(np.mean(widths)),
+        reached=float(np.mean(np.array(widths) <= HALF_WIDTH)),
+        power=float(np.mean(told_apart)),
+    )
 
 
 def lines(studies: int) -> Iterator[str]:
@@ -94,8 +100,8 @@ def lines(studies: int) -> Iterator[str]:
         "experts",
         "points between neighbours",
         "scenario / expert",
-        f"votes per expert for every interval ±{HALF_WIDTH:.0f}",
-        "widest, simulated",
+        f"votes per expert for an expected widest interval ±{HALF_WIDTH:.0f}",
+        "widest, simulated; studies that reach it",
         f"votes per expert to find a gap, power {POWER:.0%}",
         "power, simulated",
     )
@@ -120,7 +126,7 @@ def _row(world: World, step: float, gap: float, studies: int) -> list[str]:
         cells += [f"none: ±{most.widest:.0f} with all units", ""]
     else:
         found = simulate(replace(world, votes_per_expert=votes), studies=studies, apart=1)
-        cells += [f"{votes:,}", f"±{found.widest:.1f}"]
+        cells += [f"{votes:,}", f"±{found.widest:.1f}; {found.reached:.0%}"]
     votes = votes_per_expert_for(design, lambda found: found.tells_apart(gap, power=POWER))
     if votes is None:
         return [*cells, f"{gap:.0f} points: none, {most.gap_found(power=POWER):.0f} at least", ""]

@@ -21,7 +21,7 @@ HELP = {
     "ties": "percent of the votes that say Equal",
     "expert_sd": "Elo points by which experts differ about a contestant",
     "scenario_sd": "Elo points by which scenarios differ in a contestant",
-    "half_width": "Elo points that every 95 %% interval is to have at most",
+    "half_width": "Elo points expected of the widest 95 %% interval",
     "gap": "Elo points between two that are to be told apart",
     "power": "percent, the chance of that",
     "seconds": "of one vote",
@@ -77,7 +77,9 @@ class Command(TerminalCommand):
 
     def _say(self, question: Question, found: Outlook) -> None:
         self.stdout.write("")
-        self._say_wish(f"Every interval at most ±{question.half_width:g}", found.narrow, question)
+        self._say_wish(
+            f"Expected widest interval ±{question.half_width:g}", found.narrow, question
+        )
         self._say_wish(f"Two that differ by {question.gap:g} told apart", found.apart, question)
         if found.in_mind is not None:
             self.stdout.write(f"Votes in mind: {_line(found.in_mind, question)}")
