@@ -9,10 +9,11 @@ PYTHON ?= $(shell for name in python3 python3.12 python3.11; do \
 	&& echo $$name && exit; done; echo python3)
 PORT ?= 8000
 SERVE ?= 1
+PURE := geometry scene checks llm prompts variants metrics rating pairing results house
 # Compiled once, not by each of the many processes that the tests start.
 export PYTHONDONTWRITEBYTECODE :=
 
-.PHONY: demo serve test lint fuzz fast postgres chromium screenshots bench figures real-model mutants receivers lock clean
+.PHONY: demo serve test test-all check lint fuzz chromium screenshots bench figures real-model mutants receivers lock clean
 
 demo: $(VENV)/.runtime ## Run the main job on the catalogue, then serve it (SERVE=0: don't)
 	$(BIN)/python manage.py demo --port $(PORT) $(if $(filter 0,$(SERVE)),--no-serve)
@@ -20,15 +21,15 @@ demo: $(VENV)/.runtime ## Run the main job on the catalogue, then serve it (SERV
 serve: $(VENV)/.runtime ## Serve what is there
 	$(BIN)/python manage.py serve --port $(PORT)
 
-test: lint chromium receivers ## Every check and every test, on SQLite, Redis, PostgreSQL and in a browser
-	$(BIN)/python -m pytest -n 2 --dist loadgroup
-	$(BIN)/python -m tests.on_postgres -m "postgres and not redis" -n 2
+test: lint chromium receivers ## Style, floors, types and every test that is not slow, on SQLite, Redis, PostgreSQL and in a browser
+	$(BIN)/python -m pytest -n 2 --dist loadgroup -m "not slow"
+	$(BIN)/python -m tests.on_postgres -m "postgres and not redis and not slow" -n 2
 
-fast: $(VENV)/.test ## The tests that need neither a browser nor a server
-	$(BIN)/python -m pytest -n 2 -m "not browser and not redis and not slow"
+test-all: chromium receivers ## The slow tests: whole journeys, kills, all roles of the API
+	$(BIN)/python -m pytest -n 2 --dist loadgroup -m slow
 
-postgres: $(VENV)/.test ## The tests of rows and concurrency on a real PostgreSQL
-	$(BIN)/python -m tests.on_postgres -m "postgres and not redis" -n 2
+check: lint ## The quick round: style, floors, types and the tests of the pure packages
+	$(BIN)/python -m pytest -n 2 -q -m "not slow and not realdata" $(PURE:%=tests/%)
 
 fuzz: $(VENV)/.test ## New random examples for every property, ten times as many as in `make test`
 	$(BIN)/python -m pytest -n 2 -m "hypothesis and not browser" --hypothesis-profile fuzz

