@@ -91,7 +91,7 @@ def test_a_making_that_fails_says_why(closed: Study) -> None:
     admin = signed_in(people()["admin"])
     GenerationJob.objects.update(state=GenerationJob.State.RUNNING)
     assert write(admin, closed, "study").state == "failed"
-    assert "of this study still runs." in shown(admin, closed)
+    assert "of this study still runs" in shown(admin, closed)
     GenerationJob.objects.update(state=GenerationJob.State.FINISHED)
     admin.post(reverse("study-write", args=[closed.code, "study"]))
     newest = StudyFile.objects.latest("pk")
