@@ -1,12 +1,14 @@
 """Half the expert's speed on short recordings: `python -m tests.benchmarks.recording_lengths`.
 
 Cuts recordings to 3, 6, 8 and 15 s, drives 15 s on each at half of the expert's mean speed, and
-prints the table of docs/simulation.md; with REALDATA_DIR set also for the recorded log.
+prints a table; with REALDATA_DIR set also for the recorded log. `--write` stores it in
+docs/simulation.md.
 """
 
 from __future__ import annotations
 
 import os
+import sys
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -23,7 +25,7 @@ from augment.simulation.road import Road
 from augment.simulation.score import score_drive
 from augment.simulation.setting import DriveSetting
 from augment.simulation.states import STEP_S, EgoBody
-from tests.benchmarks.report import table
+from tests.benchmarks.report import ROOT, table, write_block
 from tests.recorded import recorded
 from tests.scenes import vehicle
 from tests.simulation.worlds import street
@@ -107,7 +109,7 @@ def half_speed_drives(scene: Scene, recording: Recording) -> Iterator[HalfSpeed]
 
 
 def main() -> None:
-    """Drive and print."""
+    """Drive, and print the table or store it."""
     worlds = {"street": recorded_street()}
     if "REALDATA_DIR" in os.environ:
         worlds["Argoverse 2 log"] = recorded(Path(os.environ["REALDATA_DIR"]))
@@ -124,7 +126,9 @@ def main() -> None:
         for one in half_speed_drives(scene, recording)
     ]
     head = ["scene", "recorded", "expert (m)", "progress (%)", "others at the end", "score (%)"]
-    print(table(head, lines))
+    print(text := table(head, lines))
+    if "--write" in sys.argv[1:]:
+        write_block("recording lengths", text, page=ROOT / "docs" / "simulation.md")
 
 
 if __name__ == "__main__":
