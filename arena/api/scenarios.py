@@ -95,6 +95,7 @@ class CatalogueDocument(serializers.Serializer[Any]):
     scenarios_added = serializers.IntegerField()
     scenarios_changed = serializers.IntegerField()
     scenarios_unchanged = serializers.IntegerField()
+    kept = serializers.ListField(child=serializers.CharField())
 
 
 class ScenariosView(ApiView):

@@ -36,4 +36,7 @@ def load_scenarios(request: HttpRequest) -> HttpResponse:
             "unchanged": report.scenarios_unchanged,
         }
         messages.success(request, done % numbers)
+        if report.kept:
+            names = ", ".join(report.kept)
+            messages.warning(request, f"Kept as stored, because augmentations use them: {names}.")
     return redirect("scenarios")

@@ -3,6 +3,7 @@ from __future__ import annotations
 import json
 import shutil
 from collections.abc import Callable
+from functools import partial
 from io import StringIO
 from pathlib import Path
 from typing import Any
@@ -155,21 +156,47 @@ def test_an_unused_scenario_and_its_scene_may_change(folder: Path) -> None:
 @pytest.mark.parametrize(
     ("file", "field"), [("scenarios/parked-car", "instruction"), ("scenes/street", "provenance")]
 )
-def test_what_was_augmented_already_is_not_changed(folder: Path, file: str, field: str) -> None:
+def test_what_was_augmented_stays_as_stored_and_is_named(
+    folder: Path, file: str, field: str
+) -> None:
     load_catalogue(folder=folder)
     augment(Scenario.objects.get())
     edit(folder / f"{file}.json", lambda it: it.update({field: "other"}))
-    with pytest.raises(Conflict, match="1 augmentations were made from the old state"):
-        load_catalogue(folder=folder)
+    assert load_catalogue(folder=folder).kept == ("parked-car",)
     assert Scenario.objects.get().instruction == PARKED.instruction
+    assert BaseScene.objects.get().provenance != "other"
 
 
-def test_a_changed_scene_with_somebodys_own_scenario_is_refused(folder: Path) -> None:
+def test_an_older_installation_is_upgraded_but_for_what_was_augmented(folder: Path) -> None:
+    shutil.copy(folder / "scenes/street.json", folder / "scenes/avenue.json")
+    edit(folder / "scenes/avenue.json", lambda it: it.update(name="avenue"))
+    for slug, place in (("beside", "street"), ("far", "avenue")):
+        copy = folder / f"scenarios/{slug}.json"
+        shutil.copy(folder / "scenarios/parked-car.json", copy)
+        edit(copy, partial(dict.update, slug=slug, scene=place, instruction=slug))
+    load_catalogue(folder=folder)
+    augment(Scenario.objects.get(slug="parked-car"))
+    for name in ("street", "avenue"):
+        edit(folder / f"scenes/{name}.json", lambda it: it.update(provenance="newer"))
+    new = folder / "scenarios/new.json"
+    shutil.copy(folder / "scenarios/beside.json", new)
+    edit(new, lambda it: it.update(slug="new", instruction="anew"))
+    out = StringIO()
+    call_command("load_catalogue", "--folder", str(folder), stdout=out)
+    assert "scenes: 0 added, 1 changed, 0 unchanged" in out.getvalue()
+    assert "newer version: beside, new, parked-car" in out.getvalue()
+    assert [*BaseScene.objects.filter(provenance="newer")] == [
+        BaseScene.objects.get(slug="avenue")
+    ]
+    assert Augmentation.objects.get().scenario.instruction == PARKED.instruction
+
+
+def test_a_changed_scene_with_somebodys_own_scenario_is_kept(folder: Path) -> None:
     load_catalogue(folder=folder)
     add_scenario(scene="street", type="jaywalking_pedestrian", instruction="walk", slug="mine")
     edit(folder / "scenes/street.json", lambda it: it.update(provenance="mended"))
-    with pytest.raises(Conflict, match="outside the catalogue use it: mine"):
-        load_catalogue(folder=folder)
+    assert load_catalogue(folder=folder).kept == ("parked-car",)
+    assert BaseScene.objects.get().provenance != "mended"
 
 
 def test_rows_from_elsewhere_are_never_replaced(folder: Path) -> None:
@@ -218,8 +245,7 @@ def test_a_used_scenario_gets_the_intent_that_it_had_not_and_no_other(folder: Pa
     row.refresh_from_db()
     assert row.intent == intent
     edit(file, lambda it: it["intent"]["requests"][0].update(count=2))
-    with pytest.raises(Conflict, match="1 augmentations were made from"):
-        load_catalogue(folder=folder)
+    assert load_catalogue(folder=folder).kept == ("parked-car",)
 
 
 def test_a_reference_has_to_fit_its_scene(folder: Path) -> None:
@@ -236,10 +262,9 @@ def test_a_reference_has_to_fit_its_scene(folder: Path) -> None:
 
 def test_a_conflict_late_in_the_folder_undoes_everything(folder: Path) -> None:
     load_catalogue(folder=folder)
-    augment(Scenario.objects.get())
+    Scenario.objects.update(catalogue_set="")
     shutil.copy(folder / "scenes/street.json", folder / "scenes/avenue.json")
     edit(folder / "scenes/avenue.json", lambda it: it.update(name="avenue"))
-    edit(folder / "scenarios/parked-car.json", lambda it: it.update(instruction="other"))
     with pytest.raises(Conflict):
         load_catalogue(folder=folder)
     assert [row.slug for row in BaseScene.objects.all()] == ["street"]

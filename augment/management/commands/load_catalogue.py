@@ -46,3 +46,8 @@ class Command(TerminalCommand):
                 getattr(report, f"{kind}_{step}") for step in ("added", "changed", "unchanged")
             )
             self.stdout.write(f"{kind}: {added} added, {changed} changed, {unchanged} unchanged")
+        if report.kept:
+            self.stdout.write(
+                "kept as stored, because they or their scene were augmented, although the "
+                f"catalogue has a newer version: {', '.join(report.kept)}"
+            )

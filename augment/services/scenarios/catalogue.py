@@ -5,14 +5,15 @@ Loading it twice changes nothing.
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from enum import StrEnum
 from pathlib import Path
 
 from django.conf import settings
 from django.contrib.auth.models import User
 from django.db import transaction
-from django.db.models import QuerySet
 
 from augment.errors import Conflict, UnknownName
 from augment.models import Augmentation, BaseScene, Scenario
@@ -31,7 +32,12 @@ SOURCE = "authored"
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class CatalogueReport:
-    """How many rows a loading added, changed and found as they should be."""
+    """How many rows a loading added, changed and found as they should be.
+
+    Attributes:
+        kept: Scenarios whose file has changed and that stay as they were stored, because
+            something was made from them or from their scene.
+    """
 
     scenes_added: int
     scenes_changed: int
@@ -39,6 +45,7 @@ class CatalogueReport:
     scenarios_added: int
     scenarios_changed: int
     scenarios_unchanged: int
+    kept: tuple[str, ...] = ()
 
 
 @transaction.atomic
@@ -51,8 +58,9 @@ def load_catalogue(
 ) -> CatalogueReport:
     """Bring the rows in line with the files, all of them or none.
 
-    Rows whose file is gone stay. A change is refused where something was made from the old
-    state already, because nobody could tell any more what it was made from.
+    Rows whose file is gone stay. So does a scenario of which augmentations were made, and a scene
+    with all its scenarios once something was made on it: the stored version is what they were
+    made from. The report names them.
 
     Args:
         folder: Holds `scenes` and `scenarios`, and those of the hard set in `hard`.
@@ -64,25 +72,31 @@ def load_catalogue(
     Raises:
         InvalidDocument: The folder holds no catalogue, or files break their format or do not
             fit together; every problem names its file and the path inside it.
-        Conflict: A slug belongs to a row from elsewhere, or what changed is in use.
+        Conflict: A slug belongs to a row from elsewhere.
     """
     read = {one: read_catalogue(folder_of(folder, one)) for one in sets}
-    scene_steps = [
-        _store_scene(scene, actor) for scenes, _ in read.values() for scene in scenes.values()
-    ]
-    scenario_steps = []
+    scene_steps = {
+        name: _store_scene(scene, actor)
+        for scenes, _ in read.values()
+        for name, scene in scenes.items()
+    }
+    scenario_steps: dict[str, _Step] = {}
     for one, (_, entries) in read.items():
         for entry in entries:
-            scenario_steps.append(_store_scenario(entry, one, actor))
-            if with_paraphrases:
-                scenario_steps += _store_paraphrases(entry, one, actor)
+            is_kept = scene_steps[entry.scene] is _Step.KEPT
+            step = _Step.KEPT if is_kept else _store_scenario(entry, one, actor)
+            scenario_steps[entry.slug] = step
+            if with_paraphrases and step is not _Step.KEPT:
+                scenario_steps |= _store_paraphrases(entry, one, actor)
+    of_scenes, of_scenarios = Counter(scene_steps.values()), Counter(scenario_steps.values())
     return CatalogueReport(
-        scenes_added=scene_steps.count("add"),
-        scenes_changed=scene_steps.count("change"),
-        scenes_unchanged=scene_steps.count("keep"),
-        scenarios_added=scenario_steps.count("add"),
-        scenarios_changed=scenario_steps.count("change"),
-        scenarios_unchanged=scenario_steps.count("keep"),
+        scenes_added=of_scenes[_Step.ADDED],
+        scenes_changed=of_scenes[_Step.CHANGED],
+        scenes_unchanged=of_scenes[_Step.UNCHANGED],
+        scenarios_added=of_scenarios[_Step.ADDED],
+        scenarios_changed=of_scenarios[_Step.CHANGED],
+        scenarios_unchanged=of_scenarios[_Step.UNCHANGED],
+        kept=tuple(slug for slug, step in scenario_steps.items() if step is _Step.KEPT),
     )
 
 
@@ -103,7 +117,16 @@ def load_own_catalogue(*, sets: Sequence[str], actor: User) -> CatalogueReport:
 # Private
 
 
-def _store_scene(scene: Scene, actor: User | None) -> str:
+class _Step(StrEnum):
+    """What became of a file; `KEPT` where the stored version is another one and in use."""
+
+    ADDED = "added"
+    CHANGED = "changed"
+    UNCHANGED = "unchanged"
+    KEPT = "kept"
+
+
+def _store_scene(scene: Scene, actor: User | None) -> _Step:
     document = scene_to_document(scene)
     row, is_new = BaseScene.objects.get_or_create(
         slug=scene.name,
@@ -116,47 +139,39 @@ def _store_scene(scene: Scene, actor: User | None) -> str:
     )
     if is_new:
         _log(actor, "add", "scene", row, slug=row.slug, source=SOURCE)
-        return "add"
+        return _Step.ADDED
     if row.source != SOURCE:
         raise Conflict(
             f"There is a scene called {row.slug!r} already, from the source {row.source!r}; "
             "the catalogue does not replace it."
         )
     if row.document == document:
-        return "keep"
-    _refuse_if_used(f"scene {row.slug!r}", Augmentation.objects.filter(scenario__base_scene=row))
-    own = row.scenarios.filter(catalogue_set="").values_list("slug", flat=True)
-    if own:
-        raise Conflict(
-            f"The scene {row.slug!r} has changed, but scenarios outside the catalogue use it: "
-            f"{', '.join(own)}."
-        )
+        return _Step.UNCHANGED
+    is_augmented = Augmentation.objects.filter(scenario__base_scene=row).exists()
+    if is_augmented or row.scenarios.filter(catalogue_set="").exists():
+        return _Step.KEPT
     row.document, row.provenance = document, scene.provenance
     row.content_hash = content_hash(document)
     row.save(update_fields=["document", "provenance", "content_hash"])
     row.scenarios.update(original_image="")
     _log(actor, "change", "scene", row, slug=row.slug, source=SOURCE)
-    return "change"
+    return _Step.CHANGED
 
 
 def _store_paraphrases(
     entry: CatalogueEntry, which: CatalogueSet, actor: User | None
-) -> list[str]:
+) -> dict[str, _Step]:
     original = Scenario.objects.get(slug=entry.slug)
-    return [
-        _store_scenario(
-            replace(
-                entry,
-                slug=f"{entry.slug}-p{number}",
-                instruction=wording.text,
-                language=wording.language,
-            ),
-            which,
-            actor,
-            original,
+    wordings = [
+        replace(
+            entry,
+            slug=f"{entry.slug}-p{number}",
+            instruction=wording.text,
+            language=wording.language,
         )
         for number, wording in enumerate(entry.paraphrases, start=1)
     ]
+    return {one.slug: _store_scenario(one, which, actor, original) for one in wordings}
 
 
 def _store_scenario(
@@ -164,7 +179,7 @@ def _store_scenario(
     which: CatalogueSet,
     actor: User | None,
     original: Scenario | None = None,
-) -> str:
+) -> _Step:
     row = Scenario.objects.filter(slug=entry.slug).select_related("base_scene").first()
     reference = modification_to_document(entry.reference)
     intent = None if entry.intent is None else intent_to_document(entry.intent)
@@ -183,7 +198,7 @@ def _store_scenario(
         row.catalogue_set, row.language = which.value, entry.language
         row.paraphrase_of = original
         row.save(update_fields=["catalogue_set", "language", "paraphrase_of"])
-        return "add"
+        return _Step.ADDED
     if not row.in_catalogue:
         raise Conflict(
             f"There is a scenario called {row.slug!r} already that is not the catalogue's; "
@@ -203,26 +218,18 @@ def _store_scenario(
     }
     changed = sorted(name for name, value in wanted.items() if getattr(row, name) != value)
     if not changed:
-        return "keep"
-    if row.intent is not None or set(changed) - {"intent", "intent_origin"}:
-        # An intent where there was none changes nothing that anybody was shown or asked.
-        _refuse_if_used(f"scenario {row.slug!r}", row.augmentations.all())
+        return _Step.UNCHANGED
+    # An intent where there was none changes nothing that anybody was shown or asked.
+    is_new_to_readers = row.intent is not None or set(changed) - {"intent", "intent_origin"}
+    if is_new_to_readers and row.augmentations.exists():
+        return _Step.KEPT
     for name, value in wanted.items():
         setattr(row, name, value)
     if set(changed) - {"intent", "intent_origin"}:
         row.original_image = ""
     row.save(update_fields=[*wanted, "original_image"])
     _log(actor, "change", "scenario", row, slug=row.slug, changed=changed)
-    return "change"
-
-
-def _refuse_if_used(what: str, made_from_it: QuerySet[Augmentation]) -> None:
-    count = made_from_it.count()
-    if count:
-        raise Conflict(
-            f"The {what} has changed in the catalogue, but {count} augmentations were made from "
-            "the old state; give the new one another name."
-        )
+    return _Step.CHANGED
 
 
 def _log(
