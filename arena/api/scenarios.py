@@ -21,10 +21,16 @@ from arena.api.schema import describe
 from arena.api.sending import WarnedDocument, keep_and_send
 from arena.queries.scenarios import OWN
 from augment.models import Scenario
+from augment.models.scenes import DENSITIES, GOALS
 from augment.scene_tasks import enqueue_scenario
 from augment.services.endpoints.contestants import ensure_builtin
 from augment.services.scenarios.catalogue import load_own_catalogue
-from augment.services.scenarios.scenes import INSTRUCTION_LENGTH, SLUG_LENGTH, add_scenario
+from augment.services.scenarios.scenes import (
+    INSTRUCTION_LENGTH,
+    SLUG_LENGTH,
+    add_scenario,
+    read_circumstances,
+)
 from augment.services.scenarios.types import LONGEST_LABEL, LONGEST_TYPE
 
 SETS = (*Scenario.SETS, OWN)
@@ -57,6 +63,11 @@ class WholeScenarioDocument(ScenarioDocument):
 
     reference = serializers.DictField(allow_null=True, help_text="The reference modification.")
     intent = serializers.DictField(allow_null=True, help_text="What the instruction asks for.")
+    keep_traffic = serializers.BooleanField()
+    density = serializers.CharField(
+        source="traffic_density", help_text="none, low, medium or high: of spawned traffic."
+    )
+    goal = serializers.CharField(help_text="left, right, straight; empty for none.")
 
 
 class ScenarioBody(StrictSerializer):
@@ -74,6 +85,15 @@ class ScenarioBody(StrictSerializer):
     reference = serializers.DictField(required=False, help_text="A modification that fits.")
     intent = serializers.DictField(required=False, help_text="What the instruction asks for.")
     keep_traffic = FlagField(required=False, default=False)
+    density = serializers.ChoiceField(
+        choices=DENSITIES,
+        required=False,
+        default="none",
+        help_text="Of traffic spawned in place of the recorded one.",
+    )
+    goal = serializers.ChoiceField(
+        choices=GOALS, required=False, help_text="Where the ego's way turns."
+    )
 
 
 class NewScenarioDocument(WholeScenarioDocument, WarnedDocument):
@@ -131,7 +151,10 @@ class ScenariosView(ApiView):
         """A worker draws it."""
         body = ScenarioBody(data=request.data)
         body.is_valid(raise_exception=True)
-        add = partial(add_scenario, **body.validated_data, actor=cast(User, request.user))
+        given = body.validated_data
+        circumstances = read_circumstances(given.pop("density"), given.pop("goal", ""))
+        actor = cast(User, request.user)
+        add = partial(add_scenario, **given, circumstances=circumstances, actor=actor)
         return Response(changed_scenario(*keep_and_send(add, enqueue_scenario)), status=201)
 
 

@@ -22,6 +22,7 @@ from arena.web.json_text import read_json
 from arena.web.sending import looks_again, send_later
 from augment.errors import AugmentError, Conflict
 from augment.models import BaseScene, Scenario
+from augment.models.scenes import DENSITIES, GOALS
 from augment.scene_tasks import enqueue_scenario, enqueue_scene
 from augment.sentences import sentence
 from augment.services.scenarios.bulk import MOST_ROWS_AT_ONCE, BulkReport
@@ -35,14 +36,21 @@ from augment.services.scenarios.intent_fields import (
     fields_of_intent,
     intent_of_fields,
 )
-from augment.services.scenarios.intents import enter_intent, refuse_open
+from augment.services.scenarios.intents import enter_intent, waiting_reading
 from augment.services.scenarios.scene_pictures import SceneView, is_drawn, scene_picture
-from augment.services.scenarios.scenes import INSTRUCTION_LENGTH, SLUG_LENGTH, add_scenario
+from augment.services.scenarios.scenes import (
+    INSTRUCTION_LENGTH,
+    SLUG_LENGTH,
+    add_scenario,
+    read_circumstances,
+)
 from augment.services.scenarios.types import LONGEST_LABEL, LONGEST_TYPE, type_choices
 from augment.services.wording import translate
 
 OWN = ""
 LONGEST_INTENT = 200_000
+DENSITY_CHOICES = [(one.value, one.value) for one in DENSITIES]
+GOAL_CHOICES = [("", "as recorded, or straightest"), *((one.value, one.value) for one in GOALS)]
 
 REARRANGE = "fields"
 """What the buttons send that add and remove objects, and turn fields into JSON and back."""
@@ -58,16 +66,12 @@ class IntentForm(forms.Form):
 
         Raises:
             Conflict: The text is no JSON object.
-            InvalidDocument: The fields do not make an intent, or leave open what jobs need.
+            InvalidDocument: The fields do not make an intent.
         """
         text = self.cleaned_data["intent"].strip()
         if not text:
-            document = intent_of_fields(entered_fields(cast(QueryDict, self.data)))
-        else:
-            document = _read_json(text)
-        if document is not None:
-            refuse_open(document)
-        return document
+            return intent_of_fields(entered_fields(cast(QueryDict, self.data)))
+        return _read_json(text)
 
 
 class ScenarioForm(IntentForm):
@@ -79,6 +83,8 @@ class ScenarioForm(IntentForm):
     own_label = forms.CharField(required=False, max_length=LONGEST_LABEL)
     instruction = forms.CharField(max_length=INSTRUCTION_LENGTH, strip=True)
     keep_traffic = forms.BooleanField(required=False)
+    density = forms.ChoiceField(required=False, choices=DENSITY_CHOICES)
+    goal = forms.ChoiceField(required=False, choices=GOAL_CHOICES)
 
     def __init__(self, data: Any = None, *, initial: dict[str, Any] | None = None) -> None:
         super().__init__(data, initial=initial)
@@ -105,6 +111,7 @@ def new_scenario_page(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
                 slug=given["slug"] or None,
                 intent=form.intent_document(),
                 keep_traffic=given["keep_traffic"],
+                circumstances=read_circumstances(given["density"], given["goal"]),
                 actor=cast(User, request.user),
             )
         except AugmentError as error:
@@ -142,7 +149,9 @@ def intent_page(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
         except AugmentError as error:
             form.add_error(None, translate(error))
     else:
-        fields = fields_of_intent(scenario.intent) if scenario.intent else IntentFields()
+        reading = waiting_reading(scenario) if "reading" in request.GET else None
+        document = scenario.intent if reading is None else reading.document
+        fields = fields_of_intent(document) if document else IntentFields()
     context = {"scenario": scenario, "form": form} | _intent_context(fields, problem)
     return render(request, "scenarios/intent.html", context, status=422 if problem else 200)
 

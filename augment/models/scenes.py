@@ -13,6 +13,7 @@ from augment.scene.intent_words import (
     IntentOrigin,
 )
 
+DENSITIES = tuple(TrafficDensity)
 GOALS = (TurnType.LEFT, TurnType.RIGHT, TurnType.STRAIGHT)
 SLUG_HELP = "lower-case letters, digits and hyphens"
 

@@ -19,6 +19,7 @@ from augment.scene.entities import (
     Origin,
     Point,
     Scene,
+    SceneOptions,
     TrafficAgent,
 )
 from augment.scene.modification import Modification
@@ -31,6 +32,7 @@ from augment.scene.schema import (
     LaneDocument,
     ModificationDocument,
     SceneDocument,
+    SceneOptionsDocument,
     read,
 )
 from augment.scene.soundness import modification_problems, scene_problems
@@ -64,6 +66,8 @@ def scene_to_document(scene: Scene) -> dict[str, Any]:
             for area in scene.areas
         ],
     }
+    if scene.options != SceneOptions():
+        document["options"] = _options_to_document(scene.options)
     scene_from_document(document)
     return document
 
@@ -95,6 +99,7 @@ def scene_from_document(document: object) -> Scene:
             Area(id=area.id, kind=area.kind, boundary_m=_points(area.boundary_m))
             for area in read_scene.areas
         ),
+        options=_options(read_scene.options),
     )
 
 
@@ -177,6 +182,14 @@ def _lane_to_document(lane: Lane) -> dict[str, Any]:
     )
 
 
+def _options_to_document(options: SceneOptions) -> dict[str, Any]:
+    return _given(
+        density=options.density.value,
+        goal=None if options.goal is None else options.goal.value,
+        goal_m=None if options.goal_m is None else [*options.goal_m],
+    )
+
+
 def _connector_to_document(connector: LaneConnector) -> dict[str, Any]:
     return _given(
         id=connector.id,
@@ -229,6 +242,15 @@ def _lane(lane: LaneDocument) -> Lane:
         left_neighbor=lane.left_neighbor,
         right_neighbor=lane.right_neighbor,
         successors=tuple(lane.successors),
+    )
+
+
+def _options(options: SceneOptionsDocument) -> SceneOptions:
+    place = options.goal_m
+    return SceneOptions(
+        density=options.density,
+        goal=options.goal,
+        goal_m=None if place is None else (place[0], place[1]),
     )
 
 

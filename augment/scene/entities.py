@@ -188,7 +188,7 @@ class Scene:
         ego: Always at (0, 0), heading 0, type EGO_VEHICLE, id "Agent1".
         agents: All others, nearest to the ego first.
         provenance: Where it comes from and under which licence, in a sentence.
-        options: Set by a scenario; no part of the scene's document.
+        options: Set by a scenario; a stored scene has none unless its file names them.
     """
 
     name: str

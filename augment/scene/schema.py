@@ -12,7 +12,14 @@ from typing import Annotated, Any, TypeVar
 from pydantic import BaseModel, ConfigDict, Field, Strict, ValidationError
 
 from augment.errors import InvalidDocument
-from augment.scene.entities import AgentType, AreaKind, TrafficLight, TrafficSide, TurnType
+from augment.scene.entities import (
+    AgentType,
+    AreaKind,
+    TrafficDensity,
+    TrafficLight,
+    TrafficSide,
+    TurnType,
+)
 
 VERSION = 1
 SCENE_FORMAT = "scenario-arena/scene"
@@ -42,6 +49,7 @@ AreaKindText = Annotated[AreaKind, Strict(False)]
 LightText = Annotated[TrafficLight, Strict(False)]
 SideText = Annotated[TrafficSide, Strict(False)]
 TurnText = Annotated[TurnType, Strict(False)]
+DensityText = Annotated[TrafficDensity, Strict(False)]
 
 
 class Document(BaseModel):
@@ -114,6 +122,14 @@ class OriginDocument(Document):
     heading_rad: Heading
 
 
+class SceneOptionsDocument(Document):
+    """The `SceneOptions`."""
+
+    density: DensityText = TrafficDensity.NONE
+    goal: TurnText | None = None
+    goal_m: PointPair | None = None
+
+
 class SceneDocument(Document):
     """A `Scene`."""
 
@@ -128,6 +144,7 @@ class SceneDocument(Document):
     lanes: Annotated[list[LaneDocument], Field(max_length=MOST_WAYS)] = []
     connectors: Annotated[list[ConnectorDocument], Field(max_length=MOST_WAYS)] = []
     areas: Annotated[list[AreaDocument], Field(max_length=MOST_WAYS)] = []
+    options: SceneOptionsDocument = SceneOptionsDocument()
 
 
 class ModificationDocument(Document):

@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Sequence
 
 from augment.geometry.polyline import Polyline
-from augment.scene.entities import AgentType
+from augment.scene.entities import AgentType, TurnType
 from augment.scene.schema import (
     AgentDocument,
     AreaDocument,
@@ -37,6 +37,8 @@ def scene_problems(scene: SceneDocument) -> Iterator[Problem]:
     for index, area in enumerate(scene.areas):
         if len({(x, y) for x, y in area.boundary_m}) < 3:
             yield path("areas", index, "boundary_m"), "an area needs three distinct points"
+    if scene.options.goal is TurnType.U_TURN:
+        yield path("options", "goal"), "left, right or straight"
 
 
 def modification_problems(change: ModificationDocument) -> Iterator[Problem]:

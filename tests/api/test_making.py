@@ -151,8 +151,10 @@ def test_a_scenario_gets_a_reference_that_is_checked_first(
 ) -> None:
     add_scenario("street", reference=None)
     given = {"scene": "street-scene", "type": "cut_in", "instruction": "Place a car ahead."}
-    made = send(analyst, "scenarios", **given, slug="mine").json()
+    error_of(send(analyst, "scenarios", **given, goal="back"), 422, "invalid")
+    made = send(analyst, "scenarios", **given, slug="mine", density="low", goal="left").json()
     assert (made["slug"], made["type"], made["reference"]) == ("mine", "cut_in", None)
+    assert (made["keep_traffic"], made["density"], made["goal"]) == (False, "low", "left")
     here = f"scenarios/{made['code']}"
     checked = send(analyst, here + "/check", modification=AWAY).json()
     assert checked["lines"][0]["severity"] == "wrong"

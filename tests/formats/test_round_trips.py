@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from augment.formats import commonroad_writer, scenarionet_writer
+from augment.formats import commonroad_writer, own_writer, scenarionet_writer
 from augment.formats.readers import READERS
 from augment.formats.reading import Reading
 from augment.formats.strips import RADIUS_M
@@ -22,7 +22,9 @@ from augment.scene.entities import (
     Lane,
     LaneConnector,
     Scene,
+    SceneOptions,
     TrafficAgent,
+    TrafficDensity,
     TrafficLight,
     TrafficSide,
     TurnType,
@@ -297,3 +299,14 @@ def test_the_ruler_finds_every_kind_of_change(tmp_path: Path) -> None:
     for aspect, other in spoilt(reading):
         found = [one for one in changes(given, other) if str(one) not in before]
         assert aspect in {one.aspect for one in found}, aspect
+
+
+def test_our_own_json_keeps_density_and_goal(tmp_path: Path) -> None:
+    options = SceneOptions(density=TrafficDensity.LOW, goal=TurnType.LEFT, goal_m=(20.0, 5.5))
+    given = cell(replace(crossing(), options=options), added=())
+    for name, text in own_writer.write([given]).files.items():
+        (tmp_path / name).write_bytes(text)
+    for name in ("before", "scene"):
+        path = tmp_path / f"{given.stem}.{name}.json"
+        read = READERS["json"].read(path, item=None, frame=0, name=given.scene.name)
+        assert read.scene == (given.scene if name == "before" else given.after)

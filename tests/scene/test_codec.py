@@ -26,7 +26,9 @@ from augment.scene.entities import (
     LaneConnector,
     Origin,
     Scene,
+    SceneOptions,
     TrafficAgent,
+    TrafficDensity,
     TrafficLight,
     TrafficSide,
     TurnType,
@@ -92,6 +94,14 @@ def areas() -> st.SearchStrategy[Area]:
     )
 
 
+options = st.builds(
+    SceneOptions,
+    density=st.sampled_from(TrafficDensity),
+    goal=st.sampled_from([None, TurnType.LEFT, TurnType.RIGHT, TurnType.STRAIGHT]),
+    goal_m=st.none() | points,
+)
+
+
 @st.composite
 def scenes(draw: st.DrawFn) -> Scene:
     names = [f"Lane{number}" for number in range(1, draw(st.integers(1, 3)) + 1)]
@@ -125,6 +135,7 @@ def scenes(draw: st.DrawFn) -> Scene:
         lanes=lanes,
         connectors=(draw(connectors(names)),),
         areas=(draw(areas()),),
+        options=draw(options),
     )
 
 
@@ -189,6 +200,8 @@ BROKEN = [
     (["ego", "x_m"], 0.5, "ego.x_m: the ego is the origin"),
     (["ego", "type"], "VEHICLE", "ego.type: the ego is EGO_VEHICLE"),
     (["agents"], None, "agents: "),
+    (["options"], {"goal": "u_turn"}, "options.goal: left, right or straight"),
+    (["options"], {"density": "dense"}, "options.density: "),
 ]
 
 

@@ -1,19 +1,31 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
 from django.contrib.auth.models import User
 
 from augment.errors import Conflict, InvalidDocument, InvalidModification, UnknownName
-from augment.models import BaseScene, Event, Scenario
+from augment.models import BaseScene, Event, IntentReading, Scenario
 from augment.scene.codec import modification_to_document, scene_to_document
+from augment.scene.entities import SceneOptions, TurnType
+from augment.scene.intent_codec import intent_to_document
+from augment.scene.intent_words import Shape
 from augment.scene.modification import Modification
 from augment.scene.recording_codec import recording_from_document
+from augment.services.endpoints.known_endpoints import ensure_endpoint
+from augment.services.scenarios.intents import accept_reading, enter_intent
 from augment.services.scenarios.scene_imports import import_scene
-from augment.services.scenarios.scenes import add_scenario, reference_of, scene_of
+from augment.services.scenarios.scenes import (
+    Circumstances,
+    add_scenario,
+    reference_of,
+    scene_of,
+)
 from tests.formats.av2_logs import write_log
+from tests.intents import cones
 from tests.scenes import cone, scene, vehicle
 
 pytestmark = pytest.mark.django_db
@@ -153,3 +165,31 @@ def test_unknown_names_are_refused_with_the_known_ones() -> None:
     with pytest.raises(Conflict, match="'mine'"):
         scenario(slug="mine")
     assert Event.objects.filter(object_kind="scenario").count() == 1
+
+
+def test_a_scene_s_own_goal_holds_where_the_scenario_names_none(street: BaseScene) -> None:
+    own = replace(BUSY, options=SceneOptions(goal=TurnType.LEFT, goal_m=(20.0, 5.0)))
+    BaseScene.objects.update(document=scene_to_document(own))
+    assert scene_of(scenario(slug="kept")).options == own.options
+    right = scenario(slug="right", circumstances=Circumstances(goal=TurnType.RIGHT))
+    assert scene_of(right).options == SceneOptions(goal=TurnType.RIGHT)
+
+
+def test_no_door_takes_an_intent_that_jobs_would_refuse(street: BaseScene) -> None:
+    whole = intent_to_document(cones(25.0, 8, Shape.RING))
+    [request] = whole["requests"]
+    left_open = whole | {"requests": [{**request, "shape": None}]}
+    with pytest.raises(InvalidDocument, match="leaves open the shape"):
+        scenario(intent=left_open)
+    made = scenario(intent=whole)
+    with pytest.raises(InvalidDocument, match="leaves open the shape"):
+        enter_intent(scenario=made.slug, document=left_open)
+    endpoint = ensure_endpoint(label="here", base_url="http://127.0.0.1:1/v1")
+    IntentReading.objects.create(
+        scenario=made, endpoint=endpoint, model="m", state="read", document=left_open
+    )
+    with pytest.raises(InvalidDocument, match="leaves open the shape"):
+        accept_reading(scenario=made.slug)
+    assert IntentReading.objects.get().state == "read"
+    made.refresh_from_db()
+    assert made.intent == whole

@@ -63,6 +63,20 @@ def test_what_a_model_read_is_shown_and_counts_once_accepted(staff: Client) -> N
     assert (scenario.intent, scenario.intent_origin) == (RING, "read")
 
 
+def test_what_was_read_is_changed_by_fields_first(staff: Client) -> None:
+    scenario = add_scenario("street", intent=None, intent_origin="")
+    endpoint = ensure_endpoint(label="here", base_url="http://127.0.0.1:1/v1")
+    open_ring = {**RING, "requests": [{**RING["requests"][0], "shape": None}]}
+    IntentReading.objects.create(
+        scenario=scenario, endpoint=endpoint, model="m", state="read", document=open_ring
+    )
+    assert "leaves open the shape" in send(staff, scenario, accept="1")
+    assert scenario.intent is None
+    change = f"/scenarios/{scenario.code}/intent/fields/?reading=1"
+    assert change in page(staff, scenario)
+    assert 'value="25"' in staff.get(change).content.decode()
+
+
 def test_a_file_replaces_the_intent_and_can_be_fetched_again(staff: Client) -> None:
     scenario = add_scenario("street")
     send(staff, scenario, file=file(json.dumps(RING)))

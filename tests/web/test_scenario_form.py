@@ -92,6 +92,24 @@ def test_a_scenario_of_a_type_of_one_s_own_with_an_intent_by_fields(
     assert reverse("picture", args=["original", made.code]) in shown
 
 
+def test_density_and_goal_are_fields(analyst: Client, scene: BaseScene) -> None:
+    _, made = send(
+        analyst, scene, type="nudge_around_parked_vehicle", density="high", goal="right"
+    )
+    assert made is not None
+    assert (made.traffic_density, made.goal) == ("high", "right")
+    url = reverse("scenario-new", args=[scene.code])
+    given = {
+        "type": "jaywalking_pedestrian",
+        "instruction": "x",
+        "density": "low",
+        "keep_traffic": "on",
+    }
+    refused = analyst.post(url, given).content.decode()
+    assert "Spawned traffic replaces the recorded one" in refused
+    assert '<option value="low" selected>' in refused
+
+
 def test_an_intent_as_json_goes_before_the_fields(analyst: Client, scene: BaseScene) -> None:
     _, made = send(
         analyst, scene, type="jaywalking_pedestrian", intent=RING, i_kind="walk", i_start="left"

@@ -13,10 +13,9 @@ from augment.formats.json_file import read_json
 from augment.models.scenes import GOALS
 from augment.scene.catalogue import ScenarioType
 from augment.scene.codec import modification_from_document, modification_to_document
-from augment.scene.entities import TrafficDensity, TurnType
-from augment.scene.intent_codec import intent_from_document, intent_to_document
+from augment.scene.entities import TrafficDensity
 from augment.services.scenarios.bulk import NEEDED, OPTIONAL, add_scenarios, read_rows
-from augment.services.scenarios.scenes import Circumstances, add_scenario
+from augment.services.scenarios.scenes import add_scenario, read_circumstances
 from augment.services.terminal import TerminalCommand
 
 
@@ -82,10 +81,7 @@ class Command(TerminalCommand):
                 reference=_reference(options["reference"]),
                 intent=_intent(options["intent"]),
                 keep_traffic=options["keep_traffic"],
-                circumstances=Circumstances(
-                    density=TrafficDensity(options["density"] or "none"),
-                    goal=TurnType(options["goal"]) if options["goal"] else None,
-                ),
+                circumstances=read_circumstances(options["density"] or "", options["goal"] or ""),
             )
         except AugmentError as fault:
             raise CommandError(str(fault)) from fault
@@ -96,11 +92,7 @@ class Command(TerminalCommand):
         )
 
     def _add_many(self, options: dict[str, Any]) -> None:
-        given = [
-            f"--{name.replace('_', '-')}"
-            for name in (*NEEDED, *OPTIONAL, "density", "goal")
-            if options[name]
-        ]
+        given = [f"--{name.replace('_', '-')}" for name in (*NEEDED, *OPTIONAL) if options[name]]
         if given:
             raise CommandError(f"--file says all of it; it goes without {', '.join(given)}.")
         try:
@@ -119,8 +111,5 @@ def _reference(file: Path | None) -> dict[str, Any] | None:
     return modification_to_document(modification_from_document(document))
 
 
-def _intent(file: Path | None) -> dict[str, Any] | None:
-    if file is None:
-        return None
-    document = read_json(file, what="intent")
-    return intent_to_document(intent_from_document(document))
+def _intent(file: Path | None) -> object:
+    return None if file is None else read_json(file, what="intent")

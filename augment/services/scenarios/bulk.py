@@ -20,12 +20,11 @@ from augment.formats.json_file import read_json
 from augment.formats.yaml_file import MAX_CHARACTERS, read_yaml_file
 from augment.models import Scenario
 from augment.scene.codec import modification_from_document, modification_to_document
-from augment.scene.intent_codec import intent_from_document, intent_to_document
-from augment.services.scenarios.scenes import add_scenario
+from augment.services.scenarios.scenes import add_scenario, read_circumstances
 
 WHAT = "list of scenarios"
 NEEDED = ("scene", "type", "instruction")
-OPTIONAL = ("slug", "type_label", "keep_traffic", "reference", "intent")
+OPTIONAL = ("slug", "type_label", "keep_traffic", "density", "goal", "reference", "intent")
 MOST_ROWS = 10_000
 MOST_ROWS_AT_ONCE = 300
 """On a page: adding them holds the database for some seconds."""
@@ -181,6 +180,13 @@ def _read(row: Mapping[str, Any], folder: Path) -> dict[str, Any]:
         for name, value in given.items()
         if name != "keep_traffic" and not isinstance(value, str)
     ]
+    circumstances = None
+    try:
+        circumstances = read_circumstances(
+            *(str(given.pop(name, "")) for name in ("density", "goal"))
+        )
+    except InvalidDocument as error:
+        problems += error.problems
     keep = str(given.pop("keep_traffic", "")).strip().lower()
     if keep not in _YES_NO:
         problems.append(("keep_traffic", f"{keep!r} must be yes or no"))
@@ -190,9 +196,8 @@ def _read(row: Mapping[str, Any], folder: Path) -> dict[str, Any]:
         change = modification_from_document(_document(given["reference"], folder, "modification"))
         given["reference"] = modification_to_document(change)
     if "intent" in given:
-        intent = intent_from_document(_document(given["intent"], folder, "intent"))
-        given["intent"] = intent_to_document(intent)
-    return given | {"keep_traffic": _YES_NO[keep]}
+        given["intent"] = _document(given["intent"], folder, "intent")
+    return given | {"keep_traffic": _YES_NO[keep], "circumstances": circumstances}
 
 
 def _document(name: str, folder: Path, what: str) -> object:

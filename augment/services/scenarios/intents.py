@@ -7,16 +7,16 @@ from typing import Any
 from django.contrib.auth.models import User
 from django.db import transaction
 
-from augment.baselines.rule_placer import list_open
-from augment.errors import Conflict, InvalidDocument, UnknownName
+from augment.errors import Conflict, UnknownName
 from augment.models import IntentReading, Scenario
-from augment.scene.intent_codec import intent_from_document, intent_to_document
+from augment.scene.intent_codec import intent_from_document
 from augment.scene.intent_statements import list_statements
 from augment.scene.intent_words import (
     IntentOrigin,
 )
 from augment.sentences import Sentence, sentence
 from augment.services.events import log_event
+from augment.services.scenarios.scenes import placeable_intent
 
 State = IntentReading.State
 
@@ -27,7 +27,7 @@ def enter_intent(*, scenario: str, document: object, actor: User | None = None) 
 
     Raises:
         UnknownName: No such scenario.
-        InvalidDocument: The document breaks the format.
+        InvalidDocument: The document breaks the format, or leaves open what jobs need.
         Conflict: The scenario is the catalogue's, whose intents are authored.
     """
     row = _scenario(scenario)
@@ -38,8 +38,7 @@ def enter_intent(*, scenario: str, document: object, actor: User | None = None) 
                 scenario=row.slug,
             )
         )
-    intent = intent_from_document(document)
-    return _set(row, intent_to_document(intent), IntentOrigin.ENTERED, actor)
+    return _set(row, placeable_intent(document), IntentOrigin.ENTERED, actor)
 
 
 @transaction.atomic
@@ -48,6 +47,7 @@ def accept_reading(*, scenario: str, actor: User | None = None) -> Scenario:
 
     Raises:
         UnknownName: No such scenario.
+        InvalidDocument: What was read leaves open what jobs need.
         Conflict: Nothing that was read waits to be accepted, or the scenario is the catalogue's.
     """
     row = _scenario(scenario)
@@ -63,7 +63,7 @@ def accept_reading(*, scenario: str, actor: User | None = None) -> Scenario:
                 scenario=row.slug,
             )
         )
-    document: dict[str, Any] = reading.document or {}
+    document = placeable_intent(reading.document)
     IntentReading.objects.filter(pk=reading.pk).update(state=State.ACCEPTED)
     return _set(row, document, IntentOrigin.READ, actor)
 
@@ -86,20 +86,6 @@ def statements_of(document: object) -> tuple[Sentence, ...]:
         InvalidDocument: The document breaks the format.
     """
     return () if document is None else list_statements(intent_from_document(document))
-
-
-def refuse_open(document: object) -> None:
-    """Do nothing where an intent says all that jobs need to place it; for who enters one.
-
-    Raises:
-        InvalidDocument: It is no intent, or leaves open what the rule placer would refuse.
-    """
-    requests = intent_from_document(document).requests
-    problems = [
-        (f"requests[{n}]", problem) for n, one in enumerate(requests) for problem in list_open(one)
-    ]
-    if problems:
-        raise InvalidDocument("intent", problems)
 
 
 # --- Private -----------------------------------------------------------------------------------

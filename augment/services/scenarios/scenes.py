@@ -12,16 +12,18 @@ from typing import Any
 from django.contrib.auth.models import User
 from django.db import IntegrityError, transaction
 
+from augment.baselines.rule_placer import list_open
 from augment.errors import Conflict, InvalidDocument, UnknownName
 from augment.formats.interplan_reader import goal_place
 from augment.models import BaseScene, Scenario
+from augment.models.scenes import GOALS
 from augment.scene.codec import (
     modification_from_document,
     modification_to_document,
     scene_from_document,
 )
 from augment.scene.density import spawn_traffic
-from augment.scene.entities import Scene, SceneOptions, TrafficAgent, TrafficDensity, TurnType
+from augment.scene.entities import Scene, TrafficAgent, TrafficDensity, TurnType
 from augment.scene.intent import (
     Intent,
 )
@@ -59,6 +61,43 @@ class Circumstances:
     instruction_is_generated: bool = False
 
 
+def read_circumstances(density: str, goal: str) -> Circumstances:
+    """Read density and goal as somebody typed them; empty texts choose neither.
+
+    Raises:
+        InvalidDocument: There is no such density or goal.
+    """
+    known = {"density": (density, [*TrafficDensity]), "goal": (goal, [*GOALS])}
+    problems = [
+        (name, f"{given!r} must be one of {', '.join(choices)}")
+        for name, (given, choices) in known.items()
+        if given and given not in choices
+    ]
+    if problems:
+        raise InvalidDocument("scenario", problems)
+    return Circumstances(
+        density=TrafficDensity(density or TrafficDensity.NONE),
+        goal=TurnType(goal) if goal else None,
+    )
+
+
+def placeable_intent(document: object) -> dict[str, Any]:
+    """Return an intent as it is stored; every way to enter one leads through here.
+
+    Raises:
+        InvalidDocument: It breaks the format, or leaves open what the rule placer would refuse.
+    """
+    intent = intent_from_document(document)
+    problems = [
+        (f"requests[{n}]", problem)
+        for n, request in enumerate(intent.requests)
+        for problem in list_open(request)
+    ]
+    if problems:
+        raise InvalidDocument("intent", problems)
+    return intent_to_document(intent)
+
+
 @transaction.atomic
 def add_scenario(
     *,
@@ -68,7 +107,7 @@ def add_scenario(
     type_label: str | None = None,
     slug: str | None = None,
     reference: dict[str, Any] | None = None,
-    intent: dict[str, Any] | None = None,
+    intent: object = None,
     intent_origin: IntentOrigin = IntentOrigin.ENTERED,
     keep_traffic: bool = False,
     circumstances: Circumstances | None = None,
@@ -112,7 +151,7 @@ def add_scenario(
     if reference is not None:
         _set_reference(scenario, reference)
     if intent is not None:
-        scenario.intent = intent_to_document(intent_from_document(intent))
+        scenario.intent = placeable_intent(intent)
         scenario.intent_origin = intent_origin
     _insert(scenario)
     _log_addition(scenario, actor)
@@ -181,11 +220,12 @@ def scene_of(scenario: Scenario) -> Scene:
         scene = without_traffic(scene)
     if scenario.spawned is not None:
         scene = apply(scene, modification_from_document(scenario.spawned))
-    options = SceneOptions(
-        density=TrafficDensity(scenario.traffic_density),
-        goal=TurnType(scenario.goal) if scenario.goal else None,
-        goal_m=goal_place(scenario.interplan, scenario.goal, scene),
-    )
+    own = scene.options
+    density = own.density if scenario.keep_traffic else TrafficDensity(scenario.traffic_density)
+    options = replace(own, density=density)
+    if scenario.goal:
+        place_m = goal_place(scenario.interplan, scenario.goal, scene)
+        options = replace(options, goal=TurnType(scenario.goal), goal_m=place_m)
     return replace(scene, options=options)
 
 
