@@ -81,25 +81,35 @@ def test_a_report_behind_a_long_writer_is_given_back_in_the_same_shape() -> None
 
 @contextmanager
 def full_disk() -> Iterator[None]:
-    """Let a vote need pages that SQLite may not add, as on a full disk (SQLITE_FULL)."""
+    """Let a vote need more pages than SQLite may add, as on a full disk (SQLITE_FULL)."""
     with connection.cursor() as cursor:
+
+        def pragma(name: str) -> int:
+            return int(cursor.execute(f"PRAGMA {name}").fetchone()[0])
+
         cursor.execute("CREATE TABLE filler (bytes)")
+        # Pages that earlier tests freed are still in the file.
+        needed = pragma("page_size") * (pragma("freelist_count") + 20)
         cursor.execute(
             "CREATE TRIGGER fill AFTER INSERT ON arena_vote "
-            "BEGIN INSERT INTO filler VALUES (zeroblob(100000)); END"
+            f"BEGIN INSERT INTO filler VALUES (zeroblob({needed})); END"
         )
-        cursor.execute("PRAGMA page_count")
-        cursor.execute(f"PRAGMA max_page_count = {cursor.fetchone()[0]}")
-        yield
-        cursor.execute("PRAGMA max_page_count = 4294967294")
-        cursor.execute("DROP TRIGGER fill")
-        cursor.execute("DROP TABLE filler")
+        pragma(f"max_page_count = {pragma('page_count')}")
+        try:
+            yield
+        finally:
+            pragma("max_page_count = 4294967294")
+            cursor.execute("DROP TRIGGER fill")
+            cursor.execute("DROP TABLE filler")
 
 
 @only_sqlite
 def test_a_vote_on_a_full_disk_is_given_back() -> None:
     matchup = matchups_of(a_study(), "eva")[0]
     client = signed_in("eva")
+    with connection.cursor() as cursor:  # as after a test with many rows
+        cursor.execute("CREATE TABLE freed AS SELECT zeroblob(1000000) AS bytes")
+        cursor.execute("DROP TABLE freed")
     with full_disk():
         refused = post(client, body_for(matchup))
     error_of(refused, 503, "busy")
