@@ -1,42 +1,39 @@
 """Zips from strangers, unpacked within bounds, and what in a folder can be read.
 
-A zip is believed in nothing: the names, sizes and kinds of all its entries are looked at before
-anything is written, and while it is written the bytes are counted, whatever the zip says.
+A zip is believed in nothing: how many entries it has is looked at before they are listed, and the
+names, sizes and kinds of all of them before anything is written.
 """
 
 from __future__ import annotations
 
-import lzma
 import os
+import shutil
 import stat
 import struct
 import zipfile
 import zlib
 from dataclasses import dataclass
 from pathlib import Path, PurePosixPath
-from typing import IO
 
 from augment.errors import InvalidDocument
 from augment.formats.reading import Reader
 
 WHAT = "zip"
-_PIECE = 1 << 20
+_END = struct.Struct("<4s4H2LH")
+"""The end record: entries and bytes of the list of contents are its fifth and sixth field."""
+_LINE_BYTES = 1_000
+"""Of the list of contents for each entry, at most on average."""
 _LONGEST_NAME = 200
 _DEEPEST = 12
-_UNREADABLE = (zipfile.BadZipFile, zlib.error, EOFError, struct.error, NotImplementedError)
+_UNREADABLE = (zipfile.BadZipFile, zlib.error, EOFError, struct.error)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ZipBounds:
-    """What a zip may hold at most.
-
-    Attributes:
-        ratio: Bytes of an entry for each packed one; small entries may have more.
-    """
+    """What a zip may hold at most."""
 
     entries: int = 20_000
     bytes: int = 2_000_000_000
-    ratio: int = 200
 
 
 USUAL_BOUNDS = ZipBounds()
@@ -61,11 +58,12 @@ def unpack_zip(path: Path, into: Path, *, bounds: ZipBounds = USUAL_BOUNDS) -> N
             special files, a name twice, a file in a file, or more than the bounds allow.
     """
     try:
+        _check_end(path, bounds)
         with zipfile.ZipFile(path) as packed:
-            files = _checked(packed.infolist(), bounds)
-            left = bounds.bytes
-            for entry, name in files:
-                left -= _write(packed, entry, into / name, most=left)
+            for entry, name in _checked(packed.infolist(), bounds):
+                (into / name).parent.mkdir(parents=True, exist_ok=True)
+                with packed.open(entry) as source, (into / name).open("xb") as file:
+                    shutil.copyfileobj(source, file)  # no more than the entry says
     except _UNREADABLE as fault:
         raise InvalidDocument(WHAT, [("", f"is broken: {fault}")]) from None
 
@@ -98,13 +96,29 @@ def find_input(folder: Path, readers: list[Reader]) -> tuple[Reader, Path]:
 # Private
 
 
+def _check_end(path: Path, bounds: ZipBounds) -> None:
+    """Raise for a list of contents that is too long, before it is read."""
+    with path.open("rb") as file:
+        file.seek(max(0, file.seek(0, os.SEEK_END) - _END.size - 0xFFFF))
+        tail = file.read()
+    place = tail.rfind(b"PK\5\6")
+    if place < 0:
+        raise zipfile.BadZipFile("it has no end")
+    _, _, _, _, entries, list_bytes, *_ = _END.unpack_from(tail, place)
+    _check_number(max(entries, list_bytes // _LINE_BYTES), bounds)
+
+
+def _check_number(entries: int, bounds: ZipBounds) -> None:
+    if entries > bounds.entries:
+        text = f"holds more than {bounds.entries} entries"
+        raise InvalidDocument(WHAT, [("", text)])
+
+
 def _checked(
     entries: list[zipfile.ZipInfo], bounds: ZipBounds
 ) -> list[tuple[zipfile.ZipInfo, PurePosixPath]]:
     """The files among the entries with their places."""
-    if len(entries) > bounds.entries:
-        text = f"holds {len(entries)} entries, at most {bounds.entries} are read"
-        raise InvalidDocument(WHAT, [("", text)])
+    _check_number(len(entries), bounds)
     total = sum(entry.file_size for entry in entries)
     if total > bounds.bytes:
         raise InvalidDocument(
@@ -114,7 +128,7 @@ def _checked(
     taken: set[str] = set()
     for entry in entries:
         name = _place(entry)
-        problem = _problem(entry, bounds)
+        problem = _problem(entry)
         if problem:
             raise InvalidDocument(WHAT, [(_shown(entry.filename), problem)])
         if entry.is_dir() or _is_of_the_system(name):
@@ -152,43 +166,21 @@ def _place(entry: zipfile.ZipInfo) -> PurePosixPath:
     return place
 
 
-def _problem(entry: zipfile.ZipInfo, bounds: ZipBounds) -> str:
+def _problem(entry: zipfile.ZipInfo) -> str:
     """What keeps an entry from being unpacked, empty for nothing."""
     if entry.flag_bits & 0x1:
         return "is encrypted"
     kind = stat.S_IFMT(entry.external_attr >> 16)
     if kind not in (0, stat.S_IFREG, stat.S_IFDIR):
         return "is a link or a special file"
-    if entry.file_size > max(bounds.ratio * entry.compress_size, _PIECE):
-        return f"unpacks to more than {bounds.ratio} times its size"
+    if entry.compress_type not in (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED):
+        return "is packed in another way than the usual one"
     return ""
 
 
 def _is_of_the_system(place: PurePosixPath) -> bool:
     """What file managers add and nobody meant."""
     return "__MACOSX" in place.parts or place.name in (".DS_Store", "Thumbs.db")
-
-
-def _write(packed: zipfile.ZipFile, entry: zipfile.ZipInfo, path: Path, *, most: int) -> int:
-    """Write one file; how many bytes it has."""
-    path.parent.mkdir(parents=True, exist_ok=True)
-    written = 0
-    with packed.open(entry) as source, path.open("xb") as file:
-        while piece := _next_piece(source):
-            written += len(piece)
-            if written > min(most, entry.file_size):
-                text = "unpacks to more than it says"
-                raise InvalidDocument(WHAT, [(_shown(entry.filename), text)])
-            file.write(piece)
-    return written
-
-
-def _next_piece(source: IO[bytes]) -> bytes:
-    """Bytes of an entry; what its way of packing says of broken ones is said of the zip."""
-    try:
-        return source.read(_PIECE)
-    except (OSError, lzma.LZMAError) as fault:
-        raise zipfile.BadZipFile(str(fault)) from None
 
 
 def _shown(name: str) -> str:

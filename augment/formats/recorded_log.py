@@ -26,9 +26,6 @@ from augment.scene.sizes import LENGTH_WIDTH_M
 
 FloatArray = NDArray[np.float64]
 
-MOST_NUMBERS = 20_000_000
-"""States of all tracks together: 160 MB."""
-MOST_TRACKS = 20_000
 LONGEST_M = 100.0
 """No road user is longer."""
 LONGEST_GAP_S = 0.35
@@ -95,17 +92,6 @@ class Log:
             if (np.abs(states) > FURTHEST_M).any():
                 raise InvalidDocument(self.what, [(name, f"has a number over {FURTHEST_M:.0e}")])
         return Pose(x_m=x_m, y_m=y_m, heading_rad=wrap(heading_rad))
-
-
-def check_count(what: str, place: str, *, tracks: int, steps: int) -> None:
-    """Whether so many tracks over so many steps are read.
-
-    Raises:
-        InvalidDocument: They are not.
-    """
-    if tracks > MOST_TRACKS or tracks * steps * 4 > MOST_NUMBERS:
-        text = f"{tracks} objects over {steps} steps are too many"
-        raise InvalidDocument(what, [(place, text)])
 
 
 def scene_at(

@@ -35,7 +35,10 @@ def av2_rows_that_unpack_to_gigabytes(root: Path) -> Made:
     columns = dict.fromkeys(numbers, pa.array(ZEROS))
     columns |= dict.fromkeys(("track_uuid", "category"), _one_text("PEDESTRIAN", MANY))
     table = pa.table(columns | {"timestamp_ns": pa.array(ZEROS.astype(np.int64))})
-    feather.write_feather(table, folder / "annotations.feather", compression="zstd")
+    packed = pa.ipc.IpcWriteOptions(compression="zstd")
+    with pa.ipc.new_file(folder / "annotations.feather", table.schema, options=packed) as file:
+        for _ in range(50):
+            file.write_table(table)
     return "av2", folder
 
 
@@ -102,7 +105,12 @@ def motion_rows_that_unpack_to_gigabytes(root: Path) -> Made:
     names = ("position_x", "position_y", "heading", "velocity_x", "velocity_y", "timestep")
     columns = dict.fromkeys((*names, "observed"), pa.array(ZEROS))
     columns |= dict.fromkeys(("track_id", "object_type"), _one_text("AV", MANY))
-    parquet.write_table(pa.table(columns), folder / "scenario_made.parquet", compression="zstd")
+    table = pa.table(columns)
+    with parquet.ParquetWriter(
+        folder / "scenario_made.parquet", table.schema, compression="zstd"
+    ) as file:
+        for _ in range(50):
+            file.write_table(table)
     return "av2-motion", folder
 
 
@@ -262,9 +270,17 @@ def scenarionet_of_integers_of_equal_hash(root: Path) -> Made:
 
 
 def scenarionet_of_sets_of_a_long_text(root: Path) -> Made:
-    text = "".join(map(chr, range(1_000))).encode()
+    text = "".join(map(chr, range(50_000))).encode()
     head = b"c__builtin__\nset\n\x94X" + struct.pack("<I", len(text)) + text + b"\x940]\x94("
-    return _pickled(root, head + b"h\x00h\x01\x85R" * 150 + b"e.")
+    return _pickled(root, head + b"h\x00h\x01\x85R" * 1_000 + b"e.")
+
+
+def scenarionet_of_a_place_far_in_its_memory(root: Path) -> Made:
+    return _pickled(root, b"Nr\xff\xff\xff\x7f.")
+
+
+def scenarionet_of_a_text_of_a_terabyte(root: Path) -> Made:
+    return _pickled(root, b"\x8e" + struct.pack("<Q", 1 << 40) + b".")
 
 
 def zip_of_very_many_entries(root: Path) -> Made:

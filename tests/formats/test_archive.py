@@ -15,7 +15,7 @@ from augment.formats.archive import ZipBounds, find_input, unpack_zip
 from augment.formats.readers import READERS
 from tests.formats.av2_logs import write_log
 
-SMALL = ZipBounds(entries=20, bytes=3_000_000, ratio=50)
+SMALL = ZipBounds(entries=20, bytes=3_000_000)
 
 
 def packed(path: Path, files: dict[str, bytes], *, kind: int = stat.S_IFREG) -> Path:
@@ -57,8 +57,7 @@ def test_no_name_leads_out_of_the_folder(tmp_path: Path, name: str) -> None:
 @pytest.mark.parametrize(
     ("make", "problem"),
     [
-        (lambda p: packed(p, {"a": b"\0" * 2_900_000}), "more than 50 times its size"),
-        (lambda p: packed(p, {f"{n}": b"1" for n in range(21)}), "21 entries, at most 20"),
+        (lambda p: packed(p, {f"{n}": b"1" for n in range(21)}), "holds more than 20 entries"),
         (lambda p: packed(p, {f"{n}": bytes(200_000) for n in range(16)}), "unpacks to 3200000"),
         (lambda p: packed(p, {"link": b"/etc/passwd"}, kind=stat.S_IFLNK), "link or a special"),
         (lambda p: packed(p, {"pipe": b""}, kind=stat.S_IFIFO), "link or a special"),
@@ -68,11 +67,12 @@ def test_no_name_leads_out_of_the_folder(tmp_path: Path, name: str) -> None:
         (lambda p: packed(p, {}), "holds no file"),
         (lambda p: garbage(p), "is broken"),
         (lambda p: cut(packed(p, {"a": bytes(range(256)) * 50})), "is broken"),
-        (lambda p: scrambled(p, zipfile.ZIP_LZMA), "is broken"),
-        (lambda p: scrambled(p, zipfile.ZIP_BZIP2), "is broken"),
+        (lambda p: packed_as(p, zipfile.ZIP_LZMA), "packed in another way"),
+        (lambda p: packed_as(p, zipfile.ZIP_BZIP2), "packed in another way"),
+        (lambda p: scrambled(p), "is broken"),
         (lambda p: wrong_checksum(packed(p, {"a": b"hello"})), "is broken"),
         (lambda p: encrypted(packed(p, {"a": b"hello"})), "is encrypted"),
-        (lambda p: understated(packed(p, {"a": bytes(2_000)})), "broken|more than it says"),
+        (lambda p: understated(packed(p, {"a": bytes(2_000)})), "is broken"),
     ],
 )
 def test_what_breaks_the_rules_is_refused(
@@ -102,11 +102,15 @@ def cut(path: Path) -> Path:
     return path
 
 
-def scrambled(path: Path, kind: int) -> Path:
-    """Packed in another way, and broken where its bytes lie."""
+def packed_as(path: Path, kind: int) -> Path:
     with zipfile.ZipFile(path, "w", kind) as made:
         made.writestr("a", bytes(range(256)) * 400)
-    data = bytearray(path.read_bytes())
+    return path
+
+
+def scrambled(path: Path) -> Path:
+    """Broken where its bytes lie."""
+    data = bytearray(packed_as(path, zipfile.ZIP_DEFLATED).read_bytes())
     data[45:80] = bytes(byte ^ 0xFF for byte in data[45:80])
     path.write_bytes(data)
     return path

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from augment.errors import InvalidDocument
 from augment.formats.argoverse2.categories import EGO, TYPE_OF
 from augment.formats.arrow_file import TextColumn, read_arrow
-from augment.formats.recorded_log import Log, LoggedTrack, check_count, speeds
+from augment.formats.recorded_log import Log, LoggedTrack, speeds
 
 WHAT = "Argoverse 2 log"
 BOXES = "annotations.feather"
@@ -126,7 +126,6 @@ def _tracks(
     names, kinds = boxes["track_uuid"], boxes["category"]
     order = np.lexsort((sweeps, names.codes))
     uuids, starts = np.unique(names.codes[order], return_index=True)
-    check_count(WHAT, BOXES, tracks=len(uuids), steps=len(times_s))
     for uuid, mine in zip(uuids.tolist(), np.split(order, starts[1:]), strict=True):
         kind = kinds.values[kinds.codes[mine[0]]]
         if kind == EGO:

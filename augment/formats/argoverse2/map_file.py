@@ -18,7 +18,6 @@ from augment.errors import InvalidDocument
 from augment.formats.argoverse2.log import WHAT
 from augment.formats.json_file import read_json
 from augment.formats.road_map import RoadMap, Segment
-from augment.formats.strips import MOST_SEGMENTS
 from augment.scene.entities import AreaKind
 from augment.scene.schema import problems_of
 
@@ -81,10 +80,6 @@ def read_map(file: Path) -> MapFile:
         InvalidDocument: The file is no such map; with the path and the reason of every fault.
     """
     document = read_json(file, what=WHAT)
-    lanes = document.get("lane_segments") if isinstance(document, dict) else None
-    if isinstance(lanes, dict) and len(lanes) > MOST_SEGMENTS:
-        text = f"{len(lanes)} lane segments, at most {MOST_SEGMENTS} are read"
-        raise InvalidDocument(WHAT, [(file.name, text)])
     try:
         return MapFile.model_validate(document)
     except ValidationError as fault:

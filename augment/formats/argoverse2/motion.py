@@ -22,7 +22,7 @@ from augment.formats.argoverse2.map_file import read_map, road_map
 from augment.formats.argoverse2.sensor import LICENCE, map_file_in, map_notes
 from augment.formats.arrow_file import Columns, read_parquet
 from augment.formats.reading import Moment, Reading, frames_every
-from augment.formats.recorded_log import Log, LoggedTrack, check_count, far_notes, scene_at
+from augment.formats.recorded_log import Log, LoggedTrack, far_notes, scene_at
 from augment.formats.roads import road_around
 from augment.scene.entities import AgentType
 from augment.scene.notes import Note, SceneNoteKind
@@ -153,7 +153,6 @@ def _read(file: Path, ego_id: str) -> MotionFile:
         raise InvalidDocument(
             WHAT, [("track_id", f"{ego_id[:40]!r} is not there; known: {known}")]
         )
-    check_count(WHAT, "track_id", tracks=len(names), steps=count)
     tracks = _tracks(columns, count)
     seen = columns["observed"] > 0
     log = Log(

@@ -8,7 +8,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from augment.formats.commonroad.fields import (
-    WHAT,
     fault,
     point_of,
     points_of,
@@ -16,7 +15,7 @@ from augment.formats.commonroad.fields import (
     value_of,
     whole,
 )
-from augment.formats.recorded_log import LoggedTrack, check_count
+from augment.formats.recorded_log import LoggedTrack
 from augment.formats.xml_file import Element
 from augment.scene.entities import AgentType
 from augment.scene.notes import Note, SceneNoteKind
@@ -113,7 +112,6 @@ def obstacles_of(root: Element) -> Obstacles:
             found.append(_obstacle(element, TYPE_OF[name], place))
     left_out.update(one.name for one in root.all("environmentObstacle", "phantomObstacle"))
     steps = 1 + max((one.states[-1].step for one in found), default=0)
-    check_count(WHAT, "obstacles", tracks=len(found), steps=steps)
     notes = []
     if left_out:
         number, names = sum(left_out.values()), tuple(sorted(left_out))

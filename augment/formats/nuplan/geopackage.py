@@ -17,7 +17,6 @@ from augment.errors import InvalidDocument
 from augment.formats.nuplan.mercator import FloatArray, from_utm, to_utm
 from augment.formats.nuplan.sqlite import WHAT, Tables
 
-MOST_POINTS = 1_000_000
 _ENVELOPE_BYTES = (0, 32, 48, 48, 64)
 GEOGRAPHIC = 4326
 SHORTEST_DEGREE_M = 110_000.0
@@ -180,7 +179,7 @@ def _line(block: bytes, place: int, order: str, size: int) -> tuple[list[FloatAr
     (count,) = struct.unpack_from(f"{order}I", block, place)
     place += 4
     end = place + 8 * size * count
-    if count > MOST_POINTS or end > len(block) or count < 2:
-        raise ValueError("a line is cut off, or has too few or too many points")
+    if end > len(block) or count < 2:
+        raise ValueError("a line is cut off, or has too few points")
     numbers = np.frombuffer(block, dtype=f"{order}f8", count=size * count, offset=place)
     return [numbers.reshape(count, size)[:, :2].astype(np.float64)], end

@@ -16,7 +16,7 @@ import numpy as np
 
 from augment.errors import InvalidDocument
 from augment.formats.nuplan.sqlite import WHAT, Tables
-from augment.formats.recorded_log import Log, LoggedTrack, check_count
+from augment.formats.recorded_log import Log, LoggedTrack
 from augment.scene.entities import AgentType, TrafficLight
 from augment.scene.sizes import EGO_LENGTH_M, EGO_WIDTH_M
 
@@ -98,7 +98,7 @@ def place_of(tables: Tables) -> LogPlace:
     rows = tables.rows("SELECT location, map_version, logfile FROM log LIMIT 1")
     if not rows:
         raise InvalidDocument(WHAT, [("log", "has no row")])
-    location, version, logfile = (str(row or "") for row in rows[0])
+    location, version, logfile = (str(row or "")[:200] for row in rows[0])
     return LogPlace(location=location, version=version, logfile=logfile)
 
 
@@ -251,7 +251,6 @@ def _tracks(tables: Tables, index: dict[bytes, int]) -> tuple[LoggedTrack, ...]:
             continue  # as a join leaves it out
         x, y, yaw, vx, vy, length, width = _numbers(numbers, "lidar_box")
         if track not in states:
-            check_count(WHAT, "track", tracks=len(states) + 1, steps=len(index))
             states[track] = np.full((len(index), 4), np.nan)
             shapes[track] = (_type_of(kind), length, width)
         states[track][index[token]] = (x, y, yaw, math.hypot(vx, vy))

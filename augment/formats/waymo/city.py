@@ -14,7 +14,6 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from augment.errors import InvalidDocument
 from augment.formats.intersection_ways import crossing_segments, take_end_widths
 from augment.formats.lane_edges import USUAL_M, edge_of, whole_edge, width_of
 from augment.formats.road_map import FloatArray, Name, RoadMap, Segment
@@ -24,7 +23,6 @@ from augment.scene.entities import AreaKind, TrafficLight
 from augment.scene.notes import Note, SceneNoteKind
 
 BICYCLE_LANE = 3
-MOST_WORK = 50_000_000
 """Pairs of a lane's point and an edge's; a scenario of the data set has one to ten million."""
 CROSSWALK, SPEED_BUMP, DRIVEWAY = 8, 9, 10
 MPS_OF_MPH = 0.44704
@@ -55,7 +53,6 @@ def city_of(scenario: ScenarioMessage, frame: int) -> WaymoCity:
     """The map with the lights of one step."""
     lanes = {key: lane for key, lane in scenario.lanes.items() if lane.type != BICYCLE_LANE}
     lanes = {key: lane for key, lane in lanes.items() if len(lane.line) >= 2}
-    _check_work(scenario, lanes)
     lights = scenario.lights[frame] if frame < len(scenario.lights) else {}
     controlled = {lane for step in scenario.lights for lane in step}
     crossing: set[Name] = {
@@ -78,21 +75,6 @@ def city_of(scenario: ScenarioMessage, frame: int) -> WaymoCity:
 
 
 # Private
-
-
-def _check_work(scenario: ScenarioMessage, lanes: dict[int, LaneMessage]) -> None:
-    """Whether the edges and neighbours of all lanes together can be measured in good time."""
-    work = 0
-    for lane in lanes.values():
-        for edge in (*lane.left_boundaries, *lane.right_boundaries):
-            rows = min(edge.end + 1, len(lane.line)) - max(edge.start, 0)
-            work += max(rows, 0) * len(scenario.edges.get(edge.feature, ()))
-        for name in (*lane.left_neighbors, *lane.right_neighbors):
-            if name in scenario.lanes:
-                work += len(lane.line) * len(scenario.lanes[name].line)
-    if work > MOST_WORK:
-        text = f"edges of lanes take {work} steps to measure, at most {MOST_WORK} are taken"
-        raise InvalidDocument(WHAT, [("map_features", text)])
 
 
 def _unbounded_joints(lanes: dict[int, LaneMessage]) -> set[int]:

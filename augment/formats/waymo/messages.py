@@ -25,9 +25,6 @@ from augment.formats.waymo.wire import (
 
 FloatArray = NDArray[np.float64]
 
-MOST_STEPS = 10_000
-MOST_POINTS = 10_000
-"""Of one line: five kilometres."""
 _STATE = {2: 0, 3: 1, 8: 2, 9: 3, 10: 4, 5: 5, 6: 6, 11: 7}
 """Field numbers of an ObjectState: x, y, heading, velocity x and y, length, width, valid."""
 _VALID = 11
@@ -155,8 +152,6 @@ def _track(block: bytes) -> TrackMessage:
                 if place is not None:
                     row[place] = whole_of(one) if inner == _VALID else real_of(one)
             rows.append(row)
-            if len(rows) > MOST_STEPS:
-                raise InvalidDocument(WHAT, [("tracks", f"more than {MOST_STEPS} states in one")])
     made.states = np.array(rows, dtype=np.float64).reshape(-1, 8)
     return made
 
@@ -202,9 +197,6 @@ def _points(blocks: Iterable[bytes]) -> FloatArray:
             if number in (1, 2):
                 row[number - 1] = real_of(value)
         rows.append(row)
-        if len(rows) > MOST_POINTS:
-            text = f"has a line of more than {MOST_POINTS} points"
-            raise InvalidDocument(WHAT, [("map_features", text)])
     points = np.array(rows, dtype=np.float64).reshape(-1, 2)
     if not (np.abs(points) <= FURTHEST_M).all():
         text = f"has a point that is not finite or beyond {FURTHEST_M:.0e} m"

@@ -14,7 +14,7 @@ import numpy as np
 
 from augment.errors import InvalidDocument
 from augment.formats.reading import Moment, Reading, frame_in, frames_every
-from augment.formats.recorded_log import Log, LoggedTrack, check_count, far_notes, scene_at
+from augment.formats.recorded_log import Log, LoggedTrack, far_notes, scene_at
 from augment.formats.roads import road_around
 from augment.formats.waymo.city import city_of
 from augment.formats.waymo.messages import (
@@ -118,7 +118,6 @@ def _log(scenario: ScenarioMessage) -> Log:
     if not 0 <= scenario.ego < len(scenario.tracks):
         text = f"{scenario.ego} is none of the {len(scenario.tracks)} tracks"
         raise InvalidDocument(WHAT, [("sdc_track_index", text)])
-    check_count(WHAT, "tracks", tracks=len(scenario.tracks), steps=len(times_s))
     problems = [
         (f"tracks[{index}]", f"has {len(track.states)} states for {len(times_s)} times")
         for index, track in enumerate(scenario.tracks)

@@ -1,7 +1,7 @@
 """Records of a TFRecord file, one after the other, each with its checksum checked.
 
 A record is its length (8 bytes, little endian), the length's checksum (4), the payload and the
-payload's checksum (4). Nothing is read before its length is known to be possible.
+payload's checksum (4).
 """
 
 from __future__ import annotations
@@ -15,8 +15,6 @@ from augment.errors import InvalidDocument
 from augment.formats.waymo.crc32c import masked_crc32c
 
 WHAT = "Waymo Open Motion file"
-LONGEST_RECORD = 12 * 1024 * 1024
-"""A scenario takes one to four megabytes, a very crowded one eight; lidar is in other files."""
 
 _HEAD = struct.Struct("<QI")
 _FOOT = struct.Struct("<I")
@@ -62,8 +60,6 @@ def _records(
         length, check = _HEAD.unpack(head)
         if masked_crc32c(head[:8]) != check:
             raise _fault(name, number, "has a length with a wrong checksum")
-        if length > LONGEST_RECORD:
-            raise _fault(name, number, f"has {length} bytes; at most {LONGEST_RECORD} are read")
         end = place + _HEAD.size + length + _FOOT.size
         if end > size:
             missing = end - size
