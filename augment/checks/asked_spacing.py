@@ -1,10 +1,10 @@
-"""How cones and their worker stand to each other, against what is asked."""
+"""How cones, their worker and vehicles in a row stand to each other, against what is asked."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
-from itertools import combinations
+from itertools import combinations, pairwise
 from statistics import median
 
 from augment.checks.asked import Asked, distance_outside, severity_of, side_of
@@ -12,15 +12,18 @@ from augment.checks.finding import Finding, FindingKind
 from augment.checks.parties import Party
 from augment.checks.tolerances import WORKER_M
 from augment.scene.entities import TrafficAgent
-from augment.scene.intent import ConesRequest, Length, Side
+from augment.scene.intent import ConesRequest, Length, Side, VehicleRequest
 from augment.sentences import sentence, word
 
 
 def asked_spacing(asked: Asked) -> Iterator[Finding]:
-    """The median gap from a cone to the nearest other, and from a worker to the cones."""
+    """The median gap between neighbours in a row, and from a worker to the cones."""
     for party in asked.parties:
-        if isinstance(party.request, ConesRequest):
-            yield from _around_cones(asked, party, party.request)
+        request = party.request
+        if isinstance(request, ConesRequest):
+            yield from _around_cones(asked, party, request)
+        elif isinstance(request, VehicleRequest):
+            yield from _in_row(asked, party, request.spacing, _VEHICLES)
 
 
 def fits_gap(asked: Asked, gap_m: float, wanted: Length) -> bool:
@@ -39,8 +42,7 @@ def apart_m(one: TrafficAgent, other: TrafficAgent) -> float:
 
 def _around_cones(asked: Asked, party: Party, request: ConesRequest) -> Iterator[Finding]:
     wanted = request.spacing if request.reach_m is None else None
-    if wanted and party.is_exact and len(party.agents) > 1 and _are_apart(party.agents):
-        yield _spacing(asked, party.agents, wanted)
+    yield from _in_row(asked, party, wanted, _CONES)
     for worker in party.workers:
         if party.agents:
             yield _worker(worker, party)
@@ -54,15 +56,25 @@ def _are_apart(cones: Sequence[TrafficAgent]) -> bool:
     return all(apart_m(one, other) > one.width_m for one, other in pairs)
 
 
-def _spacing(asked: Asked, cones: Sequence[TrafficAgent], wanted: Length) -> Finding:
-    gaps_m = [min(apart_m(cone, other) for other in cones if other is not cone) for cone in cones]
-    gap_m = median(gaps_m)
-    return Finding(
+def _in_row(asked: Asked, party: Party, wanted: Length | None, template: str) -> Iterator[Finding]:
+    """From centre to centre, straight or along the ego's lane: whichever is nearer to the wish."""
+    things = party.agents
+    if wanted is None or not party.is_exact or len(things) < 2 or not _are_apart(things):
+        return
+    straight_m = median(
+        min(apart_m(one, other) for other in things if other is not one) for one in things
+    )
+    stations_m = sorted(asked.ahead_m(one) for one in things)
+    along_m = median(after - before for before, after in pairwise(stations_m))
+    gap_m = min(
+        straight_m, along_m, key=lambda m: distance_outside(m, wanted.low_m, wanted.high_m)
+    )
+    yield Finding(
         kind=FindingKind.ASKED_SPACING,
         severity=severity_of(fits=fits_gap(asked, gap_m, wanted)),
-        agents=tuple(cone.id for cone in cones),
+        agents=tuple(one.id for one in things),
         measured={"gap_m": gap_m, "asked_m": (wanted.low_m + wanted.high_m) / 2.0},
-        template=sentence("The cones stand {gap_m:.1f} m apart; {asked_m:.1f} m are asked for."),
+        template=template,
     )
 
 
@@ -94,3 +106,7 @@ def _worker_side(asked: Asked, worker: TrafficAgent, party: Party, side: Side) -
             asked=word(side.value),
         ),
     )
+
+
+_CONES = sentence("The cones stand {gap_m:.1f} m apart; {asked_m:.1f} m are asked for.")
+_VEHICLES = sentence("The vehicles stand {gap_m:.1f} m apart; {asked_m:.1f} m are asked for.")

@@ -29,6 +29,7 @@ class FindingKind(StrEnum):
     DEGREES = "degrees"
     WALK_HEADING = "walk_heading"
     WALK_CROSSING = "walk_crossing"
+    WALK_BLOCKED = "walk_blocked"
     OFF_ROAD = "off_road"
     OUTSIDE_MAP = "outside_map"
     OVERLAP = "overlap"
@@ -62,6 +63,7 @@ FAULT_OF = {
     FindingKind.ASKED_HEADING: FaultClass.HEADING,
     FindingKind.LANE_NAMED: FaultClass.LOGIC,
     FindingKind.WALK_CROSSING: FaultClass.LOGIC,
+    FindingKind.WALK_BLOCKED: FaultClass.LOGIC,
     FindingKind.OVERLAP: FaultClass.LOGIC,
     FindingKind.DUPLICATE: FaultClass.LOGIC,
     FindingKind.SIZE: FaultClass.LOGIC,

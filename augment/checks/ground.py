@@ -55,10 +55,10 @@ class Ground:
         """Where vehicles stand in any direction."""
         return Surface.of(areas=(a for a in self.scene.areas if a.kind is AreaKind.CARPARK))
 
-    @property
-    def shows_walkways(self) -> bool:
-        """Whether the map says at all where people walk."""
-        return any(area.kind is AreaKind.WALKWAY for area in self.scene.areas)
+    @cached_property
+    def walkways(self) -> Surface:
+        """Where people walk beside the road; empty where the map does not say."""
+        return Surface.of(areas=(a for a in self.scene.areas if a.kind is AreaKind.WALKWAY))
 
     @cached_property
     def route(self) -> EgoRoute | None:

@@ -84,7 +84,7 @@ def _on_foot(agent: TrafficAgent, situation: ChangedScene) -> Finding | None:
     if gap_m == 0.0:
         return None
     severity = Severity.FACT
-    if situation.ground.shows_walkways and gap_m > VERGE_M:
+    if not situation.ground.walkways.is_empty and gap_m > VERGE_M:
         severity = Severity.DOUBTFUL if gap_m <= FAR_FROM_PATHS_M else Severity.WRONG
     share = ground.share_outside(situation.boxes[agent.id].corners_m)
     return Finding(

@@ -24,6 +24,7 @@ from augment.checks.overlap import overlap
 from augment.checks.situation import ChangedScene, Check
 from augment.checks.size import size
 from augment.checks.speed import speed
+from augment.checks.walk_blocked import walk_blocked
 from augment.checks.walk_crossing import walk_crossing
 from augment.checks.walk_heading import walk_heading
 from augment.scene.entities import Scene
@@ -38,6 +39,7 @@ CHECKS: tuple[Check, ...] = (
     degrees,
     walk_heading,
     walk_crossing,
+    walk_blocked,
     off_road,
     outside_map,
     overlap,

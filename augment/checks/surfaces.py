@@ -85,6 +85,28 @@ class Surface:
         Neighbouring pieces seldom meet exactly: gaps up to `SEAM_M` are passed over. None where
         the point is not on the surface, or the surface ends nowhere within `most_m`.
         """
+        reached_m = 0.0
+        is_on = False
+        for low_m, high_m in self._spans_m(x_m, y_m, heading_rad, most_m):
+            if low_m > reached_m + SEAM_M:
+                break
+            is_on = is_on or high_m >= 0.0
+            reached_m = max(reached_m, high_m)
+        return reached_m if is_on and reached_m < most_m - SEAM_M else None
+
+    def begins_m(self, x_m: float, y_m: float, heading_rad: float, most_m: float) -> float | None:
+        """How far off a point the surface begins in a direction, 0 on it.
+
+        None where it begins nowhere within `most_m`.
+        """
+        ahead = (span for span in self._spans_m(x_m, y_m, heading_rad, most_m) if span[1] > 0.0)
+        first = next(ahead, None)
+        return None if first is None else max(0.0, first[0])
+
+    def _spans_m(
+        self, x_m: float, y_m: float, heading_rad: float, most_m: float
+    ) -> list[tuple[float, float]]:
+        """From where to where each piece lies under a ray; it begins a seam behind its point."""
         import shapely
 
         step = np.array([math.cos(heading_rad), math.sin(heading_rad)])
@@ -93,15 +115,8 @@ class Surface:
         near = self._pieces[self._tree.query(ray, predicate="intersects")]
         parts = shapely.get_parts(shapely.intersection(near, ray))
         parts = parts[shapely.get_type_id(parts) == shapely.GeometryType.LINESTRING]
-        spans = sorted(((shapely.get_coordinates(part) - start) @ step).tolist() for part in parts)
-        reached_m = 0.0
-        is_on = False
-        for low_m, high_m in (sorted((span[0], span[-1])) for span in spans):
-            if low_m > reached_m + SEAM_M:
-                break
-            is_on = is_on or high_m >= 0.0
-            reached_m = max(reached_m, high_m)
-        return reached_m if is_on and reached_m < most_m - SEAM_M else None
+        spans = (((shapely.get_coordinates(part) - start) @ step).tolist() for part in parts)
+        return sorted((min(span), max(span)) for span in spans)
 
     def distance_to_hull_m(self, x_m: float, y_m: float) -> float:
         """From the point to the smallest convex region around the whole surface, 0 inside."""

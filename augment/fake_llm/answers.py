@@ -35,8 +35,8 @@ def write_refusal(task: Task, reason: str) -> str:
     return _sections(
         insights=f"{_road(task.scene)} I did not understand the instruction: {reason}",
         summary="The instruction is not clear to me, so I leave the scene as it is.",
-        changes="[]",
-        calculations="Nothing is to be computed.",
+        changes="none",
+        calculations="none",
         block=block_of(Modification()),
     )
 

@@ -12,6 +12,7 @@ _FOLLOWS_PLACE = frozenset(
     {
         FindingKind.OVERLAP,
         FindingKind.WALK_CROSSING,
+        FindingKind.WALK_BLOCKED,
         FindingKind.ASKED_CROSSING,
         FindingKind.LANE_NAMED,
     }
@@ -23,9 +24,9 @@ def first_guess(findings: Iterable[Finding]) -> frozenset[FaultClass]:
 
     A fault counts once, where it begins. The paper's heading errors are those of agents whose
     position is about right; so at a wrong place the heading, a contact with somebody who is in
-    the right place and a walk that crosses nothing follow from the place. A contact may
-    also follow from a wrong heading. Two that are both misplaced and overlap do so on their own
-    account.
+    the right place and a walk that crosses nothing follow from the place. A contact and a
+    walk that leads through something may also follow from a wrong heading. Two that are both
+    misplaced and overlap do so on their own account.
     """
     faults = [finding for finding in findings if finding.is_fault]
     misplaced = _names(faults, FaultClass.POSITION)
@@ -40,6 +41,8 @@ def _names(faults: Iterable[Finding], fault: FaultClass) -> set[str]:
 def _follows(finding: Finding, misplaced: set[str], turned: set[str]) -> bool:
     if finding.fault is FaultClass.HEADING:
         return bool(finding.agents) and finding.agents[0] in misplaced
+    if finding.kind is FindingKind.WALK_BLOCKED and turned.intersection(finding.agents):
+        return True
     if finding.kind is FindingKind.OVERLAP:
         is_alone = len(misplaced.intersection(finding.agents)) == 1
         return is_alone or bool(turned.intersection(finding.agents))

@@ -27,7 +27,7 @@ from augment.prompts.blocks import (
 from augment.prompts.loose import Unreadable, arguments_at, value_at
 
 TOOL = "pose_on_lane"
-PARAMETERS = ("lane", "start", "distance_m", "lateral_m")
+PARAMETERS = ("lane", "start", "distance_m", "lateral_m", "object")
 """In the order in which the prompt names them."""
 MOST_LOOKED_AT = 64
 

@@ -5,11 +5,13 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 from augment.errors import ToolError
 from augment.geometry.bezier import CubicBezier
 from augment.prompts.calls import PARAMETERS, TOOL
 from augment.prompts.lane_curves import curve_from
+from augment.scene.entities import AgentType
 
 LANE_START = "lane"
 """The start that means the beginning of the lane; any other start is an agent's id."""
@@ -19,6 +21,22 @@ WIDEST_M = 30.0
 MOST_PLACES = 16
 """So many distances may be asked for in one call."""
 
+OBJECT_TYPES = tuple(kind for kind in AgentType if kind is not AgentType.EGO_VEHICLE)
+
+
+class AskedPlace(NamedTuple):
+    """One place of a call.
+
+    Attributes:
+        distance_m: From the start along the lane, negative to go back.
+        lateral_m: To its left, negative to its right.
+        object_type: Of what is to stand there.
+    """
+
+    distance_m: float
+    lateral_m: float
+    object_type: AgentType
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PoseCall:
@@ -27,14 +45,13 @@ class PoseCall:
     Attributes:
         lane: The id of a lane, a connector or a piece, or a curve given by its control points.
         start: "lane" or an agent's id.
-        places: Pairs of a distance from the start along the lane (negative to go back) and an
-            offset to its left (negative to its right).
+        places: What is asked for, in order.
         is_list: Whether several were asked for, be it a list of one.
     """
 
     lane: str | CubicBezier
     start: str
-    places: tuple[tuple[float, float], ...]
+    places: tuple[AskedPlace, ...]
     is_list: bool = False
 
 
@@ -90,7 +107,7 @@ def read_call(arguments: object) -> PoseCall:
     return PoseCall(
         lane=_lane(arguments["lane"]),
         start=start,
-        places=_places(arguments["distance_m"], arguments.get("lateral_m", 0.0)),
+        places=_places(arguments),
         is_list=any(isinstance(arguments.get(name), list) for name in PARAMETERS[2:]),
     )
 
@@ -98,21 +115,36 @@ def read_call(arguments: object) -> PoseCall:
 # Private
 
 
-def _places(distances: object, laterals: object) -> tuple[tuple[float, float], ...]:
-    """Each distance with its offset; one that is no list goes with each of the others."""
-    along = _numbers("distance_m", distances, FURTHEST_M)
-    aside = _numbers("lateral_m", laterals, WIDEST_M)
-    count = max(len(along), len(aside))
-    for name, values, given in (("distance_m", along, distances), ("lateral_m", aside, laterals)):
-        if len(values) != count and isinstance(given, list):
-            other = "lateral_m" if name == "distance_m" else "distance_m"
+def _places(arguments: Mapping[str, object]) -> tuple[AskedPlace, ...]:
+    """The places of a call; what is no list goes with each of the others."""
+    along = _numbers("distance_m", arguments["distance_m"], FURTHEST_M)
+    aside = _numbers("lateral_m", arguments.get("lateral_m", 0.0), WIDEST_M)
+    kinds = _object_types(arguments.get("object", AgentType.VEHICLE.value))
+    count = max(len(along), len(aside), len(kinds))
+    lists = {"distance_m": len(along), "lateral_m": len(aside), "object": len(kinds)}
+    for name, length in lists.items():
+        if length != count and isinstance(arguments.get(name), list):
+            longest = next(other for other, most in lists.items() if most == count)
             raise ToolError(
                 TOOL,
-                f"{name} is a list of {len(values)} and {other} one of {count}: make them equally "
-                "long, or give one number for all places",
+                f"{name} is a list of {length} and {longest} one of {count}: make them equally "
+                "long, or give one value for all places",
             )
-    along, aside = (values * count if len(values) == 1 else values for values in (along, aside))
-    return tuple(zip(along, aside, strict=True))
+    return tuple(
+        AskedPlace(along[n % len(along)], aside[n % len(aside)], kinds[n % len(kinds)])
+        for n in range(count)
+    )
+
+
+def _object_types(value: object) -> tuple[AgentType, ...]:
+    listed = value if isinstance(value, list) else [value]
+    names = [kind.value for kind in OBJECT_TYPES]
+    if not 1 <= len(listed) <= MOST_PLACES or any(one not in names for one in listed):
+        raise ToolError(
+            TOOL,
+            f"object must be one of {_listed(names)}, or a list of 1 to {MOST_PLACES} of them",
+        )
+    return tuple(AgentType(str(one)) for one in listed)
 
 
 def _numbers(name: str, value: object, limit: float) -> tuple[float, ...]:

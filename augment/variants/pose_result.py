@@ -6,6 +6,7 @@ import math
 from dataclasses import dataclass
 
 from augment.geometry.frames import Pose
+from augment.variants.pose_surroundings import RoadSide
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -13,17 +14,17 @@ class PoseOnLane:
     """One place.
 
     Attributes:
-        lane: The short id of the lane or connector that the place was counted on, None on a
-            curve of the model's own, and where the place is beside the lane's width.
-        other_lane: Beside it: the lane or connector under the place, None where there is none.
-        is_beside: Whether the place is outside the lane's width.
-        along_m: From where the shown part of that lane begins.
-        remaining_m: From the place to the end of that lane.
-        width_m: Of that lane, None on a foreign curve.
-        edge_left_m, edge_right_m: From the centre of the lane there to the edge of the road, at a
-            right angle; None where the road has none within 30 m.
+        lane: The short id of the shown lane or connector under the place, None where there is
+            none. Of several the one that the place was counted on.
+        along_m: On the last lane of the route, from where its shown part begins.
+        remaining_m: To the end of that lane.
+        width_m: Of that lane, None on a curve of the model's own.
+        left, right: The sides of the road, from the centre of that lane there.
         next_lanes: What follows at its end, straightest first.
         route: The lanes from the start to the place, in the order they were passed.
+        taken_by: Short ids of those in whose place an object there would stand.
+        nearest_free_m: The distance of the nearest free place, None where there is none near or
+            the place itself is free.
         start_lateral_m: How far left of the lane the starting agent is, None without one.
     """
 
@@ -32,12 +33,12 @@ class PoseOnLane:
     along_m: float
     remaining_m: float
     width_m: float | None
-    edge_left_m: float | None
-    edge_right_m: float | None
+    left: RoadSide
+    right: RoadSide
     next_lanes: tuple[str, ...]
     route: tuple[str, ...]
-    is_beside: bool = False
-    other_lane: str | None = None
+    taken_by: tuple[str, ...] = ()
+    nearest_free_m: float | None = None
     start_lateral_m: float | None = None
 
     def to_document(self) -> dict[str, object]:
@@ -48,16 +49,26 @@ class PoseOnLane:
             "heading_rad": round_number(self.pose.heading_rad, 3),
             "heading_deg": round_number(math.degrees(self.pose.heading_rad), 1),
             "lane": self.lane,
+            "taken_by": list(self.taken_by) or None,
             "along_m": round_number(self.along_m, 2),
             "remaining_m": round_number(self.remaining_m, 2),
             "lane_width_m": _rounded_if_known(self.width_m),
-            "edge_left_m": _rounded_if_known(self.edge_left_m),
-            "edge_right_m": _rounded_if_known(self.edge_right_m),
+            "edge_left_m": _rounded_if_known(self.left.edge_m),
+            "edge_right_m": _rounded_if_known(self.right.edge_m),
             "next_lanes": list(self.next_lanes),
             "route": list(self.route),
         }
-        if self.is_beside:
-            document["other_lane"] = self.other_lane
+        begins = {
+            "carpark_left_m": self.left.carpark_m,
+            "carpark_right_m": self.right.carpark_m,
+            "walkway_left_m": self.left.walkway_m,
+            "walkway_right_m": self.right.walkway_m,
+        }
+        document |= {
+            name: round_number(value, 2) for name, value in begins.items() if value is not None
+        }
+        if self.taken_by:
+            document["nearest_free_m"] = _rounded_if_known(self.nearest_free_m)
         if self.start_lateral_m is not None:
             document["start_lateral_m"] = round_number(self.start_lateral_m, 2)
         return document

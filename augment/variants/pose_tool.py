@@ -4,10 +4,11 @@ In: a `Scene`, and the arguments of a call (`pose_call.py` reads them). Out: a `
 (`pose_result.py`), which the model gets as JSON, or a `ToolError` whose sentence tells the model
 what was wrong.
 
-`pose_on_lane(lane, start, distance_m, lateral_m)` answers from the recorded centrelines, under
-the same short ids as the prompt shows; only control points that are none of the prompt's are a
-curve of their own. It follows the lanes across connectors, straightest first, and says on which
-one it ended. Everything is computed from the scene before the change.
+`pose_on_lane(lane, start, distance_m, lateral_m, object)` answers from the recorded centrelines,
+under the same short ids as the prompt shows; only control points that are none of the prompt's
+are a curve of their own. It follows the lanes across connectors, along the ego's route where they
+belong to it, else straightest first, and says which lane lies under the place and who stands
+there. Everything is computed from the scene before the change.
 
 Frame: ego frame; s along the shown part of a lane, from where it begins.
 """
@@ -31,15 +32,13 @@ from augment.prompts.lane_curves import LaneCurve, lane_curves
 from augment.prompts.names import ShortNames, short_names
 from augment.prompts.vectors import DEFAULT_RADIUS_M, shown_agents
 from augment.scene.bezier_lanes import BezierLane, LanePiece
-from augment.scene.entities import Scene, TrafficAgent
-from augment.variants.pose_call import LANE_START, PoseCall, read_call
+from augment.scene.entities import AgentType, Scene, TrafficAgent
+from augment.variants.pose_call import LANE_START, AskedPlace, PoseCall, read_call
 from augment.variants.pose_result import PoseOnLane, round_number
+from augment.variants.pose_surroundings import Occupancy, side_of_road
 
 COPIED_WITHIN_M = 0.05
 """Control points this near to those of a piece are that piece: the prompt rounds to 0.01 m."""
-
-FURTHEST_EDGE_M = 30.0
-"""The edge of the road is looked for as far beside a lane."""
 
 BESIDE_WITHIN_M = 1.0
 """How far an agent may be past an end of a lane and still count as beside it."""
@@ -59,6 +58,21 @@ class _Road:
     begins_m: float = 0.0
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Spot:
+    """Where a distance leads.
+
+    Attributes:
+        line: The lane or curve that it ends on.
+        s_m: Along its shown part.
+        passed: The lanes on the way, the last one included; empty on a curve.
+    """
+
+    line: LaneCurve | BezierLane
+    s_m: float
+    passed: tuple[LaneCurve, ...] = ()
+
+
 @dataclass(frozen=True, eq=False)
 class PoseTool:
     """The tool for one scene: make it once, call it often. Pure: no call changes it."""
@@ -72,6 +86,7 @@ class PoseTool:
         start: str,
         distance_m: float,
         lateral_m: float = 0.0,
+        object_type: AgentType = AgentType.VEHICLE,
     ) -> PoseOnLane:
         """The pose `distance_m` from the start along the lane and `lateral_m` to its left.
 
@@ -80,6 +95,7 @@ class PoseTool:
             start: "lane" for its beginning, or an agent's id for the place beside that agent.
             distance_m: Along the direction of travel, on over connectors; negative goes back.
             lateral_m: To the left of the direction of travel, negative to the right.
+            object_type: Of what is to stand there.
 
         Raises:
             ToolError: Nobody knows the lane or the agent, the agent is not beside the lane, or
@@ -87,22 +103,34 @@ class PoseTool:
         """
         road = self._road(lane)
         start_m, start_lateral_m = self._start(road, start)
-        s_m = start_m + distance_m
-        if isinstance(road.line, LaneCurve):
-            passed, s_m = self._walk(road.line, s_m, distance_m)
-            return self._on_lane(passed, s_m, lateral_m, start_lateral_m)
-        s_m = _on_foreign_curve(s_m, road.line.length_m, start_m)
-        left_m, right_m = self._edges(road.line.pose_at(s_m))
+
+        def pose_at(along_m: float) -> Pose:
+            there = self._spot(road, start_m, along_m)
+            return there.line.pose_at(there.s_m, lateral_m)
+
+        spot = self._spot(road, start_m, distance_m)
+        here, pose = spot.line, spot.line.pose_at(spot.s_m, lateral_m)
+        counted = here if isinstance(here, LaneCurve) else None
+        taken_by = self._occupancy.taken_by(pose, object_type)
+        free_m = None
+        if taken_by:
+            free_m = self._occupancy.nearest_free_m(pose_at, object_type, distance_m)
+        left, right = (
+            side_of_road(self._ground, here.pose_at(spot.s_m), turn_rad)
+            for turn_rad in (math.pi / 2.0, -math.pi / 2.0)
+        )
         return PoseOnLane(
-            pose=road.line.pose_at(s_m, lateral_m),
-            lane=None,
-            along_m=s_m,
-            remaining_m=road.line.length_m - s_m,
-            width_m=None,
-            edge_left_m=left_m,
-            edge_right_m=right_m,
-            next_lanes=(),
-            route=(),
+            pose=pose,
+            lane=self._under(pose, counted, lateral_m),
+            along_m=spot.s_m,
+            remaining_m=here.length_m - spot.s_m,
+            width_m=None if counted is None else counted.width_m,
+            left=left,
+            right=right,
+            next_lanes=() if counted is None else counted.after,
+            route=tuple(curve.id for curve in spot.passed),
+            taken_by=taken_by,
+            nearest_free_m=free_m,
             start_lateral_m=start_lateral_m,
         )
 
@@ -118,11 +146,11 @@ class PoseTool:
         except ToolError as fault:
             return {"error": fault.problem}
         if not call.is_list:
-            return self._answer_at(call, *call.places[0])
+            return self._answer_at(call, call.places[0])
         found = [
-            {"distance_m": distance_m, "lateral_m": lateral_m}
-            | self._answer_at(call, distance_m, lateral_m)
-            for distance_m, lateral_m in call.places
+            {"distance_m": place.distance_m, "lateral_m": place.lateral_m}
+            | self._answer_at(call, place)
+            for place in call.places
         ]
         shared = {
             name: value
@@ -161,52 +189,30 @@ class PoseTool:
     def _ground(self) -> Ground:
         return Ground.of(self.scene)
 
-    def _answer_at(self, call: PoseCall, distance_m: float, lateral_m: float) -> dict[str, object]:
+    @cached_property
+    def _occupancy(self) -> Occupancy:
+        return Occupancy(self.agents)
+
+    def _answer_at(self, call: PoseCall, place: AskedPlace) -> dict[str, object]:
         try:
-            found = self.pose_on_lane(call.lane, call.start, distance_m, lateral_m)
+            found = self.pose_on_lane(call.lane, call.start, *place)
         except ToolError as fault:
             return {"error": fault.problem}
         return found.to_document()
 
-    def _on_lane(
-        self,
-        passed: list[LaneCurve],
-        s_m: float,
-        lateral_m: float,
-        start_lateral_m: float | None,
-    ) -> PoseOnLane:
-        """The place beside s of the last of the lanes that were passed."""
-        here = passed[-1]
-        pose = here.pose_at(s_m, lateral_m)
-        is_beside = abs(lateral_m) > here.width_m / 2.0
-        left_m, right_m = self._edges(here.pose_at(s_m))
-        return PoseOnLane(
-            pose=pose,
-            lane=None if is_beside else here.id,
-            along_m=s_m,
-            remaining_m=here.length_m - s_m,
-            width_m=here.width_m,
-            edge_left_m=left_m,
-            edge_right_m=right_m,
-            next_lanes=here.after,
-            route=tuple(curve.id for curve in passed),
-            is_beside=is_beside,
-            other_lane=self._under(pose) if is_beside else None,
-            start_lateral_m=start_lateral_m,
-        )
+    def _spot(self, road: _Road, start_m: float, distance_m: float) -> _Spot:
+        """Where a distance from s of a road leads."""
+        s_m = start_m + distance_m
+        if isinstance(road.line, LaneCurve):
+            passed, s_m = self._walk(road.line, s_m, distance_m)
+            return _Spot(line=passed[-1], s_m=s_m, passed=tuple(passed))
+        return _Spot(line=road.line, s_m=_on_foreign_curve(s_m, road.line.length_m, start_m))
 
-    def _edges(self, centre: Pose) -> tuple[float | None, float | None]:
-        """From a lane's centre to the edge of the road on its left and on its right."""
-        road, quarter = self._ground.road, math.pi / 2.0
-        left_m, right_m = (
-            road.reach_m(centre.x_m, centre.y_m, centre.heading_rad + turn, FURTHEST_EDGE_M)
-            for turn in (quarter, -quarter)
-        )
-        return left_m, right_m
-
-    def _under(self, pose: Pose) -> str | None:
-        """The shown lane or connector under a place."""
-        lane_id = self._ground.graph.under(pose.x_m, pose.y_m)
+    def _under(self, pose: Pose, counted: LaneCurve | None, lateral_m: float) -> str | None:
+        """The shown lane or connector under a place: the one it was counted on, if that is."""
+        if counted is not None and abs(lateral_m) <= counted.width_m / 2.0:
+            return counted.id
+        lane_id = self._ground.graph.under(pose.x_m, pose.y_m, pose.heading_rad)
         short = None if lane_id is None else self._names.lanes[lane_id]
         return short if short in self.curves else None
 
@@ -263,7 +269,7 @@ class PoseTool:
         while s_m > passed[-1].length_m:
             over_m = s_m - passed[-1].length_m
             if passed[-1].after:
-                passed.append(self.curves[passed[-1].after[0]])
+                passed.append(self.curves[self._onward(passed[-1])])
                 s_m = over_m
             else:
                 _refuse_past_end(over_m, distance_m - over_m, passed, forward=True)
@@ -276,6 +282,19 @@ class PoseTool:
                 _refuse_past_end(-s_m, distance_m - s_m, passed, forward=False)
                 s_m = 0.0
         return passed, s_m
+
+    def _onward(self, curve: LaneCurve) -> str:
+        """What is driven after a lane: the ego's route where it leads there, else straight on."""
+        routed = self._ego_route if curve.id in self._ego_route else frozenset()
+        return next((name for name in curve.after if name in routed), curve.after[0])
+
+    @cached_property
+    def _ego_route(self) -> frozenset[str]:
+        """Short ids of the lanes that the ego's goal leads over."""
+        route = self._ground.route
+        return (
+            frozenset(self._names.lanes[name] for name in route.lane_ids) if route else frozenset()
+        )
 
 
 # Private

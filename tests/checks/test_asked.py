@@ -9,6 +9,7 @@ import pytest
 
 from augment.checks import Finding, FindingKind, Ground, Severity
 from augment.checks.against_intent import check_against_intent
+from augment.checks.tolerances import AUTHORED
 from augment.scene.entities import AgentType, TrafficAgent, TrafficSide
 from augment.scene.intent import (
     CrashedCar,
@@ -16,6 +17,7 @@ from augment.scene.intent import (
     LaneChoice,
     Side,
     Spot,
+    VehicleRequest,
 )
 from augment.scene.intent_words import (
     Body,
@@ -32,6 +34,7 @@ from tests.intents import (
     crash,
     metres,
     parked,
+    spot,
     towards,
     walk,
 )
@@ -299,3 +302,25 @@ def test_ahead_without_a_number_is_anywhere_ahead() -> None:
     ahead = Intent(requests=(replace(request, spot=where),))
     assert faults(ahead, vehicle("Agent2", 47.0, 0.0)) == set()
     assert faults(ahead, vehicle("Agent2", -20.0, 0.0)) == {FindingKind.ASKED_DISTANCE}
+
+
+def test_a_row_is_measured_from_centre_to_centre_along_its_lane_or_straight() -> None:
+    one = VehicleRequest(spot=spot(20.0), count=3, speed_mps=0.0, spacing=metres(8.0))
+    row = Intent(requests=(one,))
+    cars = [vehicle(f"Agent{n + 2}", 20.0 + 8.0 * n, 0.0) for n in range(3)]
+    assert faults(row, *cars) == set()
+    gaps = [vehicle(f"Agent{n + 2}", 20.0 + 12.8 * n, 0.0) for n in range(3)]  # 8 m between boxes
+    assert FindingKind.ASKED_SPACING in faults(row, *gaps)
+
+
+def test_cones_around_a_sharp_bend_are_apart_along_the_lane() -> None:
+    """On a circle of 6 m, 5 m along the lane are 4.8 m straight, and 3.8 m at its inner edge."""
+    bend, wanted = curve(6.0), metres(5.0)
+    line = cones(12.5, 3, Shape.LINE, lateral=towards(LEFT_EDGE), spacing=wanted)
+    angles = [(2.5 + 5.0 * n) / 6.0 for n in range(2)]
+    inner = [(10.0 + 4.25 * math.sin(a), 6.0 - 4.25 * math.cos(a)) for a in angles]
+    added = [cone(f"Agent{n + 2}", *place) for n, place in enumerate([(7.5, 1.75), *inner])]
+    found = check_against_intent(Ground.of(bend), Modification(added=tuple(added)), line, AUTHORED)
+    (spacing,) = [one for one in found if one.kind is FindingKind.ASKED_SPACING]
+    assert not spacing.is_fault
+    assert spacing.measured["gap_m"] == pytest.approx(5.0, abs=0.1)

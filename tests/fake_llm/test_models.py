@@ -127,6 +127,16 @@ def test_what_is_not_understood_is_said_and_changes_nothing(
     assert "I did not understand the instruction" in made.reason
 
 
+def test_a_refusal_holds_none_in_the_sections_that_have_nothing_to_say(
+    server: FakeServer,
+) -> None:
+    transcript = MemoryTranscript()
+    outcome(server, "fake-good", scene(), "Paint the sky green.", transcript=transcript)
+    reply = transcript.calls[0].reply
+    assert reply is not None
+    assert "Modification Dict: none\n\nModification Calculations:\nnone\n" in reply.text
+
+
 def test_the_answer_has_five_sections_with_computed_numbers(server: FakeServer) -> None:
     transcript = MemoryTranscript()
     outcome(server, "fake-good", scene(), WISH, transcript=transcript)

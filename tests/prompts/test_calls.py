@@ -110,7 +110,7 @@ MALFORMED = [
     ("pose_on_lane(lane='Lane1', distance_m=20+1.4)", "expected a comma or ) at '+1.4)'"),
     ("pose_on_lane(lane='Lane1', lane='Lane2')", "lane stands twice"),
     ("pose_on_lane('Lane1', lane='Lane2')", "has the form"),
-    ("pose_on_lane(1, 2, 3, 4, 5)", "has the form"),
+    ("pose_on_lane(1, 2, 3, 4, 5, 6)", "has the form"),
     ("I need pose_on_lane(lane, start, distance_m) for this.", "is named and not called"),
     ("I would ask pose_on_lane for the pose.", "is named and not called"),
 ]

@@ -15,8 +15,14 @@ from augment.geometry.bezier import CubicBezier
 from augment.geometry.polyline import Polyline
 from augment.prompts.calls import TOOL
 from augment.prompts.lane_curves import control_points
-from augment.scene.entities import Lane
-from augment.variants.pose_call import FURTHEST_M, MOST_PLACES, WIDEST_M, CallLimits
+from augment.scene.entities import AreaKind, Lane, SceneOptions, TurnType
+from augment.variants.pose_call import (
+    FURTHEST_M,
+    MOST_PLACES,
+    OBJECT_TYPES,
+    WIDEST_M,
+    CallLimits,
+)
 from augment.variants.pose_tool import PoseTool
 from tests.scenes import curve, junction, scene, vehicle
 
@@ -52,6 +58,7 @@ def test_the_answer_carries_what_an_agent_of_the_block_needs() -> None:
         "heading_rad": 0.0,
         "heading_deg": 0.0,
         "lane": "Lane1",
+        "taken_by": None,
         "along_m": 50.0,
         "remaining_m": 5.0,
         "lane_width_m": 3.5,
@@ -83,31 +90,103 @@ def test_one_call_asks_for_several_places() -> None:
 
 
 @pytest.mark.parametrize(
-    ("lateral_m", "lane", "other"),
+    ("lateral_m", "lane"),
     [
-        (1.75, "Lane1", "none"),
-        (1.76, None, "Lane2"),
-        (3.5, None, "Lane2"),
-        (5.26, None, None),
-        (-1.75, "Lane1", "none"),
-        (-1.76, None, None),
+        (1.75, "Lane1"),
+        (1.76, "Lane2"),
+        (3.5, "Lane2"),
+        (5.26, None),
+        (-1.75, "Lane1"),
+        (-1.76, None),
     ],
 )
-def test_outside_the_width_of_the_lane_there_is_no_lane(
-    lateral_m: float, lane: str | None, other: str | None
-) -> None:
+def test_the_lane_is_the_one_under_the_place(lateral_m: float, lane: str | None) -> None:
     answer = STREET.answer(
         {"lane": "Lane1", "start": "lane", "distance_m": 60, "lateral_m": lateral_m}
     )
     assert answer["lane"] == lane
-    assert answer.get("other_lane", "none") == other
+    assert answer["route"] == ["Lane1"]
+
+
+def parking_street() -> PoseTool:
+    """The street with a bay 2 m deep on the right, the walkway beyond it, and a car in it."""
+    street = scene()
+    road, walkway, other = street.areas
+    bay = replace(road, id="Area4", kind=AreaKind.CARPARK, boundary_m=strip(-3.75, -1.75))
+    beyond = replace(walkway, boundary_m=strip(-6.25, -3.75))
+    parked = vehicle("Agent2", 20.0, -2.85)
+    return PoseTool(replace(street, areas=(road, beyond, other, bay), agents=(parked,)))
+
+
+def strip(low_m: float, high_m: float) -> tuple[tuple[float, float], ...]:
+    return ((-50.0, low_m), (100.0, low_m), (100.0, high_m), (-50.0, high_m))
+
+
+def test_the_edge_of_the_road_lies_before_its_bays_and_its_walkways() -> None:
+    answer = parking_street().answer({"lane": "Lane1", "start": "Agent1", "distance_m": 40})
+    assert [answer[f"{name}_left_m"] for name in ("edge", "walkway")] == [5.25, 5.25]
+    assert "carpark_left_m" not in answer
+    named = [answer[f"{name}_right_m"] for name in ("edge", "carpark", "walkway")]
+    assert named == [1.75, 1.75, 3.75]
+
+
+@pytest.mark.parametrize(
+    ("distance_m", "lateral_m", "object_type", "taken_by", "free_m"),
+    [
+        (20.0, 0.0, "VEHICLE", None, None),
+        (20.0, -2.85, "VEHICLE", ["Agent2"], 25.5),
+        (18.0, -2.85, "VEHICLE", ["Agent2"], 14.5),
+        (24.7, -2.85, "VEHICLE", ["Agent2"], 25.7),
+        (24.9, -2.85, "VEHICLE", None, None),
+        (23.0, -2.85, "PEDESTRIAN", None, None),
+        (20.0, -1.5, "VEHICLE", ["Agent2"], 25.5),
+        (20.0, -1.5, "TRAFFIC_CONE", None, None),
+        (1.0, 0.0, "TRAFFIC_CONE", ["Agent1"], 3.5),
+    ],
+)
+def test_a_place_that_is_taken_names_who_stands_there_and_the_nearest_free_one(
+    distance_m: float,
+    lateral_m: float,
+    object_type: str,
+    taken_by: list[str] | None,
+    free_m: float | None,
+) -> None:
+    call = {"lane": "Lane1", "start": "Agent1", "distance_m": distance_m, "lateral_m": lateral_m}
+    answer = parking_street().answer({**call, "object": object_type})
+    assert answer["taken_by"] == taken_by
+    assert answer.get("nearest_free_m") == free_m
+    if free_m is not None:
+        again = parking_street().answer({**call, "object": object_type, "distance_m": free_m})
+        assert again["taken_by"] is None
+
+
+def test_where_everything_is_taken_no_place_is_free() -> None:
+    wall = replace(vehicle("Agent2", 25.0, 0.0), length_m=160.0)
+    answer = PoseTool(scene(agents=(wall,))).answer(
+        {"lane": "Lane1", "start": "Agent1", "distance_m": 20}
+    )
+    assert answer["taken_by"] == ["Agent2"]
+    assert answer["nearest_free_m"] is None
+
+
+def test_each_place_may_have_an_object_of_its_own() -> None:
+    call = {"lane": "Lane1", "start": "Agent1", "distance_m": 20, "lateral_m": -1.5}
+    both = parking_street().answer({**call, "object": ["VEHICLE", "TRAFFIC_CONE"]})
+    assert [one["taken_by"] for one in places(both)] == [["Agent2"], None]
+
+
+def test_a_distance_runs_on_along_the_goal_of_the_ego() -> None:
+    left = SceneOptions(goal=TurnType.LEFT)
+    tool = PoseTool(replace(junction(), options=left))
+    assert tool.pose_on_lane("Lane1", "Agent1", 30.0).route == ("Lane1", "Connector2")
+    assert JUNCTION.pose_on_lane("Lane1", "Agent1", 30.0).route == ("Lane1", "Connector1")
 
 
 def test_the_edges_of_the_road_are_told_from_the_centre_of_the_lane() -> None:
     ahead = STREET.pose_on_lane("Lane1", "lane", 60.0, 1.0)
-    assert [ahead.edge_left_m, ahead.edge_right_m] == pytest.approx([5.25, 1.75])
+    assert [ahead.left.edge_m, ahead.right.edge_m] == pytest.approx([5.25, 1.75])
     back = STREET.pose_on_lane("Lane2", "lane", 60.0)
-    assert [back.edge_left_m, back.edge_right_m] == pytest.approx([5.25, 1.75])
+    assert [back.left.edge_m, back.right.edge_m] == pytest.approx([5.25, 1.75])
 
 
 def test_a_seam_between_lanes_is_no_edge_and_a_verge_is_one() -> None:
@@ -117,7 +196,7 @@ def test_a_seam_between_lanes_is_no_edge_and_a_verge_is_one() -> None:
         for n, y in ((1, 0.0), (2, 3.75), (3, 7.9))
     ]
     place = PoseTool(scene(lanes=tuple(row), areas=())).pose_on_lane("Lane1", "lane", 60.0)
-    assert place.edge_left_m == pytest.approx(3.75 + 1.75)
+    assert place.left.edge_m == pytest.approx(3.75 + 1.75)
 
 
 def test_a_road_without_an_edge_nearby_has_none() -> None:
@@ -125,7 +204,7 @@ def test_a_road_without_an_edge_nearby_has_none() -> None:
         scene().areas[0], boundary_m=((-90.0, -90.0), (90.0, -90.0), (90.0, 90.0), (-90.0, 90.0))
     )
     place = PoseTool(scene(areas=(square,))).pose_on_lane("Lane1", "lane", 60.0)
-    assert (place.edge_left_m, place.edge_right_m) == (None, None)
+    assert (place.left.edge_m, place.right.edge_m) == (None, None)
 
 
 def test_a_distance_runs_on_straight_over_connectors_and_back_again() -> None:
@@ -213,7 +292,12 @@ def test_ids_from_other_peoples_files_go_by_their_short_forms() -> None:
         ({"lane": [[0, 0], [1, 1]]}, "this curve is 1.41 m long and no lane of the scene"),
         ({"lane": [[0, 0], [1], [2, 2], [3, 3]]}, "lane must be an id or four control points"),
         ({"lane": [[0, 0]] * 4}, "lane: a curve needs control points in more than one place"),
-        ({"offset": 1}, "no argument 'offset'; there are lane, start, distance_m, lateral_m"),
+        ({"offset": 1}, "no argument 'offset'; there are lane, start, distance_m, lateral_m, obj"),
+        ({"object": "TREE"}, "object must be one of VEHICLE, BUS, BICYCLE, PEDESTRIAN"),
+        ({"object": []}, "or a list of 1 to 16 of them"),
+        ({"object": [[]]}, "object must be one of VEHICLE"),
+        ({"object": "EGO_VEHICLE"}, "object must be one of VEHICLE"),
+        ({"object": ["BUS"], "lateral_m": [1, 2]}, "object is a list of 1 and lateral_m one of 2"),
     ],
 )
 def test_a_call_that_cannot_be_answered_says_why(change: dict[str, object], said: str) -> None:
@@ -256,7 +340,10 @@ any_json = st.recursive(
             "start": any_json | st.sampled_from(["lane", "Agent1"]),
             "distance_m": any_json | st.floats(-200, 200),
         },
-        optional={"lateral_m": any_json | st.floats(-5, 5)},
+        optional={
+            "lateral_m": any_json | st.floats(-5, 5),
+            "object": any_json | st.sampled_from(OBJECT_TYPES),
+        },
     )
 )
 def test_whatever_is_called_the_answer_is_json(arguments: object) -> None:
@@ -299,11 +386,12 @@ def test_the_texts_tell_of_the_tool_as_it_is() -> None:
     schema = json.loads(texts.joinpath("pose_on_lane.json").read_text(encoding="utf-8"))
     parameters = schema["function"]["parameters"]
     assert schema["function"]["name"] == TOOL
-    assert list(parameters["properties"]) == ["lane", "start", "distance_m", "lateral_m"]
+    assert list(parameters["properties"]) == ["lane", "start", "distance_m", "lateral_m", "object"]
+    assert parameters["properties"]["object"]["anyOf"][0]["enum"] == list(OBJECT_TYPES)
     one, several = parameters["properties"]["distance_m"]["anyOf"]
     assert (one["maximum"], several["maxItems"]) == (FURTHEST_M, MOST_PLACES)
     assert parameters["properties"]["lateral_m"]["anyOf"][0]["minimum"] == -WIDEST_M
     told = texts.joinpath("pose_on_lane.md").read_text(encoding="utf-8")
-    answer = JUNCTION.answer({"lane": "Lane1", "start": "Agent1", "distance_m": 1})
-    for name in (*parameters["properties"], *answer, "other_lane", "error"):
+    answer = parking_street().answer({"lane": "Lane1", "start": "Agent1", "distance_m": 1})
+    for name in (*parameters["properties"], *answer, "carpark_left_m", "error"):
         assert name in told
