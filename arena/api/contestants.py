@@ -20,7 +20,7 @@ from arena.api.paging import PageQuery, answer_page, page_of, read_query
 from arena.api.schema import describe
 from augment.models import Contestant
 from augment.services.endpoints.entering import VARIANTS, EnteredEndpoint, enter_contestant
-from augment.services.endpoints.retirement import retire, take_back
+from augment.services.retirement import retire, take_back
 from augment.services.running.transcript_export import contestant_documents
 
 KINDS = [kind for kind in Contestant.Kind if kind is not Contestant.Kind.CHECK]

@@ -23,11 +23,13 @@ class Narrowing:
         search: A part of a name or of what else is read there.
         kind: The state, kind or type.
         part: Another filter that the list has.
+        is_retired: Of scenarios: those that forms offer no more, instead of the others.
     """
 
     search: str = ""
     kind: str = ""
     part: str = ""
+    is_retired: bool = False
 
 
 def find_jobs(wanted: Narrowing, *, user: User) -> QuerySet[GenerationJob]:
@@ -71,6 +73,7 @@ def find_scenarios(wanted: Narrowing) -> QuerySet[Scenario]:
     `part` is a set of the catalogue, `own` for those in none.
     """
     found = Scenario.objects.filter(paraphrase_of=None).select_related("base_scene")
+    found = found.filter(retired_at__isnull=not wanted.is_retired)
     if wanted.search:
         found = found.filter(_any_has(wanted.search, "slug", "instruction", "base_scene__slug"))
     if wanted.kind:

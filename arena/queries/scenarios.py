@@ -26,15 +26,14 @@ OWN = "own"
 
 
 def by_type(chosen: str = "", *, with_paraphrases: bool = True) -> list[TypeGroup]:
-    """The scenarios, in the order of the types; types without any are left out.
+    """The scenarios that forms offer, in the order of the types; types without any are left out.
 
     Args:
         chosen: A set of the catalogue, `own` for those in none; empty for all.
         with_paraphrases: Whether those count that say another one in other words.
     """
-    found = Scenario.objects.select_related("base_scene").defer(
-        "reference", "base_scene__document", "base_scene__recording"
-    )
+    offered = Scenario.objects.filter(retired_at=None).select_related("base_scene")
+    found = offered.defer("reference", "base_scene__document", "base_scene__recording")
     if chosen:
         found = found.filter(catalogue_set="" if chosen == OWN else chosen)
     if not with_paraphrases:
@@ -58,7 +57,9 @@ class SetChoice:
 
 def set_choices(chosen: str) -> list[SetChoice]:
     """All scenarios first (named by the empty text), then the sets that there are."""
-    counted = Scenario.objects.filter(paraphrase_of=None).values_list("catalogue_set")
+    counted = Scenario.objects.filter(paraphrase_of=None, retired_at=None).values_list(
+        "catalogue_set"
+    )
     numbers = dict(counted.annotate(number=Count("pk")).order_by())
     found = [(name, numbers.get(name, 0)) for name in Scenario.SETS]
     found.append((OWN, numbers.get("", 0)))

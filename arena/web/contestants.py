@@ -21,7 +21,7 @@ from arena.web.listing import read_listing, read_page, said_choices
 from augment.errors import AugmentError
 from augment.models import Augmentation, Contestant, GenerationJob
 from augment.services.endpoints.respondents import respondents_of
-from augment.services.endpoints.retirement import retire, take_back
+from augment.services.retirement import retire, take_back
 from augment.services.wording import translate
 
 CONTESTANTS_AT_ONCE = 50

@@ -1,4 +1,4 @@
-"""Deleting scenarios and scenes; asks first, and names what needs them."""
+"""Retiring scenarios and scenes, renaming and deleting them; says what needs them."""
 
 from __future__ import annotations
 
@@ -10,13 +10,15 @@ from django.contrib.auth.models import User
 from django.http import HttpRequest, HttpResponse
 from django.shortcuts import get_object_or_404, redirect
 from django.urls import reverse
-from django.views.decorators.http import require_http_methods
+from django.views.decorators.http import require_http_methods, require_POST
 
 from arena.services.removal import delete_scenario, delete_scene
-from arena.web.access import ADMIN, allow_only
+from arena.services.scenario_edits import rename_scene
+from arena.web.access import ADMIN, STAFF, allow_only
 from arena.web.questions import Confirmation, ask, is_sure
 from augment.errors import AugmentError
 from augment.models import BaseScene, Scenario
+from augment.services.retirement import retire, take_back
 from augment.services.wording import translate
 
 
@@ -50,6 +52,38 @@ def delete_scene_page(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
         return redirect("scene", code=code)
     messages.success(request, f"“{scene.slug}” is deleted.")
     return redirect("scenes")
+
+
+@allow_only(ADMIN)
+@require_POST
+def set_scenario_retired(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
+    """Retire a scenario, or take that back."""
+    row = get_object_or_404(Scenario, code=code)
+    change = take_back if request.POST.get("retired") == "no" else retire
+    change(row, actor=cast(User, request.user))
+    return redirect("scenario", code=code)
+
+
+@allow_only(ADMIN)
+@require_POST
+def set_scene_retired(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
+    """Retire a scene, or take that back."""
+    row = get_object_or_404(BaseScene.objects.defer("recording", "document"), code=code)
+    change = take_back if request.POST.get("retired") == "no" else retire
+    change(row, actor=cast(User, request.user))
+    return redirect("scene", code=code)
+
+
+@allow_only(*STAFF)
+@require_POST
+def rename_scene_page(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
+    """Give a scene without scenarios another slug."""
+    row = get_object_or_404(BaseScene.objects.only("code", "slug"), code=code)
+    try:
+        rename_scene(row, request.POST.get("slug", "").strip(), actor=cast(User, request.user))
+    except AugmentError as error:
+        messages.error(request, translate(error))
+    return redirect("scene", code=code)
 
 
 def _question(slug: str, back: str) -> Confirmation:

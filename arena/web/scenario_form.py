@@ -1,4 +1,4 @@
-"""New scenarios: one on a scene that is looked at, or many from a file."""
+"""Scenarios by form: a new one beside its scene, many from a file, or one to be changed."""
 
 from __future__ import annotations
 
@@ -16,6 +16,7 @@ from django.utils.translation import gettext as _
 from django.utils.translation import gettext_lazy
 from django.views.decorators.http import require_http_methods
 
+from arena.services.scenario_edits import change_scenario
 from arena.services.sent_files import was_too_large
 from arena.web.access import STAFF, allow_only
 from arena.web.json_text import read_json
@@ -105,13 +106,9 @@ def new_scenario_page(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
         try:
             made = add_scenario(
                 scene=scene.slug,
-                type=given["type"] or given["own_type"],
-                type_label=None if given["type"] else given["own_label"] or None,
-                instruction=given["instruction"],
+                **_wanted(given),
                 slug=given["slug"] or None,
                 intent=form.intent_document(),
-                keep_traffic=given["keep_traffic"],
-                circumstances=read_circumstances(given["density"], given["goal"]),
                 actor=cast(User, request.user),
             )
         except AugmentError as error:
@@ -122,6 +119,24 @@ def new_scenario_page(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
             return redirect("scenario", code=made.code)
     fields = entered_fields(request.POST) if request.method == "POST" else IntentFields()
     return _shown(request, scene, form, fields)
+
+
+@allow_only(*STAFF)
+@require_http_methods(["GET", "HEAD", "POST"])
+def edit_page(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
+    """Instruction, type and circumstances of a scenario that nothing needs yet."""
+    scenario = get_object_or_404(Scenario, code=code)
+    form = ScenarioForm(request.POST if request.method == "POST" else _entered(scenario))
+    if request.method == "POST" and form.is_valid():
+        try:
+            change_scenario(scenario, **_wanted(form.cleaned_data), actor=cast(User, request.user))
+        except AugmentError as error:
+            form.add_error(None, translate(error))
+        else:
+            send_later(request, enqueue_scenario, scenario.pk)
+            messages.success(request, f"“{scenario.slug}” is changed.")
+            return redirect("scenario", code=code)
+    return render(request, "scenarios/edit.html", {"scenario": scenario, "form": form})
 
 
 @allow_only(*STAFF)
@@ -186,6 +201,28 @@ def entered_fields(posted: QueryDict) -> IntentFields:
 
 
 # --- Private -----------------------------------------------------------------------------------
+
+
+def _wanted(given: dict[str, Any]) -> dict[str, Any]:
+    """What the form says of a scenario that is new or is changed."""
+    return {
+        "type": given["type"] or given["own_type"],
+        "type_label": None if given["type"] else given["own_label"] or None,
+        "instruction": given["instruction"],
+        "keep_traffic": given["keep_traffic"],
+        "circumstances": read_circumstances(given["density"], given["goal"]),
+    }
+
+
+def _entered(scenario: Scenario) -> dict[str, Any]:
+    """A scenario as the form would send it."""
+    return {
+        "type": scenario.type,
+        "instruction": scenario.instruction,
+        "keep_traffic": scenario.keep_traffic,
+        "density": scenario.traffic_density,
+        "goal": scenario.goal,
+    }
 
 
 def _rearranged(request: HttpRequest, scene: BaseScene) -> HttpResponse:

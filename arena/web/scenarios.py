@@ -61,10 +61,17 @@ SCENARIOS_AT_ONCE = 60
 def scenarios_page(request: HttpRequest) -> HttpResponse:
     """The contact sheet: scenarios of a set by type, the reference where it was drawn."""
     chosen = scenarios.set_asked(request.GET.get("set"))
-    listing = read_listing(
-        request, {"type": (_("Type"), said_choices(type_choices()))}, keep=("set",)
+    choices = {
+        "type": (_("Type"), said_choices(type_choices())),
+        "offered": (_("In forms"), [("retired", _("retired"))]),
+    }
+    listing = read_listing(request, choices, keep=("set",))
+    wanted = Narrowing(
+        search=listing.search,
+        kind=listing.chosen("type"),
+        part=chosen,
+        is_retired=listing.chosen("offered") == "retired",
     )
-    wanted = Narrowing(search=listing.search, kind=listing.chosen("type"), part=chosen)
     page = read_page(request, find_scenarios(wanted), size=SCENARIOS_AT_ONCE)
     rows = list(page.object_list)
     context = {

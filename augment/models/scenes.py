@@ -15,6 +15,7 @@ from augment.scene.intent_words import (
 
 DENSITIES = tuple(TrafficDensity)
 GOALS = (TurnType.LEFT, TurnType.RIGHT, TurnType.STRAIGHT)
+RETIRED_HELP = "since when forms offer it no more"
 SLUG_HELP = "lower-case letters, digits and hyphens"
 
 
@@ -41,6 +42,7 @@ class BaseScene(models.Model):
         db_index=True,
         help_text="of what was read from outside; two scenes of one hash are the same",
     )
+    retired_at = models.DateTimeField(null=True, blank=True, help_text=RETIRED_HELP)
     created_at = models.DateTimeField(auto_now_add=True)
 
     class Meta:
@@ -137,6 +139,7 @@ class Scenario(models.Model):
         blank=True,
         help_text="by key of a window that was drawn: original image and view",
     )
+    retired_at = models.DateTimeField(null=True, blank=True, help_text=RETIRED_HELP)
     created_at = models.DateTimeField(auto_now_add=True)
 
     class Meta:

@@ -9,15 +9,18 @@ from django.core.files.uploadedfile import SimpleUploadedFile
 from django.test import Client
 from django.urls import reverse
 
-from augment.models import BaseScene, Scenario
+from arena.queries.scenarios import by_type
+from augment.models import BaseScene, GenerationJob, Scenario
 from augment.scene.codec import modification_to_document
 from augment.scene.intent_codec import intent_to_document
 from augment.scene.intent_words import Shape
 from augment.scene.modification import Modification
+from augment.services.running.choosing import resolve_scenarios
 from augment.services.scenarios.scene_pictures import draw_scenario, draw_scene
 from tests.intents import cones
 from tests.jobs.rows import add_scenario
-from tests.scenes import cone
+from tests.scenes import cone, vehicle
+from tests.scenes import scene as a_scene
 from tests.study_rows import a_study
 from tests.web.cast import people, signed_in
 
@@ -215,3 +218,73 @@ def test_what_nothing_needs_is_deleted_and_else_is_said_what_needs_it(scene: Bas
     admin.post(reverse("scene-delete", args=[scene.code]), {"sure": "1"})
     assert not BaseScene.objects.filter(pk=scene.pk).exists()
     assert list(Scenario.objects.all()) == [place]
+
+
+def test_a_scenario_is_changed_until_something_needs_it(analyst: Client, scene: BaseScene) -> None:
+    _, made = send(analyst, scene, type="jaywalking_pedestrian")
+    assert made is not None
+    page = reverse("scenario-edit", args=[made.code])
+    shown = analyst.get(page).content.decode()
+    assert "Let a car cut in.</textarea>" in shown
+    given = {"type": "jaywalking_pedestrian", "instruction": "Let a bus cut in.", "density": "low"}
+    assert "is changed" in analyst.post(page, given, follow=True).content.decode()
+    made.refresh_from_db()
+    assert (made.instruction, made.traffic_density) == ("Let a bus cut in.", "low")
+    assert made.spawned is not None
+    job = GenerationJob.objects.create(name="Round 1")
+    job.scenarios.add(made)
+    refused = analyst.post(page, given | {"instruction": "Let a tram cut in."}).content.decode()
+    assert "can’t be changed; it is needed by the job “Round 1”" in refused
+    assert "Let a tram cut in." in refused
+    made.refresh_from_db()
+    assert made.instruction == "Let a bus cut in."
+
+
+def test_a_reference_must_still_fit_a_changed_scenario(analyst: Client) -> None:
+    busy = a_scene(agents=(vehicle("Agent2", 20.0, 0.0),))
+    moved = Modification(removed=("Agent2",))
+    made = add_scenario(
+        "busy", scene=busy, reference=modification_to_document(moved), keep_traffic=True
+    )
+    page = reverse("scenario-edit", args=[made.code])
+    refused = analyst.post(page, {"type": made.type, "instruction": "x"}).content.decode()
+    assert "Agent2" in refused
+    made.refresh_from_db()
+    assert made.keep_traffic
+
+
+def test_what_is_retired_is_offered_no_more(scene: BaseScene) -> None:
+    admin = signed_in(people()["admin"])
+    made = scene.scenarios.get()
+    admin.post(reverse("scenario-retired", args=[made.code]), {"retired": "yes"})
+    assert resolve_scenarios(["all"]) == []
+    assert resolve_scenarios([made.slug]) == [made.slug]
+    assert by_type() == []
+    listed = admin.get(reverse("scenarios")).content.decode()
+    assert reverse("scenario", args=[made.code]) not in listed
+    retired = admin.get(reverse("scenarios") + "?offered=retired").content.decode()
+    assert reverse("scenario", args=[made.code]) in retired
+    admin.post(reverse("scenario-retired", args=[made.code]), {"retired": "no"})
+    assert resolve_scenarios(["all"]) == [made.slug]
+
+
+def test_no_scenario_is_added_to_a_retired_scene(scene: BaseScene) -> None:
+    admin = signed_in(people()["admin"])
+    admin.post(reverse("scene-retired", args=[scene.code]), {"retired": "yes"})
+    shown, made = send(admin, scene, type="jaywalking_pedestrian")
+    assert made is None
+    assert "is retired" in shown
+    admin.post(reverse("scene-retired", args=[scene.code]), {"retired": "no"})
+    assert send(admin, scene, type="jaywalking_pedestrian")[1] is not None
+
+
+def test_a_scene_is_renamed_while_it_has_no_scenario(scene: BaseScene) -> None:
+    admin = signed_in(people()["admin"])
+    page = reverse("scene-rename", args=[scene.code])
+    refused = admin.post(page, {"slug": "other"}, follow=True).content.decode()
+    assert "can’t be renamed; it is needed by the scenario “street”" in refused
+    scene.scenarios.all().delete()
+    assert "lower-case letters" in admin.post(page, {"slug": "No"}, follow=True).content.decode()
+    admin.post(page, {"slug": "other"})
+    scene.refresh_from_db()
+    assert (scene.slug, scene.document["name"]) == ("other", "other")

@@ -21,7 +21,7 @@ from arena.web.forms import ChoiceForm
 from arena.web.study_forms import StudyForm
 from augment.errors import InvalidDocument, UnknownName
 from augment.models import Contestant, Event, Scenario
-from augment.services.endpoints.retirement import retire
+from augment.services.retirement import retire
 from tests import study_rows
 from tests.web.cast import people, signed_in
 from tests.web.test_questions import hidden_of, text_of

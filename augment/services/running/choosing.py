@@ -38,7 +38,8 @@ def resolve_scenarios(given: Sequence[str]) -> list[str]:
 
     `all`: every scenario; `catalogue`: the authored ones, `set:paper` or `set:hard` (or the name
     alone): those of one set, all three without paraphrases; `paraphrases`: those of the
-    catalogue; with *, ? or [...]: every slug of that pattern.
+    catalogue; with *, ? or [...]: every slug of that pattern. Only a slug or a pattern names
+    retired ones.
 
     Raises:
         UnknownName: There is no such scenario or set, or none of that pattern.
@@ -61,7 +62,8 @@ def _matching(word: str, known: Sequence[str]) -> list[str]:
 
 
 def _several(word: str) -> QuerySet[Scenario] | None:
-    authored = Scenario.objects.exclude(catalogue_set="")
+    offered = Scenario.objects.filter(retired_at=None)
+    authored = offered.exclude(catalogue_set="")
     name = word.removeprefix(SET)
     if name in list(CatalogueSet):
         return authored.filter(paraphrase_of=None, catalogue_set=name)
@@ -69,7 +71,7 @@ def _several(word: str) -> QuerySet[Scenario] | None:
         raise UnknownName("set", name, [one.value for one in CatalogueSet])
     match word:
         case "all":
-            return Scenario.objects.all()
+            return offered
         case "paraphrases":
             return authored.exclude(paraphrase_of=None)
         case "catalogue":

@@ -137,16 +137,14 @@ def add_scenario(
             spawned.
     """
     base_scene = _base_scene(scene)
-    label = label_for(type, type_label)
-    check_prose("instruction", instruction, what="scenario", longest=INSTRUCTION_LENGTH)
+    if base_scene.retired_at is not None:
+        raise Conflict(f"The scene “{base_scene.slug}” is retired; offer it again first.")
     scenario = Scenario(
         slug=_untaken_slug(base_scene, type, slug),
         base_scene=base_scene,
-        type=type,
-        type_label=label,
-        instruction=instruction.strip(),
         keep_traffic=keep_traffic,
     )
+    set_wording(scenario, instruction, type, type_label)
     _set_circumstances(scenario, circumstances or Circumstances(), reference)
     if reference is not None:
         _set_reference(scenario, reference)
@@ -156,6 +154,46 @@ def add_scenario(
     _insert(scenario)
     _log_addition(scenario, actor)
     return scenario
+
+
+def set_wording(scenario: Scenario, instruction: str, type: str, type_label: str | None) -> None:
+    """Set type and instruction without saving; an instruction that changes is a person's own.
+
+    Raises:
+        InvalidDocument: The type or the instruction breaks its format.
+        Conflict: The type has another label.
+    """
+    check_prose("instruction", instruction, what="scenario", longest=INSTRUCTION_LENGTH)
+    scenario.type, scenario.type_label = type, label_for(type, type_label)
+    scenario.instruction_is_generated &= scenario.instruction == instruction.strip()
+    scenario.instruction = instruction.strip()
+
+
+def change_circumstances(scenario: Scenario, given: Circumstances, *, keep_traffic: bool) -> None:
+    """Set traffic and goal of a scenario that was never asked, without saving.
+
+    Raises:
+        InvalidModification: The reference does not fit any more.
+        Conflict: Traffic is to be kept and spawned.
+    """
+    before = (scenario.keep_traffic, scenario.traffic_density, scenario.goal)
+    if before == (keep_traffic, given.density.value, given.goal or ""):
+        return
+    spawned = None
+    if before[:2] == (keep_traffic, given.density.value) and scenario.spawned is not None:
+        spawned = modification_from_document(scenario.spawned).added
+    reference, scenario.keep_traffic = scenario.reference, keep_traffic
+    kept = replace(
+        given,
+        traffic=spawned,
+        interplan=scenario.interplan,
+        instruction_is_generated=scenario.instruction_is_generated,
+    )
+    scenario.spawned = None
+    _set_circumstances(scenario, kept, reference)
+    if reference is not None:
+        _set_reference(scenario, reference)
+    scenario.original_image, scenario.windows = "", {}
 
 
 def _log_addition(scenario: Scenario, actor: User | None) -> None:
