@@ -86,7 +86,7 @@ def read_votes(
         raise
     except (ValueError, KeyError, csv.Error) as error:
         explain(path, wanted)
-        raise VotesFileUnreadable(f"{path}: {error}") from error
+        raise VotesFileUnreadable(f"{path.name}: {error}") from error
     many = 1 + len(clusters)
     found = _as_votes(rows[:, : 2 + many], counts, clusters, names[:many])
     if covariates:

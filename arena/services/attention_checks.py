@@ -74,8 +74,8 @@ def enough_checks(
         raise NothingToPlan(
             sentence(
                 "Attention checks wanted for each expert: %(wanted)s; scenarios with pictures for "
-                "one: %(found)s. Generate the contestant reference and run “manage.py draw_checks "
-                "all”, which draws the broken pictures, then open the study; or ask for 0 %%.",
+                "one: %(found)s. Generate the contestant reference and press “Draw missing "
+                "attention checks” on the page of a new study, then open it; or ask for 0 %%.",
                 wanted=wanted,
                 found=len(checks),
             )

@@ -97,8 +97,9 @@ def require_practice_pictures() -> None:
         raise NothingToPlan(
             sentence(
                 "There is nothing to practise on yet: no scenario has a picture of its reference "
-                "and a broken one. Generate the contestant reference and run “manage.py "
-                "draw_checks all”, or open the study without a practice round."
+                "and a broken one. Generate the contestant reference and press “Draw missing "
+                "attention checks” on the page of a new study, or open it without a practice "
+                "round."
             )
         )
 

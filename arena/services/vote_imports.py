@@ -105,7 +105,7 @@ def _checked(path: Path) -> tuple[int, str]:
     except VotesFileUnreadable as error:
         raise VotesUnreadable(str(error)) from error
     except OSError as error:
-        raise VotesUnreadable(f"{path} can't be read: {error.strerror}.") from error
+        raise VotesUnreadable(f"{path.name} can't be read: {error.strerror}.") from error
 
 
 def _write(path: Path, file: VoteFile) -> tuple[int, bool]:

@@ -24,7 +24,11 @@ def load_scenarios(request: HttpRequest) -> HttpResponse:
     """Load one set of the catalogue, all of it or nothing, and those who ask nobody."""
     actor = cast(User, request.user)
     try:
-        report = load_own_catalogue(sets=[request.POST.get("set", "")], actor=actor)
+        report = load_own_catalogue(
+            sets=[request.POST.get("set", "")],
+            with_paraphrases="wordings" in request.POST,
+            actor=actor,
+        )
     except AugmentError as error:
         messages.error(request, translate(error))
     else:

@@ -39,7 +39,7 @@ def read_json(file: Path, *, what: str) -> object:
         _check_texts(value)
         return value
     except OSError as fault:
-        raise InvalidDocument(what, [(str(file), fault.strerror or "can't be read")]) from None
+        raise InvalidDocument(what, [(file.name, fault.strerror or "can't be read")]) from None
     except RecursionError:
         raise InvalidDocument(what, [(file.name, "is nested too deeply")]) from None
     except ValueError as fault:  # not JSON, not UTF-8, or a number of thousands of digits

@@ -40,7 +40,7 @@ def read_yaml_file(file: Path, *, what: str) -> object:
             raise InvalidDocument(what, [(file.name, text)])
         return read_yaml(file.read_text(encoding="utf-8"), what=what)
     except OSError as fault:
-        raise InvalidDocument(what, [(str(file), fault.strerror or "can't be read")]) from None
+        raise InvalidDocument(what, [(file.name, fault.strerror or "can't be read")]) from None
     except UnicodeDecodeError as fault:
         raise InvalidDocument(what, [(file.name, f"is not UTF-8: {fault.reason}")]) from None
 

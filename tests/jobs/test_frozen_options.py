@@ -27,7 +27,7 @@ def test_who_ran_with_other_prompts_is_not_run_with_these() -> None:
         run("a")
         Contestant.objects.update(frozen_options={"prompt_version": "0" * 12})
         assert "version 000000000000" in find_obstacle(Contestant.objects.get(slug="a"))
-        with pytest.raises(Conflict, match="add_contestant SLUG --like a"):
+        with pytest.raises(Conflict, match="Add another contestant like it"):
             run("a")
         row = Augmentation.objects.create(
             job=GenerationJob.objects.get(),

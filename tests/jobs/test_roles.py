@@ -125,9 +125,8 @@ def test_visual_qa_waits_until_the_viewer_is_probed_or_somebody_tells() -> None:
     with pytest.raises(Conflict) as raised:
         jobs.launch(name="J", contestants=["one"], scenarios=["street-1"])
     assert "nobody knows whether they do: one (eyes at there)" in str(raised.value)
-    assert "manage.py probe_endpoint there --model eyes" in str(raised.value)
-    assert "--sees yes" in str(raised.value)
-    assert "probe_endpoint there --model eyes finds out" in find_obstacle(Contestant.objects.get())
+    assert "Probe the model on the page of its endpoint" in str(raised.value)
+    assert "viewer eyes at there sees pictures" in find_obstacle(Contestant.objects.get())
     assert not GenerationJob.objects.exists()
     out = io.StringIO()
     call_command("probe_endpoint", "there", "--model", "eyes", "--sees", "yes", stdout=out)

@@ -79,7 +79,7 @@ def test_checks_show_the_reference_against_a_broken_one() -> None:
 def test_a_study_whose_checks_nobody_has_drawn_is_not_opened() -> None:
     cast = with_checks(6)
     Augmentation.objects.filter(contestant__kind="check").delete()
-    with pytest.raises(NothingToPlan, match=r"each expert: 3; .* for one: 0.*draw_checks all"):
+    with pytest.raises(NothingToPlan, match=r"expert: 3; .* for one: 0.*Draw missing"):
         opened(cast, check_share=0.25)
     assert not Study.objects.exists()
     assert not opened(cast).matchups.filter(kind="check").exists()

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from tempfile import gettempdir
 
 import pytest
 from django.core.files.uploadedfile import SimpleUploadedFile
@@ -172,6 +173,7 @@ def test_a_file_is_tried_then_added(analyst: Client) -> None:
 def test_one_wrong_row_keeps_all_out_and_each_row_is_told(analyst: Client, name: str) -> None:
     shown = upload(analyst, ROWS.replace("change.json", name))
     assert "Nothing was added" in shown
+    assert gettempdir() not in shown
     assert shown.count("badge is-bad") == 1
     assert "Fine" in shown
     assert Scenario.objects.count() == 1

@@ -46,6 +46,13 @@ def test_the_paper_set_is_loaded_by_a_button_and_loading_it_again_changes_nothin
     assert Contestant.objects.filter(slug="reference").exists()
 
 
+def test_other_wordings_are_loaded_by_a_button(client: Client) -> None:
+    given = {"set": "hard", "wordings": "1"}
+    said = client.post(reverse("catalogue-load"), given, follow=True).content.decode()
+    assert " added" in said
+    assert Scenario.objects.exclude(paraphrase_of=None).exists()
+
+
 def test_another_set_is_named_as_unknown(client: Client) -> None:
     answer = client.post(reverse("catalogue-load"), {"set": "easy"}, follow=True)
     assert "Unknown set" in answer.content.decode()

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from tempfile import gettempdir
 
 import pytest
 from django.conf import LazySettings
@@ -70,6 +71,7 @@ def test_from_a_file_to_a_scene(analyst: Client) -> None:
 def test_what_can_not_be_read_says_why(analyst: Client) -> None:
     shown = send(analyst, b"hello", "notes.txt")
     assert "It can’t be read." in shown
+    assert gettempdir() not in shown
     assert "none of the formats" in shown
 
 

@@ -145,7 +145,7 @@ def other_prompts(slug: str, options: ContestantOptions) -> Sentence | None:
         return None
     return sentence(
         "%(contestant)s asks with prompts of version %(wanted)s, and version %(installed)s is "
-        "installed. Add another contestant: manage.py add_contestant SLUG --like %(contestant)s",
+        "installed. Add another contestant like it, which asks with the installed ones",
         contestant=slug,
         wanted=wanted,
         installed=installed,

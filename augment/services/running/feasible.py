@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import shlex
 from collections.abc import Sequence
 
 from django.db.models import Q
@@ -57,9 +56,9 @@ def find_obstacle(contestant: Contestant) -> str:
         return sentence("its viewer sees text alone; visual QA needs vision")
     if viewer is not None and sight_of(viewer) is None:
         return sentence(
-            "nobody knows whether its viewer sees pictures, which visual QA needs: %(probe)s "
-            "finds out, and with --sees yes (or at the endpoint) you say so",
-            probe=_probe(viewer),
+            "nobody knows whether its viewer %(viewer)s sees pictures, which visual QA needs: "
+            "probe it on its page, or say there what you know",
+            viewer=str(viewer),
         )
     return ""
 
@@ -182,15 +181,8 @@ def _refuse_without_sight(who: Sequence[Contestant]) -> None:
         raise Conflict(
             sentence(
                 "Visual QA needs a viewer that sees, and of these nobody knows whether they do: "
-                "%(names)s. Probe the model (%(probe)s), or say what you know: the same with "
-                "--sees yes, or at the endpoint.",
+                "%(names)s. Probe the model on the page of its endpoint, or say there what you "
+                "know.",
                 names=tuple(f"{slug} ({respondent})" for slug, respondent in lacking[None]),
-                probe=_probe(lacking[None][0][1]),
             )
         )
-
-
-def _probe(respondent: Respondent) -> str:
-    """The command that asks what a model can do."""
-    endpoint, model = respondent.endpoint.label, shlex.quote(respondent.model)
-    return f"manage.py probe_endpoint {endpoint} --model {model}"

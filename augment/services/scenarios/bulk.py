@@ -157,7 +157,7 @@ def _csv_rows(file: Path) -> list[dict[str, Any]]:
             raise InvalidDocument(WHAT, [(file.name, f"at most {MAX_CHARACTERS} bytes are read")])
         text = file.read_text(encoding="utf-8-sig")
     except OSError as fault:
-        raise InvalidDocument(WHAT, [(str(file), fault.strerror or "can't be read")]) from None
+        raise InvalidDocument(WHAT, [(file.name, fault.strerror or "can't be read")]) from None
     except UnicodeDecodeError as fault:
         raise InvalidDocument(WHAT, [(file.name, f"is not UTF-8: {fault.reason}")]) from None
     try:

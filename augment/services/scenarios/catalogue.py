@@ -100,8 +100,10 @@ def load_catalogue(
     )
 
 
-def load_own_catalogue(*, sets: Sequence[str], actor: User) -> CatalogueReport:
-    """What comes with the project, by the names of its sets.
+def load_own_catalogue(
+    *, sets: Sequence[str], with_paraphrases: bool = False, actor: User
+) -> CatalogueReport:
+    """What comes with the project, by the names of its sets; see `load_catalogue`.
 
     Raises:
         UnknownName: There is no such set.
@@ -111,7 +113,12 @@ def load_own_catalogue(*, sets: Sequence[str], actor: User) -> CatalogueReport:
         if name not in known:
             raise UnknownName("set", name, known)
     folder = settings.BASE_DIR / "fixtures"
-    return load_catalogue(folder=folder, actor=actor, sets=[CatalogueSet(one) for one in sets])
+    return load_catalogue(
+        folder=folder,
+        actor=actor,
+        sets=[CatalogueSet(one) for one in sets],
+        with_paraphrases=with_paraphrases,
+    )
 
 
 # Private

@@ -82,7 +82,7 @@ def read_circumstances(density: str, goal: str) -> Circumstances:
 
 
 def placeable_intent(document: object) -> dict[str, Any]:
-    """Return an intent as it is stored; every way to enter one leads through here.
+    """Return an intent as it is stored; whoever enters or accepts one comes through here.
 
     Raises:
         InvalidDocument: It breaks the format, or leaves open what the rule placer would refuse.
@@ -96,6 +96,10 @@ def placeable_intent(document: object) -> dict[str, Any]:
     if problems:
         raise InvalidDocument("intent", problems)
     return intent_to_document(intent)
+
+
+def _stored_intent(document: object) -> dict[str, Any]:
+    return intent_to_document(intent_from_document(document))
 
 
 @transaction.atomic
@@ -149,7 +153,10 @@ def add_scenario(
     if reference is not None:
         _set_reference(scenario, reference)
     if intent is not None:
-        scenario.intent = placeable_intent(intent)
+        # The catalogue leaves some open on purpose: the rule placer refuses them, models do not.
+        is_entered = intent_origin is IntentOrigin.ENTERED
+        read = placeable_intent if is_entered else _stored_intent
+        scenario.intent = read(intent)
         scenario.intent_origin = intent_origin
     _insert(scenario)
     _log_addition(scenario, actor)
