@@ -3,11 +3,15 @@
 from __future__ import annotations
 
 import os
+import signal
 import subprocess
 import sys
 import threading
 import uuid
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
+from urllib.parse import urlsplit
 
 import pytest
 from django.core.files.base import ContentFile
@@ -100,23 +104,62 @@ def test_a_database_of_an_earlier_release_is_left_as_it_is(tmp_path: Path) -> No
         recorder.record_applied(app, name)
 
 
+RESTORE_KILLED_WITHIN_A_MIGRATION = """
+import os, signal, sys
+import django
+django.setup()
+from django.core.management import call_command
+from django.db.migrations.executor import MigrationExecutor
+record = MigrationExecutor.record_migration
+def record_or_die(self, migration):
+    if (migration.app_label, migration.name[:4]) == ("augment", "0003"):
+        os.kill(os.getpid(), signal.SIGKILL)
+    record(self, migration)
+MigrationExecutor.record_migration = record_or_die
+call_command("restore", sys.argv[1])
+"""
+
+
+@contextmanager
+def a_new_database(folder: Path) -> Iterator[str]:
+    """The address of an empty database of the kind that the tests run on."""
+    if connection.vendor == "sqlite":
+        yield f"sqlite:///{folder / 'new.sqlite3'}"
+        return
+    name = f"restored_{os.getpid()}"
+    with connection.cursor() as cursor:
+        cursor.execute(f"CREATE DATABASE {name}")
+        try:
+            yield urlsplit(os.environ["DATABASE_URL"])._replace(path=f"/{name}").geturl()
+        finally:
+            cursor.execute(f"DROP DATABASE {name} WITH (FORCE)")
+
+
 def test_a_restore_that_was_killed_while_it_made_tables_is_repeated(tmp_path: Path) -> None:
-    take_backup(tmp_path / "b.zip", now=NOW, say=quiet)
-    environment = os.environ | {
-        "DATABASE_URL": f"sqlite:///{tmp_path / 'new.sqlite3'}",
-        "ARENA_VAR_DIR": str(tmp_path / "new"),
-        "ARENA_MEDIA_DIR": str(tmp_path / "new-media"),
-    }
+    backup = str(tmp_path / "b.zip")
+    take_backup(Path(backup), now=NOW, say=quiet)
 
-    def manage(*arguments: str) -> str:
-        command = [sys.executable, str(ROOT / "manage.py"), *arguments]
-        ended = subprocess.run(
-            command, env=environment, capture_output=True, text=True, check=False
+    def run(*arguments: str) -> subprocess.CompletedProcess[str]:
+        return subprocess.run(
+            [sys.executable, *arguments],
+            cwd=ROOT,
+            env=environment,
+            capture_output=True,
+            text=True,
+            check=False,
         )
-        return ended.stdout + ended.stderr
 
-    manage("migrate", "augment", "0003")
-    assert "Restored." in manage("restore", str(tmp_path / "b.zip"))
+    with a_new_database(tmp_path) as url:
+        environment = os.environ | {
+            "DJANGO_SETTINGS_MODULE": "arena.config.settings",
+            "DATABASE_URL": url,
+            "ARENA_VAR_DIR": str(tmp_path / "new"),
+            "ARENA_MEDIA_DIR": str(tmp_path / "new-media"),
+        }
+        killed = run("-c", RESTORE_KILLED_WITHIN_A_MIGRATION, backup)
+        assert killed.returncode == -signal.SIGKILL, killed.stderr
+        repeated = run("manage.py", "restore", backup)
+        assert "Restored." in repeated.stdout, repeated.stderr
 
 
 def test_zips_and_thumbnails_that_can_be_made_again_stay_out(tmp_path: Path) -> None:
