@@ -8,6 +8,7 @@ from threading import Thread
 
 import pytest
 
+from tests.formats.hostile_files import scenarionet_of_nested_tuples_as_a_key
 from tests.processes import Machine, WaitingModel, machine, wait_until
 from tests.variants.answers import GOOD
 
@@ -24,6 +25,20 @@ for number in range(1, 4):
     add_scenario(f"street-{{number}}")
 """
 CHOSEN = ("--contestants", "reference", "waiting", "--scenarios", "all")
+UPLOAD_THEN_GENERATE = """
+import time
+from pathlib import Path
+from django.core.files.base import ContentFile
+from django.core.management import call_command
+from augment.models import SceneUpload
+from augment.scene_tasks import enqueue_upload
+from augment.services.scenarios.uploads import keep_upload
+content = ContentFile(Path("{path}").read_bytes())
+enqueue_upload(keep_upload(name="made.pkl", content=content, source="scenarionet").pk)
+while SceneUpload.objects.get().state != "running":
+    time.sleep(0.05)
+call_command("generate", *{chosen})
+"""
 BY_STATE = "SELECT state, COUNT(*) FROM augment_augmentation GROUP BY state"
 RUNNING = "SELECT id FROM augment_augmentation WHERE state = 'running'"
 ATTEMPTS = "SELECT augmentation_id, number, outcome FROM augment_attempt ORDER BY 1, 2"
@@ -202,3 +217,30 @@ def test_without_redis_the_command_says_what_to_do(place: Machine) -> None:
     assert ended.returncode == 1
     assert "start `manage.py serve` or set REDIS_URL" in ended.stderr
     assert place.rows(BY_STATE) == []
+
+
+def test_a_job_goes_on_in_a_worker_that_reads_a_freezing_pickle(
+    place: Machine, model: WaitingModel, tmp_path: Path
+) -> None:
+    _, pickle = scenarionet_of_nested_tuples_as_a_key(tmp_path)
+    model.gate.set()
+    redis = place.redis()
+    worker = place.worker()
+    upload = "SELECT state, attempts, reason FROM augment_sceneupload"
+    meanwhile = (
+        "SELECT COUNT(*) FROM augment_augmentation a, augment_sceneupload u "
+        "WHERE a.state = 'done' AND a.finished_at < u.finished_at"
+    )
+    try:
+        code = UPLOAD_THEN_GENERATE.format(path=pickle, chosen=CHOSEN)
+        place.must("shell", "--verbosity", "0", "-c", code)
+        wait_until(lambda: is_finished(place), what="the job is over", within_s=240)
+        wait_until(lambda: place.rows(upload)[0][0] == "failed", what="the file is refused")
+        state = place.rows(upload)
+        assert state[0][1] == 1
+        assert "made.pkl: takes more than 8 s of computing to read" in state[0][2]
+        assert place.rows(BY_STATE) == [("done", 6)]
+        assert place.rows(meanwhile)[0][0] > 0
+    finally:
+        worker.stop()
+        redis.stop()
