@@ -16,8 +16,6 @@ from numpy.typing import NDArray
 
 from augment.errors import InvalidDocument
 
-_ARROW, _HEAD_BYTES = b"ARROW1", 8
-
 
 @dataclass(frozen=True, slots=True, eq=False)
 class TextColumn:
@@ -53,14 +51,11 @@ def read_arrow(
     """
     import pyarrow as pa
 
-    block = _bytes(file, what)
-    if block[:6] != _ARROW:
-        raise InvalidDocument(what, [(file.name, "is not a feather file of version 2")])
+    block, wanted = _bytes(file, what), (*whole, *numbers, *texts)
     try:
-        stream = pa.py_buffer(block).slice(_HEAD_BYTES)
-        with pa.ipc.open_stream(stream) as reader:
-            _check_names(file, what, reader.schema.names, (*whole, *numbers, *texts))
-            table = reader.read_all().select([*whole, *numbers, *texts])
+        with pa.ipc.open_file(pa.py_buffer(block)) as reader:
+            _check_names(file, what, reader.schema.names, wanted)
+            table = reader.read_all().select(list(wanted))
         table.validate(full=True)
     except _faults() as fault:
         text = f"is not a feather file: {str(fault)[:200]}"
