@@ -129,8 +129,8 @@ def test_an_empty_file_a_missing_one_and_foreign_letters_are_errors(tmp_path: Pa
 
 
 def test_a_column_that_is_resampled_must_be_there_and_filled(votes: Any) -> None:
-    with pytest.raises(CsvNotRated, match="no column 'judge', which --resample judge needs"):
-        run(file=votes(*PLAIN), resample="judge")
+    with pytest.raises(CsvNotRated, match="no column 'judge', which --resample expert needs"):
+        run(file=votes(*PLAIN), resample="expert")
     file = votes("a,b,tie,j,i", "a,b,tie,,i", head=WITH_CLUSTERS)
     with pytest.raises(CsvNotRated, match="line 3: judge is empty"):
         run(file=file)

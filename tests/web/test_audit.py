@@ -133,6 +133,7 @@ DOORS = {
     "arena/management/demo.py": "rates a study that it has closed",
     "arena/management/exporting/studies.py": "--early, logged",
     "arena/web/planning.py": "reads what the reader may read",
+    "arena/web/rating.py": "gives none: the page that asked leads to the gate",
     "arena/web/results.py": "the gate",
     "arena/web/results_files.py": "behind the gate",
     "arena/web/results_galleries.py": "behind the gate",
