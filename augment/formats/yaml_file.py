@@ -18,6 +18,8 @@ MAX_CHARACTERS: Final = 4 * 1024 * 1024
 DEEPEST: Final = 20
 MOST_VALUES: Final = 300_000
 LONGEST_TEXT: Final = 1_000
+LONGEST_NUMBER: Final = 18
+"""Of a key: larger numbers can be chosen so that all have one hash."""
 
 _PLAIN_TAGS = frozenset(f"tag:yaml.org,2002:{kind}" for kind in ("bool", "int", "float", "null"))
 _BASE: Any = getattr(yaml, "CSafeLoader", yaml.SafeLoader)  # libyaml's where it is there
@@ -95,6 +97,9 @@ class _PlainLoader(_BASE):  # type: ignore[misc]
         for key, _ in node.value:
             if not isinstance(key, yaml.ScalarNode):
                 raise _NotPlain(key.start_mark, "a key is a text, not a list or a mapping")
+            if key.tag.endswith(":int") and len(key.value) > LONGEST_NUMBER:
+                text = f"a key is a number of more than {LONGEST_NUMBER} digits"
+                raise _NotPlain(key.start_mark, text)
             if key.value in written:
                 raise _NotPlain(key.start_mark, f"the key {_shown(key.value)} stands twice")
             written.add(key.value)

@@ -80,6 +80,7 @@ HOSTILE = [
     (special("type: avoid_crashed_cars"), "the key 'type' stands twice"),
     (f"{TOP}: {{}}\n{TOP}: {{}}", "line 2, column 1: the key"),
     ("1: a\n0x1: b", "two keys mean the same number"),
+    (f"{2**61 - 1}: a\n{2 * (2**61 - 1)}: b", "a key is a number of more than 18 digits"),
     ("? [a, b]\n: 1", "line 1, column 3: a key is a text"),
     (LAUGHS, "line 1, column 5: anchors and aliases"),
     ("a: &b {c: *b}", "anchors and aliases"),
