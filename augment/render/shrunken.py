@@ -10,6 +10,8 @@ from PIL import Image
 
 # As many colours as leave the soft edges of what is made smaller soft.
 _COLOURS = 64
+MOST_PIXELS = 16_000_000
+"""Far more than is drawn; an imported study may hold any file as its picture."""
 
 
 def shrink(png: bytes, widest: int) -> NDArray[np.uint8]:
@@ -33,7 +35,9 @@ def shrink_png(png: bytes, widest: int) -> bytes:
 
 
 def _smaller(png: bytes, widest: int) -> Image.Image:
-    with Image.open(io.BytesIO(png)) as picture:
+    with Image.open(io.BytesIO(png), formats=("PNG",)) as picture:
+        if picture.width * picture.height > MOST_PIXELS:
+            raise ValueError(f"a picture of {picture.width} x {picture.height} pixels")
         factor = -(-picture.width // widest)
         colours = picture.convert("RGB")
     return colours.reduce(factor) if factor > 1 else colours

@@ -8,7 +8,7 @@ from collections.abc import Iterator
 import pytest
 from django.core.files.storage import default_storage
 from django.urls import reverse
-from PIL import Image
+from PIL import Image, UnidentifiedImageError
 from pytest_django import Settings
 
 from arena.config import env
@@ -21,7 +21,7 @@ from augment.services.scenarios.thumbnails import WIDTHS_PX, thumbnail_of
 from tests import scenes
 from tests.buckets import Bucket, bucket
 from tests.jobs.rows import add_scenario
-from tests.web.cast import people, signed_in
+from tests.web.cast import people, png, signed_in
 
 
 @pytest.fixture(scope="module")
@@ -91,3 +91,16 @@ def test_pages_ask_for_the_width_that_they_show(picture: bytes) -> None:
         assert analyst.get(address + query).status_code == 404
     shown = analyst.get(reverse("scenarios")).content.decode()
     assert f"{address}?width=400&amp;v={scenario.original_image[-16:-4]} 400w" in shown
+
+
+def test_a_picture_of_very_many_pixels_is_refused_unread() -> None:
+    with pytest.raises(ValueError, match="a picture of 8000 x 8000 pixels"):
+        shrink_png(png(width=8_000, height=8_000), 400)
+
+
+def test_nothing_but_a_png_is_opened() -> None:
+    """Pillow hands PostScript to another program."""
+    stream = io.BytesIO()
+    Image.new("RGB", (8, 8)).save(stream, "EPS")
+    with pytest.raises(UnidentifiedImageError):
+        shrink_png(stream.getvalue(), 400)
