@@ -48,6 +48,7 @@ def _arguments(graph: LaneGraph, ego: TrafficAgent, agent: TrafficAgent) -> dict
         "start": start,
         "distance_m": round(distance_m, 3),
         "lateral_m": round(max(-30.0, min(30.0, place.d_m)), 3),
+        "object": agent.type.value,
     }
 
 

@@ -141,3 +141,19 @@ def test_the_lane_that_an_agent_names(
 def test_a_map_without_lanes_has_no_facts_about_lanes() -> None:
     found = found_in(scene(lanes=(), areas=()), vehicle("Agent2", 30.0, 0.0))
     assert {one.kind for one in found} == {FindingKind.EGO_OFFSET}
+
+
+@pytest.mark.parametrize(
+    ("y_m", "doubtful"),
+    [(1.75, set()), (1.3, set()), (2.2, set()), (1.2, {"Lane2"}), (2.3, {"Lane1"})],
+)
+def test_on_the_line_between_two_lanes_either_may_be_named(y_m: float, doubtful: set[str]) -> None:
+    named = {
+        lane
+        for lane in ("Lane1", "Lane2")
+        if of_kind(
+            found_in(scene(), replace(vehicle("Agent2", 30.0, y_m), lane_id=lane)),
+            FindingKind.LANE_NAMED,
+        )
+    }
+    assert named == doubtful

@@ -48,6 +48,17 @@ def test_an_empty_modification_is_readable() -> None:
     assert read_reply(block(), scene()).modification.is_empty
 
 
+def test_a_refusal_is_read_with_none_in_its_sections_and_keeps_its_reason() -> None:
+    refusal = (
+        "Insights: There is no bus stop in this scene.\n\nSummary: none\n\n"
+        f"Modification Dict: none\n\nModification Calculations: none\n\n"
+        f"Modified Vectors:\n{block()}"
+    )
+    read = read_reply(refusal, scene())
+    assert read.modification.is_empty
+    assert read.notes == "There is no bus stop in this scene.\n\nnone"
+
+
 def test_a_pedestrian_may_walk() -> None:
     walker = agent(type="PEDESTRIAN", width_m=0.8, length_m=0.9, walk_to=[21.4, 8], lane=None)
     (added,) = read_reply(block(walker), scene()).modification.added

@@ -15,6 +15,8 @@ from augment.geometry.bezier import CubicBezier
 from augment.geometry.polyline import Polyline
 from augment.prompts.calls import TOOL
 from augment.prompts.lane_curves import control_points
+from augment.prompts.names import short_names
+from augment.scene.ego_route import EgoRoute
 from augment.scene.entities import AreaKind, Lane, SceneOptions, TurnType
 from augment.variants.pose_call import (
     FURTHEST_M,
@@ -24,6 +26,7 @@ from augment.variants.pose_call import (
     CallLimits,
 )
 from augment.variants.pose_tool import PoseTool
+from tests.fixtures.shelf import whole_scene
 from tests.scenes import curve, junction, scene, vehicle
 
 JUNCTION = PoseTool(junction())
@@ -180,6 +183,20 @@ def test_a_distance_runs_on_along_the_goal_of_the_ego() -> None:
     tool = PoseTool(replace(junction(), options=left))
     assert tool.pose_on_lane("Lane1", "Agent1", 30.0).route == ("Lane1", "Connector2")
     assert JUNCTION.pose_on_lane("Lane1", "Agent1", 30.0).route == ("Lane1", "Connector1")
+
+
+@pytest.mark.parametrize("goal", [None, TurnType.STRAIGHT, TurnType.LEFT, TurnType.RIGHT])
+@pytest.mark.parametrize("name", ["market-crossing", "theatre-crossing", "orchard-circle"])
+def test_the_tool_goes_where_the_checks_measure(name: str, goal: TurnType | None) -> None:
+    """Over junctions and around roundabouts "our lane" is one and the same."""
+    world = replace(whole_scene(name), options=SceneOptions(goal=goal))
+    tool, route = PoseTool(world), EgoRoute.of(world)
+    assert route is not None
+    start = short_names(world).lanes[route.lane_id]
+    for ahead_m in range(5, 75, 10):
+        place = tool.pose_on_lane(start, "Agent1", ahead_m).pose
+        gap_m = math.dist((place.x_m, place.y_m), route.position(ahead_m))
+        assert gap_m < 0.02, ahead_m
 
 
 def test_the_edges_of_the_road_are_told_from_the_centre_of_the_lane() -> None:
