@@ -1,0 +1,120 @@
+"""docs/features.md lists what the code offers, and what it keeps is there."""
+
+from __future__ import annotations
+
+import ast
+import re
+from argparse import _SubParsersAction
+from collections.abc import Callable, Iterator
+from typing import Any
+
+import pytest
+from django.core.management import get_commands, load_command_class
+from django.urls import URLPattern, URLResolver, get_resolver
+
+from augment.formats.readers import READERS
+from augment.formats.writers import WRITERS
+from tests.house.source import PRODUCT, ROOT, walked
+
+SETTING = re.compile(r"ARENA_[A-Z_]+|DATABASE_URL|REDIS_URL")
+READ_BY_BOTO3 = {"AWS_ACCESS_KEY_ID", "AWS_SECRET_ACCESS_KEY"}
+INTERNAL = {"ARENA_SERVED_BY"}
+"""What `serve` marks its children with; nobody sets it."""
+
+API = "api/v1/"
+
+
+def decisions(section: str) -> dict[str, str]:
+    """`keep` or `drop` by the name of a feature, from the tables of a section."""
+    text = (ROOT / "docs" / "features.md").read_text()
+    (part,) = re.findall(rf"^## {section}\n(.*?)(?=^## |\Z)", text, re.M | re.S)
+    listed: dict[str, str] = {}
+    for names, decision in re.findall(r"^\| (`.*?) \|.*\| (\w+) \|$", part, re.M):
+        for name in re.findall(r"`([^`]+)`", names):
+            assert listed.setdefault(name, decision) == decision, name
+    assert set(listed.values()) <= {"keep", "drop"}
+    return listed
+
+
+def addresses(resolver: URLResolver, before: str = "") -> Iterator[tuple[str, URLPattern]]:
+    """Every address with its pattern, but those of Django's own admin."""
+    for pattern in resolver.url_patterns:
+        address = before + str(pattern.pattern)
+        if isinstance(pattern, URLPattern):
+            yield address, pattern
+        elif pattern.app_name != "admin":
+            yield from addresses(pattern, address)
+
+
+def pages() -> set[str]:
+    found = addresses(get_resolver())
+    return {pattern.name or address for address, pattern in found if not address.startswith(API)}
+
+
+def operations() -> set[str]:
+    """`POST jobs/{code}/pause` and its like; what is no view of the API answers pages."""
+    found = set()
+    for address, pattern in addresses(get_resolver()):
+        view: Any = getattr(pattern.callback, "cls", None)
+        if not address.startswith(API) or view is None:
+            continue
+        path = re.sub(r"<(?:\w+:)?(\w+)>", r"{\1}", address.removeprefix(API))
+        methods = getattr(pattern.callback, "actions", None) or {
+            method for method in view.http_method_names if hasattr(view, method)
+        }
+        found |= {
+            f"{method.upper()} {path}" for method in methods if method not in ("head", "options")
+        }
+    return found
+
+
+def commands() -> set[str]:
+    return {name for name, app in get_commands().items() if str(app).startswith(PRODUCT)}
+
+
+def settings_read() -> set[str]:
+    strings = {
+        node.value
+        for _, nodes in walked()
+        for node in nodes
+        if isinstance(node, ast.Constant) and isinstance(node.value, str)
+    }
+    return READ_BY_BOTO3 | {name for name in strings if SETTING.fullmatch(name)} - INTERNAL
+
+
+def formats() -> set[str]:
+    """Formats of scenes and scenarios, and the kinds of `manage.py export`."""
+    parser = load_command_class(get_commands()["export"], "export").create_parser("", "export")
+    (kinds,) = (one for one in parser._actions if isinstance(one, _SubParsersAction))
+    return {*READERS, *WRITERS, *kinds.choices}
+
+
+OFFERED: dict[str, Callable[[], set[str]]] = {
+    "Pages": pages,
+    "Commands": commands,
+    "API": operations,
+    "Settings": settings_read,
+    "File formats": formats,
+}
+
+
+@pytest.mark.parametrize("section", OFFERED)
+def test_everything_that_is_offered_is_listed(section: str) -> None:
+    assert OFFERED[section]() - decisions(section).keys() == set()
+
+
+@pytest.mark.parametrize("section", OFFERED)
+def test_what_is_to_be_kept_is_there(section: str) -> None:
+    kept = {name for name, decision in decisions(section).items() if decision == "keep"}
+    assert len(kept) >= 10
+    assert kept - OFFERED[section]() == set()
+
+
+def test_the_page_on_deploying_explains_every_setting() -> None:
+    page = (ROOT / "docs" / "deploying.md").read_text()
+    explained = {
+        name
+        for names in re.findall(r"^\| (`[A-Z].*?) \|", page, re.M)
+        for name in re.findall(r"`([A-Z_]+)`", names)
+    }
+    assert explained == decisions("Settings").keys()
