@@ -55,6 +55,11 @@ class MatchupDocument(serializers.Serializer[Any]):
     ego_px = serializers.ListField(child=serializers.FloatField())
     width = serializers.IntegerField()
     height = serializers.IntegerField()
+    legend = serializers.ListField(
+        child=serializers.CharField(),
+        required=False,
+        help_text="Which kinds of marks the two pictures hold; absent of pairs planned before.",
+    )
     text = SidesDocument(required=False, help_text="In studies that offer it.")
 
 

@@ -22,6 +22,9 @@ VIEW_OF_OLD: dict[str, Any] = {
 """The window of all pictures before windows were fitted to scenarios and views were kept. (Where a
 reference did not fit it was wider: the ruler of such a picture measures too little.)"""
 
+LEGEND = "legend"
+"""In the view of a matchup: the legend's entries of its scene, and those that the pair adds."""
+
 _NOT_SHOWN = "This picture is not shown to you."
 
 
@@ -56,7 +59,8 @@ def picture_of_side(matchup: Matchup, side: str) -> str:
 
 def view_shown(matchup: Matchup) -> dict[str, Any]:
     """The view kept with a matchup; those planned before it was kept have the one of then."""
-    return VIEW_OF_OLD if matchup.view is None else matchup.view
+    kept = VIEW_OF_OLD if matchup.view is None else matchup.view
+    return {name: value for name, value in kept.items() if name != LEGEND}
 
 
 def as_shown(matchup: Matchup, wording: Wording) -> dict[str, Any]:
@@ -67,6 +71,7 @@ def as_shown(matchup: Matchup, wording: Wording) -> dict[str, Any]:
         wording: For the text description, where the study has one.
     """
     original = matchup.original_token if matchup.original_image else None
+    legend = (matchup.view or {}).get(LEGEND)
     shown = {
         "matchup": str(matchup.code),
         "position": matchup.position,
@@ -76,6 +81,8 @@ def as_shown(matchup: Matchup, wording: Wording) -> dict[str, Any]:
         "original": reverse("matchup-image", args=[original]) if original else None,
         **view_shown(matchup),
     }
+    if legend is not None:
+        shown["legend"] = sorted({*legend["scene"], *legend["pair"]})
     if matchup.descriptions is not None:
         left, right = matchup.descriptions
         shown["text"] = {

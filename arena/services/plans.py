@@ -6,6 +6,7 @@ from collections import defaultdict
 from collections.abc import Iterable, Sequence
 from functools import partial
 from operator import eq
+from typing import Any
 
 from django.contrib.auth.models import User
 from django.db.models import Max
@@ -13,11 +14,19 @@ from django.db.models import Max
 from arena.models import Matchup, Study
 from arena.pairing.plan import Check, Entry, PlannedMatchup, PlanRules
 from arena.pairing.rules import place_of, scenario_of
+from arena.queries.showings import LEGEND
 from arena.services.attention_checks import check_pictures, placed_checks
-from arena.services.frames import Cells, find_frames, frames_shown, sides_of
+from arena.services.frames import (
+    Cells,
+    ScenarioFrame,
+    find_frames,
+    frames_shown,
+    sides_of,
+)
 from arena.services.showable import find_showable, windows_of, with_picture
 from augment.models import Augmentation, Scenario
 from augment.services.scenarios.descriptions import Description, descriptions
+from augment.services.scenarios.legends import legend_of_scene, legends_of_changes
 
 SoFar = dict[str, list[PlannedMatchup]]
 """Every expert's showings as they are stored, by position."""
@@ -92,6 +101,7 @@ def store(
     places = _places(planned, cells, reads_scenes=study.allow_text or not known)
     frames = find_frames(planned, cells, places, known)
     texts = _descriptions(study, planned, cells, places)
+    views = _pair_views(planned, cells, places, frames)
     rows = [
         Matchup(
             study=study,
@@ -103,13 +113,13 @@ def store(
             left_image=left.image,
             right_image=right.image,
             original_image=frames[one.scenario].original_image,
-            view=frames[one.scenario].view,
+            view=view,
             descriptions=None if texts is None else [texts[left.pk], texts[right.pk]],
             kind=one.kind,
             batch=batch,
             draw_probability=one.draw_probability,
         )
-        for one in planned
+        for one, view in zip(planned, views, strict=True)
         for left, right in [sides_of(one, cells)]
     ]
     Matchup.objects.bulk_create([row for row in rows if row.kind != _REPEAT], batch_size=500)
@@ -197,6 +207,37 @@ def _descriptions(
     return descriptions(
         augmentations=shown, scenarios={place.pk: place for place in places.values()}
     )
+
+
+def _pair_views(
+    planned: Sequence[PlannedMatchup],
+    cells: Cells,
+    places: dict[str, Scenario],
+    frames: dict[str, ScenarioFrame],
+) -> list[dict[str, Any]]:
+    """The view of each showing, with what its legend names: the same whichever side adds what."""
+    scenes: dict[str, list[str]] = {}
+    for name, frame in frames.items():
+        slug = scenario_of(name)
+        kept = frame.view.get(LEGEND)
+        if kept is not None:
+            scenes[slug] = kept["scene"]
+        elif slug not in scenes:
+            scenes[slug] = legend_of_scene(places[slug], frame.view)
+    sides = [(one.scenario, sides_of(one, cells)) for one in planned]
+    adds = legends_of_changes(
+        {cell.pk: frames[name].view for name, pair in sides for cell in pair}
+    )
+    return [
+        frames[name].view
+        | {
+            LEGEND: {
+                "scene": scenes[scenario_of(name)],
+                "pair": sorted(adds[left.pk] | adds[right.pk]),
+            }
+        }
+        for name, (left, right) in sides
+    ]
 
 
 def _mains(study: Study, experts: list[int]) -> dict[tuple[int, int], int]:

@@ -162,13 +162,19 @@ def _nose(ground: MetricCanvas, agent: TrafficAgent, style: MarkStyle) -> None:
 
 
 def _bus(ground: MetricCanvas, agent: TrafficAgent, style: MarkStyle) -> None:
-    """A vehicle with two hatches on its roof."""
-    _vehicle(ground, agent, style)
-    for rear in (-0.8, -0.35):
-        front, side = rear + 0.3, 0.5
-        roof = _part(ground, agent, [(rear, side), (front, side), (front, -side), (rear, -side)])
-        ground.fill(roof, style.fill)
-        ground.stroke(roof, style.outline, 1.8, closed=True)
+    """A vehicle with a band of windows along either side and a windscreen across its front."""
+    edge_m = _body(ground, agent, style)
+    half_m, inner_m = agent.length_m / 2.0 - edge_m, agent.width_m / 2.0 - edge_m
+    nose_m = min(0.85 * agent.width_m, 0.45 * agent.length_m)
+    band_m, gap_m = 0.26 * inner_m, 0.12 * agent.width_m
+    number = max(3, round((2.0 * half_m - nose_m) / (0.55 * agent.width_m)))
+    ends_m = np.linspace(-half_m + gap_m, half_m - nose_m, number + 1)
+    for side in (1.0, -1.0):
+        outer, inner = side * (inner_m - 0.4 * gap_m), side * (inner_m - 0.4 * gap_m - band_m)
+        for rear_m, front_m in zip(ends_m[:-1], ends_m[1:] - gap_m, strict=True):
+            pane = [(rear_m, outer), (front_m, outer), (front_m, inner), (rear_m, inner)]
+            ground.fill(agent.pose.to_parent(np.array(pane)), style.detail)
+    _nose(ground, agent, style)
 
 
 def _bicycle(ground: MetricCanvas, agent: TrafficAgent, style: MarkStyle) -> None:

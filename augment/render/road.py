@@ -202,7 +202,7 @@ def _centrelines(ground: MetricCanvas, scene: Scene, lanes: list[AnyLane]) -> No
 
     Connectors of others are thin lines without chevrons: in a junction of many they would tangle.
     """
-    own = _own_lanes(scene)
+    own = own_lanes(scene)
     shown: list[Pose] = []
     for lane in sorted(lanes, key=lambda lane: (lane.id in own, isinstance(lane, Lane))):
         line = lane.centerline
@@ -221,7 +221,7 @@ def _centrelines(ground: MetricCanvas, scene: Scene, lanes: list[AnyLane]) -> No
                 shown.append(pose)
 
 
-def _own_lanes(scene: Scene) -> frozenset[str]:
+def own_lanes(scene: Scene) -> frozenset[str]:
     """The lanes that the ego can take from where it is, up to 60 m and past one fork.
 
     At the mouth of a junction it stands on several at once.

@@ -45,7 +45,8 @@ export function replay(element) {
 
 const item = (line) => Object.assign(document.createElement("li"), { textContent: line });
 
-export function drawPair({ instruction, position, text: lists }) {
+export function drawPair({ instruction, position, text: lists, legend }) {
+  for (const mark of at("legend").children) mark.hidden = Boolean(legend) && !legend.includes(mark.dataset.mark);
   at("instruction").textContent = instruction;
   document.title = document.title.replace(/\d+/, position);
   for (const side in lists) at(`text-${side}`).replaceChildren(...lists[side].map(item));

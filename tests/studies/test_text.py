@@ -10,7 +10,7 @@ from django.utils.translation import override
 
 from arena.models import Study
 from arena.queries.descriptions import describe_in_words
-from arena.queries.showings import as_shown
+from arena.queries.showings import as_shown, view_shown
 from arena.services.handing_over import hand_over
 from arena.services.replanning import plan_batch
 from augment.models import Augmentation
@@ -173,3 +173,16 @@ def test_nothing_is_said_in_both_languages() -> None:
         assert describe_in_words([], translate_all) == ["Nothing was changed."]
     with override("de"):
         assert describe_in_words([], translate_all) == ["Nichts wurde geändert."]
+
+
+def test_the_legend_names_what_the_two_pictures_hold_on_either_side() -> None:
+    study = a_described_study()
+    for row in matchups_of(study, "eva"):
+        shown = as_shown(row, translate_all)
+        assert "legend" not in view_shown(row)
+        assert "ego" in shown["legend"]
+        assert "junction" not in shown["legend"]
+        sides = (row.left.modification or {}, row.right.modification or {})
+        added = {one["type"] for side in sides for one in side.get("add", ())}
+        assert ("cone" in shown["legend"]) == ("TRAFFIC_CONE" in added)
+        assert ("person" in shown["legend"]) == ("PEDESTRIAN" in added)

@@ -11,7 +11,7 @@ from django.core.management import call_command
 
 from arena.errors import NothingToPlan
 from arena.models import Matchup, Study
-from arena.queries.showings import VIEW_OF_OLD
+from arena.queries.showings import VIEW_OF_OLD, view_shown
 from arena.services.frames import find_frames
 from arena.services.plans import pictures_of, planned_so_far
 from arena.services.redrawing import redraw_pictures
@@ -64,7 +64,7 @@ def test_pictures_of_two_windows_are_never_paired() -> None:
             for name in (matchup.left_image, matchup.right_image, matchup.original_image)
         }
         assert windows == {camera_of(matchup.scenario).key}
-        assert matchup.view == view_of(camera_of(matchup.scenario))
+        assert view_shown(matchup) == view_of(camera_of(matchup.scenario))
     assert not any(found.pictures for found in redraw_pictures())
 
 
@@ -73,7 +73,7 @@ def test_a_study_keeps_the_pictures_that_were_shown() -> None:
     drawn_before()
     study = opened("before", **cast)
     assert {row.original_image for row in study.matchups.all()} == {"bev/original.png"}
-    assert [row.view for row in study.matchups.all()] == [VIEW_OF_OLD] * 2
+    assert [view_shown(row) for row in study.matchups.all()] == [VIEW_OF_OLD] * 2
     shown = set(study.matchups.values_list("left_image", "right_image", "original_image"))
     assert sum(found.pictures for found in redraw_pictures()) == 4
     assert not Augmentation.objects.filter(image__regex=r"^bev/[^/]+$").exists()
@@ -111,7 +111,7 @@ def test_pictures_of_a_former_window_keep_the_view_that_they_were_shown_with() -
             left_image=sides[0], right_image=sides[1]
         )
         again = opened(f"again {number}", **cast)
-        found = [(row.view, row.original_image) for row in again.matchups.all()]
+        found = [(view_shown(row), row.original_image) for row in again.matchups.all()]
         assert found == [(then, "shown.png")] * 2
         again.matchups.all().delete()
 
@@ -155,7 +155,7 @@ def test_a_change_outside_widens_the_window_of_all_and_an_open_study_keeps_its_o
     assert {picture.image for picture in pictures_of(study).values()} == set(shown[:2])
     enlarged = study.matchups.get()
     frame = find_frames(planned_so_far(study)["eva"], pictures_of(study), {place.slug: place}, {})
-    assert frame[place.slug].view == enlarged.view
+    assert frame[place.slug].view == view_shown(enlarged)
     assert frame[place.slug].original_image == enlarged.original_image
     cast["contestants"] = ["reference", "by-hand"]
     opened("after", **cast, votes_per_expert=1)
