@@ -92,17 +92,15 @@ def rate_part(votes: Comparisons, rules: Rules, status: Status) -> Rated:
     if rules.intervals is Intervals.CLOSED_FORM and found.pulls is not None:
         spread = spread_of(votes, found.pulls, rules.unit, everywhere.reference)
     if _are_all_the_same(everywhere.values if spread is None else _ends(spread)):
-        return _without_intervals(
-            found, rules, remarks.NO_SPREAD, (remarks.ALL_THE_SAME[rules.unit],)
-        )
+        return _without_intervals(found, rules, remarks.NO_SPREAD, (remarks.why_no_spread(rules),))
     if everywhere.are_finite:
         bounds = interval(everywhere.values)
     else:
         bounds = open_interval(everywhere.values)
     if np.isnan(bounds).all():
         lost = found.loose.values.shape[1]
-        said = remarks.why_no_interval(votes.names, lost=lost, rounds=rules.rounds)
-        return _without_intervals(found, rules, remarks.TOO_FEW, said)
+        said = remarks.why_no_interval(votes.names, rules, lost=lost)
+        return _without_intervals(found, rules, remarks.TOO_FEW, (said,))
     if spread is not None:
         return _in_closed_form(votes, rules, found, everywhere, bounds, spread)
     return _by_rounds(votes, rules, found, everywhere, bounds)

@@ -32,23 +32,38 @@ def few_clusters(votes: Comparisons, unit: Unit) -> int | None:
     return smallest if smallest < sandwich.FEW_CLUSTERS else None
 
 
-def why_no_interval(names: tuple[str, ...], *, lost: int, rounds: int) -> tuple[Sentence, ...]:
+def why_no_interval(names: tuple[str, ...], rules: Rules, *, lost: int) -> Sentence:
     """Why nobody of a part has a bound.
 
     Args:
         names: Of the part.
+        rules: How it was rated.
         lost: Rounds that did not determine everybody.
-        rounds: How many were drawn.
     """
-    return (
-        sentence(
-            "Among %(names)s the votes determined no ratings in %(lost)s of %(rounds)s "
-            "resamples, so intervals can't be given: there are too few votes, or hardly "
-            "any against some contestant.",
-            names=few_of(names, mark="…"),
-            lost=lost,
-            rounds=rounds,
-        ),
+    named = few_of(names, mark="…")
+    if rules.intervals is not Intervals.RESAMPLES:
+        return sentence(
+            "Among %(names)s no intervals can be given: there are too few votes, or hardly any "
+            "against some contestant.",
+            names=named,
+        )
+    return sentence(
+        "Among %(names)s the votes determined no ratings in %(lost)s of %(rounds)s "
+        "resamples, so intervals can't be given: there are too few votes, or hardly "
+        "any against some contestant.",
+        names=named,
+        lost=lost,
+        rounds=rules.rounds,
+    )
+
+
+def why_no_spread(rules: Rules) -> Sentence:
+    """Why the votes leave no width for an interval."""
+    if rules.intervals is Intervals.RESAMPLES:
+        return _ALL_THE_SAME[rules.unit]
+    return sentence(
+        "The votes do not vary between what they are clustered by, so intervals can't be given: "
+        "there is too little that could have come out otherwise."
     )
 
 
@@ -163,7 +178,7 @@ NOT_ADJUSTED = sentence(
     "no more than who was shown. The ratings stand without it."
 )
 
-ALL_THE_SAME = {
+_ALL_THE_SAME = {
     Unit.VOTE: sentence(
         "Every resample by vote gave the same ratings, so intervals can't be given: there is too "
         "little that could have come out otherwise."
@@ -190,7 +205,7 @@ def note_with_rank(note: Sentence | str, rank: int | None) -> Sentence | str:
     return _RANKED.get(note, note)
 
 
-NO_SPREAD = sentence("no interval and no rank: every resample gave the same rating")
+NO_SPREAD = sentence("no interval and no rank: the votes leave no spread")
 ONLY_TIES = sentence("no interval and no rank: every vote is a tie")
 TOO_FEW = sentence("no interval and no rank: too few votes")
 NOT_RATED = sentence("no rating by this model")

@@ -11,7 +11,7 @@ from arena.rating.bootstrap import Unit
 from arena.rating.comparisons import Comparison, as_arrays
 from arena.rating.connectivity import Status
 from arena.rating.leaderboard import Leaderboard, Method, rate
-from arena.rating.rules import TooManyContestants
+from arena.rating.rules import Intervals, TooManyContestants
 from tests.rating.votes import by_votes, named, versus
 
 
@@ -114,7 +114,8 @@ def test_a_few_rounds_without_ratings_are_counted_and_leave_both_bounds() -> Non
 
 
 def test_a_single_expert_leaves_nothing_to_resample_by_expert() -> None:
-    board = by_votes(named(versus("a", "b", 6, 0, 5)), unit=Unit.EXPERT, rounds=50)
+    rules = {"unit": Unit.EXPERT, "rounds": 50, "intervals": Intervals.RESAMPLES}
+    board = by_votes(named(versus("a", "b", 6, 0, 5)), **rules)
     assert board.status is Status.NO_INTERVALS
     assert "Every resample by expert gave the same ratings" in board.explanation
     assert [(line.lower, line.upper, line.rank) for line in board.lines] == [
@@ -194,3 +195,15 @@ def test_a_contestant_with_all_votes_on_one_scenario_is_told_so() -> None:
     board = rate(as_arrays(("a", "b", "c", "d"), votes), rounds=500)
     assert board.lines[3].votes == 400
     assert board.lines[3].note == "no interval and no rank: all votes are on one scenario"
+
+
+@pytest.mark.parametrize("unit", Unit)
+@pytest.mark.parametrize("votes", [(6, 0, 5), (1, 0, 1), (3, 2, 1)])
+def test_closed_form_intervals_never_speak_of_resamples(
+    unit: Unit, votes: tuple[int, int, int]
+) -> None:
+    board = by_votes(named(versus("a", "b", *votes)), unit=unit, intervals=Intervals.CLOSED_FORM)
+    said = " ".join(map(str, (board.explanation, *board.warnings, *(x.note for x in board.lines))))
+    assert "resampl" not in said
+    if board.status is Status.NO_INTERVALS:
+        assert "intervals can" in said
