@@ -172,11 +172,14 @@ def _refuse_others(intent: Intent | None) -> None:
     requests = () if intent is None else intent.requests
     asked = [name for kind, name in _UNKNOWN.items() if any(_are(kind, requests))]
     bodies = {request.body for request in requests if isinstance(request, VehicleRequest)}
-    asked += ["bicycles"] if Body.BICYCLE in bodies else []
+    asked += [f"{body}s" for body in _NO_VEHICLES if body in bodies]
     if asked:
         raise CannotPlace(
             f"The code knows vehicles alone, and {' and '.join(asked)} are asked for."
         )
+
+
+_NO_VEHICLES = (Body.BICYCLE, Body.BARRIER, Body.CONSTRUCTION_SIGN)
 
 
 def _are(kind: type, requests: Sequence[object]) -> list[bool]:

@@ -33,8 +33,15 @@ SIZES_M: dict[Body, tuple[float, float]] = {
     Body.TRUCK: (8.0, 2.4),
     Body.BUS: LENGTH_WIDTH_M[AgentType.BUS],
     Body.BICYCLE: LENGTH_WIDTH_M[AgentType.BICYCLE],
+    Body.BARRIER: LENGTH_WIDTH_M[AgentType.BARRIER],
+    Body.CONSTRUCTION_SIGN: LENGTH_WIDTH_M[AgentType.CONSTRUCTION_SIGN],
 }
-TYPES = {Body.BUS: AgentType.BUS, Body.BICYCLE: AgentType.BICYCLE}
+TYPES = {
+    Body.BUS: AgentType.BUS,
+    Body.BICYCLE: AgentType.BICYCLE,
+    Body.BARRIER: AgentType.BARRIER,
+    Body.CONSTRUCTION_SIGN: AgentType.CONSTRUCTION_SIGN,
+}
 """Of the bodies that are no plain vehicle."""
 FACING_RAD = {
     Facing.WITH_LANE: 0.0,

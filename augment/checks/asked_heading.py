@@ -13,6 +13,7 @@ from augment.scene.intent import (
     VehicleRequest,
 )
 from augment.scene.intent_words import (
+    Body,
     Facing,
 )
 from augment.sentences import sentence, word
@@ -28,7 +29,7 @@ def asked_heading(asked: Asked) -> Iterator[Finding]:
 
 
 def _vehicle(asked: Asked, request: VehicleRequest, agent: TrafficAgent) -> Iterator[Finding]:
-    if request.spot.lane is None:
+    if request.spot.lane is None or (request.body in _NO_FRONT and request.facing is None):
         return
     place = asked.route.locate_agent(agent)
     band = asked.lanes.band(request.spot.lane, place.ahead_m)
@@ -77,4 +78,5 @@ def _difference_deg(one: float, other: float) -> float:
     return math.degrees(difference(math.radians(one), math.radians(other)))
 
 
+_NO_FRONT = frozenset({Body.BARRIER, Body.CONSTRUCTION_SIGN})
 _FACING_DEG = {Facing.WITH_LANE: 0.0, Facing.AGAINST_LANE: 180.0, Facing.ACROSS: 90.0}

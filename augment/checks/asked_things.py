@@ -143,6 +143,8 @@ _A = {
     Role.WALKER: word("a pedestrian"),
     Role.CONE: word("a cone"),
     Role.WORKER: word("a worker"),
+    Role.BARRIER: word("a barrier"),
+    Role.SIGN: word("a construction sign"),
 }
 _COUNTED = {
     Role.VEHICLE: (word("vehicle is"), word("vehicles are")),
@@ -152,5 +154,7 @@ _COUNTED = {
     Role.WALKER: (word("pedestrian is"), word("pedestrians are")),
     Role.CONE: (word("cone is"), word("cones are")),
     Role.WORKER: (word("worker is"), word("workers are")),
+    Role.BARRIER: (word("barrier is"), word("barriers are")),
+    Role.SIGN: (word("construction sign is"), word("construction signs are")),
 }
 """One, and several or none."""

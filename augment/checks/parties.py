@@ -35,6 +35,8 @@ class Role(StrEnum):
     WALKER = "pedestrian"
     CONE = "cone"
     WORKER = "worker"
+    BARRIER = "barrier"
+    SIGN = "construction sign"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -155,8 +157,16 @@ def _places(party: int, request: Request, added: Sequence[TrafficAgent]) -> Iter
 
 
 def _role(body: Body) -> Role:
-    roles = {Body.BUS: Role.BUS, Body.VEHICLE: Role.VEHICLE, Body.BICYCLE: Role.BICYCLE}
-    return roles.get(body, Role.CAR)
+    return _ROLES.get(body, Role.CAR)
+
+
+_ROLES = {
+    Body.BUS: Role.BUS,
+    Body.VEHICLE: Role.VEHICLE,
+    Body.BICYCLE: Role.BICYCLE,
+    Body.BARRIER: Role.BARRIER,
+    Body.CONSTRUCTION_SIGN: Role.SIGN,
+}
 
 
 def _suits(place: _Place, agent: TrafficAgent) -> bool:
@@ -172,6 +182,10 @@ def _suits(place: _Place, agent: TrafficAgent) -> bool:
             return agent.type is AgentType.BICYCLE
         case Role.CONE:
             return agent.type is AgentType.TRAFFIC_CONE
+        case Role.BARRIER:
+            return agent.type is AgentType.BARRIER
+        case Role.SIGN:
+            return agent.type is AgentType.CONSTRUCTION_SIGN
         case Role.WALKER | Role.WORKER:
             return agent.type is AgentType.PEDESTRIAN
 

@@ -252,6 +252,8 @@ _BODIES = {
     Body.TRUCK: sentence("truck"),
     Body.BUS: sentence("bus"),
     Body.BICYCLE: sentence("bicycle"),
+    Body.BARRIER: sentence("barrier"),
+    Body.CONSTRUCTION_SIGN: sentence("construction sign"),
 }
 _ROUTES = {
     TurnType.LEFT: sentence("distances run along the way that turns left"),

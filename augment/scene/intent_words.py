@@ -34,7 +34,7 @@ class Nearness(StrEnum):
 
 
 class Body(StrEnum):
-    """What kind of vehicle is meant; `vehicle` and `car` share one size."""
+    """What is meant to stand or drive; `vehicle` and `car` share one size."""
 
     VEHICLE = "vehicle"
     CAR = "car"
@@ -42,6 +42,8 @@ class Body(StrEnum):
     VAN = "van"
     TRUCK = "truck"
     BUS = "bus"
+    BARRIER = "barrier"
+    CONSTRUCTION_SIGN = "construction sign"
 
 
 class Facing(StrEnum):

@@ -43,7 +43,7 @@ def test_the_projects_own_catalogue_is_clean() -> None:
 
 
 def test_a_clean_folder_says_how_many_statements_each_intent_makes(folder: Path) -> None:
-    assert "nudge-plane-tree-street           7  good" in checked(folder)
+    assert "nudge-plane-tree-street           7  oncoming lane   good" in checked(folder)
 
 
 def test_a_reference_that_is_elsewhere_than_said_is_refused(folder: Path) -> None:
@@ -51,13 +51,13 @@ def test_a_reference_that_is_elsewhere_than_said_is_refused(folder: Path) -> Non
     with pytest.raises(CommandError) as fault:
         checked(folder)
     reasons = str(fault.value)
-    assert "Agent2 is 24.0 m ahead of the ego along its lane; 21.5 m ahead is asked for" in reasons
-    assert "Agent2 is 1.00 m to the right of the centre of the ego's lane; 1.3 m" in reasons
+    assert "Agent13 is 24.0 m ahead of the ego along its lane; 21.5 m ahead is asked for" in reasons
+    assert "Agent13 is 1.00 m to the right of the centre of the ego's lane; 1.3 m" in reasons
 
 
 def test_a_reference_with_something_wrong_is_refused(folder: Path) -> None:
     edit(folder, lambda it: it["reference"]["add"][0].update(x_m=0.0, y_m=0.0))
-    with pytest.raises(CommandError, match="wrong: Agent2 and the ego overlap"):
+    with pytest.raises(CommandError, match="wrong: Agent13 and the ego overlap"):
         checked(folder)
 
 

@@ -37,7 +37,7 @@ class Command(TerminalCommand):
         except AugmentError as error:
             raise CommandError(str(error)) from error
         width = max((len(scenario.slug) for scenario in checked.scenarios), default=8)
-        self.stdout.write(f"{'scenario':{width}}  statements  result")
+        self.stdout.write(f"{'scenario':{width}}  statements  {'way past':14}  result")
         for scenario in checked.scenarios:
             self.stdout.write(_line(scenario, width))
         reasons = _reasons(checked)
@@ -48,7 +48,7 @@ class Command(TerminalCommand):
 
 def _line(one: ScenarioCheck, width: int) -> str:
     result = f"{len(one.reasons)} reasons" if one.reasons else "good"
-    return f"{one.slug:{width}}  {one.statements:>10}  {result}"
+    return f"{one.slug:{width}}  {one.statements:>10}  {one.way_past:14}  {result}"
 
 
 def _reasons(found: CatalogueCheck) -> list[str]:

@@ -1,5 +1,7 @@
 """Whether the catalogue's references are what their intents ask for, and can be shown.
 
+Those of the paper set are also held against what a driver expects (`catalogue_rules`).
+
 Reads files, touches no rows.
 """
 
@@ -28,6 +30,8 @@ from augment.scene.intent_codec import intent_to_parts
 from augment.scene.intent_statements import list_statements
 from augment.scene.modification import without_traffic
 from augment.services.scenarios.catalogue_files import folder_of, read_catalogue
+from augment.services.scenarios.catalogue_rules import RULES, StagedScenario, find_sparse
+from augment.services.scenarios.way_past import WayPast, way_past
 
 MOST_ON_ONE_SCENE = 8
 
@@ -44,11 +48,13 @@ class ScenarioCheck:
 
     Attributes:
         statements: How many its intent makes; each is held against the reference.
+        way_past: By which lane the ego gets past what the reference adds.
         reasons: Why it is not as it should be; empty if all is well.
     """
 
     slug: str
     statements: int
+    way_past: WayPast
     reasons: tuple[str, ...]
 
 
@@ -72,17 +78,32 @@ def check_catalogue(
     Raises:
         InvalidDocument: The folder holds no catalogue, or its files do not fit together.
     """
-    read = [read_catalogue(folder_of(folder, one)) for one in sets]
-    checked = [_check(scenes[entry.scene], entry) for scenes, entries in read for entry in entries]
-    everything = [entry for _, entries in read for entry in entries]
-    return CatalogueCheck(scenarios=tuple(checked), reasons=tuple(_whole(everything)))
+    read = {one: read_catalogue(folder_of(folder, one)) for one in sets}
+    staged = {
+        one: [_staged(scenes[entry.scene], entry) for entry in entries]
+        for one, (scenes, entries) in read.items()
+    }
+    paper = staged.get(CatalogueSet.PAPER, [])
+    everything = [one.entry for among in staged.values() for one in among]
+    return CatalogueCheck(
+        scenarios=tuple(_check(one, which) for which, among in staged.items() for one in among),
+        reasons=(*_whole(everything), *find_sparse(paper)),
+    )
 
 
-def _check(whole: Scene, entry: CatalogueEntry) -> ScenarioCheck:
+def _staged(whole: Scene, entry: CatalogueEntry) -> StagedScenario:
     scene = whole if entry.keep_traffic else without_traffic(whole)
+    return StagedScenario(entry=entry, scene=scene)
+
+
+def _check(staged: StagedScenario, which: CatalogueSet) -> ScenarioCheck:
+    scene, entry = staged.scene, staged.entry
     ground = Ground.of(scene)
+    way = way_past(scene, entry.reference)
     if entry.intent is None:
-        return ScenarioCheck(slug=entry.slug, statements=0, reasons=("it has no intent",))
+        return ScenarioCheck(
+            slug=entry.slug, statements=0, way_past=way, reasons=("it has no intent",)
+        )
     reasons = [
         f"{one.severity}: {one.sentence()}"
         for one in check_against_intent(ground, entry.reference, entry.intent, AUTHORED)
@@ -91,6 +112,7 @@ def _check(whole: Scene, entry: CatalogueEntry) -> ScenarioCheck:
     return ScenarioCheck(
         slug=entry.slug,
         statements=len(list_statements(entry.intent)),
+        way_past=way,
         reasons=(
             *reasons,
             *_unheld(entry),
@@ -98,6 +120,7 @@ def _check(whole: Scene, entry: CatalogueEntry) -> ScenarioCheck:
             *_refusal(entry),
             *_unseen(scene, entry),
             *_unreached(entry),
+            *(_unlikely(staged, way) if which is CatalogueSet.PAPER else ()),
         ),
     )
 
@@ -155,6 +178,14 @@ def _unreached(entry: CatalogueEntry) -> Iterator[str]:
         points = [(agent.x_m, agent.y_m), agent.walk_to_m or (0.0, 0.0)]
         if max(abs(value) for point in points for value in point) > DEFAULT_RADIUS_M:
             yield f"{agent.id} lies further than {DEFAULT_RADIUS_M:g} m off, which no prompt shows"
+
+
+def _unlikely(staged: StagedScenario, way: WayPast) -> Iterator[str]:
+    """What no driver would expect to meet."""
+    for rule in RULES:
+        yield from rule(staged)
+    if way is WayPast.NONE:
+        yield "it leaves no way past"
 
 
 def _holds(camera: Camera, points_m: FloatArray) -> bool:

@@ -15,7 +15,7 @@ from typing import Any
 
 from augment.errors import InvalidDocument
 from augment.scene.intent_codec import intent_from_document, intent_to_document
-from augment.scene.intent_words import Shape
+from augment.scene.intent_words import Body, Shape
 
 KINDS = ("vehicles", "walk", "cones", "crash")
 CHOICES: dict[str, tuple[str, ...]] = {
@@ -26,7 +26,7 @@ CHOICES: dict[str, tuple[str, ...]] = {
     "relation": ("ahead", "behind", ""),
     "anchor": (),
     "lane": ("", "own", "left", "right", "oncoming"),
-    "body": ("", "vehicle", "car", "bicycle", "van", "truck", "bus"),
+    "body": ("", *(one.value for one in Body)),
     "speed_mps": (),
     "start": ("", "left", "right"),
     "shape": ("", *(one.value for one in Shape)),
