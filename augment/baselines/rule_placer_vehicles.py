@@ -107,7 +107,9 @@ def _vehicle(
         y_m=place.pose.y_m,
         heading_rad=wrap(place.pose.heading_rad + turn_rad),
     )
-    return build_vehicle(request.body, pose, place.lane_id, request.speed_mps or 0.0)
+    on_lane = abs(d_m) <= ground.lane(place).width_m / 2.0
+    lane_id = place.lane_id if on_lane else None
+    return build_vehicle(request.body, pose, lane_id, request.speed_mps or 0.0)
 
 
 def _offset_m(

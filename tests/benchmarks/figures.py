@@ -1,4 +1,4 @@
-"""Write every figure of README.md, docs/checks.md and docs/formats.md anew: `make figures`.
+"""Write the figures of README.md, catalogue.md, checks.md and formats.md anew: `make figures`.
 
 The other measurements write their own section of docs/benchmarks.md and docs/coverage.md, because
 they take long or need other software.
@@ -6,9 +6,14 @@ they take long or need other software.
 
 from __future__ import annotations
 
+import os
+
+import django
+
+from augment.services.scenarios.way_past import WayPast
 from tests.benchmarks import displacement, hostile_reading, injected_faults
-from tests.benchmarks.report import ROOT, write_block
-from tests.fixtures.shelf import SLUGS
+from tests.benchmarks.report import ROOT, table, write_block
+from tests.fixtures.shelf import FOLDER, SLUGS
 
 
 def main() -> None:
@@ -22,6 +27,23 @@ def main() -> None:
     write_block("faults", faults, page=checks)
     formats = ROOT / "docs" / "formats.md"
     write_block("hostile", hostile_reading.hostile_table(), page=formats)
+    write_ways()
+
+
+def write_ways() -> None:
+    """By which lane the ego gets past the references of the paper set."""
+    os.environ.setdefault("DJANGO_SETTINGS_MODULE", "arena.config.settings")
+    django.setup()
+    from augment.services.scenarios.catalogue_check import check_catalogue
+
+    found = check_catalogue(folder=FOLDER).scenarios
+    rows = [
+        [way.value, ", ".join(one.slug for one in found if one.way_past is way)]
+        for way in WayPast
+        if way is not WayPast.NONE
+    ]
+    body = table(["way past", "scenarios"], rows)
+    write_block("ways", body, page=ROOT / "docs" / "catalogue.md")
 
 
 if __name__ == "__main__":

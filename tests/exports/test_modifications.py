@@ -21,13 +21,14 @@ from tests.web.cast import png
 
 pytestmark = pytest.mark.django_db
 
-SLUGS = ("crash-mill-junction", "roadworks-mill-junction", "nudge-ferry-road")
+SLUGS = ("crash-mill-junction", "overtake-mill-junction", "nudge-ferry-road")
 
 
 @pytest.fixture
 def job() -> GenerationJob:
     """Everything of two scenes from the reference, and nothing from a contestant that refused."""
     load_catalogue(folder=FOLDER)
+    Scenario.objects.filter(slug__in=SLUGS).update(keep_traffic=False)
     job = GenerationJob.objects.create(name="Round 1")
     reference = rows.add_kind("reference")
     rule = rows.add_kind("rule", Contestant.Kind.RULE)

@@ -51,7 +51,7 @@ def test_a_reference_that_is_elsewhere_than_said_is_refused(folder: Path) -> Non
     with pytest.raises(CommandError) as fault:
         checked(folder)
     reasons = str(fault.value)
-    assert "Agent13 is 24.0 m ahead of the ego along its lane; 21.5 m ahead is asked for" in reasons
+    assert "Agent13 is 24.0 m ahead of the ego along its lane; 21.5 m ahead is asked" in reasons
     assert "Agent13 is 1.00 m to the right of the centre of the ego's lane; 1.3 m" in reasons
 
 

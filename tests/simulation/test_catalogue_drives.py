@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from augment.scene.modification import without_traffic
 from augment.simulation.drive import Drive, run
 from augment.simulation.pdm_closed import PdmClosed
 from augment.simulation.proposals import ORIGINAL_OFFSETS_M, PAPER_OFFSETS_M
@@ -20,7 +21,7 @@ def advance_m(drive: Drive) -> float:
 
 
 def test_offsets_to_4_m_pass_a_parked_car_at_which_the_original_ones_wait() -> None:
-    scene, parked = shown_scene(SLUG), entry(SLUG).reference
+    scene, parked = without_traffic(shown_scene(SLUG)), entry(SLUG).reference
     assert parked is not None
     road, setting = Road(scene), DriveSetting(scene=scene, modification=parked)
     wide, narrow = (

@@ -5,6 +5,7 @@ One function a rule; each yields its reasons why a scenario is not as it should 
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -16,7 +17,9 @@ from augment.checks import Ground
 from augment.checks.landmarks import find_mark
 from augment.checks.lanes_across import LanesAcross
 from augment.checks.situation import VEHICLES, is_stopped
-from augment.geometry.boxes import corners
+from augment.checks.surfaces import gaps_m
+from augment.geometry.boxes import Box, corners, overlap
+from augment.geometry.frames import Pose
 from augment.render.camera import Camera, camera_for
 from augment.scene.catalogue import ScenarioType
 from augment.scene.catalogue_codec import ENGLISH, CatalogueEntry
@@ -76,7 +79,8 @@ class StagedScenario:
     def shows(self, agent: TrafficAgent) -> bool:
         """Whether the picture holds an agent's centre."""
         x_px, y_px = self.camera.to_pixels(np.array([[agent.x_m, agent.y_m]]))[0]
-        return 0.0 <= x_px <= self.camera.width_px and 0.0 <= y_px <= self.camera.height_px
+        is_across = 0.0 <= float(x_px) <= self.camera.width_px
+        return is_across and 0.0 <= float(y_px) <= self.camera.height_px
 
 
 # Of one scenario
@@ -84,12 +88,12 @@ class StagedScenario:
 
 def find_apart(one: StagedScenario) -> Iterator[str]:
     """Crashed vehicles of which one touches none before it."""
-    from shapely import Polygon
-
     cars = one.added(*VEHICLES) if one.entry.type is ScenarioType.ACCIDENT_SITE else []
-    boxes = [Polygon(corners(car.pose, car.length_m, car.width_m)) for car in cars]
+    if not cars:
+        return
+    gaps = gaps_m(np.array([corners(car.pose, car.length_m, car.width_m) for car in cars]))
     for number, car in enumerate(cars[1:], start=1):
-        gap_m = min(boxes[number].distance(box) for box in boxes[:number])
+        gap_m = gaps[number, :number].min()
         if gap_m > TOUCH_M:
             yield f"{car.id} has crashed into nobody: {gap_m:.2f} m off"
 
@@ -181,19 +185,29 @@ RULES = (find_apart, find_unguarded, find_unnamed_junction, find_unhidden)
 
 def is_hidden(one: StagedScenario) -> bool:
     """Whether a vehicle stands between the ego and where the first walk begins."""
-    from shapely import LineString, Polygon
-
     walkers = [walker for walker in one.entry.reference.added if walker.walk_to_m is not None]
-    ego = one.scene.ego
     if not walkers:
         return False
-    sight = LineString([(ego.x_m, ego.y_m), (walkers[0].x_m, walkers[0].y_m)])
-    standing = [*one.scene.agents, *one.entry.reference.added]
+    ego, walker = one.scene.ego, walkers[0]
+    dx_m, dy_m = walker.x_m - ego.x_m, walker.y_m - ego.y_m
+    sight = Box(
+        pose=Pose(
+            x_m=ego.x_m + dx_m / 2.0,
+            y_m=ego.y_m + dy_m / 2.0,
+            heading_rad=math.atan2(dy_m, dx_m),
+        ),
+        length_m=math.hypot(dx_m, dy_m),
+        width_m=_SIGHT_M,
+    )
     return any(
-        sight.intersects(Polygon(corners(car.pose, car.length_m, car.width_m)))
-        for car in standing
+        overlap(sight, Box(pose=car.pose, length_m=car.length_m, width_m=car.width_m)).area_m2
+        > 0.0
+        for car in (*one.scene.agents, *one.entry.reference.added)
         if car.type in VEHICLES and is_stopped(car)
     )
+
+
+_SIGHT_M = 0.02
 
 
 def has_traffic(one: StagedScenario) -> bool:
