@@ -145,6 +145,14 @@ def counted_votes(snapshot: Snapshot) -> QuerySet[Vote]:
     return votes_behind(snapshot, VoteSearch())
 
 
+def settled_counted(snapshot: Snapshot) -> int:
+    """Return how many ties of pairs that nobody was shown count in a rating."""
+    is_possible = snapshot.study.rules.get("identical") and not is_imported(snapshot.study)
+    if not is_possible or Filters.of_document(snapshot.filters).leave_out_settled:
+        return 0
+    return snapshot.votes_counted - counted_votes(snapshot).count()
+
+
 # --- What is found -----------------------------------------------------------------------------
 
 

@@ -27,6 +27,7 @@ from arena.queries.results import (
     snapshots_of,
     votes_in,
 )
+from arena.queries.vote_lists import settled_counted
 from arena.services.early_looks import open_early
 from arena.web.access import ADMIN, ANALYST, EXPERT, STAFF, allow_only
 from arena.web.rating import rate_or_send
@@ -80,7 +81,9 @@ def results_page(request: HttpRequest, code: uuid.UUID, tab: str = "table") -> H
             context["own_votes"] = both_versions(snapshot, table)
         else:
             table = for_experts(table)
+        settled = settled_counted(snapshot)
         context |= {"table": table, "early_look": EARLY_LOOK}
+        context |= {"settled": settled, "cast": snapshot.votes_counted - settled}
         context["adjusted"] = show_adjustment(snapshot, table)
         context |= chosen.fill(snapshot, table)
     return render(request, "results/page.html", context)

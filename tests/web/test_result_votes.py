@@ -14,6 +14,7 @@ from django.urls import reverse
 from pytest_django import DjangoAssertNumQueries
 
 from arena.models import Matchup, Snapshot, Study, Vote
+from arena.queries.vote_lists import counted_votes
 from arena.queries.vote_sets import Filters
 from arena.services.ratings import rate
 from arena.web.results_tabs import TABS
@@ -235,3 +236,15 @@ def test_a_list_takes_as_many_queries_for_any_number_of_votes(
         listed(analyst, study, **search)
         with django_assert_max_num_queries(18):
             listed(analyst, study, **search)
+
+
+def test_settled_ties_are_told_apart_from_votes_that_experts_cast(
+    study: Study, analyst: Client
+) -> None:
+    snapshot = rate(study=study, rounds=10)
+    cast = counted_votes(snapshot).count()
+    ties = snapshot.votes_counted - cast
+    assert ties > 0
+    shown = analyst.get(reverse("results", args=[study.code])).content.decode()
+    assert f"{cast} votes and {ties} settled ties counted" in shown
+    assert f"Counted {cast} votes and {ties} ties of pairs that nobody was shown." in shown
