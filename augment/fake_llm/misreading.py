@@ -1,8 +1,8 @@
 """How the careless stand-in misreads what a sentence asks for, before it places anything.
 
-Only what the paper set never asks for is misread here: who or what a distance runs from, where the
-ego turns, several groups, a move or a removal, a wish that can't be met. So on the paper set
-nothing changes.
+Only what the paper set hardly asks for is misread here: who or what a distance runs from, where
+the ego turns, several groups, a move or a removal, a wish that can't be met. On the paper set
+that changes the ten roadworks alone, whose sign and barrier are counted from the first cone.
 """
 
 from __future__ import annotations
