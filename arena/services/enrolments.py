@@ -131,7 +131,8 @@ def enrol(*, token: str, external_id: str, agreed_sha256: str) -> EnrolledVoter:
     if enrolment.voters.filter(external_id__iexact=external_id).exists():
         raise Conflict(
             sentence(
-                "“%(id)s” takes part already. Go on where you began, in the same browser.",
+                "“%(id)s” takes part already. Go on where you began, in the same "
+                "browser, or ask who runs the study for a link of your own.",
                 id=external_id,
             )
         )

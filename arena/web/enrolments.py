@@ -10,6 +10,7 @@ from django.contrib import messages
 from django.contrib.auth import login
 from django.contrib.auth.decorators import login_not_required
 from django.contrib.auth.models import User
+from django.core import signing
 from django.core.paginator import Paginator
 from django.http import Http404, HttpRequest, HttpResponse
 from django.shortcuts import get_object_or_404, redirect, render
@@ -20,7 +21,7 @@ from django.views.decorators.cache import never_cache
 from django.views.decorators.http import require_http_methods, require_POST, require_safe
 
 from arena.errors import ArenaError, EnrolmentOver, NotYours
-from arena.models import Enrolment, Study
+from arena.models import EnrolledVoter, Enrolment, Study
 from arena.queries.enrolments import code_told, enrolled_voters, enrolment_by_token, state_of
 from arena.services.cells import csv_text
 from arena.services.enrolments import LONGEST_CONSENT, drop_silent, enrol, set_enrolment
@@ -30,6 +31,10 @@ from augment.errors import AugmentError
 from augment.services.wording import translate
 
 PAGE = 100
+VOTER_COOKIE, ENROLMENT_COOKIE = "arena_voter", "arena_enrolment"
+RETURN_S = 365 * 24 * 3600
+"""So long a browser knows who enrolled in it; its session ends before."""
+
 ID_PARAMETERS = ("id", "worker", "workerId", "PROLIFIC_PID")
 """In an address, what the platforms call the id of whom they send."""
 
@@ -81,6 +86,11 @@ def enrol_page(request: HttpRequest, token: str) -> HttpResponse:
     if user.is_authenticated and enrolment.voters.filter(expert=user).exists():
         return redirect("vote", code=enrolment.study.code)
     given = next((request.GET[name] for name in ID_PARAMETERS if name in request.GET), "")
+    returning = _returning(request, enrolment)
+    if returning is not None and "again" in request.POST:
+        return _sign_in(request, returning)
+    if returning is not None:
+        return render(request, "enrol_again.html", {"study": enrolment.study})
     form = NewcomerForm(request.POST or None, initial={"external_id": given[:120]})
     if request.method == "POST" and form.is_valid():
         try:
@@ -95,9 +105,7 @@ def enrol_page(request: HttpRequest, token: str) -> HttpResponse:
             form.add_error("external_id", translate(error))
             enrolment.refresh_from_db()
         else:
-            login(request, voter.expert, backend=BACKEND)
-            request.session.set_expiry(SESSION_S)
-            return redirect("vote", code=enrolment.study.code)
+            return _sign_in(request, voter)
     if not enrolment.is_open or enrolment.study.state != Study.State.OPEN:
         return _over(request, enrolment)
     context = {"enrolment": enrolment, "form": form}
@@ -158,6 +166,43 @@ def voters_file(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
 
 
 # --- Private -----------------------------------------------------------------------------------
+
+
+def _sign_in(request: HttpRequest, voter: EnrolledVoter) -> HttpResponse:
+    """The first pair, and what brings this browser back when its session is over."""
+    enrolment = voter.enrolment
+    login(request, voter.expert, backend=BACKEND)
+    request.session.set_expiry(SESSION_S)
+    answer = redirect("vote", code=enrolment.study.code)
+    proof = signing.dumps(str(voter.code), salt=VOTER_COOKIE)
+    page = reverse("enrol", args=[enrolment.token])
+    for name, value, path in (
+        (VOTER_COOKIE, proof, page),
+        (ENROLMENT_COOKIE, enrolment.token, reverse("login")),
+    ):
+        answer.set_cookie(
+            name,
+            value,
+            max_age=RETURN_S,
+            path=path,
+            httponly=True,
+            secure=request.is_secure(),
+            samesite="Lax",
+        )
+    return answer
+
+
+def _returning(request: HttpRequest, enrolment: Enrolment) -> EnrolledVoter | None:
+    """Who enrolled in this browser, None where nobody did or the study takes no votes."""
+    try:
+        code = signing.loads(
+            request.COOKIES.get(VOTER_COOKIE, ""), salt=VOTER_COOKIE, max_age=RETURN_S
+        )
+    except signing.BadSignature:
+        return None
+    if enrolment.study.state != Study.State.OPEN:
+        return None
+    return enrolment.voters.filter(code=code, expert__is_active=True).first()
 
 
 def _over(request: HttpRequest, enrolment: Enrolment) -> HttpResponse:

@@ -13,6 +13,7 @@ from django.urls import reverse
 
 from arena.models import Enrolment, Study
 from arena.services.enrolments import set_enrolment
+from arena.web.enrolments import VOTER_COOKIE
 from tests.study_rows import a_study, matchups_of, vote
 from tests.web.cast import people, signed_in
 
@@ -81,6 +82,30 @@ def test_a_link_that_takes_nobody_on_says_so(enrolment: Enrolment) -> None:
     Enrolment.objects.update(is_open=False)
     assert Client().get(reverse("enrol", args=[enrolment.token])).status_code == 410
     assert Client().get(reverse("enrol", args=["nobody"])).status_code == 404
+
+
+def test_a_voter_whose_session_ended_goes_on_in_the_same_browser(enrolment: Enrolment) -> None:
+    client = Client()
+    join(client, enrolment)
+    voter, link = enrolment.voters.get(), reverse("enrol", args=[enrolment.token])
+    del client.cookies["sessionid"]
+    assert link in client.get(reverse("login")).content.decode()
+    Enrolment.objects.update(is_open=False)
+    assert "You take part already" in client.get(link).content.decode()
+    assert client.get(reverse("vote", args=[enrolment.study.code])).status_code == 302
+    client.post(link, {"again": "1"})
+    assert client.session["_auth_user_id"] == str(voter.expert_id)
+    assert client.get(reverse("vote", args=[enrolment.study.code])).status_code == 200
+
+
+def test_nobody_goes_on_as_a_voter_without_that_voter_s_browser(enrolment: Enrolment) -> None:
+    join(Client(), enrolment)
+    voter, link = enrolment.voters.get(), reverse("enrol", args=[enrolment.token])
+    stranger = Client()
+    stranger.cookies[VOTER_COOKIE] = str(voter.code)
+    assert "You take part already" not in stranger.get(link).content.decode()
+    stranger.post(link, {"again": "1"})
+    assert "_auth_user_id" not in stranger.session
 
 
 def test_a_voter_opens_nothing_but_the_own_study(enrolment: Enrolment) -> None:
