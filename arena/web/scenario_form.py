@@ -126,6 +126,11 @@ def new_scenario_page(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
 def edit_page(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
     """Instruction, type and circumstances of a scenario that nothing needs yet."""
     scenario = get_object_or_404(Scenario, code=code)
+    if scenario.in_catalogue:
+        messages.error(
+            request, f"“{scenario.slug}” is the catalogue’s own; change it in its file."
+        )
+        return redirect("scenario", code=code)
     form = ScenarioForm(request.POST if request.method == "POST" else _entered(scenario))
     if request.method == "POST" and form.is_valid():
         try:

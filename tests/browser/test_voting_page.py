@@ -55,6 +55,31 @@ def test_axe_finds_nothing_on_any_page_of_voting(booth: Booth, theme: str) -> No
     assert faults(page) == [], "closed"
 
 
+@pytest.mark.parametrize("size", [(390, 844), (1280, 720)])
+def test_no_entry_of_the_legend_is_cut_however_many_there_are(
+    booth: Booth, size: tuple[int, int]
+) -> None:
+    for row in study_rows.matchups_of(booth.study, "eva"):
+        row.view = {name: value for name, value in (row.view or {}).items() if name != "legend"}
+        row.save()  # a pair of an earlier version, which names every mark
+    page = booth.enter(viewport={"width": size[0], "height": size[1]})
+    legend = page.locator("#legend")
+    assert legend.locator("li:visible").count() > 12
+    within = """list => [...list.children].every(one => {
+        const box = one.getBoundingClientRect(), all = list.getBoundingClientRect();
+        return box.bottom <= all.bottom + 0.5 && box.right <= all.right + 0.5;
+    })"""
+    assert legend.evaluate(within)
+    page.evaluate("scrollTo(0, document.documentElement.scrollHeight)")
+    bar = page.locator("#answers").bounding_box()
+    assert bar is not None
+    for reached in (legend, page.locator(".tools")):
+        box = reached.bounding_box()
+        assert box is not None
+        assert box["y"] + box["height"] <= bar["y"] + 0.5 or box["y"] >= bar["y"] + bar["height"]
+        assert box["y"] + box["height"] <= size[1] + 0.5
+
+
 @pytest.mark.layout
 @pytest.mark.parametrize("size", [(1280, 720), (1366, 650), (1920, 1080)])
 def test_nothing_scrolls_or_moves_and_the_pictures_are_as_large_as_can_be(
