@@ -11,7 +11,9 @@ import pytest
 from django.core.management import call_command
 from django.core.management.base import CommandError
 
-from tests.fixtures.shelf import FOLDER, HARD_SLUGS, SLUGS
+from tests.fixtures.shelf import FOLDER, HARD_SLUGS, SLUGS, entry
+
+CAR = entry("nudge-plane-tree-street").reference.added[0].id
 
 
 @pytest.fixture
@@ -51,13 +53,13 @@ def test_a_reference_that_is_elsewhere_than_said_is_refused(folder: Path) -> Non
     with pytest.raises(CommandError) as fault:
         checked(folder)
     reasons = str(fault.value)
-    assert "Agent13 is 24.0 m ahead of the ego along its lane; 21.5 m ahead is asked" in reasons
-    assert "Agent13 is 1.00 m to the right of the centre of the ego's lane; 1.3 m" in reasons
+    assert f"{CAR} is 24.0 m ahead of the ego along its lane; 21.5 m ahead is asked" in reasons
+    assert f"{CAR} is 1.00 m to the right of the centre of the ego's lane; 1.3 m" in reasons
 
 
 def test_a_reference_with_something_wrong_is_refused(folder: Path) -> None:
     edit(folder, lambda it: it["reference"]["add"][0].update(x_m=0.0, y_m=0.0))
-    with pytest.raises(CommandError, match="wrong: Agent13 and the ego overlap"):
+    with pytest.raises(CommandError, match=f"wrong: {CAR} and the ego overlap"):
         checked(folder)
 
 
