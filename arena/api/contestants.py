@@ -1,35 +1,30 @@
-"""Who contestants are and how they ask."""
+"""Contestants and how they ask."""
 
 from __future__ import annotations
 
-import uuid
 from collections.abc import Sequence
-from typing import Any, cast
+from typing import Any
 
-from django.contrib.auth.models import User
-from django.db.models import QuerySet
-from django.shortcuts import get_object_or_404
 from rest_framework import serializers
 from rest_framework.request import Request
 from rest_framework.response import Response
 
-from arena.api.access import AdminsOnly, ReadersAndAdmins, StaffOnly
-from arena.api.errors import ApiView
-from arena.api.fields import FlagField, StrictSerializer, TextField
-from arena.api.paging import PageQuery, answer_page, page_of, read_query
-from arena.api.schema import describe
+from arena.api.access import ADMINS, STAFF
+from arena.api.fields import StrictSerializer, TextField
+from arena.api.paging import PageQuery, answer_page, page_of
+from arena.api.schema import operation
+from arena.api.views import ApiView
 from augment.models import Contestant
 from augment.services.endpoints.entering import VARIANTS, EnteredEndpoint, enter_contestant
-from augment.services.retirement import retire, take_back
 from augment.services.running.transcript_export import contestant_documents
 
-KINDS = [kind for kind in Contestant.Kind if kind is not Contestant.Kind.CHECK]
+KINDS = [kind.value for kind in Contestant.Kind if kind is not Contestant.Kind.CHECK]
 
 
 class ContestantQuery(PageQuery):
     """Which contestants."""
 
-    kind = serializers.ChoiceField(choices=[kind.value for kind in KINDS], required=False)
+    kind = serializers.ChoiceField(choices=KINDS, required=False)
     variant = serializers.ChoiceField(choices=list(VARIANTS), required=False)
     slug = serializers.CharField(max_length=80, required=False)
 
@@ -43,7 +38,7 @@ class ContestantEndpointDocument(serializers.Serializer[Any]):
 
 
 class WholeContestantDocument(serializers.Serializer[Any]):
-    """A contestant in full, as transcripts have it."""
+    """A contestant, as in transcripts."""
 
     code = serializers.UUIDField()
     slug = serializers.CharField()
@@ -51,13 +46,13 @@ class WholeContestantDocument(serializers.Serializer[Any]):
     kind = serializers.CharField()
     variant = serializers.CharField(allow_null=True)
     model = serializers.CharField(allow_null=True)
-    roles = serializers.DictField(help_text="Who else plays a role.")
+    roles = serializers.DictField(help_text="The models of other roles.")
     options = serializers.DictField(help_text="Those that were chosen.")
     frozen_options = serializers.DictField(
-        allow_null=True, help_text="The whole set since its first run."
+        allow_null=True, help_text="All options, from its first run on."
     )
     left_out = serializers.DictField(
-        help_text="By role, what its models do not take and is not sent."
+        help_text="By role, options that its model does not support and that are not sent."
     )
     sends = serializers.DictField(allow_null=True)
     endpoint = ContestantEndpointDocument(allow_null=True)
@@ -69,101 +64,41 @@ class ContestantBody(StrictSerializer):
 
     slug = TextField(max_length=80)
     variant = serializers.ChoiceField(choices=list(VARIANTS))
-    endpoint = TextField(max_length=80, help_text="The label of one that is there.")
+    endpoint = TextField(max_length=80, help_text="The label of an endpoint.")
     model = TextField(max_length=120, help_text="The model id on the endpoint.")
     name = TextField(max_length=120, required=False, default="", allow_blank=True)
-    options = serializers.DictField(
-        required=False, default=dict, help_text="By name; what is missing stays open."
-    )
-
-
-class RetiredBody(StrictSerializer):
-    """Whether forms offer it no more."""
-
-    is_retired = FlagField()
+    options = serializers.DictField(required=False, default=dict, help_text="By name.")
 
 
 class ContestantsView(ApiView):
-    """The contestants by their slug; attention checks are none."""
+    """Contestants; attention checks are not among them."""
 
-    permission_classes = (ReadersAndAdmins,)
+    readers, writers = STAFF, ADMINS
 
-    @describe(
+    @operation(
         "Contestants by slug",
         answers=page_of(WholeContestantDocument),
         query=ContestantQuery,
         name="listContestants",
     )
-    def get(self, request: Request) -> Response:
-        """In full, and whether they are retired."""
-        query = read_query(request, ContestantQuery)
-        rows = _contestants()
-        for name in ("kind", "variant", "slug"):
-            if name in query:
-                rows = rows.filter(**{name: query[name]})
+    def get(self, request: Request, given: dict[str, Any]) -> Response:
+        """Retired ones have a date in `retired_at`."""
+        rows = Contestant.objects.exclude(kind=Contestant.Kind.CHECK).select_related("endpoint")
         return answer_page(
-            request,
-            rows,
-            query,
-            WholeContestantDocument,
-            order="slug",
-            lines=_documents,
+            request, rows, given, WholeContestantDocument, order="slug", lines=_documents
         )
 
-    @describe(
+    @operation(
         "Add a contestant that asks a language model",
         takes=ContestantBody,
         answers=WholeContestantDocument,
         status=201,
         name="createContestant",
     )
-    def post(self, request: Request) -> Response:
+    def post(self, request: Request, given: dict[str, Any]) -> dict[str, Any]:
         """The same one twice is one."""
-        body = ContestantBody(data=request.data)
-        body.is_valid(raise_exception=True)
-        given = dict(body.validated_data)
         endpoint = EnteredEndpoint(label=given.pop("endpoint"))
-        made = enter_contestant(**given, endpoint=endpoint, actor=cast(User, request.user))
-        return Response(WholeContestantDocument(_document(made)).data, status=201)
-
-
-class ContestantView(ApiView):
-    """One contestant."""
-
-    permission_classes = (StaffOnly,)
-
-    @describe("A contestant", answers=WholeContestantDocument, name="getContestant")
-    def get(self, request: Request, code: uuid.UUID) -> Response:
-        """In full."""
-        row = get_object_or_404(_contestants(), code=code)
-        return Response(WholeContestantDocument(_document(row)).data)
-
-
-class RetirementView(ApiView):
-    """Whether forms offer a contestant."""
-
-    permission_classes = (AdminsOnly,)
-
-    @describe(
-        "Retire a contestant or take that back",
-        takes=RetiredBody,
-        answers=WholeContestantDocument,
-        name="retireContestant",
-    )
-    def post(self, request: Request, code: uuid.UUID) -> Response:
-        """What it made stays."""
-        body = RetiredBody(data=request.data)
-        body.is_valid(raise_exception=True)
-        row = get_object_or_404(_contestants(), code=code)
-        change = retire if body.validated_data["is_retired"] else take_back
-        change(row, actor=cast(User, request.user))
-        changed = _contestants().get(pk=row.pk)
-        return Response(WholeContestantDocument(_document(changed)).data)
-
-
-def _contestants() -> QuerySet[Contestant]:
-    rows = Contestant.objects.exclude(kind=Contestant.Kind.CHECK)
-    return rows.select_related("endpoint")
+        return _documents([enter_contestant(**given, endpoint=endpoint, actor=self.user)])[0]
 
 
 def _documents(rows: Sequence[Contestant]) -> list[dict[str, Any]]:
@@ -171,7 +106,3 @@ def _documents(rows: Sequence[Contestant]) -> list[dict[str, Any]]:
         document | {"code": row.code, "retired_at": row.retired_at}
         for row, document in zip(rows, contestant_documents(rows), strict=True)
     ]
-
-
-def _document(row: Contestant) -> dict[str, Any]:
-    return _documents([row])[0]

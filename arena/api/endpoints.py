@@ -1,29 +1,31 @@
-"""Endpoints: where language models are asked. Keys are never told, nor taken."""
+"""Endpoints, their models, and probes of what a model can do. Keys are never sent or accepted."""
 
 from __future__ import annotations
 
 import uuid
-from typing import Any, cast
+from functools import partial
+from typing import Any
 
-from django.contrib.auth.models import User
+from django.http import Http404
 from django.shortcuts import get_object_or_404
+from drf_spectacular.utils import extend_schema_field
 from rest_framework import serializers
 from rest_framework.request import Request
-from rest_framework.response import Response
 
-from arena.api.access import AdminsOnly, ReadersAndAdmins
-from arena.api.endpoint_models import EndpointModelDocument, NewModelBody
-from arena.api.errors import ApiView
+from arena.api.access import ADMINS, STAFF
 from arena.api.fields import FlagField, StrictSerializer, TextField, WholeNumberField
-from arena.api.paging import PageQuery, answer_page, page_of, read_query
-from arena.api.schema import describe
-from augment.models import Endpoint
+from arena.api.schema import operation
+from arena.api.views import ApiView, WarnedDocument, keep_and_send
+from arena.queries.probes import probe_lines
+from augment.models import Endpoint, EndpointModel, Probe
 from augment.services.endpoints import editing
 from augment.services.endpoints.editing import EndpointFacts
+from augment.services.endpoints.probing import plan_probe
+from augment.tasks import enqueue_probe
 
 
 class EndpointDocument(serializers.Serializer[Any]):
-    """One endpoint."""
+    """An endpoint."""
 
     code = serializers.UUIDField()
     label = serializers.CharField()  # type: ignore[assignment]
@@ -36,15 +38,11 @@ class EndpointDocument(serializers.Serializer[Any]):
     requests_per_minute = serializers.IntegerField(allow_null=True)
 
 
-class WholeEndpointDocument(EndpointDocument):
-    """One endpoint with its models."""
+class EndpointBody(StrictSerializer):
+    """A new endpoint."""
 
-    models = EndpointModelDocument(many=True)
-
-
-class FactsBody(StrictSerializer):
-    """What of an endpoint can be changed."""
-
+    label = TextField(max_length=80)  # type: ignore[assignment]
+    is_simulated = FlagField(required=False, default=False)
     base_url = TextField(max_length=200)
     key_variable = TextField(max_length=80, required=False, default="", allow_blank=True)
     max_concurrency = WholeNumberField(
@@ -59,115 +57,125 @@ class FactsBody(StrictSerializer):
     )
 
 
-class EndpointBody(FactsBody):
-    """A new endpoint; its label and whether it is simulated stay."""
+class EndpointModelDocument(serializers.Serializer[Any]):
+    """A model of an endpoint; null or empty is unknown."""
 
-    label = TextField(max_length=80)  # type: ignore[assignment]
-    is_simulated = FlagField(required=False, default=False)
-
-
-class EndpointChangeBody(FactsBody):
-    """Another address, key variable or limits."""
-
-    move_key = FlagField(
-        required=False, default=False, help_text="Its key may go to another server than so far."
+    code = serializers.UUIDField()
+    endpoint = serializers.CharField(source="endpoint.label")
+    model = serializers.CharField()
+    model_class = serializers.CharField()
+    vision = serializers.BooleanField(allow_null=True)
+    native_tools = serializers.BooleanField(allow_null=True)
+    json_schema = serializers.BooleanField(allow_null=True)
+    temperature = serializers.BooleanField(allow_null=True)
+    reasoning_effort = serializers.CharField()
+    context_tokens = serializers.IntegerField(allow_null=True)
+    max_output_tokens = serializers.IntegerField(allow_null=True)
+    price_in_usd = serializers.DecimalField(
+        None, 6, allow_null=True, help_text="For a million tokens."
     )
+    price_out_usd = serializers.DecimalField(None, 6, allow_null=True)
+    price_as_of = serializers.DateField(allow_null=True)
+    price_source = serializers.CharField()
+
+
+class NewModelBody(StrictSerializer):
+    """A model that an endpoint has."""
+
+    model = TextField(max_length=120, help_text="Its id there.")
+
+
+class ProbeLineDocument(serializers.Serializer[Any]):
+    """The result of one question so far."""
+
+    ability = serializers.CharField()
+    progress = serializers.CharField(
+        help_text="asked, asking, waiting, or left where it was not asked."
+    )
+    has_it = serializers.BooleanField(
+        allow_null=True, help_text="Null where the answer does not tell."
+    )
+    note = serializers.CharField()
+    model_returned = serializers.CharField()
+    tokens = serializers.IntegerField(allow_null=True)
+    latency_s = serializers.FloatField(allow_null=True)
+    cost_usd = serializers.DecimalField(None, 9, allow_null=True)
+
+
+class ProbeDocument(WarnedDocument):
+    """A probe with its six lines."""
+
+    code = serializers.UUIDField()
+    state = serializers.CharField(help_text="queued, running, done or failed.")
+    reason = serializers.CharField(help_text="Why it failed.")
+    lines = serializers.SerializerMethodField()
+    created_at = serializers.DateTimeField()
+    finished_at = serializers.DateTimeField(allow_null=True)
+
+    @extend_schema_field(ProbeLineDocument(many=True))
+    def get_lines(self, probe: Probe) -> Any:
+        """Return the lines, those to come included."""
+        return ProbeLineDocument(probe_lines(probe.model, probe), many=True).data
 
 
 class EndpointsView(ApiView):
-    """The endpoints by their label."""
+    """Endpoints."""
 
-    permission_classes = (ReadersAndAdmins,)
+    writers = ADMINS
 
-    @describe(
-        "Endpoints by label",
-        answers=page_of(EndpointDocument),
-        query=PageQuery,
-        name="listEndpoints",
-    )
-    def get(self, request: Request) -> Response:
-        """Where their models are and how often they may be asked."""
-        query = read_query(request, PageQuery)
-        rows = Endpoint.objects.all()
-        return answer_page(request, rows, query, EndpointDocument, order="label")
-
-    @describe(
+    @operation(
         "Add an endpoint",
         takes=EndpointBody,
         answers=EndpointDocument,
         status=201,
         name="createEndpoint",
     )
-    def post(self, request: Request) -> Response:
-        """One that is there is never moved: others ask it at the address it has."""
-        body = EndpointBody(data=request.data)
-        body.is_valid(raise_exception=True)
-        given = dict(body.validated_data)
-        made = editing.add_endpoint(
+    def post(self, request: Request, given: dict[str, Any]) -> Endpoint:
+        """409 where the label is taken."""
+        return editing.add_endpoint(
             label=given.pop("label"),
             is_simulated=given.pop("is_simulated"),
             facts=EndpointFacts(**given),
-            actor=cast(User, request.user),
+            actor=self.user,
         )
-        return Response(EndpointDocument(made).data, status=201)
-
-
-class EndpointView(ApiView):
-    """One endpoint."""
-
-    permission_classes = (ReadersAndAdmins,)
-
-    @describe("An endpoint with its models", answers=WholeEndpointDocument, name="getEndpoint")
-    def get(self, request: Request, code: uuid.UUID) -> Response:
-        """What is known of each, and what it costs."""
-        return Response(_whole(code))
-
-    @describe(
-        "Change an endpoint",
-        takes=EndpointChangeBody,
-        answers=WholeEndpointDocument,
-        name="changeEndpoint",
-    )
-    def post(self, request: Request, code: uuid.UUID) -> Response:
-        """It counts for the next call; what is missing is as for a new one."""
-        row = get_object_or_404(Endpoint, code=code)
-        body = EndpointChangeBody(data=request.data)
-        body.is_valid(raise_exception=True)
-        given = dict(body.validated_data)
-        may_move_key = given.pop("move_key")
-        editing.change_endpoint(
-            row,
-            facts=EndpointFacts(**given),
-            may_move_key=may_move_key,
-            actor=cast(User, request.user),
-        )
-        return Response(_whole(code))
 
 
 class ModelsView(ApiView):
     """The models of an endpoint."""
 
-    permission_classes = (AdminsOnly,)
+    writers = ADMINS
 
-    @describe(
-        "Note a model of an endpoint",
+    @operation(
+        "Add a model to an endpoint",
         takes=NewModelBody,
         answers=EndpointModelDocument,
         status=201,
         name="addModel",
     )
-    def post(self, request: Request, code: uuid.UUID) -> Response:
-        """Its listed price comes with it; all else is unknown."""
+    def post(self, request: Request, code: uuid.UUID, given: dict[str, Any]) -> EndpointModel:
+        """Comes with its listed price; all else is unknown before a probe."""
         row = get_object_or_404(Endpoint, code=code)
-        body = NewModelBody(data=request.data)
-        body.is_valid(raise_exception=True)
-        model = body.validated_data["model"]
-        made = editing.add_model(row, model=model, actor=cast(User, request.user))
-        return Response(EndpointModelDocument(made).data, status=201)
+        return editing.add_model(row, model=given["model"], actor=self.user)
 
 
-def _whole(code: uuid.UUID) -> dict[str, Any]:
-    rows = Endpoint.objects.prefetch_related("models__endpoint")
-    row = get_object_or_404(rows, code=code)
-    found = dict(EndpointDocument(row).data)
-    return found | {"models": EndpointModelDocument(row.models.all(), many=True).data}
+class ProbeView(ApiView):
+    """What a model can do, asked by a worker."""
+
+    readers, writers = STAFF, ADMINS
+
+    @operation("The last probe of a model", answers=ProbeDocument, name="getProbe")
+    def get(self, request: Request, code: uuid.UUID) -> Probe:
+        """Line by line while it runs; 404 before the first."""
+        found = _model(code).probes.first()
+        if found is None:
+            raise Http404
+        return found
+
+    @operation("Have a model probed", answers=ProbeDocument, status=202, name="probeModel")
+    def post(self, request: Request, code: uuid.UUID) -> tuple[Probe, list[str]]:
+        """Poll it until its state is done or failed."""
+        return keep_and_send(partial(plan_probe, _model(code), actor=self.user), enqueue_probe)
+
+
+def _model(code: uuid.UUID) -> EndpointModel:
+    return get_object_or_404(EndpointModel.objects.select_related("endpoint"), code=code)

@@ -1,10 +1,9 @@
-"""One shape for everything that goes wrong on the wire, and one table of status codes.
+"""The one form of every API error, and the status of each exception.
 
     {"error": {"code": "already_decided", "message": "...", "outcome": "A"}}
 
-`message` is a sentence for a person. `fields` (per field a list of sentences) comes with 422,
-`outcome` (the stored one) with a matchup that is decided already. What pages show of them is in
-the language of whoever asks.
+`message` is a sentence for people. `fields` (lists of sentences by field) comes with 422,
+`outcome` (the stored one) with a pair that is already decided.
 """
 
 from __future__ import annotations
@@ -12,26 +11,17 @@ from __future__ import annotations
 from typing import Any
 
 from django.core.exceptions import PermissionDenied, RequestDataTooBig
-from django.http import Http404
+from django.http import Http404, JsonResponse
 from django.utils.translation import gettext as _
-from django.views.decorators.cache import never_cache
-from django.views.decorators.http import conditional_page
 from rest_framework import exceptions
-from rest_framework.parsers import BaseParser
-from rest_framework.request import Request
 from rest_framework.response import Response
-from rest_framework.views import APIView
 
-from arena.api.parsing import SoundJSONParser
-from arena.api.schema import ArenaSchema
 from arena.errors import (
     AlreadyDecided,
-    AlreadyLabelled,
     ArenaError,
     DatabaseBusy,
     InvalidPreference,
     InvalidVote,
-    LabellingClosed,
     LinkOver,
     NoSnapshot,
     NotYours,
@@ -56,8 +46,6 @@ STATUS: tuple[tuple[type[Exception], int, str], ...] = (
     (StudyNotOpen, 410, "study_not_open"),
     (StudyStillOpen, 403, "study_still_open"),
     (AlreadyDecided, 409, "already_decided"),
-    (AlreadyLabelled, 409, "already_labelled"),
-    (LabellingClosed, 410, "labelling_closed"),
     (InvalidVote, 422, "invalid"),
     (InvalidPreference, 422, "invalid"),
     (TooFast, 429, "too_fast"),
@@ -77,49 +65,11 @@ STATUS: tuple[tuple[type[Exception], int, str], ...] = (
     (exceptions.UnsupportedMediaType, 415, "unsupported_media_type"),
     (exceptions.Throttled, 429, "too_fast"),
 )
-"""The first row that fits decides; what is in no row is a fault of ours and stays one."""
+"""The first match wins; an exception without a row is a bug and is raised again."""
 
 
-class ApiView(APIView):
-    """What every resource shares: how a body is read, how errors look, and what a GET is worth.
-
-    Every answer to a GET that may be kept has an ETag; the same one asked for again is 304.
-
-    Attributes:
-        is_never_cached: Whether its answers are nobody's to keep.
-        is_public: Whether it is for those who are not signed in.
-        may_miss: Whether a GET can find nothing, beside what its path names.
-        read_errors: Further statuses that a GET can have, for the document.
-    """
-
-    parser_classes: tuple[type[BaseParser], ...] = (SoundJSONParser,)
-    schema = ArenaSchema()
-    is_never_cached = False
-    is_public = False
-    may_miss = False
-    read_errors: tuple[int, ...] = ()
-
-    @classmethod
-    def as_view(cls, **initkwargs: Any) -> Any:
-        """The view, with its conditional GETs."""
-        view = super().as_view(**initkwargs)
-        return never_cache(view) if cls.is_never_cached else conditional_page(view)
-
-    def finalize_response(self, request: Request, response: Any, *args: Any, **kwargs: Any) -> Any:
-        """The answer, which no cache between may keep."""
-        response.headers.setdefault("Cache-Control", "private, no-cache")
-        return super().finalize_response(request, response, *args, **kwargs)
-
-    def handle_exception(self, exc: Exception) -> Response:
-        """Turn an error of the table into its response; any other is raised again."""
-        found = _response(exc)
-        if found is None:
-            raise exc
-        found.exception = True
-        return found
-
-
-def _response(exc: Exception) -> Response | None:
+def error_response(exc: Exception) -> Response | None:
+    """Return the response to an exception, None for one that is not in the table."""
     for kind, status, code in STATUS:
         if isinstance(exc, kind):
             headers = {}
@@ -130,6 +80,14 @@ def _response(exc: Exception) -> Response | None:
             error = {"code": code, "message": _message(exc), **_extras(exc)}
             return Response({"error": error}, status=status, headers=headers)
     return None
+
+
+def fault(status: int, code: str, message: str) -> JsonResponse:
+    """Return an error outside any view; it needs neither database nor session."""
+    return JsonResponse({"error": {"code": code, "message": message}}, status=status)
+
+
+# --- Private -----------------------------------------------------------------------------------
 
 
 def _message(exc: Exception) -> str:

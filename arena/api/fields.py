@@ -1,20 +1,42 @@
-"""Reading a request: known fields only, each of its own type."""
+"""Parsing a request body: known fields only, each of its own type."""
 
 from __future__ import annotations
 
 import uuid
 from collections.abc import Mapping
 from math import isfinite
-from typing import Any
+from typing import IO, Any
 
 from rest_framework import serializers
+from rest_framework.exceptions import ParseError
+from rest_framework.parsers import JSONParser
+
+
+class SoundJSONParser(JSONParser):
+    """JSON whose nesting can't exhaust the stack."""
+
+    def parse(
+        self,
+        stream: IO[Any],
+        media_type: str | None = None,
+        parser_context: Mapping[str, Any] | None = None,
+    ) -> Any:
+        """Return the value.
+
+        Raises:
+            ParseError: It is no JSON, or nested too deeply.
+        """
+        try:
+            return super().parse(stream, media_type, parser_context)
+        except RecursionError as error:
+            raise ParseError("JSON parse error - nested too deeply") from error
 
 
 class StrictSerializer(serializers.Serializer[Any]):
-    """A body whose unknown fields are refused, so that a misspelt one is never ignored."""
+    """A body that refuses unknown fields, so that a misspelt one is never ignored."""
 
     def run_validation(self, data: Any = serializers.empty) -> Any:
-        """The typed values.
+        """Return the typed values.
 
         Raises:
             serializers.ValidationError: A field is unknown, missing or of the wrong type.
@@ -33,20 +55,20 @@ class StrictSerializer(serializers.Serializer[Any]):
 
 
 class WholeNumberField(serializers.IntegerField):
-    """An integer of JSON: neither a text nor a fraction nor true."""
+    """A JSON integer; strings, fractions and booleans are refused."""
 
     def to_internal_value(self, data: Any) -> int:
-        """The number itself."""
+        """Return the number."""
         if isinstance(data, bool) or not isinstance(data, int):
             self.fail("invalid")
         return super().to_internal_value(data)
 
 
 class NumberField(serializers.FloatField):
-    """A finite number of JSON: neither a text nor true."""
+    """A finite JSON number; strings and booleans are refused."""
 
     def to_internal_value(self, data: Any) -> float:
-        """The number itself."""
+        """Return the number."""
         if isinstance(data, bool) or not isinstance(data, int | float):
             self.fail("invalid")
         try:
@@ -59,37 +81,37 @@ class NumberField(serializers.FloatField):
 
 
 class ShareField(NumberField):
-    """A number of JSON from 0 to 1."""
+    """A JSON number from 0 to 1."""
 
     def __init__(self, **kwargs: Any) -> None:
         super().__init__(min_value=0, max_value=1, **kwargs)
 
 
 class CodeField(serializers.UUIDField):
-    """A UUID as a text of JSON: no number stands for one."""
+    """A UUID as a JSON string; numbers are refused."""
 
     def to_internal_value(self, data: Any) -> uuid.UUID:
-        """The UUID itself."""
+        """Return the UUID."""
         if not isinstance(data, str):
             self.fail("invalid", value=data)
         return super().to_internal_value(data)
 
 
 class FlagField(serializers.BooleanField):
-    """True or false of JSON: neither a text nor a number stands for one."""
+    """A JSON boolean; strings and numbers are refused."""
 
     def to_internal_value(self, data: Any) -> bool:
-        """The flag itself."""
+        """Return the flag."""
         if not isinstance(data, bool):
             self.fail("invalid", input=data)
         return data
 
 
 class TextField(serializers.CharField):
-    """A text of JSON as it is: no number stands for one, and what is said in it is kept."""
+    """A JSON string; numbers are refused."""
 
     def to_internal_value(self, data: Any) -> str:
-        """The text itself."""
+        """Return the text."""
         if not isinstance(data, str):
             self.fail("invalid")
         return super().to_internal_value(data)

@@ -1,11 +1,11 @@
-"""Lists in pages: `?after=CODE` of the last row of the page before, and `next` with that in it.
+"""Lists in pages: `?after=CODE` of the last row before, and `next` with that in it.
 
-No row is lost or shown twice where rows are added meanwhile, and no key of the database is told.
+No row is lost or repeated while others are added, and no primary key is shown.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from functools import cache
 from typing import Any, TypeVar
 from urllib.parse import urlencode
@@ -37,7 +37,7 @@ class PageQuery(StrictSerializer):
 
 @cache
 def page_of(line: type[serializers.Serializer[Any]]) -> serializers.Serializer[Any]:
-    """The body of a page, for the document."""
+    """Return the serializer of a page, for the document."""
     return inline_serializer(
         name=line.__name__.removesuffix("Document") + "Page",
         fields={
@@ -49,18 +49,6 @@ def page_of(line: type[serializers.Serializer[Any]]) -> serializers.Serializer[A
     )
 
 
-def read_query(request: Request, query: type[StrictSerializer]) -> dict[str, Any]:
-    """The parameters of the address.
-
-    Raises:
-        ValidationError: One is unknown or wrong.
-    """
-    given = query(data=request.query_params.dict())
-    given.is_valid(raise_exception=True)
-    found: dict[str, Any] = given.validated_data
-    return found
-
-
 def answer_page(
     request: Request,
     rows: QuerySet[Row],
@@ -68,39 +56,32 @@ def answer_page(
     line: type[serializers.Serializer[Any]],
     *,
     order: str = "-pk",
-    lines: Callable[[Sequence[Row]], Sequence[Any]] | None = None,
-    context: Mapping[str, Any] | None = None,
+    lines: Callable[[Sequence[Row]], Sequence[Any]] = list,
 ) -> Response:
-    """A page of the rows.
+    """Return a page of the rows.
 
     Args:
-        request: Whose address the next page's has.
-        rows: All that are asked for.
-        query: As `PageQuery` or a part of it has them.
-        line: What is told of each.
-        order: A unique column, a minus before it where the greatest comes first.
-        lines: What `line` is told of, made of all rows of the page at once.
-        context: What `line` is told besides.
+        request: Its address is that of the next page.
+        rows: All rows of the list, unless `query` names values of their columns.
+        query: The validated `PageQuery`; other names in it are columns to filter by.
+        line: Serializer of a row.
+        order: A unique column; a minus before it for descending order.
+        lines: Makes what `line` serializes of all rows of the page at once.
 
     Raises:
-        ValidationError: No row has the code that the page is to begin after.
+        ValidationError: No row has the code `after`.
     """
+    limit, after = query.pop("limit"), query.pop("after", None)
     column, sign = order.removeprefix("-"), "lt" if order.startswith("-") else "gt"
-    limit = query["limit"]
-    rows = rows.order_by(order)
-    if "after" in query:
-        last = rows.filter(code=query["after"]).values_list(column, flat=True).first()
+    rows = rows.filter(**query).order_by(order)
+    if after is not None:
+        last = rows.filter(code=after).values_list(column, flat=True).first()
         if last is None:
             raise ValidationError({"after": ["No row of this list has that code."]})
         rows = rows.filter(**{f"{column}__{sign}": last})
     found = list(rows[: limit + 1])
     shown = found[:limit]
-    body: dict[str, Any] = {
-        "results": line(
-            shown if lines is None else lines(shown), many=True, context=dict(context or {})
-        ).data,
-        "next": None,
-    }
+    body: dict[str, Any] = {"results": line(lines(shown), many=True).data, "next": None}
     if len(found) > limit:
         kept = request.query_params.dict() | {"after": str(shown[-1].code)}  # type: ignore[attr-defined]
         body["next"] = f"{request.path}?{urlencode(kept)}"

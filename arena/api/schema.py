@@ -1,45 +1,48 @@
-"""How the OpenAPI document is made: what every operation has in common is said here once."""
+"""Operations and how the OpenAPI document describes them."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
-from typing import Any, TypeVar
+from collections.abc import Callable, Iterable, Mapping
+from functools import wraps
+from typing import Any
 
+from django.http.response import HttpResponseBase
 from drf_spectacular.extensions import OpenApiAuthenticationExtension
 from drf_spectacular.openapi import AutoSchema
+from drf_spectacular.types import OpenApiTypes
 from drf_spectacular.utils import OpenApiParameter, extend_schema
 from rest_framework import serializers
-
-View = TypeVar("View", bound=Callable[..., Any])
+from rest_framework.permissions import SAFE_METHODS
+from rest_framework.request import Request
+from rest_framework.response import Response
 
 JSON = "application/json"
-READS = ("GET", "HEAD")
-OF_ALL = {
-    401: "Not signed in, or the token opens nothing.",
+ERRORS = {
+    401: "Not signed in, or the token is not valid.",
     403: "Not for this role, or the CSRF token is missing.",
+    404: "Nothing at this address, or nothing that this account may know of.",
     406: "Answers are JSON.",
-    422: "The address or the body is wrong; `fields` says where.",
-    429: "Too many requests; `Retry-After` says when the next one is taken.",
+    409: "In conflict with what there is.",
+    410: "Over: the study takes no votes, or the link has expired.",
+    422: "The address or the body is invalid; `fields` says where.",
+    429: "Too many requests; `Retry-After` says when the next one is accepted.",
     503: "The database is busy or its disk is full; `Retry-After` says when to try again.",
 }
-OF_CHANGES = {
+ERRORS_OF_CHANGES = ERRORS | {
     400: "Refused; the message says why and what is allowed.",
-    404: "Nothing at this address, or nothing that this account may know of.",
-    409: "It does not fit what is there.",
-    410: "Over: the study takes no votes, the labelling no labels, or the link no visitors.",
     413: "The body is larger than 2.5 MB, or a file in it than the installation takes.",
-    415: "The body has another form than is said here: JSON, or with files that of browsers.",
+    415: "The body is not JSON, or not multipart where files are sent.",
 }
 
 
 class BearerScheme(OpenApiAuthenticationExtension):  # type: ignore[no-untyped-call]
     """How the document describes tokens."""
 
-    target_class = "arena.api.authentication.BearerToken"
+    target_class = "arena.api.access.BearerToken"
     name = "token"
 
     def get_security_definition(self, auto_schema: AutoSchema) -> dict[str, Any]:
-        """An HTTP scheme."""
+        """Return an HTTP scheme."""
         return {
             "type": "http",
             "scheme": "bearer",
@@ -59,66 +62,110 @@ class ErrorDetail(serializers.Serializer[Any]):
 
 
 class ErrorBody(serializers.Serializer[Any]):
-    """The one shape of every error."""
+    """The form of every error."""
 
     error = ErrorDetail()
 
 
 class ArenaSchema(AutoSchema):
-    """Adds the errors that an operation of its kind can have."""
+    """Adds the errors that every operation can have."""
 
     def _get_response_bodies(self, direction: Any = "response") -> dict[str, Any]:
         found: dict[str, Any] = super()._get_response_bodies(direction)
-        for status, meaning in self._errors().items():
-            if str(status) not in found:
-                answer: dict[str, Any] = self._get_response_for_code(  # type: ignore[no-untyped-call]
-                    ErrorBody, str(status), [JSON]
-                )
-                found[str(status)] = answer | {"description": meaning}
-        if self.method in READS and not getattr(self.view, "is_never_cached", False):
-            found["304"] = {"description": "As it was at the ETag that came with the request."}
+        reads = self.method in SAFE_METHODS
+        for status, meaning in (ERRORS if reads else ERRORS_OF_CHANGES).items():
+            answer: dict[str, Any] = self._get_response_for_code(  # type: ignore[no-untyped-call]
+                ErrorBody, str(status), [JSON]
+            )
+            found[str(status)] = answer | {"description": meaning}
+        if reads and not getattr(self.view, "is_never_cached", False):
+            found["304"] = {"description": "Unchanged since the ETag that came with the request."}
         return dict(sorted(found.items()))
 
-    def _errors(self) -> dict[int, str]:
-        view: Any = self.view
-        changes = dict(OF_CHANGES) if self.method not in READS else {}
-        if self.method in READS and ("{" in self.path or view.may_miss):
-            changes |= {404: OF_CHANGES[404]}
-        if self.method in READS:
-            changes |= {code: OF_CHANGES[code] for code in view.read_errors}
-        shared = dict(OF_ALL)
-        if view.is_public:
-            del shared[401], shared[403]
-        return shared | changes
 
-
-def describe(
+def operation(
     summary: str,
     *,
+    name: str,
     answers: Any,
-    takes: Any = None,
+    takes: type[serializers.Serializer[Any]] | None = None,
     query: type[serializers.Serializer[Any]] | None = None,
     status: int = 200,
-    parameters: Iterable[OpenApiParameter] = (),
-    name: str | None = None,
-) -> Callable[[View], View]:
-    """Describe an operation.
+) -> Callable[[Callable[..., Any]], Callable[..., HttpResponseBase]]:
+    """Describe an operation, validate its input, and serialize its result.
+
+    The method gets the validated body or query as `given`. It returns what `answers` serializes,
+    beside a list of warnings where workers are involved, or a finished response.
 
     Args:
-        summary: A line for people.
-        answers: The serializer of the answer's body, `many` where it is a list.
-        takes: The serializer of the request's body.
-        query: The serializer of the address's parameters.
-        status: Of an answer that is no error.
-        parameters: Others, of the path for example.
-        name: Of the operation, where its address gives no good one.
+        summary: One line for people.
+        name: Operation id.
+        answers: Serializer of the answer, `many` where it is a list.
+        takes: Serializer of the body.
+        query: Serializer of the address's parameters.
+        status: Of a successful answer.
     """
-    asked: list[Any] = [*([query] if query is not None else []), *parameters]
-    described: Callable[[View], View] = extend_schema(
+
+    def decorate(method: Callable[..., Any]) -> Callable[..., HttpResponseBase]:
+        @wraps(method)
+        def call(view: Any, request: Request, **path: Any) -> HttpResponseBase:
+            if takes is not None:
+                path["given"] = validate(takes, request.data)
+            elif query is not None:
+                path["given"] = validate(query, request.query_params.dict())
+            found = method(view, request, **path)
+            if isinstance(found, HttpResponseBase):
+                return found
+            row, warnings = found if isinstance(found, tuple) else (found, [])
+            return Response(answers(row, context={"warnings": warnings}).data, status=status)
+
+        described: Callable[..., HttpResponseBase] = extend_schema(
+            summary=summary,
+            request=takes,
+            responses={status: answers},
+            parameters=[] if query is None else [query],
+            operation_id=name,
+        )(call)
+        return described
+
+    return decorate
+
+
+def validate(serializer: type[serializers.Serializer[Any]], data: Any) -> dict[str, Any]:
+    """Return the validated input.
+
+    Raises:
+        ValidationError: A field is unknown, missing or invalid.
+    """
+    given = serializer(data=data)
+    given.is_valid(raise_exception=True)
+    return dict(given.validated_data)
+
+
+def file_operation(
+    summary: str,
+    *,
+    name: str,
+    types: Iterable[str],
+    words: Mapping[str, Iterable[str]] | None = None,
+) -> Callable[[Callable[..., Any]], Callable[..., Any]]:
+    """Describe an operation that answers with a file.
+
+    Args:
+        summary: One line for people.
+        name: Operation id.
+        types: Content types that it can have.
+        words: By part of the path, its allowed values.
+    """
+    parts = [
+        OpenApiParameter(one, OpenApiTypes.STR, OpenApiParameter.PATH, enum=sorted(set(allowed)))
+        for one, allowed in (words or {}).items()
+    ]
+    kinds = {kind.partition(";")[0] for kind in types}
+    described: Callable[[Callable[..., Any]], Callable[..., Any]] = extend_schema(
         summary=summary,
-        request=takes,
-        responses={status: answers},
-        parameters=asked,
         operation_id=name,
+        parameters=parts,
+        responses={(200, kind): OpenApiTypes.BINARY for kind in sorted(kinds)},
     )
     return described

@@ -1,81 +1,36 @@
-"""Frozen ratings of a study with their tables, for staff who may read its results."""
+"""Ratings of a study with their tables, for staff who may read its results."""
 
 from __future__ import annotations
 
 import uuid
 from functools import partial
-from typing import Any, cast
+from typing import Any
 
-from django.contrib.auth.models import User
-from django.db import transaction
-from django.http import Http404
 from django.shortcuts import get_object_or_404
 from drf_spectacular.utils import extend_schema_field
 from rest_framework import serializers
-from rest_framework.permissions import BasePermission
 from rest_framework.request import Request
-from rest_framework.response import Response
-from rest_framework.views import APIView
 
 from arena import tasks
-from arena.api.errors import ApiView
+from arena.api.access import STAFF
 from arena.api.fields import FlagField, StrictSerializer, TextField, WholeNumberField
-from arena.api.paging import PageQuery, answer_page, page_of, read_query
-from arena.api.schema import describe
-from arena.api.studies import get_study
-from arena.exports.tables import LeaderboardTable, for_experts, leaderboard_table
+from arena.api.schema import operation
+from arena.api.studies import HIGHEST_SEED, get_study
+from arena.api.views import ApiView, keep_and_send
+from arena.exports.tables import LeaderboardTable, leaderboard_table
 from arena.models import Snapshot, Study
 from arena.pairing.order import MAIN, REPEAT
-from arena.queries.people import role_of
-from arena.queries.results import STAFF, must_read_results, snapshots_of
-from arena.queries.vote_sets import Filters, of_experts
+from arena.queries.results import must_read_results
+from arena.queries.vote_sets import Filters
 from arena.rating.bootstrap import Unit
 from arena.rating.leaderboard import Intervals, Method
 from arena.services.ratings import DEFAULT_ROUNDS, MOST_ROUNDS, is_big, plan_snapshot, rate
-from augment.errors import QueueFault
 from augment.services.scenarios.types import type_choices
 from augment.services.wording import translate
 
-HIGHEST_SEED = 2**63 - 1
-
-
-class ResultReaders(BasePermission):
-    """Experts read the results of their closed studies, as on the page; staff also rate."""
-
-    def has_permission(self, request: Request, view: APIView) -> bool:
-        """Whether the account may do what it asks for."""
-        allowed = STAFF if request.method == "POST" else (*STAFF, "expert")
-        return role_of(request.user) in allowed
-
-
-class SnapshotDocument(serializers.Serializer[Any]):
-    """One rating of a list."""
-
-    code = serializers.UUIDField()
-    study = serializers.UUIDField(source="study.code")
-    state = serializers.CharField(help_text="queued, running, ready or failed.")
-    progress = serializers.IntegerField(help_text="Percent.")
-    method = serializers.CharField()
-    rounds = serializers.IntegerField()
-    resample = serializers.CharField(source="resampling_unit")
-    intervals = serializers.CharField()
-    seed = serializers.IntegerField()
-    filters = serializers.SerializerMethodField()
-    votes = serializers.IntegerField(source="votes_counted")
-    votes_sha256 = serializers.CharField()
-    is_early = serializers.BooleanField(help_text="The study was still open.")
-    includes_simulated = serializers.BooleanField()
-    status = serializers.CharField(help_text="Why there is no rating, if there is none.")
-    made_at = serializers.DateTimeField()
-
-    def get_filters(self, row: Snapshot) -> dict[str, Any]:
-        """Which votes were asked for; an expert reads nothing of authors."""
-        kept = dict(row.filters)
-        return of_experts(kept) if self.context.get("is_expert") else kept
-
 
 class StandingDocument(serializers.Serializer[Any]):
-    """One contestant's line; null is what the votes do not determine."""
+    """A contestant; null is what the votes do not determine."""
 
     slug = serializers.CharField()
     name = serializers.CharField()
@@ -98,7 +53,7 @@ class StandingDocument(serializers.Serializer[Any]):
 
 
 class TableDocument(serializers.Serializer[Any]):
-    """The table of a rating, best first, and what must be said with it."""
+    """The table of a rating, best first, with its warnings."""
 
     method = serializers.CharField(source="method_text")
     left_out = serializers.DictField(child=serializers.IntegerField())
@@ -106,22 +61,36 @@ class TableDocument(serializers.Serializer[Any]):
     rows = StandingDocument(many=True)
 
     def get_warnings(self, table: LeaderboardTable) -> list[str]:
-        """Sentences that no reader may miss."""
+        """Return them as sentences."""
         return [translate(one) for one in table.warnings]
 
 
-class WholeSnapshotDocument(SnapshotDocument):
-    """One rating with its table, which is null until it is ready."""
+class SnapshotDocument(serializers.Serializer[Any]):
+    """A rating with its table, which is null until it is ready."""
 
+    code = serializers.UUIDField()
+    study = serializers.UUIDField(source="study.code")
+    state = serializers.CharField(help_text="queued, running, ready or failed.")
+    progress = serializers.IntegerField(help_text="Percent.")
+    method = serializers.CharField()
+    rounds = serializers.IntegerField()
+    resample = serializers.CharField(source="resampling_unit")
+    intervals = serializers.CharField()
+    seed = serializers.IntegerField()
+    filters = serializers.DictField(help_text="Which votes were asked for.")
+    votes = serializers.IntegerField(source="votes_counted")
+    votes_sha256 = serializers.CharField()
+    is_early = serializers.BooleanField(help_text="The study was still open.")
+    includes_simulated = serializers.BooleanField()
+    status = serializers.CharField(help_text="Why there is no rating, if there is none.")
+    made_at = serializers.DateTimeField()
     table = serializers.SerializerMethodField()
 
     @extend_schema_field(TableDocument(allow_null=True))
     def get_table(self, row: Snapshot) -> Any:
-        """The table."""
-        if row.state != Snapshot.State.READY:
-            return None
-        table = leaderboard_table(row)
-        return TableDocument(for_experts(table) if self.context.get("is_expert") else table).data
+        """Return the table."""
+        ready = row.state == Snapshot.State.READY
+        return TableDocument(leaderboard_table(row)).data if ready else None
 
 
 class SnapshotBody(StrictSerializer):
@@ -154,91 +123,58 @@ class SnapshotBody(StrictSerializer):
 
 
 class SnapshotsView(ApiView):
-    """The ratings of a study, the newest first."""
+    """The ratings of a study."""
 
-    permission_classes = (ResultReaders,)
+    writers = STAFF
 
-    @describe(
-        "Ratings of a study, the newest first",
-        answers=page_of(SnapshotDocument),
-        query=PageQuery,
-        name="listSnapshots",
-    )
-    def get(self, request: Request, code: uuid.UUID) -> Response:
-        """Of an open study only after `POST .../early-look`; an expert's closed ones."""
-        study, context = _readable(request, code), _context(request)
-        rows = snapshots_of(study).select_related("study").defer("results")
-        if context["is_expert"]:
-            rows = rows.filter(state=Snapshot.State.READY)
-        query = read_query(request, PageQuery)
-        return answer_page(request, rows, query, SnapshotDocument, context=context)
-
-    @describe(
+    @operation(
         "Rate the votes as they are now",
         takes=SnapshotBody,
-        answers=WholeSnapshotDocument,
+        answers=SnapshotDocument,
         status=201,
         name="rateStudy",
     )
-    def post(self, request: Request, code: uuid.UUID) -> Response:
-        """Many votes are left to a worker: ask for the rating until its state is ready."""
-        body = SnapshotBody(data=request.data)
-        body.is_valid(raise_exception=True)
-        study = _readable(request, code)
-        wanted = _wanted(dict(body.validated_data)) | {
-            "early": study.state == Study.State.OPEN,
-            "actor": cast(User, request.user),
-        }
+    def post(self, request: Request, code: uuid.UUID, given: dict[str, Any]) -> Snapshot:
+        """A worker rates large studies: poll the rating until its state is ready."""
+        study = get_study(code)
+        must_read_results(user=self.user, study=study)
+        wanted = _wanted(given) | {"early": study.state == Study.State.OPEN, "actor": self.user}
         if not is_big(study):
-            return Response(WholeSnapshotDocument(rate(study=study, **wanted)).data, status=201)
-        with transaction.atomic():
-            planned = plan_snapshot(study=study, **wanted)
-            transaction.on_commit(partial(_send, planned))
-        return Response(WholeSnapshotDocument(planned).data, status=201)
+            return rate(study=study, **wanted)
+        plan = partial(plan_snapshot, study=study, **wanted)
+        planned, warnings = keep_and_send(plan, tasks.send_snapshot)
+        planned.status = " ".join([planned.status, *warnings]).strip()
+        return planned
 
 
 class SnapshotView(ApiView):
     """One rating."""
 
-    permission_classes = (ResultReaders,)
+    readers = STAFF
 
-    @describe("A rating with its table", answers=WholeSnapshotDocument, name="getSnapshot")
-    def get(self, request: Request, code: uuid.UUID) -> Response:
-        """Of an open study only after `POST .../early-look`; an expert's closed ones."""
-        row, context = get_snapshot(request, code), _context(request)
-        if context["is_expert"] and row.state != Snapshot.State.READY:
-            raise Http404
-        return Response(WholeSnapshotDocument(row, context=context).data)
+    @operation("A rating with its table", answers=SnapshotDocument, name="getSnapshot")
+    def get(self, request: Request, code: uuid.UUID) -> Snapshot:
+        """Of an open study only after an early look, which is taken on its page."""
+        return get_snapshot(self, code)
 
 
-def get_snapshot(request: Request, code: uuid.UUID) -> Snapshot:
-    """The rating of that code, where whoever asks may read the results of its study.
+def get_snapshot(view: ApiView, code: uuid.UUID) -> Snapshot:
+    """Return the rating with that code, for whoever may read the results of its study.
 
     Raises:
         StudyStillOpen, NotYours: They may not, or not before an early look.
     """
     rows = Snapshot.objects.select_related("study__vote_file")
     snapshot = get_object_or_404(rows, code=code)
-    must_read_results(user=cast(User, request.user), study=snapshot.study)
+    must_read_results(user=view.user, study=snapshot.study)
     return snapshot
 
 
 # --- Private -----------------------------------------------------------------------------------
 
 
-def _readable(request: Request, code: uuid.UUID) -> Study:
-    study = get_study(code)
-    must_read_results(user=cast(User, request.user), study=study)
-    return study
-
-
-def _context(request: Request) -> dict[str, bool]:
-    """For whom the documents are."""
-    return {"is_expert": role_of(request.user) == "expert"}
-
-
 def _wanted(given: dict[str, Any]) -> dict[str, Any]:
-    """As the service takes it."""
+    """Return the choices of the rating services."""
     kinds = (MAIN, REPEAT) if given.pop("with_repeats") else (MAIN,)
     known = [name for name, _ in type_choices()]
     for name in given["types"]:
@@ -254,11 +190,3 @@ def _wanted(given: dict[str, Any]) -> dict[str, Any]:
         leave_out_own=given.pop("leave_out_own"),
     )
     return given | {"filters": filters}
-
-
-def _send(planned: Snapshot) -> None:
-    """Without a broker it waits; its status says so to whoever asks."""
-    try:
-        tasks.send_snapshot(planned.pk)
-    except QueueFault as error:
-        planned.status = translate(error)

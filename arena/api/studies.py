@@ -1,41 +1,92 @@
-"""Studies: opened, closed, and how far their votes are; never who leads."""
+"""Studies: opened, closed, and their progress; never who leads."""
 
 from __future__ import annotations
 
 import uuid
-from typing import Any, cast
+from typing import Any
 
-from django.contrib.auth.models import User
 from django.shortcuts import get_object_or_404
 from rest_framework import serializers
-from rest_framework.permissions import BasePermission
 from rest_framework.request import Request
 from rest_framework.response import Response
-from rest_framework.views import APIView
 
-from arena.api.access import AdminsOnly, StaffOnly
-from arena.api.errors import ApiView
-from arena.api.fields import StrictSerializer, TextField
-from arena.api.paging import PageQuery, answer_page, page_of, read_query
-from arena.api.schema import describe
-from arena.api.study_body import StudyBody
+from arena.api.access import ADMINS, EXPERTS, STAFF
+from arena.api.fields import FlagField, NumberField, StrictSerializer, TextField, WholeNumberField
+from arena.api.paging import PageQuery, answer_page, page_of
+from arena.api.schema import operation
+from arena.api.views import ApiView
 from arena.models import Study
+from arena.pairing.target_lines import read_targets
 from arena.queries.people import role_of
 from arena.queries.progress import StudyProgress, of_these, studies_seen_by
-from arena.services.early_looks import open_early
-from arena.services.ending import LONGEST_WHY
-from arena.services.studies import cancel_study, close_study, open_study
+from arena.services.shown_pictures import SampleRule
+from arena.services.studies import PlanOptions, close_study, open_study
 
-STAFF = ("admin", "analyst")
+MOST_CHOSEN = 5_000
+MOST_VOTES = 10_000
+MOST_LINES = 2_000
+HIGHEST_SEED = 2**63 - 1
+WHO_AND_WHAT = (
+    *("name", "contestants", "scenarios", "experts", "votes_per_expert", "seed"),
+    "allow_simulated",
+)
+"""Arguments of `open_study` beside the options of the plan."""
 
 
-class StudyReaders(BasePermission):
-    """Experts see their own studies; staff see all, and admins open new ones."""
+def _slugs() -> serializers.ListField:
+    return serializers.ListField(
+        child=TextField(max_length=80), max_length=MOST_CHOSEN, help_text="Slugs."
+    )
 
-    def has_permission(self, request: Request, view: APIView) -> bool:
-        """Whether the account may do what it asks for."""
-        allowed = ("admin",) if request.method == "POST" else (*STAFF, "expert")
-        return role_of(request.user) in allowed
+
+def _lines(words: str) -> serializers.ListField:
+    return serializers.ListField(
+        child=TextField(max_length=500, allow_blank=True),
+        required=False,
+        default=list,
+        max_length=MOST_LINES,
+        help_text=words,
+    )
+
+
+def _share(most: float) -> NumberField:
+    return NumberField(required=False, default=0.0, min_value=0, max_value=most)
+
+
+class StudyBody(StrictSerializer):
+    """A new study; its rules are fixed from the moment it opens."""
+
+    name = TextField(max_length=120)
+    contestants = _slugs()
+    scenarios = _slugs()
+    experts = serializers.ListField(
+        child=TextField(max_length=150), max_length=MOST_CHOSEN, help_text="Usernames."
+    )
+    votes_per_expert = WholeNumberField(min_value=1, max_value=MOST_VOTES)
+    seed = WholeNumberField(required=False, default=1, min_value=0, max_value=HIGHEST_SEED)
+    repeat_share = _share(0.5)
+    check_share = _share(0.5)
+    overlap_share = _share(0.8)
+    adaptive_share = _share(0.9)
+    targets = _lines("“CONTESTANT NUMBER” or “CONTESTANT vs CONTESTANT NUMBER” each.")
+    hypotheses = _lines("What is expected, a line each; frozen at the opening.")
+    allow_both_miss = FlagField(required=False, default=False)
+    allow_text = FlagField(required=False, default=False)
+    allow_replay = FlagField(required=False, default=False)
+    allow_measures = FlagField(required=False, default=True)
+    allow_simulated = FlagField(required=False, default=False)
+    settle_alike = FlagField(required=False, default=False)
+    practice = FlagField(required=False, default=False)
+    samples = serializers.ChoiceField(
+        choices=[rule.value for rule in SampleRule], required=False, default=SampleRule.ONE.value
+    )
+    jobs = serializers.ListField(
+        child=TextField(max_length=120),
+        required=False,
+        default=list,
+        max_length=MOST_CHOSEN,
+        help_text="Names or codes of the jobs whose augmentations are shown; none for all.",
+    )
 
 
 class StudyQuery(PageQuery):
@@ -45,7 +96,7 @@ class StudyQuery(PageQuery):
 
 
 class StudyDocument(serializers.Serializer[Any]):
-    """A study and how far its votes are; to an expert, their own."""
+    """A study and the progress of its votes; an expert gets their own."""
 
     code = serializers.UUIDField(source="study.code")
     name = serializers.CharField(source="study.name")
@@ -58,12 +109,26 @@ class StudyDocument(serializers.Serializer[Any]):
     closed_at = serializers.DateTimeField(source="study.closed_at", allow_null=True)
 
 
-class WholeStudyDocument(StudyDocument):
-    """A study with who takes part, for staff."""
+class NamesField(serializers.ListField):
+    """One column of related rows."""
 
-    contestants = serializers.ListField(child=serializers.CharField(), help_text="Slugs.")
-    scenarios = serializers.ListField(child=serializers.CharField(), help_text="Slugs.")
-    experts = serializers.ListField(child=serializers.CharField(), help_text="Usernames.")
+    child = serializers.CharField()
+
+    def __init__(self, column: str, **kwargs: Any) -> None:
+        self.column = column
+        super().__init__(help_text=f"Each by its {column}.", **kwargs)
+
+    def to_representation(self, rows: Any) -> list[str]:
+        """Return the values, sorted."""
+        return list(rows.order_by(self.column).values_list(self.column, flat=True))
+
+
+class WholeStudyDocument(StudyDocument):
+    """A study with its participants, for staff."""
+
+    contestants = NamesField("slug", source="study.contestants")
+    scenarios = NamesField("slug", source="study.scenarios")
+    experts = NamesField("username", source="study.experts")
     votes_per_expert = serializers.IntegerField(source="study.votes_per_expert")
     seed = serializers.IntegerField(source="study.seed")
     allow_both_miss = serializers.BooleanField(source="study.allow_both_miss")
@@ -74,122 +139,84 @@ class WholeStudyDocument(StudyDocument):
 
 
 class StudiesView(ApiView):
-    """The studies, the youngest first."""
+    """Studies."""
 
-    permission_classes = (StudyReaders,)
+    readers, writers = (*STAFF, *EXPERTS), ADMINS
 
-    @describe(
+    @operation(
         "Studies, the youngest first",
         answers=page_of(StudyDocument),
         query=StudyQuery,
         name="listStudies",
     )
-    def get(self, request: Request) -> Response:
-        """An expert's own with their own progress, staff's all with everybody's."""
-        query, user = read_query(request, StudyQuery), cast(User, request.user)
-        is_staff = role_of(user) in STAFF
-        rows = studies_seen_by(user, is_staff=is_staff)
-        if "state" in query:
-            rows = rows.filter(state=query["state"])
-        expert = None if is_staff else user
+    def get(self, request: Request, given: dict[str, Any]) -> Response:
+        """An expert gets their own with their own progress, staff all with everybody's."""
+        is_staff = role_of(self.user) in STAFF
+        expert = None if is_staff else self.user
         return answer_page(
-            request, rows, query, StudyDocument, lines=lambda page: of_these(page, expert=expert)
+            request,
+            studies_seen_by(self.user, is_staff=is_staff),
+            given,
+            StudyDocument,
+            lines=lambda page: of_these(page, expert=expert),
         )
 
-    @describe(
+    @operation(
         "Plan a study and open it",
         takes=StudyBody,
         answers=WholeStudyDocument,
         status=201,
         name="openStudy",
     )
-    def post(self, request: Request) -> Response:
+    def post(self, request: Request, given: dict[str, Any]) -> StudyProgress:
         """Its experts can vote at once."""
-        body = StudyBody(data=request.data)
-        body.is_valid(raise_exception=True)
-        study = open_study(**body.rules(), actor=cast(User, request.user))
-        return Response(whole_study(study), status=201)
+        return _progress(open_study(**study_rules(given), actor=self.user))
 
 
 class StudyView(ApiView):
     """One study."""
 
-    permission_classes = (StaffOnly,)
+    readers = STAFF
 
-    @describe("A study", answers=WholeStudyDocument, name="getStudy")
-    def get(self, request: Request, code: uuid.UUID) -> Response:
-        """With who takes part."""
-        return Response(whole_study(get_study(code)))
+    @operation("A study", answers=WholeStudyDocument, name="getStudy")
+    def get(self, request: Request, code: uuid.UUID) -> StudyProgress:
+        """With its participants."""
+        return _progress(get_study(code))
 
 
 class CloseStudyView(ApiView):
     """The end of a study."""
 
-    permission_classes = (AdminsOnly,)
+    writers = ADMINS
 
-    @describe("Close a study", answers=WholeStudyDocument, name="closeStudy")
-    def post(self, request: Request, code: uuid.UUID) -> Response:
-        """No more votes are taken; there is no way back. Twice changes nothing."""
-        return Response(
-            whole_study(close_study(study=get_study(code), actor=cast(User, request.user)))
-        )
+    @operation("Close a study", answers=WholeStudyDocument, name="closeStudy")
+    def post(self, request: Request, code: uuid.UUID) -> StudyProgress:
+        """Ends voting for good. Twice changes nothing."""
+        return _progress(close_study(study=get_study(code), actor=self.user))
 
 
-class CancelBody(StrictSerializer):
-    """Why a study is given up."""
+def study_rules(given: dict[str, Any]) -> dict[str, Any]:
+    """Return the arguments of `open_study` from a valid body.
 
-    why = TextField(max_length=LONGEST_WHY, required=False, default="", allow_blank=True)
-
-
-class CancelStudyView(ApiView):
-    """A study that is given up."""
-
-    permission_classes = (AdminsOnly,)
-
-    @describe("Cancel a study", takes=CancelBody, answers=WholeStudyDocument, name="cancelStudy")
-    def post(self, request: Request, code: uuid.UUID) -> Response:
-        """No more votes, no rating, no results; there is no way back. Twice changes nothing."""
-        study = get_study(code)
-        body = CancelBody(data=request.data)
-        body.is_valid(raise_exception=True)
-        actor = cast(User, request.user)
-        return Response(
-            whole_study(cancel_study(study=study, why=body.validated_data["why"], actor=actor))
-        )
-
-
-class EarlyLookView(ApiView):
-    """Results before the end."""
-
-    permission_classes = (StaffOnly,)
-
-    @describe("Open the results of an open study", answers=StudyDocument, name="lookEarly")
-    def post(self, request: Request, code: uuid.UUID) -> Response:
-        """An act that is written to the log; who votes in the study votes no longer."""
-        study = get_study(code)
-        open_early(study=study, actor=cast(User, request.user))
-        return Response(StudyDocument(_progress(study)).data)
+    Raises:
+        NothingToPlan: A target can't be parsed.
+    """
+    who = {name: given.pop(name) for name in WHO_AND_WHAT}
+    appearances, pair_votes = read_targets(given.pop("targets"))
+    options = PlanOptions(
+        appearances=appearances,
+        pair_votes=pair_votes,
+        hypotheses=tuple(given.pop("hypotheses")),
+        jobs=tuple(given.pop("jobs")),
+        samples=SampleRule(given.pop("samples")),
+        **given,
+    )
+    return who | {"options": options}
 
 
 def get_study(code: uuid.UUID) -> Study:
-    """The study of that code, 404 without one."""
+    """Return the study with that code, or raise 404."""
     return get_object_or_404(Study.objects.select_related("vote_file"), code=code)
-
-
-def whole_study(study: Study) -> dict[str, Any]:
-    """As `WholeStudyDocument` has it."""
-    lists = {
-        "contestants": study.contestants.values_list("slug", flat=True),
-        "scenarios": study.scenarios.values_list("slug", flat=True),
-        "experts": study.experts.order_by("username").values_list("username", flat=True),
-    }
-    found = dict(StudyDocument(_progress(study)).data)
-    for name in WholeStudyDocument().fields.keys() - found.keys() - lists.keys():
-        found[name] = getattr(study, name)
-    return found | {name: list(values) for name, values in lists.items()}
-
-
-# --- Private -----------------------------------------------------------------------------------
 
 
 def _progress(study: Study) -> StudyProgress:

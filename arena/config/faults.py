@@ -1,62 +1,75 @@
-"""Whether a fault is told as a page or in the shape of the wire."""
+"""Errors outside any view: as JSON for programs, as a page for people."""
 
 from __future__ import annotations
 
 from django.http import HttpRequest, HttpResponse
+from django.utils.translation import gettext as _
 from django.views.defaults import bad_request
 
-from arena.api import faults as wire
+from arena.api.errors import fault
 from arena.errors import DatabaseBusy
 from arena.web import faults as pages
+from augment.services.wording import translate
 
 
 def answer_unreadable(request: HttpRequest, exception: Exception) -> HttpResponse:
-    """400."""
-    answer = wire.answer_unreadable if _is_of_the_wire(request) else bad_request
-    return answer(request, exception)
+    """Answer 400: the request is invalid, its host name for example."""
+    if _wants_json(request):
+        return fault(400, "bad_request", _("The request can’t be read."))
+    return bad_request(request, exception)
 
 
 def answer_refused(request: HttpRequest, exception: Exception | None = None) -> HttpResponse:
-    """403."""
-    answer = wire.answer_refused if _is_of_the_wire(request) else pages.answer_refused
-    return answer(request, exception)
+    """Answer 403: signed in, but not allowed to do this."""
+    if _wants_json(request):
+        return fault(403, "forbidden", _("Your account may not do this."))
+    return pages.answer_refused(request, exception)
 
 
 def answer_forged(request: HttpRequest, reason: str = "") -> HttpResponse:
-    """403 for a missing or old token."""
-    answer = wire.answer_forged if _is_of_the_wire(request) else pages.answer_forged
-    return answer(request, reason)
+    """Answer 403: the CSRF token is missing or old."""
+    if _wants_json(request):
+        return fault(403, "forbidden", _("The CSRF token is missing or old."))
+    return pages.answer_forged(request, reason)
 
 
 def answer_missing(request: HttpRequest, exception: Exception | None = None) -> HttpResponse:
-    """404."""
-    answer = wire.answer_missing if _is_of_the_wire(request) else pages.answer_missing
-    return answer(request, exception)
+    """Answer 404: no such address, or nothing that this account may know of."""
+    if _wants_json(request):
+        return fault(404, "not_found", _("There is nothing at this address."))
+    return pages.answer_missing(request, exception)
 
 
 def answer_broken(request: HttpRequest) -> HttpResponse:
-    """500."""
-    answer = wire.answer_broken if _is_of_the_wire(request) else pages.answer_broken
-    return answer(request)
+    """Answer 500: a bug, which is in the log."""
+    if _wants_json(request):
+        return fault(500, "broken", _("Something broke on our side; it was written to the log."))
+    return pages.answer_broken(request)
 
 
 def answer_busy(request: HttpRequest) -> HttpResponse:
-    """503."""
-    answer = wire.answer_busy(request) if _is_of_the_wire(request) else pages.answer_busy(request)
+    """Answer 503: the database can't be written at the moment."""
+    if _wants_json(request):
+        answer: HttpResponse = fault(503, "busy", translate(DatabaseBusy()))
+    else:
+        answer = pages.answer_busy(request)
     answer.headers["Retry-After"] = str(DatabaseBusy.retry_after_s)
     return answer
 
 
 def answer_without_media(request: HttpRequest) -> HttpResponse:
-    """503."""
-    build = wire.answer_without_media if _is_of_the_wire(request) else pages.answer_without_media
-    answer = build(request)
+    """Answer 503: the picture storage does not respond; the log says why."""
+    if _wants_json(request):
+        message = _("Pictures can’t be reached just now. Try again later.")
+        answer: HttpResponse = fault(503, "no_pictures", message)
+    else:
+        answer = pages.answer_without_media(request)
     answer.headers["Retry-After"] = str(DatabaseBusy.retry_after_s)
     return answer
 
 
-def _is_of_the_wire(request: HttpRequest) -> bool:
-    """By its address, or because a program asks for JSON (a transcript, say) and for no page."""
+def _wants_json(request: HttpRequest) -> bool:
+    """By its address, or because a program accepts JSON (a transcript) but no page."""
     if request.path_info.startswith("/api/"):
         return True
     wanted = request.get_preferred_type(["text/html", "application/json"])

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from uuid import UUID
 
@@ -37,39 +36,6 @@ def of_expert(expert: User) -> list[LabellingProgress]:
 def of_job(job: GenerationJob) -> list[LabellingProgress]:
     """The labellings of a job over all their experts."""
     return _counted(job.labellings.all())
-
-
-def rounds_seen_by(expert: User | None) -> QuerySet[LabellingRound]:
-    """The labellings that an expert was invited to; without one, all."""
-    rows = LabellingRound.objects.all()
-    if expert is None:
-        return rows
-    return rows.filter(pk__in=LabelTask.objects.filter(expert=expert).values("labelling"))
-
-
-def of_rounds(
-    rounds: Sequence[LabellingRound], *, expert: User | None = None
-) -> list[LabellingProgress]:
-    """These labellings in their order, counted over an expert's showings or over all."""
-    pks = [row.pk for row in rounds]
-    tasks = LabelTask.objects.filter(labelling__in=pks)
-    if expert is not None:
-        tasks = tasks.filter(expert=expert)
-    counted = {
-        line["labelling"]: line
-        for line in tasks.order_by()
-        .values("labelling")
-        .annotate(planned=Count("pk"), labelled=Count("label"))
-    }
-    empty = {"planned": 0, "labelled": 0}
-    return [
-        LabellingProgress(
-            labelling=row,
-            planned=counted.get(row.pk, empty)["planned"],
-            labelled=counted.get(row.pk, empty)["labelled"],
-        )
-        for row in rounds
-    ]
 
 
 def labelling_of(*, expert: User, code: UUID) -> LabellingProgress:

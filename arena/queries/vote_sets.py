@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import StrEnum
 from typing import Any
@@ -25,9 +25,6 @@ from augment.models import Scenario
 
 KINDS = (MAIN, REPEAT)
 """What may be rated: planned showings, and on demand the hidden repeats of them."""
-
-
-OPEN_TO_EXPERTS = ("types", "kinds", "leave_out_settled")
 
 
 class LeftOut(StrEnum):
@@ -90,11 +87,6 @@ class Filters:
             leave_out_own=bool(document.get("leave_out_own", False)),
             authors=frozenset((judge, slug) for judge, slug in document.get("authors", ())),
         )
-
-
-def of_experts(document: Mapping[str, Any]) -> dict[str, Any]:
-    """Filters as an expert may read them: nothing of who else voted, nor of authors."""
-    return {name: document[name] for name in OPEN_TO_EXPERTS if name in document}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -59,7 +59,7 @@ def test_the_example_of_the_docs_goes_from_nothing_to_a_table(
             expert.get("contestants")
         assert (refused.value.status, refused.value.code) == (403, "forbidden")
         with pytest.raises(ApiError, match="opens nothing"):
-            Arena(address, "arena_nobodys").get("account")
+            Arena(address, "arena_nobodys").get("studies")
 
 
 def first_link(home: Home) -> str:

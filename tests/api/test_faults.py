@@ -15,7 +15,7 @@ from rest_framework.exceptions import Throttled
 from rest_framework.request import Request
 from rest_framework.response import Response
 
-from arena.api.errors import ApiView
+from arena.api.views import ApiView
 from tests.api.asking import error_of, signed_in
 from tests.web.cast import people
 
@@ -33,6 +33,8 @@ RAISED: dict[str, tuple[Exception, int, str]] = {
 
 class Raising(ApiView):
     """A resource that raises what its address says."""
+
+    readers = ("admin",)
 
     def get(self, request: Request, name: str) -> Response:
         raise RAISED[name][0]

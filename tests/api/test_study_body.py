@@ -7,7 +7,7 @@ from typing import Any
 
 import pytest
 
-from arena.api.study_body import WHO_AND_WHAT, StudyBody
+from arena.api.studies import WHO_AND_WHAT, StudyBody, study_rules
 from arena.models import Study
 from arena.services.studies import PlanOptions
 from arena.web.study_forms import StudyForm
@@ -50,7 +50,7 @@ def test_every_option_of_a_plan_can_be_given() -> None:
     }
     body = StudyBody(data=least | rest)
     assert body.is_valid(), body.errors
-    rules = body.rules()
+    rules = study_rules(dict(body.validated_data))
     assert set(rules) == {*WHO_AND_WHAT, "options"}
     usual = PlanOptions()
     left = [

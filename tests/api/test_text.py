@@ -31,8 +31,6 @@ def test_every_pair_brings_what_its_two_pictures_show(described: Study) -> None:
     assert [pair["text"] for pair in coming] == right[:4]
     answer = post(client, body_for(mine[0])).json()
     assert [pair["text"] for pair in answer["next"]] == right[1:5]
-    votes = client.get(f"/api/v1/votes?study={described.code}").json()
-    assert votes[0]["matchup"]["text"] == right[0]
 
 
 def test_it_is_in_the_language_of_who_asks(described: Study) -> None:
@@ -49,7 +47,6 @@ def test_without_it_no_answer_of_the_wire_has_a_trace_of_it() -> None:
     asked = [
         client.get(f"/api/v1/matchups?study={study.code}"),
         post(client, body_for(matchups_of(study, "eva")[0])),
-        client.get(f"/api/v1/votes?study={study.code}"),
     ]
     assert not any("text" in answer.content.decode() for answer in asked)
 

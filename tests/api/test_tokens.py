@@ -24,12 +24,16 @@ from tests.web.cast import people, signed_in
 
 pytestmark = pytest.mark.django_db
 
-ACCOUNT = "/api/v1/account"
+STUDIES = "/api/v1/studies"
 
 
 def role_at(client: Client) -> str | None:
-    answer = client.get(ACCOUNT)
-    return answer.json()["role"] if answer.status_code == 200 else None
+    """What the API lets a client do."""
+    if client.get(STUDIES).status_code != 200:
+        return None
+    if client.post(reverse("api-people")).status_code == 415:
+        return "admin"
+    return "analyst" if client.get(reverse("api-jobs")).status_code == 200 else "expert"
 
 
 def test_the_page_shows_a_new_token_once_and_keeps_only_its_hash() -> None:
@@ -63,7 +67,7 @@ def test_the_log_says_who_made_and_revoked_it_and_not_what_it_is() -> None:
         ("revoke", admin.pk),
     ]
     assert secret not in str(list(events.values()))
-    error_of(program(secret).get(ACCOUNT), 401, "signed_out")
+    error_of(program(secret).get(STUDIES), 401, "signed_out")
 
 
 def test_nobody_revokes_somebody_elses() -> None:
@@ -125,7 +129,7 @@ def test_a_paused_owners_token_opens_nothing() -> None:
     accounts = people()
     asking = program_of(accounts["analyst"])
     set_active(user=accounts["analyst"], is_active=False, actor=accounts["admin"])
-    error_of(asking.get(ACCOUNT), 401, "signed_out")
+    error_of(asking.get(STUDIES), 401, "signed_out")
 
 
 def test_a_token_ends_at_its_time() -> None:
@@ -133,13 +137,13 @@ def test_a_token_ends_at_its_time() -> None:
     ApiToken.objects.update(expires_at=timezone.now() + timedelta(seconds=60))
     assert role_at(program(secret)) == "expert"
     ApiToken.objects.update(expires_at=timezone.now())
-    error_of(program(secret).get(ACCOUNT), 401, "signed_out")
+    error_of(program(secret).get(STUDIES), 401, "signed_out")
 
 
 @pytest.mark.parametrize("header", ["Bearer", "Bearer ", "Bearer nonsense", "bearer arena_x"])
 def test_a_wrong_token_is_401_even_beside_a_session(header: str) -> None:
     client = signed_in(people()["admin"])
-    answer = client.get(ACCOUNT, headers={"Authorization": header})
+    answer = client.get(STUDIES, headers={"Authorization": header})
     error_of(answer, 401, "signed_out")
     assert answer.headers["WWW-Authenticate"] == "Bearer"
 
@@ -157,9 +161,8 @@ def test_a_token_needs_no_csrf_token_and_a_session_does() -> None:
 
 def test_an_analysts_token_of_an_admin_changes_nothing() -> None:
     asking = program_of(people()["admin"], "analyst")
-    answer = asking.post(
-        reverse("api-catalogue"), {"set": "paper"}, content_type="application/json"
-    )
+    person = {"username": "grace", "role": "expert"}
+    answer = asking.post(reverse("api-people"), person, content_type="application/json")
     error_of(answer, 403, "forbidden")
     assert asking.get(reverse("api-jobs")).status_code == 200
 
@@ -169,13 +172,13 @@ def test_use_is_remembered_and_limited_by_role(monkeypatch: pytest.MonkeyPatch) 
     accounts = people()
     asking, other = program_of(accounts["expert"]), program_of(accounts["analyst"])
     assert ApiToken.objects.exclude(last_used_at=None).count() == 0
-    assert [asking.get(ACCOUNT).status_code for _ in range(4)] == [200, 200, 200, 429]
-    refused = asking.get(ACCOUNT)
+    assert [asking.get(STUDIES).status_code for _ in range(4)] == [200, 200, 200, 429]
+    refused = asking.get(STUDIES)
     error_of(refused, 429, "too_many_requests")
     assert refused.headers["Retry-After"] == "60"
-    assert other.get(ACCOUNT).status_code == 200, "another token has its own count"
+    assert other.get(STUDIES).status_code == 200, "another token has its own count"
     ApiToken.objects.update(window_began_at=timezone.now() - timedelta(seconds=61))
-    assert asking.get(ACCOUNT).status_code == 200, "a new window"
+    assert asking.get(STUDIES).status_code == 200, "a new window"
     assert ApiToken.objects.exclude(last_used_at=None).count() == 2
 
 

@@ -33,6 +33,7 @@ def test_the_next_matchups_have_tokens_and_nothing_else(study: Study) -> None:
             "b": f"/i/{matchup.right_token}",
             "original": f"/i/{matchup.original_token}",
             **VIEW_OF_OLD,
+            "legend": ["ego", "grid", "motion", "other", "own", "walkway"],
         }
         for matchup in mine
     ]
@@ -149,20 +150,6 @@ def test_a_vote_says_all_that_an_expert_can_say(study: Study) -> None:
     tie, skip = Vote.objects.order_by("pk")
     assert (tie.both_miss, tie.comment, tie.aids) == (True, "Both off the road.", "zoom ruler")
     assert (skip.outcome, skip.reason, skip.winner_id) == ("skip", "picture_missing", None)
-
-
-def test_the_last_votes_come_back_with_their_pairs(study: Study) -> None:
-    first, second, third, *_ = matchups_of(study, "eva")
-    client = signed_in("eva")
-    for matchup, letter in ((first, "A"), (second, "E"), (third, "B")):
-        post(client, body_for(matchup, letter, comment=f"{letter}!"))
-    given = client.get(f"/api/v1/votes?study={study.code}&n=2").json()
-    assert [(vote["outcome"], vote["comment"]) for vote in given] == [("B", "B!"), ("E", "E!")]
-    assert given[0]["matchup"]["a"] == f"/i/{third.left_token}"
-    body = body_for(third, "A", supersedes=given[0]["key"])
-    assert post(client, body).json()["saved"] == 3
-    assert client.get(f"/api/v1/votes?study={study.code}&n=1").json()[0]["outcome"] == "A"
-    assert signed_in("finn").get(f"/api/v1/votes?study={study.code}").json() == []
 
 
 def test_more_votes_than_a_person_can_give_are_refused_and_flagged(settings: Settings) -> None:

@@ -217,7 +217,7 @@ def _visit() -> None:
 
 
 def _lists() -> list[str]:
-    return ["scenarios", "contestants", "jobs", "augmentations", "simulations", "studies"]
+    return ["scenarios", "contestants", "jobs", "studies"]
 
 
 def _opened(name: str, user: Any, url: str) -> tuple[str, int, float] | None:

@@ -6,7 +6,7 @@ import ast
 
 from tests.house.source import walked
 
-DOORS = ("arena.web", "arena.templatetags", "arena.api")
+DOORS = ("arena.web", "arena.templatetags", "arena.api", "arena.config.faults")
 WORDING = "augment.services.wording"
 MARKS = {"gettext_noop"}
 LABELS = {"arena.models": {"gettext_lazy"}}

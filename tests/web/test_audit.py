@@ -173,7 +173,6 @@ def _pages(study: Study, rating: Snapshot) -> dict[str, str]:
             for form in ("csv", "json", "latex", "parquet", "zip")
         },
         "votes.csv": reverse("results-votes-export", args=[code, "csv"]),
-        "api list": reverse("api-snapshots", args=[code]),
         "api rating": reverse("api-snapshot", args=[rating.code]),
         "api file": reverse("api-snapshot-file", args=[rating.code, "leaderboard", "csv"]),
         "pairs.svg": reverse("results-chart", args=[code, "pairs", "svg"]),

@@ -40,7 +40,7 @@ handler500 = "arena.config.faults.answer_broken"
         ("/label/x/", 404),
         ("/broken/", 500),
         ("/api/v1/matchups", 403),
-        ("/api/v1/votes?study=x", 403),
+        ("/api/v1/votes", 403),
         ("/api/v1/nothing", 404),
     ],
 )
