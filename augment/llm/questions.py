@@ -18,6 +18,8 @@ MARKER = "heron-4417"
 LONG_LINES = 310
 MAX_TOKENS = 1024
 """Room for a model that thinks before it answers."""
+LIMIT_TOKENS = 16
+"""The limit of an answer that would be much longer."""
 
 _SIDE_PX = 96
 _GREEN, _YELLOW = (0, 128, 0), (255, 255, 0)
@@ -27,6 +29,7 @@ class Ability(StrEnum):
     """What is asked about."""
 
     ANSWERS = "answers"
+    ANSWER_LIMIT = "answer_limit"
     TEMPERATURE = "temperature"
     JSON_SCHEMA = "json_schema"
     NATIVE_TOOLS = "native_tools"
@@ -39,12 +42,13 @@ class ProbeQuestion:
     """One request, and what a good answer to it is.
 
     Attributes:
+        is_good: None where the answer does not tell.
         parameter: The wire's name of what the endpoint may refuse, empty where there is none.
     """
 
     ability: Ability
     request: Request
-    is_good: Callable[[Reply], bool]
+    is_good: Callable[[Reply], bool | None]
     parameter: str = ""
 
 
@@ -52,6 +56,13 @@ def questions_for(model: str) -> tuple[ProbeQuestion, ...]:
     """The questions in the order in which they are asked; the first decides about the others."""
     return (
         _question(model, Ability.ANSWERS, "Answer with the single word: ready", _says("ready")),
+        _question(
+            model,
+            Ability.ANSWER_LIMIT,
+            "Count from one to three hundred in words.",
+            _keeps_limit,
+            max_tokens=LIMIT_TOKENS,
+        ),
         _question(
             model,
             Ability.TEMPERATURE,
@@ -124,19 +135,26 @@ def _question(
     model: str,
     ability: Ability,
     text: str,
-    is_good: Callable[[Reply], bool],
+    is_good: Callable[[Reply], bool | None],
     *,
     parameter: str = "",
     images: tuple[bytes, ...] = (),
+    max_tokens: int = MAX_TOKENS,
     **changes: object,
 ) -> ProbeQuestion:
     message = Message(speaker=Speaker.USER, text=text, images=images)
-    request = Request(model=model, messages=(message,), max_tokens=MAX_TOKENS, **changes)  # type: ignore[arg-type]
+    request = Request(model=model, messages=(message,), max_tokens=max_tokens, **changes)  # type: ignore[arg-type]
     return ProbeQuestion(ability=ability, request=request, is_good=is_good, parameter=parameter)
 
 
 def _says(word: str) -> Callable[[Reply], bool]:
     return lambda reply: word in reply.text.lower()
+
+
+def _keeps_limit(reply: Reply) -> bool | None:
+    """Twice the limit is allowed: servers count the end of an answer differently."""
+    written = reply.completion_tokens
+    return None if written is None else written <= 2 * LIMIT_TOKENS
 
 
 def _is_sum(reply: Reply) -> bool:

@@ -13,6 +13,7 @@ from django.core.management import CommandError, call_command
 from PIL import Image
 
 from augment.fake_llm.server import running
+from augment.llm.messages import LengthName
 from augment.llm.patience import Patience
 from augment.llm.questions import MARKER, Ability, questions_for, two_halves
 from augment.llm.window import least_tokens
@@ -22,7 +23,10 @@ from tests.llm.json_server import JsonServer, serving
 
 pytestmark = pytest.mark.django_db(transaction=True)
 EVERYTHING = frozenset(
-    {"temperature", "response_format", "tools", "images", "window", "usage", "seed"}
+    {
+        *("temperature", "response_format", "tools", "images", "window", "usage", "seed"),
+        *LengthName,
+    }
 )
 KEY = "sk-planted-4f7a9c0d1e2b3a"
 
@@ -56,7 +60,9 @@ class Candidate(JsonServer):
         made = {"id": "1", "object": "chat.completion", "created": 0, "model": "m-2026"}
         made["choices"] = [{"index": 0, "finish_reason": "stop", "message": message}]
         if "usage" in self.can:
-            made["usage"] = {"prompt_tokens": prompt_tokens, "completion_tokens": 2}
+            is_long = "three hundred" in text and not self.can.intersection(body)
+            written = 1200 if is_long else 2
+            made["usage"] = {"prompt_tokens": prompt_tokens, "completion_tokens": written}
         return 200, made
 
     def _said(self, body: dict[str, Any], content: Any) -> str | None:
@@ -94,16 +100,16 @@ def test_a_server_that_can_do_everything() -> None:
     with candidate():
         report = asked()
     assert {made.ability: made.has_it for made in report.findings} == dict.fromkeys(Ability, True)
-    assert (report.calls, report.refused, report.counts_tokens) == (6, [], True)
+    assert (report.calls, report.refused, report.counts_tokens) == (7, [], True)
     assert report.models_returned == ["m-2026"]
     known = row()
     abilities = (known.native_tools, known.vision, known.json_schema, known.temperature)
     assert abilities == (True, True, True, True)
     assert known.probed_at == report.probed_at
     assert known.probe_report is not None
-    assert len(known.probe_report["findings"]) == 6
+    assert len(known.probe_report["findings"]) == 7
     assert Event.objects.get(verb="probe").object_code == str(known.code)
-    assert CallLease.objects.filter(finished_at__isnull=False).count() == 6
+    assert CallLease.objects.filter(finished_at__isnull=False).count() == 7
 
 
 @pytest.mark.parametrize(
@@ -137,6 +143,26 @@ def test_a_window_that_is_cut_uncounted_is_found_by_the_lost_word() -> None:
     assert not report.counts_tokens
 
 
+def test_a_limit_that_is_passed_over_is_sent_by_its_other_name() -> None:
+    with candidate(EVERYTHING - {"max_completion_tokens"}):
+        report = asked()
+    assert report.has(Ability.ANSWER_LIMIT) is True
+    assert report.refused == row().refused_parameters == ["max_completion_tokens"]
+    assert report.calls == 8
+
+
+def test_a_server_that_knows_no_limit_is_told_and_goes_on() -> None:
+    with candidate(EVERYTHING - {*LengthName}):
+        report = asked()
+    found = {made.ability: made.has_it for made in report.findings}
+    assert found == dict.fromkeys(Ability, True) | {Ability.ANSWER_LIMIT: False}
+
+
+def test_without_a_count_of_tokens_the_limit_is_unknown() -> None:
+    with candidate(EVERYTHING - {"usage"}):
+        assert asked().has(Ability.ANSWER_LIMIT) is None
+
+
 def test_a_parameter_beside_the_question_is_gone_without() -> None:
     with candidate(EVERYTHING - {"seed"}):
         report = asked()
@@ -165,7 +191,7 @@ def test_what_was_known_stays_where_the_answer_does_not_tell() -> None:
         server.can = EVERYTHING - {"images"} | {"a bad day"}
         report = asked()
     assert report.has(Ability.VISION) is None
-    assert "503" in report.findings[4].note
+    assert "503" in report.findings[5].note
     assert row().vision is True
 
 
@@ -191,9 +217,9 @@ def test_the_command_prints_a_table() -> None:
         call_command("probe_endpoint", "local", "--model", "m", stdout=said)
     lines = said.getvalue().splitlines()
     assert lines[0].split()[:2] == ["answers", "yes"]
-    assert lines[4].split()[:2] == ["vision", "no"]
-    assert lines[6:9] == ["usage         yes", "model id      m-2026", "not taken     seed"]
-    assert lines[9] == "cost          unknown, 7 calls"
+    assert lines[5].split()[:2] == ["vision", "no"]
+    assert lines[7:10] == ["usage         yes", "model id      m-2026", "not taken     seed"]
+    assert lines[10] == "cost          unknown, 8 calls"
 
 
 def test_the_command_fails_where_nobody_answers() -> None:

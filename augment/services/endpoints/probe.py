@@ -6,7 +6,7 @@ A fault that says nothing about the ability (a busy server) leaves the ability a
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass, field, replace
 from datetime import datetime
 from decimal import Decimal
 from typing import Any
@@ -20,7 +20,7 @@ from augment.errors import ModelFault, ParameterRefused
 from augment.llm.client import ChatClient
 from augment.llm.costs import Price, usd_of
 from augment.llm.cutting import shorten
-from augment.llm.messages import Reply, Request
+from augment.llm.messages import LengthName, Reply, Request
 from augment.llm.patience import Patience
 from augment.llm.profile import ModelProfile
 from augment.llm.questions import Ability, ProbeQuestion, questions_for
@@ -65,7 +65,7 @@ class ProbeReport:
     """All findings, and what asking has cost as far as it is known.
 
     Attributes:
-        refused: Parameters that the endpoint answered 400 to.
+        refused: Parameters that the endpoint answered 400 to, or passed over.
         cost_usd: None where the price or a count of tokens is unknown.
     """
 
@@ -178,7 +178,9 @@ class _Prober:
             has_it = False if refuses or ability == Ability.ANSWERS else None
             return ProbeFinding(ability=ability, has_it=has_it, note=_short(str(fault)))
         cut = cut_of(request, reply, context_tokens=self.context_tokens)
-        is_good = question.is_good(reply) and cut is None
+        is_good = question.is_good(reply) if cut is None else False
+        if ability == Ability.ANSWER_LIMIT and is_good is False and self._renames_limit(request):
+            return replace(self._finding(question), cost_usd=None)
         # Any answer shows that the parameter is taken.
         has_it = True if ability in (Ability.ANSWERS, Ability.TEMPERATURE) else is_good
         return ProbeFinding(
@@ -211,6 +213,17 @@ class _Prober:
                     raise
                 self.patience.sleep(wait_s)
                 attempt += 1
+
+    def _renames_limit(self, request: Request) -> bool:
+        """Use the limit's other name from now on; return whether there is one left.
+
+        Some servers pass over a parameter that they do not know instead of refusing it.
+        """
+        profile = self.profile.without(request.length_name)
+        if profile.refused.issuperset(LengthName):
+            return False
+        self.profile = profile
+        return True
 
     def _cost_usd(self, reply: Reply) -> str | None:
         prompt, completion = reply.prompt_tokens, reply.completion_tokens
