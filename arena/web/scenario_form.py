@@ -141,7 +141,7 @@ def edit_page(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
             send_later(request, enqueue_scenario, scenario.pk)
             messages.success(request, f"“{scenario.slug}” is changed.")
             return redirect("scenario", code=code)
-    return render(request, "scenarios/edit.html", {"scenario": scenario, "form": form})
+    return render(request, "scenarios/change.html", {"scenario": scenario, "form": form})
 
 
 @allow_only(*STAFF)
