@@ -28,7 +28,7 @@ CHUNKS = {"IHDR", "PLTE", "tRNS", "IDAT", "IEND"}
 TELLING_HEADERS = ("ETag", "Last-Modified", "Content-Disposition")
 MATCHUP = {
     *("matchup", "position", "instruction", "a", "b", "original"),
-    *("px_per_m", "ego_px", "width", "height", "text"),
+    *("px_per_m", "ego_px", "width", "height", "text", "legend"),
 }
 """All that a matchup may say on the wire; its text has the fields a and b."""
 REPLY = {
