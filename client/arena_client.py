@@ -1,12 +1,11 @@
-"""Scenario Arena from a program: one file, nothing but Python 3.11, to be copied where it is used.
+"""A client of Scenario Arena in one file: copy it; it needs nothing but Python 3.11.
 
     arena = Arena("https://arena.example.org", token="arena_...")
     for job in arena.list("jobs", state="running"):
         print(job["name"], job["by_state"])
 
-What there is to ask for stands in the OpenAPI document, which staff read at
-/api/v1/reference/. `post` sends JSON, `get` and `list` read it, `upload` sends files, `download`
-gives a file's bytes.
+Staff find every operation at /api/v1/reference/. `post` sends JSON, `get` and `list` read it,
+`upload` sends files, `download` returns the bytes of one.
 """
 
 from __future__ import annotations
@@ -26,15 +25,15 @@ from urllib.parse import urlencode
 PREFIX = "/api/v1/"
 BUSY = (429, 503)
 KEYED = (PREFIX + "votes", PREFIX + "reports")
-"""What counts once however often it is sent, because its body has a key."""
+"""Idempotent requests: their body has a key."""
 
 AGAIN_S = 1.0
 MOST_KEPT = 256
-"""So many answers are kept to be asked for only if they have changed."""
+"""Size of the cache of answers with ETags."""
 
 
 class ApiError(Exception):
-    """The server refused; the text is its sentence.
+    """The server refused a request.
 
     Attributes:
         status: Of the answer.
@@ -51,13 +50,13 @@ class ApiError(Exception):
 
 
 class Arena:
-    """The API of one installation.
+    """The API of one installation. Every method raises `ApiError` where it is refused.
 
     Args:
         address: Of the installation, without a path.
         token: Of the page “API tokens”; empty for `first` and `welcome`, which give one.
-        timeout_s: How long to wait for an answer.
-        patience_s: How long to go on asking a server that is busy or wants fewer requests.
+        timeout_s: For one request.
+        patience_s: How long to retry while the server is busy or limits the rate.
     """
 
     def __init__(
@@ -71,11 +70,7 @@ class Arena:
     # --- Any resource --------------------------------------------------------------------------
 
     def get(self, path: str, **query: object) -> Any:
-        """What is at a path below /api/v1/, read; asked for again only if it has changed.
-
-        Raises:
-            ApiError: It was refused.
-        """
+        """Return the JSON at a path below /api/v1/, from the cache where it has not changed."""
         address = self._address(path, query)
         tag, body = self._kept.get(address, ("", None))
         answer = self._send("GET", address, headers={"If-None-Match": tag} if tag else {})
@@ -89,11 +84,7 @@ class Arena:
         return body
 
     def list(self, path: str, **query: object) -> Iterator[dict[str, Any]]:
-        """Every row of a list, page after page.
-
-        Raises:
-            ApiError: It was refused.
-        """
+        """Yield every row of a list."""
         page = self.get(path, **query)
         while True:
             yield from page["results"]
@@ -102,11 +93,7 @@ class Arena:
             page = self.get(page["next"])
 
     def post(self, path: str, **body: object) -> Any:
-        """What a change is answered with.
-
-        Raises:
-            ApiError: It was refused; nothing was changed.
-        """
+        """Send JSON and return the answer."""
         headers = {"Content-Type": "application/json"}
         data = json.dumps(body).encode()
         return json.loads(self._send("POST", self._address(path, {}), data, headers).body)
@@ -114,11 +101,7 @@ class Arena:
     def upload(
         self, path: str, files: Mapping[str, str | Path | Sequence[str | Path]], **fields: object
     ) -> Any:
-        """What is answered to files, by the name of their field, and other fields beside them.
-
-        Raises:
-            ApiError: It was refused; nothing was changed.
-        """
+        """Send files by the name of their form field, with other fields; return the answer."""
         mark = uuid.uuid4().hex
         parts = [_part(mark, name, str(value).encode()) for name, value in fields.items()]
         for name, given in files.items():
@@ -129,62 +112,45 @@ class Arena:
         return json.loads(self._send("POST", self._address(path, {}), data, headers).body)
 
     def download(self, path: str, **query: object) -> bytes:
-        """The bytes of a file.
-
-        Raises:
-            ApiError: It was refused.
-        """
+        """Return the bytes of a file."""
         return self._send("GET", self._address(path, query)).body
 
     # --- What takes more than one request ------------------------------------------------------
 
     def first(self, link: str, *, username: str, password: str) -> Arena:
-        """Make the first admin by the link that `serve` prints; gives the API as that admin."""
+        """Make the first admin by the link that `serve` prints; return a client for them."""
         made = self.post("first", link=link, username=username, password=password)
         return self._as(made["token"])
 
     def welcome(self, link: str, *, password: str) -> Arena:
-        """Set a new account's password by its link; gives the API as that account."""
+        """Set a new account's password by its link; return a client for that account."""
         return self._as(self.post("welcome", link=link, password=password)["token"])
 
     def wait_for_job(self, code: str, *, every_s: float = 2, within_s: float = 3600) -> Any:
-        """The job once nothing of it is under way.
-
-        Raises:
-            TimeoutError: It still is.
-        """
+        """Wait until nothing of a job is under way, and return it."""
         return self._wait(f"jobs/{code}", lambda job: bool(job["is_over"]), every_s, within_s)
 
-    def wait_for_snapshot(self, code: str, *, every_s: float = 2, within_s: float = 3600) -> Any:
-        """The rating once it is ready or failed.
-
-        Raises:
-            TimeoutError: It is neither.
-        """
-        ended = ("ready", "failed")
-        return self.wait_for(f"snapshots/{code}", *ended, every_s=every_s, within_s=within_s)
-
     def wait_for(self, path: str, *states: str, every_s: float = 1, within_s: float = 3600) -> Any:
-        """A row once its state is one of these: `wait_for(f"uploads/{code}", "read", "failed")`.
+        """Poll a row until it has one of these states, and return it.
 
         Raises:
-            TimeoutError: It is none of them.
+            TimeoutError: It has none of them in time.
         """
-        return self._wait(path, lambda one: one["state"] in states, every_s, within_s)
+        return self._wait(path, lambda row: row["state"] in states, every_s, within_s)
 
     def pairs(self, study: str) -> Iterator[dict[str, Any]]:
-        """The pairs that an expert still has to judge; decide each before the next one comes."""
+        """Yield the pairs that are left; vote on each before taking the next."""
         while waiting := self.get("matchups", study=study, n=1):
             yield from waiting
 
     def picture(self, address: str) -> bytes:
-        """The PNG behind `a`, `b` or `original` of a pair."""
+        """Return the PNG at `a`, `b` or `original` of a pair."""
         return self.download(f"pictures/{address.rpartition('/')[2]}")
 
     def vote(self, pair: dict[str, Any], outcome: str, **more: object) -> Any:
-        """Decide a pair: "A", "B", "E" for equal, or "skip" with a reason.
+        """Vote "A", "B", "E" for equal, or "skip" with a reason.
 
-        It is sent again with the same key where the answer was lost, so that it counts once.
+        Retries send the same key, so that the vote counts once.
         """
         key = str(uuid.uuid4())
         return self.post("votes", key=key, matchup=pair["matchup"], outcome=outcome, **more)
@@ -237,10 +203,10 @@ class Arena:
 
 
 class _StaysHere(urllib.request.HTTPRedirectHandler):
-    """Follows no redirect: it would lose what is posted, and show the token to another host."""
+    """Refuse redirects: they would drop a posted body and leak the token."""
 
     def redirect_request(self, *args: Any, **more: Any) -> None:
-        """Nowhere."""
+        """Follow none."""
 
 
 _STAYING = urllib.request.build_opener(_StaysHere)
@@ -252,7 +218,7 @@ class _Answer:
 
 
 def _part(mark: str, name: str, content: bytes, file: str | Path | None = None) -> bytes:
-    """One field of a form; names of files go in plain letters."""
+    """Return one field of a form; file names are reduced to ASCII."""
     head = f'--{mark}\r\nContent-Disposition: form-data; name="{name}"'
     if file is not None:
         plain = re.sub(r"[^A-Za-z0-9._-]", "-", Path(file).name)
@@ -261,7 +227,7 @@ def _part(mark: str, name: str, content: bytes, file: str | Path | None = None) 
 
 
 def _wait_s(error: urllib.error.HTTPError) -> float | None:
-    """How long to wait before the same is asked again, None where that would not help."""
+    """Return how long to wait before a retry, None where it would not help."""
     given = error.headers.get("Retry-After", "")
     return float(given) if error.code in BUSY and given.isdigit() else None
 

@@ -33,16 +33,14 @@ MATCHUP = {
 """All that a matchup may say on the wire; its text has the fields a and b."""
 REPLY = {
     *("saved", "skipped", "total", "minutes_left", "next"),
-    *("key", "outcome", "both_miss", "reason", "comment"),
-    *("error", "code", "message", "fields"),
+    *("error", "code", "message", "fields", "outcome"),
 }
 """All that may stand around it in a reply of the API."""
 OWN = {
-    *("username", "pseudonym", "role", "token_expires_at"),
     *("results", "name", "state", "planned", "voted", "skipped", "left"),
     *("opened_at", "closed_at", "labelled", "task", "picture", "original"),
 }
-"""What an expert is told of their account, their studies and what they label."""
+"""What an expert is told of their studies and of what they label."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
