@@ -24,18 +24,16 @@ from augment.services.endpoints.probing import plan_probe
 from augment.tasks import enqueue_probe
 
 
-class EndpointDocument(serializers.Serializer[Any]):
-    """An endpoint."""
+class EndpointDocument(serializers.ModelSerializer[Endpoint]):
+    """An endpoint; `key_variable` names an environment variable of the workers."""
 
-    code = serializers.UUIDField()
-    label = serializers.CharField()  # type: ignore[assignment]
-    base_url = serializers.CharField()
-    key_variable = serializers.CharField(
-        help_text="The environment variable of the workers that holds the key; may be empty."
-    )
-    is_simulated = serializers.BooleanField()
-    max_concurrency = serializers.IntegerField()
-    requests_per_minute = serializers.IntegerField(allow_null=True)
+    class Meta:
+        model = Endpoint
+        fields = (
+            *("code", "label", "base_url", "key_variable", "is_simulated"),
+            *("max_concurrency", "requests_per_minute"),
+        )
+        read_only_fields = fields
 
 
 class EndpointBody(StrictSerializer):
@@ -57,26 +55,19 @@ class EndpointBody(StrictSerializer):
     )
 
 
-class EndpointModelDocument(serializers.Serializer[Any]):
-    """A model of an endpoint; null or empty is unknown."""
+class EndpointModelDocument(serializers.ModelSerializer[EndpointModel]):
+    """A model of an endpoint; null or empty is unknown. Prices are for a million tokens."""
 
-    code = serializers.UUIDField()
     endpoint = serializers.CharField(source="endpoint.label")
-    model = serializers.CharField()
-    model_class = serializers.CharField()
-    vision = serializers.BooleanField(allow_null=True)
-    native_tools = serializers.BooleanField(allow_null=True)
-    json_schema = serializers.BooleanField(allow_null=True)
-    temperature = serializers.BooleanField(allow_null=True)
-    reasoning_effort = serializers.CharField()
-    context_tokens = serializers.IntegerField(allow_null=True)
-    max_output_tokens = serializers.IntegerField(allow_null=True)
-    price_in_usd = serializers.DecimalField(
-        None, 6, allow_null=True, help_text="For a million tokens."
-    )
-    price_out_usd = serializers.DecimalField(None, 6, allow_null=True)
-    price_as_of = serializers.DateField(allow_null=True)
-    price_source = serializers.CharField()
+
+    class Meta:
+        model = EndpointModel
+        fields = (
+            *("code", "endpoint", "model", "model_class", "vision", "native_tools", "json_schema"),
+            *("temperature", "reasoning_effort", "context_tokens", "max_output_tokens"),
+            *("price_in_usd", "price_out_usd", "price_as_of", "price_source"),
+        )
+        read_only_fields = fields
 
 
 class NewModelBody(StrictSerializer):
@@ -102,15 +93,15 @@ class ProbeLineDocument(serializers.Serializer[Any]):
     cost_usd = serializers.DecimalField(None, 9, allow_null=True)
 
 
-class ProbeDocument(WarnedDocument):
+class ProbeDocument(serializers.ModelSerializer[Probe], WarnedDocument):
     """A probe with its six lines."""
 
-    code = serializers.UUIDField()
-    state = serializers.CharField(help_text="queued, running, done or failed.")
-    reason = serializers.CharField(help_text="Why it failed.")
     lines = serializers.SerializerMethodField()
-    created_at = serializers.DateTimeField()
-    finished_at = serializers.DateTimeField(allow_null=True)
+
+    class Meta:
+        model = Probe
+        fields = ("code", "state", "reason", "lines", "created_at", "finished_at", "warnings")
+        read_only_fields = fields
 
     @extend_schema_field(ProbeLineDocument(many=True))
     def get_lines(self, probe: Probe) -> Any:

@@ -40,28 +40,32 @@ class ScenarioQuery(PageQuery):
     slug = serializers.CharField(max_length=80, required=False)
 
 
-class ScenarioDocument(serializers.Serializer[Any]):
+class ScenarioDocument(serializers.ModelSerializer[Scenario]):
     """A scenario of a list."""
 
-    code = serializers.UUIDField()
-    slug = serializers.CharField()
-    type = serializers.CharField()
     set = serializers.CharField(source="catalogue_set")
-    instruction = serializers.CharField()
     scene = serializers.CharField(source="base_scene.slug")
     has_reference = serializers.BooleanField()
+
+    class Meta:
+        model = Scenario
+        fields: tuple[str, ...] = (
+            *("code", "slug", "type", "set", "instruction", "scene", "has_reference"),
+        )
+        read_only_fields = fields
 
 
 class NewScenarioDocument(ScenarioDocument, WarnedDocument):
     """A new scenario; the forms of its documents are those of the files on its page."""
 
-    reference = serializers.DictField(allow_null=True, help_text="The reference modification.")
-    intent = serializers.DictField(allow_null=True, help_text="What the instruction asks for.")
-    keep_traffic = serializers.BooleanField()
-    density = serializers.CharField(
-        source="traffic_density", help_text="none, low, medium or high: of spawned traffic."
-    )
-    goal = serializers.CharField(help_text="left, right, straight; empty for none.")
+    density = serializers.CharField(source="traffic_density", help_text="Of spawned traffic.")
+
+    class Meta(ScenarioDocument.Meta):
+        fields = (
+            *ScenarioDocument.Meta.fields,
+            *("reference", "intent", "keep_traffic", "density", "goal", "warnings"),
+        )
+        read_only_fields = fields
 
 
 class ScenarioBody(StrictSerializer):

@@ -65,26 +65,22 @@ class TableDocument(serializers.Serializer[Any]):
         return [translate(one) for one in table.warnings]
 
 
-class SnapshotDocument(serializers.Serializer[Any]):
+class SnapshotDocument(serializers.ModelSerializer[Snapshot]):
     """A rating with its table, which is null until it is ready."""
 
-    code = serializers.UUIDField()
     study = serializers.UUIDField(source="study.code")
-    state = serializers.CharField(help_text="queued, running, ready or failed.")
-    progress = serializers.IntegerField(help_text="Percent.")
-    method = serializers.CharField()
-    rounds = serializers.IntegerField()
     resample = serializers.CharField(source="resampling_unit")
-    intervals = serializers.CharField()
-    seed = serializers.IntegerField()
-    filters = serializers.DictField(help_text="Which votes were asked for.")
     votes = serializers.IntegerField(source="votes_counted")
-    votes_sha256 = serializers.CharField()
-    is_early = serializers.BooleanField(help_text="The study was still open.")
-    includes_simulated = serializers.BooleanField()
-    status = serializers.CharField(help_text="Why there is no rating, if there is none.")
-    made_at = serializers.DateTimeField()
     table = serializers.SerializerMethodField()
+
+    class Meta:
+        model = Snapshot
+        fields = (
+            *("code", "study", "state", "progress", "method", "rounds", "resample", "intervals"),
+            *("seed", "filters", "votes", "votes_sha256", "is_early", "includes_simulated"),
+            *("status", "made_at", "table"),
+        )
+        read_only_fields = fields
 
     @extend_schema_field(TableDocument(allow_null=True))
     def get_table(self, row: Snapshot) -> Any:

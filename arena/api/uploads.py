@@ -66,39 +66,38 @@ class RecordingPartDocument(serializers.Serializer[Any]):
     stops = StopDocument(many=True)
 
 
-class UploadDocument(WarnedDocument):
+class UploadDocument(serializers.ModelSerializer[SceneUpload], WarnedDocument):
     """A recording, and once it is read the moments that it offers."""
 
-    tracks = RecordingPartDocument(many=True)
+    tracks = RecordingPartDocument(many=True, read_only=True)
 
-    code = serializers.UUIDField()
-    name = serializers.CharField()
-    size_bytes = serializers.IntegerField()
-    digest = serializers.CharField(help_text="SHA-256.")
-    state = serializers.CharField(help_text="queued, running, read or failed.")
-    reason = serializers.CharField(help_text="Why it can't be read.")
-    format = serializers.CharField(help_text="As it was read; empty before.")
-    is_cut = serializers.BooleanField(help_text="It holds more than is offered.")
-    created_at = serializers.DateTimeField()
-    finished_at = serializers.DateTimeField(allow_null=True)
+    class Meta:
+        model = SceneUpload
+        fields = (
+            *("code", "name", "size_bytes", "digest", "state", "reason", "format", "is_cut"),
+            *("created_at", "finished_at", "tracks", "warnings"),
+        )
+        read_only_fields = fields
 
 
-class MomentDocument(WarnedDocument):
+class MomentDocument(serializers.ModelSerializer[UploadMoment], WarnedDocument):
     """A moment of a recording, with a report of what is in it."""
 
-    code = serializers.UUIDField()
     upload = serializers.UUIDField(source="upload.code")
-    item = serializers.CharField(allow_blank=True)
-    frame = serializers.IntegerField()
-    state = serializers.CharField(help_text="queued, drawn, keeping, kept or failed.")
-    reason = serializers.CharField(help_text="Why it can't be read or kept.")
-    report = serializers.DictField(allow_null=True, help_text="What is in it, once it is read.")
     notes = serializers.SerializerMethodField(help_text="What the source left open.")
     scene = serializers.CharField(source="scene.slug", default=None, allow_null=True)
 
+    class Meta:
+        model = UploadMoment
+        fields = (
+            *("code", "upload", "item", "frame", "state", "reason", "report"),
+            *("notes", "scene", "warnings"),
+        )
+        read_only_fields = fields
+
     def get_notes(self, row: UploadMoment) -> list[str]:
         """Return them as sentences."""
-        return [translate(one) for one in upload_moments.sentences_of(row)]
+        return [translate(note) for note in upload_moments.sentences_of(row)]
 
 
 class UploadsView(ApiView):
