@@ -59,6 +59,7 @@ class EndpointModelDocument(serializers.ModelSerializer[EndpointModel]):
     """A model of an endpoint; null or empty is unknown. Prices are for a million tokens."""
 
     endpoint = serializers.CharField(source="endpoint.label")
+    model_class = serializers.CharField(allow_blank=True)
 
     class Meta:
         model = EndpointModel

@@ -58,7 +58,10 @@ class ScenarioDocument(serializers.ModelSerializer[Scenario]):
 class NewScenarioDocument(ScenarioDocument, WarnedDocument):
     """A new scenario; the forms of its documents are those of the files on its page."""
 
+    reference = serializers.DictField(allow_null=True, help_text="The reference modification.")
+    intent = serializers.DictField(allow_null=True, help_text="What the instruction asks for.")
     density = serializers.CharField(source="traffic_density", help_text="Of spawned traffic.")
+    goal = serializers.CharField(help_text="left, right, straight; empty for none.")
 
     class Meta(ScenarioDocument.Meta):
         fields = (

@@ -84,6 +84,7 @@ class MomentDocument(serializers.ModelSerializer[UploadMoment], WarnedDocument):
     """A moment of a recording, with a report of what is in it."""
 
     upload = serializers.UUIDField(source="upload.code")
+    report = serializers.DictField(allow_null=True, help_text="What is in it, once it is read.")
     notes = serializers.SerializerMethodField(help_text="What the source left open.")
     scene = serializers.CharField(source="scene.slug", default=None, allow_null=True)
 
