@@ -15,6 +15,7 @@ from pytest_django import Settings
 from xdist.scheduler import LoadScopeScheduling
 
 import tests.properties  # noqa: F401
+from arena.management.catalogue import compile_catalogue
 from tests.append_only import empty_with_triggers
 from tests.brokers import MEMORY, NOWHERE, Broker, broker_at
 from tests.on_postgres import FILES
@@ -42,6 +43,10 @@ class Grouped(LoadScopeScheduling):  # type: ignore[misc] # it has no types
     def _split_scope(self, nodeid: str) -> str:
         fitting = (group for start, group in GROUPS.items() if nodeid.startswith(start))
         return next(fitting, nodeid.partition("::")[0])
+
+
+def pytest_configure() -> None:
+    compile_catalogue()
 
 
 @pytest.hookimpl(optionalhook=True)

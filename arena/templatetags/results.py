@@ -101,6 +101,13 @@ def left_out(reason: str) -> str:
     return str(_LEFT_OUT.get(reason, reason))
 
 
+@register.filter
+def counted(number: int, forms: str) -> str:
+    """Fill in the singular or the plural, as in `3|counted:"{} vote | {} votes"`."""
+    one, many = forms.split(" | ")
+    return (one if number == 1 else many).format(number)
+
+
 register.filter("said", translate)
 
 

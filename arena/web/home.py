@@ -17,6 +17,7 @@ from arena.queries.results import ResultsAccess, results_access
 from arena.services.preferences import choose_language, choose_theme
 from arena.web.checklist import steps
 from arena.web.forms import LanguageForm, ThemeForm
+from arena.web.language import use_english
 from arena.web.sign_in import keep_language
 from augment.models import GenerationJob
 from augment.services.running.summary import count_each
@@ -31,8 +32,10 @@ def home(request: HttpRequest) -> HttpResponse:
         case "expert":
             return _expert(request)
         case "analyst":
+            use_english(request)
             return _analyst(request)
         case "admin":
+            use_english(request)
             return _admin(request)
         case _:
             return render(request, "home/nobody.html")

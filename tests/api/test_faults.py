@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from typing import Any
 
 import pytest
@@ -97,9 +96,3 @@ def test_a_program_that_asks_a_page_for_json_gets_json_and_a_browser_a_page() ->
     for accepted in ("text/html,application/json;q=0.9", "*/*"):
         page = client.get(gone, HTTP_ACCEPT=accepted)
         assert page["Content-Type"].startswith("text/html")
-
-
-def test_the_message_is_in_the_language_of_who_asks() -> None:
-    answer = client_of().get("/api/v1/raise/fault", HTTP_ACCEPT_LANGUAGE="de")
-    told = json.loads(answer.content)["error"]["message"]
-    assert told.startswith("Bei uns ist etwas kaputt")

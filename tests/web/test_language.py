@@ -1,4 +1,4 @@
-"""English or German: by the browser's wish, by the switch, and remembered with the account."""
+"""Voters' pages are English or German, by browser, switch and account; all others English."""
 
 from __future__ import annotations
 
@@ -10,7 +10,6 @@ from arena.models import Person
 from arena.services.invitations import invite
 from arena.services.ratings import rate
 from arena.services.studies import close_study
-from tests.jobs import rows
 from tests.study_rows import a_study, vote
 from tests.web.cast import people, signed_in
 
@@ -81,19 +80,27 @@ def test_files_are_the_same_in_every_language() -> None:
         assert english
 
 
-@pytest.mark.parametrize("address", ["/nothing-here/", "/jobs/"])
-def test_pages_of_faults_speak_german(address: str) -> None:
-    answer = signed_in(people()["expert"]).get(address, **GERMAN)  # type: ignore[arg-type]
+def test_pages_of_faults_speak_german() -> None:
+    answer = signed_in(people()["expert"]).get("/nothing-here/", **GERMAN)  # type: ignore[arg-type]
     assert '<html lang="de"' in answer.content.decode()
     assert "Zu meiner Startseite" in answer.content.decode()
 
 
-def test_a_job_and_its_script_speak_german() -> None:
-    job = rows.launch(scenarios=2)
-    address = reverse("job", args=[job.code])
-    answer = signed_in(people()["analyst"]).get(address, **GERMAN)  # type: ignore[arg-type]
-    shown = answer.content.decode()
-    assert 'aria-label="0 von 2 erledigt"' in shown
-    assert 'data-all="Alle 2 sind erledigt."' in shown
-    assert 'data-stopped="Steht: {} von 2 sind erledigt."' in shown
-    assert '<th scope="col">Szenario</th>' in shown
+def test_voting_is_german() -> None:
+    study = a_study()
+    client = signed_in(study.experts.get(username="eva"))
+    for name in ("vote", "vote-help", "vote-skipped"):
+        answer = client.get(reverse(name, args=[study.code]), **GERMAN)  # type: ignore[arg-type]
+        assert answer.headers["Content-Language"] == "de"
+        assert '<html lang="de"' in answer.content.decode()
+        assert "Hilfe" in answer.content.decode()
+
+
+@pytest.mark.parametrize("address", ["/", "/jobs/", "/studies/new/", "/people/"])
+def test_pages_of_the_staff_are_english(address: str) -> None:
+    answer = signed_in(people()["admin"]).get(address, **GERMAN)  # type: ignore[arg-type]
+    page = answer.content.decode()
+    assert answer.headers["Content-Language"] == "en"
+    assert '<html lang="en"' in page
+    assert "Signed in as an admin" in page
+    assert 'name="language"' not in page

@@ -34,9 +34,9 @@ def judged(**cast: object) -> Study:
     return close_study(study=study)
 
 
-def shown(study: Study, user: User | None = None) -> str:
+def shown(study: Study, user: User | None = None, tab: str = "table") -> str:
     reader = user or people()["analyst"]
-    answer = signed_in(reader).get(reverse("results", args=[study.code]))
+    answer = signed_in(reader).get(reverse("results-tab", args=[study.code, tab]))
     assert answer.status_code == 200
     return answer.content.decode()
 
@@ -125,13 +125,6 @@ def test_a_study_without_votes_is_explained_rather_than_rated() -> None:
     assert snapshot.status
     assert snapshot.status.split(".")[0] in page.replace("&#x27;", "'")
     assert 'class="range"' not in page
-
-
-def german(study: Study, tab: str = "table") -> str:
-    analyst = signed_in(people()["analyst"])
-    analyst.post(reverse("language"), {"language": "de"})
-    answer = analyst.get(reverse("results-tab", args=[study.code, tab]))
-    return answer.content.decode().replace("&#x27;", "'")
 
 
 def test_groups_that_never_met_stand_apart_in_page_and_files(tmp_path: Path) -> None:

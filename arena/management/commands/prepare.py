@@ -1,4 +1,4 @@
-"""`manage.py prepare`: bring tables and static files up to date; a second run changes nothing."""
+"""`manage.py prepare`: bring tables, files and texts up to date; again, it changes nothing."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ from typing import Any
 from django.conf import settings
 from django.core.management import call_command
 
+from arena.management.catalogue import compile_catalogue
 from arena.services.redrawing import redraw_pictures
 from augment.services.endpoints.contestants import ensure_builtin
 from augment.services.terminal import TerminalCommand
@@ -16,8 +17,8 @@ class Command(TerminalCommand):
     """What has to be done once after every update, before anything is served."""
 
     help = (
-        "Apply migrations, add contestants that ask no model, collect the static files, redraw "
-        "pictures of earlier versions."
+        "Apply migrations, add contestants that ask no model, collect the static files, compile "
+        "the German texts, redraw pictures of earlier versions."
     )
 
     def handle(self, *args: Any, **options: Any) -> None:
@@ -26,6 +27,7 @@ class Command(TerminalCommand):
         ensure_builtin()
         settings.STATIC_ROOT.mkdir(parents=True, exist_ok=True)
         call_command("collectstatic", interactive=False, verbosity=0)
+        compile_catalogue()
         for found in redraw_pictures():
             if found.fault:
                 self.stderr.write(found.says)
