@@ -95,7 +95,7 @@ class ProbeLineDocument(serializers.Serializer[Any]):
 
 
 class ProbeDocument(serializers.ModelSerializer[Probe], WarnedDocument):
-    """A probe with its six lines."""
+    """A probe with a line for each ability."""
 
     lines = serializers.SerializerMethodField()
 

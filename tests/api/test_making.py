@@ -22,6 +22,7 @@ from augment.scene.codec import modification_to_document, scene_to_document
 from augment.scene.modification import Modification
 from augment.services.endpoints.known_endpoints import ensure_endpoint
 from augment.services.endpoints.known_models import model_at
+from augment.services.endpoints.probing import ABILITIES
 from augment.services.scenarios import upload_moments, uploads
 from tests.api.asking import error_of
 from tests.api.tokens import program_of
@@ -160,7 +161,7 @@ def test_a_model_of_a_new_endpoint_is_probed(admin: Client, sent: list[tuple[str
     there = f"models/{model['code']}/probe"
     error_of(admin.get(API + there), 404, "not_found")
     answer = send(admin, there)
-    assert (answer.status_code, len(answer.json()["lines"])) == (202, 6)
+    assert (answer.status_code, len(answer.json()["lines"])) == (202, len(ABILITIES))
     assert {line["progress"] for line in answer.json()["lines"]} == {"waiting"}
     assert sent == [("enqueue_probe", Probe.objects.get().pk)]
     error_of(send(admin, there), 409, "conflict")
