@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from django.http import HttpRequest, HttpResponse
-from django.utils.translation import gettext as _
 from django.views.defaults import bad_request
 
 from arena.api.errors import fault
@@ -15,35 +14,35 @@ from augment.services.wording import translate
 def answer_unreadable(request: HttpRequest, exception: Exception) -> HttpResponse:
     """Answer 400: the request is invalid, its host name for example."""
     if _wants_json(request):
-        return fault(400, "bad_request", _("The request can’t be read."))
+        return fault(400, "bad_request", "The request can’t be read.")
     return bad_request(request, exception)
 
 
 def answer_refused(request: HttpRequest, exception: Exception | None = None) -> HttpResponse:
     """Answer 403: signed in, but not allowed to do this."""
     if _wants_json(request):
-        return fault(403, "forbidden", _("Your account may not do this."))
+        return fault(403, "forbidden", "Your account may not do this.")
     return pages.answer_refused(request, exception)
 
 
 def answer_forged(request: HttpRequest, reason: str = "") -> HttpResponse:
     """Answer 403: the CSRF token is missing or old."""
     if _wants_json(request):
-        return fault(403, "forbidden", _("The CSRF token is missing or old."))
+        return fault(403, "forbidden", "The CSRF token is missing or old.")
     return pages.answer_forged(request, reason)
 
 
 def answer_missing(request: HttpRequest, exception: Exception | None = None) -> HttpResponse:
     """Answer 404: no such address, or nothing that this account may know of."""
     if _wants_json(request):
-        return fault(404, "not_found", _("There is nothing at this address."))
+        return fault(404, "not_found", "There is nothing at this address.")
     return pages.answer_missing(request, exception)
 
 
 def answer_broken(request: HttpRequest) -> HttpResponse:
     """Answer 500: a bug, which is in the log."""
     if _wants_json(request):
-        return fault(500, "broken", _("Something broke on our side; it was written to the log."))
+        return fault(500, "broken", "Something broke on our side; it was written to the log.")
     return pages.answer_broken(request)
 
 
@@ -60,7 +59,7 @@ def answer_busy(request: HttpRequest) -> HttpResponse:
 def answer_without_media(request: HttpRequest) -> HttpResponse:
     """Answer 503: the picture storage does not respond; the log says why."""
     if _wants_json(request):
-        message = _("Pictures can’t be reached just now. Try again later.")
+        message = "Pictures can’t be reached just now. Try again later."
         answer: HttpResponse = fault(503, "no_pictures", message)
     else:
         answer = pages.answer_without_media(request)

@@ -7,9 +7,6 @@ from dataclasses import dataclass
 from typing import Any
 
 from django import template
-from django.utils.functional import Promise
-from django.utils.translation import gettext as _
-from django.utils.translation import gettext_lazy, ngettext
 
 from arena.templatetags.results import left_out, method_label, type_label
 from augment.models import Event
@@ -39,28 +36,28 @@ def details_of(event: Event, names: Mapping[str, str]) -> list[Detail]:
 
 # --- Private -----------------------------------------------------------------------------------
 
-_LABELS: dict[str, str | Promise] = {
-    "batch": gettext_lazy("batch"),
-    "contestant": gettext_lazy("contestant"),
-    "ends_voting": gettext_lazy("votes no longer in this study"),
-    "expert": gettext_lazy("expert"),
-    "file": gettext_lazy("file"),
-    "filters": gettext_lazy("which votes"),
-    "matchups": gettext_lazy("pairs"),
-    "method": gettext_lazy("method"),
-    "name": gettext_lazy("name"),
-    "seed": gettext_lazy("seed"),
-    "sha256": gettext_lazy("SHA-256"),
-    "snapshot": gettext_lazy("rating"),
-    "state": gettext_lazy("state"),
-    "votes": gettext_lazy("votes"),
-    "what": gettext_lazy("seen"),
-    "why": gettext_lazy("why"),
+_LABELS: dict[str, str] = {
+    "batch": "batch",
+    "contestant": "contestant",
+    "ends_voting": "votes no longer in this study",
+    "expert": "expert",
+    "file": "file",
+    "filters": "which votes",
+    "matchups": "pairs",
+    "method": "method",
+    "name": "name",
+    "seed": "seed",
+    "sha256": "SHA-256",
+    "snapshot": "rating",
+    "state": "state",
+    "votes": "votes",
+    "what": "seen",
+    "why": "why",
 }
-_STATES: dict[str, str | Promise] = {
-    "open": gettext_lazy("open"),
-    "closed": gettext_lazy("closed"),
-    "cancelled": gettext_lazy("cancelled"),
+_STATES: dict[str, str] = {
+    "open": "open",
+    "closed": "closed",
+    "cancelled": "cancelled",
 }
 
 Names = Mapping[str, str]
@@ -71,15 +68,13 @@ def _details(event: Event, names: Names) -> Iterable[Detail]:
     for key, value in after.items():
         text = _text(key, value, names)
         if key in before and before[key] != value:
-            text = _("%(before)s, then %(after)s") % {
-                "before": _text(key, before[key], names), "after": text,
-            }  # fmt: skip
+            text = f"{_text(key, before[key], names)}, then {text}"  # fmt: skip
         if text:
             rating = str(value) if key == "snapshot" else ""
             yield Detail(label=str(_LABELS.get(key, key)), text=text, rating=rating)
     for key, value in before.items():
         if key not in after and (text := _text(key, value, names)):
-            yield Detail(label=_("before: %(what)s") % {"what": _LABELS.get(key, key)}, text=text)
+            yield Detail(label=f"before: {_LABELS.get(key, key)}", text=text)
 
 
 def _text(key: str, value: Any, names: Names) -> str:
@@ -92,7 +87,7 @@ def _plain(value: Any, names: Names) -> str:
     if value is None or value == "":
         return ""
     if isinstance(value, bool):
-        return _("yes") if value else _("no")
+        return "yes" if value else "no"
     if isinstance(value, Mapping):
         parts = ((names.get(str(k), str(k)), _plain(v, names)) for k, v in value.items())
         return ", ".join(f"{key}: {text}" for key, text in parts if text)
@@ -107,11 +102,11 @@ def _number(value: Any, names: Names) -> str:
 
 
 def _only_yes(value: Any, names: Names) -> str:
-    return _("yes") if value else ""
+    return "yes" if value else ""
 
 
 def _seen(value: Any, names: Names) -> str:
-    return _("the results") if value == "results" else str(value)
+    return "the results" if value == "results" else str(value)
 
 
 def _filters(value: Any, names: Names) -> str:
@@ -123,14 +118,14 @@ def _filters(value: Any, names: Names) -> str:
         said.append(", ".join(type_label(name) for name in types))
     if experts := value.get("experts"):
         n = experts if isinstance(experts, int) else len(experts)
-        said.append(ngettext("%(n)s expert", "%(n)s experts", n) % {"n": n})
+        said.append(("%(n)s expert" if n == 1 else "%(n)s experts") % {"n": n})
     if "repeat" in value.get("kinds", ()):
-        said.append(_("hidden repeats count"))
+        said.append("hidden repeats count")
     if value.get("leave_out_settled"):
         said.append("pairs that nobody can tell apart are left out")
     if value.get("leave_out_own"):
-        said.append(_("left out: %(what)s") % {"what": left_out("own")})
-    return "; ".join(said) or _("all")
+        said.append(f"left out: {left_out('own')}")
+    return "; ".join(said) or "all"
 
 
 _WRITERS: dict[str, Callable[[Any, Names], str]] = {

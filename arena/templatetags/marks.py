@@ -7,8 +7,6 @@ from dataclasses import dataclass
 from django import template
 from django.utils.html import format_html
 from django.utils.safestring import SafeString
-from django.utils.translation import gettext, gettext_lazy, ngettext
-from django.utils.translation import gettext_noop as _
 
 from arena.models import Study
 from augment.models import Augmentation, GenerationJob
@@ -33,34 +31,10 @@ _TONES = {
     "open": "busy",
     "closed": "good",
 }
-_WORDS = (
-    *(_("Waiting"), _("Running"), _("Done"), _("Unreadable answer"), _("Refused"), _("Failed")),
-    *(_("Cancelled"), _("Finished"), _("Stopped at cap"), _("Paused"), _("Ready")),
-    *(_("Draft"), _("Open"), _("Closed")),
-    *(
-        _("Jaywalker"),
-        _("Nudge around parked vehicle"),
-        _("Overtake parked vehicle"),
-        _("Construction zone"),
-        _("Accident site"),
-    ),
-    *(_("Reference"), _("Human"), _("Language model"), _("Rules"), _("Baseline")),
-    *(_("Simulated"), _("Attention check")),
-    *(_("The whole study"), _("Contact sheet"), _("Scenarios for interPlan")),
-    *(_("added"), _("moved"), _("removed")),
-    *(_("vehicle"), _("bus"), _("bicycle"), _("pedestrian"), _("traffic cone"), _("barrier")),
-    *(_("construction sign"), _("generic object")),
-    *(_("modifier"), _("reviewer"), _("engineer"), _("viewer")),
-    *(_("Lost"), _("Released"), _("Unreadable")),
-    *(_("Frontier"), _("Utility"), _("Open weight")),
-    *(_("wrong"), _("doubtful"), _("position"), _("heading"), _("logic")),
-)
-"""What rows call their states, types, kinds and roles. Files and commands keep the English words;
-pages say them in the language of whoever looks."""
 _MATCHUPS = {
-    "main": gettext_lazy("Votes"),
-    "repeat": gettext_lazy("Hidden repeats"),
-    "check": gettext_lazy("Attention checks"),
+    "main": "Votes",
+    "repeat": "Hidden repeats",
+    "check": "Attention checks",
 }
 _ICONS = {"finished": "done", "stopped_at_cap": "stop"}
 
@@ -97,17 +71,17 @@ def job_mark(counts: JobCounts) -> Mark:
     states, job = GenerationJob.State, counts.job
     if job.state == states.FINISHED and counts.failed:
         if counts.failed == counts.total:
-            return Mark(tone="bad", icon="icons/failed.svg", label=gettext("Failed"))
-        return Mark(tone="warn", icon="icons/failed.svg", label=gettext("Finished in part"))
+            return Mark(tone="bad", icon="icons/failed.svg", label="Failed")
+        return Mark(tone="warn", icon="icons/failed.svg", label="Finished in part")
     if job.state == states.FINISHED and not counts.done and counts.total:
-        label = gettext("Finished without a modification")
+        label = "Finished without a modification"
         return Mark(tone="warn", icon="icons/unreadable.svg", label=label)
     running = counts.by_state[Augmentation.State.RUNNING]
     if job.state == states.PAUSED and running:
-        label = ngettext("Pausing, %(n)s still runs", "Pausing, %(n)s still run", running)
+        label = "Pausing, %(n)s still runs" if running == 1 else "Pausing, %(n)s still run"
         return Mark(tone="busy", icon="icons/paused.svg", label=label % {"n": running})
     if job.state == states.CANCELLED and running:
-        label = ngettext("Cancelled, %(n)s still runs", "Cancelled, %(n)s still run", running)
+        label = "Cancelled, %(n)s still runs" if running == 1 else "Cancelled, %(n)s still run"
         return Mark(tone="busy", icon="icons/cancelled.svg", label=label % {"n": running})
     return mark(job)
 
@@ -171,12 +145,12 @@ def duration(seconds: float) -> str:
     """How long something will take, as coarse as such a forecast is."""
     minutes = seconds / 60.0
     if minutes < 1.0:
-        return gettext("a minute")
+        return "a minute"
     if minutes < 90.0:
-        return gettext("%(n)s min") % {"n": round(minutes)}
+        return f"{round(minutes)} min"
     if minutes < 36.0 * 60.0:
-        return gettext("%(n)s h") % {"n": f"{minutes / 60.0:.1f}"}
-    return gettext("%(n)s days") % {"n": f"{minutes / 1440.0:.1f}"}
+        return f"{minutes / 60.0:.1f} h"
+    return f"{minutes / 1440.0:.1f} days"
 
 
 @register.simple_tag
@@ -186,6 +160,4 @@ def percent(part: int, whole: int) -> SafeString:
 
 
 def _mark(state: str, label: str) -> Mark:
-    return Mark(
-        tone=_TONES[state], icon=f"icons/{_ICONS.get(state, state)}.svg", label=gettext(label)
-    )
+    return Mark(tone=_TONES[state], icon=f"icons/{_ICONS.get(state, state)}.svg", label=label)

@@ -6,7 +6,6 @@ from decimal import Decimal
 
 from django import template
 from django.utils.formats import number_format
-from django.utils.translation import gettext as _
 
 register = template.Library()
 
@@ -20,11 +19,11 @@ def usd(amount: Decimal | None) -> str:
     Unknown is said in words and never shown as zero.
     """
     if amount is None:
-        return _("unknown")
+        return "unknown"
     if amount == amount.quantize(Decimal("0.01")):
         return f"${amount:,.2f}"
     if amount < _SMALLEST:
-        return _("less than $0.0001")
+        return "less than $0.0001"
     return f"${amount:,.4f}"
 
 

@@ -5,10 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from django import template
-from django.utils.formats import get_format
-from django.utils.functional import Promise
-from django.utils.translation import gettext as _
-from django.utils.translation import gettext_lazy, gettext_noop
 
 from arena.exports.columns import Column
 from arena.exports.tables import Row
@@ -23,60 +19,45 @@ from augment.services.wording import translate
 
 register = template.Library()
 
-ONLINE_ELO = gettext_noop(
-    "Online Elo follows the latest votes: its interval does not shrink with more votes, and the "
-    "order of the votes matters."
-)
-"""What arena.rating.elo says of its intervals: marked here, as it stands there in a constant."""
-
 
 _FORMS = {
     "csv": "CSV", "json": "JSON", "parquet": "Parquet", "latex": "LaTeX", "svg": "SVG",
     "pdf": "PDF", "png": "PNG",
 }  # fmt: skip
-_LEFT_OUT: dict[str, str | Promise] = {
-    "superseded": gettext_lazy("changed later"),
-    "check": gettext_lazy("attention checks"),
-    "repeat": gettext_lazy("hidden repeats"),
-    "skip": gettext_lazy("skipped"),
-    "simulated": gettext_lazy("simulated"),
-    "filtered": gettext_lazy("not asked for"),
-    "own": gettext_lazy("by authors on their own contestants"),
+_LEFT_OUT: dict[str, str] = {
+    "superseded": "changed later",
+    "check": "attention checks",
+    "repeat": "hidden repeats",
+    "skip": "skipped",
+    "simulated": "simulated",
+    "filtered": "not asked for",
+    "own": "by authors on their own contestants",
 }
-UNMEASURED = (
-    gettext_noop("waits, runs, failed or was cancelled"),
-    gettext_noop("its scenario has no reference that can be read"),
-    gettext_noop("its stored modification can't be read"),
-    gettext_noop("Without a variant"),
-)
-"""Words of arena.exports and augment: marked here, as they stand there in constants."""
 
-_VERBS: dict[str, str | Promise] = {
-    "open": gettext_lazy("opened"),
-    "close": gettext_lazy("closed"),
-    "rate": gettext_lazy("rated"),
-    "rate early": gettext_lazy("rated early"),
-    "rating failed": gettext_lazy("a rating failed"),
-    "look early": gettext_lazy("looked at results early"),
-    "hand over": gettext_lazy("handed over"),
-    "plan batch": gettext_lazy("planned a batch"),
-    "simulate votes": gettext_lazy("simulated votes"),
-    "import votes": gettext_lazy("imported votes"),
-    "mark author": gettext_lazy("marked an author"),
-    "take back author": gettext_lazy("took the mark of an author back"),
+_VERBS: dict[str, str] = {
+    "open": "opened",
+    "close": "closed",
+    "rate": "rated",
+    "rate early": "rated early",
+    "rating failed": "a rating failed",
+    "look early": "looked at results early",
+    "hand over": "handed over",
+    "plan batch": "planned a batch",
+    "simulate votes": "simulated votes",
+    "import votes": "imported votes",
+    "mark author": "marked an author",
+    "take back author": "took the mark of an author back",
 }
-_METHODS: dict[str, str | Promise] = {
-    "bt": gettext_lazy("Bradley-Terry on the Elo scale, a tie half a win for both"),
-    "davidson": gettext_lazy("Davidson’s Bradley-Terry with ties, on the Elo scale"),
-    "elo": gettext_lazy(
-        "online Elo, the median over resamples; its interval does not shrink with votes"
-    ),
+_METHODS: dict[str, str] = {
+    "bt": "Bradley-Terry on the Elo scale, a tie half a win for both",
+    "davidson": "Davidson’s Bradley-Terry with ties, on the Elo scale",
+    "elo": "online Elo, the median over resamples; its interval does not shrink with votes",
 }
-_UNITS: dict[str, str | Promise] = {
-    "vote": gettext_lazy("single votes"),
-    "scenario": gettext_lazy("scenarios"),
-    "expert": gettext_lazy("experts"),
-    "two-way": gettext_lazy("experts and scenarios"),
+_UNITS: dict[str, str] = {
+    "vote": "single votes",
+    "scenario": "scenarios",
+    "expert": "experts",
+    "two-way": "experts and scenarios",
 }
 
 
@@ -121,7 +102,7 @@ def verb_label(verb: str) -> str:
 def type_label(name: str) -> str:
     """The name of a scenario type."""
     known = dict(Scenario.Type.choices)
-    return _(str(known[name])) if name in known else own_label(name)
+    return str(known[name]) if name in known else own_label(name)
 
 
 @register.filter
@@ -183,7 +164,7 @@ def seconds(milliseconds: float) -> str:
 def dollars(amount: float) -> str:
     """Four digits after the point, more where there would be none but zeros."""
     if 0 < amount < 0.0001:
-        return _("less than $0.0001")
+        return "less than $0.0001"
     return f"${amount:,.4f}" if amount < 1 else f"${amount:,.2f}"
 
 
@@ -222,8 +203,8 @@ def estimate_tenths(found: Estimate | None) -> str:
 
 @register.filter
 def minus(text: str) -> str:
-    """A printed number with a real minus sign and the decimal sign of the page's language."""
-    return with_minus(text).replace(".", get_format("DECIMAL_SEPARATOR"))
+    """A printed number with a real minus sign."""
+    return with_minus(text)
 
 
 def _change(value: float) -> str:
@@ -233,18 +214,18 @@ def _change(value: float) -> str:
 
 
 def _decimal(value: float, places: int) -> str:
-    """Rounded, with the decimal sign of the page's language; Django's own way cuts off."""
-    return f"{value:.{places}f}".replace(".", get_format("DECIMAL_SEPARATOR"))
+    """Rounded; Django's own way cuts off."""
+    return f"{value:.{places}f}"
 
 
 def _with_interval(found: Estimate | None, written: Callable[[float], str]) -> str:
     if not found or found.value is None:
-        return _("unknown")
+        return "unknown"
     text = written(found.value)
     if found.lower is None or found.upper is None:
         return text
     low, high = written(found.lower), written(found.upper)
-    return _("%(value)s (%(low)s to %(high)s)") % {"value": text, "low": low, "high": high}
+    return f"{text} ({low} to {high})"
 
 
 @register.filter
@@ -253,21 +234,21 @@ def percent_one(share: float | None) -> str:
     return "–" if share is None else _decimal(100.0 * share, 1)
 
 
-_METRICS: dict[str, str | Promise] = {
-    "no_ego_at_fault_collisions": gettext_lazy("No collision at fault"),
-    "drivable_area_compliance": gettext_lazy("Stays on the road"),
-    "ego_is_making_progress": gettext_lazy("Makes progress"),
-    "driving_direction_compliance": gettext_lazy("Driving direction"),
-    "ego_progress_along_expert_route": gettext_lazy("Progress along the route"),
-    "time_to_collision_within_bound": gettext_lazy("Time to collision"),
-    "speed_limit_compliance": gettext_lazy("Speed limit"),
-    "ego_is_comfortable": gettext_lazy("Comfort"),
-    "lane_changes_to_goal": gettext_lazy("Lane changes to the goal"),
-    "ego_passed_obstacles": gettext_lazy("Obstacles passed"),
+_METRICS: dict[str, str] = {
+    "no_ego_at_fault_collisions": "No collision at fault",
+    "drivable_area_compliance": "Stays on the road",
+    "ego_is_making_progress": "Makes progress",
+    "driving_direction_compliance": "Driving direction",
+    "ego_progress_along_expert_route": "Progress along the route",
+    "time_to_collision_within_bound": "Time to collision",
+    "speed_limit_compliance": "Speed limit",
+    "ego_is_comfortable": "Comfort",
+    "lane_changes_to_goal": "Lane changes to the goal",
+    "ego_passed_obstacles": "Obstacles passed",
 }
 
 
 @register.filter
-def metric_label(name: str) -> str | Promise:
+def metric_label(name: str) -> str:
     """A part of the driving score in words."""
     return _METRICS[name]

@@ -5,23 +5,20 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
-from django.utils.translation import gettext as _
-from django.utils.translation import gettext_lazy
-
 from augment.models import Contestant
 from augment.services.endpoints.treatments import OPTIONS, left_out, options_of
 
 LABELS = {
-    "temperature": gettext_lazy("Temperature"),
-    "seed": gettext_lazy("Seed"),
-    "reasoning_effort": gettext_lazy("Reasoning effort"),
-    "max_output_tokens": gettext_lazy("Longest answer"),
-    "protocol": gettext_lazy("Calls of the function"),
-    "rounds": gettext_lazy("Rounds at most"),
-    "accepted_from": gettext_lazy("Content from a mean rating of"),
-    "radius_m": gettext_lazy("Radius"),
-    "prompt_version": gettext_lazy("Prompt version"),
-    "picture_px": gettext_lazy("Width of the viewer’s picture"),
+    "temperature": "Temperature",
+    "seed": "Seed",
+    "reasoning_effort": "Reasoning effort",
+    "max_output_tokens": "Longest answer",
+    "protocol": "Calls of the function",
+    "rounds": "Rounds at most",
+    "accepted_from": "Content from a mean rating of",
+    "radius_m": "Radius",
+    "prompt_version": "Prompt version",
+    "picture_px": "Width of the viewer’s picture",
 }
 
 
@@ -65,7 +62,7 @@ def asking_of(contestant: Contestant, made_with: dict[str, Any] | None = None) -
                 label=str(LABELS[name]),
                 value=_value(name, options[name]),
                 is_chosen=name in contestant.options,
-                left_out=tuple(_(role) for role, names in lacking.items() if name in names),
+                left_out=tuple(role for role, names in lacking.items() if name in names),
             )
             for name in OPTIONS
             if name in options
@@ -78,6 +75,6 @@ def _value(name: str, value: object) -> str:
     if isinstance(value, float):
         value = f"{value:g}"
     if name == "protocol":
-        return _("natively") if value == "native" else _("in the answer")
-    units = {"max_output_tokens": _("%s tokens"), "radius_m": "%s m", "picture_px": "%s px"}
+        return "natively" if value == "native" else "in the answer"
+    units = {"max_output_tokens": "%s tokens", "radius_m": "%s m", "picture_px": "%s px"}
     return units.get(name, "%s") % value

@@ -10,8 +10,6 @@ from django.contrib import messages
 from django.contrib.auth.models import User
 from django.http import HttpRequest, HttpResponse
 from django.shortcuts import get_object_or_404, redirect
-from django.utils.translation import gettext as _
-from django.utils.translation import gettext_lazy
 from django.views.decorators.http import require_POST
 
 from arena.errors import ArenaError
@@ -26,10 +24,8 @@ from augment.services.wording import translate
 class AuthorForm(forms.Form):
     """Which expert of the study made which of its contestants."""
 
-    expert = forms.ChoiceField(error_messages={"required": gettext_lazy("Choose an expert.")})
-    contestant = forms.ChoiceField(
-        error_messages={"required": gettext_lazy("Choose a contestant.")}
-    )
+    expert = forms.ChoiceField(error_messages={"required": "Choose an expert."})
+    contestant = forms.ChoiceField(error_messages={"required": "Choose a contestant."})
 
     def __init__(self, data: dict[str, Any] | None = None, *, study: Study) -> None:
         super().__init__(data)
@@ -45,7 +41,7 @@ class AuthorForm(forms.Form):
         for name, offered in (("expert", named.items()), ("contestant", made)):
             found = self.fields[name]
             assert isinstance(found, forms.ChoiceField)
-            found.choices = [("", _("Choose …")), *offered]
+            found.choices = [("", "Choose …"), *offered]
             found.widget.attrs["class"] = "input"
 
 
@@ -70,7 +66,7 @@ def mark(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
         messages.error(request, translate(error))
     else:
         named = {"name": row.expert.person.pseudonym, "contestant": row.contestant.name}
-        done = _("%(name)s is marked as author of %(contestant)s.") % named
+        done = "{name} is marked as author of {contestant}.".format(**named)
         messages.success(request, done)
     return redirect("experts", code=code)
 
@@ -83,6 +79,6 @@ def take_back(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
     row = get_object_or_404(rows, code=code)
     named = {"name": row.expert.person.pseudonym, "contestant": row.contestant.name}
     take_back_author(authorship=row, actor=cast(User, request.user))
-    done = _("%(name)s is not marked as author of %(contestant)s any more.") % named
+    done = "{name} is not marked as author of {contestant} any more.".format(**named)
     messages.success(request, done)
     return redirect("experts", code=row.study.code)

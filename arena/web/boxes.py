@@ -6,8 +6,6 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from itertools import groupby
 
-from django.utils.translation import gettext_noop
-
 from arena.exports.displacement_table import DisplacementTable
 from arena.exports.published import PublishedBox
 from augment.services.judging.displacement import BoxSummary, Group, Summary
@@ -96,9 +94,7 @@ def box_sheet(table: DisplacementTable) -> BoxSheet | None:
     ]
     if table.published:
         published = [_from_paper(box, at) for box in table.published]
-        parts.append(
-            BoxPart(heading=gettext_noop("Read from the paper’s figure"), lines=published)
-        )
+        parts.append(BoxPart(heading="Read from the paper’s figure", lines=published))
     return BoxSheet(parts=parts, end_m=end_m)
 
 

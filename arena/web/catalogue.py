@@ -8,7 +8,6 @@ from django.contrib import messages
 from django.contrib.auth.models import User
 from django.http import HttpRequest, HttpResponse
 from django.shortcuts import redirect
-from django.utils.translation import gettext as _
 from django.views.decorators.http import require_POST
 
 from arena.web.access import ADMIN, allow_only
@@ -33,7 +32,7 @@ def load_scenarios(request: HttpRequest) -> HttpResponse:
         messages.error(request, translate(error))
     else:
         ensure_builtin()
-        done = _("Scenarios: %(added)s added, %(changed)s changed, %(unchanged)s as they were.")
+        done = "Scenarios: %(added)s added, %(changed)s changed, %(unchanged)s as they were."
         numbers = {
             "added": report.scenarios_added,
             "changed": report.scenarios_changed,

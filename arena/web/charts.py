@@ -5,8 +5,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from django.utils.translation import gettext as _
-
 from arena.exports.plot_axes import interval_ticks, known_ends, shorten_name
 from arena.exports.tables import Row
 from arena.rating.printed import with_minus
@@ -167,9 +165,9 @@ def _title(line: Row) -> str:
     if line.elo is None or line.lower is None or line.upper is None:
         numbers = f"{with_minus(line.elo_text)} ({with_minus(line.interval_text)})"
         return f"{line.model}: {numbers}"
-    return _("%(name)s: %(rating)s, 95 %% from %(low)s to %(high)s") % {
-        "name": line.model,
-        "rating": with_minus(f"{line.elo:.0f}"),
-        "low": with_minus(f"{line.lower:.0f}"),
-        "high": with_minus(f"{line.upper:.0f}"),
-    }
+    return "{name}: {rating}, 95 % from {low} to {high}".format(
+        name=line.model,
+        rating=with_minus(f"{line.elo:.0f}"),
+        low=with_minus(f"{line.lower:.0f}"),
+        high=with_minus(f"{line.upper:.0f}"),
+    )

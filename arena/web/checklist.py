@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 
-from django.utils.translation import gettext as _
-
 from arena.queries.inventory import Inventory
 
 
@@ -33,31 +31,31 @@ def steps(found: Inventory) -> list[Step]:
 def _preparing(found: Inventory) -> list[Step]:
     return [
         Step(
-            title=_("Load the catalogue"),
-            detail=_("%(n)s scenarios are here.") % {"n": found.scenarios}
+            title="Load the catalogue",
+            detail=f"{found.scenarios} scenarios are here."
             if found.scenarios
-            else _("No scenario yet. What comes with the project is loaded by a button."),
+            else "No scenario yet. What comes with the project is loaded by a button.",
             done=found.scenarios > 0,
             link="scenarios",
-            action=_("Scenarios"),
+            action="Scenarios",
         ),
         Step(
-            title=_("Have at least two contestants"),
-            detail=_("%(n)s contestants are registered.") % {"n": found.contestants}
+            title="Have at least two contestants",
+            detail=f"{found.contestants} contestants are registered."
             if found.contestants
-            else _("None yet. A model at an endpoint, or one of those that ask nobody."),
+            else "None yet. A model at an endpoint, or one of those that ask nobody.",
             done=found.contestants >= 2,
             link="contestants",
-            action=_("Contestants"),
+            action="Contestants",
         ),
         Step(
-            title=_("Run a job"),
-            detail=_("%(n)s augmentations are done.") % {"n": found.done}
+            title="Run a job",
+            detail=f"{found.done} augmentations are done."
             if found.done
-            else _("A job lets contestants carry out the instructions of scenarios."),
+            else "A job lets contestants carry out the instructions of scenarios.",
             done=found.done > 0,
             link="job-new",
-            action=_("New job"),
+            action="New job",
         ),
     ]
 
@@ -65,33 +63,31 @@ def _preparing(found: Inventory) -> list[Step]:
 def _studying(found: Inventory) -> list[Step]:
     return [
         Step(
-            title=_("Open a study"),
-            detail=_("%(n)s so far, %(open)s open now.")
-            % {"n": found.studies, "open": found.studies_open}
+            title="Open a study",
+            detail=f"{found.studies} so far, {found.studies_open} open now."
             if found.studies
-            else _("Experts compare two results of a scenario without knowing whose they are."),
+            else "Experts compare two results of a scenario without knowing whose they are.",
             done=found.studies > 0,
             link="studies",
-            action=_("Studies"),
+            action="Studies",
         ),
         Step(
-            title=_("Let the experts vote"),
-            detail=_("%(n)s votes are saved; studies open: %(open)s.")
-            % {"n": f"{found.votes:,}", "open": found.studies_open}
+            title="Let the experts vote",
+            detail=f"{found.votes:,} votes are saved; studies open: {found.studies_open}."
             if found.votes
-            else _("No vote yet."),
+            else "No vote yet.",
             done=found.votes > 0 and found.studies_open == 0,
             link="studies",
-            action=_("Progress"),
+            action="Progress",
         ),
         Step(
-            title=_("Close and read the results"),
-            detail=_("%(n)s closed.") % {"n": found.studies_closed}
+            title="Close and read the results",
+            detail=f"{found.studies_closed} closed."
             if found.studies_closed
-            else _("Results show once a study is closed."),
+            else "Results show once a study is closed.",
             done=found.studies_closed > 0,
             link="studies",
-            action=_("Results"),
+            action="Results",
         ),
     ]
 

@@ -9,8 +9,6 @@ from django.contrib import messages
 from django.contrib.auth.models import User
 from django.http import HttpRequest, HttpResponse
 from django.shortcuts import redirect, render
-from django.utils.translation import gettext as _
-from django.utils.translation import gettext_lazy
 from django.views.decorators.http import require_http_methods
 
 from arena.web.access import ADMIN, allow_only
@@ -34,57 +32,49 @@ NEW = ""
 class ContestantForm(forms.Form):
     """A model, a variant, and how it asks; options that are left empty stay open."""
 
-    slug = forms.SlugField(max_length=80, label=gettext_lazy("Slug"), help_text=SLUG_RULE)
+    slug = forms.SlugField(max_length=80, label="Slug", help_text=SLUG_RULE)
     name = forms.CharField(
-        max_length=120, required=False, label=gettext_lazy("Name (made of model and variant)")
+        max_length=120, required=False, label="Name (made of model and variant)"
     )
-    variant = forms.ChoiceField(
-        choices=[(name, name) for name in VARIANTS], label=gettext_lazy("Variant")
-    )
-    model = forms.CharField(max_length=120, label=gettext_lazy("Model id on the endpoint"))
-    endpoint = forms.ChoiceField(required=False, label=gettext_lazy("Endpoint"))
-    label = forms.SlugField(
-        max_length=80, required=False, label=gettext_lazy("Label of the new endpoint")
-    )
-    base_url = forms.CharField(
-        max_length=200, required=False, label=gettext_lazy("Its address, up to /v1")
-    )
+    variant = forms.ChoiceField(choices=[(name, name) for name in VARIANTS], label="Variant")
+    model = forms.CharField(max_length=120, label="Model id on the endpoint")
+    endpoint = forms.ChoiceField(required=False, label="Endpoint")
+    label = forms.SlugField(max_length=80, required=False, label="Label of the new endpoint")
+    base_url = forms.CharField(max_length=200, required=False, label="Its address, up to /v1")
     key_variable = forms.CharField(
         max_length=80,
         required=False,
-        label=gettext_lazy("Environment variable of the workers that holds its key"),
+        label="Environment variable of the workers that holds its key",
     )
     is_simulated = forms.BooleanField(
-        required=False, label=gettext_lazy("A stand-in: what it answers counts as simulated")
+        required=False, label="A stand-in: what it answers counts as simulated"
     )
-    temperature = forms.FloatField(required=False, label=gettext_lazy("Temperature"))
-    seed = forms.IntegerField(required=False, label=gettext_lazy("Seed"))
+    temperature = forms.FloatField(required=False, label="Temperature")
+    seed = forms.IntegerField(required=False, label="Seed")
     reasoning_effort = forms.ChoiceField(
         required=False,
         choices=[("", "–"), *((word, word) for word in REASONING_EFFORTS)],
-        label=gettext_lazy("Reasoning effort"),
+        label="Reasoning effort",
     )
-    max_output_tokens = forms.IntegerField(
-        required=False, label=gettext_lazy("Tokens of one answer, at most")
-    )
+    max_output_tokens = forms.IntegerField(required=False, label="Tokens of one answer, at most")
     protocol = forms.ChoiceField(
         required=False,
         choices=[("", "–"), *((word, word) for word in PROTOCOLS)],
-        label=gettext_lazy("Tool protocol"),
+        label="Tool protocol",
     )
-    rounds = forms.IntegerField(required=False, label=gettext_lazy("Rounds, at most"))
+    rounds = forms.IntegerField(required=False, label="Rounds, at most")
 
     def __init__(self, data: Any = None, *, initial: dict[str, str] | None = None) -> None:
         super().__init__(data, initial=initial)
         field = cast(forms.ChoiceField, self.fields["endpoint"])
         known = Endpoint.objects.values_list("label", flat=True)
-        field.choices = [(NEW, _("A new one")), *((label, label) for label in known)]
+        field.choices = [(NEW, "A new one"), *((label, label) for label in known)]
 
     def clean(self) -> dict[str, Any]:
         """A known endpoint, or a new one with its address."""
         found = super().clean() or {}
         if not found.get("endpoint") and not (found.get("label") and found.get("base_url")):
-            raise forms.ValidationError(_("Choose an endpoint, or give label and address."))
+            raise forms.ValidationError("Choose an endpoint, or give label and address.")
         return found
 
     def entered_endpoint(self) -> EnteredEndpoint:
@@ -126,7 +116,7 @@ def new_contestant_page(request: HttpRequest) -> HttpResponse:
         except AugmentError as error:
             form.add_error(None, translate(error))
         else:
-            messages.success(request, _("“%(name)s” is added.") % {"name": row.name})
+            messages.success(request, f"“{row.name}” is added.")
             return redirect("contestant", code=row.code)
     of_options = [form[name] for name in OPTION_NAMES if name in form.fields]
     context = {

@@ -10,7 +10,6 @@ from django.contrib.auth.models import User
 from django.db.models import Count
 from django.http import HttpRequest, HttpResponse
 from django.shortcuts import get_object_or_404, redirect, render
-from django.utils.translation import gettext as _
 from django.views.decorators.http import require_POST, require_safe
 
 from arena.queries.listings import Narrowing, find_contestants
@@ -33,8 +32,8 @@ def contestants_page(request: HttpRequest) -> HttpResponse:
     """Contestants page by page, those who are retired at the end."""
     kinds = [one for one in Contestant.Kind.choices if one[0] != Contestant.Kind.CHECK]
     choices = {
-        "kind": (_("Kind"), said_choices(kinds)),
-        "offered": (_("In forms"), [("active", _("offered")), ("retired", _("retired"))]),
+        "kind": ("Kind", said_choices(kinds)),
+        "offered": ("In forms", [("active", "offered"), ("retired", "retired")]),
     }
     listing = read_listing(request, choices)
     wanted = Narrowing(
@@ -79,10 +78,8 @@ def set_retired(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
     actor = cast(User, request.user)
     if request.POST.get("retired") == "no":
         take_back(row, actor=actor)
-        messages.success(request, _("“%(name)s” is offered again.") % {"name": row.name})
+        messages.success(request, f"“{row.name}” is offered again.")
     else:
         retire(row, actor=actor)
-        messages.success(
-            request, _("“%(name)s” is retired. What it made stays.") % {"name": row.name}
-        )
+        messages.success(request, f"“{row.name}” is retired. What it made stays.")
     return redirect("contestant", code=code)

@@ -7,7 +7,6 @@ import uuid
 from django.http import Http404, HttpRequest, HttpResponse
 from django.shortcuts import get_object_or_404
 from django.utils.text import slugify
-from django.utils.translation import gettext_lazy as _
 from django.views.decorators.http import require_safe
 
 from arena.exports.displacement_objects import BY_OBJECT, OBJECT_FORMATS, object_rows
@@ -21,9 +20,9 @@ from augment.models import GenerationJob
 from augment.services.judging.displacement import By, types_named
 
 LABELS = {
-    By.CONTESTANT: _("Contestant"),
-    By.TYPE: _("Scenario type"),
-    By.VARIANT: _("Variant"),
+    By.CONTESTANT: "Contestant",
+    By.TYPE: "Scenario type",
+    By.VARIANT: "Variant",
 }
 
 

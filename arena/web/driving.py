@@ -12,8 +12,6 @@ from django.http import Http404, HttpRequest, HttpResponse, HttpResponseBase
 from django.shortcuts import get_object_or_404, redirect, render
 from django.urls import reverse
 from django.utils.text import slugify
-from django.utils.translation import gettext as _
-from django.utils.translation import ngettext
 from django.views.decorators.http import require_POST, require_safe
 
 from arena.exports.driving_table import DrivingTable
@@ -69,7 +67,7 @@ def simulate_job(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
         number = len(waiting)
         messages.success(
             request,
-            ngettext("%(number)s drive is queued.", "%(number)s drives are queued.", number)
+            ("%(number)s drive is queued." if number == 1 else "%(number)s drives are queued.")
             % {"number": number},
         )
     shown = f"?score={score}#driving" if score in SCORES else "#driving"
@@ -229,7 +227,7 @@ def _way_asked(request: HttpRequest, known: list[Options]) -> int:
 
 def _offsets() -> dict[str, str]:
     """What the names of the lateral offsets mean."""
-    return {"paper": _("Up to 4 m (paper)"), "original": _("Up to 1 m (original)")}
+    return {"paper": "Up to 4 m (paper)", "original": "Up to 1 m (original)"}
 
 
 def _driven(code: uuid.UUID) -> Simulation:

@@ -10,7 +10,6 @@ from django.contrib import messages
 from django.contrib.auth.models import User
 from django.http import HttpRequest, HttpResponse, JsonResponse
 from django.shortcuts import get_object_or_404, redirect, render
-from django.utils.translation import gettext as _
 from django.views.decorators.http import require_http_methods, require_POST
 
 from arena.services.references import drop_reference, set_reference, why_not_editable
@@ -48,7 +47,7 @@ def reference_page(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
             problem = translate(error)
         else:
             send_later(request, enqueue_scenario, scenario.pk)
-            messages.success(request, _("The reference is kept; a worker draws it."))
+            messages.success(request, "The reference is kept; a worker draws it.")
             return redirect("scenario", code=code)
     context = _context(request, scenario, given, problem)
     context["refusal"] = translate(why_not_editable(scenario))
@@ -65,7 +64,7 @@ def drop(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
     except AugmentError as error:
         messages.error(request, translate(error))
     else:
-        messages.success(request, _("“%(name)s” has no reference now.") % {"name": scenario.slug})
+        messages.success(request, f"“{scenario.slug}” has no reference now.")
     return redirect("scenario", code=code)
 
 
@@ -90,7 +89,7 @@ def check(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
     lines = [
         {
             "severity": line.severity,
-            "label": _("measured") if line.severity == "fact" else _(line.severity),
+            "label": "measured" if line.severity == "fact" else line.severity,
             "sentence": line.finding.sentence(say=translate),
         }
         for line in found.lines
@@ -125,7 +124,7 @@ def correct_page(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
             problem = translate(error)
         else:
             send_later(request, enqueue_job, made.job_id)
-            messages.success(request, _("The correction is kept; a worker draws it."))
+            messages.success(request, "The correction is kept; a worker draws it.")
             return redirect("augmentation", code=made.code)
     context = _context(request, original.scenario, given, problem) | {
         "original": original,

@@ -6,7 +6,6 @@ from typing import Any
 
 from django import forms
 from django.utils.text import capfirst
-from django.utils.translation import gettext_lazy as _
 
 from augment.errors import InvalidDocument
 from augment.models import Endpoint, EndpointModel
@@ -14,7 +13,7 @@ from augment.services.endpoints.editing import FACTS, EndpointFacts, ModelFacts
 from augment.services.endpoints.entering import REASONING_EFFORTS
 from augment.services.wording import translate
 
-_UNKNOWN = [("", _("unknown")), ("yes", _("yes")), ("no", _("no"))]
+_UNKNOWN = [("", "unknown"), ("yes", "yes"), ("no", "no")]
 
 
 SLUG_RULE = "Lower-case letters, digits, hyphens."
@@ -23,22 +22,22 @@ SLUG_RULE = "Lower-case letters, digits, hyphens."
 class EndpointPageForm(forms.Form):
     """An address, the variable with its key, and its limits; the label and what it is stay."""
 
-    label = forms.SlugField(max_length=80, label=_("Label"), help_text=SLUG_RULE)
-    base_url = forms.CharField(max_length=200, label=_("Address, up to /v1"))
+    label = forms.SlugField(max_length=80, label="Label", help_text=SLUG_RULE)
+    base_url = forms.CharField(max_length=200, label="Address, up to /v1")
     key_variable = forms.CharField(
         max_length=80,
         required=False,
-        label=_("Environment variable of the workers that holds its key"),
+        label="Environment variable of the workers that holds its key",
     )
-    max_concurrency = forms.IntegerField(initial=4, label=_("Calls at once, over all workers"))
+    max_concurrency = forms.IntegerField(initial=4, label="Calls at once, over all workers")
     requests_per_minute = forms.IntegerField(
-        required=False, label=_("Calls a minute, at most (empty: no limit)")
+        required=False, label="Calls a minute, at most (empty: no limit)"
     )
     is_simulated = forms.BooleanField(
-        required=False, label=_("A stand-in: what it answers counts as simulated")
+        required=False, label="A stand-in: what it answers counts as simulated"
     )
     move_key = forms.BooleanField(
-        required=False, label=_("Its key may go to another server than so far")
+        required=False, label="Its key may go to another server than so far"
     )
 
     def __init__(self, data: Any = None, *, row: Endpoint | None = None) -> None:
@@ -66,40 +65,38 @@ class ModelPageForm(forms.Form):
 
     model_class = forms.ChoiceField(
         required=False,
-        label=_("Class"),
+        label="Class",
         choices=[
             ("", "–"),
-            (EndpointModel.ModelClass.FRONTIER.value, _("Frontier")),
-            (EndpointModel.ModelClass.UTILITY.value, _("Utility")),
-            (EndpointModel.ModelClass.OPEN_WEIGHT.value, _("Open weight")),
+            (EndpointModel.ModelClass.FRONTIER.value, "Frontier"),
+            (EndpointModel.ModelClass.UTILITY.value, "Utility"),
+            (EndpointModel.ModelClass.OPEN_WEIGHT.value, "Open weight"),
         ],
     )
     price_in_usd = forms.DecimalField(
-        required=False, max_digits=12, decimal_places=6, label=_("USD per million tokens in")
+        required=False, max_digits=12, decimal_places=6, label="USD per million tokens in"
     )
     price_out_usd = forms.DecimalField(
-        required=False, max_digits=12, decimal_places=6, label=_("USD per million tokens out")
+        required=False, max_digits=12, decimal_places=6, label="USD per million tokens out"
     )
-    price_as_of = forms.DateField(required=False, label=_("Price as of (YYYY-MM-DD)"))
-    price_source = forms.CharField(required=False, max_length=200, label=_("Source of the price"))
-    context_tokens = forms.IntegerField(required=False, label=_("Tokens of context"))
-    max_output_tokens = forms.IntegerField(
-        required=False, label=_("Tokens of one answer, at most")
-    )
+    price_as_of = forms.DateField(required=False, label="Price as of (YYYY-MM-DD)")
+    price_source = forms.CharField(required=False, max_length=200, label="Source of the price")
+    context_tokens = forms.IntegerField(required=False, label="Tokens of context")
+    max_output_tokens = forms.IntegerField(required=False, label="Tokens of one answer, at most")
     reasoning_effort = forms.ChoiceField(
         required=False,
-        choices=[("", _("not sent")), *((word, word) for word in REASONING_EFFORTS)],
-        label=_("Reasoning effort"),
+        choices=[("", "not sent"), *((word, word) for word in REASONING_EFFORTS)],
+        label="Reasoning effort",
     )
-    vision = forms.ChoiceField(required=False, choices=_UNKNOWN, label=_("Sees pictures"))
+    vision = forms.ChoiceField(required=False, choices=_UNKNOWN, label="Sees pictures")
     native_tools = forms.ChoiceField(
-        required=False, choices=_UNKNOWN, label=_("Calls functions natively")
+        required=False, choices=_UNKNOWN, label="Calls functions natively"
     )
     json_schema = forms.ChoiceField(
-        required=False, choices=_UNKNOWN, label=_("Keeps to a JSON schema")
+        required=False, choices=_UNKNOWN, label="Keeps to a JSON schema"
     )
     temperature = forms.ChoiceField(
-        required=False, choices=_UNKNOWN, label=_("Temperature may be chosen")
+        required=False, choices=_UNKNOWN, label="Temperature may be chosen"
     )
 
     def __init__(self, data: Any = None, *, row: EndpointModel) -> None:

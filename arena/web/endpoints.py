@@ -13,7 +13,6 @@ from django.db import transaction
 from django.db.models import Count
 from django.http import HttpRequest, HttpResponse
 from django.shortcuts import get_object_or_404, redirect, render
-from django.utils.translation import gettext as _
 from django.views.decorators.http import require_http_methods, require_POST, require_safe
 
 from arena.queries.people import role_of
@@ -58,9 +57,7 @@ def new_endpoint_page(request: HttpRequest) -> HttpResponse:
         except AugmentError as error:
             _tell(form, error)
         else:
-            messages.success(
-                request, _("“%(name)s” is added. Name its models now.") % {"name": row.label}
-            )
+            messages.success(request, f"“{row.label}” is added. Name its models now.")
             return redirect("endpoint", code=row.code)
     context = {"form": form, "variables": list_key_variables()}
     return render(request, "endpoints/new.html", context, status=422 if form.errors else 200)
@@ -108,7 +105,7 @@ def model_page(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
             else:
                 messages.success(
                     request,
-                    _("Kept. It counts for contestants that have not run yet."),
+                    "Kept. It counts for contestants that have not run yet.",
                 )
                 return redirect("endpoint-model", code=code)
     probe = row.probes.first()
@@ -155,7 +152,7 @@ def _change(request: HttpRequest, row: Endpoint) -> HttpResponse:
         except AugmentError as error:
             _tell(form, error)
         else:
-            messages.success(request, _("Kept. It counts for the next call."))
+            messages.success(request, "Kept. It counts for the next call.")
             return redirect("endpoint", code=row.code)
     return _shown(request, row, form)
 

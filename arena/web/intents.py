@@ -10,7 +10,6 @@ from django.contrib.auth.models import User
 from django.db import transaction
 from django.http import Http404, HttpRequest, HttpResponse, JsonResponse
 from django.shortcuts import get_object_or_404, redirect
-from django.utils.translation import gettext as _
 from django.views.decorators.http import require_POST, require_safe
 
 from arena.web.access import ADMIN, STAFF, allow_only
@@ -52,7 +51,7 @@ def set_intent(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
     except AugmentError as error:
         messages.error(request, translate(error))
     else:
-        messages.success(request, _("The intent is set. It counts from now on."))
+        messages.success(request, "The intent is set. It counts from now on.")
     return redirect("scenario", code=code)
 
 
@@ -65,7 +64,7 @@ def read_instruction(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
     known = EndpointModel.objects.select_related("endpoint")
     reader = None if chosen is None else known.filter(code=chosen).first()
     if reader is None:
-        messages.error(request, _("Choose a model."))
+        messages.error(request, "Choose a model.")
         return redirect("scenario", code=code)
     try:
         with transaction.atomic():
@@ -79,7 +78,7 @@ def read_instruction(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
     except (AugmentError, QueueFault) as error:
         messages.error(request, translate(error))
     else:
-        messages.success(request, _("%(model)s reads it now.") % {"model": reader.model})
+        messages.success(request, f"{reader.model} reads it now.")
     return redirect("scenario", code=code)
 
 

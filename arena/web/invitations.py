@@ -13,7 +13,6 @@ from django.http import Http404, HttpRequest, HttpResponse
 from django.shortcuts import get_object_or_404, redirect, render
 from django.urls import reverse
 from django.utils import timezone
-from django.utils.translation import gettext as _
 from django.views.decorators.cache import never_cache
 from django.views.decorators.http import require_http_methods, require_POST, require_safe
 
@@ -82,7 +81,7 @@ def invite_experts(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
     else:
         chosen = [line for line in lines if line.may_be_invited and not line.has_live_link]
     if not chosen:
-        messages.info(request, _("Nobody was left to invite; no link was made."))
+        messages.info(request, "Nobody was left to invite; no link was made.")
         return redirect("experts", code=study.code)
     try:
         made = [
@@ -105,7 +104,7 @@ def revoke_invitation(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
     invitation = get_object_or_404(Invitation.objects.select_related("study"), code=code)
     revoke(invitation=invitation, actor=cast(User, request.user))
     name = invitation.expert.person.pseudonym
-    messages.success(request, _("The link of %(name)s was taken back.") % {"name": name})
+    messages.success(request, f"The link of {name} was taken back.")
     return redirect("experts", code=invitation.study.code)
 
 

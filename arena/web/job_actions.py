@@ -12,7 +12,6 @@ from django.db import transaction
 from django.http import HttpRequest, HttpResponse
 from django.shortcuts import get_object_or_404, redirect
 from django.urls import reverse
-from django.utils.translation import gettext as _
 from django.views.decorators.http import require_http_methods, require_POST
 
 from arena.services.retrying import retry_cause as retry_one_cause
@@ -43,7 +42,7 @@ def retry_job(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
     except AugmentError as error:
         messages.error(request, translate(error))
     else:
-        messages.success(request, _("What failed is queued again."))
+        messages.success(request, "What failed is queued again.")
     return redirect("job", code=code)
 
 
@@ -62,9 +61,7 @@ def retry_cause(request: HttpRequest, code: uuid.UUID, key: str) -> HttpResponse
     except AugmentError as error:
         messages.error(request, translate(error))
     else:
-        messages.success(
-            request, _("Queued again: %(number)s with this cause.") % {"number": len(pks)}
-        )
+        messages.success(request, f"Queued again: {len(pks)} with this cause.")
     return redirect("job", code=code)
 
 
@@ -78,7 +75,7 @@ def pause_job(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
     except AugmentError as error:
         messages.error(request, translate(error))
     else:
-        messages.success(request, _("Paused: nothing new is started; what is in flight ends."))
+        messages.success(request, "Paused: nothing new is started; what is in flight ends.")
     return redirect("job", code=code)
 
 
@@ -96,7 +93,7 @@ def cancel_job(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
     except AugmentError as error:
         messages.error(request, translate(error))
     else:
-        messages.success(request, _("Cancelled. What is done stays."))
+        messages.success(request, "Cancelled. What is done stays.")
     return redirect("job", code=code)
 
 
@@ -107,7 +104,7 @@ def resume_job(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
     job = get_object_or_404(GenerationJob, code=code)
     form = CapsForm(request.POST)
     if not form.is_valid():
-        messages.error(request, _("A cap is a number; nothing was changed."))
+        messages.error(request, "A cap is a number; nothing was changed.")
         return redirect("job", code=code)
     try:
         with transaction.atomic():
@@ -116,7 +113,7 @@ def resume_job(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
     except AugmentError as error:
         messages.error(request, translate(error))
     else:
-        messages.success(request, _("What is left is queued again."))
+        messages.success(request, "What is left is queued again.")
     return redirect("job", code=code)
 
 
@@ -137,15 +134,15 @@ def _cancelling(job: GenerationJob) -> Confirmation:
     waiting, running = found[State.QUEUED], found[State.RUNNING]
     settled = sum(found.values()) - waiting - running
     facts = (
-        _("Augmentations that wait and are never made: %(n)s.") % {"n": waiting},
-        _("Running now, which end and keep their results: %(n)s.") % {"n": running},
-        _("Settled, which stay as they are: %(n)s.") % {"n": settled},
-        _("A cancelled job can’t go on; what is missing takes a new one."),
+        f"Augmentations that wait and are never made: {waiting}.",
+        f"Running now, which end and keep their results: {running}.",
+        f"Settled, which stay as they are: {settled}.",
+        "A cancelled job can’t go on; what is missing takes a new one.",
     )
     return Confirmation(
-        title=_("Cancel “%(name)s”?") % {"name": job.name},
+        title=f"Cancel “{job.name}”?",
         facts=facts,
-        button=_("Cancel the job"),
+        button="Cancel the job",
         back=reverse("job", args=[job.code]),
         crumbs=_crumbs(job),
     )
@@ -154,13 +151,13 @@ def _cancelling(job: GenerationJob) -> Confirmation:
 def _second_chance(job: GenerationJob, number: int) -> Confirmation:
     """What is asked before answers are asked for a second time."""
     return Confirmation(
-        title=_("Ask again for %(n)s unreadable answers?") % {"n": number},
+        title=f"Ask again for {number} unreadable answers?",
         facts=(
-            _("An unreadable answer is the contestant’s own and counts as a miss."),
-            _("Asked again it has a second chance that the others did not have; that is logged."),
-            _("The attempts so far stay in the transcripts; what counts is the last one."),
+            "An unreadable answer is the contestant’s own and counts as a miss.",
+            "Asked again it has a second chance that the others did not have; that is logged.",
+            "The attempts so far stay in the transcripts; what counts is the last one.",
         ),
-        button=_("Ask again"),
+        button="Ask again",
         back=reverse("job", args=[job.code]),
         is_final=False,
         crumbs=_crumbs(job),
@@ -168,4 +165,4 @@ def _second_chance(job: GenerationJob, number: int) -> Confirmation:
 
 
 def _crumbs(job: GenerationJob) -> tuple[tuple[str, str], ...]:
-    return ((_("Jobs"), reverse("jobs")), (job.name, reverse("job", args=[job.code])))
+    return (("Jobs", reverse("jobs")), (job.name, reverse("job", args=[job.code])))

@@ -9,7 +9,6 @@ from django.contrib.auth.models import User
 from django.http import Http404, HttpRequest, HttpResponse
 from django.shortcuts import get_object_or_404, render
 from django.utils.text import slugify
-from django.utils.translation import gettext as _
 from django.views.decorators.http import require_safe
 
 from arena.exports.formats import format_named
@@ -49,8 +48,8 @@ State = Augmentation.State
 def jobs_page(request: HttpRequest) -> HttpResponse:
     """Jobs with their bars, page by page."""
     choices = {
-        "state": (_("State"), said_choices(GenerationJob.State.choices)),
-        "by": (_("Started by"), [(MINE, _("me"))]),
+        "state": ("State", said_choices(GenerationJob.State.choices)),
+        "by": ("Started by", [(MINE, "me")]),
     }
     listing = read_listing(request, choices)
     wanted = Narrowing(

@@ -10,7 +10,6 @@ from django.contrib.auth.models import User
 from django.http import Http404, HttpRequest, HttpResponse
 from django.shortcuts import get_object_or_404, redirect, render
 from django.utils.text import slugify
-from django.utils.translation import gettext as _
 from django.views.decorators.cache import never_cache
 from django.views.decorators.http import require_http_methods, require_safe
 
@@ -105,9 +104,7 @@ def close(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
     except ArenaError as error:
         messages.error(request, translate(error))
     else:
-        messages.success(
-            request, _("“%(name)s” is closed; its labels stay.") % {"name": labelling.name}
-        )
+        messages.success(request, f"“{labelling.name}” is closed; its labels stay.")
     return redirect("faults", code=labelling.job.code)
 
 
@@ -117,7 +114,7 @@ def close(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
 def _save(request: HttpRequest, expert: User, code: uuid.UUID) -> HttpResponse:
     form = LabelForm(request.POST)
     if not form.is_valid():
-        messages.error(request, _("That could not be read; nothing was saved."))
+        messages.error(request, "That could not be read; nothing was saved.")
         return redirect("label", code=code)
     try:
         label = save_label(
@@ -131,22 +128,22 @@ def _save(request: HttpRequest, expert: User, code: uuid.UUID) -> HttpResponse:
     except LabellingClosed as error:
         messages.error(request, translate(error))
     else:
-        messages.success(request, " ".join((_("Saved."), _guess(label))))
+        messages.success(request, " ".join(("Saved.", _guess(label))))
     return redirect("label", code=code)
 
 
 def _guess(label: FaultLabel) -> str:
     """What the checks had guessed, told only now."""
     if label.guessed_position is None:
-        return _("The automatic checks could not look at that picture.")
+        return "The automatic checks could not look at that picture."
     names = {
-        FaultClass.POSITION: _("position"),
-        FaultClass.HEADING: _("heading"),
-        FaultClass.LOGIC: _("logic"),
+        FaultClass.POSITION: "position",
+        FaultClass.HEADING: "heading",
+        FaultClass.LOGIC: "logic",
     }
     seen = [name for fault, name in names.items() if getattr(label, f"guessed_{fault.value}")]
-    faults = ", ".join(seen) or _("no fault")
-    return _("The automatic checks had guessed: %(faults)s.") % {"faults": faults}
+    faults = ", ".join(seen) or "no fault"
+    return f"The automatic checks had guessed: {faults}."
 
 
 def _open(request: HttpRequest, job: GenerationJob, form: LabellingForm) -> HttpResponse | None:
@@ -159,7 +156,5 @@ def _open(request: HttpRequest, job: GenerationJob, form: LabellingForm) -> Http
     except (ArenaError, AugmentError) as error:
         form.add_error(None, translate(error))
         return None
-    messages.success(
-        request, _("“%(name)s” is open; its experts can label now.") % {"name": labelling.name}
-    )
+    messages.success(request, f"“{labelling.name}” is open; its experts can label now.")
     return redirect("faults", code=job.code)

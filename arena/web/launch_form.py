@@ -6,7 +6,6 @@ from dataclasses import dataclass
 from typing import Any
 
 from django import forms
-from django.utils.translation import gettext_lazy as _
 
 from arena.web.forms import CapsForm, ChoiceForm, Offer
 from augment.errors import AugmentError
@@ -58,22 +57,20 @@ class LaunchForm(ChoiceForm, CapsForm):
     cells = forms.MultipleChoiceField(required=False)
     samples = forms.IntegerField(min_value=1, max_value=HIGHEST_SAMPLES, initial=1, required=False)
     is_fresh = forms.BooleanField(required=False)
-    temperature = forms.FloatField(required=False, label=_("Temperature"))
-    seed = forms.IntegerField(required=False, label=_("Seed"))
+    temperature = forms.FloatField(required=False, label="Temperature")
+    seed = forms.IntegerField(required=False, label="Seed")
     reasoning_effort = forms.ChoiceField(
         required=False,
         choices=[("", "–"), *((word, word) for word in REASONING_EFFORTS)],
-        label=_("Reasoning effort"),
+        label="Reasoning effort",
     )
-    max_output_tokens = forms.IntegerField(
-        required=False, label=_("Tokens of one answer, at most")
-    )
+    max_output_tokens = forms.IntegerField(required=False, label="Tokens of one answer, at most")
     protocol = forms.ChoiceField(
         required=False,
         choices=[("", "–"), *((word, word) for word in PROTOCOLS)],
-        label=_("Tool protocol"),
+        label="Tool protocol",
     )
-    rounds = forms.IntegerField(required=False, label=_("Rounds, at most"))
+    rounds = forms.IntegerField(required=False, label="Rounds, at most")
 
     def __init__(self, *args: Any, models: list[EndpointModel], **kwargs: Any) -> None:
         super().__init__(*args, **kwargs)
@@ -90,7 +87,7 @@ class LaunchForm(ChoiceForm, CapsForm):
         """Somebody is chosen, by name or by a cell; options are what they may be."""
         cleaned = super().clean()
         if not (cleaned.get("contestants") or cleaned.get("cells")):
-            self.add_error("contestants", _("Choose at least one contestant."))
+            self.add_error("contestants", "Choose at least one contestant.")
         options = {name: v for name in OF_CELLS if (v := cleaned.get(name)) not in (None, "")}
         try:
             cleaned["chosen_cells"] = read_cells(cleaned.get("cells", []), options)

@@ -9,7 +9,6 @@ from typing import TypeVar
 from django.core.paginator import Page, Paginator
 from django.db.models import Model, QuerySet
 from django.http import HttpRequest
-from django.utils.translation import gettext as _
 
 LONGEST_SEARCH = 80
 
@@ -35,7 +34,7 @@ def choice_asked(request: HttpRequest, name: str, allowed: list[str]) -> str:
 
 def said_choices(choices: Sequence[tuple[str, str]]) -> list[tuple[str, str]]:
     """The choices of a column with their words in the language of whoever reads them."""
-    return [(str(value), _(str(label))) for value, label in choices]
+    return [(str(value), str(label)) for value, label in choices]
 
 
 def read_page(request: HttpRequest, rows: QuerySet[Row], *, size: int) -> Page[Row]:

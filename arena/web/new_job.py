@@ -12,7 +12,6 @@ from django.contrib.auth.models import User
 from django.db import transaction
 from django.http import HttpRequest, HttpResponse
 from django.shortcuts import redirect, render
-from django.utils.translation import gettext as _
 from django.views.decorators.http import require_http_methods
 
 from arena.queries import scenarios
@@ -47,7 +46,7 @@ def new_job_page(request: HttpRequest) -> HttpResponse:
         except AugmentError as error:
             form.add_error(None, translate(error))
         else:
-            messages.success(request, _("“%(name)s” is launched.") % {"name": job.name})
+            messages.success(request, f"“{job.name}” is launched.")
             return redirect("job", code=job.code)
     return _page(request, form, status=422 if form.errors else 200)
 
@@ -140,20 +139,20 @@ def _read(request: HttpRequest) -> HttpResponse:
     file = request.FILES.get("file")
     problem = ""
     if file is None:
-        problem = _("Choose a matrix file.")
+        problem = "Choose a matrix file."
     elif file.size is None or file.size > LONGEST_FILE:
-        problem = _("The file is too long for a matrix: at most 1 MB.")
+        problem = "The file is too long for a matrix: at most 1 MB."
     else:
         try:
             found = read_matrix(file.read().decode(), actor=cast(User, request.user))
         except UnicodeDecodeError:
-            problem = _("The file is not UTF-8.")
+            problem = "The file is not UTF-8."
         except AugmentError as error:
             problem = translate(error)
     if problem:
         return _page(request, _form(request, None), status=422, file_problem=problem)
     for slug in found.made:
-        messages.success(request, _("“%(name)s” is added.") % {"name": slug})
+        messages.success(request, f"“{slug}” is added.")
     initial = {
         "name": found.name or "",
         "contestants": list(found.contestants),
@@ -170,7 +169,7 @@ def _launch(request: HttpRequest, form: LaunchForm) -> GenerationJob:
     if "try" in request.POST:
         plan = _plan(form)
         where, samples = where[:1], 1
-        name = _("%(name)s, first try") % {"name": name}
+        name = f"{name}, first try"
     with transaction.atomic():
         made = add_cells(form.chosen_cells_value(), actor=actor)
         job = service.launch(

@@ -11,7 +11,6 @@ from django.contrib.auth.models import User
 from django.http import Http404, HttpRequest, HttpResponse
 from django.shortcuts import get_object_or_404, render
 from django.urls import reverse
-from django.utils.translation import gettext as _
 from django.views.decorators.http import require_safe
 
 from arena.models import Study
@@ -63,10 +62,10 @@ def planning_page(request: HttpRequest) -> HttpResponse:
         "known": known,
         "fault": fault,
         "parts": (
-            (_("Who and what"), form.rows_of(WHO)),
-            (_("What is expected"), form.rows_of(EXPECTED)),
-            (_("What it is to tell"), form.rows_of(WANTED)),
-            (_("On top"), form.rows_of(ON_TOP)),
+            ("Who and what", form.rows_of(WHO)),
+            ("What is expected", form.rows_of(EXPECTED)),
+            ("What it is to tell", form.rows_of(WANTED)),
+            ("On top", form.rows_of(ON_TOP)),
         ),
     }
     if form.is_valid():
@@ -96,7 +95,7 @@ def _lines(
     wishes = (
         (f"Expected widest interval ±{question.half_width:g}",
          found.narrow, "widest"),
-        (_("Two that differ by %(points)s told apart") % {"points": f"{question.gap:g}"},
+        (f"Two that differ by {question.gap:g} told apart",
          found.apart, "gap"),
     )  # fmt: skip
     lines = [
@@ -111,7 +110,7 @@ def _lines(
     if found.in_mind is not None:
         lines.append(
             GoalLine(
-                goal=_("Votes in mind"),
+                goal="Votes in mind",
                 prospect=found.in_mind,
                 address=_new_study(found.in_mind, entered, study),
             )
@@ -123,9 +122,9 @@ def _obstacle(question: Question, wish: Wish, what: str) -> str:
     """Why no number of votes reaches it, and what would."""
     reached = f"{getattr(wish.most, what):.0f}"
     text = (
-        _("No number of votes reaches it: with every pair judged by everybody it is ±%(points)s.")
+        "No number of votes reaches it: with every pair judged by everybody it is ±%(points)s."
         if what == "widest"
-        else _(
+        else (
             "No number of votes reaches it: with every pair judged by everybody %(points)s points "
             "can be told apart."
         )
@@ -133,17 +132,11 @@ def _obstacle(question: Question, wish: Wish, what: str) -> str:
     said = [text % {"points": reached}]
     design = question.design
     if wish.experts is not None:
-        said.append(
-            _("On %(scenarios)s scenarios it takes %(experts)s experts or more.")
-            % {"scenarios": design.scenarios, "experts": wish.experts}
-        )
+        said.append(f"On {design.scenarios} scenarios it takes {wish.experts} experts or more.")
     if wish.scenarios is not None:
-        said.append(
-            _("With %(experts)s experts it takes %(scenarios)s scenarios or more.")
-            % {"scenarios": wish.scenarios, "experts": design.experts}
-        )
+        said.append(f"With {design.experts} experts it takes {wish.scenarios} scenarios or more.")
     if wish.experts is None and wish.scenarios is None:
-        said.append(_("It takes more experts and more scenarios."))
+        said.append("It takes more experts and more scenarios.")
     return " ".join(said)
 
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 from typing import Any
 
 from django import forms
-from django.utils.translation import gettext as _
 
 from arena.rating.prospects import Question
 from arena.rating.sample_size import StudyDesign
@@ -76,8 +75,7 @@ class PlanningForm(forms.Form):
         if cleaned["ties"] >= possible:
             self.add_error(
                 "ties",
-                _("Contestants so far apart can tie in less than %(most)s %% of votes.")
-                % {"most": f"{possible:.0f}"},
+                f"Contestants so far apart can tie in less than {possible:.0f} % of votes.",
             )
         return cleaned
 

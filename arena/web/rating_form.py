@@ -5,7 +5,6 @@ from __future__ import annotations
 from typing import Any
 
 from django import forms
-from django.utils.translation import gettext_lazy as _
 
 from arena.models import Snapshot
 from arena.pairing.order import MAIN, REPEAT
@@ -18,30 +17,30 @@ from arena.services.ratings import DEFAULT_ROUNDS, MOST_ROUNDS
 from augment.services.scenarios.types import type_choices
 
 METHOD_LABELS = {
-    "bt": _("Bradley-Terry"),
-    "davidson": _("Davidson (ties)"),
-    "elo": _("Online Elo"),
+    "bt": "Bradley-Terry",
+    "davidson": "Davidson (ties)",
+    "elo": "Online Elo",
 }
 UNIT_LABELS = {
-    "": _("as the votes allow"),
-    "two-way": _("experts and scenarios"),
-    "scenario": _("scenarios"),
-    "expert": _("experts"),
-    "vote": _("votes, as in the paper"),
+    "": "as the votes allow",
+    "two-way": "experts and scenarios",
+    "scenario": "scenarios",
+    "expert": "experts",
+    "vote": "votes, as in the paper",
 }
 
 
 INTERVAL_LABELS = {
-    "": _("right for the method"),
-    "closed": _("in closed form"),
-    "resamples": _("by resamples"),
+    "": "right for the method",
+    "closed": "in closed form",
+    "resamples": "by resamples",
 }
 
 
 COVARIATE_LABELS = {
-    "side": _("being on the left"),
-    "objects": _("the number of objects"),
-    "vehicles": _("the number of vehicles"),
+    "side": "being on the left",
+    "objects": "the number of objects",
+    "vehicles": "the number of vehicles",
 }
 
 

@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-from django.utils.translation import gettext_lazy as _
-from django.utils.translation import gettext_noop
-
 from arena.exports.plots import plots
 from arena.exports.tables import LeaderboardTable
 from arena.models import Snapshot
@@ -12,7 +9,7 @@ from arena.web.results_ratings import Context
 from arena.web.scatter import NARROW, scatter
 from augment.models import EndpointModel
 
-_CLASSES = (gettext_noop("Frontier"), gettext_noop("Utility"), gettext_noop("Open weight"))
+_CLASSES = ("Frontier", "Utility", "Open weight")
 """What models call their classes."""
 
 
@@ -31,7 +28,7 @@ def cost(snapshot: Snapshot, table: LeaderboardTable) -> Context:
     """Elo and displacement against money and tokens, by class of model."""
     spent = {line.slug: line for line in snapshot.results.cost}
     metres = {line.slug: line.median_m for line in snapshot.results.displacement}
-    labels = {value: _(str(label)) for value, label in EndpointModel.ModelClass.choices}
+    labels = {value: str(label) for value, label in EndpointModel.ModelClass.choices}
     lines = [
         {
             "number": n,

@@ -11,8 +11,6 @@ from django.core.paginator import Paginator
 from django.http import Http404, HttpRequest, HttpResponse
 from django.shortcuts import render
 from django.utils.text import slugify
-from django.utils.translation import gettext as _
-from django.utils.translation import gettext_lazy
 from django.views.decorators.http import require_safe
 
 from arena.errors import NoSnapshot
@@ -33,16 +31,16 @@ LOST, FAULTS = "lost", "faults"
 class GalleryForm(forms.Form):
     """Which pictures, as they stand in the address."""
 
-    contestant = forms.ChoiceField(label=gettext_lazy("Contestant"), required=False)
+    contestant = forms.ChoiceField(label="Contestant", required=False)
     order = forms.ChoiceField(
-        label=gettext_lazy("Begin with"),
+        label="Begin with",
         required=False,
         choices=[
-            (LOST, gettext_lazy("most often beaten")),
-            (FAULTS, gettext_lazy("most faults labelled")),
+            (LOST, "most often beaten"),
+            (FAULTS, "most faults labelled"),
         ],
     )
-    type = forms.ChoiceField(label=gettext_lazy("Scenario type"), required=False)
+    type = forms.ChoiceField(label="Scenario type", required=False)
 
     def __init__(self, request: HttpRequest, table: LeaderboardTable, *fields: str) -> None:
         """Offer what the rating has; the lowest one is the contestant unless told otherwise."""
@@ -54,7 +52,7 @@ class GalleryForm(forms.Form):
             del self.fields[name]
         offered = {
             "contestant": [(row.slug, row.model) for row in table.rows],
-            "type": [("", _("all")), *type_choices()],
+            "type": [("", "all"), *type_choices()],
         }
         for name, choices in offered.items():
             if (field := self.fields.get(name)) is not None:

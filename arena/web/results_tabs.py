@@ -6,8 +6,6 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
-from django.utils.translation import gettext_lazy as _
-
 from arena.exports.tables import LeaderboardTable
 from arena.models import Snapshot
 from arena.queries.results import log_of, names_in_log, snapshots_of
@@ -51,13 +49,13 @@ def log(snapshot: Snapshot, table: LeaderboardTable) -> Context:
 
 
 TABS = (
-    Tab(name="table", label=_("Table"), staff=False, fill=standings),
-    Tab(name="pairs", label=_("Pairs"), staff=False, fill=pairs),
-    Tab(name="types", label=_("Types"), staff=False, fill=types),
-    Tab(name="raters", label=_("Raters"), staff=True, fill=raters),
-    Tab(name="coverage", label=_("Coverage"), staff=True, fill=coverage),
-    Tab(name="displacement", label=_("Displacement"), staff=True, fill=displacement),
-    Tab(name="driving", label=_("Driving"), staff=True, fill=driving),
-    Tab(name="cost", label=_("Cost"), staff=True, fill=cost),
-    Tab(name="log", label=_("Log"), staff=True, fill=log),
+    Tab(name="table", label="Table", staff=False, fill=standings),
+    Tab(name="pairs", label="Pairs", staff=False, fill=pairs),
+    Tab(name="types", label="Types", staff=False, fill=types),
+    Tab(name="raters", label="Raters", staff=True, fill=raters),
+    Tab(name="coverage", label="Coverage", staff=True, fill=coverage),
+    Tab(name="displacement", label="Displacement", staff=True, fill=displacement),
+    Tab(name="driving", label="Driving", staff=True, fill=driving),
+    Tab(name="cost", label="Cost", staff=True, fill=cost),
+    Tab(name="log", label="Log", staff=True, fill=log),
 )

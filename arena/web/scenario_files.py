@@ -12,7 +12,6 @@ from django.db import transaction
 from django.http import FileResponse, Http404, HttpRequest, HttpResponse
 from django.shortcuts import get_object_or_404, redirect
 from django.urls import reverse
-from django.utils.translation import gettext as _
 from django.views.decorators.http import require_POST, require_safe
 
 from arena import tasks
@@ -47,7 +46,7 @@ def ask(request: HttpRequest, code: uuid.UUID, form: str) -> HttpResponse:
     except AugmentError as error:
         messages.error(request, translate(error))
     else:
-        messages.success(request, _("A worker writes the file; it is offered here when ready."))
+        messages.success(request, "A worker writes the file; it is offered here when ready.")
     return redirect(reverse("job", args=[code]) + "#scenario-files")
 
 

@@ -12,8 +12,6 @@ from django.contrib import messages
 from django.contrib.auth.models import User
 from django.http import HttpRequest, HttpResponse, QueryDict
 from django.shortcuts import get_object_or_404, redirect, render
-from django.utils.translation import gettext as _
-from django.utils.translation import gettext_lazy
 from django.views.decorators.http import require_http_methods
 
 from arena.services.scenario_edits import change_scenario
@@ -90,7 +88,7 @@ class ScenarioForm(IntentForm):
     def __init__(self, data: Any = None, *, initial: dict[str, Any] | None = None) -> None:
         super().__init__(data, initial=initial)
         field = cast(forms.ChoiceField, self.fields["type"])
-        field.choices = [*type_choices(), (OWN, gettext_lazy("A type of your own"))]
+        field.choices = [*type_choices(), (OWN, "A type of your own")]
 
 
 @allow_only(*STAFF)
@@ -115,7 +113,7 @@ def new_scenario_page(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
             form.add_error(None, translate(error))
         else:
             send_later(request, enqueue_scenario, made.pk)
-            messages.success(request, _("“%(name)s” is added.") % {"name": made.slug})
+            messages.success(request, f"“{made.slug}” is added.")
             return redirect("scenario", code=made.code)
     fields = entered_fields(request.POST) if request.method == "POST" else IntentFields()
     return _shown(request, scene, form, fields)
@@ -188,7 +186,7 @@ def bulk_page(request: HttpRequest) -> HttpResponse:
         except AugmentError as error:
             problem = translate(error)
         if report is not None and report.is_kept:
-            text = _("%(number)s scenarios are added.") % {"number": len(report.rows)}
+            text = f"{len(report.rows)} scenarios are added."
             messages.success(request, text)
     context = {"report": report, "problem": problem, "most": MOST_ROWS_AT_ONCE}
     return render(request, "scenarios/bulk.html", context)

@@ -10,7 +10,6 @@ from django.contrib import messages
 from django.db import transaction
 from django.http import Http404, HttpRequest, HttpResponse, HttpResponseBase, JsonResponse
 from django.shortcuts import get_object_or_404, render
-from django.utils.translation import gettext as _
 from django.views.decorators.http import require_safe
 
 from arena.queries import scenarios
@@ -62,8 +61,8 @@ def scenarios_page(request: HttpRequest) -> HttpResponse:
     """The contact sheet: scenarios of a set by type, the reference where it was drawn."""
     chosen = scenarios.set_asked(request.GET.get("set"))
     choices = {
-        "type": (_("Type"), said_choices(type_choices())),
-        "offered": (_("In forms"), [("retired", _("retired"))]),
+        "type": ("Type", said_choices(type_choices())),
+        "offered": ("In forms", [("retired", "retired")]),
     }
     listing = read_listing(request, choices, keep=("set",))
     wanted = Narrowing(

@@ -10,7 +10,6 @@ from django.contrib.auth.models import User
 from django.http import Http404, HttpRequest, HttpResponse
 from django.shortcuts import get_object_or_404, redirect, render
 from django.utils.text import slugify
-from django.utils.translation import gettext as _
 from django.views.decorators.http import require_http_methods, require_POST, require_safe
 
 from arena.errors import ArenaError
@@ -46,8 +45,8 @@ DRAFT = "draft"
 @require_safe
 def studies_page(request: HttpRequest) -> HttpResponse:
     """Studies with their bars, page by page; before the first ones the drafts."""
-    states = [(DRAFT, _("Draft")), *said_choices(Study.State.choices)]
-    listing = read_listing(request, {"state": (_("State"), states)})
+    states = [(DRAFT, "Draft"), *said_choices(Study.State.choices)]
+    listing = read_listing(request, {"state": ("State", states)})
     wanted = Narrowing(search=listing.search, kind=listing.chosen("state"))
     page = read_page(request, find_studies(wanted), size=STUDIES_AT_ONCE)
     shows_drafts = page.number == 1 and wanted.kind in ("", DRAFT)
@@ -124,7 +123,7 @@ def hand_over_pairs(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
         messages.error(request, translate(error))
     else:
         shares = ", ".join(f"{name} {votes}" for name, votes in taken.items())
-        messages.success(request, _("Handed over: %(shares)s.") % {"shares": shares})
+        messages.success(request, f"Handed over: {shares}.")
     return redirect("study", code=code)
 
 
@@ -163,7 +162,7 @@ def cancel(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
     except (ArenaError, AugmentError) as error:
         messages.error(request, translate(error))
     else:
-        messages.success(request, _("Cancelled. Its votes stay."))
+        messages.success(request, "Cancelled. Its votes stay.")
     return redirect("study", code=code)
 
 

@@ -14,7 +14,6 @@ from django.db import transaction
 from django.http import FileResponse, Http404, HttpRequest, HttpResponse
 from django.shortcuts import get_object_or_404, redirect
 from django.urls import reverse
-from django.utils.translation import gettext as _
 from django.views.decorators.http import require_POST, require_safe
 
 from arena import tasks
@@ -81,7 +80,7 @@ def export_place(study: Study, user: User) -> ExportPlace:
         files=tuple(
             FileLine(
                 kind=kind.value,
-                label=_(str(kind.label)),
+                label=str(kind.label),
                 row=rows.get(kind.value),
                 obstacle=_obstacle(study, kind, access),
             )
@@ -103,7 +102,7 @@ def ask(request: HttpRequest, code: uuid.UUID, kind: str) -> HttpResponse:
     except AugmentError as error:
         messages.error(request, translate(error))
     else:
-        messages.success(request, _("A worker writes the file; it is offered here when ready."))
+        messages.success(request, "A worker writes the file; it is offered here when ready.")
     if is_imported(study):
         return redirect("results", code=code)
     return redirect(reverse("study", args=[code]) + "#export")
@@ -142,5 +141,5 @@ def _obstacle(study: Study, kind: StudyFile.Kind, access: ResultsAccess) -> str:
     if reason := why_not(study, kind):
         return translate(reason)
     if kind in SHOWS_RESULTS and access is not ResultsAccess.FULL:
-        return _("It shows results, which you have not opened.")
+        return "It shows results, which you have not opened."
     return ""

@@ -7,7 +7,6 @@ from typing import Any
 
 from django import forms
 from django.contrib.auth.models import User
-from django.utils.translation import gettext_lazy as _
 
 from arena.errors import NothingToPlan
 from arena.pairing.target_lines import Appearances, PairVotes, read_targets
@@ -26,9 +25,7 @@ def _percent(*, initial: int, most: int) -> forms.FloatField:
 class StudyForm(ChoiceForm):
     """A new study; its rules are fixed from the moment it opens."""
 
-    experts = forms.MultipleChoiceField(
-        error_messages={"required": _("Choose at least one expert.")}
-    )
+    experts = forms.MultipleChoiceField(error_messages={"required": "Choose at least one expert."})
     votes_per_expert = forms.IntegerField(min_value=1, max_value=10_000, initial=40)
     seed = forms.IntegerField(initial=1)
     repeats = _percent(initial=5, most=50)
@@ -109,10 +106,8 @@ class StudyForm(ChoiceForm):
 class HandOverForm(forms.Form):
     """Whose remaining pairs go to whom."""
 
-    giver = forms.ChoiceField(
-        error_messages={"required": _("Choose whose pairs are handed over.")}
-    )
-    takers = forms.MultipleChoiceField(error_messages={"required": _("Choose who takes over.")})
+    giver = forms.ChoiceField(error_messages={"required": "Choose whose pairs are handed over."})
+    takers = forms.MultipleChoiceField(error_messages={"required": "Choose who takes over."})
 
     def __init__(self, *args: Any, givers: list[str], takers: list[str], **kwargs: Any) -> None:
         super().__init__(*args, **kwargs)

@@ -9,7 +9,6 @@ from django.contrib import messages
 from django.contrib.auth.models import User
 from django.http import Http404, HttpRequest, HttpResponse, QueryDict
 from django.shortcuts import get_object_or_404, redirect, render
-from django.utils.translation import gettext as _
 from django.views.decorators.http import require_http_methods, require_POST
 
 from arena import tasks
@@ -69,7 +68,7 @@ def discard(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
     if not is_sure(request):
         return ask(request, discarding(draft))
     discard_draft(draft=draft, actor=cast(User, request.user))
-    messages.success(request, _("The draft is discarded."))
+    messages.success(request, "The draft is discarded.")
     return redirect("studies")
 
 
@@ -83,7 +82,7 @@ def use_again(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
     except AugmentError as error:
         messages.error(request, translate(error))
         return redirect("study", code=code)
-    messages.success(request, _("A draft with the settings of “%(name)s”.") % {"name": study.name})
+    messages.success(request, f"A draft with the settings of “{study.name}”.")
     return redirect("study-draft", code=draft.code)
 
 
@@ -97,7 +96,7 @@ def draw_checks(request: HttpRequest) -> HttpResponse:
         messages.error(request, translate(error))
     else:
         messages.success(
-            request, _("Attention checks are being drawn. Reload this page in a moment.")
+            request, "Attention checks are being drawn. Reload this page in a moment."
         )
     return redirect("study-new")
 
@@ -117,9 +116,7 @@ def _set_up(request: HttpRequest, draft: StudyDraft | None) -> HttpResponse:
         except (ArenaError, AugmentError) as error:
             form.add_error(None, translate(error))
         else:
-            messages.success(
-                request, _("“%(name)s” is open; its experts can vote now.") % {"name": study.name}
-            )
+            messages.success(request, f"“{study.name}” is open; its experts can vote now.")
             return redirect("study", code=study.code)
     revision = request.POST.get("revision", "") or (draft.revision if draft else "")
     return _shown(request, draft, form, revision)
@@ -147,13 +144,11 @@ def _keep(request: HttpRequest, draft: StudyDraft | None) -> HttpResponse:
         messages.error(request, translate(error))
         if draft is not None:
             messages.info(
-                request, _("What you entered stands below; saving it again replaces theirs.")
+                request, "What you entered stands below; saving it again replaces theirs."
             )
         form = _form(initial=entered)
         return _shown(request, draft, form, draft.revision if draft else "", 409 if draft else 422)
-    messages.success(
-        request, _("Saved as a draft: no expert sees it, and nothing is planned yet.")
-    )
+    messages.success(request, "Saved as a draft: no expert sees it, and nothing is planned yet.")
     return redirect("study-draft", code=kept.code)
 
 

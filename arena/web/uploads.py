@@ -10,7 +10,6 @@ from django.contrib.auth.models import User
 from django.http import HttpRequest, HttpResponse
 from django.shortcuts import get_object_or_404, redirect, render
 from django.urls import reverse
-from django.utils.translation import gettext as _
 from django.views.decorators.http import require_POST, require_safe
 
 from arena.queries.uploads import place_of, track_maps
@@ -30,11 +29,11 @@ def send_file(request: HttpRequest) -> HttpResponse:
     """Keep a recording and leave it to a worker."""
     file = request.FILES.get("file")
     if was_too_large(request.META):
-        text = _("The file is too large: at most %(most)s MB are taken. A zip may be smaller.")
+        text = "The file is too large: at most %(most)s MB are taken. A zip may be smaller."
         messages.error(request, text % {"most": uploads.most_megabytes()})
         return redirect("scenes")
     if file is None:
-        messages.error(request, _("Choose a file."))
+        messages.error(request, "Choose a file.")
         return redirect("scenes")
     try:
         row = uploads.keep_upload(
@@ -87,7 +86,7 @@ def show_moment(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
         messages.error(request, translate(error))
         return redirect(page)
     except (ValueError, LookupError):
-        messages.error(request, _("This recording has no such moment."))
+        messages.error(request, "This recording has no such moment.")
         return redirect(page)
     if is_new:
         send_later(request, enqueue_moment, moment.pk)
@@ -131,7 +130,7 @@ def remove(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
     """Forget the file; the scenes that were kept stay."""
     row = get_object_or_404(SceneUpload, code=code)
     uploads.remove_upload(row, actor=cast(User, request.user))
-    messages.success(request, _("“%(name)s” is removed.") % {"name": row.name})
+    messages.success(request, f"“{row.name}” is removed.")
     return redirect("scenes")
 
 

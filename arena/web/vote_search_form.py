@@ -6,8 +6,6 @@ from collections.abc import Mapping
 from typing import Any
 
 from django import forms
-from django.utils.translation import gettext as _
-from django.utils.translation import gettext_lazy
 
 from arena.models import Snapshot
 from arena.models.votes import AID_LABELS
@@ -27,60 +25,58 @@ from augment.services.running.jobs import HIGHEST_SAMPLES
 from augment.services.scenarios.types import type_choices
 
 OUTCOMES = {
-    SoughtOutcome.WON: gettext_lazy("The contestant won"),
-    SoughtOutcome.TIED: gettext_lazy("Tied"),
-    SoughtOutcome.LOST: gettext_lazy("The contestant lost"),
-    SoughtOutcome.LEFT: gettext_lazy("A is better"),
-    SoughtOutcome.EQUAL: gettext_lazy("Equal"),
-    SoughtOutcome.RIGHT: gettext_lazy("B is better"),
-    SoughtOutcome.DECIDED: gettext_lazy("A or B is better"),
-    SoughtOutcome.BOTH_MISS: gettext_lazy("Equal, both miss the instruction"),
-    SoughtOutcome.SKIP: gettext_lazy("Skipped"),
+    SoughtOutcome.WON: "The contestant won",
+    SoughtOutcome.TIED: "Tied",
+    SoughtOutcome.LOST: "The contestant lost",
+    SoughtOutcome.LEFT: "A is better",
+    SoughtOutcome.EQUAL: "Equal",
+    SoughtOutcome.RIGHT: "B is better",
+    SoughtOutcome.DECIDED: "A or B is better",
+    SoughtOutcome.BOTH_MISS: "Equal, both miss the instruction",
+    SoughtOutcome.SKIP: "Skipped",
 }
 PARTS = {
-    SoughtPart.COMMENTED: gettext_lazy("With a comment"),
-    SoughtPart.FAST: gettext_lazy("Under 1 s"),
-    SoughtPart.OWN: gettext_lazy("By authors on their own contestants"),
-    SoughtPart.REPEATS: gettext_lazy("Hidden repeats of counted votes"),
-    SoughtPart.ALIKE: gettext_lazy("Hidden repeats answered alike"),
-    SoughtPart.CHECKS: gettext_lazy("Attention checks answered"),
-    SoughtPart.PASSED: gettext_lazy("Attention checks passed"),
-    SoughtPart.CHECKS_SKIPPED: gettext_lazy("Attention checks skipped"),
-    SoughtPart.SHARED: gettext_lazy("On what others judged as well"),
+    SoughtPart.COMMENTED: "With a comment",
+    SoughtPart.FAST: "Under 1 s",
+    SoughtPart.OWN: "By authors on their own contestants",
+    SoughtPart.REPEATS: "Hidden repeats of counted votes",
+    SoughtPart.ALIKE: "Hidden repeats answered alike",
+    SoughtPart.CHECKS: "Attention checks answered",
+    SoughtPart.PASSED: "Attention checks passed",
+    SoughtPart.CHECKS_SKIPPED: "Attention checks skipped",
+    SoughtPart.SHARED: "On what others judged as well",
 }
 MARKS = {
-    COUNTED: gettext_lazy("Counted"),
-    EVERY: gettext_lazy("All"),
-    LEFT_OUT: gettext_lazy("Left out"),
-    "superseded": gettext_lazy("Left out: changed later"),
-    "check": gettext_lazy("Left out: attention checks"),
-    "repeat": gettext_lazy("Left out: hidden repeats"),
-    "skip": gettext_lazy("Left out: skipped"),
-    "simulated": gettext_lazy("Left out: simulated"),
-    "filtered": gettext_lazy("Left out: not asked for"),
-    "own": gettext_lazy("Left out: by authors on their own contestants"),
-    AUTOMATIC_TIE: gettext_lazy("Not shown: nobody can tell the pictures apart"),
+    COUNTED: "Counted",
+    EVERY: "All",
+    LEFT_OUT: "Left out",
+    "superseded": "Left out: changed later",
+    "check": "Left out: attention checks",
+    "repeat": "Left out: hidden repeats",
+    "skip": "Left out: skipped",
+    "simulated": "Left out: simulated",
+    "filtered": "Left out: not asked for",
+    "own": "Left out: by authors on their own contestants",
+    AUTOMATIC_TIE: "Not shown: nobody can tell the pictures apart",
 }
 
 
 class VoteSearchForm(forms.Form):
     """The filters of a list of votes, as they stand in the address."""
 
-    contestant = forms.ChoiceField(label=gettext_lazy("Contestant"), required=False)
-    opponent = forms.ChoiceField(label=gettext_lazy("Against"), required=False)
-    outcome = forms.ChoiceField(label=gettext_lazy("Outcome"), required=False)
-    type = forms.ChoiceField(label=gettext_lazy("Scenario type"), required=False)
-    scenario = forms.CharField(label=gettext_lazy("Scenario"), required=False, max_length=200)
+    contestant = forms.ChoiceField(label="Contestant", required=False)
+    opponent = forms.ChoiceField(label="Against", required=False)
+    outcome = forms.ChoiceField(label="Outcome", required=False)
+    type = forms.ChoiceField(label="Scenario type", required=False)
+    scenario = forms.CharField(label="Scenario", required=False, max_length=200)
     sample = forms.IntegerField(
-        label=gettext_lazy("Sample"), required=False, min_value=1, max_value=HIGHEST_SAMPLES
+        label="Sample", required=False, min_value=1, max_value=HIGHEST_SAMPLES
     )
-    expert = forms.ChoiceField(label=gettext_lazy("Expert"), required=False)
-    mark = forms.ChoiceField(label=gettext_lazy("Counts"), required=False)
-    part = forms.ChoiceField(label=gettext_lazy("Only"), required=False)
-    aid = forms.ChoiceField(label=gettext_lazy("Looked with"), required=False)
-    comment = forms.CharField(
-        label=gettext_lazy("Words in the comment"), required=False, max_length=200
-    )
+    expert = forms.ChoiceField(label="Expert", required=False)
+    mark = forms.ChoiceField(label="Counts", required=False)
+    part = forms.ChoiceField(label="Only", required=False)
+    aid = forms.ChoiceField(label="Looked with", required=False)
+    comment = forms.CharField(label="Words in the comment", required=False, max_length=200)
 
     def __init__(
         self, query: Mapping[str, str], *, snapshot: Snapshot, names: Mapping[str, str]
@@ -90,7 +86,7 @@ class VoteSearchForm(forms.Form):
         data["mark"] = data["mark"] or COUNTED
         super().__init__(data)
         self._snapshot = snapshot
-        everybody = ("", _("all"))
+        everybody = ("", "all")
         contestants = [everybody, *names.items()]
         self._offer("contestant", contestants)
         self._offer("opponent", contestants)
@@ -111,7 +107,7 @@ class VoteSearchForm(forms.Form):
         slug: str = self.cleaned_data["scenario"].strip()
         if slug and not is_scenario_of(self._snapshot, slug):
             raise forms.ValidationError(
-                _("There is no scenario “%(name)s” in this study."), params={"name": slug}
+                "There is no scenario “%(name)s” in this study.", params={"name": slug}
             )
         return slug
 
@@ -124,12 +120,12 @@ class VoteSearchForm(forms.Form):
         found: dict[str, Any] = super().clean() or {}
         contestant, outcome = found.get("contestant"), found.get("outcome")
         if contestant and contestant == found.get("opponent"):
-            self.add_error("opponent", _("Choose somebody else: nobody meets themselves."))
+            self.add_error("opponent", "Choose somebody else: nobody meets themselves.")
         if outcome and not contestant and SoughtOutcome(outcome).needs_contestant:
             if outcome == SoughtOutcome.TIED:
                 found["outcome"] = SoughtOutcome.EQUAL.value
             else:
-                self.add_error("outcome", _("Choose the contestant who won or lost."))
+                self.add_error("outcome", "Choose the contestant who won or lost.")
         return found
 
     def search(self) -> VoteSearch:
@@ -153,6 +149,6 @@ def _experts(snapshot: Snapshot) -> list[tuple[str, str]]:
         for code, name in snapshot.study.experts.values_list("person__code", "person__pseudonym")
     } | snapshot.results.judges
     if AUTOMATIC in names:
-        names[AUTOMATIC] = _("nobody: never shown")
+        names[AUTOMATIC] = "nobody: never shown"
     names.pop("", None)
     return sorted(names.items(), key=lambda item: natural_order(item[1]))

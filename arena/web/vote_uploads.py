@@ -13,8 +13,6 @@ from django.contrib.auth.models import User
 from django.core.files.uploadedfile import UploadedFile
 from django.http import HttpRequest, HttpResponse
 from django.shortcuts import redirect, render
-from django.utils.translation import gettext as _
-from django.utils.translation import gettext_lazy
 from django.views.decorators.http import require_http_methods
 
 from arena.errors import ArenaError
@@ -32,11 +30,11 @@ _ODD = re.compile(r"[^A-Za-z0-9._ -]+")
 class VoteFileForm(forms.Form):
     """A file and what its study is called."""
 
-    name = forms.CharField(max_length=120, strip=True, label=gettext_lazy("Name of the study"))
+    name = forms.CharField(max_length=120, strip=True, label="Name of the study")
     file = forms.FileField(
-        label=gettext_lazy("File"),
+        label="File",
         allow_empty_file=True,
-        error_messages={"required": gettext_lazy("Choose a file.")},
+        error_messages={"required": "Choose a file."},
     )
     is_simulated = forms.BooleanField(required=False)
 
@@ -65,8 +63,7 @@ def upload_votes_page(request: HttpRequest) -> HttpResponse:
         else:
             messages.success(
                 request,
-                _("Imported: votes %(votes)s, contestants %(contestants)s.")
-                % {"votes": imported.votes, "contestants": imported.contestants},
+                f"Imported: votes {imported.votes}, contestants {imported.contestants}.",
             )
             return redirect("results", code=imported.study.code)
     context = {"form": form, "most_mb": MOST_MB}
@@ -90,6 +87,7 @@ def _import(form: VoteFileForm, actor: User) -> ImportedVotes:
 
 
 def _too_large() -> str:
-    return _(
-        "The file has more than %(most)s MB. Send a smaller one, or use “manage.py import_votes”."
-    ) % {"most": MOST_MB}
+    return (
+        f"The file has more than {MOST_MB} MB. "
+        "Send a smaller one, or use “manage.py import_votes”."
+    )

@@ -131,7 +131,7 @@ def test_staff_read_both_versions_of_the_table_and_who_is_an_author() -> None:
     shown = page(analyst, study, "results")
     assert HEADING in shown
     assert (
-        f"{own.votes} votes, by 1 of 4 experts, are by authors on contestants of their own."
+        f"{own.votes} votes</a>, by 1 of 4 experts, are by authors on contestants of their own."
     ) in shown
     assert "The table above counts them." in shown
     assert "computed with 100 resamples" in shown
