@@ -13,6 +13,7 @@ from django.utils import timezone
 
 from augment.errors import Conflict
 from augment.fake_llm.server import FakeServer, running
+from augment.llm.questions import Ability
 from augment.models import Endpoint, EndpointModel, Event, Probe
 from augment.services.endpoints import editing, probing
 from tests.web.cast import people, signed_in
@@ -162,7 +163,7 @@ def test_a_probe_is_asked_for_on_the_page_and_its_lines_appear_one_by_one(
     assert len(waiting) == 1, "its message is sent once the row is stored"
     probe = Probe.objects.get()
     shown = admin.get(address).content.decode()
-    assert (shown.count("data-ability"), shown.count("waiting")) == (6, 6)
+    assert (shown.count("data-ability"), shown.count("waiting")) == (len(Ability), len(Ability))
     assert "js/live.js" in shown
     seen: list[tuple[int, int]] = []
     keep = probing._keep
@@ -174,7 +175,7 @@ def test_a_probe_is_asked_for_on_the_page_and_its_lines_appear_one_by_one(
 
     monkeypatch.setattr(probing, "_keep", look)
     assert probing.make_probe(probe.pk)
-    assert [asked for asked, _ in seen] == [1, 1, 1, 1, 1, 0], "the next one is asked"
+    assert [asked for asked, _ in seen] == [*[1] * (len(Ability) - 1), 0], "the next one is asked"
     shown = admin.get(address).content.decode()
     assert "js/live.js" not in shown
     assert "Last report:" in shown
