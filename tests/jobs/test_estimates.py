@@ -79,7 +79,7 @@ def test_a_cap_below_what_is_expected_covers_so_many_rows() -> None:
 def test_contestants_that_no_job_can_run_say_why() -> None:
     ensure_endpoint(label="here", base_url="http://127.0.0.1:1/v1")
     blind = add_contestant(slug="blind", variant="vqa", endpoint="here", model=MODEL)
-    assert "nobody knows whether its viewer sees pictures" in find_obstacle(blind)
+    assert "nobody knows whether its viewer llama3.1 at here sees pictures" in find_obstacle(blind)
     EndpointModel.objects.update_or_create(
         endpoint=blind.endpoint, model=MODEL, defaults={"vision": False}
     )
