@@ -13,7 +13,7 @@ from django.core.management import CommandError, call_command
 from PIL import Image
 
 from augment.fake_llm.server import running
-from augment.llm.messages import LengthName
+from augment.llm.messages import LengthName, Reply
 from augment.llm.patience import Patience
 from augment.llm.questions import MARKER, Ability, questions_for, two_halves
 from augment.llm.window import least_tokens
@@ -60,8 +60,9 @@ class Candidate(JsonServer):
         made = {"id": "1", "object": "chat.completion", "created": 0, "model": "m-2026"}
         made["choices"] = [{"index": 0, "finish_reason": "stop", "message": message}]
         if "usage" in self.can:
-            is_long = "three hundred" in text and not self.can.intersection(body)
-            written = 1200 if is_long else 2
+            written = 2
+            if "story" in text:
+                written = 16 if self.can.intersection(body) else 1200
             made["usage"] = {"prompt_tokens": prompt_tokens, "completion_tokens": written}
         return 200, made
 
@@ -156,6 +157,25 @@ def test_a_server_that_knows_no_limit_is_told_and_goes_on() -> None:
         report = asked()
     found = {made.ability: made.has_it for made in report.findings}
     assert found == dict.fromkeys(Ability, True) | {Ability.ANSWER_LIMIT: False}
+
+
+@pytest.mark.parametrize(
+    ("written", "finish_reason", "kept"),
+    [
+        (15, "stop", None),
+        (15, "length", True),
+        (16, "stop", True),
+        (32, "stop", True),
+        (33, "length", False),
+        (None, "length", None),
+    ],
+)
+def test_an_answer_shorter_than_the_limit_tells_nothing_of_it(
+    written: int | None, finish_reason: str, kept: bool | None
+) -> None:
+    (question,) = (one for one in questions_for("m") if one.ability == Ability.ANSWER_LIMIT)
+    reply = Reply(text="Once", finish_reason=finish_reason, completion_tokens=written)
+    assert question.is_good(reply) is kept
 
 
 def test_without_a_count_of_tokens_the_limit_is_unknown() -> None:
