@@ -17,6 +17,7 @@ export function aim(ofPage) {
     at("report").addEventListener("change", draw);
     // The panel covers the pictures, so it gives way.
     at("mark").addEventListener("click", () => give(true));
+    at("mark").disabled = false; // so that no press before is lost
   }
   if (box.hidden) give(false);
   draw();

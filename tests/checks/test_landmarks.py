@@ -45,7 +45,7 @@ PARKED_LEFT = Pick(kind=Sight.PARKED, side=Side.LEFT)
         (replace(PARKED_LEFT, relation=Relation.BEHIND, ordinal=2), [-11.0]),
         (replace(PARKED_LEFT, every=True), [1.0, 6.9, 14.2, 28.2]),
         (Pick(kind=Sight.PARKED, side=Side.RIGHT, ordinal=2), [15.4]),
-        (Pick(kind=Sight.BICYCLE, lane=LaneChoice.ONCOMING), [37.0]),
+        (Pick(kind=Sight.BICYCLE, lane=LaneChoice.ONCOMING), [72.0]),
         (Pick(kind=Sight.BICYCLE, lane=LaneChoice.OWN), []),
         (Pick(kind=Sight.BUS), []),
     ],
