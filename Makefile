@@ -45,12 +45,12 @@ screenshots: chromium ## Every page, light and dark, into docs/images/pages and 
 	$(BIN)/python -m tests.screenshots
 
 bench: chromium ## Ours beside other products, each in its own environment; writes docs/benchmarks.md
-	$(BIN)/python -m tests.benchmarks.rivals.voting
-	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m tests.benchmarks.rating_speed
-	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m tests.benchmarks.rating_scale --write
+	$(BIN)/python -m bench.rivals.voting
+	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m bench.rating_speed
+	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m bench.rating_scale --write
 
 figures: $(VENV)/.test ## Write the figures of README, catalogue.md, checks.md and formats.md
-	$(BIN)/python -m tests.benchmarks.figures
+	$(BIN)/python -m bench.figures
 
 real-model: $(VENV)/.test ## The whole way with a real, tiny language model; writes docs/benchmarks.md
 	$(BIN)/python -m bench.real_model.run --write

@@ -1,1 +1,1 @@
-"""Measurements against other software, each in an environment of its own."""
+"""Measurements to run by hand; each prints its table: `python -m bench.<name>`."""

@@ -25,7 +25,7 @@ from augment.scene.intent import (
 from augment.scene.intent_words import (
     Shape,
 )
-from tests.benchmarks.displacement import made, measured
+from bench.displacement import made, measured
 from tests.fixtures.shelf import SLUGS
 from tests.intents import cones, parked, walk
 from tests.scenes import scene as street

@@ -35,7 +35,7 @@ READS_SETTINGS = (
     *("augment.services", "augment.tasks", "augment.apps", "augment.management"),
 )
 MOST_LINES = {
-    **dict.fromkeys(("arena", "augment", "fixtures", "tests"), ("*.py", 500)),
+    **dict.fromkeys(("arena", "augment", "bench", "fixtures", "tests"), ("*.py", 500)),
     "static": ("*.js", 400),
 }
 """Of a file, by the folder that it lies in."""

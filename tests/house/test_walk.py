@@ -10,7 +10,7 @@ import pytest
 from tests.house.source import ROOT
 
 DOCS = ROOT / "docs"
-NAMED = r"`((?:arena|augment|docs|tests|templates)/[\w./+-]+)`(\s\(new\))?"
+NAMED = r"`((?:arena|augment|bench|docs|tests|templates)/[\w./+-]+)`(\s\(new\))?"
 """A file in docs/extending.md; "(new)" stands after one that whoever follows it is to make."""
 
 
@@ -53,7 +53,9 @@ def test_every_name_that_the_page_on_extending_speaks_of_is_in_the_source() -> N
     spoken = set(re.findall(r"`([A-Za-z_]\w*)`", page))
     assert len(spoken) > 60
     paths = [
-        path for folder in ("arena", "augment", "tests") for path in (ROOT / folder).rglob("*.py")
+        path
+        for folder in ("arena", "augment", "bench", "tests")
+        for path in (ROOT / folder).rglob("*.py")
     ]
     known = {word for path in paths for word in re.findall(r"\w+", path.read_text())}
     assert spoken - known == set()

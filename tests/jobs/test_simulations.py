@@ -25,7 +25,7 @@ from augment.services.running import leases
 from augment.simulation.planning import Plan, Situation
 from augment.simulation.road import Road
 from augment.simulation.states import EgoBody
-from tests.benchmarks.recording_lengths import cut, recorded_street
+from bench.recording_lengths import cut, recorded_street
 from tests.jobs import rows
 
 pytestmark = pytest.mark.django_db

@@ -9,7 +9,7 @@ import pytest
 from augment.baselines.simulated_faults import FaultKind
 from augment.checks.against_intent import check_against_intent
 from augment.checks.finding import FaultClass
-from tests.benchmarks.injected_faults import Tally, measure, shifted_share
+from bench.injected_faults import Tally, measure, shifted_share
 
 COUNT = 150
 

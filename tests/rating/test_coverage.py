@@ -1,4 +1,4 @@
-"""A small coverage study; the large one is tests/benchmarks/coverage_study.py."""
+"""A small coverage study; the large one is bench/coverage_study.py."""
 
 from __future__ import annotations
 
@@ -9,8 +9,8 @@ import pytest
 
 from arena.rating.bootstrap import Unit
 from arena.rating.leaderboard import Intervals, rate
-from tests.benchmarks.coverage_study import CHECK, SINGLE, Found, study
-from tests.benchmarks.worlds import THRESHOLDS, World, paper_ratings
+from bench.coverage_study import CHECK, SINGLE, Found, study
+from bench.worlds import THRESHOLDS, World, paper_ratings
 
 EQUAL = np.full(9, 1000.0)
 

@@ -7,7 +7,7 @@ import pytest
 
 from arena.rating import elo
 from arena.rating.comparisons import Comparisons, FloatArray, count_pairs, select_votes
-from tests.benchmarks.rating_sizes import SIZES, drawn
+from bench.rating_sizes import SIZES, drawn
 from tests.rating.votes import simulated
 
 TRUTH = [1150.0, 1040.0, 1000.0, 980.0, 830.0]

@@ -8,7 +8,7 @@ import pytest
 from arena.rating.bootstrap import Unit
 from arena.rating.bradley_terry import to_elo
 from arena.rating.moderated import left_of_effect, spread_of
-from tests.benchmarks.worlds import World
+from bench.worlds import World
 from tests.rating.test_sandwich import pulls_of
 from tests.rating.votes import fit
 

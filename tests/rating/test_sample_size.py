@@ -27,8 +27,8 @@ from arena.rating.sample_size import (
     votes_per_expert_for,
 )
 from arena.rating.simultaneous import CAUTION
-from tests.benchmarks.study_size import design_of, world_of
-from tests.benchmarks.worlds import World, paper_ratings
+from bench.study_size import design_of, world_of
+from bench.worlds import World, paper_ratings
 
 NINE = StudyDesign(contestants=9, experts=9, scenarios=50, tie_share=0.4)
 

@@ -19,7 +19,7 @@ from arena.rating.leaderboard import Intervals, rate
 from arena.rating.planning import design_effects, votes_for, votes_until
 from arena.rating.position import side_bias
 from arena.rating.win_rates import win_rates
-from tests.benchmarks.worlds import World
+from bench.worlds import World
 from tests.rating.votes import fit, named, simulated, versus
 
 PAPERS = [1042.0, 1039, 1025, 1011, 1003, 998, 984, 953, 941]

@@ -12,7 +12,7 @@ from augment.simulation.expert import ExpertKind, expert_of
 from augment.simulation.progress import progress_ratio
 from augment.simulation.road import Road
 from augment.simulation.setting import DriveSetting
-from tests.benchmarks.recording_lengths import (
+from bench.recording_lengths import (
     LENGTHS_S,
     ConstantSpeed,
     cut,

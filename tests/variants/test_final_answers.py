@@ -16,7 +16,7 @@ from augment.variants.pipeline import run
 from augment.variants.recipes import find_recipe
 from augment.variants.respondents import RespondentClient
 from augment.variants.transcript import MemoryTranscript
-from tests.benchmarks.mutated_answers import Answering
+from bench.mutated_answers import Answering
 from tests.fixtures.shelf import SLUGS, entry, shown_scene
 from tests.prompts.test_calls import FORMS
 

@@ -1,10 +1,10 @@
-"""A small helping of `python -m tests.benchmarks.mutated_answers`."""
+"""A small helping of `python -m bench.mutated_answers`."""
 
 from __future__ import annotations
 
 import pytest
 
-from tests.benchmarks.mutated_answers import play
+from bench.mutated_answers import play
 
 
 @pytest.mark.parametrize("start", range(0, 120, 12))

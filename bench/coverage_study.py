@@ -1,0 +1,217 @@
+"""How often 95 % intervals contain the truth, over simulated studies: `docs/coverage.md`.
+
+    python -m bench.coverage_study [STUDIES] [--write]
+
+Each world is simulated with the paper's nine ratings, for coverage, and with nine equals, of whom
+no pair should be told apart. 400 studies a row take about half an hour of one processor.
+"""
+
+from __future__ import annotations
+
+import argparse
+import re
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, field, replace
+from itertools import product
+from pathlib import Path
+
+import numpy as np
+
+from arena.rating import bradley_terry, remarks, sandwich
+from arena.rating.bootstrap import Unit
+from arena.rating.bradley_terry import DidNotConverge, Meetings, to_elo
+from arena.rating.comparisons import BoolArray, Comparisons, FloatArray, count_pairs
+from arena.rating.leaderboard import FEWEST_TO_JUDGE
+from arena.rating.moderated import spread_of
+from arena.rating.pulls import bradley_terry_pulls
+from arena.rating.simultaneous import judge_pairs
+from bench.worlds import World, paper_ratings
+
+EFFECTS = ((0.0, 0.0), (100.0, 40.0), (0.0, 80.0))
+"""Points by which scenarios, and experts, differ about a contestant."""
+ROUNDS = 500
+PAGE = Path(__file__).resolve().parents[1] / "docs" / "coverage.md"
+DEFAULT, CHECK, SINGLE = "closed form, default", "cross-check", "single votes"
+METHODS = (DEFAULT, CHECK, SINGLE)
+
+
+def worlds() -> Iterator[tuple[str, World]]:
+    """What is simulated, by what the rows have in common."""
+    blank = World(ratings=paper_ratings(), scenario_sd=100.0, expert_sd=40.0, votes_per_expert=200)
+    for experts, votes, effects in product((3, 5, 9, 20), (40, 480), EFFECTS):
+        even = replace(blank, experts=experts, votes_per_expert=votes)
+        yield "even", _differing(even, effects)
+    strong = replace(blank, experts=3, votes_per_expert=480)
+    yield "even", _differing(strong, (0.0, 300.0))
+    for scenarios, experts, effects in product((3, 5, 8), (5, 9, 20), EFFECTS[:2]):
+        few = replace(blank, scenarios=scenarios, experts=experts, votes_per_expert=100)
+        yield f"{scenarios} scenarios", _differing(few, effects)
+    for uneven, experts, effects in product((1.0, 1.5), (5, 9, 20), EFFECTS):
+        some = replace(blank, uneven=uneven, experts=experts)
+        yield f"uneven experts, {uneven}", _differing(some, effects)
+    for experts in (5, 9, 20):
+        yield "a fifth spammers", replace(blank, experts=experts, spammers=0.2)
+    for experts in (5, 9):
+        yield "handed over", replace(blank, experts=experts, handed_over=True)
+        yield "adaptive", replace(blank, experts=experts, adaptive=True)
+
+
+def _differing(world: World, effects: tuple[float, float]) -> World:
+    return replace(world, scenario_sd=effects[0], expert_sd=effects[1])
+
+
+@dataclass(slots=True)
+class Found:
+    """What studies of one world said.
+
+    Attributes:
+        held: By method, (N, C) whether the interval holds the truth.
+        half_widths: By method, (N, C) points.
+        told_apart: (N,) whether any true order of a pair is contradicted, or equals told apart.
+    """
+
+    held: dict[str, list[BoolArray]] = field(default_factory=lambda: {m: [] for m in METHODS})
+    half_widths: dict[str, list[FloatArray]] = field(
+        default_factory=lambda: {method: [] for method in METHODS}
+    )
+    told_apart: list[bool] = field(default_factory=list)
+
+    def coverage(self, method: str = DEFAULT, contestants: slice = slice(None)) -> float:
+        return float(np.array(self.held[method])[:, contestants].mean())
+
+    def half_width(self, method: str = DEFAULT, contestants: slice = slice(None)) -> float:
+        return float(np.array(self.half_widths[method])[:, contestants].mean())
+
+    def cell(self, method: str = DEFAULT, contestants: slice = slice(None)) -> str:
+        coverage = self.coverage(method, contestants)
+        return f"{coverage:.1%} ±{self.half_width(method, contestants):.0f}"
+
+    @property
+    def false(self) -> float:
+        return float(np.mean(self.told_apart))
+
+
+def study(world: World, *, studies: int, judge: bool = False) -> Found:
+    """What studies with seeds 0, 1, 2 and so on say of a world; `judge` also judges all pairs.
+
+    Studies whose votes determine no ratings are left out.
+    """
+    found, truth = Found(), world.truth()
+    for seed in range(studies):
+        votes = world.votes(np.random.default_rng(seed))
+        try:
+            _add(found, votes, truth, seed if judge else None)
+        except DidNotConverge:
+            continue
+    return found
+
+
+def _add(found: Found, votes: Comparisons, truth: FloatArray, seed: int | None) -> None:
+    counts = count_pairs(votes)
+    met = Meetings(contestants=len(truth), low=counts.low, high=counts.high)
+    strengths = bradley_terry.newton(met, counts.games[:, None], counts.scores[:, None])[:, 0]
+    inverse = bradley_terry.inverse_curvature(met, counts.games, strengths)
+    pulls = bradley_terry_pulls(votes, strengths, inverse)
+    rating, spread = to_elo(strengths), spread_of(votes, pulls, Unit.TWO_WAY)
+    few = sandwich.factor(remarks.few_clusters(votes, Unit.TWO_WAY))
+    half_widths = {
+        DEFAULT: spread.half_widths(),
+        CHECK: few * np.sqrt(np.maximum(spread.plain.diagonal(), 0.0)),
+        SINGLE: sandwich.NORMAL * np.sqrt(pulls.by_row().diagonal()),
+    }
+    for method, half_width in half_widths.items():
+        found.held[method].append(np.abs(rating - truth) <= half_width)
+        found.half_widths[method].append(half_width)
+    if seed is not None:
+        above = judge_pairs(rating, spread, rounds=ROUNDS, seed=seed).above
+        found.told_apart.append(bool((above & (truth[:, None] < truth + 1e-6)).any()))
+
+
+def lines(studies: int) -> Iterator[str]:
+    """The table of worlds, row by row, and what is lowest and highest in it."""
+    yield from _head("plan", "experts x votes", "scenario / expert", *METHODS, "told apart")
+    coverage, single, false = [], [], []
+    for plan, world in worlds():
+        number = studies // 3 if world.adaptive else studies
+        found = study(world, studies=number)
+        equal = replace(world, ratings=np.full(len(world.ratings), 1000.0))
+        alike = study(equal, studies=number, judge=True)
+        coverage.append(found.coverage())
+        single.append(found.coverage(SINGLE))
+        judged = min(world.experts, world.scenarios) >= FEWEST_TO_JUDGE
+        if judged:
+            false.append(alike.false)
+        cells = (
+            plan,
+            f"{world.experts} x {world.votes_per_expert}",
+            f"{world.scenario_sd:.0f} / {world.expert_sd:.0f}",
+            *(found.cell(method) for method in METHODS),
+            f"{alike.false:.1%}" if judged else f"({alike.false:.1%})",
+        )
+        yield "| " + " | ".join(cells) + " |"
+    yield ""
+    yield (
+        f"The closed form holds in {min(coverage):.1%} to {max(coverage):.1%}, intervals by "
+        f"single votes in {min(single):.1%} to {max(single):.1%}. Of nine equals any are told "
+        f"apart in at most {max(false):.1%} of studies."
+    )
+
+
+def controversial_lines(studies: int) -> Iterator[str]:
+    """One contestant about whom experts differ four times as much (160 points against 40)."""
+    yield from _head("experts x votes", DEFAULT, "of the one contestant", CHECK, "of the one")
+    for experts in (3, 5, 9, 20):
+        world = World(
+            ratings=paper_ratings(),
+            scenario_sd=100.0,
+            expert_sd=40.0,
+            experts=experts,
+            votes_per_expert=200,
+            controversial=(4,),
+        )
+        found, one = study(world, studies=studies), slice(4, 5)
+        cells = [
+            found.cell(method, of) for method in (DEFAULT, CHECK) for of in (slice(None), one)
+        ]
+        yield f"| {experts} x 200 | " + " | ".join(cells) + " |"
+
+
+def _head(*heads: str) -> Iterator[str]:
+    yield "| " + " | ".join(heads) + " |"
+    yield "|---" * len(heads) + "|"
+
+
+def write_table(name: str, text: str) -> None:
+    """Replace what stands between the marks of a table."""
+    begin, end = f"<!-- {name} -->\n", f"<!-- end of {name} -->"
+    page = re.sub(
+        f"{re.escape(begin)}.*?{re.escape(end)}",
+        lambda _: f"{begin}{text}\n{end}",
+        PAGE.read_text(),
+        flags=re.S,
+    )
+    PAGE.write_text(page)
+
+
+def print_tables(tables: Mapping[str, Callable[[int], Iterator[str]]], *, studies: int) -> None:
+    """Print tables line by line; with `--write` each goes between its marks in the page.
+
+    Args:
+        tables: What gives the lines of each, for so many studies a row.
+        studies: How many, unless the command says so.
+    """
+    parser = argparse.ArgumentParser()
+    parser.add_argument("studies", type=int, nargs="?", default=studies)
+    parser.add_argument("--write", action="store_true", help="into docs/coverage.md")
+    asked = parser.parse_args()
+    for name, lines_of in tables.items():
+        said = [f"{asked.studies} simulated studies a row.", ""]
+        for line in lines_of(asked.studies):
+            print(line, flush=True)
+            said.append(line)
+        if asked.write:
+            write_table(name, "\n".join(said))
+
+
+if __name__ == "__main__":
+    print_tables({"controversial": controversial_lines, "worlds": lines}, studies=400)

@@ -1,0 +1,50 @@
+"""Write the figures of README.md, catalogue.md, checks.md and formats.md anew: `make figures`.
+
+The other measurements write their own section of docs/benchmarks.md and docs/coverage.md, because
+they take long or need other software.
+"""
+
+from __future__ import annotations
+
+import os
+
+import django
+
+from augment.services.scenarios.way_past import WayPast
+from bench import displacement, hostile_reading, injected_faults
+from bench.report import ROOT, table, write_block
+from tests.fixtures.shelf import FOLDER, SLUGS
+
+
+def main() -> None:
+    """Measure and write."""
+    readme, checks = ROOT / "README.md", ROOT / "docs" / "checks.md"
+    placed = displacement.displacement_table(SLUGS, displacement.placed_by_each())
+    write_block("displacement", placed, page=readme)
+    tally = injected_faults.measure(injected_faults.COUNT, injected_faults.SEED)
+    write_block("faults", injected_faults.class_table(tally), page=readme)
+    faults = injected_faults.report(injected_faults.COUNT, injected_faults.SEED)
+    write_block("faults", faults, page=checks)
+    formats = ROOT / "docs" / "formats.md"
+    write_block("hostile", hostile_reading.hostile_table(), page=formats)
+    write_ways()
+
+
+def write_ways() -> None:
+    """By which lane the ego gets past the references of the paper set."""
+    os.environ.setdefault("DJANGO_SETTINGS_MODULE", "arena.config.settings")
+    django.setup()
+    from augment.services.scenarios.catalogue_check import check_catalogue
+
+    found = check_catalogue(folder=FOLDER).scenarios
+    rows = [
+        [way.value, ", ".join(one.slug for one in found if one.way_past is way)]
+        for way in WayPast
+        if way is not WayPast.NONE
+    ]
+    body = table(["way past", "scenarios"], rows)
+    write_block("ways", body, page=ROOT / "docs" / "catalogue.md")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,138 @@
+"""How long an expert waits from the press of a key to the next pair on the screen.
+
+    python -m bench.key_to_pair [VOTES]
+
+Serves the demo's catalogue and votes in Chromium at 1280x720 without and with a network latency of
+150 ms. Visible means: the number of the pair has changed, both new pictures are complete, and one
+more animation frame has passed. "Painted" is the browser's own account of the same presses (Event
+Timing, in steps of 8 ms), which includes decoding and drawing.
+"""
+
+from __future__ import annotations
+
+import statistics
+import sys
+import tempfile
+from pathlib import Path
+from typing import Any
+
+from playwright.sync_api import Browser, Page
+
+from tests.browser.chromium import chromium
+from tests.stack import SMALL_DEMO, Home
+
+VOTES = 40
+LATENCIES_MS = (0, 150)
+PASSWORD = "a password to vote with"
+PAUSE_MS = 600
+"""An expert looks for longer; votes at less than four a second are taken."""
+
+# Put after the page's own listeners, so that it looks on right after them.
+STOPWATCH = """() => {
+window.visible = [];
+window.painted = [];
+let before = document.getElementById("place").textContent;
+addEventListener("keydown", (event) => {
+  const look = () => {
+    const { textContent: place } = document.getElementById("place");
+    const pictures = [...document.querySelectorAll(".side img")];
+    const isThere = pictures.every((picture) => picture.complete && picture.naturalWidth > 1);
+    if (place === before || !isThere) return requestAnimationFrame(look);
+    before = place;
+    requestAnimationFrame(() => visible.push(performance.now() - event.timeStamp));
+  };
+  look();
+});
+new PerformanceObserver((list) => {
+  const presses = list.getEntries().filter(({ name }) => name === "keydown");
+  painted.push(...presses.map(({ duration }) => duration));
+}).observe({ type: "event", durationThreshold: 16 });
+}"""
+
+
+def main() -> None:
+    """Measure and print the table."""
+    votes = int(sys.argv[1]) if len(sys.argv) > 1 else VOTES
+    with tempfile.TemporaryDirectory(prefix="arena-keys-") as folder:
+        home = Home.at(Path(folder))
+        home.must(*SMALL_DEMO)
+        _prepare(home, votes)
+        print("| latency | presses | visible: median | p95 | max | painted: median | p95 |")
+        print("|---|---|---|---|---|---|---|")
+        with home.serving() as address, chromium() as browser:
+            for latency in LATENCIES_MS:
+                visible, painted = _vote(browser, address, latency, votes)
+                print(_row(latency, visible, painted))
+
+
+def _prepare(home: Home, votes: int) -> None:
+    """An expert for each latency, and a study of one pair more than they vote on."""
+    names = [f"expert-{latency}" for latency in LATENCIES_MS]
+    made = "; ".join(
+        f"create_person(username={name!r}, password={PASSWORD!r}, role='expert')" for name in names
+    )
+    home.must("shell", "-c", f"from arena.services.people import create_person; {made}")
+    scenarios = home.rows(
+        "SELECT slug FROM augment_scenario WHERE id IN"
+        " (SELECT scenario_id FROM augment_augmentation)"
+    )
+    home.must(
+        *("open_study", "Keys", "--experts", *names, "--votes-per-expert", str(votes + 1)),
+        *("--contestants", "reference", "rule-placer", "sim-good-otm", "sim-careless-otm"),
+        *("--scenarios", *(slug for (slug,) in scenarios), "--seed", "5", "--allow-simulated"),
+    )
+
+
+def _vote(
+    browser: Browser, address: str, latency_ms: int, votes: int
+) -> tuple[list[float], list[float]]:
+    context = browser.new_context(viewport={"width": 1280, "height": 720})
+    page = context.new_page()
+    page.goto(f"{address}/login/")
+    page.fill("input[name=username]", f"expert-{latency_ms}")
+    page.fill("input[name=password]", PASSWORD)
+    page.click("main form button")
+    page.wait_for_url(f"{address}/")
+    wire = context.new_cdp_session(page)
+    wire.send("Network.enable")
+    wire.send("Network.emulateNetworkConditions", _conditions(latency_ms))
+    page.click("a[href*='/vote/']")
+    page.wait_for_selector("body.is-live #answers:not([inert])")
+    page.wait_for_timeout(2000)
+    page.evaluate(STOPWATCH)
+    for number in range(votes):
+        page.keyboard.press("123"[number % 3])
+        page.wait_for_timeout(PAUSE_MS)
+    found = _numbers(page, "visible"), _numbers(page, "painted")
+    context.close()
+    return found
+
+
+def _conditions(latency_ms: int) -> dict[str, Any]:
+    return {
+        "offline": False,
+        "latency": latency_ms,
+        "downloadThroughput": -1,
+        "uploadThroughput": -1,
+    }
+
+
+def _numbers(page: Page, name: str) -> list[float]:
+    found: list[float] = page.evaluate(f"window.{name}")
+    return found
+
+
+def _row(latency_ms: int, visible: list[float], painted: list[float]) -> str:
+    # Presses that were painted within 16 ms are not reported by the browser.
+    painted = painted + [16.0] * (len(visible) - len(painted))
+    figures = [*_spread(visible), max(visible), *_spread(painted)]
+    cells = [f"{latency_ms} ms", str(len(visible)), *(f"{figure:.1f}" for figure in figures)]
+    return f"| {' | '.join(cells)} |"
+
+
+def _spread(values: list[float]) -> tuple[float, float]:
+    return statistics.median(values), statistics.quantiles(values, n=20)[-1]
+
+
+if __name__ == "__main__":
+    main()

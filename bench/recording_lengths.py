@@ -1,0 +1,135 @@
+"""Half the expert's speed on short recordings: `python -m bench.recording_lengths`.
+
+Cuts recordings to 3, 6, 8 and 15 s, drives 15 s on each at half of the expert's mean speed, and
+prints a table; with REALDATA_DIR set also for the recorded log. `--write` stores it in
+docs/simulation.md.
+"""
+
+from __future__ import annotations
+
+import os
+import sys
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+
+from augment.scene.entities import Scene
+from augment.scene.recording import Recording, Track
+from augment.simulation.drive import Drive, run
+from augment.simulation.expert import Expert, expert_of
+from augment.simulation.planning import Plan, Situation
+from augment.simulation.progress import progress_ratio
+from augment.simulation.road import Road
+from augment.simulation.score import score_drive
+from augment.simulation.setting import DriveSetting
+from augment.simulation.states import STEP_S, EgoBody
+from bench.report import ROOT, table, write_block
+from tests.recorded import recorded
+from tests.scenes import vehicle
+from tests.simulation.worlds import street
+
+LENGTHS_S = (3.0, 6.0, 8.0, 15.0)
+EGO_MPS = 8.0
+
+
+class ConstantSpeed:
+    """Follows the route's centreline at one speed."""
+
+    def __init__(self, speed_mps: float) -> None:
+        self._speed_mps = speed_mps
+
+    def start(self, road: Road, body: EgoBody) -> None:
+        """Keep the line."""
+        self._line = road.centreline
+
+    def plan(self, situation: Situation) -> Plan:
+        """Poses every 0.1 s."""
+        (start_m,), _ = self._line.beside(situation.ego[None, :2])
+        return Plan(poses=self._line.poses(start_m + STEP_S * self._speed_mps * np.arange(41)))
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class HalfSpeed:
+    """A drive at half the expert's speed on a recording that was cut."""
+
+    recorded_s: float
+    drive: Drive
+    expert: Expert
+    score: float
+
+
+def recorded_street() -> tuple[Scene, Recording]:
+    """The ego at 8 m/s for 15 s, a car ahead as fast, one parked beside the lane 60 m ahead."""
+    scene = street(speed_mps=EGO_MPS)
+    ahead = replace(vehicle("Agent2", 40.0, 0.0), speed_mps=EGO_MPS, lane_id="Lane1")
+    parked = replace(vehicle("Agent3", 60.0, -3.2), speed_mps=0.0)
+    times_s = np.asarray(np.arange(151) * STEP_S, dtype=np.float64)
+    tracks = tuple(
+        Track(
+            agent_id=agent.id,
+            type=agent.type.value,
+            length_m=agent.length_m,
+            width_m=agent.width_m,
+            states=np.column_stack(
+                [
+                    agent.x_m + agent.speed_mps * times_s,
+                    np.full_like(times_s, agent.y_m),
+                    np.zeros_like(times_s),
+                    np.full_like(times_s, agent.speed_mps),
+                ]
+            ),
+        )
+        for agent in (replace(scene.ego, speed_mps=EGO_MPS), ahead, parked)
+    )
+    recording = Recording(times_s=times_s, ego=tracks[0].states, tracks=tracks[1:])
+    return replace(scene, agents=(ahead, parked)), recording
+
+
+def cut(recording: Recording, length_s: float) -> Recording:
+    """The recording's first seconds."""
+    kept = recording.times_s <= length_s + STEP_S / 2.0
+    return Recording(
+        times_s=recording.times_s[kept],
+        ego=recording.ego[kept],
+        tracks=tuple(replace(one, states=one.states[kept]) for one in recording.tracks),
+    )
+
+
+def half_speed_drives(scene: Scene, recording: Recording) -> Iterator[HalfSpeed]:
+    """One drive for each length."""
+    road = Road(scene, recording)
+    for length_s in LENGTHS_S:
+        setting = DriveSetting(scene=scene, recording=cut(recording, length_s))
+        expert = expert_of(setting, road)
+        drive = run(setting, ConstantSpeed(expert.progress_m / 15.0 / 2.0), road=road)
+        value = score_drive(drive, expert).value
+        yield HalfSpeed(recorded_s=length_s, drive=drive, expert=expert, score=value)
+
+
+def main() -> None:
+    """Drive, and print the table or store it."""
+    worlds = {"street": recorded_street()}
+    if "REALDATA_DIR" in os.environ:
+        worlds["Argoverse 2 log"] = recorded(Path(os.environ["REALDATA_DIR"]))
+    lines = [
+        [
+            name,
+            f"{one.recorded_s:g} s",
+            f"{one.expert.progress_m:.1f}",
+            f"{100.0 * progress_ratio(one.drive, one.expert):.1f}",
+            f"{len(one.drive.objects[-1])}",
+            f"{100.0 * one.score:.1f}",
+        ]
+        for name, (scene, recording) in worlds.items()
+        for one in half_speed_drives(scene, recording)
+    ]
+    head = ["scene", "recorded", "expert (m)", "progress (%)", "others at the end", "score (%)"]
+    print(text := table(head, lines))
+    if "--write" in sys.argv[1:]:
+        write_block("recording lengths", text, page=ROOT / "docs" / "simulation.md")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,50 @@
+"""Making a rival's environment from its lock file, once."""
+
+from __future__ import annotations
+
+import hashlib
+import subprocess
+import sys
+import venv
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parents[2]
+RIVALS = Path(__file__).parent
+
+
+class NotInstalled(Exception):
+    """A rival can't be installed here (no package index, no room); the text is pip's last line."""
+
+
+def python_of(name: str, lock: Path | None = None) -> Path:
+    """The interpreter of a rival's environment, which is made or renewed where the lock changed.
+
+    Raises:
+        NotInstalled: pip could not install what the lock names.
+    """
+    lock = lock or RIVALS / name / "requirements.txt"
+    folder = ROOT / ".bench" / name
+    stamp = folder / "installed"
+    digest = hashlib.sha256(lock.read_bytes()).hexdigest()
+    python = folder / "bin" / "python"
+    if stamp.exists() and stamp.read_text() == digest:
+        return python
+    print(f"Installing {name} into {folder} ...", flush=True)
+    venv.create(folder, with_pip=True, clear=True)
+    arguments = [str(python), "-m", "pip", "install", "--quiet", "--disable-pip-version-check"]
+    ended = subprocess.run(
+        [*arguments, "--require-hashes", "--requirement", str(lock)],
+        stdout=subprocess.DEVNULL,
+        stderr=subprocess.PIPE,
+        text=True,
+        check=False,
+    )
+    if ended.returncode:
+        said = ended.stderr.strip().splitlines() or ["pip said nothing"]
+        raise NotInstalled(f"{name} can't be installed: {said[-1]}")
+    stamp.write_text(digest)
+    return python
+
+
+if __name__ == "__main__":
+    print(python_of(sys.argv[1]))

@@ -1,0 +1,271 @@
+"""Simulated studies whose truth is known: experts and scenarios that differ, several plans.
+
+Experts and scenarios may differ in what they make of each contestant: normal effects with a
+standard deviation in Elo points. Every expert has a threshold of their own for calling two equal
+(Rao and Kupper 1967). The truth is what infinitely many votes of new experts on new scenarios
+would be rated.
+
+Plans: the product's (default); `uneven` experts, who judge a lognormal number of random units;
+`adaptive`, the product's choice of pairs, ten at a time; `handed_over`, the product's plan of
+which a fifth of the experts judge a random part and others the rest.
+"""
+
+from __future__ import annotations
+
+import json
+from dataclasses import dataclass
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+
+from arena.pairing.adaptive import draw_units, ratings_so_far
+from arena.pairing.plan import Entry, PlanRules, plan
+from arena.pairing.rules import Grid, grid_of
+from arena.rating import bradley_terry
+from arena.rating.bradley_terry import ELO_PER_LOGIT
+from arena.rating.comparisons import LOSS, TIE, WIN, Comparisons, FloatArray, IntArray
+
+PAPER = Path(__file__).parents[1] / "tests" / "rating" / "paper_table.json"
+SCENARIOS = 50
+THRESHOLDS = np.exp(np.linspace(0.5, 1.5, 5))
+"""Of experts, drawn evenly: two equals are called so in 24 to 63 % of votes, 45 % on average."""
+BATCH, UNIFORM_SHARE = 10, 0.2
+"""Of adaptive plans: votes of an expert between two fits, and the share of uniform draws."""
+PLANS = 4
+"""Different plans for a size; contestants take turns in them."""
+
+
+def paper_ratings() -> FloatArray:
+    return np.array([row[2] for row in json.loads(PAPER.read_text())["rows"]], dtype=np.float64)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class World:
+    """What is true: ratings, and how much scenarios and experts differ, in Elo points.
+
+    Attributes:
+        controversial: Contestants about whom experts differ four times as much.
+        spammers: The chance that an expert answers at random.
+        uneven: The standard deviation of the logarithm of the votes of an expert.
+    """
+
+    ratings: FloatArray
+    scenario_sd: float = 0.0
+    expert_sd: float = 0.0
+    experts: int = 9
+    votes_per_expert: int = 640
+    scenarios: int = SCENARIOS
+    controversial: tuple[int, ...] = ()
+    spammers: float = 0.0
+    uneven: float = 0.0
+    adaptive: bool = False
+    handed_over: bool = False
+
+    @property
+    def expert_sds(self) -> FloatArray:
+        """(C,) points."""
+        found = np.full(len(self.ratings), float(self.expert_sd))
+        found[list(self.controversial)] *= 4.0
+        return found
+
+    def truth(self, thresholds: FloatArray = THRESHOLDS) -> FloatArray:
+        """(C,) what infinitely many votes of this world would be rated, if these thresholds
+        were alike frequent among experts.
+        """
+        win, loss, weights = self._chances_of_pairs(thresholds)
+        scores = 0.5 * (1.0 + (1.0 - self.spammers) * (win - loss).mean(axis=0) @ weights)
+        low, high = np.triu_indices(len(self.ratings), 1)
+        fitted = bradley_terry.fit(
+            contestants=len(self.ratings),
+            low=low,
+            high=high,
+            games=np.ones((1, len(low))),
+            scores=scores[None],
+        )
+        return bradley_terry.to_elo(fitted[0])
+
+    def tie_share(self) -> float:
+        """Of all votes, pairs alike frequent."""
+        win, loss, weights = self._chances_of_pairs(THRESHOLDS)
+        return float(((1.0 - win - loss).mean(axis=0) @ weights).mean())
+
+    def shown_expert_sd(self) -> float:
+        """Points by which experts differ about a contestant, as it shows in ratings.
+
+        An expert who seldom calls two equal pulls them further apart than another one: where
+        contestants differ, thresholds show as tastes do.
+        """
+        truth = self.truth()
+        by_thresholds = [self.truth(one) - truth for one in np.split(THRESHOLDS, len(THRESHOLDS))]
+        contestants = len(truth)
+        of_thresholds = np.mean(np.square(by_thresholds)) * contestants / (contestants - 1)
+        spread = float(np.ptp(self.ratings))
+        pulled = float(np.ptp(truth)) / spread if spread else 1.0
+        return float(np.hypot(pulled * self.expert_sd, np.sqrt(of_thresholds)))
+
+    def _chances_of_pairs(
+        self, thresholds: FloatArray
+    ) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """(T, P, N) of T thresholds and N sizes of effects that the first wins, and loses; and
+        (N,) how likely these sizes are.
+        """
+        strengths = self.ratings / ELO_PER_LOGIT
+        low, high = np.triu_indices(len(strengths), 1)
+        variance = self.scenario_sd**2 + self.expert_sds**2
+        spread = np.sqrt(variance[low] + variance[high])[:, None] / ELO_PER_LOGIT
+        nodes, weights = np.polynomial.hermite_e.hermegauss(60)
+        gaps = (strengths[low] - strengths[high])[:, None] + spread * nodes
+        win, loss = _chances(gaps[None], thresholds[:, None, None])
+        return win, loss, weights / weights.sum()
+
+    def votes(self, rng: np.random.Generator) -> Comparisons:
+        """A study: experts and scenarios are new ones each time."""
+        panel = _Panel(self, rng)
+        if self.adaptive:
+            expert, scenario, first, second, score = self._adaptive_votes(panel, rng)
+        else:
+            expert, scenario, first, second = self._planned(rng)
+            score = panel.scores(expert, scenario, first, second, rng)
+        return Comparisons(
+            names=tuple(f"c{index}" for index in range(len(self.ratings))),
+            first=first,
+            second=second,
+            score=score,
+            expert=expert.copy(),
+            scenario=scenario.copy(),
+        )
+
+    def _planned(self, rng: np.random.Generator) -> IntArray:
+        """(4, V) expert, scenario, first and second contestant of every vote."""
+        contestants = len(self.ratings)
+        if self.uneven:
+            return self._uneven_votes(rng)
+        number = int(rng.integers(PLANS))
+        planned = _plan(contestants, self.experts, self.votes_per_expert, self.scenarios, number)
+        expert = planned[0]
+        if self.handed_over:
+            expert = _handed_over(planned, self.experts, rng)
+        return np.stack([expert, planned[1], *rng.permutation(contestants)[planned[2:]]])
+
+    def _uneven_votes(self, rng: np.random.Generator) -> IntArray:
+        low, high = np.triu_indices(len(self.ratings), 1)
+        units = len(low) * self.scenarios
+        size = rng.lognormal(-0.5 * self.uneven**2, self.uneven, self.experts)
+        votes = np.clip(size * self.votes_per_expert, 1, units).astype(int)
+        unit = np.concatenate([rng.permutation(units)[:number] for number in votes])
+        expert = np.repeat(np.arange(self.experts), votes)
+        return np.stack(
+            [expert, unit % self.scenarios, *np.stack([low, high])[:, unit // self.scenarios]]
+        )
+
+    def _adaptive_votes(self, panel: _Panel, rng: np.random.Generator) -> tuple[np.ndarray, ...]:
+        contestants = len(self.ratings)
+        grid = _grid(contestants, self.scenarios)
+        pairs = np.stack(np.triu_indices(contestants, 1))
+        judges = np.zeros(grid.showable.shape, dtype=np.int64)
+        known: list[set[tuple[int, int]]] = [set() for _ in range(self.experts)]
+        scores = np.zeros((contestants, contestants))
+        rows, answers = [], []
+        for turn in range(self.experts * self.votes_per_expert // BATCH):
+            expert = turn % self.experts
+            ratings, covariance = ratings_so_far(scores)
+            drawn = draw_units(
+                grid, known[expert], judges, ratings, covariance, UNIFORM_SHARE, BATCH, rng
+            )
+            units = np.array([(wanted.pair, wanted.scenario) for wanted in drawn]).T
+            known[expert].update((wanted.pair, wanted.scenario) for wanted in drawn)
+            first, second = pairs[:, units[0]]
+            experts = np.full(len(drawn), expert)
+            answer = panel.scores(experts, units[1], first, second, rng)
+            np.add.at(judges, (units[0], units[1]), 1)
+            np.add.at(scores, (first, second), answer)
+            np.add.at(scores, (second, first), 1.0 - answer)
+            rows.append(np.stack([experts, units[1], first, second]))
+            answers.append(answer)
+        return (*np.concatenate(rows, axis=1), np.concatenate(answers))
+
+
+class _Panel:
+    """The experts and scenarios of one study: effects in points, thresholds, who answers at
+    random.
+    """
+
+    def __init__(self, world: World, rng: np.random.Generator) -> None:
+        contestants = len(world.ratings)
+        of_scenarios = rng.normal(0.0, 1.0, (world.scenarios, contestants)) * world.scenario_sd
+        of_experts = rng.normal(0.0, 1.0, (world.experts, contestants)) * world.expert_sds
+        self.seen = world.ratings + of_scenarios[:, None] + of_experts
+        self.threshold = THRESHOLDS[rng.integers(0, len(THRESHOLDS), world.experts)]
+        self.is_spammer = rng.random(world.experts) < world.spammers
+
+    def scores(
+        self,
+        expert: IntArray,
+        scenario: IntArray,
+        first: IntArray,
+        second: IntArray,
+        rng: np.random.Generator,
+    ) -> FloatArray:
+        """(V,) what the first contestants score."""
+        seen = self.seen[scenario, expert]
+        rows = np.arange(len(expert))
+        gap = (seen[rows, first] - seen[rows, second]) / ELO_PER_LOGIT
+        win, loss = _chances(gap, self.threshold[expert])
+        at_random = self.is_spammer[expert]
+        win, loss = np.where(at_random, 1 / 3, win), np.where(at_random, 1 / 3, loss)
+        drawn = rng.random(len(rows))
+        return np.where(drawn < win, WIN, np.where(drawn < 1.0 - loss, TIE, LOSS))
+
+
+def _handed_over(planned: IntArray, experts: int, rng: np.random.Generator) -> IntArray:
+    """(V,) the experts when a fifth of them leave; nobody gets a unit twice."""
+    expert: IntArray = planned[0].copy()
+    low, high = np.sort(planned[2:], axis=0)
+    units = (planned[1] * 1000 + low) * 1000 + high
+    known = [set(units[expert == one].tolist()) for one in range(experts)]
+    leaving = rng.permutation(experts)[: max(1, round(experts / 5))]
+    staying = np.setdiff1d(np.arange(experts), leaving)
+    for one in leaving.tolist():
+        places = np.flatnonzero(expert == one)
+        for place in places[int(rng.uniform(0.1, 0.6) * len(places)) :].tolist():
+            takers = [name for name in staying.tolist() if units[place] not in known[name]]
+            if takers:
+                expert[place] = takers[int(rng.integers(len(takers)))]
+                known[expert[place]].add(int(units[place]))
+    return expert
+
+
+def _chances(gap: FloatArray, threshold: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """The chances that the first wins and loses; the rest are ties."""
+    win, loss = 1.0 / (1.0 + threshold * np.exp(-gap)), 1.0 / (1.0 + threshold * np.exp(gap))
+    return win, loss
+
+
+def _entries(contestants: int, scenarios: int) -> tuple[Entry, ...]:
+    return tuple(
+        Entry(scenario=f"{scenario:02d}", contestant=f"{one:02d}", picture=f"{scenario} {one}")
+        for scenario in range(scenarios)
+        for one in range(contestants)
+    )
+
+
+@cache
+def _grid(contestants: int, scenarios: int) -> Grid:
+    return grid_of(_entries(contestants, scenarios))
+
+
+@cache
+def _plan(contestants: int, experts: int, votes: int, scenarios: int, number: int) -> IntArray:
+    """(4, V) expert, scenario, left and right of every planned vote."""
+    rules = PlanRules(
+        entries=_entries(contestants, scenarios),
+        experts=tuple(f"{expert:02d}" for expert in range(experts)),
+        votes_per_expert=votes,
+        seed=number,
+    )
+    rows = [
+        (int(one.expert), int(one.scenario), int(one.left), int(one.right))
+        for one in plan(rules).matchups
+    ]
+    return np.array(rows, dtype=np.int64).T

@@ -1,1 +1,0 @@
-"""Measurements to run by hand; each prints its table: python -m tests.benchmarks.<name>."""

@@ -1,0 +1,25 @@
+"""A benchmark's section is replaced as a whole, and what was measured elsewhere says so."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from bench.report import write_section
+from bench.rivals.figures import ELSEWHERE, section
+
+
+def test_a_section_replaces_its_own_and_nothing_else(tmp_path: Path) -> None:
+    page = tmp_path / "page.md"
+    page.write_text("# Benchmarks\n\n## A\n\nold\n\n## B\n\nkept\n")
+    write_section("A", "new", page=page)
+    write_section("C", "more", page=page)
+    expected = "# Benchmarks\n\n## A\n\nnew\n\n## B\n\nkept\n\n## C\n\nmore\n"
+    assert page.read_text() == expected
+    write_section("C", "more", page=page)
+    assert page.read_text() == expected
+
+
+def test_quoted_rows_are_marked() -> None:
+    text = section([ELSEWHERE[0], ELSEWHERE[1], *ELSEWHERE], "load average 0.1", runs=3)
+    assert text.count("(measured elsewhere)") == 4
+    assert "could not be installed here" in text
