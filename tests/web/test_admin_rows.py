@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from pathlib import Path
-from sqlite3 import connect
 from typing import Any
 
 import pytest
@@ -13,20 +11,12 @@ from django.contrib.auth.models import Group, User
 from django.test import Client
 from django.urls import reverse
 
-from arena.models import Person
-from arena.services.faults import open_labelling
 from arena.services.studies import close_study
-from augment.models import Contestant, Endpoint, EndpointModel, Event, Scenario
-from tests.jobs.rows import add_model
+from augment.models import Contestant, Event, Scenario
 from tests.web.cast import World, people, signed_in, world
 
 pytestmark = pytest.mark.django_db
 
-ODD = "%(name)s %s {{ x }} <b>“é”"
-LISTS = ("home", "jobs", "job-new", "scenarios", "studies", "study-new")
-OF_STUDY = ("study", "experts", "results", "results-tab", "results-votes")
-OF_JOB = ("job", "faults", "displacement-export", "faults-export")
-EXPERT_PAGES = ("home", "vote", "vote-help")
 
 Act = Callable[[Client, World], None]
 
@@ -73,147 +63,6 @@ def with_groups(name: str, *groups: str, **more: Any) -> Act:
     return act
 
 
-def of_eva(**changes: Any) -> Act:
-    def act(office: Client, here: World) -> None:
-        groups = changes.pop("groups", None)
-        if groups is not None:
-            keys = Group.objects.filter(name__in=groups).values_list("pk", flat=True)
-            changes["groups"] = list(keys)
-        edit(office, User.objects.get(username="eva"), **changes)
-
-    return act
-
-
-def odd_pseudonym(office: Client, here: World) -> None:
-    edit(office, Person.objects.get(user__username="finn"), pseudonym=ODD)
-
-
-def odd_contestant(office: Client, here: World) -> None:
-    edit(office, Contestant.objects.get(slug="ann"), name=f"{ODD} ".ljust(120, "x"))
-
-
-def odd_scenario(office: Client, here: World) -> None:
-    edit(office, Scenario.objects.all()[0], catalogue_set="paper")
-
-
-def model_fields(row: EndpointModel, **values: Any) -> dict[str, Any]:
-    return {f"models-0-{name}": value for name, value in {"id": row.pk, **values}.items()}
-
-
-def endpoint_of_llama() -> Endpoint:
-    endpoint, made = Endpoint.objects.get_or_create(
-        label="local", defaults={"base_url": "http://127.0.0.1:9/v1"}
-    )
-    if made:
-        EndpointModel.objects.create(endpoint=endpoint, model="llama")
-        add_model("llama", endpoint=endpoint, model="llama")
-    return endpoint
-
-
-def odd_model(office: Client, here: World) -> None:
-    endpoint = endpoint_of_llama()
-    row = endpoint.models.get()
-    odd = {"context_tokens": 1, "max_output_tokens": 4_000_000, "reasoning_effort": ODD[:20]}
-    edit(office, endpoint, **model_fields(row, **odd))
-
-
-def free_of_charge(office: Client, here: World) -> None:
-    endpoint = endpoint_of_llama()
-    price = {"price_in_usd": 0, "price_out_usd": 0, "price_source": ODD}
-    row = endpoint.models.get()
-    edit(office, endpoint, **model_fields(row, price_as_of="2026-01-01", **price))
-
-
-def renamed_model(office: Client, here: World) -> None:
-    endpoint = endpoint_of_llama()
-    edit(office, endpoint, **model_fields(endpoint.models.get(), model=ODD))
-
-
-def dropped_model(office: Client, here: World) -> None:
-    endpoint = endpoint_of_llama()
-    edit(office, endpoint, **model_fields(endpoint.models.get(), DELETE="on"))
-    assert not endpoint.models.exists()
-
-
-def new_endpoint(office: Client, here: World) -> None:
-    sent = {
-        "label": "far",
-        "base_url": "https://[2001:db8::1]:8443/a%20b",
-        "max_concurrency": 1,
-        "models-TOTAL_FORMS": 1,
-        "models-INITIAL_FORMS": 0,
-        "models-0-model": ODD,
-    }
-    assert office.post(reverse("admin:augment_endpoint_add"), sent).status_code == 302
-
-
-def other_group(office: Client, here: World) -> None:
-    assert office.post(reverse("admin:auth_group_add"), {"name": ODD}).status_code == 302
-    keys = list(Group.objects.values_list("pk", flat=True))
-    edit(office, add_account(office, "everything"), groups=keys)
-
-
-EDITS: dict[str, Act] = {
-    "an account without a role": with_groups("nobody"),
-    "an expert": with_groups("new-expert", "expert"),
-    "an expert with the longest name": with_groups("a@.+-_" * 25, "expert", first_name=ODD),
-    "an analyst": with_groups("new-analyst", "analyst"),
-    "an admin by group alone": with_groups("new-admin", "admin"),
-    "a clerk of the admin": with_groups("clerk", is_staff="on"),
-    "an inactive expert": with_groups("gone", "expert", is_active=None),
-    "every group at once, one of them no role": other_group,
-    "a pseudonym with signs": odd_pseudonym,
-    "a contestant's name with signs": odd_contestant,
-    "a scenario in the catalogue": odd_scenario,
-    "a model with odd limits": odd_model,
-    "a model that costs nothing": free_of_charge,
-    "a model by another name": renamed_model,
-    "a model that is gone": dropped_model,
-    "an endpoint with an odd address": new_endpoint,
-    "an expert who is an analyst too": of_eva(groups=["expert", "analyst"]),
-    "an expert without a role": of_eva(groups=[]),
-    "an expert who left": of_eva(is_active=None),
-    "an expert who became an admin": of_eva(is_active="on", is_superuser="on", is_staff="on"),
-}
-
-
-def addresses(here: World, names: tuple[str, ...]) -> list[str]:
-    found = []
-    for name in names:
-        given: dict[str, Any] = {}
-        if name in OF_JOB:
-            given = {"code": here.job.code} | ({"form": "csv"} if "export" in name else {})
-        elif name not in LISTS:
-            given = {"code": here.study.code} | ({"tab": "table"} if "tab" in name else {})
-        found.append(reverse(name, kwargs=given))
-    return found
-
-
-def broken_pages(client: Client, found: list[str]) -> list[str]:
-    return [url for url in found if client.get(url).status_code >= 500]
-
-
-def test_every_page_answers_whatever_is_made_in_the_admin() -> None:
-    here, roles = world(), people()
-    open_labelling(name="L", job=here.study.matchups.all()[0].left.job, experts=["eva"], seed=1)
-    office = signed_in(roles["admin"])
-    office.raise_request_exception = False
-    for_staff = addresses(here, LISTS + OF_STUDY + OF_JOB)
-    for_experts = addresses(here, EXPERT_PAGES)
-    with_forms = addresses(here, ("study-new", "study", "faults", "job-new"))
-    for name, act in EDITS.items():
-        act(office, here)
-        assert broken_pages(office, with_forms) == [], name
-    finn = signed_in(User.objects.get(username="finn"))
-    finn.raise_request_exception = False
-    assert broken_pages(office, for_staff) == []
-    assert broken_pages(finn, for_experts) == []
-    for user in User.objects.filter(is_active=True):
-        client = signed_in(user)
-        client.raise_request_exception = False
-        assert broken_pages(client, addresses(here, ("home", "vote", "study"))) == [], user
-
-
 def test_who_is_made_in_the_admin_can_be_chosen_by_the_forms() -> None:
     office = signed_in(people()["admin"])
     with_groups("new-expert", "expert")(office, None)  # type: ignore[arg-type]
@@ -243,11 +92,6 @@ def test_names_that_plans_and_roles_hang_on_stay() -> None:
         office.post(reverse(f"{name}_changelist"), several)
         assert type(row)._default_manager.filter(pk=row.pk).exists(), name
     assert here.study.experts.filter(pk=eva.pk).exists()
-
-
-def test_the_roles_are_there_after_the_first_migration(migrated: Path) -> None:
-    rows = connect(migrated).execute("SELECT name FROM auth_group ORDER BY name").fetchall()
-    assert [name for (name,) in rows] == ["admin", "analyst", "expert"]
 
 
 def test_every_list_and_every_row_of_arena_can_be_opened() -> None:

@@ -3,20 +3,16 @@
 from __future__ import annotations
 
 import re
-from dataclasses import replace
 from datetime import UTC, datetime
 
 import pytest
 from django.contrib.auth.models import User
 from django.test import Client
 from django.urls import reverse
-from pytest_django import DjangoAssertNumQueries
 
 from arena.models import Authorship, Snapshot, Study
-from arena.queries.vote_sets import Filters
 from arena.services.authorships import mark_author
 from arena.services.ratings import rate
-from arena.services.studies import close_study
 from augment.models import Event
 from tests.full_study import Size, full_study
 from tests.study_rows import a_study, matchups_of, vote
@@ -25,7 +21,6 @@ from tests.web.cast import people, signed_in
 pytestmark = pytest.mark.django_db
 
 SIZE = Size(scenarios=8, experts=4, votes_per_expert=90)
-SAID = re.compile(r"author|own contestant|by_judge", re.I)
 FRESH = re.compile(r'name="(csrfmiddlewaretoken|key)" value="[^"]+"')
 """What is another one on every page."""
 HEADING = "With and without votes of authors on their own contestants"
@@ -87,35 +82,6 @@ def test_an_admin_marks_an_author_and_takes_it_back_by_plain_forms(
     assert [one.verb for one in acts][-2:] == ["mark author", "take back author"]
 
 
-@pytest.mark.parametrize(
-    ("sent", "sentence"),
-    [
-        ({}, "Choose an expert. Choose a contestant."),
-        ({"expert": "", "contestant": "ann"}, "Choose an expert."),
-        ({"expert": "nobody", "contestant": "ann"}, "nobody is not one of the available choices"),
-        ({"contestant": "zoe"}, "zoe is not one of the available choices"),
-    ],
-)
-def test_what_the_page_does_not_offer_is_refused(
-    study: Study, admin: Client, sent: dict[str, str], sentence: str
-) -> None:
-    answer = admin.post(reverse("author", args=[study.code]), sent, follow=True)
-    said = re.sub(r"<[^>]+>", " ", answer.content.decode())
-    assert sentence in " ".join(said.split())
-    assert not Authorship.objects.exists()
-
-
-def test_the_page_costs_as_many_queries_with_many_marks(
-    study: Study, admin: Client, django_assert_max_num_queries: DjangoAssertNumQueries
-) -> None:
-    page(admin, study)
-    for username in ("eva", "finn"):
-        for slug in ("ann", "bob", "cid"):
-            mark(study, username, slug)
-    with django_assert_max_num_queries(22):
-        assert page(admin, study).count('value="') >= 6
-
-
 # --- Results -----------------------------------------------------------------------------------
 
 
@@ -163,20 +129,6 @@ def test_a_rating_without_them_is_asked_for_by_a_box_and_says_so() -> None:
     assert "Votes of authors on their own contestants are left out." in log
 
 
-def test_a_rating_of_before_opens_on_every_tab() -> None:
-    study = full_study(size=SIZE)
-    analyst = signed_in(people()["analyst"])
-    snapshot = rated(study)
-    for name in ("leave_out_own", "authors"):
-        del snapshot.filters[name]
-    snapshot.results = replace(snapshot.results, own_votes=None)
-    snapshot.save()
-    for tab in ("table", "pairs", "raters", "coverage", "log"):
-        shown = page(analyst, study, "results-tab", tab)
-        assert HEADING not in shown
-        assert ">Author</span>" not in shown
-
-
 # --- Experts -----------------------------------------------------------------------------------
 
 
@@ -210,33 +162,3 @@ def test_after_closing_an_expert_reads_the_same_table_as_without_a_mark() -> Non
     mark(study, "expert-1", "gpt-4o-otm")
     rated(study)
     assert seen() == before
-
-
-def test_where_they_are_left_out_an_expert_reads_that_they_were_not_asked_for() -> None:
-    study = full_study(size=SIZE)
-    expert = signed_in(User.objects.get(username="expert-1"))
-    mark(study, "expert-1", "gpt-4o-otm")
-    snapshot = rated(study, filters=Filters(leave_out_own=True))
-    shown = page(expert, study, "results")
-    assert f"Left out: {snapshot.votes_left_out['own']} not asked for." in shown
-    assert not SAID.search(shown)
-
-
-@pytest.mark.parametrize("role", ["analyst", "expert"])
-def test_nobody_but_an_admin_marks_or_takes_back(study: Study, role: str) -> None:
-    mark(study, "eva", "ann")
-    other = signed_in(
-        people()["analyst"] if role == "analyst" else User.objects.get(username="eva")
-    )
-    sent = {"expert": str(User.objects.get(username="finn").person.code), "contestant": "bob"}
-    for url in (
-        reverse("author", args=[study.code]),
-        reverse("author-back", args=[Authorship.objects.get().code]),
-    ):
-        assert other.post(url, sent).status_code == 403
-    assert other.get(reverse("experts", args=[study.code])).status_code == 403
-    assert Authorship.objects.get().contestant.slug == "ann"
-    close_study(study=study)
-    assert other.get(reverse("results-tab", args=[study.code, "log"])).status_code == (
-        403 if role == "expert" else 200
-    )

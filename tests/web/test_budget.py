@@ -7,14 +7,12 @@ from decimal import Decimal
 import pytest
 from django.urls import reverse
 
-from arena.templatetags.money import grouped, usd
-from augment.llm.messages import Reply
-from augment.models import Contestant, Endpoint, GenerationJob
+from arena.templatetags.money import usd
+from augment.models import GenerationJob
 from augment.services.running import runner
 from augment.services.running.caps import Caps
 from tests.jobs.models import Model, add_llama, llama_job
-from tests.jobs.rows import add_kind, add_scenario, only_row
-from tests.variants.answers import GOOD
+from tests.jobs.rows import add_scenario, only_row
 from tests.web.cast import people, signed_in
 
 pytestmark = pytest.mark.django_db
@@ -42,25 +40,6 @@ def test_a_job_is_launched_with_its_caps() -> None:
     assert job.is_fresh
 
 
-def test_a_cap_in_usd_without_a_price_is_refused_in_words() -> None:
-    add_llama()
-    add_scenario("street")
-    sent = {"name": "R", "contestants": ["llama"], "scenarios": ["street"], "cap_usd": "1"}
-    answer = signed_in(people()["admin"]).post(reverse("job-new"), sent)
-    assert answer.status_code == 422
-    assert "cap the job by calls or tokens instead" in " ".join(answer.content.decode().split())
-    assert not GenerationJob.objects.exists()
-
-
-@pytest.mark.parametrize("caps", [{"cap_usd": "much"}, {"cap_calls": "1.5"}, {"cap_tokens": "-3"}])
-def test_a_cap_that_is_none_is_not_launched(caps: dict[str, str]) -> None:
-    add_llama(price="1")
-    add_scenario("street")
-    sent = {"name": "R", "contestants": ["llama"], "scenarios": ["street"]} | caps
-    assert signed_in(people()["admin"]).post(reverse("job-new"), sent).status_code == 422
-    assert not GenerationJob.objects.exists()
-
-
 def test_the_page_shows_what_is_spent_beside_the_cap() -> None:
     shown = page_of(ran(llama_job(price="2", caps=Caps(usd=Decimal("0.5")))))
     assert "$0.0060" in shown
@@ -72,11 +51,6 @@ def test_an_unknown_cost_is_shown_as_unknown_and_never_as_zero() -> None:
     shown = page_of(ran(llama_job(caps=Caps(calls=10))))
     assert "unknown" in shown
     assert "$0.00" not in shown
-
-
-def test_the_page_says_where_the_worst_case_counts() -> None:
-    silent = Model(lambda request: Reply(text=GOOD))
-    assert "1 call did not say what they used" in page_of(ran(llama_job(), silent))
 
 
 def test_a_stopped_job_is_raised_and_resumed_from_its_page() -> None:
@@ -97,12 +71,6 @@ def test_a_stopped_job_is_raised_and_resumed_from_its_page() -> None:
     assert (job.state, job.cap_tokens) == (GenerationJob.State.RUNNING, 90_000)
 
 
-def test_an_analyst_sees_that_a_job_stopped_and_has_no_button() -> None:
-    shown = page_of(ran(llama_job(caps=Caps(tokens=5))), role="analyst")
-    assert "An admin can raise it." in shown
-    assert "Raise and resume" not in shown
-
-
 @pytest.mark.parametrize(
     ("amount", "shown"),
     [
@@ -115,10 +83,6 @@ def test_an_analyst_sees_that_a_job_stopped_and_has_no_button() -> None:
 )
 def test_an_amount_is_short_and_honest(amount: Decimal | None, shown: str) -> None:
     assert usd(amount) == shown
-
-
-def test_numbers_are_grouped() -> None:
-    assert [grouped(n) for n in (None, 7, 176917)] == ["", "7", "176,917"]
 
 
 def test_an_estimate_launches_nothing_and_asks_for_no_name() -> None:
@@ -138,13 +102,3 @@ def test_an_estimate_launches_nothing_and_asks_for_no_name() -> None:
         assert sentence in shown
         assert "This field is required" not in shown
     assert not GenerationJob.objects.exists()
-
-
-def test_a_contestant_that_can_not_run_is_offered_with_its_reason() -> None:
-    add_kind("by-hand", Contestant.Kind.HUMAN)
-    add_llama()
-    Endpoint.objects.update(key_variable="NO_SUCH_API_KEY")
-    shown = signed_in(people()["admin"]).get(reverse("job-new")).content.decode()
-    assert 'value="by-hand" disabled' in shown
-    assert "made by people or by an outside program" in shown
-    assert "Key not set here: NO_SUCH_API_KEY." in shown

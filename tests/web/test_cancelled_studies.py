@@ -66,11 +66,6 @@ def test_cancelling_needs_the_name_and_says_how_it_differs_from_closing(
     assert admin.get(page).status_code == 302, "there is nothing more to ask"
 
 
-def test_closing_still_takes_one_more_click_alone(study: Study, admin: Client) -> None:
-    admin.post(reverse("study-close", args=[study.code]), {"sure": "1"})
-    assert Study.objects.get().state == "closed"
-
-
 def test_an_expert_reads_a_calm_sentence_and_can_vote_no_more(study: Study) -> None:
     eva = signed_in(User.objects.get(username="eva"))
     waiting = study_rows.matchups_of(study, "eva")[5]

@@ -11,7 +11,6 @@ from django.test import Client
 from django.urls import reverse
 from django.utils import timezone
 
-from augment.errors import Conflict
 from augment.fake_llm.server import FakeServer, running
 from augment.llm.questions import Ability
 from augment.models import Endpoint, EndpointModel, Event, Probe
@@ -101,15 +100,6 @@ def test_a_key_goes_to_another_server_only_where_somebody_says_so(admin: Client)
     assert Event.objects.filter(verb="move key").count() == 1
 
 
-def test_a_second_endpoint_of_a_label_and_a_second_row_of_a_model_are_refused(
-    admin: Client, model: EndpointModel
-) -> None:
-    assert "already; choose another label" in post(admin, "endpoint-new", GIVEN)
-    shown = post(admin, "endpoint-model-new", {"model": "m"}, code=model.endpoint.code)
-    assert "here has the model m already." in shown
-    assert EndpointModel.objects.count() == 1
-
-
 def test_a_model_keeps_what_somebody_knows_and_no_half_of_a_price(
     admin: Client, model: EndpointModel
 ) -> None:
@@ -129,14 +119,6 @@ def test_a_model_keeps_what_somebody_knows_and_no_half_of_a_price(
     assert post(admin, "endpoint-model", whole | {"price_in_usd": "-1"}, code=model.code).count(
         "a price is 0 or more".capitalize()
     )
-
-
-def test_an_analyst_looks_and_changes_nothing(model: EndpointModel) -> None:
-    analyst = signed_in(people()["analyst"])
-    for name, code in (("endpoint", model.endpoint.code), ("endpoint-model", model.code)):
-        address = reverse(name, args=[code])
-        assert analyst.get(address).status_code == 200
-        assert analyst.post(address, GIVEN).status_code == 403
 
 
 # --- Probes --------------------------------------------------------------------------------------
@@ -182,18 +164,6 @@ def test_a_probe_is_asked_for_on_the_page_and_its_lines_appear_one_by_one(
     model.refresh_from_db()
     assert (model.vision, model.native_tools) == (False, True)
     assert not probing.make_probe(probe.pk), "a second message asks nothing"
-
-
-def test_a_probe_that_cannot_be_made_says_why(model: EndpointModel, admin: Client) -> None:
-    Endpoint.objects.update(key_variable="NOBODY_HAS_THIS_API_KEY")
-    probe = probing.plan_probe(model)
-    with pytest.raises(Conflict, match="is being probed already"):
-        probing.plan_probe(model)
-    assert probing.make_probe(probe.pk)
-    shown = admin.get(reverse("endpoint-model", args=[model.code])).content.decode()
-    assert "The probe could not be made." in shown
-    assert "NOBODY_HAS_THIS_API_KEY" in shown
-    assert probing.plan_probe(model).state == "queued", "it may be asked for again"
 
 
 def test_a_probe_whose_worker_died_is_given_up(model: EndpointModel) -> None:

@@ -6,9 +6,7 @@ import csv
 import io
 
 import pytest
-from django.db import connection
 from django.test import Client
-from django.test.utils import CaptureQueriesContext
 from django.urls import reverse
 
 from arena.models import Enrolment, Study
@@ -63,25 +61,6 @@ def test_a_newcomer_votes_at_once_and_is_told_the_code_at_the_end(enrolment: Enr
     assert voter.completion_code in page
     again = client.get(reverse("enrol", args=[enrolment.token]))
     assert again["Location"] == reverse("vote", args=[study.code])
-
-
-@pytest.mark.parametrize(
-    "changes", [{"external_id": " "}, {"agreed": ""}, {"agreed_sha256": "0" * 64}]
-)
-def test_what_is_missing_is_said_and_nobody_is_taken_on(
-    enrolment: Enrolment, changes: dict[str, str]
-) -> None:
-    assert join(Client(), enrolment, **changes) == 422
-    assert not enrolment.voters.exists()
-
-
-def test_a_link_that_takes_nobody_on_says_so(enrolment: Enrolment) -> None:
-    assert join(Client(), enrolment) == 302
-    assert join(Client(), enrolment, external_id="w-2") == 302
-    assert join(Client(), enrolment, external_id="w-3") == 410
-    Enrolment.objects.update(is_open=False)
-    assert Client().get(reverse("enrol", args=[enrolment.token])).status_code == 410
-    assert Client().get(reverse("enrol", args=["nobody"])).status_code == 404
 
 
 def test_a_voter_whose_session_ended_goes_on_in_the_same_browser(enrolment: Enrolment) -> None:
@@ -142,16 +121,3 @@ def test_the_file_says_whom_to_pay_and_holds_no_formula(enrolment: Enrolment) ->
     assert (first["id"], first["is_done"], first["completion_code"]) == ("'=1+1", "0", "")
     assert (second["id"], second["answered"]) == ("w-2", "6")
     assert second["completion_code"] == done.completion_code
-
-
-def test_the_admins_page_asks_as_much_for_many_as_for_few(enrolment: Enrolment) -> None:
-    Enrolment.objects.update(places=40)
-    client = signed_in(people()["admin"])
-    url = reverse("enrolment", args=[enrolment.study.code])
-    asked = []
-    for number in range(4):
-        join(Client(), enrolment, external_id=f"w-{number}")
-        with CaptureQueriesContext(connection) as queries:
-            client.get(url)
-        asked.append(len(queries))
-    assert asked[1] == asked[3]

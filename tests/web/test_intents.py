@@ -100,13 +100,6 @@ def test_a_file_that_is_no_intent_changes_nothing(staff: Client, text: str, why:
     assert "Choose a JSON file" in send(staff, scenario)
 
 
-def test_experts_neither_see_nor_set_intents() -> None:
-    scenario = add_scenario("street")
-    expert = signed_in(people()["expert"])
-    assert expert.post(f"/scenarios/{scenario.code}/intent/", {"accept": "1"}).status_code == 403
-    assert expert.get(f"/scenarios/{scenario.code}/intent.json").status_code == 403
-
-
 def test_an_admin_has_an_instruction_read_by_a_worker(
     staff: Client, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -120,20 +113,3 @@ def test_an_admin_has_an_instruction_read_by_a_worker(
     row = IntentReading.objects.get()
     assert (sent, row.state, row.model) == ([row.pk], "running", "m")
     assert "m at here reads it now" in page(staff, scenario)
-
-
-def test_what_went_wrong_with_a_reading_is_said(staff: Client) -> None:
-    scenario = add_scenario("street", intent=None, intent_origin="")
-    endpoint = ensure_endpoint(label="here", base_url="http://127.0.0.1:1/v1")
-    IntentReading.objects.create(
-        scenario=scenario, endpoint=endpoint, model="m", state="failed", reason="it was silent"
-    )
-    assert "m at here read nothing: it was silent" in page(staff, scenario)
-
-
-def test_without_a_choice_nobody_is_asked(staff: Client) -> None:
-    scenario = add_scenario("street")
-    for given in ("", "m", str(scenario.code)):
-        answer = staff.post(f"/scenarios/{scenario.code}/read/", {"reader": given}, follow=True)
-        assert "Choose a model" in answer.content.decode()
-    assert not IntentReading.objects.exists()

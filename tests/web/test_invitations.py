@@ -7,7 +7,6 @@ import re
 
 import pytest
 from django.contrib.auth.models import User
-from django.core.management import CommandError, call_command
 from django.test import Client
 from django.urls import reverse
 from django.utils import timezone
@@ -15,7 +14,6 @@ from django.utils import timezone
 from arena.config.hiding import HideKeys
 from arena.models import Invitation, Study
 from arena.services.invitations import invite
-from arena.services.studies import close_study
 from tests.study_rows import a_study
 from tests.web.cast import people, signed_in
 
@@ -75,12 +73,6 @@ def test_the_button_needs_the_forms_token(study: Study) -> None:
     assert who(client) is None
 
 
-def test_the_link_of_a_closed_study_leads_home(study: Study) -> None:
-    url = link(study)
-    close_study(study=study)
-    assert Client().post(url).headers["Location"] == reverse("home")
-
-
 def test_another_account_on_the_device_is_named_and_signed_out(study: Study) -> None:
     client = signed_in(people()["analyst"])
     url = link(study)
@@ -130,14 +122,6 @@ def test_an_admin_invites_once_for_all_and_sees_each_link_once(study: Study) -> 
     assert "Nobody was left to invite" in text(again.content)
 
 
-def test_one_expert_gets_a_new_link(study: Study) -> None:
-    admin, older = signed_in(people()["admin"]), link(study)
-    eva = User.objects.get(username="eva")
-    admin.post(reverse("invite", args=[study.code]), {"expert": eva.person.code})
-    assert Invitation.objects.filter(revoked_at=None).get().expert == eva
-    assert Client().get(older).status_code == 410
-
-
 def test_taking_a_link_back_signs_out_who_came_in_by_it(study: Study) -> None:
     came, url = Client(), link(study)
     came.post(url)
@@ -149,22 +133,6 @@ def test_taking_a_link_back_signs_out_who_came_in_by_it(study: Study) -> None:
     assert came.get(vote).status_code == 302
     assert by_password.get(vote).status_code == 200
     assert Client().post(url).status_code == 410
-
-
-def test_the_command_prints_a_link_for_each_expert_without_one(
-    study: Study, capsys: pytest.CaptureFixture[str]
-) -> None:
-    link(study, "finn")
-    call_command("invite", "Round 1", "--address", "https://arena.example/")
-    said = capsys.readouterr().out
-    found = re.search(r"^eva \(Expert 1\): https://arena\.example(/invitation/\S+)$", said, re.M)
-    assert found
-    assert "finn" not in said
-    assert Client().get(found.group(1)).status_code == 200
-    call_command("invite", "Round 1")
-    assert "no link was made" in capsys.readouterr().out
-    with pytest.raises(CommandError, match="Unknown expert 'ghost'"):
-        call_command("invite", "Round 1", "--experts", "ghost")
 
 
 def test_no_log_line_holds_a_key() -> None:
@@ -179,13 +147,3 @@ def test_no_log_line_holds_a_key() -> None:
     )
     assert HideKeys().filter(line)
     assert line.getMessage() == '"GET /invitation/.../ HTTP/1.1" 200'
-
-
-def test_whose_session_ended_finds_the_link_again_on_the_sign_in_page(study: Study) -> None:
-    client, address = Client(), link(study)
-    client.post(address)
-    assert who(client) is not None
-    del client.cookies["sessionid"]
-    page = client.get(reverse("home"), follow=True).content.decode()
-    assert f'href="{address}"' in page
-    assert "Open your link again" not in Client().get(reverse("login")).content.decode()

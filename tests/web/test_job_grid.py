@@ -4,15 +4,12 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable
-from html import unescape
-from itertools import product
 
 import pytest
-from django.db.models.signals import post_init
 from django.test import Client
 from django.urls import reverse
 
-from augment.models import Augmentation, Contestant, GenerationJob, Scenario, Simulation
+from augment.models import Augmentation, Contestant, GenerationJob, Scenario
 from tests.jobs import rows
 from tests.web.cast import people, signed_in
 
@@ -99,41 +96,12 @@ def test_every_cell_is_on_exactly_one_page(analyst: Client) -> None:
     assert len(seen) == len(set(seen)) == 7 * 12 * 12
 
 
-def test_ten_thousand_different_reasons_are_named_by_the_most_frequent(
-    analyst: Client, django_assert_max_num_queries: Questions
-) -> None:
-    job = large_job(scenarios=52, contestants=20)
-    words = "".join(chr(ord("a") + number) for number in range(26))
-    failed = list(job.augmentations.all())
-    for number, row in enumerate(failed):
-        row.state, row.reason = State.FAILED, f"no {words[number % 26]}{words[number // 26 % 26]}"
-    Augmentation.objects.bulk_update(failed, ["state", "reason"], batch_size=500)
-    with django_assert_max_num_queries(17):  # type: ignore[attr-defined]
-        found = page(analyst, job)
-    assert found.count('<details class="card" id="failure-') == 20
-    assert "there are more: 676." in found
-
-
 def test_marks_say_in_words_what_they_show_and_lead_to_the_augmentation(analyst: Client) -> None:
     job = large_job(scenarios=2, contestants=1)
     cell = job.augmentations.order_by("pk")[0]
     found = page(analyst, job)
     assert f'href="{reverse("augmentation", args=[cell.code])}" title="Unreadable answer"' in found
     assert '<span class="unseen">Unreadable answer</span>' in found
-
-
-def test_pictures_are_loaded_when_they_are_seen(analyst: Client) -> None:
-    job = large_job(scenarios=2, contestants=1)
-    job.augmentations.update(image="bev/x.png")
-    cell = job.augmentations.order_by("pk")[0]
-    found = page(analyst, job, "?view=pictures")
-    address = reverse("picture", args=["augmentation", cell.code])
-    (shown,) = [img for img in re.findall("<img[^>]*>", found) if f"{cell.code}.png" in img]
-    assert 'loading="lazy"' in shown
-    addresses = re.findall(rf'"?({address}[^" ]*)', unescape(shown))
-    assert len(addresses) == 3
-    assert all("width=" in one and one.endswith("&v=bev/x") for one in addresses)
-    assert address not in page(analyst, job)
 
 
 @pytest.mark.parametrize(
@@ -155,43 +123,3 @@ def test_the_grid_is_narrowed_by_word_and_state(
     grid = page(analyst, job, query).split('id="grid"')[1]
     found = re.findall(r'<th scope="row"><a[^>]*>(street-\d+)</a>', grid)
     assert found == shown if isinstance(shown, list) else len(found) == shown
-
-
-DRIVE = re.compile(r'href="/drives/([0-9a-f-]+)/"')
-
-
-def test_the_drives_of_a_large_job_are_a_page_of_them(
-    analyst: Client, django_assert_max_num_queries: Questions
-) -> None:
-    job = large_job(scenarios=60, contestants=12, samples=2)
-    Simulation.objects.bulk_create(
-        Simulation(scenario_id=row.scenario_id, augmentation=row, subject="augmentation")
-        for row in job.augmentations.all()
-    )
-    shown = reverse("drives", args=[job.code])
-    seen: list[str] = []
-    for column, sample, row in product((1, 2), (1, 2), (1, 2)):
-        with django_assert_max_num_queries(13):  # type: ignore[attr-defined]
-            found = analyst.get(shown, {"column": column, "sample": sample, "row": row})
-        drives = DRIVE.findall(found.content.decode())
-        assert 0 < len(drives) <= 300
-        seen += drives
-    assert len(set(seen)) == len(seen), "no drive is on two pages"
-    assert len(seen) == 2 * 60 * 12
-
-
-def test_fault_labels_of_a_large_job_read_no_augmentation(analyst: Client) -> None:
-    job = large_job(scenarios=60, contestants=12)
-    made: list[object] = []
-
-    def note(instance: object, **_: object) -> None:
-        made.append(instance)
-
-    post_init.connect(note, sender=Augmentation)
-    try:
-        found = analyst.get(reverse("faults", args=[job.code])).content.decode()
-    finally:
-        post_init.disconnect(note, sender=Augmentation)
-    assert not made
-    assert found.count("Who ") == 12
-    assert "60" in found

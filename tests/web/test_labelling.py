@@ -51,26 +51,6 @@ def test_an_expert_labels_by_a_press_and_learns_the_guess_only_afterwards(
     assert "The automatic checks had guessed:" in client.get(url).content.decode()
 
 
-def test_after_the_last_picture_the_page_says_so(labelling: LabellingRound, eva: User) -> None:
-    client, url = signed_in(eva), reverse("label", args=[labelling.code])
-    assert "Start labelling" in client.get(reverse("home")).content.decode()
-    for task in labelling.tasks.all():
-        client.post(url, {"task": task.code})
-    assert "You are done." in client.get(url).content.decode()
-    assert "2 of 2 labelled" in client.get(reverse("home")).content.decode()
-
-
-def test_a_second_and_a_broken_answer_change_nothing(labelling: LabellingRound, eva: User) -> None:
-    client, url = signed_in(eva), reverse("label", args=[labelling.code])
-    task = labelling.tasks.get(position=1)
-    client.post(url, {"task": task.code})
-    shown = client.post(url, {"task": task.code, "logic": "on"}, follow=True).content.decode()
-    assert "your first label counts" in shown
-    broken = client.post(url, {"task": "x"}, follow=True).content.decode()
-    assert "nothing was saved" in broken
-    assert FaultLabel.objects.count() == 1
-
-
 def test_pictures_go_out_to_their_expert_alone(labelling: LabellingRound, eva: User) -> None:
     task, finn = labelling.tasks.get(position=1), expert("finn")
     for token in (task.token, task.original_token):

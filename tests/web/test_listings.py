@@ -100,13 +100,6 @@ def test_every_row_is_found_by_its_word(admin: Client, name: str) -> None:
     assert page(admin, name, "?q=%00").count(mark) == LISTS[name][1]
 
 
-def test_a_page_link_keeps_what_is_looked_for(admin: Client) -> None:
-    add_many()
-    assert 'href="?q=0&amp;state=finished&amp;page=2"' in page(
-        admin, "jobs", "?q=0&state=finished"
-    )
-
-
 @pytest.mark.parametrize(
     ("name", "query", "found"),
     [
@@ -127,20 +120,3 @@ def test_a_page_link_keeps_what_is_looked_for(admin: Client) -> None:
 def test_filters_narrow_a_list(admin: Client, name: str, query: str, found: int) -> None:
     add_many()
     assert page(admin, name, query).count(LISTS[name][0]) == found
-
-
-def test_mine_are_the_jobs_that_i_launched(accounts: dict[str, User]) -> None:
-    add_many(user=accounts["admin"])
-    admin, analyst = (signed_in(accounts[role]) for role in ("admin", "analyst"))
-    assert page(admin, "jobs", "?by=mine").count("Job ") == 25
-    assert page(analyst, "jobs", "?by=mine").count("Job ") == 0
-
-
-def test_home_counts_the_latest_jobs_alone(
-    admin: Client, django_assert_max_num_queries: Questions
-) -> None:
-    add_many()
-    admin.get(reverse("home"))
-    with django_assert_max_num_queries(25):  # type: ignore[attr-defined]
-        shown = page(admin, "home")
-    assert shown.count("Job 1") == 5

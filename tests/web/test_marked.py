@@ -66,33 +66,7 @@ def test_the_page_has_the_picture_drawn_and_shows_it_with_the_same_numbers(
     shown.close()
 
 
-def test_the_page_does_not_ask_for_ever(row: Augmentation) -> None:
-    analyst, url = signed_in(people()["analyst"]), reverse("augmentation", args=[row.code])
-    last = analyst.get(url, {"drawing": "5"}).content.decode()
-    assert "http-equiv" not in last
-    assert "load this page again" in last
-    assert analyst.get(url, {"drawing": "x"}).status_code == 200
-
-
 def test_no_expert_sees_it(row: Augmentation) -> None:
     draw_marked(augmentation_pk=row.pk)
     expert = signed_in(people()["expert"])
     assert expert.get(reverse("picture", args=["marked", row.code])).status_code == 403
-
-
-def test_other_findings_are_another_picture(row: Augmentation) -> None:
-    first = draw_marked(augmentation_pk=row.pk)
-    assert draw_marked(augmentation_pk=row.pk) == first
-    row.scenario.intent = intent_to_document(parked(20.0))
-    row.scenario.save(update_fields=["intent"])
-    assert draw_marked(augmentation_pk=row.pk) != first
-
-
-def test_without_a_fault_there_is_no_picture(row: Augmentation) -> None:
-    row.scenario.intent, row.scenario.intent_origin = None, ""  # nothing to be held against
-    row.scenario.save(update_fields=["intent", "intent_origin"])
-    assert draw_marked(augmentation_pk=row.pk) == ""
-    analyst = signed_in(people()["analyst"])
-    page = analyst.get(reverse("augmentation", args=[row.code])).content.decode()
-    assert "The checks find nothing wrong or doubtful." in page
-    assert analyst.get(reverse("picture", args=["marked", row.code])).status_code == 404

@@ -16,7 +16,7 @@ from augment.models import Scenario
 from augment.scene.intent_codec import intent_to_document
 from tests.intents import LEFT_EDGE, parked, towards
 from tests.study_rows import a_study, cast_of, matchups_of, vote
-from tests.web.cast import people, signed_in
+from tests.web.cast import signed_in
 from tests.web.test_replay import loaded
 from tests.web.test_weight import MOST_BYTES, weight
 
@@ -117,15 +117,3 @@ def test_a_study_that_forbids_them_has_no_trace_of_them() -> None:
     assert eva.get(address(first), {"x": "1", "y": "1"}).status_code == 404
     with pytest.raises(InvalidVote, match="no measures"):
         vote(first, "left", aids=["measures"])
-
-
-def test_they_are_allowed_unless_the_form_says_no_and_the_preregistration_tells() -> None:
-    admin = signed_in(people()["admin"])
-    shown = admin.get(reverse("study-new")).content.decode()
-    assert 'name="no_measures"' in shown
-    assert 'name="no_measures" checked' not in shown
-    allowed = measured_study()
-    assert allowed.allow_measures
-    rules = admin.get(reverse("study", args=[allowed.code])).content.decode()
-    assert "may be laid over both images" in rules
-    assert '"measures": true' in allowed.preregistration

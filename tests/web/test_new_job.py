@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable
 from decimal import Decimal
 from typing import Any
 
@@ -13,7 +12,6 @@ from django.test import Client
 from django.urls import reverse
 
 from augment.models import Contestant, Endpoint, EndpointModel, Event, GenerationJob, ModelCall
-from augment.services.endpoints.editing import EndpointFacts, change_endpoint
 from augment.services.running import jobs, runner
 from augment.services.running.caps import Caps
 from augment.services.running.estimates import estimate
@@ -128,27 +126,6 @@ def test_what_is_answered_already_is_reused_and_counts_for_nothing() -> None:
     assert estimate(["llama"], where).answered == 0, "other prompts, other requests"
 
 
-def test_what_was_answered_at_another_address_is_asked_anew() -> None:
-    ran()
-    where, site = ["street-1", "street-2"], Endpoint.objects.get()
-    here, there = site.base_url, "http://127.0.0.1:3/v1"
-
-    def move(base_url: str) -> int:
-        change_endpoint(site, facts=EndpointFacts(base_url=base_url))
-        return estimate(["llama"], where).answered
-
-    assert estimate(["llama"], where).answered == 2
-    assert move(there) == 0, "the store knows other requests than those to be sent"
-    assert move(here + "/") == 2, "moved back, the same requests are sent"
-
-
-def test_asked_anew_nothing_is_reused(admin: Client) -> None:
-    ran()
-    given = {"contestants": ["llama"], "scenarios": ["street-1", "street-2"], "estimate": "1"}
-    assert "Answered already" in send(admin, **given)
-    assert "Answered already" not in send(admin, **given, is_fresh="on")
-
-
 def test_the_time_is_that_of_recorded_calls_at_the_endpoints_limits() -> None:
     ran()
     for number in range(3, 43):
@@ -229,35 +206,3 @@ def test_the_file_that_the_page_writes_fills_the_page_again(
     assert 'name="scenarios" value="two" checked' in form
     assert 'value="Round 2"' in form
     assert not GenerationJob.objects.exists(), "reading launches nothing"
-
-
-@pytest.mark.parametrize(
-    ("text", "words"),
-    [
-        ("scenarios: [nowhere]\ncontestants: [reference]", "is no scenario"),
-        ("scenarios: [one", "This matrix can&#x27;t be read"),
-        (b"\xff\xfe\x00", "The file is not UTF-8."),
-        ("a: 1\n" * 300_000, "The file is too long for a matrix"),
-        ("", "matrix"),
-    ],
-)
-def test_a_file_that_is_no_matrix_is_refused_with_its_place(
-    admin: Client, models: Endpoint, text: str | bytes, words: str
-) -> None:
-    rows.add_kind("reference")
-    before = Contestant.objects.count()
-    status, shown = upload(admin, text)
-    assert (status, words in shown) == (422, True)
-    assert Contestant.objects.count() <= before + 4, "only the built-in ones"
-
-
-def test_the_page_asks_as_many_questions_for_forty_models_as_for_ten(
-    admin: Client, models: Endpoint, django_assert_max_num_queries: Callable[..., object]
-) -> None:
-    EndpointModel.objects.bulk_create(
-        EndpointModel(endpoint=models, model=f"m{number}") for number in range(40)
-    )
-    admin.get(reverse("job-new"))
-    with django_assert_max_num_queries(40):  # type: ignore[attr-defined]
-        shown = admin.get(reverse("job-new")).content.decode()
-    assert shown.count('name="cells"') == 43 * 8

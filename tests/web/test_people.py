@@ -63,23 +63,6 @@ def test_the_first_admin_is_made_by_the_printed_link_once() -> None:
     assert not User.objects.filter(username="eve").exists()
 
 
-@pytest.mark.parametrize(
-    ("given", "says"),
-    [
-        ({"new_password2": "another"}, "match"),
-        ({"new_password1": "short", "new_password2": "short"}, "too short"),
-        ({"username": "with blank"}, "valid username"),
-    ],
-)
-def test_what_can_not_be_taken_is_said_beside_its_field(given: dict[str, str], says: str) -> None:
-    token = make_first_link_token()
-    assert token is not None
-    status, text = first(token, **given)
-    assert status == 200
-    assert says in text
-    assert not User.objects.exists()
-
-
 def test_a_forged_or_old_first_link_opens_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
     token = make_first_link_token()
     assert token is not None
@@ -123,21 +106,6 @@ def test_of_two_who_use_a_link_at_once_the_second_finds_it_used(settings: Settin
     second = dict.fromkeys(TWICE, "the password of who was slower")
     assert Client().post(reverse("welcome", args=[token]), second).status_code == 410
     assert can_sign_in("grace", PASSWORD)
-
-
-@pytest.mark.parametrize("token", ["", "x", "-", "0" * 32, "0" * 32 + "-abc-def", "ä-b-c"])
-def test_what_is_no_link_is_over(token: str) -> None:
-    assert Client().get(f"/welcome/{token or '-'}/").status_code == 410
-
-
-def test_a_taken_name_is_said_and_the_form_stays_filled() -> None:
-    accounts = people()
-    answer = signed_in(accounts["admin"]).post(
-        reverse("people"), {"username": "the-expert", "role": "expert", "pseudonym": "Nina"}
-    )
-    text = answer.content.decode()
-    assert "is taken" in text
-    assert 'value="Nina"' in text
 
 
 def change(actor: User, user: User, **given: str) -> None:
@@ -199,17 +167,6 @@ def test_who_is_forgotten_leaves_votes_and_no_name() -> None:
     assert Study.objects.get().rules["experts"] == [eva.username, "finn"]
     assert Study.objects.get().votes_to_plan == {eva.username: 3, "finn": 4}
     assert not AccessAttempt.objects.exists()
-
-
-def test_who_is_forgotten_stays_so() -> None:
-    accounts = people()
-    expert, admin = accounts["expert"], accounts["admin"]
-    forget_identity(user=expert, actor=admin)
-    change(admin, expert, act="resume")
-    assert not expert.is_active
-    text = signed_in(admin).get(reverse("people")).content.decode()
-    assert "Forgotten" in text
-    assert reverse("person-change", args=[expert.person.code]) not in text
 
 
 def test_two_admins_who_demote_each_other_leave_one() -> None:

@@ -5,14 +5,13 @@ from __future__ import annotations
 from io import StringIO
 
 import pytest
-from django.core.management import CommandError, call_command
+from django.core.management import call_command
 from django.urls import reverse
 
 from arena.models import Study
 from arena.rating.prospects import prospect
 from arena.services.prospects import GUESSES, known_of
 from arena.services.ratings import rate
-from arena.services.studies import close_study
 from arena.web.planning_form import question_of
 from tests import study_rows
 from tests.web.cast import people, signed_in
@@ -68,30 +67,6 @@ def test_an_open_study_gives_its_numbers_but_nothing_of_its_results() -> None:
     assert known.values == {"contestants": 3, "experts": 2, "scenarios": 6}
 
 
-def test_a_closed_and_rated_study_says_what_to_expect_of_the_next() -> None:
-    study = _voted()
-    study = close_study(study=study)
-    snapshot = rate(study=study)
-    known = known_of(study)
-    ratings = [line.rating for line in snapshot.standings.all() if line.rating is not None]
-    assert known.from_results
-    assert known.values["spread"] == round(max(ratings) - min(ratings))
-    assert known.values["ties"] == pytest.approx(100 * 5 / 18, abs=0.1)
-
-
-def test_what_can_not_be_is_said_at_its_field() -> None:
-    person = people()["analyst"]
-    answer = signed_in(person).get(reverse("study-plan"), {"spread": 2000, "ties": 60})
-    assert answer.status_code == 422
-    assert "can tie in less than" in answer.content.decode()
-
-
-def test_an_unknown_study_is_not_found() -> None:
-    person = people()["analyst"]
-    for code in ("no-code", "6f1a0b0e-0000-4000-8000-000000000000"):
-        assert signed_in(person).get(reverse("study-plan"), {"study": code}).status_code == 404
-
-
 def test_the_command_says_the_same_numbers() -> None:
     out = StringIO()
     call_command("plan_study", "--votes-per-expert", "100", stdout=out)
@@ -100,10 +75,3 @@ def test_the_command_says_the_same_numbers() -> None:
     assert f"100 votes per expert, 900 in all, {expected.minutes:.0f} minutes each" in said
     assert "expert sd: 30 (guessed)" in said
     assert "no number of votes reaches it" in said
-
-
-def test_the_command_refuses_what_can_not_be() -> None:
-    with pytest.raises(CommandError, match="tie_share goes from 0 to below"):
-        call_command("plan_study", "--spread", "2000", "--ties", "60")
-    with pytest.raises(CommandError, match="no study named 'none'"):
-        call_command("plan_study", "--like", "none")

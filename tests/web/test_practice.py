@@ -3,29 +3,25 @@
 from __future__ import annotations
 
 import re
-import uuid
 
 import pytest
 from django.contrib.auth.models import User
-from django.db import connection
 from django.test import Client
-from django.test.utils import CaptureQueriesContext
 from django.urls import reverse
-from pytest_django import DjangoAssertNumQueries
 
 from arena.errors import NothingToPlan
 from arena.models import PracticePair, Study, Vote
 from arena.queries.votes import voting_progress
 from arena.services.practice import practice_pairs
-from arena.services.studies import PlanOptions, close_study, open_study
+from arena.services.studies import PlanOptions, open_study
 from augment.models import Augmentation, Scenario
 from augment.scene.codec import modification_to_document
 from augment.scene.modification import Modification
 from augment.services.scenarios.attention import draw_checks
 from augment.services.scenarios.pictures import store
 from tests.scenes import vehicle
-from tests.study_rows import KINDS, cast_of, contestant, picture, scenario, vote
-from tests.web.cast import names_of_contestants, people, png, signed_in
+from tests.study_rows import KINDS, cast_of, contestant, picture, scenario
+from tests.web.cast import names_of_contestants, png, signed_in
 
 pytestmark = pytest.mark.django_db
 
@@ -89,41 +85,11 @@ def test_five_pairs_with_feedback_come_before_the_first_pair_and_none_is_a_vote(
     assert voting_progress(study=study, expert=eva()).voted == 0
 
 
-def test_by_ear_and_by_keys_the_feedback_comes_first_and_enter_leads_on() -> None:
-    study = opened()
-    client = signed_in(eva())
-    client.get(page(study))
-    for pair, verdict in zip(practice_pairs(study, eva()), ("Right.", "Not quite."), strict=False):
-        told = answer(client, study, pair, well=verdict == "Right.")
-        assert f"<title>{verdict} Practice pair {pair.position}," in told
-        focused = re.findall(r"<a [^>]*autofocus[^>]*>", told)
-        assert len(focused) == 1
-        assert 'aria-describedby="feedback-title"' in focused[0]
-
-
 def test_scenarios_outside_of_the_study_come_first_and_its_own_where_those_are_too_few() -> None:
     study = opened(outside=3)
     slugs = [pair.scenario.slug for pair in practice_pairs(study, eva())]
     assert [slug.startswith("elsewhere") for slug in slugs] == [True] * 3 + [False] * 2
     assert len(set(slugs)) == 5
-
-
-def test_a_round_takes_as_many_queries_for_any_number_of_scenarios(
-    django_assert_num_queries: DjangoAssertNumQueries,
-) -> None:
-    study = opened(outside=1)
-    with CaptureQueriesContext(connection) as few:
-        practice_pairs(study, eva())
-    for number in range(5):
-        twin = Scenario.objects.get(slug="elsewhere-0")
-        rows = list(twin.augmentations.all())
-        twin.pk, twin.slug, twin.code = None, f"twin-{number}", uuid.uuid4()
-        twin.save()
-        for row in rows:
-            row.pk, row.code, row.scenario = None, uuid.uuid4(), twin
-            row.save()
-    with django_assert_num_queries(len(few)):
-        practice_pairs(study, User.objects.get(username="finn"))
 
 
 def test_who_skips_the_practice_is_not_asked_again() -> None:
@@ -138,12 +104,6 @@ def test_who_skips_the_practice_is_not_asked_again() -> None:
     assert finn.get(page(study)).status_code == 302, "that was only eva's round"
 
 
-def test_who_has_voted_is_past_practice() -> None:
-    study = opened()
-    vote(study.matchups.filter(expert=eva()).earliest("position"))
-    assert signed_in(eva()).get(page(study)).status_code == 200
-
-
 def test_a_second_answer_to_a_pair_changes_nothing() -> None:
     study = opened()
     client = signed_in(eva())
@@ -152,15 +112,6 @@ def test_a_second_answer_to_a_pair_changes_nothing() -> None:
     assert "Right." in answer(client, study, first, well=False)
     first.refresh_from_db()
     assert first.is_right
-
-
-@pytest.mark.parametrize("sent", [{}, {"pair": "x"}, {"pair": "1", "outcome": "skipped"}])
-def test_what_is_no_answer_is_refused(sent: dict[str, str]) -> None:
-    study = opened()
-    client = signed_in(eva())
-    client.get(page(study))
-    assert "nothing was saved" in client.post(practice(study), sent, follow=True).content.decode()
-    assert set(PracticePair.objects.values_list("answer", flat=True)) == {""}
 
 
 def test_pictures_go_to_their_expert_alone_and_the_page_names_nobody() -> None:
@@ -181,42 +132,8 @@ def test_pictures_go_to_their_expert_alone_and_the_page_names_nobody() -> None:
     assert [word for word in words if word in shown] == []
 
 
-def test_without_the_rule_there_is_no_practice() -> None:
-    study = opened(practice=False)
-    client = signed_in(eva())
-    assert client.get(page(study)).status_code == 200
-    assert client.get(practice(study)).status_code == 302
-    assert not PracticePair.objects.exists()
-
-
-def test_a_closed_study_has_none_either() -> None:
-    study = opened()
-    close_study(study=study)
-    assert "This study is closed" in signed_in(eva()).get(page(study)).content.decode()
-
-
 def test_a_study_with_nothing_to_practise_on_is_not_opened() -> None:
     given = PlanOptions(practice=True)
     with pytest.raises(NothingToPlan, match="nothing to practise on"):
         open_study(name="Round 1", votes_per_expert=9, seed=7, options=given, **cast_of())
     assert not Study.objects.exists()
-
-
-def test_an_admin_switches_it_by_the_form() -> None:
-    study = opened()
-    admin = signed_in(people()["admin"])
-    shown = admin.get(reverse("study-new")).content.decode()
-    assert 'name="practice" checked' in shown, "on where there is something to practise on"
-    rules = admin.get(reverse("study", args=[study.code])).content.decode()
-    assert "five pairs before the first one" in rules
-
-
-def test_the_feedback_is_in_the_language_of_the_page() -> None:
-    study = opened()
-    client = signed_in(eva())
-    client.get(page(study))
-    answer(client, study, practice_pairs(study, eva())[0], well=True)
-    told = client.get(practice(study), {"pair": 1}, HTTP_ACCEPT_LANGUAGE="de").content.decode()
-    reasons = re.findall(r"<li>([^<]*(?:overlap|überlappen)[^<]*)</li>", told)
-    assert reasons
-    assert all("überlappen sich zu" in reason for reason in reasons)

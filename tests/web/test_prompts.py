@@ -80,23 +80,6 @@ def test_a_viewer_s_picture_is_drawn_by_a_worker_and_nobody_is_asked(analyst: Cl
 
 
 @pytest.mark.parametrize(
-    ("asked", "problem"),
-    [
-        ({"variant": "xyz"}, "xyz"),
-        ({"variant": "otm", "role": "viewer"}, "Nobody plays the viewer"),
-        ({"variant": "otm", "native": "1"}, "calls no function"),
-        ({"variant": "otm", "role": "king"}, "Known: modifier"),
-    ],
-)
-def test_what_no_variant_sends_is_said(
-    analyst: Client, asked: dict[str, str], problem: str
-) -> None:
-    here = add_scenario("street")
-    page = analyst.get(reverse("prompts", args=[here.code]), asked).content.decode()
-    assert problem in html.unescape(page)
-
-
-@pytest.mark.parametrize(
     ("variant", "options"),
     [
         ("otm", {"radius_m": 20.0}),
@@ -124,43 +107,3 @@ def test_a_contestant_s_prompts_are_what_its_options_then_send(
     if "radius_m" in options:
         assert f"{options['radius_m']:g} m" in shown
         assert found["messages"] != previewed(analyst, here, variant=variant)["messages"]
-
-
-def test_a_viewer_is_shown_the_picture_of_the_contestant_s_width(
-    analyst: Client, server: Scripted
-) -> None:
-    add(server, "asked", "vqa", picture_px=600)
-    here = add_scenario("street")
-    asked = {"contestant": "asked", "role": "viewer"}
-    url = reverse("prompts", args=[here.code])
-    assert "A worker is drawing it." in analyst.get(url, asked).content.decode()
-    analyst.get(url, asked)
-    answer = analyst.get(reverse("prompt-image", args=[here.code, 0]), asked)
-    png = b"".join(answer)
-    assert int.from_bytes(png[16:20]) == 600
-
-
-def test_a_contestant_s_page_leads_to_its_prompts(analyst: Client, server: Scripted) -> None:
-    asker = add(server, "asked", "otm")
-    here = add_scenario("street")
-    page = analyst.get(reverse("contestant", args=[asker.code])).content.decode()
-    way = reverse("contestant-prompts", args=[asker.code])
-    assert way in page
-    answer = analyst.get(way, {"scenario": here.slug})
-    assert answer.headers["Location"] == (
-        f"{reverse('prompts', args=[here.code])}?contestant=asked"
-    )
-    assert analyst.get(way, {"scenario": "nowhere"}).status_code == 404
-
-
-def test_a_contestant_that_asks_with_other_prompts_says_so(
-    analyst: Client, server: Scripted
-) -> None:
-    asker = add(server, "asked", "otm")
-    asker.frozen_options = {"radius_m": 50.0, "prompt_version": "0123456789ab"}
-    asker.save()
-    here = add_scenario("street")
-    page = analyst.get(reverse("prompts", args=[here.code]), {"contestant": "asked"})
-    assert "asks with prompts of version 0123456789ab" in html.unescape(page.content.decode())
-    missing = analyst.get(reverse("prompts", args=[here.code]), {"contestant": "nobody"})
-    assert missing.status_code == 404

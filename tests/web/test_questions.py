@@ -11,7 +11,7 @@ from django.contrib.auth.models import User
 from django.test import Client
 from django.urls import reverse
 
-from arena.models import LabellingRound, Study
+from arena.models import Study
 from arena.services.faults import open_labelling
 from augment.models import Augmentation, Event, GenerationJob
 from augment.services.running import leases
@@ -83,27 +83,6 @@ def test_opening_a_study_asks_with_its_numbers_and_keeps_what_was_filled_in() ->
     assert study.matchups.count() == 24 + 6
 
 
-def test_what_cannot_be_opened_is_said_on_the_form_and_not_asked() -> None:
-    sent = {"name": "Round 1", **study_rows.cast_of(), "votes_per_expert": 99, "seed": 4}
-    answer = admin_of().post(reverse("study-new"), sent)
-    assert answer.status_code == 422
-    assert 'name="sure"' not in answer.content.decode()
-
-
-def test_handing_over_asks_who_will_take_how_many() -> None:
-    study = study_rows.a_study(experts=("eva", "finn", "gus"))
-    admin, page = admin_of(), reverse("study-hand-over", args=[study.code])
-    before = study_rows.rows_planned(study)
-    asked = admin.post(page, {"giver": "eva", "takers": ["finn", "gus"]})
-    numbers = re.findall(r"Pairs that (\w+) takes: (\d)\.", text_of(asked))
-    assert (set(dict(numbers)), sum(int(n) for _, n in numbers)) == ({"finn", "gus"}, 9)
-    assert study_rows.rows_planned(study) == before
-    admin.post(page, {**hidden_of(asked), "sure": "1"})
-    assert not study.matchups.filter(expert__username="eva").exists()
-    for name, number in numbers:
-        assert study.matchups.filter(expert__username=name).count() == 9 + int(number)
-
-
 def test_cancelling_a_job_asks_and_says_what_is_lost_and_what_stays() -> None:
     job = rows.launch(scenarios=4)
     first, second, *_ = job.augmentations.all()
@@ -120,28 +99,6 @@ def test_cancelling_a_job_asks_and_says_what_is_lost_and_what_stays() -> None:
     admin.post(page, {"sure": "1"})
     assert Augmentation.objects.filter(state="cancelled").count() == 2
     assert "Cancelled, 1 still runs" in text_of(admin.get(reverse("job", args=[job.code])))
-
-
-def test_a_labelling_asks_before_it_opens_and_before_it_closes() -> None:
-    study = study_rows.a_study()
-    job = study.matchups.all()[0].left.job
-    admin, page = admin_of(), reverse("faults", args=[job.code])
-    asked = admin.post(page, {"name": "Faults", "experts": ["eva", "finn"], "seed": "1"})
-    assert "Pictures: 1. Experts: 2. Labels planned: 2." in text_of(asked)
-    assert not LabellingRound.objects.exists()
-    back = admin.post(page, {**hidden_of(asked), "change": "1"})
-    assert 'value="Faults"' in back.content.decode()
-    admin.post(page, {**hidden_of(asked), "sure": "1"})
-    labelling = LabellingRound.objects.get()
-    close = reverse("labelling-close", args=[labelling.code])
-    assert close in admin.get(page).content.decode()
-    for asked in (admin.get(close), admin.post(close)):
-        assert "Planned labels that will be missing: 2." in text_of(asked)
-        labelling.refresh_from_db()
-        assert labelling.closed_at is None
-    admin.post(close, {"sure": "1"})
-    labelling.refresh_from_db()
-    assert labelling.closed_at is not None
 
 
 def test_every_question_is_for_admins_alone_and_no_crawler_acts() -> None:

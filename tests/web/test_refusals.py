@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import pytest
 from django.utils.translation import override
 
@@ -14,19 +12,17 @@ from arena.queries.vote_sets import Filters
 from arena.services.handing_over import hand_over
 from arena.services.invitations import invite
 from arena.services.ratings import plan_snapshot
-from augment.errors import Conflict, InvalidDocument, KeyMissing, UnknownName
+from augment.errors import Conflict, InvalidDocument, UnknownName
 from augment.models import Event
-from augment.sentences import sentence, sentence_of, word
+from augment.sentences import sentence
 from augment.services.running import caps, jobs, leases
 from augment.services.running.caps import Caps
 from augment.services.wording import translate
 from tests import study_rows
 from tests.jobs import rows
-from tests.web.cast import signed_in
 
 pytestmark = pytest.mark.django_db
 
-GERMAN: Any = {"HTTP_ACCEPT_LANGUAGE": "de"}
 ODD = "100 % of %(name)s"
 
 
@@ -61,14 +57,6 @@ def test_words_and_sentences_within_a_sentence_are_said_and_names_are_not() -> N
     assert in_german(many).endswith("lanes.7: is empty (und 2 weitere)")
 
 
-def test_errors_without_a_sentence_stay_as_they_are() -> None:
-    plain = KeyMissing("KEY", "local")
-    assert in_german(plain) == str(plain)
-    assert (in_german(Conflict()), translate("")) == ("", "")
-    assert type(sentence_of(Conflict(word("100 %")))) is not str
-    assert in_german(Conflict(word("100 %"))) == "100 %"
-
-
 @pytest.mark.parametrize(
     ("error", "german"),
     [
@@ -78,15 +66,6 @@ def test_errors_without_a_sentence_stay_as_they_are() -> None:
 )
 def test_errors_that_word_themselves_speak_german(error: Exception, german: str) -> None:
     assert in_german(error).startswith(german)
-
-
-def test_keys_of_ones_own_are_refused_in_german() -> None:
-    client = signed_in(study_rows.expert("eva"))
-    body = {"keys": {"a": "s"}}
-    answer = client.post("/api/v1/preferences", body, content_type="application/json", **GERMAN)
-    assert answer.json()["error"]["fields"] == {
-        "keys": ["„s“ würde zweierlei tun: A ist besser, Überspringen."]
-    }
 
 
 def test_nothing_that_is_stored_is_german() -> None:

@@ -13,7 +13,7 @@ from arena.services.studies import PlanOptions, open_study
 from augment.models import Augmentation
 from tests.drives import drive_pictures
 from tests.study_rows import Cast, a_study, cast_of, matchups_of
-from tests.web.cast import people, signed_in
+from tests.web.cast import signed_in
 from tests.web.test_weight import MOST_BYTES, weight
 
 pytestmark = pytest.mark.django_db
@@ -72,22 +72,3 @@ def test_the_answer_says_nothing_of_where_it_comes_from() -> None:
     assert answer["Cache-Control"] == "private, no-store"
     assert not {"ETag", "Last-Modified", "Content-Disposition"} & set(answer.headers)
     assert signed_in(User.objects.get(username="finn")).get(address).status_code == 404
-
-
-def test_the_form_opens_a_study_with_them_and_its_page_says_so() -> None:
-    cast = a_driven_cast(scenarios=6)
-    admin = signed_in(people()["admin"])
-    sent = {"name": "Round 1", **cast, "votes_per_expert": 9, "seed": 4, "sure": "1"}
-    answer = admin.post(reverse("study-new"), sent | {"allow_replay": "on"}, follow=True)
-    assert Study.objects.get().allow_replay
-    said = r"<dt>Drives</dt><dd>may be played on 6 scenarios</dd>"
-    assert re.search(said, answer.content.decode())
-
-
-def test_the_form_names_what_was_not_driven() -> None:
-    cast = cast_of()
-    admin = signed_in(people()["admin"])
-    sent = {"name": "Round 1", **cast, "votes_per_expert": 9, "seed": 4, "sure": "1"}
-    answer = admin.post(reverse("study-new"), sent | {"allow_replay": "on"})
-    assert "ann on place-0" in answer.content.decode()
-    assert not Study.objects.exists()

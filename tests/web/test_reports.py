@@ -54,12 +54,6 @@ def test_the_mark_lies_in_the_pictures_that_the_report_names(side: str, marked: 
     assert row.matchup.scenario.instruction in shown
 
 
-def test_without_a_mark_none_is_drawn() -> None:
-    here = world()
-    shown = signed_in(people()["admin"]).get(address(told(here))).content.decode()
-    assert "The reported place" not in shown
-
-
 def test_an_admin_who_votes_in_the_open_study_is_not_told_who_made_it() -> None:
     here = world()
     row = told(here)

@@ -11,10 +11,8 @@ from urllib.parse import urlsplit
 import pytest
 from django.test import Client
 from django.urls import reverse
-from pytest_django import DjangoAssertNumQueries
 
 from arena.models import Matchup, Snapshot, Study, Vote
-from arena.queries.vote_lists import counted_votes
 from arena.queries.vote_sets import Filters
 from arena.services.ratings import rate
 from arena.web.results_tabs import TABS
@@ -107,27 +105,6 @@ def test_the_filters_stand_in_the_address_and_in_the_form(study: Study, analyst:
         assert number_of(listed(analyst, study, page=page)) > 0
 
 
-@pytest.mark.parametrize(
-    ("search", "said"),
-    [
-        ({"contestant": "nobody"}, "Select a valid choice. nobody is not one of the available"),
-        ({"contestant": "ann", "opponent": "ann"}, "nobody meets themselves"),
-        ({"outcome": "won"}, "Choose the contestant who won or lost."),
-        ({"scenario": "the-moon"}, "There is no scenario “the-moon” in this study."),
-        ({"mark": "purple"}, "Select a valid choice. purple is not one"),
-        ({"expert": "eva"}, "Select a valid choice. eva is not one"),
-    ],
-)
-def test_a_filter_that_means_nothing_is_explained(
-    study: Study, analyst: Client, search: dict[str, str], said: str
-) -> None:
-    rate(study=study, rounds=10)
-    for name in ("results-votes", "results-votes-file"):
-        answer = analyst.get(reverse(name, args=[study.code]), search)
-        assert answer.status_code == 422
-        assert said in " ".join(unescape(answer.content.decode()).split())
-
-
 def test_the_file_has_the_votes_of_the_list(study: Study, analyst: Client) -> None:
     rate(study=study, rounds=10, filters=Filters())
     address = reverse("results-votes-file", args=[study.code])
@@ -181,25 +158,6 @@ def test_a_changed_vote_says_from_what_to_what(study: Study, analyst: Client) ->
         assert str(other.key) in page
 
 
-def test_one_walks_from_vote_to_vote_within_the_filters(study: Study, analyst: Client) -> None:
-    rate(study=study, rounds=10, filters=Filters(leave_out_settled=True))
-    address = reverse("results-votes", args=[study.code])
-    page = listed(analyst, study, contestant="ann", opponent="bob")
-    total = number_of(page)
-    first = re.search(rf'href="({address}[0-9a-f-]+/\?[^"]*)"', page)
-    assert first is not None
-    here, seen = unescape(first[1]), []
-    while True:
-        shown = " ".join(analyst.get(here).content.decode().split())
-        seen.append(urlsplit(here).path)
-        assert f"Vote {len(seen)} of {total}" in shown
-        after = re.search(r'rel="next" href="([^"]*)"', shown)
-        if after is None:
-            break
-        here = unescape(after[1])
-    assert len(set(seen)) == total > 3
-
-
 def test_a_vote_given_after_the_rating_is_none_of_it(study: Study, analyst: Client) -> None:
     snapshot = rate(study=study, rounds=10)
     newest = Vote.objects.latest("pk")
@@ -226,25 +184,3 @@ def test_an_open_study_keeps_its_votes_until_an_early_look(analyst: Client) -> N
         b"".join(answer)
         assert answer.status_code == 200, address
         assert eva.get(address).status_code == 403
-
-
-def test_a_list_takes_as_many_queries_for_any_number_of_votes(
-    study: Study, analyst: Client, django_assert_max_num_queries: DjangoAssertNumQueries
-) -> None:
-    rate(study=study, rounds=10, filters=Filters())
-    for search in ({"scenario": "place-3"}, {"mark": "all"}):
-        listed(analyst, study, **search)
-        with django_assert_max_num_queries(18):
-            listed(analyst, study, **search)
-
-
-def test_settled_ties_are_told_apart_from_votes_that_experts_cast(
-    study: Study, analyst: Client
-) -> None:
-    snapshot = rate(study=study, rounds=10)
-    cast = counted_votes(snapshot).count()
-    ties = snapshot.votes_counted - cast
-    assert ties > 0
-    shown = analyst.get(reverse("results", args=[study.code])).content.decode()
-    assert f"{cast} votes and {ties} settled ties counted" in shown
-    assert f"Counted {cast} votes and {ties} ties of pairs that nobody was shown." in shown

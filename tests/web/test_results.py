@@ -41,14 +41,6 @@ def shown(study: Study, user: User | None = None, tab: str = "table") -> str:
     return answer.content.decode()
 
 
-def test_a_closed_study_without_a_rating_offers_to_rate_it() -> None:
-    study, analyst = judged(), people()["analyst"]
-    assert "Not rated yet" in shown(study, analyst)
-    signed_in(analyst).post(reverse("study-rate", args=[study.code]))
-    assert study.snapshots.count() == 1
-    assert "18 votes counted" in shown(study, analyst)
-
-
 def test_the_table_says_rank_rating_interval_and_votes_with_the_method_beneath() -> None:
     study = judged()
     rate(study=study, rounds=50)
@@ -57,16 +49,6 @@ def test_the_table_says_rank_rating_interval_and_votes_with_the_method_beneath()
     assert order == sorted(order)
     for said in ("Bradley-Terry on the Elo scale", "50 rounds", "seed 0", "SHA-256", "one plus"):
         assert said in page
-
-
-def test_one_vote_each_way_is_drawn_with_its_interval() -> None:
-    study = study_rows.a_study()
-    for n, matchup in enumerate(study.matchups.all()):
-        study_rows.vote(matchup, ("left", "equal", "right")[n % 3])
-    study = close_study(study=study)
-    rate(study=study, rounds=50, unit="vote")
-    page = shown(study)
-    assert page.count('class="range"') == page.count('class="whisker"') == 3
 
 
 def test_files_carry_the_numbers_of_the_page() -> None:
@@ -116,15 +98,6 @@ def test_an_expert_reads_results_only_once_no_open_study_has_the_same_contestant
     assert url not in signed_in(eva).get("/").content.decode()
     close_study(study=second)
     assert signed_in(eva).get(url).status_code == 200
-
-
-def test_a_study_without_votes_is_explained_rather_than_rated() -> None:
-    study = close_study(study=study_rows.a_study())
-    snapshot = rate(study=study, rounds=50)
-    page = shown(study)
-    assert snapshot.status
-    assert snapshot.status.split(".")[0] in page.replace("&#x27;", "'")
-    assert 'class="range"' not in page
 
 
 def test_groups_that_never_met_stand_apart_in_page_and_files(tmp_path: Path) -> None:

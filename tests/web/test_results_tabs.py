@@ -9,9 +9,9 @@ from django.urls import reverse
 from pytest_django import DjangoAssertNumQueries
 
 from arena.exports.bundle import bundle_files
-from arena.models import EarlyLook, Matchup, Snapshot, Study
+from arena.models import EarlyLook, Matchup, Study
 from arena.queries.vote_sets import Filters
-from arena.services.ratings import plan_snapshot, rate
+from arena.services.ratings import rate
 from arena.services.studies import close_study
 from arena.web.results_tabs import TABS
 from augment.models import Scenario
@@ -65,26 +65,6 @@ def test_beneath_the_table_stands_how_far_to_trust_it(study: Study, analyst: Cli
         "Test of fit:",
     ):
         assert said in shown, said
-
-
-def test_the_heat_map_leads_to_the_votes_with_both_pictures(study: Study, analyst: Client) -> None:
-    shown = page(analyst, study, "pairs")
-    assert shown.count('class="h') >= 72
-    snapshot = study.snapshots.get()
-    query = {"rating": str(snapshot.code), "contestant": "interplan", "opponent": "llama-otm"}
-    assert f"?rating={snapshot.code}&amp;contestant=interplan&amp;opponent=llama-otm" in shown
-    cell = analyst.get(reverse("results-votes", args=[study.code]), query).content.decode()
-    pair = next(p for p in snapshot.results.pairs if {p.a, p.b} == {"interplan", "llama-otm"})
-    assert cell.count("<img") == 2 * pair.votes
-
-
-def test_types_stand_on_one_axis_with_a_warning_where_votes_are_few(
-    study: Study, analyst: Client
-) -> None:
-    shown = page(analyst, study, "types")
-    for label in Scenario.Type.labels:
-        assert str(label) in shown
-    assert "Lines marked with * have fewer than 30 votes: too few to read much from." in shown
 
 
 def test_raters_are_pseudonyms_with_repeats_and_checks(analyst: Client) -> None:
@@ -195,15 +175,3 @@ def test_an_open_study_shows_a_gate_then_its_results_to_who_opened_them() -> Non
     assert "Early look: the study was still open." in shown
     Study.objects.filter(pk=study.pk).update(state=Study.State.OPEN)
     assert "still open" in admin.get(address).content.decode(), "each opens for themselves"
-
-
-def test_a_rating_under_way_shows_its_progress_beside_the_one_before(
-    study: Study, analyst: Client
-) -> None:
-    waiting = plan_snapshot(study=study, rounds=50)
-    Snapshot.objects.filter(pk=waiting.pk).update(progress=60, state="running")
-    shown = page(analyst, study)
-    assert "is being computed: 60 %" in shown
-    assert "Counted 360 votes." in shown
-    Snapshot.objects.filter(pk=waiting.pk).update(state="failed", status="Nobody voted.")
-    assert "could not be computed: Nobody voted." in page(analyst, study)

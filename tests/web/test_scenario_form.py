@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-from tempfile import gettempdir
 
 import pytest
 from django.core.files.uploadedfile import SimpleUploadedFile
@@ -96,33 +95,6 @@ def test_a_scenario_of_a_type_of_one_s_own_with_an_intent_by_fields(
     assert reverse("picture", args=["original", made.code]) in shown
 
 
-def test_density_and_goal_are_fields(analyst: Client, scene: BaseScene) -> None:
-    _, made = send(
-        analyst, scene, type="nudge_around_parked_vehicle", density="high", goal="right"
-    )
-    assert made is not None
-    assert (made.traffic_density, made.goal) == ("high", "right")
-    url = reverse("scenario-new", args=[scene.code])
-    given = {
-        "type": "jaywalking_pedestrian",
-        "instruction": "x",
-        "density": "low",
-        "keep_traffic": "on",
-    }
-    refused = analyst.post(url, given).content.decode()
-    assert "Spawned traffic replaces the recorded one" in refused
-    assert '<option value="low" selected>' in refused
-
-
-def test_an_intent_as_json_goes_before_the_fields(analyst: Client, scene: BaseScene) -> None:
-    _, made = send(
-        analyst, scene, type="jaywalking_pedestrian", intent=RING, i_kind="walk", i_start="left"
-    )
-    assert made is not None
-    assert made.intent == json.loads(RING)
-    assert made.slug == "street-scene-jaywalker-1"
-
-
 @pytest.mark.parametrize(
     ("fields", "problem"),
     [
@@ -166,28 +138,6 @@ def test_a_file_is_tried_then_added(analyst: Client) -> None:
     change.seek(0)
     assert "2 scenarios are added." in upload(analyst, ROWS, documents=change)
     assert Scenario.objects.get(slug="two").reference is not None
-
-
-@pytest.mark.usefixtures("scene")
-@pytest.mark.parametrize("name", ["change.json", "../../secret.json", "/etc/passwd"])
-def test_one_wrong_row_keeps_all_out_and_each_row_is_told(analyst: Client, name: str) -> None:
-    shown = upload(analyst, ROWS.replace("change.json", name))
-    assert "Nothing was added" in shown
-    assert gettempdir() not in shown
-    assert shown.count("badge is-bad") == 1
-    assert "Fine" in shown
-    assert Scenario.objects.count() == 1
-    if name != "change.json":
-        assert "lies outside of the folder of the list" in shown
-
-
-@pytest.mark.usefixtures("scene")
-def test_a_file_that_is_no_list_is_told(analyst: Client) -> None:
-    assert "must end in .csv" in upload(analyst, "hello", "many.txt")
-    many = "scene,type,instruction\n" + "street-scene,cut_in,x\n" * 301
-    assert "301 rows are too many for a page" in upload(analyst, many)
-    answer = analyst.post(reverse("scenarios-bulk"))
-    assert "Choose a CSV or YAML file." in answer.content.decode()
 
 
 def test_an_intent_is_changed_by_fields(analyst: Client, scene: BaseScene) -> None:
@@ -268,25 +218,3 @@ def test_what_is_retired_is_offered_no_more(scene: BaseScene) -> None:
     assert reverse("scenario", args=[made.code]) in retired
     admin.post(reverse("scenario-retired", args=[made.code]), {"retired": "no"})
     assert resolve_scenarios(["all"]) == [made.slug]
-
-
-def test_no_scenario_is_added_to_a_retired_scene(scene: BaseScene) -> None:
-    admin = signed_in(people()["admin"])
-    admin.post(reverse("scene-retired", args=[scene.code]), {"retired": "yes"})
-    shown, made = send(admin, scene, type="jaywalking_pedestrian")
-    assert made is None
-    assert "is retired" in shown
-    admin.post(reverse("scene-retired", args=[scene.code]), {"retired": "no"})
-    assert send(admin, scene, type="jaywalking_pedestrian")[1] is not None
-
-
-def test_a_scene_is_renamed_while_it_has_no_scenario(scene: BaseScene) -> None:
-    admin = signed_in(people()["admin"])
-    page = reverse("scene-rename", args=[scene.code])
-    refused = admin.post(page, {"slug": "other"}, follow=True).content.decode()
-    assert "can’t be renamed; it is needed by the scenario “street”" in refused
-    scene.scenarios.all().delete()
-    assert "lower-case letters" in admin.post(page, {"slug": "No"}, follow=True).content.decode()
-    admin.post(page, {"slug": "other"})
-    scene.refresh_from_db()
-    assert (scene.slug, scene.document["name"]) == ("other", "other")

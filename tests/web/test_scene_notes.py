@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-from html import unescape
 
 import pytest
 
@@ -38,16 +37,3 @@ def test_every_note_of_the_scene_stands_there_as_a_sentence() -> None:
     assert "building" in objects
     assert "&lt;b&gt;vegetation" in objects  # what a file says is text, never markup
     assert "CC BY-NC-SA 4.0" in licence
-
-
-def test_there_is_a_sentence_for_every_kind() -> None:
-    one_of_each = tuple(
-        Note(kind=kind, number=1, of=2, value=3.5, names=("this",)) for kind in SceneNoteKind
-    )
-    said = [unescape(line) for line in notes_on_page(one_of_each)]
-    assert len(said) == len(set(said)) == len(SceneNoteKind)
-    assert not [line for line in said if "%(" in line]
-
-
-def test_a_scene_that_left_nothing_open_says_nothing() -> None:
-    assert notes_on_page(()) == []

@@ -46,19 +46,6 @@ def test_the_paper_set_is_loaded_by_a_button_and_loading_it_again_changes_nothin
     assert Contestant.objects.filter(slug="reference").exists()
 
 
-def test_other_wordings_are_loaded_by_a_button(client: Client) -> None:
-    given = {"set": "hard", "wordings": "1"}
-    said = client.post(reverse("catalogue-load"), given, follow=True).content.decode()
-    assert " added" in said
-    assert Scenario.objects.exclude(paraphrase_of=None).exists()
-
-
-def test_another_set_is_named_as_unknown(client: Client) -> None:
-    answer = client.post(reverse("catalogue-load"), {"set": "easy"}, follow=True)
-    assert "Unknown set" in answer.content.decode()
-    assert not Scenario.objects.exists()
-
-
 def test_a_contestant_is_entered_with_a_new_endpoint_and_its_options(client: Client) -> None:
     text = enter(client)
     row = Contestant.objects.get(slug="qwen-fc")
@@ -67,14 +54,6 @@ def test_a_contestant_is_entered_with_a_new_endpoint_and_its_options(client: Cli
     assert row.endpoint is not None
     assert row.endpoint.base_url == "http://127.0.0.1:11434/v1"
     assert "0.7" in text
-
-
-def test_the_next_one_takes_the_endpoint_that_is_there(client: Client) -> None:
-    enter(client)
-    enter(client, slug="qwen-otm", variant="otm", endpoint="local", label="", base_url="",
-          protocol="")  # fmt: skip
-    assert Endpoint.objects.count() == 1
-    assert Contestant.objects.filter(slug="qwen-otm", endpoint__label="local").exists()
 
 
 @pytest.mark.parametrize(

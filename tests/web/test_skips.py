@@ -3,17 +3,13 @@
 from __future__ import annotations
 
 import re
-from functools import partial
 
 import pytest
 from django.contrib.auth.models import User
-from django.db import connection
-from django.test.utils import CaptureQueriesContext
 from django.urls import reverse
 
 from arena.queries import progress
 from arena.queries.coverage import coverage
-from arena.queries.gauges import read_gauges
 from arena.queries.inventory import take_inventory
 from arena.queries.votes import tallies, voting_progress
 from tests import study_rows
@@ -54,15 +50,6 @@ def test_a_skip_is_counted_apart_everywhere_and_a_vote_instead_of_it_counts() ->
     assert counted() == ((2, 2, 2), (2, 1, 0), (2, 1, 0), (2, 2, 2))
 
 
-def test_metrics_count_no_skip() -> None:
-    study = study_rows.a_study()
-    first, second, *_ = study_rows.matchups_of(study, "eva")
-    study_rows.vote(first)
-    study_rows.vote(second, "skip", reason="other")
-    (votes,) = (gauge for gauge in read_gauges() if gauge.name == "arena_votes")
-    assert votes.values == (("open", 1),)
-
-
 def test_a_skipped_pair_is_found_again_and_its_vote_stands_in_place_of_the_skip() -> None:
     here = world()
     eva, finn = signed_in(here.expert), signed_in(User.objects.get(username="finn"))
@@ -96,17 +83,3 @@ def test_the_thanks_say_that_skipped_pairs_have_no_vote() -> None:
     assert "9 pairs are skipped and have no vote of yours." in thanks
     home = signed_in(here.expert).get(reverse("home")).content.decode()
     assert reverse("vote-skipped", args=[here.study.code]) in home
-
-
-def test_progress_carries_no_rules_along_with_every_vote() -> None:
-    """Rules name every picture: grouped by them, 100,000 votes fill 100 GB of temporary rows."""
-    study = study_rows.a_study(votes_per_expert=3)
-    expert = study.experts.get(username="eva")
-    looks = (progress.of_studies, partial(progress.of_expert, expert))
-    for look in looks:
-        with CaptureQueriesContext(connection) as captured:
-            (line,) = look()
-        assert line.left
-        for query in captured:
-            assert "GROUP BY" not in query["sql"] or '"rules"' not in query["sql"]
-        assert len(captured) == 4

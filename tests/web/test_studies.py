@@ -2,17 +2,12 @@
 
 from __future__ import annotations
 
-import uuid
-
 import pytest
 from django.contrib.auth.models import User
 from django.urls import reverse
 
 from arena import tasks
 from arena.models import Study
-from arena.queries.coverage import shared_units
-from arena.services.reports import Complaint, report
-from arena.services.studies import open_study
 from augment.models import Augmentation
 from augment.scene.codec import modification_to_document
 from augment.scene.modification import Modification
@@ -74,23 +69,6 @@ def test_closing_rates_the_votes_once_and_shows_the_table() -> None:
     assert (study.state, study.snapshots.count()) == ("closed", 1)
 
 
-def test_a_study_nobody_voted_in_can_be_closed() -> None:
-    study = study_rows.a_study()
-    admin = signed_in(people()["admin"])
-    answer = admin.post(reverse("study-close", args=[study.code]), {"sure": "1"}, follow=True)
-    assert answer.status_code == 200
-    study.refresh_from_db()
-    assert study.state == "closed"
-
-
-def test_only_a_study_with_something_simulated_says_so() -> None:
-    real = open_study(
-        name="Real", votes_per_expert=2, seed=7, allow_simulated=True, **study_rows.cast_of()
-    )
-    page = signed_in(people()["admin"]).get(reverse("study", args=[real.code]))
-    assert "Simulated votes and contestants count" not in page.content.decode()
-
-
 def opened(**rules: object) -> tuple[int, str]:
     """What posting the form with these rules answers."""
     sent = {"name": "Round 1", **study_rows.cast_of(), "votes_per_expert": 12, "seed": 4}
@@ -127,25 +105,6 @@ def test_rules_that_make_no_sense_are_said_on_the_form(
     assert not Study.objects.exists()
 
 
-def test_the_page_shows_rules_coverage_and_reports() -> None:
-    study = study_rows.a_study()
-    first, second, *_ = study_rows.matchups_of(study, "eva")
-    study_rows.vote(first)
-    report(
-        expert=first.expert,
-        matchup_code=second.code,
-        key=uuid.uuid4(),
-        said=Complaint(reason="picture_wrong", comment="The truck is cut off."),
-    )
-    shown = (
-        signed_in(people()["analyst"]).get(reverse("study", args=[study.code])).content.decode()
-    )
-    assert "none, balanced" in shown
-    assert "Votes: 1 of 18." in shown
-    assert "The truck is cut off." in shown
-    assert "Hand over" not in shown, "that is for admins"
-
-
 def test_an_admin_hands_over_what_an_expert_has_not_judged() -> None:
     study = study_rows.a_study(experts=("eva", "finn", "gus"))
     admin = signed_in(people()["admin"])
@@ -161,20 +120,6 @@ def test_an_admin_hands_over_what_an_expert_has_not_judged() -> None:
     nobody = admin.post(url, {"giver": "finn"}, follow=True)
     assert "Choose who takes over." in nobody.content.decode()
     assert signed_in(User.objects.get(username="the-analyst")).post(url).status_code == 403
-
-
-def test_pairs_that_two_experts_judge_are_planned_previewed_and_shown() -> None:
-    cast = study_rows.cast_of()
-    sent = {"name": "Round 1", **cast, "votes_per_expert": 9, "seed": 4, "overlap": 30}
-    admin = signed_in(people()["admin"])
-    asked = admin.post(reverse("study-new"), sent).content.decode()
-    assert "that are judged: 12; by two experts or more: 6." in asked
-    admin.post(reverse("study-new"), {**sent, "sure": "1"})
-    study = Study.objects.get()
-    assert study.rules["overlap_share"] == 0.3
-    assert shared_units(study) == (12, 6)
-    shown = admin.get(reverse("study", args=[study.code])).content.decode()
-    assert "6 of 12 pairs; 30 % were asked for" in shown
 
 
 def test_attention_checks_are_drawn_by_a_worker_with_one_click(

@@ -16,11 +16,10 @@ from arena.pairing.plan import plan
 from arena.services.accounts import forget_identity
 from arena.services.plans import rules_of
 from arena.services.studies import PlanOptions, open_study
-from arena.services.study_drafts import FIELDS, NAMES, keep_draft, read_entered, settings_of
+from arena.services.study_drafts import FIELDS, keep_draft
 from arena.web.forms import ChoiceForm
 from arena.web.study_forms import StudyForm
-from augment.errors import InvalidDocument, UnknownName
-from augment.models import Contestant, Event, Scenario
+from augment.models import Contestant
 from augment.services.retirement import retire
 from tests import study_rows
 from tests.web.cast import people, signed_in
@@ -89,13 +88,6 @@ def test_the_drafts_fields_are_those_of_the_form() -> None:
     """A field that one of them lacks would be lost on the way."""
     fields = {**ChoiceForm.base_fields, **StudyForm.base_fields}
     assert set(FIELDS) == set(fields) - {"types"}, "whole types are kept as their scenarios"
-
-
-def test_a_whole_type_is_kept_as_the_scenarios_it_had(admin: Client) -> None:
-    study_rows.cast_of(scenarios=2)
-    admin.post(NEW, {"name": "Round 1", "types": [Scenario.Type.NUDGE], "keep": "1"})
-    study_rows.scenario("later")
-    assert StudyDraft.objects.get().names_in("scenarios") == ["place-0", "place-1"]
 
 
 def test_a_draft_is_listed_and_no_expert_sees_it(admin: Client) -> None:
@@ -174,56 +166,12 @@ def test_a_draft_that_was_changed_meanwhile_is_not_opened(admin: Client) -> None
     assert (answer.status_code, Study.objects.count()) == (422, 0)
 
 
-def test_discarding_takes_a_second_click(admin: Client) -> None:
-    draft = keep_draft(entered={"name": "Round 1"})
-    page = reverse("study-draft-discard", args=[draft.code])
-    assert "Discard the draft “Round 1”?" in text_of(admin.post(page))
-    assert StudyDraft.objects.exists()
-    admin.post(page, {"sure": "1"})
-    assert not StudyDraft.objects.exists()
-
-
-def test_the_log_has_every_act_on_a_draft(admin: Client) -> None:
-    cast = study_rows.cast_of()
-    admin.post(NEW, {"name": "One", "keep": "1"})
-    draft = StudyDraft.objects.get()
-    for name in ("One", "Two"):
-        revision = str(StudyDraft.objects.get().revision)
-        admin.post(page_of(draft), {"name": name, "revision": revision, "keep": "1"})
-    sent = {"name": "Two", **cast, "votes_per_expert": "9", "seed": "4", "revision": "2"}
-    admin.post(page_of(draft), {**sent, "sure": "1"})
-    acts = Event.objects.filter(object_kind="study draft").order_by("pk")
-    assert [act.verb for act in acts] == ["draft", "change draft", "open draft"]
-    assert acts[1].after == {"name": "Two", "fields": ["name"]}
-    assert {act.actor.username for act in acts if act.actor} == {"the-admin"}
-
-
 def test_who_is_forgotten_is_forgotten_in_drafts_too(admin: Client) -> None:
     draft = keep_draft(entered={"experts": study_rows.cast_of()["experts"]})
     eva = User.objects.get(username="eva")
     forget_identity(user=eva, actor=User.objects.get(username="the-admin"))
     draft.refresh_from_db()
     assert "eva" not in str(draft.entered)
-
-
-@pytest.mark.parametrize(
-    ("given", "fault"),
-    [
-        ({"colour": "red"}, UnknownName),
-        ({"experts": "eva"}, InvalidDocument),
-        ({"practice": "on"}, InvalidDocument),
-        ({"seed": ["4"]}, InvalidDocument),
-        ({"name": "x" * 121}, InvalidDocument),
-        ({"name": "two\nlines"}, InvalidDocument),
-        ({"targets": "x" * 60_001}, InvalidDocument),
-    ],
-)
-def test_a_program_is_told_what_a_field_takes(
-    given: dict[str, object], fault: type[Exception]
-) -> None:
-    with pytest.raises(fault):
-        read_entered(given)
-    assert read_entered({"name": "x" * 120, "seed": 4})["seed"] == "4"
 
 
 def a_rich_study() -> Study:
@@ -261,10 +209,3 @@ def test_the_settings_of_a_study_open_another_that_is_planned_the_same(admin: Cl
         "allow_simulated",
     ):
         assert getattr(first, name) == getattr(second, name), name
-
-
-def test_names_of_drafts_count_when_a_free_one_is_looked_for() -> None:
-    study = study_rows.a_study()
-    keep_draft(entered={"name": "Round 1 (2)"})
-    assert settings_of(study)["name"] == "Round 1 (3)"
-    assert set(NAMES) < set(settings_of(study))

@@ -7,7 +7,6 @@ import zipfile
 from pathlib import Path
 
 import pytest
-import yaml
 from django.contrib.auth.models import User
 from django.core.files.base import ContentFile
 from django.core.files.storage import default_storage
@@ -110,17 +109,6 @@ def test_the_contact_sheet_has_every_scenario(closed: Study) -> None:
     admin = signed_in(people()["admin"])
     assert write(admin, closed, "contact-sheet").state == "ready"
     assert content_of(admin, closed, "contact-sheet").startswith(b"%PDF")
-
-
-def test_interplans_file_has_what_the_study_shows(closed: Study) -> None:
-    admin = signed_in(people()["admin"])
-    row = write(admin, closed, "interplan")
-    assert (row.state, row.fault) == ("ready", "")
-    with zipfile.ZipFile(io.BytesIO(content_of(admin, closed, "interplan"))) as archive:
-        named = yaml.safe_load(archive.read("interplan.yaml"))
-        manifest = archive.read("manifest.json").decode()
-    assert str(closed.code) in manifest
-    assert named
 
 
 def test_an_open_study_gives_away_no_results(closed: Study) -> None:

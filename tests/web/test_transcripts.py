@@ -44,10 +44,6 @@ def test_the_page_shows_role_tokens_cost_and_the_answer() -> None:
     assert "Prompt version" in shown
 
 
-def test_an_unknown_cost_is_called_unknown() -> None:
-    assert "cost unknown" in page_of(ran(only_row(llama_job())))
-
-
 def test_a_call_from_the_store_is_marked_and_leads_to_its_source() -> None:
     first = ran(only_row(llama_job(price="1")))
     job = jobs.launch(name="Again", contestants=["llama"], scenarios=["street-1"])
@@ -86,11 +82,3 @@ def test_rounds_reviews_and_pictures_are_on_the_page() -> None:
 def test_no_other_file_is_given_out(digest: str) -> None:
     url = reverse("asked-image", args=[digest])
     assert signed_in(people()["admin"]).get(url).status_code == 404
-
-
-def test_the_json_is_a_file_for_staff() -> None:
-    row = ran(only_row(llama_job()))
-    answer = signed_in(people()["analyst"]).get(reverse("transcript", args=[row.code]))
-    assert answer.headers["Content-Type"] == "application/json"
-    assert f"transcript-{row.code}.json" in answer.headers["Content-Disposition"]
-    assert answer.json()["augmentation"]["code"] == str(row.code)

@@ -81,19 +81,3 @@ def test_a_file_that_is_too_large_is_not_kept(analyst: Client, settings: LazySet
     assert "at most 1 MB are taken" in shown
     assert not SceneUpload.objects.exists()
     assert "Choose the moment" in send(analyst, STREET + b" " * (1_000_000 - len(STREET)))
-
-
-def test_a_moment_that_is_not_there_is_told(analyst: Client) -> None:
-    send(analyst)
-    row = SceneUpload.objects.get()
-    for track, stop in (("0", "1"), ("1", "0"), ("0", "-1"), ("x", "0"), ("0", "")):
-        answer = analyst.post(
-            reverse("upload-show", args=[row.code]), {"track": track, "stop": stop}, follow=True
-        )
-        assert "no such moment" in answer.content.decode()
-    assert not UploadMoment.objects.exists()
-
-
-def test_without_a_file_nothing_is_kept(analyst: Client) -> None:
-    answer = analyst.post(reverse("scene-send"), {"format": ""}, follow=True)
-    assert "Choose a file." in answer.content.decode()

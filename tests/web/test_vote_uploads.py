@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from tempfile import gettempdir
-
 import pytest
 from django.core.files.uploadedfile import SimpleUploadedFile
 from django.http import HttpResponse
@@ -35,27 +33,6 @@ def test_a_file_becomes_a_closed_study_of_whoever_sent_it() -> None:
     event = Event.objects.get(verb="import votes")
     assert event.actor is not None
     assert event.actor.username == "the-admin"
-
-
-@pytest.mark.parametrize(
-    ("content", "said"),
-    [
-        (b"model_a,model_b,winner\nann,bob,nobody\n", "line 2"),
-        (b"model_a,winner\nann,tie\n", "model_b"),
-        (b"", 'role="alert"'),
-        (b"\xff\xfe\x00", 'role="alert"'),
-        (b"PAR1 and no more", 'role="alert"'),
-    ],
-)
-def test_what_can_not_be_read_is_said_with_its_place_and_nothing_is_kept(
-    content: bytes, said: str
-) -> None:
-    answer = _send(content)
-    assert answer.status_code == 422
-    assert said in answer.content.decode()
-    assert gettempdir() not in answer.content.decode()
-    assert 'value="Elsewhere"' in answer.content.decode()
-    assert not Study.objects.exists()
 
 
 def test_a_file_that_is_too_large_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:

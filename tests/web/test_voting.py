@@ -11,7 +11,6 @@ from django.test.utils import CaptureQueriesContext
 from django.urls import reverse
 
 from arena.models import Report, Vote
-from arena.queries.voting_keys import USUAL_KEYS
 from arena.services.studies import close_study
 from tests import study_rows
 from tests.web.ballots import ballot, following, page
@@ -105,17 +104,6 @@ def test_the_last_vote_leads_to_the_thanks() -> None:
     assert "9 answers saved" in shown
 
 
-def test_the_page_works_without_a_script_and_says_where_one_is() -> None:
-    here = world()
-    shown = signed_in(here.expert).get(page(here)).content.decode()
-    assert re.findall(r'name="outcome" value="(\w+)"', shown) == ["left", "equal", "right"]
-    assert re.findall(r'name="skip" value="(\w+)"', shown) == Vote.SkipReason.values
-    assert re.findall(r'name="report" value="(\w+)"', shown) == Report.Reason.values
-    assert re.search(r'<span id="place">1</span> of 9', shown)
-    assert following(here).scenario.instruction in shown
-    assert shown.count('width="1200" height="800"') == 2
-
-
 def test_every_showing_has_a_key_of_its_own_and_is_never_cached() -> None:
     here, key = world(), r'name="key" value="([0-9a-f-]+)"'
     expert = signed_in(here.expert)
@@ -153,11 +141,6 @@ def test_a_picture_goes_out_bare_and_to_its_expert_alone() -> None:
     assert signed_in(here.expert).get(theirs).status_code == 404
     assert status(people()["admin"], theirs) == 200
     assert signed_in(here.expert).get(reverse("matchup-image", args=["x"])).status_code == 404
-
-
-def test_another_experts_study_is_404() -> None:
-    here = world()
-    assert signed_in(people()["expert"]).get(page(here)).status_code == 404
 
 
 def test_a_skip_keeps_its_reason_and_a_comment_goes_along() -> None:
@@ -201,15 +184,6 @@ def test_a_vote_that_is_not_ones_own_can_not_be_shown_for_a_change() -> None:
     assert "supersedes" not in shown
 
 
-def test_the_thanks_still_lead_to_the_last_votes() -> None:
-    here = world()
-    last = [study_rows.vote(matchup) for matchup in study_rows.matchups_of(here.study, "eva")][-1]
-    expert = signed_in(here.expert)
-    assert f"?change={last.key}" in expert.get(page(here)).content.decode()
-    changed = expert.get(page(here), {"change": str(last.key)}).content.decode()
-    assert f'name="supersedes" value="{last.key}"' in changed
-
-
 def test_a_report_by_the_form_is_kept_and_leads_back() -> None:
     here = world()
     first = following(here)
@@ -222,24 +196,6 @@ def test_a_report_by_the_form_is_kept_and_leads_back() -> None:
     assert (kept.matchup, kept.reason, kept.comment) == (first, "picture_wrong", "a car floats")
     assert (kept.side, kept.mark_x) == ("right", None)
     assert not Vote.objects.exists()
-
-
-def test_a_report_that_can_not_be_read_keeps_nothing() -> None:
-    here = world()
-    url = reverse("vote-report", args=[here.study.code])
-    answer = signed_in(here.expert).post(url, ballot(following(here), report="?"), follow=True)
-    assert "nothing was reported" in answer.content.decode()
-    assert not Report.objects.exists()
-
-
-def test_the_help_page_names_every_key() -> None:
-    here = world()
-    url = reverse("vote-help", args=[here.study.code])
-    here.study.allow_text = here.study.allow_replay = True
-    here.study.save()
-    shown = signed_in(here.expert).get(url).content.decode()
-    for keys in USUAL_KEYS.values():
-        assert all(f"<kbd>{key.upper()}</kbd>" in shown for key in keys), keys
 
 
 def test_the_page_costs_few_queries() -> None:

@@ -44,22 +44,6 @@ def test_the_page_names_every_module_that_its_script_imports() -> None:
     assert named == imported
 
 
-def test_comments_and_indentation_are_not_served() -> None:
-    script = '// why\nconst a = {\n  b: "// no comment",\n};\n\n  // more\na.b;\n'
-    assert as_served("a.js", script) == 'const a = {b: "// no comment",\n};a.b;'
-
-
-def test_a_line_with_a_comment_behind_it_ends_where_it_ended() -> None:
-    script = "a(); // b;\nc(\n  d,\n);\nreturn\ne\n"
-    assert as_served("a.js", script) == "a(); // b;\nc(d,);return\ne\n"
-
-
-def test_style_sheets_go_without_blanks_around_braces_and_behind_commas_and_colons() -> None:
-    style = "/* About. */\na, b > i { c: d e; f: g; }\n"
-    style += "@media (h: 1) {\n  /* gone */\n  i { j: k; }\n}\n"
-    assert as_served("a.css", style) == "a,b>i{c:d e;f:g}@media (h:1){\ni{j:k}}"
-
-
 @pytest.mark.parametrize("path", [p for p in OURS if p.suffix == ".css"], ids=lambda p: p.name)
 def test_no_text_of_a_style_sheet_has_braces_semicolons_or_commas(path: Path) -> None:
     # Else taking away what is around them would change it.
