@@ -1,7 +1,6 @@
 from __future__ import annotations
 
 import pytest
-from django.contrib import admin
 from django.contrib.auth.models import User
 from django.test import Client
 from django.urls import reverse
@@ -10,7 +9,6 @@ from django.utils import timezone
 from augment.models import (
     Attempt,
     Augmentation,
-    Contestant,
     Endpoint,
     EndpointModel,
     Event,
@@ -47,19 +45,6 @@ def past_job() -> None:
     add_model("llama", endpoint=endpoint, model="llama3.1")
 
 
-def test_every_list_and_every_row_can_be_opened(office: Client) -> None:
-    past_job()
-    for model in admin.site._registry:
-        if model._meta.app_label != "augment":
-            continue
-        name = f"admin:augment_{model._meta.model_name}"
-        page = office.get(reverse(f"{name}_changelist"), {"q": "x"})
-        assert page.status_code == 200, name
-        row = model._default_manager.first()
-        assert row is not None, name
-        assert office.get(reverse(f"{name}_change", args=[row.pk])).status_code == 200, name
-
-
 @pytest.mark.parametrize("model", PAST)
 def test_what_is_past_can_only_be_read(office: Client, model: type) -> None:
     past_job()
@@ -68,12 +53,3 @@ def test_what_is_past_can_only_be_read(office: Client, model: type) -> None:
     assert office.get(reverse(f"{name}_add")).status_code == 403
     assert office.post(reverse(f"{name}_change", args=[row.pk]), {}).status_code == 403
     assert office.post(reverse(f"{name}_delete", args=[row.pk]), {}).status_code == 403
-
-
-def test_only_the_name_of_a_contestant_can_be_changed(office: Client) -> None:
-    past_job()
-    llama = Contestant.objects.get(slug="llama")
-    page = reverse("admin:augment_contestant_change", args=[llama.pk])
-    office.post(page, {"name": "Llama 3.1", "kind": "rule", "model": "other"})
-    llama.refresh_from_db()
-    assert (llama.name, llama.kind, llama.model) == ("Llama 3.1", "llm", "llama3.1")

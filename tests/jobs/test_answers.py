@@ -2,21 +2,16 @@
 
 from __future__ import annotations
 
-import hashlib
 from dataclasses import replace
 
 import pytest
-from django.core.files.storage import default_storage
-from django.utils import timezone
 
 from augment.errors import ModelFault
-from augment.llm.messages import Message, Reply, Request, Speaker, ToolCall
+from augment.llm.messages import Reply
 from augment.models import Augmentation, GenerationJob, ModelCall
-from augment.services.running import answers, jobs, runner
-from augment.services.running.transcripts import RowTranscript
-from augment.variants.transcript import ModelRole, NoteKind
+from augment.services.running import jobs, runner
 from tests.jobs.models import Model, llama_job, reply
-from tests.jobs.rows import leased, only_row
+from tests.jobs.rows import only_row
 from tests.variants.answers import GOOD
 
 pytestmark = pytest.mark.django_db
@@ -87,35 +82,6 @@ def test_a_refusal_is_an_answer_and_stays_one() -> None:
     assert len(model.requests) == 1
 
 
-def test_an_image_is_kept_once_in_the_media_and_named_in_the_request() -> None:
-    row = only_row(llama_job())
-    assert row.contestant.endpoint is not None
-    transcript = RowTranscript(leased(row, now=timezone.now()), row, row.contestant.endpoint)
-    message = Message(speaker=Speaker.USER, text="Look.", images=(b"a picture",))
-    transcript.asked(ModelRole.VIEWER, Request(model="m", messages=(message,)), "p1")
-    digest = hashlib.sha256(b"a picture").hexdigest()
-    call = ModelCall.objects.get()
-    assert call.request["messages"][0]["content"][1]["image_url"]["url"] == f"sha256:{digest}"
-    with default_storage.open(f"asked/{digest}.png") as kept:
-        assert kept.read() == b"a picture"
-
-
-def test_notes_are_kept_in_their_order_between_calls() -> None:
-    row = only_row(llama_job())
-    assert row.contestant.endpoint is not None
-    held = leased(row, now=timezone.now())
-    transcript = RowTranscript(held, row, row.contestant.endpoint)
-    transcript.note(NoteKind.ROUND, {"round": 1})
-    message = Message(speaker=Speaker.USER, text="Go.")
-    transcript.asked(ModelRole.MODIFIER, Request(model="m", messages=(message,)), "p1")
-    transcript.note(NoteKind.REVIEW, {"mean": 4.5, "said": "nul \0"})
-    notes = row.attempts.get().notes.values_list("after_call", "kind", "document")
-    assert list(notes) == [
-        (0, "round", {"round": 1}),
-        (1, "review", {"mean": 4.5, "said": "nul ␀"}),
-    ]
-
-
 def test_an_answer_to_a_cut_prompt_is_kept_and_paid_for_but_never_served() -> None:
     cut = Model(lambda request: replace(reply(), prompt_tokens=12))
     job = llama_job(price="1")
@@ -128,10 +94,3 @@ def test_an_answer_to_a_cut_prompt_is_kept_and_paid_for_but_never_served() -> No
     whole = Model()
     assert ran(again(), whole).state == DONE
     assert len(whole.requests) == 1
-
-
-def test_what_a_model_wants_called_is_part_of_its_answer() -> None:
-    wanted = ToolCall(id="c1", name="pose_on_lane", arguments='{"lane": "Lane1"')
-    columns = answers.columns_of(replace(reply(), tool_calls=(wanted,)))
-    assert answers.reply_of(ModelCall(**columns)).tool_calls == (wanted,)
-    assert answers.columns_of(reply())["extras"] is None

@@ -8,11 +8,11 @@ from decimal import Decimal
 import pytest
 from django.utils import timezone
 
-from augment.errors import EndpointBusy, LeaseLost, ModelFault, NotSent
+from augment.errors import EndpointBusy, LeaseLost, ModelFault
 from augment.llm.costs import Price, WorstCase
 from augment.llm.messages import Reply
-from augment.models import Augmentation, EndpointModel, Event, GenerationJob, ModelCall
-from augment.services.running import budget, caps, jobs, leases, pausing, runner
+from augment.models import Augmentation, Event, GenerationJob, ModelCall
+from augment.services.running import budget, caps, leases, pausing, runner
 from augment.services.running.budget import Room
 from augment.services.running.caps import Caps
 from augment.services.running.costs import costs_of
@@ -44,14 +44,6 @@ def test_a_call_turns_its_reservation_into_what_it_used() -> None:
     assert (call.cost_usd, call.is_cost_estimated) == (Decimal("0.00604"), False)
     assert (job.spent_usd, job.spent_calls, job.spent_tokens) == (Decimal("0.00604"), 1, 3020)
     assert (job.reserved_nano_usd, job.reserved_calls, job.reserved_tokens) == (0, 0, 0)
-
-
-def test_an_unknown_price_leaves_the_cost_unknown() -> None:
-    job = llama_job()
-    ran(job)
-    call = ModelCall.objects.get()
-    assert (call.cost_usd, call.reserved_usd, call.spent_tokens) == (None, None, 3020)
-    assert (job.spent_calls, job.spent_tokens) == (1, 3020)
 
 
 def test_unknown_usage_counts_with_its_worst_case_and_says_so() -> None:
@@ -89,24 +81,6 @@ def test_a_call_that_found_no_place_counts_nothing() -> None:
     assert_nothing_is_counted(job)
 
 
-def test_an_endpoint_that_is_down_uses_up_no_cap() -> None:
-    job = llama_job(price="1", caps=Caps(calls=1))
-    row = ran(job, Model(NotSent("the connection failed: Connection refused")))
-    assert row.state == ROW.FAILED
-    assert_nothing_is_counted(job)
-    assert ModelCall.objects.get().sent_at is None
-
-
-def test_a_fault_that_is_free_makes_no_sum_of_unknown_prices() -> None:
-    job = llama_job()
-    ran(job, Model(ModelFault("no such model", retryable=False, status=404)))
-    assert not costs_of(job).is_money_unknown
-    jobs.retry_failed(job)
-    ran(job)
-    costs = costs_of(job)
-    assert (costs.paid, costs.unpriced, costs.is_money_unknown) == (2, 1, True)
-
-
 @pytest.mark.parametrize("queue_finds_out", [True, False])
 def test_a_claim_that_is_lost_before_a_call_is_sent_costs_nothing(queue_finds_out: bool) -> None:
     job = llama_job(price="1", caps=Caps(usd=Decimal(1)))
@@ -134,15 +108,6 @@ def assert_nothing_is_counted(job: GenerationJob) -> None:
     assert (job.reserved_calls, job.reserved_tokens, job.reserved_nano_usd) == (0, 0, 0)
 
 
-def test_each_attempt_at_a_request_is_a_reservation_of_its_own() -> None:
-    job = llama_job(caps=Caps(calls=2))
-    passing = ModelFault("busy", retryable=True, status=503, retry_after_s=0.001)
-    model = Model(passing)
-    row = ran(job, model)
-    assert len(model.requests) == 2
-    assert (job.state, job.spent_calls, row.state) == (JOB.STOPPED_AT_CAP, 2, ROW.QUEUED)
-
-
 def test_a_job_that_has_no_room_for_a_call_asks_nothing_and_is_stopped() -> None:
     job = llama_job(caps=Caps(tokens=5))
     model = Model()
@@ -157,12 +122,6 @@ def test_a_job_that_has_no_room_for_a_call_asks_nothing_and_is_stopped() -> None
     assert event.after == {"state": "stopped_at_cap", "cap": "5 tokens"}
     assert leases.take_lease(augmentation_pk=row.pk, now=NOON) is None
     assert leases.find_unsent(now=NOON, older_than=STALE) == []
-
-
-def test_what_is_over_at_a_cap_that_is_just_reached_finishes() -> None:
-    job = llama_job(caps=Caps(calls=1))
-    assert ran(job).state == ROW.DONE
-    assert job.state == JOB.FINISHED
 
 
 def test_a_stopped_attempt_is_replayed_from_its_answers_also_in_a_fresh_job() -> None:
@@ -197,21 +156,6 @@ def test_room_that_calls_in_flight_hold_is_waited_for() -> None:
     assert [reserve(), reserve()] == [Room.SPENT, Room.SPENT]
     job.refresh_from_db()
     assert (job.state, job.reserved_tokens) == (JOB.STOPPED_AT_CAP, 0)
-
-
-def test_a_cap_is_used_to_its_last_token() -> None:
-    job = launch()
-    GenerationJob.objects.filter(pk=job.pk).update(cap_tokens=1000, cap_nano_usd=1_000_000)
-    assert budget.reserve(job_pk=job.pk, worst=WORST, price=ONE_USD) == Room.TAKEN
-
-
-def test_a_price_that_went_away_fails_the_row_and_spends_nothing() -> None:
-    job = llama_job(price="1", caps=Caps(usd=Decimal(1)))
-    EndpointModel.objects.all().delete()
-    model = Model()
-    row = ran(job, model)
-    assert (row.state, model.requests) == (ROW.FAILED, [])
-    assert "the price of the model is unknown" in row.reason
 
 
 def test_a_call_of_a_dead_worker_counts_with_its_worst_case() -> None:
@@ -271,29 +215,3 @@ def in_flight(job: GenerationJob, held: leases.Lease, *, is_sent: bool = True) -
         reserved_tokens=WORST.tokens,
         reserved_nano_usd=WORST.nano_usd(ONE_USD),
     )
-
-
-def test_a_worker_that_is_told_to_stop_settles_its_call_in_flight() -> None:
-    job = llama_job()
-
-    def stop() -> None:
-        raise SystemExit(0)
-
-    with pytest.raises(SystemExit):
-        ran(job, Model(looking_on=stop))
-    job.refresh_from_db()
-    assert (job.reserved_calls, job.spent_calls) == (0, 1)
-    assert only_row(job).state == ROW.QUEUED
-
-
-def test_a_worker_that_is_told_to_stop_while_its_call_waits_spends_nothing() -> None:
-    job = llama_job(price="1")
-
-    def stop() -> None:
-        raise SystemExit(0)
-
-    model = Model(waiting=stop)
-    with pytest.raises(SystemExit):
-        ran(job, model)
-    assert (only_row(job).state, model.requests) == (ROW.QUEUED, [])
-    assert_nothing_is_counted(job)

@@ -5,17 +5,9 @@ from __future__ import annotations
 from typing import Any
 
 import pytest
-from django.urls import reverse
 
-from augment.models import Augmentation, Endpoint, EndpointModel, ModelCall, TranscriptNote
-from augment.services.endpoints import treatments
-from augment.services.endpoints.known_models import profile_of
-from augment.services.running import runner
+from augment.models import ModelCall, TranscriptNote
 from augment.services.running.call_changes import changes_of
-from augment.services.running.transcript_export import transcript_of
-from tests.jobs.models import Model, llama_job
-from tests.jobs.rows import only_row
-from tests.web.cast import people, signed_in
 
 pytestmark = pytest.mark.django_db
 
@@ -73,29 +65,3 @@ def test_each_change_is_said_and_nothing_else(
     found = changes_of(made, options=options, before=before, notes=notes)
     assert len(found) == bool(said)
     assert said in "".join(found)
-
-
-def test_the_page_and_the_file_say_what_the_model_did_not_take() -> None:
-    job = llama_job()
-    row = only_row(job)
-    contestant, site = row.contestant, Endpoint.objects.get()
-    contestant.options = {"temperature": 0.7}
-    contestant.save()
-    EndpointModel.objects.update_or_create(
-        endpoint=site, model=contestant.model, defaults={"temperature": False}
-    )
-    assert treatments.left_out(contestant) == {"modifier": ["temperature"]}
-
-    class Fitting(Model):
-        def fitted(self, request: Any) -> Any:
-            return profile_of(endpoint=site, model=contestant.model).fitted(request)
-
-    runner.work_on(augmentation_pk=row.pk, connect=Fitting())
-    row = Augmentation.objects.get()
-    sentence = "temperature was to be 0.7 and is not sent: the model does not take it."
-    client = signed_in(people()["analyst"])
-    assert sentence in client.get(reverse("augmentation", args=[row.code])).content.decode()
-    (step,) = [
-        step for step in transcript_of(row)["attempts"][0]["steps"] if step["kind"] == "call"
-    ]
-    assert step["changes"] == [sentence]

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import threading
 import time
-import uuid
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from datetime import datetime, timedelta
@@ -14,7 +13,7 @@ from django.db import connection
 
 from augment.errors import EndpointBusy, LeaseLost
 from augment.models import CallLease, Endpoint
-from augment.services.endpoints.call_limits import LEASE, MINUTE, Queue, admit, clear_old, place_at
+from augment.services.endpoints.call_limits import LEASE, Queue, admit, clear_old, place_at
 from tests.jobs.rows import NOON
 from tests.processes import wait_until
 
@@ -97,41 +96,6 @@ def test_a_place_is_free_again_when_its_call_ended() -> None:
         1 / 0  # noqa: B018
     with place_at(endpoint, queue):
         pass
-
-
-@pytest.mark.django_db
-def test_a_dead_worker_keeps_its_place_until_its_lease_runs_out() -> None:
-    endpoint = local(max_concurrency=1)
-    assert isinstance(admit(endpoint_pk=endpoint.pk, clock=at(NOON)), uuid.UUID)
-    assert admit(endpoint_pk=endpoint.pk, clock=at(NOON + LEASE / 2)) == 0.0
-    assert isinstance(admit(endpoint_pk=endpoint.pk, clock=at(NOON + LEASE)), uuid.UUID)
-
-
-@pytest.mark.django_db
-def test_a_start_that_waits_for_the_minute_is_told_how_long() -> None:
-    endpoint = local(max_concurrency=9, requests_per_minute=2)
-    for second in (0, 10):
-        moment = NOON + timedelta(seconds=second)
-        assert isinstance(admit(endpoint_pk=endpoint.pk, clock=at(moment)), uuid.UUID)
-    later = NOON + timedelta(seconds=20)
-    assert admit(endpoint_pk=endpoint.pk, clock=at(later)) == MINUTE.total_seconds() - 20
-    assert isinstance(admit(endpoint_pk=endpoint.pk, clock=at(NOON + MINUTE)), uuid.UUID)
-
-
-@pytest.mark.django_db
-def test_limits_count_for_their_own_endpoint() -> None:
-    first = local(max_concurrency=1)
-    other = Endpoint.objects.create(label="other", base_url="http://127.0.0.1:8/v1")
-    admit(endpoint_pk=first.pk, clock=at(NOON))
-    assert isinstance(admit(endpoint_pk=other.pk, clock=at(NOON)), uuid.UUID)
-
-
-@pytest.mark.django_db
-def test_a_limit_that_an_admin_raises_counts_at_once() -> None:
-    endpoint = local(max_concurrency=1)
-    admit(endpoint_pk=endpoint.pk, clock=at(NOON))
-    Endpoint.objects.update(max_concurrency=2)
-    assert isinstance(admit(endpoint_pk=endpoint.pk, clock=at(NOON)), uuid.UUID)
 
 
 @pytest.mark.django_db

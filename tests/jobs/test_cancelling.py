@@ -15,7 +15,7 @@ from augment.llm.openai_wire import OpenAIWire
 from augment.models import Augmentation, CallLease, Endpoint, GenerationJob, ModelCall
 from augment.services.endpoints.call_limits import Queue, place_at
 from augment.services.running import budget, jobs, leases, runner
-from tests.jobs.models import Model, llama_job, reply
+from tests.jobs.models import llama_job, reply
 from tests.jobs.rows import only_row
 from tests.jobs.running import Wire, ran
 from tests.llm.raw_server import drip, head, speaking
@@ -69,19 +69,6 @@ def test_a_call_in_flight_ends_with_its_job_and_gives_its_place_back(
     assert (job.reserved_calls, job.spent_calls, job.reserved_nano_usd) == (0, 1, 0)
 
 
-def test_a_row_asks_nothing_more_after_its_job_was_cancelled() -> None:
-    job = llama_job()
-    model = Model(
-        lambda request: reply("Sorry?"),
-        looking_on=cancel,
-    )
-    row = only_row(job)
-    assert runner.work_on(augmentation_pk=row.pk, connect=model)
-    row.refresh_from_db()
-    assert (row.state, len(model.requests)) == (State.CANCELLED, 1)
-    assert ModelCall.objects.get().answer == "Sorry?", "what was answered is kept"
-
-
 def test_a_call_that_waits_when_its_job_is_cancelled_is_not_sent() -> None:
     job = llama_job()
     row = only_row(job)
@@ -98,15 +85,6 @@ def test_a_call_that_waits_when_its_job_is_cancelled_is_not_sent() -> None:
     ):
         opened.complete(ASKED)
     assert CallLease.objects.count() == 1
-
-
-def test_a_row_beyond_its_last_call_keeps_its_result() -> None:
-    job = llama_job()
-    model = Model(looking_on=cancel)
-    row = only_row(job)
-    runner.work_on(augmentation_pk=row.pk, connect=model)
-    row.refresh_from_db()
-    assert row.state == State.DONE
 
 
 # --- A locked database -------------------------------------------------------------------------

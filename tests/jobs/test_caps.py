@@ -6,17 +6,14 @@ from decimal import Decimal
 
 import pytest
 
-from augment.errors import Conflict, ModelFault
-from augment.models import Augmentation, Event, GenerationJob
-from augment.services.running import caps, jobs, pausing, runner
+from augment.errors import Conflict
+from augment.models import Event, GenerationJob
+from augment.services.running import caps, jobs
 from augment.services.running.caps import Caps
-from augment.services.running.summary import count_rows
-from tests.jobs.models import Model, add_llama, llama_job
-from tests.jobs.rows import add_scenario, launch, only_row
+from tests.jobs.models import add_llama, llama_job
+from tests.jobs.rows import add_scenario, launch
 
 pytestmark = pytest.mark.django_db
-
-ROW, JOB = Augmentation.State, GenerationJob.State
 
 
 def test_a_money_cap_needs_every_price() -> None:
@@ -73,30 +70,3 @@ def test_caps_are_only_raised_and_only_where_there_are_any() -> None:
     jobs.cancel(job)
     with pytest.raises(Conflict, match="is cancelled already"):
         caps.raise_cap(job, caps=Caps(calls=7))
-
-
-def test_only_a_stopped_job_is_resumed() -> None:
-    with pytest.raises(
-        Conflict, match="is running; only one that is paused or stopped at its cap"
-    ):
-        pausing.resume(llama_job())
-
-
-def test_a_stopped_job_can_be_cancelled() -> None:
-    job = llama_job(caps=Caps(tokens=5))
-    runner.work_on(augmentation_pk=only_row(job).pk, connect=Model())
-    job.refresh_from_db()
-    jobs.cancel(job)
-    assert (job.state, only_row(job).state) == (JOB.CANCELLED, ROW.CANCELLED)
-
-
-def test_retrying_in_a_stopped_job_leaves_it_stopped() -> None:
-    job = llama_job(scenarios=2, caps=Caps(calls=1))
-    first, second = job.augmentations.order_by("pk")
-    broken = Model(ModelFault("no", retryable=False, status=500))
-    runner.work_on(augmentation_pk=first.pk, connect=broken)
-    runner.work_on(augmentation_pk=second.pk, connect=Model())
-    job.refresh_from_db()
-    assert job.state == JOB.STOPPED_AT_CAP
-    jobs.retry_failed(job)
-    assert (job.state, count_rows(job).queued) == (JOB.STOPPED_AT_CAP, 2)

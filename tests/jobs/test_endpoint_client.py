@@ -8,12 +8,12 @@ from typing import Any
 
 import pytest
 
-from augment.errors import ContextTruncated, EndpointBusy, KeyMissing, ModelFault, ParameterRefused
+from augment.errors import ContextTruncated, KeyMissing, ModelFault
 from augment.llm.messages import Message, Request, Speaker
 from augment.llm.openai_wire import OpenAIWire
 from augment.llm.patience import Patience
 from augment.models import Augmentation, CallLease, Endpoint, EndpointModel, Event, ModelCall
-from augment.services.endpoints.call_limits import Queue, place_at
+from augment.services.endpoints.call_limits import Queue
 from augment.services.endpoints.client import EndpointClient
 from augment.services.running import jobs, runner
 from augment.variants.recording_client import RecordingClient
@@ -98,34 +98,11 @@ def test_a_refused_parameter_is_dropped_logged_and_remembered(
     assert Event.objects.filter(verb="learn", object_code=known.code).count() == 3
 
 
-def test_every_attempt_is_in_the_transcript_as_it_was_sent() -> None:
-    with picky("seed") as server:
-        asking = Asking(server)
-        asking.ask()
-        calls = asking.transcript.calls
-        assert [call.request.to_document() for call in calls] == server.bodies
-    first, second = calls
-    assert isinstance(first.fault, ParameterRefused)
-    assert (second.request.seed, second.fault) == (None, None)
-
-
 def test_a_limit_that_is_taken_by_no_name_ends_the_asking() -> None:
     with picky("max_completion_tokens", "max_tokens") as server:
         with pytest.raises(ModelFault, match="its cost has no bound"):
             Asking(server).ask()
         assert len(server.bodies) == 2
-
-
-def test_a_refusal_that_can_not_be_helped_is_raised_once() -> None:
-    EndpointModel.objects.create(
-        endpoint=Endpoint.objects.create(label="local", base_url="http://127.0.0.1:1/v1"),
-        model="picky",
-        reasoning_effort="none",
-    )
-    with picky("reasoning_effort") as server:
-        Endpoint.objects.update(base_url=server.url)
-        assert Asking(server).ask() == "Hi"
-        assert ["reasoning_effort" in body for body in server.bodies] == [True, False]
 
 
 def test_a_cut_prompt_is_a_fault_whose_answer_is_kept() -> None:
@@ -140,18 +117,6 @@ def test_a_cut_prompt_is_a_fault_whose_answer_is_kept() -> None:
     reply = asking.transcript.calls[0].reply
     assert reply is not None
     assert reply.text == "Hi"
-
-
-def test_each_call_takes_a_place_and_gives_it_back() -> None:
-    with picky() as server:
-        asking = Asking(server)
-        asking.ask()
-        lease = CallLease.objects.get()
-        assert lease.finished_at is not None
-        Endpoint.objects.update(max_concurrency=1)
-        with place_at(asking.endpoint, Queue(longest_s=0.0)), pytest.raises(EndpointBusy):
-            asking.ask()
-        assert len(server.bodies) == 1
 
 
 def test_a_worker_goes_through_the_limits_and_the_profile() -> None:

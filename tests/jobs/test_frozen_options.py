@@ -2,19 +2,15 @@
 
 from __future__ import annotations
 
-import importlib
-
 import pytest
-from django.apps import apps
 
 from augment.errors import Conflict
-from augment.models import Augmentation, Contestant, EndpointModel, GenerationJob, ModelCall
+from augment.models import Augmentation, Contestant, EndpointModel, GenerationJob
 from augment.prompts.texts import prompt_version
 from augment.services.endpoints import contestants
 from augment.services.endpoints.treatments import options_of
 from augment.services.running import runner
 from augment.services.running.feasible import find_obstacle
-from augment.variants.options import ToolProtocol
 from tests.jobs.scripted import Scripted, add, run
 from tests.llm.json_server import serving
 
@@ -59,22 +55,3 @@ def test_a_contestant_like_another_one_asks_as_that_one_did() -> None:
     assert made.name == "m FC (temperature 0.7) at here"
     other = contestants.add_like(slug="c", like="a", changes={"variant": "otm"})
     assert other.options == {"temperature": 0.7, "radius_m": 60.0, "max_output_tokens": 900}
-
-
-def test_who_ran_before_there_were_options_keeps_what_it_ran_with() -> None:
-    migration = importlib.import_module("augment.migrations.0011_options_and_samples")
-    with serving(Scripted()) as server:
-        add(server, "a", "fc", protocol="native")
-        EndpointModel.objects.update(native_tools=True)
-        (row,) = run("a")
-    before = row.options
-    Contestant.objects.update(options={}, frozen_options=None)
-    Augmentation.objects.update(options=None)
-    EndpointModel.objects.update(native_tools=False)
-    ModelCall.objects.update(prompt_version="0123456789ab")
-    migration.freeze_what_ran(apps, None)
-    row.refresh_from_db()
-    assert before is not None
-    assert row.options == before | {"prompt_version": "0123456789ab"}
-    assert Contestant.objects.get().frozen_options == row.options
-    assert options_of(Contestant.objects.get()).protocol is ToolProtocol.NATIVE

@@ -7,9 +7,8 @@ from django.contrib.auth.models import User
 from django.core.management import CommandError
 from django.db import connection
 from django.test.utils import CaptureQueriesContext
-from pytest_django import DjangoAssertNumQueries
 
-from augment.errors import Conflict, InvalidDocument, UnknownName
+from augment.errors import Conflict, UnknownName
 from augment.management.commands.generate import Command
 from augment.models import Augmentation, Contestant, Event, GenerationJob
 from augment.services.running import jobs, leases
@@ -40,25 +39,11 @@ def test_a_launch_is_logged_with_who_and_what() -> None:
     assert event.after == {"name": "R", "contestants": ["reference"], "scenarios": ["street"]}
 
 
-def test_a_slug_given_twice_counts_once() -> None:
-    add_kind("reference")
-    add_scenario("street")
-    job = jobs.launch(name="R", contestants=["reference"] * 2, scenarios=["street", "street"])
-    assert job.augmentations.count() == 1
-
-
 def test_an_unknown_contestant_stops_the_launch_and_names_the_known() -> None:
     add_kind("reference")
     with pytest.raises(UnknownName, match=r"Unknown contestant 'gpt'\. Known: reference"):
         jobs.launch(name="R", contestants=["gpt"], scenarios=["nowhere"])
     assert not GenerationJob.objects.exists()
-
-
-def test_an_unknown_scenario_stops_the_launch_and_names_the_known() -> None:
-    add_kind("reference")
-    add_scenario("street")
-    with pytest.raises(UnknownName, match=r"Unknown scenario 'road'\. Known: street"):
-        jobs.launch(name="R", contestants=["reference"], scenarios=["street", "road"])
 
 
 def test_the_reference_can_not_run_where_there_is_none() -> None:
@@ -78,36 +63,6 @@ def test_a_job_of_nothing_is_refused(empty: str) -> None:
     chosen = {"contestants": ["reference"], "scenarios": ["street"]} | {empty: []}
     with pytest.raises(Conflict, match=f"at least one {empty[:-1]}"):
         jobs.launch(name="R", contestants=chosen["contestants"], scenarios=chosen["scenarios"])
-
-
-@pytest.mark.parametrize("name", [" ", "two\nlines", "n" * 121])
-def test_a_name_that_is_not_one_line_is_refused(name: str) -> None:
-    add_kind("reference")
-    add_scenario("street")
-    with pytest.raises(InvalidDocument, match="job can't be read: name: "):
-        jobs.launch(name=name, contestants=["reference"], scenarios=["street"])
-
-
-def test_what_a_human_made_can_not_be_run() -> None:
-    add_kind("kevin", Contestant.Kind.HUMAN)
-    add_scenario("street")
-    with pytest.raises(Conflict, match="can't run kevin"):
-        jobs.launch(name="R", contestants=["kevin"], scenarios=["street"])
-
-
-def test_progress_counts_states_by_one_query(
-    django_assert_num_queries: DjangoAssertNumQueries,
-) -> None:
-    job = launch(scenarios=4)
-    first, second, third, _ = job.augmentations.order_by("pk")
-    leases.settle(held=leased(first), settlement=done(), now=NOON)
-    leases.settle(held=leased(second), settlement=failed(), now=NOON)
-    leased(third)
-    with django_assert_num_queries(1):
-        counts = count_rows(job)
-    assert (counts.total, counts.queued, counts.running) == (4, 1, 1)
-    assert (counts.by_state[State.DONE], counts.failed) == (1, 1)
-    assert (counts.under_way, counts.settled) == (2, 2)
 
 
 def test_failures_stand_by_state_and_reason_faults_of_the_machine_first() -> None:
@@ -160,13 +115,6 @@ def test_cancel_stops_what_waits_and_keeps_what_is_done_or_runs() -> None:
     assert event.after == {"state": "cancelled", "cancelled": 1}
 
 
-def test_a_job_is_cancelled_once() -> None:
-    job = launch()
-    jobs.cancel(job)
-    with pytest.raises(Conflict, match="is cancelled already"):
-        jobs.cancel(job)
-
-
 def test_retry_queues_failed_rows_alone_and_opens_the_job_again() -> None:
     job = launch(scenarios=2)
     first, second = job.augmentations.order_by("pk")
@@ -180,21 +128,3 @@ def test_retry_queues_failed_rows_alone_and_opens_the_job_again() -> None:
     assert (first.state, first.reason, first.sent_at) == (State.QUEUED, "", None)
     assert second.state == State.DONE
     assert leased(first).attempt_number == 2
-
-
-def test_there_is_nothing_to_retry_where_nothing_failed() -> None:
-    job = launch()
-    row = job.augmentations.get()
-    leases.settle(held=leased(row), settlement=done(), now=NOON)
-    jobs.finish_if_over(now=NOON)
-    with pytest.raises(Conflict, match="Nothing in job 'Round 1' failed"):
-        jobs.retry_failed(job)
-    job.refresh_from_db()
-    assert job.state == GenerationJob.State.FINISHED
-
-
-def test_a_cancelled_job_is_not_retried() -> None:
-    job = launch()
-    jobs.cancel(job)
-    with pytest.raises(Conflict, match="was cancelled"):
-        jobs.retry_failed(job)

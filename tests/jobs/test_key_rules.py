@@ -10,9 +10,9 @@ from django.core.management import CommandError, call_command
 from django.test import Client
 from django.urls import reverse
 
-from augment.errors import Conflict, InvalidDocument, KeyMissing, KeyNotAllowed
+from augment.errors import Conflict, InvalidDocument
 from augment.models import Augmentation, Contestant, Endpoint, Event
-from augment.services.endpoints.keys import key_of, may_hold_key, move_of
+from augment.services.endpoints.keys import may_hold_key, move_of
 from augment.services.endpoints.known_endpoints import ensure_endpoint
 from augment.services.running import jobs, runner
 from augment.services.running.feasible import find_obstacle, keys_missing
@@ -87,18 +87,6 @@ def test_a_contestant_with_such_a_variable_is_refused_at_launch() -> None:
     assert keys_missing(llama) == []
     with pytest.raises(Conflict, match="llama names DATABASE_URL, which may not hold a key"):
         jobs.launch(name="J", contestants=["llama"], scenarios=["street"])
-
-
-def test_a_listed_variable_is_read(settings: Any, monkeypatch: pytest.MonkeyPatch) -> None:
-    settings.KEY_VARIABLES = ["LAB_TOKEN"]
-    endpoint = ensure_endpoint(label="lab", base_url=URL, key_variable="LAB_TOKEN")
-    with pytest.raises(KeyMissing):
-        key_of(endpoint)
-    monkeypatch.setenv("LAB_TOKEN", "sk-lab")
-    assert key_of(endpoint) == "sk-lab"
-    settings.KEY_VARIABLES = []
-    with pytest.raises(KeyNotAllowed):
-        key_of(endpoint)
 
 
 @pytest.fixture

@@ -52,10 +52,6 @@ def test_a_row_of_a_job_that_stopped_is_not_started(state: str, is_started: bool
     assert row.state == (State.RUNNING if is_started else State.QUEUED)
 
 
-def test_a_row_that_is_gone_can_not_be_claimed() -> None:
-    assert leases.take_lease(augmentation_pk=12345, now=NOON) is None
-
-
 def test_an_outcome_is_written_with_its_attempt() -> None:
     row = only_row(launch())
     held = leased(row)

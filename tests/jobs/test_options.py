@@ -9,14 +9,13 @@ from collections.abc import Callable
 
 import pytest
 from django.core.management import CommandError, call_command
-from pytest_django import DjangoAssertNumQueries
 
 from augment.errors import Conflict, InvalidDocument
 from augment.models import Augmentation, Contestant, EndpointModel, ModelCall
 from augment.prompts.texts import prompt_version
 from augment.services.endpoints import contestants
 from augment.services.endpoints.known_endpoints import ensure_endpoint
-from augment.services.endpoints.treatments import left_out, options_of
+from augment.services.endpoints.treatments import options_of
 from augment.services.running.transcript_export import transcript_of
 from augment.variants.options import NAMES, ContestantOptions, ToolProtocol, options_from_document
 from tests.jobs.scripted import SCRIPTS, Bodies, Scripted, add, run
@@ -127,14 +126,6 @@ def test_samples_are_asked_anew_with_seeds_of_their_own() -> None:
     ]
 
 
-def test_samples_without_a_seed_are_asked_anew_too() -> None:
-    with serving(Scripted()) as server:
-        add(server, "a")
-        run("a", samples=2)
-        assert len(server.bodies) == 2
-        assert server.bodies[0] == server.bodies[1]
-
-
 def test_another_option_never_reuses_an_answer_and_the_same_does() -> None:
     with serving(Scripted()) as server:
         for slug, rounds in (("two", 2), ("also-two", 2), ("three", 3)):
@@ -154,32 +145,6 @@ def test_another_option_never_reuses_an_answer_and_the_same_does() -> None:
         assert len(server.bodies) == 4
         run("three")
         assert len(server.bodies) == 10
-
-
-def test_what_the_model_does_not_take_is_left_out_and_said() -> None:
-    with serving(Scripted()) as server:
-        server.refuses = {"temperature", "seed"}
-        one = add(server, "a", temperature=0.7, seed=3)
-        assert left_out(one) == {}
-        (row,) = run("a")
-        assert not {"temperature", "seed"} & server.bodies[0].keys()
-    one.refresh_from_db()
-    assert left_out(one) == {"modifier": ["seed", "temperature"]}
-    document = transcript_of(row)
-    assert document["contestant"]["left_out"] == {"modifier": ["seed", "temperature"]}
-    answered = document["attempts"][0]["steps"][-1]["request"]
-    assert not {"temperature", "seed"} & answered.keys()
-    # Known from the beginning where a probe has seen it.
-    assert left_out(contestants.add_like(slug="b", like="a", name="b")) == left_out(one)
-
-
-def test_who_chose_nothing_that_could_be_refused_costs_no_query(
-    django_assert_num_queries: DjangoAssertNumQueries,
-) -> None:
-    with serving(Scripted()) as server:
-        one = add(server, "a", "fc", radius_m=60.0)
-    with django_assert_num_queries(0):
-        assert left_out(one) == {}
 
 
 def test_a_temperature_that_is_refused_after_answers_is_a_fault_and_no_mixture() -> None:

@@ -9,7 +9,7 @@ import pytest
 from augment.errors import Conflict
 from augment.models import Augmentation, Event, GenerationJob
 from augment.services.running import jobs, leases, pausing, runner
-from augment.services.running.caps import Caps, raise_cap
+from augment.services.running.caps import Caps
 from augment.services.running.summary import count_rows
 from tests.jobs.models import Model, after_a_second_look, llama_job
 from tests.jobs.rows import NOON, done, failed, launch, leased, only_row
@@ -53,43 +53,6 @@ def test_all_calls_of_what_is_in_flight_are_made_though_the_job_is_paused_betwee
     row.refresh_from_db()
     assert (row.state, len(model.requests)) == (State.DONE, 2)
     assert GenerationJob.objects.get().state == Job.FINISHED, "nothing is left to resume"
-
-
-def test_a_paused_job_still_keeps_to_its_cap() -> None:
-    job = llama_job(caps=Caps(calls=1))
-
-    def pause_once() -> None:
-        if GenerationJob.objects.get().state == Job.RUNNING:
-            pausing.pause(GenerationJob.objects.get())
-
-    model = Model(after_a_second_look, looking_on=pause_once)
-    row = only_row(job)
-    runner.work_on(augmentation_pk=row.pk, connect=model)
-    row.refresh_from_db()
-    job.refresh_from_db()
-    assert (row.state, len(model.requests), job.state) == (State.QUEUED, 1, Job.PAUSED)
-    raise_cap(job, caps=Caps(calls=2))
-    pausing.resume(job)
-    runner.work_on(augmentation_pk=row.pk, connect=model)
-    row.refresh_from_db()
-    assert (row.state, len(model.requests)) == (State.DONE, 2), "the first answer is replayed"
-
-
-@pytest.mark.parametrize(
-    ("state", "sentence"),
-    [
-        (Job.PAUSED, "is paused already: it starts nothing"),
-        (Job.STOPPED_AT_CAP, "is stopped at cap already: it starts nothing"),
-        (Job.FINISHED, "is finished already"),
-        (Job.CANCELLED, "is cancelled already"),
-    ],
-)
-def test_only_a_running_job_is_paused(state: str, sentence: str) -> None:
-    job = launch()
-    GenerationJob.objects.update(state=state)
-    with pytest.raises(Conflict, match=sentence):
-        pausing.pause(job)
-    assert not Event.objects.filter(verb="pause").exists()
 
 
 def test_a_paused_job_can_be_cancelled_and_what_failed_in_it_waits_until_it_is_resumed() -> None:

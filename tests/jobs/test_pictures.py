@@ -11,7 +11,7 @@ from django.core.files.storage import default_storage
 from augment.scene.modification import Modification
 from augment.services.scenarios.pictures import camera_of, original_picture, picture_of, store
 from augment.services.scenarios.scenes import scene_of
-from tests.jobs.rows import TWO_CONES, add_scenario
+from tests.jobs.rows import add_scenario
 
 NAME = f"bev/{hashlib.sha256(b'png').hexdigest()}.png"
 WORKERS = 4
@@ -25,11 +25,6 @@ def read(name: str) -> bytes:
 def test_a_picture_is_named_by_its_bytes() -> None:
     assert store(b"png") == NAME
     assert read(NAME) == b"png"
-
-
-def test_the_same_picture_is_stored_once() -> None:
-    assert store(b"png") == store(b"png") == NAME
-    assert default_storage.listdir("bev")[1] == [NAME.removeprefix("bev/")]
 
 
 def test_a_picture_that_was_cut_off_is_written_again() -> None:
@@ -72,10 +67,3 @@ def test_an_original_picture_that_got_lost_is_drawn_again() -> None:
     default_storage.delete(name)
     assert original_picture(scenario) == name
     assert default_storage.exists(name)
-
-
-@pytest.mark.django_db
-def test_a_changed_scene_has_another_picture() -> None:
-    scenario = add_scenario("street")
-    changed = picture_of(scene_of(scenario), TWO_CONES, camera_of(scenario))
-    assert changed != original_picture(scenario)

@@ -8,13 +8,12 @@ import pytest
 
 from augment.models import Augmentation, Contestant
 from augment.scene.codec import modification_to_document
-from augment.scene.intent import Intent, Side
+from augment.scene.intent import Intent
 from augment.scene.intent_codec import intent_to_document
 from augment.scene.modification import Modification
 from augment.services.endpoints import contestants
 from augment.services.running import jobs
-from augment.services.scenarios.scenes import seed_of
-from tests.intents import parked, walk
+from tests.intents import parked
 from tests.jobs.rows import add_kind, add_scenario, launch, only_row
 from tests.jobs.running import ran
 
@@ -52,14 +51,6 @@ def test_the_rule_placer_places_the_same_each_time() -> None:
     assert second.image == first.image
 
 
-def test_the_rule_placer_refuses_a_scenario_without_an_intent() -> None:
-    row = ran(one_job(Contestant.Kind.RULE, intent=None, intent_origin=""))
-    assert row.state == State.REFUSED
-    assert row.reason.startswith("The scenario has no intent")
-    row.scenario.refresh_from_db()
-    assert row.image == row.scenario.original_image
-
-
 PARKED = parked(22.0)
 
 
@@ -78,24 +69,7 @@ def test_the_quantised_baselines_place_vehicles_and_tell_their_codes(slug: str) 
     assert "direction same, stands" in row.notes
 
 
-def test_the_quantised_baselines_refuse_what_is_no_vehicle() -> None:
-    row = quantised("quantised-5m", walk(15.0, Side.LEFT))
-    assert row.state == State.REFUSED
-    assert row.reason == "The code knows vehicles alone, and pedestrians are asked for."
-
-
-def test_a_scenario_has_a_seed_of_its_own() -> None:
-    assert seed_of("street") == seed_of("street") != seed_of("street-2")
-
-
 def test_a_placement_tells_what_stands_where_and_by_which_convention() -> None:
     row = ran(one_job(Contestant.Kind.RULE))
     assert row.notes.startswith("1 cones in a line, 20.0 m ahead of the ego along its lane")
     assert "by convention: 2.5 m between the cones" in row.notes
-
-
-def test_a_refusal_says_what_the_intent_leaves_open() -> None:
-    walker = intent_to_document(walk(15.0, None))
-    row = ran(one_job(Contestant.Kind.RULE, intent=walker))
-    assert row.state == State.REFUSED
-    assert row.reason.endswith("the pedestrians leaves open the side that they come from.")

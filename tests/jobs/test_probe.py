@@ -2,20 +2,16 @@
 
 from __future__ import annotations
 
-import io
 from collections.abc import Iterator
 from contextlib import contextmanager
-from io import StringIO
 from typing import Any
 
 import pytest
-from django.core.management import CommandError, call_command
-from PIL import Image
 
 from augment.fake_llm.server import running
 from augment.llm.messages import LengthName, Reply
 from augment.llm.patience import Patience
-from augment.llm.questions import MARKER, Ability, questions_for, two_halves
+from augment.llm.questions import MARKER, Ability, questions_for
 from augment.llm.window import least_tokens
 from augment.models import CallLease, Endpoint, EndpointModel, Event
 from augment.services.endpoints.probe import ProbeReport, probe
@@ -152,13 +148,6 @@ def test_a_limit_that_is_passed_over_is_sent_by_its_other_name() -> None:
     assert report.calls == 8
 
 
-def test_a_server_that_knows_no_limit_is_told_and_goes_on() -> None:
-    with candidate(EVERYTHING - {*LengthName}):
-        report = asked()
-    found = {made.ability: made.has_it for made in report.findings}
-    assert found == dict.fromkeys(Ability, True) | {Ability.ANSWER_LIMIT: False}
-
-
 @pytest.mark.parametrize(
     ("written", "finish_reason", "kept"),
     [
@@ -178,18 +167,6 @@ def test_an_answer_shorter_than_the_limit_tells_nothing_of_it(
     assert question.is_good(reply) is kept
 
 
-def test_without_a_count_of_tokens_the_limit_is_unknown() -> None:
-    with candidate(EVERYTHING - {"usage"}):
-        assert asked().has(Ability.ANSWER_LIMIT) is None
-
-
-def test_a_parameter_beside_the_question_is_gone_without() -> None:
-    with candidate(EVERYTHING - {"seed"}):
-        report = asked()
-    assert report.has(Ability.TEMPERATURE) is True
-    assert report.refused == row().refused_parameters == ["seed"]
-
-
 def test_a_server_that_does_not_answer_is_asked_once_and_forgets_nothing(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
@@ -203,50 +180,6 @@ def test_a_server_that_does_not_answer_is_asked_once_and_forgets_nothing(
     assert row().vision is True
     assert "401" in report.findings[0].note
     assert KEY not in str(list(EndpointModel.objects.values())) + str(list(Event.objects.values()))
-
-
-def test_what_was_known_stays_where_the_answer_does_not_tell() -> None:
-    with candidate() as server:
-        asked()
-        server.can = EVERYTHING - {"images"} | {"a bad day"}
-        report = asked()
-    assert report.has(Ability.VISION) is None
-    assert "503" in report.findings[5].note
-    assert row().vision is True
-
-
-def test_the_cost_is_recorded_where_the_price_is_known() -> None:
-    with candidate():
-        assert asked().cost_usd is None
-        EndpointModel.objects.update(price_in_usd=1, price_out_usd=2)
-        report = asked()
-    tokens = [
-        (made.prompt_tokens or 0) + 2 * (made.completion_tokens or 0) for made in report.findings
-    ]
-    assert report.cost_usd is not None
-    assert float(report.cost_usd) == pytest.approx(sum(tokens) / 1_000_000)
-    event = Event.objects.filter(verb="probe").first()
-    assert event is not None
-    assert event.after is not None
-    assert event.after["cost_usd"] == report.cost_usd
-
-
-def test_the_command_prints_a_table() -> None:
-    said = StringIO()
-    with candidate(EVERYTHING - {"images", "seed"}):
-        call_command("probe_endpoint", "local", "--model", "m", stdout=said)
-    lines = said.getvalue().splitlines()
-    assert lines[0].split()[:2] == ["answers", "yes"]
-    assert lines[5].split()[:2] == ["vision", "no"]
-    assert lines[7:10] == ["usage         yes", "model id      m-2026", "not taken     seed"]
-    assert lines[10] == "cost          unknown, 8 calls"
-
-
-def test_the_command_fails_where_nobody_answers() -> None:
-    with candidate(status=404), pytest.raises(CommandError, match="m at endpoint local does not"):
-        call_command("probe_endpoint", "local", "--model", "m", stdout=StringIO())
-    with pytest.raises(CommandError, match=r"Unknown endpoint 'cloud'\. Known: local"):
-        call_command("probe_endpoint", "cloud", "--model", "m")
 
 
 @pytest.mark.parametrize(
@@ -265,16 +198,3 @@ def test_the_stand_in_can_be_probed(model: str, lacks: Ability | None) -> None:
     assert found == {ability: ability != lacks for ability in Ability}
     assert report.counts_tokens
     assert report.models_returned == [model]
-
-
-def test_the_picture_of_the_question_has_two_halves() -> None:
-    picture = Image.open(io.BytesIO(two_halves()))
-    picture.load()
-    assert picture.getpixel((10, 50)) == (0, 128, 0)
-    assert picture.getpixel((80, 50)) == (255, 255, 0)
-
-
-def test_the_long_question_is_longer_than_the_usual_small_window() -> None:
-    text = questions_for("m")[-1].request.messages[0].text
-    assert 0.7 * least_tokens(text) > 4096
-    assert text.index(MARKER) < 100

@@ -79,13 +79,6 @@ def test_roles_are_stored_by_label_and_model() -> None:
     assert EndpointModel.objects.filter(endpoint__label="there", model="eyes").exists()
 
 
-def test_the_same_contestant_with_another_viewer_is_another() -> None:
-    add("vqa", viewer=("there", "eyes"))
-    assert add("vqa", viewer=("there", "eyes")).slug == "one"
-    with pytest.raises(Conflict, match="another contestant called 'one'"):
-        add("vqa", viewer=("there", "other-eyes"))
-
-
 def test_a_role_that_nobody_plays_is_refused() -> None:
     with pytest.raises(InvalidDocument, match=r"roles.viewer: tqa has reviewer"):
         add("tqa", viewer=("there", "eyes"))
@@ -110,14 +103,6 @@ def test_visual_qa_with_a_viewer_known_to_be_blind_is_refused_at_launch() -> Non
         jobs.launch(name="J", contestants=["one"], scenarios=["street-1"])
 
 
-def test_another_viewer_lets_a_blind_model_do_visual_qa() -> None:
-    add("vqa", viewer=("there", "eyes"))
-    add_scenario("street-1")
-    sees("text-model", "here", vision=False)
-    sees("eyes", "there", vision=True)
-    jobs.launch(name="J", contestants=["one"], scenarios=["street-1"])
-
-
 def test_visual_qa_waits_until_the_viewer_is_probed_or_somebody_tells() -> None:
     add("vqa", viewer=("there", "eyes"))
     add_scenario("street-1")
@@ -137,20 +122,6 @@ def test_visual_qa_waits_until_the_viewer_is_probed_or_somebody_tells() -> None:
         "vision": True,
     }
     assert find_obstacle(Contestant.objects.get()) == ""
-    jobs.launch(name="J", contestants=["one"], scenarios=["street-1"])
-
-
-def test_what_is_told_can_be_told_otherwise() -> None:
-    add("vqa")
-    for word, known in (("no", False), ("yes", True)):
-        call_command("probe_endpoint", "here", "--model", "text-model", "--sees", word)
-        assert EndpointModel.objects.get(model="text-model").vision is known
-
-
-@pytest.mark.parametrize("variant", ["otm", "fc", "tqa", "geo"])
-def test_a_variant_that_shows_no_picture_needs_no_sight(variant: str) -> None:
-    add(variant)
-    add_scenario("street-1")
     jobs.launch(name="J", contestants=["one"], scenarios=["street-1"])
 
 
@@ -197,25 +168,6 @@ def test_each_role_is_asked_at_its_own_endpoint(server: FakeServer) -> None:
     assert first.extras["tool_calls"][0]["name"] == "pose_on_lane"
     kinds = list(row.attempts.get().notes.values_list("kind", flat=True))
     assert kinds == ["tool_call", "round", "review"] * 2 + ["kept"]
-
-
-def test_a_run_that_was_answered_before_is_replayed_with_its_native_calls(
-    server: FakeServer,
-) -> None:
-    ensure_endpoint(label="a", base_url=server.url, is_simulated=True)
-    contestants.add_contestant(slug="two", variant="fc", endpoint="a", model="fake-good")
-    EndpointModel.objects.update(native_tools=True)
-    add_scenario("street-1")
-    for number in (1, 2):
-        job = jobs.launch(name=f"J{number}", contestants=["two"], scenarios=["street-1"])
-        runner.work_on(augmentation_pk=only_row(job).pk, connect=opened)
-    first, second = Augmentation.objects.order_by("pk")
-    assert first.modification == second.modification
-    assert list(ModelCall.objects.order_by("pk").values_list("served_from", flat=True))[:2] == [
-        None,
-        None,
-    ]
-    assert ModelCall.objects.filter(served_from__isnull=False).count() == 2
 
 
 def test_the_command_takes_models_and_endpoints() -> None:

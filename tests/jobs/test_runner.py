@@ -111,10 +111,6 @@ def test_a_model_is_asked_and_every_call_is_kept() -> None:
     assert call.prompt_version
 
 
-def test_a_simulated_contestant_runs_like_a_model() -> None:
-    assert ran(model_job(is_simulated=True), Wire(GOOD)).state == State.DONE
-
-
 def test_an_answer_that_nobody_can_read_is_an_outcome_with_the_unchanged_picture() -> None:
     row = ran(model_job(), Wire("Sorry?", "Pardon?"))
     assert row.state == State.UNREADABLE
@@ -126,27 +122,12 @@ def test_an_answer_that_nobody_can_read_is_an_outcome_with_the_unchanged_picture
     assert list(answers) == ["Sorry?", "Pardon?"]
 
 
-def test_a_refusal_is_an_outcome_with_the_unchanged_picture() -> None:
-    row = ran(model_job(), Wire(Reply(text="", refusal="I can't help with that.")))
-    assert row.state == State.REFUSED
-    assert "I can't help with that." in row.reason
-    assert ModelCall.objects.get().answer == "I can't help with that."
-
-
 def test_a_broken_wire_fails_with_the_status_and_leaves_the_call() -> None:
     row = ran(model_job(), Wire(ModelFault("upstream broke", retryable=False, status=500)))
     assert (row.state, row.reason) == (State.FAILED, "HTTP 500: upstream broke")
     assert (row.image, row.modification) == ("", None)
     call = ModelCall.objects.get()
     assert (call.answer, call.fault) == (None, "HTTP 500: upstream broke")
-
-
-def test_a_missing_key_fails_and_names_the_variable() -> None:
-    row = model_job(key_variable="NO_SUCH_API_KEY")
-    assert runner.work_on(augmentation_pk=row.pk)
-    row.refresh_from_db()
-    assert row.state == State.FAILED
-    assert "NO_SUCH_API_KEY" in row.reason
 
 
 def test_a_failed_row_is_tried_again_on_request() -> None:
@@ -204,20 +185,3 @@ def test_what_nobody_foresaw_fails_the_row_and_is_raised() -> None:
     assert row.attempts.get().outcome == "failed"
     row.job.refresh_from_db()
     assert row.job.state == GenerationJob.State.FINISHED
-
-
-def test_a_worker_that_is_told_to_stop_gives_its_row_back() -> None:
-    row = model_job()
-    wire = Wire()
-    wire.client = Stumbling(SystemExit(0))
-    with pytest.raises(SystemExit):
-        runner.work_on(augmentation_pk=row.pk, connect=wire)
-    row.refresh_from_db()
-    assert (row.state, row.claim) == (State.QUEUED, None)
-
-
-def test_answers_that_a_database_can_not_take_are_kept_all_the_same() -> None:
-    row = ran(model_job(), Wire("nul \0 and half \ud800", "again \0"))
-    assert row.state == State.UNREADABLE
-    answers = ModelCall.objects.order_by("number").values_list("answer", flat=True)
-    assert list(answers) == ["nul \u2400 and half \\ud800", "again \u2400"]

@@ -15,17 +15,14 @@ from django.core.management.base import CommandError
 from django.utils import timezone
 from pytest_django import Settings
 
-from arena.exports.driving_table import DrivingTable
-from augment.errors import Conflict, UnknownName
-from augment.models import BaseScene, GenerationJob, Simulation
-from augment.scene.recording_codec import recording_to_document
+from augment.errors import UnknownName
+from augment.models import GenerationJob, Simulation
 from augment.services.judging import driving_scores, simulations
 from augment.services.judging.simulations import Options
 from augment.services.running import leases
 from augment.simulation.planning import Plan, Situation
 from augment.simulation.road import Road
 from augment.simulation.states import EgoBody
-from bench.recording_lengths import cut, recorded_street
 from tests.jobs import rows
 
 pytestmark = pytest.mark.django_db
@@ -127,11 +124,6 @@ def finished_other() -> GenerationJob:
     return GenerationJob.objects.get()
 
 
-def test_a_job_without_results_has_nothing_to_drive() -> None:
-    with pytest.raises(Conflict, match="no result"):
-        simulations.plan_job(job=rows.launch(), options=STRAIGHT)
-
-
 def test_a_drive_whose_worker_fell_silent_waits_again() -> None:
     (first, *_) = simulations.plan_job(job=finished_job(), options=STRAIGHT)
     then = timezone.now() - timedelta(minutes=5)
@@ -141,13 +133,6 @@ def test_a_drive_whose_worker_fell_silent_waits_again() -> None:
     assert simulations.requeue_stale(older_than=timedelta(minutes=10)) == 0
     assert simulations.requeue_stale(older_than=timedelta(minutes=1)) == 1
     assert first in simulations.find_unsent(older_than=timedelta(minutes=10))
-
-
-def test_what_was_sent_just_now_is_not_sent_again() -> None:
-    waiting = simulations.plan_job(job=finished_job(), options=STRAIGHT)
-    assert simulations.find_unsent(older_than=timedelta(minutes=10)) == waiting
-    simulations.mark_sent(waiting)
-    assert simulations.find_unsent(older_than=timedelta(minutes=10)) == []
 
 
 def test_contestants_are_ranked_by_how_much_they_lower_the_score() -> None:
@@ -219,63 +204,3 @@ def test_the_command_line_names_a_planner_for_its_own_process_alone(settings: Se
         said("Round 1", planner=STRAIGHT.planner, queue=True)
     assert not Simulation.objects.exists()
     assert "[3/3]" in said("Round 1", planner=STRAIGHT.planner)
-
-
-def test_the_command_drives_a_scenario_and_says_it_again() -> None:
-    rows.add_scenario("street-9")
-    first = said("street-9", planner=STRAIGHT.planner)
-    assert "street-9, Unmodified scene: 99.8" in first
-    assert "street-9, Reference: 0.0" in first
-    assert "street-9, Unmodified scene: 99.8" in said("street-9", planner=STRAIGHT.planner)
-
-
-@pytest.mark.parametrize(
-    ("arguments", "options", "sentence"),
-    [
-        (["nowhere"], {}, "nowhere"),
-        (["Round 1"], {"score": "carla"}, "carla"),
-        (["Round 1"], {"planner": "no.such.Planner"}, "no.such.Planner"),
-        (["Round 1"], {"planner": "tests.jobs.rows.NOON"}, "can't be made"),
-    ],
-)
-def test_the_command_refuses_in_words(
-    arguments: list[str], options: dict[str, str], sentence: str
-) -> None:
-    finished_job()
-    with pytest.raises(CommandError, match=sentence):
-        said(*arguments, **options)
-
-
-def test_the_command_prints_the_number_of_a_drive_that_a_worker_had_taken() -> None:
-    scenario = rows.add_scenario("street-9")
-    (first, *_) = simulations.plan_scenario(scenario=scenario, options=STRAIGHT)
-    long_ago = timezone.now() - timedelta(days=1)
-    Simulation.objects.filter(pk=first).update(
-        state=State.RUNNING, claim="11111111-1111-1111-1111-111111111111", heartbeat_at=long_ago
-    )
-    text = said("street-9", planner=STRAIGHT.planner)
-    assert "[1/2] street-9, Unmodified scene: 99.8, clearance" in text
-    assert "[2/2] street-9, Reference: 0.0, clearance 0.00 m (below 0.3 m)" in text
-
-
-def test_a_table_counts_drives_that_came_too_close_and_that_outlast_their_recording() -> None:
-    job = finished_job()
-    BaseScene.objects.update(recording=recording_to_document(cut(recorded_street()[1], 3.0)))
-    driven(job)
-    scores = driving_scores.scores_of_job(job, options=STRAIGHT, score="nuplan")
-    lines = {line.subject: line for line in scores.lines}
-    assert (lines["augmentation"].least_clearance_m, lines["augmentation"].close) == (0.0, 1)
-    assert lines["unmodified"].close == 0
-    assert (scores.outlasting, scores.total) == (3, 3)
-    notes = " ".join(DrivingTable(title="", scores=scores).notes)
-    assert "The recording ends before the drive in 3 of 3 drives" in notes
-    assert "less than 0.3 m" in notes
-    assert "In 3 of 3 drives the recording ends" in said("Round 1", planner=STRAIGHT.planner)
-
-
-@pytest.mark.parametrize(
-    ("distance_m", "text"),
-    [(None, "–"), (0.0, "0.00 m (below 0.3 m)"), (0.29, "0.29 m (below 0.3 m)"), (0.3, "0.30 m")],
-)
-def test_clearance_below_30_cm_is_marked(distance_m: float | None, text: str) -> None:
-    assert driving_scores.clearance_text(distance_m) == text

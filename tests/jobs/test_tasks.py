@@ -17,7 +17,7 @@ from augment.services.running import leases, runner
 from augment.services.running.caps import Caps
 from augment.services.running.summary import count_rows
 from tests.brokers import Broker
-from tests.jobs.models import Model, add_llama, llama_job
+from tests.jobs.models import Model, llama_job
 from tests.jobs.rows import add_kind, add_scenario, done, failed, launch, leased, only_row
 
 pytestmark = pytest.mark.django_db
@@ -56,13 +56,6 @@ def test_the_task_runs_its_row() -> None:
     assert row.attempts.get().worker.startswith("here ")
 
 
-def test_the_task_leaves_a_row_alone_that_somebody_else_has() -> None:
-    row = only_row(launch())
-    held = leased(row, now=timezone.now())
-    tasks.run_augmentation.run(row.pk)
-    assert leases.is_held(held=held)
-
-
 def test_recover_sends_what_was_never_sent(broker: Broker) -> None:
     launch(scenarios=2)
     tasks.recover(now=timezone.now())
@@ -79,26 +72,6 @@ def test_recover_takes_back_and_sends_what_a_dead_worker_held(broker: Broker) ->
     assert row.state == State.QUEUED
     assert row.sent_at is not None
     assert len(broker) == 1
-
-
-def test_messages_of_another_kind_keep_nothing_that_is_lost_waiting(broker: Broker) -> None:
-    row = only_row(launch())
-    now = timezone.now()
-    leases.mark_sent(ids=[row.pk], now=now - timedelta(minutes=1))
-    tasks.draw_marks.delay(row.pk)
-    tasks.recover(now=now)
-    assert len(broker) == 1
-    broker.purge("drawing")
-
-
-def test_what_waits_where_an_earlier_release_sent_it_is_on_its_way(broker: Broker) -> None:
-    row = only_row(launch())
-    now = timezone.now()
-    leases.mark_sent(ids=[row.pk], now=now - timedelta(minutes=1))
-    tasks.run_augmentation.apply_async((row.pk,), queue="celery")
-    tasks.recover(now=now)
-    assert len(broker) == 0
-    broker.purge("celery")
 
 
 def test_recover_leaves_alone_what_is_on_its_way(broker: Broker) -> None:
@@ -163,11 +136,6 @@ def test_generate_without_a_broker_says_what_to_do_and_launches_nothing(no_broke
     assert not GenerationJob.objects.exists()
 
 
-def test_generate_says_which_name_is_unknown(broker: Broker) -> None:
-    with pytest.raises(CommandError, match=r"Unknown contestant 'gpt'\. Known: .*reference"):
-        call_command("generate", "--contestants", "gpt", "--scenarios", "all")
-
-
 def test_generate_gives_up_waiting_and_says_so(broker: Broker) -> None:
     add_scenario("street")
     with pytest.raises(CommandError, match=r"Still under way after 0 s: 1 wait, 0 run"):
@@ -207,34 +175,6 @@ def test_waiting_ends_with_the_job() -> None:
     assert count_rows(job).by_state[Augmentation.State.DONE] == 1
 
 
-def test_generate_caps_the_job_it_launches(broker: Broker) -> None:
-    add_llama(price="1")
-    add_scenario("street")
-    chosen = ("--contestants", "llama", "--scenarios", "street")
-    caps = ("--cap", "2.50", "--cap-calls", "7", "--cap-tokens", "9000", "--fresh")
-    call_command("generate", *chosen, *caps, stdout=StringIO())
-    job = GenerationJob.objects.get()
-    assert (str(job.cap_usd), job.cap_calls, job.cap_tokens) == ("2.5", 7, 9000)
-    assert job.is_fresh
-
-
-def test_generate_refuses_a_cap_in_usd_without_prices(broker: Broker) -> None:
-    add_llama()
-    add_scenario("street")
-    chosen = ("--contestants", "llama", "--scenarios", "street")
-    with pytest.raises(CommandError, match="cap the job by calls or tokens instead"):
-        call_command("generate", *chosen, "--cap", "1", stdout=StringIO())
-    assert not GenerationJob.objects.exists()
-
-
-def test_waiting_ends_when_the_job_stops_at_its_cap() -> None:
-    job = llama_job(caps=Caps(tokens=5))
-    runner.work_on(augmentation_pk=only_row(job).pk, connect=Model())
-    with pytest.raises(CommandError, match="Stopped at its cap of 5 tokens with 1 left") as caught:
-        Command(stdout=StringIO()).wait(job, timeout_s=1.0)
-    assert caught.value.returncode == 3
-
-
 def test_a_stopped_job_is_sent_again_once_it_is_resumed(
     broker: Broker, django_capture_on_commit_callbacks: object
 ) -> None:
@@ -249,11 +189,3 @@ def test_a_stopped_job_is_sent_again_once_it_is_resumed(
         call_command("resume_job", str(job.code), "--cap-tokens", "90000", stdout=said)
     assert said.getvalue() == f"Job {job.code}, capped at 90000 tokens: 1 to run.\n"
     assert len(broker) == 1
-
-
-def test_a_job_that_runs_is_not_resumed(broker: Broker) -> None:
-    job = llama_job(caps=Caps(calls=5))
-    with pytest.raises(CommandError, match="only one that is paused or stopped"):
-        call_command("resume_job", str(job.code), "--cap-calls", "6", stdout=StringIO())
-    job.refresh_from_db()
-    assert job.cap_calls == 5

@@ -2,29 +2,22 @@
 
 from __future__ import annotations
 
-import base64
-import hashlib
 import json
-from io import StringIO
-from pathlib import Path
 from typing import Any
-from uuid import uuid4
 
 import pytest
-from django.core.management import CommandError, call_command
 from django.urls import reverse
 from django.utils import timezone
 
 from augment.errors import ModelFault
 from augment.llm.fingerprint import request_hash
-from augment.llm.messages import Message, Reply, Request, Speaker
+from augment.llm.messages import Message, Request, Speaker
 from augment.models import Augmentation, Endpoint, ModelCall, TranscriptNote
 from augment.services.running import caps, jobs, pausing, runner
 from augment.services.running.caps import Caps
 from augment.services.running.transcript_export import transcript_of
-from augment.services.running.transcript_steps import messages_of, totals_of, tries_of
+from augment.services.running.transcript_steps import totals_of, tries_of
 from augment.services.running.transcripts import RowTranscript
-from augment.services.texts import LONGEST_REASON
 from augment.variants.transcript import ModelRole, NoteKind
 from tests.jobs.models import Model, after_a_second_look, llama_job, reply
 from tests.jobs.rows import INSTRUCTION, leased, only_row
@@ -96,16 +89,6 @@ def test_a_request_in_it_is_what_the_server_was_sent_and_nothing_else() -> None:
     assert '"temperature"' not in json.dumps(document)
 
 
-def test_what_is_unknown_is_null_and_not_zero() -> None:
-    row = ran(only_row(llama_job()), Model(lambda request: Reply(text=GOOD)))
-    document = transcript_of(row)
-    (call,) = document["attempts"][0]["steps"]
-    assert [call[name] for name in ("prompt_tokens", "cost_usd", "latency_s")] == [None] * 3
-    assert document["totals"]["prompt_tokens"] is None
-    assert document["totals"]["cost_usd"] is None
-    assert document["totals"]["is_cost_estimated"]
-
-
 def test_every_attempt_and_every_fault_is_in_it() -> None:
     job = llama_job()
     row = ran(only_row(job), Model(ModelFault("upstream broke", retryable=False, status=500)))
@@ -146,17 +129,6 @@ def test_rounds_tools_and_reviews_stand_between_the_calls() -> None:
     assert steps[2]["document"] == {"call": "pose_on_lane", "for": "Go."}
 
 
-def test_images_are_in_the_document_once() -> None:
-    row = only_row(llama_job())
-    transcript = looking(row)
-    message = Message(speaker=Speaker.USER, text="Look.", images=(b"a picture",) * 2)
-    transcript.asked(ModelRole.VIEWER, Request(model="m", messages=(message,)), "p1")
-    digest = hashlib.sha256(b"a picture").hexdigest()
-    assert transcript_of(row)["images"] == {digest: base64.b64encode(b"a picture").decode()}
-    (said,) = messages_of(ModelCall.objects.get().request)
-    assert (said.text, said.images, said.rest) == ("Look.", (digest, digest), "")
-
-
 def test_the_order_in_which_a_database_keeps_keys_does_not_show() -> None:
     """PostgreSQL keeps the keys of a stored document in an order of its own."""
 
@@ -190,22 +162,6 @@ def test_the_order_in_which_a_database_keeps_keys_does_not_show() -> None:
     assert known == call.request_hash
 
 
-def test_the_command_writes_it_to_a_file_or_to_the_terminal(tmp_path: Path) -> None:
-    row = ran(only_row(llama_job()), Model())
-    said, file = StringIO(), tmp_path / "t.json"
-    call_command("transcript", str(row.code), stdout=said)
-    call_command("transcript", str(row.code), "--out", str(file), stdout=StringIO())
-    assert json.loads(said.getvalue()) == json.loads(file.read_text()) == transcript_of(row)
-
-
-def test_the_command_says_what_it_can_not_do(tmp_path: Path) -> None:
-    row = only_row(llama_job())
-    with pytest.raises(CommandError, match="There is no augmentation"):
-        call_command("transcript", str(uuid4()))
-    with pytest.raises(CommandError, match="Can't write"):
-        call_command("transcript", str(row.code), "--out", str(tmp_path))
-
-
 def test_long_texts_are_cut_with_a_mark_in_rows_and_on_the_page_and_answers_are_kept() -> None:
     answer = "no " * 60_000
     row = only_row(llama_job())
@@ -218,13 +174,3 @@ def test_long_texts_are_cut_with_a_mark_in_rows_and_on_the_page_and_answers_are_
     assert len(page) < 800_000
     steps = transcript_of(row)["attempts"][0]["steps"]
     assert steps[0]["answer"] == answer
-
-
-def test_a_long_refusal_is_a_reason_of_a_stated_length() -> None:
-    row = only_row(llama_job())
-    refusal = "n" * 3000
-    ran(row, Model(lambda request: Reply(text="", refusal=refusal)))
-    assert len(row.reason) == LONGEST_REASON
-    assert row.reason.endswith("… [cut: 3000 characters]")
-    assert row.attempts.get().reason == row.reason
-    assert ModelCall.objects.get().refusal == refusal

@@ -2,24 +2,18 @@
 
 from __future__ import annotations
 
-import importlib
 import json
 from dataclasses import replace
 from typing import Any
 
 import pytest
-from django.apps import apps
 
-from augment.errors import ParameterRefused
 from augment.llm.profile import ModelProfile
-from augment.models import Augmentation, Contestant, Endpoint, EndpointModel, Event, ModelCall
-from augment.services.endpoints import contestants, probe
+from augment.models import Augmentation, Endpoint, EndpointModel
+from augment.services.endpoints import contestants
 from augment.services.endpoints.known_endpoints import ensure_endpoint
-from augment.services.endpoints.respondents import respondents_of
-from augment.services.endpoints.treatments import document_of, profile_from_document, treatment_of
+from augment.services.endpoints.treatments import document_of, profile_from_document
 from augment.services.running import jobs, runner
-from augment.services.running.transcript_export import transcript_of
-from augment.variants.transcript import ModelRole
 from tests.jobs.rows import add_scenario
 from tests.llm.json_server import JsonServer, serving
 
@@ -108,40 +102,6 @@ def test_what_is_learnt_after_the_first_run_changes_nothing_that_is_sent(
         assert (shapes(server) != before) is is_sent
 
 
-def test_a_probe_between_two_rows_does_not_mix_ways_of_calling() -> None:
-    with serving(Model()) as server:
-        job_at(server)
-        run("first")
-        assert "tools" not in server.bodies[0]
-        probe.probe(label="here", model="m")
-        learn(native_tools=True)
-        server.bodies.clear()
-        run("second")
-        assert all("tools" not in body for body in server.bodies)
-
-
-def test_what_was_known_before_the_first_run_is_sent_and_shown() -> None:
-    with serving(Model()) as server:
-        job_at(server)
-        learn(native_tools=True, reasoning_effort="none", max_output_tokens=500)
-        row = run("first")
-        assert all("tools" in body for body in server.bodies)
-        assert server.bodies[0]["reasoning_effort"] == "none"
-        assert server.bodies[0]["max_completion_tokens"] == 500
-    contestant = Contestant.objects.get()
-    assert contestant.sends is not None
-    assert contestant.sends["modifier"] == document_of(
-        ModelProfile(native_tools=True, reasoning_effort="none", max_output_tokens=500)
-    )
-    assert transcript_of(row)["contestant"]["sends"] == contestant.sends
-    event = Event.objects.get(verb="fix")
-    assert event.after == {
-        "slug": "one",
-        "sends": contestant.sends,
-        "options": contestant.frozen_options,
-    }
-
-
 def test_a_parameter_that_is_refused_before_any_answer_is_left_out_for_good() -> None:
     with serving(Model()) as server:
         server.refuses = {"reasoning_effort", "max_completion_tokens"}
@@ -166,14 +126,6 @@ def test_a_parameter_that_is_refused_after_answers_with_it_is_a_fault_and_no_mix
     assert row.state == Augmentation.State.FAILED
     assert "does not take 'reasoning_effort' any more" in row.reason
     assert "add another contestant" in row.reason
-
-
-def test_another_name_for_the_limit_of_the_answer_is_no_other_treatment() -> None:
-    with serving(Model()) as server:
-        job_at(server)
-        run("first")
-        server.refuses = {"max_completion_tokens"}
-        assert run("second").state == Augmentation.State.UNREADABLE
 
 
 def test_who_never_had_an_answer_is_fixed_anew_when_it_is_tried_again() -> None:
@@ -207,54 +159,3 @@ def test_a_profile_comes_back_from_its_document() -> None:
     assert profile_from_document(document_of(fewer)) == fewer
     unsent = replace(profile, json_schema=True, refused=frozenset({"response_format"}))
     assert document_of(unsent) == document_of(profile) | {"refused": []}
-
-
-def test_each_role_has_its_own() -> None:
-    ensure_endpoint(label="here", base_url="http://127.0.0.1:1/v1")
-    one = contestants.add_contestant(
-        slug="one",
-        variant="fc+tqa",
-        endpoint="here",
-        model="m",
-        roles={ModelRole.REVIEWER: (None, "boss")},
-    )
-    EndpointModel.objects.filter(model="boss").update(reasoning_effort="high")
-    treatment = treatment_of(one, respondents_of(one))
-    endpoint = Endpoint.objects.get()
-    assert treatment.at(endpoint) == {
-        "m": ModelProfile(),
-        "boss": ModelProfile(reasoning_effort="high"),
-    }
-    refused = ParameterRefused("reasoning_effort", "no", status=400)
-    assert treatment.without(refused, endpoint=endpoint, model="boss").refused == {
-        "reasoning_effort"
-    }
-    one.refresh_from_db()
-    assert one.sends is not None
-    assert (one.sends["modifier"]["refused"], one.sends["reviewer"]["refused"]) == (
-        [],
-        ["reasoning_effort"],
-    )
-
-
-def test_contestants_from_before_go_on_with_what_they_sent() -> None:
-    migration = importlib.import_module("augment.migrations.0006_what_a_contestant_sends")
-    with serving(Model()) as server:
-        server.refuses = {"max_completion_tokens"}
-        job_at(server)
-        learn(reasoning_effort="low")
-        run("first")
-    Contestant.objects.update(sends=None)
-    learn(native_tools=True, refused_parameters=[], reasoning_effort="", max_output_tokens=100)
-    migration.fix_what_was_sent(apps, None)
-    sends = Contestant.objects.get().sends
-    assert sends == {
-        "modifier": document_of(
-            ModelProfile(
-                native_tools=False,
-                refused=frozenset({"max_completion_tokens"}),
-                reasoning_effort="low",
-            )
-        )
-    }
-    assert ModelCall.objects.exists()
