@@ -11,7 +11,6 @@ from django.conf import LazySettings
 from django.core.files.uploadedfile import SimpleUploadedFile
 from django.test import Client
 
-from augment.errors import QueueFault
 from augment.models import (
     BaseScene,
     Probe,
@@ -35,7 +34,6 @@ pytestmark = pytest.mark.django_db
 API = "/api/v1/"
 STREET = json.dumps(scene_to_document(scene(agents=(vehicle("Agent2", 20.0, 0.0),)))).encode()
 CAR = modification_to_document(Modification(added=(vehicle("Added1", 20.0, 0.4),)))
-AWAY = modification_to_document(Modification(added=(vehicle("Added1", 20.0, 400.0),)))
 
 
 @pytest.fixture
@@ -105,17 +103,6 @@ def test_a_recording_becomes_a_scene(analyst: Client, sent: list[tuple[str, int]
     assert BaseScene.objects.get().slug == "main-street"
 
 
-def test_a_recording_that_can_not_be_read_says_why(
-    analyst: Client, sent: list[tuple[str, int]]
-) -> None:
-    code = upload(analyst, b"hello").json()["code"]
-    uploads.read_upload(sent.pop()[1])
-    found = analyst.get(f"{API}uploads/{code}").json()
-    assert found["state"] == "failed"
-    assert "none of the formats" in found["reason"]
-    error_of(send(analyst, f"uploads/{code}/moments", frame=7), 409, "conflict")
-
-
 def test_a_file_that_can_not_be_taken_is_refused_before_anything_is_kept(
     analyst: Client, settings: LazySettings
 ) -> None:
@@ -166,17 +153,6 @@ def test_a_model_of_a_new_endpoint_is_probed(admin: Client, sent: list[tuple[str
     assert sent == [("enqueue_probe", Probe.objects.get().pk)]
     error_of(send(admin, there), 409, "conflict")
     assert admin.get(API + there).json()["state"] == "queued"
-
-
-def test_a_missing_broker_is_a_warning(admin: Client, monkeypatch: pytest.MonkeyPatch) -> None:
-    def refuse(pk: int) -> None:
-        raise QueueFault("No broker.")
-
-    monkeypatch.setattr("arena.api.endpoints.enqueue_probe", refuse)
-    monkeypatch.setattr("arena.api.views.transaction.on_commit", lambda done: done())
-    row = model_at(endpoint=ensure_endpoint(label="here", base_url="http://x/v1"), model="m")
-    assert send(admin, f"models/{row.code}/probe").json()["warnings"] == ["No broker."]
-    assert Probe.objects.get().state == "queued"
 
 
 def test_an_analyst_reads_probes_and_changes_no_endpoint(analyst: Client) -> None:

@@ -9,7 +9,7 @@ from django.contrib.auth.models import User
 from django.test import Client
 
 from arena.queries.profiles import Theme
-from arena.queries.voting_keys import USUAL_KEYS, voting_preferences
+from arena.queries.voting_keys import voting_preferences
 from arena.services.preferences import choose_theme
 from tests.study_rows import expert
 
@@ -27,17 +27,6 @@ def post(user: User, body: object) -> Any:
     return client.post("/api/v1/preferences", body, content_type="application/json")
 
 
-def test_at_first_everything_is_as_usual(eva: User) -> None:
-    answer = post(eva, {})
-    assert answer.status_code == 200
-    assert answer.json() == {
-        "keys": {action: list(keys) for action, keys in USUAL_KEYS.items()},
-        "single_keys": True,
-        "legend": True,
-        "keep_zoom": False,
-    }
-
-
 def test_what_is_named_changes_and_the_rest_stays(eva: User) -> None:
     choose_theme(user=eva, theme=Theme.DARK)
     post(eva, {"legend": False})
@@ -52,34 +41,6 @@ def test_a_key_of_ones_own_replaces_the_usual_ones_and_nothing_else_has_it(eva: 
     assert (keys["a"], keys["zoom"], keys["e"]) == (["j"], ["e"], ["2"])
     assert keys["b"] == ["3", "b"]
     assert voting_preferences(eva).keys == keys
-
-
-def test_the_key_of_what_only_some_studies_have_gives_way_to_a_chosen_one(eva: User) -> None:
-    keys = post(eva, {"keys": {"zoom": "t"}}).json()["keys"]
-    assert (keys["zoom"], keys["text"]) == (["t"], [])
-    keys = post(eva, {"keys": {"zoom": "t", "text": "x"}}).json()["keys"]
-    assert (keys["zoom"], keys["text"]) == (["t"], ["x"])
-    refused = post(eva, {"keys": {"zoom": "t", "text": "t"}})
-    assert refused.status_code == 422
-    said = refused.json()["error"]["fields"]["keys"]
-    assert "'t' would do two things: Zoom, Text description." in said
-
-
-def test_a_page_without_the_text_leaves_its_key_alone_unless_it_gives_it_away(eva: User) -> None:
-    shown = {action: keys[0] for action, keys in USUAL_KEYS.items() if action != "text"}
-    post(eva, {"keys": {**shown, "text": "k"}})
-    assert post(eva, {"keys": {**shown, "zoom": "y"}}).json()["keys"]["text"] == ["k"]
-    assert post(eva, {"keys": {**shown, "zoom": "k"}}).json()["keys"]["text"] == ["t"]
-
-
-def test_the_usual_keys_come_back(eva: User) -> None:
-    post(eva, {"keys": {"a": "j"}})
-    assert post(eva, {"keys": {}}).json()["keys"]["a"] == ["1", "a"]
-
-
-def test_keys_can_swap_places(eva: User) -> None:
-    keys = post(eva, {"keys": {"a": "3", "b": "1"}}).json()["keys"]
-    assert (keys["a"], keys["b"]) == (["3"], ["1"])
 
 
 @pytest.mark.parametrize(

@@ -7,7 +7,6 @@ import uuid
 import pytest
 
 from arena.models import Report, Study, Vote
-from arena.services.studies import close_study
 from tests.api.asking import error_of, signed_in
 from tests.study_rows import matchups_of
 
@@ -56,11 +55,3 @@ def test_a_report_that_can_not_be_kept_says_why(
     answer = signed_in(whose).post("/api/v1/reports", body, content_type="application/json")
     error_of(answer, status, code)
     assert not Report.objects.exists()
-
-
-def test_after_the_closing_nothing_more_is_reported(study: Study) -> None:
-    matchup = matchups_of(study, "eva")[0]
-    close_study(study=study)
-    body = {"key": str(uuid.uuid4()), "matchup": str(matchup.code), "reason": "other"}
-    answer = signed_in("eva").post("/api/v1/reports", body, content_type="application/json")
-    error_of(answer, 410, "study_not_open")

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 import pytest
-from django.contrib.auth.models import Group, User
+from django.contrib.auth.models import User
 from django.db import connection
 from django.test import Client
 from django.test.utils import CaptureQueriesContext
@@ -63,15 +63,6 @@ def test_pages_lose_no_row_and_repeat_none_while_rows_are_added() -> None:
     assert second.json()["next"] is None
 
 
-def test_the_next_page_keeps_filters_and_tells_no_key() -> None:
-    a_study()
-    asking = program_of(people()["analyst"])
-    given: dict[str, Any] = {"set": "own", "limit": 4}
-    page = asking.get(API + "scenarios", given).json()
-    assert "set=own" in page["next"]
-    assert f"after={page['results'][-1]['code']}" in page["next"]
-
-
 @pytest.mark.parametrize(
     ("query", "field"),
     [
@@ -87,18 +78,6 @@ def test_a_wrong_parameter_is_named(query: dict[str, Any], field: str) -> None:
     asking = program_of(people()["analyst"])
     error = error_of(asking.get(API + "jobs", query), 422, "invalid")
     assert list(error["fields"]) == [field]
-
-
-def test_lists_are_filtered() -> None:
-    here = world()
-    asking = program_of(people()["analyst"])
-    assert slugs(asking.get(API + "contestants", {"slug": "ann"})) == ["ann"]
-    assert slugs(asking.get(API + "contestants", {"kind": "llm"})) == []
-    assert slugs(asking.get(API + "scenarios", {"set": "paper"})) == []
-    for state, number in (("running", 1), ("cancelled", 0)):
-        found = asking.get(API + "jobs", {"state": state}).json()["results"]
-        codes = [row["code"] for row in found if row["code"] == str(here.job.code)]
-        assert len(codes) == number
 
 
 def test_what_has_not_changed_is_304_and_what_has_is_not() -> None:
@@ -164,13 +143,6 @@ def test_a_job_is_launched_by_the_pages_own_service(
     assert event.actor is not None
 
 
-def test_nothing_is_launched_where_something_is_unknown() -> None:
-    asking = program_of(people()["admin"])
-    answer = send(asking, "jobs", name="x", contestants=["nobody"], scenarios=["nowhere"])
-    assert "nobody" in error_of(answer, 400, "refused")["message"]
-    assert not GenerationJob.objects.exists()
-
-
 def test_links_let_in_once_and_only_with_a_password_that_holds() -> None:
     link = f"http://x/first/{make_first_link_token()}/"
     given = {"link": link, "username": "ada"}
@@ -186,19 +158,6 @@ def test_links_let_in_once_and_only_with_a_password_that_holds() -> None:
     assert expert.get(API + "jobs").status_code == 403
     error_of(send(Client(), "welcome", **invited), 410, "link_over")
     assert User.objects.get(username="grace").check_password("a bird in the hand")
-
-
-def test_who_can_have_no_token_keeps_the_link() -> None:
-    asking = program_of(people()["admin"])
-    link = send(asking, "people", username="grace", role="expert").json()["link"]
-    grace = User.objects.get(username="grace")
-    grace.groups.clear()
-    invited = {"link": link, "password": "a bird in the hand"}
-    error_of(send(Client(), "welcome", **invited), 400, "refused")
-    grace.refresh_from_db()
-    assert not grace.has_usable_password()
-    grace.groups.add(Group.objects.get(name="expert"))
-    assert send(Client(), "welcome", **invited).status_code == 201
 
 
 # --- Blindness ---------------------------------------------------------------------------------

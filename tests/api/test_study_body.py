@@ -61,23 +61,6 @@ def test_every_option_of_a_plan_can_be_given() -> None:
     assert left == []
 
 
-@pytest.mark.parametrize(
-    ("given", "field"),
-    [
-        ({"overlap_share": 0.81}, "overlap_share"),
-        ({"adaptive_share": "0.5"}, "adaptive_share"),
-        ({"repeat_share": 10**400}, "repeat_share"),
-        ({"stopping": {"votes": 5}}, "stopping"),
-        ({"hypotheses": "ann above bob"}, "hypotheses"),
-    ],
-)
-def test_what_can_not_be_is_named(given: dict[str, Any], field: str) -> None:
-    least = {"name": "x", "contestants": [], "scenarios": [], "experts": [], "votes_per_expert": 1}
-    body = StudyBody(data=least | given)
-    assert not body.is_valid()
-    assert list(body.errors) == [field]
-
-
 @pytest.mark.django_db
 def test_a_preregistered_study_is_opened_by_the_wire() -> None:
     chosen = cast_of()

@@ -3,7 +3,6 @@ from __future__ import annotations
 import csv
 import io
 import json
-from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
@@ -28,7 +27,6 @@ from tests.web.cast import people, png, signed_in
 pytestmark = pytest.mark.django_db
 
 State = Augmentation.State
-NOTHING = modification_to_document(Modification())
 UNMET = intent_to_document(Intent(unmet="There is no tram."))
 
 
@@ -118,27 +116,6 @@ def test_a_second_look_reads_what_it_follows_from_and_computes_nothing() -> None
     with CaptureQueriesContext(connection) as asked:
         assert analysis_of(job) is kept
     assert len(asked) == 3
-
-
-@pytest.mark.parametrize(
-    "change",
-    [
-        lambda: Augmentation.objects.filter(contestant__slug="ann").update(state=State.UNREADABLE),
-        lambda: Augmentation.objects.filter(scenario__slug="wish-1").update(modification=NOTHING),
-        lambda: Augmentation.objects.filter(scenario__slug="wish-1").delete(),
-        lambda: Scenario.objects.filter(slug="wish-2").update(reference=NOTHING),
-        lambda: Scenario.objects.filter(slug="never").update(intent=None, intent_origin=""),
-        lambda: Scenario.objects.filter(slug="wish-0-p1").update(paraphrase_of=None),
-        lambda: Contestant.objects.filter(slug="ann").update(name="Anna"),
-    ],
-)
-def test_whatever_changes_is_analysed_anew(change: Callable[[], object]) -> None:
-    job = a_job()
-    before = analysis_of(job)
-    change()
-    after = analysis_of(job)
-    assert after == analyse_job(job)
-    assert after != before
 
 
 def test_the_page_shows_all_three_and_an_empty_job_says_so() -> None:

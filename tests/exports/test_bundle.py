@@ -15,13 +15,10 @@ from pyarrow import parquet
 
 from arena.exports.bundle import bundle
 from arena.exports.formats import format_named
-from arena.exports.heat_chart import heat_chart
-from arena.exports.parquet import NUMBER, TEXT, WHOLE, YES_NO, parquet_bytes
 from arena.exports.tables import leaderboard_table
 from arena.exports.votes import VOTE_FORMATS, vote_table
 from arena.exports.writers import FORMATS
 from arena.models import Snapshot, Study
-from arena.queries.vote_sets import Filters
 from arena.services.ratings import rate
 from augment.errors import UnknownName
 from augment.models import Event
@@ -67,16 +64,6 @@ def test_the_zip_is_the_same_twice_its_manifest_true_and_no_account_named(
         assert secret.encode() not in texts
 
 
-def test_a_rating_by_chosen_experts_names_them_by_pseudonym(snapshot: Snapshot) -> None:
-    person = snapshot.study.experts.order_by("pk")[0].person
-    chosen = Filters(experts=(str(person.code),))
-    rated = rate(study=snapshot.study, rounds=50, unit="vote", filters=chosen)
-    with zipfile.ZipFile(io.BytesIO(bundle(rated))) as archive:
-        manifest = json.loads(archive.read("manifest.json"))
-    assert manifest["filters"]["experts"] == [person.pseudonym]
-    assert str(person.code) not in json.dumps(manifest)
-
-
 def test_votes_read_back_from_both_formats_are_the_same(snapshot: Snapshot) -> None:
     rows = vote_table(snapshot)
     text = csv.DictReader(io.StringIO(VOTE_FORMATS["csv"].write(rows).decode()))
@@ -101,21 +88,6 @@ def test_the_table_reads_back_from_parquet(snapshot: Snapshot) -> None:
         table.rows[0].rank,
         table.rows[0].elo,
     )
-
-
-def test_an_empty_table_keeps_its_columns_and_unknown_is_null() -> None:
-    columns = {"a": TEXT, "b": WHOLE, "c": NUMBER, "d": YES_NO}
-    assert parquet.read_table(io.BytesIO(parquet_bytes(columns, []))).column_names == [*"abcd"]
-    row = parquet.read_table(io.BytesIO(parquet_bytes(columns, [("x", None, None, True)])))
-    assert row.to_pylist() == [{"a": "x", "b": None, "c": None, "d": True}]
-
-
-def test_the_heat_chart_names_everybody_and_is_the_same_twice(snapshot: Snapshot) -> None:
-    table, pairs = leaderboard_table(snapshot), snapshot.results.pairs
-    picture = heat_chart(table.rows, pairs, file_format="svg")
-    assert picture == heat_chart(table.rows, pairs, file_format="svg")
-    for row in table.rows:
-        assert row.model in picture.decode()
 
 
 # --- The command -------------------------------------------------------------------------------

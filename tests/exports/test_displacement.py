@@ -3,15 +3,11 @@ from __future__ import annotations
 import csv
 import io
 import json
-from dataclasses import replace
 from pathlib import Path
 
 import pytest
 from django.core.management import CommandError, call_command
-from pyarrow import parquet
 
-from arena.exports.displacement_chart import box_plot
-from arena.exports.displacement_objects import OBJECT_FORMATS, object_rows
 from arena.exports.displacement_table import DisplacementTable, displacement_table
 from arena.exports.displacement_writers import COLUMNS, FORMATS, csv_bytes, json_bytes
 from arena.exports.published import BY_VARIANT, SOURCE
@@ -95,13 +91,6 @@ def test_by_variant_says_which_types_it_leaves_out_and_shows_the_papers_boxes_be
     assert (published[0]["mean_m"], published[0]["n"]) == ("", "")
 
 
-def test_all_five_types_stand_without_the_papers_boxes_which_answer_another_question() -> None:
-    shown = displacement_table(a_job(), by=By.VARIANT, types=tuple(ScenarioType))
-    assert shown.published == ()
-    assert shown.notes[0] == "All five scenario types."
-    assert {group.summary.augmentations for group in shown.groups} == {2}
-
-
 def test_json_holds_every_single_distance() -> None:
     document = json.loads(json_bytes(table()))
     assert document["simulated"] is True
@@ -148,27 +137,6 @@ def test_by_object_there_is_a_row_for_each_object_with_both_places() -> None:
     assert len(found) == 5 + 4
 
 
-def test_the_formats_by_object_say_the_same_and_agree_with_the_summary(tmp_path: Path) -> None:
-    job = a_job()
-    objects = object_rows(job)
-    document = json.loads(OBJECT_FORMATS["json"].write(objects))["objects"]
-    table = parquet.read_table(io.BytesIO(OBJECT_FORMATS["parquet"].write(objects))).to_pylist()
-    assert document == table
-    shown = displacement_table(job, by=By.CONTESTANT)
-    for name, count in (("matched", "n"), ("missing", "missing"), ("surplus", "surplus")):
-        summed = sum(getattr(group.summary, count) for group in shown.groups)
-        assert sum(one["object"] == name for one in table) == summed
-    with pytest.raises(CommandError, match=r"'pdf'. Known: csv, json, parquet"):
-        run("displacement", "Round 1", "--by", "object", "--format", "pdf", "--out", "-")
-
-
-def test_what_was_not_measured_is_said() -> None:
-    job = a_job()
-    job.augmentations.filter(contestant__slug="sim").update(state="failed")
-    notes = displacement_table(job, by=By.TYPE).notes
-    assert "Augmentations not measured: 2 (waits, runs, failed or was cancelled)." in notes
-
-
 @pytest.mark.parametrize("name", sorted(FORMATS))
 def test_the_same_job_gives_the_same_bytes(name: str) -> None:
     job = a_job()
@@ -176,37 +144,6 @@ def test_the_same_job_gives_the_same_bytes(name: str) -> None:
     first, again = (write(displacement_table(job, by=By.VARIANT)) for _ in range(2))
     assert first == again
     assert b"2026" not in first[:400]
-
-
-@pytest.mark.parametrize("by", list(By))
-def test_the_chart_names_and_marks_everybody(by: By) -> None:
-    shown = box_plot(table(by), file_format="svg").decode()
-    assert "sim (simulated)" in shown
-    assert "n 0, " in shown
-    assert ("read from the paper's figure" in shown.replace("&#x27;", "'")) is (by is By.VARIANT)
-
-
-def test_outliers_far_beyond_the_whiskers_turn_the_axis_logarithmic() -> None:
-    near = table()
-    group = near.groups[0]
-    assert group.summary.box is not None
-    far = replace(group.summary.box, outliers_m=(90.0,))
-    wide = replace(near, groups=(replace(group, summary=replace(group.summary, box=far)),))
-    assert "logarithmic beyond 1 m" not in box_plot(near, file_format="svg").decode()
-    assert "logarithmic beyond 1 m" in box_plot(wide, file_format="svg").decode()
-
-
-def test_a_pdf_embeds_fonts_that_publishers_take() -> None:
-    made = box_plot(table(), file_format="pdf")
-    assert b"/FontFile2" in made
-    assert b"/Type3" not in made
-
-
-def test_a_job_of_which_nothing_is_measured_still_has_a_chart() -> None:
-    job = GenerationJob.objects.create(name="Empty")
-    assert b"Displacement error" in box_plot(
-        displacement_table(job, by=By.CONTESTANT), file_format="svg"
-    )
 
 
 def test_the_command_writes_what_it_is_asked_for(tmp_path: Path) -> None:
@@ -232,13 +169,6 @@ def test_a_wrong_wish_is_a_sentence(arguments: tuple[str, ...], sentence: str) -
         run(*arguments)
 
 
-def test_two_jobs_of_one_name_go_by_their_codes() -> None:
-    job = a_job()
-    GenerationJob.objects.create(name="Round 1")
-    with pytest.raises(CommandError, match=f"2 jobs are called 'Round 1'.*{job.code}"):
-        run("displacement", "Round 1", "--out", "-")
-
-
 # The sheet of samples
 
 SHEET = ("samples", "Round 1", "--scenarios", "works", "parked", "--contestants", "sim", "ann")
@@ -253,29 +183,3 @@ def test_the_sheet_of_samples_has_the_same_bytes_twice(tmp_path: Path, name: str
         made.append((tmp_path / name).read_bytes())
     assert made[0] == made[1]
     assert made[0].startswith((b"%PDF", b"\x89PNG"))
-
-
-def test_a_sheet_without_a_picture_says_why(tmp_path: Path) -> None:
-    a_job().augmentations.filter(contestant__slug="sim").update(image="", state="cancelled")
-    run(*SHEET, "--out", tmp_path / "sheet.pdf")
-    assert (tmp_path / "sheet.pdf").exists()
-
-
-@pytest.mark.parametrize(
-    ("scenario", "contestant", "out", "sentence"),
-    [
-        ("works", "bob", "x.png", "Unknown contestant of this job 'bob'. Known: ann, sim."),
-        ("moon", "ann", "x.png", "Unknown scenario of this job 'moon'"),
-        ("works", "ann", "x.svg", "Unknown format 'svg'. Known: pdf, png."),
-    ],
-)
-def test_a_sheet_of_what_is_not_there_is_refused(
-    tmp_path: Path, scenario: str, contestant: str, out: str, sentence: str
-) -> None:
-    a_job()
-    with pytest.raises(CommandError, match=sentence):
-        run(
-            *("samples", "Round 1", "--scenarios", scenario),
-            *("--contestants", contestant, "--out", tmp_path / out),
-        )
-    assert list(tmp_path.glob("*.*")) == []

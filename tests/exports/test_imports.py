@@ -8,7 +8,6 @@ from pathlib import Path
 
 import pytest
 from django.core.management import CommandError, call_command
-from django.urls import reverse
 
 from arena.exports.tables import leaderboard_table
 from arena.exports.votes import VOTE_FORMATS, vote_table
@@ -16,7 +15,6 @@ from arena.models import ImportedVote, Study, VoteFile
 from arena.services.ratings import rate
 from arena.services.vote_imports import import_votes
 from augment.models import Event
-from tests.web.cast import people, signed_in
 
 pytestmark = pytest.mark.django_db
 
@@ -53,17 +51,6 @@ def test_a_file_becomes_a_closed_study_that_is_rated(tmp_path: Path) -> None:
     assert [row.slug for row in leaderboard_table(snapshot).rows] == ["x", "y", "z"]
     assert {row.kind for row in leaderboard_table(snapshot).rows} == {"imported"}
     assert snapshot.votes_counted == 36
-
-
-def test_without_judges_votes_are_resampled(tmp_path: Path) -> None:
-    cut = [",".join(line.split(",")[:3]) for line in lines()]
-    path = written(tmp_path, *cut, head="model_a,model_b,winner")
-    study = import_votes(path=path, name="Elsewhere").study
-    snapshot = rate(study=study, rounds=200)
-    assert snapshot.resampling_unit == "vote"
-    agreement = snapshot.results.trust.agreement
-    assert agreement is not None
-    assert agreement.units == 0, "nobody knows what was shown"
 
 
 @pytest.mark.parametrize(
@@ -117,20 +104,3 @@ def test_made_up_votes_say_so_wherever_they_go(tmp_path: Path) -> None:
     assert snapshot.includes_simulated
     table = csv.DictReader(io.StringIO(VOTE_FORMATS["csv"].write(vote_table(snapshot)).decode()))
     assert {line["simulated"] for line in table} == {"yes"}
-
-
-def test_the_same_pages_show_imported_votes(tmp_path: Path) -> None:
-    study = import_votes(path=written(tmp_path, *lines()), name="Elsewhere").study
-    rate(study=study, rounds=50)
-    analyst = signed_in(people()["analyst"])
-    assert "Imported votes" in analyst.get(reverse("studies")).content.decode()
-    assert analyst.get(reverse("study", args=[study.code])).status_code == 302
-    page = analyst.get(reverse("results", args=[study.code])).content.decode()
-    assert "votes from the file arena.csv" in page
-    for tab in ("pairs", "types", "raters", "coverage", "displacement", "cost", "log"):
-        answer = analyst.get(reverse("results-tab", args=[study.code, tab]))
-        assert answer.status_code == 200, tab
-    cell = analyst.get(
-        reverse("results-votes", args=[study.code]), {"contestant": "x", "opponent": "y"}
-    )
-    assert cell.content.decode().count("<tr>") == 13, "a head and twelve votes"

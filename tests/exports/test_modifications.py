@@ -75,13 +75,6 @@ def test_a_job_goes_to_a_file_and_back(job: GenerationJob, tmp_path: Path) -> No
             assert made["heading_rad"] == pytest.approx(given["heading_rad"], abs=0.001)
 
 
-def test_one_contestant_can_be_chosen(job: GenerationJob) -> None:
-    text, said = export("--contestant", "rule", "--out", "-")
-    assert yaml.safe_load(text)["modification_details_dictionary"] == {}
-    assert all(f"{slug} by rule: there is no modification" in said for slug in SLUGS)
-    assert "3 things could not be said" in said
-
-
 def test_scenes_can_be_named_for_foreign_tokens(job: GenerationJob, tmp_path: Path) -> None:
     file = tmp_path / "foreign.yaml"
     text, _ = export("--contestant", "reference", "--out", "-")
@@ -163,14 +156,3 @@ def test_a_file_of_something_else_is_an_error_and_not_nothing_read(
         call_command("read_interplan", str(file), "--out", str(tmp_path / "read"))
     assert sentence in str(fault.value)
     assert not (tmp_path / "read").exists()
-
-
-def test_a_file_that_is_not_there_and_a_scene_nobody_has_are_named(tmp_path: Path) -> None:
-    with pytest.raises(CommandError, match="can't be read"):
-        call_command("read_interplan", str(tmp_path / "none.yaml"), "--out", str(tmp_path))
-    with pytest.raises(CommandError, match="Unknown scene 'nowhere'"):
-        call_command(
-            "read_interplan", "none.yaml", "--scene", "ab=nowhere", "--out", str(tmp_path)
-        )
-    with pytest.raises(CommandError, match="TOKEN=SLUG"):
-        call_command("read_interplan", "none.yaml", "--scene", "ab", "--out", str(tmp_path))

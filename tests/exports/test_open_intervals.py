@@ -14,10 +14,8 @@ from django.core.management import call_command
 from pyarrow import parquet
 
 from arena.exports.bundle import bundle
-from arena.exports.rating_charts import charts
 from arena.exports.tables import leaderboard_table
 from arena.exports.writers import FORMATS, plain_text
-from arena.management.rate_csv import run
 from arena.models import Snapshot, Study
 from arena.services.ratings import rate
 from tests.web.test_results import judged, shown
@@ -87,30 +85,6 @@ def test_latex_and_terminal_print_open_ends_and_the_reasons_beneath(snapshot: Sn
     text = plain_text(table)
     assert f"few: {FEW}." in text
     assert "+∞" in text
-
-
-def test_the_command_for_files_says_the_same(file: Path) -> None:
-    found = json.loads(run(file=str(file), rounds=1000, format="json"))
-    assert [line["model"] for line in found["standings"]] == ORDER
-    assert [line["rank"] for line in found["standings"]] == RANKS
-    assert found["standings"][1]["note"] == FEW
-    for form in ("table", "latex", "csv"):
-        assert FEW in run(file=str(file), rounds=1000, format=form)
-
-
-def test_the_page_draws_open_bars_and_says_why(snapshot: Snapshot) -> None:
-    page = shown(snapshot.study)
-    assert page.count("11m6-5-6 5 6 5") == 1  # one arrow to the left, two to the right
-    assert page.count("11m-6-5 6 5-6 5") == 2
-    assert "≥ " in page
-    assert FEW in page.replace("&#x27;", "'")
-
-
-def test_charts_are_drawn_with_open_ends(snapshot: Snapshot) -> None:
-    drawn = FORMATS["svg"].write(leaderboard_table(snapshot)).decode()
-    assert drawn.count("<path") > 7
-    for chart in charts(snapshot).values():
-        assert chart(file_format="svg").startswith(b"<?xml")
 
 
 def test_a_type_with_too_few_votes_has_no_ranks_in_page_and_files() -> None:

@@ -5,32 +5,27 @@ from __future__ import annotations
 import io
 import json
 import zipfile
-from dataclasses import replace
 from typing import Any
 
 import pytest
 from django.contrib.auth.models import User
-from django.core.management import call_command
 from hypothesis import given
 from hypothesis import strategies as st
 
 from arena.exports.bundle import bundle
 from arena.models import Snapshot, Study
 from arena.pairing.order import MAIN
-from arena.queries.judged import Entrant, Judged, last_vote_of
-from arena.queries.vote_lists import vote_page
-from arena.queries.vote_search import VoteSearch
-from arena.queries.vote_sets import Filters, VoteSet, vote_set
+from arena.queries.judged import Entrant, Judged
+from arena.queries.vote_sets import Filters, VoteSet
 from arena.rating.leaderboard import rate as rate_votes
 from arena.results.both_versions import OwnVotes
-from arena.services.authorships import mark_author, take_back_author
+from arena.services.authorships import mark_author
 from arena.services.own_votes import OTHER_ROUNDS, with_and_without
-from arena.services.ratings import compute_snapshot, plan_snapshot, rate
+from arena.services.ratings import rate
 from arena.services.snapshots import votes_of
 from arena.services.vote_arrays import vote_arrays
-from augment.models import Event, Scenario
+from augment.models import Event
 from tests.full_study import Size, full_study
-from tests.study_rows import a_study, matchups_of, shown_again, vote
 
 pytestmark = pytest.mark.django_db
 
@@ -110,67 +105,6 @@ def test_both_versions_are_those_of_the_two_ratings_themselves(study: Study) -> 
     assert found.largest.places == max(moves.values())
 
 
-def test_a_rating_knows_the_authors_of_its_own_time(study: Study) -> None:
-    mark(study)
-    counted, left = (rate(study=study, rounds=20, filters=f) for f in (None, WITHOUT))
-    take_back_author(authorship=study.authorships.get())
-    mark(study, "expert-2", "llama-fc")
-    assert len(votes_of(left).counted) == left.votes_counted
-    assert own_votes(counted).by_judge.keys() == {code_of(AUTHOR)}
-    planned = plan_snapshot(study=study, rounds=20, filters=WITHOUT)
-    take_back_author(authorship=study.authorships.get())
-    later = compute_snapshot(snapshot_pk=planned.pk)
-    assert later is not None
-    assert own_votes(later).by_judge.keys() == {code_of("expert-2")}
-
-
-def test_without_authors_or_without_own_votes_there_is_nothing_to_compare(study: Study) -> None:
-    assert rate(study=study, rounds=10).results.own_votes is None
-    mark(study)
-    others = tuple(code_of(f"expert-{number}") for number in (2, 3, 4))
-    snapshot = rate(study=study, rounds=10, filters=Filters(experts=others))
-    assert snapshot.results.own_votes is None
-
-
-def test_the_other_version_says_why_it_rates_nobody() -> None:
-    study = a_study(votes_per_expert=6, experts=("eva",))
-    for number, matchup in enumerate(matchups_of(study, "eva")):
-        vote(matchup, "left" if number % 2 else "right")
-    for slug in ("ann", "bob", "cid"):
-        mark(study, "eva", slug)
-    found = own_votes(rate(study=study, rounds=10, early=True))
-    assert found.largest is None
-    assert [*found.reasons] == ["There are no votes to rate."]
-
-
-def test_other_reasons_are_said_before_this_one_and_repeats_follow_the_same_rule() -> None:
-    study = a_study(votes_per_expert=9)
-    mark(study, "eva", "ann")
-    first = next(
-        one for one in matchups_of(study, "eva")
-        if "ann" in (one.left.contestant.slug, one.right.contestant.slug)
-    )  # fmt: skip
-    for matchup in (first, shown_again(first)):
-        vote(matchup)
-    authors = frozenset({(code_of("eva"), "ann")})
-
-    def left_out(**more: Any) -> dict[str, int]:
-        filters = Filters(leave_out_own=True, authors=authors, **more)
-        return vote_set(study, filters=filters, last=last_vote_of(study)).left_out
-
-    assert left_out() == {"own": 1, "repeat": 1}
-    assert left_out(kinds=("main", "repeat")) == {"own": 2}
-    assert left_out(types=(Scenario.Type.OVERTAKE.value,)) == {"filtered": 1, "repeat": 1}
-
-
-def test_pairs_their_plan_and_their_cells_leave_them_out_alike(study: Study) -> None:
-    mark(study)
-    snapshot = rate(study=study, rounds=10, filters=WITHOUT)
-    for pair in snapshot.results.pairs:
-        cell = vote_page(snapshot, VoteSearch(contestant=pair.a, opponent=pair.b), 1)
-        assert cell.total == pair.votes == pair.planned, pair
-
-
 def test_the_zip_has_both_versions_but_never_who_is_author(study: Study) -> None:
     mark(study)
     snapshot = rate(study=study, rounds=20, filters=WITHOUT)
@@ -184,24 +118,6 @@ def test_the_zip_has_both_versions_but_never_who_is_author(study: Study) -> None
     assert "by_judge" not in statistics["own_votes"]
     texts = b"".join(files[name] for name in files if not name.endswith(".pdf"))
     assert code_of(AUTHOR).encode() not in texts
-
-
-def test_a_snapshot_of_before_still_opens_and_packs(study: Study) -> None:
-    snapshot = rate(study=study, rounds=20)
-    for name in ("leave_out_own", "authors"):
-        del snapshot.filters[name]
-    snapshot.results = replace(snapshot.results, own_votes=None)
-    snapshot.save()
-    assert Filters.of_document(snapshot.filters) == Filters()
-    files = zipped(snapshot)
-    assert json.loads(files["manifest.json"])["filters"] == snapshot.filters
-    assert json.loads(files["statistics.json"])["own_votes"] is None
-
-
-def test_the_command_leaves_them_out_too(study: Study, capsys: pytest.CaptureFixture[str]) -> None:
-    mark(study)
-    call_command("rate", study.name, "--rounds", "20", "--leave-out-own")
-    assert f"{study.snapshots.get().votes_left_out['own']} own." in capsys.readouterr().out
 
 
 # --- Properties --------------------------------------------------------------------------------

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from fractions import Fraction
-
 import pytest
 
 from arena.exports.heat import heat_map
@@ -20,17 +18,6 @@ from arena.templatetags.results import estimate_percent, percent
 )
 def test_a_half_goes_to_the_even_number(share: float, shown: int) -> None:
     assert whole_percent(share) == shown
-
-
-def test_every_share_of_up_to_200_votes_is_rounded_as_if_it_were_exact() -> None:
-    for votes in range(1, 201):
-        for halves in range(2 * votes + 1):
-            share = halves / 2 / votes
-            assert whole_percent(share) == round(Fraction(100 * halves, 2 * votes)), (
-                halves,
-                votes,
-            )
-            assert whole_percent(share) + whole_percent(1.0 - share) == 100
 
 
 def test_table_heat_map_and_panels_agree() -> None:

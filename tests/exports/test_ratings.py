@@ -3,27 +3,25 @@ from __future__ import annotations
 from typing import Any
 
 import pytest
-from pytest_django import DjangoAssertNumQueries
 
-from arena.errors import NoSnapshot, NotYours, StudyNotOpen, StudyStillOpen
+from arena.errors import NotYours, StudyStillOpen
 from arena.models import Snapshot, Study, Vote
 from arena.queries.results import (
     ResultsAccess,
     latest_snapshot,
     results_access,
-    snapshot_to_export,
 )
 from arena.services.early_looks import open_early
 from arena.services.people import create_person
 from arena.services.ratings import rate
 from arena.services.simulation import simulate_votes
 from arena.services.studies import close_study, open_study
-from augment.errors import Conflict, UnknownName
-from augment.models import Augmentation, Contestant, Event, Scenario
+from augment.errors import Conflict
+from augment.models import Augmentation, Event, Scenario
 from augment.scene.codec import modification_to_document
 from augment.scene.modification import Modification
 from tests.scenes import vehicle
-from tests.study_rows import KINDS, a_study, cast_of, expert, matchups_of, shown_again, vote
+from tests.study_rows import KINDS, a_study, cast_of, expert, matchups_of, vote
 
 pytestmark = pytest.mark.django_db
 
@@ -87,27 +85,6 @@ def test_only_current_votes_count() -> None:
     assert snapshot.votes_left_out == {"superseded": 1}
 
 
-def test_skips_repeats_and_checks_are_left_out_and_counted_apart() -> None:
-    study = a_study(votes_per_expert=6)
-    counted, skipped, check, *_ = matchups_of(study, "eva")
-    study.matchups.filter(pk=check.pk).update(kind="check")
-    repeat = shown_again(counted)
-    vote(counted, "equal", both_miss=False)
-    vote(skipped, "skip", reason="unclear")
-    for matchup in (check, repeat):
-        vote(matchup, "left")
-    snapshot = rate(study=close_study(study=study))
-    assert snapshot.votes_counted == 1
-    assert snapshot.votes_left_out == {"check": 1, "repeat": 1, "skip": 1}
-    assert sum(line.ties for line in snapshot.standings.all()) == 2
-
-
-def test_votes_that_determine_nothing_leave_empty_ratings_and_a_reason() -> None:
-    snapshot = rate(study=close_study(study=a_study()))
-    assert snapshot.status == "There are no votes to rate."
-    assert {line[1:5] for line in lines(snapshot)} == {(None, None, None, None)}
-
-
 def test_an_open_study_is_rated_only_on_purpose_and_that_is_logged() -> None:
     study = a_study()
     with pytest.raises(StudyStillOpen, match="'Round 1' is still open"):
@@ -127,38 +104,6 @@ def test_simulated_votes_stay_out_of_a_study_that_does_not_allow_them() -> None:
     assert snapshot.votes_counted == 1
     assert snapshot.votes_left_out == {"simulated": 1}
     assert not snapshot.includes_simulated
-
-
-@pytest.mark.parametrize(
-    ("options", "error", "sentence"),
-    [
-        ({"method": "glicko"}, UnknownName, "'glicko'. Known: bt, davidson, elo"),
-        ({"unit": "pair"}, UnknownName, "'pair'. Known: vote, scenario, expert, two-way"),
-        ({"rounds": 0}, Conflict, "from 1 to 100000, not 0"),
-        ({"seed": -1}, Conflict, "not -1"),
-        ({"method": "elo", "unit": "expert"}, Conflict, "'expert' needs bt"),
-    ],
-)
-def test_rules_that_make_no_sense_are_refused(
-    options: dict[str, Any], error: type[Exception], sentence: str
-) -> None:
-    study = close_study(study=a_study())
-    with pytest.raises(error, match=sentence):
-        rate(study=study, **options)
-    assert not Snapshot.objects.exists()
-
-
-def test_every_method_and_unit_rates() -> None:
-    study = voted_study()
-    for unit in ("vote", "scenario", "expert", "two-way"):
-        assert lines(rate(study=study, unit=unit))[0][2] > 1000
-    assert lines(rate(study=study, method="elo"))[0][2] > 1000
-
-
-def test_rating_costs_few_queries(django_assert_max_num_queries: DjangoAssertNumQueries) -> None:
-    study = voted_study()
-    with django_assert_max_num_queries(28):
-        rate(study=study, rounds=10)
 
 
 def test_who_may_see_results() -> None:
@@ -195,11 +140,6 @@ def test_opening_results_early_is_logged_once_and_ends_voting() -> None:
     vote(matchups_of(study, "finn")[0])
     with pytest.raises(Conflict, match="is closed: nothing is opened early"):
         open_early(study=close_study(study=study), actor=matchup.expert)
-
-
-def test_a_study_without_a_rating_has_nothing_to_export() -> None:
-    with pytest.raises(NoSnapshot, match="no rating yet"):
-        snapshot_to_export(a_study())
 
 
 # --- Simulated votes ---------------------------------------------------------------------------
@@ -255,17 +195,6 @@ def test_simulated_votes_need_a_study_that_allows_them() -> None:
     assert simulate_votes(study=demo, seed=1) == 1, "eva is a person"
 
 
-def test_a_closed_study_takes_no_simulated_votes() -> None:
-    study = close_study(study=simulated_study(2))
-    with pytest.raises(StudyNotOpen):
-        simulate_votes(study=study, seed=1)
-
-
-def test_a_simulated_contestant_makes_the_snapshot_simulated() -> None:
-    study = voted_study_with_simulated_contestants()
-    assert rate(study=study).includes_simulated
-
-
 def test_a_simulated_line_without_a_vote_makes_the_snapshot_simulated() -> None:
     study = open_study(
         name="Round 2",
@@ -275,12 +204,3 @@ def test_a_simulated_line_without_a_vote_makes_the_snapshot_simulated() -> None:
         **cast_of(kind=KINDS.SIMULATED),
     )
     assert rate(study=close_study(study=study)).includes_simulated
-
-
-def voted_study_with_simulated_contestants() -> Study:
-    cast = cast_of(kind=KINDS.SIMULATED, scenarios=2)
-    study = open_study(name="Demo", votes_per_expert=4, seed=1, allow_simulated=True, **cast)
-    for matchup in study.matchups.all():
-        vote(matchup, "equal")
-    assert Contestant.objects.filter(kind="simulated").count() == 3
-    return close_study(study=study)

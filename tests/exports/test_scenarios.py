@@ -115,14 +115,6 @@ def test_the_own_format_comes_back_exactly(job: GenerationJob, tmp_path: Path) -
     assert after.agents == ADDED.added
 
 
-def test_own_work_and_unknown_licences_are_told_apart(job: GenerationJob, tmp_path: Path) -> None:
-    BaseScene.objects.update(provenance="Authored by this project; same licence as the project.")
-    assert "Warning" not in export("--format", "json", "--out", str(tmp_path / "own.zip"))
-    BaseScene.objects.update(provenance="found on a disk")
-    said = export("--format", "json", "--out", str(tmp_path / "own.zip"))
-    assert "Warning: The licence of these sources is not known: junction." in said
-
-
 def test_strict_writes_nothing_once_something_would_change(
     job: GenerationJob, tmp_path: Path
 ) -> None:
@@ -181,32 +173,6 @@ def test_a_message_that_comes_twice_changes_nothing_and_a_new_zip_replaces_the_o
     assert second.pk != first.pk
     assert not default_storage.exists(first.stored)
     assert default_storage.exists(second.stored)
-
-
-def test_what_cannot_be_written_says_why(job: GenerationJob, admin_client: Client) -> None:
-    job.augmentations.exclude(modification=None).delete()
-    ask_for(admin_client, job, "json")
-    assert "failed: Round 1 has no modification that could be written." in page_of(
-        admin_client, job
-    )
-    assert admin_client.post(f"/jobs/{job.code}/scenarios-xodr/").status_code == 404
-
-
-@pytest.mark.parametrize(
-    ("options", "said"),
-    [
-        (("--format", "xodr"), "Unknown format 'xodr'. Known: "),
-        (("--format", "json", "--contestant", "nobody"), "Unknown contestant 'nobody'"),
-        (("--format", "json", "--contestant", "shy"), "no modification that could be written"),
-        (("--format", "json", "--motion", "idm"), "Unknown motion 'idm'. Known: recorded"),
-    ],
-)
-def test_what_can_not_be_asked_for_is_named(
-    options: tuple[str, ...], said: str, job: GenerationJob, tmp_path: Path
-) -> None:
-    with pytest.raises(CommandError, match=said):
-        export(*options, "--out", str(tmp_path / "x.zip"))
-    assert not list(tmp_path.glob("*.zip"))
 
 
 def test_a_zip_that_a_newer_one_overtook_leaves_no_file(

@@ -20,24 +20,19 @@ from django.contrib.auth.models import User
 from django.core.files.base import ContentFile
 from django.core.files.storage import default_storage
 from django.core.management import CommandError, call_command
-from django.db import connection
-from django.test.utils import CaptureQueriesContext
 from django.utils import timezone
 from pytest_django import Settings
 
 from arena.exports.study_folder.closure import TRAVELLING, close_over
-from arena.exports.study_folder.tables import files_for_people
 from arena.models import Study, Vote
 from arena.services.ratings import rate
 from arena.services.stored_rows import as_line, columns_of, find_filled_tables, label_of
 from arena.services.studies import close_study
 from augment.models import (
-    Attempt,
     Augmentation,
     Contestant,
     Endpoint,
     GenerationJob,
-    ModelCall,
     Scenario,
     Simulation,
 )
@@ -157,20 +152,6 @@ def test_nothing_is_overwritten_and_nothing_half_written_stays(
     assert sorted(path.name for path in tmp_path.iterdir()) == ["media", "out"]
 
 
-def test_a_name_that_is_no_account_any_more_gets_a_number(study: Study, tmp_path: Path) -> None:
-    rules = study.rules | {"experts": ["eva", "zoe", "finn"], "note": "eva"}
-    Study.objects.update(rules=rules, votes_to_plan={"zoe": 2, "eva": 0})
-    first = export(study, tmp_path / "first")
-    assert not [name for name, content in first.items() if b'"zoe"' in content]
-    told = json.loads(first["manifest.json"])["study"]["rules"]
-    assert told["experts"] == ["expert-0001", "former-0001", "expert-0002"]
-    assert told["note"] == "eva", "rules may hold the same word for something else"
-    empty()
-    call_command("import", "study", str(tmp_path / "first"))
-    assert Study.objects.get().votes_to_plan == {"former-0001": 2, "expert-0001": 0}
-    assert export(Study.objects.get(), tmp_path / "second") == first
-
-
 def test_a_picture_that_is_gone_is_named_and_nothing_is_written(
     study: Study, tmp_path: Path
 ) -> None:
@@ -179,30 +160,6 @@ def test_a_picture_that_is_gone_is_named_and_nothing_is_written(
     with pytest.raises(CommandError, match=f"{image} of this study is missing"):
         export(study, tmp_path / "out")
     assert not (tmp_path / "out").exists()
-
-
-def test_transcripts_are_read_in_the_same_queries_however_many_there_are(study: Study) -> None:
-    def queries() -> int:
-        with CaptureQueriesContext(connection) as asked:
-            files = dict(files_for_people(close_over(study)))
-        written = [name for name in files if name.startswith("transcripts/")]
-        assert len(written) == ModelCall.objects.values("attempt__augmentation").count()
-        return len(asked)
-
-    first, *others = Augmentation.objects.all()
-    call_a_model(first)
-    with_one = queries()
-    for row in others:
-        call_a_model(row)
-    assert queries() == with_one
-
-
-def call_a_model(row: Augmentation) -> None:
-    now = timezone.now()
-    attempt = Attempt.objects.create(augmentation=row, number=1, started_at=now)
-    ModelCall.objects.create(
-        attempt=attempt, number=1, role="modifier", request={}, started_at=now
-    )
 
 
 def test_only_drives_that_are_over_travel(study: Study, tmp_path: Path) -> None:
@@ -253,17 +210,6 @@ def test_it_is_taken_in_by_an_empty_installation_alone(study: Study, tmp_path: P
     with pytest.raises(CommandError, match="An empty installation is needed"):
         call_command("import", "study", str(tmp_path / "out"))
     assert Vote.objects.count() == 5
-
-
-def test_a_contestant_of_two_jobs_travels_once(study: Study, tmp_path: Path) -> None:
-    for job in GenerationJob.objects.all():
-        job.contestants.set(study.contestants.all())
-    first = export(study, tmp_path / "first")
-    lines = first["rows/augment.contestant.jsonl"].splitlines()
-    assert len(lines) == len(set(lines))
-    empty()
-    call_command("import", "study", str(tmp_path / "first"))
-    assert export(Study.objects.get(), tmp_path / "second") == first
 
 
 def test_the_tables_that_travel_are_those_that_are_taken_in(study: Study) -> None:

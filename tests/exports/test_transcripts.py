@@ -8,14 +8,11 @@ from pathlib import Path
 
 import pytest
 from django.core.management import call_command
-from django.test import Client
-from django.urls import reverse
 
 from augment.models import Augmentation, GenerationJob
 from augment.services.running import runner
 from augment.services.running.transcript_export import transcript_of
 from tests.jobs.models import Model, after_a_second_look, llama_job
-from tests.web.cast import people, signed_in
 
 pytestmark = pytest.mark.django_db
 
@@ -54,13 +51,3 @@ def test_the_zip_holds_the_same_lines(job: GenerationJob, tmp_path: Path) -> Non
     call_command("export", "transcripts", job.name, "--format", "zip", "--out", str(packed))
     with zipfile.ZipFile(packed) as archive:
         assert archive.read("transcripts.jsonl") == lines.read_bytes()
-
-
-def test_the_page_of_a_job_offers_them(job: GenerationJob) -> None:
-    client: Client = signed_in(people()["admin"])
-    address = reverse("transcripts-export", args=[job.code])
-    assert address in client.get(reverse("job", args=[job.code])).content.decode()
-    answer = client.get(address)
-    lines = b"".join(answer).splitlines()
-    assert [json.loads(line) for line in lines] == [alone(Augmentation.objects.get(job=job))]
-    assert "attachment" in answer["Content-Disposition"]

@@ -10,14 +10,14 @@ import pytest
 from pyarrow import parquet
 
 from arena.exports.votes import VOTE_FORMATS, vote_table
-from arena.models import Matchup, Snapshot, Study, Vote
+from arena.models import Matchup, Study, Vote
 from arena.queries.judged import last_vote_of
 from arena.queries.vote_sets import Filters, vote_set
-from arena.services.ratings import compute_snapshot, plan_snapshot, rate
+from arena.services.ratings import rate
 from arena.services.snapshots import votes_of
 from arena.services.studies import close_study
 from arena.services.vote_rows import COLUMNS, digest_of, vote_rows, votes_csv
-from augment.errors import Conflict, UnknownName
+from augment.errors import Conflict
 from augment.models import Contestant, Scenario
 from tests.append_only import rewriting
 from tests.study_rows import a_study, matchups_of, vote
@@ -42,22 +42,6 @@ def test_filters_choose_by_type_and_expert_and_count_what_they_leave_out() -> No
     assert len(counted(study, experts=(str(eva.code),))) == 6
     found = vote_set(study, filters=Filters(experts=(str(eva.code),)), last=last_vote_of(study))
     assert found.left_out == {"filtered": 6}
-
-
-@pytest.mark.parametrize(
-    ("filters", "sentence"),
-    [
-        ({"types": ("parade",)}, "scenario type 'parade'"),
-        ({"experts": ("nobody",)}, "expert 'nobody'"),
-        ({"kinds": ("check",)}, "Known: main, repeat"),
-    ],
-)
-def test_a_filter_that_names_nothing_is_refused(
-    filters: dict[str, tuple[str, ...]], sentence: str
-) -> None:
-    study = a_study(votes_per_expert=1)
-    with pytest.raises(UnknownName, match=sentence):
-        counted(study, **filters)
 
 
 @pytest.mark.parametrize(("left", "right"), [("ann", "bob"), ("bob", "ann"), ("cid", "bob")])
@@ -205,27 +189,3 @@ def test_a_snapshot_of_before_keeps_its_file_and_the_hash_of_it() -> None:
     assert VOTE_FORMATS["csv"].write(vote_table(snapshot)) == before
     table = parquet.read_table(io.BytesIO(VOTE_FORMATS["parquet"].write(vote_table(snapshot))))
     assert tuple(table.column_names) == COLUMNS[:10]
-
-
-def test_a_planned_snapshot_counts_only_once_it_is_computed_and_once() -> None:
-    study = a_study(votes_per_expert=3)
-    for matchup in study.matchups.all():
-        vote(matchup)
-    study = close_study(study=study)
-    snapshot = plan_snapshot(study=study, rounds=10)
-    assert (snapshot.state, snapshot.progress) == (Snapshot.State.QUEUED, 0)
-    computed = compute_snapshot(snapshot_pk=snapshot.pk)
-    assert computed is not None
-    assert (computed.state, computed.progress, computed.votes_counted) == ("ready", 100, 6)
-    assert compute_snapshot(snapshot_pk=snapshot.pk) is None
-    again = rate(study=study, rounds=10)
-    assert again.results == Snapshot.objects.get(pk=snapshot.pk).results
-
-
-def test_a_planned_snapshot_that_names_what_is_gone_says_so() -> None:
-    study = close_study(study=a_study(votes_per_expert=1))
-    snapshot = plan_snapshot(study=study, rounds=10, filters=Filters(experts=("nobody",)))
-    assert compute_snapshot(snapshot_pk=snapshot.pk) is None
-    snapshot.refresh_from_db()
-    assert snapshot.state == "failed"
-    assert "nobody" in snapshot.status

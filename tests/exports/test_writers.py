@@ -7,11 +7,9 @@ from dataclasses import replace
 
 import pytest
 
-from arena.exports.formats import format_named
 from arena.exports.latex import escape, latex
 from arena.exports.tables import LeaderboardTable, Row
-from arena.exports.writers import FORMATS, csv_bytes, json_bytes, plain_text
-from augment.errors import UnknownName
+from arena.exports.writers import FORMATS, csv_bytes, json_bytes
 
 PAPER = (
     ("interPlan", "", 1, 1042, 9, 11, 1960),
@@ -98,13 +96,6 @@ def test_latex_has_the_form_of_the_papers_table() -> None:
     ]
 
 
-def test_latex_names_the_method_and_says_what_is_simulated() -> None:
-    text = latex(table(row("Fake (simulated)", simulated=True), simulated=True, early=True))
-    assert "% Round 1: 5760 votes; Bradley-Terry on the Elo scale" in text
-    assert "5760 votes. (simulated, early)}" in text
-    assert "Fake (simulated) & 1" in text
-
-
 def test_tex_specials_are_escaped() -> None:
     assert escape("a_b & 5% of $x {#1} ~^\\") == (
         r"a\_b \& 5\% of \$x \{\#1\} \textasciitilde{}\textasciicircum{}\textbackslash{}"
@@ -114,13 +105,6 @@ def test_tex_specials_are_escaped() -> None:
 def test_a_line_break_in_a_name_cannot_leave_its_comment() -> None:
     text = latex(table(row("x"), study="Round\n\\input{evil}"))
     assert all(line.startswith("%") for line in text.splitlines() if "evil" in line)
-
-
-def test_what_is_unknown_is_two_hyphens_in_tables_and_empty_in_data() -> None:
-    unknown = table(row("x", elo=None, lower=None, upper=None, rank=None, note="no votes"))
-    assert r"    x & -- & -- & -- & 10 & --\\" in latex(unknown)
-    assert parsed(unknown)[0]["elo"] == ""
-    assert json.loads(json_bytes(unknown))["standings"][0]["rating"] is None
 
 
 def parsed(given: LeaderboardTable) -> list[dict[str, str]]:
@@ -182,32 +166,7 @@ def test_json_has_everything_that_makes_the_table_again() -> None:
     assert [first[key] for key in wanted] == ["interPlan", 1, 1042.2, 1033.0, 1053.0, 1960]
 
 
-def test_plain_text_says_method_and_warnings_beneath() -> None:
-    note = "In 4 of 1000 resamples the votes determined no ratings."
-    given = table(*papers_rows(), simulated=True, degenerate_rounds=4, notes=(note,))
-    text = plain_text(given)
-    assert "interPlan                1  1042   -9/+11   1960" in text
-    assert "5760 votes counted; left out: 3 superseded." in text
-    assert "Simulated: votes or contestants" in text
-    assert text.count("4 of 1000 resamples") == 1
-
-
 @pytest.mark.parametrize("name", FORMATS)
 def test_every_format_is_byte_identical_for_the_same_table(name: str) -> None:
     given = table(*papers_rows(), row("No $votes", elo=None, lower=None, upper=None, rank=None))
     assert FORMATS[name].write(given) == FORMATS[name].write(given)
-
-
-def test_the_chart_names_every_contestant_and_no_date() -> None:
-    svg = FORMATS["svg"].write(table(*papers_rows(), simulated=True)).decode()
-    for name, *_ in PAPER:
-        assert name in svg
-    assert "(simulated)" in svg
-    assert "<dc:date>" not in svg
-    assert FORMATS["png"].write(table(*papers_rows()))[:8] == b"\x89PNG\r\n\x1a\n"
-    assert FORMATS["pdf"].write(table(*papers_rows()))[:5] == b"%PDF-"
-
-
-def test_an_unknown_format_is_refused() -> None:
-    with pytest.raises(UnknownName, match=r"'xls'. Known: csv, json, parquet, latex"):
-        format_named(FORMATS, "xls")

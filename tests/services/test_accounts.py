@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import pytest
-from django.contrib.auth.models import Group, User
+from django.contrib.auth.models import Group
 from pytest_django import DjangoAssertNumQueries
 
 from arena.queries.accounts import AccountBackend
@@ -31,13 +31,6 @@ def test_of_several_roles_the_most_powerful_counts() -> None:
     found = AccountBackend().get_user(person.pk)
     assert found is not None
     assert role_of(found) == "analyst"
-
-
-def test_an_account_without_a_role_has_none() -> None:
-    bare = User.objects.create_user("bare")
-    found = AccountBackend().get_user(bare.pk)
-    assert found is not None
-    assert role_of(found) is None
 
 
 def test_an_account_that_is_gone_or_not_active_is_nobody() -> None:

@@ -10,7 +10,7 @@ from typing import Any
 
 import pytest
 from django.contrib.auth.models import User
-from django.core.management import CommandError, call_command
+from django.core.management import call_command
 
 from augment.errors import Conflict, InvalidDocument, UnknownName
 from augment.models import Augmentation, BaseScene, Contestant, Event, GenerationJob, Scenario
@@ -21,14 +21,13 @@ from augment.scene.modification import Modification
 from augment.services.running.choosing import resolve_scenarios
 from augment.services.scenarios.catalogue import CatalogueReport, load_catalogue
 from augment.services.scenarios.scene_imports import import_scene
-from augment.services.scenarios.scenes import add_scenario, intent_of, reference_of
+from augment.services.scenarios.scenes import add_scenario, reference_of
 from tests.fixtures.shelf import HARD
 from tests.intents import parked
 from tests.scenes import scene, vehicle
 
 pytestmark = pytest.mark.django_db
 
-OWN = Path(__file__).resolve().parents[2] / "fixtures"
 PARKED = CatalogueEntry(
     slug="parked-car",
     scene="street",
@@ -98,15 +97,6 @@ def test_loading_again_changes_nothing(folder: Path) -> None:
     assert Event.objects.count() == events
 
 
-def test_the_projects_own_catalogue_loads_twice_through_the_command() -> None:
-    for scenes, scenarios in (("12 added, 0", "50 added, 0"), ("0 added, 0", "0 added, 0")):
-        out = StringIO()
-        call_command("load_catalogue", stdout=out)
-        assert f"scenes: {scenes} changed" in out.getvalue()
-        assert f"scenarios: {scenarios} changed" in out.getvalue()
-    assert Scenario.objects.filter(catalogue_set="paper").count() == 50
-
-
 def test_the_hard_set_comes_when_it_is_asked_for_with_its_paraphrases_beside(
     folder: Path,
 ) -> None:
@@ -140,17 +130,6 @@ def test_the_hard_set_comes_when_it_is_asked_for_with_its_paraphrases_beside(
     assert (german.language, german.paraphrase_of) == ("de", original)
     assert (german.reference, german.intent) == (original.reference, original.intent)
     assert german.instruction.startswith("In der Kehre")
-
-
-def test_an_unused_scenario_and_its_scene_may_change(folder: Path) -> None:
-    load_catalogue(folder=folder)
-    Scenario.objects.update(original_image="bev/old.png")
-    edit(folder / "scenarios/parked-car.json", lambda it: it.update(instruction="Park a car."))
-    edit(folder / "scenes/street.json", lambda it: it.update(provenance="mended"))
-    assert load_catalogue(folder=folder) == report(scenes=(0, 1, 0), scenarios=(0, 1, 0))
-    scenario = Scenario.objects.get()
-    assert (scenario.instruction, scenario.original_image) == ("Park a car.", "")
-    assert scenario.base_scene.provenance == "mended"
 
 
 @pytest.mark.parametrize(
@@ -191,14 +170,6 @@ def test_an_older_installation_is_upgraded_but_for_what_was_augmented(folder: Pa
     assert Augmentation.objects.get().scenario.instruction == PARKED.instruction
 
 
-def test_a_changed_scene_with_somebodys_own_scenario_is_kept(folder: Path) -> None:
-    load_catalogue(folder=folder)
-    add_scenario(scene="street", type="jaywalking_pedestrian", instruction="walk", slug="mine")
-    edit(folder / "scenes/street.json", lambda it: it.update(provenance="mended"))
-    assert load_catalogue(folder=folder).kept == ("parked-car",)
-    assert BaseScene.objects.get().provenance != "mended"
-
-
 def test_rows_from_elsewhere_are_never_replaced(folder: Path) -> None:
     import_scene(source="json", path=folder / "scenes/street.json", frame=0, slug="street")
     with pytest.raises(Conflict, match="from the source 'json'"):
@@ -227,39 +198,6 @@ def test_every_problem_names_its_file_and_path_and_nothing_is_kept(folder: Path)
     assert not BaseScene.objects.exists()
 
 
-def test_an_intent_comes_with_its_scenario_and_is_the_authors(folder: Path) -> None:
-    load_catalogue(folder=folder)
-    row = Scenario.objects.get(slug="parked-car")
-    assert (intent_of(row), row.intent_origin) == (parked(20.0), "authored")
-
-
-def test_a_used_scenario_gets_the_intent_that_it_had_not_and_no_other(folder: Path) -> None:
-    file = folder / "scenarios/parked-car.json"
-    intent = json.loads(file.read_text())["intent"]
-    edit(file, lambda it: it.update(intent=None))
-    load_catalogue(folder=folder)
-    row = Scenario.objects.get(slug="parked-car")
-    augment(row)
-    edit(file, lambda it: it.update(intent=intent))
-    assert load_catalogue(folder=folder).scenarios_changed == 1
-    row.refresh_from_db()
-    assert row.intent == intent
-    edit(file, lambda it: it["intent"]["requests"][0].update(count=2))
-    assert load_catalogue(folder=folder).kept == ("parked-car",)
-
-
-def test_a_reference_has_to_fit_its_scene(folder: Path) -> None:
-    file = folder / "scenarios/parked-car.json"
-    edit(file, lambda it: it["reference"]["add"][0].update(lane_id="Lane9"))
-    with pytest.raises(
-        InvalidDocument, match=r"parked-car.json: reference.Agent2.lane_id: 'Lane9'"
-    ):
-        load_catalogue(folder=folder)
-    edit(file, lambda it: it["reference"].update(add=[], remove=["Agent7"]))
-    with pytest.raises(InvalidDocument, match=r"parked-car.json: reference: Agent7 is not in"):
-        load_catalogue(folder=folder)
-
-
 def test_a_conflict_late_in_the_folder_undoes_everything(folder: Path) -> None:
     load_catalogue(folder=folder)
     Scenario.objects.update(catalogue_set="")
@@ -268,8 +206,3 @@ def test_a_conflict_late_in_the_folder_undoes_everything(folder: Path) -> None:
     with pytest.raises(Conflict):
         load_catalogue(folder=folder)
     assert [row.slug for row in BaseScene.objects.all()] == ["street"]
-
-
-def test_the_command_says_what_is_wrong(tmp_path: Path) -> None:
-    with pytest.raises(CommandError, match="holds no scenes"):
-        call_command("load_catalogue", "--folder", str(tmp_path))

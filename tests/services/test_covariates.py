@@ -76,15 +76,6 @@ def test_the_adjusted_table_stands_with_its_effects_and_the_table_as_voted(study
     assert np.abs(columns[:, 1]).max() > np.abs(columns[:, 2]).max()
 
 
-def test_without_objects_the_table_is_as_voted_and_says_so() -> None:
-    study = full_study(size=Size(scenarios=10, experts=4, votes_per_expert=90))
-    snapshot = ratings.rate(study=study, rounds=100, covariates=["objects"])
-    assert "do not determine what was to be adjusted for" in snapshot.status
-    assert snapshot.results.adjustment is not None
-    assert snapshot.results.adjustment.effects == ()
-    assert leaderboard_table(snapshot).covariates == ()
-
-
 def test_what_can_not_be_adjusted_for_is_refused(study: Study) -> None:
     with pytest.raises(UnknownName, match="side, objects, vehicles"):
         ratings.rate(study=study, covariates=["length"])

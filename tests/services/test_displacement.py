@@ -3,10 +3,7 @@
 from __future__ import annotations
 
 import pytest
-from django.db import connection
-from django.test.utils import CaptureQueriesContext
 
-from augment.errors import UnknownName
 from augment.models import Augmentation, Contestant, GenerationJob, Scenario
 from augment.scene.catalogue import ScenarioType
 from augment.scene.codec import modification_to_document
@@ -16,10 +13,8 @@ from augment.services.judging.displacement import (
     Group,
     Unmeasured,
     groups,
-    of_augmentation,
     of_job,
     of_latest,
-    types_named,
 )
 from tests.jobs import rows
 from tests.scenes import cone
@@ -57,17 +52,6 @@ def only(found: list[Group]) -> Group:
     return found[0]
 
 
-def matched(found: list[Group]) -> int:
-    return sum(group.summary.n for group in found)
-
-
-def test_the_reference_against_itself_is_exactly_zero() -> None:
-    row = ended(a_job(), rows.add_scenario("one"), rows.add_kind("ann"), change=rows.TWO_CONES)
-    found = of_augmentation(row).displacement
-    assert found is not None
-    assert found.distances_m == (0.0, 0.0)
-
-
 def test_a_job_is_summed_up_per_contestant() -> None:
     job, one, two = a_job(), rows.add_scenario("one"), rows.add_scenario("two")
     ann = rows.add_kind("ann", Contestant.Kind.SIMULATED)
@@ -79,14 +63,6 @@ def test_a_job_is_summed_up_per_contestant() -> None:
     assert (group.summary.missing, group.summary.surplus) == (2, 0)
     assert group.summary.box is not None
     assert group.summary.box.mean_m == pytest.approx(1.5)
-
-
-@pytest.mark.parametrize("state", ["unreadable", "refused"])
-def test_an_answer_without_a_modification_misses_everything(state: str) -> None:
-    row = ended(a_job(), rows.add_scenario("one"), rows.add_kind("ann"), state=state)
-    found = of_augmentation(row).displacement
-    assert found is not None
-    assert found.missing == ("Agent2", "Agent3")
 
 
 def test_what_cannot_be_measured_says_why_and_counts_nowhere() -> None:
@@ -123,24 +99,3 @@ def test_the_latest_outcome_of_every_cell_counts_whatever_its_job() -> None:
     latest = ended(a_job(), one, ann)
     ended(a_job(), one, ann, state="failed")
     assert [found.row.pk for found in of_latest()] == [latest.pk]
-
-
-def test_a_job_is_read_by_one_query_however_long_it_is() -> None:
-    job, people = a_job(), [rows.add_kind("ann"), rows.add_kind("bob")]
-    for number in range(4):
-        scenario = rows.add_scenario(f"street-{number}")
-        for contestant in people:
-            ended(job, scenario, contestant)
-    with CaptureQueriesContext(connection) as queries:
-        assert matched(groups(of_job(job), by=By.TYPE)) == 16
-    assert len(queries) == 1
-    with CaptureQueriesContext(connection) as queries:
-        assert matched(groups(of_latest(), by=By.TYPE)) == 16
-    assert len(queries) == 1
-
-
-def test_types_go_by_their_names() -> None:
-    assert types_named(["all"]) == tuple(ScenarioType)
-    assert types_named(["jaywalking_pedestrian"]) == (ScenarioType.JAYWALKER,)
-    with pytest.raises(UnknownName, match="jaywalking_pedestrian"):
-        types_named(["jaywalker"])

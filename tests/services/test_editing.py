@@ -29,7 +29,7 @@ from augment.services.judging.displacement import of_augmentation
 from augment.services.judging.edits import check_edit
 from augment.services.judging.findings import check_augmentation
 from augment.services.running import by_hand, runner
-from augment.services.scenarios.editing import editor_document, read_edit
+from augment.services.scenarios.editing import editor_document
 from augment.services.scenarios.references import drop_reference, set_reference
 from augment.services.scenarios.scene_pictures import (
     SceneView,
@@ -39,7 +39,7 @@ from augment.services.scenarios.scene_pictures import (
     scene_picture,
 )
 from augment.services.scenarios.scenes import reference_of
-from tests.jobs.rows import add_kind, add_scenario, launch
+from tests.jobs.rows import add_scenario, launch
 from tests.render.pictures import at_camera_size
 from tests.scenes import pedestrian, scene, vehicle
 from tests.study_rows import a_study
@@ -69,13 +69,6 @@ def test_what_is_placed_lies_in_the_picture_where_the_page_says() -> None:
     assert found == pytest.approx((left, left + 100.0, top, top + 40.0), abs=2.0)
 
 
-def test_a_placed_agent_is_on_the_lane_that_lies_under_it() -> None:
-    here = add_scenario("street", reference=None)
-    lost = replace(vehicle("Added2", 20.0, 30.0), lane_id="Lane1")
-    made = read_edit(here, document(replace(CAR, lane_id="Lane2"), lost))
-    assert [agent.lane_id for agent in made.added] == ["Lane1", None]
-
-
 @pytest.mark.parametrize(
     ("agent", "x_m", "y_m", "heading_rad"),
     [
@@ -99,17 +92,6 @@ def test_an_agent_is_put_on_the_centreline(
     assert (snapped["x_m"], snapped["y_m"]) == pytest.approx((x_m, y_m))
     turn = math.remainder(snapped["heading_rad"] - heading_rad, 2.0 * math.pi)
     assert turn == pytest.approx(0.0, abs=1e-6)
-
-
-def test_the_checks_speak_before_anything_is_kept() -> None:
-    here = add_scenario("street", reference=None)
-    found = check_edit(here, document(CAR, vehicle("Added2", 21.0, 0.4)))
-    assert found.is_against_intent
-    assert found.lines[0].severity == "wrong"
-    assert any("overlap" in line.finding.sentence() for line in found.lines)
-    assert "is not a field" in check_edit(here, {**document(CAR), "more": 1}).problem
-    assert "Agent9 is not in the scene" in check_edit(here, document(removed=("Agent9",))).problem
-    assert not Event.objects.exists()
 
 
 def test_a_drawn_reference_is_kept_drawn_and_told() -> None:
@@ -200,30 +182,6 @@ def test_a_correction_goes_the_whole_way_and_leaves_the_original() -> None:
     assert event.after is not None
     assert (event.actor, event.object_code) == (ada, str(first.code))
     assert event.after["contestant"] == "by-hand"
-
-
-def test_a_second_correction_stands_beside_the_first() -> None:
-    first = original()
-    for x_m in (20.0, 22.0):
-        row = by_hand.keep_correction(first, document(vehicle("Added1", x_m, 0.0)))
-        runner.work_on(augmentation_pk=row.pk)
-    assert first.corrections.filter(state="done", contestant__slug="by-hand").count() == 2
-
-
-def test_a_correction_that_is_none_writes_nothing() -> None:
-    first = original()
-    rows = Augmentation.objects.count()
-    add_kind("a-machine", Contestant.Kind.RULE)
-    for given, slug, problem in (
-        (by_hand.starting_document(first), "by-hand", "Nothing was corrected"),
-        (document(), "by-hand", "nothing to keep"),
-        (document(CAR), "a-machine", "is no person"),
-        (document(CAR), "Not a slug", "slug"),
-    ):
-        with pytest.raises((Conflict, InvalidDocument), match=problem):
-            by_hand.keep_correction(first, given, slug=slug)
-    assert Augmentation.objects.count() == rows
-    assert not Contestant.objects.filter(kind=Contestant.Kind.HUMAN).exists()
 
 
 def test_nothing_counts_any_more_for_a_retired_person() -> None:

@@ -6,7 +6,6 @@ import threading
 from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
-from pathlib import Path
 
 import pytest
 from django.contrib.auth.models import User
@@ -15,11 +14,9 @@ from django.db.models import Model
 from django.db.models.signals import pre_save
 
 from arena.errors import NothingToPlan
-from arena.models import Invitation, LabellingRound, Person, Study
+from arena.models import Invitation, LabellingRound
 from arena.services.faults import open_labelling
 from arena.services.invitations import FreshLink, invite
-from arena.services.people import create_person
-from arena.services.vote_imports import import_votes
 from augment.errors import Conflict
 from augment.models import GenerationJob
 from tests.exports.test_displacement import a_job
@@ -53,37 +50,6 @@ def test_a_labelling_whose_name_is_just_taken_is_refused() -> None:
         pytest.raises(Conflict, match="called 'Faults' already"),
     ):
         open_labelling(name="Faults", job=job, experts=["eva"], seed=1)
-
-
-@pytest.mark.django_db
-def test_imported_votes_whose_name_is_just_taken_are_refused(tmp_path: Path) -> None:
-    path = tmp_path / "votes.csv"
-    path.write_text("model_a,model_b,winner\na,b,model_a\n")
-    taken = [Study(name="Elsewhere", votes_per_expert=1, seed=1)]
-    with (
-        faster(Study, lambda: Study.objects.bulk_create(taken)),
-        pytest.raises(Conflict, match="a study named 'Elsewhere' already"),
-    ):
-        import_votes(path=path, name="Elsewhere")
-
-
-@pytest.mark.django_db
-def test_an_account_whose_name_or_pseudonym_is_just_taken_is_refused() -> None:
-    with (
-        faster(User, lambda: User.objects.bulk_create([User(username="eva")])),
-        pytest.raises(Conflict, match="'eva' or the pseudonym 'Expert 1' was taken"),
-    ):
-        create_person(username="eva", password=None, role="expert")
-    finn = expert("finn")  # as Expert 1
-
-    def becomes_expert_2() -> None:
-        Person.objects.filter(user=finn).update(pseudonym="Expert 2")
-
-    with (
-        faster(User, becomes_expert_2),
-        pytest.raises(Conflict, match="'eva' or the pseudonym 'Expert 2' was taken"),
-    ):
-        create_person(username="eva", password=None, role="expert")
 
 
 @pytest.mark.django_db(transaction=True)

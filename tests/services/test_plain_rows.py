@@ -26,18 +26,3 @@ def test_columns_in_any_order_become_what_the_orm_makes_of_them(
         name: getattr(matchup, name) for name in NAMES
     }
     assert behind == (matchup.position + 7,)
-
-
-def test_what_was_not_read_is_loaded_when_somebody_asks(
-    django_assert_num_queries: DjangoAssertNumQueries,
-) -> None:
-    matchup = matchups_of(a_study(), "eva")[0]
-    ((found, _),) = instances(
-        Matchup, NAMES, f"{SQL} WHERE id = %(id)s", {"id": matchup.pk, "more": 0}
-    )
-    with django_assert_num_queries(1):
-        assert found.left_token == matchup.left_token
-
-
-def test_no_row_is_no_instance() -> None:
-    assert instances(Matchup, NAMES, f"{SQL} WHERE id = %(id)s", {"id": 0, "more": 0}) == []

@@ -10,20 +10,15 @@ from dataclasses import replace
 
 import pytest
 from django.core.management import CommandError, call_command
-from django.urls import reverse
 
 from arena.queries.jobs import grid
-from augment.errors import Conflict, UnknownName
-from augment.metrics.repeats import spread_of, within_sd
+from augment.errors import UnknownName
 from augment.models import Augmentation, GenerationJob
 from augment.scene.codec import modification_to_document
 from augment.scene.modification import Modification
 from augment.services.judging.repeatability import repeatability
 from augment.services.running import jobs
-from augment.services.running.estimates import estimate
-from tests.jobs.models import add_llama
 from tests.jobs.rows import TWO_CONES, add_kind, add_scenario
-from tests.web.cast import people, signed_in
 
 pytestmark = pytest.mark.django_db
 
@@ -60,14 +55,6 @@ def test_a_job_has_a_row_for_every_sample() -> None:
         grid(made, sample=3)
 
 
-@pytest.mark.parametrize("samples", [0, -1, 101])
-def test_samples_have_bounds(samples: int) -> None:
-    add_kind("a")
-    add_scenario("street")
-    with pytest.raises(Conflict, match="from 1 to 100"):
-        jobs.launch(name="J", contestants=["a"], scenarios=["street"], samples=samples)
-
-
 def test_what_varies_between_samples() -> None:
     first, second = repeatability(job())
     # By hand: means over the matched objects of each sample.
@@ -85,15 +72,6 @@ def test_what_varies_between_samples() -> None:
     assert second.displacement_m.values == pytest.approx((0.2, 0.5))
     assert first.usd is None
     assert first.wrong is not None
-
-
-def test_spreads_of_little() -> None:
-    assert spread_of([]) is None
-    one = spread_of([3.0])
-    assert one is not None
-    assert (one.mean, one.sd) == (3.0, None)
-    assert within_sd([[1.0], [2.0]]) is None
-    assert within_sd([[1.0, 1.0], [5.0]]) == 0.0
 
 
 def exported(capsys: pytest.CaptureFixture[str], *what: str) -> str:
@@ -125,30 +103,3 @@ def test_files_name_the_sample(capsys: pytest.CaptureFixture[str]) -> None:
             *("export", "samples", "J", "--scenarios", "lane", "--contestants", "a"),
             *("--sample", "3", "--out", "x.pdf"),
         )
-
-
-def test_the_page_shows_them_and_the_form_launches_them() -> None:
-    made = job()
-    made.augmentations.filter(state=Augmentation.State.QUEUED).delete()
-    admin = signed_in(people()["admin"])
-    shown = admin.get(reverse("job", args=[made.code])).content.decode()
-    assert "Between 2 samples" in shown
-    assert "0.35</b> ± 0.21" in shown
-    assert "Findings that are wrong" not in shown
-    checked = admin.get(reverse("job", args=[made.code]), {"checks": "1"}).content.decode()
-    assert "Findings that are wrong" in checked
-    entered = {"name": "K", "contestants": ["a"], "scenarios": ["lane"], "samples": "3"}
-    admin.post(reverse("job-new"), entered)
-    assert GenerationJob.objects.get(name="K").augmentations.count() == 3
-    refused = admin.post(reverse("job-new"), entered | {"samples": "101"})
-    assert refused.status_code == 422
-
-
-def test_an_estimate_counts_samples() -> None:
-    add_llama()
-    add_scenario("street")
-    once = estimate(["llama"], ["street"])
-    thrice = estimate(["llama"], ["street"], samples=3)
-    assert (once.rows, thrice.rows) == (1, 3)
-    assert thrice.calls == tuple(3 * number for number in once.calls)
-    assert thrice.tokens_in == 3 * once.tokens_in

@@ -1,16 +1,14 @@
 from __future__ import annotations
 
 import json
-from dataclasses import replace
 from pathlib import Path
 
 import pytest
 from django.contrib.auth.models import User
 
-from augment.errors import Conflict, InvalidDocument, InvalidModification, UnknownName
+from augment.errors import InvalidDocument, InvalidModification
 from augment.models import BaseScene, Event, IntentReading, Scenario
 from augment.scene.codec import modification_to_document, scene_to_document
-from augment.scene.entities import SceneOptions, TurnType
 from augment.scene.intent_codec import intent_to_document
 from augment.scene.intent_words import Shape
 from augment.scene.modification import Modification
@@ -19,7 +17,6 @@ from augment.services.endpoints.known_endpoints import ensure_endpoint
 from augment.services.scenarios.intents import accept_reading, enter_intent
 from augment.services.scenarios.scene_imports import import_scene
 from augment.services.scenarios.scenes import (
-    Circumstances,
     add_scenario,
     reference_of,
     scene_of,
@@ -72,34 +69,12 @@ def test_a_recorded_scene_comes_with_its_recording(tmp_path: Path) -> None:
     assert "log log, frame 1 of 5" in row.provenance
 
 
-def test_a_taken_slug_is_a_conflict(street: BaseScene, file: Path) -> None:
-    with pytest.raises(Conflict, match="a scene called 'street' already"):
-        import_scene(source="json", path=file, frame=0, slug="street")
-
-
-@pytest.mark.parametrize("slug", ["", "Main Street", "a--b", "-a", "a/b", "ä", "x" * 81])
-def test_a_slug_keeps_to_its_letters(file: Path, slug: str) -> None:
-    with pytest.raises(InvalidDocument, match="slug"):
-        import_scene(source="json", path=file, frame=0, slug=slug)
-
-
-def test_an_unknown_source_names_the_known_ones(file: Path) -> None:
-    with pytest.raises(UnknownName, match="json"):
-        import_scene(source="osm", path=file, frame=0, slug="street")
-
-
 def test_a_broken_scene_leaves_nothing_behind(file: Path) -> None:
     file.write_text(file.read_text().replace('"width_m": 3.5', '"width_m": NaN', 1))
     with pytest.raises(InvalidDocument, match=r"lanes\[0\]\.width_m"):
         import_scene(source="json", path=file, frame=0, slug="street")
     assert not BaseScene.objects.exists()
     assert not Event.objects.exists()
-
-
-@pytest.mark.usefixtures("street")
-def test_a_scenario_without_a_slug_gets_the_next_free_one() -> None:
-    assert [scenario().slug, scenario().slug] == ["street-jaywalker-1", "street-jaywalker-2"]
-    assert scenario(type="avoid_crashed_cars").slug == "street-accident-site-1"
 
 
 @pytest.mark.parametrize(
@@ -151,28 +126,6 @@ def test_a_reference_has_to_fit_the_scene() -> None:
     with pytest.raises(InvalidDocument, match="'Lane9' is not a lane"):
         scenario(reference=change)
     assert not Scenario.objects.exists()
-
-
-@pytest.mark.usefixtures("street")
-def test_unknown_names_are_refused_with_the_known_ones() -> None:
-    with pytest.raises(UnknownName, match=r"scene 'road'\. Known: street"):
-        scenario(scene="road")
-    with pytest.raises(InvalidDocument, match="jaywalking_pedestrian"):
-        scenario(type="Jay Walker")
-    with pytest.raises(InvalidDocument, match="instruction"):
-        scenario(instruction="  ")
-    scenario(slug="mine")
-    with pytest.raises(Conflict, match="'mine'"):
-        scenario(slug="mine")
-    assert Event.objects.filter(object_kind="scenario").count() == 1
-
-
-def test_a_scene_s_own_goal_holds_where_the_scenario_names_none(street: BaseScene) -> None:
-    own = replace(BUSY, options=SceneOptions(goal=TurnType.LEFT, goal_m=(20.0, 5.0)))
-    BaseScene.objects.update(document=scene_to_document(own))
-    assert scene_of(scenario(slug="kept")).options == own.options
-    right = scenario(slug="right", circumstances=Circumstances(goal=TurnType.RIGHT))
-    assert scene_of(right).options == SceneOptions(goal=TurnType.RIGHT)
 
 
 def test_no_door_takes_an_intent_that_jobs_would_refuse(street: BaseScene) -> None:

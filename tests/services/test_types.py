@@ -3,16 +3,10 @@
 from __future__ import annotations
 
 import pytest
-from django.db import IntegrityError
 
-from arena.exports.displacement_table import displacement_table
-from arena.queries.scenarios import by_type
 from arena.templatetags.results import type_label
 from augment.errors import Conflict, InvalidDocument
-from augment.models import Augmentation, GenerationJob, Scenario
-from augment.services.judging.displacement import By, types_named
-from augment.services.running import jobs
-from augment.services.scenarios.interplan import job_as_interplan
+from augment.models import Scenario
 from augment.services.scenarios.scenes import add_scenario
 from augment.services.scenarios.types import type_choices
 from tests.jobs import rows
@@ -53,35 +47,3 @@ def test_a_type_of_ones_own_has_one_label() -> None:
 def test_a_type_is_a_slug(slug: str) -> None:
     with pytest.raises(InvalidDocument, match="slug of your own"):
         add("one", slug)
-
-
-def test_the_database_knows_a_label_from_none() -> None:
-    row = add("one", "cut_in")
-    with pytest.raises(IntegrityError):
-        Scenario.objects.filter(pk=row.pk).update(type_label="")
-
-
-def job() -> GenerationJob:
-    add("own", "cut_in")
-    rows.add_kind("reference")
-    made = jobs.launch(name="J", contestants=["reference"], scenarios=["own", "street"])
-    document = Scenario.objects.get(slug="own").reference
-    made.augmentations.update(state=Augmentation.State.DONE, modification=document, image="x.png")
-    return made
-
-
-def test_it_is_kept_apart_in_tables_and_pages() -> None:
-    table = displacement_table(job(), by=By.TYPE)
-    assert [group.heading for group in table.groups] == ["Construction zone", "Cut in"]
-    assert "Cut in" in table.types_text
-    only = displacement_table(
-        GenerationJob.objects.get(), by=By.TYPE, types=types_named(["cut_in"])
-    )
-    assert [group.heading for group in only.groups] == ["Cut in"]
-    assert [group.label for group in by_type()] == ["Construction zone", "Cut in"]
-
-
-def test_interplan_is_told_that_it_has_no_such_type() -> None:
-    text, losses = job_as_interplan(job())
-    assert text.count("type:") == 1
-    assert any("five types" in loss.text and loss.changes_scene for loss in losses)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import zipfile
 from datetime import timedelta
 from io import BytesIO
@@ -14,12 +13,10 @@ from django.core.files.base import ContentFile
 from django.core.files.storage import default_storage
 from django.utils import timezone
 
-from augment.errors import Conflict, InvalidDocument, UnknownName
+from augment.errors import Conflict, InvalidDocument
 from augment.models import BaseScene, Event, SceneUpload, UploadMoment
-from augment.scene.codec import scene_to_document
 from augment.services.scenarios import upload_moments, uploads
 from tests.formats.av2_logs import write_log
-from tests.scenes import scene
 
 pytestmark = pytest.mark.django_db
 
@@ -148,33 +145,6 @@ def test_a_file_whose_worker_ended_is_sent_again_once_and_read(log: bytes) -> No
     assert (row.state, row.attempts, row.heartbeat_at) == ("read", 2, None)
 
 
-def test_a_moment_that_takes_an_hour_is_begun_once(log: bytes) -> None:
-    moment, _ = upload_moments.ask_for_moment(read(sent(log)), item="", frame=0)
-    now = timezone.now()
-    marks = {"heartbeat_at": now - SECONDS, "sent_at": now - HOUR}
-    UploadMoment.objects.filter(pk=moment.pk).update(attempts=1, **marks)
-    assert upload_moments.find_lost() == []
-    upload_moments.work_on_moment(moment.pk)
-    moment.refresh_from_db()
-    assert (moment.state, moment.attempts) == ("queued", 1)
-
-
-@pytest.mark.parametrize("was_sent", [True, False])
-def test_what_waits_too_long_is_sent_again(log: bytes, was_sent: bool) -> None:
-    row = sent(log)
-    if was_sent:
-        uploads.mark_sent(row.pk)
-    assert uploads.find_lost() == []
-    later = timezone.now() + timedelta(minutes=11)
-    assert uploads.find_lost(now=later) == [row.pk]
-    moment, _ = upload_moments.ask_for_moment(read(row), item="", frame=0)
-    if was_sent:
-        upload_moments.mark_sent(moment.pk)
-    assert upload_moments.find_lost() == []
-    assert upload_moments.find_lost(now=later) == [moment.pk]
-    assert uploads.find_lost(now=later) == []
-
-
 def test_the_same_scene_is_kept_once_and_a_taken_name_says_so(log: bytes) -> None:
     BaseScene.objects.create(slug="taken", document={}, source="json", provenance="here")
     row = read(sent(log))
@@ -196,13 +166,6 @@ def test_the_same_scene_is_kept_once_and_a_taken_name_says_so(log: bytes) -> Non
         assert moment.scene.slug == "first"
 
 
-def test_only_moments_that_are_offered_are_read(log: bytes) -> None:
-    row = read(sent(log))
-    with pytest.raises(Conflict, match="no such moment"):
-        upload_moments.ask_for_moment(row, item="../x", frame=0)
-    assert not UploadMoment.objects.exists()
-
-
 def test_a_removed_file_is_gone_and_its_scenes_stay(log: bytes) -> None:
     row = read(sent(log))
     moment = looked_at(row, 0)
@@ -211,14 +174,6 @@ def test_a_removed_file_is_gone_and_its_scenes_stay(log: bytes) -> None:
     uploads.remove_upload(row)
     assert not SceneUpload.objects.exists()
     assert BaseScene.objects.filter(slug="stays").exists()
-
-
-def test_an_empty_file_or_an_unknown_format_stores_nothing() -> None:
-    with pytest.raises(Conflict, match="empty"):
-        sent(b"")
-    with pytest.raises(UnknownName, match="osm"):
-        sent(b"1", source="osm")
-    assert not SceneUpload.objects.exists()
 
 
 @pytest.mark.parametrize(
@@ -233,9 +188,3 @@ def test_an_empty_file_or_an_unknown_format_stores_nothing() -> None:
 )
 def test_a_name_is_kept_in_plain_letters(given: str, kept: str) -> None:
     assert uploads.plain_name(given) == kept
-
-
-def test_a_scene_in_our_own_json_is_one_moment(tmp_path: Path) -> None:
-    row = read(sent(json.dumps(scene_to_document(scene())).encode(), "street.json"))
-    assert (row.format, len(row.tracks), len(row.tracks[0]["stops"])) == ("json", 1, 1)
-    assert row.tracks[0]["stops"][0]["place_m"] == [0.0, 0.0]

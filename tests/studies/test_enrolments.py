@@ -10,13 +10,12 @@ from django.utils import timezone
 from arena.errors import EnrolmentOver
 from arena.models import EnrolledVoter, Enrolment, Study
 from arena.queries.enrolments import own_enrolment, state_of
-from arena.queries.people import experts, list_accounts
 from arena.services.accounts import forget_identity
 from arena.services.enrolments import drop_silent, enrol, set_enrolment
 from arena.services.people import create_person
 from arena.services.studies import close_study
 from augment.errors import Conflict
-from augment.models import BaseScene, Event
+from augment.models import Event
 from tests.study_rows import a_study, matchups_of, vote
 
 pytestmark = pytest.mark.django_db
@@ -108,22 +107,6 @@ def test_who_read_an_older_text_reads_the_new_one_first(study: Study) -> None:
     assert join(enrolment, "w-1").consent_sha256 == enrolment.consent_sha256
 
 
-def test_a_changed_rule_keeps_the_link(study: Study) -> None:
-    first = link(study)
-    assert link(study, places=9).token == first.token
-
-
-@pytest.mark.parametrize(
-    ("changes", "told"), [({"consent": "  "}, "1 to 5000"), ({"consent": "x" * 5001}, "1 to 5000")]
-)
-def test_a_rule_that_makes_no_sense_is_refused(
-    study: Study, changes: dict[str, object], told: str
-) -> None:
-    with pytest.raises(Conflict, match=told):
-        link(study, **changes)
-    assert not Enrolment.objects.exists()
-
-
 def test_the_code_is_told_when_every_pair_has_an_answer(study: Study) -> None:
     voter = join(link(study), "w-1")
     told = own_enrolment(study, voter.expert)
@@ -134,12 +117,6 @@ def test_the_code_is_told_when_every_pair_has_an_answer(study: Study) -> None:
     assert told is not None
     assert told.completion_code == voter.completion_code
     assert state_of(voter.enrolment).done == 1
-
-
-def test_others_are_told_no_code(study: Study) -> None:
-    join(link(study), "w-1")
-    eva = study.experts.get(username="eva")
-    assert own_enrolment(study, eva) is None
 
 
 @pytest.mark.parametrize(("hours", "places"), [(23.9, 0), (24.1, 1)])
@@ -169,25 +146,6 @@ def test_a_drop_out_is_replaced_when_somebody_comes_and_keeps_the_votes(study: S
     assert (told.was_given_on, told.completion_code) == (True, "")
 
 
-def test_who_is_done_keeps_the_place_for_ever(study: Study) -> None:
-    enrolment = link(study, places=1)
-    voter = join(enrolment, "w-1")
-    answer(study, voter, 6)
-    assert drop_silent(enrolment=enrolment, now=timezone.now() + timedelta(days=365)) == 0
-
-
-def test_without_a_limit_nobody_drops_out(study: Study) -> None:
-    enrolment = link(study, drop_out_after_h=None)
-    join(enrolment, "w-1")
-    assert drop_silent(enrolment=enrolment, now=timezone.now() + timedelta(days=365)) == 0
-
-
-def test_voters_are_asked_for_their_study_alone(study: Study) -> None:
-    voter = join(link(study), "w-1")
-    assert voter.expert not in experts()
-    assert voter.expert not in [line.user for line in list_accounts()]
-
-
 def test_the_id_stands_in_no_log_and_goes_when_the_person_is_forgotten(study: Study) -> None:
     admin = create_person(username="root", password=None, role="admin")
     voter = join(link(study), "w-secret")
@@ -214,14 +172,3 @@ def test_who_is_forgotten_before_the_end_makes_room_at_once(
     if free:
         newcomer = join(enrolment, "w-2")
         assert study.matchups.filter(expert=newcomer.expert).count() == 6
-
-
-def test_planning_for_a_newcomer_takes_the_window_from_what_is_shown(study: Study) -> None:
-    """To read and measure the scenes again would take longer than all the rest."""
-    study.matchups.update(original_image="bev/before.png")
-    before = {row.scenario_id: row.view for row in study.matchups.all()}
-    BaseScene.objects.update(document={})
-    voter = join(link(study), "w-1")
-    mine = matchups_of(study, voter.expert.username)
-    assert {row.original_image for row in mine} == {"bev/before.png"}
-    assert [row.view for row in mine] == [before[row.scenario_id] for row in mine]

@@ -7,7 +7,6 @@ from collections import Counter
 
 import pytest
 from django.contrib.auth.models import User
-from django.core.management import CommandError, call_command
 
 from arena.errors import NothingToPlan, NotYours, StudyNotOpen
 from arena.models import Matchup, Study, Vote
@@ -17,7 +16,6 @@ from arena.queries.votes import tallies, voting_progress
 from arena.services.handing_over import hand_over
 from arena.services.replanning import next_pairs, plan_batch
 from arena.services.reports import Complaint, report
-from arena.services.simulation import simulate_votes
 from arena.services.studies import PlanOptions, close_study, open_study
 from augment.errors import Conflict, UnknownName
 from augment.models import Event
@@ -67,14 +65,6 @@ def test_a_vote_on_what_was_handed_over_is_not_taken() -> None:
     with pytest.raises(NotYours):
         vote(late)
     assert not Vote.objects.exists()
-
-
-def test_somebody_new_joins_the_study_by_taking_over() -> None:
-    study = a_study(experts=("eva", "finn"))
-    gus = expert("gus")
-    assert hand_over(study=study, username="eva", to=["gus"]) == {"gus": 9}
-    assert study.experts.filter(pk=gus.pk).exists()
-    assert next_pairs(study=study, expert=gus, n=4)[0].position == 1
 
 
 def test_a_pair_that_was_reported_but_not_judged_stays_where_it_is() -> None:
@@ -137,14 +127,6 @@ def test_nothing_is_handed_over_twice_or_after_the_closing() -> None:
         hand_over(study=close_study(study=study), username="finn", to=["eva"])
 
 
-def test_the_command_hands_over_and_names_its_faults() -> None:
-    study = a_study()
-    call_command("hand_over", "Round 1", "eva", "--to", "finn")
-    assert study.matchups.filter(expert__username="finn").count() == 18
-    with pytest.raises(CommandError, match="nothing left"):
-        call_command("hand_over", "Round 1", "eva", "--to", "finn")
-
-
 # --- The adaptive part -------------------------------------------------------------------------
 
 
@@ -203,26 +185,3 @@ def test_the_same_votes_give_the_same_batch() -> None:
     plan_batch(study=study, expert=eva)
     assert rows_planned(study, batch=1) == first
     assert len(first) >= 10
-
-
-def test_no_batch_is_planned_while_much_is_waiting_or_the_study_is_closed() -> None:
-    study = adaptive()
-    finn = User.objects.get(username="finn")
-    assert plan_batch(study=study, expert=finn) == 11
-    assert plan_batch(study=study, expert=finn) == 0
-    eva = User.objects.get(username="eva")
-    assert next_pairs(study=close_study(study=study), expert=eva, n=4) == []
-
-
-def test_votes_that_are_not_planned_yet_are_handed_over_as_well() -> None:
-    study = adaptive()
-    assert hand_over(study=study, username="eva", to=["finn"]) == {"finn": 20}
-    study.refresh_from_db()
-    assert study.votes_to_plan == {"eva": 0, "finn": 20}
-
-
-def test_simulated_experts_judge_the_adaptive_part_too() -> None:
-    study = adaptive(simulated=True)
-    simulate_votes(study=study, seed=1)
-    assert Counter(study.matchups.values_list("kind", flat=True))["main"] == 40
-    assert not study.matchups.filter(votes=None).exists()

@@ -4,11 +4,9 @@ from __future__ import annotations
 
 import json
 import uuid
-from io import StringIO
 
 import pytest
 from django.contrib.auth.models import User
-from django.core.management import call_command
 
 from arena.errors import InvalidVote, NothingToPlan, NotYours
 from arena.models import Matchup, Study, Vote
@@ -65,15 +63,6 @@ def test_a_scenario_is_played_where_all_of_its_pictures_were_driven_in_one_way()
     for matchup in matchups_of(study, "eva"):
         found = drives_of_pair(user=eva(), code=matchup.code)
         assert (found is not None) == (matchup.scenario.slug in {"place-0", "place-3"})
-
-
-def test_what_is_driven_later_changes_nothing_for_an_open_study() -> None:
-    cast = cast_of()
-    drive_pictures(pictures("place-0"))
-    study = played(cast)
-    drive_pictures(pictures("place-1"))
-    at_1 = [one for one in matchups_of(study, "eva") if one.scenario.slug == "place-1"]
-    assert [drives_of_pair(user=eva(), code=one.code) for one in at_1] == [None] * len(at_1)
 
 
 def test_a_scenario_whose_attention_check_was_not_driven_is_not_played() -> None:
@@ -136,21 +125,3 @@ def test_without_the_rule_nothing_is_played_and_no_vote_can_say_so() -> None:
     with pytest.raises(InvalidVote, match="no drives to play"):
         cast_vote(expert=eva(), decision=decision)
     assert not Vote.objects.exists()
-
-
-def test_a_vote_says_that_the_drives_were_played() -> None:
-    cast = cast_of()
-    drive_pictures(pictures())
-    first = matchups_of(played(cast), "eva")[0]
-    cast_vote(expert=eva(), decision=decided(first, "replay", "zoom"))
-    assert Vote.objects.get().aids == "zoom replay"
-
-
-def test_the_command_opens_it_too() -> None:
-    cast = cast_of()
-    drive_pictures(pictures())
-    given = ["open_study", "Round 1", "--votes-per-expert", "9", "--seed", "1", "--replay"]
-    for option, names in cast.items():
-        given += [f"--{option}", *names]  # type: ignore[misc]
-    call_command(*given, stdout=StringIO())
-    assert Study.objects.get().allow_replay

@@ -10,7 +10,6 @@ from django.core.management import CommandError, call_command
 
 from arena.errors import NothingToPlan
 from arena.models import Study
-from arena.pairing.plan import plan
 from arena.services.handing_over import hand_over
 from arena.services.plans import pictures_of
 from arena.services.replanning import plan_batch
@@ -21,7 +20,7 @@ from augment.scene.codec import modification_to_document
 from augment.scene.modification import Modification
 from augment.services.scenarios.attention import draw_checks
 from tests.scenes import vehicle
-from tests.study_rows import KINDS, Cast, a_study, cast_of, contestant, picture, rows_planned
+from tests.study_rows import KINDS, Cast, a_study, cast_of, contestant, picture
 
 pytestmark = pytest.mark.django_db
 
@@ -76,57 +75,10 @@ def test_checks_show_the_reference_against_a_broken_one() -> None:
     assert study.matchups.exclude(kind="check").filter(left__contestant__kind="check").count() == 0
 
 
-def test_a_study_whose_checks_nobody_has_drawn_is_not_opened() -> None:
-    cast = with_checks(6)
-    Augmentation.objects.filter(contestant__kind="check").delete()
-    with pytest.raises(NothingToPlan, match=r"expert: 3; .* for one: 0.*Draw missing"):
-        opened(cast, check_share=0.25)
-    assert not Study.objects.exists()
-    assert not opened(cast).matchups.filter(kind="check").exists()
-
-
-@pytest.mark.parametrize(("scenarios", "opens"), [(2, False), (3, True)])
-def test_each_check_needs_a_scenario_of_its_own(scenarios: int, opens: bool) -> None:
-    cast = with_checks(6)
-    Scenario.objects.filter(slug__in=cast["scenarios"][scenarios:]).update(reference=None)
-    kind = {"contestant__kind": "check"}
-    Augmentation.objects.filter(scenario__slug__in=cast["scenarios"][scenarios:], **kind).delete()
-    if opens:
-        study = opened(cast, check_share=0.25)
-        assert study.matchups.filter(kind="check").count() == 3 * 2
-        return
-    with pytest.raises(NothingToPlan, match=r"each expert: 3; .* the study has 2\. Ask for fewer"):
-        opened(cast, check_share=0.25)
-
-
 def test_checks_that_the_adaptive_part_will_show_are_asked_for_at_once() -> None:
     cast = with_checks(2)
     with pytest.raises(NothingToPlan, match="each expert: 3"):
         opened(cast, votes=6, check_share=0.5, adaptive_share=0.5)
-
-
-def test_the_command_says_that_there_are_no_checks_where_nobody_asked_for_any() -> None:
-    cast, told = cast_of(), StringIO()
-    words = ["open_study", "Round 1", "--contestants", *cast["contestants"]]
-    words += ["--scenarios", *cast["scenarios"], "--experts", *cast["experts"]]
-    words += ["--votes-per-expert", "12", "--seed", "7"]
-    with pytest.raises(CommandError, match="Ask for fewer"):
-        call_command(*words, "--checks", "25")
-    for share in ("nan", "inf", "51"):
-        with pytest.raises(CommandError, match="attention checks goes from 0 to 50%"):
-            call_command(*words, "--checks", share)
-    call_command(*words, stdout=told)
-    assert "No attention checks: nobody has drawn pictures" in told.getvalue()
-
-
-def test_check_pictures_are_drawn_once_by_a_command() -> None:
-    cast = with_checks(2)
-    assert draw_checks(scenarios=cast["scenarios"]) == []
-    call_command("draw_checks", "all")
-    rows = Augmentation.objects.filter(contestant__kind="check")
-    assert (rows.count(), rows.filter(image="").count()) == (2, 0)
-    heap = [one for row in rows for one in (row.modification or {})["add"]]
-    assert {(one["x_m"], one["y_m"]) for one in heap} == {(0.0, 0.0)}, "across the ego"
 
 
 def test_an_attention_check_is_nobody_to_be_rated() -> None:
@@ -142,22 +94,6 @@ def test_targets_by_contestant_are_met_in_the_rows() -> None:
     shown = Counter(study.matchups.values_list("left__contestant__slug", flat=True))
     shown += Counter(study.matchups.values_list("right__contestant__slug", flat=True))
     assert shown == dict(targets)
-
-
-def test_targets_that_do_not_add_up_leave_nothing_behind() -> None:
-    with pytest.raises(NothingToPlan, match=r"49 appearances, .* 48"):
-        opened(cast_of(), appearances=(("ann", 25), ("bob", 14), ("cid", 10)))
-    assert not Study.objects.exists()
-
-
-def test_every_rule_is_kept_and_gives_the_same_rows_again() -> None:
-    rules: dict[str, float] = {"repeat_share": 0.25, "check_share": 0.25}
-    study = Study.objects.get(pk=opened(with_checks(), 12, **rules).pk)
-    assert rows_planned(study) == [
-        (m.expert, m.position, m.kind, m.scenario, m.left, m.right)
-        for m in plan(rules_of(study)).matchups
-    ]
-    assert study.rules["planner"] == "balanced-2"
 
 
 def test_a_study_opened_before_these_rules_is_read_without_them() -> None:
@@ -218,17 +154,3 @@ def test_checks_drawn_in_another_window_stay_out_of_an_open_study() -> None:
     assert {row.scenario.slug for row in new} <= kept - had
     giver = hand_over(study=study, username="eva", to=["finn"])
     assert sum(giver.values()) > 0
-
-
-def test_checks_are_opened_with_pictures_of_the_window_of_the_others() -> None:
-    cast = with_checks()
-    old = Augmentation.objects.filter(contestant__kind="check").order_by("pk")
-    names = {row.image for row in old}
-    for row in old:
-        late = picture(row.scenario, row.contestant, image=f"bev/1-new/{row.pk}.png")
-        assert late.finished_at is not None
-    study = opened(cast, check_share=0.25)
-    checks = study.matchups.filter(kind="check").select_related("left__contestant")
-    drawn = {r.left_image if r.left.contestant.kind == "check" else r.right_image for r in checks}
-    assert drawn
-    assert drawn <= names

@@ -3,25 +3,21 @@
 from __future__ import annotations
 
 import uuid
-from itertools import pairwise
 
 import pytest
 from django.core.management import call_command
 from django.urls import reverse
 from django.utils import timezone
 
-from arena.errors import NothingToPlan
 from arena.models import Matchup, Study
 from arena.pairing.plan import plan
-from arena.queries.judged import last_vote_of, settled_ties, votes_up_to
-from arena.services.handing_over import hand_over
 from arena.services.shown_pictures import SampleRule, draw_sample
 from arena.services.studies import PlanOptions, open_study, rules_of
 from augment.errors import Conflict
 from augment.models import Augmentation, Contestant, GenerationJob, Scenario
 from tests.jobs.scripted import Scripted, add, run
 from tests.llm.json_server import serving
-from tests.study_rows import contestant, expert, scenario, vote
+from tests.study_rows import contestant, expert, scenario
 from tests.web.cast import people, signed_in
 
 pytestmark = pytest.mark.django_db
@@ -102,40 +98,6 @@ def test_the_same_rules_give_the_same_plan_with_all_samples_kept_apart() -> None
         )
         for width in range(1, kept + 1):
             assert all(a != b for a, b in zip(order, order[width:], strict=False))
-
-
-def test_samples_are_handed_over_as_they_are() -> None:
-    sampled(samples=2)
-    study = opened(votes=6, samples=SampleRule.ALL)
-    hand_over(study=study, username="eva", to=["finn"])
-    assert all(left == right for _, left, right in shown(study))
-    mine = study.matchups.filter(expert__username="finn").order_by("position")
-    assert mine.count() == 12
-    assert len(set(mine.values_list("left", "right"))) == 12
-    slugs = list(mine.values_list("scenario__slug", flat=True))
-    assert all(a != b for a, b in pairwise(slugs))
-
-
-def test_identical_samples_are_one_tie_of_their_scenario() -> None:
-    sampled(samples=2)
-    Augmentation.objects.filter(sample=2, scenario__slug="place-0").exclude(
-        contestant__slug="cid"
-    ).update(image="bev/same.png")
-    study = opened(votes=18, samples=SampleRule.ALL)
-    assert study.rules["identical"] == [["place-0#2", "ann", "bob"]]
-    for matchup in study.matchups.all():
-        vote(matchup)
-    ties = settled_ties(study, votes_up_to(study, last_vote_of(study))[0])
-    assert {(tie.item, tie.left, tie.right) for tie in ties} == {("place-0", "ann", "bob")}
-
-
-def test_a_sample_that_somebody_lacks_is_named() -> None:
-    sampled(samples=2)
-    Augmentation.objects.filter(
-        contestant__slug="bob", scenario__slug="place-1", sample=2
-    ).delete()
-    with pytest.raises(NothingToPlan, match="bob on place-1, sample 2"):
-        opened(samples=SampleRule.ALL)
 
 
 def test_options_are_not_mixed_under_one_contestant() -> None:

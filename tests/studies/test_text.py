@@ -2,21 +2,18 @@
 
 from __future__ import annotations
 
-from io import StringIO
-
 import pytest
-from django.core.management import call_command
 from django.utils.translation import override
 
 from arena.models import Study
 from arena.queries.descriptions import describe_in_words
-from arena.queries.showings import as_shown, view_shown
+from arena.queries.showings import as_shown
 from arena.services.handing_over import hand_over
 from arena.services.replanning import plan_batch
 from augment.models import Augmentation
 from augment.services.wording import translate_all
 from tests.described import a_described_study, draw_changes, said_of, with_text
-from tests.study_rows import a_study, cast_of, matchups_of, vote
+from tests.study_rows import cast_of, matchups_of, vote
 
 pytestmark = pytest.mark.django_db
 
@@ -30,15 +27,6 @@ def read_by(study: Study, username: str) -> list[tuple[list[str], list[str]]]:
 
 def right_for(study: Study, username: str) -> list[tuple[list[str], list[str]]]:
     return [(said_of(row.left), said_of(row.right)) for row in matchups_of(study, username)]
-
-
-def test_without_being_asked_for_there_is_none() -> None:
-    study = a_study()
-    assert not study.allow_text
-    assert not study.matchups.exclude(descriptions=None).exists()
-    assert all(
-        "text" not in as_shown(matchup, translate_all) for matchup in matchups_of(study, "eva")
-    )
 
 
 def test_every_showing_keeps_what_its_two_pictures_show() -> None:
@@ -77,28 +65,6 @@ def test_what_is_edited_later_does_not_change_what_was_read() -> None:
     before = read_by(study, "eva")
     Augmentation.objects.update(modification={})
     assert read_by(study, "eva") == before
-
-
-def test_an_unreadable_answer_reads_like_its_picture_the_unchanged_scene() -> None:
-    made = cast_of()
-    draw_changes()
-    Augmentation.objects.filter(contestant__slug="ann").update(
-        state=Augmentation.State.UNREADABLE, modification=None
-    )
-    study = with_text(made)
-    for row in study.matchups.select_related("left__contestant"):
-        if row.left.contestant.slug == "ann":
-            assert as_shown(row, translate_all)["text"]["a"] == ["Nothing was changed."]
-
-
-def test_the_command_opens_it_too() -> None:
-    given = ["open_study", "Round 1", "--votes-per-expert", "9", "--seed", "1", "--text"]
-    made = cast_of()
-    draw_changes()
-    for option, names in made.items():
-        given += [f"--{option}", *names]  # type: ignore[misc]
-    call_command(*given, stdout=StringIO())
-    assert Study.objects.get().allow_text
 
 
 # --- The words ---------------------------------------------------------------------------------
@@ -173,16 +139,3 @@ def test_nothing_is_said_in_both_languages() -> None:
         assert describe_in_words([], translate_all) == ["Nothing was changed."]
     with override("de"):
         assert describe_in_words([], translate_all) == ["Nichts wurde geändert."]
-
-
-def test_the_legend_names_what_the_two_pictures_hold_on_either_side() -> None:
-    study = a_described_study()
-    for row in matchups_of(study, "eva"):
-        shown = as_shown(row, translate_all)
-        assert "legend" not in view_shown(row)
-        assert "ego" in shown["legend"]
-        assert "junction" not in shown["legend"]
-        sides = (row.left.modification or {}, row.right.modification or {})
-        added = {one["type"] for side in sides for one in side.get("add", ())}
-        assert ("cone" in shown["legend"]) == ("TRAFFIC_CONE" in added)
-        assert ("person" in shown["legend"]) == ("PEDESTRIAN" in added)

@@ -2,10 +2,6 @@
 
 from __future__ import annotations
 
-from io import StringIO
-from pathlib import Path
-from typing import Any
-
 import pytest
 from django.core.management import call_command
 
@@ -83,15 +79,6 @@ def test_a_study_keeps_the_pictures_that_were_shown() -> None:
     }
 
 
-def test_pictures_that_are_as_they_should_be_are_not_said_to_be_kept() -> None:
-    cast = cast_of(contestants=("ann", "bob"), scenarios=2, experts=("eva",))
-    drawn_before()
-    call_command("redraw_pictures")
-    look_otherwise("bob")
-    opened("now", **cast)
-    assert list(redraw_pictures()) == []
-
-
 def test_pictures_of_a_former_window_keep_the_view_that_they_were_shown_with() -> None:
     cast = cast_of(contestants=("ann", "bob"), scenarios=2, experts=("eva",))
     drawn_before("bev/1-0ld")
@@ -114,23 +101,6 @@ def test_pictures_of_a_former_window_keep_the_view_that_they_were_shown_with() -
         found = [(view_shown(row), row.original_image) for row in again.matchups.all()]
         assert found == [(then, "shown.png")] * 2
         again.matchups.all().delete()
-
-
-@pytest.mark.parametrize("command", ["redraw_pictures", "prepare"])
-def test_one_that_can_not_be_drawn_does_not_stop_the_others(
-    command: str, settings: Any, tmp_path: Path
-) -> None:
-    settings.STATIC_ROOT = tmp_path
-    cast_of(contestants=("ann",), scenarios=3, experts=())
-    drawn_before()
-    bad = Augmentation.objects.filter(scenario__slug="place-0")
-    bad.update(modification={"add": "a car"})
-    said, wrong = StringIO(), StringIO()
-    call_command(command, stdout=said, stderr=wrong)
-    assert "place-1: 1 drawn anew" in said.getvalue()
-    assert "place-2: 1 drawn anew" in said.getvalue()
-    assert "place-0: kept as they are. This modification can't be read" in wrong.getvalue()
-    assert window_of(bad.get().image) == ""
 
 
 def test_a_change_outside_widens_the_window_of_all_and_an_open_study_keeps_its_own() -> None:

@@ -10,12 +10,11 @@ from django.contrib.auth.models import User
 from django.core.management import call_command
 from django.db import IntegrityError, transaction
 
-from arena.errors import AlreadyLabelled, LabellingClosed, NothingToPlan, NotYours
+from arena.errors import LabellingClosed, NotYours
 from arena.exports.faults import csv_bytes, fault_table, latex
 from arena.models import FaultLabel, LabellingRound, LabelTask
 from arena.queries.faults import labelling_of, next_task, of_expert
 from arena.services.faults import close_labelling, open_labelling, save_label
-from augment.errors import Conflict, UnknownName
 from augment.models import Event, GenerationJob
 from augment.services.judging.fault_guess import FaultClass
 from tests.append_only import rewriting
@@ -25,7 +24,6 @@ from tests.study_rows import expert
 pytestmark = pytest.mark.django_db
 
 P, H, L = FaultClass.POSITION, FaultClass.HEADING, FaultClass.LOGIC
-NONE: frozenset[FaultClass] = frozenset()
 
 
 @pytest.fixture
@@ -62,25 +60,6 @@ def test_every_expert_gets_every_finished_augmentation_once(job: GenerationJob, 
     assert len(set(tokens)) == 8
 
 
-def test_what_was_planned_before_is_not_planned_again(job: GenerationJob, eva: User) -> None:
-    opened(job, "eva")
-    with pytest.raises(NothingToPlan):
-        opened(job, "eva", name="Again")
-    assert LabellingRound.objects.count() == 1
-
-
-def test_a_labelling_needs_real_experts_and_a_name_of_its_own(job: GenerationJob) -> None:
-    expert("sim-eva", is_simulated=True)
-    expert("finn")
-    with pytest.raises(UnknownName, match="nobody"):
-        opened(job, "nobody")
-    with pytest.raises(Conflict, match="sim-eva"):
-        opened(job, "sim-eva")
-    opened(job, "finn")
-    with pytest.raises(Conflict, match="called 'Faults' already"):
-        opened(job, "finn")
-
-
 def test_a_label_keeps_any_faults_a_note_and_what_the_checks_had_guessed(
     job: GenerationJob, eva: User
 ) -> None:
@@ -92,19 +71,11 @@ def test_a_label_keeps_any_faults_a_note_and_what_the_checks_had_guessed(
     assert not save(second).position
 
 
-def test_the_same_label_twice_is_one_and_another_is_refused(job: GenerationJob, eva: User) -> None:
-    task = tasks_of(opened(job, "eva"), eva)[0]
-    assert save(task, H).pk == save(task, H).pk
-    with pytest.raises(AlreadyLabelled):
-        save(task, P)
-    assert FaultLabel.objects.get().heading
-
-
 def test_nobody_labels_for_somebody_else(job: GenerationJob, eva: User) -> None:
     finn = expert("finn")
     labelling = opened(job, "eva")
     with pytest.raises(NotYours):
-        save_label(expert=finn, task_code=tasks_of(labelling, eva)[0].code, faults=NONE)
+        save_label(expert=finn, task_code=tasks_of(labelling, eva)[0].code, faults=frozenset())
     with pytest.raises(NotYours):
         labelling_of(expert=finn, code=labelling.code)
 
@@ -159,23 +130,6 @@ def test_agreement_compares_guess_and_label(job: GenerationJob, eva: User) -> No
     position, heading, _ = fault_table(job).agreement
     assert (position.kappa, position.n) == (1.0, 2)
     assert heading.n == 2
-
-
-def test_the_experts_are_compared_where_two_have_labelled(job: GenerationJob, eva: User) -> None:
-    finn = expert("finn")
-    labelling = opened(job, "eva", "finn")
-    by_eva, by_finn = tasks_of(labelling, eva), tasks_of(labelling, finn)
-    by_finn.sort(key=lambda task: task.augmentation_id != by_eva[0].augmentation_id)
-    save(by_eva[0], P)
-    save(by_finn[0], P, L)
-    assert [one.pictures for one in fault_table(job).agreement] == [1, 1, 1]
-    save(by_eva[1], L)
-    save(by_finn[1])
-    position, heading, logic = fault_table(job).agreement
-    assert (position.alpha, position.pictures) == (1.0, 2)
-    assert heading.alpha is None  # nobody saw any
-    assert logic.alpha == pytest.approx(-0.5)  # 1 - 3 * 4 / (2 * 2 * 2), by hand
-    assert "position 1.00 (pictures=2), heading undefined (pictures=2)" in latex(fault_table(job))
 
 
 def test_a_closed_labelling_takes_no_more_and_asks_for_nothing(

@@ -108,18 +108,6 @@ def test_an_import_that_stops_midway_leaves_nothing(
     assert not Study.objects.exists()
 
 
-def test_a_name_that_somebody_took_meanwhile_leaves_nothing(
-    file: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    def act() -> None:
-        a_study().__class__.objects.update(name="Elsewhere")
-
-    between_batches(monkeypatch, act)
-    with pytest.raises(Conflict, match="a study named 'Elsewhere' already"):
-        import_votes(path=file, name="Elsewhere")
-    assert nothing_is_left()
-
-
 def half_written(*, ago: timedelta) -> VoteFile:
     """What a process that was killed leaves behind."""
     left = VoteFile.objects.create(name="half.csv", sha256="0" * 64)

@@ -9,7 +9,7 @@ from django.contrib.auth.models import User
 from django.db.models import F
 
 from arena.models import Snapshot, Study, Vote
-from arena.queries.vote_lists import each_vote, neighbours, vote_page, votes_behind
+from arena.queries.vote_lists import each_vote, vote_page, votes_behind
 from arena.queries.vote_search import EVERY, LEFT_OUT, VoteSearch
 from arena.queries.vote_sets import Filters
 from arena.services.ratings import rate
@@ -127,15 +127,6 @@ def test_every_number_of_standings_pairs_and_raters_is_a_search(study: Study) ->
     assert total(snapshot, part="own") == own.votes
 
 
-def test_words_of_a_comment_and_quick_votes_are_found(study: Study) -> None:
-    study.allow_simulated = True
-    study.save()
-    snapshot = rated(study)
-    assert total(snapshot, comment="KERB") == total(snapshot, part="commented") == 6
-    assert total(snapshot, comment="moon") == 0
-    assert total(snapshot, part="fast") == 4
-
-
 def test_pages_hold_every_vote_once_and_automatic_ties_at_the_end(
     study: Study, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -152,17 +143,3 @@ def test_pages_hold_every_vote_once_and_automatic_ties_at_the_end(
     assert len(listed) == snapshot.votes_counted == 24
     assert [vote.kind for vote in listed].index("automatic") == 22
     assert vote_page(snapshot, search, 99).number == 4
-
-
-def test_a_vote_knows_its_place_among_those_looked_for(study: Study) -> None:
-    study.allow_simulated = True
-    study.save()
-    snapshot = rated(study)
-    search = VoteSearch(contestant="ann", opponent="bob")
-    rows = list(votes_behind(snapshot, search).order_by("pk"))
-    beside = neighbours(snapshot, search, rows[1])
-    assert (beside.before, beside.after) == (rows[0].key, rows[2].key)
-    assert (beside.place, beside.total) == (2, len(rows))
-    stranger = votes_behind(snapshot, VoteSearch(contestant="cid")).order_by("pk").first()
-    assert stranger is not None
-    assert neighbours(snapshot, search, stranger).place is None

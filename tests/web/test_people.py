@@ -108,6 +108,11 @@ def test_of_two_who_use_a_link_at_once_the_second_finds_it_used(settings: Settin
     assert can_sign_in("grace", PASSWORD)
 
 
+@pytest.mark.parametrize("token", ["", "x", "-", "0" * 32, "0" * 32 + "-abc-def", "ä-b-c"])
+def test_what_is_no_link_is_over(token: str) -> None:
+    assert Client().get(f"/welcome/{token or '-'}/").status_code == 410
+
+
 def change(actor: User, user: User, **given: str) -> None:
     signed_in(actor).post(reverse("person-change", args=[user.person.code]), given)
     user.refresh_from_db()
@@ -167,6 +172,17 @@ def test_who_is_forgotten_leaves_votes_and_no_name() -> None:
     assert Study.objects.get().rules["experts"] == [eva.username, "finn"]
     assert Study.objects.get().votes_to_plan == {eva.username: 3, "finn": 4}
     assert not AccessAttempt.objects.exists()
+
+
+def test_who_is_forgotten_stays_so() -> None:
+    accounts = people()
+    expert, admin = accounts["expert"], accounts["admin"]
+    forget_identity(user=expert, actor=admin)
+    change(admin, expert, act="resume")
+    assert not expert.is_active
+    text = signed_in(admin).get(reverse("people")).content.decode()
+    assert "Forgotten" in text
+    assert reverse("person-change", args=[expert.person.code]) not in text
 
 
 def test_two_admins_who_demote_each_other_leave_one() -> None:
