@@ -37,6 +37,7 @@ fuzz: $(VENV)/.test ## New random examples for every property, ten times as many
 lint: $(VENV)/.test ## Format, style, floors and types
 	$(BIN)/ruff format --check .
 	$(BIN)/ruff check .
+	$(BIN)/djlint templates --check --quiet
 	$(BIN)/lint-imports
 	$(BIN)/mypy
 	$(BIN)/python manage.py makemigrations --check --dry-run
