@@ -35,6 +35,8 @@ CONTEXT_TOKENS = 8192
 MOST_TOKENS = 512
 """Of an answer; a model of this size often repeats itself until it is cut off."""
 LONGEST_CALL_S = 600
+# Instructions of this processor alone (AMX) have crashed llama.cpp in a virtual machine.
+PORTABLE = {"CMAKE_ARGS": "-DGGML_NATIVE=OFF"}
 JOB = "real-model"
 WEIGHTS = (
     "import importlib.util, pathlib; "
@@ -64,7 +66,8 @@ def main(arguments: list[str]) -> None:
 @contextmanager
 def served() -> Iterator[str]:
     """Serve the model on a free port and yield its base URL."""
-    python = python_of("real_model", Path(__file__).parent / "requirements.txt")
+    lock = Path(__file__).parent / "requirements.txt"
+    python = python_of("real_model", lock, PORTABLE)
     weights = subprocess.run([python, "-c", WEIGHTS], capture_output=True, text=True, check=True)
     port = free_port()
     command = [str(python), "-m", "llama_cpp.server", "--model", weights.stdout.strip()]
@@ -76,6 +79,8 @@ def served() -> Iterator[str]:
     try:
         wait_until(lambda: answers(f"{base_url}/models"), what="the model is served")
         yield base_url
+        if server.poll() is not None:
+            raise ChildProcessError(f"The model's server ended with {server.returncode}.")
     finally:
         server.terminate()
         server.wait(timeout=60)

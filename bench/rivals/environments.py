@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 import hashlib
+import os
 import subprocess
 import sys
 import venv
+from collections.abc import Mapping
 from pathlib import Path
+from types import MappingProxyType
 
 ROOT = Path(__file__).resolve().parents[2]
 RIVALS = Path(__file__).parent
@@ -16,8 +19,13 @@ class NotInstalled(Exception):
     """A rival can't be installed here (no package index, no room); the text is pip's last line."""
 
 
-def python_of(name: str, lock: Path | None = None) -> Path:
-    """The interpreter of a rival's environment, which is made or renewed where the lock changed.
+def python_of(
+    name: str, lock: Path | None = None, settings: Mapping[str, str] = MappingProxyType({})
+) -> Path:
+    """Return the interpreter of a rival's environment, made or renewed where the lock changed.
+
+    Args:
+        settings: Environment variables for what pip compiles.
 
     Raises:
         NotInstalled: pip could not install what the lock names.
@@ -38,6 +46,7 @@ def python_of(name: str, lock: Path | None = None) -> Path:
         stderr=subprocess.PIPE,
         text=True,
         check=False,
+        env={**os.environ, **settings},
     )
     if ended.returncode:
         said = ended.stderr.strip().splitlines() or ["pip said nothing"]
