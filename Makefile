@@ -42,7 +42,7 @@ lint: $(VENV)/.test ## Format, style, floors and types
 	$(BIN)/mypy
 	$(BIN)/python manage.py makemigrations --check --dry-run
 
-screenshots: chromium ## Every page, light and dark, into docs/images/pages and docs/pages.md
+screenshots: chromium ## Every page, light and dark, into docs/images/pages
 	$(BIN)/python -m tests.screenshots
 
 bench: chromium ## Ours beside other products, each in its own environment; writes docs/benchmarks.md
@@ -56,7 +56,7 @@ figures: $(VENV)/.test ## Write the figures of README, catalogue.md, checks.md a
 real-model: $(VENV)/.test ## The whole way with a real, tiny language model; writes docs/benchmarks.md
 	$(BIN)/python -m bench.real_model.run --write
 
-mutants: $(VENV)/.test ## Whether the tests notice small mutations of what matters; writes docs/mutants.md
+mutants: $(VENV)/.test ## Whether the tests notice small mutations of what matters; writes docs/benchmarks.md
 	$(BIN)/python -m tests.mutants
 
 chromium: $(VENV)/.test

@@ -1,8 +1,8 @@
 """Every page, light and dark, into docs/images/pages: `python -m tests.screenshots [FOLDER]`.
 
 Fills a new installation with the demo (authored scenes, simulated people and models), serves it,
-opens every page of the table of access with Chromium at 1280 px, and writes docs/pages.md. What
-answers no page there (a file, a question that is not asked there) is left out and said. With a
+and opens every page of the table of access with Chromium at 1280 px. What answers no page there
+(a file, a question that is not asked there) is left out and said. With a
 folder, the demo that is there is used again.
 """
 
@@ -12,7 +12,6 @@ import io
 import os
 import sys
 import tempfile
-from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal
@@ -26,7 +25,6 @@ from tests.processes import ROOT
 from tests.stack import SMALL_DEMO, Home
 
 FOLDER = ROOT / "docs" / "images" / "pages"
-INDEX = ROOT / "docs" / "pages.md"
 SCHEMES: tuple[Literal["light", "dark"], ...] = ("light", "dark")
 WIDTH, LEAST, MOST = 1280, 720, 1600
 """A page is shown from its top, so many pixels high at least and at most."""
@@ -64,7 +62,6 @@ def main() -> None:
         with home.serving() as url, chromium() as browser:
             pages = {who: _page(browser, url, sessions.get(who)) for who in ("", *sessions)}
             taken = [one for one in shots if _take(pages[one.who], url, one)]
-    INDEX.write_text("\n".join(_index(taken)) + "\n")
     size = sum(path.stat().st_size for path in FOLDER.glob("*.webp"))
     print(f"{len(taken)} pages, {size / 1e6:.1f} MB")
 
@@ -174,26 +171,6 @@ def _keep(png: bytes, path: Path) -> None:
         picture.save(path, "WEBP", quality=quality, method=6)
         if path.stat().st_size < LIGHT:
             return
-
-
-def _index(taken: list[Shot]) -> Iterator[str]:
-    yield "# Every page, light and dark"
-    yield ""
-    yield "Made by `python -m tests.screenshots` from the demo: authored scenes, simulated models"
-    yield "and simulated votes. Pages longer than the picture are shown from their top."
-    for shot in taken:
-        who = f" (as {shot.who})" if shot.who else ""
-        yield f"\n## {shot.name}{who}\n"
-        yield "| light | dark |"
-        yield "|---|---|"
-        yield (
-            "| "
-            + " | ".join(
-                f"![{shot.name}, {scheme}](images/pages/{shot.name}-{scheme}.webp)"
-                for scheme in SCHEMES
-            )
-            + " |"
-        )
 
 
 if __name__ == "__main__":

@@ -1,8 +1,8 @@
 """Run mutations in copies of the tree: `python -m tests.mutants [AREA or NAME ...]`.
 
 Each one's tests run with it, up to the first that fails; in the end those that failed run once
-more without a mutation: a mutation is caught where they pass then. The table is printed, and
-written to docs/mutants.md where all mutations ran.
+more without a mutation: a mutation is caught where they pass then. The outcomes are printed; their
+counts are written to docs/benchmarks.md when all mutations ran.
 """
 
 from __future__ import annotations
@@ -11,14 +11,16 @@ import argparse
 import os
 import tempfile
 import time
+from collections import Counter
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from pathlib import Path
 from queue import SimpleQueue
 
+from bench.report import PAGE, table, write_block
 from tests.environment import fix_environment
-from tests.mutants.mutation import ROOT, Mutation, mutations
+from tests.mutants.mutation import Mutation, mutations
 from tests.mutants.trees import FAILED, PASSED, Tree
 
 CAUGHT, SURVIVED, EQUIVALENT = "caught", "SURVIVED", "equivalent"
@@ -57,7 +59,7 @@ def main(wanted: Sequence[str], *, at_once: int) -> int:
                 print(one.noticed_by, flush=True)
         found = _without_what_is_red(trees.get(), found)
     if not wanted:
-        (ROOT / "docs" / "mutants.md").write_text(report(found))
+        write_block("mutants", report(found), page=PAGE)
     bad = [one.of.name for one in found if not one.is_right]
     print(f"{len(found) - len(bad)} of {len(found)} noticed or equivalent", *bad, sep="\n  ")
     return 1 if bad else 0
@@ -96,34 +98,16 @@ def _outcome(trees: SimpleQueue[Tree], one: Mutation) -> Outcome:
 
 
 def report(found: Sequence[Outcome]) -> str:
-    """The page of docs."""
-    caught = sum(one.came == CAUGHT for one in found)
-    equal = sum(one.came == EQUIVALENT for one in found)
-    lines = [
-        "# Mutations",
-        "",
-        "Tests are worth what they notice. `make mutants` changes one small thing at a time in a",
-        "copy of the tree and runs the tests that must then fail; `tests/mutants/*.toml` keeps",
-        "the changes, and this page is what came of the last run of each. It is no part of",
-        "`make test`, which only checks that every change still fits the source.",
-        "",
-        f"Caught: {caught} of {len(found)}. Equivalent, with the reason beside it: {equal}.",
-        "",
-        "| area | mutation | in | what came of it |",
-        "|---|---|---|---|",
+    """Return how many mutations of each area were caught, as a table."""
+    counts = {
+        area: Counter(one.came for one in found if one.of.area == area)
+        for area in dict.fromkeys(one.of.area for one in found)
+    }
+    rows = [
+        [area, str(came.total()), str(came[CAUGHT]), str(came[EQUIVALENT])]
+        for area, came in counts.items()
     ]
-    lines += [
-        f"| {one.of.area} | {one.of.name.replace('-', ' ')} | `{one.of.file}` | {_told(one)} |"
-        for one in found
-    ]
-    return "\n".join([*lines, ""])
-
-
-def _told(one: Outcome) -> str:
-    if one.came == EQUIVALENT:
-        return f"{one.came}: {one.of.equivalent}"
-    path, _, test = one.noticed_by.removeprefix("tests/").partition("::")
-    return f"{one.came} by `{path}`: {test.removeprefix('test_').replace('_', ' ')}"
+    return table(["area", "mutations", CAUGHT, EQUIVALENT], rows)
 
 
 if __name__ == "__main__":
