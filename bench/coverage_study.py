@@ -1,4 +1,4 @@
-"""How often 95 % intervals contain the truth, over simulated studies: `docs/coverage.md`.
+"""How often 95 % intervals contain the truth, over simulated studies: `docs/rating.md`.
 
     python -m bench.coverage_study [STUDIES] [--write]
 
@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import argparse
 import re
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import product
 from pathlib import Path
@@ -30,7 +30,7 @@ from bench.worlds import World, paper_ratings
 EFFECTS = ((0.0, 0.0), (100.0, 40.0), (0.0, 80.0))
 """Points by which scenarios, and experts, differ about a contestant."""
 ROUNDS = 500
-PAGE = Path(__file__).resolve().parents[1] / "docs" / "coverage.md"
+PAGE = Path(__file__).resolve().parents[1] / "docs" / "rating.md"
 DEFAULT, CHECK, SINGLE = "closed form, default", "cross-check", "single votes"
 METHODS = (DEFAULT, CHECK, SINGLE)
 
@@ -45,7 +45,7 @@ def worlds() -> Iterator[tuple[str, World]]:
     yield "even", _differing(strong, (0.0, 300.0))
     for scenarios, experts, effects in product((3, 5, 8), (5, 9, 20), EFFECTS[:2]):
         few = replace(blank, scenarios=scenarios, experts=experts, votes_per_expert=100)
-        yield f"{scenarios} scenarios", _differing(few, effects)
+        yield "3, 5 or 8 scenarios", _differing(few, effects)
     for uneven, experts, effects in product((1.0, 1.5), (5, 9, 20), EFFECTS):
         some = replace(blank, uneven=uneven, experts=experts)
         yield f"uneven experts, {uneven}", _differing(some, effects)
@@ -128,33 +128,32 @@ def _add(found: Found, votes: Comparisons, truth: FloatArray, seed: int | None) 
 
 
 def lines(studies: int) -> Iterator[str]:
-    """The table of worlds, row by row, and what is lowest and highest in it."""
-    yield from _head("plan", "experts x votes", "scenario / expert", *METHODS, "told apart")
-    coverage, single, false = [], [], []
+    """Yield the table of worlds: per plan and effects the lowest and highest of its worlds."""
+    yield from _head("plan", "scenario / expert", "experts", *METHODS, "told apart, at most")
+    groups: dict[tuple[str, float, float], list[World]] = {}
     for plan, world in worlds():
-        number = studies // 3 if world.adaptive else studies
-        found = study(world, studies=number)
-        equal = replace(world, ratings=np.full(len(world.ratings), 1000.0))
-        alike = study(equal, studies=number, judge=True)
-        coverage.append(found.coverage())
-        single.append(found.coverage(SINGLE))
-        judged = min(world.experts, world.scenarios) >= FEWEST_TO_JUDGE
-        if judged:
-            false.append(alike.false)
+        groups.setdefault((plan, world.scenario_sd, world.expert_sd), []).append(world)
+    for (plan, scenario_sd, expert_sd), members in groups.items():
+        found, false = [], []
+        for world in members:
+            number = studies // 3 if world.adaptive else studies
+            found.append(study(world, studies=number))
+            if min(world.experts, world.scenarios) >= FEWEST_TO_JUDGE:
+                equal = replace(world, ratings=np.full(len(world.ratings), 1000.0))
+                false.append(study(equal, studies=number, judge=True).false)
         cells = (
             plan,
-            f"{world.experts} x {world.votes_per_expert}",
-            f"{world.scenario_sd:.0f} / {world.expert_sd:.0f}",
-            *(found.cell(method) for method in METHODS),
-            f"{alike.false:.1%}" if judged else f"({alike.false:.1%})",
+            f"{scenario_sd:.0f} / {expert_sd:.0f}",
+            _range([world.experts for world in members], "d"),
+            *(_range([one.coverage(method) for one in found], ".1%") for method in METHODS),
+            f"{max(false):.1%}" if false else "",
         )
         yield "| " + " | ".join(cells) + " |"
-    yield ""
-    yield (
-        f"The closed form holds in {min(coverage):.1%} to {max(coverage):.1%}, intervals by "
-        f"single votes in {min(single):.1%} to {max(single):.1%}. Of nine equals any are told "
-        f"apart in at most {max(false):.1%} of studies."
-    )
+
+
+def _range(values: Sequence[float], form: str) -> str:
+    lowest, highest = format(min(values), form), format(max(values), form)
+    return lowest if lowest == highest else f"{lowest} to {highest}"
 
 
 def controversial_lines(studies: int) -> Iterator[str]:
@@ -202,7 +201,7 @@ def print_tables(tables: Mapping[str, Callable[[int], Iterator[str]]], *, studie
     """
     parser = argparse.ArgumentParser()
     parser.add_argument("studies", type=int, nargs="?", default=studies)
-    parser.add_argument("--write", action="store_true", help="into docs/coverage.md")
+    parser.add_argument("--write", action="store_true", help="into docs/rating.md")
     asked = parser.parse_args()
     for name, lines_of in tables.items():
         said = [f"{asked.studies} simulated studies a row.", ""]

@@ -1,6 +1,6 @@
 """Write the figures of README.md, catalogue.md, checks.md and formats.md anew: `make figures`.
 
-The other measurements write their own section of docs/benchmarks.md and docs/coverage.md, because
+The other measurements write their own section of docs/benchmarks.md and docs/rating.md, because
 they take long or need other software.
 """
 

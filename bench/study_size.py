@@ -1,6 +1,6 @@
-"""Whether a planned study tells what the planning page said: `docs/coverage.md`.
+"""Whether a planned study tells what the planning page said: `docs/rating.md`.
 
-    python -m bench.study_size [STUDIES] [--write]
+    python -m bench.study_size [STUDIES]
 
 For each design the votes that `arena.rating.sample_size` asks for are simulated, and what comes
 out is held against what was wanted: a widest half-width, and neighbours told apart with a power.
@@ -9,6 +9,7 @@ All of it is simulated; 100 studies a row take three minutes of one processor.
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
@@ -17,7 +18,6 @@ import numpy as np
 from arena.rating.comparisons import FloatArray
 from arena.rating.leaderboard import rate
 from arena.rating.sample_size import StudyDesign, expect, votes_per_expert_for
-from bench.coverage_study import print_tables
 from bench.worlds import SCENARIOS, World
 
 CONTESTANTS = 9
@@ -136,4 +136,5 @@ def _row(world: World, step: float, gap: float, studies: int) -> list[str]:
 
 
 if __name__ == "__main__":
-    print_tables({"sizes": lines}, studies=100)
+    for line in lines(int(sys.argv[1]) if len(sys.argv) > 1 else 100):
+        print(line, flush=True)

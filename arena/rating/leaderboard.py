@@ -108,7 +108,7 @@ class Leaderboard:
 
     @property
     def told_apart(self) -> Separation | None:
-        """The pairs where "at 5 % for the whole table" holds: docs/coverage.md.
+        """The pairs where "at 5 % for the whole table" holds: docs/rating.md.
 
         Only intervals in closed form that know of experts or scenarios, at least five of each,
         hold it: votes that hang together unseen tell equals apart in every second study.

@@ -9,7 +9,7 @@ With few experts such a square is a guess by few numbers, and Student's t makes 
 need be. But contestants are many: by how much experts disagree about one says something about the
 others. So each contestant's own square is drawn towards what all of them have in common, the less
 the more they differ (moderated variances, Smyth 2004), and Student's t gets the degrees of freedom
-of what it then rests on (Satterthwaite 1946). docs/coverage.md has how often the truth is inside.
+of what it then rests on (Satterthwaite 1946). docs/rating.md has how often the truth is inside.
 
 Notation: C contestants, R rows, G clusters of one kind. Strengths are logarithms of odds.
 """

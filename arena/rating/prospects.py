@@ -27,7 +27,7 @@ class Question:
 
     Attributes:
         half_width: Points that the widest 95 % interval is expected to have: some studies miss
-            it (docs/coverage.md).
+            it (docs/rating.md).
         gap: Points between two contestants that are to be told apart.
         power: With this chance.
         votes_per_expert: What somebody has in mind, None without.

@@ -12,7 +12,7 @@ from arena.rating.rules import Intervals, Rules
 from augment.sentences import Sentence, sentence
 
 FEWEST = {"expert": 5, "scenario": 10}
-"""A table that rests on fewer says so: docs/coverage.md."""
+"""A table that rests on fewer says so: docs/rating.md."""
 
 
 def _clusters(votes: Comparisons, unit: Unit) -> dict[str, int]:

@@ -11,7 +11,7 @@ the terms that the intervals of `moderated.py` are made of:
 
 All of it is closed form, but for the gap that is found (`planned_pairs.py`).
 
-`docs/coverage.md` holds it against simulated studies. Everything is on the scale of the rated
+`docs/rating.md` holds it against simulated studies. Everything is on the scale of the rated
 table, ties as half a win.
 
 Notation: C contestants, P pairs, E experts, S scenarios, V votes. Points are Elo points.

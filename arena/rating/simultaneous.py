@@ -25,7 +25,7 @@ SingleArray = NDArray[np.float32]
 
 CAUTION = 1.8
 """What p-values are multiplied by: effects of scenarios are no sums of many, and simulated studies
-of equals were told apart up to so much more often than the draws foresee (docs/coverage.md)."""
+of equals were told apart up to so much more often than the draws foresee (docs/rating.md)."""
 MOST_DRAWN = 300
 """Contestants above whom pairs go by Holm's step-down alone, without draws."""
 MOST_ROUNDS = 2000

@@ -36,7 +36,7 @@ GUESSES: dict[str, Any] = {
     "checks": 2,
     "overlap": 10,
 }
-"""Where nothing is known; shares in percent. Effects are those of docs/coverage.md."""
+"""Where nothing is known; shares in percent. Effects are those of docs/rating.md."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
