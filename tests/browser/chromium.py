@@ -11,7 +11,7 @@ from tempfile import TemporaryDirectory
 
 from playwright.sync_api import Browser, sync_playwright
 
-from tests.browser.fonts import DEJAVU, FontFamily
+from tests.browser.fonts import configure
 
 NAMES = ("chromium", "chromium-browser", "google-chrome", "google-chrome-stable")
 FLAGS = [
@@ -27,19 +27,15 @@ PATIENCE_MS = 60_000
 
 
 @contextmanager
-def chromium(family: FontFamily = DEJAVU) -> Iterator[Browser]:
-    """The system's Chromium, else the one that Playwright downloaded; one for each thread.
-
-    Args:
-        family: The only fonts that it finds.
-    """
+def chromium() -> Iterator[Browser]:
+    """The system's Chromium, else the one that Playwright downloaded; one for each thread."""
     path = os.environ.get("CHROMIUM") or next(filter(None, map(shutil.which, NAMES)), None)
     with TemporaryDirectory(prefix="arena-fonts-") as folder, sync_playwright() as playwright:
         browser = playwright.chromium.launch(
             executable_path=path,
             args=FLAGS,
             timeout=2 * PATIENCE_MS,
-            env={**os.environ, **family.configure(Path(folder))},
+            env={**os.environ, **configure(Path(folder))},
         )
         try:
             yield browser

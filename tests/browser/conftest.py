@@ -14,7 +14,6 @@ from pytest_django.live_server_helper import LiveServer
 
 from tests.browser.booth import Booth, furnish
 from tests.browser.chromium import PATIENCE_MS, chromium
-from tests.browser.fonts import DEJAVU, LIBERATION
 
 
 @pytest.fixture(scope="session", autouse=True)
@@ -28,19 +27,10 @@ def _patience() -> None:
     expect.set_options(timeout=PATIENCE_MS)
 
 
-def pytest_generate_tests(metafunc: pytest.Metafunc) -> None:
-    """DejaVu Sans, the widest; tests of layout once more with a family of the widths of Arial."""
-    if "browser" in metafunc.fixturenames:
-        is_layout = metafunc.definition.get_closest_marker("layout") is not None
-        families = [DEJAVU, LIBERATION] if is_layout else [DEJAVU]
-        ids = [family.name for family in families]
-        metafunc.parametrize("browser", families, ids=ids, indirect=True, scope="package")
-
-
 @pytest.fixture(scope="package")
-def browser(request: pytest.FixtureRequest) -> Iterator[Browser]:
-    """A Chromium that finds one family of fonts alone."""
-    with pytest.MonkeyPatch.context() as patch, chromium(request.param) as started:
+def browser() -> Iterator[Browser]:
+    """One Chromium for all of these tests."""
+    with pytest.MonkeyPatch.context() as patch, chromium() as started:
         # Playwright keeps an event loop in this thread, where Django would refuse to read rows.
         patch.setenv("DJANGO_ALLOW_ASYNC_UNSAFE", "true")
         yield started

@@ -12,7 +12,7 @@ from augment.models import Augmentation
 from augment.scene.modification import Modification
 from augment.services.scenarios.pictures import camera_of, picture_of
 from augment.services.scenarios.scenes import scene_of
-from tests.browser.booth import PHONE, Booth, all_sent, press
+from tests.browser.booth import Booth, all_sent, press
 from tests.scenes import vehicle
 from tests.study_rows import a_study, hang
 
@@ -74,14 +74,3 @@ def test_x_holds_b_in_the_place_of_a_and_v_marks_what_differs(drawn: Booth) -> N
     expect(page.locator(".side canvas")).to_have_count(0)
     all_sent(page, 2)
     assert [vote.aids for vote in drawn.votes()] == ["zoom blink difference", "difference"]
-
-
-def test_a_tap_blinks_and_another_one_ends_it(drawn: Booth) -> None:
-    page = drawn.enter(viewport=PHONE, has_touch=True)
-    a, b = page.evaluate(ADDRESSES)
-    page.get_by_role("button", name="Blink").tap()
-    expect(page.locator(".reading").first).to_have_text("B stands in both places")
-    assert page.evaluate(ADDRESSES) == [b, b]
-    page.get_by_role("button", name="Blink").tap()
-    expect(page.locator(".reading").first).to_have_text("")
-    assert page.evaluate(ADDRESSES) == [a, b]

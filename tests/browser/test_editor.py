@@ -87,17 +87,6 @@ def test_an_answer_never_undoes_what_was_done_after_its_question(desk: Desk) -> 
     assert desk.y_m == 1.0
 
 
-def test_a_snap_right_after_a_change_is_not_lost(desk: Desk) -> None:
-    desk.place_ahead()
-    desk.page.locator("svg.stage").press("Shift+ArrowUp")
-    desk.snap()
-    desk.page.clock.run_for(LATER_MS)
-    assert desk.asked(2)["snap"] == "Added1"
-    desk.answer(2, y_m=0.0)
-    expect(desk.page.locator("#n-y")).to_have_value("0")
-    assert len(desk.held.posted) == 3
-
-
 @pytest.mark.parametrize(
     "change",
     [
@@ -118,11 +107,3 @@ def test_what_is_no_modification_is_told_and_leaves_the_picture(
     assert desk.page.input_value("[name=modification]") == json.dumps(change)
     desk.page.locator("svg.stage").press("Shift+ArrowUp")
     assert desk.y_m == 1.0
-
-
-def test_an_unknown_class_is_shown_by_its_name(desk: Desk) -> None:
-    desk.answer(0)
-    size = {"length_m": 4, "width_m": 2}
-    tram = {"id": "T", "type": 'a "tram"', "x_m": 9, "y_m": 0, "heading_rad": 0, **size}
-    desk.type_in(json.dumps({"add": [tram]}))
-    expect(desk.page.locator("[data-list]")).to_contain_text('a "tram"')

@@ -11,7 +11,7 @@ from arena.models import Study
 from arena.services.enrolments import set_enrolment
 from arena.services.people import create_person
 from augment.models import Augmentation
-from tests.browser.booth import DESK, PHONE, Booth, ready
+from tests.browser.booth import PHONE, Booth, ready
 from tests.browser.test_voting_page import faults
 
 pytestmark = [pytest.mark.browser, pytest.mark.django_db(transaction=True)]
@@ -30,8 +30,7 @@ def plan_with_hung_pictures(study: Study) -> None:
     study.save()
 
 
-@pytest.mark.parametrize("theme", ["light", "dark"])
-def test_somebody_enrols_votes_and_gets_a_code(booth: Booth, theme: str) -> None:
+def test_somebody_enrols_votes_and_gets_a_code(booth: Booth) -> None:
     plan_with_hung_pictures(booth.study)
     enrolment = set_enrolment(
         study=booth.study,
@@ -43,8 +42,8 @@ def test_somebody_enrols_votes_and_gets_a_code(booth: Booth, theme: str) -> None
     )
     context = booth.browser.new_context(
         base_url=booth.address,
-        viewport=PHONE if theme == "dark" else DESK,
-        color_scheme="dark" if theme == "dark" else "light",
+        viewport=PHONE,
+        color_scheme="dark",
         bypass_csp=True,
     )
     booth.contexts.append(context)

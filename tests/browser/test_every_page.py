@@ -1,9 +1,8 @@
-"""Every page of the site, once each in one browser: axe in light and dark, and a phone's width."""
+"""Every page of the site, once each in one browser: axe, and a phone's width."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any
 
 import pytest
 from django.urls import reverse
@@ -12,24 +11,13 @@ from pytest_django.live_server_helper import LiveServer
 
 from arena.models import Study
 from tests.browser.booth import PHONE, Booth, ready
-from tests.browser.test_voting_page import RULES, faults
+from tests.browser.test_voting_page import faults
 from tests.web.every_page import ShownPage, pages_of_a_rated_study, pages_of_an_open_study
 
 pytestmark = [pytest.mark.browser, pytest.mark.django_db(transaction=True)]
-CONTRAST: dict[str, Any] = {**RULES, "runOnly": {"type": "rule", "values": ["color-contrast"]}}
-"""What alone depends on the theme."""
 LOOKS_AGAIN = "meta-refresh: "
 """A page that waits for a worker's picture loads itself a few times: the one finding left."""
 TOO_WIDE = "document.documentElement.scrollWidth - document.documentElement.clientWidth"
-
-
-def test_the_contrast_of_the_dark_theme_is_looked_at(browser: Browser) -> None:
-    page = browser.new_page(color_scheme="light")
-    page.set_content("<main style='color: light-dark(#000, #777); background: #888'>Hardly</main>")
-    page.add_style_tag(content=":root { color-scheme: light dark; }")
-    assert not [fault for fault in faults(page) if "contrast" in fault]
-    assert len(_faults_in_the_dark(page)) == 1
-    page.close()
 
 
 @pytest.mark.parametrize("pages", [pages_of_an_open_study, pages_of_a_rated_study])
@@ -43,7 +31,6 @@ def test_axe_finds_nothing_and_nothing_is_wider_than_a_phone(
     for one in shown:
         page = _tab(booth, by_user, one)
         found = [fault for fault in faults(page) if not fault.startswith(LOOKS_AGAIN)]
-        found += _faults_in_the_dark(page)
         page.set_viewport_size(PHONE)
         if beyond := page.evaluate(TOO_WIDE):
             found.append(f"{beyond} px wider than a phone")
@@ -58,7 +45,6 @@ def _tab(booth: Booth, by_user: dict[str, BrowserContext], one: ShownPage) -> Pa
     """A tab of its own, that stays where it is even if it would look again by itself."""
     who = one.user.username
     if who not in by_user:
-        # Colours that fade from theme to theme are neither's.
         how = {"bypass_csp": True, "reduced_motion": "reduce"}
         by_user[who] = booth.visit(who, reverse("healthz"), how).context
     page = by_user[who].new_page()
@@ -75,10 +61,3 @@ def _stay(route: Route) -> None:
         route.abort()
     else:
         route.continue_()
-
-
-def _faults_in_the_dark(page: Page) -> list[str]:
-    """Once more what depends on the theme, by the axe that `faults` has put into the page."""
-    page.emulate_media(color_scheme="dark")
-    found = page.evaluate("options => axe.run(document, options)", CONTRAST)["violations"]
-    return [f"dark: {node['html'][:120]}" for rule in found for node in rule["nodes"]]

@@ -8,7 +8,7 @@ import pytest
 from playwright.sync_api import Browser, Page, expect
 from pytest_django.live_server_helper import LiveServer
 
-from tests.browser.booth import PHONE, Booth, all_sent, hang, press, ready
+from tests.browser.booth import Booth, all_sent, hang, press
 from tests.web.test_replay import a_replayed_study
 
 pytestmark = [pytest.mark.browser, pytest.mark.django_db(transaction=True)]
@@ -52,33 +52,3 @@ def test_d_plays_both_drives_in_step_and_the_next_pair_ends_it(played: Booth) ->
     press(page, "3")
     all_sent(page, 2)
     assert [vote.aids for vote in played.votes()] == ["replay", ""]
-
-
-def test_a_pair_without_drives_says_so_and_counts_no_aid(played: Booth) -> None:
-    played.study.rules["replays"]["scenarios"] = []
-    played.study.save(update_fields=["rules"])
-    page = played.enter()
-    page.keyboard.press("d")
-    expect(page.locator("#note")).to_have_text("There is no drive of this pair.")
-    press(page, "2")
-    all_sent(page, 1)
-    assert played.votes()[0].aids == ""
-
-
-@pytest.mark.parametrize("how", [{}, {"viewport": PHONE}])
-def test_the_pictures_keep_their_place_above_the_drives(
-    played: Booth, how: dict[str, object]
-) -> None:
-    page = played.enter(**how, reduced_motion="reduce")
-    page.get_by_role("button", name="Drives").click()
-    expect(page.locator(".side canvas")).to_have_count(2)
-    ready(page)
-    for side in page.locator(".side").all():
-        panel, drive = side.locator(".panel").bounding_box(), side.locator("canvas").bounding_box()
-        assert panel is not None
-        assert drive is not None
-        assert panel["y"] + panel["height"] <= drive["y"] + 1
-        assert panel["height"] >= 150
-        assert drive["height"] >= 100
-    if not how:
-        assert page.evaluate("document.documentElement.scrollHeight <= innerHeight")

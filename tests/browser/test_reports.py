@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 from django.urls import reverse
-from playwright.sync_api import Locator, Position, ViewportSize, expect
+from playwright.sync_api import Locator, Position, expect
 
 from arena.models import Report
 from arena.services.people import create_person
@@ -54,31 +54,6 @@ def test_a_press_in_a_picture_marks_the_place_and_names_the_picture(booth: Booth
     assert (row.side, row.mark_x, row.mark_y) == ("both", None, None)
 
 
-def test_the_panel_gives_way_to_aim_and_a_second_press_takes_the_mark_away(booth: Booth) -> None:
-    page = booth.enter()
-    page.keyboard.press("z")
-    page.keyboard.press("r")
-    aim = page.get_by_role("button", name="Mark the place in an image")
-    first, drawn = page.locator(".panel").first, page.locator(".spot:not([d=''])")
-    for place, marks in ((0.5, 1), (0.5, 0), (0.75, 1)):
-        aim.click()
-        expect(aim).to_be_hidden()
-        expect(page.locator("#note")).to_contain_text("Press the place in an image")
-        first.click(position=place_in(first, place, 0.9))
-        expect(aim).to_be_visible()
-        expect(page.locator("#note")).to_be_empty()
-        expect(drawn).to_have_count(marks)
-    aim.click()
-    page.keyboard.press("Escape")
-    page.keyboard.press("r")
-    expect(aim).to_be_visible()
-    page.keyboard.press("1")
-    row = told(page.locator("#note"))
-    # Zoomed 2.5 times around the middle of the picture.
-    assert row.side == "left"
-    assert row.mark_x == pytest.approx(0.6, abs=0.01)
-
-
 def test_a_tap_marks_on_a_phone_and_the_admin_sees_the_mark(booth: Booth) -> None:
     page = booth.enter(viewport=PHONE, has_touch=True, is_mobile=True)
     page.locator("#report > summary").tap()
@@ -96,20 +71,3 @@ def test_a_tap_marks_on_a_phone_and_the_admin_sees_the_mark(booth: Booth) -> Non
         office = booth.visit("ada", path, looks)
         expect(office.locator("figure.reported svg")).to_have_count(1)
         assert faults(office) == []
-
-
-def test_the_panel_is_whole_above_the_answers_on_every_phone(booth: Booth) -> None:
-    page = booth.enter(locale="de-DE")
-    for width, height in ((360, 640), (390, 844), (667, 375), (740, 360), (844, 390)):
-        page.set_viewport_size(ViewportSize(width=width, height=height))
-        page.locator("#report > summary").click()
-        panel = page.locator("#report > div").bounding_box()
-        answers = page.locator("#answers").bounding_box()
-        assert panel is not None
-        assert answers is not None
-        assert panel["y"] >= 0, f"{width}x{height}: its top is out of the window"
-        assert panel["y"] + panel["height"] <= answers["y"] + 1, f"{width}x{height}"
-        last = page.locator("#report [data-choice]").last
-        last.scroll_into_view_if_needed()
-        expect(last).to_be_in_viewport(ratio=1)
-        page.keyboard.press("Escape")

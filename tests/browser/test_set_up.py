@@ -10,7 +10,6 @@ from playwright.sync_api import Page, expect
 
 from arena.services.people import create_person
 from augment.models import BaseScene
-from augment.services.scenarios.scene_pictures import draw_scene
 from tests.browser.booth import Booth
 
 pytestmark = [pytest.mark.browser, pytest.mark.django_db(transaction=True)]
@@ -58,43 +57,3 @@ def test_objects_come_and_go_and_become_json_without_leaving_the_page(booth: Boo
     expect(asks.locator("[name=i_name]")).to_have_value("bus")
     assert page.evaluate("window.stayed")
     assert page.input_value("[name=instruction]") == "Somebody crosses before the bus."
-
-
-def test_a_picture_comes_without_taking_what_was_typed(booth: Booth) -> None:
-    scene = BaseScene.objects.earliest("pk")
-    page = visit(booth, reverse("scenario-new", args=[scene.code]))
-    page.fill("[name=instruction]", "Somebody crosses before the bus.")
-    page.check("[name=keep_traffic]")
-    expect(page.get_by_text("A worker is drawing it.").first).to_be_visible()
-    draw_scene(scene.pk)
-    expect(page.locator(".beside img").first).to_be_visible()
-    assert page.evaluate("window.stayed")
-    assert page.input_value("[name=instruction]") == "Somebody crosses before the bus."
-
-
-def test_where_the_script_can_ask_nobody_the_form_brings_the_page(booth: Booth) -> None:
-    scene = BaseScene.objects.earliest("pk")
-    page = visit(booth, reverse("scenario-new", args=[scene.code]))
-    page.route(
-        "**/new/",
-        lambda route: (
-            route.abort() if route.request.resource_type == "fetch" else route.continue_()
-        ),
-    )
-    add_a_walk(page)
-    assert not page.evaluate("window.stayed === true")
-    assert page.input_value("[name=instruction]") == "Somebody crosses before the bus."
-
-
-def test_a_link_is_copied_by_its_button(booth: Booth) -> None:
-    page = visit(
-        booth,
-        reverse("experts", args=[booth.study.code]),
-        permissions=["clipboard-read", "clipboard-write"],
-    )
-    page.get_by_role("button", name="Invite", exact=False).first.click()
-    page.get_by_role("button", name="Copy").first.click()
-    expect(page.get_by_text("Copied").first).to_be_visible()
-    copied = page.evaluate("navigator.clipboard.readText()")
-    assert copied == page.locator("input[readonly]").first.input_value()
-    assert "/invitation/" in copied

@@ -31,14 +31,3 @@ def test_a_skip_moves_no_bar_and_its_pair_comes_back_from_the_list(booth: Booth)
     expect(page.locator("#skipped")).to_be_hidden()
     expect(page.locator("#place")).to_have_text("3")
     assert booth.outcomes() == ["left", "right"]
-
-
-def test_the_list_works_without_a_script(booth: Booth) -> None:
-    page = booth.enter(java_script_enabled=False)
-    page.locator("#skip > summary").click()
-    page.get_by_role("button", name="Instruction unclear").click()
-    page.get_by_role("link", name="Skipped: 1").click()
-    page.get_by_role("link", name="Open pair 1 again").click()
-    page.get_by_role("button", name="B is better").click()
-    assert booth.outcomes() == ["right"]
-    assert page.get_by_role("link", name="Skipped").count() == 0

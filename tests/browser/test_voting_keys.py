@@ -103,28 +103,6 @@ def test_looking_closely_by_keys_moves_both_pictures_and_is_kept_with_the_vote(
     assert Vote.objects.get().aids == "zoom ruler flip"
 
 
-def test_the_pointer_zooms_pans_and_measures_in_both_pictures(booth: Booth) -> None:
-    page = booth.enter()
-    booth.look_ahead(page, pairs=1)
-    box = page.locator(".panel").first.bounding_box()
-    assert box is not None
-    # Of a window of 60 x 40 m whose ego stands a quarter to the right, in the middle.
-    page.mouse.move(box["x"] + 0.5 * box["width"], box["y"] + 0.25 * box["height"])
-    page.keyboard.down("m")
-    expect(page.locator(".reading").last).to_contain_text("15.0 m ahead, 10.0 m left")
-    page.keyboard.up("m")
-    page.mouse.wheel(0, -300)
-    expect(page.locator(".panel").last).to_have_class("panel is-zoomed")
-    before = page.locator(".scene").last.get_attribute("style")
-    page.mouse.down()
-    page.mouse.move(box["x"] + 0.6 * box["width"], box["y"] + 0.3 * box["height"])
-    page.mouse.up()
-    after = [scene.get_attribute("style") for scene in page.locator(".scene").all()]
-    assert after[0] == after[1] != before
-    press(page, "1")  # the next pair is whole again
-    expect(page.locator(".panel").first).to_have_class("panel")
-
-
 def test_single_keys_can_be_changed_and_switched_off_for_good(booth: Booth) -> None:
     page = booth.enter()
     page.keyboard.press("?")

@@ -53,15 +53,6 @@ def test_a_held_key_is_one_vote(booth: Booth) -> None:
     assert booth.outcomes() == ["left"]
 
 
-def test_enter_held_on_a_button_is_one_vote(booth: Booth) -> None:
-    page = booth.enter()
-    booth.look_ahead(page, pairs=2)
-    page.get_by_role("button", name="B is better").focus()
-    hold_down(page, "Enter")
-    all_sent(page, 1)
-    assert booth.outcomes() == ["right"]
-
-
 def hold_down(page: Page, key: str) -> None:
     """Until the next pair takes an answer, and on; from the second on the presses are repeats."""
     page.keyboard.down(key)

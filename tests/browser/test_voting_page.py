@@ -26,12 +26,11 @@ def faults(page: Page) -> list[str]:
     return [f"{rule['id']}: {node['html'][:120]}" for rule in found for node in rule["nodes"]]
 
 
-@pytest.mark.parametrize("theme", ["light", "dark"])
-def test_axe_finds_nothing_on_any_page_of_voting(booth: Booth, theme: str) -> None:
+def test_axe_finds_nothing_on_any_page_of_voting(booth: Booth) -> None:
     booth.study.allow_both_miss = True
     booth.study.save()
     study_rows.vote(study_rows.matchups_of(booth.study, "eva")[0])
-    page = booth.enter(color_scheme=theme, bypass_csp=True)
+    page = booth.enter(color_scheme="dark", bypass_csp=True)
     assert faults(page) == []
     page.keyboard.press("u")
     ready(page)
@@ -55,33 +54,7 @@ def test_axe_finds_nothing_on_any_page_of_voting(booth: Booth, theme: str) -> No
     assert faults(page) == [], "closed"
 
 
-@pytest.mark.parametrize("size", [(390, 844), (1280, 720)])
-def test_no_entry_of_the_legend_is_cut_however_many_there_are(
-    booth: Booth, size: tuple[int, int]
-) -> None:
-    for row in study_rows.matchups_of(booth.study, "eva"):
-        row.view = {name: value for name, value in (row.view or {}).items() if name != "legend"}
-        row.save()  # a pair of an earlier version, which names every mark
-    page = booth.enter(viewport={"width": size[0], "height": size[1]})
-    legend = page.locator("#legend")
-    assert legend.locator("li:visible").count() > 12
-    within = """list => [...list.children].every(one => {
-        const box = one.getBoundingClientRect(), all = list.getBoundingClientRect();
-        return box.bottom <= all.bottom + 0.5 && box.right <= all.right + 0.5;
-    })"""
-    assert legend.evaluate(within)
-    page.evaluate("scrollTo(0, document.documentElement.scrollHeight)")
-    bar = page.locator("#answers").bounding_box()
-    assert bar is not None
-    for reached in (legend, page.locator(".tools")):
-        box = reached.bounding_box()
-        assert box is not None
-        assert box["y"] + box["height"] <= bar["y"] + 0.5 or box["y"] >= bar["y"] + bar["height"]
-        assert box["y"] + box["height"] <= size[1] + 0.5
-
-
-@pytest.mark.layout
-@pytest.mark.parametrize("size", [(1280, 720), (1366, 650), (1920, 1080)])
+@pytest.mark.parametrize("size", [(1280, 720), (1920, 1080)])
 def test_nothing_scrolls_or_moves_and_the_pictures_are_as_large_as_can_be(
     booth: Booth, size: tuple[int, int]
 ) -> None:
@@ -114,7 +87,6 @@ def test_nothing_scrolls_or_moves_and_the_pictures_are_as_large_as_can_be(
         assert min(box["height"], box["width"]) >= 44, button.inner_text()
 
 
-@pytest.mark.layout
 def test_a_phone_shows_one_above_the_other_and_a_bar_to_tap(booth: Booth) -> None:
     page = booth.enter(viewport=PHONE, has_touch=True, is_mobile=True)
     first, second = (panel.bounding_box() for panel in page.locator(".panel").all())
@@ -137,7 +109,6 @@ def test_a_phone_shows_one_above_the_other_and_a_bar_to_tap(booth: Booth) -> Non
     assert booth.outcomes() == ["right", "skip"]
 
 
-@pytest.mark.layout
 def test_everything_but_looking_closely_goes_without_a_script(booth: Booth) -> None:
     booth.study.allow_both_miss = True
     booth.study.save()
@@ -164,13 +135,3 @@ def test_everything_but_looking_closely_goes_without_a_script(booth: Booth) -> N
     assert votes[0].comment == "so so"
     assert votes[1].both_miss
     assert Report.objects.get().comment == "a car floats"
-
-
-def test_colours_of_the_system_still_show_what_is_pressed(booth: Booth) -> None:
-    study_rows.vote(study_rows.matchups_of(booth.study, "eva")[0])
-    page = booth.enter(forced_colors="active", reduced_motion="reduce")
-    assert page.locator("#ask").evaluate("e => getComputedStyle(e).animationName") == "none"
-    page.keyboard.press("u")
-    pressed = page.get_by_role("button", name="A is better")
-    expect(pressed).to_have_attribute("aria-pressed", "true")
-    assert pressed.evaluate("e => getComputedStyle(e).outlineStyle") == "solid"

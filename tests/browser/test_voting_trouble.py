@@ -80,19 +80,6 @@ def test_votes_that_waited_survive_the_end_of_the_session(booth: Booth) -> None:
     assert booth.outcomes() == ["left", "right"]
 
 
-def test_signing_in_again_in_another_tab_goes_on_by_itself(booth: Booth) -> None:
-    page = booth.enter()
-    booth.look_ahead(page)
-    Session.objects.all().delete()
-    press(page, "1")
-    gate = page.get_by_role("dialog", name="Please sign in again")
-    expect(gate).to_be_visible()
-    sign_in(page.context)
-    page.evaluate("dispatchEvent(new Event('focus'))")  # as the browser does for the tab in front
-    expect(gate).to_be_hidden()
-    all_sent(page, 1)
-
-
 def test_a_session_that_ended_with_no_pair_left_is_asked_for_again(booth: Booth) -> None:
     page = booth.enter()
     booth.look_ahead(page)
@@ -167,32 +154,6 @@ def test_a_closing_is_said_with_what_came_too_late(booth: Booth) -> None:
     expect(page.get_by_role("heading", name="This study is closed")).to_be_visible()
     assert Vote.objects.count() == 1
     assert kept(page) == []
-
-
-def test_a_matchup_that_was_taken_back_is_said_and_voting_goes_on(booth: Booth) -> None:
-    page = booth.enter()
-    booth.study.matchups.get(position=1).delete()
-    press(page, "1")
-    expect(page.locator("#note")).to_contain_text("isn’t yours any more")
-    press(page, "2")
-    all_sent(page, 1)
-    assert booth.outcomes() == ["equal"]
-
-
-def test_a_vote_that_came_too_fast_is_sent_again_later(booth: Booth) -> None:
-    page = booth.enter()
-    told: list[int] = []
-
-    def too_fast(route: Route) -> None:
-        told.append(1)
-        error = {"error": {"code": "too_fast", "message": "Slow."}}
-        route.fulfill(status=429, json=error, headers={"Retry-After": "1"})
-
-    page.route(VOTES, too_fast, times=1)
-    press(page, "1")
-    all_sent(page, 1)
-    assert told == [1]
-    assert booth.outcomes() == ["left"]
 
 
 def test_a_vote_behind_a_long_writer_waits_in_the_browser_and_is_sent_again(

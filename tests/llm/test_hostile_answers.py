@@ -11,7 +11,6 @@ from augment.errors import NotSent
 from augment.llm.wire_reply import (
     LONGEST_ARGUMENTS,
     LONGEST_EXTRA,
-    LONGEST_REFUSAL,
     MOST_CALLS,
     MOST_TOKENS,
 )
@@ -102,14 +101,6 @@ def test_what_an_error_says_is_cut_with_a_mark(code: str) -> None:
     assert len(said) < 500
     assert "m… [cut: 1000000 characters]" in said
     assert (f"c… [cut: {len(code)} characters]" in said) == (len(code) > 80)
-
-
-def test_a_long_refusal_is_cut_with_a_mark() -> None:
-    refusal = answered(message(content=None, refusal="no " * 1_000_000)).refusal
-    assert refusal is not None
-    assert len(refusal) == LONGEST_REFUSAL
-    assert refusal.endswith("… [cut: 3000000 characters]")
-    assert answered(message(refusal="n" * LONGEST_REFUSAL)).refusal == "n" * LONGEST_REFUSAL
 
 
 def test_calls_of_tools_are_bounded_in_number_and_length() -> None:

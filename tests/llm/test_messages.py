@@ -14,11 +14,6 @@ def test_a_request_says_only_what_was_asked_for() -> None:
     }
 
 
-def test_temperature_and_seed_are_sent_when_given_even_if_zero() -> None:
-    document = Request(model="m", messages=(), temperature=0.0, seed=0).to_document()
-    assert (document["temperature"], document["seed"]) == (0.0, 0)
-
-
 def test_an_image_goes_as_a_png_data_url_after_the_text() -> None:
     message = Message(speaker=Speaker.USER, text="Look", images=(b"\x89PNG",))
     content = message.to_document()["content"]

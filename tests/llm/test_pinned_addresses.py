@@ -8,14 +8,13 @@ from typing import Any
 
 import pytest
 
-from augment.errors import ModelFault, NotSent
+from augment.errors import NotSent
 from augment.llm import wire_network
 from augment.llm.openai_wire import OpenAIWire
 from tests.llm.hostile import ASKED, BODY
 from tests.llm.raw_server import speaking, whole
 
 KEY = "sk-planted-4f7a9c0d1e2b3a"
-PROXIES = ("HTTP_PROXY", "http_proxy", "HTTPS_PROXY", "https_proxy", "ALL_PROXY", "all_proxy")
 
 
 class Names:
@@ -123,19 +122,6 @@ def test_a_name_that_nobody_knows_was_sent_nothing() -> None:
         client.complete(ASKED)
 
 
-def test_the_proxy_of_the_environment_is_not_used(monkeypatch: pytest.MonkeyPatch) -> None:
-    with speaking(whole(b"{}")) as proxy, speaking(whole(BODY)) as server:
-        for name in PROXIES:
-            monkeypatch.setenv(name, f"http://127.0.0.1:{proxy.port}")
-        with OpenAIWire(
-            base_url=f"http://models.example:{server.port}/v1",
-            api_key=KEY,
-            resolve=Names("127.0.0.1"),
-        ) as client:
-            assert client.complete(ASKED).text == "Hi"
-    assert proxy.heard == []
-
-
 def test_the_proxy_that_is_named_gets_everything_but_what_stays_here() -> None:
     with speaking(whole(BODY)) as proxy, speaking(whole(BODY)) as server:
         settings: dict[str, Any] = {"api_key": None, "proxy_url": f"http://127.0.0.1:{proxy.port}"}
@@ -147,17 +133,3 @@ def test_the_proxy_that_is_named_gets_everything_but_what_stays_here() -> None:
         b"http://models.example/v1/chat/completions"
     ]
     assert len(server.heard) == 1
-
-
-def test_a_call_through_a_proxy_has_its_limits_too() -> None:
-    with (
-        speaking(whole(BODY + b" " * 1000)) as proxy,
-        OpenAIWire(
-            base_url="http://models.example/v1",
-            api_key=None,
-            proxy_url=f"http://127.0.0.1:{proxy.port}",
-            most_bytes=1000,
-        ) as client,
-        pytest.raises(ModelFault, match="longer than"),
-    ):
-        client.complete(ASKED)

@@ -21,10 +21,6 @@ TOOL = Tool(name="double", description="Doubles.", parameters={"type": "object"}
 ASKED = Request(model="m", messages=(HELLO,), temperature=0.0, seed=7, answer_schema=SCHEMA)
 
 
-def test_what_nobody_knows_is_tried() -> None:
-    assert ModelProfile().fitted(ASKED) == ASKED
-
-
 @pytest.mark.parametrize(
     ("parameter", "left_out"),
     [("temperature", "temperature"), ("seed", "seed"), ("response_format", "answer_schema")],
@@ -50,11 +46,6 @@ def test_a_model_without_a_limit_of_the_length_is_not_asked() -> None:
     assert not caught.value.retryable
 
 
-def test_no_answer_is_asked_to_be_longer_than_the_model_can() -> None:
-    assert ModelProfile(max_output_tokens=100).fitted(ASKED).max_tokens == 100
-    assert ModelProfile(max_output_tokens=10**6).fitted(ASKED).max_tokens == ASKED.max_tokens
-
-
 def test_the_effort_is_that_of_the_row_unless_the_request_says_so() -> None:
     profile = ModelProfile(reasoning_effort="none")
     assert profile.fitted(ASKED).to_document()["reasoning_effort"] == "none"
@@ -68,18 +59,6 @@ def test_a_blind_model_is_shown_nothing() -> None:
     assert ModelProfile(vision=True).fitted(seen) == ModelProfile().fitted(seen) == seen
     with pytest.raises(ModelFault, match="m at this endpoint can't see pictures"):
         ModelProfile(vision=False).fitted(seen)
-
-
-def test_a_model_without_native_tools_is_not_given_any() -> None:
-    armed = replace(ASKED, answer_schema=None, tools=(TOOL,))
-    assert ModelProfile().fitted(armed) == armed
-    with pytest.raises(ModelFault, match="no native tool calls"):
-        ModelProfile(native_tools=False).fitted(armed)
-
-
-def test_tools_and_a_schema_never_go_together() -> None:
-    with pytest.raises(ValueError, match="never both"):
-        replace(ASKED, tools=(TOOL,))
 
 
 def test_tools_and_schemas_have_the_form_of_the_wire() -> None:

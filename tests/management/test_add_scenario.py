@@ -83,13 +83,6 @@ def test_an_intent_that_can_not_be_read_is_refused(tmp_path: Path) -> None:
     assert "expected an object" in refused(intent=file)
 
 
-def test_unknown_names_and_taken_slugs_are_refused() -> None:
-    assert "'Cones!' must be one of approaching_construction_zone" in refused(type="Cones!")
-    assert "Unknown scene 'road'. Known: street" in refused(scene="road")
-    run(slug="cones")
-    assert "There is a scenario called 'cones' already" in refused(slug="cones")
-
-
 def test_a_reference_that_can_not_be_read_or_does_not_fit_is_refused(tmp_path: Path) -> None:
     file = reference(tmp_path, CHANGE)
     assert "Agent2 is in the scene already" in refused(reference=file, keep_traffic=True)

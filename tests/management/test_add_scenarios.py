@@ -62,17 +62,6 @@ def test_a_yaml_file_is_added_too(tmp_path: Path) -> None:
     ]
 
 
-def test_density_and_goal_are_columns(tmp_path: Path) -> None:
-    row = "{scene: street-scene, type: cut_in, instruction: Let a car cut in."
-    add(tmp_path, "many.yaml", f"- {row}, density: low, goal: left}}\n")
-    made = Scenario.objects.get(type="cut_in")
-    assert (made.traffic_density, made.goal) == ("low", "left")
-    with pytest.raises(CommandError) as caught:
-        add(tmp_path, "wrong.yaml", f"- {row}, density: dense, goal: back}}\n")
-    assert "row 1.density: 'dense' must be one of none, low, medium, high" in str(caught.value)
-    assert "row 1.goal: 'back' must be one of left, right, straight" in str(caught.value)
-
-
 def test_one_bad_row_keeps_all_out_and_every_error_is_named(tmp_path: Path) -> None:
     wrong = (
         CSV
@@ -107,11 +96,3 @@ def test_a_file_that_is_none_is_refused(tmp_path: Path, name: str, text: str, wo
     with pytest.raises(CommandError) as refused:
         add(tmp_path, name, text)
     assert words in str(refused.value)
-
-
-def test_file_and_arguments_do_not_mix(tmp_path: Path) -> None:
-    (tmp_path / "many.csv").write_text(CSV)
-    with pytest.raises(CommandError, match="goes without --scene"):
-        call_command("add_scenario", "--file", str(tmp_path / "many.csv"), "--scene", "x")
-    with pytest.raises(CommandError, match="--type, --instruction is needed"):
-        call_command("add_scenario", "--scene", "x")

@@ -22,10 +22,3 @@ def test_a_number_that_makes_no_sense_is_refused(option: str, given: str, says: 
     parser.called_from_command_line = False
     with pytest.raises(CommandError, match=says):
         parser.parse_args([f"{option}={given}"])
-
-
-@pytest.mark.parametrize(("option", "given"), [("per_type", 1), ("driven", 0)])
-def test_the_smallest_number_is_taken(option: str, given: int) -> None:
-    parser = Command().create_parser("manage.py", "demo")
-    read = parser.parse_args([f"--{option.replace('_', '-')}={given}"])
-    assert getattr(read, option) == given

@@ -1,6 +1,5 @@
 from __future__ import annotations
 
-from copy import deepcopy
 from io import StringIO
 from pathlib import Path
 
@@ -84,17 +83,6 @@ def test_what_is_not_used_stands_in_the_lines_and_the_token_with_the_scene(folde
     assert any(note.startswith("The source's route leads over 2 roadblocks") for note in notes)
 
 
-def test_density_and_goal_become_options_of_the_scenario(folder: Path) -> None:
-    run(folder)
-    plain, zone = (Scenario.objects.get(slug=f"interplan-{HERE}-s{one}") for one in (0, 1))
-    assert (plain.traffic_density, plain.goal, plain.spawned) == ("none", "", None)
-    assert (zone.traffic_density, zone.goal) == ("low", "left")
-    scene = scene_of(zone)
-    assert scene.options.goal_m == pytest.approx((60.0, 0.0), abs=1e-3)
-    assert scene.agents
-    assert {one.id for one in scene.agents} >= {"Agent101"}
-
-
 def test_an_unchanged_reference_goes_out_as_it_came_in(tmp_path: Path) -> None:
     root = write_folder(tmp_path / "given")
     (given,) = root.rglob("interPlan_modifications.yaml")
@@ -119,19 +107,6 @@ def test_an_unchanged_reference_goes_out_as_it_came_in(tmp_path: Path) -> None:
     call_command("export", *map(str, arguments), stdout=StringIO(), stderr=said)
     assert yaml.safe_load(file.read_text()) == wanted
     assert "Lost" not in said.getvalue()
-
-
-def test_scenarios_that_differ_in_nothing_are_reported(folder: Path) -> None:
-    (given,) = folder.rglob("interPlan_modifications.yaml")
-    document = yaml.safe_load(given.read_text())
-    entries = document["modification_details_dictionary"][HERE]["special_scenario"]
-    entries["4"] = deepcopy(entries["0"]) | {"config": "a0"}
-    entries["5"] = deepcopy(entries["0"]) | {"config": "dh"}
-    given.write_text(yaml.safe_dump(document))
-    lines = run(folder)
-    assert f"{HERE}-s4: interplan-{HERE}-s4; the same as {HERE}-s0" in lines
-    assert f"{HERE}-s5: interplan-{HERE}-s5" in lines, "only its traffic tells it from the first"
-    assert "1 scenarios are the same as an earlier one." in lines
 
 
 def test_the_derived_intents_are_met_by_their_references(tmp_path: Path) -> None:
@@ -163,20 +138,6 @@ def test_importing_again_changes_nothing(folder: Path) -> None:
     assert lines[-1] == "0 scenarios imported, 3 were there already, 2 skipped."
     assert f"{HERE}-s0: interplan-{HERE}-s0 was there already" in lines
     assert (BaseScene.objects.count(), Scenario.objects.count()) == (1, 3)
-
-
-def test_sentences_of_somebodys_own_are_taken(folder: Path, tmp_path: Path) -> None:
-    file = tmp_path / "sentences.csv"
-    file.write_text(f'id,instruction\n{HERE}-s0,"Add a parked car, 17.5 m ahead."\n')
-    run(folder, "--instructions", file)
-    assert (
-        Scenario.objects.get(slug=f"interplan-{HERE}-s0").instruction
-        == "Add a parked car, 17.5 m ahead."
-    )
-    file.write_text("id,instruction\n0123456789abcdef-s0,Add a car.\n")
-    assert "line 2: '0123456789abcdef-s0' is no special scenario" in refused(
-        folder, "--instructions", file
-    )
 
 
 def test_nothing_imported_is_a_fault(folder: Path, tmp_path: Path) -> None:

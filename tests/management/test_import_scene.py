@@ -1,19 +1,15 @@
 from __future__ import annotations
 
 import json
-import shutil
-from importlib import import_module
 from io import StringIO
 from pathlib import Path
 
 import pytest
-from django.apps import apps
 from django.core.management import call_command
 from django.core.management.base import CommandError
 
 from augment.models import BaseScene, Event
 from augment.scene.codec import scene_to_document
-from augment.services.scenarios.scenes import content_hash
 from tests.formats.av2_logs import write_log
 from tests.scenes import junction
 
@@ -71,13 +67,6 @@ def test_a_broken_scene_is_refused_with_the_place(tmp_path: Path) -> None:
     assert "is not there" in refused("json", tmp_path / "gone.json", "--slug", "crossing")
 
 
-def test_a_log_without_its_map_is_refused(tmp_path: Path) -> None:
-    folder = write_log(tmp_path / "log")
-    shutil.rmtree(folder / "map")
-    assert "map/log_map_archive_*.json: no such file" in refused("av2", folder, "--slug", "made")
-    assert "gone: is not there" in refused("av2", tmp_path / "gone", "--slug", "made")
-
-
 def test_a_frame_source_or_slug_that_can_not_be_is_refused(tmp_path: Path) -> None:
     folder = write_log(tmp_path / "log")
     assert "frames 0 to 4" in refused("av2", folder, "--frame", 5, "--slug", "made")
@@ -93,13 +82,6 @@ def test_a_format_that_is_not_named_is_recognised(tmp_path: Path) -> None:
     file.write_text(json.dumps(scene_to_document(junction())))
     run(file, "--slug", "crossing")
     assert BaseScene.objects.get(slug="crossing").source == "json"
-
-
-def test_what_looks_like_no_format_is_refused_with_all_of_them(tmp_path: Path) -> None:
-    said = refused(tmp_path, "--slug", "x")
-    assert "looks like none of the formats" in said
-    assert "av2: Argoverse 2 Sensor log (folder)" in said
-    assert "is not there" in refused(tmp_path / "nowhere", "--slug", "x")
 
 
 def test_the_same_scene_is_not_stored_twice(tmp_path: Path) -> None:
@@ -137,22 +119,3 @@ def test_a_log_becomes_a_scene_every_few_seconds(tmp_path: Path) -> None:
 def test_a_time_or_a_number_that_is_none_is_refused(tmp_path: Path, arguments: tuple[str]) -> None:
     with pytest.raises(CommandError, match="is no"):
         run_log("av2", tmp_path, "--slug", "x", *arguments)
-
-
-def test_a_scene_of_the_catalogue_is_not_imported_again(tmp_path: Path) -> None:
-    call_command("load_catalogue", stdout=StringIO())
-    row = BaseScene.objects.order_by("slug")[0]
-    file = tmp_path / "scene.json"
-    file.write_text(json.dumps(row.document | {"name": "another"}))
-    assert f"The same scene is stored already, as '{row.slug}'" in refused(
-        "json", file, "--slug", "another"
-    )
-
-
-def test_scenes_without_a_content_hash_get_theirs() -> None:
-    document = scene_to_document(junction())
-    old = BaseScene.objects.create(slug="old", document=document, source="json", provenance="x")
-    migration = import_module("augment.migrations.0013_content_hashes")
-    migration.fill_in(apps, None)
-    old.refresh_from_db()
-    assert old.content_hash == content_hash(document)

@@ -6,7 +6,6 @@ from pathlib import Path
 
 import pytest
 from django.core.management import CommandError, call_command
-from django.urls import reverse
 
 from augment.errors import InvalidDocument
 from augment.formats.yaml_file import read_yaml
@@ -14,7 +13,6 @@ from augment.models import Contestant, Event, GenerationJob
 from augment.services.endpoints.known_endpoints import ensure_endpoint
 from augment.services.running.matrix import load_matrix, matrix_text
 from tests.jobs.rows import add_scenario
-from tests.web.cast import people, signed_in
 
 pytestmark = pytest.mark.django_db
 
@@ -121,13 +119,6 @@ def test_a_file_that_is_none_is_refused(tmp_path: Path, text: str, words: str) -
     assert words in str(refused.value)
 
 
-def test_file_and_arguments_do_not_mix(tmp_path: Path) -> None:
-    with pytest.raises(CommandError, match="goes without --samples"):
-        call_command("generate", "--matrix", written(tmp_path, WHOLE), "--samples", "2")
-    with pytest.raises(CommandError, match="or --matrix FILE"):
-        call_command("generate", "--contestants", "reference")
-
-
 def test_what_is_written_is_read_again() -> None:
     loaded = load_matrix(read_yaml(WHOLE, what="matrix"))
     rows = list(Contestant.objects.filter(slug__in=loaded.contestants).select_related("endpoint"))
@@ -140,17 +131,3 @@ def test_what_is_written_is_read_again() -> None:
     changed = text.replace('"temperature": 0.7', '"temperature": 0.8')
     with pytest.raises(InvalidDocument, match="another contestant called 'large-fc-t0p7-native'"):
         load_matrix(read_yaml(changed, what="matrix"))
-
-
-def test_the_page_of_a_new_job_writes_what_is_chosen() -> None:
-    load_matrix(read_yaml(WHOLE, what="matrix"))
-    admin = signed_in(people()["admin"])
-    chosen = {"contestants": ["small-otm"], "scenarios": ["lane"], "samples": "3", "matrix": "1"}
-    answer = admin.post(reverse("job-new"), chosen)
-    assert answer["Content-Disposition"] == 'attachment; filename="matrix.yaml"'
-    document = read_yaml(answer.content.decode(), what="matrix")
-    loaded = load_matrix(document)
-    assert (loaded.contestants, loaded.scenarios, loaded.samples) == (("small-otm",), ("lane",), 3)
-    refused = admin.post(reverse("job-new"), {"matrix": "1"})
-    assert refused.status_code == 422
-    assert not GenerationJob.objects.exists()

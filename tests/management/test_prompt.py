@@ -31,18 +31,6 @@ def test_the_messages_are_printed_as_they_would_be_sent() -> None:
     assert 1500 < int(found.group(1)) < 6000
 
 
-def test_bezier_lanes_say_how_well_they_fit() -> None:
-    add_scenario("street-1")
-    text = printed("street-1", "fc", "--native-tools")
-    assert "2 lanes and connectors in 2 Bezier pieces; worst position error 0.00 m" in text
-    assert '=== tool\n{"type": "function"' in text
-
-
-def test_the_viewer_gets_a_picture() -> None:
-    add_scenario("street-1")
-    assert re.search(r"\[a PNG of \d{4,} bytes\]", printed("street-1", "vqa", "--role", "viewer"))
-
-
 def test_the_picture_can_be_kept(tmp_path: Path) -> None:
     add_scenario("street-1")
     file = tmp_path / "seen.png"

@@ -22,7 +22,6 @@ from augment.services.running import jobs, runner
 from augment.services.running.transcript_export import transcript_of
 from tests import study_rows
 from tests.jobs.models import Model, llama_job
-from tests.jobs.rows import launch
 from tests.web.cast import people, signed_in
 
 pytestmark = pytest.mark.django_db
@@ -158,16 +157,6 @@ def test_images_go_with_the_last_call_that_names_them() -> None:
     age()
     prune("--yes")
     assert default_storage.listdir("asked")[1] == []
-
-
-def test_a_job_without_calls_has_nothing_to_lose() -> None:
-    launch()
-    assert "Nothing is that old" in prune(age="1d")
-
-
-@pytest.mark.parametrize(("text", "days"), [("1d", 1), ("180d", 180), ("26w", 182)])
-def test_ages(text: str, days: int) -> None:
-    assert read_age(text) == timedelta(days=days)
 
 
 @pytest.mark.parametrize("text", ["", "0d", "180", "6m", "x1d", "1.5d", "999999d"])

@@ -12,14 +12,14 @@ from typing import Any
 
 import numpy as np
 import pytest
-from django.core.management import CommandError, call_command
+from django.core.management import call_command
 
 from arena.management.rate_csv import CsvNotRated, run
 from arena.management.rated_csv import COLUMNS
 from arena.rating.comparisons import Comparisons
 from arena.rating.leaderboard import rate
 from tests.house.source import ROOT
-from tests.management.votes import HEAD, PLAIN, WITH_CLUSTERS, clustered, document
+from tests.management.votes import PLAIN, WITH_CLUSTERS, clustered, document
 from tests.rating.votes import simulated
 
 
@@ -45,36 +45,6 @@ def test_without_judge_and_item_votes_are_resampled_and_a_note_says_so(votes: An
     assert "does not name both judge and item" in found["notes"][0]
 
 
-def test_with_judge_and_item_both_are_resampled(votes: Any) -> None:
-    found = document(votes(*clustered(), head=WITH_CLUSTERS))
-    assert found["resample"] == "two-way"
-    assert not any("does not name" in note for note in found["notes"])
-
-
-@pytest.mark.parametrize("resample", ["vote", "expert", "scenario", "two-way"])
-def test_every_unit_can_be_asked_for(votes: Any, resample: str) -> None:
-    file = votes(*clustered(), head=WITH_CLUSTERS)
-    assert document(file, resample=resample, rounds=200)["resample"] == resample
-
-
-def test_above_half_a_million_votes_a_thousand_rounds_are_enough(votes: Any) -> None:
-    assert document(votes(*PLAIN * 5_600))["rounds"] == 1000
-
-
-def test_above_a_hundred_models_a_thousand_resamples_are_enough(votes: Any) -> None:
-    lines = [f"m{n},m{(n + 1) % 101},tie" for n in range(101)] + ["m0,m1,model_a", "m1,m0,model_a"]
-    found = document(votes(*lines))
-    assert found["rounds"] == 1000
-    assert document(votes(*lines), intervals="closed")["rounds"] == 10_000
-
-
-def test_symmetric_intervals_are_printed_as_such(votes: Any) -> None:
-    file = votes(*clustered(900), head=WITH_CLUSTERS)
-    assert len(re.findall(r" ±\d+ ", run(file=file))) == 3
-    assert r" & $\pm$" in run(file=file, format="latex")
-    assert "clustered by judge and item" in run(file=file)
-
-
 def test_online_elo_resamples_votes_and_says_what_its_interval_is_not(votes: Any) -> None:
     file = votes(*clustered(), head=WITH_CLUSTERS)
     found = document(file, method="elo", rounds=50)
@@ -93,14 +63,6 @@ def test_the_same_seed_gives_the_same_text_and_the_order_of_lines_does_not_count
     assert first != run(file=votes(*lines, head=WITH_CLUSTERS), seed=4, rounds=200)
 
 
-def test_the_table_names_the_method_beneath(votes: Any) -> None:
-    lines = run(file=votes(*PLAIN), rounds=100, seed=2).splitlines()
-    assert lines[0].split() == ["Model", "Rank", "Elo", "95%", "CI", "Votes", "95%", "ranks"]
-    assert re.fullmatch(r"c +1 +\d+ +-\d+/\+\d+ +35 +1–3", lines[1])
-    assert "Bradley-Terry" in lines[5]
-    assert "100 resamples (vote), seed 2; 90 votes; 15.6% ties" in lines[5]
-
-
 def test_csv_cells_are_no_formulas(votes: Any, capsys: pytest.CaptureFixture[str]) -> None:
     lines = [line.replace("a,", "=1+1,").replace(",a,", ",=1+1,") for line in PLAIN]
     said = run(file=votes(*lines), rounds=100, format="csv")
@@ -108,21 +70,6 @@ def test_csv_cells_are_no_formulas(votes: Any, capsys: pytest.CaptureFixture[str
     assert list(rows[0]) == list(COLUMNS)
     assert {row["model"] for row in rows} >= {"'=1+1"}
     assert "does not name both" in capsys.readouterr().err
-
-
-def test_latex_has_the_form_of_the_papers_table(votes: Any) -> None:
-    said = run(file=votes(*[line.replace("c", "c_50%") for line in PLAIN]), format="latex")
-    assert r"\textbf{Model} & \textbf{Rank} & \textbf{Elo}~$\uparrow$ & \textbf{95\% CI}" in said
-    rows = re.findall(r"^    (\S+) & (\d+) & (\d+) & (-\d+/\+\d+) & (\d+)\\\\$", said, re.M)
-    assert len(rows) == 3
-    assert r"c\_50\%" in {row[0] for row in rows}
-
-
-def test_a_file_with_a_judge_and_no_item_is_clustered_by_judge(votes: Any) -> None:
-    lines = [line.rpartition(",")[0] for line in clustered()]
-    found = document(votes(*lines, head=f"{HEAD},judge"), rounds=100)
-    assert (found["resample"], found["intervals"]) == ("expert", "closed")
-    assert "names no item" in found["notes"][0]
 
 
 def test_davidson_rank_sets_pairs_and_cross_check_are_offered(votes: Any) -> None:
@@ -191,14 +138,6 @@ def test_what_votes_do_not_determine_is_null_and_explained(votes: Any) -> None:
     assert [row["part"] for row in parts["standings"]] == [0, 0, 0, 1, 1]
 
 
-def test_online_elo_plays_the_lines_in_their_order(votes: Any) -> None:
-    # By hand: K is 4, everybody starts at 1000.
-    lines = ["A,B,model_a", "B,C,model_a", "C,A,tie", "A,B,model_b", "A,C,model_b"]
-    found = document(votes(*lines), method="elo", order="recorded", rounds=20)
-    ratings = {row["model"]: row["elo"] for row in found["standings"]}
-    assert ratings == pytest.approx({"A": 997.9543, "B": 1002.0228, "C": 1000.0228}, abs=1e-4)
-
-
 # --- The process ---------------------------------------------------------------------------------
 
 
@@ -261,15 +200,6 @@ def test_a_covariate_that_is_no_number_is_named_with_its_line(votes: Any, cell: 
     file = votes(f"a,b,model_a,2,{cell}", "a,b,tie,2,1", head="model_a,model_b,winner,o_a,o_b")
     with pytest.raises(CsvNotRated, match=f"line 2: o_b is '{cell}', which is no number"):
         run(file=str(file), adjust=("o",))
-
-
-def test_django_takes_the_same_way(votes: Any) -> None:
-    said = io.StringIO()
-    file = votes(*PLAIN)
-    call_command("rate_csv", file, "--rounds", "50", "--format", "json", stdout=said)
-    assert said.getvalue() == run(file=file, rounds=50, format="json")
-    with pytest.raises(CommandError, match="line 2"):
-        call_command("rate_csv", votes("a,b,x"))
 
 
 @pytest.mark.parametrize(

@@ -41,7 +41,6 @@ CALLS_OF_LOW = {
     "fc+vqa": "mmevemmeve",
 }
 KINDS = ("crash", "jaywalker", "nudge", "overtake", "roadworks")
-CALLS_OF_NEVER = {"tqa": "mrmrmr", "vqa": "mevemevemeve"}
 
 
 SOME = [next(slug for slug in SLUGS if slug.startswith(kind)) for kind in KINDS]
@@ -129,29 +128,12 @@ def test_a_low_rating_costs_one_more_round(server: FakeServer, variant: str, slu
     _is_where_it_belongs(outcome, slug)
 
 
-@pytest.mark.parametrize("slug", SOME[:2])
-@pytest.mark.parametrize("variant", CALLS_OF_NEVER)
-def test_there_are_two_regenerations_and_no_third(
-    server: FakeServer, variant: str, slug: str
-) -> None:
-    outcome, transcript = played(server, "fake-qa-never", variant, slug)
-    assert (order(transcript), outcome.is_accepted) == (CALLS_OF_NEVER[variant], False)
-
-
 @pytest.mark.parametrize("slug", SLUGS[::4])
 def test_native_calls_place_as_calls_in_the_answer_do(server: FakeServer, slug: str) -> None:
     written, _ = played(server, "fake-good", "fc", slug)
     native, transcript = played(server, "fake-good", "fc", slug, native=True)
     assert order(transcript) == "mm"
     assert native.modification == written.modification
-
-
-@pytest.mark.parametrize("slug", SOME)
-def test_a_careless_model_comes_to_an_end_in_every_variant(server: FakeServer, slug: str) -> None:
-    for variant in RECIPES:
-        outcome, transcript = played(server, "fake-careless", variant, slug)
-        assert outcome.status in (OutcomeStatus.DONE, OutcomeStatus.UNREADABLE)
-        assert len(transcript.calls) <= 18
 
 
 def _is_complete(

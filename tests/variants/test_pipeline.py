@@ -7,7 +7,7 @@ from dataclasses import replace
 import pytest
 
 from augment.errors import ModelFault, UnknownName
-from augment.llm.messages import Reply, Request, Speaker
+from augment.llm.messages import Reply, Speaker
 from augment.llm.patience import Patience
 from augment.llm.scripted import ScriptedClient
 from augment.prompts.fill import prompt_version
@@ -85,12 +85,6 @@ def test_a_cut_off_answer_is_asked_for_again_with_twice_the_room() -> None:
     assert "cut off at its length limit" in second.messages[-1].text
 
 
-def test_an_empty_answer_is_echoed_as_such() -> None:
-    made = Run([Reply(text=""), GOOD])
-    assert made.outcome().status is OutcomeStatus.DONE
-    assert made.client.requests[1].messages[2].text == "(empty answer)"
-
-
 @pytest.mark.parametrize(
     ("reply", "reason"),
     [
@@ -124,14 +118,6 @@ def test_a_wire_that_stays_broken_is_nobodys_outcome() -> None:
     assert len(made.transcript.calls) == 3
 
 
-def test_a_fault_that_does_not_pass_costs_one_call() -> None:
-    made = Run([ModelFault("no such model", retryable=False, status=404)])
-    with pytest.raises(ModelFault, match="no such model"):
-        made.outcome()
-    assert len(made.transcript.calls) == 1
-    assert made.waits == []
-
-
 def test_the_transcript_has_the_answer_before_anybody_reads_it() -> None:
     class Stops(MemoryTranscript):
         def answered(self, number: int, reply: Reply, fault: ModelFault | None = None) -> None:
@@ -153,11 +139,3 @@ def test_a_recipe_that_nobody_can_run_is_refused() -> None:
             modifier=RespondentClient(client=ScriptedClient([]), model="m"),
             transcript=MemoryTranscript(),
         )
-
-
-def test_a_request_keeps_what_is_asked_apart_from_how() -> None:
-    made = Run([GOOD])
-    made.outcome()
-    request: Request = made.client.requests[0]
-    assert request.messages[0].text.startswith("You are an editor of traffic scenes")
-    assert "> Add a parked car 21.4 m ahead." in request.messages[1].text

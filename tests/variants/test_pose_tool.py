@@ -3,26 +3,19 @@ from __future__ import annotations
 import json
 import math
 from dataclasses import replace
-from importlib.resources import files
 
-import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
 from augment.errors import ToolError
-from augment.geometry.bezier import CubicBezier
 from augment.geometry.polyline import Polyline
-from augment.prompts.calls import TOOL
 from augment.prompts.lane_curves import control_points
 from augment.prompts.names import short_names
 from augment.scene.ego_route import EgoRoute
-from augment.scene.entities import AreaKind, Lane, SceneOptions, TurnType
+from augment.scene.entities import AreaKind, SceneOptions, TurnType
 from augment.variants.pose_call import (
-    FURTHEST_M,
-    MOST_PLACES,
     OBJECT_TYPES,
-    WIDEST_M,
     CallLimits,
 )
 from augment.variants.pose_tool import PoseTool
@@ -32,11 +25,6 @@ from tests.scenes import curve, junction, scene, vehicle
 JUNCTION = PoseTool(junction())
 STREET = PoseTool(scene(agents=(vehicle("Agent2", 12.0, 3.9, math.pi),)))
 BEND = PoseTool(curve())
-
-
-def winding() -> PoseTool:
-    line = Polyline([(x, 12.0 * math.sin(x / 18.0)) for x in np.linspace(0, 75, 151).tolist()])
-    return PoseTool(scene(lanes=(Lane(id="Lane1", centerline=line, width_m=3.5),), areas=()))
 
 
 def test_a_distance_from_the_ego_is_measured_along_its_lane() -> None:
@@ -163,21 +151,6 @@ def test_a_place_that_is_taken_names_who_stands_there_and_the_nearest_free_one(
         assert again["taken_by"] is None
 
 
-def test_where_everything_is_taken_no_place_is_free() -> None:
-    wall = replace(vehicle("Agent2", 25.0, 0.0), length_m=160.0)
-    answer = PoseTool(scene(agents=(wall,))).answer(
-        {"lane": "Lane1", "start": "Agent1", "distance_m": 20}
-    )
-    assert answer["taken_by"] == ["Agent2"]
-    assert answer["nearest_free_m"] is None
-
-
-def test_each_place_may_have_an_object_of_its_own() -> None:
-    call = {"lane": "Lane1", "start": "Agent1", "distance_m": 20, "lateral_m": -1.5}
-    both = parking_street().answer({**call, "object": ["VEHICLE", "TRAFFIC_CONE"]})
-    assert [one["taken_by"] for one in places(both)] == [["Agent2"], None]
-
-
 def test_a_distance_runs_on_along_the_goal_of_the_ego() -> None:
     left = SceneOptions(goal=TurnType.LEFT)
     tool = PoseTool(replace(junction(), options=left))
@@ -216,14 +189,6 @@ def test_a_seam_between_lanes_is_no_edge_and_a_verge_is_one() -> None:
     assert place.left.edge_m == pytest.approx(3.75 + 1.75)
 
 
-def test_a_road_without_an_edge_nearby_has_none() -> None:
-    square = replace(
-        scene().areas[0], boundary_m=((-90.0, -90.0), (90.0, -90.0), (90.0, 90.0), (-90.0, 90.0))
-    )
-    place = PoseTool(scene(areas=(square,))).pose_on_lane("Lane1", "lane", 60.0)
-    assert (place.left.edge_m, place.right.edge_m) == (None, None)
-
-
 def test_a_distance_runs_on_straight_over_connectors_and_back_again() -> None:
     ahead = JUNCTION.pose_on_lane("Lane1", "lane", 75.0)
     assert ahead.route == ("Lane1", "Connector1", "Lane2")
@@ -233,22 +198,6 @@ def test_a_distance_runs_on_straight_over_connectors_and_back_again() -> None:
     back = JUNCTION.pose_on_lane("Lane2", "lane", -36.0)
     assert back.lane == "Lane1"
     assert back.pose.x_m == pytest.approx(0.0)
-
-
-def test_a_turn_is_taken_by_naming_its_connector() -> None:
-    place = JUNCTION.pose_on_lane("Connector2", "lane", 20.0)
-    assert place.route == ("Connector2", "Lane3")
-    assert place.pose.x_m == pytest.approx(28.0, abs=0.01)
-    assert place.pose.heading_rad == pytest.approx(math.pi / 2, abs=0.01)
-
-
-def test_a_piece_begins_where_the_one_before_it_ends() -> None:
-    tool = winding()
-    way = tool.curves["Lane1"]
-    assert way.pieces[:2] == ("Lane1a", "Lane1b")
-    second = tool.pose_on_lane("Lane1b", "lane", 3.0)
-    assert second == tool.pose_on_lane("Lane1", "lane", way.lane.pieces[1].start_m + 3.0)
-    assert tool.pose_on_lane("Lane1a", "lane", 60.0).lane == "Lane1"
 
 
 def test_control_points_copied_from_the_prompt_are_their_lane() -> None:
@@ -324,24 +273,6 @@ def test_a_call_that_cannot_be_answered_says_why(change: dict[str, object], said
     assert said in str(answer["error"])
 
 
-def test_the_bound_that_an_error_names_can_be_called() -> None:
-    with pytest.raises(ToolError) as fault:
-        JUNCTION.pose_on_lane("Lane1", "Agent1", 300.0)
-    bound = float(fault.value.problem.split("can be ")[1].split(" ")[0])
-    assert JUNCTION.pose_on_lane("Lane1", "Agent1", bound).remaining_m == pytest.approx(0.0)
-
-
-def test_what_is_missing_is_named_and_no_object_is_no_call() -> None:
-    assert JUNCTION.answer({"lane": "Lane1"}) == {"error": "start, distance_m must be given"}
-    assert "one JSON object" in str(JUNCTION.answer(["Lane1", "lane", 3]))
-
-
-def test_an_agent_beside_another_lane_is_told_which() -> None:
-    assert 'call with lane "Lane1"' in str(
-        JUNCTION.answer({"lane": "Lane2", "start": "Agent1", "distance_m": 1})
-    )
-
-
 any_json = st.recursive(
     st.none() | st.booleans() | st.floats() | st.integers() | st.text(max_size=5),
     lambda inner: st.lists(inner, max_size=4) | st.dictionaries(st.text(max_size=3), inner),
@@ -382,11 +313,6 @@ def test_any_curve_has_a_finite_answer_or_an_error(
     json.dumps(answer, allow_nan=False)
 
 
-def test_a_curve_is_taken_as_a_value_too() -> None:
-    straight = CubicBezier([(0, 0), (1, 0), (2, 0), (3, 0)])
-    assert JUNCTION.pose_on_lane(straight, "lane", 3.0).remaining_m == pytest.approx(0.0)
-
-
 def test_calls_are_limited_and_identical_ones_more_so() -> None:
     limits = CallLimits()
     call = {"lane": "Lane1", "start": "lane", "distance_m": 1}
@@ -396,19 +322,3 @@ def test_calls_are_limited_and_identical_ones_more_so() -> None:
         limits.check([call, call, call], call)
     with pytest.raises(ToolError, match="no call is left: 8 are allowed"):
         limits.check([call, *others], {**call, "distance_m": 99})
-
-
-def test_the_texts_tell_of_the_tool_as_it_is() -> None:
-    texts = files("augment.prompts").joinpath("text")
-    schema = json.loads(texts.joinpath("pose_on_lane.json").read_text(encoding="utf-8"))
-    parameters = schema["function"]["parameters"]
-    assert schema["function"]["name"] == TOOL
-    assert list(parameters["properties"]) == ["lane", "start", "distance_m", "lateral_m", "object"]
-    assert parameters["properties"]["object"]["anyOf"][0]["enum"] == list(OBJECT_TYPES)
-    one, several = parameters["properties"]["distance_m"]["anyOf"]
-    assert (one["maximum"], several["maxItems"]) == (FURTHEST_M, MOST_PLACES)
-    assert parameters["properties"]["lateral_m"]["anyOf"][0]["minimum"] == -WIDEST_M
-    told = texts.joinpath("pose_on_lane.md").read_text(encoding="utf-8")
-    answer = parking_street().answer({"lane": "Lane1", "start": "Agent1", "distance_m": 1})
-    for name in (*parameters["properties"], *answer, "carpark_left_m", "error"):
-        assert name in told

@@ -2,11 +2,9 @@ from __future__ import annotations
 
 import pytest
 
-from augment.errors import UnknownName
 from augment.variants.recipes import (
     FC,
     PAPER,
-    RECIPES,
     TQA,
     Keep,
     LaneFormat,
@@ -27,12 +25,6 @@ def test_a_recipe_is_found_in_any_case(name: str) -> None:
     )
 
 
-def test_an_unknown_recipe_is_refused_with_those_there_are() -> None:
-    known = r"fc, fc\+geo, fc\+tqa, fc\+vqa, geo, otm, tqa, vqa\."
-    with pytest.raises(UnknownName, match=rf"Unknown variant 'zero-shot'\. Known: {known}"):
-        find_recipe("zero-shot")
-
-
 def test_the_papers_four_are_its_table() -> None:
     assert [(one.slug, one.lane_format.value, one.review.value) for one in PAPER] == [
         ("otm", "polyline", "none"),
@@ -41,13 +33,6 @@ def test_the_papers_four_are_its_table() -> None:
         ("vqa", "polyline", "visual"),
     ]
     assert [one.slug for one in PAPER if one.tools is Tools.POSE] == ["fc"]
-
-
-def test_our_own_review_is_named_ours_and_is_not_among_the_four() -> None:
-    ours = [one for one in RECIPES.values() if one.review is Review.GEOMETRIC]
-    assert {one.slug for one in ours} == {"geo", "fc+geo"}
-    assert all("ours" in one.title for one in ours)
-    assert not set(ours) & set(PAPER)
 
 
 def test_a_combination_has_the_parts_of_both() -> None:

@@ -38,10 +38,6 @@ def test_an_answer_with_a_call_is_no_final_answer() -> None:
     assert play.x_m == 21.4
 
 
-def test_a_model_may_answer_without_a_call() -> None:
-    assert Play("fc", [car(21.4)]).roles == "m"
-
-
 @pytest.mark.parametrize(
     ("line", "said"),
     [
@@ -101,21 +97,6 @@ def test_a_call_that_is_not_understood_is_told_so_and_never_to_keep_a_placement(
     assert note["mended"] is (said == "no function 'retrieve_suit")
 
 
-def test_only_an_answer_with_a_block_is_told_to_keep_its_placement() -> None:
-    broken = car(21.4).replace("21.4", "21.4 m")
-    keep = "Keep your placement unless one of these points is about it."
-    assert keep in Play("otm", [broken, car(21.4)]).client.requests[1].messages[-1].text
-    assert keep not in Play("otm", ["There.", car(21.4)]).client.requests[1].messages[-1].text
-
-
-def test_who_calls_when_no_call_is_left_is_told_so_when_asked_again() -> None:
-    play = Play("fc", [call()] * 5 + [car(21.4)])
-    told = play.client.requests[5].messages[-1].text
-    assert "no function call is answered any more" in told
-    assert "placement" not in told
-    assert (play.roles, play.x_m) == ("m" * 6, 21.4)
-
-
 def test_a_cut_off_answer_that_tells_of_a_call_is_asked_again_with_more_room() -> None:
     recap = f"Step 1: I called {FORMS['Python']} and got"
     play = Play("fc", [call(), Reply(text=recap, finish_reason="length"), car(21.4)])
@@ -131,12 +112,6 @@ def test_after_eight_calls_none_is_answered_and_an_answer_is_due() -> None:
     last = play.client.requests[9].messages[-1].text
     assert "no call is left: 8 are allowed" in last
     assert last.endswith("Give your answer in the five sections now, with what you have.")
-
-
-def test_many_calls_in_one_answer_are_cut_off_after_the_first_too_many() -> None:
-    play = Play("fc", ["\n".join(call(distance_m=float(n)) for n in range(1, 40)), car(21.4)])
-    told = play.client.requests[1].messages[-1]
-    assert [("error" in one) for one in results(told)] == [False] * 8 + [True]
 
 
 def test_a_model_in_a_loop_is_stopped_and_unreadable() -> None:
@@ -181,19 +156,6 @@ def test_every_native_call_has_a_result_even_beyond_the_limit() -> None:
     assert [one.answers for one in request.messages[3:]] == [f"c{n}" for n in range(12)]
     assert request.tool_choice is ToolChoice.NONE
     assert "error" in json.loads(request.messages[-1].text)
-
-
-def test_an_unreadable_answer_after_native_calls_is_asked_again_with_the_tool_named() -> None:
-    play = Play("fc", [native(POSE), "There.", car(21.4)], native=True)
-    last = play.client.requests[2]
-    assert [tool.name for tool in last.tools] == ["pose_on_lane"]
-    assert last.tool_choice is ToolChoice.NONE
-    assert play.x_m == 21.4
-
-
-def test_a_native_call_that_nobody_offered_is_no_answer() -> None:
-    play = Play("otm", [native(POSE), native(POSE)])
-    assert play.outcome.status is OutcomeStatus.UNREADABLE
 
 
 def test_each_round_has_calls_of_its_own() -> None:
