@@ -38,6 +38,7 @@ def checked(folder: Path) -> str:
     return out.getvalue()
 
 
+@pytest.mark.slow
 def test_the_projects_own_catalogue_is_clean() -> None:
     said = checked(FOLDER)
     assert said.count(" good\n") == len(SLUGS) + len(HARD_SLUGS) == 112
