@@ -40,6 +40,8 @@ def python_of(
     print(f"Installing {name} into {folder} ...", flush=True)
     venv.create(folder, with_pip=True, clear=True)
     arguments = [str(python), "-m", "pip", "install", "--quiet", "--disable-pip-version-check"]
+    if settings:
+        arguments.append("--no-cache-dir")  # which holds what was compiled with other settings
     ended = subprocess.run(
         [*arguments, "--require-hashes", "--requirement", str(lock)],
         stdout=subprocess.DEVNULL,
