@@ -32,7 +32,6 @@ FILES = (
 
 CHORD_M = 0.75
 EVERY_M = 4.0
-"""In tests; the benchmark reads every 0.25 m."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
