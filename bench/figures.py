@@ -1,4 +1,4 @@
-"""Write the figures of README.md, catalogue.md, checks.md and formats.md anew: `make figures`.
+"""Write the figures of README.md, method.md, catalogue.md and formats.md anew: `make figures`.
 
 The other measurements write their own section of docs/benchmarks.md and docs/rating.md, because
 they take long or need other software.
@@ -18,13 +18,13 @@ from tests.fixtures.shelf import FOLDER, SLUGS
 
 def main() -> None:
     """Measure and write."""
-    readme, checks = ROOT / "README.md", ROOT / "docs" / "checks.md"
+    readme, method = ROOT / "README.md", ROOT / "docs" / "method.md"
     placed = displacement.displacement_table(SLUGS, displacement.placed_by_each())
     write_block("displacement", placed, page=readme)
     tally = injected_faults.measure(injected_faults.COUNT, injected_faults.SEED)
     write_block("faults", injected_faults.class_table(tally), page=readme)
-    faults = injected_faults.report(injected_faults.COUNT, injected_faults.SEED)
-    write_block("faults", faults, page=checks)
+    faults = injected_faults.report(tally, count=injected_faults.COUNT, seed=injected_faults.SEED)
+    write_block("faults", faults, page=method)
     formats = ROOT / "docs" / "formats.md"
     write_block("hostile", hostile_reading.hostile_table(), page=formats)
     write_ways()
@@ -38,7 +38,7 @@ def write_ways() -> None:
 
     found = check_catalogue(folder=FOLDER).scenarios
     rows = [
-        [way.value, ", ".join(one.slug for one in found if one.way_past is way)]
+        [way.value, str(sum(one.way_past is way for one in found))]
         for way in WayPast
         if way is not WayPast.NONE
     ]

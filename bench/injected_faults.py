@@ -126,16 +126,20 @@ def class_table(tally: Tally) -> str:
     return table(["class", "precision", "recall"], rows)
 
 
-def report(count: int, seed: int) -> str:
-    """All tables, in Markdown."""
-    tally = measure(count, seed)
-    read = sum(case.intent is not None for case in cases())
+def kinds_table(tally: Tally) -> str:
+    """Return a row per kind of fault."""
     kinds = [
         [kind.value, LABELS[kind].value, *(str(seen[name]) for name in _COUNTS)]
         for kind, seen in sorted(
             tally.named.items(), key=lambda item: list(FaultKind).index(item[0])
         )
     ]
+    return table(["kind", "true label", "n", "with intent", "class named", "and no other"], kinds)
+
+
+def report(tally: Tally, *, count: int, seed: int) -> str:
+    """Return what docs/method.md shows, in Markdown."""
+    read = sum(case.intent is not None for case in cases())
     shifts = [[f"{shift_m:g} m", f"{shifted_share(shift_m):.0%}"] for shift_m in SHIFTS_M]
     return "\n\n".join(
         [
@@ -143,11 +147,6 @@ def report(count: int, seed: int) -> str:
             f"{len(cases())} instructions have an intent.",
             class_table(tally),
             f"Right placements without a guess: {tally.clean} of {tally.right}.",
-            table(
-                ["kind", "true label", "n", "with intent", "class named", "and no other"], kinds
-            ),
-            "The faults are as large as models usually make them (5 to 30 m along the lane). "
-            "Everything that was added, moved along the lane:",
             table(["moved by", "called a position fault"], shifts),
         ]
     )
@@ -196,6 +195,11 @@ def _share(part: int, whole: int) -> float:
     return part / whole if whole else 1.0
 
 
+def main(count: int = COUNT, seed: int = SEED) -> None:
+    """Print all tables."""
+    tally = measure(count, seed)
+    print(report(tally, count=count, seed=seed), kinds_table(tally), sep="\n\n")
+
+
 if __name__ == "__main__":
-    given = [int(one) for one in sys.argv[1:]]
-    print(report(*(given + [COUNT, SEED][len(given) :])))
+    main(*map(int, sys.argv[1:]))

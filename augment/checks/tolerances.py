@@ -1,6 +1,6 @@
 """How far off what was asked for something may be before it is a fault.
 
-One set for every scenario and contestant; docs/checks.md says where each number comes from. The
+One set for every scenario and contestant; docs/method.md says where each number comes from. The
 references of the catalogue are held by a narrower one: their authors measured them.
 """
 

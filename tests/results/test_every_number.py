@@ -2,7 +2,7 @@
 
 What computes it here is another's package (statsmodels, krippendorff, scipy) or plain loops, never
 our own ratings. Numbers that are drawn at random are held against what they estimate, within the
-error of the draws. docs/results.md says which number is checked where.
+error of the draws.
 """
 
 from __future__ import annotations

@@ -73,7 +73,7 @@ def shown(study: Study) -> set[tuple[str, int, int]]:
 
 
 def test_one_sample_of_each_scenario_is_drawn_by_the_seed() -> None:
-    # The rule is written down in docs/running-a-study.md; these were worked out with sha256sum.
+    # The rule is written down in docs/using.md; these were worked out with sha256sum.
     assert [draw_sample(7, f"place-{n}", 3) for n in range(6)] == DRAWN
     sampled()
     found = shown(opened())

@@ -1,7 +1,12 @@
-"""docs/faults.md, row by row: what it says of a fault is what happens."""
+"""Faults of models and endpoints, played over HTTP against the stand-in: the rows of faults.csv.
+
+Calls are given by their role (m modifier, r reviewer, e engineer, v viewer); attempts and re-asks
+are calls of their own.
+"""
 
 from __future__ import annotations
 
+import csv
 import random
 import re
 from collections.abc import Iterator
@@ -22,19 +27,10 @@ from tests.intents import intents
 from tests.scenes import scene
 
 ROOT = Path(__file__).resolve().parents[2]
-TEXT = (ROOT / "docs" / "faults.md").read_text(encoding="utf-8")
 WISH = "Add a parked vehicle 21.4 m ahead of the ego in its lane."
+with (Path(__file__).parent / "faults.csv").open(encoding="utf-8", newline="") as _file:
+    FAULTS = list(csv.DictReader(_file))
 REVIEWS = {None: "none", True: "accepted", False: "not accepted"}
-
-
-def table(number: int) -> list[list[str]]:
-    """The rows of a table of the page, without its head."""
-    blocks = re.findall(r"(?:^\|.*\|\n)+", TEXT, re.MULTILINE)
-    lines = blocks[number].splitlines()[2:]
-    return [[cell.strip() for cell in line.strip("|").split("|")] for line in lines]
-
-
-FAULTS, ELSEWHERE = table(0), table(1)
 
 
 @pytest.fixture(scope="module")
@@ -43,19 +39,19 @@ def server() -> Iterator[FakeServer]:
         yield serving
 
 
-@pytest.mark.parametrize("row", FAULTS, ids=lambda row: f"{row[0]} ({row[1].strip('`')})")
-def test_a_fault_ends_as_the_page_says(server: FakeServer, row: list[str]) -> None:
-    _, variant, model, others, calls, outcome, review = (cell.replace("`", "") for cell in row)
+@pytest.mark.parametrize("row", FAULTS, ids=lambda row: f"{row['fault']} ({row['variant']})")
+def test_a_fault_ends_as_expected(server: FakeServer, row: dict[str, str]) -> None:
+    model = row["model"]
     timeout_s = 0.5 if model == "fake-slow" else 30.0
     transcript = MemoryTranscript()
     with OpenAIWire(base_url=server.url, api_key=None, timeout_s=timeout_s) as client:
         players = {
             ModelRole(role): RespondentClient(client=client, model=name)
-            for role, name in re.findall(r"(\w+) (fake-[\w-]+)", others)
+            for role, name in re.findall(r"(\w+) (fake-[\w-]+)", row["other_roles"])
         }
         try:
             made = run(
-                find_recipe(variant),
+                find_recipe(row["variant"]),
                 scene=scene(),
                 instruction=WISH,
                 modifier=RespondentClient(client=client, model=model),
@@ -69,23 +65,21 @@ def test_a_fault_ends_as_the_page_says(server: FakeServer, row: list[str]) -> No
             found = "fails, may pass" if fault.retryable else "fails for good"
             reviewed = ""
     asked = "".join(call.role[0] for call in transcript.calls)
-    assert (asked, found, reviewed) == (calls, outcome, review)
+    assert (asked, found, reviewed) == (row["calls"], row["outcome"], row["review"])
 
 
 def test_every_model_of_the_stand_in_has_its_row() -> None:
-    named = set(re.findall(r"`(fake-[\w-]+)`", TEXT))
+    named = {
+        name
+        for row in FAULTS
+        for name in re.findall(r"fake-[\w-]+", f"{row['model']} {row['other_roles']}")
+    }
     # Its mistakes are of all kinds and it comes to all outcomes.
     assert named == MODELS.keys() - {"fake-careless"}
 
 
-@pytest.mark.parametrize("row", ELSEWHERE, ids=lambda row: row[0])
-def test_what_the_page_leans_on_is_there(row: list[str]) -> None:
-    path, _, name = row[2].strip("`").partition("::")
-    assert f"def {name}(" in (ROOT / path).read_text(encoding="utf-8")
-
-
-def test_the_page_of_variants_names_every_recipe_and_its_parts() -> None:
-    page = (ROOT / "docs" / "variants.md").read_text(encoding="utf-8")
+def test_the_page_on_the_method_names_every_recipe_and_its_parts() -> None:
+    page = (ROOT / "docs" / "method.md").read_text(encoding="utf-8")
     rows = {
         cells[0].strip("` "): cells
         for cells in (line.strip("|").split("|") for line in page.splitlines())

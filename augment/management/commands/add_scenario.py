@@ -49,7 +49,7 @@ class Command(TerminalCommand):
             "--intent",
             type=Path,
             metavar="FILE",
-            help="what the instruction asks for, as of docs/intent.md",
+            help="what the instruction asks for, see docs/catalogue.md",
         )
         parser.add_argument(
             "--keep-traffic", action="store_true", help="keep the recorded traffic in the scene"

@@ -1,4 +1,4 @@
-"""One JSON document with everything that led to an augmentation: see docs/transcripts.md."""
+"""One JSON document with everything that led to an augmentation: see docs/using.md."""
 
 from __future__ import annotations
 
