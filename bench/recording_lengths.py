@@ -69,7 +69,7 @@ def recorded_street() -> tuple[Scene, Recording]:
     tracks = tuple(
         Track(
             agent_id=agent.id,
-            type=agent.type.value,
+            type=agent.type,
             length_m=agent.length_m,
             width_m=agent.width_m,
             states=np.column_stack(

@@ -7,7 +7,6 @@ from dataclasses import replace
 
 import numpy as np
 
-from augment.geometry.frames import Pose
 from augment.geometry.polyline import Polyline
 from augment.scene.entities import (
     AgentType,
@@ -74,7 +73,7 @@ def scene(**changes: object) -> Scene:
         name="street",
         ego=EGO,
         traffic_side=TrafficSide.RIGHT,
-        origin=Origin(frame="test", pose=Pose(x_m=0.0, y_m=0.0, heading_rad=0.0)),
+        origin=Origin(frame="test", x_m=0.0, y_m=0.0, heading_rad=0.0),
         provenance="made for a test",
         lanes=(
             Lane(

@@ -22,7 +22,7 @@ class Asked:
 
     Attributes:
         to_move, to_remove: Ids of the scene's agents that are to be elsewhere, or to go.
-        unmet: Why the wish can't be met; empty where it can.
+        unmet: Why the wish can't be met; None where it can.
     """
 
     modification: Modification
@@ -31,7 +31,7 @@ class Asked:
     tolerances: Tolerances
     to_move: frozenset[str] = frozenset()
     to_remove: frozenset[str] = frozenset()
-    unmet: str = ""
+    unmet: str | None = None
 
     @property
     def route(self) -> EgoRoute:

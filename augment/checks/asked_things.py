@@ -118,8 +118,8 @@ def asked_changes(asked: Asked) -> Iterator[Finding]:
 def find_attempted(asked: Asked) -> Iterator[Finding]:
     """Whatever is done about a wish that can't be met."""
     touched = [agent.id for agent in asked.modification.changed] + [*asked.modification.removed]
-    why = asked.unmet.replace("{", "{{").replace("}", "}}")
-    if why and touched:
+    if asked.unmet and touched:
+        why = asked.unmet.replace("{", "{{").replace("}", "}}")
         yield Finding(
             kind=FindingKind.UNASKED,
             severity=Severity.WRONG,

@@ -20,7 +20,6 @@ from numpy.typing import NDArray
 
 from augment.fake_llm.requests import SpokenMessage
 from augment.geometry.angles import difference
-from augment.geometry.frames import Pose
 from augment.geometry.polyline import Polyline
 from augment.prompts.lane_curves import curve_from
 from augment.prompts.texts import QUOTE
@@ -125,7 +124,7 @@ def _task(text: str) -> Task:
         name="seen",
         ego=next(agent for agent in agents if agent.type is AgentType.EGO_VEHICLE),
         traffic_side=TrafficSide(side.group(1)),
-        origin=Origin(frame="prompt", pose=Pose(x_m=0.0, y_m=0.0, heading_rad=0.0)),
+        origin=Origin(frame="prompt", x_m=0.0, y_m=0.0, heading_rad=0.0),
         provenance="read from a prompt",
         agents=tuple(agent for agent in agents if agent.type is not AgentType.EGO_VEHICLE),
         lanes=_joined(lanes),

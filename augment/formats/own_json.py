@@ -9,8 +9,7 @@ from pathlib import Path
 from augment.errors import InvalidDocument
 from augment.formats.json_file import read_json
 from augment.formats.reading import Moment, Reading
-from augment.scene.codec import scene_from_document
-from augment.scene.schema import SCENE_FORMAT
+from augment.scene.codec import SCENE_FORMAT, scene_from_document
 
 
 class OwnJson:

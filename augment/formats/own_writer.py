@@ -54,7 +54,7 @@ def _track(movement: Movement) -> Track:
     states = np.where(movement.is_present[:, None], movement.states, np.nan)
     return Track(
         agent_id=agent.id,
-        type=agent.type.value,
+        type=agent.type,
         length_m=agent.length_m,
         width_m=agent.width_m,
         states=states,

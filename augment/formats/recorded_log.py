@@ -126,7 +126,7 @@ def scene_at(
         name=name,
         ego=ego,
         traffic_side=road.traffic_side,
-        origin=Origin(frame=world, pose=origin),
+        origin=Origin.at(origin, frame=world),
         provenance=provenance,
         agents=_agents(named, frame, origin),
         lanes=road.lanes,
@@ -239,7 +239,7 @@ def _recording(log: Log, named: dict[str, LoggedTrack], frame: int, origin: Pose
         tracks=tuple(
             Track(
                 agent_id=agent_id,
-                type=track.type.value,
+                type=track.type,
                 length_m=round(track.length_m, 3),
                 width_m=round(track.width_m, 3),
                 states=_local(track.states[frame:], origin),

@@ -9,16 +9,12 @@ from __future__ import annotations
 import json
 from functools import cache
 
-from pydantic import ValidationError
-
 from augment.errors import InvalidDocument, ReplyUnreadable
 from augment.llm.messages import Message, Speaker
 from augment.prompts.blocks import last_object
 from augment.prompts.texts import fill_text, quote, said_by_user
 from augment.scene.intent import Intent
-from augment.scene.intent_codec import intent_from_parts
-from augment.scene.intent_document import IntentParts
-from augment.scene.schema import problems_of
+from augment.scene.intent_codec import intent_from_parts, parts_schema
 
 _MOST_PROBLEMS = 8
 
@@ -38,16 +34,14 @@ def read_intent(answer: str) -> Intent:
     """
     found, _ = last_object(answer, frozenset({"requests"}))
     try:
-        return intent_from_parts(IntentParts.model_validate(found))
-    except ValidationError as fault:
-        problems = problems_of(fault)
+        return intent_from_parts(found)
     except InvalidDocument as fault:
-        problems = list(fault.problems)
+        problems = fault.problems[:_MOST_PROBLEMS]
     raise ReplyUnreadable(
-        [f"{ascii(path).strip(chr(39))[:80]}: {text}" for path, text in problems[:_MOST_PROBLEMS]]
+        [f"{ascii(path).strip(chr(39))[:80]}: {text}" for path, text in problems]
     )
 
 
 @cache
 def _schema() -> str:
-    return json.dumps(IntentParts.model_json_schema(), separators=(",", ":"))
+    return json.dumps(parts_schema(), separators=(",", ":"))

@@ -9,7 +9,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Annotated, Any, TypeVar
 
-from pydantic import Field, Strict
+from pydantic import Field, TypeAdapter
 
 from augment.errors import InvalidDocument
 from augment.scene.catalogue import ScenarioType
@@ -17,24 +17,23 @@ from augment.scene.codec import modification_from_document, modification_to_docu
 from augment.scene.intent import Intent
 from augment.scene.intent_codec import intent_from_document, intent_to_document
 from augment.scene.modification import Modification
-from augment.scene.schema import VERSION, Document, read
+from augment.scene.schema import CLOSED, Text, Yes, read, write
 
 SCENARIO_FORMAT = "scenario-arena/scenario"
 
-Parsed = TypeVar("Parsed")
-Text = Annotated[str, Field(min_length=1, pattern=r"\S")]
-_Language = Annotated[str, Field(pattern=r"^[a-z]{2}$")]
-
-
 ENGLISH = "en"
+
+Parsed = TypeVar("Parsed")
+_Words = Annotated[Text, Field(min_length=1, pattern=r"\S")]
+_Language = Annotated[Text, Field(pattern=r"^[a-z]{2}$")]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Wording:
     """A wish in one language (ISO 639-1)."""
 
-    language: str
-    text: str
+    language: _Language
+    text: _Words
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -43,50 +42,32 @@ class CatalogueEntry:
 
     Attributes:
         scene: The name of its base scene.
-        instruction: What is to be changed, in the user's words.
         language: Of the instruction.
+        instruction: What is to be changed, in the user's words.
         paraphrases: The same wish in other words, each to be answered by the same reference.
         keep_traffic: Whether the recorded traffic stays in the scene.
         notes: What a reader of the catalogue should know; may be empty.
         intent: What the instruction asks for; None where nobody has written it down.
     """
 
-    slug: str
-    scene: str
+    __pydantic_config__ = CLOSED
+
+    slug: _Words
+    scene: _Words
     type: ScenarioType
-    instruction: str
-    keep_traffic: bool
-    provenance: str
-    notes: str
-    reference: Modification
-    intent: Intent | None = None
-    language: str = ENGLISH
-    paraphrases: tuple[Wording, ...] = ()
+    language: Annotated[_Language, Field(exclude_if=lambda code: code == ENGLISH)] = ENGLISH
+    instruction: _Words
+    paraphrases: Annotated[
+        tuple[Wording, ...], Field(max_length=20, exclude_if=lambda wordings: not wordings)
+    ] = ()
+    keep_traffic: Yes
+    provenance: _Words
+    notes: Text = ""
+    intent: Annotated[Intent | None, Field(exclude=True)] = None
+    reference: Annotated[Modification, Field(exclude=True)]
 
 
-class WordingDocument(Document):
-    """A `Wording`."""
-
-    language: _Language
-    text: Text
-
-
-class EntryDocument(Document):
-    """A `CatalogueEntry`."""
-
-    format: str
-    version: int
-    slug: Text
-    scene: Text
-    type: Annotated[ScenarioType, Strict(False)]
-    language: _Language = ENGLISH
-    instruction: Text
-    paraphrases: Annotated[list[WordingDocument], Field(max_length=20)] = []
-    keep_traffic: bool
-    provenance: Text
-    notes: str = ""
-    intent: dict[str, Any] | None = None
-    reference: dict[str, Any]
+_ENTRY = TypeAdapter(CatalogueEntry)
 
 
 def entry_to_document(entry: CatalogueEntry) -> dict[str, Any]:
@@ -94,23 +75,8 @@ def entry_to_document(entry: CatalogueEntry) -> dict[str, Any]:
 
     English and an instruction without paraphrases go without saying.
     """
-    language = {} if entry.language == ENGLISH else {"language": entry.language}
-    others = [
-        {"language": paraphrase.language, "text": paraphrase.text}
-        for paraphrase in entry.paraphrases
-    ]
     return {
-        "format": SCENARIO_FORMAT,
-        "version": VERSION,
-        "slug": entry.slug,
-        "scene": entry.scene,
-        "type": entry.type.value,
-        **language,
-        "instruction": entry.instruction,
-        **({"paraphrases": others} if others else {}),
-        "keep_traffic": entry.keep_traffic,
-        "provenance": entry.provenance,
-        "notes": entry.notes,
+        **write(entry, _ENTRY, format_name=SCENARIO_FORMAT),
         "intent": None if entry.intent is None else intent_to_document(entry.intent),
         "reference": modification_to_document(entry.reference),
     }
@@ -122,27 +88,15 @@ def entry_from_document(document: object) -> CatalogueEntry:
     Raises:
         InvalidDocument: With the path and the reason of every fault.
     """
-    given = read(document, EntryDocument, what="scenario", format_name=SCENARIO_FORMAT)
-    reference = _part("reference", modification_from_document, given.reference)
-    intent = None
-    if given.intent is not None:
-        intent = _part("intent", intent_from_document, given.intent)
-    return CatalogueEntry(
-        slug=given.slug,
-        scene=given.scene,
-        type=given.type,
-        instruction=given.instruction,
-        keep_traffic=given.keep_traffic,
-        provenance=given.provenance,
-        notes=given.notes,
-        reference=reference,
-        intent=intent,
-        language=given.language,
-        paraphrases=tuple(
-            Wording(language=paraphrase.language, text=paraphrase.text)
-            for paraphrase in given.paraphrases
-        ),
-    )
+    if isinstance(document, dict):
+        document = dict(document)
+        for name, parse in (
+            ("reference", modification_from_document),
+            ("intent", intent_from_document),
+        ):
+            if document.get(name) is not None:
+                document[name] = _part(name, parse, document[name])
+    return read(document, _ENTRY, what="scenario", format_name=SCENARIO_FORMAT)
 
 
 def _part(name: str, parse: Callable[[object], Parsed], document: object) -> Parsed:

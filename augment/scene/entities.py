@@ -5,11 +5,30 @@ Frame: ego frame. Angles counter-clockwise from +x. Values are frozen; change by
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from enum import StrEnum
+from typing import Annotated
+
+from pydantic import Field
 
 from augment.geometry.frames import Pose
-from augment.geometry.polyline import Polyline
+from augment.scene.schema import (
+    CLOSED,
+    Heading,
+    Id,
+    Limit,
+    Line,
+    Metres,
+    PointPair,
+    Ring,
+    Size,
+    Speed,
+    Text,
+    WorldMetres,
+)
+
+MOST_AGENTS = 5_000
+MOST_WAYS = 50_000
 
 Point = tuple[float, float]
 
@@ -86,21 +105,32 @@ class TrafficAgent:
         walk_to_m: Where a pedestrian's walk ends (interPlan's end point), None without a walk.
     """
 
-    id: str
+    id: Id
     type: AgentType
-    x_m: float
-    y_m: float
-    heading_rad: float
-    width_m: float
-    length_m: float
-    speed_mps: float = 0.0
-    lane_id: str | None = None
-    walk_to_m: Point | None = None
+    x_m: Metres
+    y_m: Metres
+    heading_rad: Heading
+    width_m: Size
+    length_m: Size
+    speed_mps: Speed = 0.0
+    lane_id: Id | None = None
+    walk_to_m: PointPair | None = None
 
     @property
     def pose(self) -> Pose:
         """Centre and heading."""
         return Pose(x_m=self.x_m, y_m=self.y_m, heading_rad=self.heading_rad)
+
+
+Agents = Annotated[tuple[TrafficAgent, ...], Field(fail_fast=True, max_length=MOST_AGENTS)]
+_Centerline = Annotated[Line, Field(alias="centerline_m")]
+_Left = Annotated[Line | None, Field(alias="left_boundary_m")]
+_Right = Annotated[Line | None, Field(alias="right_boundary_m")]
+_Ids = Annotated[
+    tuple[Id, ...],
+    Field(fail_fast=True, max_length=MOST_WAYS, exclude_if=lambda names: not names),
+]
+_MOST = Field(fail_fast=True, max_length=MOST_WAYS)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -116,15 +146,15 @@ class Lane:
         successors: Ids of the lanes that follow at its end with no intersection between.
     """
 
-    id: str
-    centerline: Polyline
-    width_m: float
-    speed_limit_mps: float | None = None
-    left_boundary: Polyline | None = None
-    right_boundary: Polyline | None = None
-    left_neighbor: str | None = None
-    right_neighbor: str | None = None
-    successors: tuple[str, ...] = ()
+    id: Id
+    centerline: _Centerline
+    width_m: Size
+    speed_limit_mps: Limit | None = None
+    left_boundary: _Left = None
+    right_boundary: _Right = None
+    left_neighbor: Id | None = None
+    right_neighbor: Id | None = None
+    successors: _Ids = ()
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -135,33 +165,45 @@ class LaneConnector:
         from_lane, to_lane: Ids of lanes or connectors; None where the map ends.
     """
 
-    id: str
-    from_lane: str | None
-    to_lane: str | None
-    centerline: Polyline
-    width_m: float
+    id: Id
+    from_lane: Id | None = None
+    to_lane: Id | None = None
+    centerline: _Centerline
+    width_m: Size
     traffic_light: TrafficLight = TrafficLight.NONE
     turn_type: TurnType = TurnType.STRAIGHT
-    speed_limit_mps: float | None = None
-    left_boundary: Polyline | None = None
-    right_boundary: Polyline | None = None
+    speed_limit_mps: Limit | None = None
+    left_boundary: _Left = None
+    right_boundary: _Right = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Area:
     """A polygon given by its boundary points (P >= 3), not closed."""
 
-    id: str
+    id: Id
     kind: AreaKind
-    boundary_m: tuple[Point, ...]
+    boundary_m: Ring
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Origin:
     """Where the ego frame lies in the source's own world frame."""
 
-    frame: str
-    pose: Pose
+    frame: Annotated[Text, Field(min_length=1, max_length=200)]
+    x_m: WorldMetres
+    y_m: WorldMetres
+    heading_rad: Heading
+
+    @classmethod
+    def at(cls, pose: Pose, *, frame: str) -> Origin:
+        """The origin at a pose of the source's frame."""
+        return cls(frame=frame, x_m=pose.x_m, y_m=pose.y_m, heading_rad=pose.heading_rad)
+
+    @property
+    def pose(self) -> Pose:
+        """The ego frame seen from the source's."""
+        return Pose(x_m=self.x_m, y_m=self.y_m, heading_rad=self.heading_rad)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -176,7 +218,7 @@ class SceneOptions:
 
     density: TrafficDensity = TrafficDensity.NONE
     goal: TurnType | None = None
-    goal_m: Point | None = None
+    goal_m: PointPair | None = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -191,16 +233,20 @@ class Scene:
         options: Set by a scenario; a stored scene has none unless its file names them.
     """
 
-    name: str
-    ego: TrafficAgent
+    __pydantic_config__ = CLOSED
+
+    name: Annotated[Text, Field(min_length=1, max_length=200)]
+    provenance: Annotated[Text, Field(min_length=1)]
     traffic_side: TrafficSide
     origin: Origin
-    provenance: str
-    agents: tuple[TrafficAgent, ...] = ()
-    lanes: tuple[Lane, ...] = ()
-    connectors: tuple[LaneConnector, ...] = ()
-    areas: tuple[Area, ...] = field(default=())
-    options: SceneOptions = SceneOptions()
+    ego: TrafficAgent
+    agents: Agents = ()
+    lanes: Annotated[tuple[Lane, ...], _MOST] = ()
+    connectors: Annotated[tuple[LaneConnector, ...], _MOST] = ()
+    areas: Annotated[tuple[Area, ...], _MOST] = ()
+    options: Annotated[SceneOptions, Field(exclude_if=lambda one: one == SceneOptions())] = (
+        SceneOptions()
+    )
 
     @property
     def everyone(self) -> tuple[TrafficAgent, ...]:

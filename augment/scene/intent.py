@@ -2,13 +2,17 @@
 
 Distances run along the ego's lane, from centre to centre, in metres. Left and right are those of
 the ego's direction of travel. Kerb and centre line are named as such here and become left or
-right on the map, because people do not drive on one side everywhere.
+right on the map, because people do not drive on one side everywhere. What may be said, and what
+contradicts itself, is checked when a document is read (`intent_codec`).
 """
 
 from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
+from typing import Annotated, Literal, Self, TypeVar
+
+from pydantic import Field, model_validator
 
 from augment.scene.entities import TurnType
 from augment.scene.intent_words import (
@@ -25,15 +29,44 @@ from augment.scene.landmarks import LaneChoice as LaneChoice
 from augment.scene.landmarks import MapPlace, Pick
 from augment.scene.landmarks import Relation as Relation
 from augment.scene.landmarks import Side as Side
+from augment.scene.schema import CLOSED, MOST_OBJECTS, Count, Id, Real, Text, Yes
+
+MOST_REQUESTS = 20
+
+_Metres = Annotated[Real, Field(ge=0.0, le=1000.0)]
+_MetresAhead = Annotated[Real, Field(gt=0.0, le=1000.0)]
+_Drift = Annotated[Real, Field(ge=-100.0, le=100.0)]
+_Degrees = Annotated[Real, Field(ge=-180.0, le=180.0)]
+_VehicleSpeed = Annotated[Real, Field(ge=0.0, le=100.0)]
+_WalkSpeed = Annotated[Real, Field(gt=0.0, le=10.0)]
+_Words = Annotated[Text, Field(min_length=1, max_length=300, pattern=r"\S")]
+_Name = Id | Literal[""]
+_Item = TypeVar("_Item")
+_Several = Annotated[tuple[_Item, ...], Field(fail_fast=True, max_length=MOST_OBJECTS)]
+_Changes = Annotated[tuple[_Item, ...], Field(fail_fast=True, max_length=MOST_REQUESTS)]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Length:
     """A length or a range of lengths in metres; `is_approximate` if the sentence says "about"."""
 
-    low_m: float
-    high_m: float
-    is_approximate: bool = False
+    low_m: _Metres
+    high_m: _Metres
+    is_approximate: Yes = False
+
+    @model_validator(mode="before")
+    @classmethod
+    def _takes_one_number(cls, given: object) -> object:
+        """In a document `low_m` alone is one length."""
+        if isinstance(given, dict) and "low_m" in given and given.get("high_m") is None:
+            return given | {"high_m": given["low_m"]}
+        return given
+
+    @model_validator(mode="after")
+    def _is_ordered(self) -> Self:
+        if self.high_m < self.low_m:
+            raise ValueError("high_m is below low_m")
+        return self
 
     @property
     def is_range(self) -> bool:
@@ -59,7 +92,7 @@ class Lateral:
     target: LateralTarget
     offset: Length | None = None
     nearness: Nearness | None = None
-    on_shoulder: bool = False
+    on_shoulder: Yes = False
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -78,12 +111,22 @@ class Spot:
 
     distance: Length | None = None
     relation: Relation | None = None
-    anchor: str | None = None
+    anchor: Id | None = None
     landmark: Pick | None = None
     mark: MapPlace | None = None
     lane: LaneChoice | None = None
     lateral: Lateral | None = None
-    settings: tuple[Setting, ...] = ()
+    settings: _Several[Setting] = ()
+
+    @model_validator(mode="after")
+    def _says_where(self) -> Self:
+        if self.distance is not None and self.relation is None:
+            raise ValueError("a distance needs a relation: ahead or behind")
+        if sum(one is not None for one in (self.anchor, self.landmark, self.mark)) > 1:
+            raise ValueError("a distance runs from one thing: an anchor, a landmark or a mark")
+        if self.landmark is not None and self.landmark.every:
+            raise ValueError("a landmark is one road user, not every one")
+        return self
 
     @property
     def span_m(self) -> tuple[float, float] | None:
@@ -107,14 +150,20 @@ class VehicleRequest:
         spacing: Between the centres of neighbours in a row.
     """
 
+    kind: Literal["vehicles"] = "vehicles"
     spot: Spot = Spot()
-    name: str = ""
+    name: _Name = ""
     body: Body = Body.VEHICLE
     facing: Facing | None = None
-    turn_deg: float = 0.0
-    speed_mps: float | None = None
-    count: int | None = None
+    turn_deg: _Degrees = 0.0
+    speed_mps: _VehicleSpeed | None = None
+    count: Count | None = None
     spacing: Length | None = None
+
+    @model_validator(mode="after")
+    def _turns_from_something(self) -> Self:
+        _check_turn(self)
+        return self
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -129,15 +178,16 @@ class WalkRequest:
         on_road: The first one stands in the ego's lane already.
     """
 
+    kind: Literal["walk"] = "walk"
     spot: Spot = Spot()
-    name: str = ""
+    name: _Name = ""
     start: Side | None = None
-    count: int | None = None
-    speed_mps: float | None = None
-    drift_m: float | None = None
-    is_file: bool = False
-    behind: tuple[Length, ...] = ()
-    on_road: bool = False
+    count: Count | None = None
+    speed_mps: _WalkSpeed | None = None
+    drift_m: _Drift | None = None
+    is_file: Yes = False
+    behind: _Several[Length] = ()
+    on_road: Yes = False
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -154,16 +204,17 @@ class ConesRequest:
         post_side: To which side of the cones.
     """
 
+    kind: Literal["cones"] = "cones"
     spot: Spot = Spot()
-    name: str = ""
+    name: _Name = ""
     shape: Shape | None = None
-    count: int | None = None
+    count: Count | None = None
     spacing: Length | None = None
     start: Side | None = None
-    ends_in_middle: bool = False
-    both_sides: bool = False
-    reach_m: float | None = None
-    has_worker: bool = False
+    ends_in_middle: Yes = False
+    both_sides: Yes = False
+    reach_m: _MetresAhead | None = None
+    has_worker: Yes = False
     post: Post | None = None
     post_side: Side | None = None
 
@@ -181,8 +232,8 @@ class CrashedCar:
 
     gap: Length | None = None
     bearing: Bearing | None = None
-    turn_deg: float | None = None
-    is_signed: bool = False
+    turn_deg: _Degrees | None = None
+    is_signed: Yes = False
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -194,15 +245,17 @@ class CrashRequest:
         others: What is said of the further ones in order; none where it is left open.
     """
 
+    kind: Literal["crash"] = "crash"
     spot: Spot = Spot()
-    name: str = ""
-    count: int | None = None
+    name: _Name = ""
+    count: Count | None = None
     body: Body = Body.CAR
     facing: Facing | None = None
-    others: tuple[CrashedCar, ...] = ()
+    others: _Several[CrashedCar] = ()
 
 
 Request = VehicleRequest | WalkRequest | ConesRequest | CrashRequest
+_AnyRequest = Annotated[Request, Field(discriminator="kind")]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -217,8 +270,17 @@ class Move:
     who: Pick
     spot: Spot
     facing: Facing | None = None
-    turn_deg: float = 0.0
-    speed_mps: float | None = None
+    turn_deg: _Degrees = 0.0
+    speed_mps: _VehicleSpeed | None = None
+
+    @model_validator(mode="after")
+    def _is_one_with_a_place(self) -> Self:
+        if self.who.every:
+            raise ValueError("one road user is moved, not every one")
+        if self.spot.anchor is not None:
+            raise ValueError("a move is counted from the ego, a landmark or a mark")
+        _check_turn(self)
+        return self
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -231,16 +293,32 @@ class Intent:
         removals: Who of the scene is to go.
         route: Where the way leads along which the distances run, where it first parts.
         unmet: Why the wish can't be met in its scene; then nothing else is asked for, and the
-            right outcome is a refusal. Empty where it can be met.
+            right outcome is a refusal. None where it can be met.
         beyond: Parts of the sentence that these fields can't hold, in its own words.
     """
 
-    requests: tuple[Request, ...] = ()
-    moves: tuple[Move, ...] = ()
-    removals: tuple[Pick, ...] = ()
+    __pydantic_config__ = CLOSED
+
+    requests: _Changes[_AnyRequest] = ()
+    moves: _Changes[Move] = ()
+    removals: _Changes[Pick] = ()
     route: TurnType = TurnType.STRAIGHT
-    unmet: str = ""
-    beyond: tuple[str, ...] = ()
+    unmet: _Words | None = None
+    beyond: _Several[_Words] = ()
+
+    @model_validator(mode="after")
+    def _asks_for_something(self) -> Self:
+        asks = bool(self.requests or self.moves or self.removals)
+        if self.unmet is None and not asks:
+            raise ValueError("asks for nothing: no requests, moves or removals")
+        if self.unmet is not None and asks:
+            raise ValueError("what can't be met asks for nothing else")
+        return self
+
+
+def _check_turn(turned: VehicleRequest | Move) -> None:
+    if turned.turn_deg and turned.facing is None:
+        raise ValueError("turn_deg needs a facing that it is counted from")
 
 
 def resolve_anchors(intent: Intent) -> Intent:

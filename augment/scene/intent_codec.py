@@ -1,60 +1,27 @@
 """An intent as a JSON document and back; what is open is absent.
 
-One strict shape (`intent_document`) for files, rows, forms and what a language model answers:
-unknown fields, unknown words, texts for numbers and numbers that are not finite are refused with
-their path.
+One strict shape (`Intent`) for files, rows, forms and what a language model answers: unknown
+fields, unknown words, texts for numbers and numbers that are not finite are refused with their
+path.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
-from dataclasses import fields
+from collections.abc import Iterator
+from dataclasses import fields, is_dataclass
 from enum import Enum
 from typing import Any
 
-from pydantic import BaseModel
+from pydantic import TypeAdapter, ValidationError
 
 from augment.errors import InvalidDocument
-from augment.scene.entities import TurnType
-from augment.scene.intent import (
-    ConesRequest,
-    CrashedCar,
-    CrashRequest,
-    Intent,
-    Lateral,
-    Length,
-    Move,
-    Request,
-    Spot,
-    VehicleRequest,
-    WalkRequest,
-)
-from augment.scene.intent_document import (
-    ConesDocument,
-    CrashDocument,
-    CrashedCarDocument,
-    IntentDocument,
-    IntentParts,
-    LateralDocument,
-    LengthDocument,
-    MoveDocument,
-    PickDocument,
-    SpotDocument,
-    VehiclesDocument,
-    WalkDocument,
-)
-from augment.scene.landmarks import Pick
-from augment.scene.schema import VERSION, Document, read
+from augment.scene.intent import CrashRequest, Intent, Length, WalkRequest
+from augment.scene.schema import VERSION, problems_of, read
 
 INTENT_FORMAT = "scenario-arena/intent"
 
-_KINDS: dict[type[Request], str] = {
-    VehicleRequest: "vehicles",
-    WalkRequest: "walk",
-    ConesRequest: "cones",
-    CrashRequest: "crash",
-}
-_VALUES = {kind: request for request, kind in _KINDS.items()}
+_INTENT = TypeAdapter(Intent)
+_ALWAYS_WRITTEN = ("requests", "kind", "body")
 
 
 def intent_to_document(intent: Intent) -> dict[str, Any]:
@@ -64,17 +31,8 @@ def intent_to_document(intent: Intent) -> dict[str, Any]:
 
 def intent_to_parts(intent: Intent) -> dict[str, Any]:
     """The requests, and whatever else the intent says."""
-    requests = [
-        {"kind": _KINDS[type(request)], **_written(request)} for request in intent.requests
-    ]
-    others = {
-        "moves": [_written(move) for move in intent.moves],
-        "removals": [_written(removal) for removal in intent.removals],
-        "route": "" if intent.route is TurnType.STRAIGHT else intent.route.value,
-        "unmet": intent.unmet,
-        "beyond": list(intent.beyond),
-    }
-    return {"requests": requests} | {name: part for name, part in others.items() if part}
+    parts: dict[str, Any] = _written(intent)
+    return parts
 
 
 def intent_from_document(document: object) -> Intent:
@@ -83,31 +41,40 @@ def intent_from_document(document: object) -> Intent:
     Raises:
         InvalidDocument: With the path and the reason of every fault.
     """
-    given = read(document, IntentDocument, what="intent", format_name=INTENT_FORMAT)
-    return intent_from_parts(given)
+    return _checked(read(document, _INTENT, what="intent", format_name=INTENT_FORMAT))
 
 
-def intent_from_parts(given: IntentParts) -> Intent:
-    """The intent of parts that have the right shape.
+def intent_from_parts(parts: object) -> Intent:
+    """The intent of a document without its frame: what a language model answers.
 
     Raises:
-        InvalidDocument: They contradict each other.
+        InvalidDocument: With the path and the reason of every fault.
     """
-    intent = Intent(
-        requests=tuple(_request(request) for request in given.requests),
-        moves=_value(given.moves),
-        removals=_value(given.removals),
-        route=given.route,
-        unmet=given.unmet or "",
-        beyond=tuple(given.beyond),
-    )
+    try:
+        return _checked(_INTENT.validate_python(parts))
+    except ValidationError as fault:
+        raise InvalidDocument("intent", problems_of(fault)) from None
+
+
+def parts_schema() -> dict[str, Any]:
+    """The JSON schema of such parts, with a line on each."""
+    schema = _INTENT.json_schema()
+    for part in (schema, *schema["$defs"].values()):
+        part["description"] = part["description"].partition("\n")[0]
+        if "const" in part.get("properties", {}).get("kind", {}):
+            part["required"] = ["kind"]
+    schema["$defs"]["Length"]["required"] = ["low_m"]
+    return schema
+
+
+# Private
+
+
+def _checked(intent: Intent) -> Intent:
     problems = list(_contradictions(intent))
     if problems:
         raise InvalidDocument("intent", problems)
     return intent
-
-
-# Private
 
 
 def _contradictions(intent: Intent) -> Iterator[tuple[str, str]]:
@@ -129,36 +96,6 @@ def _contradictions(intent: Intent) -> Iterator[tuple[str, str]]:
                 yield f"{at}.{further}", text
 
 
-def _request(given: VehiclesDocument | WalkDocument | ConesDocument | CrashDocument) -> Request:
-    kind = _VALUES[given.kind]
-    return kind(**{name: _value(value) for name, value in _pairs(given) if name != "kind"})
-
-
-def _pairs(given: BaseModel) -> Iterator[tuple[str, Any]]:
-    return ((name, getattr(given, name)) for name in type(given).model_fields)
-
-
-_PARTS: Mapping[type[Document], type] = {
-    LateralDocument: Lateral,
-    SpotDocument: Spot,
-    CrashedCarDocument: CrashedCar,
-    PickDocument: Pick,
-    MoveDocument: Move,
-}
-
-
-def _value(value: Any) -> Any:
-    """A part of a document as the value that it stands for."""
-    if isinstance(value, LengthDocument):
-        high_m = value.low_m if value.high_m is None else value.high_m
-        return Length(low_m=value.low_m, high_m=high_m, is_approximate=value.is_approximate)
-    if isinstance(value, list):
-        return tuple(_value(one) for one in value)
-    if isinstance(value, Document):
-        return _PARTS[type(value)](**{name: _value(part) for name, part in _pairs(value)})
-    return value
-
-
 def _written(value: Any) -> Any:
     """A value as a part of a document, without what is at its default."""
     if isinstance(value, Length):
@@ -170,10 +107,10 @@ def _written(value: Any) -> Any:
         return value.value
     if isinstance(value, tuple):
         return [_written(one) for one in value]
-    if not hasattr(value, "__dataclass_fields__"):
+    if not is_dataclass(value):
         return value
-    kept = ((field.name, getattr(value, field.name), field.default) for field in fields(value))
-    always = "body" if isinstance(value, (VehicleRequest, CrashRequest)) else ""
     return {
-        name: _written(part) for name, part, default in kept if part != default or name == always
+        field.name: _written(part)
+        for field in fields(value)
+        if (part := getattr(value, field.name)) != field.default or field.name in _ALWAYS_WRITTEN
     }

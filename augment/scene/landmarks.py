@@ -7,6 +7,11 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from enum import StrEnum
+from typing import Self
+
+from pydantic import model_validator
+
+from augment.scene.schema import Count, Yes
 
 
 class Side(StrEnum):
@@ -72,5 +77,11 @@ class Pick:
     side: Side | None = None
     lane: LaneChoice | None = None
     relation: Relation = Relation.AHEAD
-    ordinal: int = 1
-    every: bool = False
+    ordinal: Count = 1
+    every: Yes = False
+
+    @model_validator(mode="after")
+    def _is_one_or_all(self) -> Self:
+        if self.every and self.ordinal != 1:
+            raise ValueError("every one and one of a number contradict each other")
+        return self

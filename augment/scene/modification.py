@@ -6,9 +6,13 @@ Frame: ego frame of the scene.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from typing import Annotated
+
+from pydantic import Field
 
 from augment.errors import InvalidModification
-from augment.scene.entities import AgentType, Scene, TrafficAgent
+from augment.scene.entities import MOST_AGENTS, Agents, AgentType, Scene, TrafficAgent
+from augment.scene.schema import CLOSED, Id
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -21,9 +25,13 @@ class Modification:
         removed: Ids of the scene's agents that go.
     """
 
-    added: tuple[TrafficAgent, ...] = ()
-    moved: tuple[TrafficAgent, ...] = ()
-    removed: tuple[str, ...] = ()
+    __pydantic_config__ = CLOSED
+
+    added: Annotated[Agents, Field(alias="add")] = ()
+    moved: Annotated[Agents, Field(alias="move")] = ()
+    removed: Annotated[
+        tuple[Id, ...], Field(alias="remove", fail_fast=True, max_length=MOST_AGENTS)
+    ] = ()
 
     @property
     def is_empty(self) -> bool:

@@ -10,10 +10,10 @@ from dataclasses import dataclass
 from enum import StrEnum
 from typing import Annotated, Any
 
-from pydantic import Strict, TypeAdapter, ValidationError
+from pydantic import Field, TypeAdapter, ValidationError
 
 from augment.errors import InvalidDocument
-from augment.scene.schema import Document, problems_of
+from augment.scene.schema import CLOSED, Real, Text, Whole, problems_of
 
 
 class SceneNoteKind(StrEnum):
@@ -63,34 +63,21 @@ class Note:
         names: What it concerns, where that has names.
     """
 
+    __pydantic_config__ = CLOSED
+
     kind: SceneNoteKind
-    number: int | None = None
-    of: int | None = None
-    value: float | None = None
-    names: tuple[str, ...] = ()
+    number: Whole | None = None
+    of: Whole | None = None
+    value: Real | None = None
+    names: Annotated[tuple[Text, ...], Field(exclude_if=lambda names: not names)] = ()
 
 
-class NoteDocument(Document):
-    """A `Note`."""
-
-    kind: Annotated[SceneNoteKind, Strict(False)]
-    number: int | None = None
-    of: int | None = None
-    value: float | None = None
-    names: list[str] = []
-
-
-_NOTES = TypeAdapter(list[NoteDocument])
+_NOTES = TypeAdapter(tuple[Note, ...])
 
 
 def notes_to_document(notes: tuple[Note, ...]) -> list[dict[str, Any]]:
     """The notes as a JSON document; fields without a value are left out."""
-    made = []
-    for note in notes:
-        fields = {"number": note.number, "of": note.of, "value": note.value}
-        one: dict[str, Any] = {"kind": note.kind.value}
-        one |= {name: value for name, value in fields.items() if value is not None}
-        made.append(one | ({"names": list(note.names)} if note.names else {}))
+    made: list[dict[str, Any]] = _NOTES.dump_python(notes, mode="json", exclude_none=True)
     return made
 
 
@@ -101,16 +88,6 @@ def notes_from_document(document: object) -> tuple[Note, ...]:
         InvalidDocument: With the path and the reason of every fault.
     """
     try:
-        given = _NOTES.validate_python(document)
+        return _NOTES.validate_python(document)
     except ValidationError as fault:
         raise InvalidDocument("scene notes", problems_of(fault)) from None
-    return tuple(
-        Note(
-            kind=one.kind,
-            number=one.number,
-            of=one.of,
-            value=one.value,
-            names=tuple(one.names),
-        )
-        for one in given
-    )

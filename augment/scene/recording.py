@@ -6,11 +6,49 @@ Frame: the ego frame of t0 (the Scene's frame). T steps.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Annotated, Any
 
 import numpy as np
 from numpy.typing import NDArray
+from pydantic import Field, GetCoreSchemaHandler
+from pydantic_core import CoreSchema, core_schema
 
 from augment.scene.entities import AgentType, TrafficAgent
+from augment.scene.schema import CLOSED, Id, Real, Size
+
+MOST_TRACKS = 50_000
+
+_Number = Annotated[Real, Field(ge=-1e6, le=1e6)]
+_State = tuple[_Number, _Number, _Number, _Number]
+_UNSEEN = (np.nan,) * 4
+
+
+class _NumberList:
+    """How an array stands in a document: as a list; a state of NaN alone is null."""
+
+    def __init__(self, item: Any, least: int = 0) -> None:
+        self._items = Annotated[list[item], Field(fail_fast=True, min_length=least)]
+
+    def __get_pydantic_core_schema__(self, _: Any, handler: GetCoreSchemaHandler) -> CoreSchema:
+        return core_schema.no_info_after_validator_function(
+            _array,
+            handler.generate_schema(self._items),
+            serialization=core_schema.plain_serializer_function_ser_schema(_rows),
+        )
+
+
+def _array(rows: list[Any]) -> NDArray[np.float64]:
+    array = np.array([_UNSEEN if row is None else row for row in rows], dtype=np.float64)
+    array.flags.writeable = False
+    return array
+
+
+def _rows(array: NDArray[np.float64]) -> list[Any]:
+    return [None if np.isnan(row).all() else row.tolist() for row in array]
+
+
+_Times = Annotated[NDArray[np.float64], _NumberList(_Number, least=1)]
+_States = Annotated[NDArray[np.float64], _NumberList(_State | None)]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -22,11 +60,11 @@ class Track:
         states: (T, 4): x_m, y_m, heading_rad, speed_mps of the box centre.
     """
 
-    agent_id: str
-    type: str
-    length_m: float
-    width_m: float
-    states: NDArray[np.float64]
+    agent_id: Id
+    type: AgentType
+    length_m: Size
+    width_m: Size
+    states: _States
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -40,9 +78,11 @@ class Recording:
         tracks: One entry an agent.
     """
 
-    times_s: NDArray[np.float64]
-    ego: NDArray[np.float64]
-    tracks: tuple[Track, ...]
+    __pydantic_config__ = CLOSED
+
+    times_s: _Times
+    ego: _States
+    tracks: Annotated[tuple[Track, ...], Field(fail_fast=True, max_length=MOST_TRACKS)] = ()
 
     @property
     def ego_is_seen(self) -> NDArray[np.bool_]:
@@ -60,7 +100,7 @@ def agent_of(track: Track, state: NDArray[np.float64]) -> TrafficAgent:
     x_m, y_m, heading_rad, speed_mps = (float(value) for value in state)
     return TrafficAgent(
         id=track.agent_id,
-        type=AgentType(track.type),
+        type=track.type,
         x_m=x_m,
         y_m=y_m,
         heading_rad=heading_rad,

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from augment.scene.entities import AgentType, TrafficAgent
+from augment.scene.entities import TrafficAgent
 from augment.scene.recording import Recording, Track, agent_of
 from augment.simulation.objects import KIND_OF, NOBODY, Objects
 from augment.simulation.states import STEP_S, FloatArray, IntArray
@@ -28,7 +28,7 @@ class Replay:
         self._times = recording.times_s
         states = [track.states for track in self._tracks]
         self._states = np.array(states).reshape(len(states), len(self._times), 4)
-        self._kinds = np.array([KIND_OF[AgentType(t.type)] for t in tracks], dtype=np.int64)
+        self._kinds = np.array([KIND_OF[t.type] for t in tracks], dtype=np.int64)
         self._sizes = np.array([(t.length_m, t.width_m) for t in tracks]).reshape(-1, 2)
         self._step, self._last_step = 0, round(float(self._times[-1]) / STEP_S)
 

@@ -79,7 +79,7 @@ def _objects(setting: DriveSetting, drive: Drive, changed: set[str]) -> list[dic
     """Each object with its poses from its first moment on; one pose alone where it stands."""
     types = {agent.id: agent.type.value for agent in setting.after.agents}
     if setting.recording is not None:
-        types |= {track.agent_id: track.type for track in setting.recording.tracks}
+        types |= {track.agent_id: track.type.value for track in setting.recording.tracks}
     by_name: dict[str, dict[str, Any]] = {}
     for moment, objects in enumerate(drive.objects):
         rows = _poses(objects.boxes, objects.speeds_mps)

@@ -125,7 +125,7 @@ def _replayed(setting: DriveSetting, road: Road) -> list[Track]:
         agent = at_start.get(track.agent_id)
         if track.agent_id in setting.replaced:
             continue
-        answers = setting.reactive and AgentType(track.type) in _ON_LANES and moves(track)
+        answers = setting.reactive and track.type in _ON_LANES and moves(track)
         # Who comes into sight later has no lane at t0 to start on; it stays away.
         if answers and (agent is None or lane_under(road, agent) is not None):
             continue

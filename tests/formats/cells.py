@@ -8,7 +8,6 @@ from typing import Any
 import numpy as np
 
 from augment.formats.writing import Cell
-from augment.geometry.frames import Pose
 from augment.scene.catalogue import ScenarioType
 from augment.scene.entities import AgentType, Area, AreaKind, Origin, Scene, TrafficSide
 from augment.scene.modification import Modification
@@ -49,7 +48,7 @@ def crossing() -> Scene:
     return replace(
         junction(),
         traffic_side=TrafficSide.LEFT,
-        origin=Origin(frame="UTM 48N", pose=Pose(x_m=365000.5, y_m=143000.25, heading_rad=1.2)),
+        origin=Origin(frame="UTM 48N", x_m=365000.5, y_m=143000.25, heading_rad=1.2),
         areas=(
             Area(
                 id="Area1",
@@ -83,7 +82,7 @@ def recorded_street() -> tuple[Scene, Recording]:
     gone, late = drives(20.0, 0.0, 0.0, 10.0), drives(80.0, 3.5, np.pi, 6.0)
     gone[20:] = np.nan
     late[:10] = np.nan
-    size = {"length_m": 4.8, "width_m": 2.0, "type": "VEHICLE"}
+    size = {"length_m": 4.8, "width_m": 2.0, "type": AgentType.VEHICLE}
     recording = Recording(
         times_s=times,
         ego=drives(0.0, 0.0, 0.0, 8.0),

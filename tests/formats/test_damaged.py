@@ -15,8 +15,7 @@ from hypothesis import strategies as st
 
 from augment.errors import InvalidDocument
 from augment.formats.readers import READERS, reader_of
-from augment.scene.codec import scene_to_document
-from augment.scene.schema import SCENE_FORMAT
+from augment.scene.codec import SCENE_FORMAT, scene_to_document
 from tests.formats import av2_logs, av2_motion, nuplan_files, waymo_files
 from tests.formats.test_commonroad import newer
 from tests.formats.test_scenarionet import description, store

@@ -129,7 +129,7 @@ def scenes(draw: st.DrawFn) -> Scene:
         name=draw(st.text(min_size=1, max_size=20)),
         ego=EGO,
         traffic_side=draw(st.sampled_from(TrafficSide)),
-        origin=Origin(frame="somewhere", pose=draw(pose)),
+        origin=Origin.at(draw(pose), frame="somewhere"),
         provenance="made for a test",
         agents=tuple(draw(agents(f"Agent{n}", names)) for n in range(2, draw(st.integers(2, 5)))),
         lanes=lanes,
@@ -235,15 +235,13 @@ def test_all_faults_are_named_at_once() -> None:
     assert [place for place, _ in caught.value.problems] == ["ego.width_m", "agents[0].x_m"]
 
 
-def test_a_line_tells_its_first_fault_and_no_list_is_endless() -> None:
+def test_a_list_tells_its_first_fault() -> None:
     made = put(document(), ["lanes", 0, "centerline_m"], [["x", "y"]] * 1000)
-    made["agents"] = [{}] * 5_001
     with pytest.raises(InvalidDocument) as caught:
         scene_from_document(made)
     assert [place for place, _ in caught.value.problems] == [
-        "agents", "lanes[0].centerline_m[0][0]", "lanes[0].centerline_m[0][1]",
+        "lanes[0].centerline_m[0][0]", "lanes[0].centerline_m[0][1]",
     ]  # fmt: skip
-    assert "at most 5000" in str(caught.value)
 
 
 @pytest.mark.parametrize(("number", "is_read"), [(5_000, True), (5_001, False)])

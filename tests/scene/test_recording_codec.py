@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from augment.errors import InvalidDocument
+from augment.scene.entities import AgentType
 from augment.scene.recording import Recording, Track
 from augment.scene.recording_codec import recording_from_document, recording_to_document
 
@@ -19,7 +20,7 @@ def recording() -> Recording:
         tracks=(
             Track(
                 agent_id="Agent2",
-                type="VEHICLE",
+                type=AgentType.VEHICLE,
                 length_m=4.8,
                 width_m=2.0,
                 states=np.array([[9.0, 1.0, 3.1, 2.0], unseen, [8.6, 1.0, 3.1, 2.0]]),

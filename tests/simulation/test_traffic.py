@@ -126,8 +126,12 @@ def recorded(reactive: bool = False, modification: Modification | None = None) -
     ego = np.zeros((151, 4))
     ego[:, 0] = times * 5.0
     tracks = (
-        Track(agent_id="Agent2", type="VEHICLE", length_m=4.8, width_m=2.0, states=stopping),
-        Track(agent_id="Agent3", type="VEHICLE", length_m=4.8, width_m=2.0, states=passing),
+        Track(
+            agent_id="Agent2", type=AgentType.VEHICLE, length_m=4.8, width_m=2.0, states=stopping
+        ),
+        Track(
+            agent_id="Agent3", type=AgentType.VEHICLE, length_m=4.8, width_m=2.0, states=passing
+        ),
     )
     agent = replace(vehicle("Agent2", 20.0, 0.0), speed_mps=6.0)
     return DriveSetting(
