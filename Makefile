@@ -50,7 +50,7 @@ bench: chromium ## Ours beside other products, each in its own environment; writ
 	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m bench.rating_speed
 	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m bench.rating_scale --write
 
-figures: $(VENV)/.test ## Write the figures of README, method.md, catalogue.md and formats.md
+figures: $(VENV)/.test ## Write the figures of README, method.md and catalogue.md
 	$(BIN)/python -m bench.figures
 
 real-model: $(VENV)/.test ## The whole way with a real, tiny language model; writes docs/benchmarks.md

@@ -1,4 +1,4 @@
-"""Write the figures of README.md, method.md, catalogue.md and formats.md anew: `make figures`.
+"""Write the figures of README.md, method.md and catalogue.md anew: `make figures`.
 
 The other measurements write their own section of docs/benchmarks.md and docs/rating.md, because
 they take long or need other software.
@@ -11,7 +11,7 @@ import os
 import django
 
 from augment.services.scenarios.way_past import WayPast
-from bench import displacement, hostile_reading, injected_faults
+from bench import displacement, injected_faults
 from bench.report import ROOT, table, write_block
 from tests.fixtures.shelf import FOLDER, SLUGS
 
@@ -25,8 +25,6 @@ def main() -> None:
     write_block("faults", injected_faults.class_table(tally), page=readme)
     faults = injected_faults.report(tally, count=injected_faults.COUNT, seed=injected_faults.SEED)
     write_block("faults", faults, page=method)
-    formats = ROOT / "docs" / "formats.md"
-    write_block("hostile", hostile_reading.hostile_table(), page=formats)
     write_ways()
 
 

@@ -1,4 +1,4 @@
-"""What each hostile file takes until it is refused: the table of docs/formats.md."""
+"""What each hostile file takes until it is refused: `python -m bench.hostile_reading`."""
 
 from __future__ import annotations
 
@@ -60,3 +60,7 @@ def _refuse(name: str, root: str) -> Refusal:
         reason = fault.problems[0][1]
         return Refusal(name, used.ru_utime + used.ru_stime, used.ru_maxrss >> 10, str(reason))
     raise AssertionError(f"{name} was read")
+
+
+if __name__ == "__main__":
+    print(hostile_table())

@@ -36,15 +36,11 @@ TIES = 0.3
 
 
 WHAT = """`python -m bench.rating_scale [--write]` (in `make bench`): `rate(votes)` with
-its defaults and all details (two-way, rank sets, cross-check) on every core, without making the
-votes; a process for each row, whose most memory is told. Simulated votes whose experts give very
-different numbers of them."""
+its defaults (two-way, rank sets, cross-check) on every core, each row in a process of its own.
+Simulated votes; the experts' numbers of votes differ widely."""
 BELOW = (
     """Targets: 2 s for LLMFAO's size and 5 s for football's (simulated alike; the files are not at
     hand), 10 s for 1,000 contestants and for 50,000 judges.""",
-    """Draws of votes by alias tables (`arena/rating/draws.py`) beside numpy's own multinomial
-    numbers, 1,000 rounds, processor time, medians of five: S 5.4 against 12.3 ms, M 87 against 478
-    ms, L 0.54 against 3.9 s. They stay.""",
 )
 
 

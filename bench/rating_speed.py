@@ -283,11 +283,8 @@ def section(found: Found, names: str, before: str) -> str:
         + f"\n\n{' '.join(TARGETS.split())}\n\n{' '.join(ELSEWHERE.split())}\n\n"
         "Rivals at their best: choix starts every round at the ratings of the data, evalica rates "
         "counts with weights instead of single votes. "
-        "A dash can't be done: evalica's Elo holds all rounds at once, FastChat a dense matrix of "
-        "votes by contestants. arena-rank is not in the table: its bootstrap hangs on Linux as "
-        "published, its closed form is compiled by JAX in the first call (1 to 5 s) and then "
-        "takes 1 to 2 ms on S and M. Ours takes 1 to 3 ms there for the intervals alone and 54 "
-        "to 173 ms with rank sets, pairs and cross-check."
+        "A dash can't be done. arena-rank is not in the table: its bootstrap hangs on Linux as "
+        "published."
     )
 
 
