@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 
 from augment.baselines import quantised, rule_placer
 from augment.baselines.quantised import allowed_by, places_of
-from augment.baselines.quantised_code import Action, Code, Direction, Quadrant, code_of
+from augment.baselines.quantised_code import Code, Direction, Quadrant, code_of
 from augment.baselines.registry import PLACERS
 from augment.errors import CannotPlace
 from augment.scene.entities import AgentType, TrafficAgent
@@ -87,12 +87,6 @@ def test_directions_are_to_45_degrees(degrees: float, direction: Direction) -> N
     assert vehicle(10.0, 0.0, math.radians(degrees)).direction is direction
 
 
-def test_speeds_become_the_middle_of_their_bin_and_none_stays_none() -> None:
-    assert vehicle(10.0, 0.0, speed_mps=6.0).speed_mps == 6.25
-    standing = vehicle(10.0, 0.0)
-    assert (standing.action, standing.speed_mps) == (Action.STOP, 0.0)
-
-
 @given(st.floats(-70.0, 70.0), st.floats(-70.0, 70.0), st.floats(-3.1, 3.1), st.floats(0.0, 19.0))
 def test_nothing_finer_than_the_code_gets_through(
     x_m: float, y_m: float, heading_rad: float, speed_mps: float
@@ -144,11 +138,6 @@ def test_what_has_no_place_gives_up_side_and_direction_before_the_distance() -> 
     assert said
     away_m = np.hypot(*places.points_m[allowed].T)
     assert ((away_m >= 35.0) & (away_m < 40.0)).all()
-
-
-def test_on_an_empty_map_it_refuses() -> None:
-    with pytest.raises(CannotPlace):
-        quantised.place(street(lanes=()), PARKED, bin_m=5.0)
 
 
 @cache

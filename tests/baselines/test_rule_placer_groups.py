@@ -12,7 +12,6 @@ from augment.geometry.boxes import Box, overlap
 from augment.geometry.polyline import Polyline
 from augment.scene.entities import AgentType, Area, AreaKind, Lane
 from augment.scene.intent import (
-    CrashedCar,
     Side,
 )
 from augment.scene.intent_words import (
@@ -43,12 +42,6 @@ def test_a_pedestrian_crosses_from_edge_to_edge(
     assert walker.speed_mps == pytest.approx(math.dist(start, end) / 15.0, abs=0.03)
 
 
-def test_a_walk_over_a_narrow_road_is_seven_metres_long() -> None:
-    (walker,) = added(curve(), walk(5.0, Side.LEFT))
-    assert walker.walk_to_m is not None
-    assert math.dist((walker.x_m, walker.y_m), walker.walk_to_m) == pytest.approx(7.0, abs=0.01)
-
-
 def test_a_walk_ends_at_the_egos_road_where_a_side_road_opens() -> None:
     mouth = Area(
         id="Area9",
@@ -71,12 +64,6 @@ def test_a_parking_lane_belongs_to_the_road() -> None:
     wide = scene(areas=(scene().areas[0], parking))
     (walker,) = added(wide, walk(18.0, Side.RIGHT))
     assert walker.y_m == pytest.approx(-4.5, abs=0.26)
-
-
-def test_pedestrians_walk_side_by_side() -> None:
-    walkers = added(scene(), walk(18.0, Side.LEFT, count=3))
-    assert [walker.x_m for walker in walkers] == [18.0, 19.2, 20.4]
-    assert [walker.id for walker in walkers] == ["Agent2", "Agent3", "Agent4"]
 
 
 def test_a_taper_closes_the_lane_and_a_worker_stands_behind_it() -> None:
@@ -117,11 +104,6 @@ def test_crashed_cars_touch_at_most_and_leave_little_room(count: int) -> None:
         assert all(overlap(first, second).depth_m == 0.0 for second in boxes[i + 1 :])
     for a, b in itertools.pairwise(cars):
         assert 3.3 < math.dist((a.x_m, a.y_m), (b.x_m, b.y_m)) < 6.0
-
-
-def test_an_accidents_angle_is_the_one_asked_for() -> None:
-    a, b = added(scene(), crash(25.0, 2, CrashedCar(turn_deg=80.0)))
-    assert math.degrees(b.heading_rad - a.heading_rad) == pytest.approx(80.0, abs=0.01)
 
 
 def test_away_from_the_crosswalk_is_checked_along_the_whole_walk() -> None:

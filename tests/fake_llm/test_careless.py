@@ -54,24 +54,6 @@ def test_a_mistake_is_what_its_name_says() -> None:
     assert abs(askew.heading_rad) < 0.1
 
 
-def test_a_heap_is_one_car_upon_the_other() -> None:
-    other = replace(PARKED, id="Agent3", x_m=25.0, heading_rad=0.5)
-    first, second = drawn(scene(), PARKED, other)["heap"].added
-    assert math.hypot(first.x_m - second.x_m, first.y_m - second.y_m) < 0.5
-
-
-def test_a_pedestrian_who_faces_away_goes_nowhere() -> None:
-    walker = pedestrian("Agent2", 18.0, -5.0, (18.0, 6.0))
-    (away,) = drawn(scene(), walker)["facing-away"].added
-    assert away.walk_to_m is None
-    assert away.heading_rad == pytest.approx(-math.pi / 2.0)
-
-
-def test_the_dice_fall_the_same_for_the_same_prompt() -> None:
-    assert dice("a").random() == dice("a").random()
-    assert dice("a").random() != dice("b").random()
-
-
 def test_about_one_answer_in_ten_can_not_be_read() -> None:
     fallen = Counter(is_unreadable(dice(f"prompt {n}")) for n in range(2000))
     assert 0.07 < fallen[True] / 2000 < 0.13

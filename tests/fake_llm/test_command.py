@@ -8,7 +8,6 @@ import sys
 from pathlib import Path
 
 import pytest
-from django.core.management import CommandError, call_command
 
 MANAGE = Path(__file__).parents[2] / "manage.py"
 
@@ -28,15 +27,3 @@ def test_it_says_where_it_listens_and_stops_cleanly(number: signal.Signals) -> N
         out, err = process.communicate(timeout=60)
     assert (process.returncode, err) == (0, "")
     assert "has stopped" in out
-
-
-def test_a_taken_port_is_named() -> None:
-    with socket.create_server(("127.0.0.1", 0)) as taken:
-        port = taken.getsockname()[1]
-        with pytest.raises(CommandError, match=f"127.0.0.1 port {port}: .*in use"):
-            call_command("fake_llm", port=port)
-
-
-def test_a_port_that_is_none_is_named() -> None:
-    with pytest.raises(CommandError, match="port 70000"):
-        call_command("fake_llm", port=70000)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from dataclasses import replace
 
 import pytest
 
@@ -13,7 +12,7 @@ from augment.fake_llm.server import FakeServer, running
 from augment.variants.transcript import MemoryTranscript
 from tests.fake_llm.asking import outcome
 from tests.intents import intents
-from tests.scenes import curve, junction, scene, vehicle
+from tests.scenes import curve, scene
 
 WISH = "Add a parked vehicle 21.4 m ahead of the ego in its lane."
 KEY = "sk-planted-4f7a9c0d1e2b3a"
@@ -98,26 +97,6 @@ def test_an_unseen_sentence_is_placed_right_on_an_unseen_curve(
     assert (car.id, car.lane_id, car.speed_mps) == ("Agent2", "Lane1", 0.0)
 
 
-def test_a_distance_runs_on_over_a_connector(server: FakeServer) -> None:
-    made = outcome(
-        server,
-        "fake-good",
-        junction(),
-        "Add a parked vehicle 43.5 m ahead of the ego in its lane.",
-    )
-    assert made.modification is not None
-    (car,) = made.modification.added
-    assert (car.x_m, car.y_m) == pytest.approx((43.5, 0.0), abs=0.1)
-    assert car.lane_id == "Lane2"
-
-
-def test_a_new_agent_gets_the_first_new_id(server: FakeServer) -> None:
-    busy = scene(agents=(vehicle("Agent4", 60.0, 3.5, math.pi),))
-    made = outcome(server, "fake-good", busy, WISH)
-    assert made.modification is not None
-    assert [agent.id for agent in made.modification.added] == ["Agent5"]
-
-
 @pytest.mark.parametrize("model", ["fake-good", "fake-careless"])
 def test_what_is_not_understood_is_said_and_changes_nothing(
     server: FakeServer, model: str
@@ -125,30 +104,3 @@ def test_what_is_not_understood_is_said_and_changes_nothing(
     made = outcome(server, model, scene(), "Paint the sky green.")
     assert (made.status, made.modification) == ("refused", None)
     assert "I did not understand the instruction" in made.reason
-
-
-def test_a_refusal_holds_none_in_the_sections_that_have_nothing_to_say(
-    server: FakeServer,
-) -> None:
-    transcript = MemoryTranscript()
-    outcome(server, "fake-good", scene(), "Paint the sky green.", transcript=transcript)
-    reply = transcript.calls[0].reply
-    assert reply is not None
-    assert "Modification Dict: none\n\nModification Calculations:\nnone\n" in reply.text
-
-
-def test_the_answer_has_five_sections_with_computed_numbers(server: FakeServer) -> None:
-    transcript = MemoryTranscript()
-    outcome(server, "fake-good", scene(), WISH, transcript=transcript)
-    reply = transcript.calls[0].reply
-    assert reply is not None
-    heads = ["Insights:", "Summary:", "Modification Dict:", "Modification Calculations:"]
-    places = [reply.text.index(head) for head in [*heads, "Modified Vectors:\n```json"]]
-    assert places == sorted(places)
-    assert "21.40 m along the lanes from the ego, on Lane1" in reply.text
-    assert '[{"Action": "add", "Modified_Agent": "Agent2"}]' in reply.text
-
-
-def test_a_scene_with_the_ego_off_every_lane_is_answered(server: FakeServer) -> None:
-    nowhere = scene(lanes=(), areas=(), ego=replace(scene().ego, lane_id=None))
-    assert outcome(server, "fake-careless", nowhere, WISH).status == "refused"

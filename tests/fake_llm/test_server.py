@@ -2,13 +2,9 @@ from __future__ import annotations
 
 import http.client
 import json
-import time
 from collections.abc import Mapping
 
-import pytest
-
-from augment.fake_llm.models import MODELS
-from augment.fake_llm.server import FakeServer, running
+from augment.fake_llm.server import FakeServer
 
 HELLO = {"role": "user", "content": "Hello"}
 
@@ -29,13 +25,6 @@ def call(
 def chat(server: FakeServer, **changes: object) -> tuple[int, Mapping[str, object]]:
     document = {"model": "fake-good", "messages": [HELLO]} | changes
     return call(server, "POST", "/v1/chat/completions", document)
-
-
-def test_it_lists_its_models(server: FakeServer) -> None:
-    status, answer = call(server, "GET", "/v1/models")
-    assert status == 200
-    assert isinstance(answer["data"], list)
-    assert [model["id"] for model in answer["data"]] == list(MODELS)
 
 
 def test_it_answers_a_conversation_and_the_same_one_the_same(server: FakeServer) -> None:
@@ -61,34 +50,3 @@ def test_a_bad_request_is_a_400_that_names_the_field(server: FakeServer) -> None
     assert isinstance(answer["error"], dict)
     assert answer["error"]["param"] == "colour"
     assert answer["error"]["type"] == "invalid_request_error"
-
-
-@pytest.mark.parametrize(
-    ("method", "path", "document", "status"),
-    [
-        ("GET", "/", None, 404),
-        ("POST", "/v1/completions", {}, 404),
-        ("POST", "/v1/chat/completions", None, 400),
-    ],
-)
-def test_other_addresses_get_an_error_in_json(
-    server: FakeServer, method: str, path: str, document: object, status: int
-) -> None:
-    got, answer = call(server, method, path, document)
-    assert got == status
-    assert isinstance(answer["error"], dict)
-
-
-def test_every_answer_can_be_delayed() -> None:
-    with running(latency_s=0.2) as slow:
-        started = time.monotonic()
-        assert chat(slow)[0] == 200
-        assert time.monotonic() - started >= 0.2
-
-
-def test_stopping_does_not_wait_for_a_slow_answer() -> None:
-    with running(slow_s=3600.0) as slow:
-        connection = http.client.HTTPConnection(*slow.server_address[:2], timeout=60)  # type: ignore[arg-type]
-        document = {"model": "fake-slow", "messages": [HELLO]}
-        connection.request("POST", "/v1/chat/completions", json.dumps(document))
-    connection.close()

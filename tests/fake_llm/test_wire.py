@@ -5,9 +5,7 @@ from dataclasses import replace
 
 import pytest
 
-from augment.fake_llm.png import size_of
 from augment.fake_llm.requests import BadRequest, chat_request, signature_of
-from augment.fake_llm.responses import completion
 from augment.llm.messages import Message, Request, Speaker, Tool, ToolCall, ToolChoice, data_url
 from augment.render.camera import camera_for
 from tests.render.pictures import draw_original
@@ -74,33 +72,6 @@ def test_a_request_that_breaks_the_rules_is_refused(sent: bytes, param: str | No
         assert raised.value.param == param
 
 
-def test_an_image_must_be_a_png_in_base64() -> None:
-    text = {"type": "text", "text": "Look"}
-    assert chat_request(body(messages=[HELLO | {"content": [text, PNG]}]))
-    damaged = [
-        b"",
-        PICTURE[:8],
-        PICTURE[:-20],
-        PICTURE[:5000] + PICTURE[5001:],
-        PICTURE.replace(b"IDAT", b"IDAX"),
-    ]
-    for url in ("data:image/png;base64,!", *map(data_url, damaged)):
-        with pytest.raises(BadRequest):
-            chat_request(
-                body(messages=[HELLO | {"content": [text, PNG | {"image_url": {"url": url}}]}])
-            )
-
-
-def test_tokens_are_counted_from_what_was_said() -> None:
-    request = chat_request(body(messages=[HELLO | {"content": "x" * 400}]))
-    usage = completion(request, "y" * 40)["usage"]
-    assert usage == {"prompt_tokens": 101, "completion_tokens": 11, "total_tokens": 112}
-
-
-def test_a_picture_says_its_size() -> None:
-    assert size_of(PICTURE) == (2400, 1200)
-
-
 TOOL = Tool(name="look", description="Looks.", parameters={"type": "object"})
 CALL = ToolCall(
     id="call_1",
@@ -146,8 +117,3 @@ def test_a_call_is_answered_once_and_comes_back_as_it_was(
 ) -> None:
     with pytest.raises(BadRequest, match=said):
         chat_request(sent_with(*messages))
-
-
-def test_calls_need_their_tools_in_every_request() -> None:
-    with pytest.raises(BadRequest, match="tools are called and none is named"):
-        chat_request(sent_with(ASKED, CALLED, TOLD, tools=()))

@@ -5,7 +5,6 @@ from __future__ import annotations
 from pathlib import Path
 
 from bench.report import write_section
-from bench.rivals.figures import ELSEWHERE, section
 
 
 def test_a_section_replaces_its_own_and_nothing_else(tmp_path: Path) -> None:
@@ -17,9 +16,3 @@ def test_a_section_replaces_its_own_and_nothing_else(tmp_path: Path) -> None:
     assert page.read_text() == expected
     write_section("C", "more", page=page)
     assert page.read_text() == expected
-
-
-def test_quoted_rows_are_marked() -> None:
-    text = section([ELSEWHERE[0], ELSEWHERE[1], *ELSEWHERE], "load average 0.1", runs=3)
-    assert text.count("(measured elsewhere)") == 4
-    assert "could not be installed here" in text

@@ -12,10 +12,8 @@ from contextlib import closing
 from pathlib import Path
 
 import pytest
-from django.core.files.base import ContentFile
 
 from arena.config import private
-from arena.config.storage import WholeFiles
 from arena.exports.files import write_once
 from tests.house.source import ROOT
 
@@ -121,11 +119,6 @@ def test_a_folder_that_is_not_ours_alone_stays_open(tmp_path: Path) -> None:
     private.mend_folder(for_all, around=tmp_path / "program")
     private.mend_folder(above, around=above / "program")
     assert modes(tmp_path) == {"tmp": 0o777, "home": 0o755}
-
-
-def test_pictures_are_readable_by_their_owner_alone(tmp_path: Path) -> None:
-    WholeFiles(location=tmp_path).save("bev/ab/picture.png", ContentFile(b"..."))
-    assert modes(tmp_path) == {"bev": 0o700, "bev/ab": 0o700, "bev/ab/picture.png": 0o600}
 
 
 def test_processes_that_start_at_once_share_the_key_of_the_first(tmp_path: Path) -> None:

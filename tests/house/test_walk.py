@@ -22,12 +22,6 @@ def opened_first() -> dict[str, str]:
     return dict(rows)
 
 
-def test_every_stage_has_a_file_of_its_own_to_open_first() -> None:
-    files = opened_first()
-    assert len(files) == 13
-    assert len(set(files.values())) == 13
-
-
 @pytest.mark.parametrize("path", opened_first().values(), ids=lambda path: str(path))
 def test_it_says_what_comes_in_and_what_goes_out(path: str) -> None:
     words = ast.get_docstring(ast.parse((ROOT / path).read_text())) or ""

@@ -44,11 +44,6 @@ def test_holm_is_statsmodels(p_values: tuple[float, ...]) -> None:
     assert adjust_holm(p_values) == pytest.approx(list(expected))
 
 
-def test_what_was_not_tested_does_not_count_for_holm() -> None:
-    assert adjust_holm([None, 0.02, None, 0.03]) == [None, 0.04, None, 0.04]
-    assert adjust_holm([]) == []
-
-
 def test_pairs_are_made_over_shared_scenarios_and_say_which_is_nearer() -> None:
     base = {f"s{n}": 1.0 for n in range(len(DIFFERENCES))}
     far = {f"s{n}": 1.0 + one for n, one in enumerate(DIFFERENCES)} | {"alone": 99.0}

@@ -35,14 +35,6 @@ def test_objects_of_all_augmentations_count_once_each() -> None:
     assert found.box.median_m == 2.0
 
 
-def test_where_nothing_is_matched_there_is_no_box_but_a_count() -> None:
-    found = summarise([of(missing=1), of(missing=1)])
-    assert found.box is None
-    assert (found.n, found.missing) == (0, 2)
-    with pytest.raises(ValueError, match="at least one"):
-        box_of([])
-
-
 @given(values=st.lists(st.floats(0.0, 1e3), min_size=1, max_size=40))
 def test_a_box_is_in_order_and_loses_no_value(values: list[float]) -> None:
     box = box_of(values)

@@ -14,7 +14,6 @@ from prometheus_client.parser import text_string_to_metric_families
 from pytest_django import Settings
 
 from arena.serving import readiness
-from arena.serving.readiness import HeldLook, PartState
 from augment.broker import check_broker
 from augment.errors import QueueUnreachable
 from augment.models import Worker
@@ -42,10 +41,6 @@ def ask(path: str) -> tuple[int, dict[str, object]]:
     return answer.status_code, answer.json()
 
 
-def test_a_process_that_answers_is_healthy_whatever_else_is_gone(no_broker: None) -> None:
-    assert ask("/healthz") == (200, {"status": "ok"})
-
-
 def test_a_whole_installation_is_ready(broker: Broker) -> None:
     a_worker()
     parts = {"database": "ok", "broker": "ok", "workers": "ok"}
@@ -68,33 +63,6 @@ def test_a_worker_that_was_silent_for_too_long_makes_it_unready(
         held.forget()
     status, document = ask("/readyz")
     assert (status, document["parts"]["workers"]) == (503, "none")  # type: ignore[index]
-
-
-def test_many_who_ask_cost_one_look_in_five_seconds() -> None:
-    now, looked = 100.0, []
-
-    def look() -> PartState:
-        looked.append(now)
-        return PartState("broker", True, f"at {now:g}")
-
-    held = HeldLook(look, for_s=5, clock=lambda: now)
-    assert [held().state, held().state] == ["at 100", "at 100"]
-    now = 104.9
-    assert held().state == "at 100"
-    now = 105.0
-    assert held().state == "at 105"
-    assert looked == [100.0, 105.0]
-
-
-def test_broker_and_workers_are_not_asked_for_every_probe(broker: Broker) -> None:
-    a_worker()
-    assert ask("/readyz")[0] == 200
-    Worker.objects.all().delete()
-    current_app.conf.broker_url = "redis+socket:///nowhere/redis.sock"
-    assert ask("/readyz")[0] == 200
-    for held in readiness.HELD:
-        held.forget()
-    assert ask("/readyz")[0] == 503
 
 
 def test_a_broker_that_takes_calls_and_never_answers_is_unreachable(broker: Broker) -> None:
@@ -126,12 +94,6 @@ def test_without_a_database_nobody_is_sent_here(
     status, document = ask("/readyz")
     assert (status, document["status"]) == (503, "down")
     assert "10.0.0.7" not in str(document)
-
-
-def test_probes_are_not_sent_to_https(settings: Settings, broker: Broker) -> None:
-    settings.SECURE_SSL_REDIRECT = True
-    assert Client().get("/healthz").status_code == 200
-    assert Client().get("/login/").status_code == 301
 
 
 def read(text: str) -> dict[tuple[str, str], float]:

@@ -78,12 +78,6 @@ def test_a_call_in_another_form_is_understood_and_counts_as_mended(
     assert calls_in(around.format(written)) == (ONE_OF_THEM,)
 
 
-def test_a_call_over_several_lines_without_a_fence_is_one_call() -> None:
-    written = json.dumps({"call": "pose_on_lane", "arguments": ARGUMENTS}, indent=2)
-    (call,) = calls_in(f"I look it up:\n{written}\n")
-    assert (call.arguments, call.problem) == (ARGUMENTS, "")
-
-
 def test_many_calls_come_in_the_order_in_which_they_were_written() -> None:
     lines = [
         '{"call": "pose_on_lane", "arguments": {"distance_m": 1}}',
@@ -121,12 +115,6 @@ def test_a_call_that_can_not_be_understood_says_what_is_wrong(answer: str, probl
     (call,) = calls_in(answer)
     assert problem in call.problem
     assert not call.mended
-
-
-def test_another_function_by_its_name_is_a_call_of_something_that_there_is_not() -> None:
-    (call,) = calls_in('retrieve_suitable_pose(lane="Lane1", agent="Agent1", dist=21.4)')
-    assert call.name == "retrieve_suitable_pose"
-    assert call.arguments == {"lane": "Lane1", "agent": "Agent1", "dist": 21.4}
 
 
 @pytest.mark.parametrize(
@@ -185,8 +173,3 @@ def test_arguments_of_a_megabyte_are_refused_unread() -> None:
     short = "{" + ",".join(['"lane": 1'] * 10_000) + "}"
     assert "'lane' stands twice" in read_arguments(short).problem
     assert calls_in(doubled) == ()
-
-
-@given(st.text())
-def test_no_text_breaks_the_reader_of_arguments(text: str) -> None:
-    read_arguments(text)

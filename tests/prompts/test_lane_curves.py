@@ -1,10 +1,8 @@
 from __future__ import annotations
 
-import json
-
 from augment.prompts.lane_curves import control_points, lane_curves
 from augment.prompts.names import short_names
-from tests.scenes import curve, junction, scene
+from tests.scenes import curve, junction
 
 
 def test_lanes_and_connectors_are_curves_that_know_their_neighbours() -> None:
@@ -14,19 +12,6 @@ def test_lanes_and_connectors_are_curves_that_know_their_neighbours() -> None:
     assert curves["Lane1"].after == ("Connector1", "Connector2")
     assert (curves["Lane3"].before, curves["Lane3"].after) == (("Connector2",), ())
     assert curves["Connector1"].width_m == 3.5
-
-
-def test_what_is_not_shown_joins_nothing() -> None:
-    cross = junction()
-    curves = lane_curves(cross, short_names(cross), 18.0)
-    assert list(curves) == ["Lane1"]
-    assert curves["Lane1"].after == ()
-
-
-def test_a_straight_lane_is_written_as_its_ends_to_the_centimetre() -> None:
-    street = scene()
-    (lane1, _) = lane_curves(street, short_names(street), 30.0).values()
-    assert json.dumps(control_points(lane1.lane)) == ("[[[-15.0, 0.0], [30.0, 0.0]]]")
 
 
 def test_pieces_of_one_lane_share_the_point_at_their_joint() -> None:

@@ -1,13 +1,12 @@
 from __future__ import annotations
 
 import json
-import math
 from dataclasses import replace
 
 import pytest
 
 from augment.errors import ReplyUnreadable
-from augment.prompts.reply import notes_of, read_reply
+from augment.prompts.reply import read_reply
 from augment.scene.entities import AgentType, TrafficAgent
 from tests.scenes import scene, vehicle
 from tests.variants.answers import GOOD, agent, block
@@ -44,10 +43,6 @@ def test_agents_are_moved_and_removed_by_id() -> None:
     assert read.modification.removed == ("Agent3",)
 
 
-def test_an_empty_modification_is_readable() -> None:
-    assert read_reply(block(), scene()).modification.is_empty
-
-
 def test_a_refusal_is_read_with_none_in_its_sections_and_keeps_its_reason() -> None:
     refusal = (
         "Insights: There is no bus stop in this scene.\n\nSummary: none\n\n"
@@ -57,18 +52,6 @@ def test_a_refusal_is_read_with_none_in_its_sections_and_keeps_its_reason() -> N
     read = read_reply(refusal, scene())
     assert read.modification.is_empty
     assert read.notes == "There is no bus stop in this scene.\n\nnone"
-
-
-def test_a_pedestrian_may_walk() -> None:
-    walker = agent(type="PEDESTRIAN", width_m=0.8, length_m=0.9, walk_to=[21.4, 8], lane=None)
-    (added,) = read_reply(block(walker), scene()).modification.added
-    assert added.walk_to_m == (21.4, 8.0)
-    assert added.lane_id is None
-
-
-def test_a_heading_is_wrapped() -> None:
-    (added,) = read_reply(block(agent(heading_rad=4.0)), scene()).modification.added
-    assert added.heading_rad == pytest.approx(4.0 - 2.0 * math.pi)
 
 
 DRAFT = block(agent(x_m=3.0))
@@ -172,12 +155,6 @@ def test_odd_ids_of_a_scene_are_known_by_their_short_forms() -> None:
     with pytest.raises(ReplyUnreadable, match="its agents: Agent2") as raised:
         read_reply(block(remove=["Agent5"]), odd)
     assert "truck" not in str(raised.value)
-
-
-def test_notes_are_the_first_two_sections_in_any_dress() -> None:
-    dressed = GOOD.replace("Insights:", "## Insights:").replace("Summary:", "**Summary:**")
-    assert notes_of(dressed) == "One road, two lanes.\n\nA parked car ahead."
-    assert notes_of("nothing of that kind") == ""
 
 
 @pytest.mark.parametrize("axis", [0, 1], ids=["x", "y"])

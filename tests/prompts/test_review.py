@@ -13,7 +13,6 @@ from hypothesis import strategies as st
 
 from augment.errors import ReplyUnreadable
 from augment.prompts.review import (
-    Ratings,
     read_questions,
     read_ratings,
     read_sight,
@@ -43,10 +42,6 @@ PIECES = st.sampled_from(
         verdict(),
     ]
 )
-
-
-def test_the_mean_is_of_three() -> None:
-    assert Ratings(compliance=5, realism=4, logical_consistency=2).mean == pytest.approx(11 / 3)
 
 
 def test_sections_are_kept_and_the_block_counts() -> None:

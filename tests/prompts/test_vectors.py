@@ -16,15 +16,13 @@ from augment.prompts.names import short_names
 from augment.prompts.vectors import (
     agent_vectors,
     area_vectors,
-    compass,
     connector_vectors,
     lane_vectors,
-    relative_direction,
     scene_text,
 )
 from augment.scene.entities import Lane
 from tests.fixtures.shelf import SLUGS, entry, whole_scene
-from tests.scenes import curve, junction, scene, vehicle
+from tests.scenes import junction, scene, vehicle
 
 FloatArray = NDArray[np.float64]
 
@@ -65,19 +63,6 @@ def test_a_connector_is_from_to_light_turn_limit_and_points() -> None:
     ]
 
 
-def test_a_lane_that_is_not_shown_is_not_named_by_its_connector() -> None:
-    crossing = junction()
-    found = connector_vectors(crossing, short_names(crossing), 30.0)
-    assert [vector[:2] for vector in found.values()] == [["Lane1", "Lane2"], ["Lane1", "Lane3"]]
-    assert "Lane2" not in lane_vectors(crossing, short_names(crossing), 30.0)
-
-
-def test_what_lies_beyond_the_radius_is_left_out() -> None:
-    street = scene(agents=(vehicle("Agent2", 31.0, 0.0), vehicle("Agent3", 29.0, 0.0)))
-    assert list(agent_vectors(street, short_names(street), 30.0)) == ["Agent1", "Agent3"]
-    assert "Agent4" in scene_text(street, radius_m=30.0)
-
-
 def test_an_area_is_its_kind_and_a_boundary_cut_to_the_square() -> None:
     street = scene()
     areas = area_vectors(street, short_names(street), 20.0)
@@ -89,30 +74,6 @@ def test_an_area_is_its_kind_and_a_boundary_cut_to_the_square() -> None:
         (20.0, -4.25),
         (20.0, -1.75),
     ]
-
-
-def test_a_lane_that_bends_is_named_by_its_direction_beside_the_ego() -> None:
-    bend = curve()
-    assert lane_vectors(bend, short_names(bend), 80.0)["Lane1"][1:3] == ["Eastwards", "same"]
-
-
-@pytest.mark.parametrize(
-    ("degrees", "word", "relative"),
-    [
-        (0, "Eastwards", "same"),
-        (-44, "Southeastwards", "same"),
-        (46, "Northeastwards", "crossing"),
-        (90, "Northwards", "crossing"),
-        (-90, "Southwards", "crossing"),
-        (136, "Northwestwards", "opposite"),
-        (180, "Westwards", "opposite"),
-        (-180, "Westwards", "opposite"),
-        (359, "Eastwards", "same"),
-    ],
-)
-def test_directions_in_words(degrees: int, word: str, relative: str) -> None:
-    assert compass(math.radians(degrees)) == word
-    assert relative_direction(math.radians(degrees)) == relative
 
 
 def test_a_name_out_of_a_file_never_reaches_the_prompt() -> None:
@@ -141,11 +102,6 @@ def test_a_line_is_shown_from_its_first_to_its_last_point_within() -> None:
     near = Extent(radius_m=30.0, routes_m=None)
     assert near.span(Polyline([(-100.0, 0.0), (100.0, 0.0)])) == (70.0, 130.0)
     assert near.span(Polyline([(-100.0, 40.0), (100.0, 40.0)])) is None
-
-
-def test_a_bent_line_within_the_radius_keeps_its_very_end() -> None:
-    line = curve(20.0).lanes[0].centerline
-    assert Extent(radius_m=500.0, routes_m=None).span(line) == (0.0, line.length_m)
 
 
 def test_a_boundary_is_cut_and_loses_points_that_say_nothing() -> None:

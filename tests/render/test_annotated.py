@@ -32,20 +32,6 @@ def test_a_mark_is_round_its_agent_and_nowhere_else() -> None:
     assert np.abs(found - [25.0, 0.0]).max() < 4.0
 
 
-def test_what_is_doubtful_has_another_colour() -> None:
-    png = draw_annotated(
-        scene(), CHANGE, CAMERA, [FaultMark(number=1, agents=("Agent2",), is_wrong=False)]
-    )
-    assert len(places(png, palette.WRONG)) == 0
-    assert len(places(png, palette.DOUBTFUL)) > 400
-
-
-def test_a_line_leads_to_where_it_belongs() -> None:
-    mark = FaultMark(number=1, agents=("Agent2",), is_wrong=True, belongs_m=(40.0, 0.0))
-    found = places(draw_annotated(scene(), CHANGE, CAMERA, [mark]), palette.WRONG)
-    assert 40.0 <= found[:, 0].max() <= 41.0
-
-
 def test_what_is_missing_is_marked_where_it_belongs() -> None:
     mark = FaultMark(number=1, agents=(), is_wrong=True, belongs_m=(20.0, 3.5))
     found = places(draw_annotated(scene(), Modification(), CAMERA, [mark]), palette.WRONG)
@@ -65,15 +51,6 @@ def test_who_is_out_of_the_picture_or_gone_breaks_nothing() -> None:
     marks = [WRONG, FaultMark(number=2, agents=("Agent77",), is_wrong=True)]
     found = places(draw_annotated(scene(), far, CAMERA, marks), palette.WRONG)
     assert len(found) > 800
-
-
-def test_the_stamp_is_there_when_it_is_asked_for() -> None:
-    plain, stamped = (
-        draw_annotated(scene(), CHANGE, CAMERA, [WRONG], stamp=stamp)
-        for stamp in ("", "SIMULATED")
-    )
-    assert len(places(plain, palette.STAMP)) == 0
-    assert len(places(stamped, palette.STAMP)) > 200
 
 
 def test_a_picture_for_a_vote_has_none_of_it() -> None:

@@ -25,10 +25,6 @@ def line_of(agent: TrafficAgent) -> DescribedAgent:
     return line
 
 
-def test_nothing_changed_is_an_empty_list() -> None:
-    assert describe(STREET, Modification()) == []
-
-
 @pytest.mark.parametrize(
     ("x_m", "y_m", "ahead_m", "left_m"),
     [
@@ -55,26 +51,12 @@ def test_headings_are_told_in_steps_of_five_degrees(degrees: float, told: int) -
     assert line_of(vehicle("new", 10.0, 0.0, math.radians(degrees + 360))).heading_deg == told
 
 
-def test_what_moves_has_its_speed_and_what_stands_has_none() -> None:
-    assert line_of(replace(vehicle("new", 10.0, 0.0), speed_mps=8.34)).speed_mps == 8.3
-    assert line_of(replace(vehicle("new", 10.0, 0.0), speed_mps=0.29)).speed_mps == 0.0
-    assert line_of(cone("new", 10.0, 0.0)).speed_mps is None
-
-
 def test_who_walks_has_the_end_of_the_walk_in_place_of_a_speed() -> None:
     walker = pedestrian("new", 12.0, 5.0, walk_to_m=(12.04, -4.96))
     line = line_of(replace(walker, speed_mps=1.4))
     assert (line.walk_to_m, line.speed_mps, line.heading_deg) == ((12.0, -5.0), None, -90)
     still = line_of(pedestrian("new", 12.0, 5.0, walk_to_m=(12.05, 5.0)))
     assert (still.walk_to_m, still.speed_mps) == (None, 0.0)
-
-
-def test_a_thing_without_a_front_has_no_heading() -> None:
-    turned = replace(cone("new", 10.0, 0.0), heading_rad=1.0)
-    assert (line_of(turned).heading_deg, line_of(turned).along_deg) == (None, None)
-    for degrees, along in ((0, 0), (180, 0), (90, 90), (-90, 90), (150, -30)):
-        bar = replace(turned, type=AgentType.BARRIER, heading_rad=math.radians(degrees))
-        assert (line_of(bar).heading_deg, line_of(bar).along_deg) == (None, along)
 
 
 def test_the_nearest_come_first_then_the_kinds_then_what_is_gone() -> None:

@@ -12,11 +12,6 @@ from tests.scenes import cone, junction, pedestrian, scene, vehicle
 VIEW = {"px_per_m": 20.0, "ego_px": [300.0, 400.0], "width": 1200, "height": 800}
 
 
-def test_an_empty_street_has_the_ego_and_its_lanes() -> None:
-    assert scene_keys(scene(), VIEW) >= {"ego", "grid", "own"}
-    assert not scene_keys(scene(), VIEW) & {"changed", "cone", "junction", "walk", "goal"}
-
-
 def test_traffic_junctions_and_goals_are_named_where_they_are_drawn() -> None:
     moving = replace(vehicle("Agent2", 20.0, 0.0), speed_mps=5.0)
     assert scene_keys(scene(agents=(moving,)), VIEW) >= {"recorded", "motion"}

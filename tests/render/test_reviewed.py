@@ -59,31 +59,6 @@ def test_every_edited_object_and_every_lane_near_it_carries_its_label(monkeypatc
             assert apart, (word, other)
 
 
-def test_the_lanes_centre_is_seen_on_a_box_that_stands_on_it() -> None:
-    base, change = scene(), added(vehicle("Agent2", 20.0, 0.0))
-    camera = camera_for(base, change)
-    (png,) = draw_for_review(base, change, camera)
-    row = pixels(png)[round(camera.to_pixels(np.array([[20.0, 0.0]]))[0, 1])]
-    left, right = camera.to_pixels(np.array([[17.8, 0.0], [19.5, 0.0]]))[:, 0].round().astype(int)
-    inside = row[left:right].astype(int)
-    blue = np.array(palette.CHANGED_MARK.fill)
-    assert (np.abs(inside - blue).sum(axis=1) > 120).mean() > 0.4
-
-
-def test_the_edges_of_connectors_are_dotted_near_the_change_alone() -> None:
-    base = junction()
-    far, near = added(vehicle("Agent2", 5.0, 0.0)), added(vehicle("Agent2", 25.0, 0.0))
-    camera = camera_for(base, near)
-    edge = camera.to_pixels(np.array([[24.0, -1.75], [32.0, -1.75]])).round().astype(int)
-
-    def dark(change: Modification) -> int:
-        picture = pixels(draw_for_review(base, change, camera)[0])
-        band = picture[edge[0, 1] - 2 : edge[0, 1] + 3, edge[0, 0] : edge[1, 0]].astype(int)
-        return int((band.sum(axis=2) < 200).sum())
-
-    assert dark(near) > dark(far) + 20
-
-
 def test_what_is_small_is_shown_enlarged_as_well() -> None:
     base = scene()
     assert (

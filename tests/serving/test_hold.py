@@ -30,13 +30,6 @@ def test_a_second_supervisor_is_kept_out_while_the_first_is_there() -> None:
         pytest.fail("two hold the same folder")
 
 
-def test_the_folder_is_free_again_when_the_first_has_ended() -> None:
-    with hold_alone(print):
-        pass
-    with hold_alone(print):
-        pass
-
-
 @override_settings(REDIS_IS_PRIVATE=False)
 def test_with_a_redis_of_their_own_several_may_run() -> None:
     with hold_alone(print), hold_alone(print):

@@ -11,10 +11,8 @@ from pathlib import Path
 
 import psutil
 import pytest
-from django.conf import settings
 
 from arena.serving.child import Program
-from arena.serving.stack import background
 from arena.serving.supervisor import ALIVE_EVERY_S, ChildFailed, Supervisor, wait_s
 from tests.processes import wait_until
 
@@ -75,12 +73,6 @@ def test_a_program_that_ends_while_starting_shows_its_last_lines_and_stops_the_o
     with pytest.raises(ChildFailed, match=r"(?s)two ended with exit code 3.*no such table"):
         supervisor.start()
     assert supervisor._places == []
-
-
-def test_a_program_that_never_gets_ready_is_named() -> None:
-    supervisor = Supervisor([program("slow", SLEEP, is_ready=lambda: False, within_s=0.3)], Said())
-    with pytest.raises(ChildFailed, match="slow is not ready"):
-        supervisor.start()
 
 
 def test_a_crashed_program_is_started_again() -> None:
@@ -184,20 +176,6 @@ def test_who_ran_for_a_minute_begins_anew(clock: Clock, ran_s: float, crashes: i
     supervisor.stop()
 
 
-def test_who_waits_for_the_programs_is_told_of_one_that_keeps_crashing() -> None:
-    code = "print('disk full'); raise SystemExit(1)"
-    supervisor = Supervisor([program("broken", code)], Said(), clock=lambda: 0.0)
-    supervisor.start()
-    place = supervisor._places[0]
-    wait_until(lambda: place.child.exit_code is not None, what="it has crashed")
-    supervisor.check()
-    supervisor.insist_on_steadiness()
-    place.crashes = 4
-    with pytest.raises(ChildFailed, match=r"(?s)broken crashed 4 times in a row.*disk full"):
-        supervisor.insist_on_steadiness()
-    supervisor.stop()
-
-
 DRAINS = """
 import os, signal, sys, time
 def drain(*_):
@@ -228,16 +206,6 @@ def draining(said: Said, may_end: Path) -> tuple[Supervisor, threading.Thread]:
     return supervisor, stopping
 
 
-def test_a_program_has_its_time_to_end(tmp_path: Path) -> None:
-    said = Said()
-    _, stopping = draining(said, tmp_path / "may-end")
-    (tmp_path / "may-end").touch()
-    stopping.join(60)
-    assert not stopping.is_alive()
-    assert ("worker", "drained") in said.lines
-    assert any("at most 600 s (Ctrl-C once more" in line for _, line in said.lines)
-
-
 def test_a_second_request_to_stop_ends_it_at_once(tmp_path: Path) -> None:
     said = Said()
     supervisor, stopping = draining(said, tmp_path / "may-end")
@@ -247,13 +215,6 @@ def test_a_second_request_to_stop_ends_it_at_once(tmp_path: Path) -> None:
         stopping.join(60)
     assert not stopping.is_alive()
     assert ("worker", "drained") not in said.lines
-
-
-@pytest.mark.django_db
-def test_a_worker_has_the_time_of_a_call_to_end() -> None:
-    *_, worker = background(concurrency=1)
-    assert worker.name == "worker"
-    assert worker.grace_s >= max(60.0, settings.LLM_TIMEOUT_S)
 
 
 def test_a_program_that_does_not_listen_is_killed_with_everything_it_started() -> None:

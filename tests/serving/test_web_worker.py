@@ -6,7 +6,6 @@ import http.client
 import os
 import socket
 import sys
-import threading
 from collections.abc import Iterator
 from contextlib import ExitStack, closing, contextmanager
 from dataclasses import dataclass
@@ -20,7 +19,6 @@ from arena.serving import web_worker
 from arena.serving.probes import port_answers
 from arena.serving.web_worker import Connection, make_room
 from tests.processes import Process, wait_until
-from tests.serving.served import LONG
 from tests.stack import free_port
 
 GENEROUS_S = 60.0
@@ -87,40 +85,8 @@ def test_slow_connections_block_nobody(served: Served, count: int, beginning: by
         assert served.get() == b"hello"
 
 
-def test_what_was_slow_is_answered_when_it_is_whole(served: Served) -> None:
-    with served.sent(b"POST / HTTP/1.1\r\nHost: a\r\nContent-Length: 8\r\n\r\nfour") as slow:
-        assert served.get() == b"hello"
-        slow.sendall(b"more")
-        assert slow.recv(65_536).endswith(b"8") or slow.recv(65_536).endswith(b"8")
-
-
-def test_a_long_answer_comes_whole(served: Served) -> None:
-    assert len(served.get("/long")) == LONG
-
-
 def test_headers_of_proxies_are_left_to_the_settings(served: Served) -> None:
     assert served.get(headers={"X-Forwarded-For": "192.0.2.7"}) == b"192.0.2.7"
-
-
-def test_what_has_come_in_is_answered_before_it_ends(tmp_path: Path) -> None:
-    with serving(tmp_path) as served:
-        check_it_answers_and_ends(served)
-
-
-def check_it_answers_and_ends(served: Served) -> None:
-    answers: list[bytes] = []
-    asking = threading.Thread(target=lambda: answers.append(served.get("/held")))
-    asking.start()
-    wait_until((served.folder / "came-in").exists, what="the request is worked on")
-    stopping = threading.Thread(target=served.process.stop)
-    stopping.start()
-    wait_until(
-        lambda: not port_answers("127.0.0.1", served.port), what="nothing new is taken any more"
-    )
-    (served.folder / "go-on").touch()
-    asking.join(GENEROUS_S)
-    stopping.join(GENEROUS_S)
-    assert answers == [b"held"]
 
 
 # --- Which connections are closed ----------------------------------------------------------------

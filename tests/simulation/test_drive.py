@@ -18,7 +18,7 @@ from augment.geometry.frames import Pose
 from augment.geometry.polyline import Polyline
 from augment.scene.entities import Lane, Scene, TrafficAgent
 from augment.scene.modification import Modification
-from augment.simulation.drive import Drive, run
+from augment.simulation.drive import run
 from augment.simulation.expert import ExpertKind, expert_of
 from augment.simulation.idm_planner import IdmPlanner
 from augment.simulation.pdm_closed import PdmClosed
@@ -26,7 +26,7 @@ from augment.simulation.planning import Plan, Situation
 from augment.simulation.road import Road
 from augment.simulation.score import score_drive
 from augment.simulation.setting import DriveSetting
-from augment.simulation.states import EgoBody, FloatArray, X, Y
+from augment.simulation.states import EgoBody, X, Y
 from tests.properties import examples
 from tests.scenes import pedestrian, vehicle
 from tests.simulation.worlds import street
@@ -141,15 +141,6 @@ def test_the_expert_is_an_idm_drive_without_the_change() -> None:
     assert 40.0 < expert.progress_m < 50.0
 
 
-def test_the_idm_planner_waits_behind_what_stands() -> None:
-    blocked = DriveSetting(
-        scene=street(), modification=Modification(added=(vehicle("A", 40.0, 0.0),))
-    )
-    drive = run(blocked, IdmPlanner(), steps=80)
-    assert drive.states[-1, 3] < 0.3
-    assert 0.3 < 40.0 - 2.4 - (drive.boxes[-1, 0] + 2.588) < 2.0
-
-
 class Straight:
     """Keeps speed and heading."""
 
@@ -163,33 +154,12 @@ class Straight:
         return Plan(poses=np.stack([x + way * cos, y + way * sin, np.full(20, heading)], axis=1))
 
 
-class Wrong(Straight):
-    """Answers with places instead of poses."""
-
-    def plan(self, situation: Situation) -> Plan:
-        return Plan(poses=np.zeros((10, 2)))
-
-
 def test_a_planner_of_ones_own_is_driven() -> None:
     drive = run(DriveSetting(scene=street()), Straight(), steps=10)
     assert drive.boxes[-1, 0] == pytest.approx(8.0, abs=1e-6)
-
-
-def test_an_answer_of_another_shape_names_it() -> None:
-    with pytest.raises(CannotDrive, match=r"\(10, 2\)"):
-        run(DriveSetting(scene=street()), Wrong(), steps=10)
 
 
 def test_an_ego_off_every_lane_can_not_be_driven() -> None:
     lost = replace(street(), ego=replace(street().ego, y_m=-30.0))
     with pytest.raises(CannotDrive, match="no lane"):
         run(DriveSetting(scene=lost), Straight())
-
-
-def test_progress_is_told_after_every_step() -> None:
-    told: list[int] = []
-    made: Drive = run(DriveSetting(scene=street()), Straight(), steps=5, after_step=told.append)
-    assert told == [1, 2, 3, 4, 5]
-    assert len(made.plans) == 5
-    shape: FloatArray = made.states
-    assert shape.shape == (6, 6)

@@ -44,13 +44,6 @@ def test_a_region_answers_as_its_polygon_does(seed: int) -> None:
     assert (found == shapely.contains_xy(ground, points[..., 0], points[..., 1])).all()
 
 
-def test_a_region_of_nothing_holds_nothing() -> None:
-    empty = Region(shapely.Polygon())
-    points = np.array([[0.0, 0.0]])
-    assert not empty.contains(points).any()
-    assert empty.distance_m(points)[0] == np.inf
-
-
 @examples(25)
 @given(st.integers(0, 2**32 - 1))
 def test_places_beside_a_path_are_those_of_the_whole_line(seed: int) -> None:
@@ -69,22 +62,6 @@ def test_places_beside_a_path_are_those_of_the_whole_line(seed: int) -> None:
     assert np.abs(d_m) == pytest.approx(shapely.distance(shapely.points(points), whole), abs=1e-9)
     assert s_m == pytest.approx(shapely.line_locate_point(whole, shapely.points(points)), abs=1e-6)
     assert (np.sign(d_m) == np.sign(aside))[np.abs(aside) > 0.05].all()
-
-
-def test_a_path_goes_straight_on_beyond_its_ends() -> None:
-    path = Path(dense(np.array([[0.0, 0.0], [10.0, 0.0]])))
-    assert path.poses(np.array([-2.0, 12.5])).tolist() == [[-2.0, 0.0, 0.0], [12.5, 0.0, 0.0]]
-    s_m, d_m = path.beside(np.array([[-3.0, 1.0], [15.0, -2.0]]))
-    assert s_m.tolist() == [-3.0, 15.0]
-    assert d_m.tolist() == [1.0, -2.0]
-
-
-def test_a_parallel_of_a_circle_is_a_circle() -> None:
-    angle = np.linspace(0.0, 2.0, 400)
-    path = Path(dense(20.0 * np.stack([np.sin(angle), 1.0 - np.cos(angle)], axis=1)))
-    inner = path.offset(4.0)
-    assert np.hypot(*(inner.points_m - [0.0, 20.0]).T) == pytest.approx(16.0, abs=0.01)
-    assert inner.length_m == pytest.approx(32.0, abs=0.3)
 
 
 @pytest.mark.parametrize("count", [20, 41, 151])

@@ -7,9 +7,7 @@ from types import ModuleType
 
 import pytest
 
-from augment.errors import CannotDrive, UnknownName
 from augment.simulation.drive import run
-from augment.simulation.pdm_closed import PdmClosed
 from augment.simulation.planners import planner_named
 from augment.simulation.setting import DriveSetting
 from tests.house.source import ROOT
@@ -27,11 +25,3 @@ def test_the_documented_planner_drives(monkeypatch: pytest.MonkeyPatch) -> None:
     planner = planner_named(name, allowed=[name])
     drive = run(DriveSetting(scene=street()), planner, steps=10)
     assert drive.boxes[-1, 0] == pytest.approx(8.0, abs=0.01)
-
-
-def test_planners_have_names() -> None:
-    assert isinstance(planner_named("pdm-closed", offsets="original"), PdmClosed)
-    with pytest.raises(UnknownName, match="pdm-open"):
-        planner_named("pdm-open")
-    with pytest.raises(CannotDrive, match="no planner"):
-        planner_named("fractions.Fraction", allowed=["fractions.Fraction"])

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from typing import Any
 
 import pytest
@@ -12,13 +11,10 @@ from django.test import Client
 from django.urls import reverse
 
 from arena.services.studies import close_study
-from augment.models import Contestant, Event, Scenario
-from tests.web.cast import World, people, signed_in, world
+from augment.models import Contestant, Scenario
+from tests.web.cast import people, signed_in, world
 
 pytestmark = pytest.mark.django_db
-
-
-Act = Callable[[Client, World], None]
 
 
 def fields_of(page: Any) -> dict[str, Any]:
@@ -47,31 +43,6 @@ def edit(office: Client, row: Any, **changes: Any) -> None:
     kept = {name: value for name, value in sent.items() if value is not None}
     answer = office.post(address, kept)
     assert answer.status_code == 302, answer.context["errors"]
-
-
-def add_account(office: Client, username: str) -> User:
-    sent = {"username": username, "usable_password": "false"}
-    assert office.post(reverse("admin:auth_user_add"), sent).status_code == 302
-    return User.objects.get(username=username)
-
-
-def with_groups(name: str, *groups: str, **more: Any) -> Act:
-    def act(office: Client, here: World) -> None:
-        keys = list(Group.objects.filter(name__in=groups).values_list("pk", flat=True))
-        edit(office, add_account(office, name), groups=keys, **more)
-
-    return act
-
-
-def test_who_is_made_in_the_admin_can_be_chosen_by_the_forms() -> None:
-    office = signed_in(people()["admin"])
-    with_groups("new-expert", "expert")(office, None)  # type: ignore[arg-type]
-    account = User.objects.get(username="new-expert")
-    assert account.person.pseudonym == f"Person {account.pk}"
-    assert "new-expert" in office.get(reverse("study-new")).content.decode()
-    logged = Event.objects.filter(object_code=str(account.person.code)).order_by("pk")
-    assert [line.verb for line in logged] == ["add", "change"]
-    assert [(line.after or {})["groups"] for line in logged] == [[], ["expert"]]
 
 
 def test_names_that_plans_and_roles_hang_on_stay() -> None:

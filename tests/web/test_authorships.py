@@ -111,24 +111,6 @@ def test_staff_read_both_versions_of_the_table_and_who_is_an_author() -> None:
     assert "marked an author" in page(analyst, study, "results-tab", "log")
 
 
-def test_a_rating_without_them_is_asked_for_by_a_box_and_says_so() -> None:
-    study = full_study(size=SIZE)
-    analyst = signed_in(people()["analyst"])
-    mark(study, "expert-1", "gpt-4o-otm")
-    rated(study)
-    assert "Leave out votes of authors on their own contestants" in page(analyst, study, "results")
-    sent = {"rounds": "50", "leave_out_own": "on"}
-    shown = analyst.post(reverse("study-rate", args=[study.code]), sent, follow=True)
-    text = re.sub(r"<a [^>]*>|</a>", "", shown.content.decode())
-    said = " ".join(text.split())
-    own = study.snapshots.latest("pk").votes_left_out["own"]
-    assert f"Left out: {own} by authors on their own contestants." in said
-    assert "Votes of authors on their own contestants are left out." in said
-    assert "The table above leaves them out." in said
-    log = page(analyst, study, "results-tab", "log")
-    assert "Votes of authors on their own contestants are left out." in log
-
-
 # --- Experts -----------------------------------------------------------------------------------
 
 

@@ -2,13 +2,8 @@
 
 from __future__ import annotations
 
-import csv
-import io
-from pathlib import Path
-
 import pytest
 from django.contrib.auth.models import User
-from django.core.management import CommandError, call_command
 from django.test import Client
 from django.urls import reverse
 
@@ -100,25 +95,6 @@ def test_it_has_no_results_for_anybody_also_where_somebody_rated_early(
     assert reverse("results", args=[study.code]) not in shown
 
 
-def test_its_votes_are_exported_as_votes(study: Study, admin: Client, tmp_path: Path) -> None:
-    cancel_study(study=study)
-    address = reverse("results-votes-export", args=[study.code, "csv"])
-    answer = admin.get(address)
-    lines = list(csv.DictReader(io.StringIO(answer.content.decode())))
-    assert len(lines) == 3, "a skip says nothing"
-    assert {line["winner"] for line in lines} == {"model_a"}
-    eva = User.objects.get(username="eva")
-    assert {line["judge"] for line in lines} == {eva.person.pseudonym}
-    assert signed_in(eva).get(address).status_code == 403
-    out = tmp_path / "votes.csv"
-    call_command("export", "votes", "Round 1", "--out", str(out))
-    assert out.read_bytes() == answer.content
-    with pytest.raises(CommandError, match="cancelled"):
-        call_command("export", "leaderboard", "Round 1", "--out", str(tmp_path / "table.csv"))
-    with pytest.raises(CommandError, match="was cancelled"):
-        call_command("export", "study", "Round 1", "--out", str(tmp_path / "study"))
-
-
 def test_closed_and_cancelled_exclude_each_other(study: Study) -> None:
     cancel_study(study=study)
     assert cancel_study(study=study).state == "cancelled"
@@ -128,10 +104,3 @@ def test_closed_and_cancelled_exclude_each_other(study: Study) -> None:
     Study.objects.update(state="closed")
     with pytest.raises(StudyNotOpen, match="is closed"):
         cancel_study(study=study)
-
-
-def test_the_command_wants_the_name_once_more(study: Study) -> None:
-    with pytest.raises(CommandError, match="Nothing was cancelled"):
-        call_command("cancel_study", "Round 1", "--sure", "Round")
-    call_command("cancel_study", "Round 1", "--sure", "Round 1", "--why", "A test.")
-    assert Study.objects.get().state == "cancelled"

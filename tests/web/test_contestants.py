@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import pytest
-from django.core.management import CommandError, call_command
 from django.urls import reverse
 
 from augment.models import Contestant, EndpointModel, Event
@@ -71,17 +70,3 @@ def test_a_retired_contestant_is_offered_no_more_and_keeps_its_page() -> None:
     told = set(Event.objects.filter(object_code=row.code).values_list("verb", flat=True))
     assert {"retire", "take back"} <= told
     assert other.retired_at is None
-
-
-def test_the_command_retires_all_that_are_named_or_none(
-    capsys: pytest.CaptureFixture[str],
-) -> None:
-    add()
-    with pytest.raises(CommandError, match="contestant 'nobody'"):
-        call_command("retire_contestant", "one", "nobody")
-    assert Contestant.objects.get(slug="one").retired_at is None
-    call_command("retire_contestant", "one")
-    assert "one: retired." in capsys.readouterr().out
-    assert Contestant.objects.get(slug="one").retired_at is not None
-    call_command("retire_contestant", "one", "--take-back")
-    assert Contestant.objects.get(slug="one").retired_at is None

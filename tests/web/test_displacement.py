@@ -49,12 +49,6 @@ def test_a_jobs_page_shows_the_error_of_every_contestant_and_marks_the_simulated
     assert "All five scenario types." in shown
 
 
-def test_by_variant_it_says_which_types_are_left_out_and_where_the_papers_boxes_are_from() -> None:
-    shown = page(a_job(), "?by=variant")
-    assert "Read from the paper’s figure GPT-4o OTM 1.50 1.20 to 2.10" in shown
-    assert "construction zone and accident site are left out" in shown
-
-
 def test_an_augmentations_page_says_what_is_wrong_with_it_and_how_far_it_is() -> None:
     shown = page_of(crash())
     assert "Agent2 and the ego overlap by" in shown

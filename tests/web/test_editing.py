@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import html
 import json
 import re
 
@@ -48,20 +47,6 @@ def given(shown: str, name: str) -> object:
     found = re.search(rf'<script id="{name}" type="application/json">(.*?)</script>', shown)
     assert found is not None
     return json.loads(found.group(1))
-
-
-def test_the_page_gets_the_traffic_and_the_picture_once_it_is_drawn(analyst: Client) -> None:
-    here = busy()
-    url = reverse("reference-edit", args=[here.code])
-    assert "A worker is drawing it." in analyst.get(url).content.decode()
-    shown = analyst.get(url).content.decode()
-    assert "editor.js" in shown or "js/editor" in shown
-    found = given(shown, "scene")
-    assert isinstance(found, dict)
-    assert [agent["id"] for agent in found["agents"]] == ["Agent2"]
-    assert found["sizes"]["TRAFFIC_CONE"] == {"length_m": 0.5, "width_m": 0.5}
-    assert given(shown, "modification") is None
-    assert html.escape(here.instruction) in shown
 
 
 def test_a_drawn_reference_is_kept_and_shown(analyst: Client) -> None:

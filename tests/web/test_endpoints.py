@@ -3,13 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from datetime import timedelta
 from decimal import Decimal
 
 import pytest
 from django.test import Client
 from django.urls import reverse
-from django.utils import timezone
 
 from augment.fake_llm.server import FakeServer, running
 from augment.llm.questions import Ability
@@ -164,11 +162,3 @@ def test_a_probe_is_asked_for_on_the_page_and_its_lines_appear_one_by_one(
     model.refresh_from_db()
     assert (model.vision, model.native_tools) == (False, True)
     assert not probing.make_probe(probe.pk), "a second message asks nothing"
-
-
-def test_a_probe_whose_worker_died_is_given_up(model: EndpointModel) -> None:
-    probe = probing.plan_probe(model)
-    assert probing.give_up_stale() == 0
-    assert probing.give_up_stale(now=timezone.now() + timedelta(days=1)) == 1
-    probe.refresh_from_db()
-    assert (probe.state, probe.reason) == ("failed", "The worker ended, or none ever took it.")

@@ -3,23 +3,17 @@
 from __future__ import annotations
 
 import re
-import uuid
-from html import unescape
-from pathlib import Path
 
 import pytest
-from django.core.management import call_command
 from django.test import Client
 from django.urls import reverse
 
-from arena.models import FaultLabel, LabellingRound, LabelTask, Snapshot, Study
-from arena.queries.galleries import VoteScore, by_faults, disagreement, disputed_pairs, pictures_of
+from arena.models import Snapshot
+from arena.queries.galleries import VoteScore, disagreement, disputed_pairs, pictures_of
 from arena.services.ratings import rate
-from arena.services.shown_pictures import SampleRule
 from arena.services.studies import close_study
 from augment.models import Augmentation
 from augment.services.scenarios.pictures import store
-from tests.studies.test_samples import opened, sampled
 from tests.study_rows import a_study, hang, vote
 from tests.web.cast import people, png, signed_in
 
@@ -114,59 +108,6 @@ def test_the_worst_picture_is_the_one_that_lost_most(rated: Snapshot, analyst: C
     assert len(pictures_in(shown)) == 6
 
 
-def test_faults_come_first_once_experts_have_labelled_some(
-    rated: Snapshot, analyst: Client
-) -> None:
-    assert "No expert has labelled faults" in page(
-        analyst, rated, "results-worst", contestant="bob", order="faults"
-    )
-    found = pictures_of(rated, "bob")
-    for number, one in enumerate(found[:3]):
-        _label(Augmentation.objects.get(code=one.augmentation), faulty=number == 2)
-    ordered = by_faults(pictures_of(rated, "bob"))
-    assert [one.faulty for one in ordered] == [1, 0, 0]
-    assert ordered[0].augmentation == found[2].augmentation
-    shown = page(analyst, rated, "results-worst", contestant="bob", order="faults")
-    assert "1 of 1 expert found faults" in shown
-
-
-def _label(row: Augmentation, *, faulty: bool) -> None:
-    study = Study.objects.get()
-    expert = study.experts.order_by("pk")[0]
-    labelling = LabellingRound.objects.create(name=str(uuid.uuid4()), job=row.job, seed=1)
-    task = LabelTask.objects.create(
-        labelling=labelling, expert=expert, position=1, augmentation=row
-    )
-    FaultLabel.objects.create(
-        augmentation=row, expert=expert, task=task, position=faulty, heading=False, logic=False
-    )
-
-
-def test_a_picture_of_one_sample_has_the_votes_on_that_sample_alone(analyst: Client) -> None:
-    """Both experts say the same of each sample, and the opposite of the other one."""
-    sampled(samples=2, places=3)
-    study = opened(votes=18, places=3, samples=SampleRule.ALL)
-    for matchup in study.matchups.select_related("left__contestant", "right__contestant"):
-        first = matchup.left.contestant.slug < matchup.right.contestant.slug
-        vote(matchup, "left" if first == (matchup.left.sample == 1) else "right")
-    snapshot = rate(study=close_study(study=study), rounds=10)
-    units = disputed_pairs(snapshot)
-    assert [one.disagreement for one in units] == [0.0] * 18
-    found = pictures_of(snapshot, "ann")
-    assert [(one.sample, one.score.lost_share) for one in found] == [(2, 1.0)] * 3 + [(1, 0.0)] * 3
-    wrong = {}
-    for name in ("results-disagreement", "results-worst"):
-        shown = page(analyst, snapshot, name, contestant="ann")
-        assert "sample 2" in shown
-        links = re.findall(r'href="([^"]*sample=[^"]*)" data-votes="(\d+)"', shown)
-        assert links
-        for address, number in links[:6]:
-            votes = analyst.get(unescape(address)).content.decode()
-            if f'<b id="found">{number} vote' not in votes:
-                wrong[address] = number
-    assert wrong == {}
-
-
 def test_the_sheet_has_every_contestant_of_a_scenario(rated: Snapshot, analyst: Client) -> None:
     shown = page(analyst, rated, "results-sheet")
     assert len(pictures_in(shown)) == len(set(pictures_in(shown))) == 18
@@ -199,9 +140,3 @@ def test_galleries_need_an_early_look_in_an_open_study(analyst: Client) -> None:
     assert [analyst.get(address).status_code for address in addresses] == [200] * 4
     close_study(study=study)
     assert [eva.get(address).status_code for address in addresses] == [403] * 4
-
-
-def test_the_command_writes_the_whole_sheet(rated: Snapshot, tmp_path: Path) -> None:
-    out = tmp_path / "sheet.pdf"
-    call_command("export", "contact-sheet", rated.study.name, out=str(out))
-    assert out.read_bytes().count(b"/Subtype /Image") == 18

@@ -16,7 +16,6 @@ from augment.models import BaseScene, Scenario
 from augment.scene.intent_codec import intent_to_document
 from augment.services.scenarios.intent_fields import (
     FIELDS,
-    NEW_ROW,
     IntentFields,
     fields_of_intent,
     intent_of_fields,
@@ -64,21 +63,6 @@ def test_every_intent_of_the_catalogue_comes_back_from_the_fields() -> None:
             continue
         document = intent_to_document(intent)
         assert intent_of_fields(fields_of_intent(document)) == document, slug
-
-
-def test_fields_alone_say_a_chain() -> None:
-    fields = IntentFields(
-        rows=(
-            row(kind="vehicles", name="bus", distance_m="20", relation="ahead", body="bus"),
-            NEW_ROW,
-            row(kind="walk", anchor="bus", distance_m="3", relation="ahead", start="left"),
-        )
-    )
-    made = intent_of_fields(fields)
-    assert made is not None
-    assert [one["kind"] for one in made["requests"]] == ["vehicles", "walk"]
-    assert made["requests"][1]["spot"]["anchor"] == "bus"
-    assert "count" not in made["requests"][0], "what is empty is left open"
 
 
 @pytest.mark.parametrize(

@@ -19,7 +19,6 @@ from tests.jobs.rows import add_scenario
 from tests.web.cast import people, signed_in
 
 pytestmark = pytest.mark.django_db
-LINE = intent_to_document(cones(20.0, 1, Shape.LINE))
 RING = intent_to_document(cones(25.0, 8, Shape.RING))
 
 
@@ -63,41 +62,11 @@ def test_what_a_model_read_is_shown_and_counts_once_accepted(staff: Client) -> N
     assert (scenario.intent, scenario.intent_origin) == (RING, "read")
 
 
-def test_what_was_read_is_changed_by_fields_first(staff: Client) -> None:
-    scenario = add_scenario("street", intent=None, intent_origin="")
-    endpoint = ensure_endpoint(label="here", base_url="http://127.0.0.1:1/v1")
-    open_ring = {**RING, "requests": [{**RING["requests"][0], "shape": None}]}
-    IntentReading.objects.create(
-        scenario=scenario, endpoint=endpoint, model="m", state="read", document=open_ring
-    )
-    assert "leaves open the shape" in send(staff, scenario, accept="1")
-    assert scenario.intent is None
-    change = f"/scenarios/{scenario.code}/intent/fields/?reading=1"
-    assert change in page(staff, scenario)
-    assert 'value="25"' in staff.get(change).content.decode()
-
-
 def test_a_file_replaces_the_intent_and_can_be_fetched_again(staff: Client) -> None:
     scenario = add_scenario("street")
     send(staff, scenario, file=file(json.dumps(RING)))
     assert (scenario.intent, scenario.intent_origin) == (RING, "entered")
     assert staff.get(f"/scenarios/{scenario.code}/intent.json").json() == RING
-
-
-@pytest.mark.parametrize(
-    ("text", "why"),
-    [
-        ("{", "The file is no JSON"),
-        ("[" * 100_000, "The file is no JSON"),
-        (json.dumps(LINE).replace("line", "zigzag"), "requests[0].cones.shape"),
-        ("[" * 200_001, "too long"),
-    ],
-)
-def test_a_file_that_is_no_intent_changes_nothing(staff: Client, text: str, why: str) -> None:
-    scenario = add_scenario("street")
-    assert why in send(staff, scenario, file=file(text))
-    assert scenario.intent == LINE
-    assert "Choose a JSON file" in send(staff, scenario)
 
 
 def test_an_admin_has_an_instruction_read_by_a_worker(

@@ -96,14 +96,6 @@ def test_every_cell_is_on_exactly_one_page(analyst: Client) -> None:
     assert len(seen) == len(set(seen)) == 7 * 12 * 12
 
 
-def test_marks_say_in_words_what_they_show_and_lead_to_the_augmentation(analyst: Client) -> None:
-    job = large_job(scenarios=2, contestants=1)
-    cell = job.augmentations.order_by("pk")[0]
-    found = page(analyst, job)
-    assert f'href="{reverse("augmentation", args=[cell.code])}" title="Unreadable answer"' in found
-    assert '<span class="unseen">Unreadable answer</span>' in found
-
-
 @pytest.mark.parametrize(
     ("query", "shown"),
     [

@@ -37,19 +37,6 @@ def test_a_launched_job_has_a_row_per_contestant_and_scenario(
     assert len(waiting) == 1, "the rows are put on the queue once they are stored"
 
 
-def test_a_whole_type_stands_for_its_scenarios_without_a_script() -> None:
-    rows.add_kind("reference")
-    for slug in ("one", "two"):
-        rows.add_scenario(slug)
-    sent = {
-        "name": "Whole type",
-        "contestants": ["reference"],
-        "types": ["approaching_construction_zone"],
-    }
-    signed_in(people()["admin"]).post(reverse("job-new"), sent)
-    assert GenerationJob.objects.get().augmentations.count() == 2
-
-
 def test_the_page_groups_failures_by_their_reason_and_retries_them() -> None:
     job = rows.launch(scenarios=3)
     for row in job.augmentations.all():

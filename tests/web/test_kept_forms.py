@@ -40,12 +40,3 @@ def test_a_form_that_was_sent_too_late_is_sent_after_signing_in() -> None:
     assert f'action="{page}"' in offered.content.decode()
     client.post(page, again)
     assert Study.objects.get().state == "cancelled"
-
-
-@pytest.mark.parametrize("kept", ["", "no JSON", "[1]", '{"a": 1}'])
-def test_without_a_kept_form_signing_in_leads_on(kept: str) -> None:
-    admin = people()["admin"]
-    admin.set_password("a good password")
-    admin.save()
-    sent = {"username": admin.username, "password": "a good password", "kept_form": kept}
-    assert Client().post(reverse("login"), sent).status_code == 302

@@ -93,25 +93,3 @@ def test_an_admin_opens_a_labelling_and_an_analyst_reads_it(job: GenerationJob, 
     assert "1 of 2" in shown
     table = signed_in(accounts["analyst"]).get(reverse("faults-export", args=[job.code, "csv"]))
     assert table.content.startswith(b"contestant,slug")
-
-
-def test_a_closed_labelling_keeps_its_labels_and_takes_no_more(
-    labelling: LabellingRound, eva: User
-) -> None:
-    client, url = signed_in(eva), reverse("label", args=[labelling.code])
-    first, second = labelling.tasks.order_by("position")
-    client.post(url, {"task": first.code})
-    admin, faults = signed_in(people()["admin"]), reverse("faults", args=[labelling.job.code])
-    close = reverse("labelling-close", args=[labelling.code])
-    assert close in admin.get(faults).content.decode()
-    assert (
-        "is closed; its labels stay."
-        in admin.post(close, {"sure": "1"}, follow=True).content.decode()
-    )
-    assert "is closed already." in admin.post(close, {"sure": "1"}, follow=True).content.decode()
-    assert close not in admin.get(faults).content.decode()
-    late = client.post(url, {"task": second.code}, follow=True).content.decode()
-    assert "is closed." in late
-    assert "This labelling is closed." in late
-    assert FaultLabel.objects.count() == 1
-    assert "Continue labelling" not in client.get(reverse("home")).content.decode()

@@ -7,7 +7,6 @@ from django.test import Client
 from django.urls import reverse
 
 from arena.models import Person
-from arena.services.invitations import invite
 from arena.services.ratings import rate
 from arena.services.studies import close_study
 from tests.study_rows import a_study, vote
@@ -38,23 +37,6 @@ def test_the_switch_is_kept_with_the_person_and_leads_back() -> None:
     assert "Gerade ist nichts zu tun" in client.get("/").content.decode()
     client.post(reverse("language"), {"language": "en"})
     assert "Nothing to do right now" in client.get("/", **GERMAN).content.decode()  # type: ignore[arg-type]
-
-
-def test_the_account_brings_its_language_to_another_device() -> None:
-    expert = people()["expert"]
-    signed_in(expert).post(reverse("language"), {"language": "de"})
-    other = Client()
-    other.post(reverse("login"), {"username": "the-expert", "password": "a password"})
-    assert '<html lang="de"' in other.get("/").content.decode()
-
-
-def test_an_invitation_brings_it_too() -> None:
-    study = a_study()
-    eva = study.experts.get(username="eva")
-    signed_in(eva).post(reverse("language"), {"language": "de"})
-    other = Client()
-    other.post(reverse("invitation", args=[invite(study=study, expert=eva).token]))
-    assert '<html lang="de"' in other.get("/").content.decode()
 
 
 def test_files_are_the_same_in_every_language() -> None:

@@ -17,8 +17,6 @@ from augment.scene.intent_codec import intent_to_document
 from tests.intents import LEFT_EDGE, parked, towards
 from tests.study_rows import a_study, cast_of, matchups_of, vote
 from tests.web.cast import signed_in
-from tests.web.test_replay import loaded
-from tests.web.test_weight import MOST_BYTES, weight
 
 pytestmark = pytest.mark.django_db
 
@@ -91,18 +89,6 @@ def test_a_pair_is_measured_by_its_expert_alone() -> None:
     assert signed_in(User.objects.get(username="finn")).get(address(first)).status_code == 404
     stranger = reverse("measures", args=[uuid.uuid4()])
     assert signed_in(User.objects.get(username="eva")).get(stranger).status_code == 404
-
-
-def test_the_page_offers_them_and_loads_nothing_until_they_are_asked_for() -> None:
-    study = measured_study()
-    eva = signed_in(User.objects.get(username="eva"))
-    shown = eva.get(reverse("vote", args=[study.code])).content.decode()
-    assert 'data-do="measures"' in shown
-    names = loaded(shown)
-    assert not any("measures" in name for name in names)
-    assert sum(weight(name) for name in names) <= MOST_BYTES
-    matchup = matchups_of(study, "eva")[0]
-    assert vote(matchup, "left", aids=["measures", "zoom"]).aids == "zoom measures"
 
 
 def test_a_study_that_forbids_them_has_no_trace_of_them() -> None:

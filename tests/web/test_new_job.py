@@ -11,11 +11,10 @@ from django.core.files.uploadedfile import SimpleUploadedFile
 from django.test import Client
 from django.urls import reverse
 
-from augment.models import Contestant, Endpoint, EndpointModel, Event, GenerationJob, ModelCall
+from augment.models import Contestant, Endpoint, EndpointModel, GenerationJob, ModelCall
 from augment.services.running import jobs, runner
 from augment.services.running.caps import Caps
 from augment.services.running.estimates import estimate
-from augment.services.running.reuse import GUESSED_LATENCY_S
 from tests.jobs import rows
 from tests.jobs.models import COMPLETION_TOKENS, PROMPT_TOKENS, Model, llama_job
 from tests.web.cast import people, signed_in
@@ -93,16 +92,6 @@ def test_what_can_not_be_launched_is_said_and_nothing_is_made(
     assert not Contestant.objects.filter(endpoint=models).exists()
 
 
-def test_an_estimate_of_cells_makes_no_contestant_and_calls_a_guess_one(
-    admin: Client, models: Endpoint
-) -> None:
-    shown = send(admin, cells=[OTM], estimate="1")
-    assert "a guess: a model among these was never asked" in shown
-    assert "their numbers are a guess" in shown or "its numbers are a guess" in shown
-    assert not Contestant.objects.filter(endpoint=models).exists()
-    assert not Event.objects.filter(object_kind="contestant").exists()
-
-
 def ran() -> GenerationJob:
     """Two scenarios answered by llama, at 2 seconds a call."""
     job = llama_job(scenarios=2, price="1")
@@ -124,21 +113,6 @@ def test_what_is_answered_already_is_reused_and_counts_for_nothing() -> None:
     assert (twice.answered, twice.calls[1]) == (2, 4), "a second sample was never asked"
     ModelCall.objects.update(prompt_version="000000000000")
     assert estimate(["llama"], where).answered == 0, "other prompts, other requests"
-
-
-def test_the_time_is_that_of_recorded_calls_at_the_endpoints_limits() -> None:
-    ran()
-    for number in range(3, 43):
-        rows.add_scenario(f"street-{number}")
-    where = [f"street-{number}" for number in range(3, 43)]
-    found = estimate(["llama"], where)
-    assert (found.seconds, found.is_time_guessed) == (40 * 2.0 / 4, False)
-    Endpoint.objects.update(requests_per_minute=30)
-    assert estimate(["llama"], where).seconds == 80.0, "two seconds between starts"
-    ModelCall.objects.update(latency_s=None)
-    Endpoint.objects.update(requests_per_minute=None)
-    guess = estimate(["llama"], where)
-    assert (guess.seconds, guess.is_time_guessed) == (40 * GUESSED_LATENCY_S / 4, True)
 
 
 def test_one_scenario_is_tried_first_and_the_rest_is_remembered(

@@ -77,33 +77,3 @@ def test_a_viewer_s_picture_is_drawn_by_a_worker_and_nobody_is_asked(analyst: Cl
     parts = previewed(analyst, here, **asked)["messages"][-1]["content"]
     assert sum(part["type"] == "image_url" for part in parts) >= 1
     assert not ModelCall.objects.exists()
-
-
-@pytest.mark.parametrize(
-    ("variant", "options"),
-    [
-        ("otm", {"radius_m": 20.0}),
-        ("fc", {"radius_m": 20.0, "protocol": "native"}),
-        ("fc", {"protocol": "prompt"}),
-        ("tqa", {"radius_m": 30.0, "rounds": 2}),
-    ],
-)
-def test_a_contestant_s_prompts_are_what_its_options_then_send(
-    analyst: Client, server: Scripted, variant: str, options: dict[str, object]
-) -> None:
-    add(server, "other", "otm", temperature=0.5)
-    here = run("other")[0].scenario
-    asker, asked_before = add(server, "asked", variant, **options), len(server.bodies)
-    before = previewed(analyst, here, contestant="asked")
-    run("asked")
-    sent = server.bodies[asked_before]
-    for found in (before, previewed(analyst, here, contestant="asked")):
-        assert found["messages"] == sent["messages"]
-        assert found.get("tools") == sent.get("tools")
-    page = analyst.get(reverse("prompts", args=[here.code]), {"contestant": "asked"})
-    shown = html.unescape(page.content.decode())
-    assert f"variant {asker.variant}, with its own options." in shown
-    assert "It would go to" in shown
-    if "radius_m" in options:
-        assert f"{options['radius_m']:g} m" in shown
-        assert found["messages"] != previewed(analyst, here, variant=variant)["messages"]

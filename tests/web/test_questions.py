@@ -13,10 +13,8 @@ from django.urls import reverse
 
 from arena.models import Study
 from arena.services.faults import open_labelling
-from augment.models import Augmentation, Event, GenerationJob
-from augment.services.running import leases
+from augment.models import Event, GenerationJob
 from tests import study_rows
-from tests.jobs import rows
 from tests.web.cast import people, signed_in
 
 pytestmark = pytest.mark.django_db
@@ -81,24 +79,6 @@ def test_opening_a_study_asks_with_its_numbers_and_keeps_what_was_filled_in() ->
     study = Study.objects.get()
     assert study.rules["appearances"] == [["ann", 20], ["bob", 15], ["cid", 13]]
     assert study.matchups.count() == 24 + 6
-
-
-def test_cancelling_a_job_asks_and_says_what_is_lost_and_what_stays() -> None:
-    job = rows.launch(scenarios=4)
-    first, second, *_ = job.augmentations.all()
-    leases.settle(held=rows.leased(first), settlement=rows.done(), now=rows.NOON)
-    rows.leased(second)
-    admin, page = admin_of(), reverse("job-cancel", args=[job.code])
-    assert page in admin.get(reverse("job", args=[job.code])).content.decode()
-    for asked in (admin.get(page), admin.post(page)):
-        shown = text_of(asked)
-        assert "wait and are never made: 2." in shown
-        assert "end and keep their results: 1." in shown
-        assert "Settled, which stay as they are: 1." in shown
-        assert not Augmentation.objects.filter(state="cancelled").exists()
-    admin.post(page, {"sure": "1"})
-    assert Augmentation.objects.filter(state="cancelled").count() == 2
-    assert "Cancelled, 1 still runs" in text_of(admin.get(reverse("job", args=[job.code])))
 
 
 def test_every_question_is_for_admins_alone_and_no_crawler_acts() -> None:

@@ -14,7 +14,6 @@ from augment.models import Augmentation
 from tests.drives import drive_pictures
 from tests.study_rows import Cast, a_study, cast_of, matchups_of
 from tests.web.cast import signed_in
-from tests.web.test_weight import MOST_BYTES, weight
 
 pytestmark = pytest.mark.django_db
 
@@ -37,19 +36,6 @@ def page(study: Study) -> str:
 
 def loaded(shown: str) -> set[str]:
     return set(re.findall(r'(?:src|href)="/static/([^"]+\.(?:js|css))"', shown))
-
-
-def test_the_page_offers_them_and_loads_nothing_until_they_are_asked_for() -> None:
-    study = a_replayed_study()
-    eva = signed_in(User.objects.get(username="eva"))
-    shown = eva.get(page(study)).content.decode()
-    first = matchups_of(study, "eva")[0]
-    assert 'data-do="replay"' in shown
-    assert f'data-url="{reverse("replay", args=[first.code])}"' in shown
-    names = loaded(shown)
-    assert not any("film" in name or "replay" in name for name in names)
-    assert sum(weight(name) for name in names) <= MOST_BYTES
-    assert eva.get(f"{page(study)}help/").content.decode().count("<kbd>D</kbd>") == 1
 
 
 def test_a_study_without_them_has_no_trace_of_them() -> None:

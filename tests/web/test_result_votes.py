@@ -92,19 +92,6 @@ def test_every_number_leads_to_as_many_votes(
     assert wrong == {}
 
 
-def test_the_filters_stand_in_the_address_and_in_the_form(study: Study, analyst: Client) -> None:
-    rate(study=study, rounds=10)
-    kept = Vote.objects.filter(comment__contains="kerb", winner__isnull=False)
-    slug = kept.values_list("winner__contestant__slug", flat=True)[0]
-    page = listed(analyst, study, contestant=slug, outcome="won", comment="kerb", mark="all")
-    assert f'<option value="{slug}" selected>' in page
-    assert 'value="kerb"' in page
-    assert number_of(page) == kept.filter(winner__contestant__slug=slug).count() > 0
-    assert number_of(listed(analyst, study, scenario="place-3")) > 0
-    for page in ("0", "x", "99", "9" * 5000):
-        assert number_of(listed(analyst, study, page=page)) > 0
-
-
 def test_the_file_has_the_votes_of_the_list(study: Study, analyst: Client) -> None:
     rate(study=study, rounds=10, filters=Filters())
     address = reverse("results-votes-file", args=[study.code])
@@ -143,19 +130,6 @@ def test_a_vote_shows_the_pair_as_it_was_shown(study: Study, analyst: Client) ->
         assert said in page, said
     address = reverse("shown-picture", args=[study.code, matchup.code, "upside-down"])
     assert analyst.get(address).status_code == 404
-
-
-def test_a_changed_vote_says_from_what_to_what(study: Study, analyst: Client) -> None:
-    rate(study=study, rounds=10)
-    later = Vote.objects.filter(supersedes__isnull=False).select_related("supersedes")[0]
-    assert later.supersedes is not None
-    for vote, other, said in (
-        (later, later.supersedes, "Changed from"),
-        (later.supersedes, later, "Changed to"),
-    ):
-        page = analyst.get(reverse("results-vote", args=[study.code, vote.key])).content.decode()
-        assert said in page
-        assert str(other.key) in page
 
 
 def test_a_vote_given_after_the_rating_is_none_of_it(study: Study, analyst: Client) -> None:

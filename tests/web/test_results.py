@@ -5,16 +5,11 @@ from __future__ import annotations
 import csv
 import io
 import json
-from itertools import groupby
-from pathlib import Path
 
 import pytest
 from django.contrib.auth.models import User
-from django.core.management import call_command
 from django.urls import reverse
 
-from arena.exports.tables import LeaderboardTable, leaderboard_table
-from arena.exports.writers import FORMATS
 from arena.models import Study
 from arena.services.ratings import rate
 from arena.services.studies import close_study, open_study
@@ -98,25 +93,3 @@ def test_an_expert_reads_results_only_once_no_open_study_has_the_same_contestant
     assert url not in signed_in(eva).get("/").content.decode()
     close_study(study=second)
     assert signed_in(eva).get(url).status_code == 200
-
-
-def test_groups_that_never_met_stand_apart_in_page_and_files(tmp_path: Path) -> None:
-    votes = tmp_path / "votes.csv"
-    lines = ["x,y,model_a", "x,y,model_b", "p,q,tie", "q,p,model_a", "p,q,model_a", "z,x,model_a"]
-    votes.write_text("model_a,model_b,winner\n" + "\n".join(lines) + "\n")
-    call_command("import_votes", str(votes), "--name", "Apart", stdout=io.StringIO())
-    study = Study.objects.get(name="Apart")
-    table = leaderboard_table(rate(study=study, rounds=50))
-    assert [sorted(group) for group in groups_of(table)] == [["p", "q"], ["x", "y"], ["z"]]
-    assert table.has_parts
-    document = json.loads(FORMATS["json"].write(table))
-    assert {one["model"]: one["part"] for one in document["standings"]} == {
-        "p": 0, "q": 0, "x": 1, "y": 1, "z": -1,
-    }  # fmt: skip
-    page = shown(study)
-    places = [page.index(text) for text in ("Group 1, rated", "Group 2, rated", "Not rated")]
-    assert places == sorted(places)
-
-
-def groups_of(table: LeaderboardTable) -> list[list[str]]:
-    return [[row.slug for row in rows] for _, rows in groupby(table.rows, lambda row: row.part)]

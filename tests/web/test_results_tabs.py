@@ -8,9 +8,7 @@ from django.test import Client
 from django.urls import reverse
 from pytest_django import DjangoAssertNumQueries
 
-from arena.exports.bundle import bundle_files
 from arena.models import EarlyLook, Matchup, Study
-from arena.queries.vote_sets import Filters
 from arena.services.ratings import rate
 from arena.services.studies import close_study
 from arena.web.results_tabs import TABS
@@ -90,24 +88,6 @@ def test_raters_are_pseudonyms_with_repeats_and_checks(analyst: Client) -> None:
     assert ">1</a>" in shown.partition("0 / ")[2][:250]
 
 
-def test_a_skipped_attention_check_is_neither_passed_nor_failed(analyst: Client) -> None:
-    study = study_rows.a_study(votes_per_expert=9)
-    first, second, *rest = study_rows.matchups_of(study, "eva")
-    Matchup.objects.filter(pk__in=[first.pk, second.pk]).update(kind="check")
-    study_rows.vote(first, "skip", reason="picture_missing")
-    for matchup in (second, *rest, *study_rows.matchups_of(study, "finn")):
-        study_rows.vote(matchup, "left", aids=["zoom"])
-    snapshot = rate(study=close_study(study=study), rounds=50)
-    eva = next(one for one in snapshot.results.trust.raters if one.checks_skipped)
-    assert (eva.checks[0], eva.checks_skipped) == (1, 1)
-    assert eva.aids == (("zoom", 7),), "of the votes that count"
-    shown = page(analyst, study, "raters")
-    assert "Checks skipped" in shown
-    assert 'part=checks_skipped&amp;mark=check" data-votes="1"' in shown
-    assert 'aid=zoom" data-votes="7"' in shown
-    assert b",1,zoom=7" in bundle_files(snapshot)["raters.csv"]
-
-
 def test_experts_read_the_table_but_nothing_about_each_other(study: Study) -> None:
     expert = signed_in(User.objects.get(username="expert-1"))
     shown = page(expert, study)
@@ -119,22 +99,6 @@ def test_experts_read_the_table_but_nothing_about_each_other(study: Study) -> No
         assert status == (403 if tab.staff else 200), tab.name
     for name, form in (("results-export", "zip"), ("results-votes-export", "csv")):
         assert expert.get(reverse(name, args=[study.code, form])).status_code == 403
-
-
-def test_a_permanent_address_shows_that_rating_and_its_filters(
-    study: Study, analyst: Client
-) -> None:
-    older = study.snapshots.get()
-    kind = Scenario.Type.NUDGE.value
-    rate(study=study, rounds=50, filters=Filters(types=(kind,)))
-    assert "Only these types: Nudge" in page(analyst, study)
-    shown = page(analyst, study, rating=str(older.code))
-    assert "Only these types" not in shown
-    assert f"{reverse('results-tab', args=[study.code, 'pairs'])}?rating={older.code}" in shown
-    address = reverse("results", args=[study.code])
-    assert analyst.get(address, {"rating": "nonsense"}).status_code == 404
-    assert analyst.get(address, {"rating": str(study.code)}).status_code == 404
-    assert analyst.get(reverse("results-tab", args=[study.code, "gossip"])).status_code == 404
 
 
 def test_a_new_rating_is_asked_for_with_method_and_filters(study: Study, analyst: Client) -> None:

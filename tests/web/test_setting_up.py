@@ -56,30 +56,6 @@ def test_a_contestant_is_entered_with_a_new_endpoint_and_its_options(client: Cli
     assert "0.7" in text
 
 
-@pytest.mark.parametrize(
-    ("changes", "says"),
-    [
-        ({"slug": "two words"}, "slug"),
-        ({"label": "", "base_url": ""}, "give label and address"),
-        ({"base_url": "ftp://example.org"}, "http"),
-        ({"base_url": "http://169.254.169.254/v1"}, "link-local"),
-        ({"key_variable": "DATABASE_URL"}, "_API_KEY"),
-        ({"temperature": "9"}, "temperature"),
-        ({"temperature": "hot"}, "number"),
-        ({"variant": "otm"}, "protocol"),
-        ({"variant": "magic"}, "magic"),
-    ],
-)
-def test_what_can_not_be_taken_is_said_and_nothing_is_kept(
-    client: Client, changes: dict[str, str], says: str
-) -> None:
-    text = enter(client, **changes)
-    assert says in text
-    assert 'value="qwen3"' in text, "the form stays filled in"
-    assert not Contestant.objects.filter(slug__in=["qwen-fc", "two words"]).exists()
-    assert not Endpoint.objects.exists()
-
-
 @pytest.mark.parametrize("base_url", ["http://127.0.0.1:9/v1", "http://127.0.0.1:11434/v1"])
 def test_a_new_endpoint_never_moves_the_one_that_has_its_label(
     client: Client, base_url: str

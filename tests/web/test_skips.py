@@ -72,14 +72,3 @@ def test_a_skipped_pair_is_found_again_and_its_vote_stands_in_place_of_the_skip(
     assert eva.post(page(here), sent).status_code == 302
     assert [vote.outcome for vote in mine[0].votes.filter(superseded_by=None)] == ["right"]
     assert "You have skipped no pair" in eva.get(address).content.decode()
-
-
-def test_the_thanks_say_that_skipped_pairs_have_no_vote() -> None:
-    here = world()
-    for matchup in study_rows.matchups_of(here.study, "eva"):
-        study_rows.vote(matchup, "skip", reason="other")
-    thanks = signed_in(here.expert).get(page(here)).content.decode()
-    assert "0 answers saved" in thanks
-    assert "9 pairs are skipped and have no vote of yours." in thanks
-    home = signed_in(here.expert).get(reverse("home")).content.decode()
-    assert reverse("vote-skipped", args=[here.study.code]) in home

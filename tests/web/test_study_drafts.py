@@ -19,8 +19,6 @@ from arena.services.studies import PlanOptions, open_study
 from arena.services.study_drafts import FIELDS, keep_draft
 from arena.web.forms import ChoiceForm
 from arena.web.study_forms import StudyForm
-from augment.models import Contestant
-from augment.services.retirement import retire
 from tests import study_rows
 from tests.web.cast import people, signed_in
 from tests.web.test_questions import hidden_of, text_of
@@ -129,21 +127,6 @@ def test_what_cannot_be_opened_is_said_and_the_draft_stays(admin: Client) -> Non
     assert answer.status_code == 422
     assert "Choose at least one contestant." in text_of(answer)
     assert StudyDraft.objects.get().names_in("contestants") == ["ann", "bob", "cid"]
-
-
-def test_what_is_gone_is_said_and_stays_ticked_until_somebody_unticks_it(admin: Client) -> None:
-    cast = study_rows.cast_of()
-    draft = keep_draft(entered={"name": "Round 1", **cast, "experts": ["eva", "nobody"]})
-    retire(Contestant.objects.get(slug="bob"), actor=None)
-    shown = admin.get(page_of(draft))
-    assert "the contestant was retired" in text_of(shown)
-    assert "no active expert has this name any more" in text_of(shown)
-    assert sorted(ticked(shown, "contestants")) == ["ann", "bob", "cid"]
-    sent = {"name": "Round 1", **cast, "votes_per_expert": "9", "seed": "4", "revision": "1"}
-    refused = admin.post(page_of(draft), {**sent, "sure": "1"})
-    assert refused.status_code == 422
-    assert "bob" in text_of(refused)
-    assert not Study.objects.exists()
 
 
 def test_two_admins_do_not_overwrite_each_other_unseen(admin: Client) -> None:

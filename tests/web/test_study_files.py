@@ -14,16 +14,14 @@ from django.test import Client
 from django.urls import reverse
 from pytest_django import Settings
 
-from arena.models import EarlyLook, Study, StudyFile, Vote
+from arena.models import EarlyLook, Study, StudyFile
 from arena.services.ending import cancel_study
 from arena.services.ratings import rate
 from arena.services.studies import close_study
-from arena.services.vote_imports import import_votes
 from arena.tasks import write_study_file
 from augment.models import Augmentation, Event, GenerationJob
 from augment.scene.codec import modification_to_document
 from augment.scene.modification import Modification
-from tests.append_only import rewriting
 from tests.exports.test_study_folder import export
 from tests.scenes import vehicle
 from tests.study_rows import a_study, matchups_of, vote
@@ -98,13 +96,6 @@ def test_a_making_that_fails_says_why(closed: Study) -> None:
     assert StudyFile.objects.get().state == "ready", "and the failed one is gone"
 
 
-def test_a_rating_whose_votes_were_changed_by_hand_is_told(closed: Study) -> None:
-    with rewriting(Vote):
-        Vote.objects.update(ms_visible=1)
-    admin = signed_in(people()["admin"])
-    assert "are not those of this rating any more" in write(admin, closed, "study").fault
-
-
 def test_the_contact_sheet_has_every_scenario(closed: Study) -> None:
     admin = signed_in(people()["admin"])
     assert write(admin, closed, "contact-sheet").state == "ready"
@@ -154,15 +145,3 @@ def test_what_became_impossible_meanwhile_is_not_written(closed: Study) -> None:
     write_study_file(row.pk)
     row.refresh_from_db()
     assert (row.state, "cancelled" in row.fault) == ("failed", True)
-
-
-def test_votes_from_a_file_have_their_folder_on_the_results_page(tmp_path: Path) -> None:
-    admin = signed_in(people()["admin"])
-    sheet = tmp_path / "votes.csv"
-    sheet.write_text("model_a,model_b,winner,judge,scenario\nann,bob,model_a,eva,one\n")
-    study = import_votes(path=sheet, name="Elsewhere").study
-    rate(study=study, rounds=20)
-    answer = admin.post(reverse("study-write", args=[study.code, "study"]), follow=True)
-    assert "waits for a worker" in answer.content.decode()
-    assert admin.post(reverse("study-write", args=[study.code, "interplan"])).status_code == 302
-    assert StudyFile.objects.count() == 1

@@ -13,7 +13,7 @@ from django.urls import reverse
 from arena.models import Study
 from tests import study_rows
 from tests.described import a_described_study, said_of
-from tests.web.cast import people, signed_in
+from tests.web.cast import signed_in
 
 pytestmark = pytest.mark.django_db
 
@@ -65,17 +65,3 @@ def test_without_it_the_page_has_no_trace_of_it() -> None:
         shown = client.get(address).content.decode()
         for trace in (' id="text"', "text-", '"text"', "description", "<kbd>T</kbd>"):
             assert trace not in shown, (address, trace)
-
-
-def test_the_form_opens_a_study_with_it_and_its_page_says_so(study: Study) -> None:
-    rows = {name: list(getattr(study, name).all()) for name in ("contestants", "scenarios")}
-    sent = {
-        **{name: [row.slug for row in found] for name, found in rows.items()},
-        **{"name": "Round 2", "experts": ["eva"], "votes_per_expert": 9, "seed": 4},
-    }
-    admin = signed_in(people()["admin"])
-    answer = admin.post(
-        reverse("study-new"), sent | {"allow_text": "on", "sure": "1"}, follow=True
-    )
-    assert Study.objects.get(name="Round 2").allow_text
-    assert re.search(r"<dt>Text description</dt><dd>may be read</dd>", answer.content.decode())

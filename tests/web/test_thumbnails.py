@@ -63,12 +63,6 @@ def test_a_thumbnail_is_made_once(picture: bytes) -> None:
     assert thumbnail_of(name, 800) == ""
 
 
-def test_there_is_none_without_a_picture_or_of_another_width() -> None:
-    assert thumbnail_of("", 400) == ""
-    with pytest.raises(ValueError, match="not 401"):
-        thumbnail_of("", 401)
-
-
 def test_thumbnails_lie_in_the_bucket_with_the_pictures(picture: bytes, there: Bucket) -> None:
     small = thumbnail_of(store(picture), 400)
     assert read(small) == shrink_png(picture, 400)

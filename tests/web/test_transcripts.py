@@ -2,20 +2,14 @@
 
 from __future__ import annotations
 
-import hashlib
-
 import pytest
 from django.urls import reverse
-from django.utils import timezone
 
-from augment.llm.messages import Message, Request, Speaker
 from augment.models import Augmentation
 from augment.services.running import jobs, runner
-from augment.services.running.transcripts import RowTranscript
-from augment.variants.transcript import ModelRole, NoteKind
 from tests.jobs.models import Model, llama_job, reply
-from tests.jobs.rows import leased, only_row
-from tests.web.cast import people, png, signed_in
+from tests.jobs.rows import only_row
+from tests.web.cast import people, signed_in
 
 pytestmark = pytest.mark.django_db
 
@@ -57,25 +51,6 @@ def test_what_a_model_says_is_never_markup() -> None:
     shown = page_of(ran(only_row(llama_job()), Model(lambda request: reply(EVIL))))
     assert EVIL not in shown
     assert "&lt;script&gt;alert(1)" in shown
-
-
-def test_rounds_reviews_and_pictures_are_on_the_page() -> None:
-    row = only_row(llama_job())
-    assert row.contestant.endpoint is not None
-    transcript = RowTranscript(leased(row, now=timezone.now()), row, row.contestant.endpoint)
-    transcript.note(NoteKind.ROUND, {"round": 7, "changes": "Added:\n{}"})
-    message = Message(speaker=Speaker.USER, text=EVIL, images=(png(),))
-    transcript.asked(ModelRole.VIEWER, Request(model="m", messages=(message,)), "p1")
-    transcript.note(NoteKind.REVIEW, {"mean": 4.25, "said": EVIL})
-    staff = signed_in(people()["analyst"])
-    shown = staff.get(reverse("augmentation", args=[row.code])).content.decode()
-    digest = hashlib.sha256(png()).hexdigest()
-    image = reverse("asked-image", args=[digest])
-    assert image in shown
-    assert "round: 7\nchanges:\n  Added:\n  {}" in shown
-    assert "4.25" in shown
-    assert EVIL not in shown
-    assert b"".join(staff.get(image)) == png()
 
 
 @pytest.mark.parametrize("digest", ["0" * 64, "0" * 63, "A" * 64, "secret_key"])

@@ -5,9 +5,7 @@ from __future__ import annotations
 import re
 
 import pytest
-from django.db import connection
 from django.test import Client
-from django.test.utils import CaptureQueriesContext
 from django.urls import reverse
 
 from arena.models import Report, Vote
@@ -196,14 +194,3 @@ def test_a_report_by_the_form_is_kept_and_leads_back() -> None:
     assert (kept.matchup, kept.reason, kept.comment) == (first, "picture_wrong", "a car floats")
     assert (kept.side, kept.mark_x) == ("right", None)
     assert not Vote.objects.exists()
-
-
-def test_the_page_costs_few_queries() -> None:
-    here = world()
-    expert = signed_in(here.expert)
-    for matchup in study_rows.matchups_of(here.study, "eva")[:3]:
-        study_rows.vote(matchup)
-    expert.get(page(here))
-    with CaptureQueriesContext(connection) as queries:
-        expert.get(page(here))
-    assert len(queries) <= 16, [query["sql"] for query in queries]
