@@ -65,11 +65,6 @@ class Services:
             self.redis.kill()
             self.redis = None
 
-    def restart_postgres(self) -> None:
-        """As an operator does: open connections break."""
-        self.postgres.stop()
-        self.postgres.start()
-
     def host(self, name: str) -> Host:
         """A machine with an empty folder of its own."""
         folder = self.folder / name

@@ -124,17 +124,6 @@ def matchups_of(study: Study, username: str) -> list[Matchup]:
     return list(study.matchups.filter(expert__username=username).order_by("position"))
 
 
-def rows_planned(study: Study, **only: object) -> list[tuple[object, ...]]:
-    """The stored plan, by expert and position."""
-    rows = study.matchups.filter(**only).order_by("expert__username", "position")
-    return list(
-        rows.values_list(
-            *("expert__username", "position", "kind", "scenario__slug"),
-            *("left__contestant__slug", "right__contestant__slug"),
-        )
-    )
-
-
 def shown_again(matchup: Matchup) -> Matchup:
     """A hidden repeat at the end of the expert's order."""
     last = Matchup.objects.filter(study=matchup.study, expert=matchup.expert).latest("position")

@@ -87,12 +87,3 @@ def test_a_missing_token_a_wrong_host_and_a_wrong_wish_are_told_so_too() -> None
     error_of(careful.get("/api/v1/nothing", HTTP_HOST="elsewhere.example"), 400, "bad_request")
     wanted = signed_in("the-expert").get("/api/v1/matchups", HTTP_ACCEPT="text/html")
     error_of(wanted, 406, "not_acceptable")
-
-
-def test_a_program_that_asks_a_page_for_json_gets_json_and_a_browser_a_page() -> None:
-    client = client_of()
-    gone = "/augmentations/00000000-0000-4000-8000-000000000000/transcript.json"
-    error_of(client.get(gone, HTTP_ACCEPT="application/json"), 404, "not_found")
-    for accepted in ("text/html,application/json;q=0.9", "*/*"):
-        page = client.get(gone, HTTP_ACCEPT=accepted)
-        assert page["Content-Type"].startswith("text/html")

@@ -8,9 +8,7 @@ import pytest
 from django.contrib.auth.models import User
 from django.test import Client
 
-from arena.queries.profiles import Theme
 from arena.queries.voting_keys import voting_preferences
-from arena.services.preferences import choose_theme
 from tests.study_rows import expert
 
 pytestmark = [pytest.mark.django_db, pytest.mark.urls("tests.api.urls")]
@@ -25,15 +23,6 @@ def post(user: User, body: object) -> Any:
     client = Client()
     client.force_login(user)
     return client.post("/api/v1/preferences", body, content_type="application/json")
-
-
-def test_what_is_named_changes_and_the_rest_stays(eva: User) -> None:
-    choose_theme(user=eva, theme=Theme.DARK)
-    post(eva, {"legend": False})
-    answer = post(eva, {"single_keys": False}).json()
-    assert (answer["legend"], answer["single_keys"], answer["keep_zoom"]) == (False, False, False)
-    eva.person.refresh_from_db()
-    assert eva.person.preferences["theme"] == "dark"
 
 
 def test_a_key_of_ones_own_replaces_the_usual_ones_and_nothing_else_has_it(eva: User) -> None:
@@ -54,11 +43,6 @@ def test_keys_that_can_not_be_told_apart_are_refused_and_nothing_is_kept(
     assert answer.status_code == 422
     assert "keys" in answer.json()["error"]["fields"]
     assert voting_preferences(eva).as_json()["legend"] is True
-
-
-@pytest.mark.parametrize("body", [{"legend": 1}, {"loud": True}, {"keys": []}])
-def test_what_is_no_preference_is_refused(eva: User, body: dict[str, object]) -> None:
-    assert post(eva, body).status_code == 422
 
 
 def test_nobody_signed_in_has_preferences() -> None:

@@ -63,23 +63,6 @@ def test_pages_lose_no_row_and_repeat_none_while_rows_are_added() -> None:
     assert second.json()["next"] is None
 
 
-@pytest.mark.parametrize(
-    ("query", "field"),
-    [
-        ({"limit": 0}, "limit"),
-        ({"limit": 501}, "limit"),
-        ({"after": "9e107d9d-372b-4682-86d0-5c1f9f3b2b1e"}, "after"),
-        ({"after": "x"}, "after"),
-        ({"state": "lost"}, "state"),
-        ({"colour": "red"}, "colour"),
-    ],
-)
-def test_a_wrong_parameter_is_named(query: dict[str, Any], field: str) -> None:
-    asking = program_of(people()["analyst"])
-    error = error_of(asking.get(API + "jobs", query), 422, "invalid")
-    assert list(error["fields"]) == [field]
-
-
 def test_what_has_not_changed_is_304_and_what_has_is_not() -> None:
     job = rows.launch(scenarios=2, contestants=("reference",))
     asking = program_of(people()["analyst"])

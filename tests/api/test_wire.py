@@ -41,12 +41,6 @@ def test_the_next_matchups_have_tokens_and_nothing_else(study: Study) -> None:
     assert all(matchup.served_at for matchup in matchups_of(study, "eva")[:4])
 
 
-def test_a_matchup_planned_before_views_were_kept_has_the_view_of_then(study: Study) -> None:
-    study.matchups.update(view=None)
-    shown = signed_in("eva").get(f"/api/v1/matchups?study={study.code}").json()
-    assert (shown[0]["px_per_m"], shown[0]["ego_px"]) == (20.0, [300.0, 400.0])
-
-
 @pytest.mark.parametrize(("letter", "stored"), [("A", "left"), ("E", "equal"), ("B", "right")])
 def test_a_vote_is_stored_and_answered_with_what_comes_next(
     study: Study, letter: str, stored: str

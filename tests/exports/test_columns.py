@@ -10,7 +10,6 @@ import json
 import pytest
 from pyarrow import parquet
 
-from arena.exports.columns import COLUMNS, IN_FILES, ON_PAGE
 from arena.exports.tables import LeaderboardTable, leaderboard_table
 from arena.exports.writers import FORMATS, plain_text
 from arena.services.cells import csv_text
@@ -82,13 +81,3 @@ def test_the_options_of_each_contestant_stand_in_every_file_with_columns() -> No
     of_parquet = parquet.read_table(io.BytesIO(FORMATS["parquet"].write(table))).to_pylist()
     for lines in (of_csv, of_json, of_parquet):
         assert {line["slug"]: line["options"] for line in lines} == wanted
-
-
-def test_a_column_stands_once_in_the_list_with_a_unit_where_it_is_a_number() -> None:
-    names = [column.name for column in IN_FILES]
-    assert len(set(names)) == len(names)
-    for column in COLUMNS:
-        assert bool(column.unit) == (column.kind in ("whole", "number") or not column.name)
-    assert [str(column.page) for column in ON_PAGE] == [
-        "Rank", "Contestant", "Elo", "95 % CI", "Votes", "Score", "Won", "Tied", "Lost",
-    ]  # fmt: skip

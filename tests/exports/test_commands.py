@@ -6,7 +6,6 @@ import json
 from pathlib import Path
 
 import pytest
-from django.contrib.auth.models import User
 from django.core.management import CommandError, call_command
 from django.test import Client
 
@@ -74,21 +73,7 @@ def test_an_open_study_is_exported_only_on_purpose_and_that_is_logged(tmp_path: 
         assert {row["early"] for row in csv.DictReader(file)} == {"yes"}
 
 
-@pytest.mark.parametrize("command", ["close_study", "rate"])
-def test_an_unknown_study_is_refused_with_the_known_ones(command: str) -> None:
-    a_study()
-    with pytest.raises(CommandError, match=r"Unknown study 'Round 2'. Known: Round 1"):
-        run(command, "Round 2")
-
-
 # --- People ------------------------------------------------------------------------------------
-
-
-@pytest.mark.parametrize("username", ["", "two words", "two\nlines", "n" * 151])
-def test_a_username_that_no_form_would_take_is_refused(username: str) -> None:
-    with pytest.raises(CommandError, match="person can't be read: username: "):
-        run("add_person", username, "--role", "expert")
-    assert not User.objects.exists()
 
 
 def test_votes_and_ratings_can_only_be_read_in_the_admin() -> None:

@@ -6,11 +6,10 @@ import json
 from pathlib import Path
 
 import pytest
-from django.core.management import CommandError, call_command
+from django.core.management import call_command
 
 from arena.exports.displacement_table import DisplacementTable, displacement_table
 from arena.exports.displacement_writers import COLUMNS, FORMATS, csv_bytes, json_bytes
-from arena.exports.published import BY_VARIANT, SOURCE
 from augment.models import Augmentation, Contestant, GenerationJob
 from augment.scene.catalogue import ScenarioType
 from augment.scene.codec import modification_to_document
@@ -75,22 +74,6 @@ def test_csv_has_a_line_per_type_and_contestant_and_leaves_the_unknown_empty() -
     assert (sim["median_m"], sim["n"], sim["missing"], sim["simulated"]) == ("", "0", "2", "yes")
 
 
-def test_by_variant_says_which_types_it_leaves_out_and_shows_the_papers_boxes_beside() -> None:
-    shown = table(By.VARIANT)
-    assert any("construction zone and accident site are left out" in one for one in shown.notes)
-    found = lines_of(csv_bytes(shown))
-    assert {line["augmentations"] for line in found if line["source"] == "measured"} == {"1"}
-    published = [line for line in found if line["source"] == SOURCE]
-    assert len(published) == len(BY_VARIANT) == 10
-    assert published[0]["contestant"] == "GPT-4o OTM (paper)"
-    assert (published[0]["q1_m"], published[0]["median_m"], published[0]["q3_m"]) == (
-        "1.2",
-        "1.5",
-        "2.1",
-    )
-    assert (published[0]["mean_m"], published[0]["n"]) == ("", "")
-
-
 def test_json_holds_every_single_distance() -> None:
     document = json.loads(json_bytes(table()))
     assert document["simulated"] is True
@@ -151,22 +134,6 @@ def test_the_command_writes_what_it_is_asked_for(tmp_path: Path) -> None:
     assert "ann" in run("displacement", job.code, "--by", "contestant", "--out", "-")
     run("displacement", "Round 1", "--format", "pdf", "--out", tmp_path / "box.pdf")
     assert (tmp_path / "box.pdf").read_bytes().startswith(b"%PDF")
-
-
-@pytest.mark.parametrize(
-    ("arguments", "sentence"),
-    [
-        (("displacement", "Round 2", "--out", "-"), "Unknown job 'Round 2'. Known: Round 1."),
-        (("displacement", "Round 1", "--by", "month", "--out", "-"), "Unknown grouping 'month'"),
-        (("displacement", "Round 1", "--types", "boat", "--out", "-"), "scenario type 'boat'"),
-        (("displacement", "Round 1", "--format", "gif", "--out", "-"), "Unknown format 'gif'"),
-        (("displacement", "Round 1", "--format", "pdf", "--out", "-"), "can't go to a terminal"),
-    ],
-)
-def test_a_wrong_wish_is_a_sentence(arguments: tuple[str, ...], sentence: str) -> None:
-    a_job()
-    with pytest.raises(CommandError, match=sentence):
-        run(*arguments)
 
 
 # The sheet of samples

@@ -25,11 +25,3 @@ def test_the_table_of_a_job_is_written_the_same_twice() -> None:
     assert '"lowered": 0.75' in first
     assert exported("--format", "json") == first
     assert exported().splitlines()[1].startswith("Unmodified scene,,,,no,100.00,100.00,0.00,1,0")
-
-
-def test_the_printed_table_says_n_and_whose_simulator_it_was() -> None:
-    driven(finished(rows.launch()))
-    text = exported("--format", "latex")
-    assert r"\textbf{n}" in text
-    assert "Unmodified scene & 1 & 100.0" in text
-    assert r"in Scenario Arena's own simulator; n: drives.}" in text

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import csv
-import io
 from pathlib import Path
 
 import pytest
@@ -94,13 +92,3 @@ def test_what_was_exported_can_be_imported_and_gives_the_same_table(tmp_path: Pa
     second = rate(study=import_votes(path=again, name="Second").study, rounds=100, seed=3)
     one, other = (leaderboard_table(snapshot).rows for snapshot in (first, second))
     assert one == other
-
-
-def test_made_up_votes_say_so_wherever_they_go(tmp_path: Path) -> None:
-    head = f"{HEAD},simulated"
-    marked = [f"{line},yes" for line in lines()]
-    study = import_votes(path=written(tmp_path, *marked, head=head), name="Elsewhere").study
-    snapshot = rate(study=study, rounds=50)
-    assert snapshot.includes_simulated
-    table = csv.DictReader(io.StringIO(VOTE_FORMATS["csv"].write(vote_table(snapshot)).decode()))
-    assert {line["simulated"] for line in table} == {"yes"}

@@ -75,22 +75,6 @@ def test_a_job_goes_to_a_file_and_back(job: GenerationJob, tmp_path: Path) -> No
             assert made["heading_rad"] == pytest.approx(given["heading_rad"], abs=0.001)
 
 
-def test_scenes_can_be_named_for_foreign_tokens(job: GenerationJob, tmp_path: Path) -> None:
-    file = tmp_path / "foreign.yaml"
-    text, _ = export("--contestant", "reference", "--out", "-")
-    file.write_text(text.replace(token_of("ferry-road"), "00000000000000ab"))
-    out = StringIO()
-    arguments = ("--scene", "00000000000000ab=ferry-road", "--out", str(tmp_path))
-    err = StringIO()
-    call_command("read_interplan", str(file), *arguments, stdout=out, stderr=err)
-    assert f"Passed over: {token_of('mill-junction')}, 2 special scenarios" in err.getvalue()
-    assert "1 special scenarios read" in out.getvalue()
-    wrong = ("--scene", "00000000000000cd=ferry-road", "--out", str(tmp_path))
-    with pytest.raises(CommandError, match="Unknown base token '00000000000000cd'"):
-        call_command("read_interplan", str(file), *wrong)
-    assert (tmp_path / "00000000000000ab-s0.json").exists()
-
-
 @pytest.mark.parametrize(
     ("options", "sentence"),
     [

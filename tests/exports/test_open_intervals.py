@@ -5,7 +5,6 @@ from __future__ import annotations
 import csv
 import io
 import json
-import zipfile
 from itertools import combinations
 from pathlib import Path
 
@@ -13,12 +12,10 @@ import pytest
 from django.core.management import call_command
 from pyarrow import parquet
 
-from arena.exports.bundle import bundle
 from arena.exports.tables import leaderboard_table
 from arena.exports.writers import FORMATS, plain_text
 from arena.models import Snapshot, Study
 from arena.services.ratings import rate
-from tests.web.test_results import judged, shown
 
 pytestmark = pytest.mark.django_db
 
@@ -85,16 +82,3 @@ def test_latex_and_terminal_print_open_ends_and_the_reasons_beneath(snapshot: Sn
     text = plain_text(table)
     assert f"few: {FEW}." in text
     assert "+∞" in text
-
-
-def test_a_type_with_too_few_votes_has_no_ranks_in_page_and_files() -> None:
-    snapshot = rate(study=judged(), rounds=50)
-    lines = [line for part in snapshot.results.types for line in part.lines]
-    assert {line.rank for line in lines} == {None}
-    assert all(line.note for line in lines if line.votes)
-    assert "no rank" in shown(snapshot.study, tab="types")
-    assert b"no rank" in _of_zip(bundle(snapshot), "types.csv")
-
-
-def _of_zip(packed: bytes, name: str) -> bytes:
-    return zipfile.ZipFile(io.BytesIO(packed)).read(name)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import threading
-import xml.etree.ElementTree as ET
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 
@@ -46,10 +45,6 @@ def snapshot() -> Snapshot:
     return made
 
 
-def words_of(svg: bytes) -> str:
-    return " ".join("".join(one.itertext()) for one in ET.fromstring(svg).iter() if one.text)
-
-
 def test_every_chart_comes_in_every_format_the_same_twice(snapshot: Snapshot) -> None:
     """Those that the zip of everything has are drawn twice for its test (test_bundle.py)."""
     names = ["pairs", "types", "width", "displacement"]
@@ -57,20 +52,11 @@ def test_every_chart_comes_in_every_format_the_same_twice(snapshot: Snapshot) ->
     assert list(charts(snapshot)) == names
     again = Snapshot.objects.get(pk=snapshot.pk)
     for name in names:
-        for form, begin in BEGINS.items():
+        for form in BEGINS if name == "displacement" else ("svg",):
             content = chart_bytes(snapshot, name=name, file_format=form)
-            assert content.startswith(begin), (name, form)
-            if name in ("displacement", "elo-usd"):
+            assert content.startswith(BEGINS[form]), (name, form)
+            if name == "displacement":
                 assert (content == chart_bytes(again, name=name, file_format=form)) is True
-
-
-def test_what_is_simulated_is_called_so_in_every_chart(snapshot: Snapshot) -> None:
-    line = snapshot.standings.get(slug="interplan")
-    line.is_simulated = True
-    line.save()
-    for name in charts(snapshot):
-        words = words_of(chart_bytes(snapshot, name=name, file_format="svg"))
-        assert "interPlan (simulated)" in words, name
 
 
 def test_charts_that_are_drawn_at_once_are_those_that_are_drawn_alone(snapshot: Snapshot) -> None:

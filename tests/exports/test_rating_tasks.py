@@ -10,7 +10,6 @@ from arena.models import Snapshot
 from arena.services.ratings import is_big, plan_snapshot
 from arena.services.snapshots import compute, keep, note_progress
 from arena.services.studies import close_study
-from augment.errors import QueueUnreachable
 from augment.models import Event
 from tests.study_rows import a_study, vote
 from tests.web.cast import people, signed_in
@@ -77,16 +76,3 @@ def test_a_rating_that_breaks_in_an_unforeseen_way_says_so_and_can_be_asked_for_
     tasks.compute_snapshot(snapshot.pk)
     snapshot.refresh_from_db()
     assert (snapshot.state, snapshot.status != "", snapshot.progress) == ("ready", True, 100)
-
-
-def test_without_a_queue_the_rating_waits_and_says_why() -> None:
-    snapshot = planned()
-    with pytest.raises(QueueUnreachable):
-        tasks.send_snapshot(snapshot.pk)
-    analyst = signed_in(people()["analyst"])
-    again = reverse("rating-again", args=[snapshot.study.code, snapshot.code])
-    shown = analyst.post(again, follow=True).content.decode()
-    assert "is being computed: 0 %" in shown
-    assert "queue" in shown.lower()
-    snapshot.refresh_from_db()
-    assert snapshot.state == Snapshot.State.QUEUED

@@ -21,7 +21,7 @@ from augment.models import Augmentation, Event, Scenario
 from augment.scene.codec import modification_to_document
 from augment.scene.modification import Modification
 from tests.scenes import vehicle
-from tests.study_rows import KINDS, a_study, cast_of, expert, matchups_of, vote
+from tests.study_rows import a_study, cast_of, expert, matchups_of, vote
 
 pytestmark = pytest.mark.django_db
 
@@ -173,12 +173,6 @@ def test_simulated_experts_prefer_what_lies_nearer_the_reference() -> None:
     assert Vote.objects.filter(outcome="equal").exists()
 
 
-def test_simulated_votes_are_cast_once_and_the_same_for_the_same_seed() -> None:
-    study = simulated_study()
-    simulate_votes(study=study, seed=1)
-    assert simulate_votes(study=study, seed=1) == 0
-
-
 def test_simulated_votes_need_a_study_that_allows_them() -> None:
     study = a_study()
     with pytest.raises(Conflict, match="does not allow simulated votes"):
@@ -193,14 +187,3 @@ def test_simulated_votes_need_a_study_that_allows_them() -> None:
         allow_simulated=True,
     )
     assert simulate_votes(study=demo, seed=1) == 1, "eva is a person"
-
-
-def test_a_simulated_line_without_a_vote_makes_the_snapshot_simulated() -> None:
-    study = open_study(
-        name="Round 2",
-        votes_per_expert=3,
-        seed=7,
-        allow_simulated=True,
-        **cast_of(kind=KINDS.SIMULATED),
-    )
-    assert rate(study=close_study(study=study)).includes_simulated

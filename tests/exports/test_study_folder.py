@@ -152,16 +152,6 @@ def test_nothing_is_overwritten_and_nothing_half_written_stays(
     assert sorted(path.name for path in tmp_path.iterdir()) == ["media", "out"]
 
 
-def test_a_picture_that_is_gone_is_named_and_nothing_is_written(
-    study: Study, tmp_path: Path
-) -> None:
-    image = Augmentation.objects.latest("pk").image
-    default_storage.delete(image)
-    with pytest.raises(CommandError, match=f"{image} of this study is missing"):
-        export(study, tmp_path / "out")
-    assert not (tmp_path / "out").exists()
-
-
 def test_only_drives_that_are_over_travel(study: Study, tmp_path: Path) -> None:
     drives = [
         Simulation.objects.create(

@@ -10,7 +10,7 @@ import pytest
 from pyarrow import parquet
 
 from arena.exports.votes import VOTE_FORMATS, vote_table
-from arena.models import Matchup, Study, Vote
+from arena.models import Study, Vote
 from arena.queries.judged import last_vote_of
 from arena.queries.vote_sets import Filters, vote_set
 from arena.services.ratings import rate
@@ -58,21 +58,6 @@ def test_a_simulated_contestant_on_either_side_keeps_a_vote_out(left: str, right
     study.save()
     allowed = vote_set(study, filters=Filters(), last=last_vote_of(study))
     assert (len(allowed.counted), allowed.left_out) == (1, {})
-
-
-def test_skips_repeats_and_checks_are_counted_but_not_rated() -> None:
-    study = a_study(votes_per_expert=4)
-    first, second, third, fourth = matchups_of(study, "eva")
-    Matchup.objects.filter(pk=second.pk).update(kind="repeat", repeat_of=first)
-    Matchup.objects.filter(pk=third.pk).update(kind="check")
-    for matchup in (first, second, third):
-        vote(matchup)
-    vote(fourth, "skip", reason="unclear")
-    found = vote_set(study, filters=Filters(), last=last_vote_of(study))
-    assert len(found.counted) == 1
-    assert found.left_out == {"check": 1, "repeat": 1, "skip": 1}
-    assert (len(found.repeats), len(found.checks)) == (1, 1)
-    assert len(counted(study, kinds=("main", "repeat"))) == 2
 
 
 def test_votes_after_the_frozen_one_do_not_count_nor_supersede() -> None:

@@ -47,23 +47,6 @@ def test_the_same_request_is_answered_once_and_the_copy_costs_nothing() -> None:
     assert (job.spent_calls, job.spent_nano_usd) == (0, 0)
 
 
-def test_a_copy_of_a_copy_names_the_call_that_was_paid_for() -> None:
-    model = Model()
-    ran(llama_job(), model)
-    ran(again(), model)
-    ran(again(), model)
-    source = ModelCall.objects.get(served_from=None)
-    assert source.copies.count() == 2
-
-
-def test_a_fresh_job_asks_anew() -> None:
-    model = Model()
-    ran(llama_job(), model)
-    ran(again(is_fresh=True), model)
-    assert len(model.requests) == 2
-    assert not ModelCall.objects.exclude(served_from=None).exists()
-
-
 def test_a_fault_is_no_answer() -> None:
     broken = Model(ModelFault("no", retryable=False, status=500))
     job = llama_job()

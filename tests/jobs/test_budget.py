@@ -16,8 +16,8 @@ from augment.services.running import budget, caps, leases, pausing, runner
 from augment.services.running.budget import Room
 from augment.services.running.caps import Caps
 from augment.services.running.costs import costs_of
-from tests.jobs.models import Model, after_a_second_look, llama_job, reply
-from tests.jobs.rows import NOON, STALE, launch, only_row
+from tests.jobs.models import Model, after_a_second_look, llama_job
+from tests.jobs.rows import NOON, STALE, only_row
 from tests.variants.answers import GOOD
 
 pytestmark = pytest.mark.django_db
@@ -142,22 +142,6 @@ def test_a_stopped_attempt_is_replayed_from_its_answers_also_in_a_fresh_job() ->
     assert job.spent_calls == 2
 
 
-def test_room_that_calls_in_flight_hold_is_waited_for() -> None:
-    job = launch()
-    GenerationJob.objects.filter(pk=job.pk).update(cap_tokens=1500)
-
-    def reserve() -> Room:
-        return budget.reserve(job_pk=job.pk, worst=WORST, price=None)
-
-    assert [reserve(), reserve()] == [Room.TAKEN, Room.BUSY]
-    job.refresh_from_db()
-    assert job.state == JOB.RUNNING
-    GenerationJob.objects.filter(pk=job.pk).update(reserved_tokens=0, spent_tokens=501)
-    assert [reserve(), reserve()] == [Room.SPENT, Room.SPENT]
-    job.refresh_from_db()
-    assert (job.state, job.reserved_tokens) == (JOB.STOPPED_AT_CAP, 0)
-
-
 def test_a_call_of_a_dead_worker_counts_with_its_worst_case() -> None:
     job = llama_job(price="1")
     row = only_row(job)
@@ -187,20 +171,6 @@ def test_a_call_that_waited_when_its_worker_died_counts_nothing() -> None:
     assert (call.cost_usd, call.spent_tokens, call.is_cost_estimated) == (Decimal(0), 0, False)
     assert call.fault == "not sent: its worker stopped while it waited for a place"
     assert costs_of(job).paid == 0
-
-
-def test_a_worker_that_was_only_slow_corrects_what_its_call_used() -> None:
-    job = llama_job(price="1")
-    row = only_row(job)
-    held = leases.take_lease(augmentation_pk=row.pk, now=timezone.now() - timedelta(minutes=1))
-    assert held is not None
-    call = in_flight(job, held)
-    leases.take_back_stale(now=timezone.now(), older_than=STALE)
-    used = budget.used_by_reply(reply(), worst=WORST, price=ONE_USD)
-    budget.settle(call_pk=call.pk, used=used, now=timezone.now())
-    job.refresh_from_db()
-    assert (job.spent_calls, job.spent_tokens, job.spent_nano_usd) == (1, 3020, 3_020_000)
-    assert (job.reserved_calls, job.reserved_tokens) == (0, 0)
 
 
 def in_flight(job: GenerationJob, held: leases.Lease, *, is_sent: bool = True) -> ModelCall:

@@ -13,8 +13,7 @@ from django.db import connection
 
 from augment.errors import EndpointBusy, LeaseLost
 from augment.models import CallLease, Endpoint
-from augment.services.endpoints.call_limits import LEASE, Queue, admit, clear_old, place_at
-from tests.jobs.rows import NOON
+from augment.services.endpoints.call_limits import Queue, place_at
 from tests.processes import wait_until
 
 THREADS = 8
@@ -112,21 +111,6 @@ def test_who_waits_asks_whether_the_call_is_still_wanted() -> None:
         waiting = Queue(longest_s=300.0, still_wanted=wanted, sleep=lambda _: None)
         with pytest.raises(LeaseLost), place_at(endpoint, waiting):
             pass
-
-
-@pytest.mark.django_db
-def test_old_leases_are_cleared_away_but_for_those_of_calls_under_way() -> None:
-    endpoint = local(max_concurrency=9)
-    for _ in range(3):
-        admit(endpoint_pk=endpoint.pk, clock=at(NOON))
-    ended, long, dead = CallLease.objects.order_by("pk")
-    hour = NOON + timedelta(hours=1)
-    CallLease.objects.filter(pk=ended.pk).update(finished_at=NOON)
-    CallLease.objects.filter(pk=long.pk).update(expires_at=hour + LEASE)
-    clear_old(endpoint_pk=endpoint.pk, now=hour)
-    left = CallLease.objects.get()
-    assert left == long
-    assert dead != long
 
 
 @pytest.mark.django_db(transaction=True)

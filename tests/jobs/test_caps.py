@@ -8,7 +8,7 @@ import pytest
 
 from augment.errors import Conflict
 from augment.models import Event, GenerationJob
-from augment.services.running import caps, jobs
+from augment.services.running import jobs
 from augment.services.running.caps import Caps
 from tests.jobs.models import add_llama, llama_job
 from tests.jobs.rows import add_scenario, launch
@@ -53,20 +53,3 @@ def test_a_money_cap_takes_contestants_that_cost_nothing() -> None:
 def test_a_cap_that_can_not_be_is_refused(given: Caps) -> None:
     with pytest.raises(Conflict, match="is more than 0 and at most"):
         given.columns()
-
-
-def test_caps_are_only_raised_and_only_where_there_are_any() -> None:
-    job = llama_job(caps=Caps(calls=5))
-    for given, sentence in (
-        (Caps(), "Say which cap"),
-        (Caps(calls=5), "must be higher than the one of 5 calls"),
-        (Caps(tokens=10), "has no such cap; its cap is 5 calls"),
-    ):
-        with pytest.raises(Conflict, match=sentence):
-            caps.raise_cap(job, caps=given)
-    job = caps.raise_cap(job, caps=Caps(calls=6))
-    assert job.cap_calls == 6
-    assert Event.objects.get(verb="raise cap").after == {"cap": "6 calls"}
-    jobs.cancel(job)
-    with pytest.raises(Conflict, match="is cancelled already"):
-        caps.raise_cap(job, caps=Caps(calls=7))

@@ -5,7 +5,7 @@ from io import StringIO
 import pytest
 from django.core.management import CommandError, call_command
 
-from augment.errors import Conflict, InvalidDocument, KeyMissing
+from augment.errors import Conflict, InvalidDocument
 from augment.models import Contestant, Endpoint, Event
 from augment.services.endpoints import contestants, keys
 from augment.services.endpoints.known_endpoints import ensure_endpoint
@@ -65,13 +65,6 @@ def test_the_same_contestant_twice_is_one() -> None:
     assert Event.objects.filter(object_kind="contestant").count() == 1
 
 
-def test_a_slug_can_not_mean_two_contestants() -> None:
-    local()
-    add()
-    with pytest.raises(Conflict, match="another contestant called 'llama-otm'"):
-        add(model="qwen")
-
-
 def test_openai_can_be_named_where_its_key_is_set(monkeypatch: pytest.MonkeyPatch) -> None:
     with pytest.raises(Conflict, match="set OPENAI_API_KEY here, or name its address"):
         add(endpoint="openai")
@@ -83,13 +76,6 @@ def test_openai_can_be_named_where_its_key_is_set(monkeypatch: pytest.MonkeyPatc
     assert keys.key_of(made.endpoint) == "sk-very-secret"
     assert "sk-very-secret" not in str(list(Endpoint.objects.values()))
     assert "sk-very-secret" not in str(list(Event.objects.values()))
-
-
-def test_a_missing_key_names_the_variable(monkeypatch: pytest.MonkeyPatch) -> None:
-    endpoint = local(key_variable="LOCAL_API_KEY")
-    monkeypatch.setenv("LOCAL_API_KEY", " ")
-    with pytest.raises(KeyMissing, match=r"LOCAL_API_KEY.*'local'"):
-        keys.key_of(endpoint)
 
 
 def test_a_key_in_place_of_its_variable_is_refused_and_not_repeated() -> None:
@@ -105,12 +91,6 @@ def test_an_endpoint_that_moves_is_logged_before_and_after() -> None:
     assert endpoint.base_url == "http://127.0.0.1:9/v1"
     event = Event.objects.filter(verb="change").get()
     assert event.before == {"base_url": LOCAL, "key_variable": ""}
-
-
-def test_an_endpoint_does_not_become_simulated() -> None:
-    local()
-    with pytest.raises(Conflict, match="is not simulated, and stays so"):
-        local(is_simulated=True)
 
 
 @pytest.mark.parametrize(

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from contextlib import AbstractContextManager
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from typing import Any
 
 import pytest
 
-from augment.errors import ContextTruncated, KeyMissing, ModelFault
+from augment.errors import KeyMissing
 from augment.llm.messages import Message, Request, Speaker
 from augment.llm.openai_wire import OpenAIWire
 from augment.llm.patience import Patience
@@ -96,27 +96,6 @@ def test_a_refused_parameter_is_dropped_logged_and_remembered(
     assert known.refused_parameters == ["max_completion_tokens", "seed"]
     assert caplog.text.count("picky at endpoint local does not take") == 3
     assert Event.objects.filter(verb="learn", object_code=known.code).count() == 3
-
-
-def test_a_limit_that_is_taken_by_no_name_ends_the_asking() -> None:
-    with picky("max_completion_tokens", "max_tokens") as server:
-        with pytest.raises(ModelFault, match="its cost has no bound"):
-            Asking(server).ask()
-        assert len(server.bodies) == 2
-
-
-def test_a_cut_prompt_is_a_fault_whose_answer_is_kept() -> None:
-    long = Message(speaker=Speaker.USER, text="word " * 4097)
-    with picky(prompt_tokens=4096) as server:
-        assert Asking(server).ask() == "Hi"  # a prompt may be just as long as a window
-        server.bodies.clear()
-        asking = Asking(server)
-        with pytest.raises(ContextTruncated, match="exactly at 4096"):
-            asking.ask(replace(ASKED, messages=(long,)))
-        assert len(server.bodies) == 1
-    reply = asking.transcript.calls[0].reply
-    assert reply is not None
-    assert reply.text == "Hi"
 
 
 def test_a_worker_goes_through_the_limits_and_the_profile() -> None:

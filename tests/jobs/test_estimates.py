@@ -6,7 +6,7 @@ from decimal import Decimal
 
 import pytest
 
-from augment.services.running import jobs, runner
+from augment.services.running import runner
 from augment.services.running.estimates import estimate
 from tests.jobs.models import Model, add_llama, llama_job
 from tests.jobs.rows import add_kind, add_scenario, only_row
@@ -40,16 +40,6 @@ def test_after_a_run_it_is_what_was_used() -> None:
     assert (line.seen, line.tokens_in, line.tokens_out) == (1, 2 * 2900, 2 * 120)
     assert line.calls == (2, 2, 4)
     assert line.usd == Decimal("0.00604")
-
-
-def test_what_was_answered_from_the_store_tells_nothing_of_the_cost() -> None:
-    first = llama_job(price="1")
-    runner.work_on(augmentation_pk=only_row(first).pk, connect=Model())
-    again = jobs.launch(name="Again", contestants=["llama"], scenarios=["street-1"])
-    runner.work_on(augmentation_pk=only_row(again).pk, connect=Model())
-    add_scenario("other")
-    (line,) = estimate(["llama"], ["other"]).lines
-    assert (line.seen, line.tokens_in) == (1, 2900)
 
 
 def test_a_cap_below_what_is_expected_covers_so_many_rows() -> None:

@@ -1,18 +1,11 @@
 from __future__ import annotations
 
-from io import StringIO
-
 import pytest
 from django.contrib.auth.models import User
-from django.core.management import CommandError
-from django.db import connection
-from django.test.utils import CaptureQueriesContext
 
 from augment.errors import Conflict, UnknownName
-from augment.management.commands.generate import Command
 from augment.models import Augmentation, Contestant, Event, GenerationJob
 from augment.services.running import jobs, leases
-from augment.services.running.causes import failure_groups
 from augment.services.running.summary import count_rows
 from tests.jobs.rows import NOON, add_kind, add_scenario, done, failed, launch, leased
 
@@ -54,33 +47,6 @@ def test_the_reference_can_not_run_where_there_is_none() -> None:
     with pytest.raises(Conflict, match="without a reference modification: bare"):
         jobs.launch(name="R", contestants=["reference"], scenarios=["full", "bare"])
     jobs.launch(name="R", contestants=["rule-placer"], scenarios=["bare"])
-
-
-@pytest.mark.parametrize("empty", ["contestants", "scenarios"])
-def test_a_job_of_nothing_is_refused(empty: str) -> None:
-    add_kind("reference")
-    add_scenario("street")
-    chosen = {"contestants": ["reference"], "scenarios": ["street"]} | {empty: []}
-    with pytest.raises(Conflict, match=f"at least one {empty[:-1]}"):
-        jobs.launch(name="R", contestants=chosen["contestants"], scenarios=chosen["scenarios"])
-
-
-def test_failures_stand_by_state_and_reason_faults_of_the_machine_first() -> None:
-    job = launch(scenarios=4)
-    rows = job.augmentations.order_by("pk")
-    rows.update(state=State.UNREADABLE, reason="no block")
-    rows.filter(pk=rows[0].pk).update(state=State.FAILED, reason="the wire broke")
-    with CaptureQueriesContext(connection) as asked:
-        found = [(one.state, one.reason, one.number) for one in failure_groups(job)]
-    assert found == [
-        (State.FAILED, "the wire broke", 1), (State.UNREADABLE, "no block", 3),
-    ]  # fmt: skip
-    assert len(asked) == 2
-    said = StringIO()
-    with pytest.raises(CommandError, match="1 failed; see the reasons above"):
-        Command(stdout=said).report(job)
-    assert "failed 1 time: the wire broke" in said.getvalue()
-    assert "no block" not in said.getvalue(), "an answer of the model is no fault of a run"
 
 
 def test_a_job_is_finished_when_nothing_is_under_way() -> None:

@@ -172,24 +172,6 @@ def test_workers_lost_before_an_outcome_are_forgiven() -> None:
     assert leases.take_back_stale(now=late + timedelta(minutes=1), older_than=STALE) == [row.pk]
 
 
-def test_a_released_row_waits_again() -> None:
-    row = only_row(launch())
-    held = leased(row)
-    assert leases.release(held=held, now=LATER)
-    row.refresh_from_db()
-    assert (row.state, row.claim) == (State.QUEUED, None)
-    assert row.attempts.get().outcome == "released"
-
-
-def test_rows_without_a_message_or_with_an_old_one_are_unsent() -> None:
-    job = launch(scenarios=4)
-    never, old, fresh, running = job.augmentations.order_by("pk")
-    leases.mark_sent(ids=[old.pk], now=NOON - timedelta(minutes=11))
-    leases.mark_sent(ids=[fresh.pk], now=NOON - timedelta(minutes=1))
-    leased(running)
-    assert leases.find_unsent(now=NOON, older_than=timedelta(minutes=10)) == [never.pk, old.pk]
-
-
 def test_the_database_refuses_a_running_row_without_a_claim() -> None:
     row = only_row(launch())
     with pytest.raises(IntegrityError), transaction.atomic():

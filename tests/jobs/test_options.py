@@ -10,14 +10,14 @@ from collections.abc import Callable
 import pytest
 from django.core.management import CommandError, call_command
 
-from augment.errors import Conflict, InvalidDocument
-from augment.models import Augmentation, Contestant, EndpointModel, ModelCall
+from augment.errors import InvalidDocument
+from augment.models import Contestant, ModelCall
 from augment.prompts.texts import prompt_version
 from augment.services.endpoints import contestants
 from augment.services.endpoints.known_endpoints import ensure_endpoint
 from augment.services.endpoints.treatments import options_of
 from augment.services.running.transcript_export import transcript_of
-from augment.variants.options import NAMES, ContestantOptions, ToolProtocol, options_from_document
+from augment.variants.options import NAMES, ContestantOptions, options_from_document
 from tests.jobs.scripted import SCRIPTS, Bodies, Scripted, add, run
 from tests.llm.json_server import serving
 
@@ -89,24 +89,6 @@ def test_what_is_sent_is_what_the_option_says(
     assert (told.options == usual.options) is (name in ("prompt_version",))
 
 
-def test_a_chosen_protocol_stands_against_what_a_probe_learns() -> None:
-    with serving(Scripted()) as server:
-        add(server, "asks-in-prompt", "fc", protocol="prompt")
-        EndpointModel.objects.update(native_tools=True)
-        (row,) = run("asks-in-prompt")
-        assert "tools" not in server.bodies[0]
-        EndpointModel.objects.update(native_tools=False)
-        contestants.add_like(
-            slug="native",
-            like="asks-in-prompt",
-            options=ContestantOptions(protocol=ToolProtocol.NATIVE),
-        )
-        with pytest.raises(Conflict, match="has no native calls"):
-            run("native")
-    assert row.options is not None
-    assert row.options["protocol"] == "prompt"
-
-
 def test_samples_are_asked_anew_with_seeds_of_their_own() -> None:
     with serving(Scripted()) as server:
         add(server, "a", seed=7, temperature=1.0)
@@ -145,16 +127,6 @@ def test_another_option_never_reuses_an_answer_and_the_same_does() -> None:
         assert len(server.bodies) == 4
         run("three")
         assert len(server.bodies) == 10
-
-
-def test_a_temperature_that_is_refused_after_answers_is_a_fault_and_no_mixture() -> None:
-    with serving(Scripted()) as server:
-        add(server, "a", temperature=0.7)
-        run("a")
-        server.refuses = {"temperature"}
-        (row,) = [one for one in run("a", samples=2) if one.sample == 2]
-    assert row.state == Augmentation.State.FAILED
-    assert "does not take 'temperature' any more" in row.reason
 
 
 def test_the_command_takes_every_option_and_keeps_contestants_apart(

@@ -6,13 +6,12 @@ from datetime import timedelta
 
 import pytest
 
-from augment.errors import Conflict
 from augment.models import Augmentation, Event, GenerationJob
 from augment.services.running import jobs, leases, pausing, runner
 from augment.services.running.caps import Caps
 from augment.services.running.summary import count_rows
 from tests.jobs.models import Model, after_a_second_look, llama_job
-from tests.jobs.rows import NOON, done, failed, launch, leased, only_row
+from tests.jobs.rows import done, launch, leased, only_row
 
 pytestmark = pytest.mark.django_db
 State = Augmentation.State
@@ -53,15 +52,3 @@ def test_all_calls_of_what_is_in_flight_are_made_though_the_job_is_paused_betwee
     row.refresh_from_db()
     assert (row.state, len(model.requests)) == (State.DONE, 2)
     assert GenerationJob.objects.get().state == Job.FINISHED, "nothing is left to resume"
-
-
-def test_a_paused_job_can_be_cancelled_and_what_failed_in_it_waits_until_it_is_resumed() -> None:
-    job = launch(scenarios=2)
-    first = job.augmentations.order_by("pk")[0]
-    leases.settle(held=leased(first), settlement=failed(), now=NOON)
-    pausing.pause(job)
-    job = jobs.retry_failed(job)
-    assert (job.state, count_rows(job).queued) == (Job.PAUSED, 2)
-    assert jobs.cancel(job).state == Job.CANCELLED
-    with pytest.raises(Conflict, match="is cancelled; only one that is paused"):
-        pausing.resume(job)

@@ -22,11 +22,6 @@ def read(name: str) -> bytes:
         return bytes(file.read())
 
 
-def test_a_picture_is_named_by_its_bytes() -> None:
-    assert store(b"png") == NAME
-    assert read(NAME) == b"png"
-
-
 def test_a_picture_that_was_cut_off_is_written_again() -> None:
     default_storage.save(NAME, ContentFile(b"p"))
     assert store(b"png") == NAME
@@ -58,12 +53,3 @@ def test_the_original_picture_is_drawn_once_and_remembered() -> None:
     assert scenario.original_image == name
     assert name == picture_of(scene_of(scenario), Modification(), camera_of(scenario))
     assert original_picture(scenario) == name
-
-
-@pytest.mark.django_db
-def test_an_original_picture_that_got_lost_is_drawn_again() -> None:
-    scenario = add_scenario("street")
-    name = original_picture(scenario)
-    default_storage.delete(name)
-    assert original_picture(scenario) == name
-    assert default_storage.exists(name)

@@ -14,7 +14,7 @@ from augment.scene.modification import Modification
 from augment.services.endpoints import contestants
 from augment.services.running import jobs
 from tests.intents import parked
-from tests.jobs.rows import add_kind, add_scenario, launch, only_row
+from tests.jobs.rows import add_kind, add_scenario, only_row
 from tests.jobs.running import ran
 
 pytestmark = pytest.mark.django_db
@@ -25,14 +25,6 @@ def one_job(kind: str, **columns: Any) -> Augmentation:
     add_kind("someone", kind)
     add_scenario("street", **columns)
     return only_row(jobs.launch(name="R", contestants=["someone"], scenarios=["street"]))
-
-
-def test_a_reference_that_went_away_is_a_failure_with_a_sentence() -> None:
-    row = only_row(launch())
-    row.scenario.reference = None
-    row.scenario.save()
-    row = ran(row)
-    assert (row.state, row.reason) == (State.FAILED, "The scenario has no reference modification.")
 
 
 def test_a_reference_that_does_not_fit_is_a_failure_with_a_sentence() -> None:
@@ -67,9 +59,3 @@ def test_the_quantised_baselines_place_vehicles_and_tell_their_codes(slug: str) 
     assert row.state == State.DONE
     assert "Agent2: front right, 20 to " in row.notes
     assert "direction same, stands" in row.notes
-
-
-def test_a_placement_tells_what_stands_where_and_by_which_convention() -> None:
-    row = ran(one_job(Contestant.Kind.RULE))
-    assert row.notes.startswith("1 cones in a line, 20.0 m ahead of the ego along its lane")
-    assert "by convention: 2.5 m between the cones" in row.notes

@@ -9,9 +9,9 @@ from typing import Any
 import pytest
 
 from augment.fake_llm.server import running
-from augment.llm.messages import LengthName, Reply
+from augment.llm.messages import LengthName
 from augment.llm.patience import Patience
-from augment.llm.questions import MARKER, Ability, questions_for
+from augment.llm.questions import MARKER, Ability
 from augment.llm.window import least_tokens
 from augment.models import CallLease, Endpoint, EndpointModel, Event
 from augment.services.endpoints.probe import ProbeReport, probe
@@ -133,53 +133,12 @@ def test_a_cut_window_is_told_with_its_numbers() -> None:
     assert "4096" in report.findings[-1].note
 
 
-def test_a_window_that_is_cut_uncounted_is_found_by_the_lost_word() -> None:
-    with candidate(EVERYTHING - {"window", "usage"}):
-        report = asked()
-    assert report.has(Ability.WHOLE_PROMPT) is False
-    assert not report.counts_tokens
-
-
 def test_a_limit_that_is_passed_over_is_sent_by_its_other_name() -> None:
     with candidate(EVERYTHING - {"max_completion_tokens"}):
         report = asked()
     assert report.has(Ability.ANSWER_LIMIT) is True
     assert report.refused == row().refused_parameters == ["max_completion_tokens"]
     assert report.calls == 8
-
-
-@pytest.mark.parametrize(
-    ("written", "finish_reason", "kept"),
-    [
-        (15, "stop", None),
-        (15, "length", True),
-        (16, "stop", True),
-        (32, "stop", True),
-        (33, "length", False),
-        (None, "length", None),
-    ],
-)
-def test_an_answer_shorter_than_the_limit_tells_nothing_of_it(
-    written: int | None, finish_reason: str, kept: bool | None
-) -> None:
-    (question,) = (one for one in questions_for("m") if one.ability == Ability.ANSWER_LIMIT)
-    reply = Reply(text="Once", finish_reason=finish_reason, completion_tokens=written)
-    assert question.is_good(reply) is kept
-
-
-def test_a_server_that_does_not_answer_is_asked_once_and_forgets_nothing(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    monkeypatch.setenv("LOCAL_API_KEY", KEY)
-    with candidate(status=401):
-        endpoint = Endpoint.objects.get()
-        Endpoint.objects.update(key_variable="LOCAL_API_KEY")
-        EndpointModel.objects.create(endpoint=endpoint, model="m", vision=True)
-        report = asked()
-    assert (report.calls, report.has(Ability.ANSWERS)) == (1, False)
-    assert row().vision is True
-    assert "401" in report.findings[0].note
-    assert KEY not in str(list(EndpointModel.objects.values())) + str(list(Event.objects.values()))
 
 
 @pytest.mark.parametrize(

@@ -5,13 +5,11 @@ from __future__ import annotations
 import json
 from collections.abc import Iterator
 from contextlib import contextmanager
-from datetime import timedelta
 from io import StringIO
 from pathlib import Path
 
 import pytest
 from django.core.management import call_command
-from pytest_django import Settings
 
 from augment.errors import Conflict, ModelFault
 from augment.fake_llm.server import running
@@ -26,7 +24,6 @@ from augment.scene.intent_words import (
 from augment.services.endpoints.known_endpoints import ensure_endpoint
 from augment.services.running.caps import Caps
 from augment.services.running.intent_readings import (
-    give_up_stale,
     plan_reading,
     read_intent,
     read_planned,
@@ -82,15 +79,6 @@ def test_an_answer_that_breaks_the_schema_is_asked_for_once_more() -> None:
     assert (failed.state, failed.document) == (State.FAILED, None)
 
 
-def test_every_call_is_a_row_with_its_request_and_raw_answer() -> None:
-    made = reading(Reply(text=GOOD, model="m-1", prompt_tokens=4000, completion_tokens=80))
-    call = made.calls.get()
-    assert (call.role, call.answer, call.model_returned) == ("reader", GOOD, "m-1")
-    assert (call.spent_tokens, call.attempt, call.sent_at is not None) == (4080, None, True)
-    assert call.settled_at is not None
-    assert '"additionalProperties":false' in call.request["messages"][0]["content"]
-
-
 def test_a_cap_ends_a_reading_before_the_call_that_would_pass_it() -> None:
     made = reading("no block", caps=Caps(calls=1))
     assert (made.state, made.calls.count()) == (State.FAILED, 1)
@@ -141,14 +129,3 @@ def test_a_worker_asks_for_a_planned_reading_once() -> None:
     IntentReading.objects.update(state=State.RUNNING, reason="")
     read_planned(row.pk)
     assert row.calls.count() == calls, "a message that comes twice asks nobody again"
-
-
-def test_a_reading_whose_worker_is_gone_fails_after_a_while(settings: Settings) -> None:
-    add_scenario("street", intent=None, intent_origin="")
-    ensure_endpoint(label="here", base_url="http://127.0.0.1:1/v1")
-    row = plan_reading(scenario="street", endpoint="here", model="m")
-    longest = timedelta(seconds=settings.LLM_QUEUE_S + 6 * settings.LLM_TIMEOUT_S)
-    assert give_up_stale(now=row.created_at + longest) == 0
-    assert give_up_stale(now=row.created_at + longest + timedelta(seconds=1)) == 1
-    row.refresh_from_db()
-    assert (row.state, "worker" in row.reason) == (State.FAILED, True)

@@ -7,8 +7,8 @@ from django.db import connection
 from django.test.utils import CaptureQueriesContext
 
 from arena.services.retrying import retry_cause as retry_unless_shown
-from augment.errors import Conflict, UnknownName
-from augment.models import Augmentation, Event, GenerationJob, ModelCall
+from augment.errors import Conflict
+from augment.models import Augmentation, GenerationJob, ModelCall
 from augment.services.running import jobs, leases, retrying, runner
 from augment.services.running.causes import cause_of, failure_groups
 from tests.jobs.models import Model, llama_job, reply
@@ -46,23 +46,6 @@ def broken(job: GenerationJob, *reasons: str) -> None:
     for row, reason in zip(job.augmentations.order_by("pk"), reasons, strict=True):
         leases.settle(held=leased(row), settlement=failed(reason))
     jobs.finish_if_over()
-
-
-def test_one_group_waits_again_and_the_others_stay() -> None:
-    job = launch(scenarios=4)
-    broken(job, "HTTP 429: in 3 s", "HTTP 429: in 4 s", "HTTP 429: in 4 s", "no picture")
-    many, one = failure_groups(job)
-    assert (many.number, many.variants, many.reason) == (3, 2, "HTTP 429: in 4 s")
-    assert len(many.augmentations) == 3
-    job = retrying.retry_cause(job, key=many.key)
-    assert job.state == GenerationJob.State.RUNNING
-    assert job.augmentations.filter(state=State.QUEUED, reason="").count() == 3
-    assert Event.objects.get(verb="retry").after == {
-        "queued": 3, "state": "failed", "cause": "HTTP 429: in # s",
-    }  # fmt: skip
-    assert [group.key for group in failure_groups(job)] == [one.key]
-    with pytest.raises(UnknownName, match="cause in this job"):
-        retrying.retry_cause(job, key=many.key)
 
 
 def test_an_unreadable_answer_is_asked_for_anew_and_not_served_again() -> None:

@@ -168,18 +168,3 @@ def test_each_role_is_asked_at_its_own_endpoint(server: FakeServer) -> None:
     assert first.extras["tool_calls"][0]["name"] == "pose_on_lane"
     kinds = list(row.attempts.get().notes.values_list("kind", flat=True))
     assert kinds == ["tool_call", "round", "review"] * 2 + ["kept"]
-
-
-def test_the_command_takes_models_and_endpoints() -> None:
-    ensure_endpoint(label="there", base_url="http://127.0.0.1:2/v1")
-    out = io.StringIO()
-    call_command(
-        *("add_contestant", "one", "--variant", "vqa", "--model", "text-model"),
-        *("--endpoint", "here", "--base-url", "http://127.0.0.1:1/v1"),
-        *("--viewer", "eyes@2@there", "--engineer", "boss"),
-        stdout=out,
-    )
-    assert Contestant.objects.get(slug="one").roles == {
-        "viewer": {"endpoint": "there", "model": "eyes@2"},
-        "engineer": {"endpoint": "here", "model": "boss"},
-    }

@@ -7,7 +7,7 @@ import pytest
 from django.core.files.storage import default_storage
 from django.utils import timezone
 
-from augment.errors import LeaseLost, ModelFault
+from augment.errors import LeaseLost
 from augment.llm.client import Sending, watch_nothing
 from augment.llm.messages import Reply, Request
 from augment.models import Augmentation, Endpoint, GenerationJob, ModelCall
@@ -120,22 +120,6 @@ def test_an_answer_that_nobody_can_read_is_an_outcome_with_the_unchanged_picture
     assert row.image == row.scenario.original_image
     answers = ModelCall.objects.order_by("number").values_list("answer", flat=True)
     assert list(answers) == ["Sorry?", "Pardon?"]
-
-
-def test_a_broken_wire_fails_with_the_status_and_leaves_the_call() -> None:
-    row = ran(model_job(), Wire(ModelFault("upstream broke", retryable=False, status=500)))
-    assert (row.state, row.reason) == (State.FAILED, "HTTP 500: upstream broke")
-    assert (row.image, row.modification) == ("", None)
-    call = ModelCall.objects.get()
-    assert (call.answer, call.fault) == (None, "HTTP 500: upstream broke")
-
-
-def test_a_failed_row_is_tried_again_on_request() -> None:
-    row = ran(model_job(), Wire(ModelFault("no", retryable=False)))
-    jobs.retry_failed(row.job)
-    row = ran(row, Wire(GOOD))
-    assert (row.state, row.reason) == (State.DONE, "")
-    assert list(row.attempts.values_list("number", "outcome")) == [(1, "failed"), (2, "done")]
 
 
 def test_an_attempt_that_was_lost_before_drawing_is_only_drawn_again() -> None:

@@ -12,7 +12,6 @@ import numpy as np
 import pytest
 from django.core.management import call_command
 from django.core.management.base import CommandError
-from django.utils import timezone
 from pytest_django import Settings
 
 from augment.errors import UnknownName
@@ -113,28 +112,6 @@ def test_a_planner_that_breaks_is_a_failed_row_that_can_be_driven_again() -> Non
     assert len(simulations.plan_job(job=job, options=BROKEN)) == 3
 
 
-def test_a_planner_that_nobody_knows_is_named() -> None:
-    with pytest.raises(UnknownName, match="pdm-open"):
-        simulations.plan_job(job=finished_job(), options=Options(planner="pdm-open"))
-    with pytest.raises(UnknownName, match="offsets"):
-        simulations.plan_job(job=finished_other(), options=Options(offsets="wide"))
-
-
-def finished_other() -> GenerationJob:
-    return GenerationJob.objects.get()
-
-
-def test_a_drive_whose_worker_fell_silent_waits_again() -> None:
-    (first, *_) = simulations.plan_job(job=finished_job(), options=STRAIGHT)
-    then = timezone.now() - timedelta(minutes=5)
-    Simulation.objects.filter(pk=first).update(
-        state=State.RUNNING, claim="11111111-1111-1111-1111-111111111111", heartbeat_at=then
-    )
-    assert simulations.requeue_stale(older_than=timedelta(minutes=10)) == 0
-    assert simulations.requeue_stale(older_than=timedelta(minutes=1)) == 1
-    assert first in simulations.find_unsent(older_than=timedelta(minutes=10))
-
-
 def test_contestants_are_ranked_by_how_much_they_lower_the_score() -> None:
     job = rows.launch(contestants=("reference", "shy"))
     for row in job.augmentations.select_related("contestant"):
@@ -170,14 +147,6 @@ def said(*arguments: str, **options: Any) -> str:
     out = StringIO()
     call_command("simulate", *arguments, stdout=out, **options)
     return out.getvalue()
-
-
-def test_the_command_drives_a_job_and_prints_the_table() -> None:
-    finished_job()
-    text = said("Round 1", planner=STRAIGHT.planner)
-    assert "[3/3]" in text
-    assert "Unmodified scene" in text
-    assert "99.8" in text
 
 
 def test_a_planner_that_is_not_allowed_is_never_imported(

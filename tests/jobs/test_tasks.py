@@ -13,12 +13,10 @@ from augment.broker import check_broker
 from augment.errors import QueueUnreachable
 from augment.management.commands.generate import Command
 from augment.models import Augmentation, GenerationJob
-from augment.services.running import leases, runner
-from augment.services.running.caps import Caps
+from augment.services.running import leases
 from augment.services.running.summary import count_rows
 from tests.brokers import Broker
-from tests.jobs.models import Model, llama_job
-from tests.jobs.rows import add_kind, add_scenario, done, failed, launch, leased, only_row
+from tests.jobs.rows import add_scenario, done, launch, leased, only_row
 
 pytestmark = pytest.mark.django_db
 State = Augmentation.State
@@ -136,36 +134,6 @@ def test_generate_without_a_broker_says_what_to_do_and_launches_nothing(no_broke
     assert not GenerationJob.objects.exists()
 
 
-def test_generate_gives_up_waiting_and_says_so(broker: Broker) -> None:
-    add_scenario("street")
-    with pytest.raises(CommandError, match=r"Still under way after 0 s: 1 wait, 0 run"):
-        call_command(
-            "generate",
-            *("--contestants", "reference", "--scenarios", "street"),
-            *("--wait", "--timeout", "0"),
-            stdout=StringIO(),
-        )
-
-
-def test_the_report_groups_failures_by_reason_and_fails() -> None:
-    add_kind("rule-placer", "rule")
-    job = launch(scenarios=2, contestants=("reference", "rule-placer"))
-    outcomes = [done(), failed("HTTP 500"), failed("HTTP 500"), failed("no key")]
-    for row, outcome in zip(job.augmentations.order_by("pk"), outcomes, strict=True):
-        leases.settle(held=leased(row), settlement=outcome, now=timezone.now())
-    said = StringIO()
-    with pytest.raises(CommandError, match="3 failed") as caught:
-        Command(stdout=said).report(job)
-    assert caught.value.returncode == 1
-    assert said.getvalue().splitlines() == [
-        "contestant   done  unreadable  refused  failed",
-        "reference       1           0        0       1",
-        "rule-placer     0           0        0       2",
-        "failed 2 times: HTTP 500",
-        "failed 1 time: no key",
-    ]
-
-
 def test_waiting_ends_with_the_job() -> None:
     job = launch()
     leases.settle(held=leased(only_row(job)), settlement=done(), now=timezone.now())
@@ -173,19 +141,3 @@ def test_waiting_ends_with_the_job() -> None:
     Command(stdout=said).wait(job, timeout_s=1.0)
     assert said.getvalue() == "1 of 1, 0 running\nOver.\n"
     assert count_rows(job).by_state[Augmentation.State.DONE] == 1
-
-
-def test_a_stopped_job_is_sent_again_once_it_is_resumed(
-    broker: Broker, django_capture_on_commit_callbacks: object
-) -> None:
-    job = llama_job(caps=Caps(tokens=5))
-    tasks.enqueue_job(job.pk)
-    runner.work_on(augmentation_pk=only_row(job).pk, connect=Model())
-    broker.purge()
-    tasks.recover(now=timezone.now(), at_start=True)
-    assert len(broker) == 0
-    said = StringIO()
-    with django_capture_on_commit_callbacks(execute=True):  # type: ignore[operator]
-        call_command("resume_job", str(job.code), "--cap-tokens", "90000", stdout=said)
-    assert said.getvalue() == f"Job {job.code}, capped at 90000 tokens: 1 to run.\n"
-    assert len(broker) == 1

@@ -7,20 +7,16 @@ from typing import Any
 
 import pytest
 from django.urls import reverse
-from django.utils import timezone
 
-from augment.errors import ModelFault
 from augment.llm.fingerprint import request_hash
-from augment.llm.messages import Message, Request, Speaker
 from augment.models import Augmentation, Endpoint, ModelCall, TranscriptNote
-from augment.services.running import caps, jobs, pausing, runner
+from augment.services.running import caps, pausing, runner
 from augment.services.running.caps import Caps
 from augment.services.running.transcript_export import transcript_of
 from augment.services.running.transcript_steps import totals_of, tries_of
-from augment.services.running.transcripts import RowTranscript
-from augment.variants.transcript import ModelRole, NoteKind
+from augment.variants.transcript import NoteKind
 from tests.jobs.models import Model, after_a_second_look, llama_job, reply
-from tests.jobs.rows import INSTRUCTION, leased, only_row
+from tests.jobs.rows import INSTRUCTION, only_row
 from tests.llm.raw_server import speaking, whole
 from tests.llm.recorder import GOOD as HEARD
 from tests.variants.answers import GOOD
@@ -33,11 +29,6 @@ def ran(row: Augmentation, model: Model) -> Augmentation:
     runner.work_on(augmentation_pk=row.pk, worker="w", connect=model)
     row.refresh_from_db()
     return row
-
-
-def looking(row: Augmentation) -> RowTranscript:
-    assert row.contestant.endpoint is not None
-    return RowTranscript(leased(row, now=timezone.now()), row, row.contestant.endpoint)
 
 
 def test_the_document_holds_the_whole_record() -> None:
@@ -89,17 +80,6 @@ def test_a_request_in_it_is_what_the_server_was_sent_and_nothing_else() -> None:
     assert '"temperature"' not in json.dumps(document)
 
 
-def test_every_attempt_and_every_fault_is_in_it() -> None:
-    job = llama_job()
-    row = ran(only_row(job), Model(ModelFault("upstream broke", retryable=False, status=500)))
-    jobs.retry_failed(job)
-    document = transcript_of(ran(row, Model()))
-    first, second = document["attempts"]
-    assert (first["outcome"], second["outcome"]) == ("failed", "done")
-    assert first["steps"][0]["fault"] == "HTTP 500: upstream broke"
-    assert first["steps"][0]["answer"] is None
-
-
 def test_a_call_from_the_store_names_its_source() -> None:
     job = llama_job(price="1", caps=Caps(calls=1))
     model = Model(after_a_second_look)
@@ -113,20 +93,6 @@ def test_a_call_from_the_store_names_its_source() -> None:
     assert (paid["served_from"], last["served_from"]) == (None, None)
     totals = totals_of(tries_of(row))
     assert (totals.calls, totals.cached, totals.spent_tokens) == (2, 1, 6040)
-
-
-def test_rounds_tools_and_reviews_stand_between_the_calls() -> None:
-    row = only_row(llama_job())
-    transcript = looking(row)
-    transcript.note(NoteKind.ROUND, {"round": 1})
-    for text in ("Go.", "On."):
-        message = Message(speaker=Speaker.USER, text=text)
-        request = Request(model="m", messages=(message,))
-        transcript.answered(transcript.asked(ModelRole.MODIFIER, request, "p1"), reply())
-        transcript.note(NoteKind.TOOL_CALL, {"call": "pose_on_lane", "for": text})
-    steps = transcript_of(row)["attempts"][0]["steps"]
-    assert [step["kind"] for step in steps] == ["round", "call", "tool_call", "call", "tool_call"]
-    assert steps[2]["document"] == {"call": "pose_on_lane", "for": "Go."}
 
 
 def test_the_order_in_which_a_database_keeps_keys_does_not_show() -> None:

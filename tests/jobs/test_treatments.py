@@ -2,17 +2,13 @@
 
 from __future__ import annotations
 
-import json
-from dataclasses import replace
 from typing import Any
 
 import pytest
 
-from augment.llm.profile import ModelProfile
-from augment.models import Augmentation, Endpoint, EndpointModel
+from augment.models import Augmentation, EndpointModel
 from augment.services.endpoints import contestants
 from augment.services.endpoints.known_endpoints import ensure_endpoint
-from augment.services.endpoints.treatments import document_of, profile_from_document
 from augment.services.running import jobs, runner
 from tests.jobs.rows import add_scenario
 from tests.llm.json_server import JsonServer, serving
@@ -126,36 +122,3 @@ def test_a_parameter_that_is_refused_after_answers_with_it_is_a_fault_and_no_mix
     assert row.state == Augmentation.State.FAILED
     assert "does not take 'reasoning_effort' any more" in row.reason
     assert "add another contestant" in row.reason
-
-
-def test_who_never_had_an_answer_is_fixed_anew_when_it_is_tried_again() -> None:
-    with serving(Model()) as server:
-        job_at(server)
-        Endpoint.objects.update(base_url="http://127.0.0.1:1/v1", key_variable="NOT_SET_API_KEY")
-        assert run("first").state == Augmentation.State.FAILED
-        learn(native_tools=True)
-        Endpoint.objects.update(base_url=server.url, key_variable="")
-        jobs.retry_failed(Augmentation.objects.all()[0].job)
-        run("first")
-        assert all("tools" in body for body in server.bodies)
-        # And never again: there are answers now.
-        learn(native_tools=False)
-        jobs.launch(name="K", contestants=["one"], scenarios=["first"])
-        server.bodies.clear()
-        run("second")
-        assert all("tools" in body for body in server.bodies)
-
-
-def test_a_profile_comes_back_from_its_document() -> None:
-    profile = ModelProfile(
-        native_tools=False,
-        vision=True,
-        refused=frozenset({"reasoning_effort", "max_tokens"}),
-        reasoning_effort="high",
-        max_output_tokens=9,
-    )
-    assert profile_from_document(json.loads(json.dumps(document_of(profile)))) == profile
-    fewer = replace(profile, temperature=False, refused=frozenset({"seed"}))
-    assert profile_from_document(document_of(fewer)) == fewer
-    unsent = replace(profile, json_schema=True, refused=frozenset({"response_format"}))
-    assert document_of(unsent) == document_of(profile) | {"refused": []}

@@ -25,7 +25,6 @@ from augment.services.running.workers import (
     FAULT_LENGTH,
     Presence,
     RecoveryRounds,
-    Workforce,
     is_silent,
     worker_name,
     workforce,
@@ -51,11 +50,6 @@ def long_ago(worker: Worker, column: str, seconds: float) -> None:
 # --- Who lives -----------------------------------------------------------------------------------
 
 
-def test_before_the_first_worker_nothing_is_known() -> None:
-    found = workforce()
-    assert (found.living, found.silent_since) == (0, None)
-
-
 @pytest.mark.parametrize(("silent_s", "count"), [(0, 1), (15, 1), (25, 0)])
 def test_a_worker_that_is_silent_too_long_is_dead_since_its_last_word(
     silent_s: float, count: int
@@ -79,35 +73,6 @@ def test_a_process_is_silent_when_its_newest_worker_is(
         if heard_s_ago == "ended":
             Worker.objects.update(ended_at=DATABASE_TIME)
     assert is_silent(pid=7, for_s=60.0) == silent
-
-
-def test_a_worker_that_ended_in_order_is_gone_at_once() -> None:
-    presence = Presence("here 1")
-    presence.beat()
-    presence.end()
-    assert workforce().living == 0
-    assert workforce().silent_since == Worker.objects.get().ended_at
-
-
-def test_one_that_lives_is_enough() -> None:
-    long_ago(living("here 1"), "seen_at", 500)
-    living("here 2")
-    assert workforce() == Workforce(living=1)
-
-
-def test_old_workers_are_forgotten_but_for_the_last() -> None:
-    for name, days in (("old", 9), ("last", 8)):
-        long_ago(living(name), "seen_at", days * 86_400)
-    Presence("new").beat()
-    assert set(Worker.objects.values_list("name", flat=True)) == {"last", "new"}
-
-
-def test_a_row_that_somebody_deleted_is_made_anew() -> None:
-    presence = Presence("here 1")
-    presence.beat()
-    Worker.objects.all().delete()
-    presence.beat()
-    assert workforce().living == 1
 
 
 # --- Bringing lost work back ---------------------------------------------------------------------
@@ -179,12 +144,6 @@ def test_a_worker_that_hangs_in_a_round_is_noticed() -> None:
     assert workforce().not_recovered_since is None
     long_ago(worker, "recovered_at", 125)
     assert workforce().not_recovered_since == worker.recovered_at
-
-
-def test_one_that_brings_work_back_is_enough() -> None:
-    Presence("here 1").failed("no Redis")
-    living("here 2")
-    assert workforce().not_recovered_since is None
 
 
 # --- A Redis that is there and refuses -----------------------------------------------------------

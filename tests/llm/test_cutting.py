@@ -16,10 +16,3 @@ def test_a_text_that_is_too_long_says_how_long_it_was(length: int) -> None:
     assert len(shown) == 40
     assert shown.startswith("xx")
     assert shown.endswith(f"x… [cut: {length} characters]")
-
-
-def test_there_has_to_be_room_for_the_mark() -> None:
-    mark = "… [cut: 100 characters]"
-    with pytest.raises(ValueError, match="leave no room"):
-        shorten("x" * 100, len(mark))
-    assert shorten("x" * 100, len(mark) + 1) == f"x{mark}"

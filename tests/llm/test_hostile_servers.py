@@ -171,8 +171,3 @@ def test_a_packing_that_nobody_asked_for_is_named(packing: str) -> None:
 @pytest.mark.parametrize("packed", [gzip.compress(BODY)[:-12], b"nonsense", b""])
 def test_a_packed_answer_that_is_broken_is_named(packed: bytes) -> None:
     assert "can't be unpacked: gzip" in str(fault(whole(packed, "Content-Encoding: gzip")))
-
-
-def test_an_error_page_of_any_size_is_that_error() -> None:
-    broken = fault(whole(b"x" * 100_000, status="500 Sorry"), most_bytes=1000)
-    assert (broken.status, broken.retryable) == (500, True)

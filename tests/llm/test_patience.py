@@ -24,18 +24,6 @@ def test_the_wait_doubles_within_its_jitter_and_its_bound() -> None:
         assert full_s / 2.0 <= wait_s <= full_s
 
 
-def test_the_jitter_comes_from_the_given_generator() -> None:
-    assert patience().wait_s(fault(), attempt=1) == patience().wait_s(fault(), attempt=1)
-
-
-def test_the_last_attempt_is_followed_by_no_wait() -> None:
-    assert patience(attempts=3).wait_s(fault(), attempt=3) is None
-
-
-def test_a_fault_that_does_not_pass_is_not_waited_for() -> None:
-    assert patience().wait_s(fault(retryable=False), attempt=1) is None
-
-
 def test_what_the_endpoint_asked_for_is_not_undercut() -> None:
     assert patience().wait_s(fault(retry_after_s=12.0), attempt=1) == 12.0
 

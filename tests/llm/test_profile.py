@@ -7,7 +7,6 @@ import pytest
 from augment.errors import ModelFault
 from augment.llm.messages import (
     AnswerSchema,
-    LengthName,
     Message,
     Request,
     Speaker,
@@ -31,27 +30,11 @@ def test_what_was_refused_is_left_out(parameter: str, left_out: str) -> None:
     assert parameter not in fitted.to_document()
 
 
-def test_the_limit_of_the_length_goes_by_its_other_name() -> None:
-    fitted = ModelProfile().without("max_completion_tokens").fitted(ASKED)
-    assert fitted.length_name == LengthName.MAX_TOKENS
-    document = fitted.to_document()
-    assert document["max_tokens"] == ASKED.max_tokens
-    assert "max_completion_tokens" not in document
-
-
 def test_a_model_without_a_limit_of_the_length_is_not_asked() -> None:
     boundless = ModelProfile().without("max_completion_tokens").without("max_tokens")
     with pytest.raises(ModelFault, match="its cost has no bound") as caught:
         boundless.fitted(ASKED)
     assert not caught.value.retryable
-
-
-def test_the_effort_is_that_of_the_row_unless_the_request_says_so() -> None:
-    profile = ModelProfile(reasoning_effort="none")
-    assert profile.fitted(ASKED).to_document()["reasoning_effort"] == "none"
-    own = replace(ASKED, reasoning_effort="low")
-    assert profile.fitted(own).reasoning_effort == "low"
-    assert profile.without("reasoning_effort").fitted(own).reasoning_effort is None
 
 
 def test_a_blind_model_is_shown_nothing() -> None:

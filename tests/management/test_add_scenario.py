@@ -75,14 +75,6 @@ def test_a_scenario_is_added_with_its_intent(tmp_path: Path) -> None:
     assert (row.intent, row.intent_origin) == (wanted, "entered")
 
 
-def test_an_intent_that_can_not_be_read_is_refused(tmp_path: Path) -> None:
-    file = tmp_path / "intent.json"
-    file.write_text(json.dumps(intent_to_document(cones(9.0, 1, Shape.LINE))).replace("line", "x"))
-    assert "requests[0].cones.shape" in refused(intent=file)
-    file.write_text("[]")
-    assert "expected an object" in refused(intent=file)
-
-
 def test_a_reference_that_can_not_be_read_or_does_not_fit_is_refused(tmp_path: Path) -> None:
     file = reference(tmp_path, CHANGE)
     assert "Agent2 is in the scene already" in refused(reference=file, keep_traffic=True)

@@ -82,17 +82,3 @@ def test_a_reference_may_be_half_a_metre_off_along_the_lane(
     else:
         with pytest.raises(CommandError, match=r"21\.5 m ahead is asked for"):
             checked(folder)
-
-
-def test_a_scenario_without_an_intent_is_named(folder: Path) -> None:
-    edit(folder, lambda it: it.update(intent=None))
-    with pytest.raises(CommandError, match="nudge-plane-tree-street: it has no intent"):
-        checked(folder)
-
-
-def test_two_scenarios_that_differ_by_numbers_alone_are_named(folder: Path) -> None:
-    text = (folder / "scenarios/nudge-plane-tree-street.json").read_text()
-    twin = text.replace("nudge-plane-tree-street", "twin").replace("21.5", "31.5")
-    (folder / "scenarios/twin.json").write_text(twin)
-    with pytest.raises(CommandError, match="differ by numbers alone"):
-        checked(folder)

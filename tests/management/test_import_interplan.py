@@ -130,21 +130,3 @@ def test_the_derived_intents_are_met_by_their_references(tmp_path: Path) -> None
             refused[row.slug] = str(fault)
     assert faults == {}
     assert refused == {}
-
-
-def test_importing_again_changes_nothing(folder: Path) -> None:
-    run(folder)
-    lines = run(folder)
-    assert lines[-1] == "0 scenarios imported, 3 were there already, 2 skipped."
-    assert f"{HERE}-s0: interplan-{HERE}-s0 was there already" in lines
-    assert (BaseScene.objects.count(), Scenario.objects.count()) == (1, 3)
-
-
-def test_nothing_imported_is_a_fault(folder: Path, tmp_path: Path) -> None:
-    (log,) = folder.rglob("*.db")
-    log.write_bytes(b"no database")
-    assert refused(folder).startswith("0 scenarios imported, 0 were there already, 5 skipped.")
-    empty = tmp_path / "empty"
-    empty.mkdir()
-    assert "holds 0 YAML files with modification_details_dictionary" in refused(empty)
-    assert not BaseScene.objects.exists()

@@ -67,23 +67,6 @@ def test_a_broken_scene_is_refused_with_the_place(tmp_path: Path) -> None:
     assert "is not there" in refused("json", tmp_path / "gone.json", "--slug", "crossing")
 
 
-def test_a_frame_source_or_slug_that_can_not_be_is_refused(tmp_path: Path) -> None:
-    folder = write_log(tmp_path / "log")
-    assert "frames 0 to 4" in refused("av2", folder, "--frame", 5, "--slug", "made")
-    assert "frames 0 to 4" in refused("av2", folder, "--frame=-1", "--slug", "made")
-    assert "Known: av2, json" in refused("osm", folder, "--slug", "made")
-    assert "lower-case letters" in refused("av2", folder, "--slug", "Made Up")
-
-
-def test_a_format_that_is_not_named_is_recognised(tmp_path: Path) -> None:
-    run(write_log(tmp_path / "log"), "--slug", "made")
-    assert BaseScene.objects.get(slug="made").source == "av2"
-    file = tmp_path / "scene.json"
-    file.write_text(json.dumps(scene_to_document(junction())))
-    run(file, "--slug", "crossing")
-    assert BaseScene.objects.get(slug="crossing").source == "json"
-
-
 def test_the_same_scene_is_not_stored_twice(tmp_path: Path) -> None:
     log = write_log(tmp_path / "log")
     run("av2", log, "--slug", "first")
@@ -113,9 +96,3 @@ def test_a_log_becomes_a_scene_every_few_seconds(tmp_path: Path) -> None:
         "frame 1: drive-4, 3 agents.",
     ]
     assert again[-1] == "Imported 1 scenes."
-
-
-@pytest.mark.parametrize("arguments", [("--every", "0s"), ("--every", "soon"), ("--limit", "0")])
-def test_a_time_or_a_number_that_is_none_is_refused(tmp_path: Path, arguments: tuple[str]) -> None:
-    with pytest.raises(CommandError, match="is no"):
-        run_log("av2", tmp_path, "--slug", "x", *arguments)

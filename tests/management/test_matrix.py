@@ -100,25 +100,6 @@ scenarios: [street, nowhere]
     assert Contestant.objects.count() >= before
 
 
-@pytest.mark.parametrize(
-    ("text", "words"),
-    [
-        ("scenarios: [street]", "models: name models with variants, or contestants"),
-        ("contestants: [reference]", "scenarios: "),
-        ("{contestants: [reference], scenarios: []}", "scenarios"),
-        ("{contestants: [reference], scenarios: [street], samples: 101}", "samples"),
-        ("{contestants: [reference], scenarios: [street], sample: 1}", "sample"),
-        ("{models: [{endpoint: here, model: m}], scenarios: [street]}", "variants: models and"),
-        ("- a list", "dictionary"),
-        ("a: [", "is no YAML"),
-    ],
-)
-def test_a_file_that_is_none_is_refused(tmp_path: Path, text: str, words: str) -> None:
-    with pytest.raises(CommandError, match="matrix") as refused:
-        call_command("generate", "--matrix", written(tmp_path, text), "--dry-run")
-    assert words in str(refused.value)
-
-
 def test_what_is_written_is_read_again() -> None:
     loaded = load_matrix(read_yaml(WHOLE, what="matrix"))
     rows = list(Contestant.objects.filter(slug__in=loaded.contestants).select_related("endpoint"))

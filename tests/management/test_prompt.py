@@ -2,7 +2,6 @@ from __future__ import annotations
 
 import io
 import re
-from pathlib import Path
 
 import pytest
 from django.core.management import call_command
@@ -29,14 +28,6 @@ def test_the_messages_are_printed_as_they_would_be_sent() -> None:
     found = re.search(r"About (\d+) tokens of text", text)
     assert found is not None
     assert 1500 < int(found.group(1)) < 6000
-
-
-def test_the_picture_can_be_kept(tmp_path: Path) -> None:
-    add_scenario("street-1")
-    file = tmp_path / "seen.png"
-    said = printed("street-1", "vqa", "--role", "viewer", "--picture", str(file))
-    assert f"[a PNG of {file.stat().st_size} bytes]" in said
-    assert file.read_bytes().startswith(b"\x89PNG")
 
 
 @pytest.mark.parametrize(

@@ -10,19 +10,14 @@ from typing import Any
 import pytest
 from django.core.files.base import ContentFile
 from django.core.files.storage import default_storage
-from django.core.management import CommandError, call_command
-from django.urls import reverse
+from django.core.management import call_command
 from django.utils import timezone
 
 from arena.models import Study
-from arena.services.retention import read_age
-from augment.errors import InvalidDocument
 from augment.models import Augmentation, Event, GenerationJob, ModelCall
 from augment.services.running import jobs, runner
-from augment.services.running.transcript_export import transcript_of
 from tests import study_rows
 from tests.jobs.models import Model, llama_job
-from tests.web.cast import people, signed_in
 
 pytestmark = pytest.mark.django_db
 
@@ -91,22 +86,6 @@ def test_with_yes_words_go_and_numbers_and_results_stay() -> None:
     assert Event.objects.filter(verb="prune").count() == 1
 
 
-def test_afterwards_the_same_request_is_asked_anew_and_the_transcript_says_why() -> None:
-    job = old_job(scenarios=1)
-    row = job.augmentations.select_related("scenario", "contestant__endpoint", "job").get()
-    prune("--yes")
-    record = transcript_of(row)
-    (step,) = record["attempts"][0]["steps"]
-    assert step["removed_at"] is not None
-    assert (step["answer"], step["prompt_tokens"]) == ("", 2900)
-    analyst = signed_in(people()["analyst"])
-    page = analyst.get(reverse("augmentation", args=[row.code])).content.decode()
-    assert "were removed for their age" in page
-    again, model = jobs.launch(name="2", contestants=["llama"], scenarios=["street-1"]), Model()
-    runner.work_on(augmentation_pk=again.augmentations.get().pk, connect=model)
-    assert len(model.requests) == 1
-
-
 def test_what_goes_on_keeps_everything() -> None:
     job = old_job(scenarios=3)
     rows = list(job.augmentations.order_by("pk"))
@@ -157,11 +136,3 @@ def test_images_go_with_the_last_call_that_names_them() -> None:
     age()
     prune("--yes")
     assert default_storage.listdir("asked")[1] == []
-
-
-@pytest.mark.parametrize("text", ["", "0d", "180", "6m", "x1d", "1.5d", "999999d"])
-def test_what_is_no_age_is_refused_with_what_is_allowed(text: str) -> None:
-    with pytest.raises(InvalidDocument, match="180d or 26w"):
-        read_age(text)
-    with pytest.raises(CommandError, match="180d or 26w"):
-        prune(age=text)

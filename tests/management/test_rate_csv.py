@@ -39,12 +39,6 @@ def test_json_has_standings_best_first(votes: Any) -> None:
         assert row["lower"] < row["elo"] < row["upper"]
 
 
-def test_without_judge_and_item_votes_are_resampled_and_a_note_says_so(votes: Any) -> None:
-    found = document(votes(*PLAIN))
-    assert (found["method"], found["resample"], found["rounds"]) == ("bt", "vote", 10_000)
-    assert "does not name both judge and item" in found["notes"][0]
-
-
 def test_online_elo_resamples_votes_and_says_what_its_interval_is_not(votes: Any) -> None:
     file = votes(*clustered(), head=WITH_CLUSTERS)
     found = document(file, method="elo", rounds=50)
@@ -108,17 +102,6 @@ def test_online_elo_does_not_depend_on_the_order_of_lines_unless_asked_to(votes:
     turned = list(reversed(PLAIN))
     assert standings(PLAIN, "shuffled") == standings(turned, "shuffled")
     assert standings(PLAIN, "recorded") != standings(turned, "recorded")
-
-
-def test_votes_that_repeat_one_are_counted_and_named(votes: Any) -> None:
-    lines = clustered()
-    found = document(votes(*lines, *lines[:5], head=WITH_CLUSTERS), rounds=50)
-    plain = document(votes(*lines, head=WITH_CLUSTERS), rounds=50)
-    assert found["votes"] == len(lines) + 5
-    before = re.search(r"(\d+) votes repeat an earlier one", " ".join(plain["notes"]))
-    after = re.search(r"(\d+) votes repeat an earlier one", " ".join(found["notes"]))
-    assert after is not None
-    assert int(after[1]) == 5 + (int(before[1]) if before else 0)
 
 
 def test_what_votes_do_not_determine_is_null_and_explained(votes: Any) -> None:

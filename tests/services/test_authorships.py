@@ -5,7 +5,6 @@ from __future__ import annotations
 import pytest
 from django.contrib.auth.models import User
 from django.core.management import CommandError, call_command
-from django.db import IntegrityError
 
 from arena.errors import NotYours
 from arena.models import Authorship, Study
@@ -29,12 +28,6 @@ def test_a_mark_says_who_made_it_and_when_and_so_does_the_log(study: Study, eva:
     assert logged.after == {"expert": str(eva.person.code), "contestant": "ann"}
     assert logged.at >= row.marked_at
     assert authors_of(study) == {(str(eva.person.code), "ann")}
-
-
-def test_the_database_keeps_one_mark_of_a_kind(study: Study, eva: User) -> None:
-    row = mark_author(study=study, expert=eva, contestant="ann")
-    with pytest.raises(IntegrityError):
-        Authorship.objects.create(study=study, expert=eva, contestant=row.contestant)
 
 
 def test_only_who_and_what_takes_part_can_be_marked(study: Study, eva: User) -> None:

@@ -14,7 +14,6 @@ from pathlib import Path
 from urllib.parse import urlsplit
 
 import pytest
-from django.core.files.base import ContentFile
 from django.core.files.storage import default_storage
 from django.core.management import CommandError, call_command
 from django.db import connection
@@ -22,13 +21,8 @@ from django.db.migrations.recorder import MigrationRecorder
 
 from arena.management.backups.taking import take_backup
 from arena.models import Vote
-from arena.services.scenario_files import ask_for_file
 from arena.services.stored_rows import applied_migrations, frozen_rows
-from arena.services.written_files import keep_file
-from augment.models import Event, GenerationJob
-from augment.services.judging.scenario_export import FORMATS
-from augment.services.scenarios.pictures import store
-from augment.services.scenarios.thumbnails import WIDTHS_PX, thumbnail_of
+from augment.models import Event
 from tests.house.source import ROOT
 from tests.services.backup_rows import (
     NOW,
@@ -40,7 +34,6 @@ from tests.services.backup_rows import (
     note,
     quiet,
 )
-from tests.web.cast import png
 
 pytestmark = [pytest.mark.django_db(transaction=True), pytest.mark.usefixtures("own_folders")]
 
@@ -160,19 +153,6 @@ def test_a_restore_that_was_killed_while_it_made_tables_is_repeated(tmp_path: Pa
         assert killed.returncode == -signal.SIGKILL, killed.stderr
         repeated = run("manage.py", "restore", backup)
         assert "Restored." in repeated.stdout, repeated.stderr
-
-
-def test_zips_and_thumbnails_that_can_be_made_again_stay_out(tmp_path: Path) -> None:
-    job = GenerationJob.objects.create(name="a job")
-    row = ask_for_file(job=job, file_format=next(iter(FORMATS)))
-    keep_file(row, name="a.zip", content=ContentFile(b"zip"))
-    picture = store(png())
-    thumbnail_of(picture, WIDTHS_PX[0])
-    take_backup(tmp_path / "b.zip", now=NOW, say=quiet)
-    names = contents(tmp_path / "b.zip").keys()
-    assert {"rows/augment.generationjob.jsonl", f"media/{picture}"} <= names
-    for folder in ("scenario-files", "scenariofile", "thumbnails"):
-        assert not [name for name in names if folder in name]
 
 
 def test_others_write_on_while_a_backup_reads_one_moment() -> None:

@@ -73,11 +73,6 @@ def test_crashed_cars_touch(gap_m: float, apart: bool) -> None:
     assert not [*find_apart(staged(OVERTAKE, *cars))]
 
 
-def test_the_third_crashed_car_may_touch_either_of_the_others() -> None:
-    cars = vehicle("A", 20.0, 0.0), vehicle("B", 24.8, 0.0), vehicle("C", 20.0, 2.05)
-    assert not [*find_apart(staged(CRASH, *cars))]
-
-
 def works(
     *, sign_m: float = 12.0, worker_m: float = 31.0, lefts: tuple[float, ...] = (-1.5, 0.0, 1.5)
 ) -> list[TrafficAgent]:
@@ -151,11 +146,6 @@ def test_a_walker_is_hidden_by_what_stands_between(
     assert not [*find_unhidden(plain)]
 
 
-def test_a_car_that_drives_hides_nobody() -> None:
-    scene = scenes.scene(agents=(moving("Agent2", 14.0, -3.0),))
-    assert not is_hidden(staged(JAYWALKER, pedestrian("W", 18.0, -4.3, (18.0, 6.0)), scene=scene))
-
-
 @pytest.mark.parametrize(
     ("others", "oncoming", "traffic"),
     [
@@ -200,9 +190,3 @@ def test_the_way_past_is_the_first_lane_that_is_wide_enough(
     added: list[TrafficAgent], way: WayPast
 ) -> None:
     assert way_past(scenes.scene(), Modification(added=tuple(added))) is way
-
-
-def test_a_multilane_road_is_passed_by_the_lane_beside() -> None:
-    scene = whole_scene("boulevard-north")
-    change = Modification(added=(vehicle("A", 25.0, 0.0),))
-    assert way_past(scene, change) is WayPast.BESIDE

@@ -5,7 +5,6 @@ from __future__ import annotations
 import pytest
 
 from augment.models import Augmentation, Contestant, GenerationJob, Scenario
-from augment.scene.catalogue import ScenarioType
 from augment.scene.codec import modification_to_document
 from augment.scene.modification import Modification
 from augment.services.judging.displacement import (
@@ -14,7 +13,6 @@ from augment.services.judging.displacement import (
     Unmeasured,
     groups,
     of_job,
-    of_latest,
 )
 from tests.jobs import rows
 from tests.scenes import cone
@@ -78,24 +76,3 @@ def test_what_cannot_be_measured_says_why_and_counts_nowhere() -> None:
         "odd": Unmeasured.UNREADABLE_ROW,
     }
     assert groups(found, by=By.TYPE) == []
-
-
-def test_by_variant_leaves_out_the_ambiguous_types_unless_asked() -> None:
-    job, ann = a_job(), rows.add_kind("ann")
-    ended(job, rows.add_scenario("works"), ann)
-    ended(job, rows.add_scenario("parked", type=ScenarioType.NUDGE), ann)
-    found = of_job(job)
-    assert only(groups(found, by=By.VARIANT)).summary.augmentations == 1
-    assert only(groups(found, by=By.VARIANT, types=tuple(ScenarioType))).summary.augmentations == 2
-    assert [group.heading for group in groups(found, by=By.TYPE)] == [
-        "Construction zone",
-        "Nudge around parked vehicle",
-    ]
-
-
-def test_the_latest_outcome_of_every_cell_counts_whatever_its_job() -> None:
-    one, ann = rows.add_scenario("one"), rows.add_kind("ann")
-    ended(a_job(), one, ann, change=rows.TWO_CONES)
-    latest = ended(a_job(), one, ann)
-    ended(a_job(), one, ann, state="failed")
-    assert [found.row.pk for found in of_latest()] == [latest.pk]

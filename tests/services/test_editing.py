@@ -12,9 +12,7 @@ from django.contrib.auth.models import User
 from django.core.files.storage import default_storage
 from django.db import connection
 from django.test.utils import CaptureQueriesContext
-from django.utils import timezone
 
-from arena.models import Study
 from arena.services import references as guarded
 from augment.errors import Conflict, InvalidDocument, InvalidModification
 from augment.models import Augmentation, Contestant, Event, Scenario
@@ -42,7 +40,6 @@ from augment.services.scenarios.scenes import reference_of
 from tests.jobs.rows import add_scenario, launch
 from tests.render.pictures import at_camera_size
 from tests.scenes import pedestrian, scene, vehicle
-from tests.study_rows import a_study
 
 pytestmark = pytest.mark.django_db
 CAR = vehicle("Added1", 20.0, 0.4, 0.1)
@@ -136,17 +133,6 @@ def test_a_reference_that_can_not_be_is_refused_and_the_old_one_stays() -> None:
         set_reference(here, document(CAR))
 
 
-def test_the_reference_of_a_scenario_that_is_being_judged_stays() -> None:
-    study = a_study()
-    here = study.scenarios.first()
-    assert here is not None
-    with pytest.raises(Conflict, match="is open and shows this scenario"):
-        guarded.set_reference(here, document(CAR))
-    assert "is open" in guarded.why_not_editable(here)
-    Study.objects.update(state="closed")
-    guarded.set_reference(here, document(CAR))
-
-
 def original() -> Augmentation:
     row = launch().augmentations.get()
     runner.work_on(augmentation_pk=row.pk)
@@ -182,16 +168,6 @@ def test_a_correction_goes_the_whole_way_and_leaves_the_original() -> None:
     assert event.after is not None
     assert (event.actor, event.object_code) == (ada, str(first.code))
     assert event.after["contestant"] == "by-hand"
-
-
-def test_nothing_counts_any_more_for_a_retired_person() -> None:
-    first = original()
-    by_hand.keep_correction(first, document(vehicle("Added1", 21.0, 0.0)), slug="ada")
-    Contestant.objects.filter(slug="ada").update(retired_at=timezone.now())
-    rows = Augmentation.objects.count()
-    with pytest.raises(Conflict, match="“ada” is retired; choose another slug"):
-        by_hand.keep_correction(first, document(vehicle("Added1", 22.0, 0.0)), slug="ada")
-    assert Augmentation.objects.count() == rows
 
 
 def test_a_scenario_is_held_before_somebody_looks_who_shows_it() -> None:

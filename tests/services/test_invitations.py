@@ -9,12 +9,11 @@ from django.contrib.auth.models import Group, User
 from django.db import IntegrityError
 from django.utils import timezone
 
-from arena.errors import LinkOver, NotYours
+from arena.errors import LinkOver
 from arena.models import Invitation, Study
 from arena.services.invitations import accept, invite, revoke
 from augment.errors import Conflict
 from augment.models import Event
-from tests.study_rows import expert
 
 pytestmark = pytest.mark.django_db
 
@@ -68,15 +67,6 @@ def test_an_account_that_was_switched_off_is_not_let_in(study: Study, eva: User)
     User.objects.filter(pk=eva.pk).update(is_active=False)
     with pytest.raises(LinkOver):
         accept(token=token)
-
-
-def test_only_who_takes_part_can_be_invited(study: Study) -> None:
-    with pytest.raises(NotYours):
-        invite(study=study, expert=expert("greta"))
-    machine = expert("machine", is_simulated=True)
-    study.experts.add(machine)
-    with pytest.raises(Conflict):
-        invite(study=study, expert=machine)
 
 
 def test_every_act_is_logged_without_the_token(study: Study, eva: User) -> None:

@@ -2,14 +2,10 @@
 
 from __future__ import annotations
 
-import csv
-import io
-import json
 import math
 from dataclasses import replace
 
 import pytest
-from django.core.management import CommandError, call_command
 
 from arena.queries.jobs import grid
 from augment.errors import UnknownName
@@ -72,34 +68,3 @@ def test_what_varies_between_samples() -> None:
     assert second.displacement_m.values == pytest.approx((0.2, 0.5))
     assert first.usd is None
     assert first.wrong is not None
-
-
-def exported(capsys: pytest.CaptureFixture[str], *what: str) -> str:
-    call_command("export", *what, "--out", "-")
-    return capsys.readouterr().out
-
-
-def test_files_name_the_sample(capsys: pytest.CaptureFixture[str]) -> None:
-    job()
-    rows = list(csv.DictReader(io.StringIO(exported(capsys, "augmentations", "J"))))
-    assert [(r["contestant"], r["scenario"], r["sample"]) for r in rows][:3] == [
-        ("a", "lane", "1"),
-        ("a", "lane", "2"),
-        ("b", "lane", "1"),
-    ]
-    assert rows[0]["options"] == '{"seed": 4}'
-    assert float(rows[1]["displacement_mean_m"]) == 0.5
-    assert (rows[3]["state"], rows[3]["missing"], rows[3]["reason"]) == (
-        "unreadable",
-        "2",
-        "Sorry?",
-    )
-    repeats = json.loads(exported(capsys, "repeats", "J", "--format", "json"))["repeats"]
-    assert [line["displacement_m_values"] for line in repeats] == ["0.2 0.5", "0.2 0.5"]
-    objects = exported(capsys, "displacement", "J", "--by", "object")
-    assert {line["sample"] for line in csv.DictReader(io.StringIO(objects))} == {"1", "2"}
-    with pytest.raises(CommandError, match="sample of this job '3'"):
-        call_command(
-            *("export", "samples", "J", "--scenarios", "lane", "--contestants", "a"),
-            *("--sample", "3", "--out", "x.pdf"),
-        )

@@ -4,10 +4,9 @@ import json
 from pathlib import Path
 
 import pytest
-from django.contrib.auth.models import User
 
 from augment.errors import InvalidDocument, InvalidModification
-from augment.models import BaseScene, Event, IntentReading, Scenario
+from augment.models import BaseScene, IntentReading, Scenario
 from augment.scene.codec import modification_to_document, scene_to_document
 from augment.scene.intent_codec import intent_to_document
 from augment.scene.intent_words import Shape
@@ -19,7 +18,6 @@ from augment.services.scenarios.scene_imports import import_scene
 from augment.services.scenarios.scenes import (
     add_scenario,
     reference_of,
-    scene_of,
 )
 from tests.formats.av2_logs import write_log
 from tests.intents import cones
@@ -51,15 +49,6 @@ def scenario(**changes: object) -> Scenario:
     return add_scenario(**(asked | changes))  # type: ignore[arg-type]
 
 
-def test_an_imported_scene_carries_its_slug_and_leaves_a_line_in_the_log(file: Path) -> None:
-    ada = User.objects.create_user("ada")
-    row = import_scene(source="json", path=file, frame=0, slug="main-street", actor=ada)
-    assert row.document["name"] == "main-street"
-    assert row.recording is None
-    event = Event.objects.get()
-    assert (event.actor, event.verb, event.object_code) == (ada, "import", str(row.code))
-
-
 def test_a_recorded_scene_comes_with_its_recording(tmp_path: Path) -> None:
     row = import_scene(source="av2", path=write_log(tmp_path / "log"), frame=1, slug="made")
     row.refresh_from_db()
@@ -67,14 +56,6 @@ def test_a_recorded_scene_comes_with_its_recording(tmp_path: Path) -> None:
     recording = recording_from_document(row.recording)
     assert len(recording.times_s) == 4
     assert "log log, frame 1 of 5" in row.provenance
-
-
-def test_a_broken_scene_leaves_nothing_behind(file: Path) -> None:
-    file.write_text(file.read_text().replace('"width_m": 3.5', '"width_m": NaN', 1))
-    with pytest.raises(InvalidDocument, match=r"lanes\[0\]\.width_m"):
-        import_scene(source="json", path=file, frame=0, slug="street")
-    assert not BaseScene.objects.exists()
-    assert not Event.objects.exists()
 
 
 @pytest.mark.parametrize(
@@ -100,12 +81,6 @@ def test_a_scene_with_a_text_that_no_database_takes_is_refused(file: Path, escap
     with pytest.raises(InvalidDocument, match=r"busy\.json"):
         import_scene(source="json", path=file, frame=0, slug="street")
     assert not BaseScene.objects.exists()
-
-
-@pytest.mark.usefixtures("street")
-def test_traffic_goes_unless_it_is_kept() -> None:
-    assert scene_of(scenario()).agents == ()
-    assert scene_of(scenario(keep_traffic=True)).agents == BUSY.agents
 
 
 @pytest.mark.usefixtures("street")

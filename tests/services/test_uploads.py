@@ -124,17 +124,6 @@ def read_by_another(
     SceneUpload.objects.filter(pk=upload.pk).update(state="running", attempts=1, **marks)
 
 
-SECONDS, HOUR = timedelta(seconds=3), timedelta(hours=1)
-
-
-def test_a_file_that_takes_an_hour_is_begun_once(log: bytes) -> None:
-    row = sent(log)
-    read_by_another(row, heard_before=SECONDS, sent_before=HOUR)
-    assert uploads.find_lost() == []
-    row = read(row)  # the message came twice
-    assert (row.state, row.attempts) == ("running", 1)
-
-
 def test_a_file_whose_worker_ended_is_sent_again_once_and_read(log: bytes) -> None:
     row = sent(log)
     read_by_another(row, heard_before=2 * timedelta(minutes=1), sent_before=timedelta(minutes=3))
@@ -164,16 +153,6 @@ def test_the_same_scene_is_kept_once_and_a_taken_name_says_so(log: bytes) -> Non
         moment.refresh_from_db()
         assert moment.scene is not None
         assert moment.scene.slug == "first"
-
-
-def test_a_removed_file_is_gone_and_its_scenes_stay(log: bytes) -> None:
-    row = read(sent(log))
-    moment = looked_at(row, 0)
-    upload_moments.ask_to_keep(moment, slug="stays")
-    upload_moments.work_on_moment(moment.pk)
-    uploads.remove_upload(row)
-    assert not SceneUpload.objects.exists()
-    assert BaseScene.objects.filter(slug="stays").exists()
 
 
 @pytest.mark.parametrize(

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from augment.geometry.polyline import Polyline
-from augment.scene.entities import LaneConnector, TrafficAgent, TrafficLight
+from augment.scene.entities import AgentType, LaneConnector, TrafficAgent, TrafficLight
 from augment.scene.modification import Modification
 from augment.scene.recording import Recording, Track
 from augment.simulation.objects import Objects

@@ -78,9 +78,3 @@ def hand_in(study: Study) -> Study:
         slugs = {matchup.left.contestant.slug, matchup.right.contestant.slug}
         vote(matchup, "equal" if slugs == {"ann", "bob"} else ("left", "right")[number % 2])
     return close_study(study=study)
-
-
-def test_a_study_may_show_them() -> None:
-    study = opened()
-    assert frozenset({"ann", "bob"}) in pairs_shown(study)
-    assert study.rules["identical"] == []

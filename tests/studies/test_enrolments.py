@@ -61,17 +61,6 @@ def test_a_newcomer_gets_an_account_and_the_quota(study: Study) -> None:
     assert not voter.expert.has_usable_password()
 
 
-def test_newcomers_judge_what_is_planned_least(study: Study) -> None:
-    enrolment = link(study, places=6)
-    for number in range(6):
-        join(enrolment, f"w-{number}")
-    pairs: dict[frozenset[int], int] = {}
-    for left, right in study.matchups.values_list("left__contestant", "right__contestant"):
-        both = frozenset((left, right))
-        pairs[both] = pairs.get(both, 0) + 1
-    assert max(pairs.values()) - min(pairs.values()) <= 1
-
-
 def test_with_every_place_taken_nobody_is_taken_on(study: Study) -> None:
     enrolment = link(study)
     join(enrolment, "w-1")

@@ -8,18 +8,18 @@ from collections import Counter
 import pytest
 from django.contrib.auth.models import User
 
-from arena.errors import NothingToPlan, NotYours, StudyNotOpen
-from arena.models import Matchup, Study, Vote
+from arena.errors import NotYours
+from arena.models import Study, Vote
 from arena.pairing.order import MAIN
 from arena.queries.progress import of_expert, of_study
 from arena.queries.votes import tallies, voting_progress
 from arena.services.handing_over import hand_over
 from arena.services.replanning import next_pairs, plan_batch
 from arena.services.reports import Complaint, report
-from arena.services.studies import PlanOptions, close_study, open_study
+from arena.services.studies import PlanOptions, open_study
 from augment.errors import Conflict, UnknownName
 from augment.models import Event
-from tests.study_rows import a_study, cast_of, expert, matchups_of, rows_planned, vote
+from tests.study_rows import a_study, cast_of, expert, matchups_of, vote
 
 pytestmark = pytest.mark.django_db
 
@@ -118,15 +118,6 @@ def test_a_hand_over_that_makes_no_sense_is_refused(
     assert study.matchups.count() == 18
 
 
-def test_nothing_is_handed_over_twice_or_after_the_closing() -> None:
-    study = a_study()
-    hand_over(study=study, username="eva", to=["finn"])
-    with pytest.raises(NothingToPlan, match="eva has nothing left"):
-        hand_over(study=study, username="eva", to=["finn"])
-    with pytest.raises(StudyNotOpen):
-        hand_over(study=close_study(study=study), username="finn", to=["eva"])
-
-
 # --- The adaptive part -------------------------------------------------------------------------
 
 
@@ -170,18 +161,3 @@ def test_the_last_share_is_planned_when_it_is_needed_and_counts_from_the_start()
     assert (event.after["batch"], event.after["votes"]) == (1, 10)
     assert event.after["last_vote"] == Vote.objects.latest("pk").pk
     assert plan_batch(study=study, expert=eva) == 0
-
-
-def test_the_same_votes_give_the_same_batch() -> None:
-    study = adaptive()
-    eva = User.objects.get(username="eva")
-    for matchup in matchups_of(study, "eva"):
-        vote(matchup)
-    plan_batch(study=study, expert=eva)
-    first = rows_planned(study, batch=1)
-    Matchup.objects.filter(batch=1).delete()
-    Study.objects.update(votes_to_plan={"eva": 10, "finn": 10})
-    study.refresh_from_db()
-    plan_batch(study=study, expert=eva)
-    assert rows_planned(study, batch=1) == first
-    assert len(first) >= 10

@@ -8,7 +8,7 @@ import uuid
 import pytest
 from django.contrib.auth.models import User
 
-from arena.errors import InvalidVote, NothingToPlan, NotYours
+from arena.errors import InvalidVote, NotYours
 from arena.models import Matchup, Study, Vote
 from arena.queries.replays import drives_of_pair
 from arena.services.decisions import Decision, decision_of
@@ -17,7 +17,6 @@ from arena.services.votes import cast_vote
 from augment.models import Augmentation
 from augment.simulation.trace import blind_trace
 from tests.drives import drive_pictures
-from tests.studies.test_rules import with_checks
 from tests.study_rows import Cast, cast_of, matchups_of
 
 pytestmark = pytest.mark.django_db
@@ -63,18 +62,6 @@ def test_a_scenario_is_played_where_all_of_its_pictures_were_driven_in_one_way()
     for matchup in matchups_of(study, "eva"):
         found = drives_of_pair(user=eva(), code=matchup.code)
         assert (found is not None) == (matchup.scenario.slug in {"place-0", "place-3"})
-
-
-def test_a_scenario_whose_attention_check_was_not_driven_is_not_played() -> None:
-    # Else only checks would have no drive, and could be told by that.
-    cast = with_checks()
-    checks = Augmentation.objects.filter(contestant__slug="attention-check")
-    drive_pictures(row for row in pictures() if row.contestant.slug != "attention-check")
-    with pytest.raises(NothingToPlan, match=r"attention-check on place-0, .*; 8 in all"):
-        played(cast, check_share=0.1)
-    assert not Study.objects.exists()
-    drive_pictures(checks.select_related("contestant", "scenario"))
-    assert len(played(cast, check_share=0.1).rules["replays"]["scenarios"]) == 8
 
 
 def test_who_made_a_picture_can_not_be_told_from_a_single_byte_of_its_drive() -> None:

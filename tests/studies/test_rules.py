@@ -8,14 +8,12 @@ from io import StringIO
 import pytest
 from django.core.management import CommandError, call_command
 
-from arena.errors import NothingToPlan
 from arena.models import Study
 from arena.services.handing_over import hand_over
 from arena.services.plans import pictures_of
 from arena.services.replanning import plan_batch
 from arena.services.studies import PlanOptions, open_study, rules_of
-from augment.errors import UnknownName
-from augment.models import Augmentation, Contestant, Scenario
+from augment.models import Augmentation, Scenario
 from augment.scene.codec import modification_to_document
 from augment.scene.modification import Modification
 from augment.services.scenarios.attention import draw_checks
@@ -75,19 +73,6 @@ def test_checks_show_the_reference_against_a_broken_one() -> None:
     assert study.matchups.exclude(kind="check").filter(left__contestant__kind="check").count() == 0
 
 
-def test_checks_that_the_adaptive_part_will_show_are_asked_for_at_once() -> None:
-    cast = with_checks(2)
-    with pytest.raises(NothingToPlan, match="each expert: 3"):
-        opened(cast, votes=6, check_share=0.5, adaptive_share=0.5)
-
-
-def test_an_attention_check_is_nobody_to_be_rated() -> None:
-    cast = with_checks(2)
-    cast["contestants"] = [*cast["contestants"], "attention-check"]
-    with pytest.raises(UnknownName, match="Unknown contestant 'attention-check'"):
-        opened(cast, votes=4)
-
-
 def test_targets_by_contestant_are_met_in_the_rows() -> None:
     targets = (("ann", 20), ("bob", 15), ("cid", 13))
     study = opened(cast_of(), appearances=targets)
@@ -101,15 +86,6 @@ def test_a_study_opened_before_these_rules_is_read_without_them() -> None:
     old = ("entries", "experts", "votes_per_expert", "seed", "scenario_gap")
     study.rules = {name: study.rules[name] for name in old}
     assert (rules_of(study).repeat_share, rules_of(study).checks) == (0.0, ())
-
-
-def test_later_pictures_of_the_contestants_do_not_enter_an_open_study() -> None:
-    study = a_study()
-    before = {cell: row.pk for cell, row in pictures_of(study).items()}
-    place, ann = Scenario.objects.get(slug="place-1"), Contestant.objects.get(slug="ann")
-    later = picture(place, ann)
-    assert {cell: row.pk for cell, row in pictures_of(study).items()} == before
-    assert later.pk not in before.values()
 
 
 def test_the_command_opens_a_study_with_its_rules_and_says_what_it_planned() -> None:

@@ -35,19 +35,6 @@ def test_every_showing_keeps_what_its_two_pictures_show() -> None:
     assert read_by(study, "finn") == right_for(study, "finn")
 
 
-def test_a_repeat_has_the_same_texts_on_the_other_sides() -> None:
-    made = cast_of()
-    draw_changes()
-    study = with_text(made, votes=12, repeat_share=0.25)
-    for row in study.matchups.filter(kind="repeat"):
-        assert row.repeat_of is not None
-        first, again = (
-            as_shown(row.repeat_of, translate_all)["text"],
-            as_shown(row, translate_all)["text"],
-        )
-        assert (again["a"], again["b"]) == (first["b"], first["a"])
-
-
 def test_pairs_that_are_handed_over_or_planned_later_have_theirs() -> None:
     made = cast_of(experts=("eva", "finn"), scenarios=12)
     draw_changes()
@@ -132,10 +119,3 @@ def test_a_line_is_said_in_both_languages(
         assert describe_in_words([LINE | changes], translate_all) == [english]
     with override("de"):
         assert describe_in_words([LINE | changes], translate_all) == [german]
-
-
-def test_nothing_is_said_in_both_languages() -> None:
-    with override("en"):
-        assert describe_in_words([], translate_all) == ["Nothing was changed."]
-    with override("de"):
-        assert describe_in_words([], translate_all) == ["Nichts wurde geändert."]

@@ -100,24 +100,6 @@ def test_a_refusal_is_an_outcome_and_not_asked_again(reply: Reply, reason: str) 
     assert made.transcript.calls[0].reply == reply
 
 
-def test_every_attempt_at_a_broken_wire_is_in_the_transcript() -> None:
-    fault = ModelFault("500", retryable=True, status=500)
-    made = Run([fault, fault, GOOD])
-    assert made.outcome().status is OutcomeStatus.DONE
-    assert [c.fault is fault for c in made.transcript.calls] == [True, True, False]
-    assert len(made.waits) == 2
-    assert 0.5 <= made.waits[0] <= 1.0 <= made.waits[1] <= 2.0
-
-
-def test_a_wire_that_stays_broken_is_nobodys_outcome() -> None:
-    fault = ModelFault("500", retryable=True, status=500)
-    made = Run([fault] * 3)
-    with pytest.raises(ModelFault) as raised:
-        made.outcome()
-    assert raised.value is fault
-    assert len(made.transcript.calls) == 3
-
-
 def test_the_transcript_has_the_answer_before_anybody_reads_it() -> None:
     class Stops(MemoryTranscript):
         def answered(self, number: int, reply: Reply, fault: ModelFault | None = None) -> None:

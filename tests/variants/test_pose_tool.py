@@ -35,13 +35,6 @@ def test_a_distance_from_the_ego_is_measured_along_its_lane() -> None:
     assert place.start_lateral_m == pytest.approx(0.0, abs=0.01)
 
 
-def test_left_and_right_are_seen_in_the_direction_of_travel() -> None:
-    left = STREET.pose_on_lane("Lane2", "Agent2", 5.0, 0.5)
-    assert (left.pose.x_m, left.pose.y_m) == pytest.approx((7.0, 3.0), abs=0.01)
-    assert left.start_lateral_m == pytest.approx(-0.4)
-    assert STREET.pose_on_lane("Lane2", "Agent2", 5.0, -0.5).pose.y_m == pytest.approx(4.0)
-
-
 def test_the_answer_carries_what_an_agent_of_the_block_needs() -> None:
     assert JUNCTION.answer({"lane": "Lane1", "start": "Agent1", "distance_m": 15}) == {
         "x_m": 15.0,
@@ -59,25 +52,6 @@ def test_the_answer_carries_what_an_agent_of_the_block_needs() -> None:
         "route": ["Lane1"],
         "start_lateral_m": 0.0,
     }
-
-
-def places(answer: dict[str, object]) -> list[dict[str, object]]:
-    found = answer["poses"]
-    assert isinstance(found, list)
-    return found
-
-
-def test_one_call_asks_for_several_places() -> None:
-    call = {"lane": "Lane1", "start": "Agent1"}
-    several = JUNCTION.answer({**call, "distance_m": [5, 10, 300], "lateral_m": [0, 1, 2]})
-    first, second, third = places(several)
-    assert first == {"distance_m": 5.0, "lateral_m": 0.0} | JUNCTION.answer(
-        {**call, "distance_m": 5}
-    )
-    assert (second["x_m"], second["y_m"]) == (10.0, 1.0)
-    assert list(third) == ["distance_m", "lateral_m", "error"]
-    row = JUNCTION.answer({**call, "distance_m": 5, "lateral_m": [-1, 1]})
-    assert [one["y_m"] for one in places(row)] == [-1.0, 1.0]
 
 
 @pytest.mark.parametrize(

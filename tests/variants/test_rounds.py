@@ -4,12 +4,8 @@ from __future__ import annotations
 
 import pytest
 
-from augment.errors import ModelFault
 from augment.llm.messages import Reply
-from augment.llm.scripted import ScriptedClient
 from augment.variants.pipeline import OutcomeStatus
-from augment.variants.respondents import RespondentClient
-from augment.variants.transcript import ModelRole
 from tests.intents import parked
 from tests.variants.playing import Play, car, questions, rating, verdict
 
@@ -73,11 +69,6 @@ def test_an_unusable_review_lets_the_modifiers_result_stand() -> None:
     assert "unusable" in play.notes("review")[0]
 
 
-def test_a_later_review_that_fails_leaves_the_newest_round() -> None:
-    play = Play("tqa", [car(10.0), LOW, car(20.0), "Fine.", "Fine."])
-    assert play.x_m == 20.0
-
-
 def test_a_regeneration_that_can_not_be_read_leaves_the_round_before() -> None:
     play = Play("tqa", [car(10.0), LOW, "There.", "There."])
     assert (play.roles, play.x_m, play.outcome.is_accepted) == ("mrmm", 10.0, False)
@@ -87,11 +78,6 @@ def test_a_regeneration_that_can_not_be_read_leaves_the_round_before() -> None:
 def test_an_unreadable_first_round_is_never_reviewed() -> None:
     play = Play("tqa", ["There.", "There."])
     assert (play.roles, play.outcome.status) == ("mm", OutcomeStatus.UNREADABLE)
-
-
-def test_a_broken_wire_at_the_reviewer_is_nobodys_outcome() -> None:
-    with pytest.raises(ModelFault, match="gone"):
-        Play("tqa", [car(10.0), ModelFault("gone", retryable=False)])
 
 
 def test_engineer_viewer_engineer_and_an_accepted_round_ends_it() -> None:
@@ -134,21 +120,6 @@ def test_a_visual_review_that_fails_anywhere_is_unusable(
     assert "The review is unusable" in play.outcome.notes
 
 
-def test_every_role_may_be_played_by_another() -> None:
-    engineer = ScriptedClient([questions(), verdict()])
-    viewer = ScriptedClient([SEEN])
-    play = Play(
-        "vqa",
-        [car(21.4)],
-        others={
-            ModelRole.ENGINEER: RespondentClient(client=engineer, model="boss"),
-            ModelRole.VIEWER: RespondentClient(client=viewer, model="eyes"),
-        },
-    )
-    assert [call.request.model for call in play.transcript.calls] == ["m", "boss", "eyes", "boss"]
-    assert len(play.client.requests) == 1
-
-
 def test_measured_facts_go_back_and_no_model_reviews() -> None:
     play = Play("geo", [car(21.4, y_m=30.0), car(21.4)])
     assert (play.roles, play.x_m, play.outcome.is_accepted) == ("mm", 21.4, True)
@@ -185,17 +156,3 @@ def test_a_geometric_review_holds_the_modification_against_the_intent_where_ther
 def test_the_least_wrong_round_counts() -> None:
     off, kerb = car(21.4, y_m=30.0), car(22.0, y_m=-1.5)
     assert Play("geo", [kerb, off, off]).x_m == 22.0
-
-
-def test_remarks_start_no_correction_and_are_kept() -> None:
-    remark = HIGH.replace('"feedback": []', '"feedback": [], "remarks": ["A bit far."]')
-    assert remark != HIGH
-    play = Play("tqa", [car(21.4), remark])
-    assert play.roles == "mr"
-    assert play.notes("review")[0]["remarks"] == ["A bit far."]
-    asked = questions()
-    accepted = verdict().replace('"feedback": []', '"feedback": [], "remarks": ["A bit far."]')
-    seen = "1. yes\n2. yes\n3. yes"
-    play = Play("vqa", [car(21.4), asked, seen, accepted])
-    assert play.roles == "meve"
-    assert play.notes("review")[0]["remarks"] == ["A bit far."]

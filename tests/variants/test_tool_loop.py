@@ -6,7 +6,7 @@ import json
 
 import pytest
 
-from augment.llm.messages import Message, Reply, Speaker, ToolChoice
+from augment.llm.messages import Message, Speaker, ToolChoice
 from augment.variants.pipeline import OutcomeStatus
 from tests.prompts.test_calls import FORMS
 from tests.variants.playing import Play, call, car, native, rating
@@ -97,14 +97,6 @@ def test_a_call_that_is_not_understood_is_told_so_and_never_to_keep_a_placement(
     assert note["mended"] is (said == "no function 'retrieve_suit")
 
 
-def test_a_cut_off_answer_that_tells_of_a_call_is_asked_again_with_more_room() -> None:
-    recap = f"Step 1: I called {FORMS['Python']} and got"
-    play = Play("fc", [call(), Reply(text=recap, finish_reason="length"), car(21.4)])
-    first, last = play.client.requests[1:]
-    assert last.max_tokens == 2 * first.max_tokens
-    assert len(play.notes("tool_call")) == 1
-
-
 def test_after_eight_calls_none_is_answered_and_an_answer_is_due() -> None:
     calls = [call(distance_m=float(n)) for n in range(1, 11)]
     play = Play("fc", [*calls[:9], car(21.4)])
@@ -149,23 +141,9 @@ def test_broken_native_arguments_are_told_and_go_back_as_none() -> None:
     assert "the arguments are not JSON" in json.loads(told.text)["error"]
 
 
-def test_every_native_call_has_a_result_even_beyond_the_limit() -> None:
-    many = [json.dumps({"lane": "Lane1", "start": "lane", "distance_m": n}) for n in range(12)]
-    play = Play("fc", [native(*many), car(21.4)], native=True)
-    request = play.client.requests[1]
-    assert [one.answers for one in request.messages[3:]] == [f"c{n}" for n in range(12)]
-    assert request.tool_choice is ToolChoice.NONE
-    assert "error" in json.loads(request.messages[-1].text)
-
-
 def test_each_round_has_calls_of_its_own() -> None:
     calls = [call(distance_m=float(n)) for n in range(1, 9)]
     low, high = rating(1, 1, 1, "Too near."), rating(5, 5, 5)
     play = Play("fc+tqa", [*calls, car(10.0), low, *calls, car(21.4), high])
     assert play.roles == "m" * 9 + "r" + "m" * 9 + "r"
     assert play.x_m == 21.4
-
-
-def test_a_refusal_in_the_middle_of_calls_is_a_refusal() -> None:
-    play = Play("fc", [call(), Reply(text="", refusal="No.")])
-    assert play.outcome.status is OutcomeStatus.REFUSED

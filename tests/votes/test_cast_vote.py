@@ -9,11 +9,9 @@ from django.db import IntegrityError, transaction
 from arena.errors import AlreadyDecided, InvalidVote, NotYours, StudyNotOpen, TooFast
 from arena.models import EarlyLook, Vote
 from arena.queries.votes import current_votes, recent_votes
-from arena.queries.votes import voting_progress as progress_of
 from arena.queries.voting_path import upcoming
 from arena.services.decisions import decision_of
 from arena.services.studies import close_study
-from arena.services.vote_writes import mark_served
 from arena.services.votes import PACE_WINDOW, cast_vote, receive_vote
 from tests.study_rows import a_study, expert, matchups_of, vote
 
@@ -227,28 +225,3 @@ def test_the_next_matchups_follow_the_experts_own_order() -> None:
     for matchup in [mine[1], *mine[3:]]:
         vote(matchup)
     assert upcoming(study=study, expert=eva, n=1) == []
-
-
-def test_progress_counts_matchups_and_foresees_the_end_at_the_experts_pace() -> None:
-    study = a_study(votes_per_expert=9)
-    mine = matchups_of(study, "eva")
-    eva = mine[0].expert
-    assert progress_of(study=study, expert=eva).minutes_left is None
-    first = vote(mine[0], ms_visible=30_000)
-    vote(mine[0], "equal", supersedes=first.key, ms_visible=30_000)
-    vote(mine[1], ms_visible=30_000)
-    progress = progress_of(study=study, expert=eva)
-    assert (progress.total, progress.voted, progress.left) == (9, 2, 7)
-    assert progress.minutes_left == 4
-
-
-def test_served_is_remembered_from_the_first_time() -> None:
-    study = a_study()
-    matchup = matchups_of(study, "eva")[0]
-    mark_served(matchups=[matchup])
-    matchup.refresh_from_db()
-    first = matchup.served_at
-    assert first is not None
-    mark_served(matchups=[matchup])
-    matchup.refresh_from_db()
-    assert matchup.served_at == first

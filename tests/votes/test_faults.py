@@ -13,11 +13,10 @@ from django.db import IntegrityError, transaction
 from arena.errors import LabellingClosed, NotYours
 from arena.exports.faults import csv_bytes, fault_table, latex
 from arena.models import FaultLabel, LabellingRound, LabelTask
-from arena.queries.faults import labelling_of, next_task, of_expert
+from arena.queries.faults import labelling_of, next_task
 from arena.services.faults import close_labelling, open_labelling, save_label
 from augment.models import Event, GenerationJob
 from augment.services.judging.fault_guess import FaultClass
-from tests.append_only import rewriting
 from tests.exports.test_displacement import a_job
 from tests.study_rows import expert
 
@@ -80,17 +79,6 @@ def test_nobody_labels_for_somebody_else(job: GenerationJob, eva: User) -> None:
         labelling_of(expert=finn, code=labelling.code)
 
 
-def test_the_next_one_comes_until_all_are_labelled(job: GenerationJob, eva: User) -> None:
-    labelling = opened(job, "eva")
-    for left in (2, 1):
-        assert [line.left for line in of_expert(eva)] == [left]
-        task = next_task(labelling=labelling, expert=eva)
-        assert task is not None
-        save(task)
-    assert next_task(labelling=labelling, expert=eva) is None
-    assert labelling_of(expert=eva, code=labelling.code).left == 0
-
-
 def test_the_database_takes_one_label_per_expert_and_a_whole_guess(
     job: GenerationJob, eva: User
 ) -> None:
@@ -118,18 +106,6 @@ def test_of_several_experts_more_than_half_must_see_a_fault(job: GenerationJob, 
     assert ann.shown_counts == (2, 1, 0, 1)
     assert sim.shown_counts == (2, "--", "--", "--"), "nothing of it was labelled"
     assert (ann.labelled, ann.labels, sim.labelled, sim.without_modification) == (2, 3, 0, 2)
-
-
-def test_agreement_compares_guess_and_label(job: GenerationJob, eva: User) -> None:
-    first, second = tasks_of(opened(job, "eva"), eva)
-    save(first, P)
-    save(second)
-    with rewriting(FaultLabel):
-        FaultLabel.objects.filter(task=first).update(guessed_position=True)
-        FaultLabel.objects.filter(task=second).update(guessed_position=False)
-    position, heading, _ = fault_table(job).agreement
-    assert (position.kappa, position.n) == (1.0, 2)
-    assert heading.n == 2
 
 
 def test_a_closed_labelling_takes_no_more_and_asks_for_nothing(

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections import Counter
 
 import pytest
-from django.contrib.auth.models import User
 from django.db.models import F
 
 from arena.models import Snapshot, Study, Vote
@@ -30,10 +29,6 @@ def rated(study: Study, **filters: object) -> Snapshot:
 
 def total(snapshot: Snapshot, **search: str) -> int:
     return vote_page(snapshot, VoteSearch(**search), 1).total
-
-
-def code_of(username: str) -> str:
-    return str(User.objects.get(username=username).person.code)
 
 
 CHOICES: dict[str, dict[str, object]] = {
@@ -68,15 +63,6 @@ def test_the_database_gives_the_reasons_of_the_rating(
     assert total(snapshot, mark=LEFT_OUT) == sum(snapshot.votes_left_out.values())
     for reason, number in snapshot.votes_left_out.items():
         assert total(snapshot, mark=reason) == number, reason
-
-
-def test_one_expert_alone_counts_and_the_other_is_not_asked_for(study: Study) -> None:
-    study.allow_simulated = True
-    study.save()
-    snapshot = rated(study, experts=(code_of("eva"),), leave_out_settled=True)
-    assert total(snapshot) == snapshot.votes_counted == 11
-    assert total(snapshot, expert=code_of("finn"), mark="filtered") == 11
-    assert total(snapshot, expert=code_of("finn")) == 0
 
 
 def test_what_comes_after_a_rating_is_none_of_its_votes(study: Study) -> None:
