@@ -7,24 +7,22 @@ of a fork or merge and crosses another lane. World frame.
 
 from __future__ import annotations
 
-from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from collections.abc import Set as AbstractSet
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
 from augment.formats.intersection_ways import crossing_segments, take_end_widths
 from augment.formats.lane_edges import USUAL_M, edge_of, whole_edge, width_of
 from augment.formats.road_map import FloatArray, Name, RoadMap, Segment
-from augment.formats.waymo.messages import BoundaryMessage, LaneMessage, ScenarioMessage
+from augment.formats.waymo.messages import MapFeatures, features_of
 from augment.formats.waymo.tfrecord import WHAT
 from augment.scene.entities import AreaKind, TrafficLight
 from augment.scene.notes import Note, SceneNoteKind
 
 BICYCLE_LANE = 3
-"""Pairs of a lane's point and an edge's; a scenario of the data set has one to ten million."""
-CROSSWALK, SPEED_BUMP, DRIVEWAY = 8, 9, 10
 MPS_OF_MPH = 0.44704
 
 LIGHT_OF = {
@@ -49,105 +47,107 @@ class WaymoCity:
     notes: tuple[Note, ...]
 
 
-def city_of(scenario: ScenarioMessage, frame: int) -> WaymoCity:
+def city_of(scenario: Any, frame: int) -> WaymoCity:
     """The map with the lights of one step."""
-    lanes = {key: lane for key, lane in scenario.lanes.items() if lane.type != BICYCLE_LANE}
-    lanes = {key: lane for key, lane in lanes.items() if len(lane.line) >= 2}
-    lights = scenario.lights[frame] if frame < len(scenario.lights) else {}
-    controlled = {lane for step in scenario.lights for lane in step}
+    features = features_of(scenario)
+    lanes = {
+        key: lane
+        for key, lane in features.lanes.items()
+        if lane.type != BICYCLE_LANE and len(features.lines[key]) >= 2
+    }
+    states = [step.lane_states for step in scenario.dynamic_map_states]
+    lights = {one.lane: one.state for one in states[frame]} if frame < len(states) else {}
+    controlled = {one.lane for step in states for one in step}
     crossing: set[Name] = {
         key for key, lane in lanes.items() if lane.interpolating or key in controlled
     }
     crossing |= _unbounded_joints(lanes)
-    built = [_segment(scenario, lane, lights.get(key)) for key, lane in lanes.items()]
+    built = [_segment(features, key, lights.get(key, 0)) for key in lanes]
     crossing |= crossing_segments({one.name: one for one, _ in built})
     segments, assumed = take_end_widths(
         [replace(one, crosses=one.name in crossing) for one, _ in built],
         {one.name for one, was_assumed in built if was_assumed},
     )
     areas = [
-        (AreaKind.CROSSWALK if kind == CROSSWALK else AreaKind.DRIVABLE, polygon)
-        for kind, polygon in scenario.polygons
-        if kind != SPEED_BUMP and len(np.unique(polygon, axis=0)) >= 3
+        (AreaKind.CROSSWALK if kind == "crosswalk" else AreaKind.DRIVABLE, polygon)
+        for kind, polygon in features.polygons
+        if kind != "speed_bump" and len(np.unique(polygon, axis=0)) >= 3
     ]
     city = RoadMap(what=WHAT, place="map_features", segments=segments, areas=tuple(areas))
-    return WaymoCity(map=city, notes=_notes(scenario, segments, assumed, crossing, controlled))
+    return WaymoCity(map=city, notes=_notes(features, segments, assumed, crossing, controlled))
 
 
 # Private
 
 
-def _unbounded_joints(lanes: dict[int, LaneMessage]) -> set[int]:
-    exits = {key: len(lane.exits) for key, lane in lanes.items()}
-    entries = {key: len(lane.entries) for key, lane in lanes.items()}
+def _unbounded_joints(lanes: dict[int, Any]) -> set[int]:
+    exits = {key: len(lane.exit_lanes) for key, lane in lanes.items()}
+    entries = {key: len(lane.entry_lanes) for key, lane in lanes.items()}
     return {
         key
         for key, lane in lanes.items()
         if not lane.left_boundaries
         and not lane.right_boundaries
         and (
-            any(exits.get(before, 0) > 1 for before in lane.entries)
-            or any(entries.get(after, 0) > 1 for after in lane.exits)
+            any(exits.get(before, 0) > 1 for before in lane.entry_lanes)
+            or any(entries.get(after, 0) > 1 for after in lane.exit_lanes)
         )
     }
 
 
-def _segment(
-    scenario: ScenarioMessage, lane: LaneMessage, light: int | None
-) -> tuple[Segment, bool]:
+def _segment(features: MapFeatures, key: int, light: int) -> tuple[Segment, bool]:
     """The segment, and whether its width was assumed."""
-    line = lane.line
-    left = edge_of(line, _parts(scenario, lane.left_boundaries))
-    right = edge_of(line, _parts(scenario, lane.right_boundaries))
-    width_m = width_of(line, left, right) or _beside_m(scenario, lane)
+    lane, line = features.lanes[key], features.lines[key]
+    left = edge_of(line, _parts(features, lane.left_boundaries))
+    right = edge_of(line, _parts(features, lane.right_boundaries))
+    width_m = width_of(line, left, right) or _beside_m(features, key)
     edges = whole_edge(line, left), whole_edge(line, right)
     both = edges if edges[0] is not None and edges[1] is not None else (None, None)
     limit = lane.speed_limit_mph
-    has_limit = limit is not None and np.isfinite(limit) and limit > 0.0
+    has_limit = np.isfinite(limit) and limit > 0.0
     return (
         Segment(
-            name=lane.id,
+            name=key,
             centerline=line,
             left=both[0],
             right=both[1],
             width_m=width_m or USUAL_M,
-            successors=tuple(lane.exits),
-            predecessors=tuple(lane.entries),
-            left_neighbors=tuple(lane.left_neighbors),
-            right_neighbors=tuple(lane.right_neighbors),
-            speed_limit_mps=round(limit * MPS_OF_MPH, 3) if has_limit and limit else None,
-            light=LIGHT_OF.get(light or 0, TrafficLight.UNKNOWN),
+            successors=tuple(lane.exit_lanes),
+            predecessors=tuple(lane.entry_lanes),
+            left_neighbors=tuple(one.feature_id for one in lane.left_neighbors),
+            right_neighbors=tuple(one.feature_id for one in lane.right_neighbors),
+            speed_limit_mps=round(limit * MPS_OF_MPH, 3) if has_limit else None,
+            light=LIGHT_OF.get(light, TrafficLight.UNKNOWN),
         ),
         width_m is None,
     )
 
 
-def _parts(
-    scenario: ScenarioMessage, boundaries: list[BoundaryMessage]
-) -> list[tuple[int, int, FloatArray]]:
+def _parts(features: MapFeatures, boundaries: Iterable[Any]) -> list[tuple[int, int, FloatArray]]:
     return [
-        (boundary.start, boundary.end, scenario.edges[boundary.feature])
-        for boundary in boundaries
-        if boundary.feature in scenario.edges
+        (one.lane_start_index, one.lane_end_index, features.edges[one.boundary_feature_id])
+        for one in boundaries
+        if one.boundary_feature_id in features.edges
     ]
 
 
-def _beside_m(scenario: ScenarioMessage, lane: LaneMessage) -> float | None:
+def _beside_m(features: MapFeatures, key: int) -> float | None:
     """How far the lanes beside it are, which is as wide as a lane."""
-    none = np.full(lane.line.shape, np.nan)
-    for name in (*lane.left_neighbors, *lane.right_neighbors):
-        other = scenario.lanes.get(name)
-        if other is not None and len(other.line) >= 2:
-            beside = edge_of(lane.line, [(0, len(lane.line), other.line)])
+    lane, line = features.lanes[key], features.lines[key]
+    none = np.full(line.shape, np.nan)
+    for neighbor in (*lane.left_neighbors, *lane.right_neighbors):
+        other = features.lines.get(neighbor.feature_id)
+        if other is not None and len(other) >= 2:
+            beside = edge_of(line, [(0, len(line), other)])
             # `width_of` doubles what is known of one side: half the way to the lane beside.
-            width_m = width_of(lane.line, (lane.line + beside) / 2.0, none)
+            width_m = width_of(line, (line + beside) / 2.0, none)
             if width_m is not None:
                 return width_m
     return None
 
 
 def _notes(
-    scenario: ScenarioMessage,
+    features: MapFeatures,
     segments: Sequence[Segment],
     assumed: int,
     crossing: AbstractSet[Name],
@@ -166,11 +166,11 @@ def _notes(
         notes.append(Note(kind=SceneNoteKind.NO_INTERSECTIONS))
     if not controlled:
         notes.append(Note(kind=SceneNoteKind.NO_LIGHTS))
-    bicycle_lanes = sum(lane.type == BICYCLE_LANE for lane in scenario.lanes.values())
+    bicycle_lanes = sum(lane.type == BICYCLE_LANE for lane in features.lanes.values())
     if bicycle_lanes:
         notes.append(Note(kind=SceneNoteKind.BICYCLE_LANES_LEFT_OUT, number=bicycle_lanes))
-    parts = Counter(SPEED_BUMP for kind, _ in scenario.polygons if kind == SPEED_BUMP)
-    left_out = {"speed bumps": parts[SPEED_BUMP], "stop signs": scenario.stop_signs}
+    bumps = sum(kind == "speed_bump" for kind, _ in features.polygons)
+    left_out = {"speed bumps": bumps, "stop signs": features.stop_signs}
     names = tuple(name for name, number in left_out.items() if number)
     if names:
         number = sum(left_out.values())

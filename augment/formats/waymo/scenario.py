@@ -6,9 +6,9 @@ scenario calls its current one (1.1 s after its start). Coordinates are the data
 
 from __future__ import annotations
 
-from collections import Counter
 from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -17,12 +17,7 @@ from augment.formats.reading import Moment, Reading, frame_in, frames_every
 from augment.formats.recorded_log import Log, LoggedTrack, far_notes, scene_at
 from augment.formats.roads import road_around
 from augment.formats.waymo.city import city_of
-from augment.formats.waymo.messages import (
-    ScenarioMessage,
-    TrackMessage,
-    read_scenario,
-    read_times,
-)
+from augment.formats.waymo.messages import read_scenario, states_of
 from augment.formats.waymo.tfrecord import WHAT, read_records, starts_a_record
 from augment.scene.entities import AgentType
 from augment.scene.notes import Note, SceneNoteKind
@@ -50,7 +45,7 @@ class WaymoMotion:
     def moments(self, path: Path, *, every_s: float) -> Iterator[Moment]:
         """Each record's steps."""
         for number, payload in read_records(path):
-            times_s, _ = read_times(payload)
+            times_s = list(read_scenario(payload).timestamps_seconds)
             for frame in frames_every(times_s, every_s):
                 time_s = times_s[frame] - times_s[0]
                 yield Moment(item=str(number), frame=frame, time_s=time_s)
@@ -74,11 +69,10 @@ def _number(item: str | None) -> int:
     return int(item)
 
 
-def _reading(
-    scenario: ScenarioMessage, path: Path, number: int, frame: int | None, name: str
-) -> Reading:
+def _reading(scenario: Any, path: Path, number: int, frame: int | None, name: str) -> Reading:
     log = _log(scenario)
-    frame = frame_in(WHAT, scenario.current if frame is None else frame, len(log.times_s))
+    frame = scenario.current_time_index if frame is None else frame
+    frame_in(WHAT, frame, len(log.times_s))
     origin = log.ego_pose(frame)
     city = city_of(scenario, frame)
     road = road_around(city.map, origin)
@@ -89,7 +83,7 @@ def _reading(
         name=name,
         world="Waymo Open Motion scenario frame",
         provenance=(
-            f"Waymo Open Motion data set, {path.name}, scenario {scenario.id}, step {frame} of "
+            f"Waymo Open Motion data set, {path.name}, scenario {_id(scenario)}, step {frame} of "
             f"{len(log.times_s)}; {LICENCE}"
         ),
     )
@@ -98,7 +92,7 @@ def _reading(
         notes.append(
             Note(kind=SceneNoteKind.TRAFFIC_SIDE_ASSUMED, names=(road.traffic_side.value,))
         )
-    unset = Counter(track.type for track in scenario.tracks)[UNSET]
+    unset = sum(track.object_type == UNSET for track in scenario.tracks)
     if unset:
         kind = SceneNoteKind.OBJECTS_LEFT_OUT
         notes.append(Note(kind=kind, number=unset, names=("TYPE_UNSET",)))
@@ -111,12 +105,21 @@ def _reading(
     )
 
 
-def _log(scenario: ScenarioMessage) -> Log:
-    times_s = np.array(scenario.times_s)
+def _id(scenario: Any) -> str:
+    try:
+        text: str = scenario.scenario_id.decode("ascii")
+    except UnicodeDecodeError:
+        raise InvalidDocument(WHAT, [("scenario_id", "is no plain text")]) from None
+    return text
+
+
+def _log(scenario: Any) -> Log:
+    times_s = np.array(scenario.timestamps_seconds)
     if not len(times_s) or not np.isfinite(times_s).all() or (np.diff(times_s) <= 0.0).any():
         raise InvalidDocument(WHAT, [("timestamps_seconds", "must be there and ascend")])
-    if not 0 <= scenario.ego < len(scenario.tracks):
-        text = f"{scenario.ego} is none of the {len(scenario.tracks)} tracks"
+    ego_index = scenario.sdc_track_index
+    if not 0 <= ego_index < len(scenario.tracks):
+        text = f"{ego_index} is none of the {len(scenario.tracks)} tracks"
         raise InvalidDocument(WHAT, [("sdc_track_index", text)])
     problems = [
         (f"tracks[{index}]", f"has {len(track.states)} states for {len(times_s)} times")
@@ -124,44 +127,40 @@ def _log(scenario: ScenarioMessage) -> Log:
         if len(track.states) != len(times_s)
     ]
     problems += [
-        (f"tracks[{index}].object_type", f"{track.type} is unknown; known: 0 to 4")
+        (f"tracks[{index}].object_type", f"{track.object_type} is unknown; known: 0 to 4")
         for index, track in enumerate(scenario.tracks)
-        if track.type not in TYPE_OF and track.type != UNSET
+        if track.object_type not in TYPE_OF and track.object_type != UNSET
     ]
     if problems:
         raise InvalidDocument(WHAT, problems)
-    ego = scenario.tracks[scenario.ego]
+    ego = scenario.tracks[ego_index]
     length_m, width_m = _size(ego)
     return Log(
         what=WHAT,
         times_s=times_s - times_s[0],
-        ego=_states(ego),
+        ego=states_of(ego),
         ego_length_m=length_m,
         ego_width_m=width_m,
         tracks=tuple(
             LoggedTrack(
                 name=f"{track.id:012d}",
-                type=TYPE_OF[track.type],
+                type=TYPE_OF[track.object_type],
                 length_m=_size(track)[0],
                 width_m=_size(track)[1],
-                states=_states(track),
+                states=states_of(track),
             )
             for index, track in enumerate(scenario.tracks)
-            if index != scenario.ego and track.type != UNSET and track.states[:, 7].any()
+            if index != ego_index
+            and track.object_type != UNSET
+            and any(one.valid for one in track.states)
         ),
     )
 
 
-def _states(track: TrackMessage) -> np.ndarray[tuple[int, int], np.dtype[np.float64]]:
-    made = np.column_stack([track.states[:, :3], np.hypot(*track.states[:, 3:5].T)])
-    made[(track.states[:, 7] == 0.0) | ~np.isfinite(made).all(axis=1)] = np.nan
-    return made
-
-
-def _size(track: TrackMessage) -> tuple[float, float]:
+def _size(track: Any) -> tuple[float, float]:
     """Length and width; boxes change a little from step to step, the usual one is taken."""
-    seen = track.states[track.states[:, 7] > 0.0]
-    if not len(seen):
+    sizes = [(one.length, one.width) for one in track.states if one.valid]
+    if not sizes:
         return 0.0, 0.0
-    length_m, width_m = np.median(seen[:, 5:7], axis=0).tolist()
+    length_m, width_m = np.median(np.array(sizes, dtype=np.float64), axis=0).tolist()
     return length_m, width_m

@@ -11,8 +11,9 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import BinaryIO
 
+import google_crc32c
+
 from augment.errors import InvalidDocument
-from augment.formats.waymo.crc32c import masked_crc32c
 
 WHAT = "Waymo Open Motion file"
 
@@ -44,6 +45,12 @@ def starts_a_record(path: Path) -> bool:
     with path.open("rb") as file:
         head = file.read(_HEAD.size)
     return len(head) == _HEAD.size and masked_crc32c(head[:8]) == _HEAD.unpack(head)[1]
+
+
+def masked_crc32c(block: bytes) -> int:
+    """What stands in the file beside a block: its CRC-32C, rotated and shifted."""
+    crc: int = google_crc32c.value(block)
+    return (((crc >> 15) | (crc << 17)) + 0xA282EAD8) & 0xFFFFFFFF
 
 
 # Private
