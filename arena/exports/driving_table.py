@@ -32,7 +32,7 @@ DIFFERENCES = (
         "keep the colour that they have at the start."
     ),
 )
-"""What differs from nuPlan; docs/method.md says it at length."""
+"""What differs from nuPlan; docs/simulation.md says it at length."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
