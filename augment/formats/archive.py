@@ -1,12 +1,11 @@
 """Zips from strangers, unpacked within bounds, and what in a folder can be read.
 
-A zip is believed in nothing: how many entries it has is looked at before they are listed, and the
-names, sizes and kinds of all of them before anything is written.
+A zip is believed in nothing: the names, sizes and kinds of all entries are looked at before
+anything is written.
 """
 
 from __future__ import annotations
 
-import os
 import shutil
 import stat
 import struct
@@ -19,12 +18,6 @@ from augment.errors import InvalidDocument
 from augment.formats.reading import Reader
 
 WHAT = "zip"
-_END = struct.Struct("<4s4H2LH")
-"""The end record: entries and bytes of the list of contents are its fifth and sixth field."""
-_LINE_BYTES = 1_000
-"""Of the list of contents for each entry, at most on average."""
-_LONGEST_NAME = 200
-_DEEPEST = 12
 _UNREADABLE = (zipfile.BadZipFile, zlib.error, EOFError, struct.error)
 
 
@@ -58,12 +51,12 @@ def unpack_zip(path: Path, into: Path, *, bounds: ZipBounds = USUAL_BOUNDS) -> N
             special files, a name twice, a file in a file, or more than the bounds allow.
     """
     try:
-        _check_end(path, bounds)
         with zipfile.ZipFile(path) as packed:
-            for entry, name in _checked(packed.infolist(), bounds):
-                (into / name).parent.mkdir(parents=True, exist_ok=True)
-                with packed.open(entry) as source, (into / name).open("xb") as file:
-                    shutil.copyfileobj(source, file)  # no more than the entry says
+            listed = packed.infolist()
+            entries = [one for one in listed if not (one.is_dir() or _is_of_the_system(one))]
+            _check_all(entries, bounds)
+            for entry in entries:
+                _unpack(packed, entry, into / entry.filename)
     except _UNREADABLE as fault:
         raise InvalidDocument(WHAT, [("", f"is broken: {fault}")]) from None
 
@@ -96,92 +89,61 @@ def find_input(folder: Path, readers: list[Reader]) -> tuple[Reader, Path]:
 # Private
 
 
-def _check_end(path: Path, bounds: ZipBounds) -> None:
-    """Raise for a list of contents that is too long, before it is read."""
-    with path.open("rb") as file:
-        file.seek(max(0, file.seek(0, os.SEEK_END) - _END.size - 0xFFFF))
-        tail = file.read()
-    place = tail.rfind(b"PK\5\6")
-    if place < 0:
-        raise zipfile.BadZipFile("it has no end")
-    _, _, _, _, entries, list_bytes, *_ = _END.unpack_from(tail, place)
-    _check_number(max(entries, list_bytes // _LINE_BYTES), bounds)
-
-
-def _check_number(entries: int, bounds: ZipBounds) -> None:
-    if entries > bounds.entries:
-        text = f"holds more than {bounds.entries} entries"
-        raise InvalidDocument(WHAT, [("", text)])
-
-
-def _checked(
-    entries: list[zipfile.ZipInfo], bounds: ZipBounds
-) -> list[tuple[zipfile.ZipInfo, PurePosixPath]]:
-    """The files among the entries with their places."""
-    _check_number(len(entries), bounds)
-    total = sum(entry.file_size for entry in entries)
-    if total > bounds.bytes:
+def _unpack(packed: zipfile.ZipFile, entry: zipfile.ZipInfo, place: Path) -> None:
+    try:
+        place.parent.mkdir(parents=True, exist_ok=True)
+        with packed.open(entry) as source, place.open("xb") as file:
+            shutil.copyfileobj(source, file)  # no more than the entry says
+    except (FileExistsError, NotADirectoryError):
         raise InvalidDocument(
-            WHAT, [("", f"unpacks to {total} bytes, at most {bounds.bytes} are read")]
-        )
-    files: list[tuple[zipfile.ZipInfo, PurePosixPath]] = []
-    taken: set[str] = set()
-    for entry in entries:
-        name = _place(entry)
-        problem = _problem(entry)
-        if problem:
-            raise InvalidDocument(WHAT, [(_shown(entry.filename), problem)])
-        if entry.is_dir() or _is_of_the_system(name):
-            continue
-        key = str(name).lower()  # some folders know no difference of case
-        if key in taken:
-            raise InvalidDocument(WHAT, [(_shown(entry.filename), "is there twice")])
-        taken.add(key)
-        files.append((entry, name))
-    for entry, name in files:
-        if any(str(above).lower() in taken for above in name.parents):
-            raise InvalidDocument(WHAT, [(_shown(entry.filename), "lies in a file")])
-    if not files:
+            WHAT, [(_shown(entry), "is there twice, or lies in a file")]
+        ) from None
+    except OSError as fault:
+        raise InvalidDocument(
+            WHAT, [(_shown(entry), f"can't be unpacked: {fault.strerror}")]
+        ) from None
+
+
+def _check_all(entries: list[zipfile.ZipInfo], bounds: ZipBounds) -> None:
+    """Do nothing where all may be unpacked.
+
+    Raises:
+        InvalidDocument: There are too many, or one of them may not.
+    """
+    total = sum(entry.file_size for entry in entries)
+    if len(entries) > bounds.entries:
+        raise InvalidDocument(WHAT, [("", f"holds more than {bounds.entries} entries")])
+    if total > bounds.bytes:
+        text = f"unpacks to {total} bytes, at most {bounds.bytes} are read"
+        raise InvalidDocument(WHAT, [("", text)])
+    if not entries:
         raise InvalidDocument(WHAT, [("", "holds no file")])
-    return files
-
-
-def _place(entry: zipfile.ZipInfo) -> PurePosixPath:
-    """Where it is to lie, in the folder and nowhere else."""
-    name = entry.filename
-    place = PurePosixPath(name)
-    bad = (
-        not place.parts
-        or "\\" in name
-        or ":" in name
-        or not name.isprintable()
-        or place.is_absolute()
-        or ".." in place.parts
-        or len(place.parts) > _DEEPEST
-        or any(len(os.fsencode(part)) > _LONGEST_NAME for part in place.parts)
-    )
-    if bad:
-        text = "is no name within the folder"
-        raise InvalidDocument(WHAT, [(_shown(name), text)])
-    return place
+    problems = [(_shown(entry), problem) for entry in entries if (problem := _problem(entry))]
+    if problems:
+        raise InvalidDocument(WHAT, problems[:1])
 
 
 def _problem(entry: zipfile.ZipInfo) -> str:
     """What keeps an entry from being unpacked, empty for nothing."""
+    name, place = entry.filename, PurePosixPath(entry.filename)
+    if place.is_absolute() or ".." in place.parts or not place.parts:
+        return "is no name within the folder"
+    if "\\" in name or ":" in name or not name.isprintable():
+        return "is no name within the folder"
     if entry.flag_bits & 0x1:
         return "is encrypted"
-    kind = stat.S_IFMT(entry.external_attr >> 16)
-    if kind not in (0, stat.S_IFREG, stat.S_IFDIR):
+    if stat.S_IFMT(entry.external_attr >> 16) not in (0, stat.S_IFREG, stat.S_IFDIR):
         return "is a link or a special file"
     if entry.compress_type not in (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED):
         return "is packed in another way than the usual one"
     return ""
 
 
-def _is_of_the_system(place: PurePosixPath) -> bool:
+def _is_of_the_system(entry: zipfile.ZipInfo) -> bool:
     """What file managers add and nobody meant."""
+    place = PurePosixPath(entry.filename)
     return "__MACOSX" in place.parts or place.name in (".DS_Store", "Thumbs.db")
 
 
-def _shown(name: str) -> str:
-    return repr(name[:80])
+def _shown(entry: zipfile.ZipInfo) -> str:
+    return repr(entry.filename[:80])

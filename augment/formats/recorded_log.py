@@ -1,20 +1,21 @@
-"""From a log in its own world frame to a scene and a recording in the ego frame of t0.
+"""From a log and a map in their world frame to a scene and a recording in the ego frame of t0.
 
-What every reader needs once it knows times, ego and tracks: who is near, in which order they are
-named, which lane lies under them. Metres are rounded to millimetres, so that documents can be
+What every reader needs once it knows times, ego, tracks and map: who is near, in which order they
+are named, which lane lies under them. Metres are rounded to millimetres, so that documents can be
 read by people. T steps.
 """
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from augment.errors import InvalidDocument
-from augment.formats.reading import frame_in
-from augment.formats.road_map import FURTHEST_M, MapExtract
+from augment.formats.reading import Moment, Reading, frame_in
+from augment.formats.road_map import FURTHEST_M, FloatArray, MapExtract, RoadMap
+from augment.formats.roads import road_around
 from augment.formats.strips import RADIUS_M
 from augment.geometry.angles import wrap
 from augment.geometry.frames import Pose
@@ -23,8 +24,6 @@ from augment.scene.lane_graph import LaneGraph
 from augment.scene.notes import Note, SceneNoteKind
 from augment.scene.recording import Recording, Track
 from augment.scene.sizes import LENGTH_WIDTH_M
-
-FloatArray = NDArray[np.float64]
 
 LONGEST_M = 100.0
 """No road user is longer."""
@@ -94,58 +93,56 @@ class Log:
         return Pose(x_m=x_m, y_m=y_m, heading_rad=wrap(heading_rad))
 
 
-def scene_at(
-    log: Log, frame: int, road: MapExtract, *, name: str, world: str, provenance: str
-) -> tuple[Scene, Recording]:
-    """The scene at a frame, and what was recorded from there on.
+def reading_at(
+    log: Log,
+    frame: int,
+    city: RoadMap,
+    *,
+    name: str,
+    world: str,
+    provenance: str,
+    licence: str | None,
+    notes: Iterable[Note] = (),
+    item: str | None = None,
+) -> Reading:
+    """The scene at a frame, what was recorded from there on, and what the source did not say.
 
     Args:
         log: The whole log.
         frame: What becomes t0.
-        road: The map around the ego at that frame.
+        city: The map, as far as the ego can see at least.
         name: The scene's slug.
         world: What the source's frame is called.
         provenance: Where it comes from and under which licence.
+        licence: One that forbids commercial use; None where there is none such.
+        notes: What neither the log nor the map tells.
+        item: Which part of the source it is.
 
     Raises:
-        InvalidDocument: There is no such frame, or no ego in it.
+        InvalidDocument: No such frame, no ego in it, or a part of the map without a shape.
     """
     origin = log.ego_pose(frame)
+    road = road_around(city, origin)
     named = _named(log, frame)
-    ego = TrafficAgent(
-        id="Agent1",
-        type=AgentType.EGO_VEHICLE,
-        x_m=0.0,
-        y_m=0.0,
-        heading_rad=0.0,
-        width_m=round(log.ego_width_m, 3),
-        length_m=round(log.ego_length_m, 3),
-        speed_mps=round(float(log.ego[frame, 3]), 3),
+    scene = _on_lanes(
+        Scene(
+            name=name,
+            ego=_ego(log, frame),
+            traffic_side=road.traffic_side,
+            origin=Origin.at(origin, frame=world),
+            provenance=provenance,
+            agents=_agents(named, frame, origin),
+            lanes=road.lanes,
+            connectors=road.connectors,
+            areas=road.areas,
+        )
     )
-    scene = Scene(
-        name=name,
-        ego=ego,
-        traffic_side=road.traffic_side,
-        origin=Origin.at(origin, frame=world),
-        provenance=provenance,
-        agents=_agents(named, frame, origin),
-        lanes=road.lanes,
-        connectors=road.connectors,
-        areas=road.areas,
+    return Reading(
+        scene=scene,
+        recording=_recording(log, named, frame, origin),
+        notes=(*city.notes, *notes, *_own_notes(log, frame, road, licence)),
+        moment=Moment(item=item, frame=frame),
     )
-    return _on_lanes(scene), _recording(log, named, frame, origin)
-
-
-def far_notes(log: Log, frame: int, road: MapExtract) -> list[Note]:
-    """What of the map and of who is there lies too far from the ego, and whose box was none."""
-    sizeless = sum(not _has_size(track) for track in log.tracks)
-    notes = [Note(kind=SceneNoteKind.SOME_BOX_SIZES, number=sizeless, of=len(log.tracks))]
-    notes = notes if sizeless else []
-    away_m = [np.hypot(*(track.states[frame, :2] - log.ego[frame, :2])) for track in log.tracks]
-    number = road.far + sum(bool(distance_m > RADIUS_M) for distance_m in away_m)
-    if number:
-        notes.append(Note(kind=SceneNoteKind.FAR_PARTS_LEFT_OUT, number=number, value=RADIUS_M))
-    return notes
 
 
 def speeds(times_s: FloatArray, xy_m: FloatArray) -> FloatArray:
@@ -163,6 +160,34 @@ def speeds(times_s: FloatArray, xy_m: FloatArray) -> FloatArray:
 
 
 # Private
+
+
+def _own_notes(log: Log, frame: int, road: MapExtract, licence: str | None) -> Iterator[Note]:
+    sizeless = sum(not _has_size(track) for track in log.tracks)
+    if sizeless:
+        yield Note(kind=SceneNoteKind.SOME_BOX_SIZES, number=sizeless, of=len(log.tracks))
+    away_m = [np.hypot(*(track.states[frame, :2] - log.ego[frame, :2])) for track in log.tracks]
+    number = road.far + sum(bool(distance_m > RADIUS_M) for distance_m in away_m)
+    if number:
+        yield Note(kind=SceneNoteKind.FAR_PARTS_LEFT_OUT, number=number, value=RADIUS_M)
+    if road.side_is_assumed:
+        side = (road.traffic_side.value,)
+        yield Note(kind=SceneNoteKind.TRAFFIC_SIDE_ASSUMED, names=side)
+    if licence:
+        yield Note(kind=SceneNoteKind.NON_COMMERCIAL, names=(licence,))
+
+
+def _ego(log: Log, frame: int) -> TrafficAgent:
+    return TrafficAgent(
+        id="Agent1",
+        type=AgentType.EGO_VEHICLE,
+        x_m=0.0,
+        y_m=0.0,
+        heading_rad=0.0,
+        width_m=round(log.ego_width_m, 3),
+        length_m=round(log.ego_length_m, 3),
+        speed_mps=round(float(log.ego[frame, 3]), 3),
+    )
 
 
 def _has_size(track: LoggedTrack) -> bool:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -16,12 +17,16 @@ from augment.scene.entities import (
     TrafficSide,
     TurnType,
 )
+from augment.scene.notes import Note, SceneNoteKind
 
 FloatArray = NDArray[np.float64]
 Name = int | str
 
 FURTHEST_M = 1e8
 """Nothing on earth is further from the origin of a map."""
+
+
+MOST_NAMED = 12
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -63,6 +68,8 @@ class RoadMap:
     Attributes:
         what, place: How faults call the source and the file.
         side: Where the lanes do not tell on which side people drive.
+        is_side_told: Whether the source itself says so, whatever the lanes look like.
+        notes: What the map does not say.
     """
 
     what: str
@@ -70,6 +77,8 @@ class RoadMap:
     segments: tuple[Segment, ...]
     areas: tuple[tuple[AreaKind, FloatArray], ...] = ()
     side: TrafficSide = TrafficSide.RIGHT
+    is_side_told: bool = False
+    notes: tuple[Note, ...] = ()
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -87,3 +96,25 @@ class MapExtract:
     areas: tuple[Area, ...]
     side_is_assumed: bool = False
     far: int = 0
+
+
+def limit_notes(segments: Sequence[Segment]) -> Iterator[Note]:
+    """Of how many lanes the map has no speed limit."""
+    unlimited = sum(segment.speed_limit_mps is None for segment in segments)
+    if segments and unlimited == len(segments):
+        yield Note(kind=SceneNoteKind.NO_SPEED_LIMITS)
+    elif unlimited:
+        kind = SceneNoteKind.SOME_SPEED_LIMITS
+        yield Note(kind=kind, number=unlimited, of=len(segments))
+
+
+def count_notes(counts: dict[SceneNoteKind, int]) -> Iterator[Note]:
+    """A note of each kind with its number, where that is not 0."""
+    return (Note(kind=kind, number=number) for kind, number in counts.items() if number)
+
+
+def left_out_notes(kind: SceneNoteKind, counts: dict[str, int]) -> Iterator[Note]:
+    """What is left out, by name, where there is any of it."""
+    names = tuple(sorted(name for name, number in counts.items() if number))
+    if names:
+        yield Note(kind=kind, number=sum(counts.values()), names=names[:MOST_NAMED])

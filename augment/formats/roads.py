@@ -44,7 +44,7 @@ def road_around(city: RoadMap, ego: Pose) -> MapExtract:
     ways = list(islice(ways_through(following, inside), MOST_WAYS + 1))
     check_count(city, "ways through intersections", len(ways), MOST_WAYS)
     lanes = _lanes(strips, lane_ids, following)
-    side = traffic_side_of(lanes)
+    side = city.side if city.is_side_told else traffic_side_of(lanes)
     areas = find_areas(city, ego)
     return MapExtract(
         traffic_side=side or city.side,

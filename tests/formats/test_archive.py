@@ -46,7 +46,7 @@ def test_a_log_folder_comes_out_as_it_went_in(tmp_path: Path) -> None:
         assert (into / "log" / file.relative_to(log)).read_bytes() == file.read_bytes()
 
 
-NAMES = ["../out", "/etc/passwd", "a/../../out", "c:\\out", "a\\b", "a:b", "x" * 300, "a\nb", "."]
+NAMES = ["../out", "/etc/passwd", "a/../../out", "c:\\out", "a\\b", "a:b", "a\nb", "."]
 
 
 @pytest.mark.parametrize("name", NAMES)
@@ -61,9 +61,9 @@ def test_no_name_leads_out_of_the_folder(tmp_path: Path, name: str) -> None:
         (lambda p: packed(p, {f"{n}": bytes(200_000) for n in range(16)}), "unpacks to 3200000"),
         (lambda p: packed(p, {"link": b"/etc/passwd"}, kind=stat.S_IFLNK), "link or a special"),
         (lambda p: packed(p, {"pipe": b""}, kind=stat.S_IFIFO), "link or a special"),
-        (lambda p: packed(p, {"a": b"1", "A": b"2"}), "is there twice"),
-        (lambda p: packed(p, {"a": b"1", "A/b": b"2"}), "'A/b': lies in a file"),
-        (lambda p: packed(p, {"a/b/c": b"1", "a": b"2"}), "'a/b/c': lies in a file"),
+        (lambda p: packed(p, {"a": b"1", "./a": b"2"}), "is there twice"),
+        (lambda p: packed(p, {"a": b"1", "a/b": b"2"}), "lies in a file"),
+        (lambda p: packed(p, {"x" * 300: b"1"}), "File name too long"),
         (lambda p: packed(p, {}), "holds no file"),
         (lambda p: garbage(p), "is broken"),
         (lambda p: cut(packed(p, {"a": bytes(range(256)) * 50})), "is broken"),

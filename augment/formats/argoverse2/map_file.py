@@ -15,11 +15,13 @@ from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from augment.errors import InvalidDocument
-from augment.formats.argoverse2.log import WHAT
 from augment.formats.json_file import read_json
-from augment.formats.road_map import RoadMap, Segment
+from augment.formats.road_map import RoadMap, Segment, count_notes
 from augment.scene.entities import AreaKind
+from augment.scene.notes import Note, SceneNoteKind
 from augment.scene.schema import problems_of
+
+LICENCE = "CC BY-NC-SA 4.0"
 
 
 class MapPart(BaseModel):
@@ -73,22 +75,18 @@ class MapFile(MapPart):
     pedestrian_crossings: dict[str, MapCrossing] = {}
 
 
-def read_map(file: Path) -> MapFile:
-    """The map in that file.
+def read_map(file: Path, *, what: str) -> RoadMap:
+    """The map in that file as segments and areas, with what maps of Argoverse 2 don't say.
 
     Raises:
         InvalidDocument: The file is no such map; with the path and the reason of every fault.
     """
-    document = read_json(file, what=WHAT)
+    document = read_json(file, what=what)
     try:
-        return MapFile.model_validate(document)
+        city = MapFile.model_validate(document)
     except ValidationError as fault:
         problems = [(f"{file.name}: {place}", text) for place, text in problems_of(fault)]
-        raise InvalidDocument(WHAT, problems) from None
-
-
-def road_map(city: MapFile, *, what: str, place: str) -> RoadMap:
-    """The map as segments and areas."""
+        raise InvalidDocument(what, problems) from None
     areas = [
         (AreaKind.DRIVABLE, _points(area.area_boundary)) for area in city.drivable_areas.values()
     ]
@@ -96,15 +94,19 @@ def road_map(city: MapFile, *, what: str, place: str) -> RoadMap:
         one, other = _points(crossing.edge1), _points(crossing.edge2)
         same_way = float(np.dot(one[-1] - one[0], other[-1] - other[0])) > 0.0
         areas.append((AreaKind.CROSSWALK, np.vstack([one, other[::-1] if same_way else other])))
+    driven = [one for one in city.lane_segments.values() if one.lane_type != "BIKE"]
+    bicycle_lanes = len(city.lane_segments) - len(driven)
     return RoadMap(
         what=what,
-        place=place,
-        segments=tuple(
-            _segment(segment)
-            for segment in city.lane_segments.values()
-            if segment.lane_type != "BIKE"
-        ),
+        place=f"{file.name}: lane_segments",
+        segments=tuple(_segment(segment) for segment in driven),
         areas=tuple(areas),
+        notes=(
+            Note(kind=SceneNoteKind.NO_SPEED_LIMITS),
+            Note(kind=SceneNoteKind.NO_LIGHTS),
+            Note(kind=SceneNoteKind.NO_WALKWAYS),
+            *count_notes({SceneNoteKind.BICYCLE_LANES_LEFT_OUT: bicycle_lanes}),
+        ),
     )
 
 

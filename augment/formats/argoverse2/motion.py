@@ -18,12 +18,11 @@ from numpy.typing import NDArray
 
 from augment.errors import InvalidDocument
 from augment.formats.argoverse2.log import EGO_LENGTH_M, EGO_WIDTH_M, MOST_NAMED, FloatArray
-from augment.formats.argoverse2.map_file import read_map, road_map
-from augment.formats.argoverse2.sensor import LICENCE, map_file_in, map_notes
+from augment.formats.argoverse2.map_file import LICENCE, read_map
+from augment.formats.argoverse2.sensor import map_file_in
 from augment.formats.arrow_file import Columns, read_parquet
 from augment.formats.reading import Moment, Reading, frames_every
-from augment.formats.recorded_log import Log, LoggedTrack, far_notes, scene_at
-from augment.formats.roads import road_around
+from augment.formats.recorded_log import Log, LoggedTrack, reading_at
 from augment.scene.entities import AgentType
 from augment.scene.notes import Note, SceneNoteKind
 from augment.scene.sizes import LENGTH_WIDTH_M
@@ -90,17 +89,11 @@ class ArgoverseMotion:
         forecast = _read(file, item or EGO)
         log = forecast.log
         frame = forecast.current if frame is None else frame
-        origin = log.ego_pose(frame)
-        map_file = map_file_in(file.parent, WHAT)
-        city = read_map(map_file)
-        road = road_around(
-            road_map(city, what=WHAT, place=f"{map_file.name}: lane_segments"), origin
-        )
         ego = "" if item is None else f", track {item} as the ego"
-        scene, recording = scene_at(
+        return reading_at(
             log,
             frame,
-            road,
+            read_map(map_file_in(file.parent, WHAT), what=WHAT),
             name=name,
             world="Argoverse 2 city frame",
             provenance=(
@@ -108,22 +101,20 @@ class ArgoverseMotion:
                 f"{file.stem.removeprefix('scenario_')[:80]}, step {frame} of "
                 f"{len(log.times_s)}{ego}; {LICENCE}"
             ),
-        )
-        merged = tuple(
-            f"{kind}: {TYPE_OF[kind].value}" for kind in sorted(forecast.kinds & MERGED)
-        )
-        notes = [Note(kind=SceneNoteKind.NO_BOX_SIZES)]
-        if merged:
-            notes.append(Note(kind=SceneNoteKind.CLASSES_MERGED, names=merged))
-        return Reading(
-            scene=scene,
-            recording=recording,
-            notes=(*notes, *map_notes(city, road), *far_notes(log, frame, road)),
-            moment=Moment(item=item, frame=frame),
+            licence=LICENCE,
+            notes=_notes(forecast.kinds),
+            item=item,
         )
 
 
 # Private
+
+
+def _notes(kinds: frozenset[str]) -> Iterator[Note]:
+    yield Note(kind=SceneNoteKind.NO_BOX_SIZES)
+    merged = tuple(f"{kind}: {TYPE_OF[kind].value}" for kind in sorted(kinds & MERGED))
+    if merged:
+        yield Note(kind=SceneNoteKind.CLASSES_MERGED, names=merged)
 
 
 def _is_scenario(path: Path) -> bool:

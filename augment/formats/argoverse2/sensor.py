@@ -14,14 +14,10 @@ from pathlib import Path
 
 from augment.errors import InvalidDocument
 from augment.formats.argoverse2.log import BOXES, WHAT, read_log
-from augment.formats.argoverse2.map_file import MapFile, read_map, road_map
+from augment.formats.argoverse2.map_file import LICENCE, read_map
 from augment.formats.reading import Moment, Reading, frames_every
-from augment.formats.recorded_log import far_notes, scene_at
-from augment.formats.road_map import MapExtract
-from augment.formats.roads import road_around
+from augment.formats.recorded_log import reading_at
 from augment.scene.notes import Note, SceneNoteKind
-
-LICENCE = "CC BY-NC-SA 4.0"
 
 
 class ArgoverseSensor:
@@ -49,50 +45,19 @@ class ArgoverseSensor:
         frame = frame or 0
         map_file = map_file_in(path / "map", WHAT)
         log = read_log(path)
-        origin = log.ego_pose(frame)
-        city = read_map(map_file)
-        road = road_around(
-            road_map(city, what=WHAT, place=f"{map_file.name}: lane_segments"), origin
-        )
-        scene, recording = scene_at(
+        return reading_at(
             log,
             frame,
-            road,
+            read_map(map_file, what=WHAT),
             name=name,
             world=city_of(map_file),
             provenance=(
                 f"Argoverse 2 Sensor data set, log {path.resolve().name}, frame {frame} of "
                 f"{len(log.times_s)}; {LICENCE}"
             ),
+            licence=LICENCE,
+            notes=[Note(kind=SceneNoteKind.SPEEDS_DIFFERENCED)],
         )
-        return Reading(
-            scene=scene,
-            recording=recording,
-            notes=(
-                *map_notes(city, road),
-                *far_notes(log, frame, road),
-                Note(kind=SceneNoteKind.SPEEDS_DIFFERENCED),
-            ),
-            moment=Moment(frame=frame),
-        )
-
-
-def map_notes(city: MapFile, road: MapExtract) -> tuple[Note, ...]:
-    """What maps of Argoverse 2 don't say."""
-    bicycle_lanes = sum(segment.lane_type == "BIKE" for segment in city.lane_segments.values())
-    notes = [
-        Note(kind=SceneNoteKind.NO_SPEED_LIMITS),
-        Note(kind=SceneNoteKind.NO_LIGHTS),
-        Note(kind=SceneNoteKind.NO_WALKWAYS),
-    ]
-    if bicycle_lanes:
-        notes.append(Note(kind=SceneNoteKind.BICYCLE_LANES_LEFT_OUT, number=bicycle_lanes))
-    if road.side_is_assumed:
-        # All logs are from the United States.
-        notes.append(
-            Note(kind=SceneNoteKind.TRAFFIC_SIDE_ASSUMED, names=(road.traffic_side.value,))
-        )
-    return (*notes, Note(kind=SceneNoteKind.NON_COMMERCIAL, names=(LICENCE,)))
 
 
 def map_file_in(folder: Path, what: str) -> Path:

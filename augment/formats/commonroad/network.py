@@ -8,6 +8,7 @@ do. Turn types are those that it names; a light holds for the ways in its direct
 from __future__ import annotations
 
 from collections import Counter
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -22,7 +23,14 @@ from augment.formats.commonroad.fields import (
 )
 from augment.formats.commonroad.lights import Light, lights_of
 from augment.formats.intersection_ways import crossing_segments
-from augment.formats.road_map import FloatArray, RoadMap, Segment
+from augment.formats.road_map import (
+    FloatArray,
+    RoadMap,
+    Segment,
+    count_notes,
+    left_out_notes,
+    limit_notes,
+)
 from augment.formats.strips import midline
 from augment.formats.xml_file import Element
 from augment.geometry.polyline import Polyline
@@ -64,15 +72,7 @@ class Lanelet:
     right_neighbors: tuple[int, ...]
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class RoadNetwork:
-    """The map, and what it does not say."""
-
-    map: RoadMap
-    notes: tuple[Note, ...]
-
-
-def network_of(root: Element, step: int) -> RoadNetwork:
+def network_of(root: Element, step: int) -> RoadMap:
     """The map with the lights at one time step.
 
     Raises:
@@ -97,10 +97,8 @@ def network_of(root: Element, step: int) -> RoadNetwork:
     if not inside:  # the dialect of 2018b has no intersections
         crossing = crossing_segments({one.name: one for one in segments})
         segments = tuple(replace(one, crosses=one.name in crossing) for one in segments)
-    has_intersections = any(one.crosses for one in segments)
-    notes = _notes(segments, areas, has_intersections, lights, other_signs, lanelets)
-    city = RoadMap(what=WHAT, place="lanelet", segments=segments, areas=areas)
-    return RoadNetwork(map=city, notes=notes)
+    notes = _notes(segments, areas, len(lights), other_signs, lanelets)
+    return RoadMap(what=WHAT, place="lanelet", segments=segments, areas=areas, notes=tuple(notes))
 
 
 # Private
@@ -230,31 +228,23 @@ def _segment(one: Lanelet, crosses: bool, turn: TurnType | None, light: TrafficL
 
 
 def _notes(
-    segments: tuple[Segment, ...],
-    areas: tuple[tuple[AreaKind, FloatArray], ...],
-    has_intersections: bool,
-    lights: dict[int, Light],
+    segments: Sequence[Segment],
+    areas: Sequence[tuple[AreaKind, FloatArray]],
+    lights: int,
     other_signs: Counter[str],
     lanelets: dict[int, Lanelet],
-) -> tuple[Note, ...]:
-    notes = []
-    unlimited = sum(segment.speed_limit_mps is None for segment in segments)
-    if segments and unlimited == len(segments):
-        notes.append(Note(kind=SceneNoteKind.NO_SPEED_LIMITS))
-    elif unlimited:
-        kind = SceneNoteKind.SOME_SPEED_LIMITS
-        notes.append(Note(kind=kind, number=unlimited, of=len(segments)))
-    if not has_intersections:
-        notes.append(Note(kind=SceneNoteKind.NO_INTERSECTIONS))
-    if lights:
-        notes.append(Note(kind=SceneNoteKind.LIGHTS_REPEATED, number=len(lights)))
+) -> Iterator[Note]:
+    yield from limit_notes(segments)
+    if not any(one.crosses for one in segments):
+        yield Note(kind=SceneNoteKind.NO_INTERSECTIONS)
     bicycle_lanes = sum("bicycleLane" in lanelet.kinds for lanelet in lanelets.values())
-    if bicycle_lanes:
-        notes.append(Note(kind=SceneNoteKind.BICYCLE_LANES_LEFT_OUT, number=bicycle_lanes))
-    if other_signs:
-        names = tuple(f"sign {name}" for name in sorted(other_signs))
-        number = sum(other_signs.values())
-        notes.append(Note(kind=SceneNoteKind.MAP_PARTS_LEFT_OUT, number=number, names=names[:12]))
+    yield from count_notes(
+        {
+            SceneNoteKind.LIGHTS_REPEATED: lights,
+            SceneNoteKind.BICYCLE_LANES_LEFT_OUT: bicycle_lanes,
+        }
+    )
+    signs = {f"sign {name}": number for name, number in other_signs.items()}
+    yield from left_out_notes(SceneNoteKind.MAP_PARTS_LEFT_OUT, signs)
     if not any(kind is AreaKind.WALKWAY for kind, _ in areas):
-        notes.append(Note(kind=SceneNoteKind.NO_WALKWAYS))
-    return tuple(notes)
+        yield Note(kind=SceneNoteKind.NO_WALKWAYS)

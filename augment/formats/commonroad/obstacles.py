@@ -16,6 +16,7 @@ from augment.formats.commonroad.fields import (
     whole,
 )
 from augment.formats.recorded_log import LoggedTrack
+from augment.formats.road_map import left_out_notes
 from augment.formats.xml_file import Element
 from augment.scene.entities import AgentType
 from augment.scene.notes import Note, SceneNoteKind
@@ -112,14 +113,10 @@ def obstacles_of(root: Element) -> Obstacles:
             found.append(_obstacle(element, TYPE_OF[name], place))
     left_out.update(one.name for one in root.all("environmentObstacle", "phantomObstacle"))
     steps = 1 + max((one.states[-1].step for one in found), default=0)
-    notes = []
-    if left_out:
-        number, names = sum(left_out.values()), tuple(sorted(left_out))
-        notes.append(Note(kind=SceneNoteKind.OBJECTS_LEFT_OUT, number=number, names=names))
+    notes = [*left_out_notes(SceneNoteKind.OBJECTS_LEFT_OUT, left_out)]
     sizeless = sum(not one.has_size for one in found)
     if sizeless:
-        kind_of = SceneNoteKind.SOME_BOX_SIZES
-        notes.append(Note(kind=kind_of, number=sizeless, of=len(found)))
+        notes.append(Note(kind=SceneNoteKind.SOME_BOX_SIZES, number=sizeless, of=len(found)))
     return Obstacles(all=tuple(found), steps=steps, notes=tuple(notes))
 
 

@@ -16,9 +16,8 @@ from augment.formats.commonroad.fields import WHAT, fault, real, whole
 from augment.formats.commonroad.network import network_of
 from augment.formats.commonroad.obstacles import Obstacles, obstacles_of, rows_of, state_of
 from augment.formats.reading import Moment, Reading, frame_in, frames_every
-from augment.formats.recorded_log import LONGEST_GAP_S, Log, far_notes, scene_at
+from augment.formats.recorded_log import LONGEST_GAP_S, Log, reading_at
 from augment.formats.road_map import FloatArray
-from augment.formats.roads import road_around
 from augment.formats.xml_file import Element, read_xml
 from augment.scene.entities import AgentType
 from augment.scene.notes import Note, SceneNoteKind
@@ -74,7 +73,6 @@ class CommonRoad:
         obstacles = obstacles_of(root)
         ego = _ego(root, obstacles, item)
         frame = frame_in(WHAT, ego.first if frame is None else frame, len(ego.states))
-        network = network_of(root, frame)
         log = Log(
             what=WHAT,
             times_s=np.arange(len(ego.states), dtype=np.float64) * _step_s(root),
@@ -83,29 +81,20 @@ class CommonRoad:
             ego_width_m=ego.width_m,
             tracks=obstacles.tracks(without=ego.item),
         )
-        road = road_around(network.map, log.ego_pose(frame))
         benchmark = root.attributes.get("benchmarkID", path.stem)[:80]
         source = root.attributes.get("source", "").strip()[:200] or "no source named"
-        scene, recording = scene_at(
+        return reading_at(
             log,
             frame,
-            road,
+            network_of(root, frame),
             name=name,
             world=f"CommonRoad scenario frame of {benchmark}",
             provenance=(
                 f"CommonRoad scenario {benchmark}, ego {ego.item}, time step {frame}; {source}"
             ),
-        )
-        notes = [*network.notes, *obstacles.notes, *_notes(ego, _step_s(root))]
-        notes += far_notes(log, frame, road)
-        if road.side_is_assumed:
-            side = (road.traffic_side.value,)
-            notes.append(Note(kind=SceneNoteKind.TRAFFIC_SIDE_ASSUMED, names=side))
-        return Reading(
-            scene=scene,
-            recording=recording,
-            notes=tuple(notes),
-            moment=Moment(item=str(ego.item), frame=frame),
+            licence=None,
+            notes=(*obstacles.notes, *_notes(ego, _step_s(root))),
+            item=str(ego.item),
         )
 
 

@@ -7,6 +7,7 @@ the columns of lane_connectors call the exit lane is the one that a connector co
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -18,7 +19,7 @@ from augment.formats.lane_edges import USUAL_M
 from augment.formats.nuplan.geopackage import Layers
 from augment.formats.nuplan.mercator import FloatArray
 from augment.formats.nuplan.sqlite import WHAT, open_tables
-from augment.formats.road_map import RoadMap, Segment
+from augment.formats.road_map import RoadMap, Segment, count_notes, limit_notes
 from augment.formats.strips import RADIUS_M
 from augment.geometry.polyline import Polyline
 from augment.scene.directions import turn_type_of
@@ -42,14 +43,6 @@ BESIDE_M = 50.0
 """Edges of a lane and what names it lie no further from its centreline than this."""
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class NuplanCity:
-    """The map, and what it does not say."""
-
-    map: RoadMap
-    notes: tuple[Note, ...]
-
-
 @dataclass(slots=True)
 class _Count:
     turned: int = 0
@@ -65,7 +58,7 @@ def city_around(
     center_m: tuple[float, float],
     lights: dict[int, TrafficLight],
     route: tuple[str, ...] = (),
-) -> NuplanCity:
+) -> RoadMap:
     """What of the map lies within reach of a point.
 
     Args:
@@ -102,15 +95,14 @@ def city_around(
             for _, points in layers.read(layer, ("fid",))
             if _is_near(points, center) and len(np.unique(points, axis=0)) >= 3
         )
-    city = RoadMap(
+    return RoadMap(
         what=WHAT,
         place=path.name,
         segments=tuple(_with_neighbors(segments)),
         areas=areas,
         side=TrafficSide.LEFT if _is_left_hand(path, location) else TrafficSide.RIGHT,
+        notes=(*_notes([one for one, *_ in segments], count), *_route_notes(route, blocks)),
     )
-    notes = [*_notes(city, count), *_route_notes(route, blocks)]
-    return NuplanCity(map=city, notes=tuple(notes))
 
 
 # Private
@@ -282,39 +274,29 @@ def _with_neighbors(found: list[tuple[Segment, Any, Any]]) -> list[Segment]:
     return made
 
 
-def _route_notes(route: tuple[str, ...], blocks: set[str]) -> list[Note]:
+def _route_notes(route: tuple[str, ...], blocks: set[str]) -> Iterator[Note]:
     """The route; some of the data set name roadblocks that their map does not have."""
-    if not route:
-        return []
-    notes = [Note(kind=SceneNoteKind.ROUTE, number=len(route), names=route[:MOST_NAMED])]
+    if route:
+        yield Note(kind=SceneNoteKind.ROUTE, number=len(route), names=route[:MOST_NAMED])
     missing = tuple(one for one in route if one not in blocks)
     if blocks and missing:
-        notes.append(
-            Note(
-                kind=SceneNoteKind.ROUTE_NOT_IN_MAP,
-                number=len(missing),
-                of=len(route),
-                names=missing[:MOST_NAMED],
-            )
+        yield Note(
+            kind=SceneNoteKind.ROUTE_NOT_IN_MAP,
+            number=len(missing),
+            of=len(route),
+            names=missing[:MOST_NAMED],
         )
-    return notes
 
 
-def _notes(city: RoadMap, count: _Count) -> tuple[Note, ...]:
-    notes, total = [], len(city.segments)
-    unlimited = sum(segment.speed_limit_mps is None for segment in city.segments)
-    if total and unlimited == total:
-        notes.append(Note(kind=SceneNoteKind.NO_SPEED_LIMITS))
-    elif unlimited:
-        notes.append(Note(kind=SceneNoteKind.SOME_SPEED_LIMITS, number=unlimited, of=total))
-    for kind, number in (
-        (SceneNoteKind.BOUNDARIES_TURNED, count.turned),
-        (SceneNoteKind.TURN_TYPES_CORRECTED, count.corrected),
-        (SceneNoteKind.BICYCLE_LANES_LEFT_OUT, count.bicycle_lanes),
-    ):
-        if number:
-            notes.append(Note(kind=kind, number=number))
+def _notes(segments: Sequence[Segment], count: _Count) -> Iterator[Note]:
+    yield from limit_notes(segments)
+    yield from count_notes(
+        {
+            SceneNoteKind.BOUNDARIES_TURNED: count.turned,
+            SceneNoteKind.TURN_TYPES_CORRECTED: count.corrected,
+            SceneNoteKind.BICYCLE_LANES_LEFT_OUT: count.bicycle_lanes,
+        }
+    )
     if count.assumed:
         kind = SceneNoteKind.LANE_WIDTHS_ASSUMED
-        notes.append(Note(kind=kind, number=count.assumed, of=total, value=USUAL_M))
-    return tuple(notes)
+        yield Note(kind=kind, number=count.assumed, of=len(segments), value=USUAL_M)

@@ -20,8 +20,6 @@ SCALE = 0.9996
 FALSE_EAST_M = 500_000.0
 FALSE_NORTH_M = 10_000_000.0
 
-_NEWTON_STEPS = 12
-_APART_DEG = 1e-6
 _N = WGS84_F / (2.0 - WGS84_F)
 _E = math.sqrt(WGS84_F * (2.0 - WGS84_F))
 _RADIUS_M = WGS84_A_M / (1.0 + _N) * (1.0 + _N**2 / 4.0 + _N**4 / 64.0)
@@ -56,22 +54,3 @@ def to_utm(degrees: FloatArray, *, zone: int, is_south: bool) -> FloatArray:
             (FALSE_NORTH_M if is_south else 0.0) + SCALE * _RADIUS_M * north,
         ]
     )
-
-
-def from_utm(east_m: float, north_m: float, *, zone: int, is_south: bool) -> tuple[float, float]:
-    """Longitude and latitude of a point, to a millionth of a degree: Newton's steps on `to_utm`.
-
-    Args:
-        east_m: From the zone's false origin.
-        north_m: From it.
-        zone: 1 to 60.
-        is_south: Whether it is a zone of the southern hemisphere.
-    """
-    wanted = np.array([east_m, north_m])
-    found = np.array([6.0 * zone - 183.0, -20.0 if is_south else 20.0])
-    for _ in range(_NEWTON_STEPS):
-        around = found + _APART_DEG * np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]])
-        here, east, north = to_utm(around, zone=zone, is_south=is_south)
-        slope = np.column_stack([east - here, north - here]) / _APART_DEG
-        found = np.clip(found + np.linalg.solve(slope, wanted - here), (-180, -84), (180, 84))
-    return float(found[0]), float(found[1])

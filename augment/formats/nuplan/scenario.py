@@ -29,8 +29,7 @@ from augment.formats.nuplan.log import (
 )
 from augment.formats.nuplan.sqlite import WHAT, Tables, open_tables
 from augment.formats.reading import Moment, Reading, frames_every
-from augment.formats.recorded_log import far_notes, scene_at
-from augment.formats.roads import road_around
+from augment.formats.recorded_log import reading_at
 from augment.geometry.frames import Pose
 from augment.scene.notes import Note, SceneNoteKind
 
@@ -83,24 +82,18 @@ class NuPlan:
             lights=lights,
             route=mission.roadblocks,
         )
-        road = road_around(city.map, origin)
-        scene, recording = scene_at(
+        return reading_at(
             log,
             0,
-            road,
+            city,
             name=name,
             world=f"UTM of {place.location}",
             provenance=(
                 f"nuPlan data set, log {place.logfile or path.stem}, lidar_pc {token}; {LICENCE}"
             ),
-        )
-        notes = [*city.notes, *_mission_notes(mission, origin), *far_notes(log, 0, road)]
-        if road.side_is_assumed:
-            side = (road.traffic_side.value,)
-            notes.append(Note(kind=SceneNoteKind.TRAFFIC_SIDE_ASSUMED, names=side))
-        notes.append(Note(kind=SceneNoteKind.NON_COMMERCIAL, names=(LICENCE,)))
-        return Reading(
-            scene=scene, recording=recording, notes=tuple(notes), moment=Moment(item=token)
+            licence=LICENCE,
+            notes=_mission_notes(mission, origin),
+            item=token,
         )
 
 

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections import Counter
-from dataclasses import dataclass, replace
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -11,7 +12,15 @@ import numpy as np
 from augment.errors import InvalidDocument
 from augment.formats.intersection_ways import crossing_segments, take_end_widths
 from augment.formats.lane_edges import NARROWEST_M, USUAL_M, WIDEST_M, edge_of, width_of
-from augment.formats.road_map import FURTHEST_M, FloatArray, RoadMap, Segment
+from augment.formats.road_map import (
+    FURTHEST_M,
+    FloatArray,
+    RoadMap,
+    Segment,
+    count_notes,
+    left_out_notes,
+    limit_notes,
+)
 from augment.formats.scenarionet.unpickling import WHAT
 from augment.scene.entities import AreaKind, TrafficLight, TrafficSide
 from augment.scene.notes import Note, SceneNoteKind
@@ -44,14 +53,6 @@ _LIGHTS = {
 }
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class ScenarioNetCity:
-    """The map, and what it does not say."""
-
-    map: RoadMap
-    notes: tuple[Note, ...]
-
-
 def points_of(value: object, place: str) -> FloatArray:
     """The points (P, 2) of a line or polygon; what lies in z is left.
 
@@ -72,7 +73,7 @@ def points_of(value: object, place: str) -> FloatArray:
     return np.asarray(value[:, :2], dtype=np.float64)
 
 
-def city_of(description: dict[str, Any], frame: int, *, place_name: str) -> ScenarioNetCity:
+def city_of(description: dict[str, Any], frame: int, *, place_name: str) -> RoadMap:
     """The map with the lights of one step.
 
     Raises:
@@ -105,19 +106,28 @@ def city_of(description: dict[str, Any], frame: int, *, place_name: str) -> Scen
     segments, assumed = take_end_widths(
         [one for one, _ in built], {one.name for one, was_assumed in built if was_assumed}
     )
-    is_left = place_name.lower().startswith(LEFT_HAND)
-    city = RoadMap(
+    side, is_told = _side(description["metadata"], place_name)
+    return RoadMap(
         what=WHAT,
         place="map_features",
         segments=segments,
         areas=tuple(areas),
-        side=TrafficSide.LEFT if is_left else TrafficSide.RIGHT,
+        side=side,
+        is_side_told=is_told,
+        notes=tuple(_notes(segments, areas, assumed, len(meaningless), bool(lights), left_out)),
     )
-    notes = _notes(city, assumed, len(meaningless), bool(lights), left_out)
-    return ScenarioNetCity(map=city, notes=notes)
 
 
 # Private
+
+
+def _side(metadata: dict[str, Any], place_name: str) -> tuple[TrafficSide, bool]:
+    """Where people drive, and whether the metadata tell it, as our own writer's alone do."""
+    told = metadata.get("traffic_side")
+    if told in ("left", "right"):
+        return TrafficSide(told), True
+    is_left = place_name.lower().startswith(LEFT_HAND)
+    return TrafficSide.LEFT if is_left else TrafficSide.RIGHT, False
 
 
 def _is_meaningless(lane: dict[str, Any], lanes: dict[str, dict[str, Any]]) -> bool:
@@ -225,41 +235,29 @@ def _lights(states: object, frame: int) -> dict[str, TrafficLight]:
 
 
 def _notes(
-    city: RoadMap, assumed: int, meaningless: int, has_lights: bool, left_out: Counter[str]
-) -> tuple[Note, ...]:
-    notes, count = _limit_notes(city, meaningless), len(city.segments)
-    if assumed:
-        kind = SceneNoteKind.LANE_WIDTHS_ASSUMED
-        notes.append(Note(kind=kind, number=assumed, of=count, value=USUAL_M))
-    if not any(segment.successors or segment.predecessors for segment in city.segments):
-        notes.append(Note(kind=SceneNoteKind.NO_CONNECTIVITY))
-    if not any(segment.crosses for segment in city.segments):
-        notes.append(Note(kind=SceneNoteKind.NO_INTERSECTIONS))
-    if not has_lights:
-        notes.append(Note(kind=SceneNoteKind.NO_LIGHTS))
-    kinds = {kind for kind, _ in city.areas}
-    if AreaKind.WALKWAY not in kinds:
-        notes.append(Note(kind=SceneNoteKind.NO_WALKWAYS))
-    if AreaKind.DRIVABLE not in kinds:
-        notes.append(Note(kind=SceneNoteKind.NO_DRIVABLE_AREAS))
-    bicycle_lanes = left_out.pop(BICYCLE_LANE, 0)
-    if bicycle_lanes:
-        notes.append(Note(kind=SceneNoteKind.BICYCLE_LANES_LEFT_OUT, number=bicycle_lanes))
-    if left_out:
-        names = tuple(sorted(left_out))[:12]
-        number = sum(left_out.values())
-        notes.append(Note(kind=SceneNoteKind.MAP_PARTS_LEFT_OUT, number=number, names=names))
-    return tuple(notes)
-
-
-def _limit_notes(city: RoadMap, meaningless: int) -> list[Note]:
-    notes, count = [], len(city.segments)
-    unlimited = sum(segment.speed_limit_mps is None for segment in city.segments)
+    segments: Sequence[Segment],
+    areas: Sequence[tuple[AreaKind, FloatArray]],
+    assumed: int,
+    meaningless: int,
+    has_lights: bool,
+    left_out: Counter[str],
+) -> Iterator[Note]:
     if meaningless:
         kind = SceneNoteKind.SPEED_LIMITS_IGNORED
-        notes.append(Note(kind=kind, number=meaningless, value=round(MEANINGLESS_KMH / 3.6, 1)))
-    if count and unlimited == count:
-        notes.append(Note(kind=SceneNoteKind.NO_SPEED_LIMITS))
-    elif unlimited:
-        notes.append(Note(kind=SceneNoteKind.SOME_SPEED_LIMITS, number=unlimited, of=count))
-    return notes
+        yield Note(kind=kind, number=meaningless, value=round(MEANINGLESS_KMH / 3.6, 1))
+    yield from limit_notes(segments)
+    if assumed:
+        kind = SceneNoteKind.LANE_WIDTHS_ASSUMED
+        yield Note(kind=kind, number=assumed, of=len(segments), value=USUAL_M)
+    kinds = {kind for kind, _ in areas}
+    known = {
+        SceneNoteKind.NO_CONNECTIVITY: any(one.successors or one.predecessors for one in segments),
+        SceneNoteKind.NO_INTERSECTIONS: any(one.crosses for one in segments),
+        SceneNoteKind.NO_LIGHTS: has_lights,
+        SceneNoteKind.NO_WALKWAYS: AreaKind.WALKWAY in kinds,
+        SceneNoteKind.NO_DRIVABLE_AREAS: AreaKind.DRIVABLE in kinds,
+    }
+    yield from (Note(kind=kind) for kind, is_known in known.items() if not is_known)
+    bicycle_lanes = left_out.pop(BICYCLE_LANE, 0)
+    yield from count_notes({SceneNoteKind.BICYCLE_LANES_LEFT_OUT: bicycle_lanes})
+    yield from left_out_notes(SceneNoteKind.MAP_PARTS_LEFT_OUT, left_out)

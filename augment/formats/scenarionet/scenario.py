@@ -8,7 +8,6 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterator
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -16,13 +15,12 @@ import numpy as np
 
 from augment.errors import InvalidDocument
 from augment.formats.reading import Moment, Reading, frame_in, frames_every
-from augment.formats.recorded_log import Log, LoggedTrack, far_notes, scene_at
-from augment.formats.road_map import FloatArray, MapExtract
-from augment.formats.roads import road_around
+from augment.formats.recorded_log import Log, LoggedTrack, reading_at
+from augment.formats.road_map import FloatArray, left_out_notes
 from augment.formats.scenarionet.city import city_of
 from augment.formats.scenarionet.folder import file_in, is_data_set, names_in
 from augment.formats.scenarionet.unpickling import WHAT, read_pickle
-from augment.scene.entities import AgentType, TrafficSide
+from augment.scene.entities import AgentType
 from augment.scene.notes import Note, SceneNoteKind
 from augment.scene.sizes import LENGTH_WIDTH_M
 
@@ -85,34 +83,23 @@ class ScenarioNet:
         current = metadata.get("current_time_index")
         if frame is None:
             frame = current if isinstance(current, int) else 0
-        origin = log.ego_pose(frame_in(WHAT, frame, len(log.times_s)))
+        frame_in(WHAT, frame, len(log.times_s))
         place = str(metadata.get("map") or "")[:60]
-        city = city_of(description, frame, place_name=place)
-        road = _with_told_side(road_around(city.map, origin), metadata)
         data_set = str(metadata.get("dataset") or description.get("version") or "unknown")[:40]
         licence, said = _licence(data_set), str(metadata.get("provenance") or "")[:300]
-        scene, recording = scene_at(
+        return reading_at(
             log,
             frame,
-            road,
+            city_of(description, frame, place_name=place),
             name=name,
             world=f"ScenarioNet frame of {data_set} {place}".strip(),
             provenance=(
                 f"{data_set} data set by ScenarioNet, {str(description.get('id'))[:120]}, step "
                 f"{frame} of {len(log.times_s)}; {licence or said or 'licence not named'}"
             ),
-        )
-        notes = [*city.notes, *notes, *far_notes(log, frame, road)]
-        if road.side_is_assumed:
-            side = (road.traffic_side.value,)
-            notes.append(Note(kind=SceneNoteKind.TRAFFIC_SIDE_ASSUMED, names=side))
-        if licence:
-            notes.append(Note(kind=SceneNoteKind.NON_COMMERCIAL, names=(licence,)))
-        return Reading(
-            scene=scene,
-            recording=recording,
-            notes=tuple(notes),
-            moment=Moment(item=item, frame=frame),
+            licence=licence,
+            notes=notes,
+            item=item,
         )
 
 
@@ -121,14 +108,6 @@ class ScenarioNet:
 
 def _fault(place: str, text: str) -> InvalidDocument:
     return InvalidDocument(WHAT, [(place, text)])
-
-
-def _with_told_side(road: MapExtract, metadata: dict[str, Any]) -> MapExtract:
-    """The side that our own writer, and nobody else's, puts into the metadata."""
-    told = metadata.get("traffic_side")
-    if told not in ("left", "right"):
-        return road
-    return replace(road, traffic_side=TrafficSide(told), side_is_assumed=False)
 
 
 def _licence(data_set: str) -> str | None:
@@ -165,7 +144,7 @@ def _log(description: dict[str, Any]) -> tuple[Log, list[Note]]:
     ego = next((track for key, track in made if key == ego_id), None)
     if ego is None:
         raise _fault("metadata.sdc_id", "the ego is of a type that is left out")
-    notes = [_note_of(left_out)] if left_out else []
+    notes = list(left_out_notes(SceneNoteKind.OBJECTS_LEFT_OUT, left_out))
     length_m, width_m = ego.length_m, ego.width_m
     if width_m > length_m:
         length_m, width_m = width_m, length_m
@@ -183,11 +162,6 @@ def _log(description: dict[str, Any]) -> tuple[Log, list[Note]]:
         ),
     )
     return log, notes
-
-
-def _note_of(left_out: Counter[str]) -> Note:
-    names = tuple(sorted(left_out))
-    return Note(kind=SceneNoteKind.OBJECTS_LEFT_OUT, number=sum(left_out.values()), names=names)
 
 
 def _times(metadata: dict[str, Any], length: object, ego: object) -> FloatArray:

@@ -7,16 +7,24 @@ of a fork or merge and crosses another lane. World frame.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from collections.abc import Set as AbstractSet
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
 from augment.formats.intersection_ways import crossing_segments, take_end_widths
 from augment.formats.lane_edges import USUAL_M, edge_of, whole_edge, width_of
-from augment.formats.road_map import FloatArray, Name, RoadMap, Segment
+from augment.formats.road_map import (
+    FloatArray,
+    Name,
+    RoadMap,
+    Segment,
+    count_notes,
+    left_out_notes,
+    limit_notes,
+)
 from augment.formats.waymo.messages import MapFeatures, features_of
 from augment.formats.waymo.tfrecord import WHAT
 from augment.scene.entities import AreaKind, TrafficLight
@@ -39,15 +47,7 @@ LIGHT_OF = {
 """LANE_STATE_*: arrows and round lights alike; flashing ones as what they ask for."""
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class WaymoCity:
-    """The map, and what it does not say."""
-
-    map: RoadMap
-    notes: tuple[Note, ...]
-
-
-def city_of(scenario: Any, frame: int) -> WaymoCity:
+def city_of(scenario: Any, frame: int) -> RoadMap:
     """The map with the lights of one step."""
     features = features_of(scenario)
     lanes = {
@@ -73,8 +73,13 @@ def city_of(scenario: Any, frame: int) -> WaymoCity:
         for kind, polygon in features.polygons
         if kind != "speed_bump" and len(np.unique(polygon, axis=0)) >= 3
     ]
-    city = RoadMap(what=WHAT, place="map_features", segments=segments, areas=tuple(areas))
-    return WaymoCity(map=city, notes=_notes(features, segments, assumed, crossing, controlled))
+    return RoadMap(
+        what=WHAT,
+        place="map_features",
+        segments=segments,
+        areas=tuple(areas),
+        notes=tuple(_notes(features, segments, assumed, crossing, controlled)),
+    )
 
 
 # Private
@@ -152,27 +157,18 @@ def _notes(
     assumed: int,
     crossing: AbstractSet[Name],
     controlled: set[int],
-) -> tuple[Note, ...]:
-    notes, count = [], len(segments)
-    unlimited = sum(segment.speed_limit_mps is None for segment in segments)
-    if count and unlimited == count:
-        notes.append(Note(kind=SceneNoteKind.NO_SPEED_LIMITS))
-    elif unlimited:
-        notes.append(Note(kind=SceneNoteKind.SOME_SPEED_LIMITS, number=unlimited, of=count))
+) -> Iterator[Note]:
+    yield from limit_notes(segments)
     if assumed:
         kind = SceneNoteKind.LANE_WIDTHS_ASSUMED
-        notes.append(Note(kind=kind, number=assumed, of=count, value=USUAL_M))
+        yield Note(kind=kind, number=assumed, of=len(segments), value=USUAL_M)
     if not crossing:
-        notes.append(Note(kind=SceneNoteKind.NO_INTERSECTIONS))
+        yield Note(kind=SceneNoteKind.NO_INTERSECTIONS)
     if not controlled:
-        notes.append(Note(kind=SceneNoteKind.NO_LIGHTS))
+        yield Note(kind=SceneNoteKind.NO_LIGHTS)
     bicycle_lanes = sum(lane.type == BICYCLE_LANE for lane in features.lanes.values())
-    if bicycle_lanes:
-        notes.append(Note(kind=SceneNoteKind.BICYCLE_LANES_LEFT_OUT, number=bicycle_lanes))
+    yield from count_notes({SceneNoteKind.BICYCLE_LANES_LEFT_OUT: bicycle_lanes})
     bumps = sum(kind == "speed_bump" for kind, _ in features.polygons)
     left_out = {"speed bumps": bumps, "stop signs": features.stop_signs}
-    names = tuple(name for name, number in left_out.items() if number)
-    if names:
-        number = sum(left_out.values())
-        notes.append(Note(kind=SceneNoteKind.MAP_PARTS_LEFT_OUT, number=number, names=names))
-    return (*notes, Note(kind=SceneNoteKind.NO_WALKWAYS))
+    yield from left_out_notes(SceneNoteKind.MAP_PARTS_LEFT_OUT, left_out)
+    yield Note(kind=SceneNoteKind.NO_WALKWAYS)

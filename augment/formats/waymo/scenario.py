@@ -14,13 +14,13 @@ import numpy as np
 
 from augment.errors import InvalidDocument
 from augment.formats.reading import Moment, Reading, frame_in, frames_every
-from augment.formats.recorded_log import Log, LoggedTrack, far_notes, scene_at
-from augment.formats.roads import road_around
+from augment.formats.recorded_log import Log, LoggedTrack, reading_at
+from augment.formats.road_map import left_out_notes
 from augment.formats.waymo.city import city_of
 from augment.formats.waymo.messages import read_scenario, states_of
 from augment.formats.waymo.tfrecord import WHAT, read_records, starts_a_record
 from augment.scene.entities import AgentType
-from augment.scene.notes import Note, SceneNoteKind
+from augment.scene.notes import SceneNoteKind
 
 LICENCE = "Waymo Open Dataset licence, non-commercial use"
 TYPE_OF = {
@@ -73,35 +73,20 @@ def _reading(scenario: Any, path: Path, number: int, frame: int | None, name: st
     log = _log(scenario)
     frame = scenario.current_time_index if frame is None else frame
     frame_in(WHAT, frame, len(log.times_s))
-    origin = log.ego_pose(frame)
-    city = city_of(scenario, frame)
-    road = road_around(city.map, origin)
-    scene, recording = scene_at(
+    unset = sum(track.object_type == UNSET for track in scenario.tracks)
+    return reading_at(
         log,
         frame,
-        road,
+        city_of(scenario, frame),
         name=name,
         world="Waymo Open Motion scenario frame",
         provenance=(
             f"Waymo Open Motion data set, {path.name}, scenario {_id(scenario)}, step {frame} of "
             f"{len(log.times_s)}; {LICENCE}"
         ),
-    )
-    notes = [*city.notes, *far_notes(log, frame, road)]
-    if road.side_is_assumed:
-        notes.append(
-            Note(kind=SceneNoteKind.TRAFFIC_SIDE_ASSUMED, names=(road.traffic_side.value,))
-        )
-    unset = sum(track.object_type == UNSET for track in scenario.tracks)
-    if unset:
-        kind = SceneNoteKind.OBJECTS_LEFT_OUT
-        notes.append(Note(kind=kind, number=unset, names=("TYPE_UNSET",)))
-    notes.append(Note(kind=SceneNoteKind.NON_COMMERCIAL, names=(LICENCE,)))
-    return Reading(
-        scene=scene,
-        recording=recording,
-        notes=tuple(notes),
-        moment=Moment(item=str(number), frame=frame),
+        licence=LICENCE,
+        notes=left_out_notes(SceneNoteKind.OBJECTS_LEFT_OUT, {"TYPE_UNSET": unset}),
+        item=str(number),
     )
 
 
