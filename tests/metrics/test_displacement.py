@@ -63,6 +63,11 @@ def test_nothing_stands_for_an_object_of_another_class() -> None:
     assert (found.missing, found.surplus) == (("r1",), ("g1",))
 
 
+def test_a_bus_stands_for_a_car() -> None:
+    bus = replace(vehicle("g", 12.0, 0.0), type=AgentType.BUS)
+    assert displacement(placed(bus), placed(vehicle("r", 10.0, 0.0))).distances_m == (2.0,)
+
+
 def test_an_answer_that_nobody_could_read_misses_everything() -> None:
     found = displacement(None, placed(vehicle("r1", 0.0, 0.0), cone("r2", 1.0, 0.0)))
     assert found == Displacement(missing=("r1", "r2"))
