@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from augment.metrics.displacement import CLASS_OF, Displacement, displacement
-from augment.scene.entities import TrafficAgent
+from augment.scene.entities import AgentType, TrafficAgent
 from augment.scene.modification import Modification
 from tests.scenes import cone, pedestrian, vehicle
 
