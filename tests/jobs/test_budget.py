@@ -16,7 +16,7 @@ from augment.services.running import budget, caps, leases, pausing, runner
 from augment.services.running.budget import Room
 from augment.services.running.caps import Caps
 from augment.services.running.costs import costs_of
-from tests.jobs.models import Model, after_a_second_look, llama_job
+from tests.jobs.models import Model, after_a_second_look, llama_job, reply
 from tests.jobs.rows import NOON, STALE, only_row
 from tests.variants.answers import GOOD
 
@@ -171,6 +171,20 @@ def test_a_call_that_waited_when_its_worker_died_counts_nothing() -> None:
     assert (call.cost_usd, call.spent_tokens, call.is_cost_estimated) == (Decimal(0), 0, False)
     assert call.fault == "not sent: its worker stopped while it waited for a place"
     assert costs_of(job).paid == 0
+
+
+def test_a_worker_that_was_only_slow_corrects_what_its_call_used() -> None:
+    job = llama_job(price="1")
+    row = only_row(job)
+    held = leases.take_lease(augmentation_pk=row.pk, now=timezone.now() - timedelta(minutes=1))
+    assert held is not None
+    call = in_flight(job, held)
+    leases.take_back_stale(now=timezone.now(), older_than=STALE)
+    used = budget.used_by_reply(reply(), worst=WORST, price=ONE_USD)
+    budget.settle(call_pk=call.pk, used=used, now=timezone.now())
+    job.refresh_from_db()
+    assert (job.spent_calls, job.spent_tokens, job.spent_nano_usd) == (1, 3020, 3_020_000)
+    assert (job.reserved_calls, job.reserved_tokens) == (0, 0)
 
 
 def in_flight(job: GenerationJob, held: leases.Lease, *, is_sent: bool = True) -> ModelCall:

@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 import json
+import math
 from dataclasses import replace
 
 import pytest
@@ -52,6 +53,11 @@ def test_a_refusal_is_read_with_none_in_its_sections_and_keeps_its_reason() -> N
     read = read_reply(refusal, scene())
     assert read.modification.is_empty
     assert read.notes == "There is no bus stop in this scene.\n\nnone"
+
+
+def test_a_heading_is_wrapped() -> None:
+    (added,) = read_reply(block(agent(heading_rad=4.0)), scene()).modification.added
+    assert added.heading_rad == pytest.approx(4.0 - 2.0 * math.pi)
 
 
 DRAFT = block(agent(x_m=3.0))

@@ -13,6 +13,7 @@ from arena.queries.voting_path import upcoming
 from arena.services.decisions import decision_of
 from arena.services.studies import close_study
 from arena.services.votes import PACE_WINDOW, cast_vote, receive_vote
+from augment.errors import Conflict
 from tests.study_rows import a_study, expert, matchups_of, vote
 
 pytestmark = pytest.mark.django_db
@@ -46,6 +47,14 @@ def test_the_same_key_with_another_outcome_is_refused_with_the_stored_one() -> N
     with pytest.raises(AlreadyDecided) as refused:
         vote(matchup, "right", key=key)
     assert refused.value.outcome == "left"
+
+
+def test_the_same_key_for_another_matchup_is_refused() -> None:
+    first, second, *_ = matchups_of(a_study(), "eva")
+    key = uuid.uuid4()
+    vote(first, key=key)
+    with pytest.raises(Conflict, match="another vote"):
+        vote(second, key=key)
 
 
 def test_another_key_for_a_decided_matchup_is_refused() -> None:
@@ -104,6 +113,15 @@ def test_changes_count_towards_the_pace_that_a_person_can_keep(
         with pytest.raises(TooFast):
             receive_vote(expert=matchup.expert, decision=change)
     assert Vote.objects.count() == 1 + is_stored
+
+
+def test_a_superseded_vote_cannot_be_superseded_again() -> None:
+    matchup = matchups_of(a_study(), "eva")[0]
+    first = vote(matchup, "left")
+    vote(matchup, "right", supersedes=first.key)
+    with pytest.raises(AlreadyDecided) as refused:
+        vote(matchup, "equal", supersedes=first.key)
+    assert refused.value.outcome == "right"
 
 
 def test_who_has_opened_the_results_of_a_study_no_longer_votes_in_it() -> None:

@@ -14,7 +14,7 @@ from arena.web.results_tabs import TABS
 from tests.mixed_study import mixed_study
 from tests.web.addresses import address
 from tests.web.cast import people, signed_in, world
-from tests.web.test_access import ASKS_FIRST, PAGES
+from tests.web.test_access import PAGES
 
 GALLERIES = ("results-votes", "results-disagreement", "results-worst", "results-sheet")
 
@@ -30,9 +30,9 @@ class ShownPage:
 
 
 def pages_of_an_open_study() -> list[ShownPage]:
-    """Every page of the site that an admin can open, and those of an expert who votes."""
+    """The pages that an admin can open, one of the questions, those of an expert who votes."""
     here, admin = world(), people()["admin"]
-    named = {name: address(name, here) for name in (*PAGES, *ASKS_FIRST)}
+    named = {name: address(name, here) for name in (*PAGES, "study-close")}
     staff = _shown(admin, named)
     own = {name: url for name, url in named.items() if name.startswith(("home", "vote"))}
     return staff + _shown(here.expert, own)
