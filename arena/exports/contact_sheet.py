@@ -1,6 +1,6 @@
 """A contact sheet: every contestant's picture side by side, scenario by scenario.
 
-In: a rating and scenarios. Out: the rows that the page shows, and the same as a PDF, whose bytes
+In: a rating and scenarios. Out: rows of pictures with their votes, and a PDF of them whose bytes
 depend on the pictures, votes and names alone. Pictures are those that were shown, drawn before.
 """
 
@@ -16,7 +16,7 @@ from arena.exports.drawing import INK, SIMULATED, SOFT, house_style
 from arena.exports.samples import stamp_simulated
 from arena.exports.tables import LeaderboardTable, Row
 from arena.models import Snapshot
-from arena.queries.galleries import PictureShown, sheet_rows
+from arena.queries.evidence import PictureShown, sheet_rows
 from augment.models import Scenario
 from augment.services.scenarios.pictures import shrunken_picture
 

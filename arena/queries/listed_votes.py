@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Collection, Iterable, Sequence
 from dataclasses import dataclass
 from datetime import datetime
 from typing import NamedTuple
@@ -12,6 +12,14 @@ from django.db.models import Q, QuerySet
 
 from arena.models import ImportedVote, Snapshot, Vote
 from arena.pairing.order import MAIN
+from arena.queries.evidence import (
+    Evidence,
+    Faults,
+    PairKey,
+    PictureKey,
+    VoteScore,
+    read_faults,
+)
 from arena.queries.judged import AUTOMATIC, IMPORTED, Judged
 from arena.queries.vote_search import COUNTED, EVERY, LEFT_OUT, SoughtOutcome, VoteSearch
 from arena.queries.vote_sets import Filters, LeftOut
@@ -20,11 +28,21 @@ from augment.models import Augmentation
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ShownSide:
-    """Who was shown on a side; `augmentation` is its code, None where there is no picture."""
+    """Who was shown on a side.
+
+    Attributes:
+        augmentation: Its code, None where there is no picture.
+        sample: Of the picture, 0 unless each is judged on its own.
+        score: The picture's votes that count, None where the list does not show them.
+    """
 
     slug: str
     name: str
+    is_simulated: bool = False
     augmentation: UUID | None = None
+    sample: int = 0
+    score: VoteScore | None = None
+    faults: Faults | None = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -40,6 +58,7 @@ class ListedVote:
         outcome: left, equal, right or skip.
         reason: Why it was skipped.
         mark: Why it does not count, or that it does.
+        pair: The votes on both pictures that count, as one of the two sees them.
     """
 
     code: UUID | None
@@ -48,6 +67,7 @@ class ListedVote:
     judge: str
     scenario: str
     scenario_code: UUID | None = None
+    instruction: str = ""
     type: str = ""
     kind: str
     matchup: UUID | None = None
@@ -62,6 +82,7 @@ class ListedVote:
     comment: str = ""
     is_simulated: bool = False
     mark: str
+    pair: VoteScore | None = None
 
     @property
     def sides(self) -> tuple[ShownHere, ShownHere]:
@@ -81,8 +102,16 @@ class ShownHere(NamedTuple):
     won: bool
 
 
-def of_votes(marks: Sequence[tuple[int, str]], snapshot: Snapshot) -> list[ListedVote]:
-    """The rows of these keys with their marks, in their order; one query."""
+def of_votes(
+    marks: Sequence[tuple[int, str]], snapshot: Snapshot, evidence: Evidence | None = None
+) -> list[ListedVote]:
+    """The rows of these keys with their marks, in their order; one query.
+
+    Args:
+        marks: Key and mark of each.
+        snapshot: Whose votes they are.
+        evidence: Adds what is known of the pictures; another query.
+    """
     rows = (
         Vote.objects.filter(pk__in=[pk for pk, _ in marks])
         .select_related(
@@ -93,13 +122,16 @@ def of_votes(marks: Sequence[tuple[int, str]], snapshot: Snapshot) -> list[Liste
             "key", "at", "outcome", "both_miss", "reason", "ms_visible", "aids", "comment",
             "is_simulated", "matchup__code", "matchup__kind", "matchup__position",
             "matchup__scenario__slug", "matchup__scenario__type", "matchup__scenario__code",
+            "matchup__scenario__instruction", "shown_left__sample", "shown_right__sample",
+            "shown_left__contestant__kind", "shown_right__contestant__kind",
             "expert__person__code", "expert__person__pseudonym", "shown_left__code",
             "shown_right__code", "shown_left__contestant__slug", "shown_left__contestant__name",
             "shown_right__contestant__slug", "shown_right__contestant__name",
         )
     )  # fmt: skip
     found = {row.pk: row for row in rows}
-    return [_of_vote(found[pk], mark, snapshot.results.judges) for pk, mark in marks]
+    known = _Known(snapshot, evidence, found.values())
+    return [_of_vote(found[pk], mark, known) for pk, mark in marks]
 
 
 def of_automatic(lines: Iterable[tuple[Judged, str]], snapshot: Snapshot) -> list[ListedVote]:
@@ -161,20 +193,56 @@ _OUTCOMES = {
 }
 
 
-def _of_vote(row: Vote, mark: str, judges: dict[str, str]) -> ListedVote:
+class _Known:
+    """What a rating knows of the votes and pictures that are listed."""
+
+    def __init__(
+        self, snapshot: Snapshot, evidence: Evidence | None, rows: Collection[Vote]
+    ) -> None:
+        self.judges = snapshot.results.judges
+        self._evidence, self._has_samples = evidence, snapshot.study.shows_all_samples
+        shown = {pk for row in rows for pk in (row.shown_left_id, row.shown_right_id)}
+        self._faults = read_faults(shown) if evidence else {}
+
+    def pair(self, row: Vote) -> VoteScore | None:
+        left, right = row.shown_left, row.shown_right
+        key = PairKey.of(
+            row.matchup.scenario_id, self._sample(right), left.contestant_id, right.contestant_id
+        )
+        return self._evidence.pairs.get(key) if self._evidence else None
+
+    def side(self, row: Vote, shown: Augmentation) -> ShownSide:
+        contestant, sample = shown.contestant, self._sample(shown)
+        key = PictureKey(row.matchup.scenario_id, sample, contestant.pk)
+        return ShownSide(
+            slug=contestant.slug,
+            name=contestant.name,
+            is_simulated=contestant.is_simulated,
+            augmentation=shown.code,
+            sample=sample,
+            score=self._evidence.pictures.get(key) if self._evidence else None,
+            faults=self._faults.get(shown.pk),
+        )
+
+    def _sample(self, shown: Augmentation) -> int:
+        return shown.sample if self._has_samples else 0
+
+
+def _of_vote(row: Vote, mark: str, known: _Known) -> ListedVote:
     matchup, person = row.matchup, row.expert.person
     return ListedVote(
         code=row.key,
         at=row.at,
-        judge=judges.get(str(person.code), person.pseudonym),
+        judge=known.judges.get(str(person.code), person.pseudonym),
         scenario=matchup.scenario.slug,
         scenario_code=matchup.scenario.code,
+        instruction=matchup.scenario.instruction,
         type=matchup.scenario.type,
         kind=matchup.kind,
         matchup=matchup.code,
         position=matchup.position,
-        left=_side(row.shown_left),
-        right=_side(row.shown_right),
+        left=known.side(row, row.shown_left),
+        right=known.side(row, row.shown_right),
         outcome=row.outcome,
         both_miss=row.both_miss,
         reason=row.reason,
@@ -183,12 +251,8 @@ def _of_vote(row: Vote, mark: str, judges: dict[str, str]) -> ListedVote:
         comment=row.comment,
         is_simulated=row.is_simulated,
         mark=mark,
+        pair=known.pair(row),
     )
-
-
-def _side(augmentation: Augmentation) -> ShownSide:
-    contestant = augmentation.contestant
-    return ShownSide(slug=contestant.slug, name=contestant.name, augmentation=augmentation.code)
 
 
 def _mark_of_line(row: ImportedVote, filters: Filters) -> str:

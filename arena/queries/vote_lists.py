@@ -9,11 +9,15 @@ from __future__ import annotations
 import json
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from functools import cached_property
+from typing import overload
 from uuid import UUID
 
-from django.db.models import F, Q, QuerySet
+from django.core.paginator import Page, Paginator
+from django.db.models import Q, QuerySet
 
 from arena.models import Snapshot, Vote
+from arena.queries.evidence import read_evidence, sort_votes
 from arena.queries.judged import AUTOMATIC, Judged, is_imported, settled_ties, votes_up_to
 from arena.queries.listed_votes import (
     ListedVote,
@@ -23,13 +27,19 @@ from arena.queries.listed_votes import (
     of_votes,
 )
 from arena.queries.remembering import Remembered, plan_types
-from arena.queries.vote_marks import made_up_contestants, marked_votes, users_of
+from arena.queries.vote_marks import (
+    counted_votes,
+    made_up_contestants,
+    marked_votes,
+    users_of,
+)
 from arena.queries.vote_parts import find_part
 from arena.queries.vote_search import (
     AUTOMATIC_TIE,
     COUNTED,
     EVERY,
     LEFT_OUT,
+    SoughtOrder,
     SoughtOutcome,
     SoughtPart,
     VoteSearch,
@@ -43,31 +53,6 @@ CHUNK = 2000
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class VotePage:
-    """One page of votes; `number` counts from 1."""
-
-    votes: Sequence[ListedVote]
-    number: int
-    pages: int
-    total: int
-
-    @property
-    def first(self) -> int:
-        """The place of the first vote of this page, from 1."""
-        return (self.number - 1) * PER_PAGE + 1
-
-    @property
-    def before(self) -> int | None:
-        """The page before."""
-        return self.number - 1 if self.number > 1 else None
-
-    @property
-    def after(self) -> int | None:
-        """The next page."""
-        return self.number + 1 if self.number < self.pages else None
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
 class Neighbours:
     """Where a vote stands among those looked for, from 1; `place` is None where it is none."""
 
@@ -77,43 +62,33 @@ class Neighbours:
     total: int
 
 
-def vote_page(snapshot: Snapshot, search: VoteSearch, page: int) -> VotePage:
-    """One page; beyond the last is the last. Five queries at most.
+def vote_page(snapshot: Snapshot, search: VoteSearch, number: int) -> Page[ListedVote]:
+    """One page with the numbers beside its pictures; beyond the last is the last.
 
     Args:
         snapshot: With its study.
         search: What is looked for.
-        page: From 1.
+        number: From 1.
     """
-    found = _Found(snapshot, search)
-    total = found.count()
-    pages = max(-(-total // PER_PAGE), 1)
-    number = min(max(page, 1), pages)
-    start = (number - 1) * PER_PAGE
-    return VotePage(
-        votes=found.part(start, min(start + PER_PAGE, total)),
-        number=number,
-        pages=pages,
-        total=total,
-    )
+    return Paginator(_Found(snapshot, search), PER_PAGE).get_page(number)
 
 
 def each_vote(snapshot: Snapshot, search: VoteSearch) -> Iterator[ListedVote]:
     """All that are looked for, in the order of their pages."""
-    return _Found(snapshot, search).each()
+    return iter(_Found(snapshot, search))
 
 
 def neighbours(snapshot: Snapshot, search: VoteSearch, vote: Vote) -> Neighbours:
-    """The votes before and after one among those that are looked for; four queries."""
-    rows = votes_behind(snapshot, search)
-    keys = rows.values_list("key", flat=True)
-    place = rows.filter(pk__lte=vote.pk).count()
-    is_found = rows.filter(pk=vote.pk).exists()
+    """The votes before and after one among those that are looked for."""
+    keys = [pk for pk, _ in _Found(snapshot, search).keys]
+    if vote.pk not in keys:
+        return Neighbours(before=None, after=None, place=None, total=len(keys))
+    place = keys.index(vote.pk)
     return Neighbours(
-        before=keys.filter(pk__lt=vote.pk).order_by("-pk").first(),
-        after=keys.filter(pk__gt=vote.pk).order_by("pk").first(),
-        place=place if is_found else None,
-        total=rows.count(),
+        before=_code_at(keys, place - 1),
+        after=_code_at(keys, place + 1),
+        place=place + 1,
+        total=len(keys),
     )
 
 
@@ -140,11 +115,6 @@ def votes_behind(snapshot: Snapshot, search: VoteSearch) -> QuerySet[Vote]:
     return find_part(rows, snapshot, SoughtPart(search.part)) if search.part else rows
 
 
-def counted_votes(snapshot: Snapshot) -> QuerySet[Vote]:
-    """The rows that the rating is made of, without those of pairs that nobody was shown."""
-    return votes_behind(snapshot, VoteSearch())
-
-
 def settled_counted(snapshot: Snapshot) -> int:
     """Return how many ties of pairs that nobody was shown count in a rating."""
     is_possible = snapshot.study.rules.get("identical") and not is_imported(snapshot.study)
@@ -156,7 +126,12 @@ def settled_counted(snapshot: Snapshot) -> int:
 # --- What is found -----------------------------------------------------------------------------
 
 
-class _Found:
+def _code_at(keys: Sequence[int], place: int) -> UUID | None:
+    inside = 0 <= place < len(keys)
+    return Vote.objects.values_list("key", flat=True).get(pk=keys[place]) if inside else None
+
+
+class _Found(Sequence[ListedVote]):
     """Rows of the database, and after them the pairs that nobody can tell apart."""
 
     def __init__(self, snapshot: Snapshot, search: VoteSearch) -> None:
@@ -164,46 +139,54 @@ class _Found:
         self._imported = is_imported(snapshot.study)
         self._automatic = [] if self._imported else _automatic(snapshot, search)
         self._lines = imported_votes(snapshot, search) if self._imported else None
-        self._stored: int | None = None
 
-    def count(self) -> int:
-        return self._count_stored() + len(self._automatic)
+    def __len__(self) -> int:
+        return self._stored + len(self._automatic)
 
-    def part(self, start: int, stop: int) -> list[ListedVote]:
-        """The votes from one place up to another, from 0."""
+    @overload
+    def __getitem__(self, place: int) -> ListedVote: ...
+
+    @overload
+    def __getitem__(self, place: slice) -> list[ListedVote]: ...
+
+    def __getitem__(self, place: int | slice) -> ListedVote | list[ListedVote]:
+        """The votes from one place up to another, from 0, with what is known of their pictures."""
+        if isinstance(place, int):
+            return self[place : place + 1][0]
         if self._lines is not None:
-            return of_imported(self._lines[start:stop], self._snapshot)
-        listed = of_votes(self._keys()[start:stop], self._snapshot)
-        stored = self._count_stored()
-        rest = self._automatic[max(start - stored, 0) : max(stop - stored, 0)]
+            return of_imported(self._lines[place], self._snapshot)
+        listed = of_votes(self.keys[place], self._snapshot, read_evidence(self._snapshot))
+        start, stop, _ = place.indices(len(self))
+        rest = self._automatic[max(start - self._stored, 0) : max(stop - self._stored, 0)]
         return listed + of_automatic(rest, self._snapshot)
 
-    def each(self) -> Iterator[ListedVote]:
+    def __iter__(self) -> Iterator[ListedVote]:
         """All of them; what is found is found once, whatever its number."""
         if self._lines is not None:
-            for start in range(0, self.count(), CHUNK):
-                yield from self.part(start, start + CHUNK)
+            yield from of_imported(self._lines.iterator(CHUNK), self._snapshot)
             return
-        keys = self._keys()
-        for start in range(0, len(keys), CHUNK):
-            yield from of_votes(keys[start : start + CHUNK], self._snapshot)
+        for start in range(0, self._stored, CHUNK):
+            yield from of_votes(self.keys[start : start + CHUNK], self._snapshot)
         yield from of_automatic(self._automatic, self._snapshot)
 
-    def _count_stored(self) -> int:
-        if self._stored is None:
-            self._stored = len(self._keys()) if self._lines is None else self._lines.count()
-        return self._stored
-
-    def _keys(self) -> list[tuple[int, str]]:
+    @cached_property
+    def keys(self) -> list[tuple[int, str]]:
         """Every vote that is looked for, with its mark; a rating's votes never change."""
-        rating = self._snapshot
-        types = plan_types(rating.study) if self._search.type else ()
-        found = (rating.code, rating.last_vote, json.dumps(rating.filters), self._search, types)
+        if self._lines is not None:
+            return []
+        rating, search = self._snapshot, self._search
+        if search.order == SoughtOrder.FAULTS:  # labels are given later
+            return self._find()
+        types = plan_types(rating.study)
+        found = (rating.code, rating.last_vote, json.dumps(rating.filters), search, types)
         return _FOUND.get(found, self._find)
 
+    @cached_property
+    def _stored(self) -> int:
+        return len(self.keys) if self._lines is None else self._lines.count()
+
     def _find(self) -> list[tuple[int, str]]:
-        rows = votes_behind(self._snapshot, self._search)
-        return list(rows.order_by("pk").values_list("pk", F("mark")))
+        return sort_votes(votes_behind(self._snapshot, self._search), self._snapshot, self._search)
 
 
 _FOUND: Remembered[list[tuple[int, str]]] = Remembered(3)

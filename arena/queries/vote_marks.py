@@ -34,6 +34,11 @@ def marked_votes(snapshot: Snapshot) -> QuerySet[Vote]:
     return rows.order_by().annotate(mark=mark)
 
 
+def counted_votes(snapshot: Snapshot) -> QuerySet[Vote]:
+    """The rows that the rating is made of, without those of pairs that nobody was shown."""
+    return marked_votes(snapshot).filter(Q(mark=COUNTED))
+
+
 def own_votes(filters: Filters) -> Q:
     """Votes of authors on their own contestants; one query."""
     users = users_of(sorted({judge for judge, _ in filters.authors}))

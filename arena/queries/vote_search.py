@@ -44,6 +44,15 @@ class SoughtPart(StrEnum):
     SHARED = "shared"
 
 
+class SoughtOrder(StrEnum):
+    """What comes first; empty is the order in which the votes were given."""
+
+    DISPUTED = "disputed"
+    LOST = "lost"
+    FAULTS = "faults"
+    SCENARIO = "scenario"
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class VoteSearch:
     """What is looked for; empty is all.
@@ -58,6 +67,7 @@ class VoteSearch:
         mark: Why votes do not count, or one of the words above.
         comment: Words in the expert's comment.
         aid: What the expert looked with.
+        order: Of `SoughtOrder`.
     """
 
     contestant: str = ""
@@ -71,6 +81,7 @@ class VoteSearch:
     mark: str = COUNTED
     comment: str = ""
     aid: str = ""
+    order: str = ""
 
     def as_query(self) -> dict[str, str]:
         """What an address says of it: nothing of what is left as it is."""

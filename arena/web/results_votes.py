@@ -1,4 +1,4 @@
-"""The votes behind the numbers of a rating: lists, files, and a vote with the pair as shown."""
+"""The evidence of a rating: votes with their pictures, as a grid, a file, or one at a time."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ from augment.services.wording import translate_all
 @allow_only(*STAFF)
 @require_safe
 def votes_page(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
-    """One page of the votes that the address looks for."""
+    """One page of the votes that the address looks for, with their pictures."""
     study, snapshot, table = _rating(request, code)
     form = _form(request, snapshot, table)
     context = _context(study, snapshot, form) | {"search": None}
@@ -42,7 +42,7 @@ def votes_page(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
     search = form.search()
     context |= {
         "search": search,
-        "found": vote_page(snapshot, search, page_asked(request)),
+        "page": vote_page(snapshot, search, page_asked(request)),
         "query": _query(snapshot, search),
     }
     return render(request, "results/votes.html", context)

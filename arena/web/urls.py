@@ -34,7 +34,6 @@ from arena.web import (
     reports,
     results,
     results_files,
-    results_galleries,
     results_votes,
     scenario_files,
     scenario_form,
@@ -204,18 +203,6 @@ urlpatterns: list[URLPattern] = [
     path("studies/<uuid:code>/results/", results.results_page, name="results"),
     path("studies/<uuid:code>/results/open/", results.open_results_early, name="results-open"),
     path("studies/<uuid:code>/results/votes/", results_votes.votes_page, name="results-votes"),
-    path(
-        "studies/<uuid:code>/results/disputed/",
-        results_galleries.disagreement_page,
-        name="results-disagreement",
-    ),
-    path("studies/<uuid:code>/results/worst/", results_galleries.worst_page, name="results-worst"),
-    path("studies/<uuid:code>/results/sheet/", results_galleries.sheet_page, name="results-sheet"),
-    path(
-        "studies/<uuid:code>/results/sheet.pdf",
-        results_galleries.sheet_file,
-        name="results-sheet-file",
-    ),
     path(
         "studies/<uuid:code>/results/votes.csv",
         results_votes.votes_file,

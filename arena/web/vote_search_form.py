@@ -17,6 +17,7 @@ from arena.queries.vote_search import (
     COUNTED,
     EVERY,
     LEFT_OUT,
+    SoughtOrder,
     SoughtOutcome,
     SoughtPart,
     VoteSearch,
@@ -45,6 +46,12 @@ PARTS = {
     SoughtPart.PASSED: "Attention checks passed",
     SoughtPart.CHECKS_SKIPPED: "Attention checks skipped",
     SoughtPart.SHARED: "On what others judged as well",
+}
+ORDERS = {
+    SoughtOrder.DISPUTED: "The most disputed pairs",
+    SoughtOrder.LOST: "The pictures that lost most votes",
+    SoughtOrder.FAULTS: "The pictures with most faults",
+    SoughtOrder.SCENARIO: "By scenario",
 }
 MARKS = {
     COUNTED: "Counted",
@@ -77,6 +84,7 @@ class VoteSearchForm(forms.Form):
     part = forms.ChoiceField(label="Only", required=False)
     aid = forms.ChoiceField(label="Looked with", required=False)
     comment = forms.CharField(label="Words in the comment", required=False, max_length=200)
+    order = forms.ChoiceField(label="Begin with", required=False)
 
     def __init__(
         self, query: Mapping[str, str], *, snapshot: Snapshot, names: Mapping[str, str]
@@ -96,10 +104,11 @@ class VoteSearchForm(forms.Form):
         self._offer("mark", _choices(MARKS))
         self._offer("part", [everybody, *_choices(PARTS)])
         self._offer("aid", [everybody, *_choices(AID_LABELS)])
+        self._offer("order", [("", "The first vote"), *_choices(ORDERS)])
         if not snapshot.study.shows_all_samples:
             del self.fields["sample"]
         if is_imported(snapshot.study):
-            for name in ("type", "part", "aid", "comment"):
+            for name in ("type", "part", "aid", "comment", "order"):
                 del self.fields[name]
 
     def clean_scenario(self) -> str:

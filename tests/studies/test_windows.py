@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import pytest
-from django.core.management import call_command
 
 from arena.errors import NothingToPlan
 from arena.models import Matchup, Study
@@ -52,7 +51,7 @@ def test_pictures_of_two_windows_are_never_paired() -> None:
     Augmentation.objects.filter(pk=one.pk).update(image=original_picture(one.scenario))
     with pytest.raises(NothingToPlan, match="different windows"):
         opened("mixed", **cast)
-    call_command("redraw_pictures")
+    assert list(redraw_pictures())
     look_otherwise("bob")
     for matchup in opened("redrawn", **cast).matchups.all():
         windows = {
@@ -108,7 +107,7 @@ def test_a_change_outside_widens_the_window_of_all_and_an_open_study_keeps_its_o
     place = Scenario.objects.get()
     Scenario.objects.update(reference=modification_to_document(CONE_AHEAD))
     Augmentation.objects.update(modification=modification_to_document(CONE_AHEAD))
-    call_command("redraw_pictures")
+    assert list(redraw_pictures())
     look_otherwise("ann")
     study = opened("before", **cast, votes_per_expert=1)
     shown = study.matchups.values_list("left_image", "right_image", "original_image").get()

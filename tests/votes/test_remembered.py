@@ -12,7 +12,7 @@ from django.utils import timezone
 
 from arena.models import Study, Vote
 from arena.queries.coverage import coverage
-from arena.queries.galleries import disputed_pairs, pictures_of
+from arena.queries.evidence import read_evidence
 from arena.queries.invitations import expert_lines
 from arena.queries.vote_lists import vote_page
 from arena.queries.vote_search import VoteSearch
@@ -64,9 +64,8 @@ def test_a_second_look_asks_for_no_votes() -> None:
         lambda: coverage(study),
         lambda: tallies(study),
         lambda: expert_lines(study, timezone.now()),
-        lambda: disputed_pairs(snapshot),
-        lambda: pictures_of(snapshot, "ann"),
-        lambda: vote_page(snapshot, VoteSearch(), 1),
+        lambda: read_evidence(snapshot),
+        lambda: list(vote_page(snapshot, VoteSearch(order="disputed"), 1)),
     ):
         first = look()
         with CaptureQueriesContext(connection) as captured:

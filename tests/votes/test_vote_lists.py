@@ -28,7 +28,7 @@ def rated(study: Study, **filters: object) -> Snapshot:
 
 
 def total(snapshot: Snapshot, **search: str) -> int:
-    return vote_page(snapshot, VoteSearch(**search), 1).total
+    return vote_page(snapshot, VoteSearch(**search), 1).paginator.count
 
 
 CHOICES: dict[str, dict[str, object]] = {
@@ -123,9 +123,10 @@ def test_pages_hold_every_vote_once_and_automatic_ties_at_the_end(
     search = VoteSearch()
     pages = [vote_page(snapshot, search, number) for number in range(1, 5)]
     assert [page.number for page in pages] == [1, 2, 3, 4]
-    assert {page.pages for page in pages} == {4}
-    listed = [vote for page in pages for vote in page.votes]
-    assert listed == list(each_vote(snapshot, search))
+    assert {page.paginator.num_pages for page in pages} == {4}
+    listed = [vote for page in pages for vote in page]
+    every = [(vote.code, vote.left.slug, vote.mark) for vote in each_vote(snapshot, search)]
+    assert [(vote.code, vote.left.slug, vote.mark) for vote in listed] == every
     assert len(listed) == snapshot.votes_counted == 24
     assert [vote.kind for vote in listed].index("automatic") == 22
     assert vote_page(snapshot, search, 99).number == 4

@@ -122,10 +122,7 @@ def address(name: str, here: World) -> str:
         *("study-cancel", "study-again"),
         *("study-hand-over", "study-rate", "enrolment", "enrolment-voters", "enrolment-drop"),
     )
-    results = (
-        *("results", "results-votes", "results-votes-file", "results-open"),
-        *("results-disagreement", "results-worst", "results-sheet", "results-sheet-file"),
-    )
+    results = ("results", "results-votes", "results-votes-file", "results-open")
     is_of_study = name in own + results or name.startswith("vote")
     found = {"code": here.study.code} if is_of_study else arguments.get(name, {})
     return reverse(name, kwargs=found)

@@ -16,8 +16,6 @@ from tests.web.addresses import address
 from tests.web.cast import people, signed_in, world
 from tests.web.test_access import PAGES
 
-GALLERIES = ("results-votes", "results-disagreement", "results-worst", "results-sheet")
-
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ShownPage:
@@ -46,7 +44,9 @@ def pages_of_a_rated_study() -> list[ShownPage]:
     rate(study=study, rounds=100, filters=Filters())
     code = [study.code]
     named = {f"tab {tab.name}": reverse("results-tab", args=[*code, tab.name]) for tab in TABS}
-    named |= {name: reverse(name, args=code) for name in ("study", "preregistration", *GALLERIES)}
+    named |= {
+        name: reverse(name, args=code) for name in ("study", "preregistration", "results-votes")
+    }
     vote = Vote.objects.exclude(comment="").first()
     assert vote is not None
     named["results-vote"] = reverse("results-vote", args=[*code, vote.key])

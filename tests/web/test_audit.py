@@ -104,7 +104,6 @@ DOORS = {
     "arena/web/rating.py": "gives none: the page that asked leads to the gate",
     "arena/web/results.py": "the gate",
     "arena/web/results_files.py": "behind the gate",
-    "arena/web/results_galleries.py": "behind the gate",
     "arena/web/results_votes.py": "behind the gate",
     "arena/web/study_files.py": "asks results_access; what shows results needs it in full",
 }

@@ -1,0 +1,162 @@
+"""The orders of the grid of evidence, what stands beside its pictures, and the contact sheet."""
+
+from __future__ import annotations
+
+import re
+import uuid
+from pathlib import Path
+
+import pytest
+from django.core.management import call_command
+from django.test import Client
+from django.urls import reverse
+
+from arena.models import FaultLabel, LabellingRound, LabelTask, Snapshot, Study, Vote
+from arena.queries.evidence import VoteScore, read_evidence
+from arena.queries.vote_lists import neighbours, vote_page
+from arena.queries.vote_search import VoteSearch
+from arena.services.ratings import rate
+from arena.services.studies import close_study
+from augment.models import Augmentation
+from augment.services.scenarios.pictures import store
+from tests.study_rows import a_study, hang, vote
+from tests.web.cast import people, png, signed_in
+
+pytestmark = pytest.mark.django_db
+
+
+@pytest.fixture
+def rated() -> Snapshot:
+    """Bob loses every vote on place-0 and wins the others; eva and finn see every pair."""
+    study = a_study(votes_per_expert=18)
+    for number, row in enumerate(Augmentation.objects.order_by("pk")):
+        hang(row, store(png(number, width=12, height=8)))
+    for matchup in study.matchups.select_related("expert", "left__contestant", "scenario"):
+        outcome = "equal"
+        shown = [matchup.left.contestant.slug, matchup.right.contestant.slug]
+        if "bob" in shown:
+            won = (shown[0] == "bob") != (matchup.scenario.slug == "place-0")
+            outcome = "left" if won else "right"
+        elif matchup.scenario.slug == "place-5":
+            first = shown[0] == "ann"
+            outcome = "left" if first == (matchup.expert.username == "eva") else "right"
+        elif matchup.scenario.slug == "place-4" and matchup.expert.username == "eva":
+            outcome = "left"
+        vote(matchup, outcome)
+    return rate(study=close_study(study=study), rounds=10)
+
+
+@pytest.fixture
+def analyst() -> Client:
+    return signed_in(people()["analyst"])
+
+
+def grid(client: Client, snapshot: Snapshot, **query: str) -> str:
+    answer = client.get(reverse("results-votes", args=[snapshot.study.code]), query)
+    assert answer.status_code == 200
+    return " ".join(answer.content.decode().split())
+
+
+def first_card(shown: str) -> str:
+    return shown.partition('<li class="card">')[2].partition("</li>")[0]
+
+
+def pictures_in(shown: str) -> list[str]:
+    return re.findall(r'<img[^>]* src="([^"?]*/shown/[^"?]*)[^"]*"', shown)
+
+
+@pytest.mark.parametrize(
+    ("score", "expected"),
+    [
+        ((0, 0, 0), 0.0),
+        ((1, 0, 0), 0.0),
+        ((2, 0, 0), 0.0),
+        ((0, 5, 0), 0.0),
+        ((1, 0, 1), 1.0),
+        ((1, 1, 0), 0.5),
+        ((0, 1, 1), 0.5),
+        ((1, 1, 1), 2 / 3),
+        ((2, 0, 2), 4 / 6),
+    ],
+)
+def test_disagreement_is_the_mean_distance_of_two_judgements(
+    score: tuple[int, int, int], expected: float
+) -> None:
+    wins, ties, losses = score
+    given = VoteScore(wins=wins, ties=ties, losses=losses)
+    assert given.disagreement == pytest.approx(expected)
+
+
+def test_the_votes_on_the_most_disputed_pair_come_first(rated: Snapshot, analyst: Client) -> None:
+    judged_twice = [score for score in read_evidence(rated).pairs.values() if score.votes > 1]
+    agreement = rated.results.trust.agreement
+    assert agreement is not None
+    assert len(judged_twice) == agreement.units == 18
+    listed = list(vote_page(rated, VoteSearch(order="disputed"), 1))
+    said = [vote.pair.disagreement for vote in listed if vote.pair]
+    assert said == [1.0, 1.0, 0.5, 0.5, *[0.0] * 21]
+    first = first_card(grid(analyst, rated, order="disputed"))
+    assert "place-5" in first
+    assert "disagreement 100 % of" in first
+    assert len(pictures_in(first)) == 2
+    for address in pictures_in(first):
+        assert b"".join(analyst.get(address))[:4] == b"\x89PNG"
+
+
+def test_the_picture_that_lost_most_comes_first(rated: Snapshot) -> None:
+    search = VoteSearch(contestant="bob", order="lost")
+    votes = list(vote_page(rated, search, 1))
+    lost = []
+    for given in votes:
+        score = next(side.score for side in (given.left, given.right) if side.slug == "bob")
+        assert score is not None
+        lost.append(score.lost_share)
+    assert votes[0].scenario == "place-0"
+    assert lost[0] == 1.0
+    assert lost == sorted(lost, reverse=True)
+    standing = rated.standings.get(slug="bob")
+    bob = Augmentation.objects.filter(contestant__slug="bob")[0].contestant_id
+    scores = [s for key, s in read_evidence(rated).pictures.items() if key.contestant == bob]
+    assert sum(score.wins for score in scores) == standing.wins
+    assert sum(score.losses for score in scores) == standing.losses
+
+
+def test_pictures_with_faults_come_first(rated: Snapshot, analyst: Client) -> None:
+    search = VoteSearch(contestant="bob", order="faults")
+    rows = Augmentation.objects.filter(contestant__slug="bob").order_by("scenario__slug")
+    for number, row in enumerate(rows[:3]):
+        _label(row, faulty=number == 2)
+    places = [vote.scenario for vote in vote_page(rated, search, 1)]
+    assert list(dict.fromkeys(places))[:3] == ["place-2", "place-0", "place-1"]
+    assert "1 of 1 expert found faults" in first_card(
+        grid(analyst, rated, contestant="bob", order="faults")
+    )
+
+
+def test_votes_by_scenario_are_walked_through_in_that_order(rated: Snapshot) -> None:
+    search = VoteSearch(order="scenario")
+    listed = [vote for number in (1, 2) for vote in vote_page(rated, search, number)]
+    places = [vote.scenario for vote in listed]
+    assert places == sorted(places)
+    middle = Vote.objects.get(key=str(listed[5].code))
+    beside = neighbours(rated, search, middle)
+    assert (beside.before, beside.place, beside.after) == (listed[4].code, 6, listed[6].code)
+    assert neighbours(rated, VoteSearch(mark="skip"), middle).place is None
+
+
+def _label(row: Augmentation, *, faulty: bool) -> None:
+    study = Study.objects.get()
+    expert = study.experts.order_by("pk")[0]
+    labelling = LabellingRound.objects.create(name=str(uuid.uuid4()), job=row.job, seed=1)
+    task = LabelTask.objects.create(
+        labelling=labelling, expert=expert, position=1, augmentation=row
+    )
+    FaultLabel.objects.create(
+        augmentation=row, expert=expert, task=task, position=faulty, heading=False, logic=False
+    )
+
+
+def test_the_command_writes_the_whole_sheet(rated: Snapshot, tmp_path: Path) -> None:
+    out = tmp_path / "sheet.pdf"
+    call_command("export", "contact-sheet", rated.study.name, out=str(out))
+    assert out.read_bytes().count(b"/Subtype /Image") == 18
