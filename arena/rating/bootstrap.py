@@ -3,7 +3,7 @@
 What is drawn with replacement is the unit: votes, whole scenarios, whole experts, or both at
 once (a vote counts as often as its expert times its scenario is drawn).
 
-Notation: R rows, P pairs, K cells (expert x scenario), B rounds, which are the last axis.
+Notation: R rows, P pairs, K clusters, B rounds, which are the last axis.
 """
 
 from __future__ import annotations
@@ -16,6 +16,7 @@ from typing import Self
 import numpy as np
 from numpy.typing import NDArray
 
+from arena.rating.chains import heaviest_tree
 from arena.rating.comparisons import (
     BoolArray,
     Comparisons,
@@ -24,15 +25,16 @@ from arena.rating.comparisons import (
     PairCounts,
     renumber_codes,
 )
-from arena.rating.draws import Multinomial
 from arena.rating.estimate import LEVEL
 
 _NUMBERS_AT_ONCE = 500_000
 """How many numbers a block of rounds may hold; more only costs memory."""
-_LARGEST_TABLE = 2_000_000
-_NUMBERS_OF_TABLES = 8_000_000
-_EMPTIEST = 500
-"""A table with more places than this for each row takes longer than going row by row."""
+FEWEST_ROUNDS = 200
+_WORK = 60_000_000
+_MISSED = 0.8
+"""A score by one more expert and scenario is missing from 6 of 10 rounds; 0.8 is on the safe side,
+because experts may share scenarios."""
+_NEVER = 1e-4
 
 
 class Unit(StrEnum):
@@ -89,6 +91,39 @@ def resample(
     return _clusters(votes, counts, unit, rounds, seed)
 
 
+def rounds_to_draw(votes: Comparisons, counts: PairCounts, rounds: int) -> int:
+    """How many of the rounds: fewer where one takes long, 200 at least."""
+    each = len(votes) + 3 * len(counts.low) + len(votes.names) ** 2
+    return min(rounds, max(FEWEST_ROUNDS, _WORK // max(each, 1)))
+
+
+def is_certain(votes: Comparisons, counts: PairCounts) -> bool:
+    """Return whether hardly a round can leave somebody undetermined.
+
+    Then each pair of a tree that joins everybody has scores of many, both ways.
+    """
+    weight = np.minimum(counts.scores, counts.games - counts.scores)
+    tree = heaviest_tree(len(votes.names), counts.low, counts.high, weight)
+    if len(tree) < len(votes.names) - 1:
+        return False
+    place = np.full(len(counts.low), -1, dtype=np.int64)
+    place[tree] = np.arange(len(tree))
+    rows = np.flatnonzero(place[counts.pair_of] >= 0)
+    pair_of, outcome_of = place[counts.pair_of[rows]], counts.outcome_of[rows]
+    fewest = np.full((2, len(tree)), np.iinfo(np.int64).max)
+    for way, scored in enumerate((outcome_of < 2, outcome_of > 0)):
+        for codes in (votes.expert, votes.scenario):
+            number, of_row = renumber_codes(codes)
+            met = np.unique(pair_of[scored] * len(number) + of_row[rows][scored])
+            different = np.bincount(met // len(number), minlength=len(tree))
+            if len(number) > 1:
+                fewest[way] = np.minimum(fewest[way], different)
+        if (fewest[way] == np.iinfo(np.int64).max).any():
+            weights = votes.count[rows][scored]
+            fewest[way] = np.bincount(pair_of[scored], weights, len(tree)).astype(np.int64)
+    return bool((_MISSED ** fewest.astype(np.float64)).sum() < _NEVER)
+
+
 def interval(samples: FloatArray, *, level: float = LEVEL) -> tuple[FloatArray, FloatArray]:
     """The percentile interval (C,), (C,) of samples (C, B)."""
     tail = 50.0 * (1.0 - level)
@@ -105,120 +140,36 @@ def _blocks(rounds: int, width: int) -> Iterator[int]:
 def _votes(counts: PairCounts, rounds: int, rng: np.random.Generator) -> Iterator[Rounds]:
     """Votes of one pair and outcome are alike, so drawing votes is drawing counts of them."""
     seen = counts.outcomes.T.ravel()
-    kinds = np.flatnonzero(seen)
-    kind_counts = Multinomial(seen[kinds])
     for size in _blocks(rounds, len(seen)):
-        drawn = kind_counts.draw(rng, size)
-        if len(kinds) < len(seen):
-            everything = np.zeros((len(seen), size))
-            everything[kinds] = drawn
-            drawn = everything
-        wins, ties, losses = drawn.reshape(3, -1, size)
-        of_all = ties.sum(axis=0)
-        losses += wins
-        losses += ties
-        ties *= 0.5
-        wins += ties
-        yield Rounds(games=losses, scores=wins, ties=of_all)
-
-
-# --- Clusters: a scenario's or an expert's votes are drawn together ------------------------------
+        drawn = rng.multinomial(seen.sum(), seen / seen.sum(), size=size).T
+        yield _as_rounds(drawn.astype(np.float64))
 
 
 def _clusters(
     votes: Comparisons, counts: PairCounts, unit: Unit, rounds: int, seed: int
 ) -> Iterator[Rounds]:
-    """Rounds are weights of clusters times their counts."""
-    expert_of, (scenarios, scenario_of) = (
-        renumber_codes(votes.expert)[1],
-        renumber_codes(votes.scenario),
-    )
-    cells, cell_of = renumber_codes(expert_of * len(scenarios) + scenario_of)
-    row_of_cell = np.empty(len(cells), dtype=np.int64)
-    row_of_cell[cell_of] = np.arange(len(votes))
-    weights = _Weights(votes, unit, row_of_cell, seed)
-    if len(cells) * len(counts.low) > _EMPTIEST * len(votes):
-        return _row_by_row(votes, counts, cell_of, weights, rounds)
-    return _by_tables(_Tables(votes, counts, cell_of, len(cells)), weights, rounds)
+    """Count each row as often as its expert is drawn, times its scenario.
 
-
-def _by_tables(tables: _Tables, weights: _Weights, rounds: int) -> Iterator[Rounds]:
-    """Many rounds at once: one product of matrices for each table."""
-    numbers = _NUMBERS_OF_TABLES if tables.are_several else _NUMBERS_AT_ONCE
-    at_once = max(1, numbers // max(tables.cells, 2 * tables.pairs))
-    for first in range(0, rounds, at_once):
-        games, scores, ties = tables.times(weights.draw(min(at_once, rounds - first)))
-        begin = 0
-        for size in _blocks(games.shape[1], 2 * tables.pairs):
-            block = slice(begin, begin + size)
-            yield Rounds(
-                games=games[:, block].astype(np.float64),
-                scores=scores[:, block].astype(np.float64),
-                ties=ties[block].astype(np.float64),
-            )
-            begin += size
-
-
-def _row_by_row(
-    votes: Comparisons, counts: PairCounts, cell_of: IntArray, weights: _Weights, rounds: int
-) -> Iterator[Rounds]:
-    """One round after the other, where tables would be nearly empty."""
+    What the unit does not name is not drawn and counts once.
+    """
     pairs = len(counts.low)
     place = counts.outcome_of * pairs + counts.pair_of
-    for _ in range(rounds):
-        weight = weights.draw(1)[cell_of, 0].astype(np.float64) * votes.count
-        drawn = np.bincount(place, weights=weight, minlength=3 * pairs).astype(np.float64)
-        wins, ties, losses = drawn.reshape(3, pairs, 1)
-        yield Rounds(games=wins + ties + losses, scores=wins + 0.5 * ties, ties=ties.sum(axis=0))
+    order = np.argsort(place, kind="stable")
+    kinds, starts = np.unique(place[order], return_index=True)
+    clusters = [(draws, of_row[order]) for draws, of_row in cluster_draws(votes, unit, seed)]
+    for size in _blocks(rounds, len(votes)):
+        weight = np.repeat(votes.count[order, None].astype(np.float64), size, axis=1)
+        for draws, of_row in clusters:
+            weight *= draws.draw(size)[of_row]
+        drawn = np.zeros((3 * pairs, size))
+        drawn[kinds] = np.add.reduceat(weight, starts, axis=0)
+        yield _as_rounds(drawn)
 
 
-class _Tables:
-    """What each cell holds of each pair: games and scores, a table for some pairs at a time.
-
-    Single precision holds whole and half numbers exactly up to 8 million votes of one pair.
-    """
-
-    def __init__(
-        self, votes: Comparisons, counts: PairCounts, cell_of: IntArray, cells: int
-    ) -> None:
-        self.pairs, self.cells = len(counts.low), cells
-        order = np.argsort(counts.pair_of, kind="stable")
-        self._pair_of = counts.pair_of[order].astype(np.int32)
-        self._cell_of = cell_of[order].astype(np.int32)
-        self._games = votes.count[order].astype(np.float32)
-        half_points = (2 - counts.outcome_of[order]).astype(np.float32)
-        self._scores = np.float32(0.5) * half_points * self._games
-        tied = votes.count * (counts.outcome_of == 1)
-        self._ties = np.bincount(cell_of, weights=tied, minlength=cells).astype(np.float32)
-        self._at_once = max(1, _LARGEST_TABLE // cells)
-        self._only = self._table(0) if self._at_once >= self.pairs else None
-
-    @property
-    def are_several(self) -> bool:
-        """Then they are made anew for every product, of as many rounds as there is room for."""
-        return self._only is None
-
-    def times(
-        self, weight: NDArray[np.float32]
-    ) -> tuple[NDArray[np.float32], NDArray[np.float32], NDArray[np.float32]]:
-        """(P, B) games, (P, B) scores, (B,) ties for weights (K, B)."""
-        counts_f4 = np.empty((2, self.pairs, weight.shape[1]), dtype=np.float32)
-        for first in range(0, self.pairs, self._at_once):
-            table = self._table(first) if self._only is None else self._only
-            for kind in range(2):
-                np.matmul(table[kind], weight, out=counts_f4[kind, first : first + self._at_once])
-        return counts_f4[0], counts_f4[1], self._ties @ weight
-
-    def _table(self, first: int) -> NDArray[np.float32]:
-        """(2, pairs from `first`, K)."""
-        pairs = min(self._at_once, self.pairs - first)
-        begin, end = np.searchsorted(self._pair_of, [first, first + pairs])
-        rows = slice(begin, end)
-        place = (self._pair_of[rows] - first) * self.cells + self._cell_of[rows]
-        table = np.empty((2, pairs * self.cells), dtype=np.float32)
-        for kind, values in enumerate((self._games, self._scores)):
-            table[kind] = np.bincount(place, weights=values[rows], minlength=table.shape[1])
-        return table.reshape(2, pairs, self.cells)
+def _as_rounds(drawn: FloatArray) -> Rounds:
+    """Return rounds of how often low won, neither or high won, for each pair (3 P, B)."""
+    wins, ties, losses = drawn.reshape(3, -1, drawn.shape[1])
+    return Rounds(games=wins + ties + losses, scores=wins + 0.5 * ties, ties=ties.sum(axis=0))
 
 
 @dataclass(slots=True, kw_only=True)
@@ -251,22 +202,3 @@ def cluster_draws(
             draws = ClusterDraws(clusters=len(occurring), rng=np.random.default_rng(child))
             found.append((draws, of_row))
     return found
-
-
-class _Weights:
-    """How often each cell is drawn: its expert's draws times its scenario's.
-
-    What the unit does not name is not drawn and counts once.
-    """
-
-    def __init__(self, votes: Comparisons, unit: Unit, rows: IntArray, seed: int) -> None:
-        """`rows` (K,) has a row of each cell."""
-        self._drawn = [(draws, of_row[rows]) for draws, of_row in cluster_draws(votes, unit, seed)]
-
-    def draw(self, rounds: int) -> NDArray[np.float32]:
-        """(K, B)."""
-        factors = [draws.draw(rounds).take(of_cell, axis=0) for draws, of_cell in self._drawn]
-        weight = factors[0]
-        for factor in factors[1:]:
-            weight *= factor
-        return weight

@@ -21,14 +21,10 @@ ELO_PER_LOGIT = 400.0 / math.log(10.0)
 MEAN_ELO = 1000.0
 
 _TOLERANCE = 1e-9
-_ROUND_TOLERANCE = 1e-7
-"""Resampled ratings stop moving at 0.00002 points; two seeds differ ten thousand times as much."""
 _MOST_STEPS = 200
-_MOST_CHORD_STEPS = 40
 _LONGEST_STEP = 2.0
 """No strength changes by more in one step: far out a whole Newton step can overshoot."""
 _NUMBERS_AT_ONCE = 4_000_000
-_DENSE_CONTESTANTS = 64
 
 
 class DidNotConverge(ArithmeticError):
@@ -49,11 +45,6 @@ class Meetings:
         ends = np.concatenate([low, high])
         self._by_end = np.argsort(ends, kind="stable")
         self._present, self._starts = np.unique(ends[self._by_end], return_index=True)
-        self._both: FloatArray | None = None
-        if contestants <= _DENSE_CONTESTANTS:
-            self._both = np.zeros((contestants, len(low)))
-            self._both[low, np.arange(len(low))] = 1.0
-            self._both[high, np.arange(len(low))] = 1.0
 
     def sums(self, of_low: FloatArray, of_high: FloatArray) -> FloatArray:
         """(C, B): a pair's first value counts for its low contestant, the second for its high."""
@@ -65,8 +56,6 @@ class Meetings:
 
     def totals(self, values: FloatArray) -> FloatArray:
         """(C, B): a pair's value counts for both."""
-        if self._both is not None:
-            return np.asarray(self._both @ values)
         return self.sums(values, values)
 
 
@@ -86,7 +75,7 @@ def fit(
 ) -> FloatArray:
     """The most likely strengths (n, C) of n sets of votes, each set's mean zero, to 1e-9.
 
-    Every set must determine them: see `connectivity.are_determined`.
+    Every set must determine them: see `chains.are_determined`.
 
     Args:
         contestants: C.
@@ -113,7 +102,7 @@ def newton(
 ) -> FloatArray:
     """The most likely strengths (C, B), each round's mean zero, by Newton's method to 1e-9.
 
-    Every round must determine them: see `connectivity.are_determined`.
+    Every round must determine them: see `chains.are_determined`.
 
     Args:
         met: The pairs.
@@ -140,53 +129,6 @@ def newton(
             None if together is None else together[block],
         )
     return strengths
-
-
-def fit_rounds(
-    met: Meetings, games: FloatArray, scores: FloatArray, *, start: FloatArray, inverse: FloatArray
-) -> FloatArray:
-    """Strengths (C, B) of rounds that resemble the data, to 1e-7.
-
-    Every round begins at the strengths of the data and follows its own slope by the curvature of
-    the data (the chord method: one factorisation for all rounds). The few that have not arrived
-    after 40 steps are left to Newton.
-
-    Args:
-        met: The pairs.
-        games: (P, B) comparisons of the pair, not negative.
-        scores: (P, B) what `low` scored in them.
-        start: (C,) strengths of the data.
-        inverse: (C, C) of the data's curvature at these strengths, divided by its votes.
-    """
-    rounds = games.shape[1]
-    strengths = np.repeat((start - start.mean())[:, None], rounds, axis=1)
-    scored = met.sums(scores, games - scores)
-    votes = games.sum(axis=0)
-    moving = np.arange(rounds)
-    now, of_games = strengths.copy(), games
-    for _ in range(_MOST_CHORD_STEPS):
-        power = np.exp(now)
-        # A contestant of power x scores x / (x + y) against one of power y.
-        shares = power.take(met.low, axis=0)
-        shares += power.take(met.high, axis=0)
-        np.divide(of_games, shares, out=shares)
-        slope = scored - power * met.totals(shares)
-        step = inverse @ slope
-        step /= votes
-        longest = np.abs(step).max(axis=0, initial=0.0)
-        step *= np.minimum(1.0, _LONGEST_STEP / np.maximum(longest, 1e-300))
-        now += step
-        left = longest > _ROUND_TOLERANCE
-        if not left.any():
-            strengths[:, moving] = now
-            return np.asarray(strengths - strengths.mean(axis=0))
-        if left.mean() < 0.5:
-            strengths[:, moving] = now
-            moving, now, of_games = moving[left], now[:, left], of_games[:, left]
-            scored, votes = scored[:, left], votes[left]
-    # From the start again: the chord may have led such a round far away.
-    strengths[:, moving] = newton(met, games[:, moving], scores[:, moving], start=start[:, None])
-    return np.asarray(strengths - strengths.mean(axis=0))
 
 
 def inverse_curvature(met: Meetings, games: FloatArray, strengths: FloatArray) -> FloatArray:

@@ -1,24 +1,22 @@
-"""Who scored against whom through chains of comparisons, without a matrix of all contestants.
+"""Who scored against whom through chains of comparisons.
 
 Contestants who reach each other both ways are a part (a strongly connected component of the graph
-of scores), those who met through any chain a group. What a contestant reaches, all of its part
-do; so what is kept is who reaches whom among parts, of which there is one in most data.
+of scores), those who met through any chain a group. Strengths exist when everybody is in one part
+(Ford 1957); a tie is a score both ways.
 
-Notation: C contestants, K parts.
+Notation: C contestants, K parts, P pairs, n sets of votes.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from graphlib import TopologicalSorter
-from typing import Literal, Self
+from typing import Self
 
 import numpy as np
 
-from arena.rating.comparisons import BoolArray, IntArray, PairCounts
+from arena.rating.comparisons import BoolArray, FloatArray, IntArray, PairCounts
 
-_QUICKLY_FOLLOWED = 2000
-"""Among so many no chain is long."""
+_BITS_AT_ONCE = 32_000_000
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -41,7 +39,7 @@ class Chains:
 
     @classmethod
     def of_nobody(cls) -> Self:
-        """No contestants."""
+        """Return the chains among no contestants."""
         numbers, flags = np.empty(0, dtype=np.int64), np.empty(0, dtype=np.bool_)
         return cls(
             part_of=numbers,
@@ -52,7 +50,7 @@ class Chains:
         )
 
     def by_group(self) -> Self:
-        """The same with whole groups for parts, as for methods that rate whoever met."""
+        """Return the same with whole groups for parts, for methods that rate whoever met."""
         number = len(self.groups())
         return replace(self, part_of=self.group_of, between=np.eye(number, dtype=np.bool_))
 
@@ -72,113 +70,119 @@ class Chains:
         return np.asarray(reaching[self.part_of])
 
     def parts(self) -> tuple[tuple[int, ...], ...]:
-        """The members of each part."""
-        return members_of(self.part_of)
+        """Return the members of each part."""
+        return _members_of(self.part_of)
 
     def groups(self) -> tuple[tuple[int, ...], ...]:
-        """The members of each group."""
-        return members_of(self.group_of)
+        """Return the members of each group."""
+        return _members_of(self.group_of)
 
 
 def chains_among(contestants: int, counts: PairCounts) -> Chains:
-    """Who reaches whom in votes (P pairs) on so many contestants."""
-    source, target = scoring_edges(counts)
-    scored, conceded = np.zeros((2, contestants), dtype=np.bool_)
-    scored[source] = conceded[target] = True
-    if contestants <= _QUICKLY_FOLLOWED and are_all_together(contestants, counts):
-        nobody_apart = np.zeros(contestants, dtype=np.int64)
-        return Chains(
-            part_of=nobody_apart,
-            group_of=nobody_apart,
-            between=np.ones((min(contestants, 1),) * 2, dtype=np.bool_),
-            scored=scored,
-            conceded=conceded,
-        )
-    part_of = _in_order(strong_parts(contestants, source, target))
-    group_of = _in_order(_components(contestants, source, target, "weak"))
-    between = _reached_parts(int(part_of.max()) + 1, part_of[source], part_of[target])
+    """Return who reaches whom in votes on so many contestants."""
+    games, scores = counts.games[:, None], counts.scores[:, None]
+    scored = _scored(contestants, counts.low, counts.high, games, scores)
+    reached, met = closure(scored)[0], closure(scored | scored.transpose(0, 2, 1))[0]
+    part_of = _numbered(reached & reached.T)
+    first = np.unique(part_of, return_index=True)[1]
+    others = scored[0] & ~np.eye(contestants, dtype=np.bool_)
     return Chains(
-        part_of=part_of, group_of=group_of, between=between, scored=scored, conceded=conceded
+        part_of=part_of,
+        group_of=_numbered(met),
+        between=reached[np.ix_(first, first)],
+        scored=others.any(axis=1),
+        conceded=others.any(axis=0),
     )
 
 
-def are_all_together(contestants: int, counts: PairCounts) -> bool:
-    """Whether everybody scored against everybody else through some chain."""
-    source, target = scoring_edges(counts)
-    return bool(
-        reached_from(0, contestants, source, target).all()
-        and reached_from(0, contestants, target, source).all()
-    )
+def chains_in_sets(
+    *, contestants: int, low: IntArray, high: IntArray, games: FloatArray, scores: FloatArray
+) -> BoolArray:
+    """(n, C, C) who reached whom in each of n sets of votes.
+
+    The row's contestant reached the column's by a score against them, or through a chain.
+
+    Args:
+        contestants: C.
+        low: (P,) who met.
+        high: (P,) whom.
+        games: (P, n) comparisons of each pair in each set.
+        scores: (P, n) what `low` scored in them.
+    """
+    return closure(_scored(contestants, low, high, games, scores))
 
 
-def reached_from(start: int, contestants: int, source: IntArray, target: IntArray) -> BoolArray:
-    """(C,) who is reached from a contestant along edges."""
-    reached = np.zeros(contestants, dtype=np.bool_)
-    reached[start : start + 1] = True
-    number = 1
-    while True:
-        reached[target[reached[source]]] = True
-        if (now := int(reached.sum())) == number:
-            return reached
-        number = now
+def are_determined(
+    *, contestants: int, low: IntArray, high: IntArray, games: FloatArray, scores: FloatArray
+) -> BoolArray:
+    """(n,) which sets have finite Bradley-Terry strengths for everybody; as `chains_in_sets`."""
+    found = np.empty(games.shape[1], dtype=np.bool_)
+    at_once = max(1, _BITS_AT_ONCE // max(1, contestants**2))
+    for first in range(0, len(found), at_once):
+        some = slice(first, first + at_once)
+        scored = _scored(contestants, low, high, games[:, some], scores[:, some])
+        found[some] = _all_from_first(scored) & _all_from_first(scored.transpose(0, 2, 1))
+    return found
 
 
-def scoring_edges(counts: PairCounts) -> tuple[IntArray, IntArray]:
-    """Who scored against whom: first all from low to high."""
-    up, down = counts.scores > 0, counts.scores < counts.games
-    return (
-        np.concatenate([counts.low[up], counts.high[down]]),
-        np.concatenate([counts.high[up], counts.low[down]]),
-    )
+def heaviest_tree(contestants: int, low: IntArray, high: IntArray, weight: FloatArray) -> IntArray:
+    """Return the pairs of the heaviest tree (Kruskal 1956), over pairs of weight above zero."""
+    group = np.arange(contestants)
+    chosen: list[int] = []
+    for pair in np.argsort(-weight, kind="stable"):
+        one, other = group[low[pair]], group[high[pair]]
+        if weight[pair] > 0 and one != other:
+            group[group == other] = one
+            chosen.append(int(pair))
+            if len(chosen) == contestants - 1:
+                break
+    return np.array(chosen, dtype=np.int64)
 
 
-def members_of(number_of: IntArray) -> tuple[tuple[int, ...], ...]:
-    """Who has each of the numbers (C,), from 0."""
-    order = np.argsort(number_of, kind="stable")
-    ends = np.cumsum(np.bincount(number_of))[:-1]
-    return tuple(tuple(some.tolist()) for some in np.split(order, ends) if len(some))
-
-
-def strong_parts(contestants: int, source: IntArray, target: IntArray) -> IntArray:
-    """(C,) the same number for those who reach each other both ways along edges."""
-    return _components(contestants, source, target, "strong")
+def closure(edges: BoolArray) -> BoolArray:
+    """(n, C, C) who is reached through chains of edges (n, C, C) (Warshall 1962)."""
+    contestants = edges.shape[1]
+    reached = np.packbits(edges, axis=2)
+    for via in range(contestants):
+        leads_there = (reached[:, :, via // 8] >> (7 - via % 8) & 1) * np.uint8(255)
+        reached |= leads_there[:, :, None] & reached[:, via, None]
+    return np.unpackbits(reached, axis=2, count=contestants).view(np.bool_)
 
 
 # --- Private -----------------------------------------------------------------------------------
 
 
-def _components(
-    contestants: int, source: IntArray, target: IntArray, kind: Literal["strong", "weak"]
-) -> IntArray:
-    """(C,) the number of each one's component."""
-    # Slow to load, and needed where somebody is apart alone.
-    from scipy.sparse import coo_matrix
-    from scipy.sparse.csgraph import connected_components
-
-    edges = coo_matrix((np.ones(len(source), dtype=np.int8), (source, target)), (contestants,) * 2)
-    return connected_components(edges, directed=True, connection=kind)[1].astype(np.int64)
-
-
-def _in_order(labels: IntArray) -> IntArray:
-    """(C,) the same labels, from 0 in the order in which they first occur."""
-    _, first, place = np.unique(labels, return_index=True, return_inverse=True)
-    rank = np.empty(len(first), dtype=np.int64)
-    rank[np.argsort(first)] = np.arange(len(first))
-    return rank[place]
+def _scored(
+    contestants: int, low: IntArray, high: IntArray, games: FloatArray, scores: FloatArray
+) -> BoolArray:
+    """(n, C, C) whether the row's contestant ever scored against the column's; itself counts."""
+    scored = np.zeros((games.shape[1], contestants, contestants), dtype=np.bool_)
+    scored[:, low, high] = (scores > 0).T
+    scored[:, high, low] = (scores < games).T
+    scored[:, np.arange(contestants), np.arange(contestants)] = True
+    return scored
 
 
-def _reached_parts(parts: int, source: IntArray, target: IntArray) -> BoolArray:
-    """(K, K): from the last ones on, each part reaches what those reach whom it scored against.
+def _all_from_first(scored: BoolArray) -> BoolArray:
+    """(n,) whether the first contestant reaches everybody by scores (n, C, C)."""
+    steps = scored.astype(np.float32)
+    reached = scored[:, :1]
+    while True:
+        further = reached.astype(np.float32) @ steps > 0
+        if (further == reached).all():
+            return np.asarray(reached.all(axis=(1, 2)))
+        reached = further
 
-    A row is kept as bits, so that ten thousand parts take 12 megabytes while it is worked out.
-    """
-    across = source != target
-    edges = np.unique(source[across] * parts + target[across])
-    beaten: dict[int, list[int]] = {part: [] for part in range(parts)}
-    for edge in edges.tolist():
-        beaten[edge // parts].append(edge % parts)
-    reached = np.zeros((parts, (parts + 7) // 8), dtype=np.uint8)
-    for part in TopologicalSorter(beaten).static_order():
-        reached[part] = np.bitwise_or.reduce(reached[beaten[part]], axis=0)
-        reached[part, part // 8] |= 128 >> part % 8
-    return np.unpackbits(reached, axis=1, count=parts).view(np.bool_)
+
+def _numbered(together: BoolArray) -> IntArray:
+    """(C,) the number of each one's class, in the order of their first members."""
+    if not len(together):
+        return np.empty(0, dtype=np.int64)
+    return np.unique(together.argmax(axis=1), return_inverse=True)[1].astype(np.int64)
+
+
+def _members_of(number_of: IntArray) -> tuple[tuple[int, ...], ...]:
+    """Return who has each of the numbers (C,), from 0."""
+    order = np.argsort(number_of, kind="stable")
+    ends = np.cumsum(np.bincount(number_of))[:-1]
+    return tuple(tuple(some.tolist()) for some in np.split(order, ends) if len(some))

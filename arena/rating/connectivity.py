@@ -1,14 +1,11 @@
 """Whether votes determine ratings at all, and if not, why.
 
-Strengths exist when everybody scored against everybody else through some chain of comparisons,
-both ways (Ford 1957). A tie is a score both ways.
-
-Notation: C contestants, P pairs, B rounds, which are the last axis.
+Notation: C contestants.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from enum import StrEnum
 from typing import TypeVar
@@ -16,11 +13,8 @@ from typing import TypeVar
 import numpy as np
 
 from arena.rating.chains import Chains, chains_among
-from arena.rating.comparisons import BoolArray, FloatArray, IntArray, PairCounts
+from arena.rating.comparisons import PairCounts
 from augment.sentences import Sentence, sentence
-
-_NUMBERS_AT_ONCE = 4_000_000
-
 
 _Named = TypeVar("_Named")
 
@@ -103,135 +97,6 @@ def diagnose(
             chains=chains,
         )
     return Diagnosis(status=Status.RATED, chains=chains)
-
-
-class Determined:
-    """Which resampled rounds have finite Bradley-Terry strengths for every contestant.
-
-    Most rounds are cleared by a look at a few pairs: if those of one tree that joins everybody
-    scored both ways, so did everybody through chains of them. The tree is made of the pairs with
-    the most scores either way in the data; only rounds in which one of them fails are followed
-    through all chains.
-
-    Args:
-        contestants: C.
-        low: (P,) who met.
-        high: (P,) whom.
-        games: (P,) comparisons of each pair in the data.
-        scores: (P,) what `low` scored in them.
-    """
-
-    def __init__(
-        self,
-        *,
-        contestants: int,
-        low: IntArray,
-        high: IntArray,
-        games: FloatArray,
-        scores: FloatArray,
-    ) -> None:
-        self._contestants, self._low, self._high = contestants, low, high
-        self._tree = heaviest_tree(contestants, low, high, np.minimum(scores, games - scores))
-
-    def among(self, games: FloatArray, scores: FloatArray) -> BoolArray:
-        """(B,) for rounds of games and scores (P, B)."""
-        if len(self._tree) == self._contestants - 1:
-            of_tree = scores[self._tree]
-            fine = np.asarray(((of_tree > 0) & (of_tree < games[self._tree])).all(axis=0))
-        else:
-            fine = np.zeros(games.shape[1], dtype=np.bool_)
-        for some, scored in self._scored(games, scores, np.flatnonzero(~fine)):
-            fine[some] = _all_from_first(scored) & _all_from_first(scored.transpose(0, 2, 1))
-        return fine
-
-    def chains(
-        self, games: FloatArray, scores: FloatArray, chosen: IntArray
-    ) -> Iterator[tuple[IntArray, BoolArray]]:
-        """Some of the chosen rounds (n,) of (P, B) at a time, and (n, C, C) who reached whom.
-
-        The row's contestant reached the column's by a score against them, or through a chain.
-        """
-        for some, scored in self._scored(games, scores, chosen):
-            yield some, _closure(scored)
-
-    def _scored(
-        self, games: FloatArray, scores: FloatArray, chosen: IntArray
-    ) -> Iterator[tuple[IntArray, BoolArray]]:
-        at_once = max(1, _NUMBERS_AT_ONCE // max(1, self._contestants**2))
-        for first in range(0, len(chosen), at_once):
-            some = chosen[first : first + at_once]
-            yield (
-                some,
-                _scored(self._contestants, self._low, self._high, games[:, some], scores[:, some]),
-            )
-
-
-def are_determined(
-    *, contestants: int, low: IntArray, high: IntArray, games: FloatArray, scores: FloatArray
-) -> BoolArray:
-    """(n,) which of n sets of votes have finite Bradley-Terry strengths for every contestant.
-
-    Args:
-        contestants: C.
-        low: (P,) who met.
-        high: (P,) whom.
-        games: (n, P) comparisons of each pair in each set.
-        scores: (n, P) what `low` scored in them.
-    """
-    everywhere = Determined(
-        contestants=contestants,
-        low=low,
-        high=high,
-        games=games.sum(axis=0),
-        scores=scores.sum(axis=0),
-    )
-    return everywhere.among(games.T, scores.T)
-
-
-def heaviest_tree(contestants: int, low: IntArray, high: IntArray, weight: FloatArray) -> IntArray:
-    """The pairs of the heaviest tree (Kruskal 1956), over pairs of weight above zero."""
-    group = np.arange(contestants)
-    chosen: list[int] = []
-    for pair in np.argsort(-weight, kind="stable"):
-        one, other = group[low[pair]], group[high[pair]]
-        if weight[pair] > 0 and one != other:
-            group[group == other] = one
-            chosen.append(int(pair))
-            if len(chosen) == contestants - 1:
-                break
-    return np.array(chosen, dtype=np.int64)
-
-
-def _scored(
-    contestants: int, low: IntArray, high: IntArray, games: FloatArray, scores: FloatArray
-) -> BoolArray:
-    """(B, C, C) whether the row's contestant ever scored against the column's; itself counts."""
-    scored = np.zeros((games.shape[1], contestants, contestants), dtype=bool)
-    scored[:, low, high] = (scores > 0).T
-    scored[:, high, low] = (scores < games).T
-    scored[:, np.arange(contestants), np.arange(contestants)] = True
-    return scored
-
-
-def _closure(edges: BoolArray) -> BoolArray:
-    """(B, C, C) who is reached through chains; each squaring doubles their length."""
-    while True:
-        steps = edges.astype(np.float32)
-        further = steps @ steps > 0
-        if (further == edges).all():
-            return edges
-        edges = further
-
-
-def _all_from_first(scored: BoolArray) -> BoolArray:
-    """(B,) whether the first contestant reaches everybody by scores (B, C, C)."""
-    steps = scored.astype(np.float32)
-    reached = scored[:, :1]
-    while True:
-        further = reached.astype(np.float32) @ steps > 0
-        if (further == reached).all():
-            return np.asarray(reached.all(axis=(1, 2)))
-        reached = further
 
 
 def _who_is_apart(names: tuple[str, ...], groups: tuple[tuple[int, ...], ...]) -> Sentence:

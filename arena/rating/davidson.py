@@ -37,7 +37,7 @@ def fit(
     """The most likely strengths, each round's mean zero, and the logarithm of v: (C + 1, B).
 
     Not a number in rounds that determine none. Every round must determine Bradley-Terry strengths,
-    see `connectivity.are_determined`, and neither none nor all of its votes may be ties.
+    see `chains.are_determined`, and neither none nor all of its votes may be ties.
 
     Args:
         met: The pairs.

@@ -15,8 +15,8 @@ import numpy as np
 from scipy.special import expit
 
 from arena.rating import bradley_terry
+from arena.rating.chains import are_determined
 from arena.rating.comparisons import Comparisons, FloatArray, PairCounts, count_pairs
-from arena.rating.connectivity import are_determined
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -68,7 +68,11 @@ def fit_test(votes: Comparisons, strengths: FloatArray, *, rounds: int, seed: in
     drawn = _simulated(counts, strengths, tie_share, rounds, np.random.default_rng(seed))
     all_games = np.broadcast_to(games, drawn.shape)
     fine = are_determined(
-        contestants=len(strengths), low=counts.low, high=counts.high, games=all_games, scores=drawn
+        contestants=len(strengths),
+        low=counts.low,
+        high=counts.high,
+        games=all_games.T,
+        scores=drawn.T,
     )
     fitted = bradley_terry.fit(
         contestants=len(strengths),

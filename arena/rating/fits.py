@@ -6,20 +6,22 @@ Notation: C contestants, P pairs, b and n rounds.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
 from arena.rating import bradley_terry, davidson, elo
-from arena.rating.bootstrap import Rounds, resample
+from arena.rating.bootstrap import Rounds, is_certain, resample, rounds_to_draw
 from arena.rating.bradley_terry import Meetings, to_elo
+from arena.rating.chains import are_determined, chains_in_sets
 from arena.rating.comparisons import BoolArray, Comparisons, FloatArray, PairCounts, tally
 from arena.rating.components import Loose, loose
-from arena.rating.connectivity import Determined, heaviest_tree
 from arena.rating.logistic import Coefficient, coefficients_of, fit_with_columns
 from arena.rating.pulls import Pulls, bradley_terry_pulls, davidson_pulls
-from arena.rating.reach import loose_rounds, rounds_to_draw
 from arena.rating.rules import Intervals, Method, Order, Rules
+
+_NUMBERS_AT_ONCE = 4_000_000
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -79,21 +81,14 @@ def _bradley_terry(votes: Comparisons, counts: PairCounts, rules: Rules) -> Fitt
         return Fitted(
             rating=to_elo(point), samples=samples, loose=rest, pulls=pulls, strengths=point
         )
-    inverse = curvature * counts.games.sum()
 
-    def whole(drawn: Rounds) -> FloatArray:
-        return to_elo(
-            bradley_terry.fit_rounds(met, drawn.games, drawn.scores, start=point, inverse=inverse)
-        )
-
-    def apart(drawn: Rounds, together: BoolArray) -> FloatArray:
+    def fitted(drawn: Rounds, together: BoolArray | None = None) -> FloatArray:
         start = point[:, None]
-        found = bradley_terry.newton(
-            met, drawn.games, drawn.scores, start=start, together=together
+        return to_elo(
+            bradley_terry.newton(met, drawn.games, drawn.scores, start=start, together=together)
         )
-        return to_elo(found)
 
-    samples, rest = _samples(votes, counts, rules, whole, apart)
+    samples, rest = _samples(votes, counts, rules, fitted, fitted)
     return Fitted(rating=to_elo(point), samples=samples, loose=rest, pulls=pulls, strengths=point)
 
 
@@ -130,10 +125,7 @@ def _davidson(votes: Comparisons, counts: PairCounts, rules: Rules) -> Fitted | 
             rating=rating, samples=samples, loose=rest, pulls=pulls, tie_strength=tie_strength
         )
 
-    def whole(drawn: Rounds) -> FloatArray:
-        return apart(drawn, None)
-
-    def apart(drawn: Rounds, together: BoolArray | None) -> FloatArray:
+    def fitted(drawn: Rounds, together: BoolArray | None = None) -> FloatArray:
         found: FloatArray = np.full((len(votes.names), drawn.games.shape[1]), np.nan)
         fine = np.asarray((drawn.ties > 0) & (drawn.ties < drawn.games.sum(axis=0)))
         some = drawn.chosen(np.flatnonzero(fine))
@@ -147,7 +139,7 @@ def _davidson(votes: Comparisons, counts: PairCounts, rules: Rules) -> Fitted | 
         )[:-1]
         return to_elo(found)
 
-    samples, rest = _samples(votes, counts, rules, whole, apart)
+    samples, rest = _samples(votes, counts, rules, fitted, fitted)
     return Fitted(
         rating=rating, samples=samples, loose=rest, pulls=pulls, tie_strength=tie_strength
     )
@@ -157,24 +149,14 @@ def _same_everywhere(
     votes: Comparisons, counts: PairCounts, rules: Rules, rating: FloatArray
 ) -> tuple[FloatArray, Loose]:
     """The data's ratings (C,) in every round: only who is determined differs."""
-    tree = heaviest_tree(
-        len(votes.names),
-        counts.low,
-        counts.high,
-        np.minimum(counts.scores, counts.games - counts.scores),
-    )
-    fine, rest = loose_rounds(
-        votes,
-        counts,
-        tree,
-        rating,
-        unit=rules.unit,
-        rounds=rounds_to_draw(votes, counts, rules.rounds),
-        seed=rules.seed,
-        workers=rules.workers,
-        report=rules.report,
-    )
-    return np.repeat(rating[:, None], fine, axis=1), rest
+    rounds = rounds_to_draw(votes, counts, rules.rounds)
+    if is_certain(votes, counts):
+        return np.repeat(rating[:, None], rounds, axis=1), Loose.none(len(rating))
+
+    def unchanged(drawn: Rounds, *_: BoolArray) -> FloatArray:
+        return np.repeat(rating[:, None], drawn.games.shape[1], axis=1)
+
+    return _samples(votes, counts, replace(rules, rounds=rounds), unchanged, unchanged)
 
 
 def _samples(
@@ -193,38 +175,28 @@ def _samples(
         whole: (C, b) ratings of rounds in which everybody is connected; NaN for none.
         apart: (C, n) ratings within the components (n, C, C) of other rounds.
     """
-    determined = Determined(
-        contestants=len(votes.names),
-        low=counts.low,
-        high=counts.high,
-        games=counts.games,
-        scores=counts.scores,
-    )
+    size = len(votes.names)
+    pairs: dict[str, Any] = {"contestants": size, "low": counts.low, "high": counts.high}
     of_each = tally(votes).sum(axis=1).astype(np.float64)
-    samples, rest = [np.empty((len(votes.names), 0))], [Loose.none(len(votes.names))]
-    drawn = resample(votes, counts, unit=rules.unit, rounds=rules.rounds, seed=rules.seed)
+    samples, rest = [np.empty((size, 0))], [Loose.none(size)]
     done = 0
-    for block in drawn:
+    for block in resample(votes, counts, unit=rules.unit, rounds=rules.rounds, seed=rules.seed):
         done += block.games.shape[1]
         if rules.report is not None:
             rules.report(done, rules.rounds)
-        fine = np.asarray(determined.among(block.games, block.scores))
-        if fine.all():
-            found = whole(block)
-        else:
-            found = whole(block.chosen(np.flatnonzero(fine)))
-            loose_ones = np.flatnonzero(~fine)
-            for some, reached in determined.chains(block.games, block.scores, loose_ones):
-                together = reached & reached.transpose(0, 2, 1)
-                inside = together[:, counts.low, counts.high].T
-                values = apart(block.chosen(some).limited_to(inside), together)
-                rest.append(loose(reached, values, votes=of_each))
+        fine = are_determined(**pairs, games=block.games, scores=block.scores)
+        found = whole(block.chosen(np.flatnonzero(fine)))
         known = ~np.isnan(found[:1]).any(axis=0)
-        if not known.all():
-            unknown = int((~known).sum())
-            size = len(votes.names)
-            everybody = np.ones((unknown, size, size), dtype=bool)
-            rest.append(loose(everybody, np.full((size, unknown), np.nan), votes=of_each))
-            found = found[:, known]
-        samples.append(found)
+        samples.append(found[:, known])
+        unknown = int((~known).sum())
+        everybody = np.ones((unknown, size, size), dtype=bool)
+        rest.append(loose(everybody, np.full((size, unknown), np.nan), votes=of_each))
+        left = np.flatnonzero(~fine)
+        at_once = max(1, _NUMBERS_AT_ONCE // size**2)
+        for some in (left[first : first + at_once] for first in range(0, len(left), at_once)):
+            rounds = block.chosen(some)
+            reached = chains_in_sets(**pairs, games=rounds.games, scores=rounds.scores)
+            together = reached & reached.transpose(0, 2, 1)
+            inside = together[:, counts.low, counts.high].T
+            rest.append(loose(reached, apart(rounds.limited_to(inside), together), votes=of_each))
     return np.hstack(samples), Loose.joined(rest)

@@ -12,8 +12,8 @@ import numpy as np
 from scipy.special import expit
 
 from arena.rating import bradley_terry
+from arena.rating.chains import are_determined
 from arena.rating.comparisons import Comparisons, FloatArray, IntArray, PairCounts, count_pairs
-from arena.rating.connectivity import are_determined
 
 MOST_RIVALS = 12
 """So many of the next contestants are tried as the new first one."""
@@ -173,7 +173,9 @@ def _fits(
 ) -> FloatArray:
     """(n, C) strengths of each row of counts, not a number where it determines none."""
     low, high = counts.low, counts.high
-    fine = are_determined(contestants=contestants, low=low, high=high, games=games, scores=scores)
+    fine = are_determined(
+        contestants=contestants, low=low, high=high, games=games.T, scores=scores.T
+    )
     strengths = np.full((len(games), contestants), np.nan)
     strengths[fine] = bradley_terry.fit(
         contestants=contestants,

@@ -23,9 +23,6 @@ from arena.rating.comparisons import (
 )
 
 _NUMBERS_AT_ONCE = 2_000_000
-_WORTH_TRYING = 200
-_FEW_ENDS = 12
-"""Clusters that pull at so few are squared entry by entry where contestants are many."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -149,8 +146,6 @@ def davidson_pulls(
 def without_negative_parts(matrix: FloatArray) -> FloatArray:
     """Few clusters can make a difference of sums negative in some direction: that is cut off."""
     matrix = 0.5 * (matrix + matrix.T)
-    if len(matrix) > _WORTH_TRYING and _is_positive(matrix):
-        return matrix
     values, directions = np.linalg.eigh(matrix)
     if values[0] >= 0.0:
         return matrix
@@ -169,37 +164,7 @@ def _squares(place: IntArray, pulls: FloatArray, clusters: int, size: int) -> Fl
     if clusters * size <= _NUMBERS_AT_ONCE:
         sums = np.bincount(place, weights=pulls, minlength=clusters * size).reshape(-1, size)
         return np.asarray(sums.T @ sums)
-    order = np.argsort(place)
-    starts = np.flatnonzero(np.diff(place[order], prepend=-1))
-    met, value = place[order[starts]], np.add.reduceat(pulls[order], starts)
-    cluster, end = met // size, met % size
-    begin = np.flatnonzero(np.diff(cluster, prepend=-1))
-    number = np.diff(begin, append=len(met))
-    found: FloatArray = np.zeros(size * size)
-    for ends in np.unique(number[number <= _FEW_ENDS]).tolist():
-        rows = begin[number == ends][:, None] + np.arange(ends)
-        both = end[rows][:, :, None] * size + end[rows][:, None, :]
-        products = value[rows][:, :, None] * value[rows][:, None, :]
-        found += np.bincount(both.ravel(), weights=products.ravel(), minlength=size * size)
-    large = np.flatnonzero(number > _FEW_ENDS)
-    at_once = max(1, _NUMBERS_AT_ONCE // size)
-    square: FloatArray = found.reshape(size, size)
-    for first in range(0, len(large), at_once):
-        some = large[first : first + at_once]
-        of_some = np.zeros((len(some), size))
-        for row, one in enumerate(some.tolist()):
-            entries = slice(begin[one], begin[one] + number[one])
-            of_some[row, end[entries]] = value[entries]
-        square += of_some.T @ of_some
-    return square
+    from scipy.sparse import coo_array  # slow to load, and for large tables alone
 
-
-def _is_positive(matrix: FloatArray) -> bool:
-    """Whether no direction is negative: a factorisation tells it in a tenth of the time."""
-    size = len(matrix)
-    mean = float(matrix.diagonal().mean())
-    try:
-        np.linalg.cholesky(matrix + mean / size + 1e-9 * mean * np.eye(size))
-    except np.linalg.LinAlgError:
-        return False
-    return True
+    table = coo_array((pulls, (place // size, place % size)), shape=(clusters, size)).tocsr()
+    return np.asarray((table.T @ table).toarray())

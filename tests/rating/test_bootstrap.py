@@ -57,14 +57,9 @@ def test_votes_that_agree_within_scenarios_widen_the_scenario_interval() -> None
     assert width(Unit.TWO_WAY) > 3 * width(Unit.VOTE)
 
 
-@pytest.mark.parametrize(("experts", "scenarios", "contestants"), [(3, 4, 6), (25, 24, 36)])
-def test_a_vote_counts_as_often_as_its_expert_times_its_scenario_is_drawn(
-    experts: int, scenarios: int, contestants: int
-) -> None:
-    """A vote a cell, each of a pair of its own: what a pair has in a round is its cell's weight.
-
-    The few cells go by a table, the many (600 x 600 places for 600 votes) row by row.
-    """
+def test_a_vote_counts_as_often_as_its_expert_times_its_scenario_is_drawn() -> None:
+    """A vote a cell, each of a pair of its own: what a pair has is its cell's weight."""
+    experts, scenarios, contestants = 3, 4, 6
     cells = experts * scenarios
     first, second = (one[:cells] for one in np.triu_indices(contestants, 1))
     score = np.resize([0.0, 0.5, 1.0, 0.5, 0.5], cells)

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import tracemalloc
-
 import numpy as np
 import pytest
 
@@ -17,7 +15,6 @@ from arena.rating.comparisons import (
     restrict_to,
     split_votes,
 )
-from arena.rating.connectivity import Status, diagnose
 from arena.rating.leaderboard import rate
 from tests.rating.votes import named, simulated, versus
 
@@ -88,20 +85,6 @@ def two_crowds(each: int, votes: int, *, unbeaten: int) -> Comparisons:
     return Comparisons(names=tuple(f"c{number}" for number in range(2 * each + 1)), **joined)
 
 
-def test_thirty_thousand_in_two_groups_need_no_matrix_of_all() -> None:
-    """Such a matrix would have 900 MB as bits of a byte each, and be multiplied with itself."""
-    votes = two_crowds(15_000, 150_000, unbeaten=20)
-    counts = count_pairs(votes)
-    tracemalloc.start()
-    found = diagnose(votes.names, counts)
-    most_bytes = tracemalloc.get_traced_memory()[1]
-    tracemalloc.stop()
-    assert found.status is Status.DISCONNECTED
-    assert [len(group) for group in found.chains.groups()] == [15_001, 15_000]
-    assert found.notes[-1] == "no upper limit"
-    assert most_bytes < 100_000_000
-
-
 def test_each_of_two_crowds_is_rated_by_itself_and_the_unbeaten_one_is_bounded() -> None:
     board = rate(two_crowds(60, 3000, unbeaten=20), rounds=50)
     alone = rate(simulated([1000.0] * 60, 3000, 1), rounds=50)
@@ -113,22 +96,6 @@ def test_each_of_two_crowds_is_rated_by_itself_and_the_unbeaten_one_is_bounded()
     assert {line.part for line in board.lines[:60]}.isdisjoint(
         line.part for line in board.lines[60:120]
     )
-
-
-def test_three_thousand_who_each_beat_the_next_stand_in_their_order() -> None:
-    """As many parts as contestants, and the longest chain that there can be."""
-    number = 3000
-    first: IntArray = np.arange(number - 1)
-    pairs = PairCounts(
-        low=first,
-        high=first + 1,
-        outcomes=np.tile(np.array([1, 0, 0]), (number - 1, 1)),
-        pair_of=first,
-        outcome_of=np.zeros_like(first),
-    )
-    chains = chains_among(number, pairs)
-    assert chains.above().tolist() == list(range(number))
-    assert len(chains.groups()) == 1
 
 
 def test_votes_of_groups_are_told_apart_in_one_go() -> None:

@@ -1,34 +1,17 @@
-"""Who is determined, by following scores along pairs, against matrices of all contestants."""
+"""Who is determined where intervals are in closed form, and what that takes."""
 
 from __future__ import annotations
 
 import numpy as np
 import pytest
 
-from arena.rating.bootstrap import Unit
-from arena.rating.chains import are_all_together
-from arena.rating.comparisons import FloatArray, count_pairs
-from arena.rating.connectivity import are_determined, heaviest_tree
+from arena.rating.bootstrap import Unit, is_certain, rounds_to_draw
+from arena.rating.comparisons import count_pairs
 from arena.rating.leaderboard import Intervals, rate
 from arena.rating.pulls import _squares
-from arena.rating.reach import loose_rounds, rounds_to_draw
 from tests.rating.votes import simulated
 
 SPREAD = [1400.0, 1200.0, 1100.0, 1000.0, 900.0, 600.0]
-
-
-@pytest.mark.parametrize("seed", range(20))
-def test_everybody_is_together_where_ford_says_so(seed: int) -> None:
-    votes = simulated(SPREAD, 25, seed)
-    counts = count_pairs(votes)
-    wanted = are_determined(
-        contestants=6,
-        low=counts.low,
-        high=counts.high,
-        games=counts.games[None],
-        scores=counts.scores[None],
-    )
-    assert are_all_together(6, counts) == wanted[0]
 
 
 @pytest.mark.parametrize("unit", Unit)
@@ -48,12 +31,7 @@ def test_bounds_are_open_for_those_for_whom_resamples_leave_them_open(unit: Unit
 
 def test_many_scores_of_many_experts_need_no_resamples() -> None:
     votes = simulated([1000.0, 1010.0, 990.0], 6000, 1, experts=90, scenarios=90)
-    counts = count_pairs(votes)
-    weight: FloatArray = np.minimum(counts.scores, counts.games - counts.scores)
-    tree = heaviest_tree(3, counts.low, counts.high, weight)
-    rules = {"unit": Unit.TWO_WAY, "rounds": 10**9, "seed": 1}
-    fine, rest = loose_rounds(votes, counts, tree, np.zeros(3), **rules)  # type: ignore[arg-type]
-    assert (fine, rest.values.shape) == (10**9, (3, 0))
+    assert is_certain(votes, count_pairs(votes))
 
 
 def test_fewer_rounds_are_drawn_where_one_takes_long() -> None:
