@@ -1,15 +1,33 @@
-"""The project's own JSON: a scene as it is stored."""
+"""The project's own JSON: a scene as it is stored, and all of a change.
+
+Nothing is lost on the way out, and what is read again is the same.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+import json
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
+
+import numpy as np
 
 from augment.errors import InvalidDocument
 from augment.formats.json_file import read_json
 from augment.formats.reading import Moment, Reading
-from augment.scene.codec import SCENE_FORMAT, scene_from_document
+from augment.formats.writing import Cell, LossReport, Written, write_each
+from augment.scene.codec import (
+    SCENE_FORMAT,
+    modification_to_document,
+    scene_from_document,
+    scene_to_document,
+)
+from augment.scene.motion import MotionSource, Movement
+from augment.scene.recording import Recording, Track
+from augment.scene.recording_codec import recording_to_document
+
+_SEEN = (MotionSource.RECORDED, MotionSource.SIMULATED)
 
 
 class OwnJson:
@@ -37,3 +55,51 @@ class OwnJson:
             raise InvalidDocument("scene", [("item", f"a JSON scene has no parts, not {item!r}")])
         scene = scene_from_document(read_json(path, what="scene"))
         return Reading(scene=replace(scene, name=name), recording=None)
+
+
+def write(cells: Sequence[Cell]) -> Written:
+    """For each cell the scene before and after its change, the change, and the tracks."""
+    return write_each(cells, _write_one)
+
+
+# Private
+
+
+def _write_one(cell: Cell, report: LossReport) -> dict[str, bytes]:
+    documents = {
+        "before": scene_to_document(cell.scene),
+        "scene": scene_to_document(cell.after),
+        "modification": modification_to_document(cell.modification),
+    }
+    if cell.recording is not None or cell.drive is not None:
+        documents["recording"] = recording_to_document(_recording(cell))
+    return {f"{cell.stem}.{name}.json": _text(one) for name, one in documents.items()}
+
+
+def _recording(cell: Cell) -> Recording:
+    """What was seen, in a log or in a drive; nothing that had to be assumed."""
+    motion = cell.motion
+    ego = motion.ego.states.copy()
+    if motion.ego.source not in _SEEN:
+        ego[1:] = np.nan  # written as null: nobody recorded it
+    return Recording(
+        times_s=motion.times_s,
+        ego=ego,
+        tracks=tuple(_track(other) for other in motion.others if other.source in _SEEN),
+    )
+
+
+def _track(movement: Movement) -> Track:
+    agent = movement.agent
+    states = np.where(movement.is_present[:, None], movement.states, np.nan)
+    return Track(
+        agent_id=agent.id,
+        type=agent.type,
+        length_m=agent.length_m,
+        width_m=agent.width_m,
+        states=states,
+    )
+
+
+def _text(document: dict[str, Any]) -> bytes:
+    return (json.dumps(document, indent=1, ensure_ascii=False) + "\n").encode()

@@ -8,25 +8,16 @@ from functools import partial
 from typing import Final
 
 from augment.errors import UnknownName
-from augment.formats import (
-    commonroad_writer,
-    interplan_writer,
-    openscenario_writer,
-    own_writer,
-    scenarionet_writer,
-)
+from augment.formats import own_json
+from augment.formats.commonroad import writer as commonroad_writer
+from augment.formats.interplan import writer as interplan_writer
+from augment.formats.openscenario import writer as openscenario_writer
+from augment.formats.scenarionet import writer as scenarionet_writer
 from augment.formats.writing import CannotExpress, Cell, Loss, Writer, Written, check_finite
 
-
-def write_interplan(cells: Sequence[Cell]) -> Written:
-    """One YAML file for all of them."""
-    text, losses = interplan_writer.write(cells)
-    return Written(files={"interplan.yaml": text.encode()}, losses=losses)
-
-
 WRITERS: Final[dict[str, Writer]] = {
-    "json": own_writer.write,
-    "interplan": write_interplan,
+    "json": own_json.write,
+    "interplan": interplan_writer.write,
     "commonroad": commonroad_writer.write,
     "openscenario": openscenario_writer.write,
     "scenarionet": scenarionet_writer.write,

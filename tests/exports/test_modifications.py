@@ -11,7 +11,7 @@ import yaml
 from django.core.management import call_command
 from django.core.management.base import CommandError
 
-from augment.formats.interplan import token_of
+from augment.formats.interplan.file import token_of
 from augment.models import Augmentation, Contestant, GenerationJob, Scenario
 from augment.services.scenarios.catalogue import load_catalogue
 from augment.services.scenarios.pictures import store

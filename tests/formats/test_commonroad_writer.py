@@ -9,7 +9,7 @@ from xml.etree import ElementTree as ET
 
 import pytest
 
-from augment.formats.commonroad_writer import write
+from augment.formats.commonroad.writer import write
 from augment.formats.writing import Cell
 from augment.geometry.polyline import Polyline
 from augment.scene.entities import Lane, LaneConnector, TurnType

@@ -8,9 +8,9 @@ import pytest
 import yaml
 
 from augment.errors import Conflict
-from augment.formats.interplan import ReadEntry, token_of
-from augment.formats.interplan_reader import read
-from augment.formats.interplan_writer import write
+from augment.formats.interplan.file import ReadEntry, token_of
+from augment.formats.interplan.reader import read
+from augment.formats.interplan.writer import interplan_text as write
 from augment.formats.writing import Cell
 from augment.geometry.angles import difference
 from augment.scene.catalogue import ScenarioType

@@ -11,7 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from augment.errors import InvalidDocument
-from augment.formats.interplan_reader import FURTHEST_FROM_EGO_M, read
+from augment.formats.interplan.reader import FURTHEST_FROM_EGO_M, read
 from augment.formats.yaml_file import (
     DEEPEST,
     LONGEST_TEXT,

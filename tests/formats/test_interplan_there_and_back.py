@@ -9,9 +9,9 @@ from dataclasses import replace
 
 import pytest
 
-from augment.formats.interplan import token_of
-from augment.formats.interplan_reader import read as read_interplan
-from augment.formats.interplan_writer import write as write_interplan
+from augment.formats.interplan.file import token_of
+from augment.formats.interplan.reader import read as read_interplan
+from augment.formats.interplan.writer import interplan_text as write_interplan
 from augment.scene.catalogue import ScenarioType
 from augment.scene.entities import (
     AgentType,

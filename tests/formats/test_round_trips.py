@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -11,11 +11,11 @@ from typing import Any
 import numpy as np
 import pytest
 
-from augment.formats import commonroad_writer, own_writer, scenarionet_writer
+from augment.formats import own_json, writers
 from augment.formats.readers import READERS
 from augment.formats.reading import Reading
 from augment.formats.strips import RADIUS_M
-from augment.formats.writing import Cell, Written
+from augment.formats.writing import Cell
 from augment.geometry.polyline import Polyline
 from augment.scene.entities import (
     AgentType,
@@ -37,10 +37,7 @@ from tests.formats.cells import OF_EACH_TYPE, cell, crossing, recorded_street
 from tests.formats.round_trips import Change, changes
 from tests.scenes import vehicle
 
-WRITERS: dict[str, Callable[[Sequence[Cell]], Written]] = {
-    "commonroad": commonroad_writer.write,
-    "scenarionet": scenarionet_writer.write,
-}
+WRITERS = {name: writers.WRITERS[name] for name in ("commonroad", "scenarionet")}
 
 SAID: dict[str, dict[str, str]] = {
     "commonroad": {
@@ -308,7 +305,7 @@ def test_the_ruler_finds_every_kind_of_change(tmp_path: Path) -> None:
 def test_our_own_json_keeps_density_and_goal(tmp_path: Path) -> None:
     options = SceneOptions(density=TrafficDensity.LOW, goal=TurnType.LEFT, goal_m=(20.0, 5.5))
     given = cell(replace(crossing(), options=options), added=())
-    for name, text in own_writer.write([given]).files.items():
+    for name, text in own_json.write([given]).files.items():
         (tmp_path / name).write_bytes(text)
     for name in ("before", "scene"):
         path = tmp_path / f"{given.stem}.{name}.json"

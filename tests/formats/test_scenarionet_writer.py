@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from augment.formats.scenarionet_writer import MAPPING_FILE, SUMMARY_FILE, write
+from augment.formats.scenarionet.writer import MAPPING_FILE, SUMMARY_FILE, write
 from augment.scene.entities import AgentType
 from augment.scene.lane_graph import AnyLane, LaneGraph
 from tests.formats.cells import OF_EACH_TYPE, cell, crossing, recorded_street

@@ -6,10 +6,10 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 from augment.errors import Conflict, InvalidDocument, UnknownName
-from augment.formats import interplan_writer
-from augment.formats.interplan import InterplanSource, ReadFile, token_of
-from augment.formats.interplan_reader import read_document
-from augment.formats.interplan_schema import WHAT
+from augment.formats.interplan.file import InterplanSource, ReadFile, token_of
+from augment.formats.interplan.reader import read_document
+from augment.formats.interplan.schema import WHAT
+from augment.formats.interplan.writer import interplan_text
 from augment.formats.nuplan.scenario import NuPlan
 from augment.formats.writing import Cell, Loss
 from augment.formats.yaml_file import read_yaml_file
@@ -54,7 +54,7 @@ def job_as_interplan(
             losses.append(Loss(cell=name, text=text, changes_scene=True))
         else:
             cells.append(_cell(name, row))
-    text, more = interplan_writer.write(cells)
+    text, more = interplan_text(cells)
     losses += more
     if strict:
         refuse_changes(losses, where="interPlan")

@@ -18,10 +18,10 @@ from pydantic import BaseModel
 
 from augment.errors import AugmentError, InvalidDocument
 from augment.formats.apart import UntrustedInput
-from augment.formats.interplan import options_of
-from augment.formats.interplan_intent import describe_reference
-from augment.formats.interplan_reader import goal_place, read_entry, traffic_of
-from augment.formats.interplan_schema import (
+from augment.formats.interplan.file import options_of
+from augment.formats.interplan.intent import describe_reference
+from augment.formats.interplan.reader import goal_place, read_entry, traffic_of
+from augment.formats.interplan.schema import (
     WHAT,
     Details,
     File,

@@ -14,7 +14,7 @@ import numpy as np
 
 from augment.checks.ground import Ground
 from augment.errors import InvalidDocument
-from augment.formats.interplan import (
+from augment.formats.interplan.file import (
     STANDING_WALK_M,
     WALK_S,
     ReadEntry,
@@ -22,7 +22,7 @@ from augment.formats.interplan import (
     cone_heading,
     options_of,
 )
-from augment.formats.interplan_schema import (
+from augment.formats.interplan.schema import (
     WHAT,
     Details,
     SpecialScenario,

@@ -12,7 +12,7 @@ from xml.etree import ElementTree as ET
 import numpy as np
 
 from augment.formats.bounds import bounds_of
-from augment.formats.commonroad_xml import Ids, add, number
+from augment.formats.commonroad.elements import Ids, add, number
 from augment.formats.strips import width_between
 from augment.formats.writing import Cell, LossReport
 from augment.geometry.polyline import FloatArray, Polyline

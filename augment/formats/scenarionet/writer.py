@@ -17,8 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from augment.formats.bounds import bounds_of
-from augment.formats.movement_losses import report_motion
-from augment.formats.writing import Cell, LossReport, Written, write_each
+from augment.formats.writing import Cell, LossReport, Written, report_motion, write_each
 from augment.scene.directions import turn_type_of
 from augment.scene.entities import (
     AgentType,

@@ -15,9 +15,16 @@ from xml.etree import ElementTree as ET
 
 import numpy as np
 
-from augment.formats.movement_losses import appears_later, has_gaps, report_motion
-from augment.formats.opendrive_writer import map_of
-from augment.formats.writing import Cell, LossReport, Written, write_each
+from augment.formats.openscenario.road_writer import map_of
+from augment.formats.writing import (
+    Cell,
+    LossReport,
+    Written,
+    appears_later,
+    has_gaps,
+    report_motion,
+    write_each,
+)
 from augment.scene.entities import AgentType, TrafficAgent
 from augment.scene.motion import SETS_OUT_WITHIN_M, FloatArray, Movement, walking_pace_mps
 

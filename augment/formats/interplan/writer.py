@@ -16,7 +16,7 @@ import numpy as np
 
 from augment.checks.ground import Ground
 from augment.errors import Conflict
-from augment.formats.interplan import (
+from augment.formats.interplan.file import (
     MOST_ENTRIES,
     STANDING_WALK_M,
     WALK_S,
@@ -27,9 +27,9 @@ from augment.formats.interplan import (
     token_of,
     yaml_text,
 )
-from augment.formats.interplan_reader import read_entry
-from augment.formats.interplan_schema import OBJECTS, SpecialScenario
-from augment.formats.writing import Cell, Loss
+from augment.formats.interplan.reader import read_entry
+from augment.formats.interplan.schema import OBJECTS, SpecialScenario
+from augment.formats.writing import Cell, Loss, Written
 from augment.geometry.angles import difference, wrap
 from augment.scene.catalogue import ScenarioType
 from augment.scene.entities import AgentType, Point, Scene, TrafficAgent
@@ -54,7 +54,13 @@ _MADE_UP = (
 )
 
 
-def write(cells: Iterable[Cell]) -> tuple[str, tuple[Loss, ...]]:
+def write(cells: Sequence[Cell]) -> Written:
+    """One YAML file for all of them."""
+    text, losses = interplan_text(cells)
+    return Written(files={"interplan.yaml": text.encode()}, losses=losses)
+
+
+def interplan_text(cells: Iterable[Cell]) -> tuple[str, tuple[Loss, ...]]:
     """The file's text and what it could not say.
 
     What came from interPlan's file keeps its base token and index, and is written as it stood

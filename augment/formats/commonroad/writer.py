@@ -11,10 +11,18 @@ from xml.etree import ElementTree as ET
 
 import numpy as np
 
-from augment.formats.commonroad_lanes import write_lanes
-from augment.formats.commonroad_xml import Ids, add, number, text_of
-from augment.formats.movement_losses import appears_later, has_gaps, report_motion
-from augment.formats.writing import CannotExpress, Cell, LossReport, Written, write_each
+from augment.formats.commonroad.elements import Ids, add, number, text_of
+from augment.formats.commonroad.lane_writer import write_lanes
+from augment.formats.writing import (
+    CannotExpress,
+    Cell,
+    LossReport,
+    Written,
+    appears_later,
+    has_gaps,
+    report_motion,
+    write_each,
+)
 from augment.scene.entities import AgentType, TrafficAgent, TrafficSide
 from augment.scene.motion import FloatArray, Movement
 

@@ -1,0 +1,1 @@
+"""interPlan's modification file: read, written, and as an intent."""

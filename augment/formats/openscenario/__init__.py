@@ -1,0 +1,1 @@
+"""OpenSCENARIO with its map in OpenDRIVE."""
